@@ -1,0 +1,40 @@
+SHELL := /bin/bash
+PYTHON ?= $(shell command -v python3.11 || command -v python3)
+VENV := .venv
+RGSPIPE := $(VENV)/bin/python -m rgspipe
+STAMP := $(VENV)/.installed
+TEST_WORKERS ?= 2
+ARGS ?=
+
+.DEFAULT_GOAL := help
+.PHONY: help setup test smoke reproduce bench lint
+
+help:  ## this list
+	@echo "rgspipe: from images of a scene, find its lights"
+	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## (.*)/  make \1|\2/' | column -t -s '|'
+	@echo "  Then: $(RGSPIPE) --help"
+
+setup: $(STAMP)  ## create .venv with the pinned packages (nothing is done when it is up to date)
+
+$(STAMP): requirements.txt pyproject.toml
+	@$(PYTHON) -c 'import sys; v = sys.version_info[:2]; sys.exit(v != (3, 11) and "rgspipe needs Python 3.11, found %d.%d: make PYTHON=/path/to/python3.11 ..." % v)'
+	test -x $(VENV)/bin/python || $(PYTHON) -m venv $(VENV)
+	$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check -r requirements.txt
+	$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps -e .
+	@touch $@
+
+test: setup  ## every test
+	$(VENV)/bin/python -m pytest -q -n $(TEST_WORKERS) --dist loadgroup $(ARGS)
+
+smoke: setup  ## the whole way on a tiny scene, in minutes
+	$(RGSPIPE) pipeline=smoke $(ARGS)
+
+reproduce: setup  ## everything in pipelines/reproduce.yaml, from nothing to the report
+	$(RGSPIPE) pipeline=reproduce $(ARGS)
+
+bench: setup  ## time the stages of a fit on this machine
+	$(RGSPIPE) stage=benchmark $(ARGS)
+
+lint: setup  ## style and mistakes
+	$(VENV)/bin/ruff check src tests
+	$(VENV)/bin/ruff format --check src tests
