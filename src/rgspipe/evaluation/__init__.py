@@ -1,0 +1,1 @@
+"""Measures, tables, pictures and the report. Reads no dataset and renders nothing."""

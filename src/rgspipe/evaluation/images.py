@@ -1,0 +1,139 @@
+"""Pictures for people: tone mapping, comparison strips and PNG."""
+
+from __future__ import annotations
+
+import io
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+from PIL import Image
+
+from rgspipe.evaluation.arrays import ArrayLike, to_array
+
+Bytes = npt.NDArray[np.uint8]
+
+#: The percentile of a target that is exposed to white.
+EXPOSURE_PERCENTILE = 97.0
+#: A signed difference this large, relative to exposed white, has the strongest colour.
+DIFFERENCE_SPAN = 0.2
+#: Width of the white gap between panels, pixels.
+GAP = 4
+
+# Ends and middle of the difference colours: too dark, equal, too bright (safe with colour blindness).
+_TOO_DARK, _EQUAL, _TOO_BRIGHT = (33, 102, 172), (247, 247, 247), (178, 24, 43)
+
+
+def exposure(target: ArrayLike) -> float:
+    """The factor that brings the 97th percentile of `target` to white; 1 for a black image."""
+    finite = to_array(target)
+    finite = finite[np.isfinite(finite)]
+    white = float(np.percentile(finite, EXPOSURE_PERCENTILE)) if finite.size else 0.0
+    return 1.0 / white if white > 0.0 else 1.0
+
+
+def tone_map(image: ArrayLike, factor: float) -> Bytes:
+    """(H, W, 3) uint8 sRGB of a linear image (H, W, 3) times `factor`; NaN becomes magenta."""
+    linear = _image(image) * factor
+    broken = np.isnan(linear).any(axis=-1)
+    linear = np.clip(np.nan_to_num(linear, nan=0.0, posinf=1.0, neginf=0.0), 0.0, 1.0)
+    srgb = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1.0 / 2.4) - 0.055)
+    result = np.round(255.0 * srgb).astype(np.uint8)
+    result[broken] = (255, 0, 255)
+    return result
+
+
+def signed_difference(target: ArrayLike, render: ArrayLike, factor: float, span: float = DIFFERENCE_SPAN) -> Bytes:
+    """(H, W, 3) uint8: red where `render` is too bright, blue where it is too dark, white where equal.
+
+    The channels' mean difference times `factor`, in the strongest colour at ±`span`.
+    """
+    target, render = _image(target), _image(render)
+    if target.shape != render.shape:
+        raise ValueError(f"images of one size are needed, got {target.shape} and {render.shape}")
+    amount = (render - target).mean(axis=-1) * factor / span
+    broken = np.isnan(amount)
+    amount = np.clip(np.nan_to_num(amount, nan=0.0), -1.0, 1.0)[..., None]
+    ends = np.where(amount > 0.0, np.array(_TOO_BRIGHT, dtype=float), np.array(_TOO_DARK, dtype=float))
+    colours = np.array(_EQUAL, dtype=float) * (1.0 - np.abs(amount)) + ends * np.abs(amount)
+    result = np.round(colours).astype(np.uint8)
+    result[broken] = (255, 0, 255)
+    return result
+
+
+def comparison_strip(target: ArrayLike, render: ArrayLike) -> Bytes:
+    """(H, 3·W + gaps, 3) uint8: target | render | signed difference, exposed for the target."""
+    return progress_strip(target, [render])
+
+
+def progress_strip(target: ArrayLike, renders: Sequence[ArrayLike]) -> Bytes:
+    """(H, …, 3) uint8: target | each render in turn | signed difference of the last, exposed for the target."""
+    if not renders:
+        raise ValueError("a strip needs at least one render")
+    factor = exposure(target)
+    panels = [tone_map(target, factor), *(tone_map(render, factor) for render in renders)]
+    return beside([*panels, signed_difference(target, renders[-1], factor)])
+
+
+def beside(panels: Sequence[Bytes], gap: int = GAP) -> Bytes:
+    """Panels of one height side by side with white gaps."""
+    return np.swapaxes(stack([np.swapaxes(panel, 0, 1) for panel in panels], gap), 0, 1)
+
+
+def stack(rows: Sequence[Bytes], gap: int = GAP) -> Bytes:
+    """Rows below each other with white gaps; narrower rows are filled up with white on the right."""
+    if not rows:
+        raise ValueError("nothing to put together")
+    width = max(row.shape[1] for row in rows)
+    parts: list[Bytes] = []
+    for row in rows:
+        if row.ndim != 3 or row.shape[2] != 3 or row.dtype != np.uint8:
+            raise ValueError(f"panels must be (H, W, 3) uint8, got {row.shape} {row.dtype}")
+        filled = np.full((row.shape[0], width, 3), 255, dtype=np.uint8)
+        filled[:, : row.shape[1]] = row
+        parts += [filled, np.full((gap, width, 3), 255, dtype=np.uint8)]
+    return np.ascontiguousarray(np.concatenate(parts[:-1], axis=0))
+
+
+def png_bytes(pixels: Bytes) -> bytes:
+    """A PNG file of (H, W, 3) uint8 pixels, without metadata: equal pixels give equal bytes."""
+    if pixels.ndim != 3 or pixels.shape[2] != 3 or pixels.dtype != np.uint8:
+        raise ValueError(f"pixels must be (H, W, 3) uint8, got {pixels.shape} {pixels.dtype}")
+    buffer = io.BytesIO()
+    Image.fromarray(pixels).save(buffer, format="PNG", optimize=True)
+    return buffer.getvalue()
+
+
+def save_png(path: str | Path, pixels: Bytes) -> None:
+    """Write (H, W, 3) uint8 pixels; the file appears under its name only when it is whole."""
+    path = Path(path)
+    partial = path.with_name(path.name + ".partial")
+    partial.write_bytes(png_bytes(pixels))
+    os.replace(partial, path)
+
+
+def fit_within(png: bytes, max_bytes: int, max_width: int = 1600, min_width: int = 240) -> bytes:
+    """The same picture, made smaller until it has at most `max_bytes` and `max_width` pixels across.
+
+    A picture that fits is returned untouched; none becomes narrower than `min_width`, whatever its size.
+    """
+    with Image.open(io.BytesIO(png)) as opened:
+        picture = opened.convert("RGB")
+    width = min(picture.width, max_width)
+    if width == picture.width and len(png) <= max_bytes:
+        return png
+    while True:
+        height = max(1, round(picture.height * width / picture.width))
+        smaller = png_bytes(np.asarray(picture.resize((width, height), Image.Resampling.LANCZOS)))
+        if len(smaller) <= max_bytes or width <= min_width:
+            return smaller
+        width = max(min_width, int(width * 0.8))
+
+
+def _image(image: ArrayLike) -> npt.NDArray[np.float64]:
+    array = to_array(image)
+    if array.ndim != 3 or array.shape[2] != 3:
+        raise ValueError(f"an image must have shape (H, W, 3), got {array.shape}")
+    return array
