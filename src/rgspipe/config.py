@@ -1,0 +1,368 @@
+"""The typed schema of every configuration group: fields, defaults, units and ranges.
+
+The files under conf/ extend these classes; a key that is not here is refused. `RgspipeConfig` is what a stage
+sees; the library below the stages takes plain arguments and knows nothing of it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import typing
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields, is_dataclass
+from pathlib import Path
+from typing import Any
+
+from rgspipe.errors import InputError
+
+SCENE_KINDS = ("cornell", "blend", "external")
+OCCLUSIONS = ("visible", "out_of_frame", "occluded", "all")
+FIT_METHODS = ("search_lm", "paper_adam")
+
+
+def option(
+    default: Any,
+    help: str,
+    *,
+    low: float | None = None,
+    high: float | None = None,
+    choices: Sequence[str] | None = None,
+    length: int | None = None,
+) -> Any:
+    """A documented field: `low` ≤ value ≤ `high`, one of `choices`, or a list of `length` values in the range."""
+    metadata = {"help": help, "low": low, "high": high, "choices": choices, "length": length}
+    if isinstance(default, list):
+        return field(default_factory=lambda: list(default), metadata=metadata)
+    return field(default=default, metadata=metadata)
+
+
+def section(schema: type, help: str) -> Any:
+    """A documented group of fields."""
+    return field(default_factory=schema, metadata={"help": help})
+
+
+def _color(red: float, green: float, blue: float, what: str) -> Any:
+    return option([red, green, blue], f"{what}, RGB reflectance", low=0.0, high=1.0, length=3)
+
+
+@dataclass
+class CornellConfig:
+    """A room with two boxes, inside the unit cube: x to the right, y away from the open front, z up, floor at z = 0."""
+
+    room: list[float] = option([1.0, 1.0, 1.0], "inner width, depth and height, scene units", low=0.1, high=1, length=3)
+    wall_color: list[float] = _color(0.73, 0.73, 0.73, "floor, ceiling and back wall")
+    left_color: list[float] = _color(0.63, 0.065, 0.05, "left wall")
+    right_color: list[float] = _color(0.14, 0.45, 0.091, "right wall")
+    box_color: list[float] = _color(0.73, 0.73, 0.73, "both boxes")
+    tall_size: list[float] = option([0.3, 0.3, 0.6], "tall box: width, depth, height", low=0.01, high=1, length=3)
+    tall_center: list[float] = option([0.335, 0.64], "tall box: centre of its foot, x and y", low=0, high=1, length=2)
+    tall_angle: float = option(18.0, "tall box: turn about the vertical, degrees", low=-180, high=180)
+    short_size: list[float] = option([0.3, 0.3, 0.3], "short box: width, depth, height", low=0.01, high=1, length=3)
+    short_center: list[float] = option([0.665, 0.31], "short box: centre of its foot, x and y", low=0, high=1, length=2)
+    short_angle: float = option(-17.0, "short box: turn about the vertical, degrees", low=-180, high=180)
+
+
+@dataclass
+class SceneConfig:
+    """What is looked at."""
+
+    kind: str = option("cornell", "where the scene comes from", choices=SCENE_KINDS)
+    name: str | None = option(None, "its name under outputs/; by default that of the file or folder")
+    path: str | None = option(None, "blend: the .blend file; external: the dataset's folder")
+    cornell: CornellConfig = section(CornellConfig, "the parametric box of scene=cornell")
+
+
+@dataclass
+class DatasetConfig:
+    """How the images are made (unused by scene=external)."""
+
+    resolution: int = option(128, "image width and height, pixels", low=8, high=8192)
+    train_views: int = option(100, "training views, each with one light of its own", low=1, high=100000)
+    test_views: int = option(24, "held-out views: new cameras and new lights", low=1, high=100000)
+    targets_per_class: int = option(20, "fit targets of each occlusion class", low=0, high=10000)
+    target_views: int = option(3, "fixed cameras that see each fit target", low=1, high=100)
+    samples: int = option(96, "paths per pixel", low=1, high=1000000)
+    denoise: bool = option(True, "denoise the colour images")
+    max_bounces: int = option(12, "bounces of a path; fewer than 8 lose light", low=0, high=1024)
+    field_of_view: float = option(40.0, "across the width, degrees", low=1, high=170)
+    light_power: float = option(40.0, "mean power of a light for a scene of size 1, W", low=1e-6, high=1e9)
+    seed: int = option(0, "draws of cameras and lights", low=0, high=2**31 - 1)
+
+
+@dataclass
+class InitConfig:
+    """From depth maps to surfels."""
+
+    surfels: int = option(10000, "how many surfels", low=100, high=10_000_000)
+    scale: float = option(0.6, "standard deviation of a surfel over the spacing of its neighbours", low=0.05, high=10)
+    seed: int = option(0, "draws of points", low=0, high=2**31 - 1)
+
+
+@dataclass
+class TrainConfig:
+    """From images to material and refined geometry."""
+
+    rounds: int = option(8, "rounds of the linear albedo solve", low=0, high=1000)
+    steps: int = option(140, "gradient steps of the geometry", low=0, high=1000000)
+    gather_rays: int = option(128, "hemisphere rays of a surfel while training", low=8, high=65536)
+    patches: int = option(500, "patches of the indirect light while training", low=8, high=20000)
+    seed: int = option(0, "draws of pixels and rays", low=0, high=2**31 - 1)
+
+
+@dataclass
+class FreezeConfig:
+    """The light-independent operators of the trained scene."""
+
+    gather_rays: int = option(512, "hemisphere rays of a surfel", low=8, high=65536)
+    patches: int = option(500, "patches of the indirect light", low=8, high=20000)
+    dictionary_grid: int = option(8, "candidate lights along each axis of the room", low=2, high=64)
+    seed: int = option(0, "draws of rays", low=0, high=2**31 - 1)
+
+
+@dataclass
+class ViewsConfig:
+    """How much of a fit target is seen."""
+
+    count: int = option(1, "the first `count` cameras of the target", low=1, high=1000)
+    indices: list[int] | None = option(None, "these cameras instead of the first ones", low=0, high=100000)
+
+
+@dataclass
+class LightConfig:
+    """What is looked for."""
+
+    type: str = option("point", "type of the unknown lights", choices=("point",))
+    count: int = option(1, "how many unknown lights", low=1, high=1)
+
+
+@dataclass
+class SearchConfig:
+    """Dictionary search with closed-form intensity, then Levenberg-Marquardt."""
+
+    starts: int = option(4, "best candidates that are refined", low=1, high=4096)
+    iterations: int = option(30, "Levenberg-Marquardt steps of one start", low=1, high=10000)
+    mask_edges: bool = option(True, "leave out pixels at depth and normal edges")
+
+
+@dataclass
+class AdamConfig:
+    """The paper's method, with its defaults."""
+
+    epochs: int = option(25, "epochs", low=1, high=100000)
+    steps: int = option(50, "steps of an epoch", low=1, high=100000)
+    position_rate: float = option(0.01, "learning rate of the position", low=0, high=10)
+    intensity_rate: float = option(0.05, "learning rate of the log-intensity", low=0, high=10)
+    ssim_weight: float = option(0.2, "λ, the share of SSIM in the loss", low=0, high=1)
+    init: str = option("dataset", "where starts are drawn from", choices=("dataset", "sphere"))
+    random_intensity: bool = option(False, "draw the first intensity too")
+    seed: int = option(0, "draws of starts", low=0, high=2**31 - 1)
+
+
+@dataclass
+class FitConfig:
+    """From images of the frozen scene to lights."""
+
+    method: str = option("search_lm", "how", choices=FIT_METHODS)
+    target: str | None = option(None, "a target's folder; by default the dataset's own targets")
+    truth: str | None = option(None, "light file with the true lights of `target`, for evaluate only")
+    limit: int | None = option(None, "at most this many targets of each class", low=1, high=100000)
+    search: SearchConfig = section(SearchConfig, "fit=search_lm")
+    adam: AdamConfig = section(AdamConfig, "fit=paper_adam")
+
+
+@dataclass
+class EffectsConfig:
+    """Which parts of light transport are computed."""
+
+    shadows: bool = option(True, "surfels block light")
+    interreflection: bool = option(True, "light bounces between surfels")
+
+
+@dataclass
+class AccuracyConfig:
+    """Which preset of the accuracy group is in force; the preset sets keys of the other groups."""
+
+    name: str = option("standard", "preset", choices=("draft", "standard", "reference"))
+
+
+@dataclass
+class EvaluateConfig:
+    """How estimates are judged."""
+
+    success: float = option(0.01, "largest position error of a success, fraction of the scene's size", low=0, high=1)
+    bootstrap: int = option(2000, "resamples behind the interval of the median", low=0, high=1000000)
+
+
+@dataclass
+class ReportConfig:
+    """What the report compares."""
+
+    views: list[int] = option([1, 3], "numbers of views", low=1, high=1000)
+    methods: list[str] = option(["search_lm", "paper_adam"], "methods", choices=FIT_METHODS)
+    paper_adam_limit: int | None = option(2, "targets of each class that paper_adam is run on", low=1, high=100000)
+
+
+@dataclass
+class BenchmarkConfig:
+    """What is timed."""
+
+    repetitions: int = option(20, "runs of each measured step", low=1, high=100000)
+
+
+@dataclass
+class DebugConfig:
+    """What is shown when something goes wrong."""
+
+    traceback: bool = option(False, "show the traceback of an error on the terminal as well")
+
+
+@dataclass
+class RgspipeConfig:
+    """Everything that can be configured."""
+
+    stage: str = option("???", "what to run")
+    upstream: str = option("build", "what to do about missing inputs", choices=("build", "require"))
+    outputs: str = option("outputs", "folder of artifacts and reports, relative to the current one")
+    seed: int = option(0, "seed of the fit's own draws", low=0, high=2**31 - 1)
+    occlusion: str = option("all", "class of fit targets", choices=OCCLUSIONS)
+    scene: SceneConfig = section(SceneConfig, "what is looked at")
+    dataset: DatasetConfig = section(DatasetConfig, "how images are made")
+    init: InitConfig = section(InitConfig, "from depth to surfels")
+    train: TrainConfig = section(TrainConfig, "from images to materials")
+    freeze: FreezeConfig = section(FreezeConfig, "light-independent operators")
+    views: ViewsConfig = section(ViewsConfig, "how much of a target is seen")
+    light: LightConfig = section(LightConfig, "what is looked for")
+    fit: FitConfig = section(FitConfig, "from images to lights")
+    effects: EffectsConfig = section(EffectsConfig, "parts of light transport")
+    accuracy: AccuracyConfig = section(AccuracyConfig, "preset of accuracy against time")
+    evaluate: EvaluateConfig = section(EvaluateConfig, "how estimates are judged")
+    report: ReportConfig = section(ReportConfig, "what the report compares")
+    benchmark: BenchmarkConfig = section(BenchmarkConfig, "what is timed")
+    debug: DebugConfig = section(DebugConfig, "when something goes wrong")
+
+
+def scene_name(config: RgspipeConfig) -> str:
+    """The scene's folder under outputs/: `scene.name`, or else the stem of its file, folder or kind."""
+    if config.scene.name is not None:
+        return config.scene.name
+    if config.scene.kind == "cornell" or config.scene.path is None:
+        return config.scene.kind
+    return Path(config.scene.path).resolve().stem
+
+
+def get_value(config: object, key: str) -> Any:
+    """The value at a dotted key, sections as plain dictionaries; ValueError if there is none."""
+    value = config
+    for part in key.split("."):
+        if not is_dataclass(value) or part not in {item.name for item in fields(value)}:
+            raise ValueError(f"no configuration key {key!r}")
+        value = getattr(value, part)
+    return dataclasses.asdict(value) if is_dataclass(value) else value
+
+
+def with_changes(config: RgspipeConfig, changes: Mapping[str, object]) -> RgspipeConfig:
+    """A copy with the values of dotted keys replaced; ValueError if a key does not exist."""
+    for key, value in changes.items():
+        config = _replaced(config, key.split("."), value, key)
+    return config
+
+
+def _replaced(node: Any, path: list[str], value: object, key: str) -> Any:
+    if not is_dataclass(node) or path[0] not in {item.name for item in fields(node)}:
+        raise ValueError(f"no configuration key {key!r}")
+    inner = value if len(path) == 1 else _replaced(getattr(node, path[0]), path[1:], value, key)
+    return dataclasses.replace(node, **{path[0]: inner})
+
+
+def describe(schema: type, prefix: str = "") -> Iterator[tuple[str, str, Any]]:
+    """(dotted key, help with the range, default) of every field of a schema and its sections, in order."""
+    hints = typing.get_type_hints(schema)
+    for item in fields(schema):
+        key = f"{prefix}{item.name}"
+        if is_dataclass(hints[item.name]):
+            yield from describe(hints[item.name], f"{key}.")
+        else:
+            default = item.default if item.default is not dataclasses.MISSING else item.default_factory()
+            yield key, f"{item.metadata['help']}{_range_text(item.metadata)}", default
+
+
+def _range_text(rule: Mapping[str, Any]) -> str:
+    if rule["choices"]:
+        return f" ({' | '.join(rule['choices'])})"
+    if rule["low"] is not None and rule["high"] is not None:
+        return f" ({rule['low']:g} to {rule['high']:g})"
+    return ""
+
+
+def check_values(config: RgspipeConfig) -> None:
+    """Refuse values that are of the right type but make no sense.
+
+    Raises:
+        InputError: names the key, what it may be and what it is.
+    """
+    _check_section(config, "")
+    _check_scene(config.scene)
+    name = scene_name(config)
+    if name in ("", ".", "..", "runs") or "/" in name or name.startswith("."):
+        raise InputError(
+            "scene.name",
+            expected="a plain folder name other than 'runs'",
+            found=repr(name),
+            remedy="Set scene.name to a name for the scene's folder.",
+        )
+    if config.views.indices is not None and len(config.views.indices) == 0:
+        raise InputError(
+            "views.indices",
+            expected="at least one camera's index",
+            found="an empty list",
+            remedy="Give indices such as views.indices=[0,2], or views.count=K.",
+        )
+
+
+def _check_section(node: Any, prefix: str) -> None:
+    for item in fields(node):
+        value, key = getattr(node, item.name), f"{prefix}{item.name}"
+        if is_dataclass(value):
+            _check_section(value, f"{key}.")
+        elif value is not None:
+            _check_value(key, value, item.metadata)
+
+
+def _check_value(key: str, value: Any, rule: Mapping[str, Any]) -> None:
+    values = value if isinstance(value, list) else [value]
+    if rule["length"] is not None and len(values) != rule["length"]:
+        raise InputError(
+            key,
+            expected=f"{rule['length']} values",
+            found=f"{len(values)}: {value}",
+            remedy=f"Write it as {key}=[...] with {rule['length']} values.",
+        )
+    for one in values:
+        if rule["choices"] and one not in rule["choices"]:
+            raise InputError(
+                key, expected=f"one of {', '.join(rule['choices'])}", found=repr(one), remedy="Choose one of them."
+            )
+        if rule["low"] is not None and not (rule["low"] <= one <= rule["high"] and math.isfinite(one)):
+            raise InputError(
+                key,
+                expected=f"a value from {rule['low']:g} to {rule['high']:g} ({rule['help']})",
+                found=str(one),
+                remedy="Choose a value in this range.",
+            )
+
+
+def _check_scene(scene: SceneConfig) -> None:
+    what = {"blend": "a .blend file", "external": "a dataset's folder"}.get(scene.kind)
+    if what is None:
+        return
+    if scene.path is None:
+        raise InputError(
+            "scene.path", expected=what, found="nothing", remedy=f"Say which: scene={scene.kind} scene.path=PATH."
+        )
+    path = Path(scene.path)
+    if not (path.is_file() if scene.kind == "blend" else path.is_dir()):
+        found = "no such file or folder" if not path.exists() else "something else"
+        raise InputError(
+            path, expected=what, found=found, remedy="Check scene.path; a relative path starts at the current folder."
+        )
