@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -111,7 +110,7 @@ def save_png(path: str | Path, pixels: Bytes) -> None:
     path = Path(path)
     partial = path.with_name(path.name + ".partial")
     partial.write_bytes(png_bytes(pixels))
-    os.replace(partial, path)
+    partial.replace(path)
 
 
 def fit_within(png: bytes, max_bytes: int, max_width: int = 1600, min_width: int = 240) -> bytes:

@@ -1,0 +1,365 @@
+"""Figures of the report. Matplotlib's object interface only: nothing here depends on global state."""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import matplotlib
+import numpy as np
+import numpy.typing as npt
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from rgspipe.evaluation import metrics
+from rgspipe.evaluation.arrays import ArrayLike, to_array
+from rgspipe.evaluation.tables import class_order
+
+#: Colours that stay apart with colour blindness and in grey; markers say the same once more.
+COLOURS = {"visible": "#0072B2", "out_of_frame": "#E69F00", "occluded": "#882255"}
+MARKERS = {"visible": "o", "out_of_frame": "s", "occluded": "^"}
+LABELS = {"visible": "visible", "out_of_frame": "out of frame", "occluded": "occluded", "unknown": "unclassified"}
+OTHER_COLOUR, OTHER_MARKER = "#666666", "D"
+
+INK, FAINT = "#222222", "#c9cdd2"
+#: Position errors outside this range are drawn at its ends.
+ERROR_RANGE = (1e-4, 2.0)
+#: At most this many surfels are drawn as dots.
+CLOUD_POINTS = 6000
+
+_STYLE = {
+    "font.size": 9.0,
+    "axes.titlesize": 9.5,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.edgecolor": "#8a9099",
+    "axes.labelcolor": INK,
+    "text.color": INK,
+    "xtick.color": "#555b63",
+    "ytick.color": "#555b63",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "grid.color": "#e6e8eb",
+    "grid.linewidth": 0.7,
+    "legend.frameon": False,
+    "svg.fonttype": "path",
+    "svg.hashsalt": "rgspipe",
+}
+
+
+@dataclass(frozen=True)
+class CameraMark:
+    """A camera as it is drawn: origin (3,), viewing direction (3,), horizontal field of view [rad]."""
+
+    origin: tuple[float, float, float]
+    direction: tuple[float, float, float]
+    angle: float
+
+
+def colour_of(name: str) -> str:
+    """The colour of an occlusion class."""
+    return COLOURS.get(name, OTHER_COLOUR)
+
+
+def svg_bytes(figure: Figure) -> bytes:
+    """The figure as an SVG file without a date: equal figures give equal bytes."""
+    buffer = io.BytesIO()
+    with matplotlib.rc_context(_STYLE):
+        FigureCanvasSVG(figure).print_svg(buffer, metadata={"Date": None, "Creator": None})
+    return buffer.getvalue()
+
+
+def png_of(figure: Figure, dpi: int = 150) -> bytes:
+    """The figure as a PNG file."""
+    buffer = io.BytesIO()
+    with matplotlib.rc_context(_STYLE):
+        figure.set_dpi(dpi)
+        FigureCanvasAgg(figure).print_png(buffer)
+    return buffer.getvalue()
+
+
+def convergence_figure(curves: pd.DataFrame) -> Figure:
+    """Loss (relative to its first value) and position error against the step, both on log scales.
+
+    Args:
+        curves: rows of `convergence_table`, of any number of fits, methods and view counts.
+
+    One column per method and view count; a thin line a target, a thick one for the class's median, in
+    which a fit that has stopped stays where it is.
+    """
+    groups = list(curves.groupby(["method", "views"], sort=True))
+    if not groups:
+        raise ValueError("no convergence to draw")
+    with matplotlib.rc_context(_STYLE):
+        figure = Figure(figsize=(max(4.6, min(11.0, 2.9 * len(groups))), 5.0), layout="constrained")
+        axes = figure.subplots(2, len(groups), squeeze=False, sharex="col", sharey="row")
+        for column, ((method, views), group) in enumerate(groups):
+            axes[0, column].set_title(f"{method}, {_views(views)}")
+            _curves(axes[0, column], group, "loss", relative=True)
+            _curves(axes[1, column], group, "position_error", relative=False)
+            axes[1, column].set_xlabel("step")
+            _limit_line(axes[1, column])
+        axes[0, 0].set_ylabel("loss / loss at the start")
+        axes[1, 0].set_ylabel("position error (fraction of scene)")
+        _class_legend(figure, curves["occlusion"])
+    return figure
+
+
+def error_figure(targets: pd.DataFrame) -> Figure:
+    """Position and intensity errors of every target per class and view count, with boxes; log scale.
+
+    Args:
+        targets: rows of `target_table` of any number of methods and view counts, some with known truth.
+    """
+    known = targets[targets["position_error"].notna()]
+    if known.empty:
+        raise ValueError("no target has a known truth")
+    methods = sorted(known["method"].unique())
+    with matplotlib.rc_context(_STYLE):
+        figure = Figure(figsize=(max(5.0, min(11.0, 5.2 * len(methods))), 5.6), layout="constrained")
+        axes = figure.subplots(2, len(methods), squeeze=False, sharey="row")
+        for column, method in enumerate(methods):
+            group = known[known["method"] == method]
+            axes[0, column].set_title(str(method))
+            for row, name in enumerate(("position_error", "intensity_error")):
+                _strips(axes[row, column], group, name)
+            _limit_line(axes[0, column])
+        axes[0, 0].set_ylabel("position error (fraction of scene)")
+        axes[1, 0].set_ylabel("relative intensity error")
+    return figure
+
+
+def light_figure(
+    targets: pd.DataFrame, cloud: ArrayLike, normals: ArrayLike | None = None, cameras: Sequence[CameraMark] = ()
+) -> Figure:
+    """True and recovered lights in the scene, from above and from the side.
+
+    Args:
+        targets: rows of `target_table` of one method and view count.
+        cloud: (N, 3) surfel centres, drawn as grey dots.
+        normals: (N, 3) surfel normals; where given, surfels that face the viewer (floor and ceiling
+            from above) are left out, so that walls and objects stand out as outlines.
+        cameras: drawn as triangles that open in the viewing direction.
+    """
+    points = to_array(cloud)
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise ValueError(f"the cloud must have shape (N, 3), got {points.shape}")
+    facing = None if normals is None else to_array(normals)
+    views = (("from above", 0, 1, 2), ("from the side", 0, 2, 1))
+    with matplotlib.rc_context(_STYLE):
+        figure = Figure(figsize=(10.0, 5.2), layout="constrained")
+        for axis, (title, across, up, along) in zip(figure.subplots(1, 2), views, strict=True):
+            window = _window(points, targets, cameras, across, up)
+            _cloud(axis, points, facing, across, up, along)
+            for camera in cameras:
+                _camera(axis, camera, across, up, size=0.07 * max(np.ptp(window, axis=0)))
+            outside = _lights(axis, targets, window, across, up)
+            axis.set(xlim=window[:, 0], ylim=window[:, 1], aspect="equal")
+            axis.set_xlabel(f"{'xyz'[across]} (scene units)")
+            axis.set_ylabel(f"{'xyz'[up]} (scene units)")
+            axis.set_title(title + (f" — {outside} estimates lie outside" if outside else ""))
+        _class_legend(figure, targets["occlusion"], extra=_light_handles(bool(cameras)))
+    return figure
+
+
+def training_figure(training: pd.DataFrame) -> Figure:
+    """Loss and training PSNR against the seconds of training (the row, if seconds are not known).
+
+    Args:
+        training: rows with `loss` and where known `psnr`, `seconds`, `kind`; kinds get markers.
+    """
+    if "loss" not in training.columns or training.empty:
+        raise ValueError(f"training needs rows with a loss, found columns {list(training.columns)}")
+    timed = "seconds" in training.columns and training["seconds"].notna().all()
+    x = (training["seconds"] if timed else pd.Series(np.arange(len(training)))).to_numpy(dtype=float)
+    with matplotlib.rc_context(_STYLE):
+        figure = Figure(figsize=(10.0, 3.0), layout="constrained")
+        left, right = figure.subplots(1, 2)
+        for axis, name, label in ((left, "loss", "training loss"), (right, "psnr", "PSNR (dB)")):
+            _training_curve(axis, training, name, x)
+            axis.set_ylabel(label)
+            axis.set_xlabel("training time (s)" if timed else "row of the log")
+        positive = training["loss"].dropna()
+        if len(positive) and (positive > 0).all():
+            left.set_yscale("log")
+        if "kind" in training.columns:
+            left.legend(fontsize=8)
+    return figure
+
+
+def _training_curve(axis: Axes, training: pd.DataFrame, name: str, x: npt.NDArray) -> None:
+    axis.grid(True)
+    values = training[name].to_numpy(dtype=float) if name in training.columns else np.full(len(training), math.nan)
+    known = np.isfinite(values)
+    if not known.any():
+        axis.text(0.5, 0.5, "not recorded", transform=axis.transAxes, ha="center", va="center", color="#777777")
+        return
+    axis.plot(x[known], values[known], color=FAINT, lw=1.0, zorder=1)
+    kinds = training["kind"].astype(str).to_numpy() if "kind" in training.columns else np.full(len(training), "")
+    palette = ("#0072B2", "#E69F00", "#882255", "#009E73", "#56B4E9")
+    for index, kind in enumerate(dict.fromkeys(kinds.tolist())):
+        rows = known & (kinds == kind)
+        axis.plot(x[rows], values[rows], "o", ms=3, color=palette[index % len(palette)], label=kind)
+
+
+def _views(count: int) -> str:
+    return "1 view" if int(count) == 1 else f"{int(count)} views"
+
+
+def _limit_line(axis: Axes) -> None:
+    axis.axhline(metrics.SUCCESS_LIMIT, color="#555b63", lw=0.9, ls=(0, (4, 3)), zorder=1)
+
+
+def _clipped(values: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    return np.clip(np.asarray(values, dtype=float), *ERROR_RANGE)
+
+
+def _curves(axis: Axes, group: pd.DataFrame, name: str, relative: bool) -> None:
+    axis.grid(True)
+    axis.set_yscale("log")
+    drawn = False
+    for occlusion in class_order(group["occlusion"]):
+        lines = []
+        for _, curve in group[group["occlusion"] == occlusion].groupby("target"):
+            values = curve[name].to_numpy(dtype=float)
+            if relative:
+                values = values / values[0] if values[0] > 0.0 else np.full(len(values), math.nan)
+            known = np.isfinite(values)
+            if not known.any():
+                continue
+            values = np.maximum(values[known], 1e-12) if relative else _clipped(values[known])
+            steps = curve["step"].to_numpy(dtype=float)[known]
+            axis.plot(steps, values, color=colour_of(occlusion), lw=0.6, alpha=0.3)
+            lines.append((steps, values))
+        if lines:
+            drawn = True
+            steps, middle = _median_curve(lines)
+            axis.plot(steps, middle, color=colour_of(occlusion), lw=2.0)
+    if not drawn:
+        axis.text(
+            0.5, 0.5, "truth unknown" if not relative else "no positive loss", transform=axis.transAxes, ha="center"
+        )
+
+
+def _median_curve(lines: list[tuple[npt.NDArray, npt.NDArray]]) -> tuple[npt.NDArray, npt.NDArray]:
+    """The median over curves (steps, values) at every step that occurs; a curve keeps its last value."""
+    steps = np.unique(np.concatenate([line[0] for line in lines]))
+    held = [np.interp(steps, *line) for line in lines]
+    return steps, np.median(held, axis=0)
+
+
+def _strips(axis: Axes, group: pd.DataFrame, name: str) -> None:
+    """Points and boxes, classes along x and view counts beside each other within a class."""
+    axis.grid(True, axis="y")
+    axis.set_yscale("log")
+    classes, views = class_order(group["occlusion"]), sorted(group["views"].unique())
+    jitter = np.random.default_rng(0)
+    ticks, labels = [], []
+    for place, occlusion in enumerate(classes):
+        for index, count in enumerate(views):
+            rows = group[(group["occlusion"] == occlusion) & (group["views"] == count)]
+            values = _clipped(rows[name].dropna())
+            x = place * (len(views) + 0.8) + index
+            ticks.append(x)
+            labels.append(f"{LABELS.get(occlusion, occlusion)}\n{_views(count)}")
+            if values.size:
+                _box(axis, x, values, colour_of(occlusion))
+                spread = x + jitter.uniform(-0.22, 0.22, values.size)
+                marker = MARKERS.get(occlusion, OTHER_MARKER)
+                axis.plot(spread, values, marker, ms=3.5, alpha=0.75, color=colour_of(occlusion), mew=0)
+    axis.set_xticks(ticks, labels, fontsize=8)
+    axis.set_xlim(ticks[0] - 0.7, ticks[-1] + 0.7)
+
+
+def _box(axis: Axes, x: float, values: npt.NDArray, colour: str) -> None:
+    line = {"color": colour, "linewidth": 1.0}
+    axis.boxplot(
+        values,
+        positions=[x],
+        widths=0.62,
+        showfliers=False,
+        patch_artist=True,
+        manage_ticks=False,
+        boxprops={"facecolor": colour, "alpha": 0.16, "edgecolor": colour},
+        medianprops={"color": colour, "linewidth": 2.2},
+        whiskerprops=line,
+        capprops=line,
+    )
+
+
+def _window(
+    points: npt.NDArray, targets: pd.DataFrame, cameras: Sequence[CameraMark], across: int, up: int
+) -> npt.NDArray[np.float64]:
+    """(2, 2) corners of what is drawn: scene, true lights and cameras; wild estimates do not widen it."""
+    true_lights = targets[["x_true", "y_true", "z_true"]].dropna().to_numpy(dtype=float)
+    origins = np.array([camera.origin for camera in cameras], dtype=float).reshape(-1, 3)
+    parts = [part[:, [across, up]] for part in (points, true_lights, origins) if len(part)]
+    if not parts:
+        parts = [np.array([[0.0, 0.0], [1.0, 1.0]])]
+    together = np.concatenate(parts)
+    low, high = together.min(axis=0), together.max(axis=0)
+    margin = 0.06 * max(float((high - low).max()), 1e-6)
+    return np.stack([low - margin, high + margin])
+
+
+def _cloud(axis: Axes, points: npt.NDArray, facing: npt.NDArray | None, across: int, up: int, along: int) -> None:
+    if facing is not None:
+        points = points[np.abs(facing[:, along]) < 0.7]
+    if len(points) > CLOUD_POINTS:
+        points = points[np.random.default_rng(0).permutation(len(points))[:CLOUD_POINTS]]
+    axis.plot(points[:, across], points[:, up], ".", ms=1.6, color="#b9bec5", mew=0, zorder=0, rasterized=True)
+
+
+def _camera(axis: Axes, camera: CameraMark, across: int, up: int, size: float) -> None:
+    origin = np.array([camera.origin[across], camera.origin[up]])
+    forward = np.array([camera.direction[across], camera.direction[up]])
+    length = float(np.linalg.norm(forward))
+    if length < 1e-6:
+        axis.plot(*origin, "s", ms=4, color="#555b63")
+        return
+    # Foreshortened like the direction itself; the opening keeps its angle.
+    forward = forward * size
+    sideways = np.array([-forward[1], forward[0]]) / length * math.tan(0.5 * camera.angle)
+    corners = np.stack([origin, origin + forward + sideways, origin + forward - sideways, origin])
+    axis.fill(*corners.T, facecolor="#e3e6ea", edgecolor="#555b63", lw=0.9, zorder=2)
+
+
+def _lights(axis: Axes, targets: pd.DataFrame, window: npt.NDArray, across: int, up: int) -> int:
+    """Draw truths and estimates; returns how many estimates lie outside the window."""
+    names = "xyz"[across], "xyz"[up]
+    outside = 0
+    for row in targets.to_dict("records"):
+        colour = colour_of(row["occlusion"])
+        estimate = np.array([row[name] for name in names], dtype=float)
+        truth = np.array([row[f"{name}_true"] for name in names], dtype=float)
+        if np.isfinite(truth).all() and np.isfinite(estimate).all():
+            axis.plot(*np.stack([truth, estimate]).T, "-", color=colour, lw=0.9, alpha=0.8, zorder=3)
+        axis.plot(*truth, "x", color=colour, ms=5.5, mew=1.3, zorder=4)
+        axis.plot(*estimate, "o", ms=6.0, mfc="none", mec=colour, mew=1.1, zorder=5)
+        outside += not ((estimate >= window[0]) & (estimate <= window[1])).all()
+    return outside
+
+
+def _light_handles(cameras: bool) -> list[Line2D]:
+    handles = [
+        Line2D([], [], marker="x", ls="", color=INK, ms=5.5, mew=1.3, label="truth"),
+        Line2D([], [], marker="o", ls="", mfc="none", mec=INK, ms=6.0, label="estimate"),
+    ]
+    if cameras:
+        camera = {"marker": ">", "ls": "", "mfc": "#e3e6ea", "mec": "#555b63"}
+        handles.append(Line2D([], [], ms=7.0, label="camera", **camera))
+    return handles
+
+
+def _class_legend(figure: Figure, names: pd.Series, extra: Sequence[Line2D] = ()) -> None:
+    handles = [
+        Line2D([], [], color=colour_of(name), lw=2.5, label=LABELS.get(name, name)) for name in class_order(names)
+    ]
+    handles += extra
+    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), fontsize=8.5)

@@ -1,0 +1,251 @@
+"""From fit results and truth to the per-target table and the per-class summary."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import pandas as pd
+from scipy.optimize import linear_sum_assignment
+
+from rgspipe.evaluation import metrics
+from rgspipe.evaluation.arrays import to_array
+from rgspipe.scene import LightRig
+
+#: Occlusion classes in the order in which every table and figure shows them.
+CLASSES = ("visible", "out_of_frame", "occluded", "unknown")
+#: The row that holds all targets of a method and view count.
+ALL = "all"
+
+TARGET_COLUMNS = (
+    "target",
+    "occlusion",
+    "method",
+    "views",
+    "position_error",
+    "intensity_error",
+    "psnr",
+    "seconds",
+    "success",
+    "lights_found",
+    "lights_true",
+    "x",
+    "y",
+    "z",
+    "r",
+    "g",
+    "b",
+    "x_true",
+    "y_true",
+    "z_true",
+    "r_true",
+    "g_true",
+    "b_true",
+    "result",
+    "reason",
+)
+SUMMARY_COLUMNS = (
+    "method",
+    "views",
+    "occlusion",
+    "count",
+    "judged",
+    "median_position_error",
+    "median_low",
+    "median_high",
+    "worst_position_error",
+    "success_rate",
+    "median_intensity_error",
+    "median_psnr",
+    "median_seconds",
+    "worst_seconds",
+)
+
+
+@dataclass(frozen=True)
+class RigErrors:
+    """How far a recovered rig is from the true one.
+
+    Attributes:
+        position: the largest position error of the matched lights, fraction of the scene size.
+        intensity: the mean intensity error of the matched lights, a fraction.
+        pairs: (estimate, truth) indices of the matched lights, in the order of the truth.
+    """
+
+    position: float
+    intensity: float
+    pairs: tuple[tuple[int, int], ...]
+
+
+def match_positions(estimate: npt.ArrayLike, truth: npt.ArrayLike) -> tuple[tuple[int, int], ...]:
+    """Pairs (estimate, truth) of positions (K, 3) and (L, 3) with the smallest sum of distances.
+
+    min(K, L) pairs, in the order of the truth. Estimates that are not finite are matched last.
+    """
+    estimate, truth = np.asarray(estimate, dtype=float), np.asarray(truth, dtype=float)
+    if estimate.ndim != 2 or truth.ndim != 2 or estimate.shape[1] != 3 or truth.shape[1] != 3:
+        raise ValueError(f"positions must have shapes (K, 3) and (L, 3), got {estimate.shape} and {truth.shape}")
+    distance = np.linalg.norm(estimate[:, None] - truth[None], axis=-1)
+    finite = distance[np.isfinite(distance)]
+    # Larger than any sum of finite distances, so a broken estimate is taken only when nothing else is left.
+    far = 1.0 + (float(finite.sum()) if finite.size else 0.0)
+    chosen, wanted = linear_sum_assignment(np.where(np.isfinite(distance), distance, far))
+    return tuple(sorted(zip(chosen.tolist(), wanted.tolist(), strict=True), key=lambda pair: pair[1]))
+
+
+def rig_errors(estimate: LightRig, truth: LightRig, scene_size: float) -> RigErrors:
+    """Errors of a recovered rig after the optimal matching of its lights.
+
+    The position error is the worst of the matched lights, so a target counts as solved only when each
+    of its lights is. Lights too many or too few are not in these numbers: see `target_table`.
+
+    Raises:
+        ValueError: the truth has no light.
+    """
+    if not truth:
+        raise ValueError("the true rig has no light")
+    if not estimate:
+        return RigErrors(math.inf, math.inf, ())
+    found = np.stack([to_array(light.position) for light in estimate])
+    wanted = np.stack([to_array(light.position) for light in truth])
+    pairs = match_positions(found, wanted)
+    positions = [metrics.position_error(found[i], wanted[j], scene_size) for i, j in pairs]
+    intensities = [metrics.intensity_error(estimate[i].intensity, truth[j].intensity) for i, j in pairs]
+    return RigErrors(max(positions), float(np.mean(intensities)), pairs)
+
+
+def target_table(
+    results: pd.DataFrame,
+    estimates: Mapping[str, LightRig],
+    truths: Mapping[str, LightRig],
+    scene_size: float,
+    success_limit: float = metrics.SUCCESS_LIMIT,
+) -> pd.DataFrame:
+    """One row a target: what was fitted, what was true, and the errors.
+
+    Args:
+        results: rows of fits, with `target`, `occlusion`, `method`, `views`, `seconds` and where known
+            `psnr`, `result`, `reason`.
+        estimates: recovered rig per target; a target without one counts as failed.
+        truths: true rig per target; targets without one get NaN errors and no verdict.
+        scene_size: longest side of the scene's bounding box; NaN if unknown (no position errors then).
+        success_limit: position error up to which a target is solved.
+
+    Returns:
+        A table with `TARGET_COLUMNS`. `success` is True, False or missing; a rig with lights too many
+        or too few is never a success. Positions and intensities are those of the true rig's first
+        light and of the estimate matched to it.
+    """
+    required = ("target", "occlusion", "method", "views", "seconds")
+    missing = [name for name in required if name not in results.columns]
+    if missing:
+        raise ValueError(f"the fit results lack the columns {missing}, found {list(results.columns)}")
+    rows = [
+        _target_row(row, estimates.get(row["target"], ()), truths.get(row["target"], ()), scene_size, success_limit)
+        for row in results.to_dict("records")
+    ]
+    table = pd.DataFrame(rows, columns=list(TARGET_COLUMNS))
+    return table.astype({"success": "boolean", "views": int, "lights_found": int, "lights_true": "Int64"})
+
+
+def summary_table(targets: pd.DataFrame, seed: int, resamples: int = 4000) -> pd.DataFrame:
+    """One row per method, view count and occlusion class, and one for all classes together.
+
+    `count` is the number of targets, `judged` that of targets with a known truth: errors and success
+    rate are over those. Position errors of failed fits are inf and count in the median. The interval
+    `median_low`…`median_high` is a 95 % bootstrap interval; each row draws from a generator of its
+    own, so a row's figures do not depend on which other rows the table has. `resamples=0` leaves the
+    interval out.
+    """
+    rows = []
+    for (method, views), group in targets.groupby(["method", "views"], sort=True):
+        present = [name for name in class_order(group["occlusion"]) if (group["occlusion"] == name).any()]
+        for name in [*present, ALL]:
+            chosen = group if name == ALL else group[group["occlusion"] == name]
+            rows.append({"method": method, "views": int(views), "occlusion": name} | _summary(chosen, seed, resamples))
+    return pd.DataFrame(rows, columns=list(SUMMARY_COLUMNS))
+
+
+def exemplars(targets: pd.DataFrame) -> dict[str, dict[str, str]]:
+    """The median and the worst target of each class: {class: {"median": target, "worst": target}}.
+
+    By position error where the truth is known, else by PSNR (the lower, the worse). A class of one
+    target has only a median.
+    """
+    chosen: dict[str, dict[str, str]] = {}
+    for name in class_order(targets["occlusion"]):
+        group = targets[targets["occlusion"] == name]
+        key = group["position_error"] if group["position_error"].notna().any() else -group["psnr"].astype(float)
+        ordered = group.loc[key.sort_values(kind="stable", na_position="first").index, "target"].tolist()
+        judged = ordered[int(key.isna().sum()) :] or ordered
+        chosen[name] = {"median": judged[(len(judged) - 1) // 2]}
+        if len(judged) > 1:
+            chosen[name]["worst"] = judged[-1]
+    return chosen
+
+
+def class_order(names: Sequence[str] | pd.Series) -> list[str]:
+    """The distinct class names: the known ones in their fixed order, then others by name."""
+    found = set(names)
+    return [name for name in CLASSES if name in found] + sorted(found - set(CLASSES))
+
+
+def _target_row(row: dict, estimate: LightRig, truth: LightRig, scene_size: float, limit: float) -> dict:
+    position, intensity, solved = math.nan, math.nan, None
+    pairs: tuple[tuple[int, int], ...] = ()
+    if truth:
+        known_size = math.isfinite(scene_size)
+        errors = rig_errors(estimate, truth, scene_size if known_size else 1.0)
+        pairs, intensity = errors.pairs, errors.intensity
+        if known_size:
+            position = errors.position
+            solved = metrics.success(position, limit) and len(estimate) == len(truth)
+    shown = estimate[pairs[0][0]] if pairs else (estimate[0] if estimate else None)
+    true_light = truth[pairs[0][1]] if pairs else (truth[0] if truth else None)
+    return (
+        {name: row[name] for name in ("target", "occlusion", "method", "views", "seconds")}
+        | {"position_error": position, "intensity_error": intensity, "success": solved}
+        | {"psnr": _number(row.get("psnr")), "result": row.get("result", ""), "reason": row.get("reason", "")}
+        | {"lights_found": len(estimate), "lights_true": len(truth) if truth else None}
+        | _light_columns(shown, "")
+        | _light_columns(true_light, "_true")
+    )
+
+
+def _light_columns(light: object, suffix: str) -> dict[str, float]:
+    values = [math.nan] * 6
+    if light is not None:
+        values = [*to_array(light.position).tolist(), *to_array(light.intensity).tolist()]
+    return {name + suffix: value for name, value in zip("xyzrgb", values, strict=True)}
+
+
+def _number(value: object) -> float:
+    return math.nan if value is None else float(value)
+
+
+def _summary(group: pd.DataFrame, seed: int, resamples: int) -> dict[str, float]:
+    errors = group["position_error"].dropna().to_numpy(dtype=float)
+    low, high = math.nan, math.nan
+    if resamples > 0:
+        low, high = metrics.bootstrap_median(errors, np.random.default_rng(seed), resamples)
+    return {
+        "count": len(group),
+        "judged": int(group["position_error"].notna().sum()),
+        "median_position_error": _median(group["position_error"]),
+        "median_low": low,
+        "median_high": high,
+        "worst_position_error": float(errors.max()) if errors.size else math.nan,
+        "success_rate": float(group["success"].dropna().astype(float).mean()) if errors.size else math.nan,
+        "median_intensity_error": _median(group["intensity_error"]),
+        "median_psnr": _median(group["psnr"]),
+        "median_seconds": _median(group["seconds"]),
+        "worst_seconds": float(group["seconds"].max()),
+    }
+
+
+def _median(values: pd.Series) -> float:
+    known = values.dropna().to_numpy(dtype=float)
+    return float(np.median(known)) if known.size else math.nan
