@@ -1,0 +1,24 @@
+"""The one exception that is meant for people: what was wrong, where, and what to do about it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+
+class InputError(Exception):
+    """Input that cannot be used: a file, a folder, a configuration key or an argument.
+
+    The message is one paragraph that names the place, what was expected, what was found and what to
+    do. The command line prints it without a traceback and exits with status 2; library callers can
+    read the parts as attributes.
+
+    Args:
+        where: the file, folder or configuration key that is wrong.
+        expected: what a usable input would have been.
+        found: what was there instead.
+        remedy: what the reader can do now.
+    """
+
+    def __init__(self, where: str | Path, *, expected: str, found: str, remedy: str) -> None:
+        self.where, self.expected, self.found, self.remedy = str(where), expected, found, remedy
+        super().__init__(f"{where}: expected {expected}, found {found}. {remedy}")

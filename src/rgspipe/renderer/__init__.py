@@ -1,0 +1,1 @@
+"""The torch renderer that all stages share: coverage, view weights, gather, transport, direct light."""

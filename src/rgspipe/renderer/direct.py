@@ -1,0 +1,74 @@
+"""Direct irradiance from point lights, with exact derivatives towards the light's position."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from rgspipe.renderer.kernels.shadow import transmittance
+from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
+
+#: A light is seen by a surfel as if it were at least this many of the surfel's scales away from it: inside a
+#: surfel the inverse square has no meaning, and its derivative would grow without bound.
+SOFTENING = 1.0
+
+
+def geometry_factor(positions: Tensor, centers: Tensor, normals: Tensor, scales: Tensor) -> tuple[Tensor, Tensor]:
+    """Unshadowed irradiance from unit point lights, max(0, n·d)/(|d|² + ε²)^{3/2} with d = light − centre.
+
+    Args:
+        positions: (L, 3) lights; centers, normals: (N, 3); scales: (N,) ε over SOFTENING, scene units.
+
+    Returns:
+        (L, N) irradiance per intensity, 1/scene unit², and its derivative (L, N, 3) towards the position.
+    """
+    d = positions[:, None] - centers
+    softened = d.square().sum(-1) + (SOFTENING * scales).square()
+    inverse = softened.rsqrt()
+    cube = inverse * inverse * inverse
+    projected = (d * normals).sum(-1)
+    lit = projected > 0
+    factor = torch.where(lit, projected * cube, torch.zeros_like(cube))
+    slope = normals * cube[..., None] - d * (3.0 * projected * cube * inverse * inverse)[..., None]
+    return factor, torch.where(lit[..., None], slope, torch.zeros_like(slope))
+
+
+def unit_irradiance(bvh: SurfelBvh, positions: Tensor, shadows: bool = True) -> tuple[Tensor, Tensor]:
+    """Irradiance on every surfel from unit point lights, and its derivative.
+
+    Args:
+        positions: (L, 3).
+        shadows: whether surfels stand in the light's way.
+
+    Returns:
+        E (L, N) and dE/dposition (L, N, 3), float32, per W/sr.
+    """
+    surfels = bvh.surfels
+    positions = positions.to(bvh.device, torch.float32)
+    scales = surfels.scales.float().prod(dim=1).sqrt()
+    factor, slope = geometry_factor(positions, surfels.centers.float(), surfels.normals.float(), scales)
+    if not shadows:
+        return factor, slope
+    share, share_slope = transmittance(bvh, positions)
+    return factor * share, slope * share[..., None] + factor[..., None] * share_slope
+
+
+class _UnitIrradiance(torch.autograd.Function):
+    @staticmethod
+    def forward(ctx: Any, positions: Tensor, bvh: SurfelBvh, shadows: bool) -> Tensor:
+        irradiance, slope = unit_irradiance(bvh, positions.detach(), shadows)
+        ctx.save_for_backward(slope)
+        ctx.dtype = positions.dtype
+        return irradiance
+
+    @staticmethod
+    def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor, None, None]:
+        (slope,) = ctx.saved_tensors
+        return torch.einsum("ln,lnc->lc", gradient, slope).to(ctx.dtype), None, None
+
+
+def differentiable_irradiance(bvh: SurfelBvh, positions: Tensor, shadows: bool = True) -> Tensor:
+    """`unit_irradiance` without the derivative, differentiable by autograd towards the positions."""
+    return _UnitIrradiance.apply(positions, bvh, shadows)

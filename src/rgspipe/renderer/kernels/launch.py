@@ -1,0 +1,71 @@
+"""Launches that use every core: Warp's CPU backend runs one launch on one thread, so a launch is cut into slices."""
+
+from __future__ import annotations
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+from functools import lru_cache
+from typing import Any
+
+import torch
+import warp as wp
+from torch import Tensor
+
+wp.config.log_level = wp.LOG_ERROR
+wp.init()
+
+#: Slices per thread of a launch whose items differ in cost; more slices balance better and start slower.
+SLICES_PER_THREAD = 4
+
+
+@lru_cache(maxsize=1)
+def thread_count() -> int:
+    """Threads that a launch may use: as many as torch was told to use, at most the cores we may run on."""
+    return max(1, min(torch.get_num_threads(), len(os.sched_getaffinity(0))))
+
+
+@lru_cache(maxsize=1)
+def _threads() -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(thread_count(), thread_name_prefix="rgspipe-kernel")
+
+
+def slices(count: int, parts: int) -> list[tuple[int, int]]:
+    """`parts` nearly equal (start, length) ranges that cover `count` items; empty ones are left out."""
+    bounds = [count * k // parts for k in range(parts + 1)]
+    return [(a, b - a) for a, b in zip(bounds, bounds[1:], strict=False) if b > a]
+
+
+def launch(kernel: wp.Kernel, count: int, inputs: list[Any], device: torch.device, slabs: int | None = None) -> None:
+    """Run `kernel` over items 0 … count−1; its first two arguments are the offset and the slab of the slice.
+
+    Args:
+        slabs: number of slices, each with a private slab to accumulate into (CPU additions are not
+            atomic across launches, and private slabs keep sums in one order). None: as many as balance.
+    """
+    if count == 0:
+        return
+    if device.type != "cpu":
+        wp.launch(kernel, dim=count, inputs=[0, 0, *inputs], device=wp.device_from_torch(device))
+        return
+    parts = slices(count, slabs or min(count, thread_count() * SLICES_PER_THREAD))
+    if len(parts) == 1:
+        wp.launch(kernel, dim=count, inputs=[0, 0, *inputs], device="cpu")
+        return
+
+    def run(slab: int) -> None:
+        offset, length = parts[slab]
+        wp.launch(kernel, dim=length, inputs=[offset, slab, *inputs], device="cpu")
+
+    # Compile and load before the threads start, so that they do not queue on the module lock.
+    kernel.module.load(wp.get_device("cpu"), block_dim=1)
+    list(_threads().map(run, range(len(parts))))
+
+
+def as_vec3(tensor: Tensor) -> wp.array:
+    """(N, 3) float32 tensor as an array of vec3, without a copy where it is contiguous."""
+    return wp.from_torch(tensor.detach().float().contiguous(), dtype=wp.vec3)
+
+
+def as_array(tensor: Tensor) -> wp.array:
+    """A tensor as a Warp array of the same scalar type, without a copy where it is contiguous."""
+    return wp.from_torch(tensor.detach().contiguous())

@@ -1,0 +1,296 @@
+"""Colours of composited rays, differentiable towards the surfels, the coverage thresholds and the radiance."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import torch
+import warp as wp
+from torch import Tensor
+
+from rgspipe.renderer.kernels.composite import MAX_HITS, Hits, composite
+from rgspipe.renderer.kernels.launch import as_array, as_vec3, launch, thread_count
+from rgspipe.renderer.kernels.surfel_bvh import SurfelArrays, SurfelBvh
+from rgspipe.scene.surfels import Surfels
+
+# Adjoints are written by hand; generating them would double the compile time.
+wp.set_module_options({"enable_backward": False})
+
+#: Columns of a surfel's gradient: centre 3, rotation vector 3, log-scales 2, opacity, clip offsets 2, clip angles 2.
+GRADIENT_COLUMNS = 13
+
+
+@wp.kernel
+def _shade(
+    offset: int,
+    slab: int,
+    indices: wp.array(dtype=int, ndim=2),
+    weights: wp.array(dtype=float, ndim=2),
+    ray_view: wp.array(dtype=int),
+    radiance: wp.array(dtype=wp.vec3, ndim=2),
+    colours: wp.array(dtype=wp.vec3),
+):
+    i = wp.tid() + offset
+    view = ray_view[i]
+    colour = wp.vec3(0.0, 0.0, 0.0)
+    k = int(0)
+    while k < MAX_HITS:
+        j = indices[i, k]
+        if j < 0:
+            k = int(MAX_HITS)
+        else:
+            colour += weights[i, k] * radiance[view, j]
+            k += 1
+    colours[i] = colour
+
+
+@wp.func
+def add_ramp_gradient(
+    gradient: wp.array(dtype=float, ndim=3),
+    slab: int,
+    j: int,
+    which: int,
+    ramp: wp.vec3,
+    u: float,
+    v: float,
+    aspect: float,
+    scaled: float,
+):
+    """Adds dL/d(offset, angle) of one clip in units of the softness; returns dL/d(u, v) through its ramp."""
+    height = ramp[0] - ramp[1] * u - ramp[2] * v
+    to_plane = wp.vec2(0.0, 0.0)
+    if height > 0.0 and height < 1.0:
+        to_ramp = scaled / wp.max(height, 1.0e-3)
+        wp.atomic_add(gradient, slab, j, 9 + which, to_ramp)
+        wp.atomic_add(gradient, slab, j, 11 + which, to_ramp * (ramp[2] * u * aspect - ramp[1] * v / aspect))
+        to_plane = wp.vec2(-to_ramp * ramp[1], -to_ramp * ramp[2])
+    return to_plane
+
+
+@wp.func
+def add_hit_gradient(
+    gradient: wp.array(dtype=float, ndim=3),
+    slab: int,
+    s: SurfelArrays,
+    j: int,
+    x: wp.vec3,
+    d: wp.vec3,
+    alpha: float,
+    to_alpha: float,
+):
+    """Adds dL/d(surfel j) of a hit at the offset x from its centre, given dL/dα."""
+    n = s.normal[j]
+    ua = s.u_axis[j]
+    va = s.v_axis[j]
+    u = wp.dot(x, ua)
+    v = wp.dot(x, va)
+    scaled = to_alpha * alpha
+    # In world units the clips do not move with the scales, so the scales act through u and v alone.
+    wp.atomic_add(gradient, slab, j, 6, scaled * u * u)
+    wp.atomic_add(gradient, slab, j, 7, scaled * v * v)
+    wp.atomic_add(gradient, slab, j, 8, scaled / s.opacity[j])
+    aspect = wp.length(va) / wp.length(ua)
+    ramp_a = add_ramp_gradient(gradient, slab, j, 0, s.clip_a[j], u, v, aspect, scaled)
+    ramp_b = add_ramp_gradient(gradient, slab, j, 1, s.clip_b[j], u, v, aspect, scaled)
+    to_u = ramp_a[0] + ramp_b[0] - scaled * u
+    to_v = ramp_a[1] + ramp_b[1] - scaled * v
+    # A plane that moves or leans also moves the point where the ray meets it.
+    lean = (to_u * wp.dot(ua, d) + to_v * wp.dot(va, d)) / wp.dot(d, n)
+    to_center = lean * n - to_u * ua - to_v * va
+    to_rotation = to_u * wp.cross(ua, x) + to_v * wp.cross(va, x) - lean * wp.cross(n, x)
+    for q in range(3):
+        wp.atomic_add(gradient, slab, j, q, to_center[q])
+        wp.atomic_add(gradient, slab, j, 3 + q, to_rotation[q])
+
+
+@wp.kernel
+def _shade_adjoint(
+    offset: int,
+    slab: int,
+    s: SurfelArrays,
+    origins: wp.array(dtype=wp.vec3),
+    directions: wp.array(dtype=wp.vec3),
+    layer: float,
+    low: float,
+    high: float,
+    indices: wp.array(dtype=int, ndim=2),
+    depths: wp.array(dtype=float, ndim=2),
+    alphas: wp.array(dtype=float, ndim=2),
+    ray_view: wp.array(dtype=int),
+    radiance: wp.array(dtype=wp.vec3, ndim=2),
+    ray_gradient: wp.array(dtype=wp.vec3),
+    to_weight: wp.array(dtype=float, ndim=2),
+    layer_passing: wp.array(dtype=float, ndim=2),
+    layer_first: wp.array(dtype=int, ndim=2),
+    gradient: wp.array(dtype=float, ndim=3),
+    threshold_gradient: wp.array(dtype=float, ndim=2),
+):
+    i = wp.tid() + offset
+    o = origins[i]
+    d = directions[i]
+    view = ray_view[i]
+    count = int(0)
+    while count < MAX_HITS and indices[i, wp.min(count, MAX_HITS - 1)] >= 0:
+        to_weight[i, count] = wp.dot(ray_gradient[i], radiance[view, indices[i, count]])
+        count += 1
+    # Front to back: what reaches each layer, noted at its last hit.
+    passing = float(1.0)
+    k = int(0)
+    while k < count:
+        clear = float(1.0)
+        end = int(k)
+        front = depths[i, k]
+        while end < count and depths[i, wp.min(end, MAX_HITS - 1)] <= front + layer:
+            clear = clear * (1.0 - alphas[i, end])
+            end += 1
+        layer_passing[i, end - 1] = passing
+        layer_first[i, end - 1] = k
+        y = wp.clamp((1.0 - clear - low) / (high - low), 0.0, 1.0)
+        passing = passing * (1.0 - y * y * (3.0 - 2.0 * y))
+        k = end
+    # Back to front: `behind` is what would be seen if everything before were taken away.
+    behind = float(0.0)
+    end = int(count)
+    while end > 0:
+        first = layer_first[i, end - 1]
+        passing = layer_passing[i, end - 1]
+        total = float(0.0)
+        clear = float(1.0)
+        mixed = float(0.0)
+        for m in range(first, end):
+            total += alphas[i, m]
+            clear = clear * (1.0 - alphas[i, m])
+            mixed += alphas[i, m] * to_weight[i, m]
+        mixed = mixed / total
+        y = wp.clamp((1.0 - clear - low) / (high - low), 0.0, 1.0)
+        covered = y * y * (3.0 - 2.0 * y)
+        to_raw = passing * (mixed - behind) * 6.0 * y * (1.0 - y) / (high - low)
+        wp.atomic_add(threshold_gradient, slab, 0, to_raw * (y - 1.0))
+        wp.atomic_add(threshold_gradient, slab, 1, -to_raw * y)
+        for m in range(first, end):
+            alpha = alphas[i, m]
+            to_alpha = passing * covered * (to_weight[i, m] - mixed) / total
+            to_alpha += to_raw * clear / wp.max(1.0 - alpha, 1.0e-4)
+            j = indices[i, m]
+            add_hit_gradient(gradient, slab, s, j, o + depths[i, m] * d - s.center[j], d, alpha, to_alpha)
+        behind = covered * mixed + (1.0 - covered) * behind
+        end = first
+
+
+class _ShadeRays(torch.autograd.Function):
+    """Ray colours from surfel tensors; the hierarchy in `bvh` must have been built from the same tensors."""
+
+    @staticmethod
+    def forward(ctx: Any, bvh: SurfelBvh, rays: tuple[Tensor, ...], radiance: Tensor, *parameters: Tensor) -> Tensor:
+        origins, directions, ray_view = rays
+        hits = composite(bvh, origins, directions)
+        colours = torch.empty((origins.shape[0], 3), dtype=torch.float32, device=bvh.device)
+        radiance_array = wp.from_torch(radiance.detach().float().contiguous(), dtype=wp.vec3)
+        arguments = [as_array(hits.indices), as_array(hits.weights), as_array(ray_view.int()), radiance_array]
+        launch(_shade, origins.shape[0], [*arguments, as_vec3(colours)], bvh.device)
+        ctx.bvh, ctx.rays, ctx.hits = bvh, rays, hits
+        ctx.save_for_backward(radiance, *parameters)
+        return colours
+
+    @staticmethod
+    def backward(ctx: Any, colour_gradient: Tensor) -> tuple[Tensor | None, ...]:
+        radiance, _centers, rotations, scales, *_rest = ctx.saved_tensors
+        packed, thresholds = _surfel_gradient(ctx.bvh, ctx.rays, ctx.hits, radiance, colour_gradient)
+        softness = ctx.bvh.coverage.clip_softness
+        return (
+            None,
+            None,
+            _radiance_gradient(ctx.hits, ctx.rays[2], radiance, colour_gradient),
+            packed[:, 0:3],
+            _quaternion_gradient(rotations, packed[:, 3:6]),
+            packed[:, 6:8] / scales,
+            packed[:, 8],
+            packed[:, 9:11] / softness,
+            packed[:, 11:13],
+            thresholds,
+        )
+
+
+def _surfel_gradient(
+    bvh: SurfelBvh, rays: tuple[Tensor, ...], hits: Hits, radiance: Tensor, colour_gradient: Tensor
+) -> tuple[Tensor, Tensor]:
+    """(N, GRADIENT_COLUMNS) and (2,) gradients of Σ colour_gradient · colour."""
+    origins, directions, ray_view = rays
+    count, device, c = origins.shape[0], bvh.device, bvh.coverage
+    slabs = thread_count() if device.type == "cpu" else 1
+    packed = torch.zeros((slabs, len(bvh.surfels), GRADIENT_COLUMNS), dtype=torch.float32, device=device)
+    thresholds = torch.zeros((slabs, 2), dtype=torch.float32, device=device)
+    scratch = [torch.empty_like(hits.weights), torch.empty_like(hits.weights), torch.empty_like(hits.indices)]
+    arguments = [bvh.arrays, as_vec3(origins), as_vec3(directions), c.layer_thickness, c.low, c.high]
+    arguments += [as_array(x) for x in (hits.indices, hits.depths, hits.alphas, ray_view.int())]
+    arguments += [wp.from_torch(radiance.detach().float().contiguous(), dtype=wp.vec3), as_vec3(colour_gradient)]
+    arguments += [as_array(x) for x in (*scratch, packed, thresholds)]
+    launch(_shade_adjoint, count, arguments, device, slabs=slabs)
+    return packed.sum(dim=0), thresholds.sum(dim=0)
+
+
+def _radiance_gradient(hits: Hits, ray_view: Tensor, radiance: Tensor, colour_gradient: Tensor) -> Tensor:
+    """(V, N, 3) gradient towards the radiance: the weights' transpose."""
+    gradient = torch.zeros_like(radiance)
+    ray, column = torch.nonzero(hits.indices >= 0, as_tuple=True)
+    rows = ray_view.long()[ray] * radiance.shape[1] + hits.indices[ray, column].long()
+    gradient.view(-1, 3).index_add_(0, rows, hits.weights[ray, column, None] * colour_gradient[ray])
+    return gradient
+
+
+def _quaternion_gradient(quaternions: Tensor, to_rotation: Tensor) -> Tensor:
+    """Gradient towards quaternions (N, 4) from that towards world-space rotation vectors (N, 3).
+
+    A change dq of a unit quaternion q turns by ω = 2·Im(dq ⊗ q*).
+    """
+    w, x, y, z = torch.nn.functional.normalize(quaternions, dim=-1).unbind(-1)
+    gx, gy, gz = (2.0 * to_rotation).unbind(-1)
+    return torch.stack(
+        [
+            -(gx * x + gy * y + gz * z),
+            gx * w + gy * z - gz * y,
+            -gx * z + gy * w + gz * x,
+            gx * y - gy * x + gz * w,
+        ],
+        dim=-1,
+    )
+
+
+def shade_rays(
+    bvh: SurfelBvh,
+    surfels: Surfels,
+    thresholds: Tensor,
+    radiance: Tensor,
+    origins: Tensor,
+    directions: Tensor,
+    ray_view: Tensor,
+) -> Tensor:
+    """Colours seen along rays, with gradients towards surfels, thresholds and radiance.
+
+    The gradient takes the order of hits and their grouping into layers as given: at the instants where
+    they change the image jumps by less than the noise of a pixel, and no derivative exists there.
+
+    Args:
+        bvh: the hierarchy over `surfels`.
+        surfels: float32; those of its tensors that require it receive gradients (clips and opacity too).
+        thresholds: (2,) the coverage's low and high, as a tensor that may require a gradient.
+        radiance: (V, N, 3) outgoing radiance of every surfel in each of V lightings.
+        origins, directions: (R, 3).
+        ray_view: (R,) which of the V lightings each ray sees.
+
+    Returns:
+        (R, 3) float32 radiance.
+    """
+    rays = (origins.float().contiguous(), directions.float().contiguous(), ray_view)
+    return _ShadeRays.apply(
+        bvh,
+        rays,
+        radiance,
+        surfels.centers,
+        surfels.rotations,
+        surfels.scales,
+        surfels.opacities,
+        surfels.clip_offsets,
+        surfels.clip_angles,
+        thresholds,
+    )

@@ -1,0 +1,87 @@
+"""Sparse linear operators with a fast product, a fast transposed product, and gradients towards the operand."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import scipy.sparse
+import torch
+from torch import Tensor
+
+
+class _Product(torch.autograd.Function):
+    @staticmethod
+    def forward(ctx: Any, operator: SparseOperator, operand: Tensor) -> Tensor:
+        ctx.operator = operator
+        return operator.matrix @ operand
+
+    @staticmethod
+    def backward(ctx: Any, gradient: Tensor) -> tuple[None, Tensor]:
+        return None, ctx.operator.transposed @ gradient.contiguous()
+
+
+class SparseOperator:
+    """A constant float32 matrix in compressed rows, kept beside its transpose.
+
+    Both orders are stored because a product that scatters cannot use all cores.
+    """
+
+    def __init__(self, matrix: Tensor, transposed: Tensor) -> None:
+        self.matrix, self.transposed = matrix, transposed
+
+    @classmethod
+    def from_scipy(cls, matrix: scipy.sparse.csr_matrix, device: torch.device | str = "cpu") -> SparseOperator:
+        return cls(_to_torch(matrix.tocsr(), device), _to_torch(matrix.T.tocsr(), device))
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        return self.matrix.shape[0], self.matrix.shape[1]
+
+    @property
+    def entries(self) -> int:
+        """Stored values."""
+        return self.matrix.values().numel()
+
+    @property
+    def T(self) -> SparseOperator:
+        return SparseOperator(self.transposed, self.matrix)
+
+    def __matmul__(self, operand: Tensor) -> Tensor:
+        """(rows, C) product with a dense (columns, C) operand, differentiable towards it."""
+        return _Product.apply(self, operand.contiguous())
+
+    def to_scipy(self) -> scipy.sparse.csr_matrix:
+        m = self.matrix
+        parts = (m.values().cpu().numpy(), m.col_indices().cpu().numpy(), m.crow_indices().cpu().numpy())
+        return scipy.sparse.csr_matrix(parts, shape=self.shape)
+
+    def tensors(self, prefix: str) -> dict[str, Tensor]:
+        """What `from_tensors` needs to make the operator again."""
+        m = self.matrix
+        shape = torch.tensor(self.shape)
+        rows, columns = m.crow_indices(), m.col_indices()
+        return {f"{prefix}.shape": shape, f"{prefix}.rows": rows, f"{prefix}.columns": columns} | {
+            f"{prefix}.values": m.values()
+        }
+
+    @classmethod
+    def from_tensors(cls, tensors: dict[str, Tensor], prefix: str, device: torch.device | str = "cpu") -> SparseOperator:
+        names = ("values", "columns", "rows")
+        parts = tuple(tensors[f"{prefix}.{name}"].numpy() for name in names)
+        shape = tuple(tensors[f"{prefix}.shape"].tolist())
+        return cls.from_scipy(scipy.sparse.csr_matrix(parts, shape=shape), device)
+
+
+def stack(operators: list[SparseOperator]) -> SparseOperator:
+    """One operator with the rows of all of them, in order."""
+    if len(operators) == 1:
+        return operators[0]
+    matrix = scipy.sparse.vstack([operator.to_scipy() for operator in operators], format="csr")
+    return SparseOperator.from_scipy(matrix, operators[0].matrix.device)
+
+
+def _to_torch(matrix: scipy.sparse.csr_matrix, device: torch.device | str) -> Tensor:
+    parts = (matrix.indptr.astype(np.int32), matrix.indices.astype(np.int32), matrix.data.astype(np.float32))
+    rows, columns, values = (torch.from_numpy(part).to(device) for part in parts)
+    return torch.sparse_csr_tensor(rows, columns, values, size=matrix.shape, check_invariants=False)

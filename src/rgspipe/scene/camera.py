@@ -1,0 +1,99 @@
+"""A pinhole camera and the rays through its pixels."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A pinhole camera with OpenGL axes: it looks along its −z, +y is up, +x is right.
+
+    Pixel (column x, row y) has its centre at (x + 0.5, y + 0.5); row 0 is the top of the image.
+
+    Attributes:
+        camera_to_world: (4, 4) float64 rigid transform, scene units.
+        fx, fy: focal lengths in pixels.
+        cx, cy: principal point in pixels.
+        width, height: image size in pixels.
+    """
+
+    camera_to_world: Tensor
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    width: int
+    height: int
+
+    @classmethod
+    def from_field_of_view(cls, camera_to_world: Tensor, angle_x: float, width: int, height: int) -> Camera:
+        """A camera with square pixels, its axis through the middle, and `angle_x` [rad] across the width."""
+        focal = 0.5 * width / math.tan(0.5 * angle_x)
+        return cls(camera_to_world, focal, focal, 0.5 * width, 0.5 * height, width, height)
+
+    @property
+    def origin(self) -> Tensor:
+        """(3,) float64, the centre of projection."""
+        return self.camera_to_world[:3, 3]
+
+    @property
+    def pixel_count(self) -> int:
+        return self.width * self.height
+
+    def rays(self, pixels: Tensor | None = None, subsamples: int = 1) -> tuple[Tensor, Tensor, Tensor]:
+        """Rays through a regular `subsamples × subsamples` grid in each pixel.
+
+        Args:
+            pixels: (P,) int64 flat indices, row · width + column; all pixels in order if None.
+            subsamples: grid size per pixel; 1 is the pixel centre.
+
+        Returns:
+            origins (P·s², 3), unit directions (P·s², 3), and the length along a ray per unit of planar
+            depth (P·s²,) — multiply planar z by it to get the ray distance. float64, the rays of one
+            pixel stand together.
+        """
+        if pixels is None:
+            pixels = torch.arange(self.pixel_count)
+        step = (torch.arange(subsamples, dtype=torch.float64) + 0.5) / subsamples
+        sub_y, sub_x = torch.meshgrid(step, step, indexing="ij")
+        column = (pixels % self.width)[:, None] + sub_x.reshape(1, -1)
+        row = torch.div(pixels, self.width, rounding_mode="floor")[:, None] + sub_y.reshape(1, -1)
+        local = torch.stack(
+            [(column - self.cx) / self.fx, -(row - self.cy) / self.fy, -torch.ones_like(column)], dim=-1
+        ).reshape(-1, 3)
+        directions = local @ self.camera_to_world[:3, :3].T
+        lengths = directions.norm(dim=1)
+        directions = directions / lengths[:, None]
+        return self.origin.expand_as(directions), directions, lengths
+
+    def project(self, points: Tensor) -> tuple[Tensor, Tensor]:
+        """Pixel coordinates (…, 2) and planar depth (…,) of world points (…, 3); depth ≤ 0 is behind."""
+        rotation = self.camera_to_world[:3, :3]
+        local = (points.double() - self.origin) @ rotation
+        depth = -local[..., 2]
+        scale = 1.0 / torch.where(depth.abs() > 1e-12, depth, torch.full_like(depth, 1e-12))
+        x = self.cx + self.fx * local[..., 0] * scale
+        y = self.cy - self.fy * local[..., 1] * scale
+        return torch.stack([x, y], dim=-1), depth
+
+
+def look_at(origin: Tensor, target: Tensor, up: Tensor | None = None) -> Tensor:
+    """(4, 4) float64 camera-to-world matrix of a camera at `origin` that looks at `target`.
+
+    `up` defaults to +z; when the view is along it, +y takes its place.
+    """
+    origin, target = origin.double(), target.double()
+    up = torch.tensor([0.0, 0.0, 1.0], dtype=torch.float64) if up is None else up.double()
+    backward = torch.nn.functional.normalize(origin - target, dim=0)
+    if torch.linalg.cross(up, backward).norm() < 1e-6:
+        up = torch.tensor([0.0, 1.0, 0.0], dtype=torch.float64)
+    right = torch.nn.functional.normalize(torch.linalg.cross(up, backward), dim=0)
+    matrix = torch.eye(4, dtype=torch.float64)
+    matrix[:3, 0], matrix[:3, 1] = right, torch.linalg.cross(backward, right)
+    matrix[:3, 2], matrix[:3, 3] = backward, origin
+    return matrix

@@ -1,0 +1,123 @@
+"""Gaussian surfels: oriented, anisotropic discs with a Gaussian opacity profile and up to two straight edges."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+
+import torch
+from torch import Tensor
+
+#: A clip offset that never clips (in units of the softness it is far beyond any surfel's footprint).
+NO_CLIP = 1e3
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """How overlapping surfels become opaque surfaces: one definition for views, gather and shadows.
+
+    Hits within `layer_thickness` along a ray form one layer. The layer's raw coverage
+    1 − Π(1−α) is sharpened by smoothstep(low, high) and shared among its surfels in proportion to α,
+    without order; layers are composited front to back.
+
+    Attributes:
+        low, high: raw coverage at which a layer is empty and fully opaque.
+        layer_thickness: scene units along the ray.
+        clip_softness: width of the ramp at a half-plane clip, scene units.
+        minimum_alpha: opacity below which a surfel is not there at all; bounds its footprint.
+    """
+
+    low: float
+    high: float
+    layer_thickness: float
+    clip_softness: float
+    minimum_alpha: float = 0.01
+
+
+@dataclass(frozen=True)
+class Surfels:
+    """N Gaussian surfels as plain tensors; all of one dtype and device.
+
+    The opacity of surfel i at a point x of its plane, with local coordinates u, v along its axes:
+
+        α = opacity · exp(−½(u²/s_u² + v²/s_v²)) · Π_k clamp(½ + (b_k − (u, v)·(cos φ_k, sin φ_k))/w, 0, 1)
+
+    Attributes:
+        centers: (N, 3) scene units.
+        rotations: (N, 4) unit quaternions (w, x, y, z) that turn the axes x, y, z into u, v, normal.
+        scales: (N, 2) standard deviations along u and v, scene units.
+        opacities: (N,) in [0, 1].
+        albedo: (N, 3) diffuse reflectance in [0, 1].
+        clip_offsets: (N, 2) distance b of the edges from the centre, scene units; NO_CLIP for none.
+        clip_angles: (N, 2) direction φ of the edges' outward normals in the (u, v) plane, rad.
+        coverage: how surfels compose to surfaces; belongs to the scene, as it was trained with it.
+    """
+
+    centers: Tensor
+    rotations: Tensor
+    scales: Tensor
+    opacities: Tensor
+    albedo: Tensor
+    clip_offsets: Tensor
+    clip_angles: Tensor
+    coverage: Coverage
+
+    def __post_init__(self) -> None:
+        count = self.centers.shape[0]
+        shapes = {"centers": (count, 3), "rotations": (count, 4), "scales": (count, 2), "opacities": (count,)}
+        shapes |= {"albedo": (count, 3), "clip_offsets": (count, 2), "clip_angles": (count, 2)}
+        for name, shape in shapes.items():
+            found = tuple(getattr(self, name).shape)
+            if found != shape:
+                raise ValueError(f"surfels.{name} must have shape {shape}, got {found}")
+
+    def __len__(self) -> int:
+        return self.centers.shape[0]
+
+    @property
+    def frames(self) -> Tensor:
+        """(N, 3, 3) orthonormal axes; [:, 0] is u, [:, 1] is v, [:, 2] the normal."""
+        return quaternion_to_axes(self.rotations)
+
+    @property
+    def normals(self) -> Tensor:
+        """(N, 3) unit normals."""
+        return self.frames[:, 2]
+
+    @property
+    def areas(self) -> Tensor:
+        """(N,) effective area 2π·s_u·s_v·opacity of the unclipped footprint, scene units²."""
+        return 2.0 * torch.pi * self.scales[:, 0] * self.scales[:, 1] * self.opacities
+
+    def to(self, *args: torch.dtype | torch.device | str) -> Surfels:
+        """A copy with every tensor moved by `Tensor.to`."""
+        return replace(self, **{name: tensor.to(*args) for name, tensor in self.tensors().items()})
+
+    def tensors(self) -> dict[str, Tensor]:
+        """The tensors by name, as they are stored."""
+        return {field.name: getattr(self, field.name) for field in fields(self) if field.name != "coverage"}
+
+
+def quaternion_to_axes(quaternions: Tensor) -> Tensor:
+    """(N, 3, 3) rows u, v, normal of the rotations (N, 4) (w, x, y, z); quaternions are normalised first."""
+    w, x, y, z = torch.nn.functional.normalize(quaternions, dim=-1).unbind(-1)
+    u = torch.stack([1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)], dim=-1)
+    v = torch.stack([2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)], dim=-1)
+    n = torch.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], dim=-1)
+    return torch.stack([u, v, n], dim=-2)
+
+
+def quaternion_from_normal(normals: Tensor) -> Tensor:
+    """(N, 4) shortest rotations from +z to the unit normals (N, 3); −z turns about x."""
+    x, y, z = normals.unbind(-1)
+    opposite = z < -1.0 + 1e-6
+    quaternion = torch.stack([1.0 + z, -y, x, torch.zeros_like(x)], dim=-1)
+    about_x = torch.tensor([0.0, 1.0, 0.0, 0.0], dtype=normals.dtype, device=normals.device)
+    quaternion = torch.where(opposite[:, None], about_x, quaternion)
+    return torch.nn.functional.normalize(quaternion, dim=-1)
+
+
+def turn_in_plane(quaternions: Tensor, angles: Tensor) -> Tensor:
+    """Rotations (N, 4) turned by `angles` (N,) [rad] about their own normals."""
+    w, x, y, z = quaternions.unbind(-1)
+    c, s = torch.cos(0.5 * angles), torch.sin(0.5 * angles)
+    return torch.stack([w * c - z * s, x * c + y * s, y * c - x * s, z * c + w * s], dim=-1)
