@@ -1,0 +1,233 @@
+"""The artifact store: what a stage made, published whole or not at all, and verified when it is read.
+
+    <root>/<scene>/<stage>/<fingerprint>/              an artifact: its files and manifest.json
+    <root>/<scene>/<stage>/latest                      link to the newest one
+    <root>/<scene>/<stage>/.partial-<fingerprint>/     an artifact in the making
+    <root>/<scene>/<stage>/.lock-<fingerprint>         held while it is made
+
+A process that is killed leaves at most a partial folder, which the next run of the same recipe finds and goes on
+with. The lock belongs to the operating system, so it ends with its holder however that ends.
+"""
+
+from __future__ import annotations
+
+import datetime
+import json
+import logging
+import shutil
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from filelock import FileLock, Timeout
+
+from rgspipe.errors import InputError
+from rgspipe.files import point_at, sha256, sync, sync_tree, write_json
+from rgspipe.machine import library_versions, machine, peak_memory_mib
+
+SCHEMA_VERSION = 1
+MANIFEST = "manifest.json"
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Key:
+    """Where an artifact belongs."""
+
+    scene: str
+    stage: str
+    fingerprint: str
+
+
+@dataclass(frozen=True)
+class Artifact:
+    """A published artifact. Read its files through `file` or `folder`, which verify them first.
+
+    Attributes:
+        path: its folder.
+        manifest: what manifest.json says: config, inputs, code, libraries, machine, seconds, files, facts.
+    """
+
+    path: Path
+    manifest: Mapping[str, Any]
+    _verified: set[str] = field(default_factory=set, repr=False, compare=False)
+
+    @property
+    def stage(self) -> str:
+        """The stage that made it."""
+        return self.manifest["stage"]
+
+    @property
+    def fingerprint(self) -> str:
+        """What identifies it among the artifacts of its stage."""
+        return self.manifest["fingerprint"]
+
+    @property
+    def facts(self) -> Mapping[str, Any]:
+        """What the stage noted about it."""
+        return self.manifest["facts"]
+
+    def file(self, name: str) -> Path:
+        """The path of one file, verified against its checksum the first time it is asked for.
+
+        Raises:
+            InputError: the file is missing, truncated or changed.
+            ValueError: the artifact never had such a file.
+        """
+        if name not in self.manifest["files"]:
+            raise ValueError(f"{self.stage} made no {name}; it made {', '.join(self.manifest['files'])}")
+        path = self.path / name
+        if name not in self._verified:
+            self._verify(path, self.manifest["files"][name])
+            self._verified.add(name)
+        return path
+
+    def folder(self) -> Path:
+        """The artifact's folder, after every file in it has been verified."""
+        for name in self.manifest["files"]:
+            self.file(name)
+        return self.path
+
+    def _verify(self, path: Path, entry: Mapping[str, Any]) -> None:
+        expected = f"the {entry['bytes']} bytes that {self.stage} wrote"
+        remedy = f"Remove the folder {self.path} and run again: the stage will make it anew."
+        if not path.is_file():
+            raise InputError(path, expected=expected, found="no file", remedy=remedy)
+        if (size := path.stat().st_size) != entry["bytes"]:
+            raise InputError(path, expected=expected, found=f"{size} bytes", remedy=remedy)
+        if sha256(path) != entry["sha256"]:
+            raise InputError(path, expected=expected, found="other content (its checksum differs)", remedy=remedy)
+
+
+@dataclass(frozen=True)
+class ArtifactStore:
+    """All artifacts below one folder. One store serves a process, so that each file is verified once."""
+
+    root: Path
+    _known: dict[Key, Artifact] = field(default_factory=dict, repr=False, compare=False)
+
+    def path(self, key: Key) -> Path:
+        """The folder of an artifact, made or not."""
+        return self.root / key.scene / key.stage / key.fingerprint
+
+    def partial(self, key: Key) -> Path:
+        """The folder in which it is made."""
+        return self.root / key.scene / key.stage / f".partial-{key.fingerprint}"
+
+    def find(self, key: Key) -> Artifact | None:
+        """The published artifact, or None.
+
+        Raises:
+            InputError: there is a folder, but its manifest is missing or not its own.
+        """
+        path = self.path(key)
+        if not path.exists():
+            return None
+        if key not in self._known:
+            self._known[key] = Artifact(path, _read_manifest(path, key))
+        return self._known[key]
+
+    def latest(self, scene: str, stage: str) -> Artifact | None:
+        """The newest artifact of a stage, or None if there is none that can be read."""
+        link = self.root / scene / stage / "latest"
+        if not link.is_symlink() or not link.exists():
+            return None
+        try:
+            return self.find(Key(scene, stage, link.resolve().name))
+        except InputError:
+            return None
+
+    def build(
+        self, key: Key, recipe: Mapping[str, Any], make: Callable[[Path], Mapping[str, Any]]
+    ) -> tuple[Artifact, bool]:
+        """Make an artifact and publish it, or wait for the process that is making it and take its result.
+
+        Args:
+            key: where it belongs.
+            recipe: what identifies it; goes into the manifest as it is.
+            make: writes the files into the folder it is given and returns facts for the manifest. The folder may
+                hold files of an earlier, interrupted attempt. Names that start with a dot are not published.
+
+        Returns:
+            the artifact, and whether this call made it.
+        """
+        path, partial = self.path(key), self.partial(key)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with _locked(path.parent / f".lock-{key.fingerprint}", key):
+            if (found := self.find(key)) is not None:
+                return found, False
+            resumed = partial.exists()
+            partial.mkdir(exist_ok=True)
+            start = time.perf_counter()
+            facts = make(partial)
+            made = {"seconds": round(time.perf_counter() - start, 3), "resumed": resumed, "facts": dict(facts)}
+            self._publish(key, recipe, made)
+        artifact = self.find(key)
+        assert artifact is not None
+        return artifact, True
+
+    def _publish(self, key: Key, recipe: Mapping[str, Any], made: Mapping[str, Any]) -> None:
+        path, partial = self.path(key), self.partial(key)
+        _remove_scratch(partial)
+        manifest = {
+            "schema": SCHEMA_VERSION,
+            "scene": key.scene,
+            "stage": key.stage,
+            "fingerprint": key.fingerprint,
+            **recipe,
+            **made,
+            "created": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+            "libraries": library_versions(),
+            "machine": machine(),
+            "peak_memory_mib": peak_memory_mib(),
+            "files": _inventory(partial),
+        }
+        write_json(partial / MANIFEST, manifest)
+        sync_tree(partial)
+        partial.rename(path)
+        sync(path.parent)
+        point_at(path.parent / "latest", key.fingerprint)
+
+
+def _locked(lock_file: Path, key: Key) -> FileLock:
+    lock = FileLock(lock_file)
+    try:
+        return lock.acquire(timeout=0)
+    except Timeout:
+        log.info("%s: another process is making %s; waiting for it", key.stage, key.fingerprint)
+        return lock.acquire()
+
+
+def _remove_scratch(partial: Path) -> None:
+    for path in [path for path in partial.rglob(".*") if path.exists()]:
+        if path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path)
+        else:
+            path.unlink(missing_ok=True)
+
+
+def _inventory(folder: Path) -> dict[str, dict[str, Any]]:
+    files = sorted(path for path in folder.rglob("*") if path.is_file() and path != folder / MANIFEST)
+    return {
+        path.relative_to(folder).as_posix(): {"sha256": sha256(path), "bytes": path.stat().st_size} for path in files
+    }
+
+
+def _read_manifest(folder: Path, key: Key) -> Mapping[str, Any]:
+    path = folder / MANIFEST
+    remedy = f"Remove the folder {folder} and run again: the stage will make it anew."
+    expected = f"the manifest of {key.stage} {key.fingerprint} (schema {SCHEMA_VERSION})"
+    try:
+        manifest = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError(path, expected=expected, found="no file", remedy=remedy) from None
+    except ValueError as error:
+        raise InputError(path, expected=expected, found=f"damaged JSON ({error})", remedy=remedy) from None
+    if not isinstance(manifest, dict) or manifest.get("schema") != SCHEMA_VERSION:
+        raise InputError(path, expected=expected, found="another schema", remedy=remedy)
+    if manifest.get("fingerprint") != key.fingerprint or not isinstance(manifest.get("files"), dict):
+        raise InputError(path, expected=expected, found="a manifest that is not its own", remedy=remedy)
+    return manifest

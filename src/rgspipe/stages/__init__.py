@@ -1,0 +1,44 @@
+"""The stages, in the order of the way from images to lights. Each is one module with a `STAGE`, imported when it runs."""
+
+from __future__ import annotations
+
+import ast
+import difflib
+import importlib
+from pathlib import Path
+
+from rgspipe.errors import InputError
+from rgspipe.stages.base import Need, Stage, StageContext
+
+__all__ = ["NAMES", "Need", "Stage", "StageContext", "load_stage", "stage_summary"]
+
+NAMES = (
+    "generate_dataset",
+    "init_depth",
+    "train_surfels",
+    "freeze",
+    "fit_light",
+    "evaluate",
+    "report",
+    "benchmark",
+)
+
+
+def load_stage(name: str) -> Stage:
+    """The stage of this name.
+
+    Raises:
+        InputError: there is none; the message suggests the nearest name.
+    """
+    if name not in NAMES:
+        near = difflib.get_close_matches(name, NAMES, n=1)
+        remedy = f"Did you mean stage={near[0]}?" if near else "Choose one of them: stage=NAME."
+        raise InputError("stage", expected=f"one of {', '.join(NAMES)}", found=repr(name), remedy=remedy)
+    return importlib.import_module(f"{__name__}.{name}").STAGE
+
+
+def stage_summary(name: str) -> str:
+    """The first line of a stage module's docstring, read without importing it (and torch with it)."""
+    source = Path(__file__).with_name(f"{name}.py")
+    text = ast.get_docstring(ast.parse(source.read_text(encoding="utf-8"))) if source.is_file() else None
+    return text.splitlines()[0] if text else ""

@@ -1,0 +1,91 @@
+"""What a stage is: a name, what it needs, what its result depends on, and the function that makes it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from rgspipe.artifacts import Artifact
+from rgspipe.config import RgspipeConfig
+
+
+@dataclass(frozen=True)
+class Need:
+    """An input of a stage: the artifact of another one, with the configuration changed where `changes` says so.
+
+    Attributes:
+        stage: the other stage's name.
+        changes: values by dotted key, such as {"views.count": 3}.
+    """
+
+    stage: str
+    changes: Mapping[str, object] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class StageContext:
+    """All that a stage's `run` is given.
+
+    Attributes:
+        config: the whole configuration; only what `config_keys` names may influence the result.
+        inputs: for each needed stage its artifact; the first one where several are needed.
+        input_lists: for each needed stage all its artifacts, in the order of the needs.
+        folder: where the result goes. After an interruption it still holds what an earlier attempt wrote, so a long
+            stage can go on; write such files to a name that starts with a dot, then rename.
+    """
+
+    config: RgspipeConfig
+    inputs: Mapping[str, Artifact]
+    input_lists: Mapping[str, Sequence[Artifact]]
+    folder: Path
+    facts: dict[str, Any] = field(default_factory=dict)
+
+    def note(self, **facts: Any) -> None:
+        """Keep JSON values in the manifest, under "facts"."""
+        self.facts.update(facts)
+
+    @property
+    def scratch(self) -> Path:
+        """A folder for checkpoints: survives an interruption, is removed when the result is published."""
+        folder = self.folder / ".scratch"
+        folder.mkdir(exist_ok=True)
+        return folder
+
+
+def _nothing(config: RgspipeConfig) -> tuple[()]:
+    return ()
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One step of the way from images to lights.
+
+    Attributes:
+        name: as in `stage=<name>`.
+        help: one line for people.
+        run: reads artifacts, calls the library, writes files into `context.folder`.
+        inputs: which artifacts it needs, for a configuration; a plain name stands for `Need(name)`.
+        config_keys: dotted keys (or whole sections) that the result depends on; a function of the configuration
+            where that depends on a choice.
+        code: module prefixes whose source the result depends on, such as "rgspipe.renderer"; the stage's own module
+            is always one. Comments, docstrings and formatting do not count.
+        files: files and folders outside the store that the result depends on; their content counts.
+    """
+
+    name: str
+    help: str
+    run: Callable[[StageContext], None]
+    inputs: Callable[[RgspipeConfig], Sequence[Need | str]] = _nothing
+    config_keys: Sequence[str] | Callable[[RgspipeConfig], Sequence[str]] = ()
+    code: Sequence[str] = ()
+    files: Callable[[RgspipeConfig], Sequence[Path]] = _nothing
+
+    def needs(self, config: RgspipeConfig) -> tuple[Need, ...]:
+        """The inputs for a configuration."""
+        return tuple(Need(item) if isinstance(item, str) else item for item in self.inputs(config))
+
+    def keys(self, config: RgspipeConfig) -> tuple[str, ...]:
+        """The configuration keys that matter for a configuration."""
+        return tuple(self.config_keys(config) if callable(self.config_keys) else self.config_keys)
