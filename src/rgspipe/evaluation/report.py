@@ -1,0 +1,233 @@
+"""One HTML file that holds everything: tables, pictures, configuration and provenance. Needs no network."""
+
+from __future__ import annotations
+
+import base64
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import jinja2
+import pandas as pd
+from matplotlib.figure import Figure
+
+from rgspipe.evaluation import goals, images, metrics, plots
+from rgspipe.evaluation.tables import ALL
+
+#: All pictures together, before they are encoded as text (which adds a third).
+PICTURE_BYTES = 4_500_000
+#: What stands where a value is not known.
+MISSING = "—"
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A PNG with the words under it; `group` gathers pictures under one heading."""
+
+    group: str
+    caption: str
+    png: bytes
+
+
+@dataclass(frozen=True)
+class StageRecord:
+    """Where one artifact came from, as plain text; what is not known is "—"."""
+
+    stage: str
+    fingerprint: str
+    seconds: str
+    memory: str
+    machine: str
+    code: str
+    libraries: str
+
+
+@dataclass(frozen=True)
+class ReportContents:
+    """What the report shows. Empty tables and None mean "not there"; the report then says so in words.
+
+    Attributes:
+        scene: name of the scene.
+        summary: rows of `summary_table`.
+        targets: rows of `target_table`.
+        curves: rows of `convergence_table`.
+        fits: pictures of single fits.
+        cloud, normals: (N, 3) surfel centres and normals of the frozen scene, or None.
+        cameras: cameras of the targets.
+        training: the trainer's metrics: `test_psnr_mean`, `test_psnr_median`, `test_psnr_min`,
+            `test_psnr_off_edges_mean`, `direct_only_psnr` [dB], `surfels`, `seconds`, `per_view`.
+        training_log: one row a training round, or None.
+        comparison: PNG of truth, render and difference of held-out views, or None.
+        success_limit: position error up to which a target counts as solved.
+        configuration: the full configuration as YAML or JSON text.
+        stages: one record per artifact behind the report.
+        notes: what the reader must know: what is missing and why.
+    """
+
+    scene: str
+    summary: pd.DataFrame
+    targets: pd.DataFrame
+    curves: pd.DataFrame
+    fits: Sequence[Picture] = ()
+    cloud: Any = None
+    normals: Any = None
+    cameras: Sequence[plots.CameraMark] = ()
+    training: Mapping[str, Any] | None = None
+    training_log: pd.DataFrame | None = None
+    comparison: bytes | None = None
+    success_limit: float = metrics.SUCCESS_LIMIT
+    configuration: str = ""
+    stages: Sequence[StageRecord] = ()
+    notes: Sequence[str] = field(default_factory=tuple)
+
+
+def render_report(contents: ReportContents) -> str:
+    """The report as one HTML document without any reference to a file or an address."""
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("rgspipe.evaluation", "templates"),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= {"percent": _percent, "decimals": _decimals, "label": _label}
+    method = goals.primary_method(contents.summary)
+    budget = PICTURE_BYTES // max(1, len(contents.fits) + (contents.comparison is not None))
+    return environment.get_template("report.html").render(
+        contents=contents,
+        goals=goals.goals(contents.summary, dict(contents.training or {}), method),
+        method=method,
+        training=_training_rows(contents.training),
+        comparison=_picture(contents.comparison, budget),
+        summary=contents.summary.to_dict("records"),
+        targets=_target_rows(contents.targets),
+        fits=_grouped_fits(contents.fits, budget),
+        figures=_figures(contents),
+        worst_views=_worst_views(contents.training),
+        all_classes=ALL,
+        success_limit=contents.success_limit,
+    )
+
+
+def data_address(content: bytes, kind: str) -> str:
+    """A data: address that holds `content` itself; `kind` is its MIME type."""
+    return f"data:{kind};base64,{base64.b64encode(content).decode('ascii')}"
+
+
+def stage_record(stage: str, manifest: Mapping[str, Any]) -> StageRecord:
+    """An artifact's manifest as text; every field may be missing."""
+    seconds, memory = manifest.get("seconds"), manifest.get("peak_memory_mb")
+    code = manifest.get("code", manifest.get("code_version", MISSING))
+    return StageRecord(
+        stage=stage,
+        fingerprint=str(manifest.get("fingerprint", MISSING)),
+        seconds=MISSING if seconds is None else f"{float(seconds):.1f}",
+        memory=MISSING if memory is None else f"{float(memory):.0f}",
+        machine=_flat(manifest.get("machine")),
+        code=_flat(code),
+        libraries=_flat(manifest.get("libraries", manifest.get("versions"))),
+    )
+
+
+def _flat(value: Any) -> str:
+    """A mapping as "key value, key value"; text as it is."""
+    if isinstance(value, Mapping):
+        return ", ".join(f"{key} {_flat(item)}" for key, item in value.items()) or MISSING
+    return MISSING if value is None or value == "" else str(value)
+
+
+def _percent(value: Any, digits: int = 2) -> str:
+    return MISSING if value is None or pd.isna(value) else goals.percent(float(value), digits)
+
+
+def _decimals(value: Any, digits: int = 2) -> str:
+    if value is None or pd.isna(value):
+        return MISSING
+    return "∞" if math.isinf(value) else f"{float(value):.{digits}f}"
+
+
+def _label(name: str) -> str:
+    return "all classes" if name == ALL else plots.LABELS.get(name, name.replace("_", " "))
+
+
+def _picture(png: bytes | None, budget: int) -> str | None:
+    return None if png is None else data_address(images.fit_within(png, budget), "image/png")
+
+
+def _grouped_fits(pictures: Sequence[Picture], budget: int) -> list[dict]:
+    groups: dict[str, list[dict]] = {}
+    for picture in pictures:
+        shown = {"caption": picture.caption, "source": _picture(picture.png, budget)}
+        groups.setdefault(picture.group, []).append(shown)
+    return [{"name": name, "pictures": members} for name, members in groups.items()]
+
+
+_TRAINING_ROWS = (
+    ("test_psnr_mean", "PSNR of held-out views under held-out lights, mean", "dB", 2),
+    ("test_psnr_median", "… median", "dB", 2),
+    ("test_psnr_min", "… worst view", "dB", 2),
+    ("test_psnr_off_edges_mean", "… mean away from silhouettes and creases", "dB", 2),
+    ("direct_only_psnr", "the same scene without interreflection, mean", "dB", 2),
+    ("surfels", "surfels", "", 0),
+    ("seconds", "training time", "s", 1),
+)
+
+
+def _training_rows(training: Mapping[str, Any] | None) -> list[dict]:
+    if training is None:
+        return []
+    rows = []
+    for key, label, unit, digits in _TRAINING_ROWS:
+        value = training.get(key)
+        shown = "not recorded" if value is None else f"{float(value):,.{digits}f} {unit}".strip()
+        rows.append({"label": label, "value": shown})
+    return rows
+
+
+def _worst_views(training: Mapping[str, Any] | None, count: int = 5) -> list[dict]:
+    views = [view for view in (training or {}).get("per_view", ()) if view.get("psnr") is not None]
+    return sorted(views, key=lambda view: view["psnr"])[:count]
+
+
+def _target_rows(targets: pd.DataFrame) -> list[dict]:
+    """Rows with a verdict in words and numbers to sort by (browsers must not parse "0.31 %")."""
+    rows = []
+    for row in targets.to_dict("records"):
+        verdict = "unknown" if row["success"] is None or pd.isna(row["success"]) else ("no", "yes")[int(row["success"])]
+        estimate, truth = (", ".join(_decimals(row[axis + suffix], 3) for axis in "xyz") for suffix in ("", "_true"))
+        ended = ": ".join(str(row[name]) for name in ("result", "reason") if isinstance(row[name], str) and row[name])
+        rows.append(row | {"verdict": verdict, "estimate": estimate, "truth": truth, "ended": ended or MISSING})
+    return rows
+
+
+def _figures(contents: ReportContents) -> dict[str, Any]:
+    """Every figure as an address, or the reason why it is not there; lights per method and view count."""
+    return {
+        "errors": _figure(lambda: plots.error_figure(contents.targets)),
+        "convergence": _figure(lambda: plots.convergence_figure(contents.curves)),
+        "training": _figure(lambda: plots.training_figure(contents.training_log))
+        if contents.training_log is not None
+        else {"source": None, "reason": "no training log"},
+        "lights": _light_figures(contents),
+    }
+
+
+def _light_figures(contents: ReportContents) -> list[dict]:
+    if contents.cloud is None:
+        return []
+    drawn = []
+    for (method, views), group in contents.targets.groupby(["method", "views"], sort=True):
+        figure = plots.light_figure(group, contents.cloud, contents.normals, contents.cameras)
+        title = f"{method}, {views} view{'s' if views > 1 else ''}"
+        # A bitmap: thousands of dots would be far larger as drawing commands.
+        drawn.append({"title": title, "source": data_address(plots.png_of(figure), "image/png")})
+    return drawn
+
+
+def _figure(draw: Callable[[], Figure]) -> dict[str, str | None]:
+    try:
+        figure = draw()
+    except ValueError as error:
+        return {"source": None, "reason": str(error)}
+    return {"source": data_address(plots.svg_bytes(figure), "image/svg+xml"), "reason": None}
