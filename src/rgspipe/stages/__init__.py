@@ -1,4 +1,4 @@
-"""The stages, in the order of the way from images to lights. Each is one module with a `STAGE`, imported when it runs."""
+"""The stages, in the order of the way from images to lights: one module each, with a `STAGE`, imported when it runs."""
 
 from __future__ import annotations
 

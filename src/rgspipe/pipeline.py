@@ -1,0 +1,222 @@
+"""The stage graph: what a stage needs, which of it is there, and making what is missing.
+
+Every fingerprint follows from the configuration, the code and the foreign files, so the whole plan is known before
+anything is made.
+"""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from rgspipe.artifacts import Artifact, ArtifactStore, Key
+from rgspipe.config import RgspipeConfig, get_value, scene_name, with_changes
+from rgspipe.errors import InputError
+from rgspipe.files import tree_digest
+from rgspipe.fingerprints import code_fingerprints, differences, fingerprint
+from rgspipe.stages.base import Stage, StageContext
+
+StageLoader = Callable[[str], Stage]
+
+#: At most this many causes are named for one stage in the plan.
+SHOWN_CAUSES = 3
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Node:
+    """One artifact of the graph, made or not.
+
+    Attributes:
+        stage: what makes it.
+        config: the configuration it is made with.
+        changes: how that differs from the configuration of the run.
+        key: where it belongs.
+        recipe: the config values, inputs, files and code behind its fingerprint.
+        inputs: the artifacts it is made from.
+    """
+
+    stage: Stage
+    config: RgspipeConfig
+    changes: Mapping[str, object]
+    key: Key
+    recipe: Mapping[str, Any]
+    inputs: tuple[Node, ...]
+
+
+@dataclass(frozen=True)
+class Step:
+    """One line of the plan: a node, whether it is there already, and if not, why not."""
+
+    node: Node
+    reused: bool
+    reason: str
+
+
+@dataclass
+class _Resolver:
+    """Builds the graph; every module and foreign file is read once."""
+
+    load_stage: StageLoader
+    code: dict[str, str] = field(default_factory=dict)
+    files: dict[str, str] = field(default_factory=dict)
+
+    def resolve(self, name: str, config: RgspipeConfig, changes: Mapping[str, object]) -> Node:
+        stage = self.load_stage(name)
+        inputs = tuple(
+            self.resolve(need.stage, with_changes(config, need.changes), {**changes, **need.changes})
+            for need in stage.needs(config)
+        )
+        recipe = {
+            "config": {key: get_value(config, key) for key in sorted(stage.keys(config))},
+            "inputs": _input_fingerprints(inputs),
+            "files": {str(path): self._file(path) for path in stage.files(config)},
+            "code": self._code(stage),
+        }
+        key = Key(scene_name(config), stage.name, fingerprint({"stage": stage.name, **recipe}))
+        return Node(stage, config, changes, key, recipe, inputs)
+
+    def _file(self, path: Path) -> str:
+        if str(path) not in self.files:
+            self.files[str(path)] = tree_digest(path)
+        return self.files[str(path)]
+
+    def _code(self, stage: Stage) -> dict[str, str]:
+        names = sorted({*stage.code, stage.run.__module__})
+        missing = [name for name in names if name not in self.code]
+        self.code |= code_fingerprints(missing)
+        return {name: self.code[name] for name in names}
+
+
+def _input_fingerprints(inputs: Sequence[Node]) -> dict[str, list[str]]:
+    names = dict.fromkeys(node.stage.name for node in inputs)
+    return {name: [node.key.fingerprint for node in inputs if node.stage.name == name] for name in names}
+
+
+def resolve(config: RgspipeConfig, load_stage: StageLoader) -> Node:
+    """The graph that ends in `config.stage`."""
+    return _Resolver(load_stage).resolve(config.stage, config, {})
+
+
+def plan(root: Node, store: ArtifactStore) -> list[Step]:
+    """What has to be made and what is reused for `root`, inputs first.
+
+    Nothing is listed below an artifact that is there: it holds all that it was made from.
+    """
+    steps: dict[Key, Step] = {}
+
+    def visit(node: Node) -> None:
+        if node.key in steps:
+            return
+        reused = store.find(node.key) is not None
+        if not reused:
+            for needed in node.inputs:
+                visit(needed)
+        steps[node.key] = Step(node, reused, "" if reused else _reason(node, store))
+
+    visit(root)
+    return list(steps.values())
+
+
+def _reason(node: Node, store: ArtifactStore) -> str:
+    if store.partial(node.key).exists():
+        return "goes on where it was interrupted"
+    latest = store.latest(node.key.scene, node.key.stage)
+    if latest is None:
+        return "not made yet"
+    causes = differences(node.recipe, latest.manifest)
+    shown = ", ".join(causes[:SHOWN_CAUSES]) or "the one that was made is gone"
+    return shown + (f" and {len(causes) - SHOWN_CAUSES} more" if len(causes) > SHOWN_CAUSES else "")
+
+
+def describe_plan(steps: Sequence[Step]) -> str:
+    """The plan as a table for people."""
+    width = max(len(step.node.stage.name) for step in steps)
+    lines = [f"Plan for {steps[-1].node.key.scene}:"]
+    for step in steps:
+        verb = "reuse" if step.reused else "make "
+        lines.append(f"  {step.node.stage.name:<{width}}  {verb}  {step.node.key.fingerprint}  {step.reason}".rstrip())
+    return "\n".join(lines)
+
+
+def run(config: RgspipeConfig, load_stage: StageLoader, overrides: Sequence[str] = ()) -> Artifact:
+    """Make `config.stage`, and before it what is missing of its inputs; reuse what is there.
+
+    Args:
+        config: the whole configuration, checked.
+        load_stage: gives a stage by name.
+        overrides: the command line's overrides, for the commands that messages suggest.
+
+    Raises:
+        InputError: an input cannot be used, or is missing under `upstream=require`.
+    """
+    store = ArtifactStore(Path(config.outputs))
+    root = resolve(config, load_stage)
+    steps = plan(root, store)
+    log.info(describe_plan(steps))
+    if config.upstream == "require":
+        _refuse_missing(steps, overrides)
+    artifacts = {step.node.key: _take(step.node, store) for step in steps if step.reused}
+    for step in steps:
+        if not step.reused:
+            artifacts[step.node.key] = _make(step.node, store, artifacts)
+    return artifacts[root.key]
+
+
+def _take(node: Node, store: ArtifactStore) -> Artifact:
+    artifact = store.find(node.key)
+    assert artifact is not None
+    return artifact
+
+
+def _make(node: Node, store: ArtifactStore, artifacts: Mapping[Key, Artifact]) -> Artifact:
+    lists: dict[str, list[Artifact]] = {}
+    for needed in node.inputs:
+        lists.setdefault(needed.stage.name, []).append(artifacts[needed.key])
+
+    def make(folder: Path) -> Mapping[str, Any]:
+        inputs = {name: found[0] for name, found in lists.items()}
+        context = StageContext(node.config, inputs, lists, folder)
+        node.stage.run(context)
+        return context.facts
+
+    log.info("%s: starting", node.stage.name)
+    start = time.perf_counter()
+    artifact, made = store.build(node.key, node.recipe, make)
+    verb = "made" if made else "made by another process"
+    log.info("%s: %s in %.1f s: %s", node.stage.name, verb, time.perf_counter() - start, artifact.path)
+    return artifact
+
+
+def _refuse_missing(steps: Sequence[Step], overrides: Sequence[str]) -> None:
+    missing = [step.node for step in steps[:-1] if not step.reused]
+    if not missing:
+        return
+    command = command_for(missing[-1], overrides)
+    raise InputError(
+        f"upstream=require: {missing[-1].stage.name}",
+        expected=f"its artifact {missing[-1].key.fingerprint} for this configuration",
+        found="none",
+        remedy=f"Make it with `{command}`, or leave upstream=require away.",
+    )
+
+
+def command_for(node: Node, overrides: Sequence[str]) -> str:
+    """The command that makes a node, in a run that was started with `overrides`."""
+    own = {"stage", "upstream", *node.changes}
+    kept = [text for text in overrides if text.split("=")[0].lstrip("+~") not in own]
+    changed = [f"{key}={_as_override(value)}" for key, value in node.changes.items()]
+    return " ".join(["python -m rgspipe", f"stage={node.stage.name}", *kept, *changed])
+
+
+def _as_override(value: object) -> str:
+    if value is None:
+        return "null"
+    if isinstance(value, list | tuple):
+        return f"[{','.join(map(_as_override, value))}]"
+    return str(value).lower() if isinstance(value, bool) else str(value)
