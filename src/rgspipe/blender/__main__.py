@@ -1,0 +1,78 @@
+"""The bpy side: `python -m rgspipe.blender JOB.json FOLDER PARENT` renders a dataset into FOLDER."""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import logging
+import os
+import shutil
+import signal
+import sys
+from pathlib import Path
+
+from rgspipe.blender.job import DatasetJob
+from rgspipe.blender.process import MESSAGE_PREFIX
+from rgspipe.errors import InputError
+
+
+#: Linux: prctl option by which a process is killed when its parent dies.
+PR_SET_PDEATHSIG = 1
+
+
+def main() -> int:
+    """Render; report progress, or what is wrong with the input, to the parent."""
+    job_path, folder, parent = Path(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[3])
+    logging.basicConfig(level=logging.INFO, format="%(message)s")
+    die_with(parent)
+    try:
+        render_all(DatasetJob.from_json(json.loads(job_path.read_text(encoding="utf-8"))), folder, parent)
+    except InputError as error:
+        parts = {"where": error.where, "expected": error.expected, "found": error.found, "remedy": error.remedy}
+        tell(input_error=parts)
+        return 2
+    return 0
+
+
+def render_all(job: DatasetJob, folder: Path, parent: int) -> None:
+    """Write the dataset's JSON files, then render every frame that is missing in `folder`."""
+    from rgspipe.blender.passes import Studio, is_whole
+    from rgspipe.blender.plan import make_plan
+    from rgspipe.blender.scenes import open_scene
+    from rgspipe.blender.write import write_dataset_files
+
+    prepared = open_scene(job)
+    plan = make_plan(job, prepared.layout, prepared.geometry)
+    write_dataset_files(job, plan, prepared, folder)
+    missing = [frame for frame in plan.frames if not is_whole(frame, folder)]
+    tell(total=len(plan.frames), done=len(plan.frames) - len(missing))
+    scratch = folder / ".scratch"
+    scratch.mkdir(parents=True, exist_ok=True)
+    studio = Studio(prepared.scene, job, scratch)
+    for frame in missing:
+        if os.getppid() != parent:
+            sys.exit("The process that asked for these images is gone.")
+        studio.render(frame, folder)
+        tell(frame=frame.name)
+    shutil.rmtree(scratch)
+
+
+def tell(**message: object) -> None:
+    """Send one message to the parent."""
+    print(MESSAGE_PREFIX + json.dumps(message), flush=True)
+
+
+def die_with(parent: int) -> None:
+    """Have this process killed when its parent dies, so that no orphan goes on writing (Linux)."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None, use_errno=True).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != parent:  # it died before the call
+        sys.exit("The process that asked for these images is gone.")
+
+
+if __name__ == "__main__":
+    status = main()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    # Blender's destructors may crash after all work is done; nothing is left to be closed.
+    os._exit(status)

@@ -1,0 +1,163 @@
+"""Where the cameras and the lights of a dataset are: seeded draws from the free space of a scene."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import torch
+
+from rgspipe.blender.geometry import FreeSpace, sphere_points
+from rgspipe.errors import InputError
+from rgspipe.scene import Camera, look_at
+
+#: Draws after which a place that meets all conditions is taken to be impossible.
+MAX_DRAWS = 20_000
+
+#: The look-at point and the origins of the cameras in front of the Cornell box, and their field of view [rad].
+CORNELL_FOCUS = (0.0, 0.0, -0.12)
+CORNELL_TARGET_CAMERAS = ((0.0, -1.5, 0.05), (-0.35, -1.2, 0.25), (0.35, -1.2, 0.25))
+CORNELL_TARGET_ANGLE = math.radians(38.0)
+
+
+class Layout(Protocol):
+    """Draws the cameras and lights that suit a kind of scene."""
+
+    def camera(self, rng: np.random.Generator, index: int) -> Camera:
+        """The camera of view `index` of a split."""
+
+    def light(self, rng: np.random.Generator, clearance: float) -> np.ndarray:
+        """(3,) a light position at least `clearance` from any surface."""
+
+    def target_cameras(self) -> list[Camera]:
+        """The three fixed cameras that see every fit target."""
+
+
+@dataclass(frozen=True)
+class CornellLayout:
+    """The Cornell box: one view in five from outside its open front, the others inside, in all directions."""
+
+    space: FreeSpace
+    resolution: int
+
+    def camera(self, rng: np.random.Generator, index: int) -> Camera:
+        if index % 5 == 0:
+            origin = np.array([rng.uniform(-0.4, 0.4), rng.uniform(-1.7, -1.2), rng.uniform(-0.4, 0.4)])
+            return aimed(origin, rng.uniform(-0.15, 0.15, 3), rng.uniform(45.0, 58.0), self.resolution)
+        for _ in range(MAX_DRAWS):
+            origin, focus = self.light(rng, 0.06), rng.uniform(-0.45, 0.45, 3)
+            view = focus - origin
+            length = float(np.linalg.norm(view))
+            looks_out = view[1] < -0.7 * length
+            if length > 0.45 and not looks_out:
+                return aimed(origin, focus, rng.uniform(75.0, 105.0), self.resolution)
+        raise no_room("a camera inside the room")
+
+    def light(self, rng: np.random.Generator, clearance: float) -> np.ndarray:
+        for _ in range(MAX_DRAWS):
+            point = rng.uniform(-0.5 + clearance, 0.5 - clearance, 3)
+            if self.space.has_room_for(point, clearance):
+                return point
+        raise no_room(f"a place {clearance:g} from any surface")
+
+    def target_cameras(self) -> list[Camera]:
+        angle = math.degrees(CORNELL_TARGET_ANGLE)
+        origins = (np.array(origin) for origin in CORNELL_TARGET_CAMERAS)
+        return [aimed(origin, np.array(CORNELL_FOCUS), angle, self.resolution) for origin in origins]
+
+
+@dataclass(frozen=True)
+class RoomLayout:
+    """Any scene with an inside: cameras and lights stand in it."""
+
+    space: FreeSpace
+    resolution: int
+
+    def camera(self, rng: np.random.Generator, index: int) -> Camera:
+        for _ in range(MAX_DRAWS):
+            origin = self.light(rng, 0.04)
+            direction = sphere_points(256)[rng.integers(256)]
+            distance, is_front = self.space.geometry.cast(origin, direction)
+            if abs(direction[2]) < 0.8 and is_front and np.isfinite(distance) and distance > 0.25:
+                return aimed(origin, origin + direction, rng.uniform(75.0, 105.0), self.resolution)
+        raise no_room("a camera with a view of 0.25 or more")
+
+    def light(self, rng: np.random.Generator, clearance: float) -> np.ndarray:
+        cell = self.space.cell
+        for _ in range(MAX_DRAWS):
+            point = self.space.interior[rng.integers(len(self.space.interior))] + rng.uniform(-0.5, 0.5, 3) * cell
+            if self.space.has_room_for(point, clearance):
+                return point
+        raise no_room(f"a place {clearance:g} from any surface")
+
+    def target_cameras(self) -> list[Camera]:
+        """The places from which most of the room is in sight, a quarter of its size apart if possible."""
+        rng = np.random.default_rng(0)
+        interior = self.space.interior
+        focus = interior.mean(axis=0)
+        probes = interior[rng.integers(len(interior), size=150)]
+        origins = np.array([self.light(rng, 0.04) for _ in range(100)])
+        origins = origins[np.linalg.norm(origins - focus, axis=1) > 0.1]
+        seen = [sum(not self.space.geometry.blocked(origin, probe) for probe in probes) for origin in origins]
+        distance = np.linalg.norm(origins - focus, axis=1)
+        ranked = origins[np.argsort(-np.array(seen) * (0.3 + distance))]
+        for apart in (0.25, 0.1, 0.0):
+            chosen = [ranked[0]]
+            for origin in ranked[1:]:
+                if all(np.linalg.norm(origin - other) > apart for other in chosen):
+                    chosen.append(origin)
+                if len(chosen) == 3:
+                    return [aimed(origin, focus, 70.0, self.resolution) for origin in chosen]
+        raise no_room("three target cameras")
+
+
+@dataclass(frozen=True)
+class ObjectLayout:
+    """An object in empty space: cameras on a sphere around it, lights in a shell."""
+
+    space: FreeSpace
+    resolution: int
+
+    @property
+    def _radius(self) -> float:
+        geometry = self.space.geometry
+        return 0.5 * float(np.linalg.norm(geometry.hi - geometry.lo))
+
+    def camera(self, rng: np.random.Generator, index: int) -> Camera:
+        direction = rng.normal(size=3)
+        direction[2] = max(direction[2], -0.3 * float(np.linalg.norm(direction)))
+        origin = direction / np.linalg.norm(direction) * self._radius * rng.uniform(2.6, 3.2)
+        focus = rng.uniform(-0.1, 0.1, 3)
+        return aimed(origin, focus, rng.uniform(40.0, 50.0), self.resolution)
+
+    def light(self, rng: np.random.Generator, clearance: float) -> np.ndarray:
+        for _ in range(MAX_DRAWS):
+            point = rng.uniform(-2.0, 2.0, 3) * self._radius
+            if np.linalg.norm(point) < 2.0 * self._radius and self.space.has_room_for(point, clearance):
+                return point
+        raise no_room(f"a place {clearance:g} from any surface")
+
+    def target_cameras(self) -> list[Camera]:
+        cameras = []
+        for azimuth in (0.0, -0.6, 0.6):
+            origin = 3.0 * self._radius * np.array([math.sin(azimuth), -math.cos(azimuth), 0.35])
+            cameras.append(aimed(origin, np.zeros(3), 40.0, self.resolution))
+        return cameras
+
+
+def aimed(origin: np.ndarray, focus: np.ndarray, degrees: float, resolution: int) -> Camera:
+    """A square camera at `origin` that looks at `focus`, `degrees` across."""
+    pose = look_at(torch.as_tensor(origin, dtype=torch.float64), torch.as_tensor(focus, dtype=torch.float64))
+    return Camera.from_field_of_view(pose, math.radians(degrees), resolution, resolution)
+
+
+def no_room(what: str) -> InputError:
+    """The scene has no place for what is wanted."""
+    return InputError(
+        "scene",
+        expected=f"room for {what}",
+        found=f"none in {MAX_DRAWS} draws",
+        remedy="Use smaller boxes, a smaller clearance, or a scene with more free space.",
+    )

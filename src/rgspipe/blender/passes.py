@@ -1,0 +1,123 @@
+"""Render one frame and store its passes as the dataset's own files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from rgspipe.blender import cycles
+from rgspipe.blender.job import DatasetJob
+from rgspipe.blender.plan import Frame
+from rgspipe.datasets.exr import read_channels, write_channels, write_image
+from rgspipe.errors import InputError
+from rgspipe.scene import Camera, PointLight
+from rgspipe.scene.lights import WATTS_PER_INTENSITY
+
+#: Suffixes of the surface files beside an image, and their channels.
+SURFACE_CHANNELS = {"depth": ("Z",), "normal": ("X", "Y", "Z"), "albedo": ("R", "G", "B")}
+
+
+class Studio:
+    """A scene with one camera and one light that are moved from frame to frame.
+
+    Args:
+        scene: what stands there already; its camera is replaced.
+        job: the settings.
+        scratch: folder for Blender's own output.
+    """
+
+    def __init__(self, scene: bpy.types.Scene, job: DatasetJob, scratch: Path) -> None:
+        self._scene, self._job, self._scratch = scene, job, scratch
+        cycles.configure(scene, job)
+        self._camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
+        self._camera.data.clip_start, self._camera.data.clip_end = 1e-3, 1e3
+        light = bpy.data.lights.new("light", "POINT")
+        light.shadow_soft_size = 0.0
+        light.use_soft_falloff = False
+        self._light = bpy.data.objects.new("light", light)
+        for item in (self._camera, self._light):
+            scene.collection.objects.link(item)
+        scene.camera = self._camera
+
+    def render(self, frame: Frame, folder: Path) -> None:
+        """Render `frame` and write its files below `folder`, each whole or not at all."""
+        place_camera(self._camera, frame.camera)
+        place_light(self._light, frame.light)
+        if frame.has_surfaces:
+            cycles.use_center_sampling(self._scene)
+            self._write_surfaces(frame, folder)
+        cycles.use_colour_sampling(self._scene, self._job, frame.seed)
+        image, alpha = self._colour(self._passes())
+        write_image(folder / f"{frame.name}.exr", image, alpha)
+
+    def _passes(self) -> dict[str, np.ndarray]:
+        """Render, and return all passes by "<pass>.<channel>"."""
+        path = self._scratch / "render.exr"
+        self._scene.render.filepath = str(path)
+        bpy.ops.render.render(write_still=True, scene=self._scene.name)
+        channels = read_channels(path)
+        return {name.split(".", 1)[1]: values for name, values in channels.items()}
+
+    def _colour(self, passes: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+        return _stack(passes, "Combined", "RGB"), passes["Combined.A"]
+
+    def _write_surfaces(self, frame: Frame, folder: Path) -> None:
+        passes = self._passes()
+        depth = passes["Depth.Z"]
+        normal = face_camera(_stack(passes, "Normal", "XYZ"), frame.camera)
+        arrays = {"depth": depth[..., None], "normal": normal, "albedo": _stack(passes, "Diffuse Color", "RGB")}
+        for kind, names in SURFACE_CHANNELS.items():
+            # Half precision: normals to 5e-4, albedo to 3e-4 at worst, below what any later step resolves.
+            stored = arrays[kind] if kind == "depth" else arrays[kind].astype(np.float16)
+            write_channels(folder / f"{frame.name}_{kind}.exr", {n: stored[..., i] for i, n in enumerate(names)})
+
+
+def place_camera(item: bpy.types.Object, camera: Camera) -> None:
+    """Give Blender's camera the pose and field of view of ours (square pixels, axis in the middle)."""
+    item.matrix_world = Matrix(camera.camera_to_world.tolist())
+    item.data.sensor_fit = "HORIZONTAL"
+    item.data.sensor_width = 1.0
+    item.data.lens = camera.fx / camera.width
+
+
+def place_light(item: bpy.types.Object, light: PointLight) -> None:
+    """Give Blender's light our position and radiant intensity [W/sr]."""
+    item.location = light.position.tolist()
+    peak = float(light.intensity.max())
+    item.data.energy = WATTS_PER_INTENSITY * peak
+    item.data.color = (light.intensity / peak).tolist()
+
+
+def face_camera(normal: np.ndarray, camera: Camera) -> np.ndarray:
+    """Unit normals (H, W, 3) turned towards the camera; 0 stays 0."""
+    _, directions, _ = camera.rays()
+    away = (normal * directions.numpy().reshape(normal.shape)).sum(axis=-1, keepdims=True) > 0
+    length = np.linalg.norm(normal, axis=-1, keepdims=True)
+    unit = np.divide(normal, length, out=np.zeros_like(normal), where=length > 0.5)
+    return np.where(away, -unit, unit)
+
+
+def frame_files(frame: Frame, folder: Path) -> list[Path]:
+    """The files of a frame; the image, written last, stands last."""
+    surfaces = [folder / f"{frame.name}_{kind}.exr" for kind in SURFACE_CHANNELS] if frame.has_surfaces else []
+    return [*surfaces, folder / f"{frame.name}.exr"]
+
+
+def is_whole(frame: Frame, folder: Path) -> bool:
+    """Whether all files of a frame are there and can be read, at the right size."""
+    shape = (frame.camera.height, frame.camera.width)
+    for path in frame_files(frame, folder):
+        try:
+            channels = read_channels(path)
+        except InputError:
+            return False
+        if any(values.shape != shape for values in channels.values()):
+            return False
+    return True
+
+
+def _stack(passes: dict[str, np.ndarray], name: str, channels: str) -> np.ndarray:
+    return np.stack([passes[f"{name}.{channel}"] for channel in channels], axis=-1)

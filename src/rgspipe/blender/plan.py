@@ -1,0 +1,128 @@
+"""Every frame of a dataset, decided before the first one is rendered, so that a killed run can go on."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+
+from rgspipe.blender.cameras import MAX_DRAWS, Layout, no_room
+from rgspipe.blender.geometry import Geometry
+from rgspipe.blender.job import DatasetJob
+from rgspipe.blender.targets import OCCLUSION_CLASSES, classify, random_intensity
+from rgspipe.scene import Camera, PointLight
+
+log = logging.getLogger(__name__)
+
+#: Numbers of the random streams; part of the seed, so never renumber them.
+STREAMS = {"train": 0, "test": 1, "visible": 2, "out_of_frame": 3, "occluded": 4}
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One image to render.
+
+    Attributes:
+        name: path of the image below the dataset's folder, without suffix.
+        camera: the camera, square pixels.
+        light: the only light.
+        seed: of Cycles.
+        has_surfaces: whether depth, normal and albedo are wanted, too.
+    """
+
+    name: str
+    camera: Camera
+    light: PointLight
+    seed: int
+    has_surfaces: bool
+
+
+@dataclass(frozen=True)
+class TargetPlan:
+    """A fit target: the frames share one light."""
+
+    name: str
+    occlusion: str
+    frames: tuple[Frame, ...]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """All frames of a dataset, in the order in which they are rendered."""
+
+    train: tuple[Frame, ...]
+    test: tuple[Frame, ...]
+    targets: tuple[TargetPlan, ...]
+
+    @property
+    def frames(self) -> list[Frame]:
+        return [*self.train, *self.test, *(frame for target in self.targets for frame in target.frames)]
+
+
+def make_plan(job: DatasetJob, layout: Layout, geometry: Geometry) -> Plan:
+    """Draw all cameras and lights of `job`.
+
+    Raises:
+        InputError: the scene has no room for a camera or a light.
+    """
+    train = tuple(_view(job, layout, "train", index) for index in range(job.train_views))
+    test = tuple(_view(job, layout, "test", index) for index in range(job.test_views))
+    cameras = layout.target_cameras()
+    targets = [
+        target for occlusion in OCCLUSION_CLASSES for target in _targets(job, layout, geometry, cameras, occlusion)
+    ]
+    return Plan(train, test, tuple(targets))
+
+
+def _view(job: DatasetJob, layout: Layout, split: str, index: int) -> Frame:
+    rng = np.random.default_rng([job.seed, STREAMS[split], index])
+    camera = layout.camera(rng, index)
+    position = layout.light(rng, job.light_clearance)
+    light = _light(position, np.full(3, rng.uniform(0.75, 1.3)))
+    return Frame(f"{split}/r_{index:04d}", camera, light, int(rng.integers(2**31 - 1)), True)
+
+
+def _targets(
+    job: DatasetJob, layout: Layout, geometry: Geometry, cameras: list[Camera], occlusion: str
+) -> list[TargetPlan]:
+    """The targets of one class: all that are wanted, or as many as a user's scene has room for."""
+    targets: list[TargetPlan] = []
+    for index in range(job.targets_per_class):
+        rng = np.random.default_rng([job.seed, STREAMS[occlusion], index])
+        position = _find(job, layout, geometry, cameras, occlusion, rng)
+        if position is None:
+            if job.kind == "cornell":
+                raise no_room(f"a light of the class {occlusion}")
+            log.warning("The scene has no place for a light of the class %s: no such targets.", occlusion)
+            return targets
+        light = _light(position, random_intensity(rng))
+        name = f"{occlusion}_{index:03d}"
+        frames = tuple(
+            Frame(f"targets/{name}/view_{number}", camera, light, int(rng.integers(2**31 - 1)), False)
+            for number, camera in enumerate(cameras[: job.target_views])
+        )
+        targets.append(TargetPlan(name, occlusion, frames))
+    return targets
+
+
+def _find(
+    job: DatasetJob,
+    layout: Layout,
+    geometry: Geometry,
+    cameras: list[Camera],
+    occlusion: str,
+    rng: np.random.Generator,
+) -> np.ndarray | None:
+    """A light position of the wanted class; None if there seems to be none."""
+    clearance = job.hidden_light_clearance if occlusion == "occluded" else job.light_clearance
+    for _ in range(MAX_DRAWS // 4):
+        point = layout.light(rng, clearance)
+        if classify(point, cameras, geometry.blocked) == occlusion:
+            return point
+    return None
+
+
+def _light(position: np.ndarray, intensity: np.ndarray) -> PointLight:
+    return PointLight(torch.as_tensor(position), torch.as_tensor(intensity))

@@ -1,0 +1,102 @@
+"""Start Blender in a process of its own, show how far it is, and say clearly why it failed."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections import deque
+from pathlib import Path
+
+import rgspipe
+from rgspipe.blender.job import DatasetJob
+from rgspipe.datasets.json_file import read_json, write_json
+from rgspipe.errors import InputError
+from rgspipe.progress import track
+
+#: Prefix of the lines on the child's stdout that are messages; the rest is Blender's own talk.
+MESSAGE_PREFIX = "@rgspipe "
+
+#: The job is kept beside its images, so that those of another job are never mixed in.
+JOB_FILE = "job.json"
+
+#: Lines of Blender's output that an error shows.
+TAIL_LINES = 15
+
+
+def render_dataset(job: DatasetJob, folder: Path) -> None:
+    """Render the dataset of `job` into `folder`; frames that are already there and whole are kept.
+
+    May be killed at any moment and called again: the result is the same.
+
+    Raises:
+        InputError: the scene cannot be used, or `folder` holds the images of another job.
+        RuntimeError: Blender died; the message ends with the last lines it wrote.
+    """
+    folder = Path(folder).resolve()
+    folder.mkdir(parents=True, exist_ok=True)
+    _claim(job, folder)
+    command = [sys.executable, "-u", "-m", "rgspipe.blender", str(folder / JOB_FILE), str(folder), str(os.getpid())]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, text=True,
+        errors="replace", env=_environment(),
+    ) as child:  # fmt: skip
+        try:
+            tail, input_error = _follow(child, job.scene)
+        except BaseException:
+            child.kill()
+            raise
+    if input_error is not None:
+        raise InputError(input_error.pop("where"), **input_error)
+    if child.returncode != 0:
+        raise RuntimeError(f"Blender {_ending(child.returncode)} while rendering {folder}. Its last lines:\n{tail}")
+
+
+def _claim(job: DatasetJob, folder: Path) -> None:
+    """Write the job into its folder, or see that it is the one that is there."""
+    path = folder / JOB_FILE
+    wanted = json.loads(json.dumps(job.to_json()))
+    if not path.exists():
+        write_json(path, wanted)
+        return
+    found = read_json(path, "the job that these images belong to")
+    if found != wanted:
+        keys = sorted(key for key in wanted.keys() | found.keys() if wanted.get(key) != found.get(key))
+        raise InputError(
+            path,
+            expected="the job that is to be rendered",
+            found=f"another one (it differs in {', '.join(keys)})",
+            remedy="Choose an empty folder, or remove this one.",
+        )
+
+
+def _environment() -> dict[str, str]:
+    """The child finds the package where we found it, however that was."""
+    source = str(Path(rgspipe.__file__).resolve().parents[1])
+    paths = [source, *filter(None, [os.environ.get("PYTHONPATH")])]
+    return os.environ | {"PYTHONPATH": os.pathsep.join(paths)}
+
+
+def _follow(child: subprocess.Popen, scene: str) -> tuple[str, dict | None]:
+    """Show the child's progress until it ends; returns the last lines of its output, and an input error."""
+    tail: deque[str] = deque(maxlen=TAIL_LINES)
+    input_error = None
+    with track([], f"rendering {scene}", unit="frame") as bar:
+        for line in child.stdout:
+            if not line.startswith(MESSAGE_PREFIX):
+                tail.append(line.rstrip())
+                continue
+            message = json.loads(line[len(MESSAGE_PREFIX) :])
+            input_error = message.get("input_error", input_error)
+            if "total" in message:
+                bar.total, bar.initial = message["total"], message["done"]
+                bar.n = message["done"]
+                bar.refresh()
+            if "frame" in message:
+                bar.update(1)
+    return "\n".join(tail), input_error
+
+
+def _ending(status: int) -> str:
+    return f"was killed by signal {-status}" if status < 0 else f"ended with status {status}"

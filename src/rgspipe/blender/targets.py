@@ -1,0 +1,44 @@
+"""The classes of fit targets: lights in sight, out of every frame, and hidden behind something."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import torch
+
+from rgspipe.scene import Camera
+
+#: Tells whether a surface lies between two points.
+Blocked = Callable[[np.ndarray, np.ndarray], bool]
+
+OCCLUSION_CLASSES = ("visible", "out_of_frame", "occluded")
+
+
+def classify(point: np.ndarray, cameras: list[Camera], blocked: Blocked) -> str | None:
+    """The class of a light at `point` (3,), as seen by the fixed cameras.
+
+    `visible`: in the frame of every camera, nothing in between. `out_of_frame`: in no camera's frame.
+    `occluded`: behind something for every camera, and inside the first camera's frame. None: mixed.
+    """
+    framed = [in_frame(camera, point) for camera in cameras]
+    if not any(framed):
+        return "out_of_frame"
+    hidden = [blocked(camera.origin.numpy(), point) for camera in cameras]
+    if all(framed) and not any(hidden):
+        return "visible"
+    if all(hidden) and framed[0]:
+        return "occluded"
+    return None
+
+
+def in_frame(camera: Camera, point: np.ndarray) -> bool:
+    """Whether `point` (3,) projects into the image, obstructed or not."""
+    pixel, depth = camera.project(torch.as_tensor(point, dtype=torch.float64))
+    column, row = pixel.tolist()
+    return float(depth) > 0 and 0 <= column < camera.width and 0 <= row < camera.height
+
+
+def random_intensity(rng: np.random.Generator, base: float = 1.0) -> np.ndarray:
+    """(3,) W/sr: each channel exp(U(−0.7, 0.7)) times `base`."""
+    return base * np.exp(rng.uniform(-0.7, 0.7, 3))

@@ -1,0 +1,30 @@
+"""The JSON files of a rendered dataset: cameras, lights, targets, and the hidden truth apart from them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rgspipe.blender.job import DatasetJob
+from rgspipe.blender.passes import SURFACE_CHANNELS
+from rgspipe.blender.plan import Frame, Plan
+from rgspipe.blender.scenes import PreparedScene
+from rgspipe.datasets.gs3_write import frame_entry, write_info, write_target_list, write_transforms
+from rgspipe.datasets.light_file import write_lights
+
+
+def write_dataset_files(job: DatasetJob, plan: Plan, prepared: PreparedScene, folder: Path) -> None:
+    """Write everything but the images; all of it is decided before the first frame is rendered."""
+    write_transforms(folder / "transforms_train.json", [_view_entry(frame) for frame in plan.train])
+    write_transforms(folder / "transforms_test.json", [_view_entry(frame) for frame in plan.test])
+    for target in plan.targets:
+        entries = [frame_entry(Path(frame.name).name, frame.camera) for frame in target.frames]
+        write_transforms(folder / "targets" / target.name / "transforms.json", entries)
+        write_lights(folder / "truth" / f"{target.name}.json", (target.frames[0].light,))
+    write_target_list(folder, [(target.name, target.occlusion) for target in plan.targets])
+    bounds = [prepared.geometry.lo.tolist(), prepared.geometry.hi.tolist()]
+    write_info(folder, job.scene, bounds, prepared.rescale, list(prepared.offset))
+
+
+def _view_entry(frame: Frame) -> dict:
+    surfaces = tuple(SURFACE_CHANNELS) if frame.has_surfaces else ()
+    return frame_entry(frame.name, frame.camera, frame.light, surfaces)

@@ -1,0 +1,115 @@
+"""OpenEXR images, read with every check that keeps a broken file from going further, written atomically."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import OpenEXR
+
+from rgspipe.errors import InputError
+
+RENDER_AGAIN = "Export or render this image again."
+
+
+def read_channels(path: str | Path) -> dict[str, np.ndarray]:
+    """All channels of all parts of an EXR file: {name: (H, W) float32}.
+
+    Raises:
+        InputError: no such file, not an EXR file, truncated, or a channel that is not a plain image.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(path, expected="an OpenEXR image", found="no such file", remedy="Check the path.")
+    try:
+        with OpenEXR.File(str(path), separate_channels=True) as file:
+            pixels = {name: channel.pixels for part in file.parts for name, channel in part.channels.items()}
+    except Exception as error:  # the binding raises bare RuntimeError, ValueError or MemoryError for bad files
+        raise InputError(
+            path, expected="a whole OpenEXR image", found=f"a file that cannot be read ({error})", remedy=RENDER_AGAIN
+        ) from error
+    channels = {name: np.asarray(values, dtype=np.float32) for name, values in pixels.items() if values is not None}
+    if not channels or any(values.ndim != 2 or values.size == 0 for values in channels.values()):
+        raise InputError(path, expected="two-dimensional channels", found="none", remedy=RENDER_AGAIN)
+    return channels
+
+
+def read_array(path: str | Path, names: tuple[str, ...]) -> np.ndarray:
+    """The named channels of an EXR file as (H, W, len(names)) float32, all finite.
+
+    Raises:
+        InputError: as `read_channels`; also when the file has other channels, or NaN or infinite pixels.
+    """
+    channels = read_channels(path)
+    if set(channels) != set(names):
+        raise InputError(
+            path,
+            expected=f"{len(names)} channel{'s' * (len(names) > 1)} {', '.join(names)}",
+            found=f"{len(channels)}: {', '.join(sorted(channels))}",
+            remedy="Export the image with exactly these channels.",
+        )
+    array = np.stack([channels[name] for name in names], axis=-1)
+    bad = ~np.isfinite(array)
+    if bad.any():
+        row, column, channel = (int(index) for index in np.argwhere(bad)[0])
+        raise InputError(
+            path,
+            expected="finite pixels",
+            found=f"{int(bad.any(axis=-1).sum())} with NaN or infinity, the first in row {row}, column {column} "
+            f"(channel {names[channel]})",
+            remedy=RENDER_AGAIN,
+        )
+    return array
+
+
+def read_image(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
+    """Colour (H, W, 3) and alpha (H, W) of an RGB or RGBA file, float32, linear, premultiplied as stored.
+
+    Alpha is 1 for a file without it.
+
+    Raises:
+        InputError: as `read_array`.
+    """
+    names = read_channels(path).keys()
+    if set(names) == {"R", "G", "B"}:
+        image = read_array(path, ("R", "G", "B"))
+        return image, np.ones(image.shape[:2], np.float32)
+    image = read_array(path, ("R", "G", "B", "A"))
+    return np.ascontiguousarray(image[..., :3]), np.ascontiguousarray(image[..., 3])
+
+
+def write_channels(path: str | Path, channels: dict[str, np.ndarray]) -> None:
+    """Write {name: (H, W)} as one EXR file, losslessly; float16 stays half, all else becomes float32.
+
+    The file appears under its name only when it is whole.
+    """
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    stored = {}
+    for name, values in channels.items():
+        values = np.asarray(values)
+        stored[name] = np.ascontiguousarray(values if values.dtype == np.float16 else values.astype(np.float32))
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    # OpenEXR chooses the format by the suffix, so the temporary name keeps it.
+    temporary = path.with_name(f".{path.stem}.{os.getpid()}.partial.exr")
+    try:
+        OpenEXR.File(header, stored).write(str(temporary))
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def write_image(path: str | Path, image: np.ndarray, alpha: np.ndarray | None = None) -> None:
+    """Write colour (H, W, 3), with `alpha` (H, W) if given, as an EXR file; a CPU tensor will do, too.
+
+    Raises:
+        ValueError: `image` is not (H, W, 3).
+    """
+    image = np.asarray(image)
+    if image.ndim != 3 or image.shape[2] != 3:
+        raise ValueError(f"image must have shape (H, W, 3), got {image.shape}")
+    channels = {name: image[..., index] for index, name in enumerate("RGB")}
+    if alpha is not None:
+        channels["A"] = np.asarray(alpha)
+    write_channels(path, channels)

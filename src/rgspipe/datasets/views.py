@@ -1,0 +1,58 @@
+"""What a dataset holds once it is in memory: views with all that is known of them, and fit targets."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from torch import Tensor
+
+from rgspipe.scene import Camera, PointLight
+
+#: Where a target's hidden light is, as the target's cameras see it.
+Occlusion = Literal["visible", "out_of_frame", "occluded", "unknown"]
+
+
+@dataclass(frozen=True)
+class View:
+    """One image and what is known of it.
+
+    Attributes:
+        name: for people and tables, e.g. "train/r_0001".
+        camera: the camera that took it.
+        image: (H, W, 3) float32 linear radiance, premultiplied by alpha.
+        alpha: (H, W) float32 in [0, 1].
+        light: the one light that was on, intensity in W/sr; None in a fit target.
+        depth: (H, W) float32 planar depth at pixel centres, scene units; +inf where there is no surface.
+        normal: (H, W, 3) float32 unit world normals that face the camera; 0 where there is no surface.
+        albedo: (H, W, 3) float32 diffuse reflectance; 0 where there is no surface.
+    """
+
+    name: str
+    camera: Camera
+    image: Tensor
+    alpha: Tensor
+    light: PointLight | None = None
+    depth: Tensor | None = None
+    normal: Tensor | None = None
+    albedo: Tensor | None = None
+
+
+@dataclass(frozen=True)
+class Target:
+    """Views of the scene under the same unknown lights; every view's `light` is None."""
+
+    name: str
+    occlusion: Occlusion
+    views: tuple[View, ...]
+
+
+@dataclass(frozen=True)
+class Dataset:
+    """The training and held-out views of one scene, and the targets whose lights are to be found."""
+
+    root: Path
+    train: tuple[View, ...]
+    test: tuple[View, ...]
+    targets: tuple[Target, ...]
