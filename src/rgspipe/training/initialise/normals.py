@@ -1,0 +1,119 @@
+"""Surface normals of one view from its planar depth."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy.ndimage import correlate1d, uniform_filter
+
+#: Windows that a noisy depth map may need, in pixels from the centre to the border.
+RADII = (1, 2, 3, 5)
+
+#: A larger window is taken while noise would turn the normals by more than this [rad].
+NOISE_TOLERANCE = 0.08
+
+#: A window whose relative rms deviation from a plane is larger shows no surface.
+LARGEST_DEVIATION = 0.05
+
+
+def normals_from_depth(
+    depth: np.ndarray, focal: tuple[float, float], center: tuple[float, float], radius: int | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Normals in camera axes (x right, y up, looking along −z), by fitting planes to the inverse depth.
+
+    On a plane 1/z is an affine function of the pixel, 1/z = a·X + b·Y + c with (X, Y, −1) the pixel's ray,
+    and the normal is along ±(a, b, −c). Every window of the image gets such a fit; each pixel takes the
+    best-fitting one of the windows that contain it. A pixel beside an edge thus finds a window on its own side,
+    where an average around the pixel would round the edge.
+
+    Args:
+        depth: (H, W) planar depth at pixel centres, scene units; +inf where there is no surface.
+        focal: fx, fy in pixels.
+        center: cx, cy in pixels.
+        radius: half width of the windows in pixels; by default the smallest of RADII at which the map's
+            own noise, seen as deviation from the fits, turns the normals by at most NOISE_TOLERANCE.
+
+    Returns:
+        (H, W, 3) float64 unit normals that face the camera and 0 where there is none, and the (H, W) mask
+        of the pixels that have one.
+    """
+    if radius is not None:
+        return _fit(depth, focal, center, radius)[:2]
+    for radius in RADII:
+        normals, valid, deviation = _fit(depth, focal, center, radius)
+        turn = deviation * math.sqrt(focal[0] * focal[1]) / math.sqrt(_spread(radius) * (2 * radius + 1) ** 2)
+        if turn <= NOISE_TOLERANCE or 2 * RADII[-1] + 1 > min(depth.shape):
+            break
+    return normals, valid
+
+
+def _fit(
+    depth: np.ndarray, focal: tuple[float, float], center: tuple[float, float], radius: int
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Normals, mask, and the median relative rms deviation of the depth from the fits."""
+    height, width = depth.shape
+    seen = np.isfinite(depth)
+    inverse = np.where(seen, 1.0 / np.where(seen, depth, 1.0), 0.0).astype(np.float64)
+    mean, slope_x, slope_y, deviation = _window_fits(inverse, seen, radius)
+
+    best = np.full(depth.shape, np.inf)
+    chosen = np.zeros((3, height, width))
+    for dy in range(-radius, radius + 1):
+        for dx in range(-radius, radius + 1):
+            into, source = _shifted(height, dy), _shifted(height, -dy)
+            into_x, source_x = _shifted(width, dx), _shifted(width, -dx)
+            window, pixel = (source, source_x), (into, into_x)
+            fitted = mean[window] + dx * slope_x[window] + dy * slope_y[window]
+            off = (fitted - inverse[pixel]) / np.maximum(inverse[pixel], 1e-300)
+            # The pixel's own residual counts too: a good window just beyond an edge must not win. The tiny
+            # constant, far below float32, keeps rounding from choosing among windows that all fit exactly.
+            cost = deviation[window] ** 2 + 0.3 * off**2 + 1e-14 * (1 + dx * dx + dy * dy)
+            better = cost < best[pixel]
+            best[pixel] = np.where(better, cost, best[pixel])
+            for index, values in enumerate((fitted, slope_x[window], slope_y[window])):
+                chosen[index][pixel] = np.where(better, values, chosen[index][pixel])
+
+    valid = seen & (best < LARGEST_DEVIATION**2)
+    at_pixel, per_column, per_row = chosen
+    column, row = np.arange(width) + 0.5, (np.arange(height) + 0.5)[:, None]
+    a, b = per_column * focal[0], -per_row * focal[1]
+    x, y = (column - center[0]) / focal[0], -(row - center[1]) / focal[1]
+    # n·(X, Y, −1) < 0 faces the camera; with n = (−a, −b, c) that product is −1/z.
+    normals = np.stack([-a, -b, at_pixel - a * x - b * y], axis=-1)
+    normals /= np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-300)
+    fitting = deviation[seen & np.isfinite(deviation)]
+    return np.where(valid[..., None], normals, 0.0), valid, float(np.median(fitting)) if len(fitting) else 0.0
+
+
+def _window_fits(
+    inverse: np.ndarray, seen: np.ndarray, radius: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Least-squares planes in the window around each pixel: mean, slopes per column and row, relative rms deviation.
+
+    The deviation is infinite for windows that leave the image or hold pixels without a surface.
+    """
+    size = 2 * radius + 1
+    offsets = np.arange(-radius, radius + 1, dtype=np.float64)
+    mean = uniform_filter(inverse, size, mode="constant")
+    square = uniform_filter(inverse * inverse, size, mode="constant")
+    spread = _spread(radius)
+    along = [
+        correlate1d(correlate1d(inverse, offsets, axis, mode="constant"), np.ones(size), 1 - axis, mode="constant")
+        for axis in (1, 0)
+    ]
+    slope_x, slope_y = (moment / (spread * size * size) for moment in along)
+    variance = square - mean * mean - spread * (slope_x * slope_x + slope_y * slope_y)
+    whole = uniform_filter(seen.astype(np.float64), size, mode="constant") > 1.0 - 1e-6
+    deviation = np.sqrt(np.maximum(variance, 0.0)) / np.maximum(mean, 1e-300)
+    return mean, slope_x, slope_y, np.where(whole, deviation, np.inf)
+
+
+def _spread(radius: int) -> float:
+    """Variance of a window's pixel offsets along one axis."""
+    return radius * (radius + 1) / 3.0
+
+
+def _shifted(length: int, by: int) -> slice:
+    """The part of an axis that remains in it when moved back by `by`."""
+    return slice(max(by, 0), length + min(by, 0))

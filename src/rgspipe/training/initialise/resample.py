@@ -1,0 +1,98 @@
+"""Thinning a cloud and spreading surfel centres evenly over it."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from rgspipe.training.initialise.cloud import Cloud
+
+#: Opposite normals are as far apart as points at this many spacings; parallel sheets and the two sides of
+#: an edge therefore never share a surfel.
+NORMAL_WEIGHT = 40.0
+
+
+def estimate_spacing(cloud: Cloud, count: int) -> float:
+    """Roughly how far apart `count` surfels stand on the surfaces of `cloud`, scene units."""
+    low, high = np.percentile(cloud.points, [1.0, 99.0], axis=0)
+    edge = max(float(np.linalg.norm(high - low)) / 96.0, 1e-9)
+    cells = thin(cloud, edge)
+    # A plane meets |n|₁ cells per cell face of its area.
+    area = edge * edge * float((1.0 / np.abs(cells.normals).sum(axis=1)).sum())
+    return float(np.sqrt(area / count))
+
+
+def thin(cloud: Cloud, edge: float, average: bool = True) -> Cloud:
+    """One point for each grid cell of size `edge` and main direction of the normal: the mean, or the first one."""
+    axis = np.abs(cloud.normals).argmax(axis=1)
+    side = 2 * axis + (np.take_along_axis(cloud.normals, axis[:, None], 1)[:, 0] > 0)
+    # The odd fraction keeps walls at round coordinates away from cell borders, where rounding would split them.
+    cell = np.floor(cloud.points / edge + 0.37).astype(np.int64)
+    cell -= cell.min(axis=0)
+    reach = cell.max(axis=0) + 1
+    # In two steps, so that no product leaves 64 bits even when a stray point is far away.
+    _, plane = np.unique(cell[:, 0] * reach[1] + cell[:, 1], return_inverse=True)
+    _, first, label = np.unique((plane * reach[2] + cell[:, 2]) * 6 + side, return_index=True, return_inverse=True)
+    if not average:
+        return cloud[first]
+    size = np.bincount(label).astype(np.float64)
+    points = _sums(cloud.points, label, len(size)) / size[:, None]
+    normals = _sums(cloud.normals, label, len(size))
+    return Cloud(points, normals / np.linalg.norm(normals, axis=1, keepdims=True))
+
+
+def thin_for(cloud: Cloud, count: int, spacing: float) -> Cloud:
+    """`cloud` thinned to cells of a quarter of `spacing`, finer where that would leave fewer than 6 points a surfel."""
+    for edge in (spacing / 4.0, spacing / 8.0, spacing / 16.0):
+        thinned = thin(cloud, edge)
+        if len(thinned) >= 6 * count:
+            return thinned
+    return cloud
+
+
+def even_out(cloud: Cloud, count: int, spacing: float, rng: np.random.Generator, rounds: int = 10) -> Cloud:
+    """`count` centres spread evenly over `cloud`: Lloyd's algorithm on position and normal together.
+
+    Each round moves every centre to the mean of the points that are nearest to it; a centre that has lost
+    all of its points starts again at the point that is farthest from any centre.
+
+    Raises:
+        ValueError: fewer points than `count`.
+    """
+    if len(cloud) < count:
+        raise ValueError(f"{count} centres need as many points, got {len(cloud)}")
+    features = _features(cloud, spacing)
+    # Grid cells are denser on slanted surfaces, by |n|₁.
+    weights = 1.0 / np.abs(cloud.normals).sum(axis=1)
+    centers = features[rng.choice(len(features), count, replace=False, p=weights / weights.sum())]
+    for _ in range(rounds):
+        distance, label = cKDTree(centers).query(features, workers=-1)
+        total = np.bincount(label, weights, count)
+        centers = _sums(features * weights[:, None], label, count) / np.maximum(total, 1e-300)[:, None]
+        empty = np.flatnonzero(total == 0)
+        centers[empty] = features[np.argsort(-distance, kind="stable")[: len(empty)]]
+    normals = centers[:, 3:]
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    return Cloud(centers[:, :3].copy(), normals / np.maximum(length, 1e-300))
+
+
+def neighbour_spacing(centers: Cloud, spacing: float, neighbours: int = 4) -> np.ndarray:
+    """(N,) mean distance of each centre to its nearest ones of like normal, scene units, at most twice the median."""
+    features = _features(centers, spacing)
+    neighbours = min(neighbours, len(features) - 1)
+    if neighbours == 0:
+        return np.full(len(features), spacing)
+    _, index = cKDTree(features).query(features, k=neighbours + 1, workers=-1)
+    distance = np.linalg.norm(centers.points[index[:, 1:]] - centers.points[:, None], axis=-1).mean(axis=1)
+    median = float(np.median(distance))
+    return np.clip(distance, 0.25 * median, 2.0 * median)
+
+
+def _features(cloud: Cloud, spacing: float) -> np.ndarray:
+    """(M, 6) points and scaled normals, in which Euclidean distance tells surfaces apart."""
+    return np.concatenate([cloud.points, cloud.normals * (0.5 * NORMAL_WEIGHT * spacing)], axis=1)
+
+
+def _sums(values: np.ndarray, label: np.ndarray, count: int) -> np.ndarray:
+    """(count, D) sums of the rows of `values` that share a label."""
+    return np.stack([np.bincount(label, column, count) for column in values.T], axis=1)

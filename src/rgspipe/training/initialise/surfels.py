@@ -1,0 +1,128 @@
+"""The first surfels of a scene, from the depth of its training views."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from rgspipe.datasets.views import View
+from rgspipe.errors import InputError
+from rgspipe.scene.surfels import NO_CLIP, Coverage, Surfels, quaternion_from_normal, quaternion_to_axes
+from rgspipe.training.initialise.cloud import Cloud, NormalSource, cloud_from_views
+from rgspipe.training.initialise.edges import find_edges
+from rgspipe.training.initialise.planes import refit_planes
+from rgspipe.training.initialise.resample import estimate_spacing, even_out, neighbour_spacing, thin_for
+
+
+@dataclass(frozen=True)
+class Footprint:
+    """What every surfel starts as; lengths in units of the spacing to its neighbours.
+
+    Attributes:
+        scale: standard deviation of a whole surfel.
+        clipped_scale: of one that ends at an edge: larger, so that coverage stays full up to the edge.
+        opacity: in [0, 1].
+        albedo: in [0, 1]; training finds the true one.
+        coverage_low, coverage_high: thresholds of Coverage that go with these scales.
+        clip_softness: width of the ramp at an edge.
+        minimum_alpha: see Coverage.
+    """
+
+    scale: float = 0.6
+    clipped_scale: float = 0.85
+    opacity: float = 0.95
+    albedo: float = 0.5
+    coverage_low: float = 0.5
+    coverage_high: float = 0.9
+    clip_softness: float = 0.12
+    minimum_alpha: float = 0.01
+
+
+def initialise_surfels(
+    views: Sequence[View],
+    count: int,
+    *,
+    seed: int,
+    normals: NormalSource = "auto",
+    clips: bool = True,
+    footprint: Footprint | None = None,
+    where: str | Path = "the training views",
+) -> Surfels:
+    """`count` surfels spread evenly over the surfaces that the views' depth shows.
+
+    Depth is back-projected (p = o + d·r(x, y)), thinned, evened out in position and normal, and refined
+    against local planes; surfels near the border of a flat surface get straight edges there. What no view sees
+    gets no surfels.
+
+    Args:
+        views: training views; those without depth are passed over, at least one must have it.
+        count: surfels.
+        seed: the same views, count and seed give the same surfels.
+        normals: "estimate" fits them to the depth, "pass" takes the views' normal passes, "auto" the pass
+            where a view has one.
+        clips: whether surfels get straight edges.
+        footprint: scales, opacity and coverage to start from.
+        where: the dataset's folder, for errors.
+
+    Returns:
+        float32 surfels on the CPU; normals face the side that was seen.
+
+    Raises:
+        InputError: no depth, bad depth, or too few points for `count`.
+        ValueError: `count` is not positive.
+    """
+    if count < 1:
+        raise ValueError(f"count must be at least 1, got {count}")
+    footprint = footprint or Footprint()
+    cloud = cloud_from_views(views, normals=normals, where=where)
+    if len(cloud) < count:
+        raise InputError(
+            where,
+            expected=f"at least {count} depth pixels on surfaces, one for each of init.surfels={count}",
+            found=f"{len(cloud)} in {sum(view.depth is not None for view in views)} views",
+            remedy=f"Set init.surfels to at most {max(len(cloud) // 4, 1)}, or give more views or a higher resolution.",
+        )
+    centers = _place(cloud, count, np.random.default_rng(seed))
+    return _dress(centers, cloud, footprint, clips)
+
+
+def _place(cloud: Cloud, count: int, rng: np.random.Generator) -> Cloud:
+    """Evenly spread centres on the surfaces, with their normals."""
+    spacing = estimate_spacing(cloud, count)
+    thinned = thin_for(cloud, count, spacing)
+    centers = even_out(thinned, count, spacing, rng)
+    return refit_planes(centers, thinned, spacing)
+
+
+def _dress(centers: Cloud, cloud: Cloud, footprint: Footprint, clips: bool) -> Surfels:
+    """Surfels at `centers` with scales from their spacing and edges from `cloud`."""
+    count = len(centers)
+    spacing = neighbour_spacing(centers, estimate_spacing(cloud, count))
+    median = float(np.median(spacing))
+    rotations = quaternion_from_normal(torch.from_numpy(centers.normals))
+    offsets, angles = np.full((count, 2), NO_CLIP), np.zeros((count, 2))
+    if clips:
+        offsets, angles = find_edges(centers, quaternion_to_axes(rotations).numpy(), cloud, median)
+    clipped = offsets[:, 0] < NO_CLIP
+    scale = torch.from_numpy(np.where(clipped, footprint.clipped_scale, footprint.scale) * spacing).float()
+    coverage = Coverage(
+        low=footprint.coverage_low,
+        high=footprint.coverage_high,
+        layer_thickness=float(scale.median()),
+        clip_softness=footprint.clip_softness * median,
+        minimum_alpha=footprint.minimum_alpha,
+    )
+    return Surfels(
+        centers=torch.from_numpy(centers.points).float(),
+        rotations=rotations.float(),
+        scales=scale[:, None].repeat(1, 2),
+        opacities=torch.full((count,), footprint.opacity),
+        albedo=torch.full((count, 3), footprint.albedo),
+        clip_offsets=torch.from_numpy(offsets).float(),
+        clip_angles=torch.from_numpy(angles).float(),
+        coverage=coverage,
+    )
