@@ -32,6 +32,10 @@ INK, FAINT = "#222222", "#c9cdd2"
 ERROR_RANGE = (1e-4, 2.0)
 #: At most this many surfels are drawn as dots.
 CLOUD_POINTS = 6000
+#: At most this many points of one fit's course are drawn.
+CURVE_POINTS = 200
+#: How far beyond scene and lights the drawing reaches to show cameras, fraction of the scene's longest side.
+CAMERA_MARGIN = 0.3
 
 _STYLE = {
     "font.size": 9.0,
@@ -93,7 +97,7 @@ def convergence_figure(curves: pd.DataFrame) -> Figure:
     One column per method and view count; a thin line a target, a thick one for the class's median, in
     which a fit that has stopped stays where it is.
     """
-    groups = list(curves.groupby(["method", "views"], sort=True))
+    groups = list(curves.groupby(["method", "views"], sort=False))
     if not groups:
         raise ValueError("no convergence to draw")
     with matplotlib.rc_context(_STYLE):
@@ -120,7 +124,7 @@ def error_figure(targets: pd.DataFrame) -> Figure:
     known = targets[targets["position_error"].notna()]
     if known.empty:
         raise ValueError("no target has a known truth")
-    methods = sorted(known["method"].unique())
+    methods = list(dict.fromkeys(known["method"]))
     with matplotlib.rc_context(_STYLE):
         figure = Figure(figsize=(max(5.0, min(11.0, 5.2 * len(methods))), 5.6), layout="constrained")
         axes = figure.subplots(2, len(methods), squeeze=False, sharey="row")
@@ -138,32 +142,41 @@ def error_figure(targets: pd.DataFrame) -> Figure:
 def light_figure(
     targets: pd.DataFrame, cloud: ArrayLike, normals: ArrayLike | None = None, cameras: Sequence[CameraMark] = ()
 ) -> Figure:
-    """True and recovered lights in the scene, from above and from the side.
+    """True and recovered lights in the scene, from above and from the side (z is up).
 
     Args:
         targets: rows of `target_table` of one method and view count.
         cloud: (N, 3) surfel centres, drawn as grey dots.
         normals: (N, 3) surfel normals; where given, surfels that face the viewer (floor and ceiling
             from above) are left out, so that walls and objects stand out as outlines.
-        cameras: drawn as triangles that open in the viewing direction.
+        cameras: drawn as triangles that open in the viewing direction; those far outside the scene are
+            drawn nearer, on their line of sight.
     """
     points = to_array(cloud)
     if points.ndim != 2 or points.shape[1] != 3:
         raise ValueError(f"the cloud must have shape (N, 3), got {points.shape}")
     facing = None if normals is None else to_array(normals)
-    views = (("from above", 0, 1, 2), ("from the side", 0, 2, 1))
+    low, high = _extent(points, targets)
+    margin = 0.05 * float((high - low).max())
+    marks = [_nearer(camera, low, high) for camera in cameras]
+    origins = np.array([mark.origin for mark in marks]).reshape(-1, 3)
+    low = np.minimum(low, origins.min(axis=0, initial=math.inf)) - margin
+    high = np.maximum(high, origins.max(axis=0, initial=-math.inf)) + margin
+    depth = _viewing_axis(cameras)
+    panels = (("from above", 0, 1, 2), ("from the side", depth, 2, 1 - depth))
     with matplotlib.rc_context(_STYLE):
-        figure = Figure(figsize=(10.0, 5.2), layout="constrained")
-        for axis, (title, across, up, along) in zip(figure.subplots(1, 2), views, strict=True):
-            window = _window(points, targets, cameras, across, up)
+        widths = [float((high - low)[across]) for _, across, _, _ in panels]
+        figure = Figure(figsize=(10.0, 5.4), layout="constrained")
+        for axis, (title, across, up, along) in zip(figure.subplots(1, 2, width_ratios=widths), panels, strict=True):
+            window = np.stack([low, high])[:, [across, up]]
             _cloud(axis, points, facing, across, up, along)
-            for camera in cameras:
-                _camera(axis, camera, across, up, size=0.07 * max(np.ptp(window, axis=0)))
+            for mark in marks:
+                _camera(axis, mark, across, up, size=2.2 * margin)
             outside = _lights(axis, targets, window, across, up)
-            axis.set(xlim=window[:, 0], ylim=window[:, 1], aspect="equal")
+            axis.set(xlim=window[:, 0], ylim=window[:, 1], aspect="equal", anchor="S")
             axis.set_xlabel(f"{'xyz'[across]} (scene units)")
             axis.set_ylabel(f"{'xyz'[up]} (scene units)")
-            axis.set_title(title + (f" — {outside} estimates lie outside" if outside else ""))
+            axis.set_title(title + (f" ({outside} estimates lie outside)" if outside else ""))
         _class_legend(figure, targets["occlusion"], extra=_light_handles(bool(cameras)))
     return figure
 
@@ -235,6 +248,8 @@ def _curves(axis: Axes, group: pd.DataFrame, name: str, relative: bool) -> None:
                 continue
             values = np.maximum(values[known], 1e-12) if relative else _clipped(values[known])
             steps = curve["step"].to_numpy(dtype=float)[known]
+            kept = np.unique(np.linspace(0, len(steps) - 1, min(len(steps), CURVE_POINTS)).astype(int))
+            steps, values = steps[kept], values[kept]
             axis.plot(steps, values, color=colour_of(occlusion), lw=0.6, alpha=0.3)
             lines.append((steps, values))
         if lines:
@@ -260,20 +275,22 @@ def _strips(axis: Axes, group: pd.DataFrame, name: str) -> None:
     axis.set_yscale("log")
     classes, views = class_order(group["occlusion"]), sorted(group["views"].unique())
     jitter = np.random.default_rng(0)
-    ticks, labels = [], []
+    ticks: list[float] = []
     for place, occlusion in enumerate(classes):
         for index, count in enumerate(views):
             rows = group[(group["occlusion"] == occlusion) & (group["views"] == count)]
             values = _clipped(rows[name].dropna())
             x = place * (len(views) + 0.8) + index
             ticks.append(x)
-            labels.append(f"{LABELS.get(occlusion, occlusion)}\n{_views(count)}")
             if values.size:
                 _box(axis, x, values, colour_of(occlusion))
                 spread = x + jitter.uniform(-0.22, 0.22, values.size)
                 marker = MARKERS.get(occlusion, OTHER_MARKER)
                 axis.plot(spread, values, marker, ms=3.5, alpha=0.75, color=colour_of(occlusion), mew=0)
-    axis.set_xticks(ticks, labels, fontsize=8)
+    axis.set_xticks(ticks, [_views(count) for _ in classes for count in views], minor=True, fontsize=8)
+    middles = [float(np.mean(ticks[start : start + len(views)])) for start in range(0, len(ticks), len(views))]
+    axis.set_xticks(middles, [LABELS.get(name, name) for name in classes], fontsize=9)
+    axis.tick_params(axis="x", which="major", length=0, pad=17)
     axis.set_xlim(ticks[0] - 0.7, ticks[-1] + 0.7)
 
 
@@ -293,19 +310,35 @@ def _box(axis: Axes, x: float, values: npt.NDArray, colour: str) -> None:
     )
 
 
-def _window(
-    points: npt.NDArray, targets: pd.DataFrame, cameras: Sequence[CameraMark], across: int, up: int
-) -> npt.NDArray[np.float64]:
-    """(2, 2) corners of what is drawn: scene, true lights and cameras; wild estimates do not widen it."""
+def _extent(points: npt.NDArray, targets: pd.DataFrame) -> tuple[npt.NDArray, npt.NDArray]:
+    """Corners (3,) of scene and true lights; wild estimates do not widen the drawing."""
     true_lights = targets[["x_true", "y_true", "z_true"]].dropna().to_numpy(dtype=float)
-    origins = np.array([camera.origin for camera in cameras], dtype=float).reshape(-1, 3)
-    parts = [part[:, [across, up]] for part in (points, true_lights, origins) if len(part)]
-    if not parts:
-        parts = [np.array([[0.0, 0.0], [1.0, 1.0]])]
-    together = np.concatenate(parts)
+    together = np.concatenate([points, true_lights])
+    if not len(together):
+        return np.zeros(3), np.ones(3)
     low, high = together.min(axis=0), together.max(axis=0)
-    margin = 0.06 * max(float((high - low).max()), 1e-6)
-    return np.stack([low - margin, high + margin])
+    return low, np.maximum(high, low + 1e-6)
+
+
+def _nearer(camera: CameraMark, low: npt.NDArray, high: npt.NDArray) -> CameraMark:
+    """The camera moved along its viewing direction until it is within `CAMERA_MARGIN` of the scene, if it can be."""
+    reach = CAMERA_MARGIN * float((high - low).max())
+    origin, direction = np.array(camera.origin, dtype=float), np.array(camera.direction, dtype=float)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        entries = np.fmin((low - reach - origin) / direction, (high + reach - origin) / direction)
+        exits = np.fmax((low - reach - origin) / direction, (high + reach - origin) / direction)
+    enter, leave = float(np.nanmax(entries)), float(np.nanmin(exits))
+    if enter <= 0.0 or leave < enter:
+        return camera
+    return CameraMark(tuple((origin + enter * direction).tolist()), camera.direction, camera.angle)
+
+
+def _viewing_axis(cameras: Sequence[CameraMark]) -> int:
+    """0 or 1: the horizontal axis that the cameras look along, so that a side view shows depth; y without any."""
+    if not cameras:
+        return 1
+    mean = np.abs(np.mean([camera.direction for camera in cameras], axis=0))
+    return 0 if mean[0] > mean[1] else 1
 
 
 def _cloud(axis: Axes, points: npt.NDArray, facing: npt.NDArray | None, across: int, up: int, along: int) -> None:

@@ -91,7 +91,7 @@ def render_report(contents: ReportContents) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"percent": _percent, "decimals": _decimals, "label": _label}
+    environment.filters |= {"percent": _percent, "bare_percent": _bare_percent, "decimals": _decimals, "label": _label}
     method = goals.primary_method(contents.summary)
     budget = PICTURE_BYTES // max(1, len(contents.fits) + (contents.comparison is not None))
     return environment.get_template("report.html").render(
@@ -117,16 +117,15 @@ def data_address(content: bytes, kind: str) -> str:
 
 def stage_record(stage: str, manifest: Mapping[str, Any]) -> StageRecord:
     """An artifact's manifest as text; every field may be missing."""
-    seconds, memory = manifest.get("seconds"), manifest.get("peak_memory_mb")
-    code = manifest.get("code", manifest.get("code_version", MISSING))
+    seconds, memory = manifest.get("seconds"), manifest.get("peak_memory_mib")
     return StageRecord(
         stage=stage,
         fingerprint=str(manifest.get("fingerprint", MISSING)),
         seconds=MISSING if seconds is None else f"{float(seconds):.1f}",
         memory=MISSING if memory is None else f"{float(memory):.0f}",
         machine=_flat(manifest.get("machine")),
-        code=_flat(code),
-        libraries=_flat(manifest.get("libraries", manifest.get("versions"))),
+        code=_flat(manifest.get("code")),
+        libraries=_flat(manifest.get("libraries")),
     )
 
 
@@ -139,6 +138,10 @@ def _flat(value: Any) -> str:
 
 def _percent(value: Any, digits: int = 2) -> str:
     return MISSING if value is None or pd.isna(value) else goals.percent(float(value), digits)
+
+
+def _bare_percent(value: Any, digits: int = 2) -> str:
+    return _percent(value, digits).removesuffix(" %")
 
 
 def _decimals(value: Any, digits: int = 2) -> str:
@@ -217,7 +220,7 @@ def _light_figures(contents: ReportContents) -> list[dict]:
     if contents.cloud is None:
         return []
     drawn = []
-    for (method, views), group in contents.targets.groupby(["method", "views"], sort=True):
+    for (method, views), group in contents.targets.groupby(["method", "views"], sort=False):
         figure = plots.light_figure(group, contents.cloud, contents.normals, contents.cameras)
         title = f"{method}, {views} view{'s' if views > 1 else ''}"
         # A bitmap: thousands of dots would be far larger as drawing commands.

@@ -154,6 +154,8 @@ def target_table(
 def summary_table(targets: pd.DataFrame, seed: int, resamples: int = 4000) -> pd.DataFrame:
     """One row per method, view count and occlusion class, and one for all classes together.
 
+    Methods and view counts stand in the order in which they first occur.
+
     `count` is the number of targets, `judged` that of targets with a known truth: errors and success
     rate are over those. Position errors of failed fits are inf and count in the median. The interval
     `median_low`…`median_high` is a 95 % bootstrap interval; each row draws from a generator of its
@@ -161,7 +163,7 @@ def summary_table(targets: pd.DataFrame, seed: int, resamples: int = 4000) -> pd
     interval out.
     """
     rows = []
-    for (method, views), group in targets.groupby(["method", "views"], sort=True):
+    for (method, views), group in targets.groupby(["method", "views"], sort=False):
         present = [name for name in class_order(group["occlusion"]) if (group["occlusion"] == name).any()]
         for name in [*present, ALL]:
             chosen = group if name == ALL else group[group["occlusion"] == name]
