@@ -290,7 +290,8 @@ def _strips(axis: Axes, group: pd.DataFrame, name: str) -> None:
     axis.set_xticks(ticks, [_views(count) for _ in classes for count in views], minor=True, fontsize=8)
     middles = [float(np.mean(ticks[start : start + len(views)])) for start in range(0, len(ticks), len(views))]
     axis.set_xticks(middles, [LABELS.get(name, name) for name in classes], fontsize=9)
-    axis.tick_params(axis="x", which="major", length=0, pad=17)
+    axis.tick_params(axis="x", which="major", length=0, pad=17, labelsize=9)
+    axis.tick_params(axis="x", which="minor", labelsize=8)
     axis.set_xlim(ticks[0] - 0.7, ticks[-1] + 0.7)
 
 

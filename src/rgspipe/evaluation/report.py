@@ -110,6 +110,21 @@ def render_report(contents: ReportContents) -> str:
     )
 
 
+def group_title(method: str, views: int) -> str:
+    """The heading over what one method did with a number of views."""
+    return f"{method}, {views} view{'s' if views != 1 else ''}"
+
+
+def picture_caption(target: str, kind: str, position_error: float | None, psnr: float | None) -> str:
+    """The words under a fit's picture; `kind` is "median" or "worst"."""
+    measured = []
+    if position_error is not None:
+        measured.append(f"position error {_percent(float(position_error))}")
+    if psnr is not None:
+        measured.append(f"PSNR {_decimals(float(psnr), 1)} dB")
+    return f"{target}, {kind} of its class" + (": " + ", ".join(measured) if measured else "")
+
+
 def data_address(content: bytes, kind: str) -> str:
     """A data: address that holds `content` itself; `kind` is its MIME type."""
     return f"data:{kind};base64,{base64.b64encode(content).decode('ascii')}"
@@ -222,7 +237,7 @@ def _light_figures(contents: ReportContents) -> list[dict]:
     drawn = []
     for (method, views), group in contents.targets.groupby(["method", "views"], sort=False):
         figure = plots.light_figure(group, contents.cloud, contents.normals, contents.cameras)
-        title = f"{method}, {views} view{'s' if views > 1 else ''}"
+        title = group_title(method, views)
         # A bitmap: thousands of dots would be far larger as drawing commands.
         drawn.append({"title": title, "source": data_address(plots.png_of(figure), "image/png")})
     return drawn

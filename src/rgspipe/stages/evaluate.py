@@ -1,0 +1,192 @@
+"""Compare recovered lights with the truth: errors per target and per occlusion class."""
+
+from __future__ import annotations
+
+import json
+import math
+import shutil
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import torch
+
+from rgspipe.artifacts import Artifact
+from rgspipe.config import RgspipeConfig
+from rgspipe.datasets.gs3 import load_target
+from rgspipe.datasets.json_file import read_json
+from rgspipe.datasets.light_file import read_lights
+from rgspipe.datasets.surfel_file import load_surfels
+from rgspipe.evaluation import convergence, metrics, tables
+from rgspipe.scene import Camera, LightRig, PointLight
+from rgspipe.stages.base import Stage, StageContext
+
+
+@dataclass(frozen=True)
+class _Truth:
+    """What is known beside the fit: true rigs by target, the scene's box, and what is missing, in words."""
+
+    rigs: Mapping[str, LightRig]
+    bounds: list[list[float]] | None
+    notes: list[str]
+
+
+def run(context: StageContext) -> None:
+    """Write metrics.csv, summary.csv, convergence.csv, metrics.json and pictures/ of typical and worst targets."""
+    fit, config = context.inputs["fit_light"], context.config
+    results = pd.read_csv(fit.file("results.csv"), dtype={"target": str, "result": str, "reason": str})
+    estimates = {row["target"]: _estimate(fit, row) for row in results.to_dict("records")}
+    root = dataset_root(context.inputs.get("generate_dataset"))
+    truth = _truth(config, root, context.inputs.get("freeze"), list(estimates))
+    size = math.nan if truth.bounds is None else metrics.longest_side(truth.bounds)
+
+    targets = tables.target_table(results, estimates, truth.rigs, size, config.evaluate.success)
+    summary = tables.summary_table(targets, config.seed, config.evaluate.bootstrap)
+    targets.to_csv(context.folder / "metrics.csv", index=False)
+    summary.to_csv(context.folder / "summary.csv", index=False)
+    _curves(fit, targets, truth.rigs, size).to_csv(context.folder / "convergence.csv", index=False)
+    content = {
+        "version": 1,
+        "scene_size": size,
+        "bounds": truth.bounds,
+        "success_limit": config.evaluate.success,
+        "summary": summary.to_dict("records"),
+        "cameras": _cameras(config, root, targets),
+        "pictures": _copy_pictures(fit, targets, context.folder),
+        "notes": truth.notes,
+    }
+    text = json.dumps(_plain(content), indent=1, allow_nan=False)
+    (context.folder / "metrics.json").write_text(text + "\n", encoding="utf-8")
+    context.note(targets=len(targets), judged=int(targets["position_error"].notna().sum()))
+
+
+def dataset_root(dataset: Artifact | None) -> Path | None:
+    """The folder with the dataset's files: the artifact's own, or the foreign one that it points at."""
+    if dataset is None:
+        return None
+    if "dataset.json" in dataset.manifest["files"]:
+        return Path(read_json(dataset.file("dataset.json"), "where a foreign dataset lies")["root"])
+    return dataset.path
+
+
+def _estimate(fit: Artifact, row: Mapping[str, Any]) -> LightRig:
+    """The recovered rig of a target: its light file, or else the one light of its row; empty if the fit failed."""
+    name = f"{row['target']}/lights.json"
+    if name in fit.manifest["files"]:
+        return read_lights(fit.file(name))
+    values = torch.tensor([float(row.get(key, math.nan)) for key in "xyzrgb"], dtype=torch.float64)
+    return (PointLight(values[:3], values[3:]),) if bool(torch.isfinite(values).all()) else ()
+
+
+def _truth(config: RgspipeConfig, root: Path | None, freeze: Artifact | None, names: list[str]) -> _Truth:
+    notes: list[str] = []
+    if config.fit.target is not None:
+        given = Path(config.fit.truth) if config.fit.truth is not None else None
+        files = dict.fromkeys(names, given)
+    else:
+        files = {name: None if root is None else root / "truth" / f"{name}.json" for name in names}
+    rigs = {
+        name: read_lights(path)
+        for name, path in files.items()
+        if path is not None and (path.is_file() or config.fit.target is not None)
+    }
+    unknown = [name for name in names if name not in rigs]
+    if unknown:
+        shown = ", ".join(unknown[:5]) + (", …" if len(unknown) > 5 else "")
+        notes.append(
+            f"The true lights of {len(unknown)} of {len(names)} targets are not known ({shown}): no errors there."
+        )
+    bounds, source = _bounds(root, freeze)
+    if bounds is None:
+        notes.append("The size of the scene is not known, so there are no position errors.")
+    elif source == "surfels":
+        notes.append("The dataset does not state the scene's bounds; those of the surfels' centres stand in for them.")
+    return _Truth(rigs, bounds, notes)
+
+
+def _bounds(root: Path | None, freeze: Artifact | None) -> tuple[list[list[float]] | None, str]:
+    info = None if root is None else root / "dataset_info.json"
+    if info is not None and info.is_file():
+        stated = read_json(info, "what is known of the dataset").get("bounds")
+        if stated is not None:
+            return [[float(value) for value in corner] for corner in stated], "dataset"
+    if freeze is None:
+        return None, "nothing"
+    centers = load_surfels(freeze.file("surfels.safetensors")).centers.double()
+    return [centers.min(dim=0).values.tolist(), centers.max(dim=0).values.tolist()], "surfels"
+
+
+def _curves(fit: Artifact, targets: pd.DataFrame, truths: Mapping[str, LightRig], size: float) -> pd.DataFrame:
+    parts = []
+    for row in targets.to_dict("records"):
+        name = f"{row['target']}/convergence.csv"
+        if name in fit.manifest["files"]:
+            curve = pd.read_csv(fit.file(name))
+            parts.append(convergence.convergence_table(curve, row, truths.get(row["target"], ()), size))
+    return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=list(convergence.COLUMNS))
+
+
+def _copy_pictures(fit: Artifact, targets: pd.DataFrame, folder: Path) -> list[dict[str, Any]]:
+    """Copy the fit pictures of each class's median and worst target, so that a report needs no fit folder."""
+    rows = targets.set_index("target")
+    pictures = []
+    for occlusion, chosen in tables.exemplars(targets).items():
+        for kind, target in chosen.items():
+            source = f"{target}/fit.png"
+            if source not in fit.manifest["files"]:
+                continue
+            name = f"pictures/{occlusion}_{kind}.png"
+            (folder / "pictures").mkdir(exist_ok=True)
+            shutil.copyfile(fit.file(source), folder / name)
+            measured = {key: float(rows.loc[target, key]) for key in ("position_error", "psnr")}
+            pictures.append({"file": name, "target": target, "occlusion": occlusion, "kind": kind} | measured)
+    return pictures
+
+
+def _cameras(config: RgspipeConfig, root: Path | None, targets: pd.DataFrame) -> list[dict[str, Any]]:
+    """The cameras of the first target that the fit used: all targets of a dataset are seen by the same ones."""
+    if config.fit.target is not None:
+        folder = Path(config.fit.target)
+    elif root is not None and len(targets):
+        folder = root / "targets" / targets["target"].iloc[0]
+    else:
+        return []
+    views = load_target(folder).views
+    indices = config.views.indices if config.views.indices is not None else range(config.views.count)
+    return [_camera(views[index].camera) for index in indices if index < len(views)]
+
+
+def _camera(camera: Camera) -> dict[str, Any]:
+    return {
+        "origin": camera.origin.tolist(),
+        "direction": (-camera.camera_to_world[:3, 2]).tolist(),
+        "angle": 2.0 * math.atan(0.5 * camera.width / camera.fx),
+    }
+
+
+def _plain(value: Any) -> Any:
+    """`value` as strict JSON knows it: NaN becomes null, infinity the text "inf"."""
+    if isinstance(value, Mapping):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None if math.isnan(value) else "inf"
+    return value
+
+
+def _truth_file(config: RgspipeConfig) -> list[Path]:
+    return [] if config.fit.truth is None else [Path(config.fit.truth)]
+
+
+STAGE = Stage(
+    name="evaluate",
+    help="errors of the recovered lights per target and per class",
+    inputs=lambda config: ["fit_light", "generate_dataset", "freeze"],
+    config_keys=("evaluate", "seed", "views", "fit.target", "fit.truth"),
+    code=("rgspipe.evaluation.metrics", "rgspipe.evaluation.tables", "rgspipe.evaluation.convergence"),
+    files=_truth_file,
+    run=run,
+)

@@ -1,0 +1,161 @@
+"""Put everything into one self-contained HTML file: tables, pictures, configuration and provenance."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+import rgspipe.evaluation
+from rgspipe.artifacts import Artifact
+from rgspipe.config import RgspipeConfig, scene_name
+from rgspipe.datasets.json_file import read_json
+from rgspipe.datasets.surfel_file import load_surfels
+from rgspipe.evaluation import report
+from rgspipe.evaluation.plots import CameraMark
+from rgspipe.stages.base import Need, Stage, StageContext
+
+REPORT = "report.html"
+#: Sections that say how a run is done, not what comes out of it.
+_OPERATION = ("stage", "upstream", "outputs", "debug")
+
+
+def run(context: StageContext) -> None:
+    """Write report.html from the evaluations and what lies behind them."""
+    contents = _contents(context)
+    page = report.render_report(contents)
+    (context.folder / REPORT).write_text(page, encoding="utf-8")
+    context.note(bytes=len(page.encode("utf-8")), fits=len(contents.targets))
+
+
+def _contents(context: StageContext) -> report.ReportContents:
+    evaluations = context.input_lists.get("evaluate", ())
+    described = [read_json(artifact.file("metrics.json"), "what an evaluation found") for artifact in evaluations]
+    surfels = _surfels(context.inputs.get("freeze"))
+    trained = context.inputs.get("train_surfels")
+    return report.ReportContents(
+        scene=scene_name(context.config),
+        summary=_table(evaluations, "summary.csv"),
+        targets=_table(evaluations, "metrics.csv", {"success": "boolean", "result": str, "reason": str}),
+        curves=_table(evaluations, "convergence.csv"),
+        fits=_pictures(evaluations, described),
+        cloud=None if surfels is None else surfels.centers,
+        normals=None if surfels is None else surfels.normals,
+        cameras=_cameras(described),
+        training=_training(trained),
+        training_log=_optional_table(trained, "training.csv"),
+        comparison=_optional_bytes(trained, "comparison.png"),
+        success_limit=context.config.evaluate.success,
+        configuration=_configuration(context.config),
+        stages=[report.stage_record(_name(artifact), artifact.manifest) for artifact in _artifacts(context)],
+        notes=_notes(described),
+    )
+
+
+def _table(artifacts: Iterable[Artifact], name: str, types: Mapping[str, Any] | None = None) -> pd.DataFrame:
+    """The tables of this name of all artifacts, one below the other; empty tables add nothing."""
+    parts = [pd.read_csv(artifact.file(name), dtype=types) for artifact in artifacts]
+    filled = [part for part in parts if len(part)] or parts[:1]
+    if not filled:
+        return pd.DataFrame(columns=["method", "views", "occlusion", "target", "position_error"])
+    return pd.concat(filled, ignore_index=True)
+
+
+def _pictures(artifacts: Iterable[Artifact], described: Iterable[Mapping[str, Any]]) -> list[report.Picture]:
+    pictures = []
+    for artifact, content in zip(artifacts, described, strict=True):
+        for entry in content["pictures"]:
+            group = report.group_title(content["summary"][0]["method"], content["summary"][0]["views"])
+            caption = report.picture_caption(entry["target"], entry["kind"], entry["position_error"], entry["psnr"])
+            pictures.append(report.Picture(group, caption, artifact.file(entry["file"]).read_bytes()))
+    return pictures
+
+
+def _cameras(described: Iterable[Mapping[str, Any]]) -> list[CameraMark]:
+    """The cameras of the evaluation with the most views."""
+    most = max((content["cameras"] for content in described), key=len, default=[])
+    return [CameraMark(tuple(item["origin"]), tuple(item["direction"]), item["angle"]) for item in most]
+
+
+def _surfels(freeze: Artifact | None) -> Any:
+    return None if freeze is None else load_surfels(freeze.file("surfels.safetensors"))
+
+
+def _training(trained: Artifact | None) -> Mapping[str, Any] | None:
+    if trained is None or "metrics.json" not in trained.manifest["files"]:
+        return None
+    metrics = read_json(trained.file("metrics.json"), "the quality of the trained scene")
+    return {"seconds": trained.manifest.get("seconds")} | metrics
+
+
+def _optional_table(artifact: Artifact | None, name: str) -> pd.DataFrame | None:
+    if artifact is None or name not in artifact.manifest["files"]:
+        return None
+    table = pd.read_csv(artifact.file(name))
+    return table if len(table) else None
+
+
+def _optional_bytes(artifact: Artifact | None, name: str) -> bytes | None:
+    if artifact is None or name not in artifact.manifest["files"]:
+        return None
+    return artifact.file(name).read_bytes()
+
+
+def _configuration(config: RgspipeConfig) -> str:
+    shown = {key: value for key, value in dataclasses.asdict(config).items() if key not in _OPERATION}
+    return json.dumps(shown, indent=2)
+
+
+def _artifacts(context: StageContext) -> list[Artifact]:
+    """Every artifact behind the report, in the order of the pipeline."""
+    order = ("generate_dataset", "init_depth", "train_surfels", "freeze", "fit_light", "evaluate")
+    return [artifact for stage in order for artifact in context.input_lists.get(stage, ())]
+
+
+def _name(artifact: Artifact) -> str:
+    """The stage, and for fits and evaluations also how they were made where the manifest says so."""
+    config = artifact.manifest.get("config", {})
+    found = [config.get("fit.method"), config.get("views.count")]
+    shown = [str(value) for value in found if value is not None]
+    return artifact.stage + (f" ({', '.join(shown)})" if shown else "")
+
+
+def _notes(described: Iterable[Mapping[str, Any]]) -> list[str]:
+    """What the evaluations note, each once."""
+    return list(dict.fromkeys(note for content in described for note in content["notes"]))
+
+
+def _inputs(config: RgspipeConfig) -> list[Need | str]:
+    """Evaluations of every method and view count, and everything before them for its provenance."""
+    needs: list[Need | str] = []
+    for method in config.report.methods:
+        for views in config.report.views:
+            changes: dict[str, object] = {"fit.method": method, "views.count": views, "views.indices": None}
+            if method == "paper_adam" and config.fit.limit is None:
+                changes["fit.limit"] = config.report.paper_adam_limit
+            needs += [Need("fit_light", changes), Need("evaluate", changes)]
+    return [*needs, "freeze", "train_surfels", "init_depth", "generate_dataset"]
+
+
+def _keys(config: RgspipeConfig) -> list[str]:
+    """Everything that the report prints."""
+    return [field.name for field in dataclasses.fields(config) if field.name not in _OPERATION]
+
+
+def _template(config: RgspipeConfig) -> list[Path]:
+    return [Path(rgspipe.evaluation.__path__[0]) / "templates" / REPORT]
+
+
+STAGE = Stage(
+    name="report",
+    help="one HTML file with tables, pictures, configuration and provenance",
+    inputs=_inputs,
+    config_keys=_keys,
+    code=("rgspipe.evaluation",),
+    files=_template,
+    run=run,
+)
