@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.ndimage import correlate1d, uniform_filter
+from scipy.ndimage import correlate1d, minimum_filter, uniform_filter
 
 #: Windows that a noisy depth map may need, in pixels from the centre to the border.
 RADII = (1, 2, 3, 5)
@@ -74,7 +74,9 @@ def _fit(
             for index, values in enumerate((fitted, slope_x[window], slope_y[window])):
                 chosen[index][pixel] = np.where(better, values, chosen[index][pixel])
 
-    valid = seen & (best < LARGEST_DEVIATION**2)
+    fitting = deviation[seen & np.isfinite(deviation)]
+    noise = float(np.median(fitting)) if len(fitting) else 0.0
+    valid = seen & (best < LARGEST_DEVIATION**2) & ~_straddles(best, noise, radius)
     at_pixel, per_column, per_row = chosen
     column, row = np.arange(width) + 0.5, (np.arange(height) + 0.5)[:, None]
     a, b = per_column * focal[0], -per_row * focal[1]
@@ -82,8 +84,16 @@ def _fit(
     # n·(X, Y, −1) < 0 faces the camera; with n = (−a, −b, c) that product is −1/z.
     normals = np.stack([-a, -b, at_pixel - a * x - b * y], axis=-1)
     normals /= np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-300)
-    fitting = deviation[seen & np.isfinite(deviation)]
-    return np.where(valid[..., None], normals, 0.0), valid, float(np.median(fitting)) if len(fitting) else 0.0
+    return np.where(valid[..., None], normals, 0.0), valid, noise
+
+
+def _straddles(cost: np.ndarray, noise: float, radius: int) -> np.ndarray:
+    """Where even the best window fits ten times worse than that of a pixel nearby: it lies across an edge.
+
+    Compared with its surroundings, not with the whole map, so that curved surfaces beside flat ones stay.
+    """
+    nearby = minimum_filter(cost, 2 * radius + 3)
+    return cost > 100.0 * nearby + 9.0 * noise**2 + 1e-10
 
 
 def _window_fits(
