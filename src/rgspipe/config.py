@@ -291,8 +291,12 @@ def _range_text(rule: Mapping[str, Any]) -> str:
     if rule["choices"]:
         return f" ({' | '.join(rule['choices'])})"
     if rule["low"] is not None and rule["high"] is not None:
-        return f" ({rule['low']:g} to {rule['high']:g})"
+        return f" ({_short(rule['low'])} to {_short(rule['high'])})"
     return ""
+
+
+def _short(number: float) -> str:
+    return str(number) if isinstance(number, int) else f"{number:g}"
 
 
 def check_values(config: RgspipeConfig) -> None:
@@ -346,7 +350,7 @@ def _check_value(key: str, value: Any, rule: Mapping[str, Any]) -> None:
         if rule["low"] is not None and not (rule["low"] <= one <= rule["high"] and math.isfinite(one)):
             raise InputError(
                 key,
-                expected=f"a value from {rule['low']:g} to {rule['high']:g} ({rule['help']})",
+                expected=f"a value from {_short(rule['low'])} to {_short(rule['high'])} ({rule['help']})",
                 found=str(one),
                 remedy="Choose a value in this range.",
             )

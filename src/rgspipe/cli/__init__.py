@@ -1,0 +1,56 @@
+"""The command line: what to do with the arguments of `python -m rgspipe` (or `rgspipe`)."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+
+from rgspipe.cli.help import help_text, overview
+from rgspipe.cli.messages import EXIT_INPUT, show_input_error
+from rgspipe.errors import InputError
+from rgspipe.pipeline import StageLoader
+from rgspipe.stages import load_stage
+
+__all__ = ["main"]
+
+MULTIRUN_FLAGS = ("-m", "--multirun")
+
+
+def main(arguments: Sequence[str] | None = None, stage_loader: StageLoader = load_stage) -> int:
+    """Do what the arguments say and return the exit status: 0 done, 1 failed, 2 input that cannot be used.
+
+    Args:
+        arguments: those after the program's name; by default the process's own.
+        stage_loader: gives a stage by name.
+    """
+    arguments = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        return _dispatch(arguments, stage_loader)
+    except InputError as error:
+        show_input_error(error)
+        return EXIT_INPUT
+
+
+def _dispatch(arguments: list[str], stage_loader: StageLoader) -> int:
+    if not arguments:
+        print(overview())
+        return 0
+    if arguments[0] in ("-h", "--help", "help"):
+        print(help_text(arguments[1:]))
+        return 0
+    if arguments[0] == "status":
+        from rgspipe.cli.runs import show_runs
+
+        return show_runs(arguments[1:])
+    name = next((text.partition("=")[2] for text in arguments if text.startswith("pipeline=")), None)
+    if name is not None:
+        from rgspipe.cli.sequence import run_sequence
+
+        return run_sequence(name, [text for text in arguments if not text.startswith("pipeline=")])
+    # Hydra and the schema take a third of a second to import, which help and status need not wait for.
+    from rgspipe.cli.jobs import run_hydra, run_jobs
+
+    if any(text.startswith("-") and text not in MULTIRUN_FLAGS for text in arguments):
+        return run_hydra(arguments, stage_loader)
+    overrides = [text for text in arguments if text not in MULTIRUN_FLAGS]
+    return run_jobs(overrides, stage_loader, multirun=len(overrides) < len(arguments))

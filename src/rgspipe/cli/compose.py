@@ -1,0 +1,238 @@
+"""From the command line's overrides to the typed configuration, with errors for people."""
+
+from __future__ import annotations
+
+import difflib
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from hydra import compose, initialize_config_dir
+from hydra.core.config_store import ConfigStore
+from hydra.core.override_parser.overrides_parser import OverridesParser
+from hydra.core.override_parser.types import Override
+from hydra.errors import ConfigCompositionException, HydraException, MissingConfigException, OverrideParseException
+from omegaconf import DictConfig, OmegaConf
+from omegaconf.errors import OmegaConfBaseException
+
+from rgspipe.config import RgspipeConfig, check_values
+from rgspipe.errors import InputError
+from rgspipe.resources import resource_folder
+from rgspipe.stages import NAMES, load_stage
+
+CONFIG_NAME = "config"
+HYDRA_VERSION_BASE = "1.3"
+
+#: Parts of Hydra's own configuration that may hold any key.
+FREE_SECTIONS = (
+    "hydra.job.env_set.",
+    "hydra.job_logging.",
+    "hydra.hydra_logging.",
+    "hydra.callbacks.",
+    "hydra.sweeper.params.",
+)
+
+#: A sweep may have thousands of values; this many of each key are tried before the first job starts.
+CHECKED_VALUES = 50
+
+
+def register_schema() -> None:
+    """Let the files under conf/ extend the typed schema."""
+    ConfigStore.instance().store(name="schema", node=RgspipeConfig, provider="rgspipe")
+
+
+def config_folder() -> str:
+    """The absolute path of conf/."""
+    return str(resource_folder("conf"))
+
+
+def typed(values: DictConfig) -> RgspipeConfig:
+    """The configuration as plain dataclasses, checked.
+
+    Raises:
+        InputError: a value is missing or out of range.
+    """
+    if OmegaConf.is_missing(values, "stage"):
+        raise InputError(
+            "stage", expected=f"one of {', '.join(NAMES)}", found="nothing", remedy="Say which: stage=NAME."
+        )
+    try:
+        config = OmegaConf.to_object(values)
+    except OmegaConfBaseException as error:
+        raise _value_error(error, "") from None
+    assert isinstance(config, RgspipeConfig)
+    check_values(config)
+    return config
+
+
+def compose_config(overrides: Sequence[str]) -> RgspipeConfig:
+    """The checked configuration of one run.
+
+    Raises:
+        InputError: an override is misspelt, of the wrong type or out of range.
+    """
+    _check_keys(_parse(overrides))
+    try:
+        return typed(_compose(overrides))
+    except (HydraException, OmegaConfBaseException) as error:
+        raise _composition_error(error, overrides) from None
+
+
+def check_sweep(overrides: Sequence[str]) -> RgspipeConfig:
+    """Check every value of a sweep before its first job starts.
+
+    Returns:
+        the configuration of the first job.
+    """
+    parsed = _parse(overrides)
+    first = [_first_value(override) for override in parsed]
+    config = compose_config(first)
+    for index, override in enumerate(parsed):
+        for text in itertools.islice(_values(override), 1, CHECKED_VALUES):
+            compose_config([*first[:index], text, *first[index + 1 :]])
+    return config
+
+
+def _compose(overrides: Sequence[str], hydra: bool = False) -> DictConfig:
+    register_schema()
+    with initialize_config_dir(version_base=HYDRA_VERSION_BASE, config_dir=config_folder(), job_name="rgspipe"):
+        return compose(CONFIG_NAME, overrides=list(overrides), return_hydra_config=hydra)
+
+
+def _parse(overrides: Sequence[str]) -> list[Override]:
+    for text in overrides:
+        if "=" not in text and not text.startswith("~"):
+            remedy = f"Did you mean stage={text}?" if text in NAMES else "See python -m rgspipe --help."
+            raise InputError(repr(text), expected="key=value", found="no '='", remedy=remedy)
+    parsed = []
+    for text in overrides:
+        try:
+            parsed += OverridesParser.create().parse_overrides([text])
+        except OverrideParseException:
+            raise InputError(
+                repr(text),
+                expected="key=value",
+                found="text that does not parse",
+                remedy="Quote values with special characters, such as key='\"a b\"'; lists are written [1,2].",
+            ) from None
+    return parsed
+
+
+def _first_value(override: Override) -> str:
+    return next(_values(override), override.input_line or "")
+
+
+def _values(override: Override) -> Iterator[str]:
+    """The overrides of the single jobs that one override of a sweep stands for."""
+    if not override.is_sweep_override() or not (override.is_choice_sweep() or override.is_range_sweep()):
+        if not override.is_sweep_override():
+            yield override.input_line or ""
+        return
+    for value in override.sweep_string_iterator():
+        yield f"{override.get_key_element()}={value}"
+
+
+def _check_keys(overrides: Sequence[Override]) -> None:
+    """Refuse what Hydra lets through: keys that `+` would add, and deletions."""
+    if not any(override.is_add() or override.is_force_add() or override.is_delete() for override in overrides):
+        return
+    known = _known_keys()
+    for override in overrides:
+        key = override.key_or_group
+        if override.is_delete():
+            raise InputError(
+                f"~{key}", expected="key=value", found="a deletion", remedy=f"Set {key} instead: no key can go."
+            )
+        if (override.is_add() or override.is_force_add()) and not key.startswith(FREE_SECTIONS) and key not in known:
+            raise _unknown_key(key, known)
+
+
+def _known_keys() -> list[str]:
+    """Every dotted key, section and group."""
+    values = OmegaConf.to_container(_compose([], hydra=True), resolve=False)
+    assert isinstance(values, dict)
+    folders = [path for path in resource_folder("conf").iterdir() if path.is_dir()]
+    return [*_flat(values), *(path.name for path in folders), "hydra/launcher", "hydra/sweeper", "pipeline"]
+
+
+def _flat(values: Mapping[Any, Any], prefix: str = "") -> Iterator[str]:
+    for key, value in values.items():
+        yield f"{prefix}{key}"
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{prefix}{key}.")
+
+
+def _composition_error(error: Exception, overrides: Sequence[str]) -> InputError:
+    if isinstance(error, MissingConfigException):
+        return _unknown_choice(error)
+    known = _known_keys()
+    for override in _parse(overrides):
+        if override.key_or_group not in known and not override.key_or_group.startswith(FREE_SECTIONS):
+            return _unknown_key(override.key_or_group, known)
+    if isinstance(error, ConfigCompositionException) and isinstance(error.__cause__, OmegaConfBaseException):
+        return _value_error(error.__cause__, str(error).rpartition(" ")[2])
+    ambiguous = next((text for text in overrides if f"'{text}'" in str(error)), None)
+    if ambiguous is not None and "multirun" in str(error):
+        return InputError(
+            ambiguous.partition("=")[0],
+            expected="one value",
+            found=ambiguous.partition("=")[2],
+            remedy="Add -m to run one job for each value, or write a list as [a,b].",
+        )
+    return InputError(
+        "the command line",
+        expected="overrides that fit the configuration",
+        found=" ".join(str(error).split()),
+        remedy="See python -m rgspipe --help.",
+    )
+
+
+def _unknown_key(key: str, known: Sequence[str]) -> InputError:
+    return InputError(
+        key, expected="a key of the configuration", found="no such key", remedy=f"{_suggestion(key, known)}"
+    )
+
+
+def _suggestion(key: str, known: Sequence[str]) -> str:
+    near = difflib.get_close_matches(key, known, n=3, cutoff=0.7)
+    # The right name in the wrong section, such as resolution= for dataset.resolution=.
+    last = key.rpartition(".")[2]
+    near += [name for name in known if name.rpartition(".")[2] == last and name not in near][:3]
+    if near:
+        return f"Did you mean {' or '.join(near)}?"
+    section = key.partition(".")[0]
+    if section in known and section != key:
+        return f"python -m rgspipe --help {section} lists the keys of {section}."
+    return "python -m rgspipe --help lists the keys."
+
+
+def _unknown_choice(error: MissingConfigException) -> InputError:
+    """Hydra lists the options of the group in its message and names the missing file."""
+    group, _, found = str(error.missing_cfg_file).rpartition("/")
+    options = list(error.options or [])
+    near = difflib.get_close_matches(found, options, n=1)
+    remedy = f"Did you mean {group}={near[0]}?" if near else f"Choose one of them: {group}=NAME."
+    return InputError(group, expected=f"one of {', '.join(options)}", found=repr(found), remedy=remedy)
+
+
+def _value_error(error: OmegaConfBaseException, override: str) -> InputError:
+    key = str(error.full_key or override.partition("=")[0] or "the configuration")
+    text = (error.msg or str(error)).splitlines()[0]
+    types = {"Integer": "a whole number", "Float": "a number", "Boolean": "true or false"}
+    for name, meaning in types.items():
+        if text.endswith(f"could not be converted to {name}"):
+            found = text.removeprefix("Value ").partition(" of type ")[0]
+            return InputError(key, expected=meaning, found=found, remedy=f"Write {key}={_example(name)}, for instance.")
+    return InputError(
+        key, expected="a value of the right type", found=text, remedy="See python -m rgspipe --help for the keys."
+    )
+
+
+def _example(type_name: str) -> str:
+    return {"Integer": "8", "Float": "0.5", "Boolean": "true"}[type_name]
+
+
+def check_stage(name: str) -> None:
+    """Refuse a stage that does not exist; imports nothing heavy when it does not."""
+    if name not in NAMES:
+        load_stage(name)

@@ -1,0 +1,119 @@
+"""What `python -m rgspipe` and `python -m rgspipe --help` say."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Sequence
+from pathlib import Path
+
+from rgspipe.config import RgspipeConfig, describe
+from rgspipe.errors import InputError
+from rgspipe.resources import resource_folder
+from rgspipe.stages import NAMES, stage_summary
+
+SCENES = """\
+  cornell    a Cornell box with two boxes, modelled and rendered with Blender; scene.cornell.* sets its measures
+  blend      a Blender file of yours: scene=blend scene.path=my.blend
+  external   images, cameras and lights from disk, no Blender needed: scene=external scene.path=DIR"""
+
+EXAMPLES = """\
+  python -m rgspipe pipeline=smoke                                  the whole way, tiny, in minutes
+  python -m rgspipe pipeline=reproduce                              the whole way, with a report at the end
+  python -m rgspipe stage=train_surfels scene=cornell               a trained scene (and the images before it)
+  python -m rgspipe stage=evaluate views=multi occlusion=occluded   lights out of sight, from three views
+  python -m rgspipe -m stage=evaluate views.count=1,2,3             a sweep: one job for each value
+  python -m rgspipe status                                          how the runs so far ended"""
+
+
+def overview() -> str:
+    """What a newcomer needs to know to start."""
+    return f"""\
+rgspipe: from images of a scene, find its lights.
+
+It learns a scene of Gaussian surfels from images with known lights, freezes it with its global illumination,
+and then finds unknown lights from one or a few images, also when they are out of sight.
+
+Stages, each of which makes what it needs of those before it (stage=NAME):
+{_stages()}
+
+Scenes (scene=NAME, cornell if nothing is said):
+{SCENES}
+
+First commands:
+{EXAMPLES}
+
+Results are in outputs/<scene>/<stage>/latest. Keys and groups: python -m rgspipe --help"""
+
+
+def help_text(topics: Sequence[str] = ()) -> str:
+    """The long help, or the keys of one section or group.
+
+    Raises:
+        InputError: there is no such section.
+    """
+    if topics:
+        return "\n\n".join(_topic(topic) for topic in topics)
+    return f"""\
+{overview()}
+
+Groups (GROUP=CHOICE) of settings:
+{_groups()}
+
+Pipelines (pipeline=NAME): {", ".join(path.stem for path in sorted(resource_folder("pipelines").glob("*.yaml")))}
+
+Keys (KEY=VALUE), by section; python -m rgspipe --help SECTION shows one with its units and ranges:
+{_sections()}
+
+More:
+  upstream=require      refuse, instead of making, missing inputs
+  -m                    sweep over all combinations of comma-separated values; hydra.launcher.n_jobs=K jobs at once
+  --cfg job             show the whole configuration instead of running it
+  debug.traceback=true  show tracebacks (or set RGSPIPE_TRACEBACK=1)
+  --hydra-help          options of Hydra, which reads the command line
+Exit status: 0 done, 1 failed, 2 input that cannot be used."""
+
+
+def _stages() -> str:
+    return "\n".join(f"  {name:<17} {stage_summary(name)}".rstrip() for name in NAMES)
+
+
+def _groups() -> str:
+    lines = []
+    for folder in sorted(path for path in resource_folder("conf").iterdir() if path.is_dir()):
+        lines.append(f"  {folder.name:<11} {' | '.join(_choices(folder))}")
+    return "\n".join(lines)
+
+
+def _choices(folder: Path) -> list[str]:
+    return [path.stem for path in sorted(folder.glob("*.yaml"))]
+
+
+def _sections() -> str:
+    sections: dict[str, list[str]] = {}
+    for key, _, _ in describe(RgspipeConfig):
+        section, _, name = key.partition(".")
+        sections.setdefault(section, []).append(name)
+    single = [name for name, keys in sections.items() if keys == [""]]
+    lines = [f"  {'':<11} {', '.join(single)}"]
+    lines += [f"  {name:<11} {', '.join(keys)}" for name, keys in sections.items() if keys != [""]]
+    return "\n".join(lines)
+
+
+def _topic(topic: str) -> str:
+    rows = [row for row in describe(RgspipeConfig) if row[0] == topic or row[0].startswith(f"{topic}.")]
+    folder = resource_folder("conf") / topic
+    if not rows and not folder.is_dir():
+        names = [key for key, _, _ in describe(RgspipeConfig)]
+        near = difflib.get_close_matches(topic, [*names, *(name.partition(".")[0] for name in names)], n=1)
+        remedy = f"Did you mean {near[0]}?" if near else "python -m rgspipe --help lists them."
+        raise InputError(f"--help {topic}", expected="a section, a key or a group", found="none", remedy=remedy)
+    lines = [f"{topic}={' | '.join(_choices(folder))}"] if folder.is_dir() else []
+    width = max((len(key) for key, _, _ in rows), default=0)
+    lines += [f"  {key:<{width}}  {help}; default {_shown(default)}" for key, help, default in rows]
+    return "\n".join(lines)
+
+
+def _shown(default: object) -> str:
+    if default is None:
+        return "null"
+    return str(default).lower() if isinstance(default, bool) else str(default)

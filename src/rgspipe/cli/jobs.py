@@ -1,0 +1,128 @@
+"""Runs and sweeps: one status file each, one failed job hides no other."""
+
+from __future__ import annotations
+
+import datetime
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import hydra
+from hydra.core.hydra_config import HydraConfig
+from hydra.types import RunMode
+from omegaconf import DictConfig
+
+from rgspipe.cli.compose import (
+    CONFIG_NAME,
+    HYDRA_VERSION_BASE,
+    check_stage,
+    check_sweep,
+    compose_config,
+    config_folder,
+    register_schema,
+    typed,
+)
+from rgspipe.cli.messages import EXIT_FAILED, EXIT_INPUT, show_failure, show_input_error
+from rgspipe.errors import InputError
+from rgspipe.pipeline import StageLoader, run
+from rgspipe.stages import load_stage
+from rgspipe.status import RunStatus, read_status, read_statuses
+
+
+def run_jobs(overrides: Sequence[str], stage_loader: StageLoader, multirun: bool) -> int:
+    """Run one configuration, or all of a sweep.
+
+    Raises:
+        InputError: an override cannot be used; nothing was started.
+    """
+    config = check_sweep(overrides) if multirun else compose_config(overrides)
+    if stage_loader is load_stage:
+        check_stage(config.stage)
+    key = "hydra.sweep.dir" if multirun else "hydra.run.dir"
+    given = next((text.partition("=")[2] for text in overrides if text.startswith(f"{key}=")), None)
+    folder = Path(given) if given else new_run_folder(Path(config.outputs), "sweep" if multirun else config.stage)
+    chosen = [] if given else [f"{key}={quoted(folder)}"]
+    code = run_hydra([*(["-m"] if multirun else []), *overrides, *chosen], stage_loader)
+    if multirun:
+        return _sweep_summary(folder, code)
+    status = read_status(folder)
+    return code if status is None else int(status.get("exit_code", EXIT_FAILED))
+
+
+def run_hydra(arguments: Sequence[str], stage_loader: StageLoader) -> int:
+    """Hand the arguments to Hydra as they are; its exit status."""
+
+    # A closure, so that worker processes get the stage loader with it.
+    def job(values: DictConfig) -> int:
+        return _job(values, stage_loader)
+
+    register_schema()
+    application = hydra.main(version_base=HYDRA_VERSION_BASE, config_path=config_folder(), config_name=CONFIG_NAME)(job)
+    former = sys.argv
+    sys.argv = ["rgspipe", *arguments]
+    try:
+        application()
+    except SystemExit as error:
+        return error.code if isinstance(error.code, int) else EXIT_FAILED
+    finally:
+        sys.argv = former
+    return 0
+
+
+def new_run_folder(outputs: Path, what: str) -> Path:
+    """Make outputs/runs/<time>_<what>, with a number if another run has the name."""
+    stamp = datetime.datetime.now().strftime("%Y-%m-%d_%H-%M-%S")
+    number = 1
+    while True:
+        folder = outputs / "runs" / f"{stamp}_{what}{f'_{number}' if number > 1 else ''}"
+        try:
+            folder.mkdir(parents=True)
+        except FileExistsError:
+            number += 1
+        else:
+            return folder
+
+
+def quoted(path: Path) -> str:
+    """A path as a value of Hydra's override grammar."""
+    text = str(path).replace("\\", "\\\\").replace("'", "\\'")
+    return f"'{text}'"
+
+
+def _job(values: DictConfig, stage_loader: StageLoader) -> int:
+    """One run, or one job of a sweep; its exit status."""
+    settings = HydraConfig.get()
+    overrides = list(settings.overrides.task)
+    status = RunStatus.start(Path(settings.runtime.output_dir), str(values.get("stage")), overrides)
+    wanted = bool(values.debug.traceback)
+    try:
+        config = typed(values)
+        artifact = run(config, stage_loader, overrides)
+    except InputError as error:
+        status.failed(error, EXIT_INPUT)
+        show_input_error(error, wanted)
+        return EXIT_INPUT
+    except Exception as error:
+        status.failed(error, EXIT_FAILED)
+        show_failure(error, status.path, wanted)
+        return EXIT_FAILED
+    except BaseException as error:
+        status.failed(error, EXIT_FAILED)
+        raise
+    status.done(artifact.path)
+    if settings.mode == RunMode.RUN:
+        print(f"Result: {artifact.path}")
+    return 0
+
+
+def _sweep_summary(folder: Path, code: int) -> int:
+    """Print how each job ended; the largest exit status."""
+    jobs = read_statuses(folder)
+    for path, status in jobs:
+        state = "killed" if status["state"] in ("killed", "running") else status["state"]
+        print(f"  job {path.name}: {state:<6} {' '.join(status['overrides'])}  {status.get('result', '')}".rstrip())
+        if state != "done":
+            print(f"    see {path / 'status.json'}")
+    failed = [status for _, status in jobs if status["state"] != "done"]
+    print(f"{len(jobs) - len(failed)} of {len(jobs)} jobs done; {folder}")
+    return max([code, *(int(status.get("exit_code", EXIT_FAILED)) for status in failed)])

@@ -1,0 +1,102 @@
+"""Named pipelines: the commands of pipelines/<name>.yaml, one after the other."""
+
+from __future__ import annotations
+
+import difflib
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from rgspipe.cli.jobs import new_run_folder, quoted
+from rgspipe.cli.messages import EXIT_FAILED
+from rgspipe.errors import InputError
+from rgspipe.resources import resource_folder
+from rgspipe.status import read_statuses
+
+
+@dataclass(frozen=True)
+class SequenceStep:
+    """One command of a pipeline: a stage, its overrides, and whether they are a sweep."""
+
+    stage: str
+    overrides: tuple[str, ...] = ()
+    sweep: bool = False
+
+
+def load_sequence(name: str) -> list[SequenceStep]:
+    """The steps of a named pipeline, or of a YAML file.
+
+    Raises:
+        InputError: there is none, or it is not a list of steps.
+    """
+    folder = resource_folder("pipelines")
+    path = Path(name) if name.endswith((".yaml", ".yml")) else folder / f"{name}.yaml"
+    if not path.is_file():
+        names = [file.stem for file in sorted(folder.glob("*.yaml"))]
+        near = difflib.get_close_matches(name, names, n=1)
+        remedy = f"Did you mean pipeline={near[0]}?" if near else "Or give a file: pipeline=FILE.yaml."
+        raise InputError("pipeline", expected=f"one of {', '.join(names)}", found=repr(name), remedy=remedy)
+    try:
+        data = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except yaml.YAMLError as error:
+        found = " ".join(str(error).split())
+        raise InputError(path, expected="YAML", found=found, remedy="Correct the file.") from None
+    steps = data.get("steps") if isinstance(data, dict) else None
+    if not isinstance(steps, list) or not steps:
+        remedy = "See docs/extending.md for an example."
+        raise InputError(path, expected="a list under 'steps'", found=type(data).__name__, remedy=remedy)
+    return [_step(path, number, item) for number, item in enumerate(steps, 1)]
+
+
+def _step(path: Path, number: int, item: Any) -> SequenceStep:
+    where = f"{path}, step {number}"
+    remedy = "A step is {stage: NAME, overrides: [key=value, ...], sweep: true or false}."
+    if not isinstance(item, dict) or not isinstance(item.get("stage"), str):
+        raise InputError(where, expected="a step with a stage", found=repr(item), remedy=remedy)
+    unknown = set(item) - {"stage", "overrides", "sweep"}
+    overrides = item.get("overrides", [])
+    if unknown or not isinstance(overrides, list) or not all(isinstance(text, str) for text in overrides):
+        raise InputError(where, expected="stage, overrides and sweep", found=repr(item), remedy=remedy)
+    return SequenceStep(item["stage"], tuple(overrides), bool(item.get("sweep", False)))
+
+
+def run_sequence(name: str, extra: Sequence[str]) -> int:
+    """Run a pipeline's commands and say where its results are; stops at the first that fails.
+
+    Args:
+        name: a file under pipelines/, or the path of one.
+        extra: overrides for every step, after its own.
+    """
+    steps = load_sequence(name)
+    outputs = Path(next((text.partition("=")[2] for text in extra if text.startswith("outputs=")), "outputs"))
+    folder = new_run_folder(outputs, f"pipeline-{Path(name).stem}")
+    start, seconds, results = time.perf_counter(), [], []
+    for number, step in enumerate(steps, 1):
+        run_folder = folder / f"{number:02d}_{step.stage}"
+        command = [*(["-m"] if step.sweep else []), f"stage={step.stage}", *step.overrides, *extra]
+        print(f"[{number}/{len(steps)}] python -m rgspipe {' '.join(command)}", flush=True)
+        begin = time.perf_counter()
+        key = "hydra.sweep.dir" if step.sweep else "hydra.run.dir"
+        code = subprocess.run([sys.executable, "-m", "rgspipe", *command, f"{key}={quoted(run_folder)}"]).returncode
+        seconds.append(time.perf_counter() - begin)
+        if code != 0:
+            print(f"Step {number} ({step.stage}) failed; see {run_folder}. What is done is kept.", file=sys.stderr)
+            return code if code > 0 else EXIT_FAILED
+        results = [Path(status["result"]) for _, status in read_statuses(run_folder)]
+    _print_summary(steps, seconds, time.perf_counter() - start, results)
+    return 0
+
+
+def _print_summary(steps: Sequence[SequenceStep], seconds: Sequence[float], total: float, results: list[Path]) -> None:
+    for step, one in zip(steps, seconds, strict=True):
+        print(f"  {one:8.1f} s  {step.stage} {' '.join(step.overrides)}".rstrip())
+    print(f"  {total:8.1f} s  in all")
+    for result in results:
+        page = result / "report.html"
+        print(f"Report: {page}" if page.is_file() else f"Result: {result}")

@@ -1,0 +1,116 @@
+"""A run's status file: running, done, or failed with the traceback; a run whose process is gone reads as killed."""
+
+from __future__ import annotations
+
+import datetime
+import json
+import os
+import time
+import traceback
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rgspipe.files import write_json
+
+STATUS = "status.json"
+
+
+def _now() -> str:
+    return datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
+
+
+def process_start(pid: int) -> str | None:
+    """When a process started, as the system counts it; None if it is gone or a zombie, "?" if the system hides it.
+
+    Together with the process id it names a process for good, as ids are used again.
+    """
+    stat = Path(f"/proc/{pid}/stat")
+    if stat.is_file():
+        # The name, in parentheses, may hold spaces; state and start time are fields 3 and 22.
+        rest = stat.read_text().rpartition(")")[2].split()
+        boot = Path("/proc/sys/kernel/random/boot_id")
+        return None if rest[0] == "Z" else f"{boot.read_text().strip() if boot.is_file() else ''}:{rest[19]}"
+    if Path("/proc/self/stat").is_file():
+        return None
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return None
+    except PermissionError:
+        pass
+    return "?"
+
+
+@dataclass
+class RunStatus:
+    """Writes the status file of the run that is going on in this process."""
+
+    folder: Path
+    values: dict[str, Any]
+    _clock: float
+
+    @classmethod
+    def start(cls, folder: Path, stage: str, overrides: Sequence[str]) -> RunStatus:
+        """Say that a run has started; `folder` is made if need be."""
+        folder.mkdir(parents=True, exist_ok=True)
+        values = {
+            "state": "running",
+            "stage": stage,
+            "overrides": list(overrides),
+            "command": " ".join(["python -m rgspipe", *overrides]),
+            "pid": os.getpid(),
+            "process_start": process_start(os.getpid()),
+            "started": _now(),
+        }
+        status = cls(folder, values, time.perf_counter())
+        status._write()
+        return status
+
+    @property
+    def path(self) -> Path:
+        """The status file."""
+        return self.folder / STATUS
+
+    def done(self, result: Path) -> None:
+        """Say that the run has made, or found, the artifact at `result`."""
+        self._end("done", {"result": str(result), "exit_code": 0})
+
+    def failed(self, error: BaseException, exit_code: int) -> None:
+        """Say why the run has failed, with the traceback."""
+        lines = traceback.format_exception(error)
+        self._end("failed", {"error": str(error), "traceback": "".join(lines), "exit_code": exit_code})
+
+    def _end(self, state: str, more: Mapping[str, Any]) -> None:
+        seconds = round(time.perf_counter() - self._clock, 3)
+        self.values |= {"state": state, "ended": _now(), "seconds": seconds, **more}
+        self._write()
+
+    def _write(self) -> None:
+        write_json(self.path, self.values)
+
+
+def read_status(folder: Path) -> dict[str, Any] | None:
+    """The status of the run in `folder`, or None if none was started there.
+
+    A run that says it is running, but whose process is gone, has the state "killed".
+    """
+    path = folder / STATUS
+    if not path.is_file():
+        return None
+    values = json.loads(path.read_text(encoding="utf-8"))
+    if values["state"] == "running" and process_start(values["pid"]) != values["process_start"]:
+        values["state"] = "killed"
+    return values
+
+
+def read_statuses(root: Path) -> list[tuple[Path, dict[str, Any]]]:
+    """(folder, status) of every run below `root`, sweep jobs in their order, oldest first."""
+    folders = sorted((path.parent for path in root.rglob(STATUS)), key=_by_number)
+    found = [(folder, read_status(folder)) for folder in folders]
+    return [(folder, status) for folder, status in found if status is not None]
+
+
+def _by_number(folder: Path) -> tuple[tuple[int, str], ...]:
+    return tuple((int(part) if part.isdigit() else -1, part) for part in folder.parts)
