@@ -15,7 +15,6 @@ from rgspipe.blender.job import DatasetJob
 from rgspipe.blender.process import MESSAGE_PREFIX
 from rgspipe.errors import InputError
 
-
 #: Linux: prctl option by which a process is killed when its parent dies.
 PR_SET_PDEATHSIG = 1
 

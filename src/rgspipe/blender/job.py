@@ -100,7 +100,8 @@ class DatasetJob:
         """The job that `to_json` described."""
         room = dict(content["cornell"])
         boxes = tuple(
-            Box(tuple(box["center"]), tuple(box["size"]), box["turn"], tuple(box["albedo"])) for box in room.pop("boxes")
+            Box(tuple(box["center"]), tuple(box["size"]), box["turn"], tuple(box["albedo"]))
+            for box in room.pop("boxes")
         )
         walls = {name: tuple(albedo) for name, albedo in room.items()}
         return cls(**{**content, "cornell": CornellParameters(**walls, boxes=boxes)})

@@ -95,7 +95,7 @@ def write_channels(path: str | Path, channels: dict[str, np.ndarray]) -> None:
     temporary = path.with_name(f".{path.stem}.{os.getpid()}.partial.exr")
     try:
         OpenEXR.File(header, stored).write(str(temporary))
-        os.replace(temporary, path)
+        temporary.replace(path)
     finally:
         temporary.unlink(missing_ok=True)
 

@@ -1,0 +1,181 @@
+"""The "frames" of a transforms file: paths, cameras and lights, checked."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import torch
+from torch import Tensor
+
+from rgspipe.datasets.json_file import is_number, numbers, read_json, required
+from rgspipe.errors import InputError
+from rgspipe.scene import Camera
+from rgspipe.scene.lights import WATTS_PER_INTENSITY
+
+#: Largest entry of RᵀR − 1 that a rotation may have; files written in float32 reach 1e-6.
+ROTATION_TOLERANCE = 1e-4
+
+#: Keys of the optional images of a frame.
+SURFACE_KEYS = ("depth_path", "normal_path", "albedo_path")
+
+
+@dataclass(frozen=True)
+class FrameEntry:
+    """One frame as it stands in the file; the parts are checked when they are asked for.
+
+    Attributes:
+        transforms_path: the file, for errors.
+        index: which frame of the file.
+        fields: the frame's own keys.
+        shared: the file's top-level keys, which hold for frames that do not say otherwise.
+    """
+
+    transforms_path: Path
+    index: int
+    fields: dict
+    shared: dict
+
+    @property
+    def where(self) -> str:
+        """The place, for errors."""
+        return f"{self.transforms_path}: frames[{self.index}]"
+
+    @property
+    def image_path(self) -> Path:
+        """The image; `file_ext` (default .exr) is added unless `file_path` has that suffix already."""
+        name, extension = self._text("file_path"), self.fields.get("file_ext", self.shared.get("file_ext", ".exr"))
+        if not isinstance(extension, str):
+            raise InputError(f"{self.where}.file_ext", expected="a suffix", found=repr(extension), remedy="Correct it.")
+        return self._path(name if name.endswith(extension) else name + extension)
+
+    @property
+    def depth_path(self) -> Path | None:
+        """The depth image, if there is one."""
+        return self._optional_path("depth_path")
+
+    @property
+    def normal_path(self) -> Path | None:
+        """The normal image, if there is one."""
+        return self._optional_path("normal_path")
+
+    @property
+    def albedo_path(self) -> Path | None:
+        """The albedo image, if there is one."""
+        return self._optional_path("albedo_path")
+
+    def camera(self, width: int, height: int) -> Camera:
+        """The camera for an image of this size.
+
+        Raises:
+            InputError: no rigid transform, no intrinsics, or intrinsics of an image of another size.
+        """
+        pose = self._pose()
+        holder = self.fields if self.fields.keys() & {"camera_intrinsics", "camera_angle_x"} else self.shared
+        if "camera_intrinsics" in holder:
+            return self._camera_from_intrinsics(pose, holder["camera_intrinsics"], width, height)
+        if "camera_angle_x" not in holder:
+            raise InputError(
+                self.where,
+                expected='"camera_angle_x" [rad] or "camera_intrinsics" [cx, cy, fx, fy], here or at the top of the file',
+                found="neither",
+                remedy="Add one of them.",
+            )
+        angle = holder["camera_angle_x"]
+        if not is_number(angle) or not 0 < angle < torch.pi:
+            place = f"{self.where}: camera_angle_x"
+            raise InputError(place, expected="radians between 0 and π", found=repr(angle), remedy="Correct it.")
+        return Camera.from_field_of_view(pose, float(angle), width, height)
+
+    def light(self) -> tuple[Tensor, Tensor]:
+        """Position (3,) and intensity (3,) [W/sr] of the frame's light, float64; the file holds watts.
+
+        Raises:
+            InputError: "pl_pos" or "pl_intensity" is missing or impossible.
+        """
+        position = numbers(required(self.fields, "pl_pos", self.where), 3, self.where, "pl_pos")
+        watts = required(self.fields, "pl_intensity", self.where)
+        watts = numbers([watts] * 3 if is_number(watts) else watts, 3, self.where, "pl_intensity")
+        if min(watts) < 0 or max(watts) <= 0:
+            raise InputError(
+                f"{self.where}.pl_intensity", expected="watts above 0", found=repr(watts), remedy="Correct it."
+            )
+        power = torch.tensor(watts, dtype=torch.float64)
+        return torch.tensor(position, dtype=torch.float64), power / WATTS_PER_INTENSITY
+
+    def _camera_from_intrinsics(self, pose: Tensor, intrinsics: object, width: int, height: int) -> Camera:
+        cx, cy, fx, fy = numbers(intrinsics, 4, self.where, "camera_intrinsics")
+        place = f"{self.where}.camera_intrinsics"
+        if fx <= 0 or fy <= 0:
+            raise InputError(place, expected="focal lengths above 0", found=f"{fx:g}, {fy:g}", remedy="Correct them.")
+        for key, expected in (("w", width), ("h", height)):
+            stated = self.fields.get(key, self.shared.get(key, expected))
+            if stated != expected:
+                found = f"{width} × {height} pixels"
+                raise InputError(
+                    self.image_path, expected=f'"{key}": {stated!r} of {self.where}', found=found, remedy="Correct one."
+                )
+        if abs(cx - 0.5 * width) > 0.25 * width or abs(cy - 0.5 * height) > 0.25 * height:
+            raise InputError(
+                self.image_path,
+                expected=f"an image whose middle is near the principal point ({cx:g}, {cy:g}) of {place}",
+                found=f"{width} × {height} pixels",
+                remedy="Use intrinsics [cx, cy, fx, fy] of this image size.",
+            )
+        return Camera(pose, fx, fy, cx, cy, width, height)
+
+    def _pose(self) -> Tensor:
+        """The (4, 4) float64 camera-to-world transform, rigid."""
+        value = required(self.fields, "transform_matrix", self.where)
+        place = f"{self.where}.transform_matrix"
+        rows = value if isinstance(value, list) else []
+        if len(rows) != 4 or not all(isinstance(row, list) and len(row) == 4 for row in rows):
+            raise InputError(place, expected="a 4 × 4 matrix", found=repr(value)[:120], remedy="Correct it.")
+        flat = [item for row in rows for item in row]
+        if not all(map(is_number, flat)):
+            raise InputError(place, expected="finite numbers", found=repr(value)[:120], remedy="Correct it.")
+        pose = torch.tensor(flat, dtype=torch.float64).reshape(4, 4)
+        rotation = pose[:3, :3]
+        error = float((rotation.T @ rotation - torch.eye(3, dtype=torch.float64)).abs().max())
+        determinant = float(torch.linalg.det(rotation))
+        bottom = torch.tensor([0.0, 0.0, 0.0, 1.0], dtype=torch.float64)
+        if error > ROTATION_TOLERANCE or determinant < 0 or not torch.allclose(pose[3], bottom):
+            raise InputError(
+                place,
+                expected="a rigid camera-to-world transform: an orthonormal rotation with determinant +1, last row 0 0 0 1",
+                found=f"RᵀR − 1 up to {error:.2g}, determinant {determinant:.4g}, last row {pose[3].tolist()}",
+                remedy="Remove scale, shear or mirroring from the camera.",
+            )
+        return pose
+
+    def _optional_path(self, key: str) -> Path | None:
+        return self._path(self._text(key)) if key in self.fields else None
+
+    def _text(self, key: str) -> str:
+        value = required(self.fields, key, self.where)
+        if not isinstance(value, str) or not value:
+            raise InputError(f"{self.where}.{key}", expected="a path", found=repr(value), remedy="Correct it.")
+        return value
+
+    def _path(self, name: str) -> Path:
+        return self.transforms_path.parent / name
+
+
+def read_entries(path: Path, what: str) -> list[FrameEntry]:
+    """The frames of a transforms file, at least one.
+
+    Raises:
+        InputError: no such file, not JSON, or no frames.
+    """
+    content = read_json(path, what)
+    frames = required(content, "frames", path)
+    if not isinstance(frames, list) or not frames:
+        raise InputError(
+            path, expected='at least one frame under "frames"', found="none", remedy="Add frames with their images."
+        )
+    for index, frame in enumerate(frames):
+        if not isinstance(frame, dict):
+            place = f"{path}: frames[{index}]"
+            raise InputError(place, expected="a JSON object", found=repr(frame)[:80], remedy="Correct it.")
+    shared = {key: value for key, value in content.items() if key != "frames"}
+    return [FrameEntry(path, index, frame, shared) for index, frame in enumerate(frames)]

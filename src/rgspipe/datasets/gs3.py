@@ -1,0 +1,134 @@
+"""Read datasets and fit targets in the GS³ / NRHints format; see docs/conventions.md.
+
+Whatever is wrong with the files is an InputError that names the file and the key: nothing that is
+broken, missing or ambiguous gets past this module.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import torch
+
+from rgspipe.datasets.frames import FrameEntry, read_entries
+from rgspipe.datasets.images import read_colour, read_depth, read_vectors
+from rgspipe.datasets.info import DatasetInfo, read_info
+from rgspipe.datasets.json_file import read_json, required
+from rgspipe.datasets.views import Dataset, Target, View
+from rgspipe.errors import InputError
+from rgspipe.progress import track
+from rgspipe.scene import PointLight
+
+OCCLUSIONS = ("visible", "out_of_frame", "occluded", "unknown")
+
+
+def load_dataset(root: str | Path, *, train: bool = True, test: bool = True, targets: bool = True) -> Dataset:
+    """Read the wanted parts of the dataset in the folder `root`; what is not wanted is empty.
+
+    A dataset without targets/ has no targets; every split that is wanted must be there.
+
+    Raises:
+        InputError: any file is missing, broken or inconsistent.
+    """
+    root = Path(root)
+    if not root.is_dir():
+        raise InputError(root, expected="the folder of a dataset", found="no such folder", remedy="Check the path.")
+    info = read_info(root)
+    splits = {"train": train, "test": test}
+    loaded = {name: load_split(root, name, info) if wanted else () for name, wanted in splits.items()}
+    return Dataset(root, loaded["train"], loaded["test"], _load_targets(root) if targets else ())
+
+
+def load_split(root: Path, split: str, info: DatasetInfo | None) -> tuple[View, ...]:
+    """The views of transforms_<split>.json, each with its light."""
+    entries = read_entries(root / f"transforms_{split}.json", f"the cameras and lights of the {split} views")
+    return tuple(
+        _load_view(entry, root, info, with_light=True)
+        for entry in track(entries, f"reading {split} views", unit="view")
+    )
+
+
+def load_target(folder: str | Path) -> Target:
+    """A fit target: a folder with transforms.json (cameras only) and its images.
+
+    Its class is looked up in targets.json beside the folder; without that it is "unknown".
+
+    Raises:
+        InputError: the folder has no frames or images, or any file is broken or inconsistent.
+    """
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise InputError(
+            folder, expected="the folder of a fit target", found="no such folder", remedy="Check the path."
+        )
+    occlusion = _listed_targets(folder.parent).get(folder.name, "unknown")
+    entries = read_entries(folder / "transforms.json", "the cameras of a fit target")
+    return Target(folder.name, occlusion, tuple(_load_view(entry, folder, None, with_light=False) for entry in entries))
+
+
+def _load_targets(root: Path) -> tuple[Target, ...]:
+    folder = root / "targets"
+    if not folder.is_dir():
+        return ()
+    listed = _listed_targets(folder)
+    names: Iterable[str] = listed or sorted(path.name for path in folder.iterdir() if path.is_dir())
+    return tuple(load_target(folder / name) for name in track(list(names), "reading targets", unit="target"))
+
+
+def _listed_targets(folder: Path) -> dict[str, str]:
+    """The names and classes of targets.json in `folder`; empty if there is no such file."""
+    path = folder / "targets.json"
+    if not path.is_file():
+        return {}
+    listed = required(read_json(path, "the list of fit targets"), "targets", path)
+    classes = {}
+    for index, item in enumerate(listed if isinstance(listed, list) else [listed]):
+        place = f"{path}: targets[{index}]"
+        if not isinstance(item, dict):
+            raise InputError(place, expected='{"name": …, "occlusion": …}', found=repr(item)[:80], remedy="Correct it.")
+        name, occlusion = required(item, "name", place), item.get("occlusion", "unknown")
+        if not isinstance(name, str) or not name or Path(name).name != name or name in (".", ".."):
+            raise InputError(f"{place}.name", expected="the name of a folder", found=repr(name), remedy="Correct it.")
+        if occlusion not in OCCLUSIONS:
+            expected = ", ".join(OCCLUSIONS)
+            raise InputError(f"{place}.occlusion", expected=expected, found=repr(occlusion), remedy="Correct it.")
+        classes[name] = occlusion
+    return classes
+
+
+@dataclass(frozen=True)
+class _Surface:
+    """The optional images of a view's surfaces."""
+
+    depth: torch.Tensor | None
+    normal: torch.Tensor | None
+    albedo: torch.Tensor | None
+
+
+def _load_view(entry: FrameEntry, root: Path, info: DatasetInfo | None, *, with_light: bool) -> View:
+    image, alpha = read_colour(entry.image_path)
+    camera = entry.camera(image.shape[1], image.shape[0])
+    surface = _load_surface(entry, camera, info)
+    light = PointLight(*entry.light()) if with_light else None
+    name = entry.image_path.relative_to(root).with_suffix("").as_posix() if with_light else entry.image_path.stem
+    return View(name, camera, image, alpha, light, surface.depth, surface.normal, surface.albedo)
+
+
+def _load_surface(entry: FrameEntry, camera, info: DatasetInfo | None) -> _Surface:
+    depth = None
+    if entry.depth_path is not None:
+        if info is None:
+            raise InputError(
+                entry.transforms_path.parent / "dataset_info.json",
+                expected='a file that says what the depth images hold, with "depth_convention": "planar_z" or '
+                '"depth_convention": "ray_distance"',
+                found="no such file",
+                remedy='Write it: {"version": 1, "depth_convention": "planar_z"} if depth is measured along the '
+                "camera's axis (Blender's Z pass), \"ray_distance\" if along each pixel's ray.",
+            )
+        depth = read_depth(entry.depth_path, camera, info.require_depth_convention())
+    normal = read_vectors(entry.normal_path, ("X", "Y", "Z"), camera) if entry.normal_path else None
+    albedo = read_vectors(entry.albedo_path, ("R", "G", "B"), camera) if entry.albedo_path else None
+    return _Surface(depth, normal, albedo)

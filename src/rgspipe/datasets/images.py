@@ -1,0 +1,104 @@
+"""The images of a view as tensors: colour, depth, normals, albedo."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from rgspipe.datasets.exr import read_array, read_channels, read_image
+from rgspipe.errors import InputError
+from rgspipe.scene import Camera
+
+#: Depths from here on (Blender writes 1e10) say that there is no surface; so does 0.
+NO_SURFACE = 1e9
+
+
+def read_colour(path: Path) -> tuple[Tensor, Tensor]:
+    """Linear, premultiplied colour (H, W, 3) and alpha (H, W) of an EXR image or a PNG (sRGB, straight alpha).
+
+    Raises:
+        InputError: missing or broken file, other channels, NaN or infinite pixels, alpha outside of [0, 1].
+    """
+    image, alpha = read_image(path) if path.suffix.lower() == ".exr" else _read_png(path)
+    if alpha.min() < 0 or alpha.max() > 1 + 1e-3:
+        found = f"{alpha.min():g} to {alpha.max():g}"
+        raise InputError(path, expected="alpha from 0 to 1", found=found, remedy="Export the image again.")
+    return torch.from_numpy(image), torch.from_numpy(np.minimum(alpha, 1.0))
+
+
+def read_depth(path: Path, camera: Camera, convention: str) -> Tensor:
+    """Planar depth (H, W) float32, +inf where there is no surface; `convention` says what the file holds.
+
+    Raises:
+        InputError: missing or broken file, more than one channel, another size than the image, NaN, negative depth.
+    """
+    channels = read_channels(path)
+    if len(channels) != 1:
+        found = f"{len(channels)}: {', '.join(sorted(channels))}"
+        raise InputError(path, expected="one channel of depth", found=found, remedy="Export only the depth.")
+    (stored,) = channels.values()
+    _check_size(path, stored, camera)
+    depth = torch.from_numpy(np.array(stored))
+    if torch.isnan(depth).any():
+        count = int(torch.isnan(depth).sum())
+        raise InputError(path, expected="depths", found=f"{count} pixels with NaN", remedy="Export the depth again.")
+    if (depth < 0).any():
+        found = f"{int((depth < 0).sum())} negative pixels, the lowest {float(depth.min()):g}"
+        raise InputError(
+            path, expected="depths ≥ 0, growing away from the camera", found=found, remedy="Change the sign."
+        )
+    if convention == "ray_distance":
+        _, _, lengths = camera.rays()
+        depth_planar = depth.double() / lengths.reshape(depth.shape)
+        depth = torch.where(depth < NO_SURFACE, depth_planar.float(), depth)
+    return torch.where((depth >= NO_SURFACE) | (depth == 0), torch.inf, depth)
+
+
+def read_vectors(path: Path, names: tuple[str, ...], camera: Camera) -> Tensor:
+    """An image (H, W, 3) float32 of normals ("X", "Y", "Z") or albedo ("R", "G", "B").
+
+    Raises:
+        InputError: missing or broken file, other channels, another size than the image, NaN or infinity.
+    """
+    stored = read_array(path, names)
+    _check_size(path, stored, camera)
+    return torch.from_numpy(stored)
+
+
+def _check_size(path: Path, stored: np.ndarray, camera: Camera) -> None:
+    height, width = stored.shape[:2]
+    if (width, height) != (camera.width, camera.height):
+        raise InputError(
+            path,
+            expected=f"{camera.width} × {camera.height} pixels, as the colour image",
+            found=f"{width} × {height}",
+            remedy="Export it at the size of the colour image.",
+        )
+
+
+def _read_png(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """An 8-bit PNG, linearised with the sRGB curve and premultiplied."""
+    from PIL import Image, UnidentifiedImageError
+
+    if not path.is_file():
+        raise InputError(path, expected="an image", found="no such file", remedy="Check file_path and file_ext.")
+    try:
+        with Image.open(path) as file:
+            stored = np.asarray(file)
+    except (UnidentifiedImageError, OSError, SyntaxError) as error:
+        raise InputError(
+            path,
+            expected="a whole PNG or OpenEXR image",
+            found=f"an unreadable file ({error})",
+            remedy="Export it again.",
+        ) from error
+    if stored.ndim != 3 or stored.shape[2] not in (3, 4) or stored.dtype != np.uint8:
+        found = f"{stored.dtype} with shape {stored.shape}"
+        raise InputError(path, expected="8-bit RGB or RGBA", found=found, remedy="Export it so, or as OpenEXR.")
+    values = stored.astype(np.float32) / 255.0
+    alpha = values[..., 3] if stored.shape[2] == 4 else np.ones(values.shape[:2], np.float32)
+    linear = np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)[..., :3]
+    return (linear * alpha[..., None]).astype(np.float32), np.ascontiguousarray(alpha)
