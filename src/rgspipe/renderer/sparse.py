@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 import numpy as np
@@ -66,7 +67,9 @@ class SparseOperator:
         }
 
     @classmethod
-    def from_tensors(cls, tensors: dict[str, Tensor], prefix: str, device: torch.device | str = "cpu") -> SparseOperator:
+    def from_tensors(
+        cls, tensors: dict[str, Tensor], prefix: str, device: torch.device | str = "cpu"
+    ) -> SparseOperator:
         names = ("values", "columns", "rows")
         parts = tuple(tensors[f"{prefix}.{name}"].numpy() for name in names)
         shape = tuple(tensors[f"{prefix}.shape"].tolist())
@@ -84,4 +87,7 @@ def stack(operators: list[SparseOperator]) -> SparseOperator:
 def _to_torch(matrix: scipy.sparse.csr_matrix, device: torch.device | str) -> Tensor:
     parts = (matrix.indptr.astype(np.int32), matrix.indices.astype(np.int32), matrix.data.astype(np.float32))
     rows, columns, values = (torch.from_numpy(part).to(device) for part in parts)
-    return torch.sparse_csr_tensor(rows, columns, values, size=matrix.shape, check_invariants=False)
+    with warnings.catch_warnings():
+        # torch announces at the first use that its compressed rows are in beta; the products used here are stable.
+        warnings.filterwarnings("ignore", message="Sparse CSR tensor support is in beta")
+        return torch.sparse_csr_tensor(rows, columns, values, size=matrix.shape, check_invariants=False)

@@ -40,18 +40,23 @@ class PatchTransport:
     inverse: Tensor
     albedo: Tensor
 
-    def indirect(self, direct: Tensor) -> Tensor:
-        """(N, 3, K) indirect part of the radiosity for K lightings with direct radiosity (N, 3, K)."""
+    def gathered(self, direct: Tensor) -> Tensor:
+        """(N, 3, K) mean radiance that each surfel receives from the others, F_p H R D, over all bounces.
+
+        Args:
+            direct: (N, 3, K) direct radiosity D of K lightings.
+        """
         count, channels, lightings = direct.shape
         patches = (self.average @ direct.reshape(count, -1)).reshape(-1, channels, lightings)
         solved = torch.einsum("cpq,qck->pck", self.inverse, patches)
-        gathered = self.gather @ solved.reshape(-1, channels * lightings)
-        return self.albedo[:, :, None] * gathered.reshape(count, channels, lightings)
+        return (self.gather @ solved.reshape(-1, channels * lightings)).reshape(count, channels, lightings)
+
+    def indirect(self, direct: Tensor) -> Tensor:
+        """(N, 3, K) indirect part of the radiosity for K lightings with direct radiosity (N, 3, K)."""
+        return self.albedo[:, :, None] * self.gathered(direct)
 
 
-def build_patch_transport(
-    gather: SparseOperator, labels: np.ndarray, areas: Tensor, albedo: Tensor
-) -> PatchTransport:
+def build_patch_transport(gather: SparseOperator, labels: np.ndarray, areas: Tensor, albedo: Tensor) -> PatchTransport:
     """Patch transport from the full gather operator.
 
     Args:

@@ -70,7 +70,7 @@ def nearest_hit(bvh: SurfelBvh) -> float:
     return 0.02 * bvh.coverage.layer_thickness
 
 
-def _replace_rows(matrix, chosen: Tensor, rows):  # noqa: ANN001, ANN202 - scipy matrices
+def _replace_rows(matrix, chosen: Tensor, rows):
     import scipy.sparse
 
     keep = torch.ones(matrix.shape[0])

@@ -33,7 +33,7 @@ def _shade(
     i = wp.tid() + offset
     view = ray_view[i]
     colour = wp.vec3(0.0, 0.0, 0.0)
-    k = int(0)
+    k = 0
     while k < MAX_HITS:
         j = indices[i, k]
         if j < 0:
@@ -129,13 +129,13 @@ def _shade_adjoint(
     o = origins[i]
     d = directions[i]
     view = ray_view[i]
-    count = int(0)
+    count = 0
     while count < MAX_HITS and indices[i, wp.min(count, MAX_HITS - 1)] >= 0:
         to_weight[i, count] = wp.dot(ray_gradient[i], radiance[view, indices[i, count]])
         count += 1
     # Front to back: what reaches each layer, noted at its last hit.
     passing = float(1.0)
-    k = int(0)
+    k = 0
     while k < count:
         clear = float(1.0)
         end = int(k)
@@ -197,10 +197,13 @@ class _ShadeRays(torch.autograd.Function):
         radiance, _centers, rotations, scales, *_rest = ctx.saved_tensors
         packed, thresholds = _surfel_gradient(ctx.bvh, ctx.rays, ctx.hits, radiance, colour_gradient)
         softness = ctx.bvh.coverage.clip_softness
+        to_radiance = None
+        if ctx.needs_input_grad[2]:
+            to_radiance = _radiance_gradient(ctx.hits, ctx.rays[2], radiance, colour_gradient)
         return (
             None,
             None,
-            _radiance_gradient(ctx.hits, ctx.rays[2], radiance, colour_gradient),
+            to_radiance,
             packed[:, 0:3],
             _quaternion_gradient(rotations, packed[:, 3:6]),
             packed[:, 6:8] / scales,

@@ -1,0 +1,41 @@
+"""Tensors by name with a JSON note beside them, in safetensors, written whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import safetensors
+import safetensors.torch
+from torch import Tensor
+
+from rgspipe.errors import InputError
+
+
+def save_tensors(path: Path, tensors: dict[str, Tensor], note: dict[str, Any] | None = None) -> None:
+    """Write `tensors` and a JSON-able `note` to `path`; a reader never sees half a file."""
+    temporary = path.with_name(f".{path.name}.{os.getpid()}")
+    whole = {name: tensor.detach().cpu().contiguous() for name, tensor in tensors.items()}
+    safetensors.torch.save_file(whole, temporary, metadata={"note": json.dumps(note or {}, sort_keys=True)})
+    os.replace(temporary, path)
+
+
+def load_tensors(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
+    """The tensors and the note of `save_tensors`.
+
+    Raises:
+        InputError: the file is missing or no safetensors file.
+    """
+    try:
+        with safetensors.safe_open(path, framework="pt") as file:
+            note = (file.metadata() or {}).get("note", "{}")
+            return {name: file.get_tensor(name) for name in file.keys()}, json.loads(note)  # noqa: SIM118
+    except (OSError, safetensors.SafetensorError, ValueError) as error:
+        raise InputError(
+            path,
+            expected="a safetensors file",
+            found=str(error).splitlines()[0] if str(error) else type(error).__name__,
+            remedy="Remove it and run the stage that makes it again.",
+        ) from error

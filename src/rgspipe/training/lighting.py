@@ -1,0 +1,64 @@
+"""The known lights of training views, as irradiance on the surfels."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from rgspipe.datasets.views import View
+from rgspipe.renderer.direct import unit_irradiance
+from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
+from rgspipe.renderer.transport import PatchTransport
+
+#: Lights whose shadows are traced at once; bounds the memory of their derivatives.
+LIGHTS_AT_ONCE = 16
+
+#: Lightings carried through the transport at once.
+LIGHTINGS_AT_ONCE = 25
+
+
+@dataclass(frozen=True)
+class Lighting:
+    """Direct light of V views on N surfels.
+
+    Attributes:
+        irradiance: (V, N) per unit intensity.
+        intensity: (V, 3) W/sr.
+    """
+
+    irradiance: Tensor
+    intensity: Tensor
+
+    def direct(self) -> Tensor:
+        """(V, N, 3) direct irradiance over π: the radiance that a white surfel would reflect."""
+        return self.irradiance[..., None] * (self.intensity[:, None, :] / math.pi)
+
+
+def trace_lighting(bvh: SurfelBvh, views: Sequence[View]) -> Lighting:
+    """Cast the shadows of every view's light.
+
+    Raises:
+        ValueError: a view has no light.
+    """
+    missing = [view.name for view in views if view.light is None]
+    if missing:
+        raise ValueError(f"views must have lights, these have none: {missing[:5]}")
+    positions = torch.stack([view.light.position for view in views])
+    blocks = [unit_irradiance(bvh, block)[0] for block in positions.split(LIGHTS_AT_ONCE)]
+    intensity = torch.stack([view.light.intensity for view in views]).float()
+    return Lighting(torch.cat(blocks), intensity.to(bvh.device))
+
+
+def total_irradiance(lighting: Lighting, albedo: Tensor, transport: PatchTransport | None) -> Tensor:
+    """(V, N, 3) direct and, with a transport, indirect irradiance over π under the given albedo (N, 3)."""
+    total = lighting.direct()
+    if transport is None:
+        return total
+    for block in total.split(LIGHTINGS_AT_ONCE):
+        direct = (albedo * block).permute(1, 2, 0).contiguous()
+        block += transport.gathered(direct).permute(2, 0, 1)
+    return total

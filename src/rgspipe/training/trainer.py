@@ -1,0 +1,179 @@
+"""Surfel training: materials, then geometry, then materials again, with global illumination throughout."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from rgspipe.datasets.views import View
+from rgspipe.progress import track
+from rgspipe.renderer.areas import surfel_areas
+from rgspipe.renderer.gather import build_gather
+from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
+from rgspipe.renderer.transport import PatchTransport, build_patch_transport, cluster_patches
+from rgspipe.renderer.view_weights import ViewWeights, build_view_weights
+from rgspipe.scene.surfels import Surfels
+from rgspipe.training.albedo import AlbedoProblem, solve_albedo
+from rgspipe.training.checkpoint import Checkpoint
+from rgspipe.training.lighting import Lighting, trace_lighting
+from rgspipe.training.record import Record
+from rgspipe.training.refine import RefineOptions, RefineState, RefineView, refine
+
+
+@dataclass(frozen=True)
+class TrainOptions:
+    """How surfels are trained.
+
+    Attributes:
+        rounds: of the albedo solve, before and after the geometry.
+        refine: of the geometry; its `steps` may be 0.
+        gather_rays, patches: of the indirect light.
+        supersampling: of edge pixels in the view weights.
+        seed: of rays and patches.
+    """
+
+    rounds: int = 8
+    refine: RefineOptions = field(default_factory=RefineOptions)
+    gather_rays: int = 128
+    patches: int = 500
+    supersampling: int = 4
+    seed: int = 0
+
+
+@dataclass(frozen=True)
+class Trained:
+    """The trained surfels and how training went."""
+
+    surfels: Surfels
+    records: tuple[Record, ...]
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """What follows from the surfels' geometry alone, for one set of views.
+
+    Attributes:
+        weights: of every view.
+        lighting: shadows and cosines of every view's light.
+        transport: light between surfels.
+    """
+
+    weights: tuple[ViewWeights, ...]
+    lighting: Lighting
+    transport: PatchTransport
+
+
+def build_transport(surfels: Surfels, options: TrainOptions) -> PatchTransport:
+    """Patch transport for the surfels as they stand."""
+    bvh = SurfelBvh(surfels)
+    areas = surfel_areas(bvh, seed=options.seed)
+    gather = build_gather(bvh, options.gather_rays, seed=options.seed, areas=areas)
+    labels = cluster_patches(surfels.centers, surfels.normals, options.patches, seed=options.seed)
+    return build_patch_transport(gather, labels, areas, surfels.albedo)
+
+
+def trace_views(surfels: Surfels, views: Sequence[View], supersampling: int) -> tuple[ViewWeights, ...]:
+    """View weights of every view."""
+    bvh = SurfelBvh(surfels)
+    return tuple(build_view_weights(bvh, view.camera, supersampling) for view in track(views, "views", unit="view"))
+
+
+def train(
+    surfels: Surfels, views: Sequence[View], options: TrainOptions, checkpoint: Checkpoint | None = None
+) -> Trained:
+    """Fit materials and geometry of `surfels` to `views` with known lights.
+
+    Args:
+        surfels: where to start; their albedo is a guess.
+        views: training views, each with its light.
+        checkpoint: where to keep what is done; an interrupted training goes on from there and ends with
+            the surfels of an uninterrupted one.
+    """
+    log = _Log(checkpoint.records if checkpoint else [])
+    surfels = surfels.to(torch.float32)
+    spacing = surfel_spacing(surfels)
+    if checkpoint is not None and (found := checkpoint.load(surfels)) is not None:
+        surfels, radiance, state = found
+    else:
+        surfels, radiance, state = *_fit_materials(surfels, views, options, log, "materials"), None
+    if options.refine.steps > 0:
+        refined = [_refine_view(view, surfels, radiance[v]) for v, view in enumerate(views)]
+
+        def keep(progress: RefineState) -> None:
+            log.steps(progress)
+            if checkpoint is not None and checkpoint.is_due(progress.step):
+                checkpoint.save(surfels, radiance, progress, log.records)
+
+        if checkpoint is not None and state is None:
+            checkpoint.save(surfels, radiance, None, log.records)
+        surfels, _ = refine(surfels, refined, spacing, options.refine, state, keep)
+        surfels, radiance = _fit_materials(surfels, views, options, log, "final materials")
+    return Trained(surfels, tuple(log.records))
+
+
+def fit_direct_materials(surfels: Surfels, views: Sequence[View], options: TrainOptions) -> Surfels:
+    """The same geometry with the albedo that explains the views best if light did not bounce: a baseline."""
+    weights = trace_views(surfels, views, options.supersampling)
+    problem = AlbedoProblem.build(surfels, weights, [view.image for view in views])
+    lighting = trace_lighting(SurfelBvh(surfels), views)
+    albedo, _ = solve_albedo(problem, surfels, lighting, None, min(3, options.rounds))
+    return replace(surfels, albedo=albedo)
+
+
+def surfel_spacing(surfels: Surfels) -> float:
+    """Typical distance of neighbours, from the footprints: init makes them a fixed part of the spacing."""
+    return surfels.coverage.clip_softness / CLIP_SOFTNESS
+
+
+#: Softness of clips over the spacing of surfels, as initialisation sets it.
+CLIP_SOFTNESS = 0.12
+
+
+def _fit_materials(
+    surfels: Surfels, views: Sequence[View], options: TrainOptions, log: _Log, phase: str
+) -> tuple[Surfels, Tensor]:
+    """Surfels with fitted albedo, and their radiance (V, N, 3) under every view's light."""
+    weights = trace_views(surfels, views, options.supersampling)
+    lighting = trace_lighting(SurfelBvh(surfels), views)
+    transport = build_transport(surfels, options)
+    problem = AlbedoProblem.build(surfels, weights, [view.image for view in views])
+    albedo, total = solve_albedo(problem, surfels, lighting, transport, options.rounds)
+    radiance = total * albedo
+    log.materials(phase, problem, radiance)
+    return replace(surfels, albedo=albedo), radiance
+
+
+def _refine_view(view: View, surfels: Surfels, radiance: Tensor) -> RefineView:
+    image = view.image.reshape(-1, 3).float()
+    weights = build_view_weights(SurfelBvh(surfels), view.camera, supersampling=1)
+    peak = float(torch.quantile(image, 0.995).clamp(min=1e-12))
+    return RefineView(view.camera, image, radiance, weights.edges, peak)
+
+
+class _Log:
+    """The training table as it grows."""
+
+    def __init__(self, records: list[Record]) -> None:
+        self.records = list(records)
+        self._start = time.monotonic() - (self.records[-1].seconds if self.records else 0.0)
+
+    def steps(self, state: RefineState) -> None:
+        loss = state.losses[-1]
+        self._add("geometry", state.step, loss, -10.0 * float(np.log10(max(loss, 1e-30))))
+
+    def materials(self, phase: str, problem: AlbedoProblem, radiance: Tensor) -> None:
+        errors = []
+        for v, view in enumerate(problem.weights):
+            image = problem.images[v]
+            peak = torch.quantile(image, 0.995).clamp(min=1e-12)
+            errors.append(float(((view.operator.matrix @ radiance[v] - image) / peak).square().mean()))
+        psnr = float(np.mean([-10.0 * np.log10(max(error, 1e-30)) for error in errors]))
+        self._add(phase, 0, float(np.mean(errors)), psnr)
+
+    def _add(self, phase: str, step: int, loss: float, psnr: float) -> None:
+        self.records.append(Record(phase, step, loss, psnr, time.monotonic() - self._start))
