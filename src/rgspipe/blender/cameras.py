@@ -42,22 +42,29 @@ class CornellLayout:
     space: FreeSpace
     resolution: int
 
+    @property
+    def _size(self) -> np.ndarray:
+        """(3,) width, depth and height of the room."""
+        return self.space.geometry.hi - self.space.geometry.lo
+
     def camera(self, rng: np.random.Generator, index: int) -> Camera:
+        size = self._size
         if index % 5 == 0:
-            origin = np.array([rng.uniform(-0.4, 0.4), rng.uniform(-1.7, -1.2), rng.uniform(-0.4, 0.4)])
+            origin = np.array([rng.uniform(-0.4, 0.4), 0.0, rng.uniform(-0.4, 0.4)]) * size
+            origin[1] = -0.5 * size[1] - rng.uniform(0.7, 1.2)
             return aimed(origin, rng.uniform(-0.15, 0.15, 3), rng.uniform(45.0, 58.0), self.resolution)
         for _ in range(MAX_DRAWS):
-            origin, focus = self.light(rng, 0.06), rng.uniform(-0.45, 0.45, 3)
+            origin, focus = self.light(rng, 0.06), rng.uniform(-0.45, 0.45, 3) * size
             view = focus - origin
             length = float(np.linalg.norm(view))
             looks_out = view[1] < -0.7 * length
-            if length > 0.45 and not looks_out:
+            if length > 0.45 * size.min() and not looks_out:
                 return aimed(origin, focus, rng.uniform(75.0, 105.0), self.resolution)
         raise no_room("a camera inside the room")
 
     def light(self, rng: np.random.Generator, clearance: float) -> np.ndarray:
         for _ in range(MAX_DRAWS):
-            point = rng.uniform(-0.5 + clearance, 0.5 - clearance, 3)
+            point = rng.uniform(clearance - 0.5 * self._size, 0.5 * self._size - clearance)
             if self.space.has_room_for(point, clearance):
                 return point
         raise no_room(f"a place {clearance:g} from any surface")

@@ -6,8 +6,6 @@ import bpy
 
 from rgspipe.blender.job import Box, CornellParameters, Vector
 
-HALF = 0.5
-
 
 def build(parameters: CornellParameters) -> bpy.types.Scene:
     """A new scene that holds the room and its boxes, and nothing else: no light, camera or world."""
@@ -37,12 +35,12 @@ def diffuse_material(name: str, albedo: Vector) -> bpy.types.Material:
 
 def _walls(parameters: CornellParameters) -> list[tuple[str, list[Vector], Vector]]:
     """Name, corners and albedo of the five walls; all face into the room."""
-    a = HALF
-    floor = [(-a, -a, -a), (a, -a, -a), (a, a, -a), (-a, a, -a)]
-    ceiling = [(-a, -a, a), (-a, a, a), (a, a, a), (a, -a, a)]
-    back = [(-a, a, -a), (a, a, -a), (a, a, a), (-a, a, a)]
-    left = [(-a, -a, -a), (-a, a, -a), (-a, a, a), (-a, -a, a)]
-    right = [(a, -a, -a), (a, -a, a), (a, a, a), (a, a, -a)]
+    a, b, c = (0.5 * length for length in parameters.room)
+    floor = [(-a, -b, -c), (a, -b, -c), (a, b, -c), (-a, b, -c)]
+    ceiling = [(-a, -b, c), (-a, b, c), (a, b, c), (a, -b, c)]
+    back = [(-a, b, -c), (a, b, -c), (a, b, c), (-a, b, c)]
+    left = [(-a, -b, -c), (-a, b, -c), (-a, b, c), (-a, -b, c)]
+    right = [(a, -b, -c), (a, -b, c), (a, b, c), (a, b, -c)]
     white = [("floor", floor), ("ceiling", ceiling), ("back", back)]
     walls = [(name, corners, parameters.white) for name, corners in white]
     return [*walls, ("left", left, parameters.left), ("right", right, parameters.right)]

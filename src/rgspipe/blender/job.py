@@ -27,14 +27,16 @@ class Box:
 
 @dataclass(frozen=True)
 class CornellParameters:
-    """A room that fills the unit cube around the origin, open towards −y, with boxes in it; +z is up.
+    """A room around the origin, inside the unit cube, open towards −y, with boxes in it; +z is up.
 
     Attributes:
+        room: width (x), depth (y) and height (z), scene units.
         white: albedo of floor, ceiling and back wall (+y).
         left, right: albedo of the walls at −x and +x.
         boxes: what stands in the room.
     """
 
+    room: Vector = (1.0, 1.0, 1.0)
     white: Vector = (0.73, 0.73, 0.73)
     left: Vector = (0.65, 0.05, 0.05)
     right: Vector = (0.12, 0.45, 0.15)

@@ -19,6 +19,9 @@ from rgspipe.scene.lights import WATTS_PER_INTENSITY
 #: Suffixes of the surface files beside an image, and their channels.
 SURFACE_CHANNELS = {"depth": ("Z",), "normal": ("X", "Y", "Z"), "albedo": ("R", "G", "B")}
 
+#: Of Blender's camera, in its millimetres; only the ratio to the focal length matters.
+SENSOR_WIDTH = 36.0
+
 
 class Studio:
     """A scene with one camera and one light that are moved from frame to frame.
@@ -79,8 +82,14 @@ def place_camera(item: bpy.types.Object, camera: Camera) -> None:
     """Give Blender's camera the pose and field of view of ours (square pixels, axis in the middle)."""
     item.matrix_world = Matrix(camera.camera_to_world.tolist())
     item.data.sensor_fit = "HORIZONTAL"
-    item.data.sensor_width = 1.0
-    item.data.lens = camera.fx / camera.width
+    # A wide sensor, because Blender silently raises focal lengths below 1 mm.
+    item.data.sensor_width = SENSOR_WIDTH
+    item.data.lens = SENSOR_WIDTH * camera.fx / camera.width
+    stored = item.data.lens / SENSOR_WIDTH * camera.width
+    if abs(stored - camera.fx) > 1e-5 * camera.fx:
+        raise ValueError(
+            f"Blender takes no focal length of {camera.fx:g} pixels at {camera.width} (it made it {stored:g})"
+        )
 
 
 def place_light(item: bpy.types.Object, light: PointLight) -> None:

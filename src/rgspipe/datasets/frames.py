@@ -77,7 +77,7 @@ class FrameEntry:
         if "camera_angle_x" not in holder:
             raise InputError(
                 self.where,
-                expected='"camera_angle_x" [rad] or "camera_intrinsics" [cx, cy, fx, fy], here or at the top of the file',
+                expected='"camera_angle_x" [rad] or "camera_intrinsics" [cx, cy, fx, fy], here or at the top',
                 found="neither",
                 remedy="Add one of them.",
             )
@@ -142,7 +142,7 @@ class FrameEntry:
         if error > ROTATION_TOLERANCE or determinant < 0 or not torch.allclose(pose[3], bottom):
             raise InputError(
                 place,
-                expected="a rigid camera-to-world transform: an orthonormal rotation with determinant +1, last row 0 0 0 1",
+                expected="a rigid camera-to-world transform (orthonormal rotation, determinant +1, last row 0 0 0 1)",
                 found=f"RᵀR − 1 up to {error:.2g}, determinant {determinant:.4g}, last row {pose[3].tolist()}",
                 remedy="Remove scale, shear or mirroring from the camera.",
             )
