@@ -16,9 +16,11 @@ import torch
 from rgspipe.artifacts import Artifact
 from rgspipe.config import RgspipeConfig
 from rgspipe.datasets.gs3 import load_target
-from rgspipe.datasets.json_file import read_json
+from rgspipe.datasets.json_file import numbers, read_json
 from rgspipe.datasets.light_file import read_lights
+from rgspipe.datasets.location import dataset_root
 from rgspipe.datasets.surfel_file import load_surfels
+from rgspipe.errors import InputError
 from rgspipe.evaluation import convergence, metrics, tables
 from rgspipe.scene import Camera, LightRig, PointLight
 from rgspipe.stages.base import Stage, StageContext
@@ -38,8 +40,8 @@ def run(context: StageContext) -> None:
     fit, config = context.inputs["fit_light"], context.config
     results = pd.read_csv(fit.file("results.csv"), dtype={"target": str, "result": str, "reason": str})
     estimates = {row["target"]: _estimate(fit, row) for row in results.to_dict("records")}
-    root = dataset_root(context.inputs.get("generate_dataset"))
-    truth = _truth(config, root, context.inputs.get("freeze"), list(estimates))
+    dataset, freeze = context.inputs.get("generate_dataset"), context.inputs.get("freeze")
+    truth = _truth(config, dataset, freeze, list(estimates))
     size = math.nan if truth.bounds is None else metrics.longest_side(truth.bounds)
 
     targets = tables.target_table(results, estimates, truth.rigs, size, config.evaluate.success)
@@ -53,7 +55,7 @@ def run(context: StageContext) -> None:
         "bounds": truth.bounds,
         "success_limit": config.evaluate.success,
         "summary": summary.to_dict("records"),
-        "cameras": _cameras(config, root, targets),
+        "cameras": _cameras(config, dataset, targets),
         "pictures": _copy_pictures(fit, targets, context.folder),
         "notes": truth.notes,
     }
@@ -62,13 +64,14 @@ def run(context: StageContext) -> None:
     context.note(targets=len(targets), judged=int(targets["position_error"].notna().sum()))
 
 
-def dataset_root(dataset: Artifact | None) -> Path | None:
-    """The folder with the dataset's files: the artifact's own, or the foreign one that it points at."""
+def _dataset_file(dataset: Artifact | None, name: str) -> Path | None:
+    """A file of the dataset, verified where it is the artifact's own; None if there is none."""
     if dataset is None:
         return None
-    if "dataset.json" in dataset.manifest["files"]:
-        return Path(read_json(dataset.file("dataset.json"), "where a foreign dataset lies")["root"])
-    return dataset.path
+    if name in dataset.manifest["files"]:
+        return dataset.file(name)
+    foreign = dataset_root(dataset.path) / name
+    return foreign if foreign.is_file() else None
 
 
 def _estimate(fit: Artifact, row: Mapping[str, Any]) -> LightRig:
@@ -80,42 +83,51 @@ def _estimate(fit: Artifact, row: Mapping[str, Any]) -> LightRig:
     return (PointLight(values[:3], values[3:]),) if bool(torch.isfinite(values).all()) else ()
 
 
-def _truth(config: RgspipeConfig, root: Path | None, freeze: Artifact | None, names: list[str]) -> _Truth:
-    notes: list[str] = []
-    if config.fit.target is not None:
-        given = Path(config.fit.truth) if config.fit.truth is not None else None
-        files = dict.fromkeys(names, given)
-    else:
-        files = {name: None if root is None else root / "truth" / f"{name}.json" for name in names}
-    rigs = {
-        name: read_lights(path)
-        for name, path in files.items()
-        if path is not None and (path.is_file() or config.fit.target is not None)
-    }
-    unknown = [name for name in names if name not in rigs]
+def _truth(config: RgspipeConfig, dataset: Artifact | None, freeze: Artifact | None, names: list[str]) -> _Truth:
+    files = {name: _truth_path(config, dataset, name) for name in names}
+    rigs = {name: read_lights(path) for name, path in files.items() if path is not None}
+    bounds, note = _bounds(dataset, freeze)
+    unknown = [name for name in names if not rigs.get(name)]
+    notes = [note] if note else []
     if unknown:
         shown = ", ".join(unknown[:5]) + (", …" if len(unknown) > 5 else "")
-        notes.append(
-            f"The true lights of {len(unknown)} of {len(names)} targets are not known ({shown}): no errors there."
-        )
-    bounds, source = _bounds(root, freeze)
-    if bounds is None:
-        notes.append("The size of the scene is not known, so there are no position errors.")
-    elif source == "surfels":
-        notes.append("The dataset does not state the scene's bounds; those of the surfels' centres stand in for them.")
+        notes.append(f"No true lights are known for {len(unknown)} of {len(names)} targets ({shown}): no errors there.")
     return _Truth(rigs, bounds, notes)
 
 
-def _bounds(root: Path | None, freeze: Artifact | None) -> tuple[list[list[float]] | None, str]:
-    info = None if root is None else root / "dataset_info.json"
-    if info is not None and info.is_file():
-        stated = read_json(info, "what is known of the dataset").get("bounds")
-        if stated is not None:
-            return [[float(value) for value in corner] for corner in stated], "dataset"
+def _truth_path(config: RgspipeConfig, dataset: Artifact | None, target: str) -> Path | None:
+    if config.fit.target is None:
+        return _dataset_file(dataset, f"truth/{target}.json")
+    return None if config.fit.truth is None else Path(config.fit.truth)
+
+
+def _bounds(dataset: Artifact | None, freeze: Artifact | None) -> tuple[list[list[float]] | None, str]:
+    """The corners of the scene's box, and a note where they are not what the dataset states."""
+    info = _dataset_file(dataset, "dataset_info.json")
+    stated = None if info is None else read_json(info, "what is known of the dataset").get("bounds")
+    if stated is not None:
+        return _checked_bounds(stated, info), ""
     if freeze is None:
-        return None, "nothing"
+        return None, "The size of the scene is not known, so there are no position errors."
     centers = load_surfels(freeze.file("surfels.safetensors")).centers.double()
-    return [centers.min(dim=0).values.tolist(), centers.max(dim=0).values.tolist()], "surfels"
+    box = [centers.min(dim=0).values.tolist(), centers.max(dim=0).values.tolist()]
+    return box, "The dataset does not state the scene's bounds; those of the surfels' centres stand in for them."
+
+
+def _checked_bounds(stated: object, path: Path) -> list[list[float]]:
+    if not isinstance(stated, list) or len(stated) != 2:
+        raise InputError(
+            f"{path}: bounds",
+            expected="[[low x, y, z], [high x, y, z]]",
+            found=repr(stated)[:120],
+            remedy="Correct it.",
+        )
+    low, high = (numbers(corner, 3, path, "bounds") for corner in stated)
+    if max(b - a for a, b in zip(low, high, strict=True)) <= 0.0:
+        raise InputError(
+            f"{path}: bounds", expected="a lower and then an upper corner", found=repr(stated), remedy="Correct it."
+        )
+    return [low, high]
 
 
 def _curves(fit: Artifact, targets: pd.DataFrame, truths: Mapping[str, LightRig], size: float) -> pd.DataFrame:
@@ -145,12 +157,12 @@ def _copy_pictures(fit: Artifact, targets: pd.DataFrame, folder: Path) -> list[d
     return pictures
 
 
-def _cameras(config: RgspipeConfig, root: Path | None, targets: pd.DataFrame) -> list[dict[str, Any]]:
+def _cameras(config: RgspipeConfig, dataset: Artifact | None, targets: pd.DataFrame) -> list[dict[str, Any]]:
     """The cameras of the first target that the fit used: all targets of a dataset are seen by the same ones."""
     if config.fit.target is not None:
         folder = Path(config.fit.target)
-    elif root is not None and len(targets):
-        folder = root / "targets" / targets["target"].iloc[0]
+    elif dataset is not None and len(targets):
+        folder = dataset_root(dataset.path) / "targets" / targets["target"].iloc[0]
     else:
         return []
     views = load_target(folder).views

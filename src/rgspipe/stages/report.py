@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -51,7 +51,7 @@ def _contents(context: StageContext) -> report.ReportContents:
         comparison=_optional_bytes(trained, "comparison.png"),
         success_limit=context.config.evaluate.success,
         configuration=_configuration(context.config),
-        stages=[report.stage_record(_name(artifact), artifact.manifest) for artifact in _artifacts(context)],
+        stages=_stages(context, described),
         notes=_notes(described),
     )
 
@@ -69,9 +69,8 @@ def _pictures(artifacts: Iterable[Artifact], described: Iterable[Mapping[str, An
     pictures = []
     for artifact, content in zip(artifacts, described, strict=True):
         for entry in content["pictures"]:
-            group = report.group_title(content["summary"][0]["method"], content["summary"][0]["views"])
             caption = report.picture_caption(entry["target"], entry["kind"], entry["position_error"], entry["psnr"])
-            pictures.append(report.Picture(group, caption, artifact.file(entry["file"]).read_bytes()))
+            pictures.append(report.Picture(_group(content), caption, artifact.file(entry["file"]).read_bytes()))
     return pictures
 
 
@@ -110,18 +109,23 @@ def _configuration(config: RgspipeConfig) -> str:
     return json.dumps(shown, indent=2)
 
 
-def _artifacts(context: StageContext) -> list[Artifact]:
-    """Every artifact behind the report, in the order of the pipeline."""
-    order = ("generate_dataset", "init_depth", "train_surfels", "freeze", "fit_light", "evaluate")
-    return [artifact for stage in order for artifact in context.input_lists.get(stage, ())]
+def _stages(context: StageContext, described: Sequence[Mapping[str, Any]]) -> list[report.StageRecord]:
+    """Every artifact behind the report, in the order of the pipeline; fits and evaluations stand in pairs."""
+    records = [
+        report.stage_record(stage, artifact.manifest)
+        for stage in ("generate_dataset", "init_depth", "train_surfels", "freeze")
+        for artifact in context.input_lists.get(stage, ())
+    ]
+    for stage in ("fit_light", "evaluate"):
+        for artifact, content in zip(context.input_lists.get(stage, ()), described, strict=False):
+            records.append(report.stage_record(f"{stage} ({_group(content)})", artifact.manifest))
+    return records
 
 
-def _name(artifact: Artifact) -> str:
-    """The stage, and for fits and evaluations also how they were made where the manifest says so."""
-    config = artifact.manifest.get("config", {})
-    found = [config.get("fit.method"), config.get("views.count")]
-    shown = [str(value) for value in found if value is not None]
-    return artifact.stage + (f" ({', '.join(shown)})" if shown else "")
+def _group(described: Mapping[str, Any]) -> str:
+    """What an evaluation is about: its method and its number of views."""
+    first = next(iter(described["summary"]), None)
+    return "no targets" if first is None else report.group_title(first["method"], first["views"])
 
 
 def _notes(described: Iterable[Mapping[str, Any]]) -> list[str]:
