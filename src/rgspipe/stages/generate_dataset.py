@@ -1,0 +1,119 @@
+"""Make the images: render a Cornell box or a .blend file with Blender, or take a dataset from disk."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+from rgspipe.blender.job import Box, CornellParameters, DatasetJob
+from rgspipe.blender.process import render_dataset
+from rgspipe.config import CornellConfig, RgspipeConfig, scene_name
+from rgspipe.datasets.gs3 import load_dataset
+from rgspipe.datasets.location import point_at_dataset
+from rgspipe.errors import InputError
+from rgspipe.stages.base import Stage, StageContext
+
+
+def run(context: StageContext) -> None:
+    """Leave a dataset in the stage's folder, or a pointer to the user's, which is checked first."""
+    if context.config.scene.kind == "external":
+        _take_external(context)
+    else:
+        render_dataset(dataset_job(context.config), context.folder)
+    context.note(kind=context.config.scene.kind)
+
+
+def dataset_job(config: RgspipeConfig) -> DatasetJob:
+    """What the configuration asks Blender for.
+
+    Raises:
+        InputError: `scene.path` names no file, or more views of a target are wanted than there are cameras.
+    """
+    if config.dataset.target_views > 3:
+        found = str(config.dataset.target_views)
+        raise InputError("dataset.target_views", expected="1, 2 or 3", found=found, remedy="Use up to 3 views.")
+    wanted = config.dataset
+    return DatasetJob(
+        scene=scene_name(config),
+        kind=config.scene.kind,
+        blend_path=str(_existing_path(config, "a .blend file")) if config.scene.kind == "blend" else None,
+        cornell=cornell_parameters(config.scene.cornell),
+        train_views=wanted.train_views,
+        test_views=wanted.test_views,
+        targets_per_class=wanted.targets_per_class,
+        target_views=wanted.target_views,
+        resolution=wanted.resolution,
+        samples=wanted.samples,
+        denoise=wanted.denoise,
+        max_bounces=wanted.max_bounces,
+        seed=wanted.seed,
+    )
+
+
+def cornell_parameters(wanted: CornellConfig) -> CornellParameters:
+    """The room around the origin; the configuration measures from the front left corner of the floor."""
+    boxes = (
+        _standing_box(wanted, wanted.tall_size, wanted.tall_center, wanted.tall_angle),
+        _standing_box(wanted, wanted.short_size, wanted.short_center, wanted.short_angle),
+    )
+    return CornellParameters(
+        room=tuple(wanted.room),
+        white=tuple(wanted.wall_color),
+        left=tuple(wanted.left_color),
+        right=tuple(wanted.right_color),
+        boxes=boxes,
+    )
+
+
+def _standing_box(wanted: CornellConfig, size: list[float], foot: list[float], degrees: float) -> Box:
+    width, depth, height = wanted.room
+    center = (foot[0] - 0.5 * width, foot[1] - 0.5 * depth, 0.5 * (size[2] - height))
+    return Box(center, tuple(size), math.radians(degrees), tuple(wanted.box_color))
+
+
+def _take_external(context: StageContext) -> None:
+    """Read every file of the user's dataset, so that what is wrong shows now and not an hour later."""
+    root = _existing_path(context.config, "the folder of a dataset")
+    dataset = load_dataset(root)
+    point_at_dataset(context.folder, root)
+    context.note(train=len(dataset.train), test=len(dataset.test), targets=len(dataset.targets))
+
+
+def _existing_path(config: RgspipeConfig, what: str) -> Path:
+    path = config.scene.path
+    if path is None:
+        raise InputError("scene.path", expected=what, found="nothing", remedy="Add scene.path=… to the command.")
+    if not Path(path).exists():
+        raise InputError("scene.path", expected=what, found=f"no such path: {path}", remedy="Correct scene.path.")
+    return Path(path).resolve()
+
+
+def _config_keys(config: RgspipeConfig) -> tuple[str, ...]:
+    by_kind = {
+        "cornell": ("scene.cornell", "dataset"),
+        "blend": ("dataset",),
+        "external": (),
+    }
+    return ("scene.kind", *by_kind[config.scene.kind])
+
+
+def _files(config: RgspipeConfig) -> tuple[Path, ...]:
+    if config.scene.kind == "cornell" or config.scene.path is None or not Path(config.scene.path).exists():
+        return ()
+    return (Path(config.scene.path).resolve(),)
+
+
+STAGE = Stage(
+    name="generate_dataset",
+    help="render the images of a scene, or check those of scene.path",
+    run=run,
+    config_keys=_config_keys,
+    code=(
+        "rgspipe.blender",
+        "rgspipe.datasets.exr",
+        "rgspipe.datasets.gs3_write",
+        "rgspipe.datasets.light_file",
+        "rgspipe.scene.camera",
+    ),
+    files=_files,
+)
