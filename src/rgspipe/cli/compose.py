@@ -218,18 +218,19 @@ def _unknown_choice(error: MissingConfigException) -> InputError:
 def _value_error(error: OmegaConfBaseException, override: str) -> InputError:
     key = str(error.full_key or override.partition("=")[0] or "the configuration")
     text = (error.msg or str(error)).splitlines()[0]
-    types = {"Integer": "a whole number", "Float": "a number", "Boolean": "true or false"}
-    for name, meaning in types.items():
-        if text.endswith(f"could not be converted to {name}"):
-            found = text.removeprefix("Value ").partition(" of type ")[0]
-            return InputError(key, expected=meaning, found=found, remedy=f"Write {key}={_example(name)}, for instance.")
+    for ending, meaning, example in (
+        ("could not be converted to Integer", "a whole number", "8"),
+        ("could not be converted to Float", "a number", "0.5"),
+        ("is not a valid bool", "true or false", "true"),
+    ):
+        if ending in text:
+            found = text.removeprefix("Value ").partition(" of type ")[0].partition(" is not ")[0]
+            return InputError(key, expected=meaning, found=found, remedy=f"Write {key}={example}, for instance.")
+    if "is not Optional" in text:
+        return InputError(key, expected="a value", found="null", remedy=f"Leave {key} away for its default.")
     return InputError(
         key, expected="a value of the right type", found=text, remedy="See python -m rgspipe --help for the keys."
     )
-
-
-def _example(type_name: str) -> str:
-    return {"Integer": "8", "Float": "0.5", "Boolean": "true"}[type_name]
 
 
 def check_stage(name: str) -> None:

@@ -1,0 +1,134 @@
+"""The command line as people meet it: what it prints, its exit status, what it leaves behind."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+REFUSED = 2
+
+
+@pytest.fixture
+def rgspipe(tmp_path: Path, child_environment: dict[str, str]):
+    """Runs the real command line, or with `toys` the one with the toy stages, in an empty folder."""
+
+    def call(*arguments: str, toys: bool = False, **environment: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [sys.executable, "-m", "toys" if toys else "rgspipe", *arguments],
+            cwd=tmp_path,
+            env={**child_environment, **environment},
+            capture_output=True,
+            text=True,
+            stdin=subprocess.DEVNULL,
+            timeout=60,
+        )
+
+    return call
+
+
+def statuses(folder: Path) -> list[dict]:
+    return [json.loads(path.read_text()) for path in sorted(folder.rglob("status.json"))]
+
+
+def test_without_arguments_it_says_what_it_can_do(rgspipe) -> None:
+    result = rgspipe()
+    assert result.returncode == 0
+    for word in ("generate_dataset", "fit_light", "cornell", "external", "pipeline=smoke"):
+        assert word in result.stdout
+
+
+def test_help_explains_stages_scenes_groups_and_keys_without_torch(rgspipe) -> None:
+    result = rgspipe("--help")
+    assert result.returncode == 0
+    for word in ("train_surfels", "blend", "accuracy", "draft | reference | standard", "upstream=require", "dataset"):
+        assert word in result.stdout
+    assert "8 to 8192" in rgspipe("--help", "dataset").stdout
+    code = "import sys; from rgspipe.cli import main; main(['--help']); sys.exit('torch' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True).returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [
+        (["stage=fit_ligth"], "stage=fit_light"),
+        (["stage=freeze", "dataset.resolutoin=3"], "dataset.resolution"),
+        (["-m", "stage=freeze", "seed=1,x"], "seed"),
+        (["pipeline=smok"], "pipeline=smoke"),
+        (["--help", "fot"], "fit"),
+    ],
+)
+def test_a_mistake_is_one_paragraph_and_leaves_nothing(
+    rgspipe, tmp_path: Path, arguments: list[str], word: str
+) -> None:
+    result = rgspipe(*arguments)
+    assert result.returncode == REFUSED
+    assert result.stderr.startswith("Error: ") and word in result.stderr.replace("\n", " ")
+    assert "Traceback" not in result.stderr and result.stdout == ""
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_run_prints_its_plan_and_result_and_leaves_a_status(rgspipe, tmp_path: Path) -> None:
+    result = rgspipe("stage=grow", "dataset.resolution=8", toys=True)
+    assert result.returncode == 0, result.stderr
+    assert "Plan for cornell" in result.stdout and "not made yet" in result.stdout
+    (status,) = statuses(tmp_path / "outputs" / "runs")
+    assert (status["state"], status["stage"]) == ("done", "grow")
+    manifest = json.loads((tmp_path / status["result"] / "manifest.json").read_text())
+    assert manifest["facts"]["spinning"] == "PASSIVE"
+    again = rgspipe("stage=grow", "dataset.resolution=8", toys=True)
+    assert "reuse" in again.stdout and "make" not in again.stdout
+    listed = rgspipe("status")
+    assert listed.stdout.count("done") == 2
+
+
+def test_a_failure_is_short_and_its_traceback_is_kept(rgspipe, tmp_path: Path) -> None:
+    result = rgspipe("stage=break", "seed=1", toys=True)
+    assert result.returncode == 1
+    assert "RuntimeError: seed 1 breaks" in result.stderr and "status.json" in result.stderr
+    assert "Traceback" not in result.stderr
+    (status,) = statuses(tmp_path / "outputs")
+    assert status["state"] == "failed" and "toys.py" in status["traceback"]
+    shown = rgspipe("stage=break", "seed=1", "debug.traceback=true", toys=True)
+    assert "Traceback" in shown.stderr
+    refused = rgspipe("stage=break", "seed=2", toys=True)
+    assert refused.returncode == REFUSED and "Traceback" not in refused.stderr
+    assert "Traceback" in rgspipe("stage=break", "seed=2", toys=True, RGSPIPE_TRACEBACK="1").stderr
+
+
+@pytest.mark.slow
+def test_one_failed_job_hides_no_other(rgspipe, tmp_path: Path) -> None:
+    result = rgspipe("-m", "stage=break", "seed=0,1,2,4", "hydra.launcher.n_jobs=2", toys=True)
+    assert result.returncode == REFUSED
+    assert "2 of 4 jobs done" in result.stdout
+    assert [status["state"] for status in statuses(tmp_path / "outputs" / "runs")] == [
+        "done",
+        "failed",
+        "failed",
+        "done",
+    ]
+
+
+@pytest.mark.slow
+def test_sweep_jobs_share_what_they_need_and_run_in_processes_of_their_own(rgspipe, tmp_path: Path) -> None:
+    command = ["-m", "stage=grow", "views.count=1,2,3", "dataset.resolution=8", "hydra.launcher.n_jobs=2"]
+    result = rgspipe(*command, toys=True, TOY_PAUSE="0.05")
+    assert result.returncode == 0, result.stderr
+    jobs = statuses(tmp_path / "outputs" / "runs")
+    assert [job["state"] for job in jobs] == ["done"] * 3
+    sown = (tmp_path / "outputs" / "cornell" / "sow" / "made.log").read_text().splitlines()
+    assert len(sown) == 1, "two jobs needed the same artifact and both made it"
+    manifests = [json.loads((tmp_path / job["result"] / "manifest.json").read_text()) for job in jobs]
+    assert all(manifest["facts"]["threads"] is not None for manifest in manifests), "jobs share the cores"
+    again = rgspipe(*command, toys=True)
+    assert again.returncode == 0 and "make " not in again.stdout
+
+
+@pytest.mark.slow
+def test_a_job_that_dies_is_told_as_killed(rgspipe) -> None:
+    result = rgspipe("-m", "stage=break", "seed=3,0", "hydra.launcher.n_jobs=2", toys=True)
+    assert result.returncode != 0
+    assert "job 0: killed" in result.stdout

@@ -1,0 +1,20 @@
+"""Shared by all tests."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+# Two test workers on two cores: more threads than one each only get in each other's way.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+TESTS = Path(__file__).resolve().parent
+
+
+@pytest.fixture
+def child_environment() -> dict[str, str]:
+    """Environment of a process that imports rgspipe and the helpers beside the tests, from any folder."""
+    paths = [str(TESTS.parent / "src"), str(TESTS)]
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}

@@ -1,0 +1,143 @@
+"""The stage graph on small real stages: what is made, reused, refused, and why."""
+
+from __future__ import annotations
+
+import dataclasses
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import toys
+from rgspipe.artifacts import ArtifactStore, Key
+from rgspipe.config import RgspipeConfig, with_changes
+from rgspipe.errors import InputError
+from rgspipe.pipeline import describe_plan, plan, resolve, run
+
+
+@pytest.fixture
+def config(tmp_path: Path) -> RgspipeConfig:
+    return with_changes(
+        RgspipeConfig(), {"stage": "harvest", "outputs": str(tmp_path / "outputs"), "dataset.resolution": 8}
+    )
+
+
+def planned(config: RgspipeConfig) -> list[tuple[str, bool, str]]:
+    steps = plan(resolve(config, toys.load), ArtifactStore(Path(config.outputs)))
+    return [(step.node.stage.name, step.reused, step.reason) for step in steps]
+
+
+def test_a_stage_makes_what_it_needs_and_nothing_twice(config: RgspipeConfig) -> None:
+    assert [name for name, _, _ in planned(config)] == ["sow", "grow", "grow", "harvest"]
+    artifact = run(config, toys.load)
+    # 0 + … + 31 = 496, once and three times.
+    assert artifact.file("totals.txt").read_text() == "496\n1488\n"
+    assert planned(config) == [("harvest", True, "")]
+    assert run(config, toys.load).manifest == artifact.manifest
+    log = Path(config.outputs) / "cornell" / "sow" / "made.log"
+    assert len(log.read_text().splitlines()) == 1
+
+
+def test_the_plan_says_why(config: RgspipeConfig) -> None:
+    assert planned(config)[0] == ("sow", False, "not made yet")
+    run(config, toys.load)
+    changed = with_changes(config, {"dataset.resolution": 9})
+    assert planned(changed)[0] == ("sow", False, "dataset.resolution 8 → 9")
+    assert planned(changed)[-1] == ("harvest", False, "another grow")
+    more = with_changes(config, {"report.views": [1, 2]})
+    assert planned(more) == [
+        ("grow", True, ""),
+        ("sow", True, ""),
+        ("grow", False, "views.count 3 → 2"),
+        ("harvest", False, "another grow"),
+    ]
+    text = describe_plan(plan(resolve(more, toys.load), ArtifactStore(Path(config.outputs))))
+    assert "reuse" in text and "make" in text and "views.count 3 → 2" in text
+
+
+def test_keys_that_do_not_matter_do_not_rebuild(config: RgspipeConfig) -> None:
+    run(config, toys.load)
+    other = with_changes(config, {"seed": 7, "debug.traceback": True, "train.steps": 3})
+    assert planned(other) == [("harvest", True, "")]
+
+
+def test_require_refuses_and_names_the_command(config: RgspipeConfig) -> None:
+    strict = with_changes(config, {"upstream": "require"})
+    with pytest.raises(InputError) as caught:
+        run(strict, toys.load, ["stage=harvest", "upstream=require", "dataset.resolution=8"])
+    message = str(caught.value)
+    assert "grow" in message
+    assert "`python -m rgspipe stage=grow dataset.resolution=8 views.count=3`" in message
+    assert not (Path(config.outputs) / "cornell" / "sow").exists()
+    run(config, toys.load)
+    assert run(strict, toys.load).stage == "harvest"
+
+
+def test_foreign_files_count_by_content(config: RgspipeConfig, tmp_path: Path) -> None:
+    source = tmp_path / "foreign"
+    source.mkdir()
+    (source / "a.txt").write_text("1")
+    stage = dataclasses.replace(toys.SOW, files=lambda config: [source])
+    load = {**toys.STAGES, "sow": stage}.__getitem__
+    before = resolve(config, load).key
+    assert resolve(config, load).key == before
+    (source / "a.txt").write_text("2")
+    assert resolve(config, load).key != before
+
+
+def test_a_damaged_input_is_refused_and_left_alone(config: RgspipeConfig) -> None:
+    run(with_changes(config, {"stage": "sow"}), toys.load)
+    path = next((Path(config.outputs) / "cornell" / "sow" / "latest").resolve().glob("row_03.txt"))
+    path.write_text("x")
+    with pytest.raises(InputError, match=r"row_03\.txt"):
+        run(config, toys.load)
+    assert path.read_text() == "x"
+
+
+def _contents(outputs: Path) -> dict[str, bytes]:
+    files = [path for path in outputs.rglob("*") if path.is_file() and path.suffix == ".txt"]
+    return {str(path.relative_to(outputs)): path.read_bytes() for path in files if not path.is_symlink()}
+
+
+@pytest.mark.slow
+def test_killed_at_any_moment_and_run_again_ends_with_the_same_bytes(
+    config: RgspipeConfig, tmp_path: Path, child_environment: dict[str, str]
+) -> None:
+    run(config, toys.load)
+    expected = _contents(Path(config.outputs))
+    killed = tmp_path / "killed"
+    command = [sys.executable, "-c", _HARVEST, str(killed)]
+    moments = random.Random(5)
+    interrupted = 0
+    for _ in range(12):
+        process = subprocess.Popen(command, env={**child_environment, toys.PAUSE_VARIABLE: "0.05"})
+        # From the start of the process (0.2 s of imports) to a little after its end.
+        time.sleep(0.2 + 0.3 * moments.random())
+        process.send_signal(signal.SIGKILL)
+        interrupted += process.wait() == -signal.SIGKILL
+        _check_published(killed)
+    assert interrupted >= 3
+    subprocess.run(command, env=child_environment, check=True)
+    found = {name: content for name, content in _contents(killed).items() if ".partial" not in name}
+    assert found == expected
+
+
+def _check_published(outputs: Path) -> None:
+    """Whatever looks like an artifact is whole."""
+    for folder in outputs.glob("cornell/*/[0-9a-f]*"):
+        if not folder.is_symlink():
+            artifact = ArtifactStore(outputs).find(Key("cornell", folder.parent.name, folder.name))
+            assert artifact is not None
+            artifact.folder()
+
+
+_HARVEST = """
+import sys, toys
+from rgspipe.config import RgspipeConfig, with_changes
+from rgspipe.pipeline import run
+run(with_changes(RgspipeConfig(), {"stage": "harvest", "outputs": sys.argv[1], "dataset.resolution": 8}), toys.load)
+"""

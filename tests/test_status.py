@@ -1,0 +1,62 @@
+"""Status files: running, done, failed, killed."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+from rgspipe.status import RunStatus, process_start, read_status, read_statuses
+
+
+def test_a_run_is_running_then_done(tmp_path: Path) -> None:
+    status = RunStatus.start(tmp_path / "run", "freeze", ["stage=freeze", "seed=1"])
+    values = read_status(tmp_path / "run")
+    assert (values["state"], values["pid"]) == ("running", os.getpid())
+    assert values["command"] == "python -m rgspipe stage=freeze seed=1"
+    status.done(Path("outputs/x"))
+    values = read_status(tmp_path / "run")
+    assert (values["state"], values["result"], values["exit_code"]) == ("done", "outputs/x", 0)
+    assert values["seconds"] >= 0 and values["ended"] >= values["started"]
+
+
+def test_a_failure_keeps_its_traceback(tmp_path: Path) -> None:
+    status = RunStatus.start(tmp_path, "freeze", [])
+    try:
+        raise RuntimeError("no luck")
+    except RuntimeError as error:
+        status.failed(error, 1)
+    values = read_status(tmp_path)
+    assert values["state"] == "failed"
+    assert values["error"] == "no luck"
+    assert "test_status.py" in values["traceback"]
+
+
+def test_a_run_whose_process_is_gone_was_killed(tmp_path: Path, child_environment: dict[str, str]) -> None:
+    code = "import sys, time, pathlib; from rgspipe.status import RunStatus; "
+    code += "RunStatus.start(pathlib.Path(sys.argv[1]), 'freeze', []); time.sleep(60)"
+    process = subprocess.Popen([sys.executable, "-c", code, str(tmp_path)], env=child_environment)
+    while read_status(tmp_path) is None:
+        time.sleep(0.01)
+    assert read_status(tmp_path)["state"] == "running"
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    assert read_status(tmp_path)["state"] == "killed"
+
+
+def test_a_process_id_that_is_used_again_does_not_deceive(tmp_path: Path) -> None:
+    status = RunStatus.start(tmp_path, "freeze", [])
+    status.values["process_start"] = "another boot:1"
+    status._write()
+    assert read_status(tmp_path)["state"] == "killed"
+    assert process_start(os.getpid()) == process_start(os.getpid())
+
+
+def test_jobs_are_listed_in_their_order(tmp_path: Path) -> None:
+    for number in (10, 9, 1):
+        RunStatus.start(tmp_path / "sweep" / str(number), "freeze", [])
+    assert [folder.name for folder, _ in read_statuses(tmp_path)] == ["1", "9", "10"]
+    assert read_status(tmp_path) is None

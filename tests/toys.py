@@ -1,0 +1,85 @@
+"""Small real stages to test the graph, the store and the command line with, and a command line that runs them.
+
+`sow` writes one file for each row, slowly, and goes on after an interruption; `grow` sums them up; `harvest` needs
+`grow` for several numbers of views.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+
+from rgspipe.cli import main
+from rgspipe.config import RgspipeConfig
+from rgspipe.errors import InputError
+from rgspipe.stages.base import Need, Stage, StageContext
+
+PAUSE_VARIABLE = "TOY_PAUSE"
+
+
+def _sow(context: StageContext) -> None:
+    pause = float(os.environ.get(PAUSE_VARIABLE, "0"))
+    for row in range(context.config.dataset.resolution):
+        path = context.folder / f"row_{row:02d}.txt"
+        if path.exists():
+            continue
+        temporary = context.scratch / path.name
+        with temporary.open("w") as stream:
+            for column in range(4):
+                stream.write(f"{row * 4 + column}\n")
+                stream.flush()
+                time.sleep(pause / 4)
+        temporary.rename(path)
+    context.note(rows=context.config.dataset.resolution)
+    with (context.folder.parent / "made.log").open("a") as log:
+        log.write(f"{os.getpid()}\n")
+
+
+def _grow(context: StageContext) -> None:
+    seeds = context.inputs["sow"]
+    rows = [seeds.file(name).read_text().split() for name in sorted(seeds.manifest["files"])]
+    total = sum(int(number) for row in rows for number in row)
+    (context.folder / "total.txt").write_text(f"{total * context.config.views.count}\n")
+    context.note(threads=os.environ.get("OMP_NUM_THREADS"), spinning=os.environ.get("OMP_WAIT_POLICY"))
+
+
+def _harvest(context: StageContext) -> None:
+    grown = context.input_lists["grow"]
+    (context.folder / "totals.txt").write_text("".join(item.file("total.txt").read_text() for item in grown))
+
+
+def _break(context: StageContext) -> None:
+    if context.config.seed == 1:
+        raise RuntimeError("seed 1 breaks\nin two lines")
+    if context.config.seed == 2:
+        raise InputError("seed", expected="another one", found="2", remedy="Choose another.")
+    if context.config.seed == 3:
+        os._exit(9)
+    (context.folder / "seed.txt").write_text(f"{context.config.seed}\n")
+
+
+def _views(config: RgspipeConfig) -> list[Need]:
+    return [Need("grow", {"views.count": count}) for count in config.report.views]
+
+
+SOW = Stage("sow", "writes rows", _sow, config_keys=("dataset.resolution",))
+GROW = Stage("grow", "adds them up", _grow, inputs=lambda config: ["sow"], config_keys=("views",))
+HARVEST = Stage("harvest", "brings it in", _harvest, inputs=_views)
+BREAK = Stage("break", "fails on some seeds", _break, config_keys=("seed",))
+
+STAGES = {stage.name: stage for stage in (SOW, GROW, HARVEST, BREAK)}
+
+
+def load(name: str) -> Stage:
+    """The toy stage of this name."""
+    if name not in STAGES:
+        raise InputError("stage", expected=f"one of {', '.join(STAGES)}", found=repr(name), remedy="Choose one.")
+    return STAGES[name]
+
+
+if __name__ == "__main__":
+    # Imported by its name, so that worker processes find the stages under it too.
+    import toys
+
+    sys.exit(main(sys.argv[1:], toys.load))
