@@ -1,0 +1,22 @@
+"""From images of a frozen scene to the lights that made them."""
+
+from rgspipe.fitting.dictionary import LightDictionary, build_dictionary
+from rgspipe.fitting.fit import FitViews, fit_lights, prepare_fit
+from rgspipe.fitting.paper_adam import AdamOptions
+from rgspipe.fitting.problem import Effects
+from rgspipe.fitting.result import FitResult, FitStatus, Step
+from rgspipe.fitting.search_lm import SearchOptions
+
+__all__ = [
+    "AdamOptions",
+    "Effects",
+    "FitResult",
+    "FitStatus",
+    "FitViews",
+    "LightDictionary",
+    "SearchOptions",
+    "Step",
+    "build_dictionary",
+    "fit_lights",
+    "prepare_fit",
+]

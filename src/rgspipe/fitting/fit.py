@@ -1,0 +1,109 @@
+"""The entry to all fits: images of a frozen scene in, lights out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from torch import Tensor
+
+from rgspipe.fitting.coarse import CoarseImages, coarse_images
+from rgspipe.fitting.dictionary import LightDictionary, build_dictionary
+from rgspipe.fitting.paper_adam import AdamOptions, LightPrior, fit_paper_adam
+from rgspipe.fitting.problem import Effects, LightProblem
+from rgspipe.fitting.result import FitResult
+from rgspipe.fitting.search_lm import SearchOptions, fit_search_lm
+from rgspipe.fitting.views import PreparedViews, prepare_views
+from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.renderer.view_weights import ViewWeights
+from rgspipe.scene import Camera, PointLight
+
+METHODS = ("search_lm", "paper_adam")
+
+
+@dataclass(frozen=True)
+class FitViews:
+    """Views made ready for any number of targets that the same cameras see.
+
+    Attributes:
+        prepared: the pixels and their weights.
+        coarse: images of the dictionary's candidates; None where only `paper_adam` is used.
+        effects: parts of light transport.
+    """
+
+    prepared: PreparedViews
+    coarse: CoarseImages | None
+    effects: Effects
+
+
+def prepare_fit(
+    frozen: FrozenScene,
+    views: Sequence[ViewWeights | Camera],
+    *,
+    masks: Sequence[Tensor] | None = None,
+    mask_edges: bool = True,
+    dictionary: LightDictionary | None = None,
+    effects: Effects | None = None,
+) -> FitViews:
+    """What all targets of one set of cameras share; see `fit_lights` for the arguments."""
+    effects = effects or Effects()
+    weights = [frozen.view(view) if isinstance(view, Camera) else view for view in views]
+    prepared = prepare_views(frozen, weights, masks=masks, mask_edges=mask_edges)
+    coarse = None
+    if dictionary is not None:
+        coarse = coarse_images(prepared, dictionary, interreflection=effects.interreflection)
+    return FitViews(prepared, coarse, effects)
+
+
+def fit_lights(
+    frozen: FrozenScene,
+    views: FitViews | Sequence[ViewWeights | Camera],
+    images: Sequence[Tensor],
+    *,
+    method: str = "search_lm",
+    masks: Sequence[Tensor] | None = None,
+    mask_edges: bool = True,
+    dictionary: LightDictionary | None = None,
+    effects: Effects | None = None,
+    search: SearchOptions | None = None,
+    adam: AdamOptions | None = None,
+    training_lights: Sequence[PointLight] = (),
+    seed: int = 0,
+) -> FitResult:
+    """Recover one point light from images of a frozen scene.
+
+    Args:
+        frozen: the scene.
+        views: the images' cameras, or their weights; or what `prepare_fit` made of them, and then `masks`,
+            `mask_edges`, `dictionary` and `effects` are those that it was given.
+        images: (H, W, 3) linear radiance per view, premultiplied by alpha.
+        method: "search_lm" or "paper_adam".
+        masks: (H, W) per view, the scene's share of each pixel (the image's alpha); 1 if None.
+        mask_edges: whether `search_lm` leaves out pixels on silhouettes, creases and depth jumps.
+        dictionary: candidates for `search_lm`; made anew if None, which takes seconds.
+        effects: parts of light transport; all if None.
+        search, adam: settings of the methods.
+        training_lights: lights of known images, where `paper_adam` starts from.
+        seed: of every draw; the same seed gives the same result.
+
+    Returns:
+        The light, why the fit stopped, and how it got there. A target that is black gives a result without
+        lights, not an error.
+
+    Raises:
+        InputError: images or masks do not fit the views, are not finite, or leave no pixel.
+        ValueError: an unknown method.
+    """
+    if method not in METHODS:
+        raise ValueError(f"method must be one of {METHODS}, got {method!r}")
+    if not isinstance(views, FitViews):
+        if method == "search_lm" and dictionary is None:
+            dictionary = build_dictionary(frozen, seed=seed, shadows=(effects or Effects()).shadows)
+        views = prepare_fit(frozen, views, masks=masks, mask_edges=mask_edges, dictionary=dictionary, effects=effects)
+    stacked = views.prepared.stack_images(images)
+    problem = LightProblem.create(views.prepared, stacked, views.effects)
+    if method == "paper_adam":
+        return fit_paper_adam(problem, stacked, adam or AdamOptions(), LightPrior.of(training_lights), seed)
+    if views.coarse is None:
+        raise ValueError("search_lm needs a dictionary: pass one to prepare_fit")
+    return fit_search_lm(problem, views.coarse, search or SearchOptions())

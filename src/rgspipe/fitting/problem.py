@@ -1,0 +1,87 @@
+"""One unknown point light and the pixels that it has to explain."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from rgspipe.fitting.moments import Moments, moments
+from rgspipe.fitting.views import PreparedViews
+from rgspipe.renderer.direct import unit_irradiance
+
+#: In relative weights 1/(y + floor·mean y): pixels darker than this share of the mean count no more than it does.
+RELATIVE_FLOOR = 0.05
+
+
+@dataclass(frozen=True)
+class Effects:
+    """Which parts of light transport a fit's model has."""
+
+    shadows: bool = True
+    interreflection: bool = True
+
+
+@dataclass(frozen=True)
+class LightProblem:
+    """Find the light whose image is the target.
+
+    Attributes:
+        views: the pixels that are used.
+        target: (P, 3) float32 their radiance over `scale`, so that its mean is 1 and neither very bright nor
+            very dim images leave the range of float32.
+        scale: mean radiance of the target; 0 if it is black.
+        effects: parts of light transport.
+    """
+
+    views: PreparedViews
+    target: Tensor
+    scale: float
+    effects: Effects
+
+    @classmethod
+    def create(cls, views: PreparedViews, stacked: Tensor, effects: Effects | None = None) -> LightProblem:
+        """The problem for images stacked by `PreparedViews.stack_images`, (all pixels, 3)."""
+        target = stacked[views.pixels].double()
+        scale = max(0.0, float(target.mean()))
+        normalised = target / scale if scale > 0.0 else target
+        if not bool(torch.isfinite(normalised).all()):
+            scale, normalised = 0.0, torch.zeros_like(target)
+        return cls(views, normalised.float(), scale, effects or Effects())
+
+    @property
+    def black(self) -> bool:
+        """Whether there is nothing to explain."""
+        return self.scale == 0.0
+
+    def evaluate(self, position: Tensor) -> Tensor:
+        """(P, 3, 4) float32 image of a unit light at `position` (3,), and its derivatives towards x, y and z."""
+        frozen = self.views.frozen
+        irradiance, slope = unit_irradiance(frozen.bvh, position[None], self.effects.shadows)
+        lightings = torch.cat([irradiance[0, :, None], slope[0]], dim=1)
+        radiance = frozen.radiance(lightings, self.effects.interreflection)
+        return (self.views.operator @ radiance.reshape(len(radiance), 12)).reshape(-1, 3, 4)
+
+    def moments(self, columns: Tensor, weights: Tensor) -> Moments:
+        """Weighted moments of an evaluation against the target."""
+        return moments(columns, self.target, weights)
+
+    def residual(self, columns: Tensor, intensity: Tensor) -> Tensor:
+        """(P, 3) float32 target − image at `intensity` (3,), both over `scale`."""
+        return self.target - columns[:, :, 0] * intensity.to(columns)
+
+    def relative_weights(self) -> Tensor:
+        """(P, 1) weights that make errors relative to the pixel's own brightness."""
+        return 1.0 / (self.target.mean(dim=1, keepdim=True).clamp(min=0.0) + RELATIVE_FLOOR)
+
+    @staticmethod
+    def block_weights(target: Tensor, counts: Tensor) -> Tensor:
+        """(B, 3) squared relative weights of block averages (B, 3) over `counts` (B,) pixels each."""
+        relative = 1.0 / (target.mean(dim=1).clamp(min=0.0) + RELATIVE_FLOOR)
+        return (counts * relative.square())[:, None].expand(target.shape)
+
+    def unexplained(self, columns: Tensor, intensity: Tensor) -> float:
+        """Σ (target − image)² / Σ target², the loss that is reported: 0 is a perfect fit, 1 a black image."""
+        energy = float(self.target.double().square().sum())
+        return float(self.residual(columns, intensity).double().square().sum()) / energy if energy > 0.0 else 0.0

@@ -1,0 +1,46 @@
+"""Structural similarity of images (Wang, Bovik, Sheikh and Simoncelli 2004), differentiable."""
+
+from __future__ import annotations
+
+import torch
+import torch.nn.functional as F
+from torch import Tensor
+
+#: Gaussian window: width in pixels and standard deviation.
+WINDOW, SIGMA = 11, 1.5
+
+#: Stabilising constants (K₁L)² and (K₂L)² for a dynamic range L of 1, as in splatting losses.
+C1, C2 = 0.01**2, 0.03**2
+
+
+def ssim_map(image: Tensor, target: Tensor) -> Tensor:
+    """(H, W, C) structural similarity at every pixel; outside the images is black.
+
+    Args:
+        image, target: (H, W, C) of one dtype; gradients flow to both.
+    """
+    if image.shape != target.shape or image.ndim != 3:
+        raise ValueError(
+            f"ssim needs two images of shape (H, W, C), got {tuple(image.shape)} and {tuple(target.shape)}"
+        )
+    x, y = image.permute(2, 0, 1)[:, None], target.permute(2, 0, 1)[:, None]
+    mean_x, mean_y, square_x, square_y, product = _blur(torch.cat([x, y, x * x, y * y, x * y])).chunk(5)
+    variance_x, variance_y = square_x - mean_x * mean_x, square_y - mean_y * mean_y
+    covariance = product - mean_x * mean_y
+    numerator = (2.0 * mean_x * mean_y + C1) * (2.0 * covariance + C2)
+    denominator = (mean_x * mean_x + mean_y * mean_y + C1) * (variance_x + variance_y + C2)
+    return (numerator / denominator)[:, 0].permute(1, 2, 0)
+
+
+def ssim(image: Tensor, target: Tensor) -> Tensor:
+    """Mean structural similarity of two images (H, W, C), a scalar; 1 for equal ones."""
+    return ssim_map(image, target).mean()
+
+
+def _blur(images: Tensor) -> Tensor:
+    """Gaussian-weighted means of (B, 1, H, W), separable, zero beyond the border."""
+    offsets = torch.arange(WINDOW, dtype=torch.float64) - WINDOW // 2
+    kernel = torch.exp(-0.5 * (offsets / SIGMA).square())
+    kernel = (kernel / kernel.sum()).to(images)
+    across = F.conv2d(images, kernel.view(1, 1, 1, -1), padding=(0, WINDOW // 2))
+    return F.conv2d(across, kernel.view(1, 1, -1, 1), padding=(WINDOW // 2, 0))
