@@ -80,8 +80,8 @@ def _composite(
     o = origins[i]
     d = directions[i]
     query = wp.bvh_query_ray(bvh, o, d)
-    count = 0
-    j = 0
+    count = int(0)
+    j = int(0)
     while wp.bvh_query_next(query, j):
         n = s.normal[j]
         facing = wp.dot(d, n)
@@ -109,7 +109,7 @@ def _composite(
                         indices[i, m] = j
                         alphas[i, m] = alpha
     passing = float(1.0)
-    k = 0
+    k = int(0)
     while k < count:
         total = float(0.0)
         clear = float(1.0)

@@ -33,7 +33,7 @@ def _shade(
     i = wp.tid() + offset
     view = ray_view[i]
     colour = wp.vec3(0.0, 0.0, 0.0)
-    k = 0
+    k = int(0)
     while k < MAX_HITS:
         j = indices[i, k]
         if j < 0:
@@ -129,13 +129,13 @@ def _shade_adjoint(
     o = origins[i]
     d = directions[i]
     view = ray_view[i]
-    count = 0
+    count = int(0)
     while count < MAX_HITS and indices[i, wp.min(count, MAX_HITS - 1)] >= 0:
         to_weight[i, count] = wp.dot(ray_gradient[i], radiance[view, indices[i, count]])
         count += 1
     # Front to back: what reaches each layer, noted at its last hit.
     passing = float(1.0)
-    k = 0
+    k = int(0)
     while k < count:
         clear = float(1.0)
         end = int(k)

@@ -47,7 +47,7 @@ def _transmittance(
     log_derivative = wp.vec3(0.0, 0.0, 0.0)
     if wp.dot(path, ni) < 0.0 and distance > 0.0:
         query = wp.bvh_query_ray(bvh, light, path / distance)
-        j = 0
+        j = int(0)
         farthest = 1.0 - RECEIVER_SKIP * s.scale[i] / distance
         while wp.bvh_query_next(query, j, distance):
             nj = s.normal[j]
