@@ -96,6 +96,10 @@ class InitConfig:
 
     surfels: int = option(10000, "how many surfels", low=100, high=10_000_000)
     scale: float = option(0.6, "standard deviation of a surfel over the spacing of its neighbours", low=0.05, high=10)
+    normals: str = option(
+        "auto", "fitted to the depth, or the views' normal pass", choices=("auto", "estimate", "pass")
+    )
+    clips: bool = option(True, "straight edges for surfels at the border of a flat surface")
     seed: int = option(0, "draws of points", low=0, high=2**31 - 1)
 
 

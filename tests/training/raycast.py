@@ -13,7 +13,7 @@ from rgspipe.scene import Camera, look_at
 
 
 @dataclass(frozen=True)
-class TestBox:
+class Cuboid:
     """A box turned about +z; `room` is seen from inside."""
 
     center: tuple[float, float, float]
@@ -32,11 +32,11 @@ class TestBox:
         return (points - np.array(self.center)) @ self.axes.T
 
 
-ROOM = TestBox((0.0, 0.0, 0.0), (1.0, 1.0, 1.0), room=True)
-BLOCK = TestBox((-0.1, 0.1, -0.3), (0.3, 0.3, 0.4), turn=0.3)
+ROOM = Cuboid((0.0, 0.0, 0.0), (1.0, 1.0, 1.0), room=True)
+BLOCK = Cuboid((-0.1, 0.1, -0.3), (0.3, 0.3, 0.4), turn=0.3)
 
 
-def cast(boxes: list[TestBox], origin: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def cast(boxes: list[Cuboid], origin: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Distance (M,), inf without a hit, and facing normal (M, 3) of the nearest surface."""
     best = np.full(len(directions), np.inf)
     normals = np.zeros_like(directions)
@@ -55,7 +55,7 @@ def cast(boxes: list[TestBox], origin: np.ndarray, directions: np.ndarray) -> tu
 
 
 def view_of(
-    boxes: list[TestBox],
+    boxes: list[Cuboid],
     origin: tuple[float, float, float],
     target: tuple[float, float, float],
     resolution: int = 64,
@@ -93,7 +93,7 @@ def room_views(count: int, resolution: int = 64, normals: bool = False, seed: in
     return views
 
 
-def surface_distance(points: np.ndarray, boxes: tuple[TestBox, ...] = (ROOM, BLOCK)) -> np.ndarray:
+def surface_distance(points: np.ndarray, boxes: tuple[Cuboid, ...] = (ROOM, BLOCK)) -> np.ndarray:
     """(M,) distance of the points to the nearest face."""
     distances = []
     for box in boxes:

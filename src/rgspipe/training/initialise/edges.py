@@ -40,7 +40,7 @@ class EdgeOptions:
     least_offset: float = 0.15
     trim: int = 2
     least_angle: float = 0.9
-    least_points: int = 12
+    least_points: int = 24
 
 
 def find_edges(

@@ -65,7 +65,7 @@ def _fit(
             into_x, source_x = _shifted(width, dx), _shifted(width, -dx)
             window, pixel = (source, source_x), (into, into_x)
             fitted = mean[window] + dx * slope_x[window] + dy * slope_y[window]
-            off = (fitted - inverse[pixel]) / np.maximum(inverse[pixel], 1e-300)
+            off = (fitted - inverse[pixel]) / np.maximum(inverse[pixel], 1e-30)
             # The pixel's own residual counts too: a good window just beyond an edge must not win. The tiny
             # constant, far below float32, keeps rounding from choosing among windows that all fit exactly.
             cost = deviation[window] ** 2 + 0.3 * off**2 + 1e-14 * (1 + dx * dx + dy * dy)

@@ -24,7 +24,7 @@ class Footprint:
 
     Attributes:
         scale: standard deviation of a whole surfel.
-        clipped_scale: of one that ends at an edge: larger, so that coverage stays full up to the edge.
+        clipped_growth: how much larger one is that ends at an edge, so that coverage stays full up to the edge.
         opacity: in [0, 1].
         albedo: in [0, 1]; training finds the true one.
         coverage_low, coverage_high: thresholds of Coverage that go with these scales.
@@ -33,7 +33,7 @@ class Footprint:
     """
 
     scale: float = 0.6
-    clipped_scale: float = 0.85
+    clipped_growth: float = 1.4
     opacity: float = 0.95
     albedo: float = 0.5
     coverage_low: float = 0.5
@@ -107,8 +107,8 @@ def _dress(centers: Cloud, cloud: Cloud, footprint: Footprint, clips: bool) -> S
     offsets, angles = np.full((count, 2), NO_CLIP), np.zeros((count, 2))
     if clips:
         offsets, angles = find_edges(centers, quaternion_to_axes(rotations).numpy(), cloud, median)
-    clipped = offsets[:, 0] < NO_CLIP
-    scale = torch.from_numpy(np.where(clipped, footprint.clipped_scale, footprint.scale) * spacing).float()
+    growth = np.where(offsets[:, 0] < NO_CLIP, footprint.clipped_growth, 1.0)
+    scale = torch.from_numpy(footprint.scale * growth * spacing).float()
     coverage = Coverage(
         low=footprint.coverage_low,
         high=footprint.coverage_high,
