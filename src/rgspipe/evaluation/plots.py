@@ -22,7 +22,7 @@ from rgspipe.evaluation.arrays import ArrayLike, to_array
 from rgspipe.evaluation.tables import class_order
 
 #: Colours that stay apart with colour blindness and in grey; markers say the same once more.
-COLOURS = {"visible": "#0072B2", "out_of_frame": "#E69F00", "occluded": "#882255"}
+COLOURS = {"visible": "#0072B2", "out_of_frame": "#E69F00", "occluded": "#6A1B4D"}
 MARKERS = {"visible": "o", "out_of_frame": "s", "occluded": "^"}
 LABELS = {"visible": "visible", "out_of_frame": "out of frame", "occluded": "occluded", "unknown": "unclassified"}
 OTHER_COLOUR, OTHER_MARKER = "#666666", "D"
@@ -106,9 +106,9 @@ def convergence_figure(curves: pd.DataFrame) -> Figure:
         for column, ((method, views), group) in enumerate(groups):
             axes[0, column].set_title(f"{method}, {_views(views)}")
             _curves(axes[0, column], group, "loss", relative=True)
-            _curves(axes[1, column], group, "position_error", relative=False)
+            if _curves(axes[1, column], group, "position_error", relative=False):
+                _limit_line(axes[1, column])
             axes[1, column].set_xlabel("step")
-            _limit_line(axes[1, column])
         axes[0, 0].set_ylabel("loss / loss at the start")
         axes[1, 0].set_ylabel("position error (fraction of scene)")
         _class_legend(figure, curves["occlusion"])
@@ -215,7 +215,7 @@ def _training_curve(axis: Axes, training: pd.DataFrame, name: str, x: npt.NDArra
         return
     axis.plot(x[known], values[known], color=FAINT, lw=1.0, zorder=1)
     kinds = training["kind"].astype(str).to_numpy() if "kind" in training.columns else np.full(len(training), "")
-    palette = ("#0072B2", "#E69F00", "#882255", "#009E73", "#56B4E9")
+    palette = ("#0072B2", "#E69F00", "#6A1B4D", "#009E73", "#56B4E9")
     for index, kind in enumerate(dict.fromkeys(kinds.tolist())):
         rows = known & (kinds == kind)
         axis.plot(x[rows], values[rows], "o", ms=3, color=palette[index % len(palette)], label=kind)
@@ -233,7 +233,8 @@ def _clipped(values: npt.ArrayLike) -> npt.NDArray[np.float64]:
     return np.clip(np.asarray(values, dtype=float), *ERROR_RANGE)
 
 
-def _curves(axis: Axes, group: pd.DataFrame, name: str, relative: bool) -> None:
+def _curves(axis: Axes, group: pd.DataFrame, name: str, relative: bool) -> bool:
+    """Draw the courses of one measure; returns whether there was any."""
     axis.grid(True)
     axis.set_yscale("log")
     drawn = False

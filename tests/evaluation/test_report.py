@@ -1,0 +1,139 @@
+"""The report: complete, self-contained, and outspoken about what is missing."""
+
+import dataclasses
+import math
+from html.parser import HTMLParser
+
+import numpy as np
+import pandas as pd
+
+from rgspipe.evaluation import images, report, tables
+
+_VOID = {"meta", "img", "br", "link", "input", "hr"}
+
+
+class _Page(HTMLParser):
+    """Collects text and addresses, and checks that tags are closed in order."""
+
+    def __init__(self, html: str) -> None:
+        super().__init__()
+        self.addresses: list[str] = []
+        self.tags: list[str] = []
+        self.words: list[str] = []
+        self._open: list[str] = []
+        self.feed(html)
+        assert not self._open
+
+    @property
+    def text(self) -> str:
+        return " ".join(" ".join(self.words).split())
+
+    def handle_starttag(self, tag, attributes):
+        self.tags.append(tag)
+        self.addresses += [value for name, value in attributes if name in ("src", "href", "srcset", "data", "action")]
+        if tag not in _VOID:
+            self._open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self._open.pop() == tag
+
+    def handle_data(self, data):
+        if not self._open or self._open[-1] not in ("style", "script"):
+            self.words.append(data)
+
+
+def _empty(fitted) -> report.ReportContents:
+    table = tables.target_table(fitted(1)[0].iloc[:0], {}, {}, 1.0)
+    return report.ReportContents("void", tables.summary_table(table, 0), table, fitted(1)[1].iloc[:0])
+
+
+def test_a_report_refers_to_nothing_outside_itself(full_contents):
+    html = report.render_report(full_contents)
+    page = _Page(html)
+    assert page.addresses and all(address.startswith("data:image/") for address in page.addresses)
+    assert "link" not in page.tags and "iframe" not in page.tags
+    assert "http:" not in html and "https:" not in html and "@import" not in html and "url(" not in html
+
+
+def test_a_report_shows_everything_and_misses_nothing(full_contents):
+    html = report.render_report(full_contents)
+    page = _Page(html)
+    assert 'class="missing"' in html and "One note." in page.text  # the note is the only thing of its kind
+    assert html.count('<p class="missing">') == 1
+    for text in ("36.50 dB", "test/r_0001", "33.25", "occluded_002", "0123abcd", "640", "torch 2.13.0", "all classes"):
+        assert text in page.text
+    # training, comparison, errors, two light drawings, convergence, one fit
+    assert len(page.addresses) == 7
+
+
+def test_text_from_files_is_escaped(full_contents):
+    html = report.render_report(full_contents)
+    assert "<step>" not in html and "small &lt;step&gt;" in html
+    assert "<cornell>" not in html and "&lt;cornell&gt;" in html
+
+
+def test_an_empty_report_says_what_is_missing(fitted):
+    page = _Page(report.render_report(_empty(fitted)))
+    assert not page.addresses
+    for text in (
+        "quality of the trained scene is not known",
+        "No lights were fitted",
+        "no pictures of single fits",
+        "Nothing is known of the stages",
+        "configuration is not known",
+        "not measured",
+    ):
+        assert text in page.text
+
+
+def test_unknown_truth_is_stated_and_shown_as_a_dash(fitted):
+    targets, curves = fitted(1, with_truth=False)
+    summary = tables.summary_table(targets, 0)
+    page = _Page(
+        report.render_report(dataclasses.replace(_empty(fitted), summary=summary, targets=targets, curves=curves))
+    )
+    assert "3 (0 with truth)" in page.text and "unknown" in page.text and "nan" not in page.text
+    assert "no target has a known truth" in page.text
+
+
+def test_failed_fits_are_shown_as_infinitely_far_away(fitted):
+    targets, curves = fitted(1)
+    targets.loc[0, ["position_error", "intensity_error"]] = math.inf
+    summary = tables.summary_table(targets, 0)
+    page = _Page(
+        report.render_report(dataclasses.replace(_empty(fitted), summary=summary, targets=targets, curves=curves))
+    )
+    assert "∞" in page.text
+
+
+def test_large_pictures_do_not_make_a_large_report(full_contents):
+    noise = images.png_bytes(np.random.default_rng(0).integers(0, 256, (900, 1500, 3), dtype=np.uint8))
+    pictures = [report.Picture("search_lm, 1 view", f"target {index}", noise) for index in range(6)]
+    html = report.render_report(dataclasses.replace(full_contents, fits=pictures))
+    assert len(html) < 8_000_000  # measured 5.3 MB
+
+
+def test_reports_of_equal_contents_are_equal(full_contents):
+    assert report.render_report(full_contents) == report.render_report(full_contents)
+
+
+def test_stage_records_do_without_what_a_manifest_lacks():
+    record = report.stage_record("freeze", {})
+    assert {record.fingerprint, record.seconds, record.memory, record.machine, record.code} == {report.MISSING}
+
+
+def test_captions_say_what_is_known():
+    assert (
+        report.picture_caption("a", "worst", 0.0123, 31.04)
+        == "a, worst of its class: position error 1.23 %, PSNR 31.0 dB"
+    )
+    assert report.picture_caption("a", "median", None, None) == "a, median of its class"
+    assert report.picture_caption("a", "worst", math.inf, 20.0).startswith("a, worst of its class: position error ∞")
+
+
+def test_tables_read_back_from_csv_render_the_same(tmp_path, full_contents):
+    contents = full_contents
+    contents.targets.to_csv(tmp_path / "metrics.csv", index=False)
+    again = pd.read_csv(tmp_path / "metrics.csv", dtype={"success": "boolean", "result": str, "reason": str})
+    html = report.render_report(dataclasses.replace(contents, targets=again))
+    assert _Page(html).text == _Page(report.render_report(contents)).text

@@ -1,0 +1,128 @@
+"""Tables against values worked out by hand."""
+
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+import torch
+
+from rgspipe.evaluation import convergence, tables
+from rgspipe.scene import PointLight
+
+
+def _light(x: float, y: float, z: float, brightness: float = 1.0) -> PointLight:
+    return PointLight(torch.tensor([x, y, z]), torch.full((3,), brightness))
+
+
+def _results(names: list[tuple[str, str]], **more: object) -> pd.DataFrame:
+    rows = [{"target": name, "occlusion": kind, "method": "search_lm", "views": 1} for name, kind in names]
+    return pd.DataFrame(rows).assign(seconds=2.0, psnr=30.0, result="converged", reason="small step", **more)
+
+
+def test_lights_are_matched_by_the_smallest_sum_of_distances():
+    truth = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [5.0, 0.0, 0.0]]
+    estimate = [[5.1, 0.0, 0.0], [0.9, 0.0, 0.0], [0.6, 0.0, 0.0]]
+    # Greedily, truth 0 would be left with what is far away.
+    assert tables.match_positions(estimate, truth) == ((2, 0), (1, 1), (0, 2))
+    assert tables.match_positions(estimate[:1], truth) == ((0, 2),)
+    assert tables.match_positions([[math.nan] * 3, [0.0, 0.0, 0.0]], [[0.1, 0.0, 0.0]]) == ((1, 0),)
+
+
+def test_rig_error_is_that_of_its_worst_light():
+    truth = (_light(0, 0, 0), _light(1, 0, 0, 2.0))
+    estimate = (_light(1, 0.3, 0, 2.2), _light(0, 0.1, 0))
+    errors = tables.rig_errors(estimate, truth, 2.0)
+    assert errors.position == pytest.approx(0.15)
+    assert errors.intensity == pytest.approx(0.05, abs=1e-6)  # float32 intensities: measured 3e-8 off
+    assert errors.pairs == ((1, 0), (0, 1))
+    assert tables.rig_errors((), truth, 2.0).position == math.inf
+
+
+def test_target_table_holds_errors_verdicts_and_both_positions():
+    results = _results([("a", "visible"), ("b", "occluded"), ("c", "occluded"), ("d", "visible")])
+    estimates = {"a": (_light(0.5, 0.5, 0.51, 1.1),), "b": (_light(0.5, 0.5, 0.9),), "d": (_light(0, 0, 0),)}
+    truths = {name: (_light(0.5, 0.5, 0.5),) for name in "abc"}
+    table = tables.target_table(results, estimates, truths, 2.0).set_index("target")
+    assert list(table.reset_index().columns) == list(tables.TARGET_COLUMNS)
+    assert table.loc["a", "position_error"] == pytest.approx(0.005, abs=1e-7)
+    assert table.loc["a", "intensity_error"] == pytest.approx(0.1, abs=1e-6)
+    assert bool(table.loc["a", "success"]) and not bool(table.loc["b", "success"])
+    assert table.loc["b", "position_error"] == pytest.approx(0.2, abs=1e-7)
+    assert table.loc["c", "position_error"] == math.inf and not bool(table.loc["c", "success"])
+    assert math.isnan(table.loc["d", "position_error"]) and pd.isna(table.loc["d", "success"])
+    assert table.loc["a", ["z", "z_true"]].tolist() == pytest.approx([0.51, 0.5], abs=1e-6)
+
+
+def test_a_light_too_many_is_no_success():
+    truths = {"a": (_light(0, 0, 0),)}
+    table = tables.target_table(_results([("a", "visible")]), {"a": (_light(0, 0, 0), _light(1, 1, 1))}, truths, 1.0)
+    assert table["position_error"].iloc[0] == 0.0 and not bool(table["success"].iloc[0])
+
+
+def test_an_unknown_scene_size_leaves_intensity_errors():
+    table = tables.target_table(
+        _results([("a", "visible")]), {"a": (_light(0, 0, 0, 2.0),)}, {"a": (_light(1, 0, 0),)}, math.nan
+    )
+    assert math.isnan(table["position_error"].iloc[0]) and table["intensity_error"].iloc[0] == pytest.approx(1.0)
+
+
+def test_results_without_a_needed_column_are_refused():
+    with pytest.raises(ValueError, match="seconds"):
+        tables.target_table(_results([("a", "visible")]).drop(columns="seconds"), {}, {}, 1.0)
+
+
+def _judged() -> pd.DataFrame:
+    names = [(f"v{i}", "visible") for i in range(5)] + [(f"o{i}", "occluded") for i in range(3)]
+    errors = [0.001, 0.002, 0.003, 0.004, 0.5, 0.02, math.inf, math.nan]
+    truths = {name: (_light(0, 0, 0),) for (name, _), error in zip(names, errors, strict=True) if not math.isnan(error)}
+    estimates = {
+        name: (_light(error, 0, 0),) for (name, _), error in zip(names, errors, strict=True) if math.isfinite(error)
+    }
+    return tables.target_table(_results(names), estimates, truths, 1.0)
+
+
+def test_summary_has_medians_worst_and_rates_per_class_and_over_all():
+    summary = tables.summary_table(_judged(), seed=3)
+    assert list(summary.columns) == list(tables.SUMMARY_COLUMNS)
+    assert summary["occlusion"].tolist() == ["visible", "occluded", "all"]
+    rows = summary.set_index("occlusion")
+    assert rows.loc["visible", "median_position_error"] == pytest.approx(0.003, abs=1e-8)
+    assert rows.loc["visible", "worst_position_error"] == pytest.approx(0.5)
+    assert rows.loc["visible", "success_rate"] == pytest.approx(0.8)
+    assert rows.loc["visible", "median_low"] <= 0.003 <= rows.loc["visible", "median_high"]
+    assert rows.loc["occluded", ["count", "judged"]].tolist() == [3, 2]
+    assert rows.loc["occluded", "median_position_error"] == math.inf  # one of two fits failed
+    assert rows.loc["all", ["count", "judged"]].tolist() == [8, 7]
+    assert rows.loc["all", "median_seconds"] == 2.0
+    pd.testing.assert_frame_equal(summary, tables.summary_table(_judged(), seed=3))
+
+
+def test_summary_without_truth_or_without_targets():
+    unknown = tables.summary_table(tables.target_table(_results([("a", "unknown")]), {}, {}, 1.0), seed=0)
+    assert unknown["judged"].tolist() == [0, 0] and unknown["success_rate"].isna().all()
+    assert unknown["median_psnr"].tolist() == [30.0, 30.0]
+    empty = tables.target_table(_results([("a", "visible")]).iloc[:0], {}, {}, 1.0)
+    assert tables.summary_table(empty, seed=0).empty and tables.exemplars(empty) == {}
+
+
+def test_exemplars_are_the_median_and_the_worst_of_each_class():
+    chosen = tables.exemplars(_judged())
+    assert chosen == {"visible": {"median": "v2", "worst": "v4"}, "occluded": {"median": "o0", "worst": "o1"}}
+
+
+def test_exemplars_without_truth_go_by_psnr():
+    results = _results([("a", "unknown"), ("b", "unknown"), ("c", "unknown")]).assign(psnr=[20.0, 40.0, 30.0])
+    chosen = tables.exemplars(tables.target_table(results, {}, {}, 1.0))
+    assert chosen == {"unknown": {"median": "c", "worst": "a"}}
+
+
+def test_convergence_measures_the_distance_to_the_nearest_true_light():
+    curve = pd.DataFrame({"step": [0, 1], "loss": [1.0, 0.1], "x": [0.0, 2.0], "y": 0.0, "z": 0.0})
+    target = {"target": "a", "occlusion": "visible", "method": "search_lm", "views": 1}
+    table = convergence.convergence_table(curve, target, (_light(0.5, 0, 0), _light(2.0, 0, 1.0)), 2.0)
+    assert table["position_error"].tolist() == pytest.approx([0.25, 0.5])
+    assert table["seconds"].isna().all() and list(table.columns) == list(convergence.COLUMNS)
+    assert np.isnan(convergence.convergence_table(curve, target, (), 2.0)["position_error"]).all()
+    with pytest.raises(ValueError, match="loss"):
+        convergence.convergence_table(curve.drop(columns="loss"), target, (), 2.0)
