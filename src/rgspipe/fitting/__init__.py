@@ -1,7 +1,7 @@
 """From images of a frozen scene to the lights that made them."""
 
 from rgspipe.fitting.dictionary import LightDictionary, build_dictionary
-from rgspipe.fitting.fit import FitViews, fit_lights, prepare_fit
+from rgspipe.fitting.fit import FitViews, fit_lights, prepare_fit, render_light
 from rgspipe.fitting.paper_adam import AdamOptions
 from rgspipe.fitting.problem import Effects
 from rgspipe.fitting.result import FitResult, FitStatus, Step
@@ -19,4 +19,5 @@ __all__ = [
     "build_dictionary",
     "fit_lights",
     "prepare_fit",
+    "render_light",
 ]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import torch
 from torch import Tensor
 
 from rgspipe.fitting.coarse import CoarseImages, coarse_images
@@ -14,6 +15,7 @@ from rgspipe.fitting.problem import Effects, LightProblem
 from rgspipe.fitting.result import FitResult
 from rgspipe.fitting.search_lm import SearchOptions, fit_search_lm
 from rgspipe.fitting.views import PreparedViews, prepare_views
+from rgspipe.renderer.direct import unit_irradiance
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.view_weights import ViewWeights
 from rgspipe.scene import Camera, PointLight
@@ -107,3 +109,18 @@ def fit_lights(
     if views.coarse is None:
         raise ValueError("search_lm needs a dictionary: pass one to prepare_fit")
     return fit_search_lm(problem, views.coarse, search or SearchOptions())
+
+
+def render_light(views: FitViews, light: PointLight | None) -> list[Tensor]:
+    """(H, W, 3) image per view of the scene under `light`, with the fit's effects; black without a light."""
+    prepared, effects = views.prepared, views.effects
+    operator, frozen = prepared.all_pixels, prepared.frozen
+    if light is None:
+        stacked = torch.zeros((operator.shape[0], 3), device=operator.matrix.device)
+    else:
+        irradiance, _ = unit_irradiance(frozen.bvh, light.position[None], effects.shadows)
+        radiance = frozen.radiance(irradiance.T, effects.interreflection)[:, :, 0]
+        stacked = (operator @ radiance) * light.intensity.to(radiance)
+    cameras = [view.camera for view in prepared.views]
+    parts = stacked.split([camera.pixel_count for camera in cameras])
+    return [part.reshape(camera.height, camera.width, 3) for part, camera in zip(parts, cameras, strict=True)]

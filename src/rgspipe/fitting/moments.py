@@ -63,7 +63,11 @@ class Moments:
 
 
 def moments(columns: Tensor, target: Tensor, weights: Tensor) -> Moments:
-    """Moments of unit image and derivative `columns` (P, 3, 4) and `target` (P, 3) under weights w² (P, 3) or (P, 1)."""
+    """Moments of unit image and derivative `columns` (P, 3, 4) and `target` (P, 3).
+
+    Args:
+        weights: (P, 3) or (P, 1) squared weights w².
+    """
     joined = torch.cat([columns.double(), target.double()[:, :, None]], dim=2).permute(1, 0, 2)
     weighted = joined * weights.double().expand(target.shape).T[:, :, None]
     return Moments((weighted.transpose(1, 2) @ joined).cpu())

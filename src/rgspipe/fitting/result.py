@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import Enum
+from enum import StrEnum
 
 from torch import Tensor
 
 from rgspipe.scene import LightRig
 
 
-class FitStatus(str, Enum):
+class FitStatus(StrEnum):
     """Why a fit ended."""
 
     CONVERGED = "converged"

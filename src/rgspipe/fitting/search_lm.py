@@ -114,9 +114,8 @@ def fit_search_lm(problem: LightProblem, coarse: CoarseImages, options: SearchOp
     if not bool(lit.any()):
         return dark_result(time.perf_counter() - begin)
     region = search_region(problem)
-    chosen = best_candidates(
-        costs, coarse.positions.cpu(), min(options.starts, int(lit.sum())), SEPARATION * region.size
-    )
+    count = min(options.starts, int(lit.sum()))
+    chosen = best_candidates(costs, coarse.positions.cpu(), count, SEPARATION * region.size)
     robust = Weighting(relative=True, robust=True)
     starts = [_start(problem, coarse.positions[index].double().cpu(), robust, begin) for index in chosen]
     for state in starts:

@@ -1,0 +1,207 @@
+"""Recover the unknown lights of fit targets from their images."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pandas as pd
+
+from rgspipe.config import RgspipeConfig
+from rgspipe.datasets.fit_file import read_result, write_result
+from rgspipe.datasets.frames import read_entries
+from rgspipe.datasets.frozen_file import DICTIONARY, load_dictionary, load_frozen
+from rgspipe.datasets.gs3 import load_target
+from rgspipe.datasets.location import dataset_root, open_dataset
+from rgspipe.datasets.views import Target, View
+from rgspipe.errors import InputError
+from rgspipe.fitting import (
+    AdamOptions,
+    Effects,
+    FitViews,
+    LightDictionary,
+    SearchOptions,
+    build_dictionary,
+    fit_lights,
+    prepare_fit,
+)
+from rgspipe.progress import track
+from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.scene import PointLight
+from rgspipe.stages.base import Stage, StageContext
+
+
+def run(context: StageContext) -> None:
+    """Write results.csv and a folder per target; targets that an earlier attempt finished are kept."""
+    fitter = _Fitter.create(context)
+    targets = select_targets(_targets(context), context.config)
+    rows = []
+    for target in track(targets, "fitting lights", unit="target"):
+        if not (context.folder / target.name).is_dir():
+            fitter.fit(target, context.folder)
+        rows.append(_row(context, target))
+    pd.DataFrame(rows).to_csv(context.folder / "results.csv", index=False)
+    context.note(targets=len(targets), view_sets=len(fitter.prepared))
+
+
+@dataclass
+class _Fitter:
+    """Fits targets; views that several of them share are prepared once."""
+
+    config: RgspipeConfig
+    frozen: FrozenScene
+    dictionary: LightDictionary | None
+    training_lights: Sequence[PointLight]
+    prepared: dict[bytes, FitViews] = field(default_factory=dict)
+
+    @classmethod
+    def create(cls, context: StageContext) -> _Fitter:
+        config, artifact = context.config, context.inputs["freeze"]
+        frozen = load_frozen(artifact.file)
+        if config.fit.method == "paper_adam":
+            return cls(config, frozen, None, _training_lights(context))
+        if not config.effects.shadows:
+            # The stored candidates cast shadows.
+            options = config.freeze
+            dictionary = build_dictionary(frozen, options.dictionary_grid, seed=options.seed, shadows=False)
+            return cls(config, frozen, dictionary, ())
+        return cls(config, frozen, load_dictionary(artifact.file(DICTIONARY), frozen), ())
+
+    def fit(self, target: Target, folder: Path) -> None:
+        """Fit one target and write its folder, whole or not at all."""
+        views = used_views(target, self.config)
+        prepared = self._prepare(views)
+        config = self.config.fit
+        result = fit_lights(
+            self.frozen,
+            prepared,
+            [view.image for view in views],
+            method=config.method,
+            search=SearchOptions(config.search.starts, config.search.iterations),
+            adam=AdamOptions(
+                epochs=config.adam.epochs,
+                steps=config.adam.steps,
+                position_rate=config.adam.position_rate,
+                intensity_rate=config.adam.intensity_rate,
+                ssim_weight=config.adam.ssim_weight,
+                init=config.adam.init,
+                random_intensity=config.adam.random_intensity,
+            ),
+            training_lights=self.training_lights,
+            seed=target_seed(target, self.config),
+        )
+        write_result(folder / target.name, result, prepared, [view.image for view in views])
+
+    def _prepare(self, views: Sequence[View]) -> FitViews:
+        key = b"".join(_identity(view) for view in views)
+        if key not in self.prepared:
+            effects = Effects(self.config.effects.shadows, self.config.effects.interreflection)
+            self.prepared[key] = prepare_fit(
+                self.frozen,
+                [view.camera for view in views],
+                masks=[view.alpha for view in views],
+                mask_edges=self.config.fit.search.mask_edges,
+                dictionary=self.dictionary,
+                effects=effects,
+            )
+        return self.prepared[key]
+
+
+def select_targets(targets: Sequence[Target], config: RgspipeConfig) -> list[Target]:
+    """The targets of the wanted class, at most `fit.limit` of each.
+
+    Raises:
+        InputError: there is none.
+    """
+    if config.fit.target is not None:
+        return list(targets)
+    chosen: list[Target] = []
+    for target in targets:
+        before = sum(other.occlusion == target.occlusion for other in chosen)
+        wanted = config.occlusion in ("all", target.occlusion)
+        if wanted and (config.fit.limit is None or before < config.fit.limit):
+            chosen.append(target)
+    if not chosen:
+        classes = sorted({target.occlusion for target in targets})
+        raise InputError(
+            "occlusion",
+            expected=f"a class that the dataset has targets of: {', '.join(classes) or 'it has no targets at all'}",
+            found=config.occlusion,
+            remedy="Choose another class, or fit a folder of your own with fit.target=DIR.",
+        )
+    return chosen
+
+
+def used_views(target: Target, config: RgspipeConfig) -> list[View]:
+    """The views of a target that the configuration asks for.
+
+    Raises:
+        InputError: the target has fewer.
+    """
+    indices = config.views.indices if config.views.indices is not None else list(range(config.views.count))
+    if max(indices) >= len(target.views) or len(set(indices)) < len(indices):
+        key = "views.count" if config.views.indices is None else "views.indices"
+        raise InputError(
+            key,
+            expected=f"different cameras of the {len(target.views)} that target {target.name} has",
+            found=str(config.views.count if config.views.indices is None else indices),
+            remedy="Ask for fewer views, or add images to the target.",
+        )
+    return [target.views[index] for index in indices]
+
+
+def target_seed(target: Target, config: RgspipeConfig) -> int:
+    """A seed of the target's own, so that a start does not depend on which other targets are fitted."""
+    return zlib.crc32(f"{config.seed}/{config.fit.adam.seed}/{target.name}".encode())
+
+
+def _targets(context: StageContext) -> Sequence[Target]:
+    if context.config.fit.target is not None:
+        return [load_target(context.config.fit.target)]
+    return open_dataset(context.inputs["generate_dataset"].path, train=False, test=False).targets
+
+
+def _training_lights(context: StageContext) -> list[PointLight]:
+    root = dataset_root(context.inputs["generate_dataset"].path)
+    entries = read_entries(root / "transforms_train.json", "the lights of the training views")
+    return [PointLight(*entry.light()) for entry in entries]
+
+
+def _identity(view: View) -> bytes:
+    camera = view.camera
+    numbers = (camera.fx, camera.fy, camera.cx, camera.cy, camera.width, camera.height)
+    return camera.camera_to_world.numpy().tobytes() + repr(numbers).encode() + view.alpha.numpy().tobytes()
+
+
+def _row(context: StageContext, target: Target) -> dict[str, object]:
+    config = context.config
+    views = len(config.views.indices) if config.views.indices is not None else config.views.count
+    named = {"target": target.name, "occlusion": target.occlusion, "method": config.fit.method, "views": views}
+    return named | read_result(context.folder / target.name)
+
+
+def _keys(config: RgspipeConfig) -> list[str]:
+    keys = ["seed", "effects", "light", "fit.method", "fit.target", "views.count", "views.indices"]
+    keys += ["fit.search"] if config.fit.method == "search_lm" else ["fit.adam"]
+    return keys if config.fit.target is not None else [*keys, "occlusion", "fit.limit"]
+
+
+STAGE = Stage(
+    name="fit_light",
+    help="recover the unknown lights of fit targets from one or several views",
+    inputs=lambda config: ["freeze", "generate_dataset"],
+    config_keys=_keys,
+    code=(
+        "rgspipe.fitting",
+        "rgspipe.renderer",
+        "rgspipe.scene",
+        "rgspipe.datasets.fit_file",
+        "rgspipe.datasets.frozen_file",
+        "rgspipe.evaluation.images",
+        "rgspipe.evaluation.metrics",
+    ),
+    files=lambda config: [] if config.fit.target is None else [Path(config.fit.target)],
+    run=run,
+)

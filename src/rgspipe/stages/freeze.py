@@ -1,0 +1,49 @@
+"""Precompute everything about the trained scene that does not depend on the light."""
+
+from __future__ import annotations
+
+import time
+
+from rgspipe.datasets.frozen_file import DICTIONARY, SURFELS, save_dictionary, save_frozen
+from rgspipe.datasets.surfel_file import load_surfels
+from rgspipe.fitting.dictionary import build_dictionary
+from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.stages.base import Stage, StageContext
+
+
+def run(context: StageContext) -> None:
+    """Write surfels, gather, transport and dictionary.safetensors."""
+    options = context.config.freeze
+    surfels = load_surfels(context.inputs["train_surfels"].file(SURFELS))
+    begin = time.perf_counter()
+    frozen = FrozenScene.freeze(surfels, gather_rays=options.gather_rays, patches=options.patches, seed=options.seed)
+    middle = time.perf_counter()
+    dictionary = build_dictionary(frozen, options.dictionary_grid, seed=options.seed)
+    end = time.perf_counter()
+    save_frozen(context.folder, frozen)
+    save_dictionary(context.folder / DICTIONARY, dictionary)
+    sizes = {path.stem: path.stat().st_size for path in sorted(context.folder.glob("*.safetensors"))}
+    context.note(
+        surfels=len(surfels),
+        gather_entries=frozen.gather.entries,
+        patches=frozen.transport.average.shape[0],
+        candidates=len(dictionary),
+        seconds={"gather and transport": round(middle - begin, 3), "dictionary": round(end - middle, 3)},
+        bytes=sizes,
+    )
+
+
+STAGE = Stage(
+    name="freeze",
+    help="precompute the light-independent operators and the light dictionary",
+    inputs=lambda config: ["train_surfels"],
+    config_keys=("freeze",),
+    code=(
+        "rgspipe.renderer",
+        "rgspipe.scene",
+        "rgspipe.datasets.frozen_file",
+        "rgspipe.datasets.surfel_file",
+        "rgspipe.fitting.dictionary",
+    ),
+    run=run,
+)
