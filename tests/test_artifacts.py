@@ -14,7 +14,7 @@ from rgspipe.artifacts import Artifact, ArtifactStore, Key
 from rgspipe.errors import InputError
 
 KEY = Key("scene", "stage", "0123456789abcdef")
-RECIPE = {"config": {"a.b": 1}, "inputs": {}, "files": {}, "code": {}}
+RECIPE = {"config": {"a.b": 1}, "inputs": {}, "foreign": {}, "code": {}}
 
 
 def make(folder: Path) -> Mapping[str, object]:

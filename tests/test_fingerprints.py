@@ -56,7 +56,7 @@ def test_rgspipe_modules_are_found_without_importing_them() -> None:
 
 
 def test_differences_are_told_in_words() -> None:
-    before = {"config": {"a": {"b": 1, "c": 2}}, "inputs": {"x": ["1"]}, "files": {}, "code": {"m": "1"}}
-    now = {"config": {"a": {"b": 5, "c": 2}}, "inputs": {"x": ["2"]}, "files": {}, "code": {"m": "2"}}
+    before = {"config": {"a": {"b": 1, "c": 2}}, "inputs": {"x": ["1"]}, "foreign": {}, "code": {"m": "1"}}
+    now = {"config": {"a": {"b": 5, "c": 2}}, "inputs": {"x": ["2"]}, "foreign": {}, "code": {"m": "2"}}
     assert differences(now, before) == ["a.b 1 → 5", "the code of m changed", "another x"]
     assert differences(now, now) == []

@@ -85,8 +85,11 @@ def test_foreign_files_count_by_content(config: RgspipeConfig, tmp_path: Path) -
     load = {**toys.STAGES, "sow": stage}.__getitem__
     before = resolve(config, load).key
     assert resolve(config, load).key == before
+    run(config, load)
     (source / "a.txt").write_text("2")
     assert resolve(config, load).key != before
+    steps = plan(resolve(config, load), ArtifactStore(Path(config.outputs)))
+    assert steps[0].reason == f"the files in {source} changed"
 
 
 def test_a_damaged_input_is_refused_and_left_alone(config: RgspipeConfig) -> None:

@@ -78,7 +78,7 @@ def _is_text(statement: ast.stmt) -> bool:
 def differences(now: Mapping[str, Any], before: Mapping[str, Any]) -> list[str]:
     """What changed between two recipes, one phrase each, such as "dataset.resolution 64 → 128"."""
     phrases = _config_differences(now["config"], before.get("config", {}))
-    for kind, text in (("code", "the code of {} changed"), ("files", "the files in {} changed")):
+    for kind, text in (("code", "the code of {} changed"), ("foreign", "the files in {} changed")):
         old = before.get(kind, {})
         phrases += [text.format(name) for name, digest in now[kind].items() if old.get(name) != digest]
     old = before.get("inputs", {})

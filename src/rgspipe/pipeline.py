@@ -37,7 +37,7 @@ class Node:
         config: the configuration it is made with.
         changes: how that differs from the configuration of the run.
         key: where it belongs.
-        recipe: the config values, inputs, files and code behind its fingerprint.
+        recipe: the config values, inputs, foreign files and code behind its fingerprint.
         inputs: the artifacts it is made from.
     """
 
@@ -75,7 +75,7 @@ class _Resolver:
         recipe = {
             "config": {key: get_value(config, key) for key in sorted(stage.keys(config))},
             "inputs": _input_fingerprints(inputs),
-            "files": {str(path): self._file(path) for path in stage.files(config)},
+            "foreign": {str(path): self._file(path) for path in stage.files(config)},
             "code": self._code(stage),
         }
         key = Key(scene_name(config), stage.name, fingerprint({"stage": stage.name, **recipe}))
@@ -185,7 +185,7 @@ def _make(node: Node, store: ArtifactStore, artifacts: Mapping[Key, Artifact]) -
         node.stage.run(context)
         return context.facts
 
-    log.info("%s: starting", node.stage.name)
+    log.info("%s: %s", node.stage.name, node.stage.help)
     start = time.perf_counter()
     artifact, made = store.build(node.key, node.recipe, make)
     verb = "made" if made else "made by another process"
