@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import torch
 from torch import Tensor
 
 from rgspipe.datasets.exr import write_image
@@ -62,10 +63,7 @@ def _milestones(result: FitResult) -> list[PointLight | None]:
 
 def _psnr(images: Sequence[Tensor], targets: Sequence[Tensor]) -> float | None:
     """PSNR over all pixels of all views; None where it has no meaning or is infinite."""
-    joined = [
-        np.concatenate([image.detach().cpu().numpy().reshape(-1, 1, 3) for image in group])
-        for group in (images, targets)
-    ]
+    joined = [torch.cat([image.detach().reshape(-1, 1, 3).cpu() for image in group]) for group in (images, targets)]
     value = psnr(*joined)
     return value if np.isfinite(value) else None
 
