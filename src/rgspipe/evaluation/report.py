@@ -214,8 +214,10 @@ def _target_rows(targets: pd.DataFrame) -> list[dict]:
     for row in targets.to_dict("records"):
         verdict = "unknown" if row["success"] is None or pd.isna(row["success"]) else ("no", "yes")[int(row["success"])]
         estimate, truth = (", ".join(_decimals(row[axis + suffix], 3) for axis in "xyz") for suffix in ("", "_true"))
-        ended = ": ".join(str(row[name]) for name in ("result", "reason") if isinstance(row[name], str) and row[name])
-        rows.append(row | {"verdict": verdict, "estimate": estimate, "truth": truth, "ended": ended or MISSING})
+        ended, why = (
+            row[name] if isinstance(row[name], str) and row[name] else MISSING for name in ("result", "reason")
+        )
+        rows.append(row | {"verdict": verdict, "estimate": estimate, "truth": truth, "ended": ended, "why": why})
     return rows
 
 
