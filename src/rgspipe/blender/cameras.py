@@ -100,7 +100,10 @@ class RoomLayout:
         raise no_room(f"a place {clearance:g} from any surface")
 
     def target_cameras(self) -> list[Camera]:
-        """The places from which most of the room is in sight, a quarter of its size apart if possible."""
+        """The place from which most of the room is in sight, and two beside it.
+
+        All look from one side, so that some of the room is in no frame.
+        """
         rng = np.random.default_rng(0)
         interior = self.space.interior
         focus = interior.mean(axis=0)
@@ -110,9 +113,10 @@ class RoomLayout:
         seen = [sum(not self.space.geometry.blocked(origin, probe) for probe in probes) for origin in origins]
         distance = np.linalg.norm(origins - focus, axis=1)
         ranked = origins[np.argsort(-np.array(seen) * (0.3 + distance))]
-        for apart in (0.25, 0.1, 0.0):
+        beside = ranked[1:][np.argsort(np.linalg.norm(ranked[1:] - ranked[0], axis=1))]
+        for apart in (0.15, 0.05, 0.0):
             chosen = [ranked[0]]
-            for origin in ranked[1:]:
+            for origin in beside:
                 if all(np.linalg.norm(origin - other) > apart for other in chosen):
                     chosen.append(origin)
                 if len(chosen) == 3:

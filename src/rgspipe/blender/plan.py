@@ -11,10 +11,16 @@ import torch
 from rgspipe.blender.cameras import MAX_DRAWS, Layout, no_room
 from rgspipe.blender.geometry import Geometry
 from rgspipe.blender.job import DatasetJob
-from rgspipe.blender.targets import OCCLUSION_CLASSES, classify, random_intensity
+from rgspipe.blender.targets import OCCLUSION_CLASSES, classify, lit_share, random_intensity
 from rgspipe.scene import Camera, PointLight
 
 log = logging.getLogger(__name__)
+
+#: Share of what a view shows that its light reaches directly; darker views tell nothing about their light.
+MIN_LIT_SHARE = 0.02
+
+#: Lights that are tried for one view.
+MAX_LIGHTS = 50
 
 #: Numbers of the random streams; part of the seed, so never renumber them.
 STREAMS = {"train": 0, "test": 1, "visible": 2, "out_of_frame": 3, "occluded": 4}
@@ -67,8 +73,8 @@ def make_plan(job: DatasetJob, layout: Layout, geometry: Geometry) -> Plan:
     Raises:
         InputError: the scene has no room for a camera or a light.
     """
-    train = tuple(_view(job, layout, "train", index) for index in range(job.train_views))
-    test = tuple(_view(job, layout, "test", index) for index in range(job.test_views))
+    train = tuple(_view(job, layout, geometry, "train", index) for index in range(job.train_views))
+    test = tuple(_view(job, layout, geometry, "test", index) for index in range(job.test_views))
     cameras = layout.target_cameras()
     targets = [
         target for occlusion in OCCLUSION_CLASSES for target in _targets(job, layout, geometry, cameras, occlusion)
@@ -76,12 +82,23 @@ def make_plan(job: DatasetJob, layout: Layout, geometry: Geometry) -> Plan:
     return Plan(train, test, tuple(targets))
 
 
-def _view(job: DatasetJob, layout: Layout, split: str, index: int) -> Frame:
+def _view(job: DatasetJob, layout: Layout, geometry: Geometry, split: str, index: int) -> Frame:
     rng = np.random.default_rng([job.seed, STREAMS[split], index])
     camera = layout.camera(rng, index)
-    position = layout.light(rng, job.light_clearance)
+    position = _view_light(job, layout, geometry, camera, rng)
     light = _light(position, np.full(3, rng.uniform(0.75, 1.3)))
     return Frame(f"{split}/r_{index:04d}", camera, light, int(rng.integers(2**31 - 1)), True)
+
+
+def _view_light(
+    job: DatasetJob, layout: Layout, geometry: Geometry, camera: Camera, rng: np.random.Generator
+) -> np.ndarray:
+    """A light that the view shows something of; in the Cornell box light gets everywhere."""
+    for _ in range(MAX_LIGHTS):
+        position = layout.light(rng, job.light_clearance)
+        if job.kind == "cornell" or lit_share(position, camera, geometry) >= MIN_LIT_SHARE:
+            break
+    return position
 
 
 def _targets(
@@ -119,7 +136,8 @@ def _find(
     clearance = job.hidden_light_clearance if occlusion == "occluded" else job.light_clearance
     for _ in range(MAX_DRAWS // 4):
         point = layout.light(rng, clearance)
-        if classify(point, cameras, geometry.blocked) == occlusion:
+        is_wanted = classify(point, cameras, geometry.blocked) == occlusion
+        if is_wanted and lit_share(point, cameras[0], geometry) >= MIN_LIT_SHARE:
             return point
     return None
 

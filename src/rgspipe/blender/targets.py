@@ -7,10 +7,15 @@ from collections.abc import Callable
 import numpy as np
 import torch
 
+from rgspipe.blender.geometry import Geometry
 from rgspipe.scene import Camera
 
 #: Tells whether a surface lies between two points.
 Blocked = Callable[[np.ndarray, np.ndarray], bool]
+
+#: Rays along each side of the image that ask what is lit, and their distance from the surface they ask about.
+PROBES = 10
+SURFACE_OFFSET = 1e-4
 
 OCCLUSION_CLASSES = ("visible", "out_of_frame", "occluded")
 
@@ -30,6 +35,23 @@ def classify(point: np.ndarray, cameras: list[Camera], blocked: Blocked) -> str 
     if all(hidden) and framed[0]:
         return "occluded"
     return None
+
+
+def lit_share(point: np.ndarray, camera: Camera, geometry: Geometry) -> float:
+    """Share of what `camera` sees of the surfaces that a light at `point` (3,) reaches directly.
+
+    Asked of a regular grid of PROBES × PROBES pixels; 0 if the camera sees no surface.
+    """
+    step = (torch.arange(PROBES, dtype=torch.float64) + 0.5) / PROBES
+    rows, columns = (step * camera.height).long(), (step * camera.width).long()
+    _, directions, _ = camera.rays((rows[:, None] * camera.width + columns).reshape(-1))
+    origin = camera.origin.numpy()
+    lit = []
+    for direction in directions.numpy():
+        distance, _ = geometry.cast(origin, direction)
+        if np.isfinite(distance):
+            lit.append(not geometry.blocked(point, origin + direction * (distance - SURFACE_OFFSET)))
+    return float(np.mean(lit)) if lit else 0.0
 
 
 def in_frame(camera: Camera, point: np.ndarray) -> bool:
