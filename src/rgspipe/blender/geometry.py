@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import bpy
 import numpy as np
 from mathutils import Vector
 from mathutils.bvhtree import BVHTree
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 #: Cells along the longest side of the grid that tells free space from solids.
 GRID_CELLS = 32
 
 #: Rays that measure how enclosed a place is.
 ENCLOSURE_RAYS = 24
+
+#: Cells that are asked how enclosed they are, about.
+MAX_ENCLOSURE_CELLS = 2000
 
 #: A place is inside a room if at least this share of directions ends on a surface.
 ROOM_ENCLOSURE = 0.6
@@ -77,10 +84,8 @@ class FreeSpace:
     faces, and a closed room if they show it their front faces.
 
     Attributes:
-        interior: (M, 3) centres of the free cells that lie inside a room: within the scene's bounds, with
-            surfaces in most directions. Few or none for a single object.
+        geometry: the surfaces.
         cell: edge length of a cell, scene units.
-        is_room: whether the interior is a good part of the scene.
     """
 
     def __init__(self, geometry: Geometry) -> None:
@@ -91,13 +96,28 @@ class FreeSpace:
         self._centers = self._start + self.cell * np.stack(
             np.meshgrid(*(np.arange(count) + 0.5 for count in counts), indexing="ij"), axis=-1
         )
-        labels = self._flood(counts)
-        self._free = self._classify(labels)
-        inside = ((self._centers > geometry.lo) & (self._centers < geometry.hi)).all(axis=-1)
-        candidates = self._centers[self._free & inside]
-        enclosed = np.array([self._enclosure(center)[0] >= ROOM_ENCLOSURE for center in candidates], bool)
-        self.interior = candidates[enclosed] if len(candidates) else candidates
-        self.is_room = len(self.interior) > 0.2 * max(1, int(inside.sum()))
+        centers = self._centers.reshape(-1, 3)
+        self._is_clear = [geometry.clearance(center) > self.cell for center in centers]
+        self._free = self._classify(self._flood(counts))
+
+    @cached_property
+    def interior(self) -> np.ndarray:
+        """(M, 3) centres of free cells inside a room: surfaces in most directions. Few or none for one object."""
+        candidates = self._centers[self._free & self._within_bounds]
+        candidates = candidates[:: 1 + len(candidates) // MAX_ENCLOSURE_CELLS]
+        enclosed = [self._enclosure(center)[0] >= ROOM_ENCLOSURE for center in candidates]
+        return candidates[np.array(enclosed, bool)]
+
+    @cached_property
+    def is_room(self) -> bool:
+        """Whether the interior is a good part of the scene."""
+        free = int((self._free & self._within_bounds).sum())
+        share = len(self.interior) * (1 + free // MAX_ENCLOSURE_CELLS) / max(1, int(self._within_bounds.sum()))
+        return share > 0.2
+
+    @property
+    def _within_bounds(self) -> np.ndarray:
+        return ((self._centers > self.geometry.lo) & (self._centers < self.geometry.hi)).all(axis=-1)
 
     def contains(self, point: np.ndarray) -> bool:
         """Whether `point` is in free space: outside the grid, or joined to a free cell beside it."""
@@ -116,9 +136,6 @@ class FreeSpace:
 
     def _flood(self, counts: np.ndarray) -> np.ndarray:
         """Component label of every cell; 0 is what surrounds the scene."""
-        from scipy.sparse import coo_matrix
-        from scipy.sparse.csgraph import connected_components
-
         numbers = np.arange(int(np.prod(counts))).reshape(counts)
         joined = [self._open_neighbours(numbers, axis) for axis in range(3)]
         first, second = np.concatenate(joined, axis=1)
@@ -134,7 +151,11 @@ class FreeSpace:
         low = np.take(numbers, range(numbers.shape[axis] - 1), axis=axis).ravel()
         high = np.take(numbers, range(1, numbers.shape[axis]), axis=axis).ravel()
         points = self._centers.reshape(-1, 3)
-        is_open = [not self.geometry.blocked(points[a], points[b]) for a, b in zip(low, high, strict=True)]
+        # A cell's neighbours lie one edge length away: only near surfaces is there anything to ask.
+        is_open = [
+            self._is_clear[a] or not self.geometry.blocked(points[a], points[b])
+            for a, b in zip(low.tolist(), high.tolist(), strict=True)
+        ]
         return np.stack([low, high])[:, is_open]
 
     def _classify(self, labels: np.ndarray) -> np.ndarray:

@@ -26,13 +26,17 @@ def read_channels(path: str | Path) -> dict[str, np.ndarray]:
         with OpenEXR.File(str(path), separate_channels=True) as file:
             pixels = {name: channel.pixels for part in file.parts for name, channel in part.channels.items()}
     except Exception as error:  # the binding raises bare RuntimeError, ValueError or MemoryError for bad files
-        raise InputError(
-            path, expected="a whole OpenEXR image", found=f"a file that cannot be read ({error})", remedy=RENDER_AGAIN
-        ) from error
-    channels = {name: np.asarray(values, dtype=np.float32) for name, values in pixels.items() if values is not None}
-    if not channels or any(values.ndim != 2 or values.size == 0 for values in channels.values()):
-        raise InputError(path, expected="two-dimensional channels", found="none", remedy=RENDER_AGAIN)
-    return channels
+        raise _broken(path, str(error)) from error
+    # Pixels that it cannot read, it leaves out without raising.
+    if not pixels or any(values is None or values.ndim != 2 or values.size == 0 for values in pixels.values()):
+        raise _broken(path, "its pixels are cut off or damaged")
+    return {name: np.asarray(values, dtype=np.float32) for name, values in pixels.items()}
+
+
+def _broken(path: Path, why: str) -> InputError:
+    return InputError(
+        path, expected="a whole OpenEXR image", found=f"a file that cannot be read ({why})", remedy=RENDER_AGAIN
+    )
 
 
 def read_array(path: str | Path, names: tuple[str, ...]) -> np.ndarray:

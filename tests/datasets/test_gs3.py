@@ -1,0 +1,257 @@
+"""Datasets in the GS³ format: what a good one gives, and that everything broken is refused by file and key."""
+
+from __future__ import annotations
+
+import math
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from PIL import Image
+
+from rgspipe.datasets.exr import write_channels, write_image
+from rgspipe.datasets.gs3 import load_dataset, load_target
+from rgspipe.datasets.location import open_dataset, point_at_dataset
+from rgspipe.errors import InputError
+
+Change = Callable[[str, Callable[[dict], object]], None]
+TRAIN = "transforms_train.json"
+
+
+def test_a_good_dataset_is_read_as_it_was_written(dataset: Path) -> None:
+    loaded = load_dataset(dataset)
+    (view,) = loaded.train
+    assert view.name == "train/r_0000"
+    assert view.image.shape == (4, 6, 3) and view.image.dtype == torch.float32
+    assert (view.image == 0.25).all() and (view.alpha == 1).all()
+    torch.testing.assert_close(view.light.intensity, torch.full((3,), 2.0, dtype=torch.float64))  # watts / 4π
+    assert view.depth[0, 0] == math.inf and (view.depth.flatten()[1:] == 2).all()
+    assert (view.normal == torch.tensor([0.0, -1.0, 0.0])).all() and (view.albedo == 0.25).all()
+    assert loaded.test[0].depth is None
+    (target,) = loaded.targets
+    assert (target.name, target.occlusion, target.views[0].light) == ("one", "visible", None)
+
+
+def test_only_what_is_wanted_is_read(dataset: Path) -> None:
+    (dataset / "transforms_test.json").unlink()
+    loaded = load_dataset(dataset, test=False, targets=False)
+    assert len(loaded.train) == 1 and loaded.test == () and loaded.targets == ()
+
+
+def test_ray_distance_becomes_planar_depth(dataset: Path, change: Change) -> None:
+    change("dataset_info.json", lambda info: info.update(depth_convention="ray_distance"))
+    view = load_dataset(dataset).train[0]
+    _, _, lengths = view.camera.rays()
+    expected = 2.0 / lengths.reshape(4, 6).float()
+    torch.testing.assert_close(view.depth.flatten()[1:], expected.flatten()[1:])
+    assert view.depth[0, 0] == math.inf
+
+
+def test_one_field_of_view_for_all_frames(dataset: Path, change: Change) -> None:
+    def share(content: dict) -> None:
+        content["camera_angle_x"] = 1.0
+        del content["frames"][0]["camera_intrinsics"], content["frames"][0]["file_ext"]
+
+    change(TRAIN, share)
+    camera = load_dataset(dataset).train[0].camera
+    assert camera.fx == camera.fy == pytest.approx(3.0 / math.tan(0.5))
+    assert (camera.cx, camera.cy) == (3.0, 2.0)
+
+
+def test_png_is_linearised_and_premultiplied(dataset: Path, change: Change) -> None:
+    Image.fromarray(np.full((4, 6, 4), (188, 188, 188, 51), np.uint8), "RGBA").save(dataset / "train/r_0000.png")
+    change(TRAIN, lambda content: content["frames"][0].update(file_ext=".png"))
+    view = load_dataset(dataset).train[0]
+    linear = ((188 / 255 + 0.055) / 1.055) ** 2.4  # the sRGB curve: 188 is 0.503
+    torch.testing.assert_close(view.image, torch.full((4, 6, 3), linear * 0.2), rtol=1e-5, atol=0)  # measured 1e-7
+    torch.testing.assert_close(view.alpha, torch.full((4, 6), 0.2))
+
+
+def test_a_dataset_may_have_no_targets(dataset: Path) -> None:
+    shutil.rmtree(dataset / "targets")
+    assert load_dataset(dataset).targets == ()
+
+
+def test_a_target_of_its_own_has_no_known_class(dataset: Path, tmp_path: Path) -> None:
+    shutil.copytree(dataset / "targets/one", tmp_path / "mine")
+    target = load_target(tmp_path / "mine")
+    assert (target.name, target.occlusion, len(target.views)) == ("mine", "unknown", 1)
+
+
+def test_an_artifact_may_point_at_a_dataset(dataset: Path, tmp_path: Path) -> None:
+    point_at_dataset(tmp_path / "artifact", dataset)
+    assert open_dataset(tmp_path / "artifact", test=False).root == dataset
+    assert open_dataset(dataset, test=False).root == dataset
+
+
+def _frame(**changes: object) -> Callable[[dict], None]:
+    def edit(content: dict) -> None:
+        for key, value in changes.items():
+            if value is ...:
+                del content["frames"][0][key]
+            else:
+                content["frames"][0][key] = value
+
+    return edit
+
+
+def _matrix(*diagonal: float, bottom: float = 1.0) -> list[list[float]]:
+    return np.diag([*diagonal, bottom]).tolist()
+
+
+NAN_MATRIX = [[float("nan"), 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
+
+
+@pytest.mark.parametrize(
+    ("edit", "message"),
+    [
+        (lambda content: content.pop("frames"), 'the key "frames"'),
+        (lambda content: content.update(frames=[]), "at least one frame"),
+        (lambda content: content.update(frames=["a"]), r"frames\[0\].*JSON object"),
+        (_frame(file_path=...), r'frames\[0\].*"file_path"'),
+        (_frame(file_path=7), r"frames\[0\]\.file_path.*a path"),
+        (_frame(file_path="./train/other"), r"train/other\.exr.*no such file"),
+        (_frame(file_ext=3), r"file_ext.*suffix"),
+        (_frame(transform_matrix=...), '"transform_matrix"'),
+        (_frame(transform_matrix=[[1, 0], [0, 1]]), r"transform_matrix.*4 × 4"),
+        (_frame(transform_matrix="eye"), r"transform_matrix.*4 × 4"),
+        (_frame(transform_matrix=NAN_MATRIX), r"transform_matrix.*finite"),
+        (_frame(transform_matrix=_matrix(1, 1, 1.01)), r"transform_matrix.*rigid.*up to 0\.02"),
+        (_frame(transform_matrix=_matrix(1, 1, -1)), r"transform_matrix.*determinant -1"),
+        (_frame(transform_matrix=_matrix(1, 1, 1, bottom=2)), r"transform_matrix.*last row"),
+        (_frame(camera_intrinsics=...), 'camera_angle_x.*or "camera_intrinsics".*neither'),
+        (_frame(camera_intrinsics=[3, 2, 5]), '4 finite numbers under "camera_intrinsics"'),
+        (_frame(camera_intrinsics=[3, 2, -5, 5]), "focal lengths above 0"),
+        (_frame(camera_intrinsics=[64, 64, 100, 100]), r"r_0000\.exr.*principal point.*6 × 4"),
+        (_frame(w=128, h=128), r'r_0000\.exr.*"w": 128.*6 × 4'),
+        (_frame(camera_intrinsics=..., camera_angle_x=4), "camera_angle_x.*between 0 and π"),
+        (_frame(pl_pos=...), r'frames\[0\].*"pl_pos"'),
+        (_frame(pl_pos=[0, 0]), '3 finite numbers under "pl_pos"'),
+        (_frame(pl_intensity=...), r'frames\[0\].*"pl_intensity"'),
+        (_frame(pl_intensity=[0, 0, 0]), "pl_intensity.*above 0"),
+        (_frame(pl_intensity=[1, -1, 1]), "pl_intensity.*above 0"),
+        (_frame(pl_intensity=["a", 1, 1]), '3 finite numbers under "pl_intensity"'),
+        (_frame(depth_path="./gone.exr"), r"gone\.exr.*no such file"),
+    ],
+)
+def test_what_is_wrong_with_the_cameras_is_named(
+    dataset: Path, change: Change, edit: Callable[[dict], object], message: str
+) -> None:
+    change(TRAIN, edit)
+    with pytest.raises(InputError, match=message) as caught:
+        load_dataset(dataset)
+    assert str(dataset) in str(caught.value)
+
+
+def _fill(path: Path, channels: str, value: float = 1.0, height: int = 4) -> None:
+    write_channels(path, {name: np.full((height, 6), value, np.float32) for name in channels})
+
+
+@pytest.mark.parametrize(
+    ("name", "spoil", "message"),
+    [
+        ("r_0000", lambda path: path.unlink(), "no such file"),
+        ("r_0000", lambda path: path.write_bytes(path.read_bytes()[:-40]), "whole OpenEXR"),
+        ("r_0000", lambda path: path.write_text("no image"), "whole OpenEXR"),
+        ("r_0000", lambda path: _fill(path, "RGBA", float("nan")), "NaN or infinity"),
+        ("r_0000", lambda path: _fill(path, "RG"), "4 channels R, G, B, A"),
+        ("r_0000", lambda path: _fill(path, "RGBA", 3.0), "alpha from 0 to 1"),
+        ("r_0000_depth", lambda path: _fill(path, "Z", -1.0), "24 negative pixels"),
+        ("r_0000_depth", lambda path: _fill(path, "Z", float("nan")), "24 pixels with NaN"),
+        ("r_0000_depth", lambda path: _fill(path, "XYZ"), "one channel of depth"),
+        ("r_0000_depth", lambda path: _fill(path, "Z", height=5), "6 × 4 pixels, as the colour image"),
+        ("r_0000_normal", lambda path: _fill(path, "XYZ", float("inf")), "NaN or infinity"),
+        ("r_0000_albedo", lambda path: _fill(path, "RGB", height=2), "6 × 4 pixels, as the colour image"),
+    ],
+)
+def test_what_is_wrong_with_an_image_is_named(
+    dataset: Path, name: str, spoil: Callable[[Path], object], message: str
+) -> None:
+    path = dataset / "train" / f"{name}.exr"
+    spoil(path)
+    with pytest.raises(InputError, match=message) as caught:
+        load_dataset(dataset)
+    assert caught.value.where == str(path)
+
+
+def test_depth_without_a_convention_shows_both(dataset: Path, change: Change) -> None:
+    change("dataset_info.json", lambda info: info.pop("depth_convention"))
+    with pytest.raises(InputError, match=r'dataset_info\.json.*"planar_z".*"ray_distance"'):
+        load_dataset(dataset)
+    change("dataset_info.json", lambda info: info.update(depth_convention="inverse"))
+    with pytest.raises(InputError, match=r'"planar_z".*"ray_distance".*inverse'):
+        load_dataset(dataset)
+    (dataset / "dataset_info.json").unlink()
+    with pytest.raises(InputError, match=r'dataset_info\.json.*"planar_z".*"ray_distance".*no such file'):
+        load_dataset(dataset)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [({"version": 2}, '"version": 1, found 2'), ({"image_alpha": "straight"}, "premultiplied")],
+)
+def test_a_dataset_info_that_is_not_understood_is_refused(
+    dataset: Path, change: Change, changes: dict, message: str
+) -> None:
+    change("dataset_info.json", lambda info: info.update(changes))
+    with pytest.raises(InputError, match=message):
+        load_dataset(dataset)
+
+
+@pytest.mark.parametrize("name", [TRAIN, "transforms_test.json", "targets/one/transforms.json"])
+def test_missing_and_broken_transforms_are_named(dataset: Path, name: str) -> None:
+    (dataset / name).write_text('{"frames": [')
+    with pytest.raises(InputError, match=rf"{name}.*invalid JSON"):
+        load_dataset(dataset)
+    (dataset / name).unlink()
+    with pytest.raises(InputError, match=rf"{name}.*no such file"):
+        load_dataset(dataset)
+
+
+def test_a_target_without_images_is_named(dataset: Path, tmp_path: Path) -> None:
+    (dataset / "targets/one/view_0.exr").unlink()
+    with pytest.raises(InputError, match=r"one/view_0\.exr.*no such file"):
+        load_dataset(dataset)
+    (tmp_path / "bare").mkdir()
+    with pytest.raises(InputError, match=r"bare/transforms\.json.*no such file"):
+        load_target(tmp_path / "bare")
+    with pytest.raises(InputError, match=r"nowhere.*no such folder"):
+        load_target(tmp_path / "nowhere")
+
+
+@pytest.mark.parametrize(
+    ("item", "message"),
+    [
+        ({"name": "two", "occlusion": "visible"}, "two.*no such folder"),
+        ({"name": "../one", "occlusion": "visible"}, "name of a folder"),
+        ({"name": "one", "occlusion": "dim"}, r"targets\[0\]\.occlusion.*visible, out_of_frame"),
+        ({"occlusion": "visible"}, r'targets\[0\].*"name"'),
+    ],
+)
+def test_a_list_of_targets_that_does_not_fit_is_named(dataset: Path, change: Change, item: dict, message: str) -> None:
+    change("targets/targets.json", lambda content: content.update(targets=[item]))
+    with pytest.raises(InputError, match=message):
+        load_dataset(dataset)
+
+
+def test_a_dataset_that_is_not_there_is_named(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"nowhere.*no such folder"):
+        load_dataset(tmp_path / "nowhere")
+
+
+def test_a_broken_png_is_named(dataset: Path, change: Change) -> None:
+    change(TRAIN, _frame(file_ext=".png"))
+    (dataset / "train/r_0000.png").write_bytes(b"\x89PNG")
+    with pytest.raises(InputError, match=r"r_0000\.png.*unreadable"):
+        load_dataset(dataset)
+    Image.fromarray(np.zeros((4, 6), np.uint8)).save(dataset / "train/r_0000.png")
+    with pytest.raises(InputError, match=r"r_0000\.png.*8-bit RGB or RGBA"):
+        load_dataset(dataset)
+
+
+def test_images_of_colour_only_are_opaque(dataset: Path) -> None:
+    write_image(dataset / "train/r_0000.exr", np.ones((4, 6, 3)))
+    assert (load_dataset(dataset).train[0].alpha == 1).all()
