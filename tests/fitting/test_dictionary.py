@@ -1,0 +1,64 @@
+"""Candidates stand in free space, and their coarse images are those of full renderings."""
+
+from __future__ import annotations
+
+import torch
+
+from lit_room import BOX_CENTER, BOX_SIZE, HIDDEN
+from rgspipe.fitting.coarse import best_candidates, block_average, candidate_costs, coarse_images
+from rgspipe.fitting.dictionary import build_dictionary, candidate_grid
+from rgspipe.fitting.problem import LightProblem
+from rgspipe.renderer.direct import unit_irradiance
+
+
+def test_candidates_are_in_free_space(room):
+    inside = (room.dictionary.positions - torch.tensor(BOX_CENTER)).abs().amax(dim=1) < 0.5 * BOX_SIZE
+    assert not bool(inside.any())
+    grid = candidate_grid(room.frozen, 6, 0)
+    free = (grid - torch.tensor(BOX_CENTER)).abs().amax(dim=1) > 0.5 * BOX_SIZE + 0.1
+    free &= grid.abs().amax(dim=1) < 0.4
+    kept = (grid[:, None] == room.dictionary.positions[None]).all(dim=2).any(dim=1)
+    assert bool(kept[free].all())  # nothing is rejected that stands free
+
+
+def test_seed_decides_the_candidates(room):
+    assert torch.equal(candidate_grid(room.frozen, 5, 3), candidate_grid(room.frozen, 5, 3))
+    assert not torch.equal(candidate_grid(room.frozen, 5, 3), candidate_grid(room.frozen, 5, 4))
+
+
+def test_irradiance_belongs_to_the_positions(room):
+    expected, _ = unit_irradiance(room.frozen.bvh, room.dictionary.positions[10:12])
+    torch.testing.assert_close(room.dictionary.irradiance[10:12], expected)
+
+
+def test_coarse_images_are_block_means_of_full_images(room, point_light):
+    """The product of small matrices against rendering, with and without interreflection."""
+    prepared = room.two.prepared
+    blocks, _ = block_average(prepared)
+    for interreflection in (True, False):
+        coarse = coarse_images(prepared, room.dictionary, interreflection=interreflection)
+        for index in (0, 30, 60):
+            light = point_light(tuple(room.dictionary.positions[index].tolist()), (1.0, 1.0, 1.0))
+            images = [room.frozen.render(view, (light,), indirect=interreflection) for view in room.views]
+            expected = blocks @ prepared.stack_images(images)[prepared.pixels]
+            torch.testing.assert_close(coarse.images[index], expected, rtol=1e-4, atol=1e-5)
+
+
+def test_the_nearest_candidates_of_a_hidden_light_are_among_the_best(room, point_light):
+    light = point_light(HIDDEN)
+    problem = LightProblem.create(room.one.prepared, room.one.prepared.stack_images(room.images(light)))
+    costs, intensities = candidate_costs(problem, room.one.coarse)
+    chosen = best_candidates(costs, room.one.coarse.positions, 4, 0.16)
+    distance = (room.one.coarse.positions[chosen] - light.position).norm(dim=1)
+    assert float(distance.min()) < 0.2
+    assert bool((costs >= 0).all() and (costs <= 1 + 1e-9).all() and (intensities >= 0).all())
+
+
+def test_best_candidates_are_apart():
+    positions = torch.tensor([[0.0, 0, 0], [0.1, 0, 0], [1.0, 0, 0], [1.05, 0, 0]])
+    costs = torch.tensor([0.1, 0.2, 0.4, 0.3])
+    assert best_candidates(costs, positions, 3, 0.16) == [0, 3]
+
+
+def test_a_dictionary_may_be_coarse(room):
+    assert len(build_dictionary(room.frozen, 2, seed=0)) > 0
