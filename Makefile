@@ -11,7 +11,7 @@ ARGS ?=
 
 help:  ## this list
 	@echo "rgspipe: from images of a scene, find its lights"
-	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## (.*)/  make \1|\2/' | column -t -s '|'
+	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-10s %s\n", $$1, $$2}'
 	@echo "  Then: $(RGSPIPE) --help"
 
 setup: $(STAMP)  ## create .venv with the pinned packages (nothing is done when it is up to date)

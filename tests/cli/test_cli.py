@@ -99,6 +99,14 @@ def test_a_failure_is_short_and_its_traceback_is_kept(rgspipe, tmp_path: Path) -
     assert "Traceback" in rgspipe("stage=break", "seed=2", toys=True, RGSPIPE_TRACEBACK="1").stderr
 
 
+@pytest.mark.parametrize("folder", ["my runs/1", "${outputs}/${stage}-${seed}"])
+def test_a_folder_for_the_run_may_be_given(rgspipe, tmp_path: Path, folder: str) -> None:
+    result = rgspipe("stage=break", "seed=1", f"hydra.run.dir='{folder}'", toys=True)
+    assert result.returncode == 1, result.stderr
+    place = tmp_path / {"my runs/1": "my runs/1"}.get(folder, "outputs/break-1")
+    assert [status["state"] for status in statuses(place)] == ["failed"]
+
+
 @pytest.mark.slow
 def test_one_failed_job_hides_no_other(rgspipe, tmp_path: Path) -> None:
     result = rgspipe("-m", "stage=break", "seed=0,1,2,4", "hydra.launcher.n_jobs=2", toys=True)

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import itertools
+import sys
 from pathlib import Path
 
 import pytest
 
 from rgspipe.cli.compose import check_sweep, compose_config
-from rgspipe.cli.sequence import load_sequence
+from rgspipe.cli.sequence import SequenceStep, load_sequence, run_sequence
 from rgspipe.errors import InputError
-from rgspipe.stages import NAMES
+from rgspipe.pipeline import Node, resolve
+from rgspipe.stages import NAMES, load_stage
+
+TOYS = (sys.executable, "-m", "toys")
 
 
 @pytest.mark.parametrize("name", ["reproduce", "smoke"])
@@ -36,3 +41,54 @@ def test_a_damaged_pipeline_is_refused(tmp_path: Path, text: str, word: str) -> 
     path.write_text(text)
     with pytest.raises(InputError, match=word):
         load_sequence(str(path))
+
+
+def jobs(step: SequenceStep) -> list[list[str]]:
+    """The overrides of each job of a step whose sweeps are plain lists of values."""
+    pairs = [text.partition("=") for text in step.overrides]
+    choices = [[f"{key}={value}" for value in values.split(",")] for key, _, values in pairs]
+    return [[f"stage={step.stage}", *chosen] for chosen in itertools.product(*choices)]
+
+
+def fingerprints(node: Node) -> set[str]:
+    """Those of a node and of all that it is made from."""
+    return {node.key.fingerprint}.union(*(fingerprints(needed) for needed in node.inputs))
+
+
+@pytest.mark.parametrize("name", ["reproduce", "smoke"])
+def test_the_report_needs_exactly_what_the_steps_before_it_make(name: str) -> None:
+    *before, last = load_sequence(name)
+    made = [resolve(compose_config(job), load_stage) for step in before for job in jobs(step)]
+    (report,) = (resolve(compose_config(job), load_stage) for job in jobs(last))
+    needed = fingerprints(report)
+    assert needed - {report.key.fingerprint} == set().union(*(fingerprints(node) for node in made))
+
+
+STEPS = """
+steps:
+  - stage: sow
+    overrides: [dataset.resolution=8]
+  - stage: grow
+    overrides: [dataset.resolution=8, "views.count=1,2"]
+    sweep: true
+"""
+
+
+@pytest.mark.slow
+def test_steps_run_in_order_and_their_results_and_times_are_told(
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+    child_environment: dict[str, str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("PYTHONPATH", child_environment["PYTHONPATH"])
+    (tmp_path / "mine.yaml").write_text(STEPS)
+    assert run_sequence("mine.yaml", ["outputs=here"], TOYS) == 0
+    told = capfd.readouterr().out
+    assert "[2/2] python -m rgspipe -m stage=grow" in told and " s  in all" in told
+    assert told.count("Result: here/cornell/grow/") == 2
+    (tmp_path / "bad.yaml").write_text("steps: [{stage: break, overrides: [seed=1]}, {stage: sow}]")
+    assert run_sequence("bad.yaml", [], TOYS) == 1
+    told = capfd.readouterr()
+    assert "Step 1 (break) failed" in told.err and "[2/2]" not in told.out

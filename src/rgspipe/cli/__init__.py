@@ -6,7 +6,7 @@ import sys
 from collections.abc import Sequence
 
 from rgspipe.cli.help import help_text, overview
-from rgspipe.cli.messages import EXIT_INPUT, show_input_error
+from rgspipe.cli.messages import EXIT_INPUT, EXIT_INTERRUPTED, show_input_error
 from rgspipe.errors import InputError
 from rgspipe.pipeline import StageLoader
 from rgspipe.stages import load_stage
@@ -29,6 +29,9 @@ def main(arguments: Sequence[str] | None = None, stage_loader: StageLoader = loa
     except InputError as error:
         show_input_error(error)
         return EXIT_INPUT
+    except KeyboardInterrupt:
+        print("\nInterrupted. What is done is kept, and the next run goes on from there.", file=sys.stderr)
+        return EXIT_INTERRUPTED
 
 
 def _dispatch(arguments: list[str], stage_loader: StageLoader) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from hydra import compose, initialize_config_dir
@@ -91,6 +92,15 @@ def check_sweep(overrides: Sequence[str]) -> RgspipeConfig:
         for text in itertools.islice(_values(override), 1, CHECKED_VALUES):
             compose_config([*first[:index], text, *first[index + 1 :]])
     return config
+
+
+def given_folder(overrides: Sequence[str], mode: str) -> Path | None:
+    """What `hydra.run.dir` or `hydra.sweep.dir` says, for `mode` "run" or "sweep"; None if it is not among them."""
+    parsed = _parse(overrides)
+    if not any(override.key_or_group == f"hydra.{mode}.dir" for override in parsed):
+        return None
+    values = _compose([_first_value(override) for override in parsed], hydra=True)
+    return Path(str(values.hydra[mode].dir))
 
 
 def _compose(overrides: Sequence[str], hydra: bool = False) -> DictConfig:

@@ -19,6 +19,7 @@ from rgspipe.cli.compose import (
     check_sweep,
     compose_config,
     config_folder,
+    given_folder,
     register_schema,
     typed,
 )
@@ -38,15 +39,17 @@ def run_jobs(overrides: Sequence[str], stage_loader: StageLoader, multirun: bool
     config = check_sweep(overrides) if multirun else compose_config(overrides)
     if stage_loader is load_stage:
         check_stage(config.stage)
-    key = "hydra.sweep.dir" if multirun else "hydra.run.dir"
-    given = next((text.partition("=")[2] for text in overrides if text.startswith(f"{key}=")), None)
-    folder = Path(given) if given else new_run_folder(Path(config.outputs), "sweep" if multirun else config.stage)
-    chosen = [] if given else [f"{key}={quoted(folder)}"]
-    code = run_hydra([*(["-m"] if multirun else []), *overrides, *chosen], stage_loader)
+    mode = "sweep" if multirun else "run"
+    folder = given_folder(overrides, mode) or new_run_folder(
+        Path(config.outputs), "sweep" if multirun else config.stage
+    )
+    # Said again even where it was given: interpolations such as the time must not be resolved twice.
+    chosen = f"hydra.{mode}.dir={quoted(folder)}"
+    code = run_hydra([*(["-m"] if multirun else []), *overrides, chosen], stage_loader)
     if multirun:
         return _sweep_summary(folder, code)
     status = read_status(folder)
-    return code if status is None else int(status.get("exit_code", EXIT_FAILED))
+    return max(code, EXIT_FAILED if status is None else int(status.get("exit_code", EXIT_FAILED)))
 
 
 def run_hydra(arguments: Sequence[str], stage_loader: StageLoader) -> int:
@@ -125,4 +128,6 @@ def _sweep_summary(folder: Path, code: int) -> int:
             print(f"    see {path / 'status.json'}")
     failed = [status for _, status in jobs if status["state"] != "done"]
     print(f"{len(jobs) - len(failed)} of {len(jobs)} jobs done; {folder}")
+    if not jobs:
+        return max(code, EXIT_FAILED)
     return max([code, *(int(status.get("exit_code", EXIT_FAILED)) for status in failed)])

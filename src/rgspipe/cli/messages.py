@@ -10,8 +10,8 @@ from pathlib import Path
 
 from rgspipe.errors import InputError
 
-#: Exit status of a run that failed, and of one whose input cannot be used.
-EXIT_FAILED, EXIT_INPUT = 1, 2
+#: Exit status of a run that failed, of one whose input cannot be used, and of one that was stopped with Ctrl-C.
+EXIT_FAILED, EXIT_INPUT, EXIT_INTERRUPTED = 1, 2, 130
 
 TRACEBACK_VARIABLE = "RGSPIPE_TRACEBACK"
 

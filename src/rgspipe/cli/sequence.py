@@ -19,6 +19,9 @@ from rgspipe.errors import InputError
 from rgspipe.resources import resource_folder
 from rgspipe.status import read_statuses
 
+#: What each step of a pipeline is run with.
+RGSPIPE = (sys.executable, "-m", "rgspipe")
+
 
 @dataclass(frozen=True)
 class SequenceStep:
@@ -66,12 +69,13 @@ def _step(path: Path, number: int, item: Any) -> SequenceStep:
     return SequenceStep(item["stage"], tuple(overrides), bool(item.get("sweep", False)))
 
 
-def run_sequence(name: str, extra: Sequence[str]) -> int:
+def run_sequence(name: str, extra: Sequence[str], program: Sequence[str] = RGSPIPE) -> int:
     """Run a pipeline's commands and say where its results are; stops at the first that fails.
 
     Args:
         name: a file under pipelines/, or the path of one.
         extra: overrides for every step, after its own.
+        program: the command that understands a step's overrides.
     """
     steps = load_sequence(name)
     outputs = Path(next((text.partition("=")[2] for text in extra if text.startswith("outputs=")), "outputs"))
@@ -83,7 +87,7 @@ def run_sequence(name: str, extra: Sequence[str]) -> int:
         print(f"[{number}/{len(steps)}] python -m rgspipe {' '.join(command)}", flush=True)
         begin = time.perf_counter()
         key = "hydra.sweep.dir" if step.sweep else "hydra.run.dir"
-        code = subprocess.run([sys.executable, "-m", "rgspipe", *command, f"{key}={quoted(run_folder)}"]).returncode
+        code = subprocess.run([*program, *command, f"{key}={quoted(run_folder)}"]).returncode
         seconds.append(time.perf_counter() - begin)
         if code != 0:
             print(f"Step {number} ({step.stage}) failed; see {run_folder}. What is done is kept.", file=sys.stderr)
