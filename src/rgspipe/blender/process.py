@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import os
 import subprocess
@@ -31,9 +32,16 @@ def render_dataset(job: DatasetJob, folder: Path) -> None:
     May be killed at any moment and called again: the result is the same.
 
     Raises:
-        InputError: the scene cannot be used, or `folder` holds the images of another job.
+        InputError: bpy is not installed, the scene cannot be used, or `folder` holds the images of another job.
         RuntimeError: Blender died; the message ends with the last lines it wrote.
     """
+    if importlib.util.find_spec("bpy") is None:
+        raise InputError(
+            "scene",
+            expected="Blender's Python module bpy, which renders the images",
+            found="none",
+            remedy="Install it (pip install 'rgspipe[blender]'), or use scene=external with a dataset from disk.",
+        )
     folder = Path(folder).resolve()
     folder.mkdir(parents=True, exist_ok=True)
     _claim(job, folder)

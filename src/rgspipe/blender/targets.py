@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
 
-from rgspipe.blender.geometry import Geometry
 from rgspipe.scene import Camera
+
+if TYPE_CHECKING:
+    from rgspipe.blender.geometry import Geometry
 
 #: Tells whether a surface lies between two points.
 Blocked = Callable[[np.ndarray, np.ndarray], bool]

@@ -112,8 +112,14 @@ def _load_view(entry: FrameEntry, root: Path, info: DatasetInfo | None, *, with_
     camera = entry.camera(image.shape[1], image.shape[0])
     surface = _load_surface(entry, camera, info)
     light = PointLight(*entry.light()) if with_light else None
-    name = entry.image_path.relative_to(root).with_suffix("").as_posix() if with_light else entry.image_path.stem
-    return View(name, camera, image, alpha, light, surface.depth, surface.normal, surface.albedo)
+    return View(
+        _name(entry.image_path, root), camera, image, alpha, light, surface.depth, surface.normal, surface.albedo
+    )
+
+
+def _name(path: Path, root: Path) -> str:
+    """The image below `root`, without suffix; only its own name if it lies elsewhere."""
+    return path.relative_to(root).with_suffix("").as_posix() if path.is_relative_to(root) else path.stem
 
 
 def _load_surface(entry: FrameEntry, camera, info: DatasetInfo | None) -> _Surface:

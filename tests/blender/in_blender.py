@@ -1,0 +1,97 @@
+"""Measurements that need bpy, run by the tests in a process of its own: `in_blender.py NAME FOLDER`."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+import torch
+
+from rgspipe.blender import blend, cornell
+from rgspipe.blender.geometry import FreeSpace, scene_geometry
+from rgspipe.blender.job import CornellParameters, DatasetJob
+from rgspipe.blender.passes import Studio
+from rgspipe.blender.plan import Frame
+from rgspipe.scene import Camera, PointLight, look_at
+
+
+def _quad(scene: bpy.types.Scene, half: float, height: float, albedo: tuple[float, float, float]) -> None:
+    mesh = bpy.data.meshes.new("quad")
+    corners = [(-half, -half), (half, -half), (half, half), (-half, half)]
+    mesh.from_pydata([(x, y, height) for x, y in corners], [], [(0, 1, 2, 3)])
+    mesh.materials.append(cornell.diffuse_material("quad", albedo))
+    scene.collection.objects.link(bpy.data.objects.new("quad", mesh))
+
+
+def _frame(name: str, origin: tuple, height: float, seed: int) -> Frame:
+    pose = look_at(torch.tensor(origin), torch.zeros(3))
+    camera = Camera.from_field_of_view(pose, 1.0, 16, 16)
+    light = PointLight(torch.tensor([0.1, -0.2, height]).double(), torch.tensor([0.5, 1.0, 2.0]).double())
+    return Frame(name, camera, light, seed, True)
+
+
+def plane(folder: Path) -> None:
+    """A diffuse plane under a coloured light: from above, again, and from below with the light below."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    _quad(bpy.context.scene, 4.0, 0.0, (0.2, 0.5, 0.8))
+    studio = Studio(bpy.context.scene, DatasetJob(resolution=16, samples=2048, denoise=False), folder)
+    studio.render(_frame("above", (0.5, -1.0, 1.5), 0.9, seed=1), folder)
+    studio.render(_frame("below", (0.5, -1.0, -1.5), -0.9, seed=2), folder)
+    studio.render(_frame("again", (0.5, -1.0, 1.5), 0.9, seed=1), folder)
+
+
+def free_space(folder: Path) -> None:
+    """Which of these places are free in the Cornell box, and in a closed room with a box in it."""
+    space = FreeSpace(scene_geometry(cornell.build(CornellParameters())))
+    points = {
+        "middle": (0, 0, 0.3),
+        "in the tall box": (-0.17, 0.12, -0.2),
+        "outside": (0, 0, 3),
+        "in front": (0, -0.6, 0),
+    }
+    in_cornell = [space.contains(np.array(point, float)) for point in points.values()]
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.mesh.primitive_cube_add(size=1.0)
+    bpy.context.object.data.flip_normals()
+    bpy.ops.mesh.primitive_cube_add(size=0.3, location=(0.2, 0.0, 0.0))
+    bpy.context.view_layer.update()
+    space = FreeSpace(scene_geometry(bpy.context.scene))
+    inside = [space.contains(np.array(point)) for point in ((-0.3, 0.0, 0.0), (0.2, 0.0, 0.0))]
+    np.savez(folder / "free.npz", cornell=in_cornell, closed=inside, is_room=space.is_room)
+
+
+def save_blends(folder: Path) -> None:
+    """Three files: nothing in it, a bare scene, and the same scene with everything that must be removed."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "empty.blend"))
+    _quad(bpy.context.scene, 4.0, 1.0, (0.5, 0.5, 0.5))
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=1.0, location=(1.0, 0.5, 2.5))
+    material = bpy.data.materials.new("principled")
+    bpy.context.object.data.materials.append(material)
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "bare.blend"))
+    material.node_tree.nodes["Principled BSDF"].inputs["Emission Strength"].default_value = 7.0
+    bpy.ops.object.light_add(type="SUN", location=(0, 0, 9))
+    bpy.ops.object.camera_add(location=(0, -9, 3))
+    world = bpy.data.worlds.new("bright")
+    world.node_tree.nodes["Background"].inputs["Strength"].default_value = 3.0
+    bpy.context.scene.world = world
+    bpy.context.scene.render.resolution_percentage = 50
+    bpy.context.scene.cycles.film_exposure = 4.0
+    bpy.ops.mesh.primitive_cube_add(size=9.0)
+    bpy.context.object.hide_render = True
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "lit.blend"))
+
+
+def normalise(folder: Path) -> None:
+    """Bounds and scale of a normalised file."""
+    scene, rescale, offset = blend.open_normalised(folder / "lit.blend")
+    geometry = scene_geometry(scene)
+    np.savez(folder / "normal.npz", lo=geometry.lo, hi=geometry.hi, rescale=rescale, offset=offset)
+
+
+if __name__ == "__main__":
+    {"plane": plane, "free_space": free_space, "save_blends": save_blends, "normalise": normalise}[sys.argv[1]](
+        Path(sys.argv[2])
+    )

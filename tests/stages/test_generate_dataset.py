@@ -1,0 +1,87 @@
+"""The first stage: what it asks Blender for, and how it takes a dataset from disk."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from rgspipe.config import RgspipeConfig
+from rgspipe.datasets.exr import write_image
+from rgspipe.datasets.gs3_write import frame_entry, write_transforms
+from rgspipe.datasets.location import open_dataset
+from rgspipe.errors import InputError
+from rgspipe.scene import Camera, PointLight, look_at
+from rgspipe.stages.base import StageContext
+from rgspipe.stages.generate_dataset import STAGE, dataset_job
+
+
+def _config(**scene: object) -> RgspipeConfig:
+    config = RgspipeConfig()
+    for key, value in scene.items():
+        setattr(config.scene, key, value)
+    return config
+
+
+def _run(config: RgspipeConfig, folder: Path) -> StageContext:
+    folder.mkdir()
+    context = StageContext(config, {}, {}, folder)
+    STAGE.run(context)
+    return context
+
+
+@pytest.fixture
+def foreign(tmp_path: Path) -> Path:
+    """A dataset of one training and one test view, without depth and targets."""
+    root = tmp_path / "foreign"
+    camera = Camera.from_field_of_view(look_at(torch.tensor([0.0, -2.0, 0.0]), torch.zeros(3)), 1.0, 4, 4)
+    light = PointLight(torch.zeros(3), torch.ones(3))
+    for split in ("train", "test"):
+        write_image(root / split / "r_0000.exr", np.ones((4, 4, 3)))
+        write_transforms(root / f"transforms_{split}.json", [frame_entry(f"{split}/r_0000", camera, light)])
+    return root
+
+
+def test_an_external_dataset_is_checked_and_pointed_at(foreign: Path, tmp_path: Path) -> None:
+    context = _run(_config(kind="external", path=str(foreign)), tmp_path / "out")
+    assert context.facts == {"kind": "external", "train": 1, "test": 1, "targets": 0}
+    assert json.loads((tmp_path / "out/dataset.json").read_text()) == {"root": str(foreign)}
+    assert len(open_dataset(tmp_path / "out").train) == 1
+    assert STAGE.files(_config(kind="external", path=str(foreign))) == (foreign,)
+
+
+def test_a_broken_external_dataset_leaves_no_pointer(foreign: Path, tmp_path: Path) -> None:
+    (foreign / "test/r_0000.exr").write_text("")
+    with pytest.raises(InputError, match=r"test/r_0000\.exr"):
+        _run(_config(kind="external", path=str(foreign)), tmp_path / "out")
+    assert not list((tmp_path / "out").iterdir())
+
+
+@pytest.mark.parametrize("kind", ["external", "blend"])
+@pytest.mark.parametrize(("path", "message"), [(None, "found nothing"), ("/gone/away", "no such path: /gone/away")])
+def test_a_path_that_leads_nowhere_is_named(kind: str, path: str | None, message: str, tmp_path: Path) -> None:
+    config = _config(kind=kind, path=path)
+    assert STAGE.files(config) == ()
+    with pytest.raises(InputError, match=rf"scene\.path.*{message}"):
+        _run(config, tmp_path / "out")
+
+
+def test_boxes_stand_on_the_floor_of_a_centred_room() -> None:
+    config = _config(kind="cornell")
+    room = config.scene.cornell
+    room.room, room.tall_size, room.tall_center, room.tall_angle = [1.0, 0.8, 0.6], [0.1, 0.2, 0.4], [0.5, 0.4], 90.0
+    cornell = dataset_job(config).cornell
+    tall = cornell.boxes[0]
+    assert cornell.room == (1.0, 0.8, 0.6)
+    assert tall.center == pytest.approx((0.0, 0.0, -0.1))  # its foot is at −0.3, the floor
+    assert tall.turn == pytest.approx(math.pi / 2)
+
+
+def test_only_what_matters_is_in_the_fingerprint() -> None:
+    assert STAGE.keys(_config(kind="external")) == ("scene.kind",)
+    assert "scene.cornell" not in STAGE.keys(_config(kind="blend"))
+    assert {"scene.cornell", "dataset"} <= set(STAGE.keys(_config(kind="cornell")))
