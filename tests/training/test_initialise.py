@@ -5,22 +5,18 @@ Tolerances carry the measured value in a comment.
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
+from raycast import BLOCK, ROOM, Cuboid, room_views, surface_distance, view_of
 from scipy.spatial import cKDTree
 
 from rgspipe.errors import InputError
 from rgspipe.scene import NO_CLIP, Surfels
 from rgspipe.training.initialise import cloud_from_views, initialise_surfels
 from rgspipe.training.initialise.normals import normals_from_depth
-
-sys.path.insert(0, str(Path(__file__).parent))
-from raycast import BLOCK, ROOM, Cuboid, room_views, surface_distance, view_of
 
 COUNT = 1500
 
@@ -214,9 +210,10 @@ def test_a_sphere_seen_beside_a_plane_stays():
     depth = np.where(ball, (along - np.sqrt(np.maximum(root, 0.0))) / square, 3.0)
     found, valid = normals_from_depth(depth, (focal, focal), (size / 2, size / 2))
     true = (rays * depth[..., None] - center) / radius
-    assert valid[ball].mean() > 0.8
-    error = np.degrees(np.arccos(np.clip((found * true).sum(-1)[ball & valid], -1, 1)))
-    assert np.median(error) < 3.0
+    inner = np.linalg.norm(true[..., :2], axis=-1) < 0.7  # beyond it a silhouette's windows reach the background
+    assert valid[ball & inner].all()
+    error = np.degrees(np.arccos(np.clip((found * true).sum(-1)[ball & inner], -1, 1)))
+    assert error.mean() < 3.0  # measured 0
 
 
 @pytest.mark.parametrize("noise", [0.001, 0.01, 0.05])

@@ -11,7 +11,7 @@ from rgspipe.scene.surfels import NO_CLIP
 from rgspipe.training.initialise.cloud import Cloud
 from rgspipe.training.initialise.resample import thin
 
-DIRECTIONS = 48
+DIRECTIONS = 72
 #: Neighbours of a coarse cloud by which the surfels near an edge are told from the others.
 COARSE_NEIGHBOURS = 96
 #: Surfels whose edges are looked for at once; bounds the memory.
@@ -44,7 +44,12 @@ class EdgeOptions:
 
 
 def find_edges(
-    centers: Cloud, axes: np.ndarray, cloud: Cloud, spacing: float, options: EdgeOptions | None = None
+    centers: Cloud,
+    axes: np.ndarray,
+    cloud: Cloud,
+    thinned: Cloud,
+    spacing: float,
+    options: EdgeOptions | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Up to two half-plane clips a surfel, from the support function of the coplanar points around it.
 
@@ -55,6 +60,7 @@ def find_edges(
         centers: N surfels.
         axes: (N, 3, 3) rows u, v, normal; angles are measured from u towards v.
         cloud: the points, all of them; the more, the truer the edges.
+        thinned: about one of them in a quarter of `spacing`, to tell quickly which surfels are near an edge.
         spacing: between surfels, scene units.
 
     Returns:
@@ -63,7 +69,7 @@ def find_edges(
     options = options or EdgeOptions()
     offsets = np.full((len(centers), 2), NO_CLIP)
     angles = np.zeros((len(centers), 2))
-    near = _near_edges(centers, axes, cloud, spacing, options)
+    near = _near_edges(centers, axes, thinned, spacing, options)
     if not len(near):
         return offsets, angles
     fine = thin(cloud, 0.08 * spacing, average=False)
@@ -123,12 +129,15 @@ def _clips(support: np.ndarray, spacing: float, options: EdgeOptions) -> tuple[n
     """Offsets (N, 2) and angles (N, 2) of the two nearest edges, the second well apart from the first."""
     compass = np.linspace(0.0, 2.0 * np.pi, DIRECTIONS, endpoint=False)
     rows = np.arange(len(support))
-    first = support.argmin(axis=1)
+    # The support of a polygon has its local minima at the edges; at a corner the lowest values stand side by side.
+    dip = (support <= np.roll(support, 1, axis=1)) & (support <= np.roll(support, -1, axis=1))
+    edges = np.where(dip, support, np.inf)
+    first = edges.argmin(axis=1)
     turn = np.abs((compass - compass[first][:, None] + np.pi) % (2.0 * np.pi) - np.pi)
-    others = np.where(turn > options.least_angle, support, np.inf)
+    others = np.where(turn > options.least_angle, edges, np.inf)
     # Without a first edge there is no second one, as the first is the nearest.
     nearest = np.stack([first, others.argmin(axis=1)], axis=1)
-    distance = np.stack([support[rows, first], others[rows, nearest[:, 1]]], axis=1)
+    distance = np.stack([edges[rows, first], others[rows, nearest[:, 1]]], axis=1)
     clipped = distance < options.threshold * spacing
     placed = np.maximum(distance, options.least_offset * spacing) + options.margin * spacing
     return np.where(clipped, placed, NO_CLIP), np.where(clipped, compass[nearest], 0.0)

@@ -24,8 +24,8 @@ def normals_from_depth(
 
     On a plane 1/z is an affine function of the pixel, 1/z = a·X + b·Y + c with (X, Y, −1) the pixel's ray,
     and the normal is along ±(a, b, −c). Every window of the image gets such a fit; each pixel takes the
-    best-fitting one of the windows that contain it. A pixel beside an edge thus finds a window on its own side,
-    where an average around the pixel would round the edge.
+    best-fitting one of the windows that contain or touch it. A pixel beside an edge thus finds a window on its own
+    side, where an average around the pixel would round the edge.
 
     Args:
         depth: (H, W) planar depth at pixel centres, scene units; +inf where there is no surface.
@@ -59,16 +59,21 @@ def _fit(
 
     best = np.full(depth.shape, np.inf)
     chosen = np.zeros((3, height, width))
-    for dy in range(-radius, radius + 1):
-        for dx in range(-radius, radius + 1):
+    # One step beyond the window: the tip of a corner is in no whole window of its own face, but on its plane.
+    # Five positions an axis are all of them for radius 1 and enough for larger windows, which overlap.
+    reach = [round(step * (radius + 1) / 2) for step in range(-2, 3)]
+    for dy in reach:
+        for dx in reach:
             into, source = _shifted(height, dy), _shifted(height, -dy)
             into_x, source_x = _shifted(width, dx), _shifted(width, -dx)
             window, pixel = (source, source_x), (into, into_x)
             fitted = mean[window] + dx * slope_x[window] + dy * slope_y[window]
             off = (fitted - inverse[pixel]) / np.maximum(inverse[pixel], 1e-30)
-            # The pixel's own residual counts too: a good window just beyond an edge must not win. The tiny
-            # constant, far below float32, keeps rounding from choosing among windows that all fit exactly.
-            cost = deviation[window] ** 2 + 0.3 * off**2 + 1e-14 * (1 + dx * dx + dy * dy)
+            # The pixel's own residual counts too: a good window just beyond an edge must not win. Windows that
+            # fit about equally well, as on smooth curves, lose by their distance; the tiny constant, far below
+            # float32, has the same effect where all fit exactly.
+            away = 1.0 + (dx * dx + dy * dy) / radius**2
+            cost = away * (deviation[window] ** 2 + 0.15 * off**2 + 1e-14)
             better = cost < best[pixel]
             best[pixel] = np.where(better, cost, best[pixel])
             for index, values in enumerate((fitted, slope_x[window], slope_y[window])):

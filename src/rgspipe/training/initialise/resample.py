@@ -14,6 +14,7 @@ NORMAL_WEIGHT = 40.0
 
 def estimate_spacing(cloud: Cloud, count: int) -> float:
     """Roughly how far apart `count` surfels stand on the surfaces of `cloud`, scene units."""
+    cloud = cloud[:: max(1, len(cloud) // 400_000)]
     low, high = np.percentile(cloud.points, [1.0, 99.0], axis=0)
     edge = max(float(np.linalg.norm(high - low)) / 96.0, 1e-9)
     cells = thin(cloud, edge)

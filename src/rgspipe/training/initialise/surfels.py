@@ -86,27 +86,19 @@ def initialise_surfels(
             found=f"{len(cloud)} in {sum(view.depth is not None for view in views)} views",
             remedy=f"Set init.surfels to at most {max(len(cloud) // 4, 1)}, or give more views or a higher resolution.",
         )
-    centers = _place(cloud, count, np.random.default_rng(seed))
-    return _dress(centers, cloud, footprint, clips)
-
-
-def _place(cloud: Cloud, count: int, rng: np.random.Generator) -> Cloud:
-    """Evenly spread centres on the surfaces, with their normals."""
     spacing = estimate_spacing(cloud, count)
     thinned = thin_for(cloud, count, spacing)
-    centers = even_out(thinned, count, spacing, rng)
-    return refit_planes(centers, thinned, spacing)
+    centers = refit_planes(even_out(thinned, count, spacing, np.random.default_rng(seed)), thinned, spacing)
+    return _dress(centers, neighbour_spacing(centers, spacing), cloud if clips else None, thinned, footprint)
 
 
-def _dress(centers: Cloud, cloud: Cloud, footprint: Footprint, clips: bool) -> Surfels:
-    """Surfels at `centers` with scales from their spacing and edges from `cloud`."""
-    count = len(centers)
-    spacing = neighbour_spacing(centers, estimate_spacing(cloud, count))
-    median = float(np.median(spacing))
+def _dress(centers: Cloud, spacing: np.ndarray, cloud: Cloud | None, thinned: Cloud, footprint: Footprint) -> Surfels:
+    """Surfels at `centers` with scales from their spacing (N,), and with edges if the whole cloud is given."""
+    count, median = len(centers), float(np.median(spacing))
     rotations = quaternion_from_normal(torch.from_numpy(centers.normals))
     offsets, angles = np.full((count, 2), NO_CLIP), np.zeros((count, 2))
-    if clips:
-        offsets, angles = find_edges(centers, quaternion_to_axes(rotations).numpy(), cloud, median)
+    if cloud is not None:
+        offsets, angles = find_edges(centers, quaternion_to_axes(rotations).numpy(), cloud, thinned, median)
     growth = np.where(offsets[:, 0] < NO_CLIP, footprint.clipped_growth, 1.0)
     scale = torch.from_numpy(footprint.scale * growth * spacing).float()
     coverage = Coverage(

@@ -1,0 +1,87 @@
+"""Surfel files come back as they were written, and broken ones are refused by name."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+
+import pytest
+import torch
+
+from rgspipe.datasets.surfel_file import FORMAT, VERSION, load_surfels, save_surfels
+from rgspipe.datasets.tensor_file import save_tensors
+from rgspipe.errors import InputError
+from rgspipe.scene import NO_CLIP, Coverage, Surfels
+
+
+@pytest.fixture
+def surfels() -> Surfels:
+    generator = torch.Generator().manual_seed(0)
+    count = 7
+    return Surfels(
+        centers=torch.randn(count, 3, generator=generator),
+        rotations=torch.nn.functional.normalize(torch.randn(count, 4, generator=generator), dim=1),
+        scales=torch.rand(count, 2, generator=generator),
+        opacities=torch.rand(count, generator=generator),
+        albedo=torch.rand(count, 3, generator=generator),
+        clip_offsets=torch.full((count, 2), NO_CLIP),
+        clip_angles=torch.rand(count, 2, generator=generator),
+        coverage=Coverage(0.5, 0.9, 0.0123456789, 1e-3),
+    )
+
+
+def note_of(surfels: Surfels) -> dict:
+    return {"format": FORMAT, "version": VERSION, "coverage": asdict(surfels.coverage)}
+
+
+def test_surfels_come_back_exactly(tmp_path, surfels):
+    save_surfels(tmp_path / "new" / "surfels.safetensors", surfels)
+    again = load_surfels(tmp_path / "new" / "surfels.safetensors")
+    assert again.coverage == surfels.coverage
+    for name, tensor in surfels.tensors().items():
+        assert torch.equal(tensor, getattr(again, name)), name
+    assert [path.name for path in (tmp_path / "new").iterdir()] == ["surfels.safetensors"]
+
+
+def test_missing_and_truncated_files_are_named(tmp_path, surfels):
+    path = tmp_path / "surfels.safetensors"
+    with pytest.raises(InputError, match=r"surfels\.safetensors.*no such file"):
+        load_surfels(path)
+    save_surfels(path, surfels)
+    path.write_bytes(path.read_bytes()[:-10])
+    with pytest.raises(InputError, match=r"surfels\.safetensors"):
+        load_surfels(path)
+    path.write_bytes(b"not a tensor file")
+    with pytest.raises(InputError, match=r"surfels\.safetensors"):
+        load_surfels(path)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda tensors: tensors.pop("scales"), "the tensors"),
+        (lambda tensors: tensors.update(scales=torch.ones(3, 2)), r"scales must have shape \(7, 2\)"),
+        (lambda tensors: tensors.update(scales=torch.full((7, 2), torch.nan)), "finite scales"),
+        (lambda tensors: tensors.update(scales=torch.ones(7, 2, dtype=torch.int64)), "one type"),
+    ],
+)
+def test_wrong_tensors_are_refused(tmp_path, surfels, change, message):
+    tensors = surfels.tensors()
+    change(tensors)
+    save_tensors(tmp_path / "s.safetensors", tensors, note_of(surfels))
+    with pytest.raises(InputError, match=message):
+        load_surfels(tmp_path / "s.safetensors")
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"format": "other"}, "format 'other'"),
+        ({"version": 2}, "version 2"),
+        ({"coverage": {"low": 0.5}}, "layer_thickness"),
+        ({"coverage": None}, "coverage with the numbers"),
+    ],
+)
+def test_wrong_notes_are_refused(tmp_path, surfels, change, message):
+    save_tensors(tmp_path / "s.safetensors", surfels.tensors(), {**note_of(surfels), **change})
+    with pytest.raises(InputError, match=message):
+        load_surfels(tmp_path / "s.safetensors")
