@@ -81,12 +81,10 @@ class DatasetConfig:
     train_views: int = option(100, "training views, each with one light of its own", low=1, high=100000)
     test_views: int = option(24, "held-out views: new cameras and new lights", low=1, high=100000)
     targets_per_class: int = option(20, "fit targets of each occlusion class", low=0, high=10000)
-    target_views: int = option(3, "fixed cameras that see each fit target", low=1, high=100)
+    target_views: int = option(3, "fixed cameras that see each fit target", low=1, high=3)
     samples: int = option(96, "paths per pixel", low=1, high=1000000)
     denoise: bool = option(True, "denoise the colour images")
     max_bounces: int = option(12, "bounces of a path; fewer than 8 lose light", low=0, high=1024)
-    field_of_view: float = option(40.0, "across the width, degrees", low=1, high=170)
-    light_power: float = option(40.0, "mean power of a light for a scene of size 1, W", low=1e-6, high=1e9)
     seed: int = option(0, "draws of cameras and lights", low=0, high=2**31 - 1)
 
 
