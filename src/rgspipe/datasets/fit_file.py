@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 import torch
 from torch import Tensor
@@ -22,6 +22,10 @@ from rgspipe.scene import PointLight
 
 #: What the light file says beside the lights, and results.csv repeats.
 FIELDS = ("loss", "iterations", "evaluations", "lights_tried", "seconds", "psnr", "result", "reason")
+
+#: What an image that is equal to the last bit gets, so that the number can be written as JSON; float32 images that
+#: differ at all stay below it.
+BEST_PSNR = 200.0
 
 
 def write_result(folder: Path, result: FitResult, views: FitViews, targets: Sequence[Tensor]) -> None:
@@ -62,10 +66,10 @@ def _milestones(result: FitResult) -> list[PointLight | None]:
 
 
 def _psnr(images: Sequence[Tensor], targets: Sequence[Tensor]) -> float | None:
-    """PSNR over all pixels of all views; None where it has no meaning or is infinite."""
+    """PSNR over all pixels of all views, at most BEST_PSNR; None where it has no meaning."""
     joined = [torch.cat([image.detach().reshape(-1, 1, 3).cpu() for image in group]) for group in (images, targets)]
     value = psnr(*joined)
-    return value if np.isfinite(value) else None
+    return None if math.isnan(value) else min(value, BEST_PSNR)
 
 
 def _write_light_file(path: Path, result: FitResult, quality: float | None) -> None:

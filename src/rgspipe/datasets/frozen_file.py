@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from torch import Tensor
@@ -41,19 +41,21 @@ def load_frozen(locate: Callable[[str], Path]) -> FrozenScene:
         InputError: a file is missing, broken, or does not belong to the others.
     """
     surfels = load_surfels(locate(SURFELS))
-    gather, _ = _load(locate(GATHER), {"areas"}, ("gather",))
-    transport, path = _load(locate(TRANSPORT), {"inverse"}, ("average", "gather"))
-    average, gathered = (SparseOperator.from_tensors(transport, name) for name in ("average", "gather"))
-    inverse, count, patches = transport["inverse"], len(surfels), average.shape[0]
-    _require(locate(GATHER), tuple(gather["areas"].shape), (count,), "areas")
-    _require(path, average.shape, (patches, count), "average")
-    _require(path, gathered.shape, (count, patches), "gather")
-    _require(path, tuple(inverse.shape), (3, patches, patches), "inverse")
-    whole = SparseOperator.from_tensors(gather, "gather")
-    _require(locate(GATHER), whole.shape, (count, count), "gather")
-    return FrozenScene(
-        surfels, gather["areas"], whole, PatchTransport(average, gathered, inverse, surfels.albedo.float())
-    )
+    count = len(surfels)
+    path = locate(GATHER)
+    tensors = _load(path, {"areas"}, ("gather",))
+    areas, gather = tensors["areas"], _operator(path, tensors, "gather", (count, count))
+    _require(path, "areas", areas.shape, (count,))
+    return FrozenScene(surfels, areas, gather, _load_transport(locate(TRANSPORT), surfels.albedo.float()))
+
+
+def _load_transport(path: Path, albedo: Tensor) -> PatchTransport:
+    tensors = _load(path, {"inverse"}, ("average", "gather"))
+    inverse = tensors["inverse"]
+    count, patches = len(albedo), inverse.shape[-1]
+    _require(path, "inverse", inverse.shape, (3, patches, patches))
+    average = _operator(path, tensors, "average", (patches, count))
+    return PatchTransport(average, _operator(path, tensors, "gather", (count, patches)), inverse, albedo)
 
 
 def save_dictionary(path: Path, dictionary: LightDictionary) -> None:
@@ -67,24 +69,32 @@ def load_dictionary(path: Path, frozen: FrozenScene) -> LightDictionary:
     Raises:
         InputError: the file is missing, broken, or of another scene.
     """
-    tensors, _ = _load(path, {"positions", "irradiance"}, ())
-    dictionary = LightDictionary(tensors["positions"], tensors["irradiance"])
-    candidates = dictionary.positions.shape[0]
-    _require(path, tuple(dictionary.positions.shape), (candidates, 3), "positions")
-    _require(path, tuple(dictionary.irradiance.shape), (candidates, len(frozen.surfels)), "irradiance")
-    return dictionary
+    tensors = _load(path, {"positions", "irradiance"}, ())
+    positions, irradiance = tensors["positions"], tensors["irradiance"]
+    _require(path, "positions", positions.shape, (positions.shape[0], 3))
+    _require(path, "irradiance", irradiance.shape, (positions.shape[0], len(frozen.surfels)))
+    return LightDictionary(positions, irradiance)
 
 
-def _load(path: Path, names: set[str], operators: tuple[str, ...]) -> tuple[dict[str, Tensor], Path]:
+def _load(path: Path, names: set[str], operators: tuple[str, ...]) -> dict[str, Tensor]:
     """The tensors of a file that holds exactly `names` and sparse `operators`."""
     tensors, _ = load_tensors(path)
     wanted = names | {f"{operator}.{part}" for operator in operators for part in ("shape", "rows", "columns", "values")}
     if set(tensors) != wanted:
         listed = ", ".join(sorted(tensors)) or "none"
         raise InputError(path, expected=f"the tensors {', '.join(sorted(wanted))}", found=listed, remedy=MAKE_AGAIN)
-    return tensors, path
+    return tensors
 
 
-def _require(path: Path, found: tuple[int, ...], expected: tuple[int, ...], name: str) -> None:
+def _operator(path: Path, tensors: dict[str, Tensor], name: str, shape: tuple[int, int]) -> SparseOperator:
+    """The sparse operator of this name, of this shape."""
+    _require(path, name, tensors[f"{name}.shape"].tolist(), shape)
+    try:
+        return SparseOperator.from_tensors(tensors, name)
+    except ValueError as error:
+        raise InputError(path, expected=f"a sparse matrix {name}", found=str(error), remedy=MAKE_AGAIN) from error
+
+
+def _require(path: Path, name: str, found: Sequence[int], expected: tuple[int, ...]) -> None:
     if tuple(found) != expected:
         raise InputError(path, expected=f"{name} of shape {expected}", found=str(tuple(found)), remedy=MAKE_AGAIN)

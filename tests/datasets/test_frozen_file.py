@@ -1,0 +1,90 @@
+"""A frozen scene comes back from disk as it was, or not at all."""
+
+from __future__ import annotations
+
+import pytest
+import torch
+
+from lit_room import VISIBLE, frozen_room, room_cameras
+from rgspipe.datasets.frozen_file import (
+    DICTIONARY,
+    GATHER,
+    SURFELS,
+    TRANSPORT,
+    load_dictionary,
+    load_frozen,
+    save_dictionary,
+    save_frozen,
+)
+from rgspipe.datasets.tensor_file import load_tensors, save_tensors
+from rgspipe.errors import InputError
+from rgspipe.fitting import build_dictionary
+from rgspipe.scene import PointLight
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return frozen_room()
+
+
+@pytest.fixture
+def folder(scene, tmp_path):
+    save_frozen(tmp_path, scene)
+    save_dictionary(tmp_path / DICTIONARY, build_dictionary(scene, 3))
+    return tmp_path
+
+
+def test_a_scene_renders_the_same_after_the_round_trip(scene, folder):
+    loaded = load_frozen(folder.joinpath)
+    light = PointLight(torch.tensor(VISIBLE), torch.ones(3))
+    camera = room_cameras(24)[0]
+    assert torch.equal(loaded.render(loaded.view(camera), (light,)), scene.render(scene.view(camera), (light,)))
+    assert torch.equal(loaded.areas, scene.areas)
+    assert torch.equal(loaded.gather.matrix.values(), scene.gather.matrix.values())
+
+
+def test_a_dictionary_is_the_same_after_the_round_trip(scene, folder):
+    loaded, expected = load_dictionary(folder / DICTIONARY, scene), build_dictionary(scene, 3)
+    assert torch.equal(loaded.positions, expected.positions)
+    assert torch.equal(loaded.irradiance, expected.irradiance)
+
+
+def test_saving_twice_gives_the_same_bytes(scene, folder, tmp_path_factory):
+    other = tmp_path_factory.mktemp("again")
+    save_frozen(other, scene)
+    for name in (SURFELS, GATHER, TRANSPORT):
+        assert (other / name).read_bytes() == (folder / name).read_bytes()
+
+
+@pytest.mark.parametrize("name", [SURFELS, GATHER, TRANSPORT])
+@pytest.mark.parametrize("damage", ["missing", "truncated"])
+def test_a_damaged_file_is_refused_by_name(folder, name, damage):
+    path = folder / name
+    if damage == "missing":
+        path.unlink()
+    else:
+        path.write_bytes(path.read_bytes()[:100])
+    with pytest.raises(InputError, match=name):
+        load_frozen(folder.joinpath)
+
+
+@pytest.mark.parametrize(
+    ("name", "tensor"),
+    [(GATHER, "areas"), (TRANSPORT, "inverse"), (TRANSPORT, "average.shape"), (GATHER, "gather.shape")],
+)
+def test_operators_of_another_scene_are_refused(folder, name, tensor):
+    tensors, note = load_tensors(folder / name)
+    tensors[tensor] = tensors[tensor][:-1].clone() if not tensor.endswith("shape") else tensors[tensor] + 1
+    save_tensors(folder / name, tensors, note)
+    with pytest.raises(InputError, match=name):
+        load_frozen(folder.joinpath)
+
+
+def test_a_missing_tensor_and_another_dictionary_are_refused(scene, folder):
+    tensors, note = load_tensors(folder / DICTIONARY)
+    save_tensors(folder / DICTIONARY, tensors | {"irradiance": tensors["irradiance"][:, :-1]}, note)
+    with pytest.raises(InputError, match="irradiance"):
+        load_dictionary(folder / DICTIONARY, scene)
+    save_tensors(folder / DICTIONARY, {"positions": tensors["positions"]}, note)
+    with pytest.raises(InputError, match="irradiance"):
+        load_dictionary(folder / DICTIONARY, scene)

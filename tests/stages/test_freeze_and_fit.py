@@ -1,0 +1,179 @@
+"""The stages freeze and fit_light on a small room with two targets."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import torch
+
+from lit_room import HIDDEN, VISIBLE, frozen_room, room_cameras, room_surfels
+from rgspipe.artifacts import Artifact, ArtifactStore, Key
+from rgspipe.config import RgspipeConfig, with_changes
+from rgspipe.datasets.exr import write_image
+from rgspipe.datasets.gs3_write import frame_entry, write_transforms
+from rgspipe.datasets.light_file import read_lights
+from rgspipe.datasets.surfel_file import save_surfels
+from rgspipe.errors import InputError
+from rgspipe.scene import PointLight
+from rgspipe.stages import fit_light, freeze
+from rgspipe.stages.base import StageContext
+
+LIGHTS = {
+    ("visible_000", "visible"): (VISIBLE, (1.0, 2.0, 0.5)),
+    ("visible_001", "visible"): ((-0.2, 0.0, 0.35), (0.7, 0.7, 0.7)),
+    ("occluded_000", "occluded"): (HIDDEN, (2.0, 1.0, 1.0)),
+}
+
+
+def _light(position, intensity) -> PointLight:
+    return PointLight(torch.tensor(position, dtype=torch.float64), torch.tensor(intensity, dtype=torch.float64))
+
+
+def _build(root: Path, stage: str, make) -> Artifact:
+    def build(folder: Path) -> dict:
+        make(folder)
+        return {}
+
+    recipe = {"config": {}, "inputs": {}, "code": {}}
+    return ArtifactStore(root).build(Key("room", stage, "aa"), recipe, build)[0]
+
+
+def _write_dataset(folder: Path) -> None:
+    frozen, cameras = frozen_room(), room_cameras(32)
+    views = [frozen.view(camera) for camera in cameras]
+    for (name, _), (position, intensity) in LIGHTS.items():
+        target = folder / "targets" / name
+        target.mkdir(parents=True)
+        for index, view in enumerate(views):
+            write_image(target / f"view_{index}.exr", frozen.render(view, (_light(position, intensity),)).numpy())
+        entries = [frame_entry(f"./view_{index}", camera) for index, camera in enumerate(cameras)]
+        write_transforms(target / "transforms.json", entries)
+    listed = [{"name": name, "occlusion": occlusion} for name, occlusion in LIGHTS]
+    (folder / "targets" / "targets.json").write_text(json.dumps({"targets": listed}))
+    known = [_light((0.1 * k, -0.1 * k, 0.2), (1.0, 1.0, 1.0)) for k in range(3)]
+    entries = [frame_entry(f"./train/r_{k}", cameras[0], light) for k, light in enumerate(known)]
+    write_transforms(folder / "transforms_train.json", entries)
+
+
+@pytest.fixture(scope="module")
+def inputs(tmp_path_factory) -> dict[str, Artifact]:
+    root = tmp_path_factory.mktemp("store")
+    trained = _build(root, "train_surfels", lambda folder: save_surfels(folder / "surfels.safetensors", room_surfels()))
+    config = with_changes(
+        RgspipeConfig(stage="freeze"),
+        {"freeze.gather_rays": 64, "freeze.patches": 150, "freeze.dictionary_grid": 6},
+    )
+    facts: dict = {}
+
+    def run_freeze(folder: Path) -> None:
+        context = StageContext(config, {"train_surfels": trained}, {}, folder)
+        freeze.run(context)
+        facts.update(context.facts)
+
+    frozen = _build(root, "freeze", run_freeze)
+    assert facts["surfels"] == len(room_surfels()) and facts["candidates"] > 0
+    json.dumps(facts, allow_nan=False)
+    return {"freeze": frozen, "generate_dataset": _build(root, "generate_dataset", _write_dataset)}
+
+
+def _fit(inputs: dict[str, Artifact], folder: Path, **changes: object) -> pd.DataFrame:
+    folder.mkdir(exist_ok=True)
+    config = with_changes(RgspipeConfig(stage="fit_light"), {key.replace("__", "."): v for key, v in changes.items()})
+    fit_light.run(StageContext(config, inputs, {}, folder))
+    return pd.read_csv(folder / "results.csv")
+
+
+def test_fits_every_target_and_writes_all_of_its_files(inputs, tmp_path):
+    table = _fit(inputs, tmp_path)
+    assert table["target"].tolist() == [name for name, _ in LIGHTS]
+    described, state = "target occlusion method views x y z r g b", "psnr result reason"
+    counted = "loss iterations evaluations lights_tried seconds"
+    assert table.columns.tolist() == f"{described} {counted} {state}".split()
+    for (name, _), (position, intensity) in LIGHTS.items():
+        (light,) = read_lights(tmp_path / name / "lights.json")
+        np.testing.assert_allclose(light.position, position, atol=1e-4)  # measured 6e-8
+        np.testing.assert_allclose(light.intensity, intensity, rtol=1e-3)
+        content = json.loads((tmp_path / name / "lights.json").read_text())
+        assert np.asarray(content["lights"][0]["covariance"]).shape == (6, 6)
+        curve = pd.read_csv(tmp_path / name / "convergence.csv")
+        assert curve.columns.tolist() == ["step", "loss", "x", "y", "z", "r", "g", "b", "seconds"]
+        assert {path.name for path in (tmp_path / name).iterdir()} == {
+            "lights.json",
+            "convergence.csv",
+            "fit.png",
+            "final.exr",
+        }
+    assert (table["psnr"] > 60).all() and (table["result"] == "converged").all()
+    assert not list(tmp_path.glob(".*"))
+
+
+def test_goes_on_after_an_interruption(inputs, tmp_path):
+    """Finished targets are kept, half-written ones are made anew."""
+    _fit(inputs, tmp_path)
+    kept = (tmp_path / "visible_000" / "lights.json").read_bytes()
+    again = tmp_path / "occluded_000"
+    again.rename(tmp_path / ".occluded_000.partial")
+    (tmp_path / ".occluded_000.partial" / "lights.json").unlink()
+    (tmp_path / "results.csv").unlink()
+    table = _fit(inputs, tmp_path)
+    assert len(table) == 3 and (again / "lights.json").is_file()
+    assert (tmp_path / "visible_000" / "lights.json").read_bytes() == kept
+
+
+def test_the_same_seed_gives_the_same_table(inputs, tmp_path):
+    one, two = (_fit(inputs, tmp_path / name).drop(columns="seconds") for name in ("one", "two"))
+    pd.testing.assert_frame_equal(one, two, check_exact=True)
+    assert (tmp_path / "one/visible_000/fit.png").read_bytes() == (tmp_path / "two/visible_000/fit.png").read_bytes()
+
+
+def test_selects_class_limit_and_views(inputs, tmp_path):
+    assert _fit(inputs, tmp_path / "a", occlusion="occluded")["target"].tolist() == ["occluded_000"]
+    table = _fit(inputs, tmp_path / "b", fit__limit=1, views__count=2)
+    assert table["target"].tolist() == ["visible_000", "occluded_000"] and table["views"].tolist() == [2, 2]
+    assert (tmp_path / "b/visible_000/final_1.exr").is_file()
+    assert _fit(inputs, tmp_path / "c", fit__limit=1, views__indices=[1])["views"].tolist() == [1, 1]
+
+
+def test_fits_a_folder_by_the_paper_s_method(inputs, tmp_path):
+    target = inputs["generate_dataset"].path / "targets" / "visible_001"
+    changes = {"fit__target": str(target), "fit__method": "paper_adam", "fit__adam__epochs": 1, "fit__adam__steps": 5}
+    table = _fit(inputs, tmp_path, **changes)
+    assert table["target"].tolist() == ["visible_001"] and table["method"].tolist() == ["paper_adam"]
+    assert len(pd.read_csv(tmp_path / "visible_001" / "convergence.csv")) == 6
+
+
+def test_a_black_target_gives_a_row_without_a_light(inputs, tmp_path):
+    folder = tmp_path / "dark"
+    folder.mkdir()
+    camera = room_cameras(32)[0]
+    write_image(folder / "view_0.exr", np.zeros((32, 32, 3), dtype=np.float32))
+    write_transforms(folder / "transforms.json", [frame_entry("./view_0", camera)])
+    table = _fit(inputs, tmp_path / "out", fit__target=str(folder))
+    assert table["result"].tolist() == ["not_enough_light"] and table[list("xyzrgb")].isna().all(axis=None)
+    assert read_lights(tmp_path / "out/dark/lights.json") == ()
+    assert "NaN" not in (tmp_path / "out/dark/lights.json").read_text()
+
+
+@pytest.mark.parametrize(
+    ("changes", "key"), [({"views__count": 3}, "views.count"), ({"views__indices": [0, 5]}, "views.indices")]
+)
+def test_views_that_a_target_does_not_have_are_refused(inputs, tmp_path, changes, key):
+    with pytest.raises(InputError, match=key):
+        _fit(inputs, tmp_path, **changes)
+
+
+def test_a_class_without_targets_is_refused(inputs, tmp_path):
+    with pytest.raises(InputError, match="occlusion"):
+        _fit(inputs, tmp_path, occlusion="out_of_frame")
+
+
+def test_result_depends_on_what_it_uses():
+    stage, config = fit_light.STAGE, RgspipeConfig(stage="fit_light")
+    assert "fit.search" in stage.keys(config) and "fit.adam" not in stage.keys(config)
+    own = replace(config, fit=replace(config.fit, target="x"))
+    assert stage.files(own) == [Path("x")] and "fit.limit" not in stage.keys(own)
