@@ -10,9 +10,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from raycast import BLOCK, ROOM, Cuboid, room_views, surface_distance, view_of
 from scipy.spatial import cKDTree
 
+from raycast import BLOCK, ROOM, Cuboid, room_views, surface_distance, view_of
 from rgspipe.errors import InputError
 from rgspipe.scene import NO_CLIP, Surfels
 from rgspipe.training.initialise import cloud_from_views, initialise_surfels
