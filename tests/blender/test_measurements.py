@@ -40,7 +40,7 @@ def test_cycles_measures_radiance_depth_and_normals(in_blender: Run, tmp_path: P
         image, alpha = read_image(tmp_path / f"{name}.exr")
         expected = _expected(points, 0.9 * side)
         # 2048 samples inside a pixel against 64 subpixels: measured 2.9e-4 at worst, 1.3e-5 for the mean.
-        np.testing.assert_allclose(image, expected, rtol=1e-5)
+        np.testing.assert_allclose(image, expected, rtol=1e-3)
         assert abs(image.mean() / expected.mean() - 1) < 1e-4
         assert (alpha == 1).all()
         normal = np.stack([read_channels(tmp_path / f"{name}_normal.exr")[axis] for axis in "XYZ"], axis=-1)
