@@ -34,7 +34,7 @@ def write_dataset(root: Path, with_depth: bool) -> None:
 def run(root: Path, folder: Path, **init: object) -> StageContext:
     folder.mkdir()
     config = replace(RgspipeConfig(), init=InitConfig(**init))
-    context = StageContext(config, {"generate_dataset": SimpleNamespace(path=root)}, {}, folder)
+    context = StageContext(config, {"generate_dataset": SimpleNamespace(folder=lambda: root)}, {}, folder)
     init_depth.STAGE.run(context)
     return context
 

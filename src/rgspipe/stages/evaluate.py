@@ -198,7 +198,7 @@ STAGE = Stage(
     help="errors of the recovered lights per target and per class",
     inputs=lambda config: ["fit_light", "generate_dataset", "freeze"],
     config_keys=("evaluate", "seed", "views", "fit.target", "fit.truth"),
-    code=("rgspipe.evaluation.metrics", "rgspipe.evaluation.tables", "rgspipe.evaluation.convergence"),
+    code=tuple(f"rgspipe.evaluation.{name}" for name in ("arrays", "metrics", "tables", "convergence")),
     files=_truth_file,
     run=run,
 )

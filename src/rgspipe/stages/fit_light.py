@@ -160,11 +160,11 @@ def target_seed(target: Target, config: RgspipeConfig) -> int:
 def _targets(context: StageContext) -> Sequence[Target]:
     if context.config.fit.target is not None:
         return [load_target(context.config.fit.target)]
-    return open_dataset(context.inputs["generate_dataset"].path, train=False, test=False).targets
+    return open_dataset(context.inputs["generate_dataset"].folder(), train=False, test=False).targets
 
 
 def _training_lights(context: StageContext) -> list[PointLight]:
-    root = dataset_root(context.inputs["generate_dataset"].path)
+    root = dataset_root(context.inputs["generate_dataset"].folder())
     entries = read_entries(root / "transforms_train.json", "the lights of the training views")
     return [PointLight(*entry.light()) for entry in entries]
 

@@ -15,7 +15,7 @@ from rgspipe.training.initialise import Footprint, initialise_surfels
 def run(context: StageContext) -> None:
     """Write surfels.safetensors."""
     init = context.config.init
-    root = dataset_root(context.inputs["generate_dataset"].path)
+    root = dataset_root(context.inputs["generate_dataset"].folder())
     views = load_dataset(root, test=False, targets=False).train
     start = time.perf_counter()
     surfels = initialise_surfels(
