@@ -48,7 +48,7 @@ def test_normals_of_a_slanted_plane_are_exact():
     normal = np.array([0.3, -0.5, 0.8]) / np.linalg.norm([0.3, -0.5, 0.8])
     found, valid = normals_from_depth(plane_depth(normal), (40.0, 40.0), (16.0, 16.0))
     assert valid.all()
-    assert np.abs(found - normal).max() < 1e-6  # measured 5e-13
+    assert np.abs(found - normal).max() < 1e-6  # measured 3e-15
 
 
 def test_normals_beside_an_edge_are_those_of_their_own_side():
@@ -82,15 +82,15 @@ def test_noisy_depth_gets_larger_windows():
 
 def test_points_and_normals_are_on_the_surfaces(views):
     cloud = cloud_from_views(views)
-    assert len(cloud) > 0.9 * 24 * 64 * 64
-    assert surface_distance(cloud.points).max() < 1e-6
-    assert degrees_off(cloud.normals).max() < 0.5
+    assert len(cloud) > 0.97 * 24 * 64 * 64  # measured 0.994
+    assert surface_distance(cloud.points).max() < 1e-6  # measured 5e-8, float32 depth
+    assert degrees_off(cloud.normals).max() < 0.01  # measured 2e-4
 
 
 def test_surfels_lie_on_the_surfaces(surfels):
     assert len(surfels) == COUNT
-    assert surface_distance(surfels.centers.double().numpy()).max() < 1e-5
-    assert degrees_off(surfels.normals.double().numpy()).max() < 0.5
+    assert surface_distance(surfels.centers.double().numpy()).max() < 1e-6  # measured 2e-8
+    assert degrees_off(surfels.normals.double().numpy()).max() < 0.05  # measured 0.02, rounding to float32
 
 
 def test_normals_face_the_side_that_was_seen(surfels):
@@ -103,15 +103,15 @@ def test_surfels_are_evenly_spaced(surfels):
     inside = (surfels.clip_offsets[:, 0] == NO_CLIP).numpy()
     nearest = cKDTree(surfels.centers.numpy()).query(surfels.centers.numpy()[inside], k=2)[0][:, 1]
     # A uniformly random set of points has a ratio of 0.52, a hexagonal grid 0.
-    assert nearest.std() / nearest.mean() < 0.25
+    assert nearest.std() / nearest.mean() < 0.2  # measured 0.146
 
 
 def test_every_seen_point_is_near_a_surfel(views, surfels):
     cloud = cloud_from_views(views)
     spacing = float(surfels.coverage.clip_softness) / 0.12
     away = cKDTree(surfels.centers.numpy()).query(cloud.points)[0]
-    assert np.percentile(away, 99) < spacing
-    assert away.max() < 2.0 * spacing
+    assert np.percentile(away, 99) < 0.9 * spacing  # measured 0.70
+    assert away.max() < 1.7 * spacing  # measured 1.34
 
 
 def test_scale_follows_the_spacing(surfels):
@@ -149,9 +149,9 @@ def test_edges_stop_surfels_at_the_border(views, surfels):
     spacing = float(surfels.coverage.clip_softness) / 0.12
     clipped = overhang(surfels)
     whole = overhang(initialise_surfels(views, COUNT, seed=0, clips=False))
-    assert whole.max() > 0.3 * spacing
-    assert clipped.max() < 0.15 * spacing
-    assert np.percentile(clipped, 95) < 0.08 * spacing
+    assert whole.max() > 0.5 * spacing  # measured 0.70
+    assert clipped.max() < 0.12 * spacing  # measured 0.061
+    assert np.percentile(clipped, 95) < 0.08 * spacing  # measured 0.040
 
 
 def test_surfels_inside_a_surface_have_no_edge(surfels):
@@ -213,7 +213,7 @@ def test_a_sphere_seen_beside_a_plane_stays():
     inner = np.linalg.norm(true[..., :2], axis=-1) < 0.7  # beyond it a silhouette's windows reach the background
     assert valid[ball & inner].all()
     error = np.degrees(np.arccos(np.clip((found * true).sum(-1)[ball & inner], -1, 1)))
-    assert error.mean() < 3.0  # measured 0
+    assert error.mean() < 3.0  # measured 1.4
 
 
 @pytest.mark.parametrize("noise", [0.001, 0.01, 0.05])
