@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import dataclass
 from typing import Any
 
@@ -100,7 +101,10 @@ def cluster_patches(centers: Tensor, normals: Tensor, patches: int, *, seed: int
     features = torch.cat([centers / size, NORMAL_WEIGHT * normals], dim=1).double().cpu().numpy()
     patches = min(patches, len(features))
     start = features[np.random.default_rng(seed).choice(len(features), patches, replace=False)]
-    _, labels = scipy.cluster.vq.kmeans2(features, start, iter=8, minit="matrix", missing="warn", seed=seed)
+    with warnings.catch_warnings():
+        # A cluster that runs empty leaves a gap in the labels, which the last line closes.
+        warnings.filterwarnings("ignore", message="One of the clusters is empty")
+        _, labels = scipy.cluster.vq.kmeans2(features, start, iter=8, minit="matrix", missing="warn", seed=seed)
     return np.unique(labels, return_inverse=True)[1]
 
 

@@ -15,7 +15,7 @@ from rgspipe.scene.camera import Camera
 from rgspipe.scene.surfels import NO_CLIP, Surfels, turn_in_plane
 
 #: Limits of the coverage thresholds, and how far apart they stay.
-LOW_RANGE, HIGH_RANGE, THRESHOLD_GAP = (0.05, 0.3), (0.7, 0.99), 0.1
+LOW_RANGE, HIGH_RANGE, THRESHOLD_GAP = (0.05, 0.7), (0.3, 0.99), 0.1
 
 #: Largest change of a log-scale, down and up, and the range of an opacity's logit.
 SHRINK, GROW, LOGIT_RANGE = 1.5, 0.6, (-4.0, 5.0)
@@ -30,7 +30,7 @@ class RefineOptions:
         views_per_step: images that a step looks at.
         edge_pixels, interior_pixels: most pixels of an image, on edges and elsewhere; the latter close pinholes.
         subsamples: rays per pixel, squared.
-        length_rate: step of positions and clips, in surfel spacings.
+        position_rate, clip_rate: steps of positions and of clip offsets, in surfel spacings.
         log_scale_rate, angle_rate, opacity_rate, clip_angle_rate, threshold_rate: steps of the others.
         seed: of views and pixels.
     """
@@ -40,12 +40,13 @@ class RefineOptions:
     edge_pixels: int = 2000
     interior_pixels: int = 1000
     subsamples: int = 3
-    length_rate: float = 0.02
+    position_rate: float = 0.003
+    clip_rate: float = 0.001
     log_scale_rate: float = 0.03
-    angle_rate: float = 0.05
+    angle_rate: float = 0.02
     opacity_rate: float = 0.05
-    clip_angle_rate: float = 0.03
-    threshold_rate: float = 0.001
+    clip_angle_rate: float = 0.001
+    threshold_rate: float = 0.002
     seed: int = 0
 
 
@@ -126,7 +127,7 @@ def refine(
             state.parameters[name] -= decay * rates[name] * _adam(state, name, value.grad, step + 1)
         _limit(state.parameters, surfels)
         state.step = step + 1
-        bar.set_postfix_str(f"loss {sum(state.losses[-20:]) / len(state.losses[-20:]):.2e}")
+        bar.set_postfix_str(f"loss {sum(state.losses[-20:]) / len(state.losses[-20:]):.2e}", refresh=False)
         if checkpoint is not None:
             checkpoint(state)
     return build_surfels(surfels, state.parameters), state
@@ -143,7 +144,8 @@ def build_surfels(base: Surfels, parameters: dict[str, Tensor]) -> Surfels:
         scales=parameters["log_scales"].exp(),
         opacities=torch.sigmoid(parameters["logit"]),
         clip_offsets=parameters["clip_offsets"],
-        clip_angles=parameters["clip_angles"],
+        # Clips stay where they are when the ellipse turns inside them.
+        clip_angles=parameters["clip_angles"] - parameters["angle"][:, None],
         coverage=replace(base.coverage, low=low, high=high),
     )
 
@@ -188,13 +190,12 @@ def _draw_pixels(edges: Tensor, options: RefineOptions, generator: torch.Generat
 
 
 def _rates(options: RefineOptions, spacing: float) -> dict[str, float]:
-    length = options.length_rate * spacing
     return {
-        "offset": length,
+        "offset": options.position_rate * spacing,
         "log_scales": options.log_scale_rate,
         "angle": options.angle_rate,
         "logit": options.opacity_rate,
-        "clip_offsets": length,
+        "clip_offsets": options.clip_rate * spacing,
         "clip_angles": options.clip_angle_rate,
         "thresholds": options.threshold_rate,
     }
