@@ -52,15 +52,15 @@ class CornellConfig:
 
     room: list[float] = option([1.0, 1.0, 1.0], "inner width, depth and height, scene units", low=0.1, high=1, length=3)
     wall_color: list[float] = _color(0.73, 0.73, 0.73, "floor, ceiling and back wall")
-    left_color: list[float] = _color(0.63, 0.065, 0.05, "left wall")
-    right_color: list[float] = _color(0.14, 0.45, 0.091, "right wall")
+    left_color: list[float] = _color(0.65, 0.05, 0.05, "left wall")
+    right_color: list[float] = _color(0.12, 0.45, 0.15, "right wall")
     box_color: list[float] = _color(0.73, 0.73, 0.73, "both boxes")
-    tall_size: list[float] = option([0.3, 0.3, 0.6], "tall box: width, depth, height", low=0.01, high=1, length=3)
-    tall_center: list[float] = option([0.335, 0.64], "tall box: centre of its foot, x and y", low=0, high=1, length=2)
-    tall_angle: float = option(18.0, "tall box: turn about the vertical, degrees", low=-180, high=180)
-    short_size: list[float] = option([0.3, 0.3, 0.3], "short box: width, depth, height", low=0.01, high=1, length=3)
-    short_center: list[float] = option([0.665, 0.31], "short box: centre of its foot, x and y", low=0, high=1, length=2)
-    short_angle: float = option(-17.0, "short box: turn about the vertical, degrees", low=-180, high=180)
+    tall_size: list[float] = option([0.28, 0.28, 0.6], "tall box: width, depth, height", low=0.01, high=1, length=3)
+    tall_center: list[float] = option([0.33, 0.62], "tall box: centre of its foot, x and y", low=0, high=1, length=2)
+    tall_angle: float = option(17.2, "tall box: turn about the vertical, degrees", low=-180, high=180)
+    short_size: list[float] = option([0.28, 0.28, 0.3], "short box: width, depth, height", low=0.01, high=1, length=3)
+    short_center: list[float] = option([0.68, 0.35], "short box: centre of its foot, x and y", low=0, high=1, length=2)
+    short_angle: float = option(-17.2, "short box: turn about the vertical, degrees", low=-180, high=180)
 
 
 @dataclass
@@ -82,7 +82,7 @@ class DatasetConfig:
     test_views: int = option(24, "held-out views: new cameras and new lights", low=1, high=100000)
     targets_per_class: int = option(20, "fit targets of each occlusion class", low=0, high=10000)
     target_views: int = option(3, "fixed cameras that see each fit target", low=1, high=3)
-    samples: int = option(96, "paths per pixel", low=1, high=1000000)
+    samples: int = option(48, "paths per pixel", low=1, high=1000000)
     denoise: bool = option(True, "denoise the colour images")
     max_bounces: int = option(12, "bounces of a path; fewer than 8 lose light", low=0, high=1024)
     seed: int = option(0, "draws of cameras and lights", low=0, high=2**31 - 1)
@@ -105,10 +105,17 @@ class InitConfig:
 class TrainConfig:
     """From images to material and refined geometry."""
 
-    rounds: int = option(8, "rounds of the linear albedo solve", low=0, high=1000)
+    rounds: int = option(8, "rounds of the linear albedo solve, before and after the geometry", low=1, high=1000)
     steps: int = option(140, "gradient steps of the geometry", low=0, high=1000000)
+    views_per_step: int = option(5, "images that a gradient step looks at", low=1, high=1000)
+    edge_pixels: int = option(2000, "most pixels on edges, of each image of a step", low=1, high=10_000_000)
+    interior_pixels: int = option(1000, "most pixels elsewhere, of each image of a step", low=0, high=10_000_000)
+    subsamples: int = option(3, "rays per pixel of a step, squared", low=1, high=16)
+    supersampling: int = option(4, "rays per edge pixel in view weights, squared", low=1, high=16)
     gather_rays: int = option(128, "hemisphere rays of a surfel while training", low=8, high=65536)
     patches: int = option(500, "patches of the indirect light while training", low=8, high=20000)
+    checkpoint_every: int = option(20, "gradient steps between checkpoints", low=1, high=1000000)
+    direct_only: bool = option(True, "also fit and report a model without interreflection, for comparison")
     seed: int = option(0, "draws of pixels and rays", low=0, high=2**31 - 1)
 
 

@@ -118,9 +118,7 @@ def test_reference_shading_matches_finite_differences(name: str) -> None:
         values = inputs | {name: value}
         scene = replace(surfels, **{key: values[key] for key in GEOMETRY})
         ray_view = torch.zeros(60)
-        colours = reference.shade_rays(
-            scene, values["thresholds"], values["radiance"], origins, directions, ray_view
-        )
+        colours = reference.shade_rays(scene, values["thresholds"], values["radiance"], origins, directions, ray_view)
         return (colours * colours).sum()
 
     leaf = inputs[name].clone().requires_grad_()

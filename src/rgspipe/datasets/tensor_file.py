@@ -19,7 +19,7 @@ def save_tensors(path: Path, tensors: dict[str, Tensor], note: dict[str, Any] | 
     temporary = path.with_name(f".{path.name}.{os.getpid()}")
     whole = {name: tensor.detach().cpu().contiguous() for name, tensor in tensors.items()}
     safetensors.torch.save_file(whole, temporary, metadata={"note": json.dumps(note or {}, sort_keys=True)})
-    os.replace(temporary, path)
+    temporary.replace(path)
 
 
 def load_tensors(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:

@@ -60,13 +60,14 @@ class _UnitIrradiance(torch.autograd.Function):
     def forward(ctx: Any, positions: Tensor, bvh: SurfelBvh, shadows: bool) -> Tensor:
         irradiance, slope = unit_irradiance(bvh, positions.detach(), shadows)
         ctx.save_for_backward(slope)
-        ctx.dtype = positions.dtype
+        ctx.like = positions.dtype, positions.device
         return irradiance
 
     @staticmethod
     def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor, None, None]:
         (slope,) = ctx.saved_tensors
-        return torch.einsum("ln,lnc->lc", gradient, slope).to(ctx.dtype), None, None
+        dtype, device = ctx.like
+        return torch.einsum("ln,lnc->lc", gradient, slope).to(device, dtype), None, None
 
 
 def differentiable_irradiance(bvh: SurfelBvh, positions: Tensor, shadows: bool = True) -> Tensor:

@@ -8,8 +8,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from torch import Tensor
-
 from rgspipe.datasets.views import View
 from rgspipe.evaluation.metrics import edge_mask, psnr
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
@@ -21,7 +19,7 @@ from rgspipe.training.trainer import trace_views
 
 @dataclass(frozen=True)
 class HeldOut:
-    """Renders of held-out views and their PSNR [dB], on all pixels and away from edges (NaN without depth)."""
+    """Renders of held-out views and their PSNR [dB], on all pixels and away from edges (NaN without passes)."""
 
     names: tuple[str, ...]
     images: tuple[npt.NDArray[np.float32], ...]
@@ -62,19 +60,11 @@ def render_held_out(
 
 
 def _off_edges(image: npt.NDArray[np.float32], view: View) -> float:
-    if view.depth is None:
+    """PSNR away from edges, which the depth and normal passes show; NaN where either is missing."""
+    if view.depth is None or view.normal is None:
         return float("nan")
-    mask = ~edge_mask(view.depth, _normals(view))
+    mask = ~edge_mask(view.depth, view.normal)
     return psnr(image, view.image, mask) if mask.any() else float("nan")
-
-
-def _normals(view: View) -> Tensor | npt.NDArray[np.float64]:
-    """The normal pass, or normals from depth where there is none."""
-    if view.normal is not None:
-        return view.normal
-    X
-
-    return depth_normals(view)[0]
 
 
 def _number(value: float) -> float | None:

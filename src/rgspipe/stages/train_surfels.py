@@ -1,0 +1,105 @@
+"""Fit the surfels' materials and geometry to the training images, and judge them on held-out ones."""
+
+from __future__ import annotations
+
+import json
+import time
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from rgspipe.config import TrainConfig
+from rgspipe.datasets.location import open_dataset
+from rgspipe.datasets.surfel_file import load_surfels, save_surfels
+from rgspipe.datasets.views import View
+from rgspipe.evaluation.images import comparison_strip, save_png, stack
+from rgspipe.stages.base import Stage, StageContext
+from rgspipe.training.checkpoint import Checkpoint
+from rgspipe.training.refine import RefineOptions
+from rgspipe.training.trainer import Trained, TrainOptions, build_transport, fit_direct_materials, train
+from rgspipe.training.validate import HeldOut, render_held_out
+
+#: Held-out views that comparison.png shows, from the worst to the best.
+SHOWN_VIEWS = 6
+
+
+def run(context: StageContext) -> None:
+    """Write surfels.safetensors, training.csv, metrics.json and comparison.png."""
+    config = context.config.train
+    options = train_options(config)
+    dataset = open_dataset(context.inputs["generate_dataset"].folder(), targets=False)
+    start = load_surfels(context.inputs["init_depth"].file("surfels.safetensors"))
+    checkpoint = Checkpoint(context.scratch / "checkpoint.safetensors", config.checkpoint_every)
+    trained = train(start, dataset.train, options, checkpoint)
+    save_surfels(context.folder / "surfels.safetensors", trained.surfels)
+    _write_table(context.folder / "training.csv", trained)
+
+    began = time.perf_counter()
+    held_out = render_held_out(
+        trained.surfels, dataset.test, build_transport(trained.surfels, options), options.supersampling
+    )
+    seconds = {"training": trained.records[-1].seconds, "held_out": time.perf_counter() - began}
+    metrics = held_out.summary() | {"surfels": len(trained.surfels), "seconds": seconds["training"]}
+    if config.direct_only:
+        metrics["direct_only_psnr"] = _direct_only(trained, dataset.train, dataset.test, options)
+    text = json.dumps(metrics, indent=1, allow_nan=False)
+    (context.folder / "metrics.json").write_text(text + "\n", encoding="utf-8")
+    _write_comparison(context.folder / "comparison.png", held_out, dataset.test)
+    context.note(
+        test_psnr_mean=metrics["test_psnr_mean"],
+        surfels=len(trained.surfels),
+        seconds={name: round(value, 3) for name, value in seconds.items()},
+    )
+
+
+def train_options(config: TrainConfig) -> TrainOptions:
+    """The library's options for a configuration."""
+    refine = RefineOptions(
+        steps=config.steps,
+        views_per_step=config.views_per_step,
+        edge_pixels=config.edge_pixels,
+        interior_pixels=config.interior_pixels,
+        subsamples=config.subsamples,
+        seed=config.seed,
+    )
+    return TrainOptions(
+        rounds=config.rounds,
+        refine=refine,
+        gather_rays=config.gather_rays,
+        patches=config.patches,
+        supersampling=config.supersampling,
+        seed=config.seed,
+    )
+
+
+def _direct_only(
+    trained: Trained, train_views: tuple[View, ...], test_views: tuple[View, ...], options: TrainOptions
+) -> float:
+    """Mean held-out PSNR of the same geometry when light does not bounce, its albedo fitted accordingly."""
+    surfels = fit_direct_materials(trained.surfels, train_views, options)
+    return float(np.mean(render_held_out(surfels, test_views, None, options.supersampling).psnr))
+
+
+def _write_table(path: Path, trained: Trained) -> None:
+    rows = [asdict(record) for record in trained.records]
+    table = pd.DataFrame(rows).rename(columns={"phase": "kind", "step": "round"})
+    table[["round", "kind", "loss", "psnr", "seconds"]].to_csv(path, index=False)
+
+
+def _write_comparison(path: Path, held_out: HeldOut, views: tuple[View, ...]) -> None:
+    """Truth, render and difference of held-out views spread evenly from the worst to the best."""
+    order = np.argsort(held_out.psnr)
+    chosen = order[np.unique(np.linspace(0, len(order) - 1, min(SHOWN_VIEWS, len(order))).round().astype(int))]
+    save_png(path, stack([comparison_strip(views[i].image, held_out.images[i]) for i in chosen]))
+
+
+STAGE = Stage(
+    name="train_surfels",
+    help="fits materials and geometry of the surfels to the training images",
+    run=run,
+    inputs=lambda config: ["init_depth", "generate_dataset"],
+    config_keys=("train",),
+    code=("rgspipe.training", "rgspipe.renderer", "rgspipe.scene", "rgspipe.evaluation"),
+)
