@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 
 from rgspipe.renderer.kernels.composite import GRAZING, OPAQUE
-from rgspipe.renderer.kernels.shadow import COPLANAR_COSINE, COPLANAR_OFFSET, RECEIVER_SKIP
+from rgspipe.renderer.kernels.shadow import COPLANAR_COSINE, COPLANAR_OFFSET, RECEIVER_FADE, RECEIVER_SKIP
 from rgspipe.scene.surfels import Surfels
 
 
@@ -89,10 +89,11 @@ def transmittance(surfels: Surfels, lights: Tensor) -> Tensor:
         met = (facing.abs() > 1e-6 * distance[:, None]) & ~coplanar
         safe = torch.where(met, facing, torch.ones_like(facing))
         t = ((centers - light) * normals).sum(-1)[None] / safe
-        before = t < (1.0 - RECEIVER_SKIP * scale / distance)[:, None]
+        ahead = (1.0 - t) * (distance / scale)[:, None] - RECEIVER_SKIP
+        fade = (ahead / RECEIVER_FADE).clamp(0.0, 1.0)
         alpha = alpha_at(surfels, light + t[..., None] * path[:, None] - centers)
-        met = met & (t > 0.0) & before & (alpha > coverage.minimum_alpha)
-        clear = (1.0 - torch.where(met, alpha, torch.zeros_like(alpha))).prod(dim=1)
+        met = met & (t > 0.0) & (alpha > coverage.minimum_alpha)
+        clear = (1.0 - torch.where(met, alpha * fade, torch.zeros_like(alpha))).prod(dim=1)
         lit = (path * normals).sum(dim=1) < 0.0
         share = 1.0 - smoothstep(1.0 - clear, coverage.low, coverage.high)
         rows.append(torch.where(lit, share, torch.ones_like(share)))

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import os
+import sys
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
+from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import torch
@@ -12,7 +15,25 @@ import warp as wp
 from torch import Tensor
 
 wp.config.log_level = wp.LOG_ERROR
-wp.init()
+
+
+def _start() -> None:
+    """Start Warp; on a machine without a GPU, without the warning that its native code prints about the driver."""
+    if torch.cuda.is_available():
+        wp.init()
+        return
+    sys.stderr.flush()
+    kept = os.dup(2)
+    try:
+        with Path(os.devnull).open("w") as nowhere:
+            os.dup2(nowhere.fileno(), 2)
+            wp.init()
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+
+
+_start()
 
 #: Slices per thread of a launch whose items differ in cost; more slices balance better and start slower.
 SLICES_PER_THREAD = 4
@@ -32,7 +53,7 @@ def _threads() -> ThreadPoolExecutor:
 def slices(count: int, parts: int) -> list[tuple[int, int]]:
     """`parts` nearly equal (start, length) ranges that cover `count` items; empty ones are left out."""
     bounds = [count * k // parts for k in range(parts + 1)]
-    return [(a, b - a) for a, b in zip(bounds, bounds[1:], strict=False) if b > a]
+    return [(a, b - a) for a, b in pairwise(bounds) if b > a]
 
 
 def launch(kernel: wp.Kernel, count: int, inputs: list[Any], device: torch.device, slabs: int | None = None) -> None:

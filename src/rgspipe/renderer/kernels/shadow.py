@@ -13,14 +13,37 @@ from rgspipe.renderer.kernels.surfel_bvh import SurfelArrays, SurfelBvh, surfel_
 # Adjoints are written by hand; generating them would double the compile time.
 wp.set_module_options({"enable_backward": False})
 
-#: A shadow ray ends this many receiver scales before the receiver.
+#: An occluder nearer to the receiver than this many of its scales casts no shadow on it …
 RECEIVER_SKIP = wp.constant(1.5)
+
+#: … and within this many more it fades in, so that the image changes smoothly as the light moves.
+RECEIVER_FADE = wp.constant(1.0)
 
 #: Neighbours on the receiver's own plane cast no shadow on it: normals within this cosine …
 COPLANAR_COSINE = wp.constant(0.8)
 
 #: … and centres within this many receiver scales of its plane.
 COPLANAR_OFFSET = wp.constant(1.0)
+
+
+@wp.func
+def opacity_slope(s: SurfelArrays, j: int, x: wp.vec3):
+    """−d(ln α)/dx of surfel j at the offset x in its plane, with the ramps of its clips."""
+    u = wp.dot(x, s.u_axis[j])
+    v = wp.dot(x, s.v_axis[j])
+    a = s.clip_a[j]
+    b = s.clip_b[j]
+    ramp_a = a[0] - a[1] * u - a[2] * v
+    ramp_b = b[0] - b[1] * u - b[2] * v
+    to_u = u
+    to_v = v
+    if ramp_a < 1.0:
+        to_u += a[1] / ramp_a
+        to_v += a[2] / ramp_a
+    if ramp_b < 1.0:
+        to_u += b[1] / ramp_b
+        to_v += b[2] / ramp_b
+    return to_u * s.u_axis[j] + to_v * s.v_axis[j]
 
 
 @wp.kernel
@@ -48,7 +71,6 @@ def _transmittance(
     if wp.dot(path, ni) < 0.0 and distance > 0.0:
         query = wp.bvh_query_ray(bvh, light, path / distance)
         j = int(0)
-        farthest = 1.0 - RECEIVER_SKIP * s.scale[i] / distance
         while wp.bvh_query_next(query, j, distance):
             nj = s.normal[j]
             facing = wp.dot(path, nj)
@@ -58,29 +80,20 @@ def _transmittance(
             )
             if wp.abs(facing) > 1.0e-6 * distance and not coplanar:
                 t = wp.dot(s.center[j] - light, nj) / facing
-                if t > 0.0 and t < farthest:
+                fade = wp.min((1.0 - t) * distance / s.scale[i] - RECEIVER_SKIP, RECEIVER_FADE) / RECEIVER_FADE
+                if t > 0.0 and fade > 0.0:
                     x = light + t * path - s.center[j]
                     alpha = surfel_alpha(s, j, x)
                     if alpha > minimum_alpha:
-                        u = wp.dot(x, s.u_axis[j])
-                        v = wp.dot(x, s.v_axis[j])
-                        a = s.clip_a[j]
-                        b = s.clip_b[j]
-                        # d(−ln α)/d(u, v), with the ramps of the clips.
-                        to_u = u
-                        to_v = v
-                        ramp_a = a[0] - a[1] * u - a[2] * v
-                        ramp_b = b[0] - b[1] * u - b[2] * v
-                        if ramp_a < 1.0:
-                            to_u += a[1] / ramp_a
-                            to_v += a[2] / ramp_a
-                        if ramp_b < 1.0:
-                            to_u += b[1] / ramp_b
-                            to_v += b[2] / ramp_b
-                        clear = clear * (1.0 - alpha)
-                        # x moves by (1 − t)·dl along the plane, corrected so that it stays on it.
-                        gx = (to_u * s.u_axis[j] + to_v * s.v_axis[j]) * (alpha / wp.max(1.0 - alpha, 1.0e-4))
-                        log_derivative += (1.0 - t) * (gx - nj * (wp.dot(gx, path) / facing))
+                        slope = alpha * fade * opacity_slope(s, j, x)
+                        # The ray's meeting point moves by (1 − t)·dl along the plane, corrected to stay on it.
+                        change = (1.0 - t) * (slope - nj * (wp.dot(slope, path) / facing))
+                        if fade < 1.0:
+                            change -= (alpha * (1.0 - t) / (s.scale[i] * RECEIVER_FADE)) * (
+                                nj * (distance / facing) - path / distance
+                            )
+                        clear = clear * (1.0 - alpha * fade)
+                        log_derivative += change / wp.max(1.0 - alpha * fade, 1.0e-4)
                         if 1.0 - clear >= high:
                             break
     y = wp.clamp((1.0 - clear - low) / (high - low), 0.0, 1.0)
