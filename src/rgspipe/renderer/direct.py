@@ -10,13 +10,15 @@ from torch import Tensor
 from rgspipe.renderer.kernels.shadow import transmittance
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 
-#: A light is seen by a surfel as if it were at least this many of the surfel's scales away from it: inside a
-#: surfel the inverse square has no meaning, and its derivative would grow without bound.
+#: Within this many of its scales a surfel sees a light as if it were farther away: inside a surfel the inverse
+#: square has no meaning, and its derivative would grow without bound.
 SOFTENING = 1.0
 
 
 def geometry_factor(positions: Tensor, centers: Tensor, normals: Tensor, scales: Tensor) -> tuple[Tensor, Tensor]:
-    """Unshadowed irradiance from unit point lights, max(0, n·d)/(|d|² + ε²)^{3/2} with d = light − centre.
+    """Unshadowed irradiance from unit point lights, max(0, n·d)/(|d|⁴ + ε⁴)^{3/4} with d = light − centre.
+
+    The fourth powers keep the inverse square law where it holds: its relative error is ¾(ε/|d|)⁴.
 
     Args:
         positions: (L, 3) lights; centers, normals: (N, 3); scales: (N,) ε over SOFTENING, scene units.
@@ -25,13 +27,13 @@ def geometry_factor(positions: Tensor, centers: Tensor, normals: Tensor, scales:
         (L, N) irradiance per intensity, 1/scene unit², and its derivative (L, N, 3) towards the position.
     """
     d = positions[:, None] - centers
-    softened = d.square().sum(-1) + (SOFTENING * scales).square()
-    inverse = softened.rsqrt()
-    cube = inverse * inverse * inverse
+    square = d.square().sum(-1)
+    inverse = (square.square() + (SOFTENING * scales).pow(4)).rsqrt()
+    cube = inverse * inverse.sqrt()
     projected = (d * normals).sum(-1)
     lit = projected > 0
     factor = torch.where(lit, projected * cube, torch.zeros_like(cube))
-    slope = normals * cube[..., None] - d * (3.0 * projected * cube * inverse * inverse)[..., None]
+    slope = normals * cube[..., None] - d * (3.0 * projected * square * cube * inverse * inverse)[..., None]
     return factor, torch.where(lit[..., None], slope, torch.zeros_like(slope))
 
 
