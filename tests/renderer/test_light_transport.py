@@ -30,8 +30,8 @@ def test_inverse_square_and_cosine() -> None:
     irradiance, _ = unit_irradiance(SurfelBvh(surfels), light)
     d = light.double() - points
     expected = d[:, 2] / d.norm(dim=1) ** 3
-    # Measured 4e-4: the softening ε = one scale, 1.5·ε²/r² in relative terms.
-    torch.testing.assert_close(irradiance[0].double(), expected, rtol=1e-3, atol=0)
+    # Measured 4e-7: the softening ε = one scale takes ¾(ε/r)⁴.
+    torch.testing.assert_close(irradiance[0].double(), expected, rtol=5e-6, atol=0)
 
 
 def test_irradiance_derivative_matches_finite_differences() -> None:
@@ -89,9 +89,9 @@ def test_pbrt_furnace() -> None:
     light = PointLight(torch.zeros(3), torch.full((3,), math.pi))
     direct = scene.radiance_of((light,), indirect=False)
     total = scene.radiance_of((light,))
-    # Measured 0.4989 (the softening takes 0.2 % at this spacing) and 0.9977.
-    torch.testing.assert_close(direct, torch.full_like(direct, 0.5), rtol=3e-3, atol=0)
-    torch.testing.assert_close(total, torch.full_like(total, 1.0), rtol=5e-3, atol=0)
+    # Measured 0.5000 and 1.0000.
+    torch.testing.assert_close(direct, torch.full_like(direct, 0.5), rtol=1e-4, atol=0)
+    torch.testing.assert_close(total, torch.full_like(total, 1.0), rtol=1e-3, atol=0)
 
 
 def test_patch_transport_agrees_with_full_solve(box: FrozenScene) -> None:
