@@ -7,6 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from tiny_dataset import change, dataset
+
+__all__ = ["change", "dataset"]
+
 # Two test workers on two cores: more threads than one each only get in each other's way.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 

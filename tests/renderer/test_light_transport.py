@@ -6,7 +6,6 @@ import math
 
 import pytest
 import torch
-from rooms import closed_box, rectangle, sphere, surfels_on
 
 from rgspipe.renderer.areas import surfel_areas
 from rgspipe.renderer.direct import differentiable_irradiance, geometry_factor, unit_irradiance
@@ -15,6 +14,7 @@ from rgspipe.renderer.gather import build_gather
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.transport import solve_radiosity
 from rgspipe.scene import PointLight
+from rooms import closed_box, rectangle, sphere, surfels_on
 
 
 @pytest.fixture(scope="module")

@@ -27,7 +27,8 @@ def main(arguments: Sequence[str] | None = None, stage_loader: StageLoader = loa
     try:
         return _dispatch(arguments, stage_loader)
     except InputError as error:
-        show_input_error(error)
+        # The configuration may be what is wrong, so the wish for a traceback is read from the words themselves.
+        show_input_error(error, "debug.traceback=true" in arguments)
         return EXIT_INPUT
     except KeyboardInterrupt:
         print("\nInterrupted. What is done is kept, and the next run goes on from there.", file=sys.stderr)

@@ -27,11 +27,13 @@ def ssim_map(image: Tensor, target: Tensor) -> Tensor:
         )
     x, y = image.permute(2, 0, 1)[:, None], target.permute(2, 0, 1)[:, None]
     mean_x, mean_y, square_x, square_y, product = _Blur.apply(torch.cat([x, y, x * x, y * y, x * y])).chunk(5)
-    variance_x, variance_y = square_x - mean_x * mean_x, square_y - mean_y * mean_y
-    covariance = product - mean_x * mean_y
-    numerator = (2.0 * mean_x * mean_y + C1) * (2.0 * covariance + C2)
-    denominator = (mean_x * mean_x + mean_y * mean_y + C1) * (variance_x + variance_y + C2)
-    return (numerator / denominator)[:, 0].permute(1, 2, 0)
+    # Differences of near squares: rounding may leave less than nothing, or more covariance than there is variance.
+    spread = (square_x - mean_x * mean_x).clamp(min=0.0) + (square_y - mean_y * mean_y).clamp(min=0.0)
+    covariance = torch.minimum(torch.maximum(product - mean_x * mean_y, -0.5 * spread), 0.5 * spread)
+    # Two fractions, each at most 1: their numerators' product would leave float32 in very bright images.
+    luminance = (2.0 * mean_x * mean_y + C1) / (mean_x * mean_x + mean_y * mean_y + C1)
+    structure = (2.0 * covariance + C2) / (spread + C2)
+    return (luminance * structure)[:, 0].permute(1, 2, 0)
 
 
 def ssim(image: Tensor, target: Tensor) -> Tensor:

@@ -14,6 +14,7 @@ from rgspipe.renderer.direct import differentiable_irradiance, unit_irradiance
 from rgspipe.renderer.gather import build_gather
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.sparse import SparseOperator
+from rgspipe.renderer.spot import spot_share
 from rgspipe.renderer.transport import PatchTransport, build_patch_transport, cluster_patches
 from rgspipe.renderer.view_weights import ViewWeights, build_view_weights
 from rgspipe.scene.camera import Camera
@@ -78,14 +79,17 @@ class FrozenScene:
         return direct + self.transport.indirect(direct) if indirect else direct
 
     def radiance_of(self, rig: LightRig, indirect: bool = True) -> Tensor:
-        """Outgoing radiance (N, 3) under a rig of point lights."""
-        if any(isinstance(light, SpotLight) for light in rig):
-            raise NotImplementedError("spot lights are not rendered yet")
+        """Outgoing radiance (N, 3) under a rig of point and spot lights."""
         positions = torch.stack([light.position for light in rig]).to(self.surfels.centers)
         intensity = torch.stack([light.intensity for light in rig]).to(self.surfels.centers)
         irradiance = differentiable_irradiance(self.bvh, positions)
+        shares = [
+            spot_share(light, self.surfels.centers, position) if isinstance(light, SpotLight) else None
+            for light, position in zip(rig, positions, strict=True)
+        ]
+        lit = torch.stack([e if s is None else e * s for e, s in zip(irradiance, shares, strict=True)])
         # Channels are independent: intensity scales each light's radiance channel by channel.
-        return torch.einsum("nck,kc->nc", self.radiance(irradiance.T, indirect), intensity)
+        return torch.einsum("nck,kc->nc", self.radiance(lit.T, indirect), intensity)
 
     def render(self, view: ViewWeights, rig: LightRig, indirect: bool = True) -> Tensor:
         """(height, width, 3) image of the scene under `rig`."""

@@ -15,6 +15,9 @@ from torch import Tensor
 
 from rgspipe.renderer.sparse import SparseOperator
 
+#: Albedo above this counts as this in the bounces: a closed room that absorbs nothing never settles.
+LARGEST_ALBEDO = 0.999
+
 #: Weight of a normal against a position [scene sizes] when surfels are clustered into patches.
 NORMAL_WEIGHT = 0.5
 
@@ -89,7 +92,7 @@ def with_albedo(transport: PatchTransport, albedo: Tensor) -> PatchTransport:
 
 
 def _bounce_inverse(average: scipy.sparse.csr_matrix, gathered: scipy.sparse.csr_matrix, albedo: Tensor) -> Tensor:
-    rho = albedo.double().cpu().numpy()
+    rho = albedo.double().clamp(0.0, LARGEST_ALBEDO).cpu().numpy()
     bounces = [(average @ scipy.sparse.diags(rho[:, c]) @ gathered).toarray() for c in range(3)]
     system = torch.eye(average.shape[0], dtype=torch.float64) - torch.from_numpy(np.stack(bounces))
     return torch.linalg.inv(system).float().to(albedo.device)
@@ -126,7 +129,7 @@ def _neumann(step: Any, source: Tensor, albedo: Tensor, tolerance: float) -> Ten
 
     Every bounce keeps at most the largest albedo, so the bounces needed are known beforehand.
     """
-    largest = float(albedo.max().clamp(max=0.999))
+    largest = float(albedo.max())
     most = max(2, math.ceil(math.log(tolerance) / math.log(largest))) if largest > 0 else 1
     total, bounce = source, source
     bound = tolerance * source.abs().amax()
@@ -143,8 +146,8 @@ def solve_radiosity(gather: SparseOperator, albedo: Tensor, direct: Tensor, tole
 
     Args:
         gather: (N, N) F with row sums of at most 1.
-        albedo: (N, C) or (N, 1), in [0, 1).
+        albedo: (N, C) or (N, 1), in [0, 1]; counts as at most LARGEST_ALBEDO.
         direct: (N, C) D.
         tolerance: relative error at which bounces end, in the largest value.
     """
-    return _Solve.apply(gather, albedo.contiguous(), direct, tolerance)
+    return _Solve.apply(gather, albedo.clamp(0.0, LARGEST_ALBEDO).contiguous(), direct, tolerance)

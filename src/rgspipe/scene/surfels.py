@@ -32,6 +32,15 @@ class Coverage:
     clip_softness: float
     minimum_alpha: float = 0.01
 
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.low < self.high <= 1.0:
+            raise ValueError(f"coverage needs 0 ≤ low < high ≤ 1, got {self.low} and {self.high}")
+        if not (self.layer_thickness > 0.0 and self.clip_softness > 0.0 and 0.0 < self.minimum_alpha < 1.0):
+            raise ValueError(
+                "coverage needs layer_thickness > 0, clip_softness > 0 and 0 < minimum_alpha < 1, got "
+                f"{self.layer_thickness}, {self.clip_softness} and {self.minimum_alpha}"
+            )
+
 
 @dataclass(frozen=True)
 class Surfels:
@@ -109,8 +118,11 @@ def quaternion_to_axes(quaternions: Tensor) -> Tensor:
 def quaternion_from_normal(normals: Tensor) -> Tensor:
     """(N, 4) shortest rotations from +z to the unit normals (N, 3); −z turns about x."""
     x, y, z = normals.unbind(-1)
-    opposite = z < -1.0 + 1e-6
-    quaternion = torch.stack([1.0 + z, -y, x, torch.zeros_like(x)], dim=-1)
+    across = x * x + y * y
+    opposite = (z < 0.0) & (across < 1e-20)
+    # 1 + z, without the cancellation next to −z.
+    w = torch.where(z < 0.0, across / (1.0 - z), 1.0 + z)
+    quaternion = torch.stack([w, -y, x, torch.zeros_like(x)], dim=-1)
     about_x = torch.tensor([0.0, 1.0, 0.0, 0.0], dtype=normals.dtype, device=normals.device)
     quaternion = torch.where(opposite[:, None], about_x, quaternion)
     return torch.nn.functional.normalize(quaternion, dim=-1)

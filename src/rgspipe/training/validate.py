@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+
 from rgspipe.datasets.views import View
 from rgspipe.evaluation.metrics import edge_mask, psnr
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh

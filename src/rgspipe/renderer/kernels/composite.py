@@ -152,6 +152,11 @@ def composite(
         weights=torch.empty(shape, dtype=torch.float32, device=device),
         transmittance=torch.empty(count, dtype=torch.float32, device=device),
     )
+    if len(bvh.surfels) == 0:
+        hits.indices.fill_(-1)
+        hits.weights.zero_()
+        hits.transmittance.fill_(1.0)
+        return hits
     rays = [as_vec3(origins.to(device)), as_vec3(directions.to(device))]
     rule = [float(nearest), int(two_sided), c.layer_thickness, c.minimum_alpha, c.low, c.high]
     outputs = [as_array(x) for x in (hits.indices, hits.depths, hits.alphas, hits.weights, hits.transmittance)]

@@ -206,7 +206,8 @@ class _ShadeRays(torch.autograd.Function):
             to_radiance,
             packed[:, 0:3],
             _quaternion_gradient(rotations, packed[:, 3:6]),
-            packed[:, 6:8] / scales,
+            # By the scales that rays meet: those of surfels without extent are not zero there.
+            packed[:, 6:8] / ctx.bvh.surfels.scales.to(scales),
             packed[:, 8],
             packed[:, 9:11] / softness,
             packed[:, 11:13],

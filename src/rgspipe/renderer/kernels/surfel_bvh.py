@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import torch
 import warp as wp
 from torch import Tensor
 
 from rgspipe.renderer.kernels.launch import as_array, as_vec3
 from rgspipe.scene.surfels import Surfels
+
+#: Smallest scale of a surfel over the largest in the scene.
+MINIMUM_SCALE = 1e-7
 
 
 @wp.struct
@@ -39,12 +44,12 @@ class SurfelBvh:
     """Surfels ready for ray casts.
 
     Args:
-        surfels: N ≥ 1 surfels. The kernels work in float32; the tensors' device is the rays' device.
+        surfels: N surfels; with none of them every ray passes. The kernels work in float32; the tensors'
+            device is the rays' device.
     """
 
     def __init__(self, surfels: Surfels) -> None:
-        if len(surfels) == 0:
-            raise ValueError("surfels must not be empty: a hierarchy over nothing cannot be built")
+        surfels = replace(surfels, scales=usable_scales(surfels.scales))
         self.surfels = surfels
         self.device = surfels.centers.device
         frames, scales, coverage = surfels.frames, surfels.scales, surfels.coverage
@@ -59,13 +64,22 @@ class SurfelBvh:
         self.arrays.scale = as_array(scales.prod(dim=1).sqrt().float())
         extent = footprint_extent(surfels)
         self._lower, self._upper = as_vec3(surfels.centers - extent), as_vec3(surfels.centers + extent)
-        self._bvh = wp.Bvh(self._lower, self._upper)
+        self._bvh = wp.Bvh(self._lower, self._upper) if len(surfels) else None
         self.coverage = coverage
 
     @property
     def id(self) -> int:
-        """Warp's handle of the hierarchy."""
-        return self._bvh.id
+        """Warp's handle of the hierarchy; 0 if there are no surfels, where no kernel may be launched."""
+        return self._bvh.id if self._bvh is not None else 0
+
+
+def usable_scales(scales: Tensor) -> Tensor:
+    """Scales (N, 2) with those of no extent made so small that no ray meets the surfel, but not zero.
+
+    A scale of zero has an infinite inverse, and infinity times a distance of zero is no number.
+    """
+    largest = scales.detach().amax() if scales.numel() else scales.new_tensor(1.0)
+    return scales.clamp(min=float(MINIMUM_SCALE * largest.clamp(min=1e-30)))
 
 
 def clip_ramps(surfels: Surfels) -> Tensor:

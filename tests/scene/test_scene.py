@@ -1,0 +1,66 @@
+"""Cameras and surfels as plain data."""
+
+from __future__ import annotations
+
+import pytest
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rgspipe.scene import Camera, Surfels, look_at
+from rgspipe.scene.surfels import quaternion_from_normal, quaternion_to_axes
+from rooms import closed_box
+
+coordinate = st.floats(-2.0, 2.0)
+
+
+def camera(resolution: int = 8) -> Camera:
+    pose = look_at(torch.tensor([0.3, -2.0, 0.4]), torch.tensor([0.0, 0.1, 0.0]))
+    return Camera.from_field_of_view(pose, 0.8, resolution, resolution)
+
+
+@given(st.integers(0, 63), st.floats(0.1, 10.0))
+def test_a_point_on_a_pixel_s_ray_projects_into_its_centre(pixel: int, depth: float) -> None:
+    view = camera()
+    origins, directions, lengths = view.rays(torch.tensor([pixel]))
+    place, found = view.project(origins + directions * (depth * lengths[:, None]))
+    # Measured 9e-16.
+    torch.testing.assert_close(place[0], torch.tensor([pixel % 8 + 0.5, pixel // 8 + 0.5]).double(), atol=1e-9, rtol=0)
+    assert float(found) == pytest.approx(depth, rel=1e-12)
+
+
+def test_subsamples_average_to_the_centre() -> None:
+    view = camera()
+    _, fine, lengths = view.rays(torch.tensor([10]), subsamples=4)
+    _, centre, one = view.rays(torch.tensor([10]))
+    planar = (fine * lengths[:, None]).mean(dim=0)
+    torch.testing.assert_close(planar, centre[0] * one[0], atol=1e-12, rtol=0)
+
+
+@given(coordinate, coordinate, coordinate)
+def test_looking_anywhere_gives_a_rotation(x: float, y: float, z: float) -> None:
+    origin = torch.tensor([5.0, 5.0, 5.0])
+    matrix = look_at(origin, torch.tensor([x, y, z]))
+    torch.testing.assert_close(matrix[:3, :3] @ matrix[:3, :3].T, torch.eye(3).double(), atol=1e-9, rtol=0)
+    assert float(torch.linalg.det(matrix[:3, :3])) == pytest.approx(1.0, abs=1e-9)
+
+
+def test_looking_straight_up_and_down_works() -> None:
+    for target in (torch.tensor([0.0, 0.0, 1.0]), torch.tensor([0.0, 0.0, -1.0])):
+        assert torch.isfinite(look_at(torch.zeros(3), target)).all()
+
+
+@given(coordinate, coordinate, coordinate)
+def test_a_rotation_from_a_normal_has_that_normal(x: float, y: float, z: float) -> None:
+    normal = torch.nn.functional.normalize(torch.tensor([[x, y, z - 1e-3]], dtype=torch.float64), dim=1)
+    frame = quaternion_to_axes(quaternion_from_normal(normal))[0]
+    # Measured 3e-14, next to −z.
+    torch.testing.assert_close(frame[2], normal[0], atol=1e-9, rtol=0)
+    torch.testing.assert_close(frame @ frame.T, torch.eye(3).double(), atol=1e-9, rtol=0)
+
+
+def test_surfels_of_a_wrong_shape_are_refused() -> None:
+    tensors = closed_box(0.5).tensors()
+    coverage = closed_box(0.5).coverage
+    with pytest.raises(ValueError, match=r"surfels.scales must have shape \(24, 2\), got \(24, 3\)"):
+        Surfels(**(tensors | {"scales": torch.ones(24, 3)}), coverage=coverage)
