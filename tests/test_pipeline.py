@@ -117,9 +117,9 @@ def test_killed_at_any_moment_and_run_again_ends_with_the_same_bytes(
     moments = random.Random(5)
     interrupted = 0
     for _ in range(12):
-        process = subprocess.Popen(command, env={**child_environment, toys.PAUSE_VARIABLE: "0.05"})
-        # From the start of the process (0.2 s of imports) to a little after its end.
-        time.sleep(0.2 + 0.3 * moments.random())
+        process = subprocess.Popen(command, env={**child_environment, toys.PAUSE_VARIABLE: "0.3"})
+        # From the start of the process (0.2 s of imports) into its work, which pauses often.
+        time.sleep(0.2 + 0.8 * moments.random())
         process.send_signal(signal.SIGKILL)
         interrupted += process.wait() == -signal.SIGKILL
         _check_published(killed)
