@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
 import scipy.ndimage
+import scipy.sparse
 import torch
 from torch import Tensor
 
@@ -70,15 +72,16 @@ def nearest_hit(bvh: SurfelBvh) -> float:
     return 0.02 * bvh.coverage.layer_thickness
 
 
-def _replace_rows(matrix, chosen: Tensor, rows):
-    import scipy.sparse
-
-    keep = torch.ones(matrix.shape[0])
-    keep[chosen] = 0.0
+def _replace_rows(
+    matrix: scipy.sparse.csr_matrix, chosen: Tensor, rows: scipy.sparse.csr_matrix
+) -> scipy.sparse.csr_matrix:
+    """`matrix` with the rows `chosen` (K,) taken from `rows` (K, …)."""
+    kept = np.ones(matrix.shape[0])
+    kept[chosen.numpy()] = 0.0
     place = scipy.sparse.csr_matrix(
-        (torch.ones(len(chosen)).numpy(), (chosen.numpy(), range(len(chosen)))), shape=(matrix.shape[0], len(chosen))
+        (np.ones(len(chosen)), (chosen.numpy(), np.arange(len(chosen)))), shape=(matrix.shape[0], len(chosen))
     )
-    result = scipy.sparse.diags(keep.numpy()) @ matrix + place @ rows
+    result = scipy.sparse.diags(kept) @ matrix + place @ rows
     result.eliminate_zeros()
     return result.tocsr()
 
@@ -107,5 +110,5 @@ def _edge_pixels(bvh: SurfelBvh, hits: Hits, camera: Camera, lengths: Tensor) ->
         )
         bad.narrow(axis, 0, count).logical_or_(jump)
         bad.narrow(axis, 1, count).logical_or_(jump)
-    grown = scipy.ndimage.binary_dilation(bad.numpy(), structure=torch.ones(3, 3).numpy())
+    grown = scipy.ndimage.binary_dilation(bad.numpy(), structure=np.ones((3, 3)))
     return torch.from_numpy(grown).reshape(-1)
