@@ -105,6 +105,17 @@ def test_a_bad_configuration_is_refused(run_cli: Callable, arguments: list[str],
     assert "Traceback" not in result.stderr
 
 
+def test_a_target_without_images_is_refused_before_anything_is_made(
+    dataset: Path, run_cli: Callable, tmp_path: Path
+) -> None:
+    (dataset / "targets/one/view_0.exr").unlink()
+    target = f"fit.target={dataset / 'targets/one'}"
+    result = run_cli("stage=fit_light", "scene=external", f"scene.path={dataset}", target)
+    assert result.returncode == REFUSED
+    assert "view_0.exr" in result.stderr and "Traceback" not in result.stderr
+    assert artifacts(tmp_path) == {}
+
+
 def test_the_traceback_is_there_when_asked_for(run_cli: Callable) -> None:
     result = run_cli("stage=init_depth", "scene=external", "scene.path=nowhere", "debug.traceback=true")
     assert result.returncode == REFUSED

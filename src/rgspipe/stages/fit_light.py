@@ -188,6 +188,14 @@ def _keys(config: RgspipeConfig) -> list[str]:
     return keys if config.fit.target is not None else [*keys, "occlusion", "fit.limit"]
 
 
+def _files(config: RgspipeConfig) -> list[Path]:
+    """The user's target, read now: what is wrong with it should show before a scene is trained for it."""
+    if config.fit.target is None:
+        return []
+    load_target(config.fit.target)
+    return [Path(config.fit.target)]
+
+
 STAGE = Stage(
     name="fit_light",
     help="recover the unknown lights of fit targets from one or several views",
@@ -202,6 +210,6 @@ STAGE = Stage(
         "rgspipe.evaluation.images",
         "rgspipe.evaluation.metrics",
     ),
-    files=lambda config: [] if config.fit.target is None else [Path(config.fit.target)],
+    files=_files,
     run=run,
 )
