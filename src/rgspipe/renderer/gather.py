@@ -74,7 +74,8 @@ def build_gather(
 
 def reciprocal_mean(matrix: scipy.sparse.csr_matrix, areas: np.ndarray) -> scipy.sparse.csr_matrix:
     """½(F + A⁻¹FᵀA) with the row sums of F (Helmholtz reciprocity, A_i F_ij = A_j F_ji)."""
-    areas = np.maximum(areas, 1e-3 * np.median(areas[areas > 0]))
+    seen = areas[areas > 0]
+    areas = np.maximum(areas, 1e-3 * np.median(seen) if seen.size else 1.0)
     mirrored = scipy.sparse.diags(1.0 / areas) @ matrix.T @ scipy.sparse.diags(areas)
     mean = (matrix + mirrored) * 0.5
     wanted, found = np.asarray(matrix.sum(axis=1)).ravel(), np.asarray(mean.sum(axis=1)).ravel()
