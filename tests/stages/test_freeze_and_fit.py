@@ -172,8 +172,9 @@ def test_a_class_without_targets_is_refused(inputs, tmp_path):
         _fit(inputs, tmp_path, occlusion="out_of_frame")
 
 
-def test_result_depends_on_what_it_uses():
+def test_result_depends_on_what_it_uses(dataset):
     stage, config = fit_light.STAGE, RgspipeConfig(stage="fit_light")
     assert "fit.search" in stage.keys(config) and "fit.adam" not in stage.keys(config)
-    own = replace(config, fit=replace(config.fit, target="x"))
-    assert stage.files(own) == [Path("x")] and "fit.limit" not in stage.keys(own)
+    target = dataset / "targets" / "one"
+    own = replace(config, fit=replace(config.fit, target=str(target)))
+    assert stage.files(own) == [target] and "fit.limit" not in stage.keys(own)

@@ -19,6 +19,9 @@ SURFELS, GATHER, TRANSPORT, DICTIONARY = (
     f"{name}.safetensors" for name in ("surfels", "gather", "transport", "dictionary")
 )
 
+#: What each effect can change, for effects=auto.
+EFFECTS = "effects.json"
+
 MAKE_AGAIN = "Remove it and run the stage freeze again."
 
 

@@ -69,9 +69,9 @@ class FrozenScene:
         """The camera's image as a linear function of the radiance."""
         return build_view_weights(self.bvh, camera, supersampling)
 
-    def unit_irradiance(self, positions: Tensor) -> tuple[Tensor, Tensor]:
+    def unit_irradiance(self, positions: Tensor, shadows: bool = True) -> tuple[Tensor, Tensor]:
         """Irradiance (L, N) of unit point lights at (L, 3) and its derivative (L, N, 3)."""
-        return unit_irradiance(self.bvh, positions)
+        return unit_irradiance(self.bvh, positions, shadows)
 
     def radiance(self, irradiance: Tensor, indirect: bool = True) -> Tensor:
         """Outgoing radiance (N, 3, K) for K direct irradiances (N, K), grey; linear and differentiable."""

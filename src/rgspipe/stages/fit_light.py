@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 import pandas as pd
@@ -12,8 +12,9 @@ import pandas as pd
 from rgspipe.config import RgspipeConfig
 from rgspipe.datasets.fit_file import read_result, write_result
 from rgspipe.datasets.frames import read_entries
-from rgspipe.datasets.frozen_file import DICTIONARY, load_dictionary, load_frozen
+from rgspipe.datasets.frozen_file import DICTIONARY, EFFECTS, load_dictionary, load_frozen
 from rgspipe.datasets.gs3 import load_target
+from rgspipe.datasets.json_file import read_json
 from rgspipe.datasets.location import dataset_root, open_dataset
 from rgspipe.datasets.views import Target, View
 from rgspipe.errors import InputError
@@ -28,6 +29,7 @@ from rgspipe.fitting import (
     prepare_fit,
 )
 from rgspipe.progress import track
+from rgspipe.renderer.effects import EffectBounds, choose_effects
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import PointLight
 from rgspipe.stages.base import Stage, StageContext
@@ -54,20 +56,22 @@ class _Fitter:
     frozen: FrozenScene
     dictionary: LightDictionary | None
     training_lights: Sequence[PointLight]
+    effects: Effects
     prepared: dict[bytes, FitViews] = field(default_factory=dict)
 
     @classmethod
     def create(cls, context: StageContext) -> _Fitter:
         config, artifact = context.config, context.inputs["freeze"]
         frozen = load_frozen(artifact.file)
+        effects = _effects(context)
         if config.fit.method == "paper_adam":
-            return cls(config, frozen, None, _training_lights(context))
-        if not config.effects.shadows:
+            return cls(config, frozen, None, _training_lights(context), effects)
+        if not effects.shadows:
             # The stored candidates cast shadows.
             options = config.freeze
             dictionary = build_dictionary(frozen, options.dictionary_grid, seed=options.seed, shadows=False)
-            return cls(config, frozen, dictionary, ())
-        return cls(config, frozen, load_dictionary(artifact.file(DICTIONARY), frozen), ())
+            return cls(config, frozen, dictionary, (), effects)
+        return cls(config, frozen, load_dictionary(artifact.file(DICTIONARY), frozen), (), effects)
 
     def fit(self, target: Target, folder: Path) -> None:
         """Fit one target and write its folder, whole or not at all."""
@@ -97,16 +101,27 @@ class _Fitter:
     def _prepare(self, views: Sequence[View]) -> FitViews:
         key = b"".join(_identity(view) for view in views)
         if key not in self.prepared:
-            effects = Effects(self.config.effects.shadows, self.config.effects.interreflection)
             self.prepared[key] = prepare_fit(
                 self.frozen,
                 [view.camera for view in views],
                 masks=[view.alpha for view in views],
                 mask_edges=self.config.fit.search.mask_edges,
                 dictionary=self.dictionary,
-                effects=effects,
+                effects=self.effects,
             )
         return self.prepared[key]
+
+
+def _effects(context: StageContext) -> Effects:
+    """The effects of the configuration; with effects.auto less those that the frozen scene does not call for."""
+    wanted = context.config.effects
+    if not wanted.auto:
+        return Effects(wanted.shadows, wanted.interreflection)
+    bounds = EffectBounds(**read_json(context.inputs["freeze"].file(EFFECTS), "the effects of a frozen scene"))
+    choice = choose_effects(bounds, wanted.tolerance)
+    print("effects: " + "; ".join(choice.reasons))
+    context.note(effects={"choice": asdict(choice), "bounds": asdict(bounds), "tolerance": wanted.tolerance})
+    return Effects(wanted.shadows and choice.shadows, wanted.interreflection and choice.interreflection)
 
 
 def select_targets(targets: Sequence[Target], config: RgspipeConfig) -> list[Target]:

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import time
+from dataclasses import asdict
 
-from rgspipe.datasets.frozen_file import DICTIONARY, SURFELS, save_dictionary, save_frozen
+from rgspipe.datasets.frozen_file import DICTIONARY, EFFECTS, SURFELS, save_dictionary, save_frozen
+from rgspipe.datasets.json_file import write_json
 from rgspipe.datasets.surfel_file import load_surfels
 from rgspipe.fitting.dictionary import build_dictionary
+from rgspipe.renderer.effects import measure_effects
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.stages.base import Stage, StageContext
 
 
 def run(context: StageContext) -> None:
-    """Write surfels, gather, transport and dictionary.safetensors."""
+    """Write surfels, gather, transport and dictionary.safetensors, and effects.json."""
     options = context.config.freeze
     surfels = load_surfels(context.inputs["train_surfels"].file(SURFELS))
     begin = time.perf_counter()
@@ -20,6 +23,8 @@ def run(context: StageContext) -> None:
     middle = time.perf_counter()
     dictionary = build_dictionary(frozen, options.dictionary_grid, seed=options.seed)
     end = time.perf_counter()
+    bounds = measure_effects(frozen, seed=options.seed)
+    write_json(context.folder / EFFECTS, asdict(bounds))
     save_frozen(context.folder, frozen)
     save_dictionary(context.folder / DICTIONARY, dictionary)
     sizes = {path.stem: path.stat().st_size for path in sorted(context.folder.glob("*.safetensors"))}
@@ -30,6 +35,7 @@ def run(context: StageContext) -> None:
         candidates=len(dictionary),
         seconds={"gather and transport": round(middle - begin, 3), "dictionary": round(end - middle, 3)},
         bytes=sizes,
+        effects=asdict(bounds),
     )
 
 
