@@ -14,7 +14,7 @@ from rgspipe.config import TrainConfig
 from rgspipe.datasets.location import open_dataset
 from rgspipe.datasets.surfel_file import load_surfels, save_surfels
 from rgspipe.datasets.views import View
-from rgspipe.evaluation.images import comparison_strip, save_png, stack
+from rgspipe.evaluation.images import beside, comparison_strip, save_png, stack
 from rgspipe.stages.base import Stage, StageContext
 from rgspipe.training.checkpoint import Checkpoint
 from rgspipe.training.refine import RefineOptions
@@ -23,6 +23,9 @@ from rgspipe.training.validate import HeldOut, render_held_out
 
 #: Held-out views that comparison.png shows, from the worst to the best.
 SHOWN_VIEWS = 6
+
+#: Pixels between its columns.
+COLUMN_GAP = 12
 
 
 def run(context: StageContext) -> None:
@@ -89,10 +92,13 @@ def _write_table(path: Path, trained: Trained) -> None:
 
 
 def _write_comparison(path: Path, held_out: HeldOut, views: tuple[View, ...]) -> None:
-    """Truth, render and difference of held-out views spread evenly from the worst to the best."""
+    """Truth, render and difference of held-out views spread evenly from the worst to the best, in two columns."""
     order = np.argsort(held_out.psnr)
     chosen = order[np.unique(np.linspace(0, len(order) - 1, min(SHOWN_VIEWS, len(order))).round().astype(int))]
-    save_png(path, stack([comparison_strip(views[i].image, held_out.images[i]) for i in chosen]))
+    strips = [comparison_strip(views[i].image, held_out.images[i]) for i in chosen]
+    half = len(strips) // 2
+    columns = [strips[:half], strips[half:]] if len(strips) % 2 == 0 else [strips]
+    save_png(path, beside([stack(column) for column in columns], COLUMN_GAP))
 
 
 STAGE = Stage(
