@@ -16,9 +16,6 @@ from rgspipe.scene.lights import WATTS_PER_INTENSITY
 #: Largest entry of RᵀR − 1 that a rotation may have; files written in float32 reach 1e-6.
 ROTATION_TOLERANCE = 1e-4
 
-#: Keys of the optional images of a frame.
-SURFACE_KEYS = ("depth_path", "normal_path", "albedo_path")
-
 
 @dataclass(frozen=True)
 class FrameEntry:

@@ -41,9 +41,7 @@ def cosine_directions(axes: Tensor, rays: int, generator: torch.Generator) -> Te
     return torch.nn.functional.normalize(local @ axes, dim=-1)
 
 
-def build_gather(
-    bvh: SurfelBvh, rays: int, *, seed: int, areas: Tensor | None = None, generator: torch.Generator | None = None
-) -> SparseOperator:
+def build_gather(bvh: SurfelBvh, rays: int, *, seed: int, areas: Tensor | None = None) -> SparseOperator:
     """The gather operator F: (F B)_i is the cosine-weighted mean of the radiance that surfel i sees.
 
     Rows sum to the share of the hemisphere that holds surfaces, at most 1, so there is no 1/r²
@@ -56,7 +54,7 @@ def build_gather(
             reciprocal A⁻¹FᵀA, which halves the variance at no ray, and rows keep their sums.
     """
     surfels, count = bvh.surfels, len(bvh.surfels)
-    generator = generator or torch.Generator().manual_seed(seed)
+    generator = torch.Generator().manual_seed(seed)
     axes = surfels.frames.float()
     lifted = (surfels.centers + LIFT * surfels.scales.prod(dim=1).sqrt()[:, None] * axes[:, 2]).float()
     per_batch = max(1, RAYS_AT_ONCE // rays)

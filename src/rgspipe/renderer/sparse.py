@@ -44,10 +44,6 @@ class SparseOperator:
         """Stored values."""
         return self.matrix.values().numel()
 
-    @property
-    def T(self) -> SparseOperator:
-        return SparseOperator(self.transposed, self.matrix)
-
     def __matmul__(self, operand: Tensor) -> Tensor:
         """(rows, C) product with a dense (columns, C) operand, differentiable towards it."""
         return _Product.apply(self, operand.contiguous())

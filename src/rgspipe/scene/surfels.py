@@ -92,11 +92,6 @@ class Surfels:
         """(N, 3) unit normals."""
         return self.frames[:, 2]
 
-    @property
-    def areas(self) -> Tensor:
-        """(N,) effective area 2π·s_u·s_v·opacity of the unclipped footprint, scene units²."""
-        return 2.0 * torch.pi * self.scales[:, 0] * self.scales[:, 1] * self.opacities
-
     def to(self, *args: torch.dtype | torch.device | str) -> Surfels:
         """A copy with every tensor moved by `Tensor.to`."""
         return replace(self, **{name: tensor.to(*args) for name, tensor in self.tensors().items()})

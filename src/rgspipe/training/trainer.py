@@ -12,15 +12,15 @@ from torch import Tensor
 
 from rgspipe.datasets.views import View
 from rgspipe.progress import track
-from rgspipe.renderer.areas import surfel_areas
-from rgspipe.renderer.gather import build_gather
+from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
-from rgspipe.renderer.transport import PatchTransport, build_patch_transport, cluster_patches
+from rgspipe.renderer.transport import PatchTransport
 from rgspipe.renderer.view_weights import ViewWeights, build_view_weights
 from rgspipe.scene.surfels import Surfels
 from rgspipe.training.albedo import AlbedoProblem, solve_albedo
 from rgspipe.training.checkpoint import Checkpoint
-from rgspipe.training.lighting import Lighting, trace_lighting
+from rgspipe.training.initialise import Footprint
+from rgspipe.training.lighting import trace_lighting
 from rgspipe.training.record import Record
 from rgspipe.training.refine import RefineOptions, RefineState, RefineView, refine
 
@@ -53,28 +53,10 @@ class Trained:
     records: tuple[Record, ...]
 
 
-@dataclass(frozen=True)
-class Geometry:
-    """What follows from the surfels' geometry alone, for one set of views.
-
-    Attributes:
-        weights: of every view.
-        lighting: shadows and cosines of every view's light.
-        transport: light between surfels.
-    """
-
-    weights: tuple[ViewWeights, ...]
-    lighting: Lighting
-    transport: PatchTransport
-
-
 def build_transport(surfels: Surfels, options: TrainOptions) -> PatchTransport:
     """Patch transport for the surfels as they stand."""
-    bvh = SurfelBvh(surfels)
-    areas = surfel_areas(bvh, seed=options.seed)
-    gather = build_gather(bvh, options.gather_rays, seed=options.seed, areas=areas)
-    labels = cluster_patches(surfels.centers, surfels.normals, options.patches, seed=options.seed)
-    return build_patch_transport(gather, labels, areas, surfels.albedo)
+    frozen = FrozenScene.freeze(surfels, gather_rays=options.gather_rays, patches=options.patches, seed=options.seed)
+    return frozen.transport
 
 
 def trace_views(surfels: Surfels, views: Sequence[View], supersampling: int) -> tuple[ViewWeights, ...]:
@@ -102,7 +84,8 @@ def train(
     else:
         surfels, radiance, state = *_fit_materials(surfels, views, options, log, "materials"), None
     if options.refine.steps > 0:
-        refined = [_refine_view(view, surfels, radiance[v]) for v, view in enumerate(views)]
+        bvh = SurfelBvh(surfels)
+        refined = [_refine_view(view, bvh, radiance[v]) for v, view in enumerate(views)]
 
         def keep(progress: RefineState) -> None:
             log.steps(progress)
@@ -126,12 +109,8 @@ def fit_direct_materials(surfels: Surfels, views: Sequence[View], options: Train
 
 
 def surfel_spacing(surfels: Surfels) -> float:
-    """Typical distance of neighbours, from the footprints: init makes them a fixed part of the spacing."""
-    return surfels.coverage.clip_softness / CLIP_SOFTNESS
-
-
-#: Softness of clips over the spacing of surfels, as initialisation sets it.
-CLIP_SOFTNESS = 0.12
+    """Typical distance of neighbours: initialisation makes the softness of clips a fixed part of it."""
+    return surfels.coverage.clip_softness / Footprint.clip_softness
 
 
 def _fit_materials(
@@ -148,9 +127,9 @@ def _fit_materials(
     return replace(surfels, albedo=albedo), radiance
 
 
-def _refine_view(view: View, surfels: Surfels, radiance: Tensor) -> RefineView:
+def _refine_view(view: View, bvh: SurfelBvh, radiance: Tensor) -> RefineView:
     image = view.image.reshape(-1, 3).float()
-    weights = build_view_weights(SurfelBvh(surfels), view.camera, supersampling=1)
+    weights = build_view_weights(bvh, view.camera, supersampling=1)
     peak = float(torch.quantile(image, 0.995).clamp(min=1e-12))
     return RefineView(view.camera, image, radiance, weights.edges, peak)
 
