@@ -1,0 +1,1 @@
+"""What accuracy costs: rooms with exact geometry, path-traced truth, other renderers, and the front between them."""
