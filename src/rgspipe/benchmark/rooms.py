@@ -23,7 +23,7 @@ class Room:
         name: of its artifact and its rows.
         surfaces: what is in it; about the size of the unit cube.
         viewpoints: (K, 2, 3) where cameras stand and what they look at.
-        lights: (L, 3) positions of the lights; each lights the room alone.
+        lights: (L, 3) positions of the lights; each lights the room alone. The last two are near a surface.
         field_of_view: of the cameras, rad.
     """
 
@@ -44,6 +44,13 @@ class Room:
         """Light number `light`, of intensity 1 W/sr."""
         return (PointLight(self.lights[light].float(), torch.ones(3)),)
 
+    def clearance(self, light: int) -> float:
+        """Distance of a light from the nearest surface, scene units."""
+        s, offset = self.surfaces, self.lights[light].double() - self.surfaces.origins
+        along = [(offset * side).sum(1) / side.square().sum(1) for side in (s.sides_a, s.sides_b)]
+        a, b = (share.clamp(0.0, 1.0)[:, None] for share in along)
+        return float((offset - a * s.sides_a - b * s.sides_b).norm(dim=1).min())
+
 
 def _cornell() -> Room:
     """Open towards −y, with two boxes; the same room as `scene=cornell`."""
@@ -58,7 +65,7 @@ def _cornell() -> Room:
     tall = solid_box([-0.17, 0.12, -0.2], [0.28, 0.28, 0.6], WHITE, 0.3)
     low = solid_box([0.18, -0.15, -0.35], [0.28, 0.28, 0.3], WHITE, -0.3)
     viewpoints = [[[0.0, -1.6, 0.0], [0.0, 0.0, 0.0]], [[0.35, -1.2, 0.3], [0.0, 0.1, -0.15]]]
-    lights = [[0.0, 0.0, 0.4], [-0.3, -0.3, 0.2], [0.3, 0.25, -0.1]]
+    lights = [[0.0, 0.0, 0.38], [-0.3, -0.3, 0.2], [0.3, 0.25, -0.1], [0.44, 0.1, 0.1], [-0.1, -0.2, -0.45]]
     return Room("cornell", walls + tall + low, torch.tensor(viewpoints), torch.tensor(lights))
 
 
@@ -81,7 +88,7 @@ def _corridor() -> Room:
         + rectangle([inner, inner, low], up, [0, h - inner, 0], WHITE)  # inner wall of the second leg, faces −x
     )
     viewpoints = [[[0.42, -0.3, 0.0], [-0.5, -0.28, -0.03]], [[0.1, -0.42, 0.12], [-0.4, 0.0, -0.1]]]
-    lights = [[-0.3, 0.3, 0.05], [0.2, -0.3, 0.08], [-0.25, -0.15, -0.08]]
+    lights = [[-0.3, 0.3, 0.05], [0.2, -0.3, 0.08], [-0.25, -0.15, -0.08], [-0.45, -0.2, 0.0], [0.3, -0.3, 0.16]]
     return Room("corridor", walls, torch.tensor(viewpoints), torch.tensor(lights), field_of_view=1.2)
 
 
@@ -107,7 +114,7 @@ def _clutter() -> Room:
     for center, size, albedo, turn in boxes:
         room += solid_box(center, size, albedo, turn)
     viewpoints = [[[-0.35, -0.42, 0.2], [0.15, 0.15, -0.15]], [[0.42, -0.44, 0.25], [-0.25, 0.15, -0.2]]]
-    lights = [[-0.05, -0.1, 0.3], [0.3, 0.0, 0.1], [-0.2, 0.3, -0.1]]
+    lights = [[-0.05, -0.1, 0.28], [0.3, -0.05, 0.1], [-0.2, 0.3, -0.1], [0.0, 0.45, 0.2], [0.2, 0.02, -0.06]]
     return Room("clutter", room + table + shelf, torch.tensor(viewpoints), torch.tensor(lights), field_of_view=1.2)
 
 
