@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import pytest
 import torch
 
 from rgspipe.datasets.surfel_file import FORMAT, VERSION, load_surfels, save_surfels
-from rgspipe.datasets.tensor_file import save_tensors
+from rgspipe.datasets.tensor_file import load_tensors, save_tensors
 from rgspipe.errors import InputError
-from rgspipe.scene import NO_CLIP, Coverage, Surfels
+from rgspipe.scene import NO_CLIP, Coverage, Gloss, Surfels
 
 
 @pytest.fixture
@@ -40,6 +40,31 @@ def test_surfels_come_back_exactly(tmp_path, surfels):
     for name, tensor in surfels.tensors().items():
         assert torch.equal(tensor, getattr(again, name)), name
     assert [path.name for path in (tmp_path / "new").iterdir()] == ["surfels.safetensors"]
+
+
+def test_gloss_is_stored_where_there_is_any(tmp_path, surfels):
+    save_surfels(tmp_path / "diffuse.safetensors", surfels)
+    gloss = Gloss(torch.linspace(0.0, 0.3, 21).reshape(7, 3), torch.linspace(1.0, 50.0, 7))
+    save_surfels(tmp_path / "glossy.safetensors", replace(surfels, albedo=0.5 * surfels.albedo, gloss=gloss))
+    assert not any("gloss" in name for name in load_tensors(tmp_path / "diffuse.safetensors")[0])
+    assert load_surfels(tmp_path / "diffuse.safetensors").gloss is None
+    again = load_surfels(tmp_path / "glossy.safetensors").gloss
+    assert torch.equal(again.reflectance, gloss.reflectance)
+    assert torch.equal(again.exponents, gloss.exponents)
+
+
+@pytest.mark.parametrize(
+    ("gloss", "message"),
+    [
+        ({"gloss.reflectance": torch.zeros(7, 3)}, "the tensors"),
+        ({"gloss.reflectance": torch.zeros(7, 3), "gloss.exponents": torch.ones(6)}, "exponents must have shape"),
+        ({"gloss.reflectance": torch.ones(7, 3), "gloss.exponents": torch.ones(7)}, "must be at most 1"),
+    ],
+)
+def test_wrong_gloss_is_refused(tmp_path, surfels, gloss, message):
+    save_tensors(tmp_path / "s.safetensors", surfels.tensors() | gloss, note_of(surfels))
+    with pytest.raises(InputError, match=message):
+        load_surfels(tmp_path / "s.safetensors")
 
 
 def test_missing_and_truncated_files_are_named(tmp_path, surfels):

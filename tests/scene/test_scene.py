@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rgspipe.scene import Camera, Surfels, look_at
+from rgspipe.scene import Camera, Gloss, Surfels, look_at
 from rgspipe.scene.surfels import quaternion_from_normal, quaternion_to_axes
 from rooms import closed_box
 
@@ -64,3 +66,25 @@ def test_surfels_of_a_wrong_shape_are_refused() -> None:
     coverage = closed_box(0.5).coverage
     with pytest.raises(ValueError, match=r"surfels.scales must have shape \(24, 2\), got \(24, 3\)"):
         Surfels(**(tensors | {"scales": torch.ones(24, 3)}), coverage=coverage)
+
+
+def test_gloss_moves_with_its_surfels_and_must_fit_them() -> None:
+    surfels = closed_box(0.5)
+    gloss = Gloss(torch.full((24, 3), 0.2), torch.full((24,), 10.0))
+    moved = replace(surfels, gloss=gloss).to(torch.float64)
+    assert moved.gloss.reflectance.dtype == moved.gloss.exponents.dtype == torch.float64
+    assert surfels.to(torch.float32).gloss is None
+    with pytest.raises(ValueError, match=r"surfels.gloss must be of 24 surfels, got 3"):
+        replace(surfels, gloss=Gloss(torch.zeros(3, 3), torch.ones(3)))
+    with pytest.raises(ValueError, match=r"gloss.exponents must have shape \(3,\), got \(4,\)"):
+        Gloss(torch.zeros(3, 3), torch.ones(4))
+
+
+@pytest.mark.parametrize(
+    ("reflectance", "exponent", "message"),
+    [(0.6, 2.0, "at most 1, got 1.1"), (-0.1, 2.0, "must not be negative"), (0.3, 0.5, "at least 1, got 0.5")],
+)
+def test_gloss_that_makes_energy_or_has_no_slope_is_refused(reflectance, exponent, message) -> None:
+    gloss = Gloss(torch.full((2, 3), reflectance), torch.full((2,), exponent))
+    with pytest.raises(ValueError, match=message):
+        gloss.check(torch.full((2, 3), 0.5))

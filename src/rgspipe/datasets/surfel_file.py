@@ -1,4 +1,4 @@
-"""Surfels on disk: a safetensors file, with how they compose (Coverage) in its note."""
+"""Surfels on disk: a safetensors file, with how they compose (Coverage) in its note and gloss where there is any."""
 
 from __future__ import annotations
 
@@ -11,10 +11,14 @@ from torch import Tensor
 from rgspipe.datasets.json_file import is_number
 from rgspipe.datasets.tensor_file import load_tensors, save_tensors
 from rgspipe.errors import InputError
-from rgspipe.scene.surfels import Coverage, Surfels
+from rgspipe.scene.gloss import Gloss
+from rgspipe.scene.surfels import Coverage, Surfels, tensor_names
 
 FORMAT = "rgspipe-surfels"
 VERSION = 1
+
+#: Before the names of the tensors of a scene's gloss; a diffuse scene has none.
+GLOSS = "gloss."
 
 MAKE_AGAIN = "Remove it and run the stage that makes it again."
 
@@ -24,7 +28,8 @@ def save_surfels(path: str | Path, surfels: Surfels) -> None:
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     note = {"format": FORMAT, "version": VERSION, "coverage": asdict(surfels.coverage)}
-    save_tensors(path, surfels.tensors(), note)
+    gloss = {} if surfels.gloss is None else {GLOSS + name: part for name, part in surfels.gloss.tensors().items()}
+    save_tensors(path, surfels.tensors() | gloss, note)
 
 
 def load_surfels(path: str | Path) -> Surfels:
@@ -32,7 +37,7 @@ def load_surfels(path: str | Path) -> Surfels:
 
     Raises:
         InputError: no such file, not safetensors, truncated, another version, or tensors that are missing,
-            of a wrong shape or type, or not finite.
+            of a wrong shape or type, not finite, or gloss that makes energy.
     """
     path = Path(path)
     if not path.is_file():
@@ -40,14 +45,25 @@ def load_surfels(path: str | Path) -> Surfels:
     tensors, note = load_tensors(path)
     coverage = _coverage(path, note)
     _check_tensors(path, tensors)
+    own = {name: tensor for name, tensor in tensors.items() if not name.startswith(GLOSS)}
     try:
-        return Surfels(**tensors, coverage=coverage)
-    except ValueError as error:  # a wrong shape
+        surfels = Surfels(**own, coverage=coverage, gloss=_gloss(tensors))
+        if surfels.gloss is not None:
+            surfels.gloss.check(surfels.albedo)
+    except ValueError as error:  # a wrong shape, or gloss out of range
         raise InputError(path, expected="surfels", found=str(error), remedy=MAKE_AGAIN) from error
+    return surfels
+
+
+def _gloss(tensors: dict[str, Tensor]) -> Gloss | None:
+    parts = {name.removeprefix(GLOSS): tensor for name, tensor in tensors.items() if name.startswith(GLOSS)}
+    return Gloss(**parts) if parts else None
 
 
 def _check_tensors(path: Path, tensors: dict[str, Tensor]) -> None:
-    names = {field.name for field in fields(Surfels)} - {"coverage"}
+    names = set(tensor_names())
+    if any(name.startswith(GLOSS) for name in tensors):
+        names |= {GLOSS + field.name for field in fields(Gloss)}
     if set(tensors) != names:
         listed = ", ".join(sorted(tensors)) or "none"
         raise InputError(path, expected=f"the tensors {', '.join(sorted(names))}", found=listed, remedy=MAKE_AGAIN)

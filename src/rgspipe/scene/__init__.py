@@ -1,7 +1,19 @@
 """Plain data: cameras, surfels and lights. Nothing here reads a file or renders."""
 
 from rgspipe.scene.camera import Camera, look_at
+from rgspipe.scene.gloss import Gloss
 from rgspipe.scene.lights import Light, LightRig, PointLight, SpotLight
 from rgspipe.scene.surfels import NO_CLIP, Coverage, Surfels
 
-__all__ = ["NO_CLIP", "Camera", "Coverage", "Light", "LightRig", "PointLight", "SpotLight", "Surfels", "look_at"]
+__all__ = [
+    "NO_CLIP",
+    "Camera",
+    "Coverage",
+    "Gloss",
+    "Light",
+    "LightRig",
+    "PointLight",
+    "SpotLight",
+    "Surfels",
+    "look_at",
+]

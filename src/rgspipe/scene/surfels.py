@@ -7,6 +7,8 @@ from dataclasses import dataclass, fields, replace
 import torch
 from torch import Tensor
 
+from rgspipe.scene.gloss import Gloss
+
 #: A clip offset that never clips (in units of the softness it is far beyond any surfel's footprint).
 NO_CLIP = 1e3
 
@@ -59,6 +61,7 @@ class Surfels:
         clip_offsets: (N, 2) distance b of the edges from the centre, scene units; NO_CLIP for none.
         clip_angles: (N, 2) direction φ of the edges' outward normals in the (u, v) plane, rad.
         coverage: how surfels compose to surfaces; belongs to the scene, as it was trained with it.
+        gloss: what they reflect besides, or None if all of them are diffuse.
     """
 
     centers: Tensor
@@ -69,6 +72,7 @@ class Surfels:
     clip_offsets: Tensor
     clip_angles: Tensor
     coverage: Coverage
+    gloss: Gloss | None = None
 
     def __post_init__(self) -> None:
         count = self.centers.shape[0]
@@ -78,6 +82,8 @@ class Surfels:
             found = tuple(getattr(self, name).shape)
             if found != shape:
                 raise ValueError(f"surfels.{name} must have shape {shape}, got {found}")
+        if self.gloss is not None and len(self.gloss) != count:
+            raise ValueError(f"surfels.gloss must be of {count} surfels, got {len(self.gloss)}")
 
     def __len__(self) -> int:
         return self.centers.shape[0]
@@ -94,11 +100,17 @@ class Surfels:
 
     def to(self, *args: torch.dtype | torch.device | str) -> Surfels:
         """A copy with every tensor moved by `Tensor.to`."""
-        return replace(self, **{name: tensor.to(*args) for name, tensor in self.tensors().items()})
+        moved = {name: tensor.to(*args) for name, tensor in self.tensors().items()}
+        return replace(self, **moved, gloss=None if self.gloss is None else self.gloss.to(*args))
 
     def tensors(self) -> dict[str, Tensor]:
-        """The tensors by name, as they are stored."""
-        return {field.name: getattr(self, field.name) for field in fields(self) if field.name != "coverage"}
+        """The surfels' own tensors by name, as they are stored; those of `gloss` are its own."""
+        return {name: getattr(self, name) for name in tensor_names()}
+
+
+def tensor_names() -> list[str]:
+    """Names of the surfels' own tensors."""
+    return [field.name for field in fields(Surfels) if field.name not in ("coverage", "gloss")]
 
 
 def quaternion_to_axes(quaternions: Tensor) -> Tensor:
