@@ -69,7 +69,8 @@ def _transmittance(
     clear = float(1.0)
     log_derivative = wp.vec3(0.0, 0.0, 0.0)
     if wp.dot(path, ni) < 0.0 and distance > 0.0:
-        query = wp.bvh_query_ray(bvh, light, path / distance)
+        # From the receiver: the light may be so far away that rounding there is larger than the scene.
+        query = wp.bvh_query_ray(bvh, s.center[i], -path / distance)
         j = int(0)
         while wp.bvh_query_next(query, j, distance):
             nj = s.normal[j]
@@ -79,17 +80,20 @@ def _transmittance(
                 and wp.abs(wp.dot(s.center[j] - s.center[i], ni)) < COPLANAR_OFFSET * s.scale[i]
             )
             if wp.abs(facing) > 1.0e-6 * distance and not coplanar:
+                # Where the ray meets the plane: shares of the way from the light, and back from the receiver.
+                # Each is exact at its own end, and the two are not one minus the other in float32.
                 t = wp.dot(s.center[j] - light, nj) / facing
-                fade = wp.min((1.0 - t) * distance / s.scale[i] - RECEIVER_SKIP, RECEIVER_FADE) / RECEIVER_FADE
+                back = wp.dot(s.center[i] - s.center[j], nj) / facing
+                fade = wp.min(back * distance / s.scale[i] - RECEIVER_SKIP, RECEIVER_FADE) / RECEIVER_FADE
                 if t > 0.0 and fade > 0.0:
-                    x = light + t * path - s.center[j]
+                    x = s.center[i] - s.center[j] - back * path
                     alpha = surfel_alpha(s, j, x)
                     if alpha > minimum_alpha:
                         slope = alpha * fade * opacity_slope(s, j, x)
-                        # The ray's meeting point moves by (1 − t)·dl along the plane, corrected to stay on it.
-                        change = (1.0 - t) * (slope - nj * (wp.dot(slope, path) / facing))
+                        # The ray's meeting point moves by back·dl along the plane, corrected to stay on it.
+                        change = back * (slope - nj * (wp.dot(slope, path) / facing))
                         if fade < 1.0:
-                            change -= (alpha * (1.0 - t) / (s.scale[i] * RECEIVER_FADE)) * (
+                            change -= (alpha * back / (s.scale[i] * RECEIVER_FADE)) * (
                                 nj * (distance / facing) - path / distance
                             )
                         clear = clear * (1.0 - alpha * fade)
