@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 import torch
 
@@ -19,6 +21,7 @@ from rgspipe.datasets.frozen_file import (
 from rgspipe.datasets.tensor_file import load_tensors, save_tensors
 from rgspipe.errors import InputError
 from rgspipe.fitting import build_dictionary
+from rgspipe.renderer.transport import with_bounces
 from rgspipe.scene import PointLight
 
 
@@ -35,12 +38,26 @@ def folder(scene, tmp_path):
 
 
 def test_a_scene_renders_the_same_after_the_round_trip(scene, folder):
-    loaded = load_frozen(folder.joinpath)
+    loaded = load_frozen(folder.joinpath, gather=True)
     light = PointLight(torch.tensor(VISIBLE), torch.ones(3))
     camera = room_cameras(24)[0]
     assert torch.equal(loaded.render(loaded.view(camera), (light,)), scene.render(scene.view(camera), (light,)))
     assert torch.equal(loaded.areas, scene.areas)
     assert torch.equal(loaded.gather.matrix.values(), scene.gather.matrix.values())
+
+
+def test_a_fit_does_not_need_the_gather(scene, folder):
+    (folder / GATHER).unlink()
+    loaded, light = load_frozen(folder.joinpath), (PointLight(torch.tensor(VISIBLE), torch.ones(3)),)
+    assert loaded.gather is None
+    assert torch.equal(loaded.radiance_of(light), scene.radiance_of(light))
+    with pytest.raises(ValueError, match="gather=True"):
+        loaded.with_solver("gather")
+
+
+def test_a_scene_with_few_bounces_is_not_stored(scene, tmp_path):
+    with pytest.raises(ValueError, match="all bounces"):
+        save_frozen(tmp_path, replace(scene, transport=with_bounces(scene.transport, 2)))
 
 
 def test_a_dictionary_is_the_same_after_the_round_trip(scene, folder):
@@ -65,19 +82,19 @@ def test_a_damaged_file_is_refused_by_name(folder, name, damage):
     else:
         path.write_bytes(path.read_bytes()[:100])
     with pytest.raises(InputError, match=name):
-        load_frozen(folder.joinpath)
+        load_frozen(folder.joinpath, gather=True)
 
 
 @pytest.mark.parametrize(
     ("name", "tensor"),
-    [(GATHER, "areas"), (TRANSPORT, "inverse"), (TRANSPORT, "average.shape"), (GATHER, "gather.shape")],
+    [(TRANSPORT, "areas"), (TRANSPORT, "inverse"), (TRANSPORT, "average.shape"), (GATHER, "gather.shape")],
 )
 def test_operators_of_another_scene_are_refused(folder, name, tensor):
     tensors, note = load_tensors(folder / name)
     tensors[tensor] = tensors[tensor][:-1].clone() if not tensor.endswith("shape") else tensors[tensor] + 1
     save_tensors(folder / name, tensors, note)
     with pytest.raises(InputError, match=name):
-        load_frozen(folder.joinpath)
+        load_frozen(folder.joinpath, gather=True)
 
 
 def test_a_missing_tensor_and_another_dictionary_are_refused(scene, folder):

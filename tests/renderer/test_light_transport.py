@@ -12,7 +12,7 @@ from rgspipe.renderer.direct import differentiable_irradiance, geometry_factor, 
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.gather import build_gather
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
-from rgspipe.renderer.transport import solve_radiosity
+from rgspipe.renderer.radiosity import solve_radiosity
 from rgspipe.scene import PointLight
 from rooms import closed_box, rectangle, sphere, surfels_on
 

@@ -88,7 +88,7 @@ def test_blender_s_profile_has_its_blend() -> None:
     middle = math.acos(edge + 0.5 * blend * (1.0 - edge))
     angles = torch.tensor([0.0, middle, cone, cone + 0.1], dtype=torch.float64)
     expected = torch.tensor([1.0, 0.5, 0.0, 0.0], dtype=torch.float64)
-    torch.testing.assert_close(spot_profile("smoothstep", angles, cone, blend), expected, atol=1e-12, rtol=0)
+    torch.testing.assert_close(spot_profile("smoothstep", angles, cone, blend)[0], expected, atol=1e-12, rtol=0)
 
 
 def test_a_spot_of_half_turn_lights_like_a_point_light() -> None:

@@ -26,39 +26,50 @@ MAKE_AGAIN = "Remove it and run the stage freeze again."
 
 
 def save_frozen(folder: Path, frozen: FrozenScene) -> None:
-    """Write surfels, gather operator (with the surfels' areas) and patch transport into `folder`."""
+    """Write surfels, patch transport (with the surfels' areas) and, where the scene has it, the gather operator.
+
+    Raises:
+        ValueError: the transport has a limited number of bounces: what is stored is the scene with all of them.
+    """
     transport = frozen.transport
+    if transport.bounces is not None:
+        raise ValueError(f"a frozen scene is stored with all bounces, got {transport.bounces}")
     save_surfels(folder / SURFELS, frozen.surfels)
-    save_tensors(folder / GATHER, frozen.gather.tensors("gather") | {"areas": frozen.areas})
+    if frozen.gather is not None:
+        save_tensors(folder / GATHER, frozen.gather.tensors("gather"))
     operators = transport.average.tensors("average") | transport.gather.tensors("gather")
-    save_tensors(folder / TRANSPORT, operators | {"inverse": transport.inverse})
+    save_tensors(folder / TRANSPORT, operators | {"inverse": transport.inverse, "areas": frozen.areas})
 
 
-def load_frozen(locate: Callable[[str], Path]) -> FrozenScene:
+def load_frozen(locate: Callable[[str], Path], *, gather: bool = False) -> FrozenScene:
     """The scene that `save_frozen` wrote, on the CPU.
 
     Args:
         locate: gives the path of a file by its name, e.g. `folder.joinpath` or an artifact's `file`.
+        gather: whether the gather operator is loaded, too, which is most of the bytes; fits work on the patches.
 
     Raises:
         InputError: a file is missing, broken, or does not belong to the others.
     """
     surfels = load_surfels(locate(SURFELS))
-    count = len(surfels)
-    path = locate(GATHER)
-    tensors = _load(path, {"areas"}, ("gather",))
-    areas, gather = tensors["areas"], _operator(path, tensors, "gather", (count, count))
-    _require(path, "areas", areas.shape, (count,))
-    return FrozenScene(surfels, areas, gather, _load_transport(locate(TRANSPORT), surfels.albedo.float()))
+    areas, transport = _load_transport(locate(TRANSPORT), surfels.albedo.float())
+    operator = _load_gather(locate(GATHER), len(surfels)) if gather else None
+    return FrozenScene(surfels, areas, operator, transport)
 
 
-def _load_transport(path: Path, albedo: Tensor) -> PatchTransport:
-    tensors = _load(path, {"inverse"}, ("average", "gather"))
-    inverse = tensors["inverse"]
+def _load_gather(path: Path, count: int) -> SparseOperator:
+    return _operator(path, _load(path, set(), ("gather",)), "gather", (count, count))
+
+
+def _load_transport(path: Path, albedo: Tensor) -> tuple[Tensor, PatchTransport]:
+    """Areas and patch transport."""
+    tensors = _load(path, {"inverse", "areas"}, ("average", "gather"))
+    areas, inverse = tensors["areas"], tensors["inverse"]
     count, patches = len(albedo), inverse.shape[-1]
+    _require(path, "areas", areas.shape, (count,))
     _require(path, "inverse", inverse.shape, (3, patches, patches))
     average = _operator(path, tensors, "average", (patches, count))
-    return PatchTransport(average, _operator(path, tensors, "gather", (count, patches)), inverse, albedo)
+    return areas, PatchTransport(average, _operator(path, tensors, "gather", (count, patches)), inverse, albedo)
 
 
 def save_dictionary(path: Path, dictionary: LightDictionary) -> None:

@@ -3,23 +3,41 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Literal, Protocol
 
 import torch
 from torch import Tensor
 
 from rgspipe.renderer.areas import surfel_areas
-from rgspipe.renderer.direct import differentiable_irradiance, unit_irradiance
+from rgspipe.renderer.clusters import cluster_patches
+from rgspipe.renderer.direct import unit_irradiance
 from rgspipe.renderer.gather import build_gather
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
+from rgspipe.renderer.monte_carlo import MonteCarloSolver
+from rgspipe.renderer.radiosity import GatherSolver
+from rgspipe.renderer.rig import Rig, rig_irradiance
 from rgspipe.renderer.sparse import SparseOperator
-from rgspipe.renderer.spot import spot_share
-from rgspipe.renderer.transport import PatchTransport, build_patch_transport, cluster_patches
+from rgspipe.renderer.transport import PatchTransport, build_patch_transport, with_bounces
 from rgspipe.renderer.view_weights import ViewWeights, build_view_weights
 from rgspipe.scene.camera import Camera
-from rgspipe.scene.lights import LightRig, SpotLight
+from rgspipe.scene.lights import LightRig
 from rgspipe.scene.surfels import Surfels
+
+
+Solver = Literal["patches", "gather", "monte_carlo"]
+
+#: Bounces of Monte Carlo where no number is given: what is left after four is 6 % of the light at albedo 0.5.
+MONTE_CARLO_BOUNCES = 4
+
+
+class IndirectSolver(Protocol):
+    """A way from direct light to the light that bounces."""
+
+    def indirect(self, direct: Tensor) -> Tensor:
+        """(N, 3, K) indirect part of the radiosity for K lightings with direct radiosity (N, 3, K)."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -29,14 +47,17 @@ class FrozenScene:
     Attributes:
         surfels: N surfels, float32.
         areas: (N,) surface that each stands for, scene units².
-        gather: (N, N) which surfels each surfel sees.
-        transport: all bounces, averaged over patches.
+        gather: (N, N) which surfels each surfel sees; None where a scene was loaded without it, as a fit needs only
+            the patches.
+        transport: bounces, averaged over patches.
+        solver: how indirect light is found; None for `transport`. See `with_solver`.
     """
 
     surfels: Surfels
     areas: Tensor
-    gather: SparseOperator
+    gather: SparseOperator | None
     transport: PatchTransport
+    solver: IndirectSolver | None = None
 
     @classmethod
     def freeze(cls, surfels: Surfels, *, gather_rays: int, patches: int, seed: int) -> FrozenScene:
@@ -73,24 +94,54 @@ class FrozenScene:
         """Irradiance (L, N) of unit point lights at (L, 3) and its derivative (L, N, 3)."""
         return unit_irradiance(self.bvh, positions, shadows)
 
+    def with_solver(
+        self, solver: Solver, *, bounces: int | None = None, samples: int = 64, seed: int = 0
+    ) -> FrozenScene:
+        """The same scene with another way to find indirect light.
+
+        Args:
+            solver: `patches`, the default, one small product; `gather`, the full operator bounce by bounce;
+                `monte_carlo`, the published method: fresh random rays at every evaluation.
+            bounces: how many; None for all of them, of Monte Carlo for MONTE_CARLO_BOUNCES.
+            samples: rays a surfel and bounce of Monte Carlo.
+            seed: of its rays.
+
+        Raises:
+            ValueError: the solver has another name, or needs the gather operator and the scene was loaded without it.
+        """
+        return replace(self, solver=self._solver(solver, bounces, samples, seed))
+
+    def _solver(self, solver: Solver, bounces: int | None, samples: int, seed: int) -> IndirectSolver:
+        if solver == "patches":
+            same = bounces == self.transport.bounces
+            return self.transport if same else with_bounces(self.transport, bounces)
+        if solver == "gather":
+            if self.gather is None:
+                raise ValueError("solver gather needs the gather operator: load the scene with gather=True")
+            return GatherSolver(self.gather, self.surfels.albedo, bounces)
+        if solver == "monte_carlo":
+            bounces = MONTE_CARLO_BOUNCES if bounces is None else bounces
+            return MonteCarloSolver(self.bvh, samples, bounces, torch.Generator().manual_seed(seed))
+        raise ValueError(f"solver must be patches, gather or monte_carlo, got {solver!r}")
+
+    def indirect(self, direct: Tensor) -> Tensor:
+        """(N, 3, K) indirect part of the radiosity for K lightings with direct radiosity (N, 3, K)."""
+        return (self.solver or self.transport).indirect(direct)
+
     def radiance(self, irradiance: Tensor, indirect: bool = True) -> Tensor:
         """Outgoing radiance (N, 3, K) for K direct irradiances (N, K), grey; linear and differentiable."""
         direct = self.surfels.albedo[:, :, None] * (irradiance / math.pi)[:, None, :]
-        return direct + self.transport.indirect(direct) if indirect else direct
+        return direct + self.indirect(direct) if indirect else direct
 
-    def radiance_of(self, rig: LightRig, indirect: bool = True) -> Tensor:
-        """Outgoing radiance (N, 3) under a rig of point and spot lights."""
-        positions = torch.stack([light.position for light in rig]).to(self.surfels.centers)
-        intensity = torch.stack([light.intensity for light in rig]).to(self.surfels.centers)
-        irradiance = differentiable_irradiance(self.bvh, positions)
-        shares = [
-            spot_share(light, self.surfels.centers, position) if isinstance(light, SpotLight) else None
-            for light, position in zip(rig, positions, strict=True)
-        ]
-        lit = torch.stack([e if s is None else e * s for e, s in zip(irradiance, shares, strict=True)])
-        # Channels are independent: intensity scales each light's radiance channel by channel.
-        return torch.einsum("nck,kc->nc", self.radiance(lit.T, indirect), intensity)
+    def radiance_of(self, rig: LightRig | Rig, indirect: bool = True, shadows: bool = True) -> Tensor:
+        """Outgoing radiance (N, 3) under a rig of point and spot lights, differentiable towards its tensors.
 
-    def render(self, view: ViewWeights, rig: LightRig, indirect: bool = True) -> Tensor:
+        The lights are added up before their light bounces, so a rig costs as many bounces as one light.
+        """
+        rig = rig if isinstance(rig, Rig) else Rig.of(rig)
+        direct = self.surfels.albedo * (rig_irradiance(self.bvh, rig, shadows) / math.pi)
+        return direct + self.indirect(direct[:, :, None])[:, :, 0] if indirect else direct
+
+    def render(self, view: ViewWeights, rig: LightRig | Rig, indirect: bool = True, shadows: bool = True) -> Tensor:
         """(height, width, 3) image of the scene under `rig`."""
-        return view.image(self.radiance_of(rig, indirect))
+        return view.image(self.radiance_of(rig, indirect, shadows))

@@ -16,7 +16,7 @@ from rgspipe.fitting.views import prepare_views
 from rgspipe.machine import machine
 from rgspipe.renderer.direct import differentiable_irradiance
 from rgspipe.renderer.frozen import FrozenScene
-from rgspipe.renderer.transport import solve_radiosity
+from rgspipe.renderer.radiosity import solve_radiosity
 from rgspipe.renderer.view_weights import ViewWeights
 from rgspipe.scene import Camera, look_at
 from rgspipe.stages.base import Stage, StageContext
@@ -27,7 +27,7 @@ DIFFERENCE_STEP = 1e-3
 
 def run(context: StageContext) -> None:
     """Write benchmark.csv and benchmark.json, and print the table."""
-    frozen = load_frozen(context.inputs["freeze"].file)
+    frozen = load_frozen(context.inputs["freeze"].file, gather=True)
     repetitions, load = context.config.benchmark.repetitions, load_average()
     timings = time_steps(frozen, repetitions)
     table = pd.DataFrame([asdict(timing) for timing in timings])
