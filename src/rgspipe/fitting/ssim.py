@@ -14,6 +14,9 @@ WINDOW, SIGMA = 11, 1.5
 #: Stabilising constants (K₁L)² and (K₂L)² for a dynamic range L of 1, as in splatting losses.
 C1, C2 = 0.01**2, 0.03**2
 
+#: Keeps black areas of images that are 1e13 bright from dividing nothing by nothing.
+LEAST_CONSTANT = 1e-30
+
 
 def ssim_map(image: Tensor, target: Tensor) -> Tensor:
     """(H, W, C) structural similarity at every pixel; outside the images is black.
@@ -25,14 +28,16 @@ def ssim_map(image: Tensor, target: Tensor) -> Tensor:
         raise ValueError(
             f"ssim needs two images of shape (H, W, C), got {tuple(image.shape)} and {tuple(target.shape)}"
         )
-    x, y = image.permute(2, 0, 1)[:, None], target.permute(2, 0, 1)[:, None]
+    # In units of the brightest value where that is above 1: squares of very bright images would leave float32.
+    unit = torch.maximum(image.detach().abs().amax(), target.detach().abs().amax()).clamp(min=1.0)
+    c1, c2 = ((c / unit / unit).clamp(min=LEAST_CONSTANT) for c in (C1, C2))
+    x, y = (values.permute(2, 0, 1)[:, None] / unit for values in (image, target))
     mean_x, mean_y, square_x, square_y, product = _Blur.apply(torch.cat([x, y, x * x, y * y, x * y])).chunk(5)
     # Differences of near squares: rounding may leave less than nothing, or more covariance than there is variance.
     spread = (square_x - mean_x * mean_x).clamp(min=0.0) + (square_y - mean_y * mean_y).clamp(min=0.0)
     covariance = torch.minimum(torch.maximum(product - mean_x * mean_y, -0.5 * spread), 0.5 * spread)
-    # Two fractions, each at most 1: their numerators' product would leave float32 in very bright images.
-    luminance = (2.0 * mean_x * mean_y + C1) / (mean_x * mean_x + mean_y * mean_y + C1)
-    structure = (2.0 * covariance + C2) / (spread + C2)
+    luminance = (2.0 * mean_x * mean_y + c1) / (mean_x * mean_x + mean_y * mean_y + c1)
+    structure = (2.0 * covariance + c2) / (spread + c2)
     return (luminance * structure)[:, 0].permute(1, 2, 0)
 
 
