@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
 import scipy.sparse
 import torch
 from torch import Tensor
 
 from rgspipe.renderer.kernels.composite import Hits
+from rgspipe.renderer.kernels.rows import compress
 
 #: A ray that is stopped by more than this meets a surface, and the share that leaks past it is noise of the
 #: representation; one that is stopped by less really sees past an edge.
@@ -23,11 +23,5 @@ def normalised_weights(hits: Hits) -> Tensor:
 
 def rows_from_hits(hits: Hits, weights: Tensor, rays_per_row: int, columns: int) -> scipy.sparse.csr_matrix:
     """(R / rays_per_row, columns) matrix; each row is the mean of `rays_per_row` successive rays."""
-    kept = (hits.indices >= 0).cpu().numpy()
-    counts = kept.sum(axis=1).reshape(-1, rays_per_row).sum(axis=1)
-    starts = np.concatenate([[0], np.cumsum(counts)])
-    indices = hits.indices.cpu().numpy()[kept]
-    values = weights.cpu().numpy()[kept] / np.float32(rays_per_row)
-    matrix = scipy.sparse.csr_matrix((values, indices, starts), shape=(len(counts), columns))
-    matrix.sum_duplicates()
-    return matrix
+    starts, indices, values = (part.cpu().numpy() for part in compress(hits, weights, rays_per_row))
+    return scipy.sparse.csr_matrix((values, indices, starts), shape=(len(starts) - 1, columns))

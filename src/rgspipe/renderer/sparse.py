@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -23,17 +24,27 @@ class _Product(torch.autograd.Function):
 
 
 class SparseOperator:
-    """A constant float32 matrix in compressed rows, kept beside its transpose.
+    """A constant float32 matrix in compressed rows; its transpose is made when it is first asked for, and kept.
 
-    Both orders are stored because a product that scatters cannot use all cores.
+    A product that scatters cannot use all cores, so transposed products have rows of their own. Operators that
+    are only ever applied forwards do not pay for them, neither time nor memory.
+
+    Args:
+        matrix: (rows, columns) float32 tensor in compressed rows with int32 indices, 8 bytes an entry; columns of
+            a row in any order.
     """
 
-    def __init__(self, matrix: Tensor, transposed: Tensor) -> None:
-        self.matrix, self.transposed = matrix, transposed
+    def __init__(self, matrix: Tensor) -> None:
+        self.matrix = matrix
 
     @classmethod
     def from_scipy(cls, matrix: scipy.sparse.csr_matrix, device: torch.device | str = "cpu") -> SparseOperator:
-        return cls(_to_torch(matrix.tocsr(), device), _to_torch(matrix.T.tocsr(), device))
+        return cls(_to_torch(matrix.tocsr(), device))
+
+    @cached_property
+    def transposed(self) -> Tensor:
+        """(columns, rows) the transpose in compressed rows."""
+        return _to_torch(self.to_scipy().T.tocsr(), self.matrix.device)
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -41,7 +52,7 @@ class SparseOperator:
 
     @property
     def entries(self) -> int:
-        """Stored values."""
+        """Stored values, those of the transpose not counted."""
         return self.matrix.values().numel()
 
     def __matmul__(self, operand: Tensor) -> Tensor:
@@ -81,8 +92,8 @@ def stack(operators: list[SparseOperator]) -> SparseOperator:
 
 
 def _to_torch(matrix: scipy.sparse.csr_matrix, device: torch.device | str) -> Tensor:
-    parts = (matrix.indptr.astype(np.int32), matrix.indices.astype(np.int32), matrix.data.astype(np.float32))
-    rows, columns, values = (torch.from_numpy(part).to(device) for part in parts)
+    kinds = (matrix.indptr, np.int32), (matrix.indices, np.int32), (matrix.data, np.float32)
+    rows, columns, values = (torch.from_numpy(part.astype(kind, copy=False)).to(device) for part, kind in kinds)
     with warnings.catch_warnings():
         # torch announces at the first use that its compressed rows are in beta; the products used here are stable.
         warnings.filterwarnings("ignore", message="Sparse CSR tensor support is in beta")

@@ -45,12 +45,15 @@ class Camera:
     def pixel_count(self) -> int:
         return self.width * self.height
 
-    def rays(self, pixels: Tensor | None = None, subsamples: int = 1) -> tuple[Tensor, Tensor, Tensor]:
-        """Rays through a regular `subsamples × subsamples` grid in each pixel.
+    def rays(
+        self, pixels: Tensor | None = None, subsamples: int = 1, places: Tensor | None = None
+    ) -> tuple[Tensor, Tensor, Tensor]:
+        """Rays through a regular `subsamples × subsamples` grid in each pixel, or through given places in it.
 
         Args:
             pixels: (P,) int64 flat indices, row · width + column; all pixels in order if None.
             subsamples: grid size per pixel; 1 is the pixel centre.
+            places: (s², 2) float64 columns and rows within the pixel, in [0, 1], instead of the grid.
 
         Returns:
             origins (P·s², 3), unit directions (P·s², 3), and the length along a ray per unit of planar
@@ -59,10 +62,12 @@ class Camera:
         """
         if pixels is None:
             pixels = torch.arange(self.pixel_count)
-        step = (torch.arange(subsamples, dtype=torch.float64) + 0.5) / subsamples
-        sub_y, sub_x = torch.meshgrid(step, step, indexing="ij")
-        column = (pixels % self.width)[:, None] + sub_x.reshape(1, -1)
-        row = torch.div(pixels, self.width, rounding_mode="floor")[:, None] + sub_y.reshape(1, -1)
+        if places is None:
+            step = (torch.arange(subsamples, dtype=torch.float64) + 0.5) / subsamples
+            sub_y, sub_x = torch.meshgrid(step, step, indexing="ij")
+            places = torch.stack([sub_x.reshape(-1), sub_y.reshape(-1)], dim=1)
+        column = (pixels % self.width)[:, None] + places[:, 0]
+        row = torch.div(pixels, self.width, rounding_mode="floor")[:, None] + places[:, 1]
         local = torch.stack(
             [(column - self.cx) / self.fx, -(row - self.cy) / self.fy, -torch.ones_like(column)], dim=-1
         ).reshape(-1, 3)
