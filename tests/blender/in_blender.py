@@ -11,7 +11,7 @@ import torch
 
 from rgspipe.blender import blend, cornell
 from rgspipe.blender.geometry import FreeSpace, scene_geometry
-from rgspipe.blender.job import CornellParameters, DatasetJob
+from rgspipe.blender.job import CornellParameters, RenderSettings
 from rgspipe.blender.passes import Studio
 from rgspipe.blender.plan import Frame
 from rgspipe.scene import Camera, PointLight, look_at
@@ -36,7 +36,7 @@ def plane(folder: Path) -> None:
     """A diffuse plane under a coloured light: from above, again, and from below with the light below."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     _quad(bpy.context.scene, 4.0, 0.0, (0.2, 0.5, 0.8))
-    studio = Studio(bpy.context.scene, DatasetJob(resolution=16, samples=2048, denoise=False), folder)
+    studio = Studio(bpy.context.scene, RenderSettings(16, 2048, denoise=False, max_bounces=12), folder)
     studio.render(_frame("above", (0.5, -1.0, 1.5), 0.9, seed=1), folder)
     studio.render(_frame("below", (0.5, -1.0, -1.5), -0.9, seed=2), folder)
     studio.render(_frame("again", (0.5, -1.0, 1.5), 0.9, seed=1), folder)

@@ -1,4 +1,4 @@
-"""The bpy side: `python -m rgspipe.blender JOB.json FOLDER PARENT` renders a dataset into FOLDER."""
+"""The bpy side: `python -m rgspipe.blender dataset|room JOB.json FOLDER PARENT` renders images into FOLDER."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from pathlib import Path
 
 from rgspipe.blender.job import DatasetJob
 from rgspipe.blender.process import MESSAGE_PREFIX
+from rgspipe.blender.room_job import RoomJob
 from rgspipe.errors import InputError
 
 #: Linux: prctl option by which a process is killed when its parent dies.
@@ -21,11 +22,15 @@ PR_SET_PDEATHSIG = 1
 
 def main() -> int:
     """Render; report progress, or what is wrong with the input, to the parent."""
-    job_path, folder, parent = Path(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[3])
+    kind, job_path, folder, parent = sys.argv[1], Path(sys.argv[2]), Path(sys.argv[3]), int(sys.argv[4])
     logging.basicConfig(level=logging.INFO, format="%(message)s")
     die_with(parent)
     try:
-        render_all(DatasetJob.from_json(json.loads(job_path.read_text(encoding="utf-8"))), folder, parent)
+        content = json.loads(job_path.read_text(encoding="utf-8"))
+        if kind == "dataset":
+            render_dataset(DatasetJob.from_json(content), folder, parent)
+        else:
+            render_room(RoomJob.from_json(content), folder, parent)
     except InputError as error:
         parts = {"where": error.where, "expected": error.expected, "found": error.found, "remedy": error.remedy}
         tell(input_error=parts)
@@ -33,7 +38,7 @@ def main() -> int:
     return 0
 
 
-def render_all(job: DatasetJob, folder: Path, parent: int) -> None:
+def render_dataset(job: DatasetJob, folder: Path, parent: int) -> None:
     """Write the dataset's JSON files, then render every frame that is missing in `folder`."""
     from rgspipe.blender.passes import Studio, is_whole
     from rgspipe.blender.plan import make_plan
@@ -45,15 +50,44 @@ def render_all(job: DatasetJob, folder: Path, parent: int) -> None:
     write_dataset_files(job, plan, prepared, folder)
     missing = [frame for frame in plan.frames if not is_whole(frame, folder)]
     tell(total=len(plan.frames), done=len(plan.frames) - len(missing))
-    scratch = folder / ".scratch"
-    scratch.mkdir(parents=True, exist_ok=True)
-    studio = Studio(prepared.scene, job, scratch)
+    scratch = make_scratch(folder)
+    studio = Studio(prepared.scene, job.settings, scratch)
     for frame in missing:
-        if os.getppid() != parent:
-            sys.exit("The process that asked for these images is gone.")
+        stop_without(parent)
         studio.render(frame, folder)
         tell(frame=frame.name)
     shutil.rmtree(scratch)
+
+
+def render_room(job: RoomJob, folder: Path, parent: int) -> None:
+    """Render every image of a room that is missing in `folder`."""
+    from rgspipe.blender.passes import Studio
+    from rgspipe.blender.room import build_room, is_whole, write_frame
+
+    missing = [frame for frame in job.frames() if not is_whole(frame, folder)]
+    tell(total=len(job.frames()), done=len(job.frames()) - len(missing))
+    scratch = make_scratch(folder)
+    for kind in job.settings:
+        frames = [frame for frame in missing if frame.kind == kind]
+        studio = Studio(build_room(job), job.settings[kind], scratch)
+        for frame in frames:
+            stop_without(parent)
+            write_frame(studio, frame, folder)
+            tell(frame=frame.name)
+    shutil.rmtree(scratch)
+
+
+def make_scratch(folder: Path) -> Path:
+    """A folder for Blender's own output."""
+    scratch = folder / ".scratch"
+    scratch.mkdir(parents=True, exist_ok=True)
+    return scratch
+
+
+def stop_without(parent: int) -> None:
+    """End when the process that wants the images has."""
+    if os.getppid() != parent:
+        sys.exit("The process that asked for these images is gone.")
 
 
 def tell(**message: object) -> None:
@@ -65,8 +99,7 @@ def die_with(parent: int) -> None:
     """Have this process killed when its parent dies, so that no orphan goes on writing (Linux)."""
     if sys.platform == "linux":
         ctypes.CDLL(None, use_errno=True).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
-    if os.getppid() != parent:  # it died before the call
-        sys.exit("The process that asked for these images is gone.")
+    stop_without(parent)  # it may have died before the call
 
 
 if __name__ == "__main__":

@@ -6,13 +6,13 @@ import warnings
 
 import bpy
 
-from rgspipe.blender.job import DatasetJob
+from rgspipe.blender.job import RenderSettings
 
 #: Width of the pixel filter [pixels] that makes a single sample fall on the pixel's centre.
 CENTER_FILTER_WIDTH = 0.01
 
 
-def configure(scene: bpy.types.Scene, job: DatasetJob) -> None:
+def configure(scene: bpy.types.Scene, settings: RenderSettings) -> None:
     """Set everything that decides what a rendered number means; what Blender would otherwise approximate is off.
 
     By default Cycles stops sampling lights below 0.01 (up to 6 % too dark in dim pixels) and clamps
@@ -22,8 +22,8 @@ def configure(scene: bpy.types.Scene, job: DatasetJob) -> None:
     cycles = scene.cycles
     cycles.device = "CPU"
     for bounces in ("max_bounces", "diffuse_bounces", "glossy_bounces", "transmission_bounces"):
-        setattr(cycles, bounces, job.max_bounces)
-    cycles.transparent_max_bounces = max(job.max_bounces, 8)
+        setattr(cycles, bounces, settings.max_bounces)
+    cycles.transparent_max_bounces = max(settings.max_bounces, 8)
     cycles.light_sampling_threshold = 0.0
     cycles.sample_clamp_direct = cycles.sample_clamp_indirect = 0.0
     cycles.use_adaptive_sampling = False
@@ -35,15 +35,15 @@ def configure(scene: bpy.types.Scene, job: DatasetJob) -> None:
     cycles.denoising_input_passes = "RGB_ALBEDO_NORMAL"
     cycles.denoising_prefilter = "ACCURATE"
     cycles.denoising_use_gpu = False
-    _configure_output(scene, job)
+    _configure_output(scene, settings)
     _make_world_black(scene)
 
 
-def use_colour_sampling(scene: bpy.types.Scene, job: DatasetJob, seed: int) -> None:
+def use_colour_sampling(scene: bpy.types.Scene, settings: RenderSettings, seed: int) -> None:
     """The mean over each pixel (box filter), many samples."""
     cycles = scene.cycles
-    cycles.samples, cycles.seed = job.samples, seed
-    cycles.use_denoising = job.denoise
+    cycles.samples, cycles.seed = settings.samples, seed
+    cycles.use_denoising = settings.denoise
     cycles.pixel_filter_type = "BOX"
 
 
@@ -56,19 +56,19 @@ def use_center_sampling(scene: bpy.types.Scene) -> None:
     cycles.filter_width = CENTER_FILTER_WIDTH
 
 
-def _configure_output(scene: bpy.types.Scene, job: DatasetJob) -> None:
+def _configure_output(scene: bpy.types.Scene, settings: RenderSettings) -> None:
     render = scene.render
-    render.resolution_x = render.resolution_y = job.resolution
+    render.resolution_x = render.resolution_y = settings.resolution
     render.resolution_percentage = 100
     render.film_transparent = True
     render.use_persistent_data = True
     layer = scene.view_layers[0]
     layer.use_pass_z = layer.use_pass_normal = layer.use_pass_diffuse_color = True
-    settings = render.image_settings
-    settings.media_type = "MULTI_LAYER_IMAGE"
-    settings.file_format = "OPEN_EXR_MULTILAYER"
-    settings.color_depth = "32"
-    settings.exr_codec = "NONE"
+    output = render.image_settings
+    output.media_type = "MULTI_LAYER_IMAGE"
+    output.file_format = "OPEN_EXR_MULTILAYER"
+    output.color_depth = "32"
+    output.exr_codec = "NONE"
 
 
 def _make_world_black(scene: bpy.types.Scene) -> None:

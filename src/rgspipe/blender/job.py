@@ -47,6 +47,23 @@ class CornellParameters:
 
 
 @dataclass(frozen=True)
+class RenderSettings:
+    """What decides the quality of an image.
+
+    Attributes:
+        resolution: width and height, pixels.
+        samples: Cycles samples a pixel.
+        denoise: whether Open Image Denoise runs over the result.
+        max_bounces: bounces of light that Cycles follows; 0 is direct light alone.
+    """
+
+    resolution: int
+    samples: int
+    denoise: bool
+    max_bounces: int
+
+
+@dataclass(frozen=True)
 class DatasetJob:
     """One dataset.
 
@@ -93,6 +110,11 @@ class DatasetJob:
             raise ValueError(f"target_views must be 1, 2 or 3, got {self.target_views}")
         if self.kind == "blend" and not self.blend_path:
             raise ValueError('kind "blend" needs blend_path')
+
+    @property
+    def settings(self) -> RenderSettings:
+        """The quality of its images."""
+        return RenderSettings(self.resolution, self.samples, self.denoise, self.max_bounces)
 
     def to_json(self) -> dict:
         return asdict(self)

@@ -9,7 +9,7 @@ import numpy as np
 from mathutils import Matrix
 
 from rgspipe.blender import cycles
-from rgspipe.blender.job import DatasetJob
+from rgspipe.blender.job import RenderSettings
 from rgspipe.blender.plan import Frame
 from rgspipe.datasets.exr import read_channels, write_channels, write_image
 from rgspipe.errors import InputError
@@ -28,13 +28,13 @@ class Studio:
 
     Args:
         scene: what stands there already; its camera is replaced.
-        job: the settings.
+        settings: the quality of its images.
         scratch: folder for Blender's own output.
     """
 
-    def __init__(self, scene: bpy.types.Scene, job: DatasetJob, scratch: Path) -> None:
-        self._scene, self._job, self._scratch = scene, job, scratch
-        cycles.configure(scene, job)
+    def __init__(self, scene: bpy.types.Scene, settings: RenderSettings, scratch: Path) -> None:
+        self._scene, self._settings, self._scratch = scene, settings, scratch
+        cycles.configure(scene, settings)
         self._camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
         self._camera.data.clip_start, self._camera.data.clip_end = 1e-3, 1e3
         light = bpy.data.lights.new("light", "POINT")
@@ -47,14 +47,17 @@ class Studio:
 
     def render(self, frame: Frame, folder: Path) -> None:
         """Render `frame` and write its files below `folder`, each whole or not at all."""
-        place_camera(self._camera, frame.camera)
-        place_light(self._light, frame.light)
         if frame.has_surfaces:
-            cycles.use_center_sampling(self._scene)
             self._write_surfaces(frame, folder)
-        cycles.use_colour_sampling(self._scene, self._job, frame.seed)
-        image, alpha = self._colour(self._passes())
-        write_image(folder / f"{frame.name}.exr", image, alpha)
+        write_image(folder / f"{frame.name}.exr", *self.radiance(frame.camera, frame.light, frame.seed))
+
+    def radiance(self, camera: Camera, light: PointLight, seed: int) -> tuple[np.ndarray, np.ndarray]:
+        """Mean over each pixel: radiance (H, W, 3) and alpha (H, W)."""
+        place_camera(self._camera, camera)
+        place_light(self._light, light)
+        cycles.use_colour_sampling(self._scene, self._settings, seed)
+        passes = self._passes()
+        return _stack(passes, "Combined", "RGB"), passes["Combined.A"]
 
     def _passes(self) -> dict[str, np.ndarray]:
         """Render, and return all passes by "<pass>.<channel>"."""
@@ -64,10 +67,10 @@ class Studio:
         channels = read_channels(path)
         return {name.split(".", 1)[1]: values for name, values in channels.items()}
 
-    def _colour(self, passes: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-        return _stack(passes, "Combined", "RGB"), passes["Combined.A"]
-
     def _write_surfaces(self, frame: Frame, folder: Path) -> None:
+        place_camera(self._camera, frame.camera)
+        place_light(self._light, frame.light)
+        cycles.use_center_sampling(self._scene)
         passes = self._passes()
         depth = passes["Depth.Z"]
         normal = face_camera(_stack(passes, "Normal", "XYZ"), frame.camera)

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import rgspipe
 from rgspipe.blender.job import DatasetJob
+from rgspipe.blender.room_job import RoomJob
 from rgspipe.datasets.json_file import read_json, write_json
 from rgspipe.errors import InputError
 from rgspipe.progress import track
@@ -35,23 +36,47 @@ def render_dataset(job: DatasetJob, folder: Path) -> None:
         InputError: bpy is not installed, the scene cannot be used, or `folder` holds the images of another job.
         RuntimeError: Blender died; the message ends with the last lines it wrote.
     """
+    remedy = "Install it (pip install 'rgspipe[blender]'), or use scene=external with a dataset from disk."
+    _require_bpy("scene", remedy)
+    _render("dataset", job.to_json(), job.scene, folder)
+
+
+def render_room(job: RoomJob, folder: Path) -> None:
+    """Render the room of `job` into `folder`; images that are already there and whole are kept.
+
+    May be killed at any moment and called again: the result is the same.
+
+    Raises:
+        InputError: bpy is not installed, or `folder` holds the images of another job.
+        RuntimeError: Blender died; the message ends with the last lines it wrote.
+    """
+    _require_bpy("path-traced truth", "Install it: pip install 'rgspipe[blender]'.")
+    _render("room", job.to_json(), job.room, folder)
+
+
+def _require_bpy(where: str, remedy: str) -> None:
     if importlib.util.find_spec("bpy") is None:
         raise InputError(
-            "scene",
+            where,
             expected="Blender's Python module bpy, which renders the images",
             found="none",
-            remedy="Install it (pip install 'rgspipe[blender]'), or use scene=external with a dataset from disk.",
+            remedy=remedy,
         )
+
+
+def _render(kind: str, job: dict, name: str, folder: Path) -> None:
+    """Have a child process render `job` into `folder`, and follow it."""
     folder = Path(folder).resolve()
     folder.mkdir(parents=True, exist_ok=True)
     _claim(job, folder)
-    command = [sys.executable, "-u", "-m", "rgspipe.blender", str(folder / JOB_FILE), str(folder), str(os.getpid())]
+    arguments = [kind, str(folder / JOB_FILE), str(folder), str(os.getpid())]
+    command = [sys.executable, "-u", "-m", "rgspipe.blender", *arguments]
     with subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, text=True,
         errors="replace", env=_environment(),
     ) as child:  # fmt: skip
         try:
-            tail, input_error = _follow(child, job.scene)
+            tail, input_error = _follow(child, name)
         except BaseException:
             child.kill()
             raise
@@ -61,10 +86,10 @@ def render_dataset(job: DatasetJob, folder: Path) -> None:
         raise RuntimeError(f"Blender {_ending(child.returncode)} while rendering {folder}. Its last lines:\n{tail}")
 
 
-def _claim(job: DatasetJob, folder: Path) -> None:
+def _claim(job: dict, folder: Path) -> None:
     """Write the job into its folder, or see that it is the one that is there."""
     path = folder / JOB_FILE
-    wanted = json.loads(json.dumps(job.to_json()))
+    wanted = json.loads(json.dumps(job))
     if not path.exists():
         write_json(path, wanted)
         return

@@ -1,0 +1,48 @@
+"""A room of rectangles in bpy, and its images with their noise."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+
+from rgspipe.blender.cornell import diffuse_material
+from rgspipe.blender.passes import Studio
+from rgspipe.blender.room_job import RoomFrame, RoomJob
+from rgspipe.datasets.exr import read_channels, write_channels
+from rgspipe.errors import InputError
+
+
+def build_room(job: RoomJob) -> bpy.types.Scene:
+    """A new scene that holds the rectangles and nothing else: no light, camera or world."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    for index, (corners, albedo) in enumerate(zip(job.corners, job.albedo, strict=True)):
+        mesh = bpy.data.meshes.new(f"rectangle_{index}")
+        mesh.from_pydata(corners, [], [(0, 1, 2, 3)])
+        mesh.materials.append(diffuse_material(f"rectangle_{index}", tuple(albedo)))
+        scene.collection.objects.link(bpy.data.objects.new(f"rectangle_{index}", mesh))
+    bpy.context.view_layer.update()
+    return scene
+
+
+def write_frame(studio: Studio, frame: RoomFrame, folder: Path) -> None:
+    """Render an image twice and write the mean (R, G, B) and half the difference (noise.R, …).
+
+    Half the difference of two independent halves is as large as the error of their mean.
+    """
+    first, second = (studio.radiance(frame.camera, frame.light, seed)[0] for seed in frame.seeds)
+    mean, noise = 0.5 * (first + second), 0.5 * (first - second)
+    channels = {name: mean[..., index] for index, name in enumerate("RGB")}
+    channels |= {f"noise.{name}": noise[..., index] for index, name in enumerate("RGB")}
+    write_channels(folder / f"{frame.name}.exr", channels)
+
+
+def is_whole(frame: RoomFrame, folder: Path) -> bool:
+    """Whether an image is there and can be read, at the right size."""
+    try:
+        channels = read_channels(folder / f"{frame.name}.exr")
+    except InputError:
+        return False
+    shape = (frame.camera.height, frame.camera.width)
+    return len(channels) == 6 and all(values.shape == shape for values in channels.values())
