@@ -11,6 +11,7 @@ from lit_room import VISIBLE, frozen_room, room_cameras
 from rgspipe.datasets.frozen_file import (
     DICTIONARY,
     GATHER,
+    GLOSS,
     SURFELS,
     TRANSPORT,
     load_dictionary,
@@ -21,8 +22,9 @@ from rgspipe.datasets.frozen_file import (
 from rgspipe.datasets.tensor_file import load_tensors, save_tensors
 from rgspipe.errors import InputError
 from rgspipe.fitting import build_dictionary
+from rgspipe.renderer.glossy_transport import build_glossy_transport
 from rgspipe.renderer.transport import with_bounces
-from rgspipe.scene import PointLight
+from rgspipe.scene import Gloss, PointLight
 
 
 @pytest.fixture(scope="module")
@@ -58,6 +60,39 @@ def test_a_fit_does_not_need_the_gather(scene, folder):
 def test_a_scene_with_few_bounces_is_not_stored(scene, tmp_path):
     with pytest.raises(ValueError, match="all bounces"):
         save_frozen(tmp_path, replace(scene, transport=with_bounces(scene.transport, 2)))
+
+
+@pytest.fixture(scope="module")
+def glossy(scene):
+    """The room with gloss on half of its surfels."""
+    count = len(scene.surfels)
+    reflectance = 0.3 * (torch.arange(count) % 2).float()[:, None].expand(-1, 3)
+    surfels = replace(scene.surfels, gloss=Gloss(reflectance.clone(), torch.full((count,), 12.0)))
+    return replace(scene, surfels=surfels, gloss=build_glossy_transport(surfels, scene.gather, scene.transport, 2))
+
+
+def test_a_glossy_scene_renders_the_same_after_the_round_trip(glossy, tmp_path):
+    save_frozen(tmp_path, glossy)
+    loaded = load_frozen(tmp_path.joinpath)
+    light, view = PointLight(torch.tensor(VISIBLE), torch.ones(3)), glossy.view(room_cameras(12)[0])
+    assert loaded.gloss.degree == 2
+    assert torch.equal(loaded.render(view, (light,)), glossy.render(view, (light,)))
+
+
+def test_a_diffuse_scene_stores_no_gloss(folder):
+    assert not (folder / GLOSS).exists()
+
+
+@pytest.mark.parametrize("tensor", ["pair_patches", "leaving.shape", "average.shape", "arriving.shape"])
+def test_gloss_of_another_scene_is_refused(glossy, tmp_path, tensor):
+    save_frozen(tmp_path, glossy)
+    tensors, note = load_tensors(tmp_path / GLOSS)
+    save_tensors(tmp_path / GLOSS, tensors | {tensor: tensors[tensor] + 1000}, note)
+    with pytest.raises(InputError, match=GLOSS):
+        load_frozen(tmp_path.joinpath)
+    (tmp_path / GLOSS).unlink()
+    with pytest.raises(InputError, match=GLOSS):
+        load_frozen(tmp_path.joinpath)
 
 
 def test_a_dictionary_is_the_same_after_the_round_trip(scene, folder):

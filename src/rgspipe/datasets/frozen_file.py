@@ -12,11 +12,14 @@ from rgspipe.datasets.tensor_file import load_tensors, save_tensors
 from rgspipe.errors import InputError
 from rgspipe.fitting.dictionary import LightDictionary
 from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.renderer.glossy_operators import GlossyOperators
+from rgspipe.renderer.glossy_transport import GlossyTransport
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.transport import PatchTransport
+from rgspipe.scene.surfels import Surfels
 
-SURFELS, GATHER, TRANSPORT, DICTIONARY = (
-    f"{name}.safetensors" for name in ("surfels", "gather", "transport", "dictionary")
+SURFELS, GATHER, TRANSPORT, GLOSS, DICTIONARY = (
+    f"{name}.safetensors" for name in ("surfels", "gather", "transport", "gloss", "dictionary")
 )
 
 #: What each effect can change, for effects=auto.
@@ -26,7 +29,7 @@ MAKE_AGAIN = "Remove it and run the stage freeze again."
 
 
 def save_frozen(folder: Path, frozen: FrozenScene) -> None:
-    """Write surfels, patch transport (with the surfels' areas) and, where the scene has it, the gather operator.
+    """Write surfels, patch transport (with the surfels' areas) and, where the scene has them, gather and gloss.
 
     Raises:
         ValueError: the transport has a limited number of bounces: what is stored is the scene with all of them.
@@ -39,6 +42,8 @@ def save_frozen(folder: Path, frozen: FrozenScene) -> None:
         save_tensors(folder / GATHER, frozen.gather.tensors("gather"))
     operators = transport.average.tensors("average") | transport.gather.tensors("gather")
     save_tensors(folder / TRANSPORT, operators | {"inverse": transport.inverse, "areas": frozen.areas})
+    if frozen.gloss is not None:
+        save_tensors(folder / GLOSS, frozen.gloss.operators.tensors())
 
 
 def load_frozen(locate: Callable[[str], Path], *, gather: bool = False) -> FrozenScene:
@@ -54,7 +59,9 @@ def load_frozen(locate: Callable[[str], Path], *, gather: bool = False) -> Froze
     surfels = load_surfels(locate(SURFELS))
     areas, transport = _load_transport(locate(TRANSPORT), surfels.albedo.float())
     operator = _load_gather(locate(GATHER), len(surfels)) if gather else None
-    return FrozenScene(surfels, areas, operator, transport)
+    glossy = surfels.gloss is not None and len(surfels.gloss.glossy) > 0
+    gloss = _load_gloss(locate(GLOSS), surfels, transport) if glossy else None
+    return FrozenScene(surfels, areas, operator, transport, gloss=gloss)
 
 
 def _load_gather(path: Path, count: int) -> SparseOperator:
@@ -70,6 +77,21 @@ def _load_transport(path: Path, albedo: Tensor) -> tuple[Tensor, PatchTransport]
     _require(path, "inverse", inverse.shape, (3, patches, patches))
     average = _operator(path, tensors, "average", (patches, count))
     return areas, PatchTransport(average, _operator(path, tensors, "gather", (count, patches)), inverse, albedo)
+
+
+def _load_gloss(path: Path, surfels: Surfels, transport: PatchTransport) -> GlossyTransport:
+    matrices = ("average", "leaving", "between", "arriving")
+    tensors = _load(path, {"pair_patches"}, matrices)
+    glossy, pair_patches = surfels.gloss.glossy, tensors["pair_patches"]
+    patches, harmonics = int(tensors["average.shape"][0]), int(tensors["arriving.shape"][0]) // len(glossy)
+    sent, pairs = patches * harmonics, len(pair_patches)
+    shapes = ((patches, len(glossy)), (len(surfels), sent), (pairs, sent), (len(glossy) * harmonics, pairs))
+    operators = (_operator(path, tensors, name, shape) for name, shape in zip(matrices, shapes, strict=True))
+    beyond = (pair_patches < 0) | (pair_patches >= transport.average.shape[0])
+    if bool(beyond.any()):
+        found = str(int(pair_patches[beyond][0]))
+        raise InputError(path, expected="pair_patches of the transport", found=found, remedy=MAKE_AGAIN)
+    return GlossyTransport(surfels, glossy, GlossyOperators(*operators, pair_patches))
 
 
 def save_dictionary(path: Path, dictionary: LightDictionary) -> None:

@@ -7,24 +7,27 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal, Protocol
 
+import numpy as np
+import scipy.sparse
 import torch
 from torch import Tensor
 
 from rgspipe.renderer.areas import surfel_areas
 from rgspipe.renderer.clusters import cluster_patches
 from rgspipe.renderer.direct import unit_irradiance
+from rgspipe.renderer.exposure import exposure
 from rgspipe.renderer.gather import build_gather
+from rgspipe.renderer.glossy_transport import GlossyLight, GlossyTransport, build_glossy_transport
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.monte_carlo import MonteCarloSolver
 from rgspipe.renderer.radiosity import GatherSolver
-from rgspipe.renderer.rig import Rig, rig_irradiance
+from rgspipe.renderer.rig import Rig, rig_irradiance, unit_response
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.transport import PatchTransport, build_patch_transport, with_bounces
 from rgspipe.renderer.view_weights import ViewWeights, build_view_weights
 from rgspipe.scene.camera import Camera
 from rgspipe.scene.lights import LightRig
 from rgspipe.scene.surfels import Surfels
-
 
 Solver = Literal["patches", "gather", "monte_carlo"]
 
@@ -51,6 +54,7 @@ class FrozenScene:
             the patches.
         transport: bounces, averaged over patches.
         solver: how indirect light is found; None for `transport`. See `with_solver`.
+        gloss: how light goes over glossy surfels; None for a diffuse scene.
     """
 
     surfels: Surfels
@@ -58,6 +62,7 @@ class FrozenScene:
     gather: SparseOperator | None
     transport: PatchTransport
     solver: IndirectSolver | None = None
+    gloss: GlossyTransport | None = None
 
     @classmethod
     def freeze(cls, surfels: Surfels, *, gather_rays: int, patches: int, seed: int) -> FrozenScene:
@@ -65,10 +70,11 @@ class FrozenScene:
         surfels = surfels.to(torch.float32)
         bvh = SurfelBvh(surfels)
         areas = surfel_areas(bvh, seed=seed)
-        gather = build_gather(bvh, gather_rays, seed=seed, areas=areas)
-        labels = cluster_patches(surfels.centers, surfels.normals, patches, seed=seed)
+        gather = _gather(bvh, gather_rays, areas, seed)
+        labels = cluster_patches(surfels.centers, surfels.normals, patches if gather.entries else 1, seed=seed)
         transport = build_patch_transport(gather, labels, areas, surfels.albedo)
-        return cls(surfels, areas, gather, transport)
+        gloss = build_glossy_transport(surfels, gather, transport)
+        return cls(surfels, areas, gather, transport, gloss=gloss)
 
     @cached_property
     def bvh(self) -> SurfelBvh:
@@ -107,7 +113,8 @@ class FrozenScene:
             seed: of its rays.
 
         Raises:
-            ValueError: the solver has another name, or needs the gather operator and the scene was loaded without it.
+            ValueError: the solver has another name, needs the gather operator and the scene was loaded without it, or
+                the scene is glossy: light goes over gloss from patch to patch.
         """
         return replace(self, solver=self._solver(solver, bounces, samples, seed))
 
@@ -115,6 +122,8 @@ class FrozenScene:
         if solver == "patches":
             same = bounces == self.transport.bounces
             return self.transport if same else with_bounces(self.transport, bounces)
+        if self.gloss is not None and solver in ("gather", "monte_carlo"):
+            raise ValueError(f"solver {solver} is for diffuse scenes: this one has gloss, which needs patches")
         if solver == "gather":
             if self.gather is None:
                 raise ValueError("solver gather needs the gather operator: load the scene with gather=True")
@@ -136,12 +145,36 @@ class FrozenScene:
     def radiance_of(self, rig: LightRig | Rig, indirect: bool = True, shadows: bool = True) -> Tensor:
         """Outgoing radiance (N, 3) under a rig of point and spot lights, differentiable towards its tensors.
 
-        The lights are added up before their light bounces, so a rig costs as many bounces as one light.
+        The lights are added up before their light bounces, so a rig costs as many bounces as one light. Of a glossy
+        scene this is the diffuse part, which is the same in all directions; `glossy_light` has all of it.
         """
         rig = rig if isinstance(rig, Rig) else Rig.of(rig)
+        if self.gloss is not None:
+            return self.glossy_light(rig, indirect, shadows).radiance
         direct = self.surfels.albedo * (rig_irradiance(self.bvh, rig, shadows) / math.pi)
         return direct + self.indirect(direct[:, :, None])[:, :, 0] if indirect else direct
 
     def render(self, view: ViewWeights, rig: LightRig | Rig, indirect: bool = True, shadows: bool = True) -> Tensor:
         """(height, width, 3) image of the scene under `rig`."""
+        if self.gloss is not None:
+            return view.image(self.glossy_light(rig, indirect, shadows).seen_from(view.camera.origin))
         return view.image(self.radiance_of(rig, indirect, shadows))
+
+    def glossy_light(self, rig: LightRig | Rig, indirect: bool = True, shadows: bool = True) -> GlossyLight:
+        """The light of a scene with gloss under `rig`, to be seen from anywhere; differentiable like `radiance_of`.
+
+        Raises:
+            ValueError: the scene is diffuse.
+        """
+        if self.gloss is None:
+            raise ValueError("a diffuse scene has no glossy light: use radiance_of")
+        rig = rig if isinstance(rig, Rig) else Rig.of(rig)
+        return self.gloss.light(self.solver or self.transport, rig, unit_response(self.bvh, rig, shadows), indirect)
+
+
+def _gather(bvh: SurfelBvh, rays: int, areas: Tensor, seed: int) -> SparseOperator:
+    """The gather operator; no ray is cast where no surfel can see another."""
+    if exposure(bvh.surfels).sight:
+        return build_gather(bvh, rays, seed=seed, areas=areas)
+    nothing = scipy.sparse.csr_matrix((len(bvh.surfels), len(bvh.surfels)), dtype=np.float32)
+    return SparseOperator.from_scipy(nothing, bvh.device)

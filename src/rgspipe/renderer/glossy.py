@@ -10,9 +10,50 @@ for physically based rendering"):
 
 from __future__ import annotations
 
+import math
+
+import torch
 from torch import Tensor
 
 from rgspipe.scene.gloss import Gloss
+
+#: A vector shorter than this many scales of its surfel has no direction of its own any more.
+DIRECTION_SOFTENING = 1e-3
+
+
+def phong_lobe(cosines: Tensor, exponents: Tensor) -> Tensor:
+    """p_n(cos α), 1/sr, for cosines and exponents n ≥ 1 that broadcast; its integral over cos α · dω is 1."""
+    return (exponents + 2.0) / (2.0 * math.pi) * cosines.clamp(min=0.0).pow(exponents)
+
+
+def lobe_coefficients(exponents: Tensor, degree: int) -> Tensor:
+    """(N, degree + 1) Legendre coefficients λ_l = 2π ∫ p_n(x) P_l(x) dx of the lobes, in closed form.
+
+        λ_0 = (n + 2)/(n + 1) ,   λ_1 = 1 ,   λ_l = λ_{l−2} · (n − l + 2)/(n + l + 1)
+
+    So that p_n(ω·r) = Σ_l λ_l Σ_m Y_lm(ω) Y_lm(r), by the addition theorem.
+    """
+    coefficients = [(exponents + 2.0) / (exponents + 1.0), torch.ones_like(exponents)]
+    for order in range(2, degree + 1):
+        coefficients.append(coefficients[order - 2] * (exponents - order + 2.0) / (exponents + order + 1.0))
+    return torch.stack(coefficients[: degree + 1], dim=-1)
+
+
+def mirrored(vectors: Tensor, normals: Tensor) -> Tensor:
+    """Vectors (…, 3), mirrored at unit normals (…, 3): 2 (n·v) n − v. Its own inverse and its own transpose."""
+    return 2.0 * (vectors * normals).sum(-1, keepdim=True) * normals - vectors
+
+
+def soft_directions(vectors: Tensor, scales: Tensor) -> Tensor:
+    """Directions of vectors (…, 3) whose derivative stays finite at zero length.
+
+    They are shorter than 1 by ½ (DIRECTION_SOFTENING · scale/|v|)²: 5e-7 at one scale of the surfel.
+
+    Args:
+        scales: (…,) of the surfels, scene units.
+    """
+    shortest = (DIRECTION_SOFTENING * scales).square()
+    return vectors * (vectors.square().sum(-1) + shortest).rsqrt()[..., None]
 
 
 def largest_lobe(gloss: Gloss) -> Tensor:

@@ -38,6 +38,11 @@ class Gloss:
     def __len__(self) -> int:
         return self.reflectance.shape[0]
 
+    @property
+    def glossy(self) -> Tensor:
+        """(G,) int64 indices of the surfels that are not diffuse."""
+        return (self.reflectance > 0.0).any(dim=1).nonzero()[:, 0]
+
     def to(self, *args: torch.dtype | torch.device | str) -> Gloss:
         """A copy with both tensors moved by `Tensor.to`."""
         return Gloss(self.reflectance.to(*args), self.exponents.to(*args))
