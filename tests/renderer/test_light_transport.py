@@ -7,8 +7,9 @@ import math
 import pytest
 import torch
 
+from rgspipe.renderer import reference
 from rgspipe.renderer.areas import surfel_areas
-from rgspipe.renderer.direct import differentiable_irradiance, geometry_factor, unit_irradiance
+from rgspipe.renderer.direct import differentiable_irradiance, unit_irradiance
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.gather import build_gather
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
@@ -40,12 +41,12 @@ def test_irradiance_derivative_matches_finite_differences() -> None:
     normals = torch.nn.functional.normalize(torch.randn(50, 3, generator=generator, dtype=torch.float64), dim=1)
     scales = torch.full((50,), 0.1, dtype=torch.float64)
     light = torch.tensor([[0.2, -0.1, 0.4]], dtype=torch.float64)
-    _, slope = geometry_factor(light, centers, normals, scales)
+    _, slope = reference.geometry_factor(light, centers, normals, scales)
     step = 1e-6
     for axis in range(3):
         shift = torch.zeros(3, dtype=torch.float64)
         shift[axis] = step
-        ahead, behind = (geometry_factor(light + s * shift, centers, normals, scales)[0] for s in (1, -1))
+        ahead, behind = (reference.geometry_factor(light + s * shift, centers, normals, scales)[0] for s in (1, -1))
         # Measured 1e-9.
         torch.testing.assert_close(slope[..., axis], (ahead - behind) / (2 * step), rtol=1e-6, atol=1e-7)
 

@@ -27,6 +27,8 @@ def cluster_patches(centers: Tensor, normals: Tensor, patches: int, *, seed: int
     Returns:
         (N,) labels 0 … P−1 of P ≤ `patches` clusters, none of them empty.
     """
+    if len(centers) == 0:
+        return np.zeros(0, dtype=np.int32)
     features = _features(centers, normals)
     count = min(patches, len(features))
     start = np.random.default_rng(seed).choice(len(features), count, replace=False)
@@ -42,8 +44,6 @@ def cluster_patches(centers: Tensor, normals: Tensor, patches: int, *, seed: int
 def _features(centers: Tensor, normals: Tensor) -> Tensor:
     """(N, 6) float32 positions over the scene's size, around its middle, and weighted normals, on the CPU."""
     centers = centers.detach().double().cpu()
-    if len(centers) == 0:
-        return torch.zeros(0, 6)
     lower, upper = centers.amin(dim=0), centers.amax(dim=0)
     placed = (centers - 0.5 * (lower + upper)) / float((upper - lower).amax().clamp(min=1e-12))
     return torch.cat([placed.float(), NORMAL_WEIGHT * normals.detach().float().cpu()], dim=1)
@@ -53,7 +53,7 @@ def _nearest(features: Tensor, means: Tensor) -> Tensor:
     """(N,) index of the mean (P, 6) nearest to each row; |x|² is the same for all and left out."""
     offset = means.square().sum(dim=1)
     blocks = [torch.addmm(offset, x, means.T, alpha=-2.0).argmin(dim=1) for x in features.split(SURFELS_AT_ONCE)]
-    return torch.cat(blocks) if blocks else torch.zeros(0, dtype=torch.int64)
+    return torch.cat(blocks)
 
 
 def _means(features: Tensor, labels: Tensor, previous: Tensor) -> Tensor:
