@@ -19,6 +19,7 @@ from rgspipe.errors import InputError
 SCENE_KINDS = ("cornell", "blend", "external")
 OCCLUSIONS = ("visible", "out_of_frame", "occluded", "all")
 FIT_METHODS = ("search_lm", "paper_adam")
+ROOM_NAMES = ("cornell", "corridor", "clutter")
 
 
 def option(
@@ -221,6 +222,11 @@ class BenchmarkConfig:
     """What is timed."""
 
     repetitions: int = option(20, "runs of each measured step", low=1, high=100000)
+    rooms: list[str] = option(list(ROOM_NAMES), "rooms that are path-traced and measured on", choices=ROOM_NAMES)
+    truth_resolution: int = option(128, "width and height of the path-traced images, pixels", low=8, high=8192)
+    truth_samples: int = option(
+        1024, "paths per pixel of the path-traced images with all bounces; a multiple of 8", low=8, high=1000000
+    )
 
 
 @dataclass

@@ -20,6 +20,7 @@ NAMES = (
     "fit_light",
     "evaluate",
     "report",
+    "render_truth",
     "benchmark",
 )
 
