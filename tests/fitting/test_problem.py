@@ -26,12 +26,12 @@ def test_unit_image_is_the_renderer_s(room, point_light):
 def test_derivative_matches_finite_differences(room, point_light):
     """Central differences over a step that is short enough not to cross a jump of the transmittance.
 
-    It jumps where an occluder enters the stretch before a receiver that casts no shadow on it, so longer
-    steps differ by some percent; without shadows a step of 1e-3 agrees to 1e-4.
+    It jumps where two hits part into two layers, which surfels that hang over edges do often, so longer steps
+    differ by some percent; without shadows a step of 1e-3 agrees to 1e-4.
     """
     for where in (VISIBLE, HIDDEN):
         problem = _problem(room, point_light, where)
-        position, step = torch.tensor(where, dtype=torch.float64) + 0.013, 1e-4
+        position, step = torch.tensor(where, dtype=torch.float64) + 0.003, 1e-4
         slope = problem.evaluate(position)[:, :, 1:]
         for axis in range(3):
             offset = torch.zeros(3, dtype=torch.float64)
@@ -39,7 +39,7 @@ def test_derivative_matches_finite_differences(room, point_light):
             upper, lower = (problem.evaluate(position + sign * offset)[:, :, 0] for sign in (1, -1))
             expected = (upper - lower) / (2 * step)
             error = float((slope[:, :, axis] - expected).norm() / expected.norm())
-            assert error < 0.003, (where, axis, error)  # measured up to 6e-4
+            assert error < 0.003, (where, axis, error)  # measured up to 2e-4
 
 
 def test_effects_leave_parts_out(room, point_light):

@@ -10,8 +10,8 @@ from torch import Tensor
 
 from rgspipe.renderer import reference
 from rgspipe.renderer.kernels.composite import composite
+from rgspipe.renderer.kernels.irradiance import transmittance
 from rgspipe.renderer.kernels.shade import shade_rays
-from rgspipe.renderer.kernels.shadow import transmittance
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.scene import NO_CLIP, Coverage, Surfels
 

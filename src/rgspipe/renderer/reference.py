@@ -11,8 +11,15 @@ import torch
 from torch import Tensor
 
 from rgspipe.renderer.kernels.composite import GRAZING, OPAQUE
-from rgspipe.renderer.kernels.shadow import COPLANAR_COSINE, COPLANAR_OFFSET, RECEIVER_FADE, RECEIVER_SKIP
-from rgspipe.scene.surfels import Surfels
+from rgspipe.renderer.kernels.irradiance import SOFTENING
+from rgspipe.renderer.kernels.shadow import (
+    COPLANAR_COSINE,
+    COPLANAR_OFFSET,
+    EDGE_ON,
+    RECEIVER_FADE,
+    RECEIVER_SKIP,
+)
+from rgspipe.scene.surfels import Coverage, Surfels
 
 
 def smoothstep(raw: Tensor, low: Tensor | float, high: Tensor | float) -> Tensor:
@@ -75,26 +82,67 @@ def shade_rays(
     return torch.einsum("rn,rnc->rc", weights, radiance[ray_view.long()])
 
 
-def transmittance(surfels: Surfels, lights: Tensor) -> Tensor:
-    """(L, N) shares of the lights (L, 3) that reach the surfels: `kernels.shadow.transmittance`."""
+def geometry_factor(positions: Tensor, centers: Tensor, normals: Tensor, scales: Tensor) -> tuple[Tensor, Tensor]:
+    """Unshadowed irradiance from unit point lights, max(0, n·d)/(|d|⁴ + ε⁴)^{3/4} with d = light − centre.
+
+    The fourth powers keep the inverse square law where it holds: its relative error is ¾(ε/|d|)⁴.
+
+    Args:
+        positions: (L, 3) lights; centers, normals: (N, 3); scales: (N,) ε over SOFTENING, scene units.
+
+    Returns:
+        (L, N) irradiance per intensity, 1/scene unit², and its derivative (L, N, 3) towards the position.
+    """
+    d = positions[:, None] - centers
+    square = d.square().sum(-1)
+    inverse = (square.square() + (SOFTENING * scales).pow(4)).rsqrt()
+    cube = inverse * inverse.sqrt()
+    projected = (d * normals).sum(-1)
+    lit = projected >= 0
+    factor = torch.where(lit, projected * cube, torch.zeros_like(cube))
+    slope = normals * cube[..., None] - d * (3.0 * projected * square * cube * inverse * inverse)[..., None]
+    return factor, torch.where(lit[..., None], slope, torch.zeros_like(slope))
+
+
+def unit_irradiance(surfels: Surfels, positions: Tensor, shadows: bool = True) -> Tensor:
+    """(L, N) irradiance of unit point lights (L, 3): `direct.differentiable_irradiance`."""
+    scales = surfels.scales.prod(dim=1).sqrt()
+    factor, _ = geometry_factor(positions, surfels.centers, surfels.normals, scales)
+    return factor * transmittance(surfels, positions) if shadows else factor
+
+
+def transmittance(surfels: Surfels, positions: Tensor) -> Tensor:
+    """(L, N) shares of the lights (L, 3) that reach the surfels: `kernels.irradiance.transmittance`."""
     coverage, normals, centers = surfels.coverage, surfels.normals, surfels.centers
     scale = surfels.scales.prod(dim=1).sqrt()
-    beside = ((centers[None] - centers[:, None]) * normals[:, None]).sum(-1).abs()
-    coplanar = (normals @ normals.T > COPLANAR_COSINE) & (beside < COPLANAR_OFFSET * scale[:, None])
+    between = centers[None] - centers[:, None]
+    coplanar = (normals @ normals.T > COPLANAR_COSINE) & (
+        (between * normals[:, None]).sum(-1).abs() < COPLANAR_OFFSET * scale[:, None]
+    )
     rows = []
-    for light in lights:
-        path = centers - light
-        distance = path.norm(dim=1)
-        facing = path @ normals.T
-        met = (facing.abs() > 1e-6 * distance[:, None]) & ~coplanar
-        safe = torch.where(met, facing, torch.ones_like(facing))
-        t = ((centers - light) * normals).sum(-1)[None] / safe
-        ahead = (1.0 - t) * (distance / scale)[:, None] - RECEIVER_SKIP
-        fade = (ahead / RECEIVER_FADE).clamp(0.0, 1.0)
-        alpha = alpha_at(surfels, light + t[..., None] * path[:, None] - centers)
-        met = met & (t > 0.0) & (alpha > coverage.minimum_alpha)
-        clear = (1.0 - torch.where(met, alpha * fade, torch.zeros_like(alpha))).prod(dim=1)
-        lit = (path * normals).sum(dim=1) < 0.0
-        share = 1.0 - smoothstep(1.0 - clear, coverage.low, coverage.high)
+    for light in positions:
+        lit = ((light - centers) * normals).sum(dim=1) > 0.0
+        path = torch.where(lit[:, None], light - centers, normals)
+        rays = path / path.norm(dim=1, keepdim=True)
+        facing = rays @ normals.T
+        met = (facing.abs() > EDGE_ON) & ~coplanar & (((light - centers) * normals).sum(-1) * facing > 0.0)
+        depth = (between * normals).sum(-1) / torch.where(met, facing, torch.ones_like(facing))
+        fade = ((depth / scale[:, None] - RECEIVER_SKIP) / RECEIVER_FADE).clamp(0.0, 1.0)
+        alpha = alpha_at(surfels, depth[..., None] * rays[:, None] - between)
+        met = met & (fade > 0.0) & (alpha > coverage.minimum_alpha)
+        share = _layers_from_afar(torch.where(met, alpha * fade, torch.zeros_like(alpha)), depth, coverage)
         rows.append(torch.where(lit, share, torch.ones_like(share)))
     return torch.stack(rows)
+
+
+def _layers_from_afar(alpha: Tensor, depth: Tensor, coverage: Coverage) -> Tensor:
+    """(R,) what passes the layers of occluders (R, N), counted from the light: the largest depths come first."""
+    passing = torch.ones(len(alpha), dtype=alpha.dtype)
+    remaining = torch.where(alpha.detach() > 0, depth.detach(), torch.full_like(depth, -torch.inf))
+    while bool((remaining > -torch.inf).any()):
+        front = remaining.amax(dim=1, keepdim=True)
+        layer = (remaining >= front - coverage.layer_thickness) & (remaining > -torch.inf)
+        clear = (1.0 - torch.where(layer, alpha, torch.zeros_like(alpha))).prod(dim=1)
+        passing = passing * (1.0 - smoothstep(1.0 - clear, coverage.low, coverage.high))
+        remaining = torch.where(layer, torch.full_like(remaining, -torch.inf), remaining)
+    return passing

@@ -1,10 +1,8 @@
 """Cast rays through surfels and composite what they meet in layers.
 
-Per ray, with hits sorted by depth t and grouped into layers of one thickness (docs/model.md):
+Per ray, with hits sorted by depth and grouped into layers as `kernels.coverage` says:
 
-    P_ℓ = Π_k (1 − α_k)            raw transparency of layer ℓ
-    C_ℓ = smoothstep(low, high)(1 − P_ℓ)
-    w_k = T_ℓ · C_ℓ · α_k / Σ_{m∈ℓ} α_m,   T_{ℓ+1} = T_ℓ (1 − C_ℓ)
+    w_k = T_ℓ · C_ℓ · α_k / Σ_{m∈ℓ} α_m
 """
 
 from __future__ import annotations
@@ -15,14 +13,18 @@ import torch
 import warp as wp
 from torch import Tensor
 
+from rgspipe.renderer.kernels.coverage import LayerRule, sharpened
 from rgspipe.renderer.kernels.launch import as_array, as_vec3, launch
-from rgspipe.renderer.kernels.surfel_bvh import SurfelArrays, SurfelBvh, surfel_alpha
+from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh, SurfelRecord, surfel_alpha
 
 # Adjoints are written by hand; generating them would double the compile time.
 wp.set_module_options({"enable_backward": False})
 
-#: Hits kept per ray, the nearest ones. Measured rays need 8 to 30; layers behind an opaque one do not count.
-MAX_HITS = wp.constant(48)
+#: Hits that a row holds at first. Measured rays need 8 to 30; those that need more are cast again with wider rows.
+USUAL_HITS = 40
+
+#: How much wider.
+WIDENING = 4
 
 #: Light that gets past a layer below this share is not followed further.
 OPAQUE = wp.constant(1.0e-3)
@@ -34,6 +36,8 @@ GRAZING = wp.constant(1.0e-5)
 @dataclass(frozen=True)
 class Hits:
     """What rays meet. Rows are rays, columns hits in order of depth; unused columns hold index −1 and weight 0.
+
+    K is as large as the ray with most hits before its light ends needs it: no hit is left out.
 
     Attributes:
         indices: (R, K) int32 surfel of each hit.
@@ -50,55 +54,54 @@ class Hits:
     transmittance: Tensor
 
 
-@wp.func
-def sharpened(raw: float, low: float, high: float):
-    y = wp.clamp((raw - low) / (high - low), 0.0, 1.0)
-    return y * y * (3.0 - 2.0 * y)
-
-
 @wp.kernel
 def _composite(
     offset: int,
     slab: int,
     bvh: wp.uint64,
-    s: SurfelArrays,
+    surfels: wp.array(dtype=SurfelRecord),
+    order: wp.array(dtype=int),
+    rule: LayerRule,
     origins: wp.array(dtype=wp.vec3),
     directions: wp.array(dtype=wp.vec3),
     nearest: float,
     two_sided: int,
-    layer: float,
-    minimum_alpha: float,
-    low: float,
-    high: float,
     indices: wp.array(dtype=int, ndim=2),
     depths: wp.array(dtype=float, ndim=2),
     alphas: wp.array(dtype=float, ndim=2),
     weights: wp.array(dtype=float, ndim=2),
     transmittance: wp.array(dtype=float),
+    cut: wp.array(dtype=int),
 ):
     i = wp.tid() + offset
+    width = indices.shape[1]
     o = origins[i]
     d = directions[i]
     query = wp.bvh_query_ray(bvh, o, d)
     count = int(0)
+    dropped = int(0)
+    # Nothing is seen behind the layer of an opaque hit.
+    farthest = float(1.0e30)
     j = int(0)
-    while wp.bvh_query_next(query, j):
-        n = s.normal[j]
+    while wp.bvh_query_next(query, j, farthest):
+        n = surfels[j].normal
         facing = wp.dot(d, n)
         if facing < -GRAZING or (two_sided == 1 and facing > GRAZING):
-            t = wp.dot(s.center[j] - o, n) / facing
-            if t > nearest:
-                alpha = surfel_alpha(s, j, o + t * d - s.center[j])
-                if alpha > minimum_alpha:
-                    # Insertion sort into the nearest MAX_HITS.
+            t = wp.dot(surfels[j].center - o, n) / facing
+            if t > nearest and t <= farthest:
+                alpha = surfel_alpha(surfels, j, o + t * d - surfels[j].center)
+                if alpha > rule.minimum_alpha:
+                    if alpha >= rule.high:
+                        farthest = wp.min(farthest, t + rule.thickness)
+                    # Insertion sort into the nearest of the row.
                     m = int(count)
-                    if count == MAX_HITS:
-                        if t < depths[i, MAX_HITS - 1]:
-                            m = MAX_HITS - 1
-                        else:
-                            m = -1
-                    else:
+                    if count < width:
                         count += 1
+                    else:
+                        dropped = int(1)
+                        m = width - 1
+                        if t >= depths[i, m]:
+                            m = int(-1)
                     if m >= 0:
                         while m > 0 and depths[i, wp.max(m - 1, 0)] > t:
                             depths[i, m] = depths[i, m - 1]
@@ -110,25 +113,28 @@ def _composite(
                         alphas[i, m] = alpha
     passing = float(1.0)
     k = int(0)
-    while k < count:
+    while k < count and passing >= OPAQUE:
         total = float(0.0)
         clear = float(1.0)
         end = int(k)
-        front = depths[i, k]
-        while end < count and depths[i, wp.min(end, MAX_HITS - 1)] <= front + layer:
+        back = depths[i, k] + rule.thickness
+        while end < count and depths[i, wp.min(end, width - 1)] <= back:
             total += alphas[i, end]
             clear = clear * (1.0 - alphas[i, end])
             end += 1
-        covered = sharpened(1.0 - clear, low, high)
+        covered = sharpened(clear, rule)
         share = passing * covered / total
         for m in range(k, end):
             weights[i, m] = alphas[i, m] * share
+            indices[i, m] = order[indices[i, m]]
         passing = passing * (1.0 - covered)
         k = end
-        if passing < OPAQUE:
-            count = k
+    # What was dropped lies behind the last hit of a full row, in its layer or farther away.
+    cut[i] = 0
+    if dropped == 1 and k == count:
+        cut[i] = 1
     transmittance[i] = passing
-    for m in range(count, MAX_HITS):
+    for m in range(k, width):
         indices[i, m] = -1
         weights[i, m] = 0.0
 
@@ -139,26 +145,45 @@ def composite(
     """Cast rays and composite what they meet, nearest layers first.
 
     Args:
-        origins, directions: (R, 3), directions of unit length.
+        origins, directions: (R, 3), directions of unit length; float64 origins keep their digits far from
+            the scene's origin.
         nearest: hits at or before this distance are passed over, scene units.
         two_sided: whether backs of surfels are met, too.
     """
-    count, device, c = origins.shape[0], bvh.device, bvh.coverage
-    shape = (count, int(MAX_HITS))
-    hits = Hits(
-        indices=torch.empty(shape, dtype=torch.int32, device=device),
-        depths=torch.empty(shape, dtype=torch.float32, device=device),
-        alphas=torch.empty(shape, dtype=torch.float32, device=device),
-        weights=torch.empty(shape, dtype=torch.float32, device=device),
-        transmittance=torch.empty(count, dtype=torch.float32, device=device),
-    )
+    rays = bvh.local(origins), directions.to(bvh.device, torch.float32).contiguous()
+    return _cast(bvh, rays, float(nearest), two_sided, min(USUAL_HITS, max(len(bvh.surfels), 1)))
+
+
+def _cast(bvh: SurfelBvh, rays: tuple[Tensor, Tensor], nearest: float, two_sided: bool, width: int) -> Hits:
+    """Composite with rows of `width` hits; rays that need more are cast again with wider ones."""
+    count, device = len(rays[0]), bvh.device
+    integers, numbers = ({"dtype": dtype, "device": device} for dtype in (torch.int32, torch.float32))
+    rows = [torch.empty((count, width), **numbers) for _ in range(3)]
+    hits = Hits(torch.empty((count, width), **integers), *rows, torch.empty(count, **numbers))
     if len(bvh.surfels) == 0:
-        hits.indices.fill_(-1)
-        hits.weights.zero_()
-        hits.transmittance.fill_(1.0)
+        return Hits(hits.indices.fill_(-1), *(row.zero_() for row in rows), hits.transmittance.fill_(1.0))
+    cut = torch.empty(count, **integers)
+    inputs = [bvh.id, bvh.records, bvh.order, bvh.rule, *(as_vec3(x) for x in rays), nearest, int(two_sided)]
+    outputs = [hits.indices, hits.depths, hits.alphas, hits.weights, hits.transmittance, cut]
+    launch(_composite, count, [*inputs, *(as_array(x) for x in outputs)], device)
+    chosen = cut.nonzero()[:, 0]
+    if len(chosen) == 0:
         return hits
-    rays = [as_vec3(origins.to(device)), as_vec3(directions.to(device))]
-    rule = [float(nearest), int(two_sided), c.layer_thickness, c.minimum_alpha, c.low, c.high]
-    outputs = [as_array(x) for x in (hits.indices, hits.depths, hits.alphas, hits.weights, hits.transmittance)]
-    launch(_composite, count, [bvh.id, bvh.arrays, *rays, *rule, *outputs], device)
-    return hits
+    wider = min(WIDENING * width, len(bvh.surfels))
+    return _with_rows(hits, chosen, _cast(bvh, (rays[0][chosen], rays[1][chosen]), nearest, two_sided, wider))
+
+
+def _with_rows(hits: Hits, chosen: Tensor, wide: Hits) -> Hits:
+    """`hits` with the rows `chosen` (C,) replaced by those of `wide`, all as wide as they are."""
+    extra = (0, wide.indices.shape[1] - hits.indices.shape[1])
+    pad = torch.nn.functional.pad
+    result = Hits(
+        indices=pad(hits.indices, extra, value=-1),
+        depths=pad(hits.depths, extra),
+        alphas=pad(hits.alphas, extra),
+        weights=pad(hits.weights, extra),
+        transmittance=hits.transmittance,
+    )
+    for name in ("indices", "depths", "alphas", "weights", "transmittance"):
+        getattr(result, name)[chosen] = getattr(wide, name)
+    return result

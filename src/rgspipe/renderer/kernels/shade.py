@@ -8,9 +8,10 @@ import torch
 import warp as wp
 from torch import Tensor
 
-from rgspipe.renderer.kernels.composite import MAX_HITS, Hits, composite
+from rgspipe.renderer.kernels.composite import Hits, composite
+from rgspipe.renderer.kernels.coverage import LayerRule, sharpened, sharpened_slope
 from rgspipe.renderer.kernels.launch import as_array, as_vec3, launch, thread_count
-from rgspipe.renderer.kernels.surfel_bvh import SurfelArrays, SurfelBvh
+from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh, SurfelRecord, clip_height
 from rgspipe.scene.surfels import Surfels
 
 # Adjoints are written by hand; generating them would double the compile time.
@@ -34,13 +35,9 @@ def _shade(
     view = ray_view[i]
     colour = wp.vec3(0.0, 0.0, 0.0)
     k = int(0)
-    while k < MAX_HITS:
-        j = indices[i, k]
-        if j < 0:
-            k = int(MAX_HITS)
-        else:
-            colour += weights[i, k] * radiance[view, j]
-            k += 1
+    while k < indices.shape[1] and indices[i, wp.min(k, indices.shape[1] - 1)] >= 0:
+        colour += weights[i, k] * radiance[view, indices[i, k]]
+        k += 1
     colours[i] = colour
 
 
@@ -57,7 +54,7 @@ def add_ramp_gradient(
     scaled: float,
 ):
     """Adds dL/d(offset, angle) of one clip in units of the softness; returns dL/d(u, v) through its ramp."""
-    height = ramp[0] - ramp[1] * u - ramp[2] * v
+    height = clip_height(ramp, u, v)
     to_plane = wp.vec2(0.0, 0.0)
     if height > 0.0 and height < 1.0:
         to_ramp = scaled / wp.max(height, 1.0e-3)
@@ -71,27 +68,28 @@ def add_ramp_gradient(
 def add_hit_gradient(
     gradient: wp.array(dtype=float, ndim=3),
     slab: int,
-    s: SurfelArrays,
+    surfels: wp.array(dtype=SurfelRecord),
+    record: int,
     j: int,
     x: wp.vec3,
     d: wp.vec3,
     alpha: float,
     to_alpha: float,
 ):
-    """Adds dL/d(surfel j) of a hit at the offset x from its centre, given dL/dα."""
-    n = s.normal[j]
-    ua = s.u_axis[j]
-    va = s.v_axis[j]
+    """Adds dL/d(surfel j) of a hit at the offset x from its centre, given dL/dα and where the surfel's record is."""
+    n = surfels[record].normal
+    ua = surfels[record].u_axis
+    va = surfels[record].v_axis
     u = wp.dot(x, ua)
     v = wp.dot(x, va)
     scaled = to_alpha * alpha
     # In world units the clips do not move with the scales, so the scales act through u and v alone.
     wp.atomic_add(gradient, slab, j, 6, scaled * u * u)
     wp.atomic_add(gradient, slab, j, 7, scaled * v * v)
-    wp.atomic_add(gradient, slab, j, 8, scaled / s.opacity[j])
+    wp.atomic_add(gradient, slab, j, 8, scaled / surfels[record].opacity)
     aspect = wp.length(va) / wp.length(ua)
-    ramp_a = add_ramp_gradient(gradient, slab, j, 0, s.clip_a[j], u, v, aspect, scaled)
-    ramp_b = add_ramp_gradient(gradient, slab, j, 1, s.clip_b[j], u, v, aspect, scaled)
+    ramp_a = add_ramp_gradient(gradient, slab, j, 0, surfels[record].clip_a, u, v, aspect, scaled)
+    ramp_b = add_ramp_gradient(gradient, slab, j, 1, surfels[record].clip_b, u, v, aspect, scaled)
     to_u = ramp_a[0] + ramp_b[0] - scaled * u
     to_v = ramp_a[1] + ramp_b[1] - scaled * v
     # A plane that moves or leans also moves the point where the ray meets it.
@@ -107,12 +105,11 @@ def add_hit_gradient(
 def _shade_adjoint(
     offset: int,
     slab: int,
-    s: SurfelArrays,
+    surfels: wp.array(dtype=SurfelRecord),
+    rank: wp.array(dtype=int),
+    rule: LayerRule,
     origins: wp.array(dtype=wp.vec3),
     directions: wp.array(dtype=wp.vec3),
-    layer: float,
-    low: float,
-    high: float,
     indices: wp.array(dtype=int, ndim=2),
     depths: wp.array(dtype=float, ndim=2),
     alphas: wp.array(dtype=float, ndim=2),
@@ -129,8 +126,9 @@ def _shade_adjoint(
     o = origins[i]
     d = directions[i]
     view = ray_view[i]
+    width = indices.shape[1]
     count = int(0)
-    while count < MAX_HITS and indices[i, wp.min(count, MAX_HITS - 1)] >= 0:
+    while count < width and indices[i, wp.min(count, width - 1)] >= 0:
         to_weight[i, count] = wp.dot(ray_gradient[i], radiance[view, indices[i, count]])
         count += 1
     # Front to back: what reaches each layer, noted at its last hit.
@@ -139,14 +137,13 @@ def _shade_adjoint(
     while k < count:
         clear = float(1.0)
         end = int(k)
-        front = depths[i, k]
-        while end < count and depths[i, wp.min(end, MAX_HITS - 1)] <= front + layer:
+        back = depths[i, k] + rule.thickness
+        while end < count and depths[i, wp.min(end, width - 1)] <= back:
             clear = clear * (1.0 - alphas[i, end])
             end += 1
         layer_passing[i, end - 1] = passing
         layer_first[i, end - 1] = k
-        y = wp.clamp((1.0 - clear - low) / (high - low), 0.0, 1.0)
-        passing = passing * (1.0 - y * y * (3.0 - 2.0 * y))
+        passing = passing * (1.0 - sharpened(clear, rule))
         k = end
     # Back to front: `behind` is what would be seen if everything before were taken away.
     behind = float(0.0)
@@ -162,9 +159,10 @@ def _shade_adjoint(
             clear = clear * (1.0 - alphas[i, m])
             mixed += alphas[i, m] * to_weight[i, m]
         mixed = mixed / total
-        y = wp.clamp((1.0 - clear - low) / (high - low), 0.0, 1.0)
-        covered = y * y * (3.0 - 2.0 * y)
-        to_raw = passing * (mixed - behind) * 6.0 * y * (1.0 - y) / (high - low)
+        covered = sharpened(clear, rule)
+        to_raw = passing * (mixed - behind) * sharpened_slope(clear, rule)
+        # 1 − P = low + y (high − low): how far the layer is from either threshold.
+        y = wp.clamp((1.0 - clear - rule.low) / (rule.high - rule.low), 0.0, 1.0)
         wp.atomic_add(threshold_gradient, slab, 0, to_raw * (y - 1.0))
         wp.atomic_add(threshold_gradient, slab, 1, -to_raw * y)
         for m in range(first, end):
@@ -172,7 +170,9 @@ def _shade_adjoint(
             to_alpha = passing * covered * (to_weight[i, m] - mixed) / total
             to_alpha += to_raw * clear / wp.max(1.0 - alpha, 1.0e-4)
             j = indices[i, m]
-            add_hit_gradient(gradient, slab, s, j, o + depths[i, m] * d - s.center[j], d, alpha, to_alpha)
+            r = rank[j]
+            x = o + depths[i, m] * d - surfels[r].center
+            add_hit_gradient(gradient, slab, surfels, r, j, x, d, alpha, to_alpha)
         behind = covered * mixed + (1.0 - covered) * behind
         end = first
 
@@ -220,12 +220,12 @@ def _surfel_gradient(
 ) -> tuple[Tensor, Tensor]:
     """(N, GRADIENT_COLUMNS) and (2,) gradients of Σ colour_gradient · colour."""
     origins, directions, ray_view = rays
-    count, device, c = origins.shape[0], bvh.device, bvh.coverage
+    count, device = origins.shape[0], bvh.device
     slabs = thread_count() if device.type == "cpu" else 1
     packed = torch.zeros((slabs, len(bvh.surfels), GRADIENT_COLUMNS), dtype=torch.float32, device=device)
     thresholds = torch.zeros((slabs, 2), dtype=torch.float32, device=device)
     scratch = [torch.empty_like(hits.weights), torch.empty_like(hits.weights), torch.empty_like(hits.indices)]
-    arguments = [bvh.arrays, as_vec3(origins), as_vec3(directions), c.layer_thickness, c.low, c.high]
+    arguments = [bvh.records, bvh.rank, bvh.rule, as_vec3(bvh.local(origins)), as_vec3(directions)]
     arguments += [as_array(x) for x in (hits.indices, hits.depths, hits.alphas, ray_view.int())]
     arguments += [wp.from_torch(radiance.detach().float().contiguous(), dtype=wp.vec3), as_vec3(colour_gradient)]
     arguments += [as_array(x) for x in (*scratch, packed, thresholds)]
@@ -285,7 +285,7 @@ def shade_rays(
     Returns:
         (R, 3) float32 radiance.
     """
-    rays = (origins.float().contiguous(), directions.float().contiguous(), ray_view)
+    rays = (origins.detach(), directions.detach(), ray_view)
     return _ShadeRays.apply(
         bvh,
         rays,

@@ -1,14 +1,16 @@
-"""Transmittance from a light to every surfel, with its derivative towards the light's position."""
+"""How much of a light reaches a surfel: a shadow ray through the same layers as every other ray.
+
+Layers are counted from the light. Occluders fade in near the receiver (`RECEIVER_SKIP`), and there they come
+last: one that appears with opacity 0 joins or follows the layers that are there and moves none of their
+fronts, so that the transmittance stays continuous as the light moves.
+"""
 
 from __future__ import annotations
 
-import torch
 import warp as wp
-from torch import Tensor
 
-from rgspipe.renderer.kernels.composite import sharpened
-from rgspipe.renderer.kernels.launch import as_array, as_vec3, launch
-from rgspipe.renderer.kernels.surfel_bvh import SurfelArrays, SurfelBvh, surfel_alpha
+from rgspipe.renderer.kernels.coverage import LayerRule, sharpened, sharpened_slope
+from rgspipe.renderer.kernels.surfel_bvh import SurfelRecord, clip_height, surfel_alpha
 
 # Adjoints are written by hand; generating them would double the compile time.
 wp.set_module_options({"enable_backward": False})
@@ -25,102 +27,174 @@ COPLANAR_COSINE = wp.constant(0.8)
 #: … and centres within this many receiver scales of its plane.
 COPLANAR_OFFSET = wp.constant(1.0)
 
+#: A ray closer to an occluder's plane than this cosine does not meet it.
+EDGE_ON = wp.constant(1.0e-6)
+
+#: Occluders that a ray holds at once; if there are more, it goes on behind the last of them.
+OCCLUDERS = wp.constant(16)
+
 
 @wp.func
-def opacity_slope(s: SurfelArrays, j: int, x: wp.vec3):
+def occluder(
+    surfels: wp.array(dtype=SurfelRecord),
+    minimum_alpha: float,
+    receiver: int,
+    j: int,
+    light: wp.vec3,
+    path: wp.vec3,
+    distance: float,
+):
+    """Opacity of surfel j, faded in, on the `path` from receiver to light, and its place there, a share; or 0, 0."""
+    alpha = float(0.0)
+    depth = float(0.0)
+    n = surfels[j].normal
+    facing = wp.dot(path, n)
+    if wp.abs(facing) > EDGE_ON * distance:
+        # From the receiver: the light may be so far away that rounding there is larger than the scene.
+        between = surfels[j].center - surfels[receiver].center
+        depth = wp.dot(between, n) / facing
+        fade = wp.min((depth * distance / surfels[receiver].scale - RECEIVER_SKIP) / RECEIVER_FADE, 1.0)
+        if fade > 0.0 and wp.dot(light - surfels[j].center, n) * facing > 0.0:
+            alpha = surfel_alpha(surfels, j, depth * path - between)
+            own = surfels[receiver].normal
+            if alpha <= minimum_alpha or (
+                wp.dot(n, own) > COPLANAR_COSINE
+                and wp.abs(wp.dot(between, own)) < COPLANAR_OFFSET * surfels[receiver].scale
+            ):
+                alpha = float(0.0)
+            alpha *= fade
+    return alpha, depth
+
+
+@wp.func
+def comes_before(depth: float, j: int, other_depth: float, other: int):
+    """Whether a ray from the light meets surfel j before another one."""
+    return depth > other_depth or (depth == other_depth and j < other)
+
+
+@wp.func
+def opacity_slope(surfels: wp.array(dtype=SurfelRecord), j: int, x: wp.vec3):
     """−d(ln α)/dx of surfel j at the offset x in its plane, with the ramps of its clips."""
-    u = wp.dot(x, s.u_axis[j])
-    v = wp.dot(x, s.v_axis[j])
-    a = s.clip_a[j]
-    b = s.clip_b[j]
-    ramp_a = a[0] - a[1] * u - a[2] * v
-    ramp_b = b[0] - b[1] * u - b[2] * v
+    u = wp.dot(x, surfels[j].u_axis)
+    v = wp.dot(x, surfels[j].v_axis)
+    a = surfels[j].clip_a
+    b = surfels[j].clip_b
+    height_a = clip_height(a, u, v)
+    height_b = clip_height(b, u, v)
     to_u = u
     to_v = v
-    if ramp_a < 1.0:
-        to_u += a[1] / ramp_a
-        to_v += a[2] / ramp_a
-    if ramp_b < 1.0:
-        to_u += b[1] / ramp_b
-        to_v += b[2] / ramp_b
-    return to_u * s.u_axis[j] + to_v * s.v_axis[j]
+    if height_a < 1.0:
+        to_u += a[1] / height_a
+        to_v += a[2] / height_a
+    if height_b < 1.0:
+        to_u += b[1] / height_b
+        to_v += b[2] / height_b
+    return to_u * surfels[j].u_axis + to_v * surfels[j].v_axis
 
 
-@wp.kernel
-def _transmittance(
-    offset: int,
-    slab: int,
-    bvh: wp.uint64,
-    s: SurfelArrays,
-    lights: wp.array(dtype=wp.vec3),
-    receivers: int,
-    minimum_alpha: float,
-    low: float,
-    high: float,
-    transmittance: wp.array(dtype=float),
-    derivative: wp.array(dtype=wp.vec3),
+@wp.func
+def occluder_slope(
+    surfels: wp.array(dtype=SurfelRecord),
+    receiver: int,
+    j: int,
+    path: wp.vec3,
+    distance: float,
+    alpha: float,
+    depth: float,
 ):
-    item = wp.tid() + offset
-    light = lights[item / receivers]
-    i = item % receivers
-    ni = s.normal[i]
-    path = s.center[i] - light
+    """−dα/d(light) of an `occluder`."""
+    n = surfels[j].normal
+    facing = wp.dot(path, n)
+    steepness = RECEIVER_FADE * surfels[receiver].scale
+    fade = wp.min((depth * distance - RECEIVER_SKIP * surfels[receiver].scale) / steepness, 1.0)
+    x = depth * path - (surfels[j].center - surfels[receiver].center)
+    slope = alpha * opacity_slope(surfels, j, x)
+    # As the light moves by dl, the meeting point moves by its share of the way, corrected to stay on the plane.
+    change = depth * (slope - n * (wp.dot(slope, path) / facing))
+    if fade < 1.0:
+        change -= (alpha / fade * depth / steepness) * (path / distance - n * (distance / facing))
+    return change
+
+
+@wp.func
+def light_transmittance(
+    bvh: wp.uint64,
+    surfels: wp.array(dtype=SurfelRecord),
+    rule: LayerRule,
+    receiver: int,
+    light: wp.vec3,
+    path: wp.vec3,
+):
+    """Share of a light that reaches a receiver along the `path` to it, and its derivative d/d(light)."""
+    passing = float(1.0)
+    slope = wp.vec3(0.0, 0.0, 0.0)
     distance = wp.length(path)
+    thickness = rule.thickness / distance
+    skip = RECEIVER_SKIP * surfels[receiver].scale / distance
+    start = surfels[receiver].center + skip * path
+    # The layer that is being filled.
+    front = float(1.0e30)
     clear = float(1.0)
-    log_derivative = wp.vec3(0.0, 0.0, 0.0)
-    if wp.dot(path, ni) < 0.0 and distance > 0.0:
-        # From the receiver: the light may be so far away that rounding there is larger than the scene.
-        query = wp.bvh_query_ray(bvh, s.center[i], -path / distance)
+    log_slope = wp.vec3(0.0, 0.0, 0.0)
+    # Occluders, the nearest to the light first; of those at one depth the surfel with the smallest number.
+    depths = wp.zeros(shape=(16,), dtype=float)
+    alphas = wp.zeros(shape=(16,), dtype=float)
+    indices = wp.zeros(shape=(16,), dtype=int)
+    last_depth = float(1.0e30)
+    last_index = int(-1)
+    more = int(1)
+    while more == 1:
+        more = int(0)
+        count = int(0)
+        reach = wp.min(1.0, last_depth + thickness) - skip
+        query = wp.bvh_query_ray(bvh, start, path)
         j = int(0)
-        while wp.bvh_query_next(query, j, distance):
-            nj = s.normal[j]
-            facing = wp.dot(path, nj)
-            coplanar = (
-                wp.dot(nj, ni) > COPLANAR_COSINE
-                and wp.abs(wp.dot(s.center[j] - s.center[i], ni)) < COPLANAR_OFFSET * s.scale[i]
-            )
-            if wp.abs(facing) > 1.0e-6 * distance and not coplanar:
-                # Where the ray meets the plane: shares of the way from the light, and back from the receiver.
-                # Each is exact at its own end, and the two are not one minus the other in float32.
-                t = wp.dot(s.center[j] - light, nj) / facing
-                back = wp.dot(s.center[i] - s.center[j], nj) / facing
-                fade = wp.min(back * distance / s.scale[i] - RECEIVER_SKIP, RECEIVER_FADE) / RECEIVER_FADE
-                if t > 0.0 and fade > 0.0:
-                    x = s.center[i] - s.center[j] - back * path
-                    alpha = surfel_alpha(s, j, x)
-                    if alpha > minimum_alpha:
-                        slope = alpha * fade * opacity_slope(s, j, x)
-                        # The ray's meeting point moves by back·dl along the plane, corrected to stay on it.
-                        change = back * (slope - nj * (wp.dot(slope, path) / facing))
-                        if fade < 1.0:
-                            change -= (alpha * back / (s.scale[i] * RECEIVER_FADE)) * (
-                                nj * (distance / facing) - path / distance
-                            )
-                        clear = clear * (1.0 - alpha * fade)
-                        log_derivative += change / wp.max(1.0 - alpha * fade, 1.0e-4)
-                        if 1.0 - clear >= high:
-                            break
-    y = wp.clamp((1.0 - clear - low) / (high - low), 0.0, 1.0)
-    transmittance[item] = 1.0 - sharpened(1.0 - clear, low, high)
-    derivative[item] = log_derivative * (clear * 6.0 * y * (1.0 - y) / (high - low))
-
-
-def transmittance(bvh: SurfelBvh, lights: Tensor) -> tuple[Tensor, Tensor]:
-    """Share of each light that reaches each surfel, and how it changes as the light moves.
-
-    All occluders of a shadow ray form one layer; they are two-sided. Surfels that face away from the
-    light get 1: their irradiance is zero by the cosine.
-
-    Args:
-        lights: (L, 3) positions.
-
-    Returns:
-        transmittance (L, N) and its derivative towards the light's position (L, N, 3), float32.
-    """
-    count, receivers, c = lights.shape[0], len(bvh.surfels), bvh.coverage
-    shares = torch.empty((count, receivers), dtype=torch.float32, device=bvh.device)
-    derivative = torch.empty((count, receivers, 3), dtype=torch.float32, device=bvh.device)
-    inputs = [bvh.id, bvh.arrays, as_vec3(lights.to(bvh.device)), receivers, c.minimum_alpha, c.low, c.high]
-    outputs = [as_array(shares.view(-1)), as_vec3(derivative.view(-1, 3))]
-    launch(_transmittance, count * receivers, [*inputs, *outputs], bvh.device)
-    return shares, derivative
+        while wp.bvh_query_next(query, j, reach):
+            alpha, depth = occluder(surfels, rule.minimum_alpha, receiver, j, light, path, distance)
+            if alpha > 0.0 and (depth < last_depth or (depth == last_depth and j > last_index)):
+                if alpha >= rule.high:  # opaque in whichever layer it falls
+                    passing = float(0.0)
+                    break
+                m = int(count)
+                if count < OCCLUDERS:
+                    count += 1
+                else:
+                    more = int(1)
+                    m = OCCLUDERS - 1
+                    if comes_before(depths[m], indices[m], depth, j):
+                        m = int(-1)
+                if m >= 0:
+                    while m > 0 and comes_before(depth, j, depths[wp.max(m - 1, 0)], indices[wp.max(m - 1, 0)]):
+                        depths[m] = depths[m - 1]
+                        alphas[m] = alphas[m - 1]
+                        indices[m] = indices[m - 1]
+                        m -= 1
+                    depths[m] = depth
+                    alphas[m] = alpha
+                    indices[m] = j
+        k = int(0)
+        while k < count and passing > 0.0:
+            last_depth = depths[k]
+            last_index = indices[k]
+            alpha = alphas[k]
+            if last_depth < front - thickness:
+                covered = sharpened(clear, rule)
+                slope = (1.0 - covered) * slope + (passing * sharpened_slope(clear, rule) * clear) * log_slope
+                passing *= 1.0 - covered
+                front = last_depth
+                clear = float(1.0)
+                log_slope = wp.vec3(0.0, 0.0, 0.0)
+            change = occluder_slope(surfels, receiver, last_index, path, distance, alpha, last_depth)
+            log_slope += change / wp.max(1.0 - alpha, 1.0e-4)
+            clear *= 1.0 - alpha
+            if 1.0 - clear >= rule.high:
+                passing = float(0.0)
+            k += 1
+        if passing <= 0.0:
+            more = int(0)
+    covered = sharpened(clear, rule)
+    slope = (1.0 - covered) * slope + (passing * sharpened_slope(clear, rule) * clear) * log_slope
+    passing *= 1.0 - covered
+    if passing <= 0.0:
+        slope = wp.vec3(0.0, 0.0, 0.0)
+    return passing, slope

@@ -1,0 +1,90 @@
+"""Irradiance of point lights on every surfel and its derivative, shadows included, in one pass."""
+
+from __future__ import annotations
+
+import torch
+import warp as wp
+from torch import Tensor
+
+from rgspipe.renderer.kernels.coverage import LayerRule
+from rgspipe.renderer.kernels.launch import as_array, as_vec3, launch
+from rgspipe.renderer.kernels.shadow import light_transmittance
+from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh, SurfelRecord
+
+# Adjoints are written by hand; generating them would double the compile time.
+wp.set_module_options({"enable_backward": False})
+
+#: Within this many of its scales a surfel sees a light as if it were farther away: inside a surfel the inverse
+#: square has no meaning, and its derivative would grow without bound.
+SOFTENING = wp.constant(1.0)
+
+
+@wp.kernel
+def _irradiance(
+    offset: int,
+    slab: int,
+    bvh: wp.uint64,
+    surfels: wp.array(dtype=SurfelRecord),
+    order: wp.array(dtype=int),
+    rule: LayerRule,
+    lights: wp.array(dtype=wp.vec3),
+    falloff: int,
+    shadows: int,
+    irradiance: wp.array(dtype=float),
+    derivative: wp.array(dtype=wp.vec3),
+):
+    item = wp.tid() + offset
+    count = surfels.shape[0]
+    light = lights[item / count]
+    i = item % count
+    n = surfels[i].normal
+    d = light - surfels[i].center
+    projected = wp.dot(d, n)
+    value = 1.0 - float(falloff)
+    slope = wp.vec3(0.0, 0.0, 0.0)
+    if projected >= 0.0:  # the derivative at a light in the plane is that towards the lit side
+        square = wp.dot(d, d)
+        if falloff == 1:
+            # √(|d|⁴ + ε⁴), without squares that leave float32's range.
+            softening = SOFTENING * surfels[i].scale
+            larger = wp.max(square, softening * softening)
+            ratio = wp.min(square, softening * softening) / larger
+            softened = larger * wp.sqrt(1.0 + ratio * ratio)
+            inverse_cube = 1.0 / (softened * wp.sqrt(softened))
+            value = projected * inverse_cube
+            slope = inverse_cube * (n - (3.0 * projected * (square / softened) / softened) * d)
+        if shadows == 1 and projected > 0.0 and square > 0.0:
+            share, share_slope = light_transmittance(bvh, surfels, rule, i, light, d)
+            slope = share * slope + value * share_slope
+            value *= share
+    place = item - i + order[i]
+    irradiance[place] = value
+    derivative[place] = slope
+
+
+def point_irradiance(bvh: SurfelBvh, positions: Tensor, shadows: bool) -> tuple[Tensor, Tensor]:
+    """Irradiance (L, N) of unit point lights at (L, 3) and its derivative (L, N, 3) towards their positions.
+
+    Without shadows the hierarchy is neither built nor read.
+    """
+    return _launch(bvh, positions, falloff=True, shadows=shadows)
+
+
+def transmittance(bvh: SurfelBvh, positions: Tensor) -> tuple[Tensor, Tensor]:
+    """Share (L, N) of lights at (L, 3) that reaches each surfel, and its derivative (L, N, 3) towards their positions.
+
+    Occluders are two-sided. Surfels that face away from the light get 1: their irradiance is zero by the cosine.
+    """
+    return _launch(bvh, positions, falloff=False, shadows=True)
+
+
+def _launch(bvh: SurfelBvh, positions: Tensor, *, falloff: bool, shadows: bool) -> tuple[Tensor, Tensor]:
+    lights, count = positions.shape[0], len(bvh.surfels)
+    value = torch.empty((lights, count), dtype=torch.float32, device=bvh.device)
+    derivative = torch.empty((lights, count, 3), dtype=torch.float32, device=bvh.device)
+    if count > 0:
+        hierarchy = bvh.id if shadows else 0
+        inputs = [hierarchy, bvh.records, bvh.order, bvh.rule, as_vec3(bvh.local(positions))]
+        outputs = [as_array(value.view(-1)), as_vec3(derivative.view(-1, 3))]
+        launch(_irradiance, lights * count, [*inputs, int(falloff), int(shadows), *outputs], bvh.device)
+    return value, derivative
