@@ -59,6 +59,22 @@ def test_the_plan_says_why(config: RgspipeConfig) -> None:
     assert "reuse" in text and "make" in text and "views.count 3 → 2" in text
 
 
+def test_stages_remark_on_what_is_made_already(config: RgspipeConfig) -> None:
+    """Below their lines in the plan: nothing yet, then of the inputs, then of the artifact itself."""
+    stage = dataclasses.replace(toys.HARVEST, remarks=lambda config, made: [f"made: {' '.join(sorted(made))}."])
+    load = {**toys.STAGES, "harvest": stage}.__getitem__
+
+    def last_lines() -> list[str]:
+        store = ArtifactStore(Path(config.outputs))
+        return [line.strip() for line in describe_plan(plan(resolve(config, load), store)).splitlines()[-2:]]
+
+    assert last_lines()[0].startswith("harvest  make") and last_lines()[1] == "made: ."
+    run(with_changes(config, {"stage": "grow", "views.count": 1}), load)
+    assert last_lines()[1] == "made: grow."
+    run(config, load)
+    assert last_lines()[0].startswith("harvest  reuse") and last_lines()[1] == "made: harvest."
+
+
 def test_keys_that_do_not_matter_do_not_rebuild(config: RgspipeConfig) -> None:
     run(config, toys.load)
     other = with_changes(config, {"seed": 7, "debug.traceback": True, "train.steps": 3})

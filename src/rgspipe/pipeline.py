@@ -51,11 +51,12 @@ class Node:
 
 @dataclass(frozen=True)
 class Step:
-    """One line of the plan: a node, whether it is there already, and if not, why not."""
+    """One line of the plan: a node, whether it is there already, and if not, why not; and what its stage remarks."""
 
     node: Node
     reused: bool
     reason: str
+    remarks: tuple[str, ...] = ()
 
 
 @dataclass
@@ -117,7 +118,7 @@ def plan(root: Node, store: ArtifactStore) -> list[Step]:
         if not reused:
             for needed in node.inputs:
                 visit(needed)
-        steps[node.key] = Step(node, reused, "" if reused else _reason(node, store))
+        steps[node.key] = Step(node, reused, "" if reused else _reason(node, store), _remarks(node, store))
 
     visit(root)
     return list(steps.values())
@@ -134,6 +135,13 @@ def _reason(node: Node, store: ArtifactStore) -> str:
     return shown + (f" and {len(causes) - SHOWN_CAUSES} more" if len(causes) > SHOWN_CAUSES else "")
 
 
+def _remarks(node: Node, store: ArtifactStore) -> tuple[str, ...]:
+    own = store.find(node.key)
+    found = {needed.stage.name: store.find(needed.key) for needed in reversed(node.inputs)} if own is None else {}
+    made = {name: artifact for name, artifact in {**found, node.stage.name: own}.items() if artifact is not None}
+    return tuple(node.stage.remarks(node.config, made))
+
+
 def describe_plan(steps: Sequence[Step]) -> str:
     """The plan as a table for people."""
     width = max(len(step.node.stage.name) for step in steps)
@@ -141,6 +149,7 @@ def describe_plan(steps: Sequence[Step]) -> str:
     for step in steps:
         verb = "reuse" if step.reused else "make "
         lines.append(f"  {step.node.stage.name:<{width}}  {verb}  {step.node.key.fingerprint}  {step.reason}".rstrip())
+        lines += [f"  {'':<{width}}         {remark}" for remark in step.remarks]
     return "\n".join(lines)
 
 

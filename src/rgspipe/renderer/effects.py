@@ -1,120 +1,214 @@
-"""Which parts of light transport a frozen scene calls for: bounds on what each can change, and what it costs."""
+"""Which parts of light transport a frozen scene calls for under a rig, and why."""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
+from math import pi
 
 import torch
-from torch import Tensor
 
+from rgspipe.renderer.effect_bounds import NO_BOUND, EffectBounds, bounces_needed
 from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.renderer.rig import Rig
+from rgspipe.renderer.spot import SpotShape
+from rgspipe.renderer.view_weights import ViewWeights
+from rgspipe.scene.lights import LightRig, SpotLight
 
-#: Lights at which shadows are sampled; half of them inside the bounding box, half in the ball around it.
-SAMPLED_LIGHTS = 128
+#: The effects that are decided on.
+EFFECTS = ("shadows", "interreflection", "spot cones", "specular lobes")
 
-#: Radius of that ball over half the diagonal of the bounding box.
-BALL_RADII = 2.0
-
-#: Timed runs behind a saving.
-RUNS = 5
+#: Of the largest loss to shadow in a sample, how much counts, as another light may lose more.
+SAMPLE_MARGIN = 2.0
 
 
 @dataclass(frozen=True)
-class EffectBounds:
-    """What leaving an effect out can change, as a share of the brightest directly lit radiance in the scene.
+class RigKind:
+    """What the choice of effects depends on in a rig; it does not depend on where lights are, how bright, how aimed.
 
     Attributes:
-        interreflection: the largest ratio of indirect to brightest direct radiance, over all surfels, channels and
-            all conceivable lights. With direct radiance D ≤ 1 the indirect part ρ F_p H R D is largest for D = 1, as
-            every operator in it is non-negative: the bound is attained, not estimated.
-        shadows: the largest unshadowed radiance that is lost to shadow, over SAMPLED_LIGHTS lights: sampled, so a
-            shadow that only few positions cast can be missed.
-        shadow_milliseconds, interreflection_milliseconds: what they cost in one evaluation with derivatives.
+        points: number of point lights.
+        spots: the shapes of the spots.
     """
 
-    interreflection: float
-    shadows: float
-    shadow_milliseconds: float
-    interreflection_milliseconds: float
+    points: int
+    spots: tuple[SpotShape, ...] = ()
+
+    @classmethod
+    def of(cls, rig: LightRig) -> RigKind:
+        spots = tuple(SpotShape.of(light) for light in rig if isinstance(light, SpotLight))
+        return cls(len(rig) - len(spots), spots)
+
+
+@dataclass(frozen=True)
+class Decision:
+    """Whether one effect is simulated.
+
+    Attributes:
+        effect: one of EFFECTS.
+        simulated: whether it is.
+        bound: what leaving it out can change, as a share of the brightest direct radiance.
+        reason: a sentence, with what is saved.
+    """
+
+    effect: str
+    simulated: bool
+    bound: float
+    reason: str
 
 
 @dataclass(frozen=True)
 class EffectChoice:
-    """The effects that are simulated, and a sentence for each that says why."""
+    """The decision on each effect, in the order of EFFECTS."""
 
-    shadows: bool
-    interreflection: bool
-    reasons: tuple[str, str]
+    decisions: tuple[Decision, ...]
+
+    def _simulated(self, effect: str) -> bool:
+        return self.decisions[EFFECTS.index(effect)].simulated
+
+    @property
+    def shadows(self) -> bool:
+        """Whether surfels stand in the light's way."""
+        return self._simulated("shadows")
+
+    @property
+    def interreflection(self) -> bool:
+        """Whether light bounces."""
+        return self._simulated("interreflection")
+
+    @property
+    def spots(self) -> bool:
+        """Whether spots have a profile; if not, they count as point lights."""
+        return self._simulated("spot cones")
+
+    @property
+    def specular(self) -> bool:
+        """Whether glossy surfels have their lobes."""
+        return self._simulated("specular lobes")
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """A sentence for each decision."""
+        return tuple(decision.reason for decision in self.decisions)
 
 
-def measure_effects(frozen: FrozenScene, *, seed: int) -> EffectBounds:
-    """Bounds for a frozen scene under one point light of any position and intensity."""
-    ones = torch.ones(len(frozen.surfels), 3, 1, device=frozen.surfels.centers.device)
-    positions = sample_lights(frozen, seed)
-    irradiance, slope = frozen.unit_irradiance(positions[:1])
-    lightings = torch.cat([irradiance.T, slope[0]], dim=1)
-    with_shadows = _milliseconds(lambda: frozen.unit_irradiance(positions[:1]))
-    without_shadows = _milliseconds(lambda: frozen.unit_irradiance(positions[:1], shadows=False))
-    with_bounces = _milliseconds(lambda: frozen.radiance(lightings))
-    without_bounces = _milliseconds(lambda: frozen.radiance(lightings, indirect=False))
-    return EffectBounds(
-        interreflection=float(frozen.transport.indirect(ones).amax()),
-        shadows=_largest_shadow(frozen, positions),
-        shadow_milliseconds=max(0.0, with_shadows - without_shadows),
-        interreflection_milliseconds=max(0.0, with_bounces - without_bounces),
-    )
+def choose_effects(
+    bounds: EffectBounds,
+    tolerance: float,
+    rig: RigKind,
+    *,
+    milliseconds: Mapping[str, float] | None = None,
+    off: Collection[str] = (),
+) -> EffectChoice:
+    """Leave out what together cannot change the radiance of any surfel, and so no pixel, by more than `tolerance`.
 
+    Effects are left out from the smallest bound on, as long as the sum of bounds is within the tolerance: the
+    difference made by leaving out several is at most the sum of the differences, one after the other.
 
-def choose_effects(bounds: EffectBounds, tolerance: float) -> EffectChoice:
-    """Leave out what cannot change the radiance anywhere by more than `tolerance` of the brightest direct radiance.
-
-    Both effects together may use up the tolerance, so each gets half. A shadow that is left out also lights what its
-    receiver lights: its bound is multiplied by 1 + interreflection.
+    Args:
+        bounds: of the frozen scene.
+        tolerance: share of the brightest direct radiance (diffuse, without shadows) under the rig.
+        rig: what kind of rig: the choice holds for every rig of this kind.
+        milliseconds: what effects cost, for the reasons.
+        off: effects that are not wanted whatever they change, and use up none of the tolerance.
     """
-    allowed = 0.5 * tolerance
-    bounces, shadow = bounds.interreflection, bounds.shadows * (1.0 + bounds.interreflection)
-    reasons = (
-        _reason("shadows", shadow, allowed, bounds.shadow_milliseconds),
-        _reason("interreflection", bounces, allowed, bounds.interreflection_milliseconds),
-    )
-    return EffectChoice(shadow > allowed, bounces > allowed, reasons)
+    shares = rig_bounds(bounds, rig)
+    left, chosen = tolerance, dict.fromkeys(off, False)
+    for effect in sorted(set(EFFECTS) - set(off), key=lambda name: shares[name]):
+        chosen[effect] = shares[effect] > left
+        left -= 0.0 if chosen[effect] else shares[effect]
+    costs = milliseconds or {}
+
+    def decision(effect: str) -> Decision:
+        simulated, share = chosen[effect], shares[effect]
+        if effect in off:
+            return Decision(effect, False, share, f"{effect} left out: as configured")
+        words = _why(effect, bounds, rig) if share == 0.0 else _how_much(effect, share, bounds, tolerance)
+        if simulated and effect == "interreflection":
+            words += _bounces(bounds, tolerance)
+        state = "simulated" if simulated else "left out"
+        return Decision(effect, simulated, share, f"{effect} {state}: {words}{_price(effect, simulated, rig, costs)}")
+
+    return EffectChoice(tuple(map(decision, EFFECTS)))
 
 
-def sample_lights(frozen: FrozenScene, seed: int) -> Tensor:
-    """(SAMPLED_LIGHTS, 3) positions, uniform in the bounding box and in the ball around it, half each."""
-    generator = torch.Generator().manual_seed(seed)
-    lower, upper = (corner.cpu() for corner in frozen.bounds)
-    half = SAMPLED_LIGHTS // 2
-    inside = lower + (upper - lower) * torch.rand(half, 3, generator=generator)
-    direction = torch.nn.functional.normalize(torch.randn(half, 3, generator=generator), dim=1)
-    radius = BALL_RADII * 0.5 * (upper - lower).norm() * torch.rand(half, 1, generator=generator).pow(1.0 / 3.0)
-    return torch.cat([inside, 0.5 * (lower + upper) + radius * direction])
+def rig_bounds(bounds: EffectBounds, rig: RigKind) -> dict[str, float]:
+    """What leaving out each of EFFECTS can change under any rig of a kind.
+
+    Every light's own brightest radiance is at most the rig's, so losses of single lights add up. A shadow or a cone
+    that is left out also lights what its receiver lights: 1 + b times, b the bound on interreflection. What is sampled
+    counts SAMPLE_MARGIN times.
+    """
+    bounced = 1.0 + bounds.interreflection
+    shadow = rig.points * bounds.shadows.point + len(rig.spots) * bounds.shadows.spot
+    return {
+        "shadows": min(NO_BOUND, shadow * bounced * SAMPLE_MARGIN),
+        "interreflection": bounds.interreflection,
+        "spot cones": min(NO_BOUND, bounced * sum(map(cone_bound, rig.spots))),
+        "specular lobes": bounds.specular,
+    }
 
 
-def _largest_shadow(frozen: FrozenScene, positions: Tensor) -> float:
-    albedo = frozen.surfels.albedo.amax(dim=1)
-    largest = 0.0
-    for block in positions.split(16):
-        lit, shadowed = (frozen.unit_irradiance(block, shadows=on)[0] * albedo for on in (False, True))
-        peak = lit.amax(dim=1)
-        lost = torch.where(peak > 0, (lit - shadowed).amax(dim=1) / peak.clamp(min=1e-30), torch.zeros_like(peak))
-        largest = max(largest, float(lost.amax()))
-    return largest
+def cone_bound(shape: SpotShape) -> float:
+    """What a spot's profile can change against a point light, (1 − p(π))/p(π), wherever it stands and is aimed.
+
+    No profile rises with the angle, so no share is smaller than that straight backwards, and the brightest surfel has
+    at least this share of what it has under a point light.
+    """
+    smallest = float(shape.share(torch.tensor([pi], dtype=torch.float64)))
+    return min(NO_BOUND, (1.0 - smallest) / smallest) if smallest > 0.0 else NO_BOUND
 
 
-def _milliseconds(run: Callable[[], object]) -> float:
-    run()
-    times = []
-    for _ in range(RUNS):
-        begin = time.perf_counter()
-        run()
-        times.append(1e3 * (time.perf_counter() - begin))
-    return sorted(times)[RUNS // 2]
+@dataclass(frozen=True)
+class ChosenScene:
+    """A frozen scene with the chosen effects only; the same calls as with all of them.
+
+    Attributes:
+        frozen: the scene, without lobes if they are left out.
+        choice: the effects.
+    """
+
+    frozen: FrozenScene
+    choice: EffectChoice
+
+    @classmethod
+    def of(cls, frozen: FrozenScene, choice: EffectChoice) -> ChosenScene:
+        return cls(frozen if choice.specular else replace(frozen, gloss=None), choice)
+
+    def render(self, view: ViewWeights, rig: LightRig | Rig) -> torch.Tensor:
+        """(height, width, 3) image under a rig of the kind that the choice was made for."""
+        rig = rig if isinstance(rig, Rig) else Rig.of(rig)
+        if not self.choice.spots and any(rig.shapes):
+            rig = Rig(rig.positions, rig.intensities)
+        return self.frozen.render(view, rig, self.choice.interreflection, self.choice.shadows)
 
 
-def _reason(effect: str, bound: float, allowed: float, milliseconds: float) -> str:
-    if bound > allowed:
-        return f"{effect} simulated: they can change {bound:.2g} of the brightest radiance (allowed {allowed:.2g})"
-    return f"{effect} left out: at most {bound:.2g} of the brightest radiance, saves {milliseconds:.1f} ms a step"
+def _why(effect: str, bounds: EffectBounds, rig: RigKind) -> str:
+    """Why an effect changes nothing at all."""
+    if effect == "shadows":
+        if bounds.shadows.proved:
+            return "no surfel rises above the plane of another"
+        return f"{bounds.shadows.lights} lights cast none"
+    if effect == "interreflection":
+        return "no surfel that reflects sees another"
+    if effect == "spot cones":
+        return "every spot shines alike in all directions" if rig.spots else "the rig has no spots"
+    return "no surfel is glossy"
+
+
+def _how_much(effect: str, share: float, bounds: EffectBounds, tolerance: float) -> str:
+    limit = "any" if share >= NO_BOUND else f"{share:.2g}"
+    sampled = f" by {bounds.shadows.lights} lights" if effect == "shadows" else ""
+    return f"can change {limit} of the brightest radiance{sampled}, tolerance {tolerance:.2g}"
+
+
+def _bounces(bounds: EffectBounds, tolerance: float) -> str:
+    """The inverse has all bounces; how many a solver without it would need."""
+    bounces = bounces_needed(bounds.row_sum, tolerance)
+    return "" if bounces is None else f", all bounces at once (one by one {bounces} would do)"
+
+
+def _price(effect: str, simulated: bool, rig: RigKind, costs: Mapping[str, float]) -> str:
+    if effect not in costs or (effect == "spot cones" and not rig.spots):
+        return ""
+    return f", {'costs' if simulated else 'saves'} {costs[effect]:.1f} ms a step"

@@ -58,6 +58,10 @@ def _nothing(config: RgspipeConfig) -> tuple[()]:
     return ()
 
 
+def _no_remarks(config: RgspipeConfig, inputs: Mapping[str, Artifact]) -> tuple[()]:
+    return ()
+
+
 @dataclass(frozen=True)
 class Stage:
     """One step of the way from images to lights.
@@ -72,6 +76,8 @@ class Stage:
         code: module prefixes whose source the result depends on, such as "rgspipe.renderer"; the stage's own module
             is always one. Comments, docstrings and formatting do not count.
         files: files and folders outside the store that the result depends on; their content counts.
+        remarks: lines that the plan shows below the stage, from the configuration and, by stage, the artifact itself
+            where it is reused, or else those of its inputs that are made already.
     """
 
     name: str
@@ -81,6 +87,7 @@ class Stage:
     config_keys: Sequence[str] | Callable[[RgspipeConfig], Sequence[str]] = ()
     code: Sequence[str] = ()
     files: Callable[[RgspipeConfig], Sequence[Path]] = _nothing
+    remarks: Callable[[RgspipeConfig, Mapping[str, Artifact]], Sequence[str]] = _no_remarks
 
     def needs(self, config: RgspipeConfig) -> tuple[Need, ...]:
         """The inputs for a configuration."""

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 import pandas as pd
 
+from rgspipe.artifacts import Artifact
 from rgspipe.config import RgspipeConfig
 from rgspipe.datasets.fit_file import read_result, write_result
 from rgspipe.datasets.frames import read_entries
@@ -29,7 +30,8 @@ from rgspipe.fitting import (
     prepare_fit,
 )
 from rgspipe.progress import track
-from rgspipe.renderer.effects import EffectBounds, choose_effects
+from rgspipe.renderer.effect_bounds import EffectBounds
+from rgspipe.renderer.effects import EffectChoice, RigKind, choose_effects
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import PointLight
 from rgspipe.stages.base import Stage, StageContext
@@ -117,11 +119,32 @@ def _effects(context: StageContext) -> Effects:
     wanted = context.config.effects
     if not wanted.auto:
         return Effects(wanted.shadows, wanted.interreflection)
-    bounds = EffectBounds(**read_json(context.inputs["freeze"].file(EFFECTS), "the effects of a frozen scene"))
-    choice = choose_effects(bounds, wanted.tolerance)
+    bounds, choice = _choice(context.config, context.inputs["freeze"])
     print("effects: " + "; ".join(choice.reasons))
     context.note(effects={"choice": asdict(choice), "bounds": asdict(bounds), "tolerance": wanted.tolerance})
-    return Effects(wanted.shadows and choice.shadows, wanted.interreflection and choice.interreflection)
+    return Effects(choice.shadows, choice.interreflection)
+
+
+def _choice(config: RgspipeConfig, freeze: Artifact) -> tuple[EffectBounds, EffectChoice]:
+    """What the frozen scene calls for under a rig of the kind that is looked for."""
+    measured = read_json(freeze.file(EFFECTS), "the effects of a frozen scene")
+    bounds, wanted = EffectBounds.from_json(measured["bounds"]), config.effects
+    off = [name for name, on in (("shadows", wanted.shadows), ("interreflection", wanted.interreflection)) if not on]
+    kind = RigKind(points=config.light.count)
+    costs = measured["milliseconds"]
+    return bounds, choose_effects(bounds, wanted.tolerance, kind, milliseconds=costs, off=off)
+
+
+def remarks(config: RgspipeConfig, made: Mapping[str, Artifact]) -> Sequence[str]:
+    """What the plan says about effects: the decisions where the frozen scene is there, or that they will be taken."""
+    wanted = config.effects
+    if not wanted.auto:
+        return ()
+    if "fit_light" in made:
+        return [decision["reason"] for decision in made["fit_light"].facts["effects"]["choice"]["decisions"]]
+    if "freeze" not in made:
+        return ["effects: decided after freeze"]
+    return _choice(config, made["freeze"])[1].reasons
 
 
 def select_targets(targets: Sequence[Target], config: RgspipeConfig) -> list[Target]:
@@ -226,5 +249,6 @@ STAGE = Stage(
         "rgspipe.evaluation.metrics",
     ),
     files=_files,
+    remarks=remarks,
     run=run,
 )
