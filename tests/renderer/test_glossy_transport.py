@@ -19,7 +19,7 @@ from rgspipe.renderer.rig import Rig, RigResponse
 from rgspipe.renderer.spherical_harmonics import real_harmonics
 from rgspipe.renderer.transport import build_patch_transport, with_bounces
 from rgspipe.scene import Camera, Gloss, PointLight, SpotLight, Surfels, look_at
-from rooms import closed_box
+from rooms import closed_box, sphere, surfels_on
 
 LIGHT, EYE = (0.1, -0.2, 0.1), (-0.3, 0.25, 0.2)
 
@@ -292,3 +292,17 @@ def test_gloss_that_makes_energy_and_harmonics_of_no_degree_are_refused(room: Fr
         build_glossy_transport(too_much, room.gather, room.transport)
     with pytest.raises(ValueError, match="degree 1 or more, got 0"):
         build_glossy_transport(room.surfels, room.gather, room.transport, degree=0)
+
+
+def test_a_glossy_object_that_sees_nothing_has_highlights_alone() -> None:
+    """The outside of a ball: no surfel sees another, and the gather operator is empty."""
+    ball = sphere(2600)
+    outside = surfels_on(ball.centers, -ball.normals, math.sqrt(4.0 * math.pi / 2600))
+    count = len(outside)
+    gloss = Gloss(torch.full((count, 3), 0.3), torch.full((count,), 30.0)).to(torch.float64)
+    scene = frozen(replace(outside, gloss=gloss), rays=16, patches=20)
+    assert scene.gather.entries == 0
+    light, eye = lamp((3.0, 1.0, 2.0)), torch.tensor([2.5, -2.0, 1.0])
+    everything, direct = (scene.glossy_light((light,), indirect=x).seen_from(eye) for x in (True, False))
+    assert torch.equal(everything, direct)
+    assert float(everything.amax()) > 3.0 * float(scene.radiance_of((light,)).amax())

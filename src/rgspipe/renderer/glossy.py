@@ -26,6 +26,11 @@ def phong_lobe(cosines: Tensor, exponents: Tensor) -> Tensor:
     return (exponents + 2.0) / (2.0 * math.pi) * cosines.clamp(min=0.0).pow(exponents)
 
 
+def phong_slope(cosines: Tensor, exponents: Tensor) -> Tensor:
+    """p_n'(cos α), the derivative of `phong_lobe` towards the cosine."""
+    return exponents * (exponents + 2.0) / (2.0 * math.pi) * cosines.clamp(min=0.0).pow(exponents - 1.0)
+
+
 def lobe_coefficients(exponents: Tensor, degree: int) -> Tensor:
     """(N, degree + 1) Legendre coefficients λ_l = 2π ∫ p_n(x) P_l(x) dx of the lobes, in closed form.
 
@@ -52,8 +57,20 @@ def soft_directions(vectors: Tensor, scales: Tensor) -> Tensor:
     Args:
         scales: (…,) of the surfels, scene units.
     """
+    return vectors * _inverse_length(vectors, scales)
+
+
+def soft_directions_and_slopes(vectors: Tensor, scales: Tensor) -> tuple[Tensor, Tensor]:
+    """`soft_directions` and their derivative (…, 3, 3) towards the vectors, symmetric."""
+    inverse = _inverse_length(vectors, scales)
+    directions = vectors * inverse
+    outer = directions[..., :, None] * directions[..., None, :]
+    return directions, (torch.eye(3).to(vectors) - outer) * inverse[..., None]
+
+
+def _inverse_length(vectors: Tensor, scales: Tensor) -> Tensor:
     shortest = (DIRECTION_SOFTENING * scales).square()
-    return vectors * (vectors.square().sum(-1) + shortest).rsqrt()[..., None]
+    return (vectors.square().sum(-1) + shortest).rsqrt()[..., None]
 
 
 def largest_lobe(gloss: Gloss) -> Tensor:

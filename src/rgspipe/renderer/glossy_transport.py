@@ -75,12 +75,15 @@ class GlossyTransport:
         """(G, K) λ of every harmonic."""
         return per_harmonic(lobe_coefficients(self.material[1], self.degree))
 
+    def vectors(self, points: Tensor) -> Tensor:
+        """(…, G, 3) from the glossy surfels to points (…, 3)."""
+        centers = self.geometry[0]
+        # The difference is taken in float64: far from the origin float32 knows neither of the two well enough.
+        return (points.to(centers.device, torch.float64)[..., None, :] - centers.double()).to(centers)
+
     def directions(self, points: Tensor) -> Tensor:
         """(…, G, 3) unit directions from the glossy surfels to points (…, 3), with a finite derivative everywhere."""
-        centers, _, scales = self.geometry
-        # The difference is taken in float64: far from the origin float32 knows neither of the two well enough.
-        between = points.to(centers.device, torch.float64)[..., None, :] - centers.double()
-        return soft_directions(between.to(centers), scales)
+        return soft_directions(self.vectors(points), self.geometry[2])
 
     def light(self, transport: PatchTransport, rig: Rig, response: RigResponse, indirect: bool = True) -> GlossyLight:
         """All light of the scene under a rig of L lights, differentiable towards the rig's tensors.

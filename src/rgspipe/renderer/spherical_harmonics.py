@@ -25,17 +25,51 @@ def coefficient_count(degree: int) -> int:
 
 def real_harmonics(directions: Tensor, degree: int) -> Tensor:
     """(…, (degree + 1)²) harmonics of unit vectors (…, 3), differentiable towards them."""
+    legendre, powers = _parts(directions, degree)
+    return torch.stack([_harmonic(legendre[order, abs(m)], powers, m) for order, m in _indices(degree)], dim=-1)
+
+
+def real_harmonics_and_slopes(directions: Tensor, degree: int) -> tuple[Tensor, Tensor]:
+    """`real_harmonics` and their derivatives (…, (degree + 1)², 3) towards the vectors' components.
+
+    By dQ_l^m/dz = √((l − m)(l + m + 1)) Q_l^{m+1} and d(x + iy)ᵐ = m (x + iy)ᵐ⁻¹ (dx + i dy).
+    """
+    legendre, powers = _parts(directions, degree)
+    zero = torch.zeros_like(directions[..., 0])
+    values, slopes = [], []
+    for order, signed in _indices(degree):
+        m, function = abs(signed), legendre[order, abs(signed)]
+        values.append(_harmonic(function, powers, signed))
+        gain = math.sqrt((order - m) * (order + m + 1))
+        upwards = _harmonic(gain * legendre[order, m + 1], powers, signed) if order > m else zero
+        along_x, along_y = zero, zero
+        if m > 0:
+            cosine, sine = (math.sqrt(2.0) * m * function * part for part in powers[m - 1])
+            along_x, along_y = (cosine, -sine) if signed > 0 else (sine, cosine)
+        slopes.append(torch.stack([along_x, along_y, upwards], dim=-1))
+    return torch.stack(values, dim=-1), torch.stack(slopes, dim=-2)
+
+
+def _indices(degree: int) -> list[tuple[int, int]]:
+    """(l, m) in the order of the coefficients."""
+    return [(order, m) for order in range(degree + 1) for m in range(-order, order + 1)]
+
+
+def _parts(directions: Tensor, degree: int) -> tuple[dict[tuple[int, int], Tensor], list[tuple[Tensor, Tensor]]]:
+    """Q_l^m by (l, m) for m ≥ 0, and real and imaginary part of (x + iy)ᵐ for m = 0 … `degree`."""
     x, y, z = directions.unbind(-1)
-    values: dict[tuple[int, int], Tensor] = {}
-    cosine, sine = torch.ones_like(x), torch.zeros_like(x)
-    for m in range(degree + 1):
-        for order, legendre in enumerate(_legendre_over_sine(z, m, degree), start=m):
-            if m == 0:
-                values[order, 0] = legendre
-            else:
-                values[order, m], values[order, -m] = (math.sqrt(2.0) * legendre * part for part in (cosine, sine))
-        cosine, sine = x * cosine - y * sine, x * sine + y * cosine
-    return torch.stack([values[order, m] for order in range(degree + 1) for m in range(-order, order + 1)], dim=-1)
+    powers = [(torch.ones_like(x), torch.zeros_like(x))]
+    for _ in range(degree):
+        cosine, sine = powers[-1]
+        powers.append((x * cosine - y * sine, x * sine + y * cosine))
+    columns = {m: _legendre_over_sine(z, m, degree) for m in range(degree + 1)}
+    return {(m + k, m): function for m, column in columns.items() for k, function in enumerate(column)}, powers
+
+
+def _harmonic(legendre: Tensor, powers: list[tuple[Tensor, Tensor]], m: int) -> Tensor:
+    if m == 0:
+        return legendre
+    return math.sqrt(2.0) * legendre * powers[abs(m)][0 if m > 0 else 1]
 
 
 def _legendre_over_sine(z: Tensor, m: int, degree: int) -> list[Tensor]:
