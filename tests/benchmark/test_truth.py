@@ -17,18 +17,10 @@ from rgspipe.benchmark.truth import load_truth, render_truth
 from rgspipe.datasets.exr import read_channels, write_channels
 from rgspipe.errors import InputError
 from rgspipe.evaluation.metrics import psnr
-from rgspipe.scene.rectangles import inside_of_box, rectangle
+from rgspipe.scene.rectangles import inside_of_box
+from tabletop import TABLETOP, lit_tabletop
 
 pytestmark = pytest.mark.skipif(importlib.util.find_spec("bpy") is None, reason="bpy is not installed")
-
-#: A floor with a dark tile; nothing about it is symmetric.
-FLOOR, TILE = [0.2, 0.5, 0.8], [0.05, 0.1, 0.1]
-TABLETOP = Room(
-    "tabletop",
-    rectangle([-4, -4, 0], [8, 0, 0], [0, 8, 0], FLOOR) + rectangle([0.1, 0.1, 0.001], [0.5, 0, 0], [0, 0.2, 0], TILE),
-    torch.tensor([[[0.5, -1.0, 1.5], [0.0, 0.0, 0.0]], [[-0.6, 0.2, 1.2], [0.2, 0.1, 0.0]]]),
-    torch.tensor([[0.1, -0.2, 0.9], [-0.5, 0.4, 0.6]]),
-)
 
 
 @pytest.fixture(scope="module")
@@ -39,24 +31,12 @@ def tabletop(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def _expected(camera: int, light: int) -> Tensor:
-    """(16, 16, 3) L = ρ/π · cosθ/r², the mean over 16 × 16 rays a pixel."""
-    origins, directions, _ = TABLETOP.cameras(16)[camera].rays(subsamples=16)
-    points = origins - (origins[:, 2:] / directions[:, 2:]) * directions
-    offset = TABLETOP.lights[light].double() - points
-    x, y = points[:, 0], points[:, 1]
-    on_tile = (x > 0.1) & (x < 0.6) & (y > 0.1) & (y < 0.3)
-    albedo = torch.where(on_tile[:, None], torch.tensor(TILE), torch.tensor(FLOOR)).double()
-    radiance = albedo / math.pi * (offset[:, 2] / offset.norm(dim=1) ** 3)[:, None]
-    return radiance.reshape(16, 16, 256, 3).mean(dim=2)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("camera", [0, 1])
 @pytest.mark.parametrize("light", [0, 1])
 def test_a_lit_rectangle_is_the_closed_form_seen_as_our_cameras_see_it(tabletop: Path, camera: int, light: int) -> None:
     truth = load_truth(tabletop)
-    expected = _expected(camera, light)
+    expected = lit_tabletop(camera, light, 16)
     for kind in ("direct", "global"):
         image = truth.image(camera, light, kind)
         # Direct images have 16 samples a pixel here: measured 42.4 dB at worst, 56 dB for global ones with 64.
