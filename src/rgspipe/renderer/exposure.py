@@ -49,7 +49,7 @@ class Exposure:
 
 @dataclass(frozen=True)
 class _Footprints:
-    """Where the footprints of surfels are; float32, on the CPU. Leading dimensions …: (N) or (groups, members).
+    """Where the footprints of surfels are; float64, on the CPU. Leading dimensions …: (N) or (groups, members).
 
     Attributes:
         centers, normals: (…, 3).
@@ -64,16 +64,19 @@ class _Footprints:
 
     @classmethod
     def of(cls, surfels: Surfels) -> _Footprints:
-        """Around the middle of the scene, so that float32 tells small heights apart wherever the scene is."""
         surfels = surfels.to(torch.float64).to("cpu")
         scales, frames = usable_scales(surfels.scales), surfels.frames
         ratio = (surfels.opacities / surfels.coverage.minimum_alpha).clamp(min=1.0)
         reach = ((2.0 * ratio.log()).sqrt()[:, None] * scales)[:, :, None] * frames[:, :2]
-        middle = surfels.centers.mean(dim=0)
-        return cls(*(x.float() for x in (surfels.centers - middle, frames[:, 2], reach, scales.prod(dim=1).sqrt())))
+        return cls(surfels.centers - surfels.centers.mean(dim=0), frames[:, 2], reach, scales.prod(dim=1).sqrt())
 
     def __getitem__(self, index: object) -> _Footprints:
         return _Footprints(*(getattr(self, item.name)[index] for item in fields(self)))
+
+    @property
+    def lifted(self) -> Tensor:
+        """(…, 3) where gather rays start."""
+        return self.centers + LIFT * self.scales[..., None] * self.normals
 
     @property
     def radius(self) -> Tensor:
@@ -83,12 +86,21 @@ class _Footprints:
 
 @dataclass(frozen=True)
 class _Cylinders:
-    """Around the footprints of each group: centres (G, 3), unit axes (G, 3), radii (G,) and half heights (G,)."""
+    """Around the footprints of G groups.
+
+    Attributes:
+        centers, axes: (G, 3), the axes of unit length.
+        radii, heights: (G,) radius and half the height.
+        spread: (G,) largest distance of a member's normal from the axis.
+        back: (G,) how far behind the centre, along its own normal, the plane of a member is at most.
+    """
 
     centers: Tensor
     axes: Tensor
     radii: Tensor
     heights: Tensor
+    spread: Tensor
+    back: Tensor
 
     @classmethod
     def around(cls, groups: _Footprints) -> _Cylinders:
@@ -98,7 +110,10 @@ class _Cylinders:
         along = (apart * axes[:, None]).sum(dim=2)
         across = (apart - along[..., None] * axes[:, None]).norm(dim=2)
         rise = torch.einsum("gkac,gc->gka", groups.reach, axes).norm(dim=2)
-        return cls(centers, axes, (across + groups.radius).amax(dim=1), (along.abs() + rise).amax(dim=1))
+        radii, heights = (across + groups.radius).amax(dim=1), (along.abs() + rise).amax(dim=1)
+        spread = (groups.normals - axes[:, None]).norm(dim=2).amax(dim=1)
+        back = -(apart * groups.normals).sum(dim=2).amin(dim=1)
+        return cls(centers, axes, radii, heights, spread, back)
 
     def top(self, receivers: _Footprints) -> Tensor:
         """(R, G) height of each cylinder's highest point over the plane of each receiver."""
@@ -106,6 +121,11 @@ class _Cylinders:
         sine = (1.0 - cosine.square()).clamp(min=0.0).sqrt()
         offset = (receivers.normals * receivers.centers).sum(dim=1, keepdim=True)
         return receivers.normals @ self.centers.T - offset + self.radii * sine + self.heights * cosine.abs()
+
+    def front(self, points: Tensor) -> Tensor:
+        """(R, G) at least the height of each point (R, 3) over the plane of any member of a group."""
+        over = points @ self.axes.T - (self.axes * self.centers).sum(dim=1)
+        return over + self.spread * torch.cdist(points, self.centers) + self.back
 
 
 def exposure(surfels: Surfels) -> Exposure:
@@ -123,7 +143,11 @@ def exposure(surfels: Surfels) -> Exposure:
     order = torch.randperm(len(surfels), generator=torch.Generator().manual_seed(0))
     for block in (order[:FIRST_RECEIVERS], *order[FIRST_RECEIVERS:].split(RECEIVERS_AT_ONCE)):
         receivers = footprints[block]
-        near = (cylinders.top(receivers) > LEAST_RISE * receivers.scales[:, None]).nonzero()
+        rises = cylinders.top(receivers) > LEAST_RISE * receivers.scales[:, None]
+        if shadow:
+            # What is left to find is what a receiver sees the front of.
+            rises &= cylinders.front(receivers.lifted) > 0.0
+        near = rises.nonzero()
         looked_into += len(near)
         # In parts, so that memory stays bounded however many groups rise.
         for i, g in (part.unbind(1) for part in near.split(RECEIVERS_AT_ONCE)):
@@ -167,7 +191,5 @@ def _possible(receivers: _Footprints, i: Tensor, groups: _Footprints, g: Tensor)
     own_surface = (cosine > COPLANAR_COSINE) & (height.abs() < COPLANAR_OFFSET * one.scales)
     shades = (top > LEAST_RISE * one.scales) & ~own_surface
     # … and as gather rays start above the surfel and meet fronts only.
-    lift = LIFT * one.scales
-    start = one.centers + lift[:, None] * one.normals
-    seen = (top > lift) & ((other.normals * (start - other.centers)).sum(dim=1) > 0.0)
+    seen = (top > LIFT * one.scales) & ((other.normals * (one.lifted - other.centers)).sum(dim=1) > 0.0)
     return bool(shades.any()), bool(seen.any())
