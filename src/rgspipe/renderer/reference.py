@@ -137,12 +137,15 @@ def transmittance(surfels: Surfels, positions: Tensor) -> Tensor:
 
 def _layers_from_afar(alpha: Tensor, depth: Tensor, coverage: Coverage) -> Tensor:
     """(R,) what passes the layers of occluders (R, N), counted from the light: the largest depths come first."""
-    passing = torch.ones(len(alpha), dtype=alpha.dtype)
-    remaining = torch.where(alpha.detach() > 0, depth.detach(), torch.full_like(depth, -torch.inf))
-    while bool((remaining > -torch.inf).any()):
-        front = remaining.amax(dim=1, keepdim=True)
-        layer = (remaining >= front - coverage.layer_thickness) & (remaining > -torch.inf)
-        clear = (1.0 - torch.where(layer, alpha, torch.zeros_like(alpha))).prod(dim=1)
-        passing = passing * (1.0 - smoothstep(1.0 - clear, coverage.low, coverage.high))
-        remaining = torch.where(layer, torch.full_like(remaining, -torch.inf), remaining)
-    return passing
+    place = torch.where(alpha.detach() > 0, depth.detach(), torch.full_like(depth, -torch.inf))
+    place, order = place.sort(dim=1, descending=True)
+    alpha = alpha.gather(1, order)
+    clear = passing = torch.ones(len(alpha), dtype=alpha.dtype)
+    front = torch.full_like(clear, torch.inf)
+    for k in range(int((place > -torch.inf).sum(dim=1).amax()) if len(alpha) else 0):
+        starts = place[:, k] < front - coverage.layer_thickness
+        covered = smoothstep(1.0 - clear, coverage.low, coverage.high)
+        passing = torch.where(starts, passing * (1.0 - covered), passing)
+        clear = torch.where(starts, torch.ones_like(clear), clear) * (1.0 - alpha[:, k])
+        front = torch.where(starts, place[:, k], front)
+    return passing * (1.0 - smoothstep(1.0 - clear, coverage.low, coverage.high))
