@@ -29,7 +29,7 @@ MAKE_AGAIN = "Remove it and run the stage freeze again."
 
 
 def save_frozen(folder: Path, frozen: FrozenScene) -> None:
-    """Write surfels, patch transport (with the surfels' areas) and, where the scene has them, gather and gloss.
+    """Write surfels, patch transport (with areas and exact centres) and, where the scene has them, gather and gloss.
 
     Raises:
         ValueError: the transport has a limited number of bounces: what is stored is the scene with all of them.
@@ -41,7 +41,9 @@ def save_frozen(folder: Path, frozen: FrozenScene) -> None:
     if frozen.gather is not None:
         save_tensors(folder / GATHER, frozen.gather.tensors("gather"))
     operators = transport.average.tensors("average") | transport.gather.tensors("gather")
-    save_tensors(folder / TRANSPORT, operators | {"inverse": transport.inverse, "areas": frozen.areas})
+    centers = (frozen.surfels.centers if frozen.centers is None else frozen.centers).double()
+    more = {"inverse": transport.inverse, "areas": frozen.areas, "centers": centers}
+    save_tensors(folder / TRANSPORT, operators | more)
     if frozen.gloss is not None:
         save_tensors(folder / GLOSS, frozen.gloss.operators.tensors())
 
@@ -57,26 +59,28 @@ def load_frozen(locate: Callable[[str], Path], *, gather: bool = False) -> Froze
         InputError: a file is missing, broken, or does not belong to the others.
     """
     surfels = load_surfels(locate(SURFELS))
-    areas, transport = _load_transport(locate(TRANSPORT), surfels.albedo.float())
+    areas, centers, transport = _load_transport(locate(TRANSPORT), surfels.albedo.float())
     operator = _load_gather(locate(GATHER), len(surfels)) if gather else None
     glossy = surfels.gloss is not None and len(surfels.gloss.glossy) > 0
     gloss = _load_gloss(locate(GLOSS), surfels, transport) if glossy else None
-    return FrozenScene(surfels, areas, operator, transport, gloss=gloss)
+    return FrozenScene(surfels, areas, operator, transport, gloss=gloss, centers=centers)
 
 
 def _load_gather(path: Path, count: int) -> SparseOperator:
     return _operator(path, _load(path, set(), ("gather",)), "gather", (count, count))
 
 
-def _load_transport(path: Path, albedo: Tensor) -> tuple[Tensor, PatchTransport]:
-    """Areas and patch transport."""
-    tensors = _load(path, {"inverse", "areas"}, ("average", "gather"))
-    areas, inverse = tensors["areas"], tensors["inverse"]
+def _load_transport(path: Path, albedo: Tensor) -> tuple[Tensor, Tensor, PatchTransport]:
+    """Areas, exact centres and patch transport."""
+    tensors = _load(path, {"inverse", "areas", "centers"}, ("average", "gather"))
+    areas, centers, inverse = tensors["areas"], tensors["centers"], tensors["inverse"]
     count, patches = len(albedo), inverse.shape[-1]
     _require(path, "areas", areas.shape, (count,))
+    _require(path, "centers", centers.shape, (count, 3))
     _require(path, "inverse", inverse.shape, (3, patches, patches))
     average = _operator(path, tensors, "average", (patches, count))
-    return areas, PatchTransport(average, _operator(path, tensors, "gather", (count, patches)), inverse, albedo)
+    transport = PatchTransport(average, _operator(path, tensors, "gather", (count, patches)), inverse, albedo)
+    return areas, centers, transport
 
 
 def _load_gloss(path: Path, surfels: Surfels, transport: PatchTransport) -> GlossyTransport:

@@ -28,7 +28,8 @@ def surfel_areas(bvh: SurfelBvh, *, samples: int = 32, seed: int = 0) -> Tensor:
     surfels, generator = bvh.surfels.to(torch.float32), torch.Generator().manual_seed(seed)
     count, frames = len(surfels), surfels.frames
     local = torch.randn((count, samples, 2), generator=generator).to(bvh.device)
-    points = surfels.centers[:, None] + torch.einsum("nsa,nac->nsc", local * surfels.scales[:, None], frames[:, :2])
+    offsets = torch.einsum("nsa,nac->nsc", local * surfels.scales[:, None], frames[:, :2])
+    points = bvh.surfels.centers[:, None] + offsets
     ramps = clip_ramps(surfels)[:, None]
     heights = ramps[..., 0] - ramps[..., 1] * local[..., :1] - ramps[..., 2] * local[..., 1:]
     own_share = heights.clamp(0.0, 1.0).prod(dim=-1).reshape(-1)

@@ -55,6 +55,8 @@ class FrozenScene:
         transport: bounces, averaged over patches.
         solver: how indirect light is found; None for `transport`. See `with_solver`.
         gloss: how light goes over glossy surfels; None for a diffuse scene.
+        centers: (N, 3) float64 centres as they were given, which rays and lights are measured from: far from the origin
+            float32 cannot hold them. None for `surfels.centers`.
     """
 
     surfels: Surfels
@@ -63,23 +65,25 @@ class FrozenScene:
     transport: PatchTransport
     solver: IndirectSolver | None = None
     gloss: GlossyTransport | None = None
+    centers: Tensor | None = None
 
     @classmethod
     def freeze(cls, surfels: Surfels, *, gather_rays: int, patches: int, seed: int) -> FrozenScene:
         """Precompute the operators of `surfels`: the gather from hemisphere rays, then patch transport."""
-        surfels = surfels.to(torch.float32)
-        bvh = SurfelBvh(surfels)
+        centers, surfels = surfels.centers.double(), surfels.to(torch.float32)
+        bvh = SurfelBvh(replace(surfels, centers=centers))
         areas = surfel_areas(bvh, seed=seed)
         gather = _gather(bvh, gather_rays, areas, seed)
-        labels = cluster_patches(surfels.centers, surfels.normals, patches if gather.entries else 1, seed=seed)
+        labels = cluster_patches(centers, surfels.normals, patches if gather.entries else 1, seed=seed)
         transport = build_patch_transport(gather, labels, areas, surfels.albedo)
         gloss = build_glossy_transport(surfels, gather, transport)
-        return cls(surfels, areas, gather, transport, gloss=gloss)
+        return cls(surfels, areas, gather, transport, gloss=gloss, centers=centers)
 
     @cached_property
     def bvh(self) -> SurfelBvh:
         """The hierarchy for shadow and camera rays."""
-        return SurfelBvh(self.surfels)
+        placed = self.surfels if self.centers is None else replace(self.surfels, centers=self.centers)
+        return SurfelBvh(placed)
 
     @cached_property
     def bounds(self) -> tuple[Tensor, Tensor]:

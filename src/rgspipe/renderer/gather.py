@@ -56,7 +56,7 @@ def build_gather(bvh: SurfelBvh, rays: int, *, seed: int, areas: Tensor | None =
     surfels, count = bvh.surfels, len(bvh.surfels)
     generator = torch.Generator().manual_seed(seed)
     axes = surfels.frames.float()
-    lifted = (surfels.centers + LIFT * surfels.scales.prod(dim=1).sqrt()[:, None] * axes[:, 2]).float()
+    lifted = surfels.centers + LIFT * surfels.scales.prod(dim=1).sqrt()[:, None] * axes[:, 2]
     per_batch = max(1, RAYS_AT_ONCE // rays)
     blocks = []
     for start in track(range(0, count, per_batch), "gather operator", unit="batch"):

@@ -64,7 +64,7 @@ def random_gather(bvh: SurfelBvh, samples: int, generator: torch.Generator) -> S
     """(N, N) unbiased estimate of the gather operator from `samples` independent cosine-distributed rays a surfel."""
     surfels, count = bvh.surfels, len(bvh.surfels)
     axes = surfels.frames.float()
-    origins = (surfels.centers + LIFT * surfels.scales.prod(dim=1).sqrt()[:, None] * axes[:, 2]).float()
+    origins = surfels.centers + LIFT * surfels.scales.prod(dim=1).sqrt()[:, None] * axes[:, 2]
     per_batch = max(1, RAYS_AT_ONCE // samples)
     blocks = [scipy.sparse.csr_matrix((0, count), dtype=np.float32)]
     for start in range(0, count, per_batch):

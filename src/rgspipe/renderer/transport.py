@@ -61,7 +61,8 @@ class PatchTransport:
             direct: (N, 3, K) direct radiosity D of K lightings.
         """
         count, channels, lightings = direct.shape
-        patches = (self.average @ direct.reshape(count, -1)).reshape(-1, channels, lightings)
+        flat = direct.reshape(count, channels * lightings)
+        patches = (self.average @ flat).reshape(self.average.shape[0], channels, lightings)
         solved = torch.einsum("cpq,qck->pck", self.inverse, patches)
         return (self.gather @ solved.reshape(-1, channels * lightings)).reshape(count, channels, lightings)
 

@@ -1,0 +1,66 @@
+"""A scene 1e4 of its sizes away from the origin is lit as it is at the origin, from freezing to derivatives."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+import torch
+from torch import Tensor
+
+from hard_cases import INSIDE, room
+from rgspipe.datasets.frozen_file import load_frozen, save_frozen
+from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.renderer.rig import Rig
+from rgspipe.renderer.spot import SpotShape
+
+#: Where a float32 is rounded to 1e-3, a sixtieth of a surfel's spacing.
+AWAY = torch.tensor([1e4, -1e4, 1e4], dtype=torch.float64)
+
+
+def freeze(offset: Tensor) -> FrozenScene:
+    surfels = room()
+    moved = replace(surfels, centers=surfels.centers.double() + offset)
+    return FrozenScene.freeze(moved, gather_rays=32, patches=60, seed=0)
+
+
+@pytest.fixture(scope="module")
+def near() -> FrozenScene:
+    return freeze(torch.zeros(3, dtype=torch.float64))
+
+
+@pytest.fixture(scope="module")
+def far() -> FrozenScene:
+    return freeze(AWAY)
+
+
+def lit(frozen: FrozenScene, offset: Tensor) -> dict[str, Tensor]:
+    """Radiance of a point and a spot, and derivatives of its sum."""
+    inside = INSIDE.double()
+    positions = (torch.stack([inside, -inside]) + offset).requires_grad_()
+    axes = torch.tensor([[0.0, 0.0, 1.0], [0.3, 0.5, -1.0]], dtype=torch.float64, requires_grad=True)
+    intensities = torch.ones(2, 3, dtype=torch.float64, requires_grad=True)
+    shapes = (None, SpotShape("gaussian", 0.4, 0.3))
+    radiance = frozen.radiance_of(Rig(positions, intensities, axes, shapes))
+    radiance.sum().backward()
+    return {
+        "radiance": radiance.detach(),
+        "positions": positions.grad,
+        "axes": axes.grad,
+        "intensity": intensities.grad,
+    }
+
+
+def test_light_and_its_derivatives_are_the_same(near: FrozenScene, far: FrozenScene) -> None:
+    here, there = lit(near, torch.zeros(3, dtype=torch.float64)), lit(far, AWAY)
+    for name, expected in here.items():
+        error = float((there[name] - expected).norm() / expected.norm())
+        # Measured 0; with centres rounded to float32 2e-3 of the radiance and 5e-3 of the derivative towards positions.
+        assert error < 1e-5, name
+
+
+def test_the_centres_are_stored(far: FrozenScene, tmp_path) -> None:
+    save_frozen(tmp_path, far)
+    loaded = load_frozen(tmp_path.joinpath)
+    assert torch.equal(loaded.centers, far.centers)
+    assert torch.equal(lit(loaded, AWAY)["radiance"], lit(far, AWAY)["radiance"])
