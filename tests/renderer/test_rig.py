@@ -11,6 +11,7 @@ from torch import Tensor
 
 from rgspipe.renderer import reference
 from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.renderer.kernels.irradiance import SOFTENING
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.rig import Rig, rig_irradiance, unit_response
 from rgspipe.renderer.spot import SpotShape, angle_from_axis
@@ -59,7 +60,7 @@ def expected_irradiance(
     """(N, 3) by the references, in float64."""
     towards = surfels.centers - positions[:, None]
     cosine = -(towards * surfels.normals).sum(dim=-1).clamp(max=0.0)
-    softening = surfels.scales.prod(dim=1).square()
+    softening = (float(SOFTENING) * surfels.scales.prod(dim=1).sqrt()).pow(4)
     geometry = cosine / (towards.square().sum(dim=-1).square() + softening).pow(0.75)
     point = geometry * reference.transmittance(surfels, positions)
     shares = [
