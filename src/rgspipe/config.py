@@ -187,7 +187,7 @@ class EffectsConfig:
 
     shadows: bool = option(True, "surfels block light")
     interreflection: bool = option(True, "light bounces between surfels")
-    auto: bool = option(False, "leave out, of these, what cannot change an image by more than `tolerance`")
+    auto: bool = option(True, "leave out, of these, what cannot change an image by more than `tolerance`")
     tolerance: float = option(
         0.001, "with auto: largest change, fraction of the brightest direct radiance", low=0, high=1
     )
