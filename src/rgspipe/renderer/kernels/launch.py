@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import AbstractContextManager, nullcontext
 from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
@@ -56,6 +57,13 @@ def slices(count: int, parts: int) -> list[tuple[int, int]]:
     return [(a, b - a) for a, b in pairwise(bounds) if b > a]
 
 
+def torch_stream(device: torch.device) -> AbstractContextManager[object]:
+    """Within it Warp works on torch's current stream, so that neither reads what the other has not written yet."""
+    if device.type == "cpu":
+        return nullcontext()
+    return wp.ScopedStream(wp.stream_from_torch(torch.cuda.current_stream(device)))
+
+
 def launch(kernel: wp.Kernel, count: int, inputs: list[Any], device: torch.device, slabs: int | None = None) -> None:
     """Run `kernel` over items 0 … count−1; its first two arguments are the offset and the slab of the slice.
 
@@ -66,7 +74,8 @@ def launch(kernel: wp.Kernel, count: int, inputs: list[Any], device: torch.devic
     if count == 0:
         return
     if device.type != "cpu":
-        wp.launch(kernel, dim=count, inputs=[0, 0, *inputs], device=wp.device_from_torch(device))
+        with torch_stream(device):
+            wp.launch(kernel, dim=count, inputs=[0, 0, *inputs], device=wp.device_from_torch(device))
         return
     parts = slices(count, slabs or min(count, thread_count() * SLICES_PER_THREAD))
     if len(parts) == 1:
@@ -90,3 +99,8 @@ def as_vec3(tensor: Tensor) -> wp.array:
 def as_array(tensor: Tensor) -> wp.array:
     """A tensor as a Warp array of the same scalar type, without a copy where it is contiguous."""
     return wp.from_torch(tensor.detach().contiguous())
+
+
+def vector(tensor: Tensor) -> wp.vec3:
+    """(3,) tensor as one float32 vector."""
+    return wp.vec3(*tensor.detach().float().cpu().tolist())

@@ -186,7 +186,7 @@ class _ShadeRays(torch.autograd.Function):
         hits = composite(bvh, origins, directions)
         colours = torch.empty((origins.shape[0], 3), dtype=torch.float32, device=bvh.device)
         radiance_array = wp.from_torch(radiance.detach().float().contiguous(), dtype=wp.vec3)
-        arguments = [as_array(hits.indices), as_array(hits.weights), as_array(ray_view.int()), radiance_array]
+        arguments = [as_array(hits.indices), as_array(hits.weights), as_array(ray_view), radiance_array]
         launch(_shade, origins.shape[0], [*arguments, as_vec3(colours)], bvh.device)
         ctx.bvh, ctx.rays, ctx.hits = bvh, rays, hits
         ctx.save_for_backward(radiance, *parameters)
@@ -226,7 +226,7 @@ def _surfel_gradient(
     thresholds = torch.zeros((slabs, 2), dtype=torch.float32, device=device)
     scratch = [torch.empty_like(hits.weights), torch.empty_like(hits.weights), torch.empty_like(hits.indices)]
     arguments = [bvh.records, bvh.rank, bvh.rule, as_vec3(bvh.local(origins)), as_vec3(directions)]
-    arguments += [as_array(x) for x in (hits.indices, hits.depths, hits.alphas, ray_view.int())]
+    arguments += [as_array(x) for x in (hits.indices, hits.depths, hits.alphas, ray_view)]
     arguments += [wp.from_torch(radiance.detach().float().contiguous(), dtype=wp.vec3), as_vec3(colour_gradient)]
     arguments += [as_array(x) for x in (*scratch, packed, thresholds)]
     launch(_shade_adjoint, count, arguments, device, slabs=slabs)
@@ -285,7 +285,8 @@ def shade_rays(
     Returns:
         (R, 3) float32 radiance.
     """
-    rays = (origins.detach(), directions.detach(), ray_view)
+    device = bvh.device
+    rays = (origins.detach(), directions.detach().to(device, torch.float32), ray_view.to(device, torch.int32))
     return _ShadeRays.apply(
         bvh,
         rays,

@@ -10,7 +10,7 @@ import warp as wp
 from torch import Tensor
 
 from rgspipe.renderer.kernels.coverage import layer_rule
-from rgspipe.renderer.kernels.launch import as_array, as_vec3
+from rgspipe.renderer.kernels.launch import as_array, as_vec3, torch_stream
 from rgspipe.scene.surfels import Surfels
 
 # Adjoints are written by hand; generating them would double the compile time.
@@ -95,7 +95,8 @@ class SurfelBvh:
         centers = self.local(self.surfels.centers)
         order = wp.to_torch(self.order).long()
         lower, upper = as_vec3((centers - extent)[order]), as_vec3((centers + extent)[order])
-        return wp.Bvh(lower, upper, leaf_size=LEAF_SIZE)
+        with torch_stream(self.device):
+            return wp.Bvh(lower, upper, leaf_size=LEAF_SIZE)
 
     @property
     def id(self) -> int:
