@@ -9,19 +9,8 @@ import scipy.sparse
 import torch
 from torch import Tensor
 
-from rgspipe.renderer.clusters import cluster_patches
-from rgspipe.renderer.radiosity import LARGEST_ALBEDO, solve_radiosity
+from rgspipe.renderer.radiosity import LARGEST_ALBEDO
 from rgspipe.renderer.sparse import SparseOperator
-
-__all__ = [
-    "LARGEST_ALBEDO",
-    "PatchTransport",
-    "build_patch_transport",
-    "cluster_patches",
-    "solve_radiosity",
-    "with_albedo",
-    "with_bounces",
-]
 
 #: Entries of the gather that are sorted into patches at once; bounds the memory of their labels to 16 MB.
 ENTRIES_AT_ONCE = 4_000_000
