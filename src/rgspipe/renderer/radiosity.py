@@ -63,10 +63,12 @@ def _neumann(
 
     Every bounce keeps at most the largest albedo, so the bounces needed are known beforehand.
     """
-    largest = float(albedo.max()) if albedo.numel() else 0.0
+    if source.numel() == 0:
+        return source
+    largest = float(albedo.max())
     most = max(2, math.ceil(math.log(tolerance) / math.log(largest))) if largest > 0 else 1
     total, bounce = source, source
-    bound = tolerance * source.abs().amax() if source.numel() else 0.0
+    bound = tolerance * source.abs().amax()
     for _ in range(most if bounces is None else bounces):
         bounce = step(bounce)
         total = total + bounce
