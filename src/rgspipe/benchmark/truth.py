@@ -107,7 +107,7 @@ class Truth:
 
 def render_truth(
     room: Room, folder: Path, *, resolution: int = 128, samples: int = 1024, seed: int = 0
-) -> dict[Kind, float]:
+) -> dict[Kind, float | None]:
     """Render `room` with Cycles into `folder`, and write what the images are into truth.json.
 
     Images that are already there and whole are kept, so an interrupted call may be repeated.
@@ -120,7 +120,7 @@ def render_truth(
         seed: of the path tracer.
 
     Returns:
-        by kind the least PSNR [dB] that the truth's own noise allows.
+        by kind the least PSNR [dB] that the truth's own noise allows; None if no noise was seen.
 
     Raises:
         InputError: bpy is not installed, or `folder` holds images of another room or with other settings.
@@ -149,12 +149,16 @@ def render_truth(
     truth = load_truth(folder)
     caps = {kind: _caps(truth, kind) for kind in KINDS}
     write_json(folder / TRUTH_FILE, facts | {"noise_cap_db": caps})
-    return {kind: min(min(row) for row in rows) for kind, rows in caps.items()}
+    return {
+        kind: min((cap for row in rows for cap in row if cap is not None), default=None) for kind, rows in caps.items()
+    }
 
 
-def _caps(truth: Truth, kind: Kind) -> list[list[float]]:
+def _caps(truth: Truth, kind: Kind) -> list[list[float | None]]:
+    """Of every camera and light; None for an image without noise or light."""
     cameras, lights = truth.images[kind].shape[:2]
-    return [[truth.cap(camera, light, kind) for light in range(lights)] for camera in range(cameras)]
+    caps = [[truth.cap(camera, light, kind) for light in range(lights)] for camera in range(cameras)]
+    return [[cap if math.isfinite(cap) else None for cap in row] for row in caps]
 
 
 def load_truth(folder: Path) -> Truth:

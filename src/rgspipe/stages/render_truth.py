@@ -22,7 +22,10 @@ def run(context: StageContext) -> None:
         for name in wanted.rooms
     }
     for name, cap in caps.items():
-        print(f"{name}: noise caps PSNR at {cap['direct']:.1f} dB (direct) and {cap['global']:.1f} dB (global)")
+        listed = ", ".join(
+            f"{kind} {'no noise' if least is None else f'{least:.1f} dB'}" for kind, least in cap.items()
+        )
+        print(f"{name}: PSNR that its own noise allows: {listed}")
     context.note(noise_cap_db=caps)
 
 
