@@ -92,7 +92,7 @@ def test_reciprocity_comes_with_more_rays() -> None:
         between = member.T @ flow
         return float((between - between.T).norm() / between.norm())
 
-    few, more, most = defect(64), defect(256), defect(1024)
-    # Measured 0.094, 0.041 and 0.037.
+    few, more, most = defect(16), defect(64), defect(1024)
+    # Measured 0.112, 0.048 and 0.0375.
     assert more < 0.55 * few
     assert most < 0.05

@@ -100,7 +100,7 @@ def _cast(
 ) -> tuple[scipy.sparse.csr_matrix, tuple[Tensor, Tensor, Tensor]]:
     """Rows of `pixels` (P,), and of each ray the mean normal, the inverse planar depth and the transmittance."""
     origins, directions, lengths = camera.rays(pixels, places=places)
-    hits = composite(bvh, origins.float(), directions.float(), nearest=nearest_hit(bvh))
+    hits = composite(bvh, origins, directions, nearest=nearest_hit(bvh))
     normal, distance = mean_surface(hits, bvh.surfels.normals.float())
     inverse = lengths.float() / distance.cpu().clamp(min=1e-6)
     rows = rows_from_hits(hits, normalised_weights(hits), len(origins) // len(pixels), len(bvh.surfels))
