@@ -131,7 +131,7 @@ def test_a_rig_without_spots_pays_for_no_profile(bvh: SurfelBvh, monkeypatch: py
         raise AssertionError("a point light has no profile")
 
     monkeypatch.setattr("rgspipe.renderer.rig.spot_profile", refuse)
-    monkeypatch.setattr("rgspipe.renderer.rig.angle_from_axis", refuse)
+    monkeypatch.setattr("rgspipe.renderer.rig.angle_slopes", refuse)
     lamps = Rig.of(tuple(PointLight(p, torch.ones(3).double()) for p in parameters()["positions"]))
     assert unit_response(bvh, lamps).by_axis is None
     assert rig_irradiance(bvh, lamps).shape == (len(bvh.surfels), 3)

@@ -11,7 +11,7 @@ from torch import Tensor
 
 from rgspipe.renderer.direct import unit_irradiance
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
-from rgspipe.renderer.spot import SpotShape, angle_from_axis, angle_slopes, spot_profile
+from rgspipe.renderer.spot import SpotShape, angle_slopes, spot_profile
 from rgspipe.scene.lights import LightRig, PointLight, SpotLight
 
 
@@ -126,8 +126,8 @@ def _spot_shares(bvh: SurfelBvh, rig: Rig, profile: str, members: list[int]) -> 
         torch.tensor([[getattr(shape, name)] for shape in shapes], dtype=torch.float32, device=towards.device)
         for name in ("cone_angle", "falloff")
     )
-    share, slope = spot_profile(profile, angle_from_axis(axes, towards), cone, falloff)
-    by_towards, by_axis = angle_slopes(axes, towards)
+    angle, by_towards, by_axis = angle_slopes(axes, towards)
+    share, slope = spot_profile(profile, angle, cone, falloff)
     # The angle does not depend on the axis' length, so the derivative towards the axis falls with it.
     length = rig.axes.detach()[members].to(towards).norm(dim=1)[:, None, None]
     return share, -slope[..., None] * by_towards, slope[..., None] * by_axis / length

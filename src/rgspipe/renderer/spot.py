@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -54,32 +55,42 @@ def angle_from_axis(axis: Tensor, towards: Tensor) -> Tensor:
 
     By the two-argument arctangent, which is exact near 0 and π where the arccosine loses half of its digits.
     """
-    _, across, along = _components(axis, towards)
-    return torch.atan2(across, along)
+    a, v = axis.unbind(-1), towards.unbind(-1)
+    return torch.atan2(_across(_cross(a, v), v), _dot(a, v))
 
 
-def angle_slopes(axis: Tensor, towards: Tensor) -> tuple[Tensor, Tensor]:
-    """Derivatives (…, 3) of `angle_from_axis` towards `towards` and towards `axis`.
+def angle_slopes(axis: Tensor, towards: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    """`angle_from_axis` (…,) and its derivatives (…, 3) towards `towards` and towards `axis`.
 
     With w = a × v, S = √(|w|² + δ|v|² + ε) and C = a·v the angle is atan2(S, C), so that
 
         ∂θ/∂v = (C (w × a + δv)/S − S a) / (S² + C²),     ∂θ/∂a = (C (v × w)/S − S v) / (S² + C²).
     """
-    cross, across, along = _components(axis, towards)
-    square = (across.square() + along.square())[..., None]
-    ratio, across = (along / across)[..., None], across[..., None]
-    sideways = torch.linalg.cross(cross, axis.expand_as(cross)) + _ON_AXIS * towards
-    by_towards = (ratio * sideways - across * axis) / square
-    by_axis = (ratio * torch.linalg.cross(towards.expand_as(cross), cross) - across * towards) / square
-    return by_towards, by_axis
+    # One component after the other, each in one piece of memory, takes a third of the time of rows of three.
+    a, v = axis.unbind(-1), towards.movedim(-1, 0).contiguous().unbind(0)
+    w = _cross(a, v)
+    across, along = _across(w, v), _dot(a, v)
+    inverse = 1.0 / (across.square() + along.square())
+    outwards, inwards = along / across * inverse, across * inverse
+    pairs = zip(_cross(w, a), _cross(v, w), v, a, strict=True)
+    slopes = [
+        (outwards * (wa + _ON_AXIS * vi) - inwards * ai, outwards * vw - inwards * vi) for wa, vw, vi, ai in pairs
+    ]
+    by_towards, by_axis = (torch.stack(parts, dim=-1) for parts in zip(*slopes, strict=True))
+    return torch.atan2(across, along), by_towards, by_axis
 
 
-def _components(axis: Tensor, towards: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-    """a × v, its length (never zero), and a·v."""
-    axis, towards = torch.broadcast_tensors(axis, towards)
-    cross = torch.linalg.cross(axis, towards)
-    across = (cross.square().sum(-1) + _ON_AXIS * towards.square().sum(-1) + _AT_LIGHT).sqrt()
-    return cross, across, (axis * towards).sum(-1)
+def _cross(a: Sequence[Tensor], b: Sequence[Tensor]) -> list[Tensor]:
+    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+
+
+def _dot(a: Sequence[Tensor], b: Sequence[Tensor]) -> Tensor:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _across(cross: Sequence[Tensor], towards: Sequence[Tensor]) -> Tensor:
+    """S, never zero."""
+    return (_dot(cross, cross) + _ON_AXIS * _dot(towards, towards) + _AT_LIGHT).sqrt()
 
 
 def spot_profile(
