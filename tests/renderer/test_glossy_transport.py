@@ -163,18 +163,18 @@ def test_a_surfel_in_uniform_light_reflects_the_visible_share_of_its_lobe(room: 
     """L = 1 all around: the specular part towards ω is k_s ∫ p_n(ω mirrored · ω') cos θ' dω'."""
     gloss, count = room.gloss, len(room.surfels)
     transport = with_bounces(room.transport, 1)
-    _, reflected = gloss.spread(transport, torch.ones(count, 3, 1), torch.zeros(len(gloss.glossy), 49, 3, 1))
+    _, reflected = gloss.spread(transport, torch.ones(count, 3, 1), torch.zeros(len(gloss.glossy), 25, 3, 1))
     generator = torch.Generator().manual_seed(0)
     axes = room.surfels.frames[gloss.glossy[:1]].double()  # one for the whole floor
     around = cosine_directions(axes, 200_000, generator)[0]
     eyes = cosine_directions(axes, 20, generator)[0]
     mirror = mirrored(eyes, axes[0, 2])
     share = math.pi * phong_lobe(mirror @ around.T, torch.tensor(20.0).double()).mean(dim=1)
-    found = torch.einsum("rk,gk->gr", real_harmonics(eyes, 6), reflected[:, :, 0, 0].double()) / 0.4
+    found = torch.einsum("rk,gk->gr", real_harmonics(eyes, 4), reflected[:, :, 0, 0].double()) / 0.4
     error = (found - share)[(room.surfels.centers[gloss.glossy, :2].abs() < 0.3).all(dim=1)]
-    # Shares are 0.2 to 1. Away from the walls measured 0.005 in the mean, and 0.022 of single surfels: the noise of 256
+    # Shares are 0.2 to 1. Away from the walls measured 0.010 in the mean, and 0.022 of single surfels: the noise of 256
     # rays. Beside a wall it is 0.1, as the direction of the nearest surfel is that of its centre.
-    assert float(error.mean(dim=0).abs().max()) < 0.01
+    assert float(error.mean(dim=0).abs().max()) < 0.015
     assert float(error.square().mean().sqrt()) < 0.03
 
 
@@ -185,10 +185,10 @@ def test_gloss_never_makes_energy(exponent: float) -> None:
     transport, generator = with_bounces(scene.transport, 1), torch.Generator().manual_seed(0)
     labels = torch.from_numpy(transport.average.to_scipy().tocsc().indices).long()
     source = torch.rand(len(labels), 1, generator=generator).pow(8.0)[labels].expand(-1, 3)
-    _, reflected = scene.gloss.spread(transport, source[..., None], torch.zeros(len(labels), 49, 3, 1))
+    _, reflected = scene.gloss.spread(transport, source[..., None], torch.zeros(len(labels), 25, 3, 1))
     arriving = math.pi * (scene.gather @ source)[:, 0]
     around = cosine_directions(scene.surfels.frames, 1000, generator)
-    leaving = math.pi * torch.einsum("nrk,nk->n", real_harmonics(around, 6), reflected[:, :, 0, 0]) / 1000
+    leaving = math.pi * torch.einsum("nrk,nk->n", real_harmonics(around, 4), reflected[:, :, 0, 0]) / 1000
     share = leaving / arriving
     # Measured 0.43, 0.42 and 0.42 at most, 0.37, 0.34 and 0.34 on average: of slanted light the lobe loses a part.
     assert 0.3 < float(share.mean()) < float(share.max()) < 0.5

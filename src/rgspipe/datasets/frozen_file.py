@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from torch import Tensor
@@ -12,7 +13,7 @@ from rgspipe.datasets.tensor_file import load_tensors, save_tensors
 from rgspipe.errors import InputError
 from rgspipe.fitting.dictionary import LightDictionary
 from rgspipe.renderer.frozen import FrozenScene
-from rgspipe.renderer.glossy_operators import GlossyOperators
+from rgspipe.renderer.glossy_operators import OPERATOR_NAMES, PAIR_NAMES, Exchange, GlossyOperators
 from rgspipe.renderer.glossy_transport import GlossyTransport
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.transport import PatchTransport
@@ -62,7 +63,7 @@ def load_frozen(locate: Callable[[str], Path], *, gather: bool = False) -> Froze
     areas, centers, transport = _load_transport(locate(TRANSPORT), surfels.albedo.float())
     operator = _load_gather(locate(GATHER), len(surfels)) if gather else None
     glossy = surfels.gloss is not None and len(surfels.gloss.glossy) > 0
-    gloss = _load_gloss(locate(GLOSS), surfels, transport) if glossy else None
+    gloss = _load_gloss(locate(GLOSS), replace(surfels, centers=centers), transport) if glossy else None
     return FrozenScene(surfels, areas, operator, transport, gloss=gloss, centers=centers)
 
 
@@ -84,18 +85,31 @@ def _load_transport(path: Path, albedo: Tensor) -> tuple[Tensor, Tensor, PatchTr
 
 
 def _load_gloss(path: Path, surfels: Surfels, transport: PatchTransport) -> GlossyTransport:
-    matrices = ("average", "leaving", "between", "arriving")
-    tensors = _load(path, {"pair_patches"}, matrices)
-    glossy, pair_patches = surfels.gloss.glossy, tensors["pair_patches"]
-    patches, harmonics = int(tensors["average.shape"][0]), int(tensors["arriving.shape"][0]) // len(glossy)
-    sent, pairs = patches * harmonics, len(pair_patches)
-    shapes = ((patches, len(glossy)), (len(surfels), sent), (pairs, sent), (len(glossy) * harmonics, pairs))
-    operators = (_operator(path, tensors, name, shape) for name, shape in zip(matrices, shapes, strict=True))
-    beyond = (pair_patches < 0) | (pair_patches >= transport.average.shape[0])
-    if bool(beyond.any()):
-        found = str(int(pair_patches[beyond][0]))
-        raise InputError(path, expected="pair_patches of the transport", found=found, remedy=MAKE_AGAIN)
-    return GlossyTransport(surfels, glossy, GlossyOperators(*operators, pair_patches))
+    tensors = _load(path, set(PAIR_NAMES), OPERATOR_NAMES)
+    glossy, patches = surfels.gloss.glossy, transport.average.shape[0]
+    for name in PAIR_NAMES:
+        beyond = (tensors[name] < 0) | (tensors[name] >= patches)
+        if bool(beyond.any()):
+            found = str(int(tensors[name][beyond][0]))
+            raise InputError(path, expected=f"{name} below {patches}", found=found, remedy=MAKE_AGAIN)
+    groups, sent = int(tensors["average.shape"][0]), int(tensors["leaving.shape"][1])
+    harmonics, pairs = sent // max(1, groups), [len(tensors[name]) for name in PAIR_NAMES]
+    shapes = (
+        (groups, len(glossy)),
+        (len(surfels), groups * harmonics),
+        (pairs[0], sent),
+        (len(glossy) * harmonics, pairs[0]),
+        (patches, sent),
+        (pairs[1], sent),
+        (groups * harmonics, pairs[1]),
+    )
+    average, leaving, between, arriving, patch_leaving, *coarse = (
+        _operator(path, tensors, name, shape) for name, shape in zip(OPERATOR_NAMES, shapes, strict=True)
+    )
+    exchanges = Exchange(between, arriving, tensors[PAIR_NAMES[0]]), Exchange(*coarse, tensors[PAIR_NAMES[1]])
+    return GlossyTransport(
+        surfels, glossy, GlossyOperators(average, leaving, exchanges[0], patch_leaving, exchanges[1])
+    )
 
 
 def save_dictionary(path: Path, dictionary: LightDictionary) -> None:

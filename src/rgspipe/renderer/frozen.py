@@ -76,7 +76,7 @@ class FrozenScene:
         gather = _gather(bvh, gather_rays, areas, seed)
         labels = cluster_patches(centers, surfels.normals, patches if gather.entries else 1, seed=seed)
         transport = build_patch_transport(gather, labels, areas, surfels.albedo)
-        gloss = build_glossy_transport(surfels, gather, transport)
+        gloss = build_glossy_transport(replace(surfels, centers=centers), gather, transport)
         return cls(surfels, areas, gather, transport, gloss=gloss, centers=centers)
 
     @cached_property

@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
+from operator import attrgetter
 
 import numpy as np
 import scipy.sparse
@@ -25,8 +26,39 @@ from rgspipe.scene.surfels import Surfels
 #: Values of harmonics held at once; bounds the memory of a build to about 100 MB.
 VALUES_AT_ONCE = 4_000_000
 
+#: The sparse operators and the patches of pairs, by where they are found in GlossyOperators.
+OPERATOR_NAMES = (
+    "average",
+    "leaving",
+    "surfels.between",
+    "surfels.arriving",
+    "patch_leaving",
+    "patches.between",
+    "patches.arriving",
+)
+PAIR_NAMES = ("surfels.patches", "patches.patches")
+
 #: Direction of the light between surfels i and j: (E, 3) vectors from two (E,) index tensors.
 Directions = Callable[[Tensor, Tensor], Tensor]
+
+
+@dataclass(frozen=True)
+class Exchange:
+    """Light that glossy receivers get from patches, pair by pair; a receiver is a surfel or a patch of them.
+
+    Attributes:
+        between: (pairs, P_g·K) V, radiance that the glossy surfels of a patch send to a receiver.
+        arriving: (receivers·K, pairs) Q, mirrored incident light of each receiver in harmonics.
+        patches: (pairs,) int64 patch of each pair.
+    """
+
+    between: SparseOperator
+    arriving: SparseOperator
+    patches: Tensor
+
+    def incident(self, radiance: Tensor, coefficients: Tensor) -> Tensor:
+        """(receivers·K, C) from patches with diffuse radiance (P, C) and glossy coefficients (P_g·K, C)."""
+        return self.arriving @ (radiance[self.patches] + self.between @ coefficients)
 
 
 @dataclass(frozen=True)
@@ -36,27 +68,26 @@ class GlossyOperators:
     Attributes:
         average: (P_g, G) R_g, averages over the glossy surfels of a patch by area.
         leaving: (N, P_g·K) S, mean radiance that each surfel receives from the glossy patches.
-        between: (pairs, P_g·K) V, radiance that the glossy surfels of a patch send to one glossy surfel.
-        arriving: (G·K, pairs) Q, mirrored incident light of each glossy surfel in harmonics.
-        pair_patches: (pairs,) int64 patch of each pair of a glossy surfel and a patch that it sees.
+        surfels: what arrives at the glossy surfels.
+        patch_leaving: (P, P_g·K) R S.
+        patches: what arrives at the glossy patches, for the light between bounces.
     """
 
     average: SparseOperator
     leaving: SparseOperator
-    between: SparseOperator
-    arriving: SparseOperator
-    pair_patches: Tensor
+    surfels: Exchange
+    patch_leaving: SparseOperator
+    patches: Exchange
 
     @property
     def degree(self) -> int:
         """Degree of the harmonics."""
-        return math.isqrt(self.arriving.shape[0] // self.average.shape[1]) - 1
+        return math.isqrt(self.leaving.shape[1] // self.average.shape[0]) - 1
 
     def tensors(self) -> dict[str, Tensor]:
         """All of it by name, as it is stored."""
-        matrices = {name: getattr(self, name) for name in ("average", "leaving", "between", "arriving")}
-        parts = {key: part for name, matrix in matrices.items() for key, part in matrix.tensors(name).items()}
-        return parts | {"pair_patches": self.pair_patches}
+        parts = {key: part for name in OPERATOR_NAMES for key, part in attrgetter(name)(self).tensors(name).items()}
+        return parts | {name: attrgetter(name)(self) for name in PAIR_NAMES}
 
 
 def build_glossy_operators(
@@ -80,17 +111,45 @@ def build_glossy_operators(
     incident = pair_sums(
         seen[chosen], labels, lambda g, j: mirrored(centers[j] - own_centers[g], own_normals[g]), degree
     )
-    pairs, count = len(incident.rows), coefficient_count(degree)
-    sent, received = len(patches) * count, len(chosen) * count
-    matrices = (
-        _group_average(patch_average, chosen, patches),
-        spread_columns(leaving.harmonics, leaving.rows, leaving.patches, (len(surfels), sent)),
-        _between(leaving, incident, chosen, patches, (pairs, sent)),
-        spread_columns(math.pi * incident.harmonics, np.arange(pairs), incident.rows, (pairs, received)).T.tocsr(),
-    )
+    average_glossy = _group_average(patch_average, chosen, patches)
+    width = len(patches) * coefficient_count(degree)
+    sent = spread_columns(leaving.harmonics, leaving.rows, leaving.patches, (len(surfels), width))
+    between = _between(leaving, incident, chosen, patches, width)
+    coarse, coarse_between = _over_receivers(incident, between, average_glossy, slots)
     device = surfels.centers.device
-    operators = (SparseOperator.from_scipy(matrix, device) for matrix in matrices)
-    return GlossyOperators(*operators, torch.from_numpy(incident.patches).to(device))
+    return GlossyOperators(
+        SparseOperator.from_scipy(average_glossy, device),
+        SparseOperator.from_scipy(sent, device),
+        _exchange(incident, between, len(chosen), device),
+        SparseOperator.from_scipy((patch_average @ sent).tocsr(), device),
+        _exchange(coarse, coarse_between, len(patches), device),
+    )
+
+
+def _exchange(incident: PairSums, between: scipy.sparse.csr_matrix, receivers: int, device: torch.device) -> Exchange:
+    pairs, count = incident.harmonics.shape
+    spread = spread_columns(math.pi * incident.harmonics, np.arange(pairs), incident.rows, (pairs, receivers * count))
+    operators = (SparseOperator.from_scipy(matrix, device) for matrix in (between, spread.T.tocsr()))
+    return Exchange(*operators, torch.from_numpy(incident.patches).to(device))
+
+
+def _over_receivers(
+    incident: PairSums, between: scipy.sparse.csr_matrix, average: scipy.sparse.csr_matrix, slots: np.ndarray
+) -> tuple[PairSums, scipy.sparse.csr_matrix]:
+    """Pairs of glossy surfels and patches, and V, averaged over the surfels of each glossy patch.
+
+    Args:
+        average: (P_g, G) R_g. slots: (G,) glossy patch of each glossy surfel.
+    """
+    area = np.asarray(average.sum(axis=0)).ravel()[incident.rows]
+    wide = int(incident.patches.max(initial=0)) + 1
+    keys, group = np.unique(slots[incident.rows] * wide + incident.patches, return_inverse=True)
+    pairs = len(group)
+    member = scipy.sparse.csr_matrix((area, (group, np.arange(pairs))), shape=(len(keys), pairs))
+    shares = member @ incident.shares
+    seen = scipy.sparse.diags(1.0 / shares) @ member @ scipy.sparse.diags(incident.shares) @ between
+    coarse = PairSums(keys // wide, keys % wide, shares, member @ incident.harmonics)
+    return coarse, seen.tocsr()
 
 
 def _only_columns(matrix: scipy.sparse.csr_matrix, columns: np.ndarray) -> scipy.sparse.csr_matrix:
@@ -103,7 +162,7 @@ def _only_columns(matrix: scipy.sparse.csr_matrix, columns: np.ndarray) -> scipy
 
 
 def _between(
-    leaving: PairSums, incident: PairSums, chosen: np.ndarray, patches: np.ndarray, shape: tuple[int, int]
+    leaving: PairSums, incident: PairSums, chosen: np.ndarray, patches: np.ndarray, width: int
 ) -> scipy.sparse.csr_matrix:
     """V: the sums of light that leaves for glossy receivers, each over the share of its pair."""
     wide = max(int(incident.patches.max(initial=0)), int(patches.max())) + 1
@@ -111,7 +170,9 @@ def _between(
     rows, slots = np.searchsorted(chosen, leaving.rows[at_gloss]), leaving.patches[at_gloss]
     # Where F_ij is an entry, its pair is one of the incident ones.
     place = np.searchsorted(incident.rows * wide + incident.patches, rows * wide + patches[slots])
-    return spread_columns(leaving.harmonics[at_gloss] / incident.shares[place][:, None], place, slots, shape)
+    return spread_columns(
+        leaving.harmonics[at_gloss] / incident.shares[place][:, None], place, slots, (len(incident.rows), width)
+    )
 
 
 def _group_average(

@@ -8,9 +8,11 @@ that comes from direction l, radiance b_p of the patches p and lobe coefficients
     c'_ik = k_s λ_k Σ_p Q_ik,p v_ip                   reflected
     B_j = ρ_j (E_j/π + (F_p b)_j + Σ_p,k S_j,pk c_p,k)
 
-c_p is the average of c over the glossy surfels of patch p, by area; b = R B of all bounces comes from the patch
-transport. Glossy bounces are added until they cannot matter. The highlight of a light itself, c⁰, is not taken from
-the harmonics in images but from the exact lobe, which costs less and has no band limit.
+As in the patch transport, the light between bounces is that of patches: b is the average of B, and c_p that of c over
+the glossy surfels of patch p, by area. They are found first, bounce by bounce between gloss and with the patch
+transport's inverse between diffuse surfaces, by the averages of the same equations over the receivers of a patch; then
+the equations above are applied once. The highlight of a light itself, c⁰, is not taken from the harmonics in images but
+from the exact lobe, which costs less and has no band limit.
 """
 
 from __future__ import annotations
@@ -31,7 +33,7 @@ from rgspipe.renderer.transport import PatchTransport
 from rgspipe.scene.surfels import Surfels
 
 #: Degree of the harmonics of indirect light.
-DEGREE = 6
+DEGREE = 4
 
 #: Bounces between gloss end when the next one is below this part of the direct light …
 TOLERANCE = 1e-4
@@ -45,7 +47,7 @@ class GlossyTransport:
     """How light goes to, between and from the G glossy surfels of a scene, in K harmonics.
 
     Attributes:
-        surfels: all N surfels of the scene, with their gloss.
+        surfels: all N surfels of the scene, with their gloss; float32, centres may be float64.
         glossy: (G,) int64 which of them have k_s > 0.
         operators: R_g, S, V and Q.
     """
@@ -77,9 +79,14 @@ class GlossyTransport:
 
     def vectors(self, points: Tensor) -> Tensor:
         """(…, G, 3) from the glossy surfels to points (…, 3)."""
-        centers = self.geometry[0]
+        centers, normals, _ = self.geometry
         # The difference is taken in float64: far from the origin float32 knows neither of the two well enough.
-        return (points.to(centers.device, torch.float64)[..., None, :] - centers.double()).to(centers)
+        return (points.to(centers.device, torch.float64)[..., None, :] - centers.double()).to(normals)
+
+    @cached_property
+    def _weights(self) -> Tensor:
+        """(G, K, 3, 1) k_s λ."""
+        return (self.lobes[..., None] * self.material[0][:, None])[..., None]
 
     def directions(self, points: Tensor) -> Tensor:
         """(…, G, 3) unit directions from the glossy surfels to points (…, 3), with a finite derivative everywhere."""
@@ -114,32 +121,42 @@ class GlossyTransport:
             radiance (N, 3, C) of the diffuse reflection, and coefficients (G, K, 3, C) of what glossy surfels reflect
             besides the highlights `emitted`.
         """
-        counted = transport.bounces is not None
-        smallest = TOLERANCE * torch.maximum(_largest(direct), _largest(emitted))
-        radiance, reflected = direct, torch.zeros_like(emitted)
+        patches, averaged = self._between_bounces(transport, direct, emitted)
+        received = transport.gather @ patches + self.operators.leaving @ averaged
+        incident = self.operators.surfels.incident(patches, averaged)
+        radiance = direct + transport.albedo[..., None] * received.reshape(direct.shape)
+        return radiance, self._weights * incident.reshape(emitted.shape)
+
+    def _between_bounces(self, transport: PatchTransport, direct: Tensor, emitted: Tensor) -> tuple[Tensor, Tensor]:
+        """Light that leaves the patches, over all bounces but the last.
+
+        Returns:
+            diffuse radiance (P, 3·C), and coefficients (P_g·K, 3·C) averaged over the glossy surfels of each patch.
+        """
+        inner, counted = direct.shape[1:], transport.bounces is not None
+        albedo = (transport.average @ transport.albedo)[..., None]
+        weights = (self.operators.average @ self._weights.flatten(1)).reshape(-1, *self._weights.shape[1:])
+        source = transport.average @ direct.flatten(1)
+        leaving = (self.operators.average @ emitted.flatten(1)).reshape(-1, source.shape[1])
+        diffuse, glossy = torch.zeros_like(source), torch.zeros_like(leaving)
+        smallest = TOLERANCE * torch.maximum(_largest(source, inner), _largest(leaving, inner))
         for _ in range(transport.bounces if counted else MOST_BOUNCES):
-            patches = _per_patch(transport, direct)
-            averaged = _product(self.operators.average, emitted)
-            by_patches = transport.albedo[..., None] * _product(transport.gather, patches)
-            by_gloss = transport.albedo[..., None] * _product(self.operators.leaving, averaged)
-            emitted = self._reflection(patches, averaged)
-            radiance, reflected = radiance + by_patches + by_gloss, reflected + emitted
-            # The inverse of the patch transport holds the diffuse bounces of `by_patches` already.
-            direct = by_patches + by_gloss if counted else by_gloss
-            if bool((torch.maximum(_largest(direct), _largest(emitted)) <= smallest).all()):
+            patches = source if counted else _all_bounces(transport, source, inner)
+            diffuse, glossy = diffuse + patches, glossy + leaving
+            source = (albedo * (self.operators.patch_leaving @ leaving).reshape(-1, *inner)).flatten(1)
+            if counted:
+                gathered = (transport.gather @ patches).reshape(-1, *inner)
+                source = source + transport.average @ (transport.albedo[..., None] * gathered).flatten(1)
+            incident = self.operators.patches.incident(patches, leaving)
+            leaving = (weights * incident.reshape(-1, weights.shape[1], *inner)).reshape(leaving.shape)
+            if bool((torch.maximum(_largest(source, inner), _largest(leaving, inner)) <= smallest).all()):
                 break
-        return radiance, reflected
+        return diffuse, glossy
 
     def highlights(self, towards: Tensor, irradiance: Tensor) -> Tensor:
         """(…, G, K, 3) coefficients c⁰ for light from directions (…, G, 3) that makes irradiances (…, G, 3)."""
         harmonics = self.lobes * real_harmonics(mirrored(towards, self.geometry[1]), self.degree)
         return harmonics[..., None] * (self.material[0] * irradiance)[..., None, :]
-
-    def _reflection(self, patches: Tensor, averaged: Tensor) -> Tensor:
-        """c' from radiances (P, 3, C) of all patches and coefficients (P_g, K, 3, C) of the glossy ones."""
-        arriving = patches[self.operators.pair_patches] + _product(self.operators.between, averaged)
-        incident = _product(self.operators.arriving, arriving).reshape(len(self.glossy), -1, *patches.shape[1:])
-        return incident * self.lobes[:, :, None, None] * self.material[0][:, None, :, None]
 
 
 @dataclass(frozen=True)
@@ -208,23 +225,11 @@ def _attached(rig: Rig, response: RigResponse) -> Tensor:
     return irradiance + torch.einsum("lnc,lc->ln", response.by_axis, axes)
 
 
-def _largest(values: Tensor) -> Tensor:
-    """(C,) largest magnitude of each lighting in (…, C)."""
-    return values.detach().abs().reshape(-1, values.shape[-1]).amax(dim=0)
+def _largest(values: Tensor, inner: torch.Size) -> Tensor:
+    """(C,) largest magnitude of each lighting in (…, 3·C)."""
+    return values.detach().abs().reshape(-1, *inner).amax(dim=(0, 1))
 
 
-def _per_patch(transport: PatchTransport, direct: Tensor) -> Tensor:
-    """(P, 3, C) radiance of the patches for direct radiosity (N, 3, C); with all diffuse bounces unless counted."""
-    averaged = _product(transport.average, direct)
-    return averaged if transport.bounces is not None else torch.einsum("cpq,qck->pck", transport.inverse, averaged)
-
-
-def _product(operator: SparseOperator, operand: Tensor) -> Tensor:
-    """Operator (R, M) times an operand whose leading dimensions make M: (R, …) with the operand's last dimensions.
-
-    An operand (P_g, K, 3, C) counts as (P_g·K, 3, C).
-    """
-    (rows, columns), last = operator.shape, operand.shape[-2:]
-    # Said in numbers, as torch infers no size where a scene has no pair of surfels that see each other.
-    width = operand.numel() // columns if columns else last.numel()
-    return (operator @ operand.reshape(columns, width)).reshape(rows, width // last.numel(), *last).squeeze(1)
+def _all_bounces(transport: PatchTransport, source: Tensor, inner: torch.Size) -> Tensor:
+    """H times patch radiances (P, 3·C)."""
+    return torch.einsum("cpq,qck->pck", transport.inverse, source.reshape(-1, *inner)).flatten(1)
