@@ -51,7 +51,7 @@ def view_of(scene: FrozenScene, resolution: int = 16):
     return scene.view(Camera.from_field_of_view(pose, 1.2, resolution, resolution))
 
 
-@pytest.mark.parametrize(("exponent", "largest"), [(5.0, 0.04), (20.0, 0.05), (100.0, 0.12)])
+@pytest.mark.parametrize(("exponent", "largest"), [(5.0, 0.04), (20.0, 0.06), (100.0, 0.12)])
 def test_radiance_of_a_glossy_room_is_that_of_an_exact_path_tracer(
     room: FrozenScene, exponent: float, largest: float
 ) -> None:
@@ -66,7 +66,7 @@ def test_radiance_of_a_glossy_room_is_that_of_an_exact_path_tracer(
     expected, deviation = truth.radiance(places, np.array(EYE), paths=8000, bounces=12)
     found = scene.glossy_light((lamp(),)).seen_from(torch.tensor(EYE))[points, 0].double().numpy()
     error = np.abs(found / expected - 1.0)
-    # Measured 2.0, 3.1 and 8.0 % at most, 1.0, 1.3 and 2.8 % on average, of which the path tracer's noise is up to 0.5,
+    # Measured 2.1, 4.1 and 9.2 % at most, 1.0, 1.2 and 2.5 % on average, of which the path tracer's noise is up to 0.5,
     # 1.1 and 2.6 %. Patches and gather rays take 1 % of a diffuse room already.
     assert float(error.max()) < largest
     assert float(error.mean()) < 0.4 * largest

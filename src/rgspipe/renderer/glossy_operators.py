@@ -101,7 +101,9 @@ def build_glossy_operators(
         degree: of the harmonics.
     """
     centers, normals = surfels.centers.double().cpu(), surfels.normals.double().cpu()
-    chosen, seen, patch_average = glossy.cpu().numpy(), gather.to_scipy(), average.to_scipy()
+    chosen, seen, patch_average = glossy.cpu().numpy(), gather.to_scipy().copy(), average.to_scipy()
+    # A pair that shares no light has no direction.
+    seen.eliminate_zeros()
     labels = patch_average.tocsc().indices.astype(np.int64)
     patches, slots = np.unique(labels[chosen], return_inverse=True)
     slot_of = np.zeros(len(surfels), dtype=np.int64)

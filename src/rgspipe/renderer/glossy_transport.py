@@ -32,13 +32,14 @@ from rgspipe.renderer.spherical_harmonics import coefficient_count, per_harmonic
 from rgspipe.renderer.transport import PatchTransport
 from rgspipe.scene.surfels import Surfels
 
-#: Degree of the harmonics of indirect light.
+#: Degree of the harmonics of indirect light. Degree 6 halves the error of a lobe of exponent 20, but leaves the image
+#: as far from an exact path tracer's as it was, at twice the time and memory.
 DEGREE = 4
 
 #: Bounces between gloss end when the next one is below this part of the direct light …
 TOLERANCE = 1e-4
 
-#: … and after this many in any case, of which a closed room with ρ + k_s = 1 everywhere would need more.
+#: … and after this many in any case. A closed room with ρ = k_s = ½ everywhere keeps 0.87 of its light a bounce.
 MOST_BOUNCES = 64
 
 
