@@ -9,16 +9,14 @@ import scipy.sparse
 import torch
 from torch import Tensor
 
-from rgspipe.renderer.gather import LIFT, cosine_directions
+from rgspipe.renderer.gather import LIFT, RAYS_AT_ONCE
 from rgspipe.renderer.kernels.composite import composite
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
+from rgspipe.renderer.point_sets import cosine_directions
 from rgspipe.renderer.radiosity import LARGEST_ALBEDO
 from rgspipe.renderer.rays import normalised_weights, rows_from_hits
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.view_weights import nearest_hit
-
-#: Rays cast at once; bounds the memory of their hits to about 110 MB.
-RAYS_AT_ONCE = 150_000
 
 
 @dataclass(frozen=True)
@@ -69,8 +67,8 @@ def random_gather(bvh: SurfelBvh, samples: int, generator: torch.Generator) -> S
     blocks = [scipy.sparse.csr_matrix((0, count), dtype=np.float32)]
     for start in range(0, count, per_batch):
         batch = slice(start, start + per_batch)
-        # A point set of one ray that is shifted at random is a random ray.
-        directions = cosine_directions(axes[batch].repeat_interleave(samples, dim=0), 1, generator)[:, 0]
-        hits = composite(bvh, origins[batch].repeat_interleave(samples, dim=0), directions, nearest=nearest_hit(bvh))
+        directions = cosine_directions(axes[batch], samples, generator, "random")
+        starts = origins[batch, None].expand_as(directions)
+        hits = composite(bvh, starts.reshape(-1, 3), directions.reshape(-1, 3), nearest=nearest_hit(bvh))
         blocks.append(rows_from_hits(hits, normalised_weights(hits), samples, count))
     return SparseOperator.from_scipy(scipy.sparse.vstack(blocks, format="csr"), bvh.device)
