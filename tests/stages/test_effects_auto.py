@@ -20,8 +20,6 @@ from rgspipe.datasets.frozen_file import load_frozen
 from rgspipe.datasets.gs3_write import frame_entry, write_transforms
 from rgspipe.datasets.surfel_file import save_surfels
 from rgspipe.renderer import direct, frozen, transport
-from rgspipe.renderer.effect_bounds import measure_effects
-from rgspipe.renderer.effects import ChosenScene, RigKind, choose_effects
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import PointLight, Surfels
 from rgspipe.stages import fit_light, freeze
@@ -51,12 +49,11 @@ def freeze_scene(root: Path, surfels: Surfels) -> Artifact:
     return made(root, "freeze", make)
 
 
-def write_target(folder: Path, scene: FrozenScene | ChosenScene) -> None:
+def write_target(folder: Path, scene: FrozenScene) -> None:
     """One image of the scene from the outside."""
     camera = EFFECT_SCENES["dark ball"].camera(24)
-    view = (scene.frozen if isinstance(scene, ChosenScene) else scene).view(camera)
     folder.mkdir()
-    write_image(folder / "view_0.exr", scene.render(view, (LIGHT,)).numpy())
+    write_image(folder / "view_0.exr", scene.render(scene.view(camera), (LIGHT,)).numpy())
     write_transforms(folder / "transforms.json", [frame_entry("./view_0", camera)])
 
 

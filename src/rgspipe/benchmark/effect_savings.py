@@ -91,7 +91,7 @@ def random_rig(scene: EffectScene, frozen: FrozenScene, generator: torch.Generat
     count = scene.points + len(scene.spots)
     positions = sample_lights(frozen, count, generator)
     intensities = 10.0 ** (2.0 * torch.rand(count, 3, generator=generator) - 1.0)
-    aims = frozen.surfels.centers[torch.randint(len(frozen.surfels), (count,), generator=generator)]
+    aims = frozen.surfels.centers.to(positions)[torch.randint(len(frozen.surfels), (count,), generator=generator)]
     axes = torch.nn.functional.normalize(aims - positions, dim=1)
     points = [PointLight(positions[k], intensities[k]) for k in range(scene.points)]
     spots = [

@@ -197,15 +197,16 @@ def _why(effect: str, bounds: EffectBounds, rig: RigKind) -> str:
 
 
 def _how_much(effect: str, share: float, bounds: EffectBounds, tolerance: float) -> str:
-    limit = "any" if share >= NO_BOUND else f"{share:.2g}"
-    sampled = f" by {bounds.shadows.lights} lights" if effect == "shadows" else ""
-    return f"can change {limit} of the brightest radiance{sampled}, tolerance {tolerance:.2g}"
+    if share >= NO_BOUND:
+        return "no bound on what this changes"
+    tried = f" ({bounds.shadows.lights} lights tried)" if effect == "shadows" else ""
+    return f"can change {share:.2g} times the brightest direct radiance{tried}, tolerance {tolerance:.2g}"
 
 
 def _bounces(bounds: EffectBounds, tolerance: float) -> str:
-    """The inverse has all bounces; how many a solver without it would need."""
+    """The inverse has all bounces; how many a solver without it would need to come as close."""
     bounces = bounces_needed(bounds.row_sum, tolerance)
-    return "" if bounces is None else f", all bounces at once (one by one {bounces} would do)"
+    return "" if bounces is None else f", all bounces at once ({bounces} would do)"
 
 
 def _price(effect: str, simulated: bool, rig: RigKind, costs: Mapping[str, float]) -> str:

@@ -15,6 +15,9 @@ from rgspipe.renderer.frozen import FrozenScene
 #: Radius of the ball in which lights may be, over half the diagonal of the bounding box.
 BALL_RADII = 2.0
 
+#: Lights nearer to a surfel than this many of its scales are in the surface, as the scene knows it: not in the domain.
+CLEARANCE = 2.0
+
 #: A loss so large that no tolerance allows it ends the search.
 CERTAIN = 0.5
 
@@ -33,7 +36,7 @@ LIGHTS_AT_ONCE = 16
 
 @dataclass(frozen=True)
 class ShadowBound:
-    """What shadows of one light can take from the radiance.
+    """What shadows of one light can take from the radiance, in the ball of BALL_RADII and clear of surfaces.
 
     Attributes:
         point: the largest radiance that a point light loses to shadow anywhere, as a share of its brightest direct
@@ -79,12 +82,26 @@ def shadow_losses(frozen: FrozenScene, positions: Tensor) -> tuple[Tensor, Tenso
 
 
 def sample_lights(frozen: FrozenScene, count: int, generator: torch.Generator) -> Tensor:
-    """(count, 3) positions, uniform in the bounding box and in the ball of BALL_RADII around it, half each."""
+    """(count, 3) float64 positions in the domain of the bound.
+
+    Uniform in the bounding box and in the ball of BALL_RADII around it, half each, those in surfaces replaced by others
+    in the ball.
+    """
     middle, extent = _box(frozen)
     inside = middle + extent * (torch.rand(count // 2, 3, generator=generator) - 0.5)
-    rest = count - count // 2
-    radius = _ball_radius(frozen) * torch.rand(rest, 1, generator=generator).pow(1.0 / 3.0)
-    return torch.cat([inside, middle + radius * normalize(torch.randn(rest, 3, generator=generator), dim=1)])
+    others = 2 * count - count // 2
+    radius = _ball_radius(frozen) * torch.rand(others, 1, generator=generator).pow(1.0 / 3.0)
+    ball = middle + radius * normalize(torch.randn(others, 3, generator=generator), dim=1)
+    drawn = torch.cat([inside, ball])
+    return drawn[clear_of_surfels(frozen, drawn)][:count]
+
+
+def clear_of_surfels(frozen: FrozenScene, positions: Tensor) -> Tensor:
+    """(L,) whether the nearest surfel to each position (L, 3) is farther than CLEARANCE of its scales."""
+    scales = frozen.surfels.scales.double().prod(dim=1).sqrt().clamp(min=1e-30)
+    centers = frozen.surfels.centers.double()
+    blocks = positions.to(centers).split(LIGHTS_AT_ONCE)
+    return torch.cat([(torch.cdist(block, centers) / scales).amin(dim=1) > CLEARANCE for block in blocks]).cpu()
 
 
 class _Search:
@@ -92,13 +109,14 @@ class _Search:
 
     def __init__(self, frozen: FrozenScene) -> None:
         self.frozen = frozen
-        self.positions, self.losses = torch.zeros(0, 3), torch.zeros(0)
+        self.positions, self.losses = torch.zeros(0, 3, dtype=torch.float64), torch.zeros(0)
         self.point = self.spot = 0.0
         self.tried = self.uniform = 0
 
     def try_lights(self, positions: Tensor, uniform: bool) -> None:
+        positions = positions[clear_of_surfels(self.frozen, positions)]
         for block in positions.split(LIGHTS_AT_ONCE):
-            if self.point >= CERTAIN:
+            if self.point >= CERTAIN or not len(block):
                 return
             point, spot = (loss.cpu() for loss in shadow_losses(self.frozen, block))
             self.positions, self.losses = torch.cat([self.positions, block]), torch.cat([self.losses, point])
@@ -109,6 +127,8 @@ class _Search:
     def around_worst(self, distance: float, generator: torch.Generator) -> Tensor:
         """(AROUND, 3) lights at normally distributed offsets of `distance` from the worst so far."""
         worst = self.positions[self.losses.topk(min(WORST, len(self.losses))).indices]
+        if not len(worst):
+            return worst
         repeated = worst.repeat(math.ceil(AROUND / len(worst)), 1)[:AROUND]
         return repeated + distance * torch.randn(AROUND, 3, generator=generator)
 
@@ -129,7 +149,7 @@ def _behind_occluders(frozen: FrozenScene, count: int, generator: torch.Generato
     r = torch.cat([first, torch.arange(len(receivers))[: count - half]])
     j = torch.cat([steepest[first], drawn[: count - half]])
     towards = centers[j] - centers[receivers[r]]
-    farthest = (_ball_radius(frozen) / towards.norm(dim=1, keepdim=True).clamp(min=1e-6)).clamp(min=1.1)
+    farthest = (_ball_radius(frozen) / towards.norm(dim=1, keepdim=True).clamp(min=1e-30)).clamp(min=1.1)
     beyond = 1.05 + (farthest - 1.05).clamp(min=0.0) * torch.rand(len(r), 1, generator=generator).square()
     return centers[receivers[r]] + beyond * towards
 
@@ -138,21 +158,21 @@ def _grazing(frozen: FrozenScene, count: int, generator: torch.Generator) -> Ten
     """Lights low over a surfel's plane, elevations from 0.001 to 0.3 rad evenly in their logarithm."""
     centers, normals, receivers = _receivers(frozen, count, generator)
     normal = normals[receivers]
-    sideways = normalize(torch.linalg.cross(normal, torch.randn(normal.shape, generator=generator)), dim=1)
+    sideways = normalize(torch.linalg.cross(normal, torch.randn(normal.shape, generator=generator).double()), dim=1)
     elevation = 1e-3 * torch.full((len(normal), 1), 300.0).pow(torch.rand(len(normal), 1, generator=generator))
     distance = _ball_radius(frozen) * torch.rand(len(normal), 1, generator=generator)
     return centers[receivers] + distance * (elevation.cos() * sideways + elevation.sin() * normal)
 
 
 def _receivers(frozen: FrozenScene, count: int, generator: torch.Generator) -> tuple[Tensor, Tensor, Tensor]:
-    """Centres and normals (N, 3) on the CPU, and the indices of up to `count` random surfels."""
+    """Centres and normals (N, 3) in float64 on the CPU, and the indices of up to `count` random surfels."""
     surfels = frozen.surfels
     chosen = torch.randperm(len(surfels), generator=generator)[:count]
-    return surfels.centers.cpu(), surfels.normals.cpu(), chosen
+    return surfels.centers.cpu().double(), surfels.normals.cpu().double(), chosen
 
 
 def _box(frozen: FrozenScene) -> tuple[Tensor, Tensor]:
-    lower, upper = (corner.cpu() for corner in frozen.bounds)
+    lower, upper = (corner.cpu().double() for corner in frozen.bounds)
     return 0.5 * (lower + upper), upper - lower
 
 

@@ -118,11 +118,11 @@ def _effects(context: StageContext) -> Effects:
     """The effects of the configuration; with effects.auto less those that the frozen scene does not call for."""
     wanted = context.config.effects
     if not wanted.auto:
-        return Effects(wanted.shadows, wanted.interreflection)
+        return Effects(wanted.shadows, wanted.interreflection, wanted.at_pixels)
     bounds, choice = _choice(context.config, context.inputs["freeze"])
     print("effects: " + "; ".join(choice.reasons))
     context.note(effects={"choice": asdict(choice), "bounds": asdict(bounds), "tolerance": wanted.tolerance})
-    return Effects(choice.shadows, choice.interreflection)
+    return Effects(choice.shadows, choice.interreflection, wanted.at_pixels)
 
 
 def _choice(config: RgspipeConfig, freeze: Artifact) -> tuple[EffectBounds, EffectChoice]:
