@@ -187,6 +187,9 @@ class EffectsConfig:
 
     shadows: bool = option(True, "surfels block light")
     interreflection: bool = option(True, "light bounces between surfels")
+    at_pixels: bool = option(
+        False, "direct light where pixels look, in a fit's last steps: sharper than at surfels' centres, and dearer"
+    )
     auto: bool = option(True, "leave out, of these, what cannot change an image by more than `tolerance`")
     tolerance: float = option(
         0.001, "with auto: largest change, fraction of the brightest direct radiance", low=0, high=1

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib.metadata
+import math
 import os
 import platform
 import re
@@ -41,6 +43,19 @@ def peak_memory_mib() -> int:
     usage = max(resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
     # Linux counts in KiB, macOS in bytes.
     return round(usage / (2**20 if sys.platform == "darwin" else 2**10))
+
+
+def reset_peak_memory() -> None:
+    """Let `peak_memory_now_mib` count from now on (Linux; elsewhere nothing happens)."""
+    with contextlib.suppress(OSError):
+        Path("/proc/self/clear_refs").write_text("5")
+
+
+def peak_memory_now_mib() -> float:
+    """Largest resident memory of this process since `reset_peak_memory`; NaN where the system does not tell."""
+    status = Path("/proc/self/status")
+    found = re.search(r"^VmHWM:\s*(\d+) kB", status.read_text(), re.MULTILINE) if status.is_file() else None
+    return int(found.group(1)) / 2**10 if found else math.nan
 
 
 def _processor() -> str:

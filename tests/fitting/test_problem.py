@@ -9,6 +9,7 @@ from lit_room import HIDDEN, VISIBLE
 from rgspipe.fitting.moments import covariance, moments
 from rgspipe.fitting.problem import Effects, LightProblem
 from rgspipe.renderer.direct import unit_irradiance
+from rgspipe.renderer.kernels.irradiance import SOFTENING
 
 
 def _problem(room, point_light, where=VISIBLE, effects=None):
@@ -100,6 +101,6 @@ def test_a_light_on_a_surfel_is_finite(room, point_light):
 
 def test_unit_irradiance_on_a_surfel_is_bounded_by_the_softening(room):
     surfels = room.frozen.surfels
-    scale = float(surfels.scales[0].prod().sqrt())
+    softening = float(SOFTENING) * float(surfels.scales[0].prod().sqrt())
     irradiance, slope = unit_irradiance(room.frozen.bvh, surfels.centers[:1])
-    assert float(irradiance.max()) <= 1.0 / scale**2 and float(slope.abs().max()) <= 4.0 / scale**3
+    assert float(irradiance.max()) <= 1.0 / softening**2 and float(slope.abs().max()) <= 4.0 / softening**3

@@ -8,6 +8,7 @@ from torch import Tensor
 
 from rgspipe.renderer.direct import differentiable_irradiance, unit_irradiance
 from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.renderer.kernels.irradiance import SOFTENING
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.scene import PointLight, Surfels
 from rooms import closed_box, rectangle, surfels_on
@@ -21,7 +22,7 @@ def box() -> FrozenScene:
 def softened(light: Tensor, surfels: Surfels) -> Tensor:
     """(N,) max(0, n·d)/(|d|⁴ + ε⁴)^{3/4}, in float64."""
     d = light - surfels.centers
-    scale = surfels.scales.prod(dim=1).sqrt()
+    scale = float(SOFTENING) * surfels.scales.prod(dim=1).sqrt()
     cosine = (d * surfels.normals).sum(dim=1).clamp(min=0.0)
     return cosine / (d.square().sum(dim=1).square() + scale.pow(4)).pow(0.75)
 
@@ -32,7 +33,7 @@ def test_inverse_square_and_cosine() -> None:
     light = torch.tensor([[0.1, 0.2, 0.7]], dtype=torch.float64)
     irradiance, _ = unit_irradiance(SurfelBvh(surfels_on(points, normals, 0.02).to(torch.float32)), light)
     d = light - points
-    # Measured 4e-7; the softening ε = one scale takes ¾(ε/r)⁴.
+    # Measured 4e-7; the softening ε = half a scale takes ¾(ε/r)⁴.
     torch.testing.assert_close(irradiance[0].double(), d[:, 2] / d.norm(dim=1) ** 3, rtol=5e-6, atol=0)
 
 

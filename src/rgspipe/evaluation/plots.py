@@ -37,7 +37,8 @@ CURVE_POINTS = 200
 #: How far beyond scene and lights the drawing reaches to show cameras, fraction of the scene's longest side.
 CAMERA_MARGIN = 0.3
 
-_STYLE = {
+#: Matplotlib settings of every figure.
+STYLE = {
     "font.size": 9.0,
     "axes.titlesize": 9.5,
     "axes.titleweight": "bold",
@@ -74,7 +75,7 @@ def colour_of(name: str) -> str:
 def svg_bytes(figure: Figure) -> bytes:
     """The figure as an SVG file without a date: equal figures give equal bytes."""
     buffer = io.BytesIO()
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         FigureCanvasSVG(figure).print_svg(buffer, metadata={"Date": None, "Creator": None})
     return buffer.getvalue()
 
@@ -82,7 +83,7 @@ def svg_bytes(figure: Figure) -> bytes:
 def png_of(figure: Figure, dpi: int = 150) -> bytes:
     """The figure as a PNG file."""
     buffer = io.BytesIO()
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         figure.set_dpi(dpi)
         FigureCanvasAgg(figure).print_png(buffer)
     return buffer.getvalue()
@@ -100,7 +101,7 @@ def convergence_figure(curves: pd.DataFrame) -> Figure:
     groups = list(curves.groupby(["method", "views"], sort=False))
     if not groups:
         raise ValueError("no convergence to draw")
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(max(4.6, min(11.0, 2.9 * len(groups))), 5.0), layout="constrained")
         axes = figure.subplots(2, len(groups), squeeze=False, sharex="col", sharey="row")
         for column, ((method, views), group) in enumerate(groups):
@@ -125,7 +126,7 @@ def error_figure(targets: pd.DataFrame) -> Figure:
     if known.empty:
         raise ValueError("no target has a known truth")
     methods = list(dict.fromkeys(known["method"]))
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(max(5.0, min(11.0, 5.2 * len(methods))), 5.6), layout="constrained")
         axes = figure.subplots(2, len(methods), squeeze=False, sharey="row")
         for column, method in enumerate(methods):
@@ -164,7 +165,7 @@ def light_figure(
     high = np.maximum(high, origins.max(axis=0, initial=-math.inf)) + margin
     depth = _viewing_axis(cameras)
     panels = (("from above", 0, 1, 2), ("from the side", depth, 2, 1 - depth))
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         widths = [float((high - low)[across]) for _, across, _, _ in panels]
         figure = Figure(figsize=(10.0, 5.4), layout="constrained")
         for axis, (title, across, up, along) in zip(figure.subplots(1, 2, width_ratios=widths), panels, strict=True):
@@ -191,7 +192,7 @@ def training_figure(training: pd.DataFrame) -> Figure:
         raise ValueError(f"training needs rows with a loss, found columns {list(training.columns)}")
     timed = "seconds" in training.columns and training["seconds"].notna().all()
     x = (training["seconds"] if timed else pd.Series(np.arange(len(training)))).to_numpy(dtype=float)
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(10.0, 3.0), layout="constrained")
         left, right = figure.subplots(1, 2)
         for axis, name, label in ((left, "loss", "training loss"), (right, "psnr", "PSNR (dB)")):

@@ -17,6 +17,7 @@ from rgspipe.fitting.search_lm import SearchOptions, fit_search_lm
 from rgspipe.fitting.views import PreparedViews, prepare_views
 from rgspipe.renderer.direct import unit_irradiance
 from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.renderer.pixel_direct import surfel_shares
 from rgspipe.renderer.view_weights import ViewWeights
 from rgspipe.scene import Camera, PointLight
 
@@ -50,7 +51,7 @@ def prepare_fit(
     """What all targets of one set of cameras share; see `fit_lights` for the arguments."""
     effects = effects or Effects()
     weights = [frozen.view(view) if isinstance(view, Camera) else view for view in views]
-    prepared = prepare_views(frozen, weights, masks=masks, mask_edges=mask_edges)
+    prepared = prepare_views(frozen, weights, masks=masks, mask_edges=mask_edges, at_pixels=effects.at_pixels)
     coarse = None
     if dictionary is not None:
         coarse = coarse_images(prepared, dictionary, interreflection=effects.interreflection)
@@ -119,8 +120,14 @@ def render_light(views: FitViews, light: PointLight | None) -> list[Tensor]:
         stacked = torch.zeros((operator.shape[0], 3), device=operator.matrix.device)
     else:
         irradiance, _ = unit_irradiance(frozen.bvh, light.position[None], effects.shadows)
-        radiance = frozen.radiance(irradiance.T, effects.interreflection)[:, :, 0]
-        stacked = (operator @ radiance) * light.intensity.to(radiance)
+        direct, radiance = (frozen.radiance(irradiance.T, more)[:, :, 0] for more in (False, effects.interreflection))
+        if prepared.pixel_direct:
+            shares = surfel_shares(frozen.bvh, light.position, effects.shadows)
+            sharp = torch.cat([one.image(light.position, *shares)[:, :, 0] for one in prepared.pixel_direct])
+            stacked = operator @ (radiance - direct) + sharp
+        else:
+            stacked = operator @ radiance
+        stacked = stacked * light.intensity.to(radiance)
     cameras = [view.camera for view in prepared.views]
     parts = stacked.split([camera.pixel_count for camera in cameras])
     return [part.reshape(camera.height, camera.width, 3) for part, camera in zip(parts, cameras, strict=True)]

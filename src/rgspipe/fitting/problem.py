@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 from torch import Tensor
@@ -10,6 +10,7 @@ from torch import Tensor
 from rgspipe.fitting.moments import Moments, moments
 from rgspipe.fitting.views import PreparedViews
 from rgspipe.renderer.direct import unit_irradiance
+from rgspipe.renderer.pixel_direct import surfel_shares
 
 #: In relative weights 1/(y + floor·mean y): pixels darker than this share of the mean count no more than it does.
 RELATIVE_FLOOR = 0.05
@@ -21,6 +22,8 @@ class Effects:
 
     shadows: bool = True
     interreflection: bool = True
+    #: Direct light where pixels look, in the last steps of a fit and in its images; else at surfels' centres.
+    at_pixels: bool = False
 
 
 @dataclass(frozen=True)
@@ -33,12 +36,14 @@ class LightProblem:
             very dim images leave the range of float32.
         scale: mean radiance of the target; 0 if it is black.
         effects: parts of light transport.
+        at_pixels: whether direct light is taken where pixels look; see `sharpest`.
     """
 
     views: PreparedViews
     target: Tensor
     scale: float
     effects: Effects
+    at_pixels: bool = False
 
     @classmethod
     def create(cls, views: PreparedViews, stacked: Tensor, effects: Effects | None = None) -> LightProblem:
@@ -58,10 +63,30 @@ class LightProblem:
     def evaluate(self, position: Tensor) -> Tensor:
         """(P, 3, 4) float32 image of a unit light at `position` (3,), and its derivatives towards x, y and z."""
         frozen = self.views.frozen
+        if self.at_pixels:
+            return self._evaluate_at_pixels(position)
         irradiance, slope = unit_irradiance(frozen.bvh, position[None], self.effects.shadows)
         lightings = torch.cat([irradiance[0, :, None], slope[0]], dim=1)
         radiance = frozen.radiance(lightings, self.effects.interreflection)
         return (self.views.operator @ radiance.reshape(len(radiance), 12)).reshape(-1, 3, 4)
+
+    def _evaluate_at_pixels(self, position: Tensor) -> Tensor:
+        """`evaluate` with direct light where pixels look; what bounces still starts from surfels' centres."""
+        frozen = self.views.frozen
+        share, share_slope = surfel_shares(frozen.bvh, position, self.effects.shadows)
+        images = [direct.image(position, share, share_slope) for direct in self.views.pixel_direct]
+        columns = torch.cat(images)[self.views.pixels]
+        if not self.effects.interreflection:
+            return columns
+        factor, slope = unit_irradiance(frozen.bvh, position[None], shadows=False)
+        slope = slope[0] * share[:, None] + factor[0, :, None] * share_slope
+        lightings = torch.cat([(factor[0] * share)[:, None], slope], dim=1)
+        bounced = frozen.radiance(lightings) - frozen.radiance(lightings, indirect=False)
+        return columns + (self.views.operator @ bounced.reshape(len(bounced), 12)).reshape(-1, 3, 4)
+
+    def sharpest(self) -> LightProblem:
+        """The same problem with direct light where pixels look, if the views were made ready for that."""
+        return replace(self, at_pixels=bool(self.views.pixel_direct))
 
     def moments(self, columns: Tensor, weights: Tensor) -> Moments:
         """Weighted moments of an evaluation against the target."""

@@ -121,10 +121,26 @@ def fit_search_lm(problem: LightProblem, coarse: CoarseImages, options: SearchOp
     for state in starts:
         refine(problem, state, robust, min(SHORT_ITERATIONS, options.iterations), region, begin)
     best = _best(problem, starts, robust)
+    if problem.views.pixel_direct:
+        problem = problem.sharpest()
+        best.columns = problem.evaluate(best.position)
+        best.evaluations += 1
     refine(problem, best, Weighting(relative=False, robust=False), options.iterations, region, begin)
     if not bool((best.intensity > 0).any()):
         return dark_result(time.perf_counter() - begin)
     return _result(problem, best, starts, region, begin)
+
+
+def fit_from(problem: LightProblem, start: Tensor, iterations: int = 30) -> FitResult:
+    """One point light from a known start (3,), by plain least squares: no search, no robust loss."""
+    begin = time.perf_counter()
+    if problem.black:
+        return dark_result(0.0)
+    problem = problem.sharpest()
+    region, plain = search_region(problem), Weighting(relative=False, robust=False)
+    state = _start(problem, start.double().cpu(), plain, begin)
+    refine(problem, state, plain, iterations, region, begin)
+    return _result(problem, state, [state], region, begin)
 
 
 def refine(

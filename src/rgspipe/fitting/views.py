@@ -12,6 +12,7 @@ from torch import Tensor
 
 from rgspipe.errors import InputError
 from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.renderer.pixel_direct import PixelDirect
 from rgspipe.renderer.sparse import SparseOperator, stack
 from rgspipe.renderer.view_weights import ViewWeights
 
@@ -35,6 +36,7 @@ class PreparedViews:
         masks: (H, W) in [0, 1] per view, the scene's share of each pixel.
         pixels: (P,) int64 pixels that a fit trusts, in the order of all views' pixels stacked.
         operator: (P, N) weights of those pixels.
+        pixel_direct: per view its direct light where pixels look; empty where surfels' centres stand for them.
     """
 
     frozen: FrozenScene
@@ -42,6 +44,7 @@ class PreparedViews:
     masks: tuple[Tensor, ...]
     pixels: Tensor
     operator: SparseOperator
+    pixel_direct: tuple[PixelDirect, ...] = ()
 
     @cached_property
     def all_pixels(self) -> SparseOperator:
@@ -72,6 +75,7 @@ def prepare_views(
     *,
     masks: Sequence[Tensor] | None = None,
     mask_edges: bool = True,
+    at_pixels: bool = False,
 ) -> PreparedViews:
     """Choose the pixels that a fit trusts and stack their weights.
 
@@ -81,6 +85,7 @@ def prepare_views(
     Args:
         masks: (H, W) per view, the scene's share of each pixel (the images' alpha); 1 if None.
         mask_edges: whether pixels on silhouettes, creases and depth jumps are left out.
+        at_pixels: whether the last steps of a fit take direct light where pixels look.
 
     Raises:
         InputError: a mask of the wrong size, or too few pixels left.
@@ -102,7 +107,8 @@ def prepare_views(
         view.operator.to_scipy()[chosen.cpu().numpy().nonzero()[0]] for view, chosen in zip(views, trusted, strict=True)
     ]
     operator = SparseOperator.from_scipy(scipy.sparse.vstack(rows, format="csr"), frozen.surfels.centers.device)
-    return PreparedViews(frozen, tuple(views), tuple(masks), pixels, operator)
+    direct = tuple(PixelDirect(frozen.bvh, view) for view in views) if at_pixels else ()
+    return PreparedViews(frozen, tuple(views), tuple(masks), pixels, operator, direct)
 
 
 def _trusted(view: ViewWeights, mask: Tensor, mask_edges: bool) -> Tensor:

@@ -7,11 +7,14 @@ signature is the same.
 
 from __future__ import annotations
 
+import math
+
 import torch
 from torch import Tensor
 
 from rgspipe.renderer.kernels.composite import GRAZING, OPAQUE
 from rgspipe.renderer.kernels.irradiance import SOFTENING
+from rgspipe.renderer.kernels.pixel_light import MIDDLE_WEIGHT, NEAR, NODE, REACH, SIDE_WEIGHT
 from rgspipe.renderer.kernels.shadow import (
     COPLANAR_COSINE,
     COPLANAR_OFFSET,
@@ -19,6 +22,7 @@ from rgspipe.renderer.kernels.shadow import (
     RECEIVER_FADE,
     RECEIVER_SKIP,
 )
+from rgspipe.scene.camera import Camera
 from rgspipe.scene.surfels import Coverage, Surfels
 
 
@@ -113,26 +117,29 @@ def unit_irradiance(surfels: Surfels, positions: Tensor, shadows: bool = True) -
 
 def transmittance(surfels: Surfels, positions: Tensor) -> Tensor:
     """(L, N) shares of the lights (L, 3) that reach the surfels: `kernels.irradiance.transmittance`."""
+    everyone = torch.arange(len(surfels))
+    return torch.stack([transmittance_at(surfels, light, everyone, surfels.centers) for light in positions])
+
+
+def transmittance_at(surfels: Surfels, light: Tensor, receivers: Tensor, points: Tensor) -> Tensor:
+    """(R,) share of a light (3,) that reaches points (R, 3) on the planes of the surfels `receivers` (R,)."""
     coverage, normals, centers = surfels.coverage, surfels.normals, surfels.centers
-    scale = surfels.scales.prod(dim=1).sqrt()
-    between = centers[None] - centers[:, None]
-    coplanar = (normals @ normals.T > COPLANAR_COSINE) & (
-        (between * normals[:, None]).sum(-1).abs() < COPLANAR_OFFSET * scale[:, None]
+    scale, own = surfels.scales.prod(dim=1).sqrt()[receivers], normals[receivers]
+    between = centers[None] - points[:, None]
+    coplanar = (own @ normals.T > COPLANAR_COSINE) & (
+        (between * own[:, None]).sum(-1).abs() < COPLANAR_OFFSET * scale[:, None]
     )
-    rows = []
-    for light in positions:
-        lit = ((light - centers) * normals).sum(dim=1) > 0.0
-        path = torch.where(lit[:, None], light - centers, normals)
-        rays = path / path.norm(dim=1, keepdim=True)
-        facing = rays @ normals.T
-        met = (facing.abs() > EDGE_ON) & ~coplanar & (((light - centers) * normals).sum(-1) * facing > 0.0)
-        depth = (between * normals).sum(-1) / torch.where(met, facing, torch.ones_like(facing))
-        fade = ((depth / scale[:, None] - RECEIVER_SKIP) / RECEIVER_FADE).clamp(0.0, 1.0)
-        alpha = alpha_at(surfels, depth[..., None] * rays[:, None] - between)
-        met = met & (fade > 0.0) & (alpha > coverage.minimum_alpha)
-        share = _layers_from_afar(torch.where(met, alpha * fade, torch.zeros_like(alpha)), depth, coverage)
-        rows.append(torch.where(lit, share, torch.ones_like(share)))
-    return torch.stack(rows)
+    lit = ((light - points) * own).sum(dim=1) > 0.0
+    path = torch.where(lit[:, None], light - points, own)
+    rays = path / path.norm(dim=1, keepdim=True)
+    facing = rays @ normals.T
+    met = (facing.abs() > EDGE_ON) & ~coplanar & (((light - centers) * normals).sum(-1) * facing > 0.0)
+    depth = (between * normals).sum(-1) / torch.where(met, facing, torch.ones_like(facing))
+    fade = ((depth / scale[:, None] - RECEIVER_SKIP) / RECEIVER_FADE).clamp(0.0, 1.0)
+    alpha = alpha_at(surfels, depth[..., None] * rays[:, None] - between)
+    met = met & (fade > 0.0) & (alpha > coverage.minimum_alpha)
+    share = _layers_from_afar(torch.where(met, alpha * fade, torch.zeros_like(alpha)), depth, coverage)
+    return torch.where(lit, share, torch.ones_like(share))
 
 
 def _layers_from_afar(alpha: Tensor, depth: Tensor, coverage: Coverage) -> Tensor:
@@ -149,3 +156,49 @@ def _layers_from_afar(alpha: Tensor, depth: Tensor, coverage: Coverage) -> Tenso
         clear = torch.where(starts, torch.ones_like(clear), clear) * (1.0 - alpha[:, k])
         front = torch.where(starts, place[:, k], front)
     return passing * (1.0 - smoothstep(1.0 - clear, coverage.low, coverage.high))
+
+
+def points_on_surfels(surfels: Surfels, origin: Tensor, rays: Tensor, indices: Tensor, reach: Tensor | float) -> Tensor:
+    """(R, 3) where rays (R, 3) from `origin` (3,) meet the planes of surfels `indices` (R,), near their centres."""
+    centers, normals = surfels.centers[indices], surfels.normals[indices]
+    across = (rays * normals).sum(-1)
+    distance = ((centers - origin) * normals).sum(-1) / across
+    beside = origin + distance[:, None] * rays - centers
+    return centers + beside * (reach / beside.norm(dim=1).clamp(min=1e-300)).clamp(max=1.0)[:, None]
+
+
+def direct_image(
+    surfels: Surfels, weights: Tensor, edges: Tensor, camera: Camera, light: Tensor, share: Tensor, own_share: Tensor
+) -> Tensor:
+    """(P, 3) direct radiance of a light (3,) of 1 W/sr: `kernels.pixel_light.PixelLight.image`, its value.
+
+    Args:
+        weights: (P, N) dense view weights.
+        edges: (P,) bool.
+        share: (N,) part of the light that reaches each surfel; own_share: (P,) of each pixel, negative where unknown.
+    """
+    _, directions, lengths = camera.rays()
+    rays, axes = directions * lengths[:, None], camera.camera_to_world[:3, :3].double()
+    right, up = axes[:, 0] / camera.fx, axes[:, 1] / camera.fy
+    pixels, indices = weights.nonzero(as_tuple=True)
+    scale = surfels.scales.prod(dim=1).sqrt()[indices]
+    reach = torch.where(edges[pixels], REACH * scale, torch.full_like(scale, torch.inf))
+    normals, origin = surfels.normals[indices], camera.origin.double()
+
+    def lit(x: float, y: float) -> tuple[Tensor, Tensor]:
+        seen = points_on_surfels(surfels, origin, rays[pixels] + x * right + y * up, indices, reach)
+        path = light - seen
+        square = path.square().sum(-1)
+        soft = (square.square() + (SOFTENING * scale).pow(4)).pow(0.75)
+        return seen, (path * normals).sum(-1).clamp(min=0.0) / soft
+
+    seen, value = lit(0.0, 0.0)
+    away = seen - origin
+    footprint = right.norm() * away.square().sum(-1) / (away * normals).sum(-1).abs()
+    near = footprint > NEAR * (light - seen).norm(dim=1)
+    nodes = ((-float(NODE), float(SIDE_WEIGHT)), (0.0, float(MIDDLE_WEIGHT)), (float(NODE), float(SIDE_WEIGHT)))
+    mean = sum(wx * wy * lit(x, y)[1] for x, wx in nodes for y, wy in nodes)
+    passing = torch.where(own_share[pixels] >= 0.0, own_share[pixels], share[indices])
+    contribution = weights[pixels, indices] * passing * torch.where(near, mean, value)
+    image = torch.zeros(len(weights), 3, dtype=weights.dtype)
+    return image.index_add(0, pixels, contribution[:, None] * surfels.albedo[indices] / math.pi)

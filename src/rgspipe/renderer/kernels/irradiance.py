@@ -16,7 +16,7 @@ wp.set_module_options({"enable_backward": False})
 
 #: Within this many of its scales a surfel sees a light as if it were farther away: inside a surfel the inverse
 #: square has no meaning, and its derivative would grow without bound.
-SOFTENING = wp.constant(1.0)
+SOFTENING = wp.constant(0.5)
 
 
 @wp.kernel
@@ -54,7 +54,7 @@ def _irradiance(
             value = projected * inverse_cube
             slope = inverse_cube * (n - (3.0 * projected * (square / softened) / softened) * d)
         if shadows == 1 and projected > 0.0 and square > 0.0:
-            share, share_slope = light_transmittance(bvh, surfels, rule, i, light, d)
+            share, share_slope = light_transmittance(bvh, surfels, rule, i, surfels[i].center, light, d)
             slope = share * slope + value * share_slope
             value *= share
     place = item - i + order[i]

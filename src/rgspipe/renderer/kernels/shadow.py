@@ -39,19 +39,20 @@ def occluder(
     surfels: wp.array(dtype=SurfelRecord),
     minimum_alpha: float,
     receiver: int,
+    at: wp.vec3,
     j: int,
     light: wp.vec3,
     path: wp.vec3,
     distance: float,
 ):
-    """Opacity of surfel j, faded in, on the `path` from receiver to light, and its place there, a share; or 0, 0."""
+    """Opacity of surfel j, faded in, on the `path` from `at` to the light, and its place there, a share; or 0, 0."""
     alpha = float(0.0)
     depth = float(0.0)
     n = surfels[j].normal
     facing = wp.dot(path, n)
     if wp.abs(facing) > EDGE_ON * distance:
         # From the receiver: the light may be so far away that rounding there is larger than the scene.
-        between = surfels[j].center - surfels[receiver].center
+        between = surfels[j].center - at
         depth = wp.dot(between, n) / facing
         fade = wp.min((depth * distance / surfels[receiver].scale - RECEIVER_SKIP) / RECEIVER_FADE, 1.0)
         if fade > 0.0 and wp.dot(light - surfels[j].center, n) * facing > 0.0:
@@ -96,6 +97,7 @@ def opacity_slope(surfels: wp.array(dtype=SurfelRecord), j: int, x: wp.vec3):
 def occluder_slope(
     surfels: wp.array(dtype=SurfelRecord),
     receiver: int,
+    at: wp.vec3,
     j: int,
     path: wp.vec3,
     distance: float,
@@ -107,7 +109,7 @@ def occluder_slope(
     facing = wp.dot(path, n)
     steepness = RECEIVER_FADE * surfels[receiver].scale
     fade = wp.min((depth * distance - RECEIVER_SKIP * surfels[receiver].scale) / steepness, 1.0)
-    x = depth * path - (surfels[j].center - surfels[receiver].center)
+    x = depth * path - (surfels[j].center - at)
     slope = alpha * opacity_slope(surfels, j, x)
     # As the light moves by dl, the meeting point moves by its share of the way, corrected to stay on the plane.
     change = depth * (slope - n * (wp.dot(slope, path) / facing))
@@ -122,16 +124,17 @@ def light_transmittance(
     surfels: wp.array(dtype=SurfelRecord),
     rule: LayerRule,
     receiver: int,
+    at: wp.vec3,
     light: wp.vec3,
     path: wp.vec3,
 ):
-    """Share of a light that reaches a receiver along the `path` to it, and its derivative d/d(light)."""
+    """Share of a light that reaches the point `at` of a receiver along the `path` to it, and d/d(light) of it."""
     passing = float(1.0)
     slope = wp.vec3(0.0, 0.0, 0.0)
     distance = wp.length(path)
     thickness = rule.thickness / distance
     skip = RECEIVER_SKIP * surfels[receiver].scale / distance
-    start = surfels[receiver].center + skip * path
+    start = at + skip * path
     # The layer that is being filled.
     front = float(1.0e30)
     clear = float(1.0)
@@ -150,7 +153,7 @@ def light_transmittance(
         query = wp.bvh_query_ray(bvh, start, path)
         j = int(0)
         while wp.bvh_query_next(query, j, reach):
-            alpha, depth = occluder(surfels, rule.minimum_alpha, receiver, j, light, path, distance)
+            alpha, depth = occluder(surfels, rule.minimum_alpha, receiver, at, j, light, path, distance)
             if alpha > 0.0 and (depth < last_depth or (depth == last_depth and j > last_index)):
                 if alpha >= rule.high:  # opaque in whichever layer it falls
                     passing = float(0.0)
@@ -184,7 +187,7 @@ def light_transmittance(
                 front = last_depth
                 clear = float(1.0)
                 log_slope = wp.vec3(0.0, 0.0, 0.0)
-            change = occluder_slope(surfels, receiver, last_index, path, distance, alpha, last_depth)
+            change = occluder_slope(surfels, receiver, at, last_index, path, distance, alpha, last_depth)
             log_slope += change / wp.max(1.0 - alpha, 1.0e-4)
             clear *= 1.0 - alpha
             if 1.0 - clear >= rule.high:

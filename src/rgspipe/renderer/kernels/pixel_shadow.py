@@ -1,0 +1,75 @@
+"""Shadows of pixels: shadow rays from a lattice of points in each, so that a shadow's edge is as sharp as the image."""
+
+from __future__ import annotations
+
+import torch
+import warp as wp
+from torch import Tensor
+
+from rgspipe.renderer.kernels.coverage import LayerRule
+from rgspipe.renderer.kernels.launch import as_array, as_vec3, launch, vector
+from rgspipe.renderer.kernels.pixel_light import point_on_surfel
+from rgspipe.renderer.kernels.shadow import light_transmittance
+from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh, SurfelRecord
+from rgspipe.scene.camera import Camera
+
+# Adjoints are written by hand; generating them would double the compile time.
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.kernel
+def _pixel_transmittance(
+    offset: int,
+    slab: int,
+    bvh: wp.uint64,
+    surfels: wp.array(dtype=SurfelRecord),
+    rule: LayerRule,
+    origin: wp.vec3,
+    directions: wp.array(dtype=wp.vec3),
+    right: wp.vec3,
+    up: wp.vec3,
+    places: wp.array(dtype=wp.vec2),
+    pixels: wp.array(dtype=int),
+    receivers: wp.array(dtype=int),
+    light: wp.vec3,
+    share: wp.array(dtype=wp.vec4),
+):
+    item = wp.tid() + offset
+    p = pixels[item]
+    i = receivers[p]
+    n = surfels[i].normal
+    total = wp.vec4(0.0, 0.0, 0.0, 0.0)
+    for k in range(places.shape[0]):
+        d = directions[p] + (places[k][0] - 0.5) * right + (places[k][1] - 0.5) * up
+        at = point_on_surfel(origin, d, surfels[i].center, n, 1.0e30)
+        path = light - at
+        if wp.dot(path, n) > 0.0:
+            passing, slope = light_transmittance(bvh, surfels, rule, i, at, light, path)
+            total += wp.vec4(passing, slope[0], slope[1], slope[2])
+    share[p] = total / float(places.shape[0])
+
+
+def pixel_transmittance(
+    bvh: SurfelBvh, camera: Camera, receivers: Tensor, pixels: Tensor, light: Tensor, places: Tensor
+) -> Tensor:
+    """(P, 4) share of a light that reaches each pixel's surface, its mean over the pixel, and d/d(light) of it.
+
+    Args:
+        receivers: (P,) int64 surfel that stands for the surface in each pixel.
+        pixels: (K,) int64 those that are computed; the share of the others is −1.
+        light: (3,) position.
+        places: (K, 2) of a pixel's shadow rays in the unit square.
+    """
+    share = torch.full((camera.pixel_count, 4), -1.0, dtype=torch.float32, device=bvh.device)
+    if len(pixels) == 0:
+        return share
+    _, directions, lengths = camera.rays()
+    axes = camera.camera_to_world[:3, :3].double()
+    rays = [vector(bvh.local(camera.origin)), as_vec3((directions * lengths[:, None]).to(bvh.device))]
+    rays += [vector(axes[:, 0] / camera.fx), vector(axes[:, 1] / camera.fy)]
+    rays.append(wp.from_torch(places.float().contiguous().to(bvh.device), dtype=wp.vec2))
+    records = wp.to_torch(bvh.rank)[receivers.to(bvh.device)].int()
+    which = [as_array(pixels.to(bvh.device).int()), as_array(records), vector(bvh.local(light))]
+    inputs = [bvh.id, bvh.records, bvh.rule, *rays, *which, wp.from_torch(share, dtype=wp.vec4)]
+    launch(_pixel_transmittance, len(pixels), inputs, bvh.device)
+    return share

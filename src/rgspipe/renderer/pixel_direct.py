@@ -1,0 +1,71 @@
+"""Direct light of one view, evaluated where its pixels look: sharper than surfels' centres, and dearer."""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from rgspipe.renderer.kernels.irradiance import SOFTENING, transmittance
+from rgspipe.renderer.kernels.pixel_light import PixelLight
+from rgspipe.renderer.kernels.pixel_shadow import pixel_transmittance
+from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
+from rgspipe.renderer.view_weights import ViewWeights, even_places
+
+#: Shadow rays of a pixel that a shadow's edge crosses.
+SHADOW_RAYS = 16
+
+#: A pixel whose surfels are lit by more than this and less than 1 minus this lies on a shadow's edge.
+LIT_OR_NOT = 2e-3
+
+
+class PixelDirect:
+    """The direct image of a light as a function of its position.
+
+    Inverse square and cosine are taken at the point that each pixel sees of each of its surfels. The
+    transmittance is that of the surfels, and pixels on a shadow's edge, away from edges of the geometry, cast
+    shadow rays of their own.
+
+    Args:
+        bvh: N surfels.
+        view: the view, P pixels.
+    """
+
+    def __init__(self, bvh: SurfelBvh, view: ViewWeights) -> None:
+        self._bvh, self._view = bvh, view
+        scales = bvh.surfels.scales.detach().prod(dim=1).sqrt()
+        self._light = PixelLight(bvh, view.operator.matrix, view.edges, view.camera, float(SOFTENING) * scales)
+        self._receivers = _heaviest(view)
+        self._places = even_places(SHADOW_RAYS)
+        self._plain = ~view.edges.to(bvh.device) & (view.coverage.to(bvh.device) > 0.5)
+
+    def image(self, position: Tensor, share: Tensor, slope: Tensor) -> Tensor:
+        """(P, 3, 4) radiance under a light of 1 W/sr in RGB at `position` (3,), and its derivative towards x, y, z.
+
+        Args:
+            share, slope: `surfel_shares` of the light.
+        """
+        lit = (self._view.operator @ share[:, None])[:, 0] / self._view.coverage.to(self._bvh.device).clamp(min=1e-6)
+        pixels = (self._plain & (lit > LIT_OR_NOT) & (lit < 1.0 - LIT_OR_NOT)).nonzero()[:, 0]
+        own = pixel_transmittance(self._bvh, self._view.camera, self._receivers, pixels, position, self._places)
+        return self._light.image(position, share, slope, own)
+
+
+def surfel_shares(bvh: SurfelBvh, position: Tensor, shadows: bool = True) -> tuple[Tensor, Tensor]:
+    """Share (N,) of a light at `position` (3,) that reaches each surfel, and its derivative (N, 3)."""
+    if not shadows:
+        count = len(bvh.surfels)
+        return torch.ones(count, device=bvh.device), torch.zeros(count, 3, device=bvh.device)
+    share, slope = transmittance(bvh, position[None])
+    return share[0], slope[0]
+
+
+def _heaviest(view: ViewWeights) -> Tensor:
+    """(P,) int64 surfel with the largest weight in each pixel; 0 in empty ones."""
+    matrix = view.operator.to_scipy()
+    rows = np.repeat(np.arange(matrix.shape[0]), np.diff(matrix.indptr))
+    order = np.lexsort((matrix.data, rows))
+    heaviest = np.zeros(matrix.shape[0], np.int64)
+    # The last entry of a row is its largest.
+    heaviest[rows[order]] = matrix.indices[order]
+    return torch.from_numpy(heaviest)
