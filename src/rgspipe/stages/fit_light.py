@@ -68,8 +68,8 @@ class _Fitter:
         effects = _effects(context)
         if config.fit.method == "paper_adam":
             return cls(config, frozen, None, _training_lights(context), effects)
-        if not effects.shadows:
-            # The stored candidates cast shadows.
+        if not effects.shadows and not _measured(artifact)[0].shadows.proved:
+            # The stored candidates have shadows.
             options = config.freeze
             dictionary = build_dictionary(frozen, options.dictionary_grid, seed=options.seed, shadows=False)
             return cls(config, frozen, dictionary, (), effects)
@@ -125,13 +125,17 @@ def _effects(context: StageContext) -> Effects:
     return Effects(choice.shadows, choice.interreflection, wanted.at_pixels)
 
 
+def _measured(freeze: Artifact) -> tuple[EffectBounds, Mapping[str, float]]:
+    """What effects can change in the frozen scene, and the milliseconds that they cost."""
+    content = read_json(freeze.file(EFFECTS), "the effects of a frozen scene")
+    return EffectBounds.from_json(content["bounds"]), content["milliseconds"]
+
+
 def _choice(config: RgspipeConfig, freeze: Artifact) -> tuple[EffectBounds, EffectChoice]:
     """What the frozen scene calls for under a rig of the kind that is looked for."""
-    measured = read_json(freeze.file(EFFECTS), "the effects of a frozen scene")
-    bounds, wanted = EffectBounds.from_json(measured["bounds"]), config.effects
+    (bounds, costs), wanted = _measured(freeze), config.effects
     off = [name for name, on in (("shadows", wanted.shadows), ("interreflection", wanted.interreflection)) if not on]
     kind = RigKind(points=config.light.count)
-    costs = measured["milliseconds"]
     return bounds, choose_effects(bounds, wanted.tolerance, kind, milliseconds=costs, off=off)
 
 
