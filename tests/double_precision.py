@@ -26,11 +26,8 @@ def in_double(surfels: Surfels) -> Surfels:
 
 
 def irradiance(surfels: Surfels, position: Tensor, shadows: bool = True) -> Tensor:
-    """(N,) irradiance T·max(0, n·d)/(|d|⁴ + ε⁴)^{3/4} of a unit point light at `position` (3,), differentiable."""
-    d = position - surfels.centers
-    softened = d.square().sum(dim=1).square() + surfels.scales.prod(dim=1).square()
-    factor = (d * surfels.normals).sum(dim=1).clamp(min=0.0) * softened.pow(-0.75)
-    return factor * reference.transmittance(surfels, position[None])[0] if shadows else factor
+    """(N,) irradiance of a unit point light at `position` (3,), differentiable."""
+    return reference.unit_irradiance(surfels, position[None], shadows)[0]
 
 
 def irradiance_and_slope(surfels: Surfels, position: Tensor, shadows: bool = True) -> tuple[Tensor, Tensor]:

@@ -43,7 +43,7 @@ def light_at(scene: HardScene, place: Tensor, exponent: float = 0.0) -> PointLig
 def prepare(kept: Kept, scene: HardScene, start: PointLight) -> tuple[FrozenScene, FitViews, Tensor]:
     """The scene, one view with the start as the only candidate, and the target's image."""
     if id(scene) not in kept:
-        frozen = FrozenScene.freeze(scene.build(), gather_rays=16, patches=20, seed=0)
+        frozen = FrozenScene.freeze(scene.build(), gather_rays=4, patches=20, seed=0)
         view = frozen.view(camera("plain", scene))
         kept[id(scene)] = frozen, view, frozen.render(view, (light_at(scene, TRUTH),))
     frozen, view, image = kept[id(scene)]
