@@ -222,8 +222,13 @@ class ReportConfig:
 
 @dataclass
 class BenchmarkConfig:
-    """What is timed."""
+    """What is measured."""
 
+    kind: str = option(
+        "renderer",
+        "the renderer on rooms with path-traced truth, or the steps of a fit on the trained scene",
+        choices=("renderer", "fit"),
+    )
     repetitions: int = option(20, "runs of each measured step", low=1, high=100000)
     rooms: list[str] = option(list(ROOM_NAMES), "rooms that are path-traced and measured on", choices=ROOM_NAMES)
     truth_resolution: int = option(128, "width and height of the path-traced images, pixels", low=8, high=8192)

@@ -1,0 +1,29 @@
+"""Tables as Markdown, as they stand in docs/."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import pandas as pd
+
+
+def markdown_table(table: pd.DataFrame, columns: Mapping[str, tuple[str, str]]) -> str:
+    """A Markdown table.
+
+    Args:
+        columns: for each column that is shown its heading and format, such as ("PSNR (dB)", ".1f").
+    """
+    shown = {name: style for name, style in columns.items() if name in table.columns}
+    lines = ["| " + " | ".join(heading for heading, _ in shown.values()) + " |", "| " + "--- | " * len(shown)]
+    for row in table.to_dict("records"):
+        lines.append("| " + " | ".join(_cell(row[name], form) for name, (_, form) in shown.items()) + " |")
+    return "\n".join(line.rstrip() for line in lines) + "\n"
+
+
+def _cell(value: object, form: str) -> str:
+    if value is None or (isinstance(value, float) and math.isnan(value)):
+        return "–"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return format(value, form) if form else str(value)
