@@ -124,8 +124,8 @@ class TrainConfig:
 class FreezeConfig:
     """The light-independent operators of the trained scene."""
 
-    gather_rays: int = option(512, "hemisphere rays of a surfel", low=8, high=65536)
-    patches: int = option(500, "patches of the indirect light", low=8, high=20000)
+    gather_rays: int = option(256, "hemisphere rays of a surfel", low=8, high=65536)
+    patches: int = option(1000, "patches of the indirect light", low=8, high=20000)
     dictionary_grid: int = option(8, "candidate lights along each axis of the room", low=2, high=64)
     seed: int = option(0, "draws of rays", low=0, high=2**31 - 1)
 
@@ -188,7 +188,7 @@ class EffectsConfig:
     shadows: bool = option(True, "surfels block light")
     interreflection: bool = option(True, "light bounces between surfels")
     at_pixels: bool = option(
-        False, "direct light where pixels look, in a fit's last steps: sharper than at surfels' centres, and dearer"
+        True, "direct light where pixels look, in a fit's last steps: sharper than at surfels' centres, and dearer"
     )
     auto: bool = option(True, "leave out, of these, what cannot change an image by more than `tolerance`")
     tolerance: float = option(

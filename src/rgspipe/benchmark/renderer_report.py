@@ -56,7 +56,7 @@ def run_bench(bench: Bench) -> None:
     """Measure every part that is missing, then write the figures and accuracy.md."""
     measured = {name: _part(bench, name, measure) for name, measure in PARTS.items()}
     front = mark_front(over_rooms(_of_one_size(measured["error"])), time="step_ms", error="global_relative")
-    peers = over_rooms(measured["peers"].assign(setting=measured["peers"]["spp"])).assign(
+    peers = over_rooms(measured["peers"].assign(setting=measured["peers"]["spp"].astype(str))).assign(
         renderer=measured["peers"]["renderer"].iloc[0]
     )
     figures = {
@@ -135,7 +135,7 @@ def _gather(bench: Bench) -> pd.DataFrame:
 
 
 def _effects(bench: Bench) -> pd.DataFrame:
-    return effect_savings(EFFECT_SCENES, EFFECT_RIGS, TOLERANCE)
+    return effect_savings(list(EFFECT_SCENES.values()), EFFECT_RIGS, TOLERANCE)
 
 
 def _peers(bench: Bench) -> pd.DataFrame:

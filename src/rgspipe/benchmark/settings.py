@@ -67,10 +67,11 @@ class Cost:
     """What a model took to make.
 
     Attributes:
-        gather_s, transport_s, views_s: seconds; views per camera.
+        areas_s, gather_s, transport_s, views_s: seconds; views per camera.
         operators_mib: memory of gather, transport and view weights.
     """
 
+    areas_s: float = 0.0
     gather_s: float = 0.0
     transport_s: float = 0.0
     views_s: float = 0.0
@@ -78,7 +79,7 @@ class Cost:
 
     @property
     def build_s(self) -> float:
-        return self.gather_s + self.transport_s + self.views_s
+        return self.areas_s + self.gather_s + self.transport_s + self.views_s
 
 
 @dataclass(frozen=True)
@@ -130,11 +131,11 @@ class Workshop:
 
     room: Room
     seed: int = 0
-    _kept: dict[tuple[int, int], tuple[SurfelBvh, SparseOperator, Tensor, float]] = field(default_factory=dict)
+    _kept: dict[tuple[int, int], tuple[SurfelBvh, SparseOperator, Tensor, float, float]] = field(default_factory=dict)
 
     def model(self, setting: Setting) -> Model:
         """The room's model; times are those of making it from nothing, also where the gather was kept."""
-        bvh, gather, areas, gather_s = self._gather(setting)
+        bvh, gather, areas, areas_s, gather_s = self._gather(setting)
         surfels = bvh.surfels
         begin = time.perf_counter()
         labels = cluster_patches(surfels.centers, surfels.normals, setting.patches, seed=self.seed)
@@ -147,9 +148,9 @@ class Workshop:
         views_s = (time.perf_counter() - middle) / len(cameras)
         parts = [gather, transport.average, transport.gather, *(view.operator for view in views)]
         size = 8 * sum(part.entries for part in parts) + 4 * transport.inverse.numel()
-        return Model(setting, frozen, views, sharp, Cost(gather_s, middle - begin, views_s, size / 2**20))
+        return Model(setting, frozen, views, sharp, Cost(areas_s, gather_s, middle - begin, views_s, size / 2**20))
 
-    def _gather(self, setting: Setting) -> tuple[SurfelBvh, SparseOperator, Tensor, float]:
+    def _gather(self, setting: Setting) -> tuple[SurfelBvh, SparseOperator, Tensor, float, float]:
         key = setting.surfels, setting.gather_rays
         if key not in self._kept:
             self._kept.clear()
@@ -157,8 +158,9 @@ class Workshop:
             begin = time.perf_counter()
             bvh = SurfelBvh(surfels)
             areas = surfel_areas(bvh, seed=self.seed)
+            middle = time.perf_counter()
             gather = build_gather(bvh, setting.gather_rays, seed=self.seed, areas=areas)
-            self._kept[key] = bvh, gather, areas, time.perf_counter() - begin
+            self._kept[key] = bvh, gather, areas, middle - begin, time.perf_counter() - middle
         return self._kept[key]
 
 
@@ -176,12 +178,14 @@ def sweep() -> list[Setting]:
         *(replace(standard, surfels=n) for n in (2_500, 5_000, 20_000, 40_000)),
     ]
     together = [
-        Setting(2_500, 64, 100, supersampling=2),
-        Setting(5_000, 64, 250, supersampling=2),
-        Setting(5_000, 256, 500, shadows="pixels"),
+        Setting(2_500, 64, 100),
+        Setting(2_500, 64, 250, shadows="pixels"),
+        Setting(5_000, 64, 250),
+        Setting(5_000, 128, 500, shadows="pixels"),
+        Setting(10_000, 128, 1000, shadows="pixels"),
+        Setting(10_000, 128, 2000, shadows="pixels"),
         Setting(20_000, 256, 1000),
-        Setting(20_000, 256, 1000, shadows="pixels"),
-        Setting(40_000, 256, 2000, shadows="pixels"),
+        Setting(40_000, 128, 2000, shadows="pixels"),
     ]
     settings = dict.fromkeys([standard, *turned, *together, *preset_settings().values()])
     return sorted(settings, key=lambda s: (s.surfels, s.gather_rays))

@@ -18,6 +18,7 @@ ERRORS = {
     "global_relative": ("relative error", ".3f"),
 }
 COSTS = {
+    "areas_s": ("areas (s)", ".2f"),
     "gather_s": ("gather (s)", ".2f"),
     "transport_s": ("transport (s)", ".2f"),
     "views_s": ("a view (s)", ".3f"),
