@@ -3,6 +3,7 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV := .venv
 RGSPIPE := $(VENV)/bin/python -m rgspipe
 STAMP := $(VENV)/.installed
+BENCH_STAMP := $(VENV)/.bench_installed
 TEST_WORKERS ?= 2
 ARGS ?=
 
@@ -32,8 +33,12 @@ smoke: setup  ## the whole way on a tiny scene, in minutes
 reproduce: setup  ## everything in pipelines/reproduce.yaml, from nothing to the report
 	$(RGSPIPE) pipeline=reproduce $(ARGS)
 
-bench: setup  ## time the stages of a fit on this machine
+bench: setup $(BENCH_STAMP)  ## accuracy against path-traced truth and what it costs on this machine (an hour, idle)
 	$(RGSPIPE) stage=benchmark $(ARGS)
+
+$(BENCH_STAMP): requirements-bench.txt $(STAMP)
+	$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check -r requirements-bench.txt
+	@touch $@
 
 lint: setup  ## style and mistakes
 	$(VENV)/bin/ruff check src tests

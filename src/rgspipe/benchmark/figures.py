@@ -40,7 +40,7 @@ def front_figure(settings: pd.DataFrame, peers: pd.DataFrame, *, error: str) -> 
                 axis.plot(group[column], 100 * group[error], "s--", color=PEER, ms=5, label=str(name))
                 for row in group.itertuples():
                     axis.annotate(
-                        f"{row.spp} spp", (getattr(row, column), 100 * getattr(row, error)), fontsize=6.5,
+                        f"{row.spp:.0f} spp", (getattr(row, column), 100 * getattr(row, error)), fontsize=6.5,
                         xytext=(4, 4), textcoords="offset points", color=PEER,
                     )  # fmt: skip
             axis.set(xscale="log", yscale="log", xlabel=label)
