@@ -84,5 +84,12 @@ STAGE = Stage(
     run=run,
     inputs=_inputs,
     config_keys=_keys,
-    code=("rgspipe.renderer", "rgspipe.fitting", "rgspipe.evaluation", "rgspipe.benchmark", "rgspipe.blender"),
+    code=(
+        "rgspipe.benchmark",
+        "rgspipe.blender",
+        "rgspipe.evaluation",
+        "rgspipe.fitting",
+        "rgspipe.renderer",
+        "rgspipe.resources",
+    ),
 )
