@@ -190,6 +190,13 @@ class EffectsConfig:
     at_pixels: bool = option(
         True, "direct light where pixels look, in a fit's last steps: sharper than at surfels' centres, and dearer"
     )
+    solver: str = option(
+        "patches",
+        "how light bounces: averaged over patches, through the full gather operator, or by the paper's random rays",
+        choices=("patches", "gather", "monte_carlo"),
+    )
+    bounces: int | None = option(None, "how many; by default all, and 4 for monte_carlo", low=0, high=1000)
+    samples: int = option(64, "random rays of a surfel and bounce, for monte_carlo", low=1, high=65536)
     auto: bool = option(True, "leave out, of these, what cannot change an image by more than `tolerance`")
     tolerance: float = option(
         0.001, "with auto: largest change, fraction of the brightest direct radiance", low=0, high=1

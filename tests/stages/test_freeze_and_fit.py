@@ -19,6 +19,8 @@ from rgspipe.datasets.gs3_write import frame_entry, write_transforms
 from rgspipe.datasets.light_file import read_lights
 from rgspipe.datasets.surfel_file import save_surfels
 from rgspipe.errors import InputError
+from rgspipe.fitting.fit import prepare_fit, render_light
+from rgspipe.fitting.problem import Effects
 from rgspipe.scene import PointLight
 from rgspipe.stages import fit_light, freeze
 from rgspipe.stages.base import StageContext
@@ -45,12 +47,13 @@ def _build(root: Path, stage: str, make) -> Artifact:
 
 def _write_dataset(folder: Path) -> None:
     frozen, cameras = frozen_room(), room_cameras(32)
-    views = [frozen.view(camera) for camera in cameras]
+    # The model's own images, with direct light where pixels look, as it is by default.
+    views = prepare_fit(frozen, cameras, effects=Effects(at_pixels=True))
     for (name, _), (position, intensity) in LIGHTS.items():
         target = folder / "targets" / name
         target.mkdir(parents=True)
-        for index, view in enumerate(views):
-            write_image(target / f"view_{index}.exr", frozen.render(view, (_light(position, intensity),)).numpy())
+        for index, image in enumerate(render_light(views, _light(position, intensity))):
+            write_image(target / f"view_{index}.exr", image.numpy())
         entries = [frame_entry(f"./view_{index}", camera) for index, camera in enumerate(cameras)]
         write_transforms(target / "transforms.json", entries)
     listed = [{"name": name, "occlusion": occlusion} for name, occlusion in LIGHTS]
@@ -178,3 +181,20 @@ def test_result_depends_on_what_it_uses(dataset):
     target = dataset / "targets" / "one"
     own = replace(config, fit=replace(config.fit, target=str(target)))
     assert stage.files(own) == [target] and "fit.limit" not in stage.keys(own)
+
+
+def test_light_may_bounce_through_the_full_operator(inputs, tmp_path):
+    """The targets bounced over patches, so the light that explains them moves a little."""
+    table = _fit(inputs, tmp_path, effects__solver="gather", fit__limit=1)
+    for row in table.itertuples():
+        position, _ = LIGHTS[row.target, row.occlusion]
+        error = np.linalg.norm(np.array([row.x, row.y, row.z]) - position)
+        # Measured 1e-4 and 2e-3.
+        assert 1e-7 < error < 0.02
+
+
+def test_random_rays_of_a_target_do_not_depend_on_the_targets_before_it(inputs, tmp_path):
+    options = {"effects__solver": "monte_carlo", "effects__bounces": 1, "effects__samples": 8, "fit__limit": 1}
+    both = _fit(inputs, tmp_path / "both", **options).drop(columns="seconds")
+    alone = _fit(inputs, tmp_path / "alone", occlusion="occluded", **options).drop(columns="seconds")
+    pd.testing.assert_frame_equal(both[1:].reset_index(drop=True), alone, check_exact=True)

@@ -33,6 +33,7 @@ from rgspipe.progress import track
 from rgspipe.renderer.effect_bounds import EffectBounds
 from rgspipe.renderer.effects import EffectChoice, RigKind, choose_effects
 from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.renderer.monte_carlo import MonteCarloSolver
 from rgspipe.scene import PointLight
 from rgspipe.stages.base import Stage, StageContext
 
@@ -64,7 +65,7 @@ class _Fitter:
     @classmethod
     def create(cls, context: StageContext) -> _Fitter:
         config, artifact = context.config, context.inputs["freeze"]
-        frozen = load_frozen(artifact.file)
+        frozen = _frozen(config, artifact)
         effects = _effects(context)
         if config.fit.method == "paper_adam":
             return cls(config, frozen, None, _training_lights(context), effects)
@@ -80,6 +81,9 @@ class _Fitter:
         views = used_views(target, self.config)
         prepared = self._prepare(views)
         config = self.config.fit
+        if isinstance(self.frozen.solver, MonteCarloSolver):
+            # Every target draws its own rays, whichever targets an earlier attempt has finished.
+            self.frozen.solver.generator.manual_seed(target_seed(target, self.config))
         result = fit_lights(
             self.frozen,
             prepared,
@@ -112,6 +116,15 @@ class _Fitter:
                 effects=self.effects,
             )
         return self.prepared[key]
+
+
+def _frozen(config: RgspipeConfig, artifact: Artifact) -> FrozenScene:
+    """The frozen scene, with the solver that is wanted; the full gather operator is read only for its own."""
+    wanted = config.effects
+    frozen = load_frozen(artifact.file, gather=wanted.solver == "gather")
+    if wanted.solver == "patches" and wanted.bounces is None:
+        return frozen
+    return frozen.with_solver(wanted.solver, bounces=wanted.bounces, samples=wanted.samples, seed=config.seed)
 
 
 def _effects(context: StageContext) -> Effects:
