@@ -3,54 +3,70 @@
 from __future__ import annotations
 
 import matplotlib
+import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from rgspipe.benchmark.front import mark_front
 from rgspipe.evaluation.plots import STYLE
 
 OURS, FRONT, PEER = "#8a9099", "#0072B2", "#D55E00"
+
+#: A point of the front is labelled if its error is below this part of the last labelled one's.
+LABEL_STEP = 0.93
+
+ABBREVIATIONS = (
+    ("gather_rays=", "M "),
+    ("shadows=pixels", "at pixels"),
+    ("surfels=", "N "),
+    ("patches=", "P "),
+    ("supersampling=", "s "),
+)
 
 
 def front_figure(settings: pd.DataFrame, peers: pd.DataFrame, *, error: str) -> Figure:
     """Error against the time of an image and its gradient, and against the time from nothing to the first image.
 
     Args:
-        settings: rows of `mark_front` with `step_ms`, `build_s`, `on_front` and the column `error`.
-        peers: rows of other renderers with `renderer`, `spp`, `forward_ms`, `step_ms` and `error`; may be empty.
+        settings: rows with `setting`, `step_ms`, `first_ms` and the column `error`.
+        peers: rows of other renderers with `renderer`, `spp`, `step_ms`, `first_ms` and `error`; may be empty.
     """
+    panels = {
+        "step_ms": ("What accuracy costs, per step", "image and gradient, once built (ms)"),
+        "first_ms": ("… and with everything that comes before", "from surfels to the first image, all built (ms)"),
+    }
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(10.0, 4.6), layout="constrained")
-        for axis, column, label in zip(
-            figure.subplots(1, 2, sharey=True),
-            ("step_ms", "first_ms"),
-            ("image and gradient, once built (ms)", "from surfels to the first image, all built (ms)"),
-            strict=True,
-        ):
-            front = settings[settings["on_front"]]
-            axis.scatter(settings[column], 100 * settings[error], s=16, color=OURS, label="rgspipe, every setting")
-            ordered = front.sort_values(column)
-            axis.plot(ordered[column], 100 * ordered[error], "o-", color=FRONT, ms=5, label="rgspipe, the front")
-            for row in front.itertuples():
-                axis.annotate(
-                    _short(row.setting), (getattr(row, column), 100 * getattr(row, error)), fontsize=6.5,
-                    xytext=(4, 4), textcoords="offset points", color=FRONT,
-                )  # fmt: skip
+        figure = Figure(figsize=(11.0, 5.0), layout="constrained")
+        for axis, (column, (title, label)) in zip(figure.subplots(1, 2, sharey=True), panels.items(), strict=True):
+            _front(axis, mark_front(settings, time=column, error=error), column, error)
             known = peers[peers[column].notna()] if column in peers else peers.iloc[:0]
             for name, group in known.groupby("renderer"):
                 axis.plot(group[column], 100 * group[error], "s--", color=PEER, ms=5, label=str(name))
                 for row in group.itertuples():
-                    axis.annotate(
-                        f"{row.spp:.0f} spp", (getattr(row, column), 100 * getattr(row, error)), fontsize=6.5,
-                        xytext=(4, 4), textcoords="offset points", color=PEER,
-                    )  # fmt: skip
-            axis.set(xscale="log", yscale="log", xlabel=label)
+                    _label(axis, f"{row.spp:.0f} spp", getattr(row, column), 100 * getattr(row, error), PEER)
+            axis.set(xscale="log", yscale="log", xlabel=label, title=title)
             axis.grid(visible=True, which="both")
-        axes = figure.axes
-        axes[0].set_ylabel("relative error of global images (%)")
-        axes[0].set_title("What accuracy costs, per step")
-        axes[1].set_title("… and with everything that comes before")
-        axes[0].legend(loc="best", fontsize=7.5)
+        figure.axes[0].set_ylabel("relative error of global images (%)")
+        figure.axes[0].legend(loc="lower left", fontsize=7.5)
     return figure
+
+
+def _front(axis: Axes, marked: pd.DataFrame, column: str, error: str) -> None:
+    axis.scatter(marked[column], 100 * marked[error], s=16, color=OURS, label="rgspipe, every setting")
+    front = marked[marked["on_front"]]
+    axis.plot(front[column], 100 * front[error], "o-", color=FRONT, ms=5, label="rgspipe, the front")
+    above = np.inf
+    for row in front.itertuples():
+        height = 100 * getattr(row, error)
+        # Points that all but touch share the label of the first.
+        if height < LABEL_STEP * above:
+            _label(axis, _short(row.setting), getattr(row, column), height, FRONT)
+            above = height
+
+
+def _label(axis: Axes, text: str, x: float, y: float, colour: str) -> None:
+    axis.annotate(text, (x, y), fontsize=6.5, xytext=(5, 3), textcoords="offset points", color=colour)
 
 
 def scaling_figure(scaling: pd.DataFrame) -> Figure:
@@ -78,6 +94,6 @@ def scaling_figure(scaling: pd.DataFrame) -> Figure:
 
 def _short(setting: str) -> str:
     """A setting's name, small enough for a label."""
-    for long, brief in (("surfels=", "N "), ("gather_rays=", "M "), ("patches=", "P "), ("supersampling=", "ss ")):
+    for long, brief in ABBREVIATIONS:
         setting = setting.replace(long, brief)
     return setting

@@ -57,9 +57,9 @@ class Setting:
     @property
     def changed(self) -> str:
         """What differs from the default, for a row of a table."""
-        standard = Setting()
-        names = [name for name in self.__dataclass_fields__ if getattr(self, name) != getattr(standard, name)]
-        return ", ".join(f"{name}={getattr(self, name)}" for name in names) or "standard"
+        base = Setting()
+        names = [name for name in self.__dataclass_fields__ if getattr(self, name) != getattr(base, name)]
+        return ", ".join(f"{name}={getattr(self, name)}" for name in names) or "base"
 
 
 @dataclass
@@ -165,17 +165,17 @@ class Workshop:
 
 
 def sweep() -> list[Setting]:
-    """The standard setting, every knob turned alone, and a few turned together; neighbours share a gather operator."""
-    standard = Setting()
+    """The base setting, every knob turned alone, and a few turned together; neighbours share a gather operator."""
+    base = Setting()
     turned = [
-        *(replace(standard, patches=n) for n in (100, 250, 1000, 2000)),
-        *(replace(standard, bounces=n) for n in (0, 1, 2, 4, 8)),
-        *(replace(standard, resolution=n) for n in (32, 64)),
-        *(replace(standard, supersampling=n) for n in (1, 2, 8)),
-        *(replace(standard, shadows=mode) for mode in ("none", "pixels")),
-        replace(standard, precision="float64"),
-        *(replace(standard, gather_rays=n) for n in (32, 64, 256, 512, 1024)),
-        *(replace(standard, surfels=n) for n in (2_500, 5_000, 20_000, 40_000)),
+        *(replace(base, patches=n) for n in (100, 250, 1000, 2000)),
+        *(replace(base, bounces=n) for n in (0, 1, 2, 4, 8)),
+        *(replace(base, resolution=n) for n in (32, 64)),
+        *(replace(base, supersampling=n) for n in (1, 2, 8)),
+        *(replace(base, shadows=mode) for mode in ("none", "pixels")),
+        replace(base, precision="float64"),
+        *(replace(base, gather_rays=n) for n in (32, 64, 256, 512, 1024)),
+        *(replace(base, surfels=n) for n in (2_500, 5_000, 20_000, 40_000)),
     ]
     together = [
         Setting(2_500, 64, 100),
@@ -187,7 +187,7 @@ def sweep() -> list[Setting]:
         Setting(20_000, 256, 1000),
         Setting(40_000, 128, 2000, shadows="pixels"),
     ]
-    settings = dict.fromkeys([standard, *turned, *together, *preset_settings().values()])
+    settings = dict.fromkeys([base, *turned, *together, *preset_settings().values()])
     return sorted(settings, key=lambda s: (s.surfels, s.gather_rays))
 
 
