@@ -11,8 +11,9 @@ from rgspipe.benchmark.image_error import image_errors
 from rgspipe.benchmark.light_bias import light_biases
 from rgspipe.benchmark.rooms import ROOMS, Room
 from rgspipe.benchmark.scaling import scaling
-from rgspipe.benchmark.settings import Model, Setting, Workshop, preset_settings, sweep
+from rgspipe.benchmark.settings import Model, Setting, Workshop, sweep
 from rgspipe.benchmark.truth import Truth
+from rgspipe.stages.benchmark import preset_settings
 
 SMALL = Setting(surfels=800, gather_rays=16, patches=60, resolution=16)
 
@@ -73,9 +74,11 @@ def test_light_at_pixels_replaces_the_direct_part_alone(room: Room) -> None:
 
 
 def test_the_sweep_holds_the_presets_and_turns_every_knob() -> None:
-    settings = sweep()
+    presets = preset_settings()
+    assert list(presets) == ["draft", "standard", "reference"]
+    settings = sweep(presets.values())
     assert len(set(settings)) == len(settings)
-    assert set(preset_settings().values()) <= set(settings)
+    assert set(presets.values()) <= set(settings)
     for knob in Setting.__dataclass_fields__:
         assert len({getattr(setting, knob) for setting in settings}) > 1, knob
 

@@ -33,11 +33,12 @@ def compare(scene: HardScene, light: torch.Tensor, within, camera_name: str = "p
 
     expected = image(position.double())
     slope = torch.autograd.functional.jacobian(image, position.double(), vectorize=True, strategy="forward-mode")
-    within("image", found[:, :, 0] * scene.size**2, expected * scene.size**2, 2e-5, outliers=0.01, cap=1e-2)
+    # Measured at most 8e-6, and 1e-4 in single pixels; 4e-7 and 7e-7 of the derivative.
+    within("image", found[:, :, 0] * scene.size**2, expected * scene.size**2, 5e-5, outliers=0.01, cap=1e-3)
     if not smooth:
         assert torch.isfinite(found).all()
         return
-    within("derivative", found[:, :, 1:] * scene.size**3, slope * scene.size**3, 2e-5, outliers=0.01, cap=3e-2)
+    within("derivative", found[:, :, 1:] * scene.size**3, slope * scene.size**3, 1e-5, outliers=0.01, cap=1e-4)
 
 
 @pytest.mark.parametrize("light", LIGHTS)

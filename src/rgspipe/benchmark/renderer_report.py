@@ -22,7 +22,7 @@ from rgspipe.benchmark.mitsuba_peer import mitsuba_rows
 from rgspipe.benchmark.ray_rate import memory_traffic, ray_rates
 from rgspipe.benchmark.rooms import Room
 from rgspipe.benchmark.scaling import scaling
-from rgspipe.benchmark.settings import Setting, Workshop, preset_settings, sweep
+from rgspipe.benchmark.settings import Setting, Workshop, sweep
 from rgspipe.benchmark.truth import Truth
 from rgspipe.evaluation.plots import png_of, svg_bytes
 from rgspipe.evaluation.timing import load_average
@@ -44,11 +44,13 @@ class Bench:
     Attributes:
         rooms: with their truth; the first one stands for all where one is enough.
         repetitions: of each timing.
+        presets: the settings of `accuracy=…`, by name.
         folder: receives a CSV file per part; parts that are there already are not measured again.
     """
 
     rooms: tuple[tuple[Room, Truth], ...]
     repetitions: int
+    presets: Mapping[str, Setting]
     folder: Path
 
 
@@ -68,7 +70,7 @@ def run_bench(bench: Bench) -> None:
         (bench.folder / f"{name}.png").write_bytes(png_of(figure))
     front.to_csv(bench.folder / "front.csv", index=False)
     loads = {name: json.loads(_load_path(bench, name).read_text())["load_average"] for name in PARTS}
-    (bench.folder / REPORT).write_text(tables.report(measured, front, loads), encoding="utf-8")
+    (bench.folder / REPORT).write_text(tables.report(measured, front, loads, bench.presets), encoding="utf-8")
 
 
 def _of_one_size(rows: pd.DataFrame) -> pd.DataFrame:
@@ -93,12 +95,12 @@ def _load_path(bench: Bench, name: str) -> Path:
 
 
 def _error(bench: Bench) -> pd.DataFrame:
-    parts = [image_errors(room, truth, sweep(), bench.repetitions) for room, truth in bench.rooms]
+    parts = [image_errors(room, truth, sweep(bench.presets.values()), bench.repetitions) for room, truth in bench.rooms]
     return pd.concat(parts, ignore_index=True)
 
 
 def _bias(bench: Bench) -> pd.DataFrame:
-    settings = [Setting(), replace(Setting(), shadows="pixels"), *preset_settings().values()]
+    settings = [Setting(), replace(Setting(), shadows="pixels"), *bench.presets.values()]
     parts = []
     for room, truth in bench.rooms:
         workshop = Workshop(room)

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import torch
-from omegaconf import DictConfig, OmegaConf
 from torch import Tensor
 
 from rgspipe.benchmark.rooms import Room
-from rgspipe.config import RgspipeConfig, get_value
 from rgspipe.renderer.areas import surfel_areas
 from rgspipe.renderer.clusters import cluster_patches
 from rgspipe.renderer.frozen import FrozenScene
@@ -22,7 +21,6 @@ from rgspipe.renderer.pixel_direct import PixelDirect, surfel_shares
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.transport import build_patch_transport
 from rgspipe.renderer.view_weights import ViewWeights
-from rgspipe.resources import resource_folder
 from rgspipe.scene import LightRig
 from rgspipe.scene.rectangles import surfels_on
 
@@ -164,7 +162,7 @@ class Workshop:
         return self._kept[key]
 
 
-def sweep() -> list[Setting]:
+def sweep(presets: Iterable[Setting] = ()) -> list[Setting]:
     """The base setting, every knob turned alone, and a few turned together; neighbours share a gather operator."""
     base = Setting()
     turned = [
@@ -187,25 +185,5 @@ def sweep() -> list[Setting]:
         Setting(20_000, 256, 1000),
         Setting(40_000, 128, 2000, shadows="pixels"),
     ]
-    settings = dict.fromkeys([base, *turned, *together, *preset_settings().values()])
+    settings = dict.fromkeys([base, *turned, *together, *presets])
     return sorted(settings, key=lambda s: (s.surfels, s.gather_rays))
-
-
-def preset_settings() -> dict[str, Setting]:
-    """The renderer's part of the presets `accuracy=draft|standard|reference`."""
-    schema = RgspipeConfig()
-    found = {}
-    for name in ("draft", "standard", "reference"):
-        preset = OmegaConf.load(resource_folder("conf") / "accuracy" / f"{name}.yaml")
-
-        def value(key: str, preset: DictConfig = preset) -> Any:
-            return OmegaConf.select(preset, key, default=get_value(schema, key))
-
-        found[name] = Setting(
-            surfels=value("init.surfels"),
-            gather_rays=value("freeze.gather_rays"),
-            patches=value("freeze.patches"),
-            supersampling=value("train.supersampling"),
-            shadows="pixels" if value("effects.at_pixels") else "surfels",
-        )
-    return found

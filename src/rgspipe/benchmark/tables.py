@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import pandas as pd
 
 from rgspipe.benchmark.markdown import markdown_table
-from rgspipe.benchmark.settings import Setting, preset_settings
+from rgspipe.benchmark.settings import Setting
 
 ERRORS = {
     "direct_db": ("direct (dB)", ".1f"),
@@ -29,7 +29,12 @@ COSTS = {
 }
 
 
-def report(parts: Mapping[str, pd.DataFrame], front: pd.DataFrame, loads: Mapping[str, float]) -> str:
+def report(
+    parts: Mapping[str, pd.DataFrame],
+    front: pd.DataFrame,
+    loads: Mapping[str, float],
+    presets: Mapping[str, Setting],
+) -> str:
     """All tables as Markdown."""
     error = parts["error"]
     sections = {
@@ -39,7 +44,7 @@ def report(parts: Mapping[str, pd.DataFrame], front: pd.DataFrame, loads: Mappin
             front[front["on_front"]],
             {"setting": ("setting", "")} | ERRORS | COSTS | {"first_ms": ("first image (ms)", ".0f")},
         ),
-        "Presets": _presets(error),
+        "Presets": _presets(error, presets),
         "Position error of fits that start at the true light": _bias(parts["bias"]),
         "Mitsuba 3": markdown_table(
             parts["peers"],
@@ -98,9 +103,9 @@ def _knobs(error: pd.DataFrame) -> str:
     return markdown_table(rows, {"setting": ("setting", "")} | ERRORS | COSTS)
 
 
-def _presets(error: pd.DataFrame) -> str:
+def _presets(error: pd.DataFrame, presets: Mapping[str, Setting]) -> str:
     rows = []
-    for name, setting in preset_settings().items():
+    for name, setting in presets.items():
         found = error[error["setting"] == setting.changed]
         rows.append({"preset": name, "setting": setting.changed} | found[[*ERRORS, *COSTS]].mean().to_dict())
     return markdown_table(pd.DataFrame(rows), {"preset": ("preset", ""), "setting": ("setting", "")} | ERRORS | COSTS)

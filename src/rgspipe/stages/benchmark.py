@@ -5,21 +5,29 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import asdict
+from pathlib import Path
+from typing import Any
 
 import pandas as pd
 import torch
+from omegaconf import OmegaConf
 
 from rgspipe.benchmark.fit_steps import fit_steps
 from rgspipe.benchmark.renderer_report import REPORT, Bench, run_bench
 from rgspipe.benchmark.rooms import ROOMS
+from rgspipe.benchmark.settings import Setting
 from rgspipe.benchmark.truth import load_truth
-from rgspipe.config import RgspipeConfig
+from rgspipe.config import RgspipeConfig, get_value
 from rgspipe.datasets.frozen_file import load_frozen
 from rgspipe.evaluation.timing import load_average
 from rgspipe.machine import machine
 from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.resources import resource_folder
 from rgspipe.scene import Camera, look_at
 from rgspipe.stages.base import Need, Stage, StageContext
+
+#: The choices of `accuracy`.
+PRESETS = ("draft", "standard", "reference")
 
 
 def run(context: StageContext) -> None:
@@ -38,8 +46,28 @@ def _renderer(context: StageContext) -> None:
     names = context.config.benchmark.rooms
     truths = [load_truth(artifact.folder() / name) for name, artifact in zip(names, _truths(context), strict=True)]
     rooms = tuple((ROOMS[name](), truth) for name, truth in zip(names, truths, strict=True))
-    run_bench(Bench(rooms, context.config.benchmark.repetitions, context.folder))
+    run_bench(Bench(rooms, context.config.benchmark.repetitions, preset_settings(), context.folder))
     print((context.folder / REPORT).read_text(encoding="utf-8"))
+
+
+def preset_settings() -> dict[str, Setting]:
+    """The renderer's part of the presets `accuracy=draft|standard|reference`."""
+    return {name: _preset(resource_folder("conf") / "accuracy" / f"{name}.yaml") for name in PRESETS}
+
+
+def _preset(path: Path) -> Setting:
+    preset, schema = OmegaConf.load(path), RgspipeConfig()
+
+    def value(key: str) -> Any:
+        return OmegaConf.select(preset, key, default=get_value(schema, key))
+
+    return Setting(
+        surfels=value("init.surfels"),
+        gather_rays=value("freeze.gather_rays"),
+        patches=value("freeze.patches"),
+        supersampling=value("train.supersampling"),
+        shadows="pixels" if value("effects.at_pixels") else "surfels",
+    )
 
 
 def _truths(context: StageContext) -> Sequence:
