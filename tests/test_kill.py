@@ -39,7 +39,7 @@ TINY = {
 }
 
 #: Values that are a matter of the clock.
-CLOCK = {"seconds", "median_seconds", "worst_seconds", "shadow_milliseconds", "interreflection_milliseconds"}
+CLOCK = {"seconds", "median_seconds", "worst_seconds", "milliseconds"}
 
 
 def start(folder: Path, environment: dict[str, str]) -> subprocess.Popen[bytes]:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import torch
 
-from rgspipe.benchmark import mitsuba_process
+from rgspipe.benchmark import mitsuba_peer, mitsuba_process
 from rgspipe.benchmark.mitsuba_peer import mitsuba_rows
 from rgspipe.benchmark.mitsuba_process import PeerMissing, ask_mitsuba, find_llvm
 from rgspipe.benchmark.truth import Truth
@@ -89,7 +89,8 @@ def test_without_mitsuba_the_rows_say_how_to_get_it(monkeypatch: pytest.MonkeyPa
 @pytest.fixture
 def installed(monkeypatch: pytest.MonkeyPatch) -> None:
     """As if Mitsuba were installed."""
-    monkeypatch.setattr(mitsuba_process, "mitsuba_version", lambda: "0.0.0")
+    for module in (mitsuba_process, mitsuba_peer):
+        monkeypatch.setattr(module, "mitsuba_version", lambda: "0.0.0")
     monkeypatch.delenv("DRJIT_LIBLLVM_PATH", raising=False)
 
 
