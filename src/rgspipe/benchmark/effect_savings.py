@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import replace
 
 import pandas as pd
@@ -12,6 +12,7 @@ import torch
 from torch import Tensor
 
 from rgspipe.benchmark.effect_scenes import EffectScene
+from rgspipe.evaluation.timing import median_ms
 from rgspipe.renderer.effect_bounds import EffectBounds, measure_effects
 from rgspipe.renderer.effects import ChosenScene, RigKind, choose_effects
 from rgspipe.renderer.frozen import FrozenScene
@@ -81,8 +82,8 @@ def _row(
         "difference": max(differences) / tolerance,
         "missed": _missed(frozen, bounds, lights, generator),
         "measurement_ms": measured,
-        "all_ms": _milliseconds(lambda: frozen.render(view, rigs[0])),
-        "chosen_ms": _milliseconds(lambda: chosen.render(view, rigs[0])),
+        "all_ms": median_ms(lambda: frozen.render(view, rigs[0]), RUNS),
+        "chosen_ms": median_ms(lambda: chosen.render(view, rigs[0]), RUNS),
     }
 
 
@@ -115,13 +116,3 @@ def _missed(frozen: FrozenScene, bounds: EffectBounds, lights: int, generator: t
     worst = torch.cat([shadow_losses(frozen, block)[0] for block in positions.split(16)])
     # Half is as good as all: nobody tolerates as much, and the search ends there.
     return float((worst.clamp(max=0.5) > bounds.shadows.point * (1.0 + 1e-5) + 1e-7).float().mean())
-
-
-def _milliseconds(run: Callable[[], object]) -> float:
-    run()
-    times = []
-    for _ in range(RUNS):
-        begin = time.perf_counter()
-        run()
-        times.append(1e3 * (time.perf_counter() - begin))
-    return min(times)

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
-from statistics import median
-
 import numpy as np
 import pandas as pd
 import torch
 from torch import Tensor
 
 from rgspipe.benchmark.mitsuba_process import PeerMissing, ask_mitsuba
+from rgspipe.evaluation.timing import median_ms
 from rgspipe.renderer.direct import unit_irradiance
 from rgspipe.renderer.kernels.composite import composite
 from rgspipe.renderer.kernels.launch import thread_count
@@ -56,8 +53,8 @@ def ray_rates(surfels: Surfels, lights: Tensor, camera: Camera, repetitions: int
     origins, paths = shadow_rays(surfels, lights.float())
     eye, directions, _ = camera.rays()
     ours = {
-        "shadow": _milliseconds(lambda: unit_irradiance(bvh, lights), repetitions),
-        "camera": _milliseconds(lambda: composite(bvh, eye, directions), repetitions),
+        "shadow": median_ms(lambda: unit_irradiance(bvh, lights), repetitions),
+        "camera": median_ms(lambda: composite(bvh, eye, directions), repetitions),
     }
     arrays = {"quads": footprint_quads(surfels).numpy(), "occluded_origins": origins.numpy()}
     arrays |= {
@@ -111,25 +108,14 @@ def memory_traffic(operators: dict[str, SparseOperator], channels: int, repetiti
     source = torch.ones(COPIED)
     target = torch.empty_like(source)
     copied = 2 * source.numel() * source.element_size()
-    copy_ms = _milliseconds(lambda: target.copy_(source), repetitions)
+    copy_ms = median_ms(lambda: target.copy_(source), repetitions)
     rows = [{"what": "copy", "entries": source.numel(), "bytes": copied, "ms": copy_ms}]
     for name, operator in operators.items():
         operand = torch.ones(operator.shape[1], channels, device=operator.matrix.device)
         size = ENTRY_BYTES * operator.entries + 4 * channels * sum(operator.shape)
-        ms = _milliseconds(lambda: operator @ operand, repetitions)  # noqa: B023
+        ms = median_ms(lambda: operator @ operand, repetitions)  # noqa: B023
         rows.append({"what": name, "entries": operator.entries, "bytes": size, "ms": ms})
     table = pd.DataFrame(rows)
     table["gib_per_s"] = table["bytes"] / 2**30 / (1e-3 * table["ms"])
     table["floor_ms"] = table["bytes"] / copied * copy_ms
     return table
-
-
-def _milliseconds(run: Callable[[], object], repetitions: int) -> float:
-    """Median after one run that is not counted."""
-    run()
-    seconds = []
-    for _ in range(repetitions):
-        begin = time.perf_counter()
-        run()
-        seconds.append(time.perf_counter() - begin)
-    return 1e3 * median(seconds)

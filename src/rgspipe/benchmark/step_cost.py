@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from statistics import median
 
 import torch
 from torch import Tensor
 
 from rgspipe.benchmark.settings import Model
+from rgspipe.evaluation.timing import median_ms
 from rgspipe.fitting.problem import Effects, LightProblem
 from rgspipe.fitting.views import prepare_views
 from rgspipe.machine import peak_memory_now_mib, reset_peak_memory
@@ -41,8 +40,8 @@ def step_cost(model: Model, position: Tensor, repetitions: int) -> StepCost:
     """The cost of a step with the model's first view."""
     step = _step_at_pixels(model) if model.at_pixels else _step_by_autograd(model)
     reset_peak_memory()
-    forward = _milliseconds(lambda: model.image(0, (PointLight(position.float(), torch.ones(3)),)), repetitions)
-    both = _milliseconds(lambda: step(position), repetitions)
+    forward = median_ms(lambda: model.image(0, (PointLight(position.float(), torch.ones(3)),)), repetitions)
+    both = median_ms(lambda: step(position), repetitions)
     return StepCost(forward, both, peak_memory_now_mib())
 
 
@@ -66,14 +65,3 @@ def _step_at_pixels(model: Model) -> Callable[[Tensor], Tensor]:
         return torch.einsum("pc,pcx->x", columns[:, :, 0], columns[:, :, 1:]) * (2.0 / columns[:, :, 0].numel())
 
     return step
-
-
-def _milliseconds(run: Callable[[], object], repetitions: int) -> float:
-    """Median after one run that is not counted."""
-    run()
-    times = []
-    for _ in range(repetitions):
-        begin = time.perf_counter()
-        run()
-        times.append(1e3 * (time.perf_counter() - begin))
-    return median(times)

@@ -37,6 +37,17 @@ def measure(step: str, run: Callable[[], object], repetitions: int) -> Timing:
     )
 
 
+def median_ms(run: Callable[[], object], repetitions: int) -> float:
+    """Median milliseconds of `run` over `repetitions` runs, after one that is not counted."""
+    run()
+    seconds = []
+    for _ in range(repetitions):
+        begin = time.perf_counter()
+        run()
+        seconds.append(time.perf_counter() - begin)
+    return 1e3 * float(np.median(seconds))
+
+
 def load_average() -> float:
     """Processes that wanted a core over the last minute: a timing on a busy machine is no timing."""
     return os.getloadavg()[0]
