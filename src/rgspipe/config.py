@@ -224,7 +224,7 @@ class ReportConfig:
 
     views: list[int] = option([1, 3], "numbers of views", low=1, high=1000)
     methods: list[str] = option(["search_lm", "paper_adam"], "methods", choices=FIT_METHODS)
-    paper_adam_limit: int | None = option(2, "targets of each class that paper_adam is run on", low=1, high=100000)
+    paper_adam_limit: int | None = option(1, "targets of each class that paper_adam is run on", low=1, high=100000)
 
 
 @dataclass
