@@ -12,23 +12,14 @@ import torch
 from torch import Tensor
 
 from rgspipe.renderer.kernels.composite import composite
-from rgspipe.renderer.kernels.surface import mean_surface
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
+from rgspipe.renderer.pixel_edges import Seen, pixels_beside_edges, pixels_on_edges
 from rgspipe.renderer.rays import normalised_weights, rows_from_hits
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.scene.camera import Camera
 
 #: Rays cast at once: so few that their hits stay in the processor's cache until they are packed.
-RAYS_AT_ONCE = 16_384
-
-#: Neighbouring pixels whose mean normals differ by more (L1) see different surfaces.
-NORMAL_JUMP = 0.3
-
-#: … and so do those whose inverse depths differ by more than this part.
-DEPTH_JUMP = 0.12
-
-#: … or whose coverages differ by more.
-COVERAGE_JUMP = 0.3
+RAYS_AT_ONCE = 32_768
 
 
 @dataclass(frozen=True)
@@ -53,22 +44,24 @@ class ViewWeights:
 
 
 def build_view_weights(bvh: SurfelBvh, camera: Camera, supersampling: int = 4) -> ViewWeights:
-    """Trace a camera once: one ray in plain pixels, `supersampling`² in those on edges.
+    """Trace a camera once: one ray in plain pixels, `supersampling`² in those that an edge crosses.
 
     Inside a surface radiance changes little across a pixel and its centre stands for it; on an edge a
     pixel is the mean over its area, as a box-filtered photograph is.
     """
-    parts, seen = zip(*(_cast(bvh, camera, block) for block in _blocks(torch.arange(camera.pixel_count))), strict=True)
-    crossed = _crossed_pixels(camera, *(torch.cat(column) for column in zip(*seen, strict=True)))
+    pixels = torch.arange(camera.pixel_count)
+    parts, seen = zip(*(_centres(bvh, camera, block) for block in _blocks(pixels)), strict=True)
+    centres = Seen.joined(seen).reshape(camera.height, camera.width)
+    beside = pixels_beside_edges(centres)
     matrix = scipy.sparse.vstack(parts, format="csr")
-    if supersampling > 1 and bool(crossed.any()):
-        chosen = crossed.reshape(-1).nonzero()[:, 0]
+    if supersampling > 1 and bool(beside.any()):
+        chosen = pixels_on_edges(bvh, camera, centres, beside, nearest_hit(bvh))
         places = even_places(supersampling**2)
         blocks = _blocks(chosen, len(places))
-        fine = scipy.sparse.vstack([_cast(bvh, camera, block, places)[0] for block in blocks], format="csr")
+        fine = scipy.sparse.vstack([_rows(bvh, camera, block, places) for block in blocks], format="csr")
         matrix = _replace_rows(matrix, chosen.numpy(), fine)
     coverage = torch.from_numpy(matrix.sum(axis=1)).float().reshape(-1)
-    edges = scipy.ndimage.binary_dilation(crossed.numpy(), structure=np.ones((3, 3)))
+    edges = scipy.ndimage.binary_dilation(beside.numpy(), structure=np.ones((3, 3)))
     return ViewWeights(
         camera, SparseOperator.from_scipy(matrix, bvh.device), torch.from_numpy(edges).reshape(-1), coverage
     )
@@ -95,16 +88,18 @@ def _blocks(pixels: Tensor, rays: int = 1) -> tuple[Tensor, ...]:
     return pixels.split(max(1, RAYS_AT_ONCE // rays))
 
 
-def _cast(
-    bvh: SurfelBvh, camera: Camera, pixels: Tensor, places: Tensor | None = None
-) -> tuple[scipy.sparse.csr_matrix, tuple[Tensor, Tensor, Tensor]]:
-    """Rows of `pixels` (P,), and of each ray the mean normal, the inverse planar depth and the transmittance."""
-    origins, directions, lengths = camera.rays(pixels, places=places)
+def _centres(bvh: SurfelBvh, camera: Camera, pixels: Tensor) -> tuple[scipy.sparse.csr_matrix, Seen]:
+    """Rows of `pixels` (P,) with one ray each, and what it sees."""
+    origins, directions, lengths = camera.rays(pixels)
     hits = composite(bvh, origins, directions, nearest=nearest_hit(bvh))
-    normal, distance = mean_surface(hits, bvh.surfels.normals.float())
-    inverse = lengths.float() / distance.cpu().clamp(min=1e-6)
-    rows = rows_from_hits(hits, normalised_weights(hits), len(origins) // len(pixels), len(bvh.surfels))
-    return rows, (normal.cpu(), inverse, hits.transmittance.cpu())
+    return rows_from_hits(hits, normalised_weights(hits), 1, len(bvh.surfels)), Seen.of(bvh, hits, lengths)
+
+
+def _rows(bvh: SurfelBvh, camera: Camera, pixels: Tensor, places: Tensor) -> scipy.sparse.csr_matrix:
+    """Rows of `pixels` (P,) with one ray through each of `places` (K, 2)."""
+    origins, directions, _ = camera.rays(pixels, places=places)
+    hits = composite(bvh, origins, directions, nearest=nearest_hit(bvh))
+    return rows_from_hits(hits, normalised_weights(hits), len(places), len(bvh.surfels))
 
 
 def _replace_rows(
@@ -114,26 +109,3 @@ def _replace_rows(
     order = np.arange(matrix.shape[0])
     order[chosen] = matrix.shape[0] + np.arange(len(chosen))
     return scipy.sparse.vstack([matrix, rows], format="csr")[order]
-
-
-def _crossed_pixels(camera: Camera, normal: Tensor, inverse: Tensor, passing: Tensor) -> Tensor:
-    """(height, width) bool: pixels that differ from a neighbour in normal, inverse depth or coverage.
-
-    A straight edge that crosses a pixel parts its centre from that of one of its four neighbours, so these are
-    all that such an edge crosses.
-    """
-    height, width = camera.height, camera.width
-    normal, inverse, passing = normal.reshape(height, width, 3), *(x.reshape(height, width) for x in (inverse, passing))
-    covered = passing < 0.5
-    crossed = ((passing > 0.02) & (passing < 0.98)) | ((normal.norm(dim=2) < 0.95) & covered)
-    for axis in (0, 1):
-        count = crossed.shape[axis] - 1
-        low, high = inverse.narrow(axis, 0, count), inverse.narrow(axis, 1, count)
-        jump = normal.diff(dim=axis).abs().sum(dim=2) > NORMAL_JUMP
-        jump |= passing.diff(dim=axis).abs() > COVERAGE_JUMP
-        jump |= ((high - low).abs() > DEPTH_JUMP * torch.minimum(low, high)) & (
-            covered.narrow(axis, 0, count) & covered.narrow(axis, 1, count)
-        )
-        crossed.narrow(axis, 0, count).logical_or_(jump)
-        crossed.narrow(axis, 1, count).logical_or_(jump)
-    return crossed

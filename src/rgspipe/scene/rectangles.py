@@ -21,6 +21,10 @@ LAYER = 0.6
 #: rectangle, which one surfel covers with 0.48, is opaque. Footprints end at edges, so no tail needs to be cut.
 OPACITY, THRESHOLDS = 0.96, (0.1, 0.4)
 
+#: Opacity below which such a surfel ends, where its neighbours cover anyway. At 0.01, the default, footprints are half
+#: as large again, rays cost 15 % more, and images are no better.
+MINIMUM_ALPHA = 0.05
+
 #: Width of the ramp at an edge over the spacing.
 EDGE_SOFTNESS = 0.05
 
@@ -92,7 +96,7 @@ def surfels_on(rectangles: Rectangles, count: int) -> Surfels:
     parts = [_grid(rectangles, index, spacing) for index in range(len(rectangles))]
     tensors = {name: torch.cat([part[name] for part in parts]) for name in parts[0]}
     total = len(tensors["centers"])
-    coverage = Coverage(*THRESHOLDS, layer_thickness=LAYER * spacing, clip_softness=EDGE_SOFTNESS * spacing)
+    coverage = Coverage(*THRESHOLDS, LAYER * spacing, EDGE_SOFTNESS * spacing, MINIMUM_ALPHA)
     return Surfels(opacities=torch.full((total,), OPACITY, dtype=torch.float64), coverage=coverage, **tensors)
 
 

@@ -140,22 +140,23 @@ def compress(hits: Hits, weights: Tensor, rays: int) -> tuple[Tensor, Tensor, Te
     device, rows = hits.indices.device, hits.indices.shape[0] // rays
     indices, weights = as_array(hits.indices), as_array(weights)
     counts = torch.empty(rows, dtype=torch.int32, device=device)
-    launch(_count_hits, rows, [rays, indices, as_array(counts)], device)
+    launch(_count_hits, rows, [rays, indices, as_array(counts)], device, even=True)
     starts = _running_sum(counts)
     if rays == 1:
         # A ray meets the plane of a surfel once.
         columns, values = _entries(starts, device)
-        launch(_copy_hits, rows, [indices, weights, as_array(starts), as_array(columns), as_array(values)], device)
+        arrays = [indices, weights, *(as_array(part) for part in (starts, columns, values))]
+        launch(_copy_hits, rows, arrays, device, even=True)
         return starts, columns, values
     # Half of a table stays empty, so that searches in it are short.
     table = _running_sum(2 * counts)
     keys = torch.full((int(table[-1]),), -1, dtype=torch.int32, device=device)
     sums = torch.zeros(len(keys), dtype=torch.float32, device=device)
     tables = [as_array(table), as_array(keys), as_array(sums)]
-    launch(_add_hits, rows, [rays, indices, weights, *tables, as_array(counts)], device)
+    launch(_add_hits, rows, [rays, indices, weights, *tables, as_array(counts)], device, even=True)
     starts = _running_sum(counts)
     columns, values = _entries(starts, device)
-    launch(_pack, rows, [*tables, as_array(starts), as_array(columns), as_array(values)], device)
+    launch(_pack, rows, [*tables, as_array(starts), as_array(columns), as_array(values)], device, even=True)
     return starts, columns, values
 
 

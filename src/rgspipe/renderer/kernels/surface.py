@@ -51,5 +51,5 @@ def mean_surface(hits: Hits, normals: Tensor) -> tuple[Tensor, Tensor]:
     count, device = hits.indices.shape[0], hits.indices.device
     normal, distance = torch.empty((count, 3), device=device), torch.empty(count, device=device)
     inputs = [as_array(x) for x in (hits.indices, hits.depths, hits.weights)]
-    launch(_mean_surface, count, [*inputs, as_vec3(normals), as_vec3(normal), as_array(distance)], device)
+    launch(_mean_surface, count, [*inputs, as_vec3(normals), as_vec3(normal), as_array(distance)], device, even=True)
     return normal, distance
