@@ -12,9 +12,6 @@ from torch import Tensor
 from rgspipe.renderer.radiosity import LARGEST_ALBEDO
 from rgspipe.renderer.sparse import SparseOperator
 
-#: Entries of the gather that are sorted into patches at once; bounds the memory of their labels to 16 MB.
-ENTRIES_AT_ONCE = 4_000_000
-
 
 @dataclass(frozen=True)
 class PatchTransport:
@@ -76,11 +73,12 @@ def build_patch_transport(
     weights = np.maximum(areas.double().cpu().numpy(), 1e-12)
     total = np.bincount(labels, weights, patches)
     average = scipy.sparse.csr_matrix((weights / total[labels], (labels, np.arange(count))), shape=(patches, count))
-    gathered = _gather_from_patches(gather.to_scipy(), labels, patches)
+    membership = scipy.sparse.csr_matrix((np.ones(count, np.float32), (np.arange(count), labels)), (count, patches))
+    gathered = gather.to_scipy() @ membership
     device = albedo.device
     return PatchTransport(
         SparseOperator.from_scipy(average, device),
-        SparseOperator.from_scipy(scipy.sparse.csr_matrix(gathered), device),
+        SparseOperator.from_scipy(gathered, device),
         _bounce_operator(average, gathered, albedo, bounces),
         albedo.float(),
         bounces,
@@ -98,34 +96,19 @@ def with_bounces(transport: PatchTransport, bounces: int | None) -> PatchTranspo
 
 
 def _remade(transport: PatchTransport, albedo: Tensor, bounces: int | None) -> PatchTransport:
-    average, gathered = transport.average.to_scipy(), transport.gather.to_scipy().toarray()
+    average, gathered = transport.average.to_scipy(), transport.gather.to_scipy()
     inverse = _bounce_operator(average, gathered, albedo, bounces)
     return PatchTransport(transport.average, transport.gather, inverse, albedo.float(), bounces)
 
 
-def _gather_from_patches(gather: scipy.sparse.csr_matrix, labels: np.ndarray, patches: int) -> np.ndarray:
-    """(N, P) float32 dense F_p = F · membership: columns of one patch are added up, some rows at a time."""
-    labels, rows = labels.astype(np.int32), gather.shape[0]
-    result = np.empty((rows, patches), dtype=np.float32)
-    step = max(1, ENTRIES_AT_ONCE * rows // max(1, gather.nnz))
-    for start in range(0, rows, step):
-        pointers = gather.indptr[start : start + step + 1]
-        entries = slice(pointers[0], pointers[-1])
-        parts = (gather.data[entries], labels[gather.indices[entries]], pointers - pointers[0])
-        block = scipy.sparse.csr_matrix(parts, shape=(len(pointers) - 1, patches), copy=False)
-        # Expanding adds up entries of one column, which is all that a product with the membership would do.
-        block.toarray(out=result[start : start + step])
-    return result
-
-
 def _bounce_operator(
-    average: scipy.sparse.csr_matrix, gathered: np.ndarray, albedo: Tensor, bounces: int | None
+    average: scipy.sparse.csr_matrix, gathered: scipy.sparse.csr_matrix, albedo: Tensor, bounces: int | None
 ) -> Tensor:
     """(3, P, P) float32 H of every channel, worked out in float64."""
     rho = albedo.double().clamp(0.0, LARGEST_ALBEDO).cpu().numpy()
     gathered = gathered.astype(np.float64)
-    steps = np.stack([average @ (rho[:, c, None] * gathered) for c in range(3)])
-    bounce = torch.from_numpy(steps)
+    steps = [(average @ scipy.sparse.diags(rho[:, c]) @ gathered).toarray() for c in range(3)]
+    bounce = torch.from_numpy(np.stack(steps))
     identity = torch.eye(average.shape[0], dtype=torch.float64)
     result = torch.linalg.inv(identity - bounce)
     if bounces is not None:
