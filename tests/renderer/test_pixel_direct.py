@@ -147,3 +147,17 @@ def test_far_from_the_origin_nothing_changes() -> None:
         images.append(PixelDirect(bvh, view).image(LIGHT + offset, *surfel_shares(bvh, LIGHT + offset)))
     # Measured 1e-6 of the largest: what float64 at 1e4 leaves of the places.
     assert float((images[0] - images[1])[:, :, 0].abs().max()) < 1e-4 * float(images[0][:, :, 0].abs().max())
+
+
+def test_the_operator_gives_the_image_of_any_albedo() -> None:
+    surfels, seen = room().to(torch.float32), camera(32, (0.35, -0.45, 0.4))
+    light = torch.tensor([0.2, 0.1, 0.3], dtype=torch.float64)
+    bvh = SurfelBvh(surfels)
+    view = build_view_weights(bvh, seen)
+    painted = replace(surfels, albedo=torch.rand(len(surfels), 3, generator=torch.Generator().manual_seed(5)))
+    share, slope = surfel_shares(bvh, light)
+    operator = PixelDirect(bvh, view).operator(light, share)
+    expected = PixelDirect(SurfelBvh(painted), view).image(light, share, slope)[:, :, 0]
+    # Measured 2e-7 of the largest.
+    difference = (operator @ (painted.albedo / math.pi) - expected).abs()
+    assert float(difference.max()) < 2e-6 * float(expected.max())

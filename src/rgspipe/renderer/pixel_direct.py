@@ -10,6 +10,7 @@ from rgspipe.renderer.kernels.irradiance import SOFTENING, transmittance
 from rgspipe.renderer.kernels.pixel_light import PixelLight
 from rgspipe.renderer.kernels.pixel_shadow import pixel_transmittance
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
+from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.view_weights import ViewWeights, even_places
 
 #: Shadow rays of a pixel that a shadow's edge crosses.
@@ -45,10 +46,29 @@ class PixelDirect:
         Args:
             share, slope: `surfel_shares` of the light.
         """
+        return self._light.image(position, share, slope, self._own_shares(position, share))
+
+    def operator(self, position: Tensor, share: Tensor) -> SparseOperator:
+        """(P, N) irradiance per W/sr where each pixel looks on each surfel, times the view's weight of it.
+
+        Times albedo over π this is `image` of surfels of any albedo.
+
+        Args:
+            share: `surfel_shares` of the light.
+        """
+        matrix = self._view.operator.matrix
+        entries = self._light.entries(position, share, self._own_shares(position, share))
+        return SparseOperator(
+            torch.sparse_csr_tensor(
+                matrix.crow_indices(), matrix.col_indices(), entries, size=matrix.shape, check_invariants=False
+            )
+        )
+
+    def _own_shares(self, position: Tensor, share: Tensor) -> Tensor:
+        """(P, 4) `own_share` of `PixelLight.image`: of pixels on a shadow's edge."""
         lit = (self._view.operator @ share[:, None])[:, 0] / self._view.coverage.to(self._bvh.device).clamp(min=1e-6)
         pixels = (self._plain & (lit > LIT_OR_NOT) & (lit < 1.0 - LIT_OR_NOT)).nonzero()[:, 0]
-        own = pixel_transmittance(self._bvh, self._view.camera, self._receivers, pixels, position, self._places)
-        return self._light.image(position, share, slope, own)
+        return pixel_transmittance(self._bvh, self._view.camera, self._receivers, pixels, position, self._places)
 
 
 def surfel_shares(bvh: SurfelBvh, position: Tensor, shadows: bool = True) -> tuple[Tensor, Tensor]:

@@ -55,6 +55,37 @@ def light_at(x: wp.vec3, n: wp.vec3, light: wp.vec3, softening: float):
     return lit
 
 
+@wp.func
+def light_on_pixel(
+    origin: wp.vec3,
+    d: wp.vec3,
+    right: wp.vec3,
+    up: wp.vec3,
+    c: wp.vec3,
+    n: wp.vec3,
+    reach: float,
+    light: wp.vec3,
+    softening: float,
+):
+    """`light_at` where a pixel looks on a surfel; its mean over the pixel's footprint beside the light."""
+    x = point_on_surfel(origin, d, c, n, reach)
+    # Longest side of the pixel's footprint: pixels are nearly square, and leaning stretches them.
+    seen = x - origin
+    footprint = wp.length(right) * wp.dot(seen, seen) / wp.max(wp.abs(wp.dot(seen, n)), 1.0e-30)
+    lit = wp.vec4(0.0, 0.0, 0.0, 0.0)
+    if footprint <= NEAR * wp.length(light - x):
+        lit = light_at(x, n, light, softening)
+    else:
+        for a in range(3):
+            for b in range(3):
+                shifted = d + (float(a) - 1.0) * NODE * right + (float(b) - 1.0) * NODE * up
+                weight = float(1.0)
+                weight *= wp.where(a == 1, MIDDLE_WEIGHT, SIDE_WEIGHT)
+                weight *= wp.where(b == 1, MIDDLE_WEIGHT, SIDE_WEIGHT)
+                lit += weight * light_at(point_on_surfel(origin, shifted, c, n, reach), n, light, softening)
+    return lit
+
+
 @wp.kernel
 def _direct_image(
     offset: int,
@@ -92,24 +123,8 @@ def _direct_image(
             passing = own[0]
             slope = wp.vec3(own[1], own[2], own[3])
         if passing > 0.0 or wp.dot(slope, slope) > 0.0:
-            n = normals[j]
-            c = centers[j]
             reach = wp.where(edges[p] == 1, REACH * scales[j], 1.0e30)
-            x = point_on_surfel(origin, d, c, n, reach)
-            # Longest side of the pixel's footprint: pixels are nearly square, and leaning stretches them.
-            seen = x - origin
-            footprint = wp.length(right) * wp.dot(seen, seen) / wp.max(wp.abs(wp.dot(seen, n)), 1.0e-30)
-            lit = wp.vec4(0.0, 0.0, 0.0, 0.0)
-            if footprint <= NEAR * wp.length(light - x):
-                lit = light_at(x, n, light, softening[j])
-            else:
-                for a in range(3):
-                    for b in range(3):
-                        shifted = d + (float(a) - 1.0) * NODE * right + (float(b) - 1.0) * NODE * up
-                        weight = float(1.0)
-                        weight *= wp.where(a == 1, MIDDLE_WEIGHT, SIDE_WEIGHT)
-                        weight *= wp.where(b == 1, MIDDLE_WEIGHT, SIDE_WEIGHT)
-                        lit += weight * light_at(point_on_surfel(origin, shifted, c, n, reach), n, light, softening[j])
+            lit = light_on_pixel(origin, d, right, up, centers[j], normals[j], reach, light, softening[j])
             lit = weights[e] * (passing * lit + wp.vec4(0.0, slope[0], slope[1], slope[2]) * lit[0])
             r = reflectance[j]
             red += r[0] * lit
@@ -118,6 +133,40 @@ def _direct_image(
     image[p, 0] = red
     image[p, 1] = green
     image[p, 2] = blue
+
+
+@wp.kernel
+def _direct_entries(
+    offset: int,
+    slab: int,
+    rows: wp.array(dtype=int),
+    columns: wp.array(dtype=int),
+    weights: wp.array(dtype=float),
+    edges: wp.array(dtype=int),
+    origin: wp.vec3,
+    directions: wp.array(dtype=wp.vec3),
+    right: wp.vec3,
+    up: wp.vec3,
+    centers: wp.array(dtype=wp.vec3),
+    normals: wp.array(dtype=wp.vec3),
+    scales: wp.array(dtype=float),
+    softening: wp.array(dtype=float),
+    light: wp.vec3,
+    share: wp.array(dtype=float),
+    own_share: wp.array(dtype=wp.vec4),
+    entries: wp.array(dtype=float),
+):
+    p = wp.tid() + offset
+    d = directions[p]
+    for e in range(rows[p], rows[p + 1]):
+        j = columns[e]
+        passing = wp.where(own_share[p][0] >= 0.0, own_share[p][0], share[j])
+        entry = float(0.0)
+        if passing > 0.0:
+            reach = wp.where(edges[p] == 1, REACH * scales[j], 1.0e30)
+            lit = light_on_pixel(origin, d, right, up, centers[j], normals[j], reach, light, softening[j])
+            entry = weights[e] * passing * lit[0]
+        entries[e] = entry
 
 
 class PixelLight:
@@ -143,7 +192,7 @@ class PixelLight:
         self._inputs += [as_vec3(bvh.local(surfels.centers)), as_vec3(surfels.normals)]
         scales = surfels.scales.detach().prod(dim=1).sqrt()
         self._inputs += [as_array(scales.float()), as_array(softening.float())]
-        self._inputs += [as_vec3(surfels.albedo / math.pi)]
+        self._reflectance = as_vec3(surfels.albedo / math.pi)
 
     def image(self, light: Tensor, share: Tensor, share_slope: Tensor, own_share: Tensor) -> Tensor:
         """(P, 3, 4) radiance under a light of 1 W/sr in RGB: its value, and its derivative towards x, y and z.
@@ -156,7 +205,22 @@ class PixelLight:
                 is negative where they are not.
         """
         image = torch.empty((self._pixels, 3, 4), dtype=torch.float32, device=self._bvh.device)
-        inputs = [*self._inputs, vector(self._bvh.local(light)), as_array(share.float()), as_vec3(share_slope)]
+        inputs = [*self._inputs, self._reflectance, vector(self._bvh.local(light))]
+        inputs += [as_array(share.float()), as_vec3(share_slope)]
         inputs.append(wp.from_torch(own_share.contiguous(), dtype=wp.vec4))
         launch(_direct_image, self._pixels, [*inputs, wp.from_torch(image, dtype=wp.vec4)], self._bvh.device)
         return image
+
+    def entries(self, light: Tensor, share: Tensor, own_share: Tensor) -> Tensor:
+        """(entries,) irradiance per W/sr in place of each of the view's weights, times that weight.
+
+        The image of the light is these in the weights' places, times the surfels' albedo over π.
+
+        Args:
+            light, share, own_share: as for `image`.
+        """
+        entries = torch.empty(self._inputs[1].shape[0], dtype=torch.float32, device=self._bvh.device)
+        inputs = [*self._inputs, vector(self._bvh.local(light)), as_array(share.float())]
+        inputs += [wp.from_torch(own_share.contiguous(), dtype=wp.vec4), as_array(entries)]
+        launch(_direct_entries, self._pixels, inputs, self._bvh.device)
+        return entries
