@@ -90,6 +90,23 @@ class DatasetConfig:
 
 
 @dataclass
+class CaptureConfig:
+    """Errors of a real capture, put into the training views; held-out views and targets stay clean."""
+
+    depth_noise: float = option(0.0, "depth: standard deviation in every pixel over the depth", low=0, high=1)
+    depth_missing: float = option(0.0, "depth: share of unknown pixels, half of them in blobs", low=0, high=0.99)
+    image_noise: float = option(
+        0.0, "images: standard deviation over the value, and a tenth of it over the brightest value", low=0, high=10
+    )
+    light_position_noise: float = option(0.0, "lights: standard deviation of a coordinate, scene units", low=0, high=10)
+    light_intensity_noise: float = option(0.0, "lights: standard deviation of the log-intensity", low=0, high=10)
+    views: int | None = option(None, "keep so many views, spread evenly", low=1, high=100000)
+    normals: bool = option(True, "keep the normal pass")
+    albedo: bool = option(True, "keep the albedo pass")
+    seed: int = option(0, "draws of the errors", low=0, high=2**31 - 1)
+
+
+@dataclass
 class InitConfig:
     """From depth maps to surfels."""
 
@@ -262,6 +279,7 @@ class RgspipeConfig:
     occlusion: str = option("all", "class of fit targets", choices=OCCLUSIONS)
     scene: SceneConfig = section(SceneConfig, "what is looked at")
     dataset: DatasetConfig = section(DatasetConfig, "how images are made")
+    capture: CaptureConfig = section(CaptureConfig, "errors put into the training views")
     init: InitConfig = section(InitConfig, "from depth to surfels")
     train: TrainConfig = section(TrainConfig, "from images to materials")
     freeze: FreezeConfig = section(FreezeConfig, "light-independent operators")

@@ -35,6 +35,18 @@ def test_a_good_dataset_is_read_as_it_was_written(dataset: Path) -> None:
     assert (target.name, target.occlusion, target.views[0].light) == ("one", "visible", None)
 
 
+@pytest.mark.parametrize("stored", [0.0, math.nan])
+@pytest.mark.parametrize("convention", ["planar_z", "ray_distance"])
+def test_unknown_depth_is_told_from_no_surface(dataset: Path, change: Change, stored: float, convention: str) -> None:
+    change("dataset_info.json", lambda info: info.update(depth_convention=convention))
+    depth = np.full((4, 6), 2.0, np.float32)
+    depth[0, 0], depth[0, 1], depth[0, 2] = stored, np.inf, 1e10
+    write_channels(dataset / "train" / "r_0000_depth.exr", {"Z": depth})
+    found = load_dataset(dataset).train[0].depth
+    assert found.isnan().sum() == 1 and found[0, 0].isnan()
+    assert found.isposinf().sum() == 2 and found[0, 1:3].isposinf().all()
+
+
 def test_only_what_is_wanted_is_read(dataset: Path) -> None:
     (dataset / "transforms_test.json").unlink()
     loaded = load_dataset(dataset, test=False, targets=False)
@@ -160,7 +172,6 @@ def _fill(path: Path, channels: str, value: float = 1.0, height: int = 4) -> Non
         ("r_0000", lambda path: _fill(path, "RG"), "4 channels R, G, B, A"),
         ("r_0000", lambda path: _fill(path, "RGBA", 3.0), "alpha from 0 to 1"),
         ("r_0000_depth", lambda path: _fill(path, "Z", -1.0), "24 negative pixels"),
-        ("r_0000_depth", lambda path: _fill(path, "Z", float("nan")), "24 pixels with NaN"),
         ("r_0000_depth", lambda path: _fill(path, "XYZ"), "one channel of depth"),
         ("r_0000_depth", lambda path: _fill(path, "Z", height=5), "6 × 4 pixels, as the colour image"),
         ("r_0000_normal", lambda path: _fill(path, "XYZ", float("inf")), "NaN or infinity"),

@@ -12,7 +12,7 @@ from rgspipe.datasets.exr import read_array, read_channels, read_image
 from rgspipe.errors import InputError
 from rgspipe.scene import Camera
 
-#: Depths from here on (Blender writes 1e10) say that there is no surface; so does 0.
+#: Depths from here on (Blender writes 1e10) say that there is no surface.
 NO_SURFACE = 1e9
 
 
@@ -30,10 +30,13 @@ def read_colour(path: Path) -> tuple[Tensor, Tensor]:
 
 
 def read_depth(path: Path, camera: Camera, convention: str) -> Tensor:
-    """Planar depth (H, W) float32, +inf where there is no surface; `convention` says what the file holds.
+    """Planar depth (H, W) float32; `convention` says what the file holds.
+
+    +inf where there is no surface, and NaN where the depth is unknown, which a file says with NaN or with the 0 of
+    depth sensors.
 
     Raises:
-        InputError: missing or broken file, more than one channel, another size than the image, NaN, negative depth.
+        InputError: missing or broken file, more than one channel, another size than the image, negative depth.
     """
     channels = read_channels(path)
     if len(channels) != 1:
@@ -42,9 +45,6 @@ def read_depth(path: Path, camera: Camera, convention: str) -> Tensor:
     (stored,) = channels.values()
     _check_size(path, stored, camera)
     depth = torch.from_numpy(np.array(stored))
-    if torch.isnan(depth).any():
-        count = int(torch.isnan(depth).sum())
-        raise InputError(path, expected="depths", found=f"{count} pixels with NaN", remedy="Export the depth again.")
     if (depth < 0).any():
         found = f"{int((depth < 0).sum())} negative pixels, the lowest {float(depth.min()):g}"
         raise InputError(
@@ -54,7 +54,8 @@ def read_depth(path: Path, camera: Camera, convention: str) -> Tensor:
         _, _, lengths = camera.rays()
         depth_planar = depth.double() / lengths.reshape(depth.shape)
         depth = torch.where(depth < NO_SURFACE, depth_planar.float(), depth)
-    return torch.where((depth >= NO_SURFACE) | (depth == 0), torch.inf, depth)
+    depth = torch.where(depth >= NO_SURFACE, torch.inf, depth)
+    return torch.where(depth == 0, torch.nan, depth)
 
 
 def read_vectors(path: Path, names: tuple[str, ...], camera: Camera) -> Tensor:

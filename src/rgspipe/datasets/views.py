@@ -24,7 +24,8 @@ class View:
         image: (H, W, 3) float32 linear radiance, premultiplied by alpha.
         alpha: (H, W) float32 in [0, 1].
         light: the one light that was on, intensity in W/sr; None in a fit target.
-        depth: (H, W) float32 planar depth at pixel centres, scene units; +inf where there is no surface.
+        depth: (H, W) float32 planar depth at pixel centres, scene units; +inf where there is no surface,
+            NaN where it is not known.
         normal: (H, W, 3) float32 unit world normals that face the camera; 0 where there is no surface.
         albedo: (H, W, 3) float32 diffuse reflectance; 0 where there is no surface.
     """

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 
+from rgspipe.datasets.degrade import Capture, degraded
 from rgspipe.datasets.gs3 import load_dataset
 from rgspipe.datasets.location import dataset_root
 from rgspipe.datasets.surfel_file import save_surfels
@@ -16,7 +17,7 @@ def run(context: StageContext) -> None:
     """Write surfels.safetensors."""
     init = context.config.init
     root = dataset_root(context.inputs["generate_dataset"].folder())
-    views = load_dataset(root, test=False, targets=False).train
+    views = degraded(load_dataset(root, test=False, targets=False).train, Capture.from_config(context.config.capture))
     start = time.perf_counter()
     surfels = initialise_surfels(
         views,
@@ -41,6 +42,6 @@ STAGE = Stage(
     help="turns the depth of the training views into surfels",
     run=run,
     inputs=lambda config: ["generate_dataset"],
-    config_keys=("init",),
+    config_keys=("init", "capture"),
     code=("rgspipe.training.initialise", "rgspipe.datasets", "rgspipe.scene"),
 )

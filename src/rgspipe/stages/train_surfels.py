@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from rgspipe.config import TrainConfig
+from rgspipe.datasets.degrade import Capture, degraded
 from rgspipe.datasets.location import open_dataset
 from rgspipe.datasets.surfel_file import load_surfels, save_surfels
 from rgspipe.datasets.views import View
@@ -35,7 +36,8 @@ def run(context: StageContext) -> None:
     dataset = open_dataset(context.inputs["generate_dataset"].folder(), targets=False)
     start = load_surfels(context.inputs["init_depth"].file("surfels.safetensors"))
     checkpoint = Checkpoint(context.scratch / "checkpoint.safetensors", config.checkpoint_every)
-    trained = train(start, dataset.train, options, checkpoint)
+    train_views = degraded(dataset.train, Capture.from_config(context.config.capture))
+    trained = train(start, train_views, options, checkpoint)
     save_surfels(context.folder / "surfels.safetensors", trained.surfels)
     _write_table(context.folder / "training.csv", trained)
 
@@ -46,7 +48,7 @@ def run(context: StageContext) -> None:
     seconds = {"training": trained.records[-1].seconds, "held_out": time.perf_counter() - began}
     metrics = held_out.summary() | {"surfels": len(trained.surfels), "seconds": seconds["training"]}
     if config.direct_only:
-        metrics["direct_only_psnr"] = _direct_only(trained, dataset.train, dataset.test, options)
+        metrics["direct_only_psnr"] = _direct_only(trained, train_views, dataset.test, options)
     text = json.dumps(metrics, indent=1, allow_nan=False)
     (context.folder / "metrics.json").write_text(text + "\n", encoding="utf-8")
     _write_comparison(context.folder / "comparison.png", held_out, dataset.test)
@@ -106,6 +108,6 @@ STAGE = Stage(
     help="fits materials and geometry of the surfels to the training images",
     run=run,
     inputs=lambda config: ["init_depth", "generate_dataset"],
-    config_keys=("train",),
-    code=("rgspipe.training", "rgspipe.renderer", "rgspipe.scene", "rgspipe.evaluation"),
+    config_keys=("train", "capture"),
+    code=("rgspipe.datasets.degrade", "rgspipe.training", "rgspipe.renderer", "rgspipe.scene", "rgspipe.evaluation"),
 )

@@ -61,8 +61,8 @@ def render_held_out(
 
 
 def _off_edges(image: npt.NDArray[np.float32], view: View) -> float:
-    """PSNR away from edges, which the depth and normal passes show; NaN where either is missing."""
-    if view.depth is None or view.normal is None:
+    """PSNR away from edges, which the depth and normal passes show; NaN where either is missing or has gaps."""
+    if view.depth is None or view.normal is None or bool(view.depth.isnan().any()):
         return float("nan")
     mask = ~edge_mask(view.depth, view.normal)
     return psnr(image, view.image, mask) if mask.any() else float("nan")

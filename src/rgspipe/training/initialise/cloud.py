@@ -58,7 +58,7 @@ def cloud_from_views(
         where: the dataset, for errors.
 
     Raises:
-        InputError: no view has depth, none sees a surface, a depth is NaN or not positive, or
+        InputError: no view has depth, none sees a surface, a depth is not positive, or
             `normals="pass"` and a view has no normals.
     """
     with_depth = [view for view in views if view.depth is not None]
@@ -82,12 +82,12 @@ def cloud_from_views(
 def _back_project(view: View, source: NormalSource, least_cosine: float, where: str | Path) -> Cloud:
     """The points of one view, in world axes."""
     depth = view.depth.detach().cpu().double().numpy()
-    bad = np.isnan(depth) | (depth <= 0)
+    bad = depth <= 0
     if bad.any():
         row, column = (int(index) for index in np.argwhere(bad)[0])
         raise InputError(
             f"{where}: {view.name}",
-            expected="positive depth, infinite where there is no surface",
+            expected="positive depth, infinite where there is no surface, NaN where it is not known",
             found=f"{int(bad.sum())} pixels that are not, the first {depth[row, column]} in row {row}, column {column}",
             remedy="Export the depth map again.",
         )

@@ -1,0 +1,144 @@
+"""What real captures bring, put into clean training views: noise, holes, wrong lights, few views, no passes.
+
+Every draw comes from the seed and the view's place in the full list, so that two captures that share a seed differ
+only in what their options say, however many views they keep.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+import torch
+from scipy.ndimage import gaussian_filter
+from torch import Tensor
+
+from rgspipe.datasets.views import View
+from rgspipe.scene import PointLight
+
+#: Read noise of an image, as a share of its relative noise and of the image's brightest values.
+READ_NOISE = 0.1
+#: Percentile of an image that stands for its brightest values.
+BRIGHT = 0.995
+#: Share of the missing depth pixels that lies in blobs, and the blobs' size over the image's width.
+BLOB_SHARE, BLOB_SIZE = 0.5, 1.0 / 30.0
+
+
+@dataclass(frozen=True)
+class Capture:
+    """How far training views are from perfect; the default changes nothing.
+
+    Attributes:
+        depth_noise: standard deviation of a depth over the depth, independent in every pixel.
+        depth_missing: share of the pixels of a depth map that are unknown (NaN), half of them in blobs.
+        image_noise: standard deviation of a value over the value; a tenth of it, relative to the image's
+            brightest values, is there in the dark, too (read noise).
+        light_position_noise: standard deviation of every coordinate of every light, scene units.
+        light_intensity_noise: standard deviation of the logarithm of every light's intensity, all channels alike.
+        views: how many views are kept, spread evenly over the list; None keeps all.
+        normals, albedo: whether the views keep their passes.
+        seed: of all draws.
+    """
+
+    depth_noise: float = 0.0
+    depth_missing: float = 0.0
+    image_noise: float = 0.0
+    light_position_noise: float = 0.0
+    light_intensity_noise: float = 0.0
+    views: int | None = None
+    normals: bool = True
+    albedo: bool = True
+    seed: int = 0
+
+    @classmethod
+    def from_config(cls, config: object) -> Capture:
+        """The options in any object with the same fields."""
+        return cls(**{item.name: getattr(config, item.name) for item in fields(cls)})
+
+
+def degraded(views: Sequence[View], capture: Capture) -> tuple[View, ...]:
+    """The views as such a capture would have taken them; where nothing is asked for, the very same tensors.
+
+    Missing depth is NaN: not known, as opposed to +inf, where there is no surface.
+
+    Raises:
+        ValueError: a share is outside of [0, 1), a noise is negative, or `views` is not positive.
+    """
+    _check(capture)
+    kept = range(len(views))
+    if capture.views is not None and capture.views < len(views):
+        kept = [round(place) for place in np.linspace(0, len(views) - 1, capture.views)]
+    return tuple(_degrade(views[index], capture, index) for index in kept)
+
+
+def _check(capture: Capture) -> None:
+    for name in ("depth_noise", "image_noise", "light_position_noise", "light_intensity_noise"):
+        if not getattr(capture, name) >= 0.0:
+            raise ValueError(f"{name} must not be negative, got {getattr(capture, name)}")
+    if not 0.0 <= capture.depth_missing < 1.0:
+        raise ValueError(f"depth_missing must be in [0, 1), got {capture.depth_missing}")
+    if capture.views is not None and capture.views < 1:
+        raise ValueError(f"views must be at least 1, got {capture.views}")
+
+
+def _degrade(view: View, capture: Capture, index: int) -> View:
+    # One stream for each kind of draw: switching one on leaves the others as they are.
+    depth_rng, hole_rng, image_rng, light_rng = (
+        np.random.default_rng([capture.seed, index, kind]) for kind in range(4)
+    )
+    depth = view.depth
+    if depth is not None and capture.depth_noise > 0:
+        depth = depth * torch.from_numpy(_positive_noise(depth.shape, capture.depth_noise, depth_rng)).to(depth.dtype)
+    if depth is not None and capture.depth_missing > 0:
+        holes = torch.from_numpy(_holes(depth.shape, capture.depth_missing, hole_rng))
+        depth = torch.where(holes, torch.nan, depth)
+    image = view.image
+    if capture.image_noise > 0:
+        image = _noisy_image(view, capture.image_noise, image_rng)
+    return replace(
+        view,
+        image=image,
+        depth=depth,
+        light=_moved(view.light, capture, light_rng),
+        normal=view.normal if capture.normals else None,
+        albedo=view.albedo if capture.albedo else None,
+    )
+
+
+def _positive_noise(shape: Sequence[int], deviation: float, rng: np.random.Generator) -> np.ndarray:
+    """Factors 1 + deviation · standard normal, kept positive: a depth of zero or less is no measurement."""
+    return np.maximum(1.0 + deviation * rng.standard_normal(shape), 0.05)
+
+
+def _holes(shape: Sequence[int], share: float, rng: np.random.Generator) -> np.ndarray:
+    """(H, W) mask with exactly `share` of the pixels (rounded), part of them where a smooth random field is high."""
+    size = int(np.prod(shape))
+    total, in_blobs = round(share * size), round(BLOB_SHARE * share * size)
+    field = gaussian_filter(rng.standard_normal(shape), BLOB_SIZE * shape[1], mode="wrap").reshape(-1)
+    order = np.argsort(-field, kind="stable")
+    single = rng.permutation(order[in_blobs:])[: total - in_blobs]
+    mask = np.zeros(size, dtype=bool)
+    mask[order[:in_blobs]] = True
+    mask[single] = True
+    return mask.reshape(tuple(shape))
+
+
+def _noisy_image(view: View, deviation: float, rng: np.random.Generator) -> Tensor:
+    """Noise on the radiance, √(value² + (READ_NOISE · brightest)²) of it; nothing outside of the alpha mask."""
+    image = view.image.double()
+    bright = READ_NOISE * torch.quantile(image.reshape(-1), BRIGHT)
+    normal = torch.from_numpy(rng.standard_normal(tuple(image.shape)))
+    noise = deviation * torch.sqrt(image.square() + bright.square()) * normal
+    return (image + noise * view.alpha[..., None]).to(view.image.dtype)
+
+
+def _moved(light: PointLight | None, capture: Capture, rng: np.random.Generator) -> PointLight | None:
+    """The light where, and as bright as, the capture believes it to be."""
+    if light is None or (capture.light_position_noise == 0 and capture.light_intensity_noise == 0):
+        return light
+    shift, gain = rng.standard_normal(3), rng.standard_normal()
+    return PointLight(
+        light.position + capture.light_position_noise * torch.from_numpy(shift).to(light.position),
+        light.intensity * float(np.exp(capture.light_intensity_noise * gain)),
+    )
