@@ -1,0 +1,235 @@
+"""Our surfels in the PLY layout that 3DGS viewers open; what that layout cannot hold goes into properties of our own.
+
+Viewers that read properties by name pass over ours. Those that expect exactly the properties of 3DGS in their order
+need the layout "viewer", from which only part of a scene comes back.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import torch
+from scipy.special import expit, logit
+from torch import Tensor
+
+from rgspipe.datasets import srgb
+from rgspipe.datasets.conversion import Conversion, Loss, loss
+from rgspipe.datasets.json_file import is_number
+from rgspipe.datasets.ply_gaussians import Y0, unit_quaternions
+from rgspipe.datasets.ply_table import VertexTable, write_vertices
+from rgspipe.errors import InputError
+from rgspipe.scene.gloss import Gloss
+from rgspipe.scene.surfels import NO_CLIP, Coverage, Surfels
+
+#: The comment that marks our files, followed by JSON.
+MARK = "rgspipe-surfels"
+VERSION = 1
+
+#: Third log-scale: so thin that viewers of 3DGS draw a disc.
+THIN = float(np.log(1e-6))
+
+#: Viewers take logits: opacities 0 and 1 have none.
+OPACITY_RANGE = (1e-6, 1.0 - 1e-6)
+
+#: Coefficients beyond the constant that a file of degree 3 has.
+REST = 45
+
+OWN = {
+    "scales": ("surfel_scale_0", "surfel_scale_1"),
+    "opacities": ("surfel_opacity",),
+    "albedo": ("albedo_0", "albedo_1", "albedo_2"),
+    "clip_offsets": ("clip_offset_0", "clip_offset_1"),
+    "clip_angles": ("clip_angle_0", "clip_angle_1"),
+}
+OWN_GLOSS = {"reflectance": ("gloss_0", "gloss_1", "gloss_2"), "exponents": ("gloss_exponent",)}
+
+Layout = Literal["full", "viewer"]
+
+
+def save_ply(
+    path: str | Path, surfels: Surfels, *, radiance: Tensor | None = None, layout: Layout = "full"
+) -> Conversion:
+    """Write surfels as a PLY file that 3DGS viewers open.
+
+    Args:
+        radiance: (N, 3) linear, shown instead of the albedo; its 99.5th percentile becomes white.
+        layout: "full" comes back as it was; "viewer" has only what 3DGS has, in its order.
+
+    Returns:
+        what a viewer does not show, and for "viewer" what the file does not hold.
+
+    Raises:
+        ValueError: `radiance` is of another number of surfels.
+    """
+    if radiance is not None and radiance.shape != (len(surfels), 3):
+        raise ValueError(f"radiance must have shape {(len(surfels), 3)}, got {tuple(radiance.shape)}")
+    shown, colour_losses = _shown(surfels, radiance)
+    columns = _viewer_columns(surfels, shown, REST if layout == "viewer" else 0)
+    comments = []
+    if layout == "full":
+        columns |= _own_columns(surfels)
+        note = {
+            "version": VERSION,
+            "coverage": asdict(surfels.coverage),
+            "colours": "albedo" if radiance is None else "radiance",
+        }
+        comments.append(f"{MARK} {json.dumps(note)}")
+    write_vertices(path, columns, comments)
+    where = "a viewer does not draw" if layout == "full" else "the file does not hold"
+    return Conversion.of(path, f"{layout} layout", len(surfels), [*_unseen(surfels, where), *colour_losses], [])
+
+
+def is_own(table: VertexTable) -> bool:
+    """Whether a file has our mark and our properties; programs that do not know those may leave either away."""
+    wanted = [name for names in OWN.values() for name in names]
+    return _mark(table) is not None and all(name in table.names for name in wanted)
+
+
+def read_own(table: VertexTable) -> tuple[Surfels, Conversion]:
+    """The surfels that `save_ply` wrote in full, with what was edited since in the properties that viewers know.
+
+    Raises:
+        InputError: a property is missing, or has impossible values.
+    """
+    note, where = _note(table), f"{table.path}: comment {MARK}"
+    try:
+        coverage = Coverage(**note["coverage"])
+    except (TypeError, ValueError) as error:
+        raise InputError(where, expected="coverage", found=str(error), remedy="Export the file again.") from error
+    own = {name: table.columns(*names) for name, names in OWN.items()}
+    scales, resized = _unless_edited(
+        own["scales"], table.columns("scale_0", "scale_1"), lambda x: np.log(np.maximum(x, 1e-30)), np.exp
+    )
+    opacities, faded = _unless_edited(
+        own["opacities"], table.columns("opacity"), lambda x: logit(np.clip(x, *OPACITY_RANGE)), expit
+    )
+    albedo, painted = own["albedo"], np.zeros(len(table))
+    if note.get("colours") == "albedo":
+        stored = table.columns("f_dc_0", "f_dc_1", "f_dc_2")
+        albedo, painted = _unless_edited(
+            albedo, stored, _constant, lambda dc: srgb.decode(np.clip(0.5 + Y0 * dc, 0.0, 1.0))
+        )
+    tensors = {
+        "centers": table.columns("x", "y", "z"),
+        "rotations": _rotations(table),
+        "scales": scales,
+        "opacities": opacities[:, 0],
+        "albedo": albedo,
+        "clip_offsets": own["clip_offsets"],
+        "clip_angles": own["clip_angles"],
+    }
+    surfels = Surfels(**{k: torch.from_numpy(v).float() for k, v in tensors.items()}, coverage=coverage, gloss=None)
+    surfels = _with_gloss(surfels, table)
+    edits = [
+        loss("scales were edited since: edges and coverage are as before", resized, 0.0, "largest step of log-scale"),
+        loss("opacities were edited since", faded, 0.0, "largest step of the logit"),
+        loss("colours were edited since and count as albedo", painted, 0.0, "largest step of f_dc"),
+    ]
+    return surfels, Conversion.of(table.path, "surfels of this program", len(surfels), edits, [])
+
+
+def _unless_edited(
+    own: np.ndarray,
+    stored: np.ndarray,
+    encode: Callable[[np.ndarray], np.ndarray],
+    decode: Callable[[np.ndarray], np.ndarray],
+) -> tuple[np.ndarray, np.ndarray]:
+    """Our exact values (N, K), or decoded ones where the stored ones are not theirs; and how far those are off (N,)."""
+    step = np.abs(encode(own) - stored)
+    edited = (step > 1e-4 * np.maximum(1.0, np.abs(stored))).any(axis=1)
+    return np.where(edited[:, None], decode(stored), own), np.where(edited, step.max(axis=1), 0.0)
+
+
+def _rotations(table: VertexTable) -> np.ndarray:
+    """As stored if they are unit quaternions already, so that they come back exactly."""
+    unit, stored = unit_quaternions(table), table.columns("rot_0", "rot_1", "rot_2", "rot_3")
+    return np.where(np.abs(unit - stored).max(axis=1, keepdims=True) < 1e-5, stored, unit)
+
+
+def _mark(table: VertexTable) -> str | None:
+    return next((line for line in table.comments if line.split(" ")[0] == MARK), None)
+
+
+def _note(table: VertexTable) -> Mapping[str, Any]:
+    where = f"{table.path}: comment {MARK}"
+    try:
+        note = json.loads((_mark(table) or "").partition(" ")[2])
+    except ValueError:
+        note = None
+    values = note.get("coverage") if isinstance(note, dict) and note.get("version") == VERSION else None
+    if not isinstance(values, dict) or not all(map(is_number, values.values())):
+        expected = f"version {VERSION} with the numbers of the coverage"
+        raise InputError(where, expected=expected, found=str(note)[:120], remedy="Export the file again.")
+    return note
+
+
+def _with_gloss(surfels: Surfels, table: VertexTable) -> Surfels:
+    names = [name for group in OWN_GLOSS.values() for name in group]
+    if not any(name in table.names for name in names):
+        return surfels
+    values = torch.from_numpy(table.columns(*names)).float()
+    gloss = Gloss(values[:, :3].contiguous(), values[:, 3].contiguous())
+    try:
+        gloss.check(surfels.albedo)
+    except ValueError as error:
+        raise table.error(names[0], "gloss that makes no energy", str(error)) from error
+    return Surfels(**surfels.tensors(), coverage=surfels.coverage, gloss=gloss)
+
+
+def _shown(surfels: Surfels, radiance: Tensor | None) -> tuple[np.ndarray, list[Loss]]:
+    """(N, 3) linear colours in [0, 1] for viewers."""
+    if radiance is None:
+        return surfels.albedo.double().cpu().numpy(), []
+    values = radiance.detach().double().cpu().numpy()
+    values = values / max(float(np.quantile(values, 0.995)), 1e-30)
+    over = loss("brighter than white", values.max(axis=1) - 1.0, 1e-6, "largest excess over white")
+    return np.clip(values, 0.0, 1.0), [over]
+
+
+def _constant(linear: np.ndarray) -> np.ndarray:
+    """f_dc of linear colours."""
+    return (srgb.encode(linear) - 0.5) / Y0
+
+
+def _viewer_columns(surfels: Surfels, shown: np.ndarray, rest: int) -> dict[str, np.ndarray]:
+    """The properties of 3DGS, in its order."""
+    count = len(surfels)
+    flat = {name: tensor.detach().double().cpu().numpy() for name, tensor in surfels.tensors().items()}
+    columns = dict(zip("xyz", flat["centers"].T, strict=True))
+    columns |= dict(zip(("nx", "ny", "nz"), surfels.normals.detach().double().cpu().numpy().T, strict=True))
+    columns |= {f"f_dc_{index}": column for index, column in enumerate(_constant(shown).T)}
+    columns |= {f"f_rest_{index}": np.zeros(count) for index in range(rest)}
+    columns["opacity"] = logit(np.clip(flat["opacities"], *OPACITY_RANGE))
+    columns |= {f"scale_{i}": column for i, column in enumerate(np.log(np.maximum(flat["scales"], 1e-30)).T)}
+    columns["scale_2"] = np.full(count, THIN)
+    return columns | {f"rot_{index}": column for index, column in enumerate(flat["rotations"].T)}
+
+
+def _own_columns(surfels: Surfels) -> dict[str, np.ndarray]:
+    tensors = {names: getattr(surfels, field) for field, names in OWN.items()}
+    if surfels.gloss is not None:
+        tensors |= {names: getattr(surfels.gloss, field) for field, names in OWN_GLOSS.items()}
+    columns = {}
+    for names, tensor in tensors.items():
+        values = tensor.detach().cpu().numpy().reshape(len(surfels), -1)
+        columns |= dict(zip(names, values.T, strict=True))
+    return columns
+
+
+def _unseen(surfels: Surfels, where: str) -> list[Loss]:
+    """What the layout of 3DGS has no place for."""
+    clips = (surfels.clip_offsets < NO_CLIP).sum(dim=1).double().numpy()
+    low = np.full(len(surfels), surfels.coverage.low)
+    losses = [
+        loss(f"straight edges: {where} them, so surfels hang over", clips, 0.0, "most edges of a surfel"),
+        loss(f"coverage: {where} it, so surfaces look softer", low, -1.0, "opacity that counts as none"),
+    ]
+    if surfels.gloss is not None:
+        size = surfels.gloss.reflectance.amax(dim=1).double().cpu().numpy()
+        losses.append(loss(f"gloss: {where} it", size, 0.0, "largest specular reflectance"))
+    return losses
