@@ -33,9 +33,7 @@ def surfels(views: list[View]) -> Surfels:
 
 
 def test_true_surfels_lie_on_the_surfaces_and_have_their_colours(surfels: Surfels) -> None:
-    assert (
-        np.median(surface_distance(surfels.centers.double().numpy())) < 1e-3
-    )  # measured 0, as refitted planes are exact here
+    assert np.median(surface_distance(surfels.centers.double().numpy())) < 1e-3  # measured 0: the planes are exact
     error = (surfels.albedo - _colour(surfels.normals)).abs().amax(dim=1)
     assert float(error.quantile(0.95)) < 0.01  # measured 1e-7
 
@@ -74,7 +72,6 @@ def test_transmittance_is_that_of_cast_rays() -> None:
     wrong = np.abs(found.ravel() - lit)[known] > 0.5
     assert 0.05 < 1.0 - lit[known].mean() < 0.5
     assert wrong.mean() < 0.03  # measured 0.2 %
-    elsewhere = Camera.from_field_of_view(
-        look_at(torch.tensor([0.0, -1.9, 0.4]), torch.tensor([0.0, -9.0, 0.0])), 0.6, 8, 8
-    )
+    pose = look_at(torch.tensor([0.0, -1.9, 0.4]), torch.tensor([0.0, -9.0, 0.0]))
+    elsewhere = Camera.from_field_of_view(pose, 0.6, 8, 8)
     assert np.isnan(transmittance_image(bvh, build_view_weights(bvh, elsewhere, 1), light)).all()
