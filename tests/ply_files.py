@@ -23,7 +23,7 @@ def write_ply(path: Path, columns: Mapping[str, np.ndarray], *, text: bool = Fal
 
 def _grid() -> dict[str, np.ndarray]:
     x, y = (part.reshape(-1) for part in np.meshgrid(np.arange(SIDE), np.arange(SIDE)))
-    return {"x": 0.1 * x, "y": 0.1 * y, "z": 0.0 * x} | {name: 0.0 * x for name in ("nx", "ny", "nz")}
+    return {"x": 0.1 * x, "y": 0.1 * y, "z": 0.0 * x} | dict.fromkeys(("nx", "ny", "nz"), 0.0 * x)
 
 
 def gaussian_columns(scales: tuple[float, ...] = (0.05, 0.04, 1e-6), opacity: float = 0.9) -> dict[str, np.ndarray]:
@@ -40,5 +40,5 @@ def radiosity_columns() -> dict[str, np.ndarray]:
     """RadiosityGS: every logit 0, so that each value is half of its range."""
     zero, columns = np.zeros(SIDE * SIDE), _grid()
     names = [f"{group}_{index}" for group in ("s", "b", "ad", "as") for index in range(3)]
-    columns |= {name: zero for name in [*names, "geovalue", "norm_factor", "scale_0", "scale_1"]}
+    columns |= dict.fromkeys([*names, "geovalue", "norm_factor", "scale_0", "scale_1"], zero)
     return columns | {f"rot_{index}": zero + float(index == 0) for index in range(4)}

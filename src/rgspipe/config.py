@@ -16,8 +16,9 @@ from typing import Any
 
 from rgspipe.errors import InputError
 
-SCENE_KINDS = ("cornell", "blend", "external")
+SCENE_KINDS = ("cornell", "blend", "external", "ply")
 OCCLUSIONS = ("visible", "out_of_frame", "occluded", "all")
+PLY_FRONTS = ("auto", "kept", "inwards", "outwards", "cameras")
 FIT_METHODS = ("search_lm", "paper_adam")
 ROOM_NAMES = ("cornell", "corridor", "clutter")
 
@@ -65,13 +66,36 @@ class CornellConfig:
 
 
 @dataclass
+class PlyConfig:
+    """What a PLY file from elsewhere leaves open; files that `stage=export` wrote say all of it themselves."""
+
+    fronts: str = option(
+        "auto",
+        "side of the surfels that light falls on: as the rotations say, towards the middle (rooms), away from it "
+        "(objects), or towards the cameras of the images",
+        choices=PLY_FRONTS,
+    )
+    cameras: str | None = option(None, "cameras.json of a 3DGS model, or a transforms file; by default the model's own")
+    srgb: bool = option(True, "colours of Gaussians are display values, not linear ones")
+    low: float | None = option(None, "raw coverage that counts as none; by default what suits the file", low=0, high=1)
+    high: float | None = option(None, "raw coverage that is opaque; by default what suits the file", low=0, high=1)
+    layer: float = option(1.0, "thickness of a layer in the median scale of the surfels", low=0.01, high=100)
+    minimum_alpha: float = option(0.01, "opacity below which a surfel is not there", low=1e-4, high=0.5)
+    gloss: bool = option(False, "take over the gloss of RadiosityGS; fits pass over it, and it takes memory")
+    crop: list[float] | None = option(
+        None, "box that is kept: lower and upper x, y, z in [x,y,z,x,y,z]", low=-1e6, high=1e6, length=6
+    )
+
+
+@dataclass
 class SceneConfig:
     """What is looked at."""
 
     kind: str = option("cornell", "where the scene comes from", choices=SCENE_KINDS)
     name: str | None = option(None, "its name under outputs/; by default that of the file or folder")
-    path: str | None = option(None, "blend: the .blend file; external: the dataset's folder")
+    path: str | None = option(None, "blend, ply: the file; external: the dataset's folder")
     cornell: CornellConfig = section(CornellConfig, "the parametric box of scene=cornell")
+    ply: PlyConfig = section(PlyConfig, "what a file of scene=ply leaves open")
 
 
 @dataclass
@@ -135,6 +159,18 @@ class TrainConfig:
     checkpoint_every: int = option(20, "gradient steps between checkpoints", low=1, high=1000000)
     direct_only: bool = option(True, "also fit and report a model without interreflection, for comparison")
     seed: int = option(0, "draws of pixels and rays", low=0, high=2**31 - 1)
+
+
+@dataclass
+class ExportConfig:
+    """Surfels for other programs."""
+
+    light: str | None = option(None, "light file: colours show the scene under these lights; by default the albedo")
+    layout: str = option(
+        "full",
+        "all of a surfel, for this program and viewers that read properties by name; or just those of 3DGS, in order",
+        choices=("full", "viewer"),
+    )
 
 
 @dataclass
@@ -283,6 +319,7 @@ class RgspipeConfig:
     init: InitConfig = section(InitConfig, "from depth to surfels")
     train: TrainConfig = section(TrainConfig, "from images to materials")
     freeze: FreezeConfig = section(FreezeConfig, "light-independent operators")
+    export: ExportConfig = section(ExportConfig, "surfels for other programs")
     views: ViewsConfig = section(ViewsConfig, "how much of a target is seen")
     light: LightConfig = section(LightConfig, "what is looked for")
     fit: FitConfig = section(FitConfig, "from images to lights")
@@ -409,7 +446,7 @@ def _check_value(key: str, value: Any, rule: Mapping[str, Any]) -> None:
 
 
 def _check_scene(scene: SceneConfig) -> None:
-    what = {"blend": "a .blend file", "external": "a dataset's folder"}.get(scene.kind)
+    what = {"blend": "a .blend file", "external": "a dataset's folder", "ply": "a .ply file"}.get(scene.kind)
     if what is None:
         return
     if scene.path is None:
@@ -417,7 +454,7 @@ def _check_scene(scene: SceneConfig) -> None:
             "scene.path", expected=what, found="nothing", remedy=f"Say which: scene={scene.kind} scene.path=PATH."
         )
     path = Path(scene.path)
-    if not (path.is_file() if scene.kind == "blend" else path.is_dir()):
+    if not (path.is_file() if scene.kind != "external" else path.is_dir()):
         found = "no such file or folder" if not path.exists() else "something else"
         raise InputError(
             path, expected=what, found=found, remedy="Check scene.path; a relative path starts at the current folder."

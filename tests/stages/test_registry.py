@@ -27,6 +27,7 @@ NO_RESULT = (
     "rgspipe.progress",
     "rgspipe.scene",
     "rgspipe.stages.base",
+    "rgspipe.stages.sources",
 )
 
 

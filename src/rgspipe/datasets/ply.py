@@ -121,7 +121,7 @@ def _oriented(surfels: Surfels, path: Path, options: PlyOptions, *, own: bool) -
             raise InputError(
                 f"{path}: fronts",
                 expected="to know which side of each surfel is seen: other programs draw both, light falls on one",
-                found=f"scene.ply.fronts={options.fronts}, and no cameras.json beside the file or in its model's folder",
+                found=f"scene.ply.fronts={options.fronts} and no cameras.json beside the file or in its model's folder",
                 remedy="Set scene.ply.fronts=outwards for an object in empty space, inwards for a room, kept to trust "
                 "the rotations, or scene.ply.cameras=FILE (cameras.json or a transforms file).",
             )

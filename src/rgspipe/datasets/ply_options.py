@@ -24,6 +24,7 @@ class PlyOptions:
         low, high: thresholds of the coverage; None for those that suit the layout.
         layer: thickness of a layer in median scales.
         minimum_alpha: opacity below which a surfel is not there.
+        gloss: take over the gloss of RadiosityGS, too; without it only the diffuse part is.
         crop: (x, y, z, x, y, z) lower and upper corner of the box that is kept; None for all.
     """
 
@@ -34,4 +35,5 @@ class PlyOptions:
     high: float | None = None
     layer: float = 1.0
     minimum_alpha: float = 0.01
+    gloss: bool = True
     crop: tuple[float, ...] | None = None

@@ -74,6 +74,8 @@ def read_radiosity(table: VertexTable, options: PlyOptions) -> Discs:
     if "norm_factor" in table.names:
         factor = np.abs(table.columns("norm_factor")[:, 0])
         losses.append(loss("the trained norm factor is left out: ours follows from areas", factor, 1e-6, "largest log"))
+    if not options.gloss:
+        losses.append(loss("gloss is left out", reflectance.max(axis=1), 1e-3, "largest specular reflectance"))
     notes = [note, "The file holds no lights: RadiosityGS keeps them elsewhere, and there are none to take over."]
     return Discs(
         table.columns("x", "y", "z"),
@@ -86,9 +88,15 @@ def read_radiosity(table: VertexTable, options: PlyOptions) -> Discs:
         "RadiosityGS surfels",
         losses,
         notes,
-        reflectance,
-        exponents,
+        reflectance if options.gloss else None,
+        exponents if options.gloss else None,
     )
+
+
+def find_config(ply: Path) -> Path | None:
+    """cfg_args of the model that a PLY file belongs to, if there is one."""
+    folders = list(ply.resolve().parents)[: LEVELS_UP + 1]
+    return next((folder / CONFIG for folder in folders if (folder / CONFIG).is_file()), None)
 
 
 def find_ranges(ply: Path) -> tuple[Ranges, str]:
@@ -97,9 +105,9 @@ def find_ranges(ply: Path) -> tuple[Ranges, str]:
     Raises:
         InputError: cfg_args is there and cannot be used.
     """
-    for folder in list(ply.resolve().parents)[: LEVELS_UP + 1]:
-        if (folder / CONFIG).is_file():
-            return _parse_ranges(folder / CONFIG), f"Ranges are those of {folder / CONFIG}."
+    config = find_config(ply)
+    if config is not None:
+        return _parse_ranges(config), f"Ranges are those of {config}."
     known = ", ".join(f"{item.name} {item.default:g}" for item in fields(Ranges))
     return Ranges(), f"There is no {CONFIG} with the model: its defaults are assumed ({known})."
 

@@ -24,6 +24,7 @@ from rgspipe.errors import InputError
 from rgspipe.evaluation import convergence, metrics, tables
 from rgspipe.scene import Camera, LightRig, PointLight
 from rgspipe.stages.base import Stage, StageContext
+from rgspipe.stages.sources import image_stage
 
 
 @dataclass(frozen=True)
@@ -196,7 +197,7 @@ def _truth_file(config: RgspipeConfig) -> list[Path]:
 STAGE = Stage(
     name="evaluate",
     help="errors of the recovered lights per target and per class",
-    inputs=lambda config: ["fit_light", "generate_dataset", "freeze"],
+    inputs=lambda config: ["fit_light", *image_stage(config), "freeze"],
     config_keys=("evaluate", "seed", "views", "fit.target", "fit.truth"),
     code=tuple(f"rgspipe.evaluation.{name}" for name in ("arrays", "metrics", "tables", "convergence")),
     files=_truth_file,

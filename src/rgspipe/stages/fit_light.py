@@ -36,6 +36,7 @@ from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.monte_carlo import MonteCarloSolver
 from rgspipe.scene import PointLight
 from rgspipe.stages.base import Stage, StageContext
+from rgspipe.stages.sources import image_stage, require_images
 
 
 def run(context: StageContext) -> None:
@@ -219,6 +220,8 @@ def _targets(context: StageContext) -> Sequence[Target]:
 
 
 def _training_lights(context: StageContext) -> list[PointLight]:
+    if "generate_dataset" not in context.inputs:
+        return []
     root = dataset_root(context.inputs["generate_dataset"].folder())
     entries = read_entries(root / "transforms_train.json", "the lights of the training views")
     return [PointLight(*entry.light()) for entry in entries]
@@ -235,6 +238,15 @@ def _row(context: StageContext, target: Target) -> dict[str, object]:
     views = len(config.views.indices) if config.views.indices is not None else config.views.count
     named = {"target": target.name, "occlusion": target.occlusion, "method": config.fit.method, "views": views}
     return named | read_result(context.folder / target.name)
+
+
+def _inputs(config: RgspipeConfig) -> list[str]:
+    """The frozen scene, and the dataset where there is one: surfels from a file bring neither targets nor lights."""
+    if config.fit.target is None:
+        require_images(config, "targets of its own (or fit.target=DIR)")
+    if config.fit.method == "paper_adam" and config.fit.adam.init == "dataset":
+        require_images(config, "the training lights that fit.adam.init=dataset draws from (or fit.adam.init=sphere)")
+    return ["freeze", *image_stage(config)]
 
 
 def _keys(config: RgspipeConfig) -> list[str]:
@@ -254,7 +266,7 @@ def _files(config: RgspipeConfig) -> list[Path]:
 STAGE = Stage(
     name="fit_light",
     help="recover the unknown lights of fit targets from one or several views",
-    inputs=lambda config: ["freeze", "generate_dataset"],
+    inputs=_inputs,
     config_keys=_keys,
     code=(
         "rgspipe.fitting",

@@ -12,12 +12,13 @@ from rgspipe.fitting.dictionary import build_dictionary
 from rgspipe.renderer.effect_bounds import measure_costs, measure_effects
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.stages.base import Stage, StageContext
+from rgspipe.stages.sources import surfel_stage
 
 
 def run(context: StageContext) -> None:
     """Write surfels, gather, transport and dictionary.safetensors, and effects.json."""
     options = context.config.freeze
-    surfels = load_surfels(context.inputs["train_surfels"].file(SURFELS))
+    surfels = load_surfels(context.inputs[surfel_stage(context.config)].file(SURFELS))
     begin = time.perf_counter()
     frozen = FrozenScene.freeze(surfels, gather_rays=options.gather_rays, patches=options.patches, seed=options.seed)
     built = time.perf_counter()
@@ -50,7 +51,7 @@ def run(context: StageContext) -> None:
 STAGE = Stage(
     name="freeze",
     help="precompute the light-independent operators and the light dictionary",
-    inputs=lambda config: ["train_surfels"],
+    inputs=lambda config: [surfel_stage(config)],
     config_keys=("freeze",),
     code=(
         "rgspipe.renderer",

@@ -1,0 +1,34 @@
+"""Where the surfels of a scene come from: training, or a file from elsewhere."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rgspipe.config import RgspipeConfig
+from rgspipe.errors import InputError
+
+
+def surfel_stage(config: RgspipeConfig) -> str:
+    """The stage whose surfels.safetensors is the scene."""
+    return "import_ply" if config.scene.kind == "ply" else "train_surfels"
+
+
+def image_stage(config: RgspipeConfig) -> list[str]:
+    """The stage that has the scene's images, if there are any."""
+    return [] if config.scene.kind == "ply" else ["generate_dataset"]
+
+
+def require_images(config: RgspipeConfig, what: str) -> None:
+    """Refuse a scene that has no images.
+
+    Raises:
+        InputError: the scene is surfels from a file.
+    """
+    if config.scene.kind == "ply":
+        raise InputError(
+            f"stage={config.stage}",
+            expected=f"a scene with images, for {what}",
+            found=f"scene=ply: finished surfels in {Path(config.scene.path or '')}",
+            remedy="Freeze them (stage=freeze), fit lights in images of your own (stage=fit_light fit.target=DIR), "
+            "or export them (stage=export).",
+        )
