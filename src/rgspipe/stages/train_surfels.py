@@ -15,18 +15,13 @@ from rgspipe.datasets.degrade import Capture, degraded
 from rgspipe.datasets.location import open_dataset
 from rgspipe.datasets.surfel_file import load_surfels, save_surfels
 from rgspipe.datasets.views import View
-from rgspipe.evaluation.images import beside, comparison_strip, save_png, stack
+from rgspipe.evaluation.held_out import held_out_picture
+from rgspipe.evaluation.images import save_png
 from rgspipe.stages.base import Stage, StageContext
 from rgspipe.training.checkpoint import Checkpoint
 from rgspipe.training.refine import RefineOptions
 from rgspipe.training.trainer import Trained, TrainOptions, build_transport, fit_direct_materials, train
-from rgspipe.training.validate import HeldOut, render_held_out
-
-#: Held-out views that comparison.png shows, from the worst to the best.
-SHOWN_VIEWS = 6
-
-#: Pixels between its columns.
-COLUMN_GAP = 12
+from rgspipe.training.validate import render_held_out
 
 
 def run(context: StageContext) -> None:
@@ -51,7 +46,8 @@ def run(context: StageContext) -> None:
         metrics["direct_only_psnr"] = _direct_only(trained, train_views, dataset.test, options)
     text = json.dumps(metrics, indent=1, allow_nan=False)
     (context.folder / "metrics.json").write_text(text + "\n", encoding="utf-8")
-    _write_comparison(context.folder / "comparison.png", held_out, dataset.test)
+    picture = held_out_picture(held_out.views, held_out.images, held_out.psnr, held_out.albedo)
+    save_png(context.folder / "comparison.png", picture)
     context.note(
         test_psnr_mean=metrics["test_psnr_mean"],
         surfels=len(trained.surfels),
@@ -93,21 +89,22 @@ def _write_table(path: Path, trained: Trained) -> None:
     table[["round", "kind", "loss", "psnr", "seconds"]].to_csv(path, index=False)
 
 
-def _write_comparison(path: Path, held_out: HeldOut, views: tuple[View, ...]) -> None:
-    """Truth, render and difference of held-out views spread evenly from the worst to the best, in two columns."""
-    order = np.argsort(held_out.psnr)
-    chosen = order[np.unique(np.linspace(0, len(order) - 1, min(SHOWN_VIEWS, len(order))).round().astype(int))]
-    strips = [comparison_strip(views[i].image, held_out.images[i]) for i in chosen]
-    half = len(strips) // 2
-    columns = [strips[:half], strips[half:]] if len(strips) % 2 == 0 else [strips]
-    save_png(path, beside([stack(column) for column in columns], COLUMN_GAP))
-
-
 STAGE = Stage(
     name="train_surfels",
     help="fits materials and geometry of the surfels to the training images",
     run=run,
     inputs=lambda config: ["init_depth", "generate_dataset"],
     config_keys=("train", "capture"),
-    code=("rgspipe.datasets.degrade", "rgspipe.training", "rgspipe.renderer", "rgspipe.scene", "rgspipe.evaluation"),
+    code=(
+        "rgspipe.datasets.degrade",
+        "rgspipe.training",
+        "rgspipe.renderer",
+        "rgspipe.scene",
+        "rgspipe.evaluation.albedo",
+        "rgspipe.evaluation.arrays",
+        "rgspipe.evaluation.held_out",
+        "rgspipe.evaluation.image_metrics",
+        "rgspipe.evaluation.images",
+        "rgspipe.evaluation.metrics",
+    ),
 )

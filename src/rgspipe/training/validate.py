@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import pandas as pd
 
 from rgspipe.datasets.views import View
-from rgspipe.evaluation.metrics import edge_mask, psnr
+from rgspipe.evaluation.held_out import albedo_of_views, held_out_summary, view_table
+from rgspipe.evaluation.metrics import psnr
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.transport import PatchTransport
 from rgspipe.scene.surfels import Surfels
@@ -20,23 +23,36 @@ from rgspipe.training.trainer import trace_views
 
 @dataclass(frozen=True)
 class HeldOut:
-    """Renders of held-out views and their PSNR [dB], on all pixels and away from edges (NaN without passes)."""
+    """Renders of held-out views, and what they are compared with.
 
-    names: tuple[str, ...]
+    Attributes:
+        views: V views with their true images.
+        images: V renders (H, W, 3), linear radiance.
+        albedo: V images (H, W, 3) of the surfels' albedo.
+    """
+
+    views: tuple[View, ...]
     images: tuple[npt.NDArray[np.float32], ...]
-    psnr: npt.NDArray[np.float64]
-    psnr_off_edges: npt.NDArray[np.float64]
+    albedo: tuple[npt.NDArray[np.float32], ...]
+
+    @cached_property
+    def psnr(self) -> npt.NDArray[np.float64]:
+        """(V,) PSNR [dB]."""
+        return np.array([psnr(image, view.image) for image, view in zip(self.images, self.views, strict=True)])
+
+    @cached_property
+    def table(self) -> pd.DataFrame:
+        """PSNR, SSIM and FLIP of every view; see `view_table`."""
+        return view_table(self.images, self.views)
+
+    @property
+    def psnr_off_edges(self) -> npt.NDArray[np.float64]:
+        """(V,) PSNR [dB] away from silhouettes and creases; NaN without depth and normal passes."""
+        return self.table["psnr_off_edges"].to_numpy()
 
     def summary(self) -> dict[str, Any]:
-        """Mean, median and worst, and a row a view; JSON values."""
-        rows = zip(self.names, self.psnr, self.psnr_off_edges, strict=True)
-        return {
-            "test_psnr_mean": float(np.mean(self.psnr)),
-            "test_psnr_median": float(np.median(self.psnr)),
-            "test_psnr_min": float(np.min(self.psnr)),
-            "test_psnr_off_edges_mean": _number(np.mean(self.psnr_off_edges)),
-            "per_view": [{"name": name, "psnr": float(a), "psnr_off_edges": _number(b)} for name, a, b in rows],
-        }
+        """PSNR, SSIM, FLIP and albedo errors, over all views and for each; JSON values."""
+        return held_out_summary(self.table, *albedo_of_views(self.albedo, self.views))
 
 
 def render_held_out(
@@ -51,22 +67,5 @@ def render_held_out(
     lighting = trace_lighting(SurfelBvh(surfels), views)
     radiance = total_irradiance(lighting, surfels.albedo, transport) * surfels.albedo
     images = tuple(weight.image(radiance[v]).numpy() for v, weight in enumerate(weights))
-    pairs = list(zip(images, views, strict=True))
-    return HeldOut(
-        tuple(view.name for view in views),
-        images,
-        np.array([psnr(image, view.image) for image, view in pairs]),
-        np.array([_off_edges(image, view) for image, view in pairs]),
-    )
-
-
-def _off_edges(image: npt.NDArray[np.float32], view: View) -> float:
-    """PSNR away from edges, which the depth and normal passes show; NaN where either is missing or has gaps."""
-    if view.depth is None or view.normal is None or bool(view.depth.isnan().any()):
-        return float("nan")
-    mask = ~edge_mask(view.depth, view.normal)
-    return psnr(image, view.image, mask) if mask.any() else float("nan")
-
-
-def _number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
+    albedo = tuple(weight.image(surfels.albedo.float()).numpy() for weight in weights)
+    return HeldOut(tuple(views), images, albedo)
