@@ -122,28 +122,8 @@ class FrameEntry:
         return Camera(pose, fx, fy, cx, cy, width, height)
 
     def _pose(self) -> Tensor:
-        """The (4, 4) float64 camera-to-world transform, rigid."""
         value = required(self.fields, "transform_matrix", self.where)
-        place = f"{self.where}.transform_matrix"
-        rows = value if isinstance(value, list) else []
-        if len(rows) != 4 or not all(isinstance(row, list) and len(row) == 4 for row in rows):
-            raise InputError(place, expected="a 4 × 4 matrix", found=repr(value)[:120], remedy="Correct it.")
-        flat = [item for row in rows for item in row]
-        if not all(map(is_number, flat)):
-            raise InputError(place, expected="finite numbers", found=repr(value)[:120], remedy="Correct it.")
-        pose = torch.tensor(flat, dtype=torch.float64).reshape(4, 4)
-        rotation = pose[:3, :3]
-        error = float((rotation.T @ rotation - torch.eye(3, dtype=torch.float64)).abs().max())
-        determinant = float(torch.linalg.det(rotation))
-        bottom = torch.tensor([0.0, 0.0, 0.0, 1.0], dtype=torch.float64)
-        if error > ROTATION_TOLERANCE or determinant < 0 or not torch.allclose(pose[3], bottom):
-            raise InputError(
-                place,
-                expected="a rigid camera-to-world transform (orthonormal rotation, determinant +1, last row 0 0 0 1)",
-                found=f"RᵀR − 1 up to {error:.2g}, determinant {determinant:.4g}, last row {pose[3].tolist()}",
-                remedy="Remove scale, shear or mirroring from the camera.",
-            )
-        return pose
+        return rigid_pose(value, f"{self.where}.transform_matrix")
 
     def _optional_path(self, key: str) -> Path | None:
         return self._path(self._text(key)) if key in self.fields else None
@@ -156,6 +136,33 @@ class FrameEntry:
 
     def _path(self, name: str) -> Path:
         return self.transforms_path.parent / name
+
+
+def rigid_pose(value: object, place: str) -> Tensor:
+    """A (4, 4) float64 camera-to-world transform, checked to be rigid; `place` names it in errors.
+
+    Raises:
+        InputError: not a 4 × 4 list of finite numbers, or not rigid.
+    """
+    rows = value if isinstance(value, list) else []
+    if len(rows) != 4 or not all(isinstance(row, list) and len(row) == 4 for row in rows):
+        raise InputError(place, expected="a 4 × 4 matrix", found=repr(value)[:120], remedy="Correct it.")
+    flat = [item for row in rows for item in row]
+    if not all(map(is_number, flat)):
+        raise InputError(place, expected="finite numbers", found=repr(value)[:120], remedy="Correct it.")
+    pose = torch.tensor(flat, dtype=torch.float64).reshape(4, 4)
+    rotation = pose[:3, :3]
+    error = float((rotation.T @ rotation - torch.eye(3, dtype=torch.float64)).abs().max())
+    determinant = float(torch.linalg.det(rotation))
+    bottom = torch.tensor([0.0, 0.0, 0.0, 1.0], dtype=torch.float64)
+    if error > ROTATION_TOLERANCE or determinant < 0 or not torch.allclose(pose[3], bottom):
+        raise InputError(
+            place,
+            expected="a rigid camera-to-world transform (orthonormal rotation, determinant +1, last row 0 0 0 1)",
+            found=f"RᵀR − 1 up to {error:.2g}, determinant {determinant:.4g}, last row {pose[3].tolist()}",
+            remedy="Remove scale, shear or mirroring from the camera.",
+        )
+    return pose
 
 
 def read_entries(path: Path, what: str) -> list[FrameEntry]:

@@ -16,6 +16,7 @@ from rgspipe.datasets.frames import FrameEntry, read_entries
 from rgspipe.datasets.images import read_colour, read_depth, read_vectors
 from rgspipe.datasets.info import DatasetInfo, read_info
 from rgspipe.datasets.json_file import read_json, required
+from rgspipe.datasets.tensoir import is_tensoir, load_tensoir
 from rgspipe.datasets.views import Dataset, Target, View
 from rgspipe.errors import InputError
 from rgspipe.progress import track
@@ -27,7 +28,8 @@ OCCLUSIONS = ("visible", "out_of_frame", "occluded", "unknown")
 def load_dataset(root: str | Path, *, train: bool = True, test: bool = True, targets: bool = True) -> Dataset:
     """Read the wanted parts of the dataset in the folder `root`; what is not wanted is empty.
 
-    A dataset without targets/ has no targets; every split that is wanted must be there.
+    A dataset without targets/ has no targets; every split that is wanted must be there. A folder of TensoIR is read
+    as what it is.
 
     Raises:
         InputError: any file is missing, broken or inconsistent.
@@ -35,6 +37,8 @@ def load_dataset(root: str | Path, *, train: bool = True, test: bool = True, tar
     root = Path(root)
     if not root.is_dir():
         raise InputError(root, expected="the folder of a dataset", found="no such folder", remedy="Check the path.")
+    if is_tensoir(root):
+        return load_tensoir(root, train=train, test=test)
     info = read_info(root)
     splits = {"train": train, "test": test}
     loaded = {name: load_split(root, name, info) if wanted else () for name, wanted in splits.items()}

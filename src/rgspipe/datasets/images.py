@@ -8,6 +8,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from rgspipe.datasets import srgb
 from rgspipe.datasets.exr import read_array, read_channels, read_image
 from rgspipe.errors import InputError
 from rgspipe.scene import Camera
@@ -22,7 +23,7 @@ def read_colour(path: Path) -> tuple[Tensor, Tensor]:
     Raises:
         InputError: missing or broken file, other channels, NaN or infinite pixels, alpha outside of [0, 1].
     """
-    image, alpha = read_image(path) if path.suffix.lower() == ".exr" else _read_png(path)
+    image, alpha = read_image(path) if path.suffix.lower() == ".exr" else _read_display_png(path)
     if alpha.min() < 0 or alpha.max() > 1 + 1e-3:
         found = f"{alpha.min():g} to {alpha.max():g}"
         raise InputError(path, expected="alpha from 0 to 1", found=found, remedy="Export the image again.")
@@ -80,8 +81,20 @@ def _check_size(path: Path, stored: np.ndarray, camera: Camera) -> None:
         )
 
 
-def _read_png(path: Path) -> tuple[np.ndarray, np.ndarray]:
+def _read_display_png(path: Path) -> tuple[np.ndarray, np.ndarray]:
     """An 8-bit PNG, linearised with the sRGB curve and premultiplied."""
+    values = read_png(path)
+    alpha = values[..., 3] if values.shape[2] == 4 else np.ones(values.shape[:2], np.float32)
+    linear = srgb.decode(values[..., :3])
+    return (linear * alpha[..., None]).astype(np.float32), np.ascontiguousarray(alpha)
+
+
+def read_png(path: Path) -> np.ndarray:
+    """(H, W, 3 or 4) float32 values in [0, 1] of an 8-bit PNG, as they are stored.
+
+    Raises:
+        InputError: missing or broken file, or other than 8-bit RGB or RGBA.
+    """
     from PIL import Image, UnidentifiedImageError
 
     if not path.is_file():
@@ -99,7 +112,4 @@ def _read_png(path: Path) -> tuple[np.ndarray, np.ndarray]:
     if stored.ndim != 3 or stored.shape[2] not in (3, 4) or stored.dtype != np.uint8:
         found = f"{stored.dtype} with shape {stored.shape}"
         raise InputError(path, expected="8-bit RGB or RGBA", found=found, remedy="Export it so, or as OpenEXR.")
-    values = stored.astype(np.float32) / 255.0
-    alpha = values[..., 3] if stored.shape[2] == 4 else np.ones(values.shape[:2], np.float32)
-    linear = np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)[..., :3]
-    return (linear * alpha[..., None]).astype(np.float32), np.ascontiguousarray(alpha)
+    return stored.astype(np.float32) / 255.0

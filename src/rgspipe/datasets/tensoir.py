@@ -1,0 +1,145 @@
+"""Read folders of TensoIR (Jin et al. 2023): a folder a view, with masks, albedo and normals, under environment light.
+
+    train_000/metadata.json  rgba_<light>.png  albedo.png  normal.png      8-bit PNG; colours in sRGB, straight alpha
+
+Their images hold no point lights and no depth, so surfels cannot be trained on them as they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import torch
+from torch import Tensor
+
+from rgspipe.datasets.frames import rigid_pose
+from rgspipe.datasets.images import read_colour, read_png
+from rgspipe.datasets.json_file import is_number, read_json, required
+from rgspipe.datasets.views import Dataset, View
+from rgspipe.errors import InputError
+from rgspipe.progress import track
+from rgspipe.scene import Camera
+
+METADATA = "metadata.json"
+IMAGES = "rgba*.png"
+
+
+def is_tensoir(root: Path) -> bool:
+    """Whether a folder has views as TensoIR lays them out, and no transforms of its own."""
+    return not (root / "transforms_train.json").exists() and bool(_folders(root, "train") + _folders(root, "test"))
+
+
+def load_tensoir(root: Path, *, train: bool = True, test: bool = True) -> Dataset:
+    """The wanted splits; views are linear and premultiplied, have no light and no depth.
+
+    Of a view under several lights the first one by name is read; a view's name says which.
+
+    Raises:
+        InputError: any file is missing, broken or inconsistent.
+    """
+    splits = {"train": train, "test": test}
+    views = {
+        name: tuple(_view(folder) for folder in track(_folders(root, name), f"reading {name} views", unit="view"))
+        if wanted
+        else ()
+        for name, wanted in splits.items()
+    }
+    return Dataset(root, views["train"], views["test"], ())
+
+
+def require_lights(views: Sequence[View], root: Path) -> None:
+    """Refuse to train on views whose lights are not known.
+
+    Raises:
+        InputError: a view has no light.
+    """
+    dark = [view for view in views if view.light is None]
+    if not dark:
+        return
+    raise InputError(
+        root,
+        expected="training views that are each lit by one point light whose place and power are known (pl_pos, "
+        "pl_intensity), with depth",
+        found=f"{len(dark)} of {len(views)} views without one, such as {dark[0].name}: TensoIR folders have "
+        "environment light, and no depth",
+        remedy="Render the scene with point lights (scene=blend scene.path=its .blend file), or photograph it so and "
+        "describe the images in transforms_train.json (docs/conventions.md); albedo maps of this folder can go with "
+        "them as albedo_path, for train.albedo_prior=dataset.",
+    )
+
+
+def _folders(root: Path, split: str) -> list[Path]:
+    return sorted(path for path in root.glob(f"{split}*") if (path / METADATA).is_file())
+
+
+def _view(folder: Path) -> View:
+    images = sorted(folder.glob(IMAGES))
+    if not images:
+        raise InputError(folder, expected=f"an image {IMAGES}", found="none", remedy="Copy the images into it.")
+    image, alpha = read_colour(images[0])
+    camera = _camera(folder / METADATA, image)
+    albedo, normal = folder / "albedo.png", folder / "normal.png"
+    return View(
+        f"{folder.name}/{images[0].stem}",
+        camera,
+        image,
+        alpha,
+        normal=_normals(normal, camera) if normal.is_file() else None,
+        albedo=_albedo(albedo, camera) if albedo.is_file() else None,
+    )
+
+
+def _camera(path: Path, image: Tensor) -> Camera:
+    content = read_json(path, "the camera of a view")
+    place = f"{path}: cam_transform_mat"
+    text = required(content, "cam_transform_mat", path)
+    try:
+        values = [float(part) for part in text.split(",")] if isinstance(text, str) else []
+    except ValueError:
+        values = []
+    if len(values) != 16:
+        raise InputError(place, expected="16 numbers with commas", found=repr(text)[:120], remedy="Correct it.")
+    pose = rigid_pose([values[row : row + 4] for row in range(0, 16, 4)], place)
+    angle = required(content, "cam_angle_x", path)
+    if not is_number(angle) or not 0 < angle < torch.pi:
+        place = f"{path}: cam_angle_x"
+        raise InputError(place, expected="radians between 0 and π", found=repr(angle), remedy="Correct it.")
+    height, width = image.shape[:2]
+    for key, found in (("imw", width), ("imh", height)):
+        stated = content.get(key, found)
+        if stated != found:
+            remedy = "Correct it, or export the image at this size."
+            raise InputError(f"{path}: {key}", expected=f"{found}, as the image has", found=repr(stated), remedy=remedy)
+    return Camera.from_field_of_view(pose, float(angle), width, height)
+
+
+def _albedo(path: Path, camera: Camera) -> Tensor:
+    """(H, W, 3) linear albedo, 0 where there is no surface."""
+    colour, alpha = read_colour(path)
+    _check_size(path, colour, camera)
+    # Premultiplied at silhouettes; the reflectance of the surface there is wanted.
+    return torch.where(alpha[..., None] > 0, colour / alpha.clamp(min=1e-6)[..., None], 0.0)
+
+
+def _normals(path: Path, camera: Camera) -> Tensor:
+    """(H, W, 3) unit normals in world axes, stored as (n + 1)/2; 0 where there is no surface."""
+    stored = torch.from_numpy(read_png(path))
+    _check_size(path, stored, camera)
+    normals = 2.0 * stored[..., :3] - 1.0
+    length = normals.norm(dim=-1, keepdim=True)
+    there = length > 0.5
+    if stored.shape[-1] == 4:
+        there &= stored[..., 3:] > 0
+    return torch.where(there, normals / length.clamp(min=1e-6), 0.0)
+
+
+def _check_size(path: Path, stored: Tensor, camera: Camera) -> None:
+    height, width = stored.shape[:2]
+    if (width, height) != (camera.width, camera.height):
+        raise InputError(
+            path,
+            expected=f"{camera.width} × {camera.height} pixels, as the colour image",
+            found=f"{width} × {height}",
+            remedy="Export it at the size of the colour image.",
+        )
