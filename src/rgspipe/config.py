@@ -16,8 +16,9 @@ from typing import Any
 
 from rgspipe.errors import InputError
 
-SCENE_KINDS = ("cornell", "blend", "external", "ply")
-OCCLUSIONS = ("visible", "out_of_frame", "occluded", "all")
+SCENE_KINDS = ("cornell", "corner", "hotdog", "room", "blend", "external", "ply")
+MODELLED = SCENE_KINDS[:4]
+OCCLUSIONS = ("visible", "out_of_frame", "occluded", "around_corner", "all")
 PLY_FRONTS = ("auto", "kept", "inwards", "outwards", "cameras")
 FIT_METHODS = ("search_lm", "paper_adam")
 ROOM_NAMES = ("cornell", "corridor", "clutter")
@@ -63,6 +64,36 @@ class CornellConfig:
     short_size: list[float] = option([0.28, 0.28, 0.3], "short box: width, depth, height", low=0.01, high=1, length=3)
     short_center: list[float] = option([0.68, 0.35], "short box: centre of its foot, x and y", low=0, high=1, length=2)
     short_angle: float = option(-17.2, "short box: turn about the vertical, degrees", low=-180, high=180)
+    gloss: float = option(0.0, "specular reflectance k_s of both boxes: a Phong lobe on their colour", low=0, high=1)
+    shininess: float = option(20.0, "exponent n of that lobe", low=1, high=1000)
+
+
+@dataclass
+class CornerConfig:
+    """A closed corridor around a corner: two legs, each 1 scene unit long outside."""
+
+    width: float = option(0.32, "width of the corridor, scene units", low=0.2, high=0.4)
+    height: float = option(0.45, "height of the corridor, scene units", low=0.35, high=1)
+    wall_color: list[float] = _color(0.75, 0.75, 0.72, "walls and ceiling")
+    floor_color: list[float] = _color(0.55, 0.5, 0.42, "floor")
+    near_end_color: list[float] = _color(0.2, 0.35, 0.65, "wall at the end of the leg that the targets show")
+    far_end_color: list[float] = _color(0.7, 0.4, 0.15, "wall at the end of the other leg")
+
+
+@dataclass
+class HotdogConfig:
+    """A hot dog on a plate, in empty space."""
+
+    textured: bool = option(True, "textures on bun and sausage; without them every part has one colour")
+    segments: int = option(192, "faces around plate and bun", low=24, high=2000)
+
+
+@dataclass
+class RoomConfig:
+    """A closed room with a table, a bookcase, an armchair and ten other things."""
+
+    textured: bool = option(True, "textures on floor, walls and furniture; without them every part has one colour")
+    segments: int = option(192, "faces around whatever is round", low=24, high=2000)
 
 
 @dataclass
@@ -95,6 +126,9 @@ class SceneConfig:
     name: str | None = option(None, "its name under outputs/; by default that of the file or folder")
     path: str | None = option(None, "blend, ply: the file; external: the dataset's folder")
     cornell: CornellConfig = section(CornellConfig, "the parametric box of scene=cornell")
+    corner: CornerConfig = section(CornerConfig, "the corridor of scene=corner")
+    hotdog: HotdogConfig = section(HotdogConfig, "the hot dog of scene=hotdog")
+    room: RoomConfig = section(RoomConfig, "the furnished room of scene=room")
     ply: PlyConfig = section(PlyConfig, "what a file of scene=ply leaves open")
 
 
@@ -177,6 +211,11 @@ class ExportConfig:
 class FreezeConfig:
     """The light-independent operators of the trained scene."""
 
+    surfels: str = option(
+        "trained",
+        "what is frozen: the trained surfels, or some made from the true surfaces, to compare with",
+        choices=("trained", "truth"),
+    )
     gather_rays: int = option(256, "hemisphere rays of a surfel", low=8, high=65536)
     patches: int = option(1000, "patches of the indirect light", low=8, high=20000)
     dictionary_grid: int = option(8, "candidate lights along each axis of the room", low=2, high=64)
@@ -272,9 +311,21 @@ class EvaluateConfig:
 
 
 @dataclass
+class StudyConfig:
+    """What becomes of a trained scene when its capture gets worse."""
+
+    cases: list[str] = option(
+        ["clean"], "captures: `clean`, or keys of capture.* such as depth_noise=0.01; several joined by spaces"
+    )
+    scenes: list[str] = option([], "scenes that are compared; by default the one that is configured", choices=MODELLED)
+    limit: int | None = option(6, "lights of each class that are recovered in each case", low=1, high=100000)
+
+
+@dataclass
 class ReportConfig:
     """What the report compares."""
 
+    truth: bool = option(True, "also recover the lights with surfels made from the true surfaces, where they are known")
     views: list[int] = option([1, 3], "numbers of views", low=1, high=1000)
     methods: list[str] = option(["search_lm", "paper_adam"], "methods", choices=FIT_METHODS)
     paper_adam_limit: int | None = option(1, "targets of each class that paper_adam is run on", low=1, high=100000)
@@ -326,6 +377,7 @@ class RgspipeConfig:
     effects: EffectsConfig = section(EffectsConfig, "parts of light transport")
     accuracy: AccuracyConfig = section(AccuracyConfig, "preset of accuracy against time")
     evaluate: EvaluateConfig = section(EvaluateConfig, "how estimates are judged")
+    study: StudyConfig = section(StudyConfig, "what bad captures cost")
     report: ReportConfig = section(ReportConfig, "what the report compares")
     benchmark: BenchmarkConfig = section(BenchmarkConfig, "what is timed")
     debug: DebugConfig = section(DebugConfig, "when something goes wrong")
@@ -335,7 +387,7 @@ def scene_name(config: RgspipeConfig) -> str:
     """The scene's folder under outputs/: `scene.name`, or else the stem of its file, folder or kind."""
     if config.scene.name is not None:
         return config.scene.name
-    if config.scene.kind == "cornell" or config.scene.path is None:
+    if config.scene.kind in MODELLED or config.scene.path is None:
         return config.scene.kind
     return Path(config.scene.path).resolve().stem
 

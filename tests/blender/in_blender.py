@@ -9,20 +9,21 @@ import bpy
 import numpy as np
 import torch
 
-from rgspipe.blender import blend, cornell
+from rgspipe.blender import blend
 from rgspipe.blender.geometry import FreeSpace, scene_geometry
-from rgspipe.blender.job import CornellParameters, RenderSettings
+from rgspipe.blender.job import RenderSettings
+from rgspipe.blender.materials import diffuse_material
+from rgspipe.blender.meshes import add, polygon
+from rgspipe.blender.models import cornell
+from rgspipe.blender.models.parameters import CornellParameters
 from rgspipe.blender.passes import Studio
 from rgspipe.blender.plan import Frame
 from rgspipe.scene import Camera, PointLight, look_at
 
 
 def _quad(scene: bpy.types.Scene, half: float, height: float, albedo: tuple[float, float, float]) -> None:
-    mesh = bpy.data.meshes.new("quad")
     corners = [(-half, -half), (half, -half), (half, half), (-half, half)]
-    mesh.from_pydata([(x, y, height) for x, y in corners], [], [(0, 1, 2, 3)])
-    mesh.materials.append(cornell.diffuse_material("quad", albedo))
-    scene.collection.objects.link(bpy.data.objects.new("quad", mesh))
+    add(scene, polygon("quad", [(x, y, height) for x, y in corners]), diffuse_material("quad", albedo))
 
 
 def _frame(name: str, origin: tuple, height: float, seed: int) -> Frame:

@@ -18,7 +18,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rgspipe.blender.job import Box, DatasetJob
+from rgspipe.blender.job import DatasetJob
+from rgspipe.blender.models.parameters import BlendFile, Box
 from rgspipe.blender.process import render_dataset
 from rgspipe.blender.targets import in_frame
 from rgspipe.datasets.gs3 import load_dataset
@@ -77,7 +78,7 @@ def test_depth_and_cameras_put_every_point_on_a_surface(dataset: Dataset) -> Non
         there = depth.isfinite()
         points = (origins + directions * (depth * lengths)[:, None])[there].numpy()
         to_walls = np.abs(np.abs(points) - 0.5).min(axis=1)
-        to_boxes = np.abs([_into_box(points, box) for box in JOB.cornell.boxes]).min(axis=0)
+        to_boxes = np.abs([_into_box(points, box) for box in JOB.model.boxes]).min(axis=0)
         off_centre = depth[there].numpy() * 0.005 / view.camera.fx  # the filter is 0.01 pixel wide
         assert (np.minimum(to_walls, to_boxes) < 1e-5 + off_centre).all()  # measured 5e-7
         facing = (view.normal.reshape(-1, 3)[there].double() * directions[there]).sum(dim=1)
@@ -92,7 +93,7 @@ def test_lights_keep_their_distance_and_their_class(rendered: Path, dataset: Dat
     for name, position in (lights | truth).items():
         clearance = 0.05 if name.startswith("occluded") else 0.08
         assert (np.abs(position) <= 0.5 - clearance + 1e-6).all(), name
-        assert min(_into_box(position, box) for box in JOB.cornell.boxes) >= clearance - 1e-6, name
+        assert min(_into_box(position, box) for box in JOB.model.boxes) >= clearance - 1e-6, name
     for name, target in hidden.items():
         framed = [in_frame(view.camera, truth[name]) for view in target.views]
         assert all(framed) if target.occlusion == "visible" else framed[0] == (target.occlusion == "occluded")
@@ -176,9 +177,9 @@ def test_killed_at_any_moment_it_goes_on_and_ends_the_same(
 
 def test_a_blend_file_is_stripped_of_all_that_glows(in_blender: Callable[[str, Path], None], tmp_path: Path) -> None:
     in_blender("save_blends", tmp_path)
-    job = replace(JOB, kind="blend", blend_path="?", train_views=2, test_views=1, targets_per_class=0)
+    job = replace(JOB, train_views=2, test_views=1, targets_per_class=0)
     for name in ("bare", "lit"):
-        render_dataset(replace(job, blend_path=str(tmp_path / f"{name}.blend")), tmp_path / name)
+        render_dataset(replace(job, model=BlendFile(str(tmp_path / f"{name}.blend"))), tmp_path / name)
     bare, lit = (_digests(tmp_path / name) for name in ("bare", "lit"))
     assert {name for name in bare if bare[name] != lit[name]} == {"job.json"}
     images = [view.image for view in load_dataset(tmp_path / "lit").train]
@@ -189,7 +190,7 @@ def test_a_blend_file_is_stripped_of_all_that_glows(in_blender: Callable[[str, P
     np.testing.assert_allclose(found["hi"] + found["lo"], 0, atol=1e-6)
     assert found["rescale"] == pytest.approx(1 / 8)
     with pytest.raises(InputError, match=r"empty\.blend.*expected meshes.*none that is rendered"):
-        render_dataset(replace(job, blend_path=str(tmp_path / "empty.blend")), tmp_path / "empty")
+        render_dataset(replace(job, model=BlendFile(str(tmp_path / "empty.blend"))), tmp_path / "empty")
 
 
 @pytest.mark.parametrize(("content", "message"), [(None, "no such file"), ("no blend", "Blender cannot open")])
@@ -198,10 +199,10 @@ def test_a_blend_file_that_is_none_is_named(tmp_path: Path, content: str | None,
     if content is not None:
         path.write_text(content)
     with pytest.raises(InputError, match=rf"mine\.blend.*{message}"):
-        render_dataset(replace(JOB, kind="blend", blend_path=str(path)), tmp_path / "data")
+        render_dataset(replace(JOB, model=BlendFile(str(path))), tmp_path / "data")
 
 
 def test_a_room_full_of_boxes_is_refused(tmp_path: Path) -> None:
-    full = replace(JOB.cornell, boxes=(Box((0.0, 0.0, 0.0), (0.98, 0.98, 0.98), 0.0),))
+    full = replace(JOB.model, boxes=(Box((0.0, 0.0, 0.0), (0.98, 0.98, 0.98), 0.0),))
     with pytest.raises(InputError, match="room for"):
-        render_dataset(replace(JOB, cornell=full), tmp_path)
+        render_dataset(replace(JOB, model=full), tmp_path)

@@ -74,7 +74,7 @@ def test_boxes_stand_on_the_floor_of_a_centred_room() -> None:
     config = _config(kind="cornell")
     room = config.scene.cornell
     room.room, room.tall_size, room.tall_center, room.tall_angle = [1.0, 0.8, 0.6], [0.1, 0.2, 0.4], [0.5, 0.4], 90.0
-    cornell = dataset_job(config).cornell
+    cornell = dataset_job(config).model
     tall = cornell.boxes[0]
     assert cornell.room == (1.0, 0.8, 0.6)
     assert tall.center == pytest.approx((0.0, 0.0, -0.1))  # its foot is at −0.3, the floor

@@ -1,6 +1,5 @@
 """Blender and Cycles: the only code that imports bpy, and it does so in a process of its own.
 
-`process.render_dataset` and `process.render_room` are the ways in; they, `job` and `room_job` import without
-bpy. The modules that `__main__` runs inside that process are `cornell`, `blend`, `room`, `geometry`, `cameras`,
-`targets`, `plan`, `cycles` and `passes`.
+`process.render_dataset` and `process.render_room` are the ways in; they, `job`, `room_job` and `models.parameters`
+import without bpy. All other modules here are run by `__main__` inside that process.
 """

@@ -21,9 +21,20 @@ CORNELL_FOCUS = (0.0, 0.0, -0.12)
 CORNELL_TARGET_CAMERAS = ((0.0, -1.5, 0.05), (-0.35, -1.2, 0.25), (0.35, -1.2, 0.25))
 CORNELL_TARGET_ANGLE = math.radians(38.0)
 
+#: Classes of fit targets that any scene may have.
+USUAL_CLASSES = ("visible", "out_of_frame", "occluded")
+
 
 class Layout(Protocol):
-    """Draws the cameras and lights that suit a kind of scene."""
+    """Draws the cameras and lights that suit a kind of scene.
+
+    Attributes:
+        classes: of fit targets that suit it.
+        is_lit_everywhere: light gets into every view, so that no view's light need be chosen for it.
+    """
+
+    classes: tuple[str, ...]
+    is_lit_everywhere: bool
 
     def camera(self, rng: np.random.Generator, index: int) -> Camera:
         """The camera of view `index` of a split."""
@@ -31,8 +42,20 @@ class Layout(Protocol):
     def light(self, rng: np.random.Generator, clearance: float) -> np.ndarray:
         """(3,) a light position at least `clearance` from any surface."""
 
+    def hidden_light(self, rng: np.random.Generator, clearance: float) -> np.ndarray:
+        """The same, where it may be behind something."""
+
     def target_cameras(self) -> list[Camera]:
         """The three fixed cameras that see every fit target."""
+
+
+@dataclass(frozen=True)
+class FixedView:
+    """A camera at `origin` that looks at `focus`, `degrees` across; both (3,)."""
+
+    origin: tuple[float, float, float]
+    focus: tuple[float, float, float]
+    degrees: float
 
 
 @dataclass(frozen=True)
@@ -41,6 +64,8 @@ class CornellLayout:
 
     space: FreeSpace
     resolution: int
+    classes: tuple[str, ...] = USUAL_CLASSES
+    is_lit_everywhere: bool = True
 
     @property
     def _size(self) -> np.ndarray:
@@ -69,6 +94,9 @@ class CornellLayout:
                 return point
         raise no_room(f"a place {clearance:g} from any surface")
 
+    def hidden_light(self, rng: np.random.Generator, clearance: float) -> np.ndarray:
+        return self.light(rng, clearance)
+
     def target_cameras(self) -> list[Camera]:
         angle = math.degrees(CORNELL_TARGET_ANGLE)
         origins = (np.array(origin) for origin in CORNELL_TARGET_CAMERAS)
@@ -77,10 +105,17 @@ class CornellLayout:
 
 @dataclass(frozen=True)
 class RoomLayout:
-    """Any scene with an inside: cameras and lights stand in it."""
+    """Any scene with an inside: cameras and lights stand in it.
+
+    Attributes:
+        fixed: the target cameras; by default some that see much of the room are looked for.
+    """
 
     space: FreeSpace
     resolution: int
+    classes: tuple[str, ...] = USUAL_CLASSES
+    fixed: tuple[FixedView, ...] = ()
+    is_lit_everywhere: bool = False
 
     def camera(self, rng: np.random.Generator, index: int) -> Camera:
         for _ in range(MAX_DRAWS):
@@ -99,7 +134,15 @@ class RoomLayout:
                 return point
         raise no_room(f"a place {clearance:g} from any surface")
 
+    def hidden_light(self, rng: np.random.Generator, clearance: float) -> np.ndarray:
+        return self.light(rng, clearance)
+
     def target_cameras(self) -> list[Camera]:
+        if not self.fixed:
+            return self._overview()
+        return [aimed(np.array(v.origin), np.array(v.focus), v.degrees, self.resolution) for v in self.fixed]
+
+    def _overview(self) -> list[Camera]:
         """The place from which most of the room is in sight, and two beside it.
 
         All look from one side, so that some of the room is in no frame.
@@ -126,10 +169,27 @@ class RoomLayout:
 
 @dataclass(frozen=True)
 class ObjectLayout:
-    """An object in empty space: cameras on a sphere around it, lights in a shell."""
+    """An object in empty space: cameras in a shell around it, lights in a wider one.
+
+    Attributes:
+        distances: inner and outer radius of the cameras' shell, in radii of the object.
+        lowest_view: least height of a camera over its distance; −1 is straight below.
+        nearest_light: inner radius of the lights' shell, in radii of the object; the outer one is 2.
+        lowest_light: least height of a light over its distance.
+        hidden_reach: how far away lights may be hidden, in radii of the object.
+        target_slope: height of the target cameras over their distance from the vertical axis.
+    """
 
     space: FreeSpace
     resolution: int
+    classes: tuple[str, ...] = USUAL_CLASSES
+    distances: tuple[float, float] = (2.6, 3.2)
+    lowest_view: float = -0.3
+    nearest_light: float = 0.0
+    lowest_light: float = -1.0
+    hidden_reach: float = 2.0
+    target_slope: float = 0.35
+    is_lit_everywhere: bool = False
 
     @property
     def _radius(self) -> float:
@@ -138,22 +198,32 @@ class ObjectLayout:
 
     def camera(self, rng: np.random.Generator, index: int) -> Camera:
         direction = rng.normal(size=3)
-        direction[2] = max(direction[2], -0.3 * float(np.linalg.norm(direction)))
-        origin = direction / np.linalg.norm(direction) * self._radius * rng.uniform(2.6, 3.2)
+        direction[2] = max(direction[2], self.lowest_view * float(np.linalg.norm(direction)))
+        origin = direction / np.linalg.norm(direction) * self._radius * rng.uniform(*self.distances)
         focus = rng.uniform(-0.1, 0.1, 3)
         return aimed(origin, focus, rng.uniform(40.0, 50.0), self.resolution)
 
     def light(self, rng: np.random.Generator, clearance: float) -> np.ndarray:
+        return self._place(rng, clearance, self.nearest_light, 2.0)
+
+    def hidden_light(self, rng: np.random.Generator, clearance: float) -> np.ndarray:
+        return self._place(rng, clearance, 0.0, self.hidden_reach)
+
+    def _place(self, rng: np.random.Generator, clearance: float, inner: float, outer: float) -> np.ndarray:
+        """A place between two radii, in radii of the object."""
         for _ in range(MAX_DRAWS):
-            point = rng.uniform(-2.0, 2.0, 3) * self._radius
-            if np.linalg.norm(point) < 2.0 * self._radius and self.space.has_room_for(point, clearance):
+            point = rng.uniform(-outer, outer, 3) * self._radius
+            distance = np.linalg.norm(point)
+            is_in_shell = inner * self._radius <= distance < outer * self._radius
+            if is_in_shell and point[2] >= self.lowest_light * distance and self.space.has_room_for(point, clearance):
                 return point
         raise no_room(f"a place {clearance:g} from any surface")
 
     def target_cameras(self) -> list[Camera]:
         cameras = []
         for azimuth in (0.0, -0.6, 0.6):
-            origin = 3.0 * self._radius * np.array([math.sin(azimuth), -math.cos(azimuth), 0.35])
+            direction = np.array([math.sin(azimuth), -math.cos(azimuth), self.target_slope])
+            origin = (self.distances[1] - 0.2) * self._radius * direction
             cameras.append(aimed(origin, np.zeros(3), 40.0, self.resolution))
         return cameras
 

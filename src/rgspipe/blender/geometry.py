@@ -23,6 +23,9 @@ MAX_ENCLOSURE_CELLS = 2000
 #: A place is inside a room if at least this share of directions ends on a surface.
 ROOM_ENCLOSURE = 0.6
 
+#: Closed rooms that fill at least this share of a scene's box are its interior.
+CLOSED_SHARE = 0.1
+
 
 class Geometry:
     """The triangles of a scene in a tree.
@@ -98,12 +101,18 @@ class FreeSpace:
         )
         centers = self._centers.reshape(-1, 3)
         self._is_clear = [geometry.clearance(center) > self.cell for center in centers]
-        self._free = self._classify(self._flood(counts))
+        labels = self._flood(counts)
+        self._free = self._classify(labels)
+        self._closed = self._free & (labels != 0)
 
     @cached_property
     def interior(self) -> np.ndarray:
-        """(M, 3) centres of free cells inside a room: surfaces in most directions. Few or none for one object."""
-        candidates = self._centers[self._free & self._within_bounds]
+        """(M, 3) centres of free cells inside a room: surfaces in most directions. Few or none for one object.
+
+        Where there are closed rooms, what lies outside of them is no interior, however enclosed.
+        """
+        has_rooms = self._closed.sum() > CLOSED_SHARE * self._within_bounds.sum()
+        candidates = self._centers[(self._closed if has_rooms else self._free) & self._within_bounds]
         candidates = candidates[:: 1 + len(candidates) // MAX_ENCLOSURE_CELLS]
         enclosed = [self._enclosure(center)[0] >= ROOM_ENCLOSURE for center in candidates]
         return candidates[np.array(enclosed, bool)]

@@ -3,47 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, field
-from typing import Literal
 
-Vector = tuple[float, float, float]
-
-
-@dataclass(frozen=True)
-class Box:
-    """A solid box that stands in the room.
-
-    Attributes:
-        center: scene units.
-        size: edge lengths, scene units.
-        turn: rotation about +z, rad.
-        albedo: diffuse reflectance RGB.
-    """
-
-    center: Vector
-    size: Vector
-    turn: float
-    albedo: Vector = (0.73, 0.73, 0.73)
-
-
-@dataclass(frozen=True)
-class CornellParameters:
-    """A room around the origin, inside the unit cube, open towards −y, with boxes in it; +z is up.
-
-    Attributes:
-        room: width (x), depth (y) and height (z), scene units.
-        white: albedo of floor, ceiling and back wall (+y).
-        left, right: albedo of the walls at −x and +x.
-        boxes: what stands in the room.
-    """
-
-    room: Vector = (1.0, 1.0, 1.0)
-    white: Vector = (0.73, 0.73, 0.73)
-    left: Vector = (0.65, 0.05, 0.05)
-    right: Vector = (0.12, 0.45, 0.15)
-    boxes: tuple[Box, ...] = (
-        Box(center=(-0.17, 0.12, -0.2), size=(0.28, 0.28, 0.6), turn=0.3),
-        Box(center=(0.18, -0.15, -0.35), size=(0.28, 0.28, 0.3), turn=-0.3),
-    )
+from rgspipe.blender.models.parameters import KINDS, CornellParameters, Model, kind_of
 
 
 @dataclass(frozen=True)
@@ -69,11 +30,9 @@ class DatasetJob:
 
     Attributes:
         scene: name of the scene, written into dataset_info.json.
-        kind: a Cornell box of our own, or the user's .blend file.
-        blend_path: the file, for kind "blend".
-        cornell: the room, for kind "cornell".
+        model: what is rendered: the measures of a scene of our own, or the user's .blend file.
         train_views, test_views: images with one known light each.
-        targets_per_class: fit targets of each class (visible, out of frame, occluded).
+        targets_per_class: fit targets of each class that suits the scene.
         target_views: cameras that see every target, 1 to 3.
         resolution: width and height of every image, pixels.
         samples: Cycles samples a pixel.
@@ -86,9 +45,7 @@ class DatasetJob:
     """
 
     scene: str = "cornell"
-    kind: Literal["cornell", "blend"] = "cornell"
-    blend_path: str | None = None
-    cornell: CornellParameters = field(default_factory=CornellParameters)
+    model: Model = field(default_factory=CornellParameters)
     train_views: int = 100
     test_views: int = 24
     targets_per_class: int = 20
@@ -108,8 +65,6 @@ class DatasetJob:
                 raise ValueError(f"{name} must be at least {lowest}, got {getattr(self, name)}")
         if not 1 <= self.target_views <= 3:
             raise ValueError(f"target_views must be 1, 2 or 3, got {self.target_views}")
-        if self.kind == "blend" and not self.blend_path:
-            raise ValueError('kind "blend" needs blend_path')
 
     @property
     def settings(self) -> RenderSettings:
@@ -117,15 +72,11 @@ class DatasetJob:
         return RenderSettings(self.resolution, self.samples, self.denoise, self.max_bounces)
 
     def to_json(self) -> dict:
-        return asdict(self)
+        return asdict(self) | {"kind": kind_of(self.model)}
 
     @classmethod
     def from_json(cls, content: dict) -> DatasetJob:
         """The job that `to_json` described."""
-        room = dict(content["cornell"])
-        boxes = tuple(
-            Box(tuple(box["center"]), tuple(box["size"]), box["turn"], tuple(box["albedo"]))
-            for box in room.pop("boxes")
-        )
-        walls = {name: tuple(albedo) for name, albedo in room.items()}
-        return cls(**{**content, "cornell": CornellParameters(**walls, boxes=boxes)})
+        values = dict(content)
+        model = KINDS[values.pop("kind")].from_plain(values.pop("model"))
+        return cls(**values, model=model)

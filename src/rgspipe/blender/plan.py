@@ -11,19 +11,17 @@ import torch
 from rgspipe.blender.cameras import MAX_DRAWS, Layout, no_room
 from rgspipe.blender.geometry import Geometry
 from rgspipe.blender.job import DatasetJob
-from rgspipe.blender.targets import OCCLUSION_CLASSES, classify, lit_share, random_intensity
+from rgspipe.blender.models.parameters import BlendFile
+from rgspipe.blender.targets import MIN_LIT_SHARE, is_of_class, lit_share, random_intensity
 from rgspipe.scene import Camera, PointLight
 
 log = logging.getLogger(__name__)
-
-#: Share of what a view shows that its light reaches directly; darker views tell nothing about their light.
-MIN_LIT_SHARE = 0.02
 
 #: Lights that are tried for one view.
 MAX_LIGHTS = 50
 
 #: Numbers of the random streams; part of the seed, so never renumber them.
-STREAMS = {"train": 0, "test": 1, "visible": 2, "out_of_frame": 3, "occluded": 4}
+STREAMS = {"train": 0, "test": 1, "visible": 2, "out_of_frame": 3, "occluded": 4, "around_corner": 5}
 
 
 @dataclass(frozen=True)
@@ -76,9 +74,7 @@ def make_plan(job: DatasetJob, layout: Layout, geometry: Geometry) -> Plan:
     train = tuple(_view(job, layout, geometry, "train", index) for index in range(job.train_views))
     test = tuple(_view(job, layout, geometry, "test", index) for index in range(job.test_views))
     cameras = layout.target_cameras()
-    targets = [
-        target for occlusion in OCCLUSION_CLASSES for target in _targets(job, layout, geometry, cameras, occlusion)
-    ]
+    targets = [target for occlusion in layout.classes for target in _targets(job, layout, geometry, cameras, occlusion)]
     return Plan(train, test, tuple(targets))
 
 
@@ -93,10 +89,10 @@ def _view(job: DatasetJob, layout: Layout, geometry: Geometry, split: str, index
 def _view_light(
     job: DatasetJob, layout: Layout, geometry: Geometry, camera: Camera, rng: np.random.Generator
 ) -> np.ndarray:
-    """A light that the view shows something of; in the Cornell box light gets everywhere."""
+    """A light that the view shows something of."""
     for _ in range(MAX_LIGHTS):
         position = layout.light(rng, job.light_clearance)
-        if job.kind == "cornell" or lit_share(position, camera, geometry) >= MIN_LIT_SHARE:
+        if layout.is_lit_everywhere or lit_share(position, camera, geometry) >= MIN_LIT_SHARE:
             break
     return position
 
@@ -110,7 +106,7 @@ def _targets(
         rng = np.random.default_rng([job.seed, STREAMS[occlusion], index])
         position = _find(job, layout, geometry, cameras, occlusion, rng)
         if position is None:
-            if job.kind == "cornell":
+            if not isinstance(job.model, BlendFile):
                 raise no_room(f"a light of the class {occlusion}")
             log.warning("The scene has no place for a light of the class %s: no such targets.", occlusion)
             return targets
@@ -133,11 +129,12 @@ def _find(
     rng: np.random.Generator,
 ) -> np.ndarray | None:
     """A light position of the wanted class; None if there seems to be none."""
-    clearance = job.hidden_light_clearance if occlusion == "occluded" else job.light_clearance
     for _ in range(MAX_DRAWS // 4):
-        point = layout.light(rng, clearance)
-        is_wanted = classify(point, cameras, geometry.blocked) == occlusion
-        if is_wanted and lit_share(point, cameras[0], geometry) >= MIN_LIT_SHARE:
+        if occlusion == "occluded":
+            point = layout.hidden_light(rng, job.hidden_light_clearance)
+        else:
+            point = layout.light(rng, job.light_clearance)
+        if is_of_class(point, occlusion, layout.classes, cameras, geometry):
             return point
     return None
 

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import bpy
 
-from rgspipe.blender.cornell import diffuse_material
+from rgspipe.blender.materials import diffuse_material
+from rgspipe.blender.meshes import add, new_scene, polygon
 from rgspipe.blender.passes import Studio
 from rgspipe.blender.room_job import RoomFrame, RoomJob
 from rgspipe.datasets.exr import read_channels, write_channels
@@ -15,13 +16,10 @@ from rgspipe.errors import InputError
 
 def build_room(job: RoomJob) -> bpy.types.Scene:
     """A new scene that holds the rectangles and nothing else: no light, camera or world."""
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    scene = bpy.context.scene
+    scene = new_scene()
     for index, (corners, albedo) in enumerate(zip(job.corners, job.albedo, strict=True)):
-        mesh = bpy.data.meshes.new(f"rectangle_{index}")
-        mesh.from_pydata(corners, [], [(0, 1, 2, 3)])
-        mesh.materials.append(diffuse_material(f"rectangle_{index}", tuple(albedo)))
-        scene.collection.objects.link(bpy.data.objects.new(f"rectangle_{index}", mesh))
+        name = f"rectangle_{index}"
+        add(scene, polygon(name, corners), diffuse_material(name, tuple(albedo)))
     bpy.context.view_layer.update()
     return scene
 

@@ -6,10 +6,15 @@ from dataclasses import dataclass
 
 import bpy
 
-from rgspipe.blender import blend, cornell
-from rgspipe.blender.cameras import CornellLayout, Layout, ObjectLayout, RoomLayout
+from rgspipe.blender import blend
+from rgspipe.blender.cameras import Layout, ObjectLayout, RoomLayout
 from rgspipe.blender.geometry import FreeSpace, Geometry, scene_geometry
 from rgspipe.blender.job import DatasetJob
+from rgspipe.blender.models import cornell, corner, hotdog, room
+from rgspipe.blender.models.parameters import BlendFile, kind_of
+
+#: The scenes that are modelled here.
+MODELS = {"cornell": cornell, "corner": corner, "hotdog": hotdog, "room": room}
 
 
 @dataclass(frozen=True)
@@ -36,14 +41,18 @@ def open_scene(job: DatasetJob) -> PreparedScene:
     Raises:
         InputError: the .blend file is missing, not one, or has no surface to render.
     """
-    if job.kind == "cornell":
-        scene, rescale, offset = cornell.build(job.cornell), 1.0, (0.0, 0.0, 0.0)
-    else:
-        scene, rescale, offset = blend.open_normalised(job.blend_path)
+    if isinstance(job.model, BlendFile):
+        return _open_file(job.model, job.resolution)
+    model = MODELS[kind_of(job.model)]
+    scene = model.build(job.model)
+    geometry = scene_geometry(scene)
+    layout = model.layout(job.model, FreeSpace(geometry), job.resolution)
+    return PreparedScene(scene, geometry, layout, 1.0, (0.0, 0.0, 0.0))
+
+
+def _open_file(file: BlendFile, resolution: int) -> PreparedScene:
+    scene, rescale, offset = blend.open_normalised(file.path)
     geometry = scene_geometry(scene)
     space = FreeSpace(geometry)
-    if job.kind == "cornell":
-        layout: Layout = CornellLayout(space, job.resolution)
-    else:
-        layout = (RoomLayout if space.is_room else ObjectLayout)(space, job.resolution)
+    layout = RoomLayout(space, resolution) if space.is_room else ObjectLayout(space, resolution)
     return PreparedScene(scene, geometry, layout, rescale, offset)

@@ -1,4 +1,4 @@
-"""The classes of fit targets: lights in sight, out of every frame, and hidden behind something."""
+"""The classes of fit targets: lights in sight, out of every frame, hidden behind something, and around a corner."""
 
 from __future__ import annotations
 
@@ -20,7 +20,11 @@ Blocked = Callable[[np.ndarray, np.ndarray], bool]
 PROBES = 10
 SURFACE_OFFSET = 1e-4
 
-OCCLUSION_CLASSES = ("visible", "out_of_frame", "occluded")
+#: Share of what a view shows that its light reaches directly; darker views tell little about their light.
+MIN_LIT_SHARE = 0.02
+
+#: A light is around the corner if it reaches at most this share of what any camera sees.
+MAX_SHARE_AROUND_CORNER = 0.1
 
 
 def classify(point: np.ndarray, cameras: list[Camera], blocked: Blocked) -> str | None:
@@ -38,6 +42,27 @@ def classify(point: np.ndarray, cameras: list[Camera], blocked: Blocked) -> str 
     if all(hidden) and framed[0]:
         return "occluded"
     return None
+
+
+def is_of_class(
+    point: np.ndarray, wanted: str, classes: tuple[str, ...], cameras: list[Camera], geometry: Geometry
+) -> bool:
+    """Whether a light at `point` (3,) is of the class `wanted`, and shows enough to be found.
+
+    Where `around_corner` is one of the scene's classes, it comes before all others.
+    """
+    if "around_corner" in classes and is_around_corner(point, cameras, geometry):
+        return wanted == "around_corner"
+    is_wanted = classify(point, cameras, geometry.blocked) == wanted
+    return is_wanted and lit_share(point, cameras[0], geometry) >= MIN_LIT_SHARE
+
+
+def is_around_corner(point: np.ndarray, cameras: list[Camera], geometry: Geometry) -> bool:
+    """Whether `point` (3,) is in no camera's line of sight, and lights next to nothing of what they see directly."""
+    return all(
+        geometry.blocked(camera.origin.numpy(), point) and lit_share(point, camera, geometry) <= MAX_SHARE_AROUND_CORNER
+        for camera in cameras
+    )
 
 
 def lit_share(point: np.ndarray, camera: Camera, geometry: Geometry) -> float:

@@ -13,6 +13,10 @@ from rgspipe.stages import NAMES, stage_summary
 
 SCENES = """\
   cornell    a Cornell box with two boxes, modelled and rendered with Blender; scene.cornell.* sets its measures
+  cornell_glossy  the same with glossy boxes
+  corner     a closed corridor around a corner; targets with the light in the other leg (occlusion=around_corner)
+  hotdog     a hot dog on a plate: curved and textured, in empty space
+  room       a closed room with furniture, textured
   blend      a Blender file of yours: scene=blend scene.path=my.blend
   external   images, cameras and lights from disk, no Blender needed: scene=external scene.path=DIR"""
 

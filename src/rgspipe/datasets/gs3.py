@@ -22,7 +22,7 @@ from rgspipe.errors import InputError
 from rgspipe.progress import track
 from rgspipe.scene import PointLight
 
-OCCLUSIONS = ("visible", "out_of_frame", "occluded", "unknown")
+OCCLUSIONS = ("visible", "out_of_frame", "occluded", "around_corner", "unknown")
 
 
 def load_dataset(root: str | Path, *, train: bool = True, test: bool = True, targets: bool = True) -> Dataset:

@@ -11,7 +11,7 @@ from torch import Tensor
 from rgspipe.scene import Camera, PointLight
 
 #: Where a target's hidden light is, as the target's cameras see it.
-Occlusion = Literal["visible", "out_of_frame", "occluded", "unknown"]
+Occlusion = Literal["visible", "out_of_frame", "occluded", "around_corner", "unknown"]
 
 
 @dataclass(frozen=True)

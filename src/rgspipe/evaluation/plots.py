@@ -22,9 +22,15 @@ from rgspipe.evaluation.arrays import ArrayLike, to_array
 from rgspipe.evaluation.tables import class_order
 
 #: Colours that stay apart with colour blindness and in grey; markers say the same once more.
-COLOURS = {"visible": "#0072B2", "out_of_frame": "#E69F00", "occluded": "#6A1B4D"}
-MARKERS = {"visible": "o", "out_of_frame": "s", "occluded": "^"}
-LABELS = {"visible": "visible", "out_of_frame": "out of frame", "occluded": "occluded", "unknown": "unclassified"}
+COLOURS = {"visible": "#0072B2", "out_of_frame": "#E69F00", "occluded": "#6A1B4D", "around_corner": "#009E73"}
+MARKERS = {"visible": "o", "out_of_frame": "s", "occluded": "^", "around_corner": "v"}
+LABELS = {
+    "visible": "visible",
+    "out_of_frame": "out of frame",
+    "occluded": "occluded",
+    "around_corner": "around the corner",
+    "unknown": "unclassified",
+}
 OTHER_COLOUR, OTHER_MARKER = "#666666", "D"
 
 INK, FAINT = "#222222", "#c9cdd2"

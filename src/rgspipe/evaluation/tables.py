@@ -16,7 +16,7 @@ from rgspipe.evaluation.arrays import to_array
 from rgspipe.scene import LightRig
 
 #: Occlusion classes in the order in which every table and figure shows them.
-CLASSES = ("visible", "out_of_frame", "occluded", "unknown")
+CLASSES = ("visible", "out_of_frame", "occluded", "around_corner", "unknown")
 #: The row that holds all targets of a method and view count.
 ALL = "all"
 

@@ -1,17 +1,18 @@
-"""Make the images: render a Cornell box or a .blend file with Blender, or take a dataset from disk."""
+"""Make the images: render a scene of ours or a .blend file with Blender, or take a dataset from disk."""
 
 from __future__ import annotations
 
-import math
+from dataclasses import replace
 from pathlib import Path
 
-from rgspipe.blender.job import Box, CornellParameters, DatasetJob
+from rgspipe.blender.job import DatasetJob
 from rgspipe.blender.process import render_dataset
-from rgspipe.config import CornellConfig, RgspipeConfig, scene_name
+from rgspipe.config import MODELLED, RgspipeConfig, scene_name
 from rgspipe.datasets.gs3 import load_dataset
 from rgspipe.datasets.location import point_at_dataset
 from rgspipe.errors import InputError
 from rgspipe.stages.base import Stage, StageContext
+from rgspipe.stages.scene_model import scene_model
 from rgspipe.stages.sources import require_images
 
 
@@ -28,17 +29,18 @@ def dataset_job(config: RgspipeConfig) -> DatasetJob:
     """What the configuration asks Blender for.
 
     Raises:
-        InputError: `scene.path` names no file, or more views of a target are wanted than there are cameras.
+        InputError: `scene.path` names no file, or more views of a target are wanted than there are cameras, or
+            a material makes light.
     """
     if config.dataset.target_views > 3:
         found = str(config.dataset.target_views)
         raise InputError("dataset.target_views", expected="1, 2 or 3", found=found, remedy="Use up to 3 views.")
-    wanted = config.dataset
+    wanted, scene = config.dataset, config.scene
+    if scene.kind == "blend":
+        scene = replace(scene, path=str(_existing_path(config, "a .blend file")))
     return DatasetJob(
         scene=scene_name(config),
-        kind=config.scene.kind,
-        blend_path=str(_existing_path(config, "a .blend file")) if config.scene.kind == "blend" else None,
-        cornell=cornell_parameters(config.scene.cornell),
+        model=scene_model(scene),
         train_views=wanted.train_views,
         test_views=wanted.test_views,
         targets_per_class=wanted.targets_per_class,
@@ -49,27 +51,6 @@ def dataset_job(config: RgspipeConfig) -> DatasetJob:
         max_bounces=wanted.max_bounces,
         seed=wanted.seed,
     )
-
-
-def cornell_parameters(wanted: CornellConfig) -> CornellParameters:
-    """The room around the origin; the configuration measures from the front left corner of the floor."""
-    boxes = (
-        _standing_box(wanted, wanted.tall_size, wanted.tall_center, wanted.tall_angle),
-        _standing_box(wanted, wanted.short_size, wanted.short_center, wanted.short_angle),
-    )
-    return CornellParameters(
-        room=tuple(wanted.room),
-        white=tuple(wanted.wall_color),
-        left=tuple(wanted.left_color),
-        right=tuple(wanted.right_color),
-        boxes=boxes,
-    )
-
-
-def _standing_box(wanted: CornellConfig, size: list[float], foot: list[float], degrees: float) -> Box:
-    width, depth, height = wanted.room
-    center = (foot[0] - 0.5 * width, foot[1] - 0.5 * depth, 0.5 * (size[2] - height))
-    return Box(center, tuple(size), math.radians(degrees), tuple(wanted.box_color))
 
 
 def _take_external(context: StageContext) -> None:
@@ -95,17 +76,14 @@ def _inputs(config: RgspipeConfig) -> tuple[()]:
 
 
 def _config_keys(config: RgspipeConfig) -> tuple[str, ...]:
-    by_kind = {
-        "cornell": ("scene.cornell", "dataset"),
-        "blend": ("dataset",),
-        "external": (),
-        "ply": (),
-    }
-    return ("scene.kind", *by_kind[config.scene.kind])
+    kind = config.scene.kind
+    if kind in MODELLED:
+        return ("scene.kind", f"scene.{kind}", "dataset")
+    return ("scene.kind", "dataset") if kind == "blend" else ("scene.kind",)
 
 
 def _files(config: RgspipeConfig) -> tuple[Path, ...]:
-    if config.scene.kind == "cornell" or config.scene.path is None or not Path(config.scene.path).exists():
+    if config.scene.kind in MODELLED or config.scene.path is None or not Path(config.scene.path).exists():
         return ()
     return (Path(config.scene.path).resolve(),)
 
@@ -122,6 +100,7 @@ STAGE = Stage(
         "rgspipe.datasets.gs3_write",
         "rgspipe.datasets.light_file",
         "rgspipe.scene.camera",
+        "rgspipe.stages.scene_model",
     ),
     files=_files,
 )

@@ -1,0 +1,80 @@
+"""From the configuration of a scene that Blender renders to its model's measures."""
+
+from __future__ import annotations
+
+import math
+
+from rgspipe.blender.models.parameters import (
+    BlendFile,
+    Box,
+    CornellParameters,
+    CornerParameters,
+    HotdogParameters,
+    Model,
+    RoomParameters,
+)
+from rgspipe.config import CornellConfig, CornerConfig, SceneConfig
+from rgspipe.errors import InputError
+
+
+def scene_model(scene: SceneConfig) -> Model:
+    """What Blender is to build or open.
+
+    Raises:
+        InputError: a material would reflect more light than it gets.
+    """
+    if scene.kind == "cornell":
+        return cornell_parameters(scene.cornell)
+    if scene.kind == "corner":
+        return _corner_parameters(scene.corner)
+    if scene.kind == "hotdog":
+        return HotdogParameters(scene.hotdog.textured, scene.hotdog.segments)
+    if scene.kind == "room":
+        return RoomParameters(scene.room.textured, scene.room.segments)
+    return BlendFile(scene.path)
+
+
+def cornell_parameters(wanted: CornellConfig) -> CornellParameters:
+    """The room around the origin; the configuration measures from the front left corner of the floor.
+
+    Raises:
+        InputError: the boxes' colour and gloss together exceed 1.
+    """
+    reflected = max(wanted.box_color) + wanted.gloss
+    if wanted.gloss > 0.0 and reflected > 1.0:
+        raise InputError(
+            "scene.cornell.gloss",
+            expected="at most 1 together with the brightest channel of scene.cornell.box_color",
+            found=f"{reflected:g}",
+            remedy="Lower one of them.",
+        )
+    boxes = (
+        _standing_box(wanted, wanted.tall_size, wanted.tall_center, wanted.tall_angle),
+        _standing_box(wanted, wanted.short_size, wanted.short_center, wanted.short_angle),
+    )
+    return CornellParameters(
+        room=tuple(wanted.room),
+        white=tuple(wanted.wall_color),
+        left=tuple(wanted.left_color),
+        right=tuple(wanted.right_color),
+        boxes=boxes,
+        gloss=wanted.gloss,
+        shininess=wanted.shininess,
+    )
+
+
+def _standing_box(wanted: CornellConfig, size: list[float], foot: list[float], degrees: float) -> Box:
+    width, depth, height = wanted.room
+    center = (foot[0] - 0.5 * width, foot[1] - 0.5 * depth, 0.5 * (size[2] - height))
+    return Box(center, tuple(size), math.radians(degrees), tuple(wanted.box_color))
+
+
+def _corner_parameters(wanted: CornerConfig) -> CornerParameters:
+    return CornerParameters(
+        width=wanted.width,
+        height=wanted.height,
+        wall=tuple(wanted.wall_color),
+        floor=tuple(wanted.floor_color),
+        near_end=tuple(wanted.near_end_color),
+        far_end=tuple(wanted.far_end_color),
+    )
