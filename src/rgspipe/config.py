@@ -85,7 +85,7 @@ class HotdogConfig:
     """A hot dog on a plate, in empty space."""
 
     textured: bool = option(True, "textures on bun and sausage; without them every part has one colour")
-    segments: int = option(192, "faces around plate and bun", low=24, high=2000)
+    segments: int = option(192, "faces around plate and bun", low=48, high=2000)
 
 
 @dataclass
@@ -93,7 +93,7 @@ class RoomConfig:
     """A closed room with a table, a bookcase, an armchair and ten other things."""
 
     textured: bool = option(True, "textures on floor, walls and furniture; without them every part has one colour")
-    segments: int = option(192, "faces around whatever is round", low=24, high=2000)
+    segments: int = option(192, "faces around whatever is round", low=48, high=2000)
 
 
 @dataclass

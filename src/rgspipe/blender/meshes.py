@@ -11,7 +11,7 @@ import numpy as np
 from rgspipe.blender.models.parameters import Vector
 
 #: Faces that meet at more than this [rad] form an edge; all others are parts of one smooth surface.
-EDGE_ANGLE = math.radians(25.0)
+EDGE_ANGLE = math.radians(15.0)
 
 #: Points nearer than this are one: the poles of swept solids, scene units.
 MERGE_DISTANCE = 1e-6

@@ -18,7 +18,7 @@ BUN_LENGTH, BUN_WIDTH, BUN_HEIGHT, BUN_LEVEL = 0.34, 0.155, 0.1, -0.005
 SAUSAGE_LENGTH, SAUSAGE_RADIUS, SAUSAGE_LEVEL = 0.39, 0.062, 0.055
 
 #: Waves of the sauce, how far they swing, and the radius of its line.
-SAUCE_WAVES, SAUCE_SWING, SAUCE_RADIUS = 5.5, 0.036, 0.0145
+SAUCE_WAVES, SAUCE_SWING, SAUCE_RADIUS = 4.5, 0.032, 0.0135
 
 COLOURS: dict[str, Vector] = {
     "plate": (0.78, 0.78, 0.76),
@@ -68,7 +68,9 @@ def _plate_outline() -> tuple[np.ndarray, np.ndarray]:
     radius = np.concatenate([np.linspace(0.0, 0.3, 12), np.linspace(0.3, 0.49, 40)[1:]])
     rise = np.clip((radius - 0.3) / 0.19, 0.0, 1.0)
     top = np.stack([radius, -0.105 + 0.07 * rise * rise * (1.5 - 0.5 * rise)], axis=-1)
-    lip = top[-1] + 0.01 * np.array([[math.sin(a), math.cos(a) - 1.0] for a in np.linspace(0.3, math.pi, 12)])
+    slope = math.atan2(*(top[-1] - top[-2])[::-1])
+    turn = np.linspace(slope, math.pi, 64)[1:]
+    lip = top[-1] + 0.01 * np.stack([np.sin(turn) - math.sin(slope), np.cos(turn) - math.cos(slope)], axis=-1)
     foot = np.array([[0.3, -0.125], [0.0, -0.125]])
     outline = np.concatenate([top, lip, foot])
     middle = 0.5 * (outline[:-1, 0] + outline[1:, 0])
@@ -82,8 +84,8 @@ def _bun(segments: int) -> tuple[np.ndarray, np.ndarray]:
     crust = np.linspace(opening, 2.0 * math.pi - opening, segments)  # from the top, around below, to the top
     y, z = BUN_WIDTH * np.sin(crust), BUN_HEIGHT * np.cos(crust)
     half, depth = y[0], 0.75 * BUN_HEIGHT
-    across = np.linspace(-1.0, 1.0, segments // 2)[1:-1]
-    groove_y, groove_z = half * across, z[0] - depth * np.sqrt(1.0 - across**2)
+    across = np.linspace(0.0, math.pi, segments // 2)[1:-1]
+    groove_y, groove_z = -half * np.cos(across), z[0] - depth * np.sin(across)
     section = np.stack([np.concatenate([y, groove_y]), np.concatenate([z, groove_z])], axis=-1)
     paint = (np.arange(len(section)) >= len(crust) - 1).astype(int)
     return _tapered(section, BUN_LENGTH, segments, 4.0) + np.array([0.0, 0.0, BUN_LEVEL]), paint
@@ -100,7 +102,7 @@ def _tapered(section: np.ndarray, length: float, count: int, power: float) -> np
 
 def _sausage(segments: int) -> np.ndarray:
     """A bent capsule."""
-    around = np.linspace(0.0, 2.0 * math.pi, segments // 2, endpoint=False)
+    around = np.linspace(0.0, 2.0 * math.pi, segments, endpoint=False)
     section = SAUSAGE_RADIUS * np.stack([np.cos(around), np.sin(around)], axis=-1)
     rings = _tapered(section, SAUSAGE_LENGTH, segments, 8.0)
     rings[..., 2] += _bend(rings[..., 0])
@@ -114,14 +116,13 @@ def _bend(x: np.ndarray) -> np.ndarray:
 
 def _sauce(segments: int) -> np.ndarray:
     """A tube that winds along the top of the sausage."""
-    count = 4 * segments
-    step = np.linspace(-1.0, 1.0, count)
+    step = np.linspace(-1.0, 1.0, 3 * segments)
     x = 0.32 * step
     y = SAUCE_SWING * np.sin(SAUCE_WAVES * math.pi * step)
     z = _bend(x) + np.sqrt(SAUSAGE_RADIUS**2 - y * y) + 0.4 * SAUCE_RADIUS
     path = np.stack([x, y, z], axis=-1)
     radius = SAUCE_RADIUS * (1.0 - np.abs(step) ** 60) ** 0.5
-    return _tube(path, radius, segments // 4)
+    return _tube(path, radius, segments // 2)
 
 
 def _tube(path: np.ndarray, radius: np.ndarray, around: int) -> np.ndarray:
