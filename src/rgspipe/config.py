@@ -181,13 +181,14 @@ class InitConfig:
 class TrainConfig:
     """From images to material and refined geometry."""
 
-    rounds: int = option(8, "rounds of the linear albedo solve, before and after the geometry", low=1, high=1000)
+    rounds: int = option(5, "rounds of the linear albedo solve, before and after the geometry", low=1, high=1000)
     steps: int = option(140, "gradient steps of the geometry", low=0, high=1000000)
     views_per_step: int = option(5, "images that a gradient step looks at", low=1, high=1000)
     edge_pixels: int = option(2000, "most pixels on edges, of each image of a step", low=1, high=10_000_000)
     interior_pixels: int = option(1000, "most pixels elsewhere, of each image of a step", low=0, high=10_000_000)
     subsamples: int = option(3, "rays per pixel of a step, squared", low=1, high=16)
     supersampling: int = option(4, "rays per edge pixel in view weights, squared", low=1, high=16)
+    at_pixels: bool = option(True, "direct light where pixels look, otherwise at surfels' centres: softer shadows")
     gather_rays: int = option(128, "hemisphere rays of a surfel while training", low=8, high=65536)
     patches: int = option(500, "patches of the indirect light while training", low=8, high=20000)
     checkpoint_every: int = option(20, "gradient steps between checkpoints", low=1, high=1000000)

@@ -12,7 +12,8 @@ import torch
 from lit_room import VISIBLE, room_cameras, room_surfels
 from rgspipe.datasets.views import View
 from rgspipe.scene import PointLight, Surfels
-from rgspipe.training.trainer import TrainOptions, build_transport
+from rgspipe.training.materials import build_transport
+from rgspipe.training.trainer import TrainOptions
 from rgspipe.training.validate import HeldOut, render_held_out
 
 OPTIONS = TrainOptions(gather_rays=64, patches=100)

@@ -19,8 +19,9 @@ from rgspipe.evaluation.held_out import held_out_picture
 from rgspipe.evaluation.images import save_png
 from rgspipe.stages.base import Stage, StageContext
 from rgspipe.training.checkpoint import Checkpoint
+from rgspipe.training.materials import build_transport, fit_materials
 from rgspipe.training.refine import RefineOptions
-from rgspipe.training.trainer import Trained, TrainOptions, build_transport, fit_direct_materials, train
+from rgspipe.training.trainer import Trained, TrainOptions, train
 from rgspipe.training.validate import render_held_out
 
 
@@ -38,7 +39,11 @@ def run(context: StageContext) -> None:
 
     began = time.perf_counter()
     held_out = render_held_out(
-        trained.surfels, dataset.test, build_transport(trained.surfels, options), options.supersampling
+        trained.surfels,
+        dataset.test,
+        build_transport(trained.surfels, options),
+        options.supersampling,
+        options.at_pixels,
     )
     seconds = {"training": trained.records[-1].seconds, "held_out": time.perf_counter() - began}
     metrics = held_out.summary() | {"surfels": len(trained.surfels), "seconds": seconds["training"]}
@@ -71,6 +76,7 @@ def train_options(config: TrainConfig) -> TrainOptions:
         gather_rays=config.gather_rays,
         patches=config.patches,
         supersampling=config.supersampling,
+        at_pixels=config.at_pixels,
         seed=config.seed,
     )
 
@@ -79,8 +85,9 @@ def _direct_only(
     trained: Trained, train_views: tuple[View, ...], test_views: tuple[View, ...], options: TrainOptions
 ) -> float:
     """Mean held-out PSNR of the same geometry when light does not bounce, its albedo fitted accordingly."""
-    surfels = fit_direct_materials(trained.surfels, train_views, options)
-    return float(np.mean(render_held_out(surfels, test_views, None, options.supersampling).psnr))
+    surfels = fit_materials(trained.surfels, train_views, options, bounces=False).surfels
+    held_out = render_held_out(surfels, test_views, None, options.supersampling, options.at_pixels)
+    return float(np.mean(held_out.psnr))
 
 
 def _write_table(path: Path, trained: Trained) -> None:

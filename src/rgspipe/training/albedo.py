@@ -1,8 +1,8 @@
 """Albedo from images: linear least squares with the indirect light held from the round before.
 
-With the light that reaches every surfel known, each image is linear in albedo: image_v = W_v (ρ ∘ L_v).
-The indirect part of L_v depends on ρ itself and is taken from the last round; undamped, that loop
-oscillates around a value that is too dark, so each round goes only part of the way.
+With the light that bounces known, each image is linear in albedo: image_v = D_v (ρ ∘ I_v) + W_v (ρ ∘ L_v), see
+`view_model`. L_v depends on ρ itself and is taken from the last round; undamped, that loop oscillates around a
+value that is too dark, so each round goes only part of the way.
 """
 
 from __future__ import annotations
@@ -16,15 +16,19 @@ import torch
 from scipy.spatial import cKDTree
 from torch import Tensor
 
+from rgspipe.datasets.views import View
 from rgspipe.progress import track
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.transport import PatchTransport, with_albedo
-from rgspipe.renderer.view_weights import ViewWeights
 from rgspipe.scene.surfels import Surfels
-from rgspipe.training.lighting import Lighting, total_irradiance
+from rgspipe.training.lighting import Lighting, indirect_irradiance
+from rgspipe.training.view_model import ViewModel
 
 #: Part of the way to the least-squares solution that a round goes when light bounces.
 DAMPING = 0.45
+
+#: Rounds that the next one is mixed from, and how little their differences may count.
+MIXED, MIXING_RIDGE = 3, 1e-4
 
 #: Conjugate-gradient steps of a round; each round starts from the last one's solution.
 CG_STEPS = 6
@@ -32,11 +36,27 @@ CG_STEPS = 6
 #: Albedo stays within these: below is numerically black, above rooms that never darken.
 ALBEDO_RANGE = (0.005, 0.98)
 
-#: Weight of neighbours' likeness, of the pull to PRIOR, and the albedo step that counts as an edge.
-SMOOTHNESS, PULL, PRIOR, ALBEDO_EDGE = 0.1, 0.003, 0.5, 0.08
+#: Weight of neighbours' likeness, of the pull to GREY, and the albedo step that counts as an edge.
+SMOOTHNESS, PULL, GREY, ALBEDO_EDGE = 0.1, 0.003, 0.5, 0.08
 
 #: Pixels with less surface than this say nothing of it.
 MINIMUM_COVERAGE = 0.3
+
+#: … and so do those whose alpha and coverage differ by more: there the surfels end where the object does not.
+COVERAGE_MISMATCH = 0.1
+
+
+@dataclass(frozen=True)
+class AlbedoPrior:
+    """What is known of the albedo before any image is explained.
+
+    Attributes:
+        albedo: (N, 3) expected.
+        weight: (N,) how much it counts against the images, which weigh 1 in the median surfel; 0 for not at all.
+    """
+
+    albedo: Tensor
+    weight: Tensor
 
 
 @dataclass(frozen=True)
@@ -44,22 +64,27 @@ class AlbedoProblem:
     """What stays the same over the rounds.
 
     Attributes:
-        weights: view weights of V views.
+        models: of V views.
         images: V images (pixels, 3).
         pixel_weights: V weights (pixels,) of squared errors: relative in bright pixels, absolute in dark.
         neighbours: (N, 6) nearest surfels by position and normal.
     """
 
-    weights: Sequence[ViewWeights]
+    models: Sequence[ViewModel]
     images: Sequence[Tensor]
     pixel_weights: Sequence[Tensor]
     neighbours: Tensor
 
     @classmethod
-    def build(cls, surfels: Surfels, weights: Sequence[ViewWeights], images: Sequence[Tensor]) -> AlbedoProblem:
-        flat = [image.reshape(-1, 3).float() for image in images]
-        pixel_weights = [_pixel_weight(image, view.coverage) for image, view in zip(flat, weights, strict=True)]
-        return cls(weights, flat, pixel_weights, _neighbours(surfels))
+    def build(cls, surfels: Surfels, models: Sequence[ViewModel], views: Sequence[View]) -> AlbedoProblem:
+        images = [view.image.reshape(-1, 3).float() for view in views]
+        pairs = zip(views, models, strict=True)
+        pixel_weights = [_pixel_weight(view, model.weights.coverage) for view, model in pairs]
+        return cls(models, images, pixel_weights, _neighbours(surfels))
+
+    def render(self, v: int, albedo: Tensor, indirect: Tensor | None) -> Tensor:
+        """(pixels, 3) view v under `indirect` (V, N, 3)."""
+        return self.models[v].image(albedo, _of_view(indirect, v))
 
 
 def solve_albedo(
@@ -68,52 +93,96 @@ def solve_albedo(
     lighting: Lighting,
     transport: PatchTransport | None,
     rounds: int,
-) -> tuple[Tensor, Tensor]:
-    """Albedo (N, 3), and the total irradiance over π (V, N, 3) that belongs to it.
+    prior: AlbedoPrior | None = None,
+) -> tuple[Tensor, Tensor | None]:
+    """Albedo (N, 3), and the indirect irradiance over π (V, N, 3) that belongs to it; None without a transport.
 
     Args:
         surfels: their albedo is where the rounds start.
         transport: light between surfels; None solves as if light did not bounce.
+        prior: pulls towards known albedo.
     """
     albedo = surfels.albedo.float()
+    indirect, mixing = None, _Mixing(DAMPING if transport is not None else 1.0)
     for index in track(range(rounds), "albedo", unit="round"):
         if transport is not None:
             transport = with_albedo(transport, albedo)
-        total = total_irradiance(lighting, albedo, transport)
+            indirect = indirect_irradiance(lighting, albedo, transport)
         pixel_weights = problem.pixel_weights
         if index > 0:
-            pixel_weights = [_robust(problem, v, total[v] * albedo) for v in range(len(problem.images))]
+            pixel_weights = [
+                _robust(problem, v, problem.render(v, albedo, indirect)) for v in range(len(problem.images))
+            ]
         laplacian = _laplacian(problem.neighbours, surfels.normals.float(), albedo if index > 1 else None)
-        solution = _least_squares(problem, pixel_weights, total, laplacian, albedo).clamp(*ALBEDO_RANGE)
-        step = DAMPING if transport is not None else 1.0
-        albedo = (1.0 - step) * albedo + step * solution
+        solution = _least_squares(problem, pixel_weights, indirect, laplacian, albedo, prior).clamp(*ALBEDO_RANGE)
+        albedo = mixing.next(albedo, solution).clamp(*ALBEDO_RANGE)
     if transport is not None:
-        transport = with_albedo(transport, albedo)
-    return albedo, total_irradiance(lighting, albedo, transport)
+        indirect = indirect_irradiance(lighting, albedo, with_albedo(transport, albedo))
+    return albedo, indirect
+
+
+class _Mixing:
+    """The next iterate of a fixed point x = g(x), from the last few (Anderson 1965), each channel on its own.
+
+    Args:
+        step: part of the way to g(x) that is gone; alone it would be plain damping.
+    """
+
+    def __init__(self, step: float) -> None:
+        self._step = step
+        self._pairs: list[tuple[Tensor, Tensor]] = []
+
+    def next(self, x: Tensor, found: Tensor) -> Tensor:
+        """The iterate after x (N, C), whose image g(x) is `found`."""
+        self._pairs = [*self._pairs, (x, found - x)][-MIXED:]
+        places, misses = (torch.stack(part, dim=-1) for part in zip(*self._pairs, strict=True))
+        if len(self._pairs) == 1:
+            return x + self._step * misses[..., -1]
+        steps, changes = places.diff(dim=-1), misses.diff(dim=-1)
+        # (C, K, K) and (C, K): what combination of the changes cancels the miss best.
+        normal = torch.einsum("nck,ncl->ckl", changes, changes).double()
+        right = torch.einsum("nck,nc->ck", changes, misses[..., -1]).double()
+        ridge = MIXING_RIDGE * normal.diagonal(dim1=1, dim2=2).mean(dim=1)[:, None, None]
+        share = torch.linalg.solve(normal + (ridge + 1e-30) * torch.eye(normal.shape[1]), right).to(x)
+        change = torch.einsum("nck,ck->nc", steps + self._step * changes, share)
+        return x + self._step * misses[..., -1] - change
 
 
 def _least_squares(
-    problem: AlbedoProblem, pixel_weights: Sequence[Tensor], total: Tensor, laplacian: SparseOperator, start: Tensor
+    problem: AlbedoProblem,
+    pixel_weights: Sequence[Tensor],
+    indirect: Tensor | None,
+    laplacian: _Laplacian,
+    start: Tensor,
+    prior: AlbedoPrior | None,
 ) -> Tensor:
     """A few preconditioned conjugate-gradient steps on the normal equations, each channel on its own."""
-    right = torch.zeros_like(start)
-    diagonal = torch.zeros_like(start)
-    for v, view in enumerate(problem.weights):
-        transposed, weight = view.operator.transposed, pixel_weights[v][:, None]
-        right += total[v] * (transposed @ (weight * problem.images[v]))
-        diagonal += total[v].square() * (_squared(transposed) @ weight)
+    right, diagonal = torch.zeros_like(start), torch.zeros_like(start)
+    for v, model in enumerate(problem.models):
+        light = _of_view(indirect, v)
+        right += model.transposed(pixel_weights[v][:, None] * problem.images[v], light)
+        diagonal += model.squared(pixel_weights[v], light)
     scale = float(diagonal[diagonal > 0].median()) if bool((diagonal > 0).any()) else 1.0
-    pull, smooth = PULL * scale, SMOOTHNESS * scale
+    pull, target = _pull(prior, start)
+    pull, smooth = scale * pull, SMOOTHNESS * scale
 
     def normal_operator(x: Tensor) -> Tensor:
         result = pull * x + smooth * (laplacian.matrix @ x)
-        for v, view in enumerate(problem.weights):
-            seen = pixel_weights[v][:, None] * (view.operator.matrix @ (total[v] * x))
-            result += total[v] * (view.operator.transposed @ seen)
+        for v, model in enumerate(problem.models):
+            light = _of_view(indirect, v)
+            result += model.transposed(pixel_weights[v][:, None] * model.image(x, light), light)
         return result
 
     precondition = 1.0 / (diagonal + pull + smooth * laplacian.diagonal()[:, None])
-    return _conjugate_gradients(normal_operator, right + pull * PRIOR, precondition, start)
+    return _conjugate_gradients(normal_operator, right + pull * target, precondition, start)
+
+
+def _pull(prior: AlbedoPrior | None, like: Tensor) -> tuple[Tensor, Tensor]:
+    """Weight (N, 1) and target (N, 3) that together stand for GREY and the prior."""
+    if prior is None:
+        return torch.full_like(like[:, :1], PULL), torch.full_like(like, GREY)
+    weight = prior.weight.to(like)[:, None]
+    return PULL + weight, (PULL * GREY + weight * prior.albedo.to(like)) / (PULL + weight)
 
 
 def _conjugate_gradients(operator, right: Tensor, precondition: Tensor, x: Tensor) -> Tensor:
@@ -132,26 +201,27 @@ def _conjugate_gradients(operator, right: Tensor, precondition: Tensor, x: Tenso
     return x
 
 
-def _pixel_weight(image: Tensor, coverage: Tensor) -> Tensor:
+def _of_view(indirect: Tensor | None, v: int) -> Tensor | None:
+    return None if indirect is None else indirect[v]
+
+
+def _pixel_weight(view: View, coverage: Tensor) -> Tensor:
+    """(P,) weights; none where surfels and photograph disagree on what is covered, which is for the geometry."""
+    image, alpha = view.image.reshape(-1, 3).float(), view.alpha.reshape(-1).float()
     peak = torch.quantile(image, 0.99).clamp(min=1e-12)
     weight = 1.0 / (image.mean(dim=1) / peak + 0.1) / peak.square()
-    return torch.where(coverage >= MINIMUM_COVERAGE, weight, torch.zeros_like(weight))
+    trusted = (coverage >= MINIMUM_COVERAGE) & ((alpha - coverage).abs() <= COVERAGE_MISMATCH)
+    return torch.where(trusted, weight, torch.zeros_like(weight))
 
 
-def _robust(problem: AlbedoProblem, v: int, radiance: Tensor) -> Tensor:
+def _robust(problem: AlbedoProblem, v: int, render: Tensor) -> Tensor:
     """Pixel weights of view v with those that fit badly (shadow edges, occlusions) weighing less."""
     image, weight = problem.images[v], problem.pixel_weights[v]
-    error = (problem.weights[v].operator.matrix @ radiance - image).abs().mean(dim=1)
+    error = (render - image).abs().mean(dim=1)
     relative = error / (image.mean(dim=1) + 0.1 * torch.quantile(image, 0.99)).clamp(min=1e-12)
     used = weight > 0
     typical = 3.0 * relative[used].median() + 1e-4 if bool(used.any()) else torch.tensor(1.0)
     return weight / (1.0 + (relative / typical).square())
-
-
-def _squared(matrix: Tensor) -> Tensor:
-    return torch.sparse_csr_tensor(
-        matrix.crow_indices(), matrix.col_indices(), matrix.values().square(), size=matrix.shape, check_invariants=False
-    )
 
 
 def _neighbours(surfels: Surfels) -> Tensor:

@@ -11,6 +11,7 @@ from torch import Tensor
 
 from rgspipe.datasets.views import View
 from rgspipe.renderer.direct import unit_irradiance
+from rgspipe.renderer.kernels.irradiance import transmittance
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.transport import PatchTransport
 
@@ -26,11 +27,15 @@ class Lighting:
     """Direct light of V views on N surfels.
 
     Attributes:
-        irradiance: (V, N) per unit intensity.
+        irradiance: (V, N) per unit intensity, at the surfels' centres.
+        shares: (V, N) part of the light that no surfel stops.
+        positions: (V, 3) of the lights, float64.
         intensity: (V, 3) W/sr.
     """
 
     irradiance: Tensor
+    shares: Tensor
+    positions: Tensor
     intensity: Tensor
 
     def direct(self) -> Tensor:
@@ -48,17 +53,23 @@ def trace_lighting(bvh: SurfelBvh, views: Sequence[View]) -> Lighting:
     if missing:
         raise ValueError(f"views must have lights, these have none: {missing[:5]}")
     positions = torch.stack([view.light.position for view in views])
-    blocks = [unit_irradiance(bvh, block)[0] for block in positions.split(LIGHTS_AT_ONCE)]
     intensity = torch.stack([view.light.intensity for view in views]).float()
-    return Lighting(torch.cat(blocks), intensity.to(bvh.device))
+    blocks = positions.split(LIGHTS_AT_ONCE)
+    shares = torch.cat([transmittance(bvh, block)[0] for block in blocks])
+    falloff = torch.cat([unit_irradiance(bvh, block, shadows=False)[0] for block in blocks])
+    return Lighting(shares * falloff, shares, positions, intensity.to(bvh.device))
+
+
+def indirect_irradiance(lighting: Lighting, albedo: Tensor, transport: PatchTransport) -> Tensor:
+    """(V, N, 3) irradiance over π that surfels of `albedo` (N, 3) receive from each other."""
+    indirect = lighting.direct()
+    for block in indirect.split(LIGHTINGS_AT_ONCE):
+        direct = (albedo * block).permute(1, 2, 0).contiguous()
+        block.copy_(transport.gathered(direct).permute(2, 0, 1))
+    return indirect
 
 
 def total_irradiance(lighting: Lighting, albedo: Tensor, transport: PatchTransport | None) -> Tensor:
     """(V, N, 3) direct and, with a transport, indirect irradiance over π under the given albedo (N, 3)."""
-    total = lighting.direct()
-    if transport is None:
-        return total
-    for block in total.split(LIGHTINGS_AT_ONCE):
-        direct = (albedo * block).permute(1, 2, 0).contiguous()
-        block += transport.gathered(direct).permute(2, 0, 1)
-    return total
+    direct = lighting.direct()
+    return direct if transport is None else direct + indirect_irradiance(lighting, albedo, transport)

@@ -4,45 +4,32 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from rgspipe.datasets.views import View
-from rgspipe.progress import track
-from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
-from rgspipe.renderer.transport import PatchTransport
-from rgspipe.renderer.view_weights import ViewWeights, build_view_weights
+from rgspipe.renderer.view_weights import build_view_weights
 from rgspipe.scene.surfels import Surfels
-from rgspipe.training.albedo import AlbedoProblem, solve_albedo
 from rgspipe.training.checkpoint import Checkpoint
 from rgspipe.training.initialise import Footprint
-from rgspipe.training.lighting import trace_lighting
+from rgspipe.training.materials import MaterialOptions, Materials, PriorOf, fit_materials
 from rgspipe.training.record import Record
 from rgspipe.training.refine import RefineOptions, RefineState, RefineView, refine
 
 
 @dataclass(frozen=True)
-class TrainOptions:
-    """How surfels are trained.
+class TrainOptions(MaterialOptions):
+    """How surfels are trained: their materials, before and after the geometry, and the geometry.
 
     Attributes:
-        rounds: of the albedo solve, before and after the geometry.
         refine: of the geometry; its `steps` may be 0.
-        gather_rays, patches: of the indirect light.
-        supersampling: of edge pixels in the view weights.
-        seed: of rays and patches.
     """
 
-    rounds: int = 8
     refine: RefineOptions = field(default_factory=RefineOptions)
-    gather_rays: int = 128
-    patches: int = 500
-    supersampling: int = 4
-    seed: int = 0
 
 
 @dataclass(frozen=True)
@@ -53,20 +40,12 @@ class Trained:
     records: tuple[Record, ...]
 
 
-def build_transport(surfels: Surfels, options: TrainOptions) -> PatchTransport:
-    """Patch transport for the surfels as they stand."""
-    frozen = FrozenScene.freeze(surfels, gather_rays=options.gather_rays, patches=options.patches, seed=options.seed)
-    return frozen.transport
-
-
-def trace_views(surfels: Surfels, views: Sequence[View], supersampling: int) -> tuple[ViewWeights, ...]:
-    """View weights of every view."""
-    bvh = SurfelBvh(surfels)
-    return tuple(build_view_weights(bvh, view.camera, supersampling) for view in track(views, "views", unit="view"))
-
-
 def train(
-    surfels: Surfels, views: Sequence[View], options: TrainOptions, checkpoint: Checkpoint | None = None
+    surfels: Surfels,
+    views: Sequence[View],
+    options: TrainOptions,
+    checkpoint: Checkpoint | None = None,
+    prior: PriorOf | None = None,
 ) -> Trained:
     """Fit materials and geometry of `surfels` to `views` with known lights.
 
@@ -75,6 +54,7 @@ def train(
         views: training views, each with its light.
         checkpoint: where to keep what is done; an interrupted training goes on from there and ends with
             the surfels of an uninterrupted one.
+        prior: known albedo that materials are pulled to.
     """
     log = _Log(checkpoint.records if checkpoint else [])
     surfels = surfels.to(torch.float32)
@@ -82,7 +62,7 @@ def train(
     if checkpoint is not None and (found := checkpoint.load(surfels)) is not None:
         surfels, radiance, state = found
     else:
-        surfels, radiance, state = *_fit_materials(surfels, views, options, log, "materials"), None
+        surfels, radiance, state = *_fit_materials(surfels, views, options, log, "materials", prior), None
     if options.refine.steps > 0:
         bvh = SurfelBvh(surfels)
         refined = [_refine_view(view, bvh, radiance[v]) for v, view in enumerate(views)]
@@ -95,17 +75,8 @@ def train(
         if checkpoint is not None and state is None:
             checkpoint.save(surfels, radiance, None, log.records)
         surfels, _ = refine(surfels, refined, spacing, options.refine, state, keep)
-        surfels, radiance = _fit_materials(surfels, views, options, log, "final materials")
+        surfels, radiance = _fit_materials(surfels, views, options, log, "final materials", prior)
     return Trained(surfels, tuple(log.records))
-
-
-def fit_direct_materials(surfels: Surfels, views: Sequence[View], options: TrainOptions) -> Surfels:
-    """The same geometry with the albedo that explains the views best if light did not bounce: a baseline."""
-    weights = trace_views(surfels, views, options.supersampling)
-    problem = AlbedoProblem.build(surfels, weights, [view.image for view in views])
-    lighting = trace_lighting(SurfelBvh(surfels), views)
-    albedo, _ = solve_albedo(problem, surfels, lighting, None, min(3, options.rounds))
-    return replace(surfels, albedo=albedo)
 
 
 def surfel_spacing(surfels: Surfels) -> float:
@@ -114,17 +85,12 @@ def surfel_spacing(surfels: Surfels) -> float:
 
 
 def _fit_materials(
-    surfels: Surfels, views: Sequence[View], options: TrainOptions, log: _Log, phase: str
+    surfels: Surfels, views: Sequence[View], options: TrainOptions, log: _Log, phase: str, prior: PriorOf | None
 ) -> tuple[Surfels, Tensor]:
     """Surfels with fitted albedo, and their radiance (V, N, 3) under every view's light."""
-    weights = trace_views(surfels, views, options.supersampling)
-    lighting = trace_lighting(SurfelBvh(surfels), views)
-    transport = build_transport(surfels, options)
-    problem = AlbedoProblem.build(surfels, weights, [view.image for view in views])
-    albedo, total = solve_albedo(problem, surfels, lighting, transport, options.rounds)
-    radiance = total * albedo
-    log.materials(phase, problem, radiance)
-    return replace(surfels, albedo=albedo), radiance
+    fitted = fit_materials(surfels, views, options, prior=prior)
+    log.materials(phase, views, fitted)
+    return fitted.surfels, fitted.radiance
 
 
 def _refine_view(view: View, bvh: SurfelBvh, radiance: Tensor) -> RefineView:
@@ -145,12 +111,12 @@ class _Log:
         loss = state.losses[-1]
         self._add("geometry", state.step, loss, -10.0 * float(np.log10(max(loss, 1e-30))))
 
-    def materials(self, phase: str, problem: AlbedoProblem, radiance: Tensor) -> None:
+    def materials(self, phase: str, views: Sequence[View], fitted: Materials) -> None:
         errors = []
-        for v, view in enumerate(problem.weights):
-            image = problem.images[v]
+        for view, render in zip(views, fitted.renders, strict=True):
+            image = view.image.reshape(-1, 3)
             peak = torch.quantile(image, 0.995).clamp(min=1e-12)
-            errors.append(float(((view.operator.matrix @ radiance[v] - image) / peak).square().mean()))
+            errors.append(float(((render - image) / peak).square().mean()))
         psnr = float(np.mean([-10.0 * np.log10(max(error, 1e-30)) for error in errors]))
         self._add(phase, 0, float(np.mean(errors)), psnr)
 

@@ -10,15 +10,18 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pandas as pd
+from torch import Tensor
 
 from rgspipe.datasets.views import View
 from rgspipe.evaluation.held_out import albedo_of_views, held_out_summary, view_table
 from rgspipe.evaluation.metrics import psnr
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.transport import PatchTransport
+from rgspipe.renderer.view_weights import ViewWeights
 from rgspipe.scene.surfels import Surfels
-from rgspipe.training.lighting import total_irradiance, trace_lighting
-from rgspipe.training.trainer import trace_views
+from rgspipe.training.lighting import indirect_irradiance, trace_lighting
+from rgspipe.training.materials import trace_views
+from rgspipe.training.view_model import build_view_models
 
 
 @dataclass(frozen=True)
@@ -56,16 +59,28 @@ class HeldOut:
 
 
 def render_held_out(
-    surfels: Surfels, views: Sequence[View], transport: PatchTransport | None, supersampling: int
+    surfels: Surfels,
+    views: Sequence[View],
+    transport: PatchTransport | None,
+    supersampling: int,
+    at_pixels: bool = True,
 ) -> HeldOut:
     """Render `views` under their own lights and compare.
 
     Args:
         transport: light between the surfels; None renders direct light only.
+        at_pixels: whether direct light is taken where pixels look, otherwise at surfels' centres.
     """
     weights = trace_views(surfels, views, supersampling)
-    lighting = trace_lighting(SurfelBvh(surfels), views)
-    radiance = total_irradiance(lighting, surfels.albedo, transport) * surfels.albedo
-    images = tuple(weight.image(radiance[v]).numpy() for v, weight in enumerate(weights))
-    albedo = tuple(weight.image(surfels.albedo.float()).numpy() for weight in weights)
+    bvh, own = SurfelBvh(surfels), surfels.albedo.float()
+    lighting = trace_lighting(bvh, views)
+    bounced = [None] * len(views) if transport is None else indirect_irradiance(lighting, own, transport)
+    models = build_view_models(bvh, weights, lighting, at_pixels)
+    flat = [model.image(own, indirect) for model, indirect in zip(models, bounced, strict=True)]
+    images = tuple(_image(weight, pixels) for weight, pixels in zip(weights, flat, strict=True))
+    albedo = tuple(weight.image(own).numpy() for weight in weights)
     return HeldOut(tuple(views), images, albedo)
+
+
+def _image(weights: ViewWeights, pixels: Tensor) -> npt.NDArray[np.float32]:
+    return pixels.reshape(weights.camera.height, weights.camera.width, 3).numpy()

@@ -1,0 +1,99 @@
+"""Materials of given surfels from the images of known lights."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from torch import Tensor
+
+from rgspipe.datasets.views import View
+from rgspipe.progress import track
+from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
+from rgspipe.renderer.transport import PatchTransport
+from rgspipe.renderer.view_weights import ViewWeights, build_view_weights
+from rgspipe.scene.surfels import Surfels
+from rgspipe.training.albedo import AlbedoPrior, AlbedoProblem, solve_albedo
+from rgspipe.training.lighting import trace_lighting
+from rgspipe.training.view_model import build_view_models
+
+#: Rounds of the solve when light does not bounce: only the pixels' weights change.
+DIRECT_ROUNDS = 3
+
+#: The prior of surfels as they stand.
+PriorOf = Callable[[Surfels], AlbedoPrior]
+
+
+@dataclass(frozen=True)
+class MaterialOptions:
+    """How materials are fitted.
+
+    Attributes:
+        rounds: of the albedo solve.
+        gather_rays, patches: of the indirect light.
+        supersampling: of edge pixels in the view weights.
+        at_pixels: whether direct light is taken where pixels look; otherwise at surfels' centres.
+        seed: of rays and patches.
+    """
+
+    rounds: int = 5
+    gather_rays: int = 128
+    patches: int = 500
+    supersampling: int = 4
+    at_pixels: bool = True
+    seed: int = 0
+
+
+@dataclass(frozen=True)
+class Materials:
+    """Fitted materials, and the images that follow.
+
+    Attributes:
+        surfels: with their albedo.
+        radiance: (V, N, 3) outgoing radiance under every view's light, with direct light at their centres.
+        renders: V images (pixels, 3).
+    """
+
+    surfels: Surfels
+    radiance: Tensor
+    renders: tuple[Tensor, ...]
+
+
+def fit_materials(
+    surfels: Surfels,
+    views: Sequence[View],
+    options: MaterialOptions,
+    *,
+    bounces: bool = True,
+    prior: PriorOf | None = None,
+) -> Materials:
+    """The albedo that explains `views` best, on surfels that stay where they are.
+
+    Args:
+        bounces: whether light goes from surfel to surfel; without, the model is a baseline.
+        prior: pulls towards known albedo.
+    """
+    weights = trace_views(surfels, views, options.supersampling)
+    bvh = SurfelBvh(surfels)
+    lighting = trace_lighting(bvh, views)
+    problem = AlbedoProblem.build(surfels, build_view_models(bvh, weights, lighting, options.at_pixels), views)
+    transport = build_transport(surfels, options) if bounces else None
+    rounds = options.rounds if bounces else min(DIRECT_ROUNDS, options.rounds)
+    known = None if prior is None else prior(surfels)
+    albedo, indirect = solve_albedo(problem, surfels, lighting, transport, rounds, known)
+    renders = tuple(problem.render(v, albedo, indirect) for v in range(len(views)))
+    received = lighting.direct() if indirect is None else lighting.direct() + indirect
+    return Materials(replace(surfels, albedo=albedo), received * albedo, renders)
+
+
+def build_transport(surfels: Surfels, options: MaterialOptions) -> PatchTransport:
+    """Patch transport for the surfels as they stand."""
+    frozen = FrozenScene.freeze(surfels, gather_rays=options.gather_rays, patches=options.patches, seed=options.seed)
+    return frozen.transport
+
+
+def trace_views(surfels: Surfels, views: Sequence[View], supersampling: int) -> tuple[ViewWeights, ...]:
+    """View weights of every view."""
+    bvh = SurfelBvh(surfels)
+    return tuple(build_view_weights(bvh, view.camera, supersampling) for view in track(views, "views", unit="view"))

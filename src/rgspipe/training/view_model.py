@@ -1,0 +1,88 @@
+"""Images as linear functions of albedo: direct light where pixels look, light that bounces at surfels' centres."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from rgspipe.progress import track
+from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
+from rgspipe.renderer.pixel_direct import PixelDirect
+from rgspipe.renderer.sparse import SparseOperator
+from rgspipe.renderer.view_weights import ViewWeights
+from rgspipe.training.lighting import Lighting
+
+
+@dataclass(frozen=True)
+class ViewModel:
+    """One view under its own light, of P pixels and N surfels.
+
+        image = D (ρ ∘ I) + W (ρ ∘ L)
+
+    with D the direct light of a lamp of π W/sr, I its intensity over π and L the indirect irradiance over π, which
+    depends on ρ itself and is an argument below.
+
+    Attributes:
+        weights: W.
+        direct: (P, N) D, in the same places as W.
+        intensity: (3,) I, W/sr over π.
+    """
+
+    weights: ViewWeights
+    direct: SparseOperator
+    intensity: Tensor
+
+    def image(self, albedo: Tensor, indirect: Tensor | None) -> Tensor:
+        """(P, 3) radiance of surfels of `albedo` (N, 3) under `indirect` (N, 3); None for no light that bounces."""
+        image = self.direct.matrix @ (albedo * self.intensity)
+        return image if indirect is None else image + self.weights.operator.matrix @ (albedo * indirect)
+
+    def transposed(self, pixels: Tensor, indirect: Tensor | None) -> Tensor:
+        """(N, 3) the transpose of `image` applied to (P, 3)."""
+        surfels = self.intensity * (self.direct.transposed @ pixels)
+        return surfels if indirect is None else surfels + indirect * (self.weights.operator.transposed @ pixels)
+
+    def squared(self, pixel_weights: Tensor, indirect: Tensor | None) -> Tensor:
+        """(N, 3) diagonal of the normal equations with weights (P,): Σ_p w_p (D_pj I + W_pj L_j)²."""
+        direct, weight = self.direct.transposed, self.weights.operator.transposed
+        column = pixel_weights[:, None]
+        total = self.intensity.square() * (_product(direct, direct) @ column)
+        if indirect is None:
+            return total
+        cross = 2.0 * self.intensity * indirect * (_product(direct, weight) @ column)
+        return total + cross + indirect.square() * (_product(weight, weight) @ column)
+
+
+def build_view_models(
+    bvh: SurfelBvh, weights: Sequence[ViewWeights], lighting: Lighting, at_pixels: bool
+) -> tuple[ViewModel, ...]:
+    """A model of every view under its own light.
+
+    Args:
+        at_pixels: whether falloff and shadows are taken where pixels look; otherwise surfels' centres stand for them.
+    """
+    models = []
+    for index, view in enumerate(track(weights, "direct light", unit="view")):
+        if at_pixels:
+            direct = PixelDirect(bvh, view).operator(lighting.positions[index], lighting.shares[index])
+        else:
+            direct = _at_centers(view.operator.matrix, lighting.irradiance[index])
+        models.append(ViewModel(view, direct, lighting.intensity[index] / torch.pi))
+    return tuple(models)
+
+
+def _at_centers(matrix: Tensor, irradiance: Tensor) -> SparseOperator:
+    return SparseOperator(_like(matrix, matrix.values() * irradiance[matrix.col_indices()]))
+
+
+def _product(left: Tensor, right: Tensor) -> Tensor:
+    """Element by element, of two matrices with the same places."""
+    return _like(left, left.values() * right.values())
+
+
+def _like(matrix: Tensor, values: Tensor) -> Tensor:
+    rows, columns = matrix.crow_indices(), matrix.col_indices()
+    return torch.sparse_csr_tensor(rows, columns, values, size=matrix.shape, check_invariants=False)
