@@ -113,5 +113,6 @@ STAGE = Stage(
         "rgspipe.evaluation.image_metrics",
         "rgspipe.evaluation.images",
         "rgspipe.evaluation.metrics",
+        "rgspipe.fitting.ssim",
     ),
 )

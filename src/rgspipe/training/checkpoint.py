@@ -36,6 +36,7 @@ class Checkpoint:
             note |= {"step": state.step, "losses": state.losses}
             for group in ("parameters", "first", "second"):
                 tensors |= {f"{group}.{name}": tensor for name, tensor in getattr(state, group).items()}
+            tensors["start_log_scales"] = state.start_log_scales
         save_tensors(self.path, tensors, note)
 
     @property
@@ -54,7 +55,11 @@ class Checkpoint:
         if note["step"] is None:
             return surfels, tensors["radiance"], None
         groups = [_group(tensors, name) for name in ("parameters", "first", "second")]
-        return surfels, tensors["radiance"], RefineState(*groups, step=note["step"], losses=note["losses"])
+        return (
+            surfels,
+            tensors["radiance"],
+            RefineState(*groups, tensors["start_log_scales"], step=note["step"], losses=note["losses"]),
+        )
 
 
 def _group(tensors: dict[str, Tensor], prefix: str) -> dict[str, Tensor]:

@@ -1,24 +1,28 @@
-"""Geometry from images: surfels move, stretch, turn and are cut so that edges and gaps render as photographed."""
+"""Geometry from images: surfels move, lean, stretch, turn and are cut so that they render as photographed."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import torch
 from torch import Tensor
 
 from rgspipe.progress import track
+from rgspipe.renderer.kernels.composite import composite
 from rgspipe.renderer.kernels.shade import shade_rays
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.scene.camera import Camera
-from rgspipe.scene.surfels import NO_CLIP, Surfels, turn_in_plane
+from rgspipe.scene.surfels import Surfels
+from rgspipe.training.adam import adam_direction
+from rgspipe.training.loss import LossOptions, image_loss
+from rgspipe.training.parameters import build_surfels, limit, start_parameters
+from rgspipe.training.regularise import Neighbours, continuity, distortion, find_neighbours, normal_smoothness
+from rgspipe.training.sampling import PixelDraw, draw_pixels, draw_window, pixel_means, views_of_step
+from rgspipe.training.shading import SurfelLight, light_where_rays_meet, shaded_radiance
 
-#: Limits of the coverage thresholds, and how far apart they stay.
-LOW_RANGE, HIGH_RANGE, THRESHOLD_GAP = (0.05, 0.7), (0.3, 0.99), 0.1
-
-#: Largest change of a log-scale, down and up, and the range of an opacity's logit.
-SHRINK, GROW, LOGIT_RANGE = 1.5, 0.6, (-4.0, 5.0)
+#: Every so many of a step's rays, the depths of hits are compared.
+DISTORTION_STRIDE = 16
 
 
 @dataclass(frozen=True)
@@ -27,26 +31,44 @@ class RefineOptions:
 
     Attributes:
         steps: Adam steps.
+        relight_every: steps between which shadows and indirect light lag; 0 keeps those of the start.
         views_per_step: images that a step looks at.
         edge_pixels, interior_pixels: most pixels of an image, on edges and elsewhere; the latter close pinholes.
-        subsamples: rays per pixel, squared.
-        position_rate, clip_rate: steps of positions and of clip offsets, in surfel spacings.
-        log_scale_rate, angle_rate, opacity_rate, clip_angle_rate, threshold_rate: steps of the others.
+        window: side of a window of pixels that is looked at instead of single pixels; 0 for single ones.
+        subsamples: rays per pixel, squared; in windows, of pixels on edges.
+        position_rate, height_rate, clip_rate: steps in the plane, along the normal and of clips, in surfel spacings.
+        tilt_rate, angle_rate, log_scale_rate, opacity_rate, clip_angle_rate, albedo_rate, threshold_rate: of
+            the others.
+        light_at_pixels: whether pixels away from edges take direct light where they look, not at surfels' centres.
+        loss: what is minimised.
+        alpha_weight: of the difference between coverage and the views' alpha.
+        continuity_weight, smoothness_weight, distortion_weight: of the terms in `regularise`.
         seed: of views and pixels.
     """
 
     steps: int = 140
+    relight_every: int = 0
     views_per_step: int = 5
     edge_pixels: int = 2000
     interior_pixels: int = 1000
+    window: int = 0
     subsamples: int = 3
     position_rate: float = 0.003
+    height_rate: float = 0.0
     clip_rate: float = 0.001
-    log_scale_rate: float = 0.03
+    tilt_rate: float = 0.0
     angle_rate: float = 0.02
+    log_scale_rate: float = 0.03
     opacity_rate: float = 0.05
     clip_angle_rate: float = 0.001
+    albedo_rate: float = 0.0
     threshold_rate: float = 0.002
+    light_at_pixels: bool = False
+    loss: LossOptions = field(default_factory=LossOptions)
+    alpha_weight: float = 0.0
+    continuity_weight: float = 0.0
+    smoothness_weight: float = 0.0
+    distortion_weight: float = 0.0
     seed: int = 0
 
 
@@ -57,42 +79,50 @@ class RefineView:
     Attributes:
         camera: its camera.
         image: (pixels, 3).
-        radiance: (N, 3) outgoing radiance of the surfels under its light.
+        alpha: (pixels,).
+        light: how its light reaches the surfels.
         edges: (pixels,) bool.
         peak: what its errors are measured against.
     """
 
     camera: Camera
     image: Tensor
-    radiance: Tensor
+    alpha: Tensor
+    light: SurfelLight
     edges: Tensor
     peak: float
 
 
 @dataclass
 class RefineState:
-    """Everything a refinement needs to go on: parameters, Adam's moments, steps done."""
+    """Everything a refinement needs to go on.
+
+    Attributes:
+        parameters: as `parameters.start_parameters` names them, relative to the surfels that `refine` is given.
+        first, second: Adam's moments of each.
+        start_log_scales: (N, 2) of the surfels that training began with.
+        step: steps done.
+        losses: of every step.
+    """
 
     parameters: dict[str, Tensor]
     first: dict[str, Tensor]
     second: dict[str, Tensor]
+    start_log_scales: Tensor
     step: int = 0
     losses: list[float] = field(default_factory=list)
 
     @classmethod
     def start(cls, surfels: Surfels) -> RefineState:
-        count, coverage = len(surfels), surfels.coverage
-        parameters = {
-            "offset": torch.zeros(count, 2),
-            "log_scales": surfels.scales.log(),
-            "angle": torch.zeros(count),
-            "logit": torch.logit(surfels.opacities.clamp(0.01, 0.99)),
-            "clip_offsets": surfels.clip_offsets.clone(),
-            "clip_angles": surfels.clip_angles.clone(),
-            "thresholds": torch.tensor([coverage.low, coverage.high]),
-        }
-        zeros = {name: torch.zeros_like(value) for name, value in parameters.items()}
-        return cls(parameters, zeros, {name: value.clone() for name, value in zeros.items()})
+        parameters = start_parameters(surfels)
+        first, second = ({name: torch.zeros_like(value) for name, value in parameters.items()} for _ in range(2))
+        return cls(parameters, first, second, surfels.scales.log())
+
+    def rebased(self, surfels: Surfels) -> RefineState:
+        """The state that goes on from `surfels`, which `refine` returned with this one."""
+        return RefineState(
+            start_parameters(surfels), self.first, self.second, self.start_log_scales, self.step, self.losses
+        )
 
 
 def refine(
@@ -102,126 +132,143 @@ def refine(
     options: RefineOptions,
     state: RefineState | None = None,
     checkpoint: Callable[[RefineState], None] | None = None,
+    until: int | None = None,
 ) -> tuple[Surfels, RefineState]:
     """Surfels that render the views better, and the state at the end.
 
-    Surfels move in their planes only; their radiance stays what it was, so the light transport must be
-    made again afterwards. Views and pixels of a step depend on the seed and the step alone: a refinement
-    that goes on from a state ends as one that was never interrupted.
+    Shadows and indirect light stay those of the views' `light`. Views and pixels of a step depend on the seed and
+    the step alone: a refinement that goes on from a state ends as one that was never interrupted.
 
     Args:
-        surfels: float32 start; also the reference of the limits when `state` is given.
+        surfels: float32 start, which the state's parameters are relative to.
         spacing: typical distance of neighbours, scene units.
         checkpoint: called with the state after every step.
+        until: the step to stop before; all of `options.steps` if None.
     """
     state = state or RefineState.start(surfels)
     rates = _rates(options, spacing)
-    bar = track(range(state.step, options.steps), "geometry", unit="step")
+    pairs = find_neighbours(surfels, spacing)
+    last = options.steps if until is None else min(until, options.steps)
+    bar = track(range(state.step, last), "geometry", unit="step")
     for step in bar:
-        moved = {name: value.clone().requires_grad_() for name, value in state.parameters.items()}
-        loss = _step_loss(build_surfels(surfels, moved), moved["thresholds"], views, options, step)
-        loss.backward()
-        state.losses.append(float(loss.detach()))
+        moved = {name: value.clone().requires_grad_(rates[name] > 0.0) for name, value in state.parameters.items()}
+        data, prior = _step_loss(build_surfels(surfels, moved), moved["thresholds"], views, pairs, options, step)
+        (data + prior).backward()
+        state.losses.append(float(data.detach()))
         decay = min(1.0, 3.0 * (1.0 - (step + 1) / (options.steps + 1)))
         for name, value in moved.items():
-            state.parameters[name] -= decay * rates[name] * _adam(state, name, value.grad, step + 1)
-        _limit(state.parameters, surfels)
+            if value.grad is not None:
+                direction = adam_direction(state.first[name], state.second[name], value.grad, step + 1)
+                state.parameters[name] -= decay * rates[name] * direction
+        limit(state.parameters, surfels, state.start_log_scales)
         state.step = step + 1
         bar.set_postfix_str(f"loss {sum(state.losses[-20:]) / len(state.losses[-20:]):.2e}", refresh=False)
         if checkpoint is not None:
             checkpoint(state)
-    return build_surfels(surfels, state.parameters), state
-
-
-def build_surfels(base: Surfels, parameters: dict[str, Tensor]) -> Surfels:
-    """Surfels from refinement parameters, differentiable; thresholds go into the coverage as numbers."""
-    frames = base.frames
-    low, high = parameters["thresholds"].detach().tolist()
-    return replace(
-        base,
-        centers=base.centers + torch.einsum("na,nac->nc", parameters["offset"], frames[:, :2]),
-        rotations=turn_in_plane(base.rotations, parameters["angle"]),
-        scales=parameters["log_scales"].exp(),
-        opacities=torch.sigmoid(parameters["logit"]),
-        clip_offsets=parameters["clip_offsets"],
-        # Clips stay where they are when the ellipse turns inside them.
-        clip_angles=parameters["clip_angles"] - parameters["angle"][:, None],
-        coverage=replace(base.coverage, low=low, high=high),
-    )
+    with torch.no_grad():
+        return build_surfels(surfels, state.parameters), state
 
 
 def _step_loss(
-    surfels: Surfels, thresholds: Tensor, views: Sequence[RefineView], options: RefineOptions, step: int
-) -> Tensor:
-    chosen = _views_of_step(len(views), options, step)
+    surfels: Surfels,
+    thresholds: Tensor,
+    views: Sequence[RefineView],
+    pairs: Neighbours,
+    options: RefineOptions,
+    step: int,
+) -> tuple[Tensor, Tensor]:
+    """What the images say, and what the regularisers add."""
     generator = torch.Generator().manual_seed(options.seed * 1_000_003 + step)
-    origins, directions, ray_view, images, peaks = [], [], [], [], []
-    for slot, index in enumerate(chosen):
-        view = views[index]
-        pixels = _draw_pixels(view.edges, options, generator)
-        o, d, _ = view.camera.rays(pixels, options.subsamples)
-        origins.append(o.float())
-        directions.append(d.float())
-        ray_view.append(torch.full((len(o),), slot))
-        images.append(view.image[pixels])
-        peaks.append(torch.full((len(pixels), 1), view.peak))
-    radiance = torch.stack([views[index].radiance for index in chosen])
-    rays = (torch.cat(origins), torch.cat(directions), torch.cat(ray_view))
-    colours = shade_rays(SurfelBvh(surfels), surfels, thresholds, radiance, *rays)
-    rendered = colours.reshape(-1, options.subsamples**2, 3).mean(dim=1)
-    return ((rendered - torch.cat(images)) / torch.cat(peaks)).square().mean()
+    chosen = [views[index] for index in views_of_step(len(views), options.views_per_step, options.seed, step)]
+    draws = [_draw(view, options, generator) for view in chosen]
+    rays = _joined(draws)
+    radiance = shaded_radiance(surfels, [view.light for view in chosen])
+    bvh = SurfelBvh(surfels)
+    colours = shade_rays(bvh, surfels, thresholds, radiance, *rays)
+    images = [pixel_means(draw, seen) for draw, seen in zip(draws, _split(draws, colours), strict=True)]
+    if options.light_at_pixels:
+        more = _light_within_surfels(surfels, bvh, chosen, draws)
+        images = [image.index_add(0, draw.plain, m) for image, draw, m in zip(images, draws, more, strict=True)]
+    data = _image_term(chosen, draws, images, options)
+    prior = torch.zeros(())
+    if options.alpha_weight > 0.0:
+        ones = torch.ones_like(radiance[:1])
+        covered = shade_rays(bvh, surfels, thresholds, ones, rays[0], rays[1], torch.zeros_like(rays[2]))
+        prior = prior + options.alpha_weight * _alpha_term(chosen, draws, covered)
+    if options.continuity_weight > 0.0:
+        prior = prior + options.continuity_weight * continuity(surfels, pairs)
+    if options.smoothness_weight > 0.0:
+        prior = prior + options.smoothness_weight * normal_smoothness(surfels, pairs)
+    if options.distortion_weight > 0.0:
+        origins, directions = rays[0][::DISTORTION_STRIDE], rays[1][::DISTORTION_STRIDE]
+        hits = composite(bvh, origins, directions)
+        prior = prior + options.distortion_weight * distortion(surfels, hits, origins, directions)
+    return data, prior
 
 
-def _views_of_step(count: int, options: RefineOptions, step: int) -> list[int]:
-    """Every view comes up once before any comes up again."""
-    per_step = min(options.views_per_step, count)
-    steps_per_epoch = max(1, count // per_step)
-    epoch, place = divmod(step, steps_per_epoch)
-    order = torch.randperm(count, generator=torch.Generator().manual_seed(options.seed * 7919 + epoch))
-    return order[place * per_step : (place + 1) * per_step].tolist()
+def _draw(view: RefineView, options: RefineOptions, generator: torch.Generator) -> PixelDraw:
+    if options.window > 0:
+        return draw_window(view.camera, view.edges, options.window, options.subsamples, generator)
+    most = (options.edge_pixels, options.interior_pixels)
+    return draw_pixels(view.camera, view.edges, *most, options.subsamples, generator)
 
 
-def _draw_pixels(edges: Tensor, options: RefineOptions, generator: torch.Generator) -> Tensor:
-    parts = []
-    for mask, most in ((edges, options.edge_pixels), (~edges, options.interior_pixels)):
-        pixels = mask.nonzero()[:, 0]
-        parts.append(pixels[torch.randperm(len(pixels), generator=generator)[:most]])
-    return torch.cat(parts)
+def _joined(draws: Sequence[PixelDraw]) -> tuple[Tensor, Tensor, Tensor]:
+    """Origins, directions and slots of all rays."""
+    slots = [torch.full((len(draw.origins),), slot) for slot, draw in enumerate(draws)]
+    origins, directions = torch.cat([d.origins for d in draws]), torch.cat([d.directions for d in draws])
+    return origins, directions, torch.cat(slots)
+
+
+def _split(draws: Sequence[PixelDraw], rays: Tensor) -> Sequence[Tensor]:
+    """What belongs to the rays (R, …) of each draw."""
+    return rays.split([len(draw.origins) for draw in draws])
+
+
+def _image_term(
+    views: Sequence[RefineView], draws: Sequence[PixelDraw], images: Sequence[Tensor], options: RefineOptions
+) -> Tensor:
+    terms = []
+    for view, draw, rendered in zip(views, draws, images, strict=True):
+        pair = (rendered, view.image[draw.pixels])
+        if draw.shape is not None:
+            pair = tuple(x.reshape(*draw.shape, 3) for x in pair)
+        terms.append(image_loss(*pair, view.peak, options.loss, window=draw.shape is not None))
+    return torch.stack(terms).mean()
+
+
+def _light_within_surfels(
+    surfels: Surfels, bvh: SurfelBvh, views: Sequence[RefineView], draws: Sequence[PixelDraw]
+) -> Sequence[Tensor]:
+    """What light at the points seen adds to that at surfels' centres, (Q, 3) for the plain pixels of each draw."""
+    rays = [view.camera.rays(draw.pixels[draw.plain]) for view, draw in zip(views, draws, strict=True)]
+    counts = [len(draw.plain) for draw in draws]
+    origins, directions = (torch.cat([ray[k] for ray in rays]).float() for k in (0, 1))
+    ray_view = torch.arange(len(views)).repeat_interleave(torch.tensor(counts))
+    hits = composite(bvh, origins, directions)
+    lights = [view.light for view in views]
+    return light_where_rays_meet(surfels, lights, hits, origins, directions, ray_view).split(counts)
+
+
+def _alpha_term(views: Sequence[RefineView], draws: Sequence[PixelDraw], covered: Tensor) -> Tensor:
+    """Mean |coverage − alpha|."""
+    triples = zip(views, draws, _split(draws, covered), strict=True)
+    terms = [
+        (pixel_means(draw, seen[:, :1])[:, 0] - view.alpha[draw.pixels]).abs().mean() for view, draw, seen in triples
+    ]
+    return torch.stack(terms).mean()
 
 
 def _rates(options: RefineOptions, spacing: float) -> dict[str, float]:
     return {
         "offset": options.position_rate * spacing,
-        "log_scales": options.log_scale_rate,
+        "height": options.height_rate * spacing,
+        "tilt": options.tilt_rate,
         "angle": options.angle_rate,
+        "log_scales": options.log_scale_rate,
         "logit": options.opacity_rate,
         "clip_offsets": options.clip_rate * spacing,
         "clip_angles": options.clip_angle_rate,
+        "albedo": options.albedo_rate,
         "thresholds": options.threshold_rate,
     }
-
-
-def _adam(state: RefineState, name: str, gradient: Tensor, step: int) -> Tensor:
-    """Adam's direction (Kingma & Ba 2015), with a floor on the second moment that scales with the gradients.
-
-    A fixed floor would freeze scenes whose images are dim; none would let surfels that were grazed once
-    by a single ray step as far as those that every image shows.
-    """
-    fast, slow = 0.9, 0.98
-    state.first[name] = fast * state.first[name] + (1.0 - fast) * gradient
-    state.second[name] = slow * state.second[name] + (1.0 - slow) * gradient.square()
-    mean = state.first[name] / (1.0 - fast**step)
-    spread = (state.second[name] / (1.0 - slow**step)).sqrt()
-    floor = 1e-3 * spread.square().mean().sqrt() + 1e-20
-    return mean / (spread + floor)
-
-
-def _limit(parameters: dict[str, Tensor], base: Surfels) -> None:
-    start = base.scales.log()
-    parameters["log_scales"] = torch.maximum(torch.minimum(parameters["log_scales"], start + GROW), start - SHRINK)
-    parameters["logit"].clamp_(*LOGIT_RANGE)
-    unclipped = base.clip_offsets >= NO_CLIP
-    parameters["clip_offsets"] = torch.where(unclipped, base.clip_offsets, parameters["clip_offsets"])
-    low = parameters["thresholds"][0].clamp(*LOW_RANGE)
-    high = torch.maximum(parameters["thresholds"][1].clamp(*HIGH_RANGE), low + THRESHOLD_GAP)
-    parameters["thresholds"] = torch.stack([low, high])

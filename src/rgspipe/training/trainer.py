@@ -16,9 +16,11 @@ from rgspipe.renderer.view_weights import build_view_weights
 from rgspipe.scene.surfels import Surfels
 from rgspipe.training.checkpoint import Checkpoint
 from rgspipe.training.initialise import Footprint
-from rgspipe.training.materials import MaterialOptions, Materials, PriorOf, fit_materials
+from rgspipe.training.lighting import total_irradiance, trace_lighting
+from rgspipe.training.materials import MaterialOptions, Materials, PriorOf, build_transport, fit_materials
 from rgspipe.training.record import Record
 from rgspipe.training.refine import RefineOptions, RefineState, RefineView, refine
+from rgspipe.training.shading import surfel_lights
 
 
 @dataclass(frozen=True)
@@ -64,17 +66,9 @@ def train(
     else:
         surfels, radiance, state = *_fit_materials(surfels, views, options, log, "materials", prior), None
     if options.refine.steps > 0:
-        bvh = SurfelBvh(surfels)
-        refined = [_refine_view(view, bvh, radiance[v]) for v, view in enumerate(views)]
-
-        def keep(progress: RefineState) -> None:
-            log.steps(progress)
-            if checkpoint is not None and checkpoint.is_due(progress.step):
-                checkpoint.save(surfels, radiance, progress, log.records)
-
         if checkpoint is not None and state is None:
             checkpoint.save(surfels, radiance, None, log.records)
-        surfels, _ = refine(surfels, refined, spacing, options.refine, state, keep)
+        surfels = _refine_geometry(surfels, radiance, state, views, spacing, options, log, checkpoint)
         surfels, radiance = _fit_materials(surfels, views, options, log, "final materials", prior)
     return Trained(surfels, tuple(log.records))
 
@@ -93,11 +87,54 @@ def _fit_materials(
     return fitted.surfels, fitted.radiance
 
 
-def _refine_view(view: View, bvh: SurfelBvh, radiance: Tensor) -> RefineView:
-    image = view.image.reshape(-1, 3).float()
-    weights = build_view_weights(bvh, view.camera, supersampling=1)
-    peak = float(torch.quantile(image, 0.995).clamp(min=1e-12))
-    return RefineView(view.camera, image, radiance, weights.edges, peak)
+def _refine_geometry(
+    surfels: Surfels,
+    radiance: Tensor,
+    state: RefineState | None,
+    views: Sequence[View],
+    spacing: float,
+    options: TrainOptions,
+    log: _Log,
+    checkpoint: Checkpoint | None,
+) -> Surfels:
+    """All steps of the geometry, in rounds between which shadows and indirect light are made again."""
+    state = state or RefineState.start(surfels)
+    steps, every = options.refine.steps, options.refine.relight_every or options.refine.steps
+
+    def keep(progress: RefineState) -> None:
+        log.steps(progress)
+        if checkpoint is not None and checkpoint.is_due(progress.step):
+            checkpoint.save(surfels, radiance, progress, log.records)
+
+    while state.step < steps:
+        refined = refine_views(surfels, views, radiance)
+        until = (state.step // every + 1) * every
+        moved, state = refine(surfels, refined, spacing, options.refine, state, keep, until)
+        surfels = moved
+        if state.step < steps:
+            radiance, state = _relit(surfels, views, options), state.rebased(surfels)
+            if checkpoint is not None:
+                checkpoint.save(surfels, radiance, state, log.records)
+    return surfels
+
+
+def _relit(surfels: Surfels, views: Sequence[View], options: TrainOptions) -> Tensor:
+    """(V, N, 3) radiance under every view's light, by the surfels as they stand."""
+    lighting = trace_lighting(SurfelBvh(surfels), views)
+    return total_irradiance(lighting, surfels.albedo, build_transport(surfels, options)) * surfels.albedo
+
+
+def refine_views(surfels: Surfels, views: Sequence[View], radiance: Tensor) -> list[RefineView]:
+    """What a refinement of `surfels` looks at; their radiance (V, N, 3) says how light bounces."""
+    bvh = SurfelBvh(surfels)
+    lights = surfel_lights(surfels, [view.light for view in views], radiance / surfels.albedo.clamp(min=1e-6))
+    found = []
+    for view, light in zip(views, lights, strict=True):
+        image = view.image.reshape(-1, 3).float()
+        edges = build_view_weights(bvh, view.camera, supersampling=1).edges
+        peak = float(torch.quantile(image, 0.995).clamp(min=1e-12))
+        found.append(RefineView(view.camera, image, view.alpha.reshape(-1).float(), light, edges, peak))
+    return found
 
 
 class _Log:
