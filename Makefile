@@ -8,11 +8,11 @@ TEST_WORKERS ?= 2
 ARGS ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup test smoke reproduce bench lint
+.PHONY: help setup test smoke reproduce train-study bench lint
 
 help:  ## this list
 	@echo "rgspipe: from images of a scene, find its lights"
-	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-10s %s\n", $$1, $$2}'
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-12s %s\n", $$1, $$2}'
 	@echo "  Then: $(RGSPIPE) --help"
 
 setup: $(STAMP)  ## create .venv with the pinned packages (nothing is done when it is up to date)
@@ -32,6 +32,9 @@ smoke: setup  ## the whole way on a tiny scene, in minutes
 
 reproduce: setup  ## everything in pipelines/reproduce.yaml, from nothing to the report
 	$(RGSPIPE) pipeline=reproduce $(ARGS)
+
+train-study: setup  ## how well scenes are trained and what bad captures cost, in one table (hours; goes on where it was)
+	$(RGSPIPE) pipeline=training $(ARGS)
 
 bench: setup $(BENCH_STAMP)  ## accuracy against path-traced truth and what it costs on this machine (an hour, idle)
 	$(RGSPIPE) stage=benchmark $(ARGS)

@@ -23,6 +23,21 @@ SHOWN_VIEWS, COLUMN_GAP = 6, 12
 #: Measures of one view, and whether more is better.
 MEASURES = {"psnr": True, "psnr_off_edges": True, "ssim": True, "flip": False}
 
+#: Columns of a table of quality, one scene a row.
+QUALITY = (
+    "count",
+    "psnr",
+    "psnr_median",
+    "psnr_min",
+    "psnr_off_edges",
+    "ssim",
+    "flip",
+    "albedo_l1",
+    "albedo_l1_scaled",
+    "albedo_l1_off_edges",
+    "albedo_psnr",
+)
+
 
 def view_table(images: Sequence[ArrayLike], views: Sequence[View]) -> pd.DataFrame:
     """One row a view: `name` and the columns of `MEASURES`; NaN where a measure has no meaning or lacks its passes.
@@ -77,6 +92,15 @@ def held_out_summary(
     for name, errors in (("albedo", on_surfaces), ("albedo_off_edges", off_edges)):
         found[name] = None if errors is None else _finite(errors.summary())
     return found
+
+
+def quality_row(summary: dict[str, Any]) -> dict[str, Any]:
+    """A held-out summary as the columns of `QUALITY` but for `count`: means, where nothing else is said."""
+    row = {name: summary[f"test_{name}_mean"] for name in MEASURES}
+    row |= {f"psnr_{what}": summary[f"test_psnr_{what}"] for what in ("median", "min")}
+    albedo, off_edges = summary["albedo"] or {}, summary["albedo_off_edges"] or {}
+    row |= {"albedo_l1": albedo.get("relative_l1"), "albedo_l1_scaled": albedo.get("relative_l1_scaled")}
+    return row | {"albedo_psnr": albedo.get("psnr"), "albedo_l1_off_edges": off_edges.get("relative_l1")}
 
 
 def surface_pixels(view: View) -> npt.NDArray[np.bool_]:

@@ -22,7 +22,7 @@ from rgspipe.evaluation.arrays import ArrayLike, to_array
 from rgspipe.evaluation.tables import class_order
 
 #: Colours that stay apart with colour blindness and in grey; markers say the same once more.
-COLOURS = {"visible": "#0072B2", "out_of_frame": "#E69F00", "occluded": "#6A1B4D", "around_corner": "#009E73"}
+COLOURS = {"visible": "#0072B2", "out_of_frame": "#E69F00", "occluded": "#6A1B4D", "around_corner": "#2DB58A"}
 MARKERS = {"visible": "o", "out_of_frame": "s", "occluded": "^", "around_corner": "v"}
 LABELS = {
     "visible": "visible",

@@ -1,4 +1,4 @@
-"""Where the surfels of a scene come from: training, or a file from elsewhere."""
+"""Where the surfels of a scene come from: training, the truth that a rendered scene knows, or a file from elsewhere."""
 
 from __future__ import annotations
 
@@ -10,7 +10,14 @@ from rgspipe.errors import InputError
 
 def surfel_stage(config: RgspipeConfig) -> str:
     """The stage whose surfels.safetensors is the scene."""
-    return "import_ply" if config.scene.kind == "ply" else "train_surfels"
+    if config.scene.kind == "ply":
+        return "import_ply"
+    return "true_surfels" if config.freeze.surfels == "truth" else "train_surfels"
+
+
+def has_truth(config: RgspipeConfig) -> bool:
+    """Whether the scene is one that Blender renders, with passes of its true surfaces."""
+    return config.scene.kind not in ("external", "ply")
 
 
 def image_stage(config: RgspipeConfig) -> list[str]:

@@ -1,0 +1,59 @@
+"""Judge a frozen scene by held-out views, and say where its error sits."""
+
+from __future__ import annotations
+
+import pandas as pd
+
+from rgspipe.config import RgspipeConfig
+from rgspipe.datasets.frozen_file import load_frozen
+from rgspipe.datasets.location import open_dataset
+from rgspipe.evaluation.held_out import held_out_picture
+from rgspipe.evaluation.images import save_png
+from rgspipe.evaluation.judgement import kinds_of_views, render_views
+from rgspipe.stages.base import Need, Stage, StageContext
+from rgspipe.stages.sources import has_truth, require_images
+
+#: The columns of split.csv.
+SPLIT = ["surfels", "light", "kind", "pixels", "error", "psnr"]
+
+
+def run(context: StageContext) -> None:
+    """Write quality.csv, split.csv, views.csv and comparison.png."""
+    require_images(context.config, "held-out views")
+    views = open_dataset(context.inputs["generate_dataset"].folder(), train=False, targets=False).test
+    scenes = [load_frozen(artifact.file) for artifact in context.input_lists["freeze"]]
+    renders, surfels = render_views(scenes[0], views), context.config.freeze.surfels
+    # Edges of shadows are told by the true surfels, so that scenes are split alike.
+    kinds = kinds_of_views(scenes[1], views) if len(scenes) > 1 else None
+
+    quality = renders.quality()
+    quality.insert(0, "surfels", surfels)
+    quality.to_csv(context.folder / "quality.csv", index=False)
+    split = pd.DataFrame(columns=SPLIT) if kinds is None else renders.split(kinds).assign(surfels=surfels)[SPLIT]
+    split.to_csv(context.folder / "split.csv", index=False)
+    table = renders.table("pixels")
+    table.to_csv(context.folder / "views.csv", index=False)
+    picture = held_out_picture(views, renders.images["pixels"], table["psnr"], renders.albedo)
+    save_png(context.folder / "comparison.png", picture)
+    context.note(psnr=dict(zip(quality["light"], quality["psnr"].round(2), strict=True)))
+
+
+def _inputs(config: RgspipeConfig) -> list[Need | str]:
+    truth = [Need("freeze", {"freeze.surfels": "truth"})] if has_truth(config) else []
+    return ["freeze", *truth, "generate_dataset"]
+
+
+STAGE = Stage(
+    name="judge",
+    help="held-out views of the frozen scene: PSNR, SSIM, FLIP, albedo, and where the error sits",
+    run=run,
+    inputs=_inputs,
+    config_keys=("freeze.surfels",),
+    code=(
+        "rgspipe.datasets.frozen_file",
+        "rgspipe.evaluation",
+        "rgspipe.fitting",
+        "rgspipe.renderer",
+        "rgspipe.training.initialise",
+    ),
+)

@@ -1,0 +1,72 @@
+"""Make surfels from what is known of a rendered scene: the best that training could find."""
+
+from __future__ import annotations
+
+import torch
+
+from rgspipe.config import RgspipeConfig
+from rgspipe.datasets.location import open_dataset
+from rgspipe.datasets.surfel_file import save_surfels
+from rgspipe.errors import InputError
+from rgspipe.evaluation.ceiling import surfels_from_passes
+from rgspipe.scene import Surfels
+from rgspipe.scene.cornell import cornell_rectangles
+from rgspipe.scene.rectangles import surfels_on
+from rgspipe.stages.base import Stage, StageContext
+from rgspipe.stages.scene_model import cornell_parameters
+
+
+def run(context: StageContext) -> None:
+    """Write surfels.safetensors: exact rectangles for a diffuse Cornell box, else from depth, normals and albedo."""
+    config = context.config
+    exact = _is_exact(config)
+    surfels = _exact_surfels(config) if exact else _from_passes(context)
+    save_surfels(context.folder / "surfels.safetensors", surfels)
+    context.note(count=len(surfels), source="rectangles" if exact else "passes")
+
+
+def _is_exact(config: RgspipeConfig) -> bool:
+    return config.scene.kind == "cornell" and config.scene.cornell.gloss == 0.0
+
+
+def _exact_surfels(config: RgspipeConfig) -> Surfels:
+    room = cornell_parameters(config.scene.cornell)
+    boxes = [(box.center, box.size, box.turn, box.albedo) for box in room.boxes]
+    rectangles = cornell_rectangles(room.room, room.white, room.left, room.right, boxes)
+    return surfels_on(rectangles, config.init.surfels).to(torch.float32)
+
+
+def _from_passes(context: StageContext) -> Surfels:
+    config = context.config
+    try:
+        views = open_dataset(context.inputs["generate_dataset"].folder(), test=False, targets=False).train
+        return surfels_from_passes(views, config.init.surfels, seed=config.init.seed)
+    except ValueError as error:
+        raise InputError(
+            "stage=true_surfels",
+            expected="training views with depth, normal and albedo passes",
+            found=str(error),
+            remedy="Use freeze.surfels=trained, or a scene that Blender renders.",
+        ) from None
+
+
+def _keys(config: RgspipeConfig) -> tuple[str, ...]:
+    return ("scene.cornell", "init.surfels") if _is_exact(config) else ("init.surfels", "init.seed")
+
+
+STAGE = Stage(
+    name="true_surfels",
+    help="makes surfels from the true surfaces of a rendered scene, as a ceiling for training",
+    run=run,
+    inputs=lambda config: [] if _is_exact(config) else ["generate_dataset"],
+    config_keys=_keys,
+    code=(
+        "rgspipe.blender.models.parameters",
+        "rgspipe.evaluation.arrays",
+        "rgspipe.evaluation.ceiling",
+        "rgspipe.evaluation.metrics",
+        "rgspipe.renderer",
+        "rgspipe.stages.scene_model",
+        "rgspipe.training.initialise",
+    ),
+)
