@@ -191,6 +191,15 @@ class TrainConfig:
     at_pixels: bool = option(True, "direct light where pixels look, otherwise at surfels' centres: softer shadows")
     gather_rays: int = option(128, "hemisphere rays of a surfel while training", low=8, high=65536)
     patches: int = option(500, "patches of the indirect light while training", low=8, high=20000)
+    albedo_prior: str = option(
+        "none",
+        "what is known of the albedo: nothing, or the albedo maps of the training views, from any method and up to a "
+        "scale of each image",
+        choices=("none", "dataset"),
+    )
+    albedo_prior_weight: float = option(
+        0.3, "what the prior counts where its maps agree; the images count 1 in the median surfel", low=0, high=1e6
+    )
     checkpoint_every: int = option(20, "gradient steps between checkpoints", low=1, high=1000000)
     direct_only: bool = option(True, "also fit and report a model without interreflection, for comparison")
     seed: int = option(0, "draws of pixels and rays", low=0, high=2**31 - 1)

@@ -8,15 +8,19 @@ import pytest
 import torch
 from torch import Tensor
 
-from lit_room import room_cameras, room_surfels
+from lit_room import VISIBLE, room_cameras, room_surfels
 from rgspipe.datasets.views import View
 from rgspipe.errors import InputError
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.view_weights import ViewWeights, build_view_weights
-from rgspipe.scene import Camera, look_at
-from rgspipe.training.prior import albedo_prior, rescaled
+from rgspipe.scene import Camera, PointLight, look_at
+from rgspipe.training.lighting import total_irradiance, trace_lighting
+from rgspipe.training.materials import MaterialOptions, build_transport, fit_materials
+from rgspipe.training.prior import albedo_prior, prior_from_maps, rescaled
 
 VIEWS = 12
+
+OPTIONS = MaterialOptions(rounds=4, gather_rays=64, patches=60, supersampling=1, at_pixels=False)
 
 
 @pytest.fixture(scope="module")
@@ -113,5 +117,36 @@ def test_views_without_maps_are_passed_over_and_all_without_refused(weights: lis
     alone, _ = albedo_prior(weights[:1], views[:1])
     among, _ = albedo_prior(weights, [views[0], *bare[1:]])
     assert torch.equal(alone, among)
-    with pytest.raises(InputError, match=r"albedo_prior=dataset.*albedo_path"):
-        albedo_prior(weights, bare)
+    for refused in (lambda: albedo_prior(weights, bare), lambda: prior_from_maps(bare, 1.0)):
+        with pytest.raises(InputError, match=r"albedo_prior=dataset.*albedo_path"):
+            refused()
+
+
+def lit_views(weights: list[ViewWeights], truth: Tensor, noise: float) -> list[View]:
+    """Views with lights of their own, noise in every pixel of the image, and maps that are twice too bright."""
+    surfels = replace(room_surfels().to(torch.float32), albedo=truth)
+    views = views_with(weights, truth, torch.full((len(weights), 3), 1.6), noise=0.2)
+    light = PointLight(torch.tensor(VISIBLE, dtype=torch.float64), torch.ones(3, dtype=torch.float64))
+    shifts = 0.1 * torch.randn(len(views), 3, generator=torch.Generator().manual_seed(5), dtype=torch.float64)
+    views = [
+        replace(view, light=replace(light, position=light.position + shift))
+        for view, shift in zip(views, shifts, strict=True)
+    ]
+    lighting = trace_lighting(SurfelBvh(surfels), views)
+    radiance = total_irradiance(lighting, truth, build_transport(surfels, OPTIONS)) * truth
+    generator = torch.Generator().manual_seed(7)
+    photographs = []
+    for index, view in enumerate(views):
+        image = weights[index].image(radiance[index])
+        photographs.append(replace(view, image=image * (1.0 + noise * torch.randn(image.shape, generator=generator))))
+    return photographs
+
+
+def test_maps_of_a_wrong_scale_help_where_images_are_noisy(weights: list[ViewWeights], truth: Tensor) -> None:
+    views = lit_views(weights[:4], truth, noise=0.3)
+    start = replace(room_surfels().to(torch.float32), albedo=torch.full_like(truth, 0.5))
+    seen = albedo_prior(weights[:4], views)[1] > 0.5
+    plain = fit_materials(start, views, OPTIONS).surfels.albedo
+    helped = fit_materials(start, views, OPTIONS, prior=prior_from_maps(views, 1.0)).surfels.albedo
+    # Measured 0.084 and 0.141.
+    assert error(helped, truth, seen) < 0.8 * error(plain, truth, seen)

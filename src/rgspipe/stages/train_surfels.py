@@ -20,6 +20,7 @@ from rgspipe.evaluation.images import save_png
 from rgspipe.stages.base import Stage, StageContext
 from rgspipe.training.checkpoint import Checkpoint
 from rgspipe.training.materials import build_transport, fit_materials
+from rgspipe.training.prior import prior_from_maps
 from rgspipe.training.refine import RefineOptions
 from rgspipe.training.trainer import Trained, TrainOptions, train
 from rgspipe.training.validate import render_held_out
@@ -33,7 +34,8 @@ def run(context: StageContext) -> None:
     start = load_surfels(context.inputs["init_depth"].file("surfels.safetensors"))
     checkpoint = Checkpoint(context.scratch / "checkpoint.safetensors", config.checkpoint_every)
     train_views = degraded(dataset.train, Capture.from_config(context.config.capture))
-    trained = train(start, train_views, options, checkpoint)
+    known = prior_from_maps(train_views, config.albedo_prior_weight) if config.albedo_prior == "dataset" else None
+    trained = train(start, train_views, options, checkpoint, known)
     save_surfels(context.folder / "surfels.safetensors", trained.surfels)
     _write_table(context.folder / "training.csv", trained)
 

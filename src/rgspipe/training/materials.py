@@ -72,7 +72,7 @@ def fit_materials(
 
     Args:
         bounces: whether light goes from surfel to surfel; without, the model is a baseline.
-        prior: pulls towards known albedo.
+        prior: pulls towards known albedo; it is asked for once the images alone have given one.
     """
     weights = trace_views(surfels, views, options.supersampling)
     bvh = SurfelBvh(surfels)
@@ -80,7 +80,11 @@ def fit_materials(
     problem = AlbedoProblem.build(surfels, build_view_models(bvh, weights, lighting, options.at_pixels), views)
     transport = build_transport(surfels, options) if bounces else None
     rounds = options.rounds if bounces else min(DIRECT_ROUNDS, options.rounds)
-    known = None if prior is None else prior(surfels)
+    known = None
+    if prior is not None:
+        # What the images say alone: maps know albedo only up to a scale.
+        surfels = replace(surfels, albedo=solve_albedo(problem, surfels, lighting, transport, rounds)[0])
+        known = prior(surfels)
     albedo, indirect = solve_albedo(problem, surfels, lighting, transport, rounds, known)
     renders = tuple(problem.render(v, albedo, indirect) for v in range(len(views)))
     received = lighting.direct() if indirect is None else lighting.direct() + indirect

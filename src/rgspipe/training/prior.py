@@ -15,6 +15,9 @@ from torch import Tensor
 from rgspipe.datasets.views import View
 from rgspipe.errors import InputError
 from rgspipe.renderer.view_weights import ViewWeights
+from rgspipe.scene.surfels import Surfels
+from rgspipe.training.albedo import AlbedoPrior
+from rgspipe.training.materials import PriorOf, trace_views
 
 #: A surfel that fewer pixels than this see in a view, all together, has no value in it.
 LEAST_PIXELS = 0.05
@@ -54,14 +57,8 @@ def albedo_prior(weights: Sequence[ViewWeights], views: Sequence[View]) -> tuple
     Raises:
         InputError: no view has an albedo map.
     """
+    _require_maps(views)
     pairs = [(weight, view) for weight, view in zip(weights, views, strict=True) if view.albedo is not None]
-    if not pairs:
-        raise InputError(
-            "train.albedo_prior=dataset",
-            expected="training views with albedo maps",
-            found=f"none in {len(views)} views",
-            remedy='Give their frames an "albedo_path", or use train.albedo_prior=none.',
-        )
     logs, shares = (torch.stack(parts) for parts in zip(*(_on_surfels(*pair) for pair in pairs), strict=True))
     channels = [_common(logs[:, :, channel], shares) for channel in range(3)]
     albedo = torch.stack([common for common, _ in channels], dim=1).exp().clamp(DARKEST, 1.0)
@@ -91,6 +88,25 @@ def _common(logs: Tensor, shares: Tensor) -> tuple[Tensor, Tensor]:
     return common, spread
 
 
+def prior_from_maps(views: Sequence[View], strength: float) -> PriorOf:
+    """A prior for `fit_materials` from the views' albedo maps, in the scale of the albedo that the surfels have.
+
+    Args:
+        strength: how much a value that all maps agree on counts against the images, which weigh 1 in the median surfel.
+
+    Raises:
+        InputError: no view has an albedo map.
+    """
+    _require_maps(views)
+
+    def prior(surfels: Surfels) -> AlbedoPrior:
+        # Edges are left out, so one ray a pixel says enough.
+        albedo, weight = albedo_prior(trace_views(surfels, views, supersampling=1), views)
+        return AlbedoPrior(rescaled(albedo, weight, surfels.albedo), strength * weight)
+
+    return prior
+
+
 def rescaled(prior: Tensor, weight: Tensor, albedo: Tensor) -> Tensor:
     """The prior (N, 3) with one scale a channel, so that it is most like `albedo` (N, 3), which images under known
     lights gave: they know the scale that the maps do not.
@@ -109,6 +125,16 @@ def _median(values: Tensor, weights: Tensor) -> Tensor:
     half = (heights < 0.5 * heights[-1]).sum(dim=0).clamp(max=len(values) - 1)
     median = values.gather(0, order).gather(0, half[None])[0]
     return torch.where(heights[-1] > 0, median, 0.0)
+
+
+def _require_maps(views: Sequence[View]) -> None:
+    if all(view.albedo is None for view in views):
+        raise InputError(
+            "train.albedo_prior=dataset",
+            expected="training views with albedo maps",
+            found=f"none in {len(views)} views",
+            remedy='Give their frames an "albedo_path", or use train.albedo_prior=none.',
+        )
 
 
 def _on_surfels(weights: ViewWeights, view: View) -> tuple[Tensor, Tensor]:
