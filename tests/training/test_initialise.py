@@ -46,15 +46,16 @@ def plane_depth(normal: np.ndarray, size: int = 32, focal: float = 40.0) -> np.n
 
 def test_normals_of_a_slanted_plane_are_exact():
     normal = np.array([0.3, -0.5, 0.8]) / np.linalg.norm([0.3, -0.5, 0.8])
-    found, valid = normals_from_depth(plane_depth(normal), (40.0, 40.0), (16.0, 16.0))
-    assert valid.all()
-    assert np.abs(found - normal).max() < 1e-6  # measured 3e-15
+    fits = normals_from_depth(plane_depth(normal), (40.0, 40.0), (16.0, 16.0))
+    assert fits.valid.all()
+    assert np.abs(fits.normals - normal).max() < 1e-6  # measured 3e-15
 
 
 def test_normals_beside_an_edge_are_those_of_their_own_side():
     left, right = np.array([0.6, 0.0, 0.8]), np.array([-0.6, 0.0, 0.8])
     depth = np.maximum(plane_depth(left), plane_depth(right))  # a valley along the middle column
-    found, valid = normals_from_depth(depth, (40.0, 40.0), (16.0, 16.0))
+    fits = normals_from_depth(depth, (40.0, 40.0), (16.0, 16.0))
+    found, valid = fits.normals, fits.valid
     assert valid.all()
     assert np.abs(found[:, :16] - found[0, 0]).max() < 1e-6
     assert np.abs(found[:, 16:] - found[0, -1]).max() < 1e-6
@@ -64,7 +65,8 @@ def test_normals_beside_an_edge_are_those_of_their_own_side():
 def test_normals_where_there_is_no_surface_are_zero():
     depth = plane_depth(np.array([0.0, 0.0, 1.0]))
     depth[:, 20:] = np.inf
-    found, valid = normals_from_depth(depth, (40.0, 40.0), (16.0, 16.0))
+    fits = normals_from_depth(depth, (40.0, 40.0), (16.0, 16.0))
+    found, valid = fits.normals, fits.valid
     assert valid[:, :20].all()
     assert not valid[:, 20:].any()
     assert not found[~valid].any()
@@ -74,14 +76,14 @@ def test_noisy_depth_gets_larger_windows():
     normal = np.array([0.0, 0.6, 0.8])
     noise = 1.0 + 0.01 * np.random.default_rng(0).standard_normal((64, 64))
     depth = plane_depth(normal, 64, 80.0) * noise
-    small, kept_small = normals_from_depth(depth, (80.0, 80.0), (32.0, 32.0), radius=1)
-    chosen, kept = normals_from_depth(depth, (80.0, 80.0), (32.0, 32.0))
-    assert kept.mean() > 0.9
-    assert (chosen[kept] @ normal).mean() > 0.95 > (small[kept_small] @ normal).mean()
+    small = normals_from_depth(depth, (80.0, 80.0), (32.0, 32.0), radius=1)
+    chosen = normals_from_depth(depth, (80.0, 80.0), (32.0, 32.0))
+    assert chosen.valid.mean() > 0.9
+    assert (chosen.normals[chosen.valid] @ normal).mean() > 0.95 > (small.normals[small.valid] @ normal).mean()
 
 
 def test_points_and_normals_are_on_the_surfaces(views):
-    cloud = cloud_from_views(views)
+    cloud = cloud_from_views(views, COUNT)
     assert len(cloud) > 0.97 * 24 * 64 * 64  # measured 0.994
     assert surface_distance(cloud.points).max() < 1e-6  # measured 5e-8, float32 depth
     assert degrees_off(cloud.normals).max() < 0.01  # measured 2e-4
@@ -107,7 +109,7 @@ def test_surfels_are_evenly_spaced(surfels):
 
 
 def test_every_seen_point_is_near_a_surfel(views, surfels):
-    cloud = cloud_from_views(views)
+    cloud = cloud_from_views(views, COUNT)
     spacing = float(surfels.coverage.clip_softness) / 0.12
     away = cKDTree(surfels.centers.numpy()).query(cloud.points)[0]
     assert np.percentile(away, 99) < 0.9 * spacing  # measured 0.70
@@ -188,13 +190,13 @@ def test_same_seed_same_surfels(views, surfels):
 def test_normal_pass_is_used_where_there_is_one(views):
     with_pass = room_views(2, normals=True)
     turned = [replace(view, normal=-view.normal) for view in with_pass]
-    assert degrees_off(cloud_from_views(with_pass, normals="pass").normals).max() < 0.05
+    assert degrees_off(cloud_from_views(with_pass, COUNT, normals="pass").normals).max() < 0.05
     # Normals that face away are refused as grazing, which shows that "auto" took the pass.
     with pytest.raises(InputError, match="no pixel"):
-        cloud_from_views(turned, normals="auto")
-    assert len(cloud_from_views(turned, normals="estimate"))
+        cloud_from_views(turned, COUNT, normals="auto")
+    assert len(cloud_from_views(turned, COUNT, normals="estimate"))
     with pytest.raises(InputError, match=r"train/r_0000.*normal pass"):
-        cloud_from_views(views, normals="pass")
+        cloud_from_views(views, COUNT, normals="pass")
 
 
 def test_a_sphere_seen_beside_a_plane_stays():
@@ -208,7 +210,8 @@ def test_a_sphere_seen_beside_a_plane_stays():
     root = along**2 - square * (center @ center - radius**2)
     ball = root > 0
     depth = np.where(ball, (along - np.sqrt(np.maximum(root, 0.0))) / square, 3.0)
-    found, valid = normals_from_depth(depth, (focal, focal), (size / 2, size / 2))
+    fits = normals_from_depth(depth, (focal, focal), (size / 2, size / 2))
+    found, valid = fits.normals, fits.valid
     true = (rays * depth[..., None] - center) / radius
     inner = np.linalg.norm(true[..., :2], axis=-1) < 0.7  # beyond it a silhouette's windows reach the background
     assert valid[ball & inner].all()
@@ -243,7 +246,7 @@ def test_no_depth_is_an_error_that_says_what_would_help(views):
 
 def test_views_without_depth_are_passed_over(views):
     mixed = [views[0], *(replace(view, depth=None) for view in views[1:])]
-    assert len(cloud_from_views(mixed)) == len(cloud_from_views(views[:1]))
+    assert len(cloud_from_views(mixed, COUNT)) == len(cloud_from_views(views[:1], COUNT))
 
 
 def test_depth_that_shows_nothing_is_an_error(views):

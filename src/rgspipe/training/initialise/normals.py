@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import correlate1d, minimum_filter, uniform_filter
 
 #: Windows that a noisy depth map may need, in pixels from the centre to the border.
-RADII = (1, 2, 3, 5)
+RADII = (1, 2, 3, 5, 7)
+
+#: Share of a window's pixels that must be known.
+LEAST_KNOWN = 0.5
 
 #: A larger window is taken while noise would turn the normals by more than this [rad].
 NOISE_TOLERANCE = 0.08
@@ -17,9 +21,26 @@ NOISE_TOLERANCE = 0.08
 LARGEST_DEVIATION = 0.05
 
 
+@dataclass(frozen=True)
+class PlaneFits:
+    """What the planes that were fitted to a depth map say of its pixels.
+
+    Attributes:
+        normals: (H, W, 3) float64 unit normals in camera axes that face the camera, 0 where there is none.
+        valid: (H, W) the pixels that have one.
+        depth: (H, W) float64 planar depth of the fitted planes, scene units; meaningless where not valid.
+        deviation: median relative rms deviation of the depth from the fits.
+    """
+
+    normals: np.ndarray
+    valid: np.ndarray
+    depth: np.ndarray
+    deviation: float
+
+
 def normals_from_depth(
     depth: np.ndarray, focal: tuple[float, float], center: tuple[float, float], radius: int | None = None
-) -> tuple[np.ndarray, np.ndarray]:
+) -> PlaneFits:
     """Normals in camera axes (x right, y up, looking along −z), by fitting planes to the inverse depth.
 
     On a plane 1/z is an affine function of the pixel, 1/z = a·X + b·Y + c with (X, Y, −1) the pixel's ray,
@@ -28,34 +49,29 @@ def normals_from_depth(
     side, where an average around the pixel would round the edge.
 
     Args:
-        depth: (H, W) planar depth at pixel centres, scene units; +inf where there is no surface.
+        depth: (H, W) planar depth at pixel centres, scene units; +inf where there is no surface, NaN where it is
+            not known.
         focal: fx, fy in pixels.
         center: cx, cy in pixels.
         radius: half width of the windows in pixels; by default the smallest of RADII at which the map's
             own noise, seen as deviation from the fits, turns the normals by at most NOISE_TOLERANCE.
-
-    Returns:
-        (H, W, 3) float64 unit normals that face the camera and 0 where there is none, and the (H, W) mask
-        of the pixels that have one.
     """
     if radius is not None:
-        return _fit(depth, focal, center, radius)[:2]
+        return _fit(depth, focal, center, radius)
     for radius in RADII:
-        normals, valid, deviation = _fit(depth, focal, center, radius)
-        turn = deviation * math.sqrt(focal[0] * focal[1]) / math.sqrt(_spread(radius) * (2 * radius + 1) ** 2)
+        fits = _fit(depth, focal, center, radius)
+        turn = fits.deviation * math.sqrt(focal[0] * focal[1]) / math.sqrt(_spread(radius) * (2 * radius + 1) ** 2)
         if turn <= NOISE_TOLERANCE or 2 * RADII[-1] + 1 > min(depth.shape):
             break
-    return normals, valid
+    return fits
 
 
-def _fit(
-    depth: np.ndarray, focal: tuple[float, float], center: tuple[float, float], radius: int
-) -> tuple[np.ndarray, np.ndarray, float]:
-    """Normals, mask, and the median relative rms deviation of the depth from the fits."""
+def _fit(depth: np.ndarray, focal: tuple[float, float], center: tuple[float, float], radius: int) -> PlaneFits:
     height, width = depth.shape
-    seen = np.isfinite(depth)
-    inverse = np.where(seen, 1.0 / np.where(seen, depth, 1.0), 0.0).astype(np.float64)
-    mean, slope_x, slope_y, deviation = _window_fits(inverse, seen, radius)
+    known = np.isfinite(depth)
+    inverse = np.where(known, 1.0 / np.where(known, depth, 1.0), 0.0).astype(np.float64)
+    fit_windows = _window_fits if not np.isnan(depth).any() else _window_fits_with_gaps
+    mean, slope_x, slope_y, deviation = fit_windows(inverse, known, np.isposinf(depth), radius)
 
     best = np.full(depth.shape, np.inf)
     chosen = np.zeros((3, height, width))
@@ -79,17 +95,18 @@ def _fit(
             for index, values in enumerate((fitted, slope_x[window], slope_y[window])):
                 chosen[index][pixel] = np.where(better, values, chosen[index][pixel])
 
-    fitting = deviation[seen & np.isfinite(deviation)]
+    fitting = deviation[known & np.isfinite(deviation)]
     noise = float(np.median(fitting)) if len(fitting) else 0.0
-    valid = seen & (best < LARGEST_DEVIATION**2) & ~_straddles(best, noise, radius)
     at_pixel, per_column, per_row = chosen
+    valid = known & (best < LARGEST_DEVIATION**2) & ~_straddles(best, noise, radius) & (at_pixel > 0)
     column, row = np.arange(width) + 0.5, (np.arange(height) + 0.5)[:, None]
     a, b = per_column * focal[0], -per_row * focal[1]
     x, y = (column - center[0]) / focal[0], -(row - center[1]) / focal[1]
     # n·(X, Y, −1) < 0 faces the camera; with n = (−a, −b, c) that product is −1/z.
     normals = np.stack([-a, -b, at_pixel - a * x - b * y], axis=-1)
     normals /= np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-300)
-    return np.where(valid[..., None], normals, 0.0), valid, noise
+    fitted_depth = 1.0 / np.where(at_pixel > 0, at_pixel, np.inf)
+    return PlaneFits(np.where(valid[..., None], normals, 0.0), valid, fitted_depth, noise)
 
 
 def _straddles(cost: np.ndarray, noise: float, radius: int) -> np.ndarray:
@@ -101,9 +118,10 @@ def _straddles(cost: np.ndarray, noise: float, radius: int) -> np.ndarray:
     return cost > 100.0 * nearby + 9.0 * noise**2 + 1e-10
 
 
-def _window_fits(
-    inverse: np.ndarray, seen: np.ndarray, radius: int
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+Fits = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+
+
+def _window_fits(inverse: np.ndarray, known: np.ndarray, empty: np.ndarray, radius: int) -> Fits:
     """Least-squares planes in the window around each pixel: mean, slopes per column and row, relative rms deviation.
 
     The deviation is infinite for windows that leave the image or hold pixels without a surface.
@@ -119,9 +137,36 @@ def _window_fits(
     ]
     slope_x, slope_y = (moment / (spread * size * size) for moment in along)
     variance = square - mean * mean - spread * (slope_x * slope_x + slope_y * slope_y)
-    whole = uniform_filter(seen.astype(np.float64), size, mode="constant") > 1.0 - 1e-6
+    whole = uniform_filter(known.astype(np.float64), size, mode="constant") > 1.0 - 1e-6
     deviation = np.sqrt(np.maximum(variance, 0.0)) / np.maximum(mean, 1e-300)
     return mean, slope_x, slope_y, np.where(whole, deviation, np.inf)
+
+
+def _window_fits_with_gaps(inverse: np.ndarray, known: np.ndarray, empty: np.ndarray, radius: int) -> Fits:
+    """The same for windows with unknown pixels; at least LEAST_KNOWN of a window must be known, and none empty.
+
+    What is called the mean here is the plane's value in the middle.
+    """
+    size = 2 * radius + 1
+    ones, steps = np.ones(size), np.arange(-radius, radius + 1, dtype=np.float64)
+
+    def moment(values: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
+        return correlate1d(correlate1d(values, rows, 0, mode="constant"), columns, 1, mode="constant")
+
+    weight, value = known.astype(np.float64), np.where(known, inverse, 0.0)
+    count, x, y = moment(weight, ones, ones), moment(weight, ones, steps), moment(weight, steps, ones)
+    xx, yy = moment(weight, ones, steps**2), moment(weight, steps**2, ones)
+    xy = moment(weight, steps, steps)
+    right = np.stack([moment(value, *k) for k in ((ones, ones), (ones, steps), (steps, ones))], axis=-1)
+    matrix = np.stack([count, x, y, x, xx, xy, y, xy, yy], axis=-1).reshape(*inverse.shape, 3, 3)
+    usable = (count >= LEAST_KNOWN * size * size) & (moment(empty.astype(np.float64), ones, ones) == 0)
+    # Half a window beyond the image would pass for gaps.
+    usable &= moment(np.ones(inverse.shape), ones, ones) == size * size
+    matrix[~usable] = np.eye(3)
+    plane = np.linalg.solve(matrix + 1e-9 * np.eye(3), right[..., None])[..., 0]
+    left_over = moment(value * value, ones, ones) - (plane * right).sum(axis=-1)
+    deviation = np.sqrt(np.maximum(left_over, 0.0) / np.maximum(count, 1.0)) / np.maximum(plane[..., 0], 1e-300)
+    return plane[..., 0], plane[..., 1], plane[..., 2], np.where(usable, deviation, np.inf)
 
 
 def _spread(radius: int) -> float:

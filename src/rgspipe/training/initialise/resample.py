@@ -12,19 +12,22 @@ from rgspipe.training.initialise.cloud import Cloud
 NORMAL_WEIGHT = 40.0
 
 
-def estimate_spacing(cloud: Cloud, count: int) -> float:
-    """Roughly how far apart `count` surfels stand on the surfaces of `cloud`, scene units."""
+def estimate_area(cloud: Cloud) -> float:
+    """Roughly the area of the surfaces of `cloud`, scene units squared."""
     cloud = cloud[:: max(1, len(cloud) // 400_000)]
     low, high = np.percentile(cloud.points, [1.0, 99.0], axis=0)
     edge = max(float(np.linalg.norm(high - low)) / 96.0, 1e-9)
-    cells = thin(cloud, edge)
     # A plane meets |n|₁ cells per cell face of its area.
-    area = edge * edge * float((1.0 / np.abs(cells.normals).sum(axis=1)).sum())
-    return float(np.sqrt(area / count))
+    return edge * edge * float((1.0 / np.abs(thin(cloud, edge).normals).sum(axis=1)).sum())
 
 
-def thin(cloud: Cloud, edge: float, average: bool = True) -> Cloud:
-    """One point for each grid cell of size `edge` and main direction of the normal: the mean, or the first one."""
+def estimate_spacing(cloud: Cloud, count: int) -> float:
+    """Roughly how far apart `count` surfels stand on the surfaces of `cloud`, scene units."""
+    return float(np.sqrt(estimate_area(cloud) / count))
+
+
+def cells(cloud: Cloud, edge: float) -> np.ndarray:
+    """(M,) number from 0 of each point's grid cell of size `edge` and main direction of the normal."""
     axis = np.abs(cloud.normals).argmax(axis=1)
     side = 2 * axis + (np.take_along_axis(cloud.normals, axis[:, None], 1)[:, 0] > 0)
     # The odd fraction keeps walls at round coordinates away from cell borders, where rounding would split them.
@@ -33,12 +36,18 @@ def thin(cloud: Cloud, edge: float, average: bool = True) -> Cloud:
     reach = cell.max(axis=0) + 1
     # In two steps, so that no product leaves 64 bits even when a stray point is far away.
     _, plane = np.unique(cell[:, 0] * reach[1] + cell[:, 1], return_inverse=True)
-    _, first, label = np.unique((plane * reach[2] + cell[:, 2]) * 6 + side, return_index=True, return_inverse=True)
+    _, label = np.unique((plane * reach[2] + cell[:, 2]) * 6 + side, return_inverse=True)
+    return label
+
+
+def thin(cloud: Cloud, edge: float, average: bool = True) -> Cloud:
+    """One point for each of the `cells`: the mean, or the first one."""
+    label = cells(cloud, edge)
     if not average:
-        return cloud[first]
+        return cloud[np.unique(label, return_index=True)[1]]
     size = np.bincount(label).astype(np.float64)
-    points = _sums(cloud.points, label, len(size)) / size[:, None]
-    normals = _sums(cloud.normals, label, len(size))
+    points = sums(cloud.points, label, len(size)) / size[:, None]
+    normals = sums(cloud.normals, label, len(size))
     return Cloud(points, normals / np.linalg.norm(normals, axis=1, keepdims=True))
 
 
@@ -69,7 +78,7 @@ def even_out(cloud: Cloud, count: int, spacing: float, rng: np.random.Generator,
     for _ in range(rounds):
         distance, label = cKDTree(centers).query(features, workers=-1)
         total = np.bincount(label, weights, count)
-        centers = _sums(features * weights[:, None], label, count) / np.maximum(total, 1e-300)[:, None]
+        centers = sums(features * weights[:, None], label, count) / np.maximum(total, 1e-300)[:, None]
         empty = np.flatnonzero(total == 0)
         centers[empty] = features[np.argsort(-distance, kind="stable")[: len(empty)]]
     normals = centers[:, 3:]
@@ -94,6 +103,6 @@ def _features(cloud: Cloud, spacing: float) -> np.ndarray:
     return np.concatenate([cloud.points, cloud.normals * (0.5 * NORMAL_WEIGHT * spacing)], axis=1)
 
 
-def _sums(values: np.ndarray, label: np.ndarray, count: int) -> np.ndarray:
+def sums(values: np.ndarray, label: np.ndarray, count: int) -> np.ndarray:
     """(count, D) sums of the rows of `values` that share a label."""
     return np.stack([np.bincount(label, column, count) for column in values.T], axis=1)

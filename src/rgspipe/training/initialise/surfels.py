@@ -12,8 +12,10 @@ import torch
 from rgspipe.datasets.views import View
 from rgspipe.errors import InputError
 from rgspipe.scene.surfels import NO_CLIP, Coverage, Surfels, quaternion_from_normal, quaternion_to_axes
-from rgspipe.training.initialise.cloud import Cloud, NormalSource, cloud_from_views
+from rgspipe.training.initialise.back_projection import NormalSource, see_surfaces
+from rgspipe.training.initialise.cloud import Cloud
 from rgspipe.training.initialise.edges import find_edges
+from rgspipe.training.initialise.fusion import fuse
 from rgspipe.training.initialise.planes import refit_planes
 from rgspipe.training.initialise.resample import estimate_spacing, even_out, neighbour_spacing, thin_for
 
@@ -78,7 +80,7 @@ def initialise_surfels(
     if count < 1:
         raise ValueError(f"count must be at least 1, got {count}")
     footprint = footprint or Footprint()
-    cloud = cloud_from_views(views, normals=normals, where=where)
+    cloud = cloud_from_views(views, count, normals=normals, where=where)
     if len(cloud) < count:
         raise InputError(
             where,
@@ -90,6 +92,28 @@ def initialise_surfels(
     thinned = thin_for(cloud, count, spacing)
     centers = refit_planes(even_out(thinned, count, spacing, np.random.default_rng(seed)), thinned, spacing)
     return _dress(centers, neighbour_spacing(centers, spacing), cloud if clips else None, thinned, footprint)
+
+
+def cloud_from_views(
+    views: Sequence[View],
+    count: int,
+    *,
+    normals: NormalSource = "auto",
+    where: str | Path = "the training views",
+) -> Cloud:
+    """The surface points behind the pixels of all views that have depth, as measured if depth is exact, else fused.
+
+    Args:
+        count: surfels that the cloud is for; noise is averaged over about as far as they reach.
+
+    Raises:
+        InputError: as `see_surfaces`.
+    """
+    seen = see_surfaces(views, normals=normals, where=where)
+    cloud = Cloud(seen.points, seen.normals)
+    if not seen.noisy:
+        return cloud
+    return fuse(seen, [view for view in views if view.depth is not None], estimate_spacing(cloud, count))
 
 
 def _dress(centers: Cloud, spacing: np.ndarray, cloud: Cloud | None, thinned: Cloud, footprint: Footprint) -> Surfels:

@@ -1,0 +1,151 @@
+"""Small planar pieces of a surface, each fitted to what many views measured around it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from rgspipe.training.initialise.resample import sums
+from rgspipe.training.initialise.sightings import Sightings
+
+#: Normals of one surface, within a radius, differ by less than this cosine.
+SAME_SURFACE = 0.85
+#: Half the width of the interval that a wider fit must share with all narrower ones, in standard deviations.
+CONFIDENCE = 2.5
+#: Residual, in standard deviations, at which a neighbour counts a quarter.
+OUTLIER = 4.0
+#: Fewest neighbours of a fit.
+LEAST_NEIGHBOURS = 6
+#: Most facets in the widest neighbourhood; their size is a sixth of its radius, so that 113 cover it.
+MOST_NEIGHBOURS = 150
+#: A facet with a smaller share of the mean weight of itself and the nearest ones, or with fewer sightings, is weak.
+WEAK, NEAREST, LEAST_SIGHTINGS = 0.2, 48, 8
+#: Facets fitted at once; bounds the memory.
+CHUNK = 2048
+
+
+@dataclass(frozen=True)
+class Facets:
+    """N planar pieces of the surface.
+
+    Attributes:
+        centers: (N, 3) scene units.
+        normals: (N, 3) unit vectors towards the cameras.
+        weights: (N,) inverse variance of the measured offset of the facet's own sightings, 1/unit².
+        strong: (N,) whether a facet has its share of the sightings around it; others are mixtures and strays.
+    """
+
+    centers: np.ndarray
+    normals: np.ndarray
+    weights: np.ndarray
+    strong: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.centers)
+
+
+def fit_facets(sightings: Sightings, label: np.ndarray, radii: np.ndarray) -> Facets:
+    """Planes through the sightings that share a label, each fitted to its whole neighbourhood.
+
+    The ray of a sighting is exact and only the distance along it is noisy. So the offset that a plane explains is
+    that of the measured points, but the places in the plane at which it explains them are those where the rays meet
+    the present surface; noise in those would flatten the planes. The neighbourhood grows through `radii` as long as
+    the wider fit agrees with all narrower ones within their confidence intervals (Goldenshluger and Nemirovski 1997):
+    it stays small where the surface bends.
+
+    Args:
+        sightings: M of them, with their present distances and normals.
+        label: (M,) facet of each sighting, −1 for none; from 0 without gaps.
+        radii: (R,) ascending, scene units; the widest must span some facets.
+    """
+    used = label >= 0
+    sightings, label = sightings[used], label[used]
+    count = int(label.max()) + 1
+    weight = sightings.certainty()
+    total = np.maximum(np.bincount(label, weight, count), 1e-300)
+
+    def mean(values: np.ndarray) -> np.ndarray:
+        return sums(values * weight[:, None], label, count) / total[:, None]
+
+    places, measured, normals = mean(sightings.points), mean(sightings.measured_points), mean(sightings.normals)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    neighbours = min(count, MOST_NEIGHBOURS)
+    distance, index = cKDTree(places).query(places, k=neighbours, distance_upper_bound=radii[-1], workers=-1)
+    distance, index = distance.reshape(count, -1), index.reshape(count, -1)
+    index = np.where(np.isfinite(distance), index, 0)
+    fitted, offset, supported = normals.copy(), np.zeros(count), np.zeros(count, dtype=bool)
+    for start in range(0, count, CHUNK):
+        part = slice(start, start + CHUNK)
+        fitted[part], offset[part], supported[part] = _fit_chunk(
+            places, measured, normals, total, part, distance[part], index[part], radii
+        )
+    # Mixtures of two surfaces and strays hold few sightings. The mean is by weight: strays lie among strays.
+    near = np.where(distance[:, :NEAREST] < radii[1], total[index[:, :NEAREST]], 0.0)
+    around = (near**2).sum(axis=1) / near.sum(axis=1)
+    strong = supported & (total >= WEAK * around) & (np.bincount(label, minlength=count) >= LEAST_SIGHTINGS)
+    return Facets(places + fitted * offset[:, None], fitted, total, strong)
+
+
+def _fit_chunk(
+    places: np.ndarray,
+    measured: np.ndarray,
+    normals: np.ndarray,
+    weights: np.ndarray,
+    part: slice,
+    distance: np.ndarray,
+    index: np.ndarray,
+    radii: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Normals (C, 3), offsets (C,) along the old normals, and whether there was a fit, of the facets in `part`."""
+    here, normal = places[part], normals[part]
+    along, across = tangents(normal)
+    away = places[index] - here[:, None]
+    height = _dot(away, normal)
+    alike = (_dot(normals[index], normal) > SAME_SURFACE) & (np.abs(height) < 0.35 * distance + 0.45 * radii[0])
+    u, v = _dot(away, along), _dot(away, across)
+    # Offset and slopes explain the measured offsets: the last column is what the first three are to give.
+    system = np.stack([np.ones_like(u), u, v, _dot(measured[index] - here[:, None], normal)], axis=-1)
+    share = np.where(alike & np.isfinite(distance), weights[index], 0.0)
+    root = np.sqrt(share)
+
+    best = np.zeros((len(here), 3))
+    low, high = np.full((len(here), 3), -np.inf), np.full((len(here), 3), np.inf)
+    growing, supported = np.ones(len(here), dtype=bool), np.zeros(len(here), dtype=bool)
+    for radius in radii:
+        weight = share * np.maximum(1.0 - (distance / radius) ** 2, 0.0)
+        found, variance = _solve(system, weight, radius)
+        off = root * (system[..., 3] - _dot(system[..., :3], found))
+        found, variance = _solve(system, weight / (1.0 + (off / OUTLIER) ** 2) ** 2, radius)
+        enough = (weight > 0).sum(axis=1) >= LEAST_NEIGHBOURS
+        margin = CONFIDENCE * np.sqrt(variance)
+        new_low, new_high = np.maximum(low, found - margin), np.minimum(high, found + margin)
+        taken = growing & enough & (new_low <= new_high).all(axis=1)
+        best[taken], low[taken], high[taken] = found[taken], new_low[taken], new_high[taken]
+        supported |= taken
+        growing &= taken | ~enough
+    tilted = normal - best[:, 1:2] * along - best[:, 2:] * across
+    return tilted / np.linalg.norm(tilted, axis=1, keepdims=True), best[:, 0], supported
+
+
+def _solve(system: np.ndarray, weight: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray]:
+    """Weighted least squares (C, 3) and its variances (C, 3), the slopes held a little where nothing fixes them."""
+    moments = np.swapaxes(system * weight[..., None], 1, 2) @ system
+    total = moments[:, 0, 0] + 1e-300
+    held = np.array([1e-9, 1e-4 * radius**2, 1e-4 * radius**2]) * total[:, None]
+    inverse = np.linalg.inv(moments[:, :3, :3] + held[:, :, None] * np.eye(3))
+    return (inverse @ moments[:, :3, 3:])[..., 0], np.diagonal(inverse, axis1=1, axis2=2)
+
+
+def tangents(normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Two unit vectors (N, 3) across each of the normals, and across one another."""
+    helper = np.where(np.abs(normals[:, :1]) < 0.6, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
+    along = np.cross(normals, helper)
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    return along, np.cross(normals, along)
+
+
+def _dot(vectors: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """(N, K) products of (N, K, D) with (N, D)."""
+    return (vectors @ normals[..., None])[..., 0]
