@@ -6,6 +6,8 @@ import pytest
 import torch
 
 from rgspipe.evaluation import convergence, images, plots, report, tables
+from rgspipe.evaluation.error_split import KINDS
+from rgspipe.evaluation.held_out import QUALITY
 from rgspipe.scene import PointLight
 
 
@@ -35,6 +37,10 @@ def make_contents() -> report.ReportContents:
     image = np.random.default_rng(0).uniform(size=(16, 16, 3))
     png = images.png_bytes(images.comparison_strip(image, image))
     cloud = np.random.default_rng(1).uniform(size=(500, 3))
+    rows = [{"surfels": name, "light": "pixels"} | dict.fromkeys(QUALITY, 38.25) for name in ("trained", "truth")]
+    quality = pd.DataFrame(rows)
+    split = pd.DataFrame({"kind": KINDS, "pixels": 0.25, "error": 0.25, "psnr": 40.0, "light": "pixels"})
+    split = split.assign(surfels="trained")
     manifest = {"fingerprint": "0123abcd", "seconds": 3.25, "peak_memory_mib": 640, "libraries": {"torch": "2.13.0"}}
     return report.ReportContents(
         scene="cornell",
@@ -48,6 +54,9 @@ def make_contents() -> report.ReportContents:
         training={"test_psnr_mean": 36.5, "seconds": 200.0, "per_view": [{"name": "test/r_0001", "psnr": 33.25}]},
         training_log=pd.DataFrame({"kind": ["albedo", "gradient"], "loss": [1.0, 0.1], "psnr": [20.0, 30.0]}),
         comparison=png,
+        quality=quality,
+        split=split,
+        true_summary=tables.summary_table(make_fitted(1, seed=1)[0], seed=0, resamples=0),
         configuration='{"scene": {"name": "<cornell>"}}',
         stages=[report.stage_record("freeze", manifest)],
         notes=["One note."],

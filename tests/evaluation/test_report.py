@@ -62,8 +62,17 @@ def test_a_report_shows_everything_and_misses_nothing(full_contents):
     assert html.count('<p class="missing">') == 1
     for text in ("36.50 dB", "test/r_0001", "33.25", "occluded_002", "0123abcd", "640", "torch 2.13.0", "all classes"):
         assert text in page.text
-    # training, comparison, errors, two light drawings, convergence, one fit
-    assert len(page.addresses) == 7
+    # training, split, comparison, errors, two light drawings, convergence, one fit
+    assert len(page.addresses) == 8
+
+
+def test_a_judged_scene_stands_beside_true_surfels(full_contents):
+    page = _Page(report.render_report(full_contents))
+    for text in ("true surfels, light at pixels", "38.25 dB", "3,825.00 %", "What the trained scene costs the lights"):
+        assert text in page.text
+    # Pixels that cannot be told apart leave the table.
+    page = _Page(report.render_report(dataclasses.replace(full_contents, split=full_contents.split.iloc[:0])))
+    assert "no passes by which pixels could be told apart" in page.text and "38.25 dB" in page.text
 
 
 def test_text_from_files_is_escaped(full_contents):

@@ -13,6 +13,8 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from rgspipe.evaluation import goals, images, metrics, plots
+from rgspipe.evaluation.quality_plots import split_figure
+from rgspipe.evaluation.report_quality import compared_lights, quality_columns, quality_rows
 from rgspipe.evaluation.tables import ALL
 
 #: All pictures together, before they are encoded as text (which adds a third).
@@ -58,6 +60,10 @@ class ReportContents:
         training: the trainer's metrics: `test_psnr_mean`, `test_psnr_median`, `test_psnr_min`,
             `test_psnr_off_edges_mean`, `direct_only_psnr` [dB], `surfels`, `seconds`, `per_view`.
         training_log: one row a training round, or None.
+        quality: rows of every measure of held-out views, with `surfels` and `light`, of the trained scene and where
+            known of one made from the truth; None if nothing judged them.
+        split: rows of the split of the squared error with `surfels` and `light`; empty if pixels cannot be told apart.
+        true_summary: rows of `summary_table` for lights recovered with surfels made from the truth.
         comparison: PNG of truth, render and difference of held-out views, or None.
         success_limit: position error up to which a target counts as solved.
         configuration: the full configuration as YAML or JSON text.
@@ -75,6 +81,9 @@ class ReportContents:
     cameras: Sequence[plots.CameraMark] = ()
     training: Mapping[str, Any] | None = None
     training_log: pd.DataFrame | None = None
+    quality: pd.DataFrame | None = None
+    split: pd.DataFrame | None = None
+    true_summary: pd.DataFrame | None = None
     comparison: bytes | None = None
     success_limit: float = metrics.SUCCESS_LIMIT
     configuration: str = ""
@@ -100,6 +109,9 @@ def render_report(contents: ReportContents) -> str:
         method=method,
         training=_training_rows(contents.training),
         comparison=_picture(contents.comparison, budget),
+        quality_columns=[] if contents.quality is None else quality_columns(contents.quality),
+        quality=[] if contents.quality is None else quality_rows(contents.quality),
+        compared=[] if contents.true_summary is None else compared_lights(contents.summary, contents.true_summary),
         summary=contents.summary.to_dict("records"),
         targets=_target_rows(contents.targets),
         fits=_grouped_fits(contents.fits, budget),
@@ -229,6 +241,9 @@ def _figures(contents: ReportContents) -> dict[str, Any]:
         "training": _figure(lambda: plots.training_figure(contents.training_log))
         if contents.training_log is not None
         else {"source": None, "reason": "no training log"},
+        "split": _figure(lambda: split_figure(contents.split))
+        if contents.split is not None
+        else {"source": None, "reason": "nothing judged the scene"},
         "lights": _light_figures(contents),
     }
 

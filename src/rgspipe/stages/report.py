@@ -18,6 +18,7 @@ from rgspipe.datasets.surfel_file import load_surfels
 from rgspipe.evaluation import report
 from rgspipe.evaluation.plots import CameraMark
 from rgspipe.stages.base import Need, Stage, StageContext
+from rgspipe.stages.sources import has_truth
 
 REPORT = "report.html"
 #: Sections that say how a run is done, not what comes out of it.
@@ -33,12 +34,16 @@ def run(context: StageContext) -> None:
 
 
 def _contents(context: StageContext) -> report.ReportContents:
-    evaluations = context.input_lists.get("evaluate", ())
+    config = context.config
+    # The evaluations with true surfels come last, as `_inputs` lists them.
+    every, count = context.input_lists.get("evaluate", ()), len(config.report.methods) * len(config.report.views)
+    evaluations, with_truth = every[:count], every[count:]
+    judged = context.input_lists.get("judge", ())
     described = [read_json(artifact.file("metrics.json"), "what an evaluation found") for artifact in evaluations]
     surfels = _surfels(context.inputs.get("freeze"))
     trained = context.inputs.get("train_surfels")
     return report.ReportContents(
-        scene=scene_name(context.config),
+        scene=scene_name(config),
         summary=_table(evaluations, "summary.csv"),
         targets=_table(evaluations, "metrics.csv", {"success": "boolean", "result": str, "reason": str}),
         curves=_table(evaluations, "convergence.csv"),
@@ -48,9 +53,12 @@ def _contents(context: StageContext) -> report.ReportContents:
         cameras=_cameras(described),
         training=_training(trained),
         training_log=_optional_table(trained, "training.csv"),
-        comparison=_optional_bytes(trained, "comparison.png"),
-        success_limit=context.config.evaluate.success,
-        configuration=_configuration(context.config),
+        quality=_joined(judged, "quality.csv"),
+        split=_joined(judged, "split.csv"),
+        true_summary=_table(with_truth, "summary.csv") if with_truth else None,
+        comparison=_optional_bytes(judged[0] if judged else trained, "comparison.png"),
+        success_limit=config.evaluate.success,
+        configuration=_configuration(config),
         stages=_stages(context, described),
         notes=_notes(described),
     )
@@ -63,6 +71,14 @@ def _table(artifacts: Iterable[Artifact], name: str, types: Mapping[str, Any] | 
     if not filled:
         return pd.DataFrame(columns=["method", "views", "occlusion", "target", "position_error"])
     return pd.concat(filled, ignore_index=True)
+
+
+def _joined(artifacts: Sequence[Artifact], name: str) -> pd.DataFrame | None:
+    """The filled tables of this name, one below the other; None without artifacts."""
+    if not artifacts:
+        return None
+    parts = [pd.read_csv(artifact.file(name)) for artifact in artifacts]
+    return pd.concat([part for part in parts if len(part)] or parts[:1], ignore_index=True)
 
 
 def _pictures(artifacts: Iterable[Artifact], described: Iterable[Mapping[str, Any]]) -> list[report.Picture]:
@@ -113,7 +129,7 @@ def _stages(context: StageContext, described: Sequence[Mapping[str, Any]]) -> li
     """Every artifact behind the report, in the order of the pipeline; fits and evaluations stand in pairs."""
     records = [
         report.stage_record(stage, artifact.manifest)
-        for stage in ("generate_dataset", "init_depth", "train_surfels", "freeze")
+        for stage in ("generate_dataset", "init_depth", "train_surfels", "freeze", "judge")
         for artifact in context.input_lists.get(stage, ())
     ]
     for stage in ("fit_light", "evaluate"):
@@ -142,7 +158,18 @@ def _inputs(config: RgspipeConfig) -> list[Need | str]:
             if method == "paper_adam" and config.fit.limit is None:
                 changes["fit.limit"] = config.report.paper_adam_limit
             needs += [Need("fit_light", changes), Need("evaluate", changes)]
-    return [*needs, "freeze", "train_surfels", "init_depth", "generate_dataset"]
+    return [*needs, *_judgements(config), "freeze", "train_surfels", "init_depth", "generate_dataset"]
+
+
+def _judgements(config: RgspipeConfig) -> list[Need | str]:
+    """Held-out views, and where it is known the same with surfels made from the truth, with their lights."""
+    if config.scene.kind == "ply":
+        return []
+    if not (config.report.truth and has_truth(config)):
+        return ["judge"]
+    truth: dict[str, object] = {"freeze.surfels": "truth"}
+    lights = truth | {"fit.method": "search_lm", "views.count": config.report.views[0], "views.indices": None}
+    return ["judge", Need("judge", truth), Need("evaluate", lights)]
 
 
 def _keys(config: RgspipeConfig) -> list[str]:

@@ -1,0 +1,119 @@
+"""Surfels from the truth, and the study that gathers what was judged and evaluated."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from rgspipe.artifacts import Artifact, ArtifactStore, Key
+from rgspipe.config import RgspipeConfig, with_changes
+from rgspipe.datasets.surfel_file import load_surfels
+from rgspipe.errors import InputError
+from rgspipe.evaluation.held_out import QUALITY
+from rgspipe.evaluation.study import TRUTH
+from rgspipe.stages import judge, study, true_surfels
+from rgspipe.stages.base import Need, StageContext
+from rgspipe.stages.sources import has_truth, surfel_stage
+
+
+def _config(**changes: object) -> RgspipeConfig:
+    return with_changes(RgspipeConfig(), {key.replace("__", "."): value for key, value in changes.items()})
+
+
+def _artifact(root: Path, stage: str, fingerprint: str, make: Callable[[Path], None]) -> Artifact:
+    def build(folder: Path) -> dict:
+        make(folder)
+        return {}
+
+    recipe = {"config": {}, "inputs": {}, "code": {}}
+    return ArtifactStore(root).build(Key("room", stage, fingerprint), recipe, build)[0]
+
+
+def test_frozen_surfels_come_from_where_the_configuration_says() -> None:
+    assert surfel_stage(_config()) == "train_surfels"
+    assert surfel_stage(_config(freeze__surfels="truth")) == "true_surfels"
+    assert surfel_stage(_config(scene__kind="ply", freeze__surfels="truth")) == "import_ply"
+    assert has_truth(_config()) and not has_truth(_config(scene__kind="external"))
+
+
+def test_true_surfels_of_a_diffuse_cornell_box_are_its_rectangles(tmp_path: Path) -> None:
+    config = _config(init__surfels=500)
+    assert true_surfels.STAGE.needs(config) == ()
+    true_surfels.run(StageContext(config, {}, {}, tmp_path))
+    surfels = load_surfels(tmp_path / "surfels.safetensors")
+    assert 400 < len(surfels) < 620
+    colours = {tuple(round(value, 3) for value in row) for row in surfels.albedo.tolist()}
+    cornell = config.scene.cornell
+    assert colours == {tuple(c) for c in (cornell.wall_color, cornell.left_color, cornell.right_color)}
+    assert surfels.centers.abs().amax() <= 0.5 + 1e-6
+
+
+@pytest.mark.parametrize("changes", [{"scene__kind": "room"}, {"scene__cornell__gloss": 0.2}])
+def test_true_surfels_of_other_scenes_come_from_the_passes(changes: dict) -> None:
+    assert true_surfels.STAGE.needs(_config(**changes)) == (Need("generate_dataset"),)
+
+
+def test_a_scene_is_judged_beside_its_truth_where_that_is_known() -> None:
+    needs = judge.STAGE.needs(_config())
+    assert [need.changes for need in needs if need.stage == "freeze"] == [{}, {"freeze.surfels": "truth"}]
+    needs = judge.STAGE.needs(_config(scene__kind="external"))
+    assert [need.changes for need in needs if need.stage == "freeze"] == [{}]
+
+
+def test_surfels_without_images_cannot_be_judged(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="held-out views"):
+        judge.run(StageContext(_config(scene__kind="ply", scene__path="x.ply"), {}, {}, tmp_path))
+
+
+def test_a_study_needs_every_case_of_every_scene_and_the_truth() -> None:
+    config = _config(study__cases=["clean", "depth_noise=0.01"], study__scenes=["cornell", "room"], study__limit=2)
+    needs = study.STAGE.needs(config)
+    judged = [need.changes for need in needs if need.stage == "judge"]
+    assert len(judged) == 6 and len(needs) == 12
+    assert judged[1] == {"scene.kind": "cornell", "scene.name": None, "capture.depth_noise": 0.01}
+    assert judged[5] == {"scene.kind": "room", "scene.name": None, "freeze.surfels": "truth"}
+    evaluated = next(need.changes for need in needs if need.stage == "evaluate")
+    assert evaluated["fit.limit"] == 2 and evaluated["views.count"] == 1
+    for need in needs:
+        with_changes(config, need.changes)
+
+
+@pytest.mark.parametrize("case", ["depth_nose=0.1", "depth_noise"])
+def test_a_case_that_is_none_is_refused(case: str) -> None:
+    with pytest.raises(InputError, match=r"study\.cases"):
+        study.STAGE.needs(_config(study__cases=[case]))
+
+
+def test_a_study_is_one_table_a_figure_and_text(tmp_path: Path) -> None:
+    errors = {"clean": 0.01, "views=25": 0.03, TRUTH: 0.005}
+
+    def write_quality(folder: Path, error: float) -> None:
+        row = {"surfels": "trained"} | dict.fromkeys(QUALITY, 0.5) | {"psnr": 40.0 - 100.0 * error}
+        pd.DataFrame([row | {"light": light} for light in ("pixels", "centres")]).to_csv(folder / "quality.csv")
+
+    def write_lights(folder: Path, error: float) -> None:
+        table = pd.DataFrame({"occlusion": ["visible", "all"], "median_position_error": error})
+        table.assign(median_intensity_error=0.02, success_rate=0.5).to_csv(folder / "summary.csv", index=False)
+
+    lists: dict[str, list[Artifact]] = {"judge": [], "evaluate": []}
+    for index, error in enumerate(errors.values()):
+        for stage, write in (("judge", write_quality), ("evaluate", write_lights)):
+            made = _artifact(tmp_path, stage, f"{index:02x}", lambda folder, w=write, e=error: w(folder, e))
+            lists[stage].append(made)
+    folder = tmp_path / "study"
+    folder.mkdir()
+    config = _config(study__cases=["clean", "views=25"])
+    context = StageContext(config, {name: found[0] for name, found in lists.items()}, lists, folder)
+    study.run(context)
+    table = pd.read_csv(folder / "study.csv")
+    assert table["case"].tolist() == list(errors) and set(table["scene"]) == {"cornell"}
+    assert table["factor"].tolist() == pytest.approx([2.0, 6.0, 1.0])
+    assert table["psnr"].tolist() == pytest.approx([39.0, 37.0, 39.5])
+    text = (folder / "study.md").read_text()
+    assert "| cornell | views=25 | 37.0 |" in text and text.count("\n") == 5
+    assert (folder / "study.png").read_bytes().startswith(b"\x89PNG")
+    json.dumps(context.facts)
