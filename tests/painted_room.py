@@ -12,7 +12,6 @@ from rgspipe.scene import Camera, PointLight, Surfels, look_at
 from rgspipe.training.lighting import total_irradiance, trace_lighting
 from rgspipe.training.materials import build_transport, trace_views
 from rgspipe.training.refine import RefineOptions
-from rgspipe.training.materials import build_transport, trace_views
 from rgspipe.training.trainer import TrainOptions
 from rooms import closed_box
 

@@ -189,6 +189,9 @@ class TrainConfig:
     subsamples: int = option(3, "rays per pixel of a step, squared", low=1, high=16)
     supersampling: int = option(4, "rays per edge pixel in view weights, squared", low=1, high=16)
     at_pixels: bool = option(True, "direct light where pixels look, otherwise at surfels' centres: softer shadows")
+    light_rounds: int = option(
+        0, "how often each fit of materials refines the training lights; their mean stays", low=0, high=100
+    )
     gather_rays: int = option(128, "hemisphere rays of a surfel while training", low=8, high=65536)
     patches: int = option(500, "patches of the indirect light while training", low=8, high=20000)
     albedo_prior: str = option(

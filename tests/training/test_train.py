@@ -40,7 +40,7 @@ def test_training_goes_on_from_a_checkpoint_as_if_never_interrupted(views: list[
     refine_options = RefineOptions(
         steps=6, relight_every=3, views_per_step=4, interior_pixels=100, subsamples=1, tilt_rate=0.01, height_rate=0.01
     )
-    options = replace(OPTIONS, rounds=2, refine=refine_options)
+    options = replace(OPTIONS, rounds=2, refine=refine_options, light_rounds=1)
     whole = train(start, views, options)
 
     class Killed(Exception):

@@ -79,6 +79,7 @@ def train_options(config: TrainConfig) -> TrainOptions:
         patches=config.patches,
         supersampling=config.supersampling,
         at_pixels=config.at_pixels,
+        light_rounds=config.light_rounds,
         seed=config.seed,
     )
 

@@ -79,7 +79,7 @@ class AlbedoProblem:
     def build(cls, surfels: Surfels, models: Sequence[ViewModel], views: Sequence[View]) -> AlbedoProblem:
         images = [view.image.reshape(-1, 3).float() for view in views]
         pairs = zip(views, models, strict=True)
-        pixel_weights = [_pixel_weight(view, model.weights.coverage) for view, model in pairs]
+        pixel_weights = [pixel_weight(view, model.weights.coverage) for view, model in pairs]
         return cls(models, images, pixel_weights, _neighbours(surfels))
 
     def render(self, v: int, albedo: Tensor, indirect: Tensor | None) -> Tensor:
@@ -205,7 +205,7 @@ def _of_view(indirect: Tensor | None, v: int) -> Tensor | None:
     return None if indirect is None else indirect[v]
 
 
-def _pixel_weight(view: View, coverage: Tensor) -> Tensor:
+def pixel_weight(view: View, coverage: Tensor) -> Tensor:
     """(P,) weights; none where surfels and photograph disagree on what is covered, which is for the geometry."""
     image, alpha = view.image.reshape(-1, 3).float(), view.alpha.reshape(-1).float()
     peak = torch.quantile(image, 0.99).clamp(min=1e-12)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 
+import torch
 from torch import Tensor
 
 from rgspipe.datasets.tensor_file import load_tensors, save_tensors
+from rgspipe.scene.lights import PointLight
 from rgspipe.scene.surfels import Surfels
 from rgspipe.training.record import Record
 from rgspipe.training.refine import RefineState
@@ -28,10 +31,20 @@ class Checkpoint:
         """Whether a state belongs after this geometry step."""
         return step % self.every == 0
 
-    def save(self, surfels: Surfels, radiance: Tensor, state: RefineState | None, records: list[Record]) -> None:
+    def save(
+        self,
+        surfels: Surfels,
+        radiance: Tensor,
+        state: RefineState | None,
+        records: list[Record],
+        lights: Sequence[PointLight],
+    ) -> None:
         """Keep a training that has its first materials and, with a `state`, has begun with the geometry."""
         tensors = {f"surfels.{name}": tensor for name, tensor in surfels.tensors().items()} | {"radiance": radiance}
+        for name in ("position", "intensity"):
+            tensors[f"light.{name}"] = torch.stack([getattr(light, name) for light in lights])
         note = {"records": [asdict(record) for record in records], "step": None}
+        note["thresholds"] = [surfels.coverage.low, surfels.coverage.high]
         if state is not None:
             note |= {"step": state.step, "losses": state.losses}
             for group in ("parameters", "first", "second"):
@@ -46,19 +59,23 @@ class Checkpoint:
             return []
         return [Record(**row) for row in load_tensors(self.path)[1]["records"]]
 
-    def load(self, like: Surfels) -> tuple[Surfels, Tensor, RefineState | None] | None:
-        """What `save` kept, or None; `like` gives the coverage that training started with."""
+    def load(self, like: Surfels) -> tuple[Surfels, Tensor, RefineState | None, list[PointLight]] | None:
+        """What `save` kept, or None; `like` gives what of the coverage is not trained."""
         if not self.path.exists():
             return None
         tensors, note = load_tensors(self.path)
-        surfels = replace(like, **_group(tensors, "surfels"))
+        low, high = note["thresholds"]
+        surfels = replace(like, coverage=replace(like.coverage, low=low, high=high), **_group(tensors, "surfels"))
+        light = _group(tensors, "light")
+        lights = [PointLight(*pair) for pair in zip(light["position"], light["intensity"], strict=True)]
         if note["step"] is None:
-            return surfels, tensors["radiance"], None
+            return surfels, tensors["radiance"], None, lights
         groups = [_group(tensors, name) for name in ("parameters", "first", "second")]
         return (
             surfels,
             tensors["radiance"],
             RefineState(*groups, tensors["start_log_scales"], step=note["step"], losses=note["losses"]),
+            lights,
         )
 
 

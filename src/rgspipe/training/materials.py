@@ -46,15 +46,32 @@ class MaterialOptions:
 
 
 @dataclass(frozen=True)
+class Prepared:
+    """What a fit needs of surfels and cameras, whatever the lights are.
+
+    Attributes:
+        bvh: the surfels.
+        weights: view weights of V views.
+        transport: light between the surfels; None if it does not bounce.
+    """
+
+    bvh: SurfelBvh
+    weights: tuple[ViewWeights, ...]
+    transport: PatchTransport | None
+
+
+@dataclass(frozen=True)
 class Materials:
     """Fitted materials, and the images that follow.
 
     Attributes:
+        prepared: what was fitted with.
         surfels: with their albedo.
         radiance: (V, N, 3) outgoing radiance under every view's light, with direct light at their centres.
         renders: V images (pixels, 3).
     """
 
+    prepared: Prepared
     surfels: Surfels
     radiance: Tensor
     renders: tuple[Tensor, ...]
@@ -67,18 +84,20 @@ def fit_materials(
     *,
     bounces: bool = True,
     prior: PriorOf | None = None,
+    prepared: Prepared | None = None,
 ) -> Materials:
     """The albedo that explains `views` best, on surfels that stay where they are.
 
     Args:
         bounces: whether light goes from surfel to surfel; without, the model is a baseline.
         prior: pulls towards known albedo; it is asked for once the images alone have given one.
+        prepared: of an earlier fit of the same surfels and cameras, under other lights.
     """
-    weights = trace_views(surfels, views, options.supersampling)
-    bvh = SurfelBvh(surfels)
-    lighting = trace_lighting(bvh, views)
-    problem = AlbedoProblem.build(surfels, build_view_models(bvh, weights, lighting, options.at_pixels), views)
-    transport = build_transport(surfels, options) if bounces else None
+    prepared = prepared or prepare(surfels, views, options, bounces)
+    transport = prepared.transport
+    lighting = trace_lighting(prepared.bvh, views)
+    models = build_view_models(prepared.bvh, prepared.weights, lighting, options.at_pixels)
+    problem = AlbedoProblem.build(surfels, models, views)
     rounds = options.rounds if bounces else min(DIRECT_ROUNDS, options.rounds)
     known = None
     if prior is not None:
@@ -88,7 +107,13 @@ def fit_materials(
     albedo, indirect = solve_albedo(problem, surfels, lighting, transport, rounds, known)
     renders = tuple(problem.render(v, albedo, indirect) for v in range(len(views)))
     received = lighting.direct() if indirect is None else lighting.direct() + indirect
-    return Materials(replace(surfels, albedo=albedo), received * albedo, renders)
+    return Materials(prepared, replace(surfels, albedo=albedo), received * albedo, renders)
+
+
+def prepare(surfels: Surfels, views: Sequence[View], options: MaterialOptions, bounces: bool = True) -> Prepared:
+    """Trace the cameras and, if light bounces, the surfels' view of each other."""
+    weights = trace_views(surfels, views, options.supersampling)
+    return Prepared(SurfelBvh(surfels), weights, build_transport(surfels, options) if bounces else None)
 
 
 def build_transport(surfels: Surfels, options: MaterialOptions) -> PatchTransport:

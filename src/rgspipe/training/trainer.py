@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import torch
@@ -12,10 +12,13 @@ from torch import Tensor
 
 from rgspipe.datasets.views import View
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
+from rgspipe.renderer.transport import with_albedo
 from rgspipe.renderer.view_weights import build_view_weights
+from rgspipe.scene.lights import PointLight
 from rgspipe.scene.surfels import Surfels
 from rgspipe.training.checkpoint import Checkpoint
 from rgspipe.training.initialise import Footprint
+from rgspipe.training.light_refinement import refine_lights
 from rgspipe.training.lighting import total_irradiance, trace_lighting
 from rgspipe.training.materials import MaterialOptions, Materials, PriorOf, build_transport, fit_materials
 from rgspipe.training.record import Record
@@ -29,17 +32,26 @@ class TrainOptions(MaterialOptions):
 
     Attributes:
         refine: of the geometry; its `steps` may be 0.
+        light_rounds: how often lights that were measured with errors are refined, before the geometry and after it.
     """
 
     refine: RefineOptions = field(default_factory=RefineOptions)
+    light_rounds: int = 0
 
 
 @dataclass(frozen=True)
 class Trained:
-    """The trained surfels and how training went."""
+    """The trained surfels and how training went.
+
+    Attributes:
+        surfels: as trained.
+        records: the training table.
+        views: training views, with their lights as refined.
+    """
 
     surfels: Surfels
     records: tuple[Record, ...]
+    views: tuple[View, ...]
 
 
 def train(
@@ -60,17 +72,19 @@ def train(
     """
     log = _Log(checkpoint.records if checkpoint else [])
     surfels = surfels.to(torch.float32)
-    spacing = surfel_spacing(surfels)
+    spacing, given = surfel_spacing(surfels), [view.light for view in views]
     if checkpoint is not None and (found := checkpoint.load(surfels)) is not None:
-        surfels, radiance, state = found
+        surfels, radiance, state, lights = found
+        views = [replace(view, light=light) for view, light in zip(views, lights, strict=True)]
     else:
-        surfels, radiance, state = *_fit_materials(surfels, views, options, log, "materials", prior), None
+        surfels, radiance, views = _fit_materials(surfels, views, given, options, log, "materials", prior)
+        state = None
     if options.refine.steps > 0:
         if checkpoint is not None and state is None:
-            checkpoint.save(surfels, radiance, None, log.records)
+            checkpoint.save(surfels, radiance, None, log.records, [view.light for view in views])
         surfels = _refine_geometry(surfels, radiance, state, views, spacing, options, log, checkpoint)
-        surfels, radiance = _fit_materials(surfels, views, options, log, "final materials", prior)
-    return Trained(surfels, tuple(log.records))
+        surfels, _, views = _fit_materials(surfels, views, given, options, log, "final materials", prior)
+    return Trained(surfels, tuple(log.records), tuple(views))
 
 
 def surfel_spacing(surfels: Surfels) -> float:
@@ -79,12 +93,24 @@ def surfel_spacing(surfels: Surfels) -> float:
 
 
 def _fit_materials(
-    surfels: Surfels, views: Sequence[View], options: TrainOptions, log: _Log, phase: str, prior: PriorOf | None
-) -> tuple[Surfels, Tensor]:
-    """Surfels with fitted albedo, and their radiance (V, N, 3) under every view's light."""
+    surfels: Surfels,
+    views: Sequence[View],
+    measured: Sequence[PointLight],
+    options: TrainOptions,
+    log: _Log,
+    phase: str,
+    prior: PriorOf | None,
+) -> tuple[Surfels, Tensor, Sequence[View]]:
+    """Surfels with fitted albedo, their radiance (V, N, 3) under every view's light, and the views with that light."""
     fitted = fit_materials(surfels, views, options, prior=prior)
     log.materials(phase, views, fitted)
-    return fitted.surfels, fitted.radiance
+    for _ in range(options.light_rounds):
+        transport = with_albedo(fitted.prepared.transport, fitted.surfels.albedo)
+        bvh = SurfelBvh(fitted.surfels)
+        views = refine_lights(bvh, fitted.prepared.weights, transport, views, measured)
+        fitted = fit_materials(fitted.surfels, views, options, prior=prior, prepared=fitted.prepared)
+        log.materials(f"{phase} and lights", views, fitted)
+    return fitted.surfels, fitted.radiance, views
 
 
 def _refine_geometry(
@@ -104,7 +130,7 @@ def _refine_geometry(
     def keep(progress: RefineState) -> None:
         log.steps(progress)
         if checkpoint is not None and checkpoint.is_due(progress.step):
-            checkpoint.save(surfels, radiance, progress, log.records)
+            checkpoint.save(surfels, radiance, progress, log.records, [view.light for view in views])
 
     while state.step < steps:
         refined = refine_views(surfels, views, radiance)
@@ -114,7 +140,7 @@ def _refine_geometry(
         if state.step < steps:
             radiance, state = _relit(surfels, views, options), state.rebased(surfels)
             if checkpoint is not None:
-                checkpoint.save(surfels, radiance, state, log.records)
+                checkpoint.save(surfels, radiance, state, log.records, [view.light for view in views])
     return surfels
 
 
