@@ -47,10 +47,11 @@ def test_panels_are_there_for_what_was_measured() -> None:
     figure = study_figure(_study(("cornell", "room")))
     assert [axis.get_title(loc="left") for axis in figure.axes] == ["PSNR (dB)", "light: position error (%)"]
     assert [label.get_text() for label in figure.axes[0].get_yticklabels()] == ["clean", "depth noise=0.01"]
-    assert len(figure.legends) == 1 and len(study_figure(_study(("cornell",))).legends) == 0
-    # The cases, and a line each for the clean case and for true surfels.
-    assert figure.axes[0].lines[0].get_xdata().tolist() == [40.0, 37.0]
-    assert [line.get_xdata()[0] for line in figure.axes[0].lines[1:3]] == [40.0, 34.0]
+    words = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert words == ["cornell", "room", "clean capture", TRUTH]
+    # The cases, a stalk to each, and a line each for the clean case and for true surfels.
+    lines = [list(line.get_xdata()) for line in figure.axes[0].lines[:5]]
+    assert lines == [[40.0, 37.0], [40.0, 40.0], [40.0, 37.0], [40.0, 40.0], [34.0, 34.0]]
 
 
 def test_nothing_to_draw_is_said() -> None:

@@ -23,6 +23,9 @@ SHOWN_VIEWS, COLUMN_GAP = 6, 12
 #: Measures of one view, and whether more is better.
 MEASURES = {"psnr": True, "psnr_off_edges": True, "ssim": True, "flip": False}
 
+#: The two kinds of surfels that are judged, in words.
+SURFELS = {"trained": "trained surfels", "truth": "true surfels"}
+
 #: Columns of a table of quality, one scene a row.
 QUALITY = (
     "count",

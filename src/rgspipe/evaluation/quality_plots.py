@@ -7,9 +7,12 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from rgspipe.evaluation.error_split import KINDS
-from rgspipe.evaluation.plots import STYLE
+from rgspipe.evaluation.held_out import SURFELS
+from rgspipe.evaluation.plots import INK, STYLE
 from rgspipe.evaluation.study import CLEAN, TRUTH
 
 #: Kinds of pixels in words, and their colours.
@@ -25,12 +28,16 @@ KIND_COLOURS = {"edges": "#0072B2", "shadow_edges": "#6A1B4D", "near_light": "#E
 PANELS = (
     ("psnr", "PSNR (dB)", 1.0, False),
     ("ssim", "SSIM", 1.0, False),
-    ("flip", "FLIP", 1.0, False),
+    ("flip", "HDR-FLIP", 1.0, False),
     ("albedo_l1", "albedo error (%)", 100.0, False),
     ("position_error", "light: position error (%)", 100.0, True),
 )
 SCENE_COLOURS = ("#0072B2", "#E69F00", "#6A1B4D", "#009E73", "#56B4E9", "#222222")
 SCENE_MARKERS = "os^Dv*"
+#: Lines of the clean case and of true surfels.
+CLEAN_LINE, TRUTH_LINE = "-", (0, (1.0, 1.5))
+#: How far apart the scenes of a case stand, in rows.
+SCENE_STEP = 0.16
 
 
 def split_figure(split: pd.DataFrame) -> Figure:
@@ -52,9 +59,9 @@ def split_figure(split: pd.DataFrame) -> Figure:
         axis = figure.subplots()
         for place, (_, group) in enumerate(reversed(groups)):
             _stacked_bar(axis, place, group.set_index("kind"))
-        names = [f"{g['surfels'].iloc[0]} surfels, light at {g['light'].iloc[0]}" for _, g in reversed(groups)]
+        names = [f"{SURFELS[g['surfels'].iloc[0]]}, light at {g['light'].iloc[0]}" for _, g in reversed(groups)]
         axis.set_yticks(range(len(groups)), names)
-        axis.set_xlabel("mean squared error over peak² (1e-4), mean over held-out views")
+        axis.set_xlabel("squared error over peak² (1e-4), mean over held-out views, and as PSNR")
         axis.grid(True, axis="x")
         axis.set_axisbelow(True)
         handles = [matplotlib.patches.Patch(color=KIND_COLOURS[k]) for k in KINDS]
@@ -64,7 +71,9 @@ def split_figure(split: pd.DataFrame) -> Figure:
 
 
 def study_figure(table: pd.DataFrame) -> Figure:
-    """Every measure over the cases, a panel each; scenes by colour and marker, true surfels as dotted lines.
+    """Every measure over the cases, a panel each; scenes by colour and marker.
+
+    A stalk joins each case to the clean one of its scene; the dotted line is what true surfels reach.
 
     Args:
         table: rows of `study_row`.
@@ -83,8 +92,9 @@ def study_figure(table: pd.DataFrame) -> Figure:
             _study_panel(axis, table, cases, panel)
         axes[0].set_yticks(range(len(cases)), [case.replace("_", " ") for case in cases])
         axes[0].set_ylim(len(cases) - 0.5, -0.5)
-        if table["scene"].nunique() > 1:
-            figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=6)
+        lines = [Line2D([], [], color=INK, lw=0.9, ls=style) for style in (CLEAN_LINE, TRUTH_LINE)]
+        handles, labels = axes[0].get_legend_handles_labels()
+        figure.legend([*handles, *lines], [*labels, "clean capture", TRUTH], loc="outside upper center", ncols=8)
     return figure
 
 
@@ -110,15 +120,23 @@ def _stacked_bar(axis: Axes, place: int, group: pd.DataFrame) -> None:
 
 def _study_panel(axis: Axes, table: pd.DataFrame, cases: list[str], panel: tuple[str, str, float, bool]) -> None:
     column, title, factor, logarithmic = panel
-    for index, (scene, group) in enumerate(table.groupby("scene", sort=False)):
+    scenes = list(table.groupby("scene", sort=False))
+    for index, (scene, group) in enumerate(scenes):
         colour, marker = SCENE_COLOURS[index % 6], SCENE_MARKERS[index % 6]
         values = group.drop_duplicates("case").set_index("case")[column] * factor
-        known = [(values[case], place) for place, case in enumerate(cases) if case in values.index]
+        shift = SCENE_STEP * (index - 0.5 * (len(scenes) - 1))
+        known = [(values[case], place + shift) for place, case in enumerate(cases) if case in values.index]
         axis.plot(*zip(*known, strict=True), marker, color=colour, ms=5, label=scene)
-        for name, dashes in ((CLEAN, (0, (1, 0))), (TRUTH, (0, (1, 2)))):
+        if CLEAN in values.index:
+            for value, place in known:
+                axis.plot([values[CLEAN], value], [place, place], "-", color=colour, lw=1.2, alpha=0.5, zorder=1)
+        for name, style in ((CLEAN, CLEAN_LINE), (TRUTH, TRUTH_LINE)):
             if name in values.index and np.isfinite(values[name]):
-                axis.axvline(values[name], color=colour, lw=0.8, ls=dashes, alpha=0.6, zorder=0)
+                axis.axvline(values[name], color=colour, lw=0.9, ls=style, alpha=0.7, zorder=0)
     axis.set_title(title)
     axis.grid(True, axis="x")
     if logarithmic:
         axis.set_xscale("log")
+        axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axis.xaxis.set_minor_formatter(NullFormatter())

@@ -6,6 +6,7 @@ from typing import Any
 
 import pandas as pd
 
+from rgspipe.evaluation.held_out import SURFELS
 from rgspipe.evaluation.tables import ALL, class_order
 
 #: Rows of the quality table: column, words, factor, unit and digits.
@@ -26,8 +27,7 @@ _ROWS = (
 
 def quality_columns(quality: pd.DataFrame) -> list[str]:
     """Headings of the quality table: which surfels, and where direct light is evaluated."""
-    names = {"truth": "true"}
-    return [f"{names.get(row.surfels, row.surfels)} surfels, light at {row.light}" for row in quality.itertuples()]
+    return [f"{SURFELS[row.surfels]}, light at {row.light}" for row in quality.itertuples()]
 
 
 def quality_rows(quality: pd.DataFrame) -> list[dict[str, Any]]:
