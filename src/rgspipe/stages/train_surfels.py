@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import time
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import torch
 
 from rgspipe.config import TrainConfig
 from rgspipe.datasets.degrade import Capture, degraded
@@ -17,6 +19,7 @@ from rgspipe.datasets.surfel_file import load_surfels, save_surfels
 from rgspipe.datasets.views import View
 from rgspipe.evaluation.held_out import held_out_picture
 from rgspipe.evaluation.images import save_png
+from rgspipe.machine import peak_memory_mib
 from rgspipe.stages.base import Stage, StageContext
 from rgspipe.training.checkpoint import Checkpoint
 from rgspipe.training.materials import build_transport, fit_materials
@@ -51,6 +54,9 @@ def run(context: StageContext) -> None:
     metrics = held_out.summary() | {"surfels": len(trained.surfels), "seconds": seconds["training"]}
     if config.direct_only:
         metrics["direct_only_psnr"] = _direct_only(trained, train_views, dataset.test, options)
+    metrics["peak_memory_mib"] = peak_memory_mib()
+    if options.light_rounds > 0:
+        metrics["lights"] = _corrections(train_views, trained.views)
     text = json.dumps(metrics, indent=1, allow_nan=False)
     (context.folder / "metrics.json").write_text(text + "\n", encoding="utf-8")
     picture = held_out_picture(held_out.views, held_out.images, held_out.psnr, held_out.albedo)
@@ -91,6 +97,17 @@ def _direct_only(
     surfels = fit_materials(trained.surfels, train_views, options, bounces=False).surfels
     held_out = render_held_out(surfels, test_views, None, options.supersampling, options.at_pixels)
     return float(np.mean(held_out.psnr))
+
+
+def _corrections(measured: Sequence[View], refined: Sequence[View]) -> dict[str, float]:
+    """How far training lights were moved, scene units, and their intensities changed: root mean squares."""
+    lights = [(a.light, b.light) for a, b in zip(measured, refined, strict=True)]
+    moved = torch.stack([b.position - a.position for a, b in lights]).norm(dim=1)
+    gain = torch.stack([(b.intensity / a.intensity).log() for a, b in lights])
+    return {
+        "position_rms": float(moved.square().mean().sqrt()),
+        "log_intensity_rms": float(gain.square().mean().sqrt()),
+    }
 
 
 def _write_table(path: Path, trained: Trained) -> None:
