@@ -138,7 +138,7 @@ def test_settings_reach_the_surfels_and_change_the_fingerprint(tmp_path: Path) -
     assert resolve(plain, load_stage).key != resolve(other, load_stage).key
     one, two = (load_surfels(run(c, load_stage).file("surfels.safetensors")) for c in (plain, other))
     assert two.coverage.high == 0.95 and float(two.albedo[0, 0]) == 0.5
-    assert two.coverage.layer_thickness == pytest.approx(3 * one.coverage.layer_thickness, rel=0.05)
+    assert two.coverage.layer_thickness == pytest.approx(3 * one.coverage.layer_thickness, rel=1e-6)
 
 
 def test_a_changed_file_is_imported_again(tmp_path: Path) -> None:
