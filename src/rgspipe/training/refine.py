@@ -19,7 +19,7 @@ from rgspipe.training.loss import LossOptions, image_loss
 from rgspipe.training.parameters import build_surfels, limit, start_parameters
 from rgspipe.training.regularise import Neighbours, continuity, distortion, find_neighbours, normal_smoothness
 from rgspipe.training.sampling import PixelDraw, draw_pixels, draw_window, pixel_means, views_of_step
-from rgspipe.training.shading import SurfelLight, light_where_rays_meet, shaded_radiance
+from rgspipe.training.shading import SurfelLight, shaded_radiance
 
 #: Every so many of a step's rays, the depths of hits are compared.
 DISTORTION_STRIDE = 16
@@ -39,7 +39,6 @@ class RefineOptions:
         position_rate, height_rate, clip_rate: steps in the plane, along the normal and of clips, in surfel spacings.
         tilt_rate, angle_rate, log_scale_rate, opacity_rate, clip_angle_rate, albedo_rate, threshold_rate: of
             the others.
-        light_at_pixels: whether pixels away from edges take direct light where they look, not at surfels' centres.
         loss: what is minimised.
         alpha_weight: of the difference between coverage and the views' alpha.
         continuity_weight, smoothness_weight, distortion_weight: of the terms in `regularise`.
@@ -63,7 +62,6 @@ class RefineOptions:
     clip_angle_rate: float = 0.001
     albedo_rate: float = 0.0
     threshold_rate: float = 0.002
-    light_at_pixels: bool = False
     loss: LossOptions = field(default_factory=LossOptions)
     alpha_weight: float = 0.0
     continuity_weight: float = 0.0
@@ -186,9 +184,6 @@ def _step_loss(
     bvh = SurfelBvh(surfels)
     colours = shade_rays(bvh, surfels, thresholds, radiance, *rays)
     images = [pixel_means(draw, seen) for draw, seen in zip(draws, _split(draws, colours), strict=True)]
-    if options.light_at_pixels:
-        more = _light_within_surfels(surfels, bvh, chosen, draws)
-        images = [image.index_add(0, draw.plain, m) for image, draw, m in zip(images, draws, more, strict=True)]
     data = _image_term(chosen, draws, images, options)
     prior = torch.zeros(())
     if options.alpha_weight > 0.0:
@@ -235,19 +230,6 @@ def _image_term(
             pair = tuple(x.reshape(*draw.shape, 3) for x in pair)
         terms.append(image_loss(*pair, view.peak, options.loss, window=draw.shape is not None))
     return torch.stack(terms).mean()
-
-
-def _light_within_surfels(
-    surfels: Surfels, bvh: SurfelBvh, views: Sequence[RefineView], draws: Sequence[PixelDraw]
-) -> Sequence[Tensor]:
-    """What light at the points seen adds to that at surfels' centres, (Q, 3) for the plain pixels of each draw."""
-    rays = [view.camera.rays(draw.pixels[draw.plain]) for view, draw in zip(views, draws, strict=True)]
-    counts = [len(draw.plain) for draw in draws]
-    origins, directions = (torch.cat([ray[k] for ray in rays]).float() for k in (0, 1))
-    ray_view = torch.arange(len(views)).repeat_interleave(torch.tensor(counts))
-    hits = composite(bvh, origins, directions)
-    lights = [view.light for view in views]
-    return light_where_rays_meet(surfels, lights, hits, origins, directions, ray_view).split(counts)
 
 
 def _alpha_term(views: Sequence[RefineView], draws: Sequence[PixelDraw], covered: Tensor) -> Tensor:

@@ -20,7 +20,6 @@ class PixelDraw:
         origins, directions: (R, 3) float32.
         ray_pixel: (R,) which of the P pixels each ray belongs to.
         ray_share: (R,) its weight in that pixel's mean.
-        plain: (Q,) those of the P pixels that no edge crosses.
     """
 
     pixels: Tensor
@@ -29,7 +28,6 @@ class PixelDraw:
     directions: Tensor
     ray_pixel: Tensor
     ray_share: Tensor
-    plain: Tensor
 
 
 def views_of_step(count: int, per_step: int, seed: int, step: int) -> list[int]:
@@ -53,8 +51,7 @@ def draw_pixels(
     rays = subsamples**2
     ray_pixel = torch.arange(len(pixels)).repeat_interleave(rays)
     share = torch.full((len(ray_pixel),), 1.0 / rays)
-    plain = (~edges[pixels]).nonzero()[:, 0]
-    return PixelDraw(pixels, None, origins.float(), directions.float(), ray_pixel, share, plain)
+    return PixelDraw(pixels, None, origins.float(), directions.float(), ray_pixel, share)
 
 
 def draw_window(camera: Camera, edges: Tensor, size: int, subsamples: int, generator: torch.Generator) -> PixelDraw:
@@ -75,7 +72,6 @@ def draw_window(camera: Camera, edges: Tensor, size: int, subsamples: int, gener
         torch.cat([fine_rays[1], plain_rays[1]]).float(),
         torch.cat([fine.repeat_interleave(count), plain]),
         torch.cat([torch.full((len(fine) * count,), 1.0 / count), torch.ones(len(plain))]),
-        plain,
     )
 
 

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from rgspipe.renderer.kernels.composite import Hits
 from rgspipe.renderer.kernels.irradiance import SOFTENING, transmittance
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.scene.lights import PointLight
@@ -17,9 +16,6 @@ from rgspipe.scene.surfels import Surfels
 
 #: Lights whose shadows are traced at once; bounds the memory of their derivatives.
 LIGHTS_AT_ONCE = 16
-
-#: Cosine below which a ray is too steep to say where on a surfel's plane it looks.
-GRAZING = 0.05
 
 
 @dataclass(frozen=True)
@@ -87,30 +83,3 @@ def shaded_radiance(surfels: Surfels, lights: Sequence[SurfelLight]) -> Tensor:
         direct = direct_irradiance(surfels, light.position, light.intensity, light.transmittance)
         rows.append(surfels.albedo * (direct + light.indirect))
     return torch.stack(rows)
-
-
-def light_where_rays_meet(
-    surfels: Surfels, lights: Sequence[SurfelLight], hits: Hits, origins: Tensor, directions: Tensor, ray_view: Tensor
-) -> Tensor:
-    """(R, 3) what direct light at the points that rays see adds to that at the surfels' centres, differentiable.
-
-    Weights of the hits are held; gradients go to normals, centres and albedo through the irradiance alone.
-
-    Args:
-        hits: of R rays; origins, directions: (R, 3); ray_view: (R,) which light each ray sees.
-    """
-    ray, column = (hits.indices >= 0).nonzero(as_tuple=True)
-    j, view = hits.indices[ray, column].long(), ray_view.long()[ray]
-    normals, centers = surfels.normals[j], surfels.centers[j]
-    positions = torch.stack([light.position for light in lights])[view]
-    strengths = torch.stack([light.intensity for light in lights])[view] / math.pi
-    shares = torch.stack([light.transmittance for light in lights])[view, j]
-    o, d = origins.to(centers)[ray], directions.to(centers)[ray]
-    across = (d * normals).sum(dim=1)
-    depth = ((centers - o) * normals).sum(dim=1) / torch.where(across.abs() > GRAZING, across, torch.ones_like(across))
-    softening = softening_lengths(surfels)[j]
-    here = geometry_factor(positions - o - depth[:, None] * d, normals, softening)
-    there = geometry_factor(positions - centers, normals, softening)
-    weight = torch.where(across.abs() > GRAZING, hits.weights[ray, column] * shares, torch.zeros_like(shares))
-    colour = (weight * (here - there))[:, None] * strengths * surfels.albedo[j]
-    return torch.zeros(len(hits.indices), 3).index_add(0, ray, colour)

@@ -20,9 +20,11 @@ from rgspipe.training.checkpoint import Checkpoint
 from rgspipe.training.initialise import Footprint
 from rgspipe.training.light_refinement import refine_lights
 from rgspipe.training.lighting import total_irradiance, trace_lighting
-from rgspipe.training.materials import MaterialOptions, Materials, PriorOf, build_transport, fit_materials
+from rgspipe.training.materials import MaterialOptions, Materials, PriorOf, build_transport, fit_materials, trace_views
+from rgspipe.training.photometric import PhotometricOptions, fit_heights, fit_normals, roughness
 from rgspipe.training.record import Record
 from rgspipe.training.refine import RefineOptions, RefineState, RefineView, refine
+from rgspipe.training.regularise import find_neighbours
 from rgspipe.training.shading import surfel_lights
 
 
@@ -32,10 +34,12 @@ class TrainOptions(MaterialOptions):
 
     Attributes:
         refine: of the geometry; its `steps` may be 0.
+        photometric: of normals from shading, where depth was too noisy to tell them.
         light_rounds: how often lights that were measured with errors are refined, before the geometry and after it.
     """
 
     refine: RefineOptions = field(default_factory=RefineOptions)
+    photometric: PhotometricOptions = field(default_factory=PhotometricOptions)
     light_rounds: int = 0
 
 
@@ -78,7 +82,12 @@ def train(
         views = [replace(view, light=light) for view, light in zip(views, lights, strict=True)]
     else:
         surfels, radiance, views = _fit_materials(surfels, views, given, options, log, "materials", prior)
-        state = None
+        centers, state = surfels.centers, None
+        for _ in range(options.photometric.rounds):
+            turned = _turned_by_shading(surfels, centers, views, radiance, spacing, options)
+            if turned is None:
+                break
+            surfels, radiance, views = _fit_materials(turned, views, given, options, log, "materials", prior)
     if options.refine.steps > 0:
         if checkpoint is not None and state is None:
             checkpoint.save(surfels, radiance, None, log.records, [view.light for view in views])
@@ -111,6 +120,20 @@ def _fit_materials(
         fitted = fit_materials(fitted.surfels, views, options, prior=prior, prepared=fitted.prepared)
         log.materials(f"{phase} and lights", views, fitted)
     return fitted.surfels, fitted.radiance, views
+
+
+def _turned_by_shading(
+    surfels: Surfels, measured: Tensor, views: Sequence[View], radiance: Tensor, spacing: float, options: TrainOptions
+) -> Surfels | None:
+    """Rough surfels with normals and heights as the shading says; None if depth knows better."""
+    pairs, photometric = find_neighbours(surfels, spacing), options.photometric
+    if roughness(surfels, pairs) < photometric.least_roughness:
+        return None
+    lights = surfel_lights(surfels, [view.light for view in views], radiance / surfels.albedo.clamp(min=1e-6))
+    weights = trace_views(surfels, views, supersampling=1)
+    images = [view.image.reshape(-1, 3).float() for view in views]
+    turned = fit_normals(surfels, weights, images, lights, pairs, photometric)
+    return fit_heights(turned, measured, find_neighbours(turned, spacing), photometric)
 
 
 def _refine_geometry(
