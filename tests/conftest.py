@@ -17,7 +17,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 TESTS = Path(__file__).resolve().parent
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def child_environment() -> dict[str, str]:
     """Environment of a process that imports rgspipe and the helpers beside the tests, from any folder."""
     paths = [str(TESTS.parent / "src"), str(TESTS)]

@@ -72,7 +72,7 @@ class CornellConfig:
 class CornerConfig:
     """A closed corridor around a corner: two legs, each 1 scene unit long outside."""
 
-    width: float = option(0.32, "width of the corridor, scene units", low=0.2, high=0.4)
+    width: float = option(0.32, "width of the corridor, scene units", low=0.28, high=0.36)
     height: float = option(0.45, "height of the corridor, scene units", low=0.35, high=1)
     wall_color: list[float] = _color(0.75, 0.75, 0.72, "walls and ceiling")
     floor_color: list[float] = _color(0.55, 0.5, 0.42, "floor")

@@ -11,16 +11,15 @@ from pathlib import Path
 import pytest
 
 
-@pytest.fixture
-def in_blender(child_environment: dict[str, str]) -> Callable[[str, Path], None]:
-    """`in_blender("plane", folder)` runs a measurement of in_blender.py; skips without bpy."""
+@pytest.fixture(scope="session")
+def in_blender(child_environment: dict[str, str]) -> Callable[..., None]:
+    """`in_blender("plane", folder)` runs a measurement of in_blender.py or another script; skips without bpy."""
     if importlib.util.find_spec("bpy") is None:
         pytest.skip("bpy is not installed")
 
-    def run(name: str, folder: Path) -> None:
-        script = Path(__file__).with_name("in_blender.py")
-        command = [sys.executable, str(script), name, str(folder)]
-        done = subprocess.run(command, env=child_environment, capture_output=True, text=True, timeout=120)
+    def run(name: str, folder: Path, script: str = "in_blender.py") -> None:
+        command = [sys.executable, str(Path(__file__).with_name(script)), name, str(folder)]
+        done = subprocess.run(command, env=child_environment, capture_output=True, text=True, timeout=600)
         assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
 
     return run

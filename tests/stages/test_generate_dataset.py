@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 import torch
 
-from rgspipe.config import RgspipeConfig
+from rgspipe.blender.models.parameters import CornerParameters, kind_of
+from rgspipe.config import MODELLED, RgspipeConfig
 from rgspipe.datasets.exr import write_image
 from rgspipe.datasets.gs3_write import frame_entry, write_transforms
 from rgspipe.datasets.location import open_dataset
@@ -79,6 +80,25 @@ def test_boxes_stand_on_the_floor_of_a_centred_room() -> None:
     assert cornell.room == (1.0, 0.8, 0.6)
     assert tall.center == pytest.approx((0.0, 0.0, -0.1))  # its foot is at −0.3, the floor
     assert tall.turn == pytest.approx(math.pi / 2)
+
+
+@pytest.mark.parametrize("kind", MODELLED)
+def test_every_scene_of_ours_is_built_from_its_own_section(kind: str) -> None:
+    assert kind_of(dataset_job(_config(kind=kind)).model) == kind
+    assert STAGE.keys(_config(kind=kind)) == ("scene.kind", f"scene.{kind}", "dataset")
+
+
+def test_the_configured_corridor_is_the_model_s_default() -> None:
+    assert dataset_job(_config(kind="corner")).model == CornerParameters()
+
+
+def test_gloss_that_makes_light_is_refused() -> None:
+    config = _config(kind="cornell")
+    config.scene.cornell.gloss = 0.28
+    with pytest.raises(InputError, match=r"scene\.cornell\.gloss.*1\.01"):
+        dataset_job(config)
+    config.scene.cornell.gloss = 0.25
+    assert dataset_job(config).model.gloss == 0.25
 
 
 def test_only_what_matters_is_in_the_fingerprint() -> None:

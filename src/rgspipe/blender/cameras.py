@@ -109,12 +109,14 @@ class RoomLayout:
 
     Attributes:
         fixed: the target cameras; by default some that see much of the room are looked for.
+        sight: least distance between a camera and what it looks at, scene units.
     """
 
     space: FreeSpace
     resolution: int
     classes: tuple[str, ...] = USUAL_CLASSES
     fixed: tuple[FixedView, ...] = ()
+    sight: float = 0.25
     is_lit_everywhere: bool = False
 
     def camera(self, rng: np.random.Generator, index: int) -> Camera:
@@ -122,9 +124,9 @@ class RoomLayout:
             origin = self.light(rng, 0.04)
             direction = sphere_points(256)[rng.integers(256)]
             distance, is_front = self.space.geometry.cast(origin, direction)
-            if abs(direction[2]) < 0.8 and is_front and np.isfinite(distance) and distance > 0.25:
+            if abs(direction[2]) < 0.8 and is_front and np.isfinite(distance) and distance > self.sight:
                 return aimed(origin, origin + direction, rng.uniform(75.0, 105.0), self.resolution)
-        raise no_room("a camera with a view of 0.25 or more")
+        raise no_room(f"a camera with a view of {self.sight:g} or more")
 
     def light(self, rng: np.random.Generator, clearance: float) -> np.ndarray:
         cell = self.space.cell

@@ -73,8 +73,8 @@ def build(parameters: RoomParameters) -> bpy.types.Scene:
 
 
 def layout(_: RoomParameters, space: FreeSpace, resolution: int) -> RoomLayout:
-    """Views from anywhere in the room; the target cameras stand at its front."""
-    return RoomLayout(space, resolution, USUAL_CLASSES, TARGET_VIEWS)
+    """Views across the room, which show more of it than a wall; the target cameras stand at its front."""
+    return RoomLayout(space, resolution, USUAL_CLASSES, TARGET_VIEWS, sight=0.55)
 
 
 def _textures() -> Materials:
