@@ -13,10 +13,12 @@ from hypothesis import strategies as st
 from plyfile import PlyData
 
 from ply_files import gaussian_columns, radiosity_columns, write_ply
+from rgspipe.datasets.gs3_write import frame_entry, write_transforms
 from rgspipe.datasets.opacity_profile import fit_profiles, smoothstep
 from rgspipe.datasets.ply import PlyOptions, load_ply
 from rgspipe.datasets.ply_radiosity import profile
 from rgspipe.errors import InputError
+from rgspipe.scene import Camera, look_at
 from rgspipe.scene.surfels import quaternion_to_axes
 
 KEPT = PlyOptions(fronts="kept")
@@ -100,6 +102,10 @@ def test_fronts_look_where_they_are_told_to(tmp_path: Path) -> None:
     surfels, conversion = load_ply(path)
     assert bool((surfels.normals[:, 2] > 0).all())
     assert any("cameras.json" in note for note in conversion.notes)
+    camera = Camera.from_field_of_view(look_at(torch.tensor([0.2, 0.2, -5.0]), torch.zeros(3)), 0.7, 128, 128)
+    write_transforms(tmp_path / "transforms.json", [frame_entry("view", camera)])
+    surfels, _ = load_ply(path, PlyOptions(cameras=tmp_path / "transforms.json"))
+    assert bool((surfels.normals[:, 2] < 0).all())
     (tmp_path / "cameras.json").write_text(json.dumps([{"id": 3}]))
     with pytest.raises(InputError, match="position"):
         load_ply(path)

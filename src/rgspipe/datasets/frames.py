@@ -67,7 +67,7 @@ class FrameEntry:
         Raises:
             InputError: no rigid transform, no intrinsics, or intrinsics of an image of another size.
         """
-        pose = self._pose()
+        pose = self.pose()
         holder = self.fields if self.fields.keys() & {"camera_intrinsics", "camera_angle_x"} else self.shared
         if "camera_intrinsics" in holder:
             return self._camera_from_intrinsics(pose, holder["camera_intrinsics"], width, height)
@@ -121,7 +121,12 @@ class FrameEntry:
             )
         return Camera(pose, fx, fy, cx, cy, width, height)
 
-    def _pose(self) -> Tensor:
+    def pose(self) -> Tensor:
+        """The (4, 4) float64 camera-to-world transform.
+
+        Raises:
+            InputError: it is missing or not rigid.
+        """
         value = required(self.fields, "transform_matrix", self.where)
         return rigid_pose(value, f"{self.where}.transform_matrix")
 

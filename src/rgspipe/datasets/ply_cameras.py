@@ -31,7 +31,7 @@ def read_viewpoints(path: Path) -> Tensor:
     content = _content(path)
     if isinstance(content, dict):
         entries = read_entries(path, "cameras")
-        return torch.stack([entry.camera(2, 2).origin for entry in entries])
+        return torch.stack([entry.pose()[:3, 3] for entry in entries])
     if not isinstance(content, list) or not content or not all(isinstance(item, dict) for item in content):
         raise InputError(
             path,
