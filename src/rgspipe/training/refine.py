@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import torch
 from torch import Tensor
@@ -118,8 +118,19 @@ class RefineState:
 
     def rebased(self, surfels: Surfels) -> RefineState:
         """The state that goes on from `surfels`, which `refine` returned with this one."""
-        return RefineState(
-            start_parameters(surfels), self.first, self.second, self.start_log_scales, self.step, self.losses
+        return replace(self, parameters=start_parameters(surfels))
+
+    def of_parts(self, parent: Tensor) -> RefineState:
+        """The state of surfels that are parts (M,) of those that it was about; their parameters start anew."""
+
+        def chosen(moments: dict[str, Tensor]) -> dict[str, Tensor]:
+            return {name: value if name == "thresholds" else value[parent] for name, value in moments.items()}
+
+        return replace(
+            self,
+            first=chosen(self.first),
+            second=chosen(self.second),
+            start_log_scales=self.start_log_scales[parent],
         )
 
 

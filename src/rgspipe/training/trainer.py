@@ -17,6 +17,7 @@ from rgspipe.renderer.view_weights import build_view_weights
 from rgspipe.scene.lights import PointLight
 from rgspipe.scene.surfels import Surfels
 from rgspipe.training.checkpoint import Checkpoint
+from rgspipe.training.density import DensityOptions, redistributed, surfel_errors
 from rgspipe.training.initialise import Footprint
 from rgspipe.training.light_refinement import refine_lights
 from rgspipe.training.lighting import total_irradiance, trace_lighting
@@ -35,11 +36,13 @@ class TrainOptions(MaterialOptions):
     Attributes:
         refine: of the geometry; its `steps` may be 0.
         photometric: of normals from shading, where depth was too noisy to tell them.
+        density: of surfels that split and vanish whenever light is made again.
         light_rounds: how often lights that were measured with errors are refined, before the geometry and after it.
     """
 
     refine: RefineOptions = field(default_factory=RefineOptions)
     photometric: PhotometricOptions = field(default_factory=PhotometricOptions)
+    density: DensityOptions = field(default_factory=DensityOptions)
     light_rounds: int = 0
 
 
@@ -77,6 +80,7 @@ def train(
     log = _Log(checkpoint.records if checkpoint else [])
     surfels = surfels.to(torch.float32)
     spacing, given = surfel_spacing(surfels), [view.light for view in views]
+    most = int(options.density.growth * len(surfels))
     if checkpoint is not None and (found := checkpoint.load(surfels)) is not None:
         surfels, radiance, state, lights = found
         views = [replace(view, light=light) for view, light in zip(views, lights, strict=True)]
@@ -91,7 +95,7 @@ def train(
     if options.refine.steps > 0:
         if checkpoint is not None and state is None:
             checkpoint.save(surfels, radiance, None, log.records, [view.light for view in views])
-        surfels = _refine_geometry(surfels, radiance, state, views, spacing, options, log, checkpoint)
+        surfels = _refine_geometry(surfels, radiance, state, views, spacing, options, log, checkpoint, most)
         surfels, _, views = _fit_materials(surfels, views, given, options, log, "final materials", prior)
     return Trained(surfels, tuple(log.records), tuple(views))
 
@@ -145,26 +149,46 @@ def _refine_geometry(
     options: TrainOptions,
     log: _Log,
     checkpoint: Checkpoint | None,
+    most: int,
 ) -> Surfels:
-    """All steps of the geometry, in rounds between which shadows and indirect light are made again."""
+    """All steps of the geometry, in rounds between which surfels split, and shadows and indirect light are made again.
+
+    Args:
+        most: surfels at the end.
+    """
     state = state or RefineState.start(surfels)
     steps, every = options.refine.steps, options.refine.relight_every or options.refine.steps
+    lights = [view.light for view in views]
 
     def keep(progress: RefineState) -> None:
         log.steps(progress)
-        if checkpoint is not None and checkpoint.is_due(progress.step):
-            checkpoint.save(surfels, radiance, progress, log.records, [view.light for view in views])
+        # Between two rounds it is what the next one starts from that is kept.
+        within = progress.step % every > 0 or progress.step == steps
+        if checkpoint is not None and within and checkpoint.is_due(progress.step):
+            checkpoint.save(surfels, radiance, progress, log.records, lights)
 
-    while state.step < steps:
+    while True:
         refined = refine_views(surfels, views, radiance)
         until = (state.step // every + 1) * every
-        moved, state = refine(surfels, refined, spacing, options.refine, state, keep, until)
-        surfels = moved
-        if state.step < steps:
-            radiance, state = _relit(surfels, views, options), state.rebased(surfels)
-            if checkpoint is not None:
-                checkpoint.save(surfels, radiance, state, log.records, [view.light for view in views])
-    return surfels
+        surfels_after, state = refine(surfels, refined, spacing, options.refine, state, keep, until)
+        if state.step >= steps:
+            return surfels_after
+        surfels, radiance = surfels_after, _relit(surfels_after, views, options)
+        if options.density.growth > 1.0:
+            surfels, parent = _redistributed(surfels, views, radiance, most, options.density)
+            radiance, state = _relit(surfels, views, options), state.of_parts(parent)
+        state = state.rebased(surfels)
+        if checkpoint is not None:
+            checkpoint.save(surfels, radiance, state, log.records, lights)
+
+
+def _redistributed(
+    surfels: Surfels, views: Sequence[View], radiance: Tensor, most: int, options: DensityOptions
+) -> tuple[Surfels, Tensor]:
+    weights = trace_views(surfels, views, supersampling=1)
+    renders = [view.operator @ light for view, light in zip(weights, radiance, strict=True)]
+    errors = surfel_errors(weights, renders, [view.image.reshape(-1, 3).float() for view in views])
+    return redistributed(surfels, errors, most, options)
 
 
 def _relit(surfels: Surfels, views: Sequence[View], options: TrainOptions) -> Tensor:

@@ -1,0 +1,88 @@
+"""Where surfels are: more of them where images ask for detail, none where they do nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import torch
+from torch import Tensor
+
+from rgspipe.renderer.view_weights import ViewWeights
+from rgspipe.scene.surfels import NO_CLIP, Surfels
+
+#: A surfel's halves stand this many of its scales from its centre, and are this much shorter along the split. Their
+#: sum differs least from the whole near these (variance along the split: 0.6² + 0.8² = 1).
+APART, SHORTER = 0.6, 0.8
+
+
+@dataclass(frozen=True)
+class DensityOptions:
+    """How surfels split and vanish between rounds of the geometry.
+
+    Attributes:
+        growth: most surfels at the end, as a multiple of those at the start; 1 for no splits.
+        split_share: part of the surfels that splits in a round at most.
+        faintest: opacity below which a surfel is taken away.
+    """
+
+    growth: float = 1.0
+    split_share: float = 0.03
+    faintest: float = 0.03
+
+
+def surfel_errors(weights: Sequence[ViewWeights], renders: Sequence[Tensor], images: Sequence[Tensor]) -> Tensor:
+    """(N,) squared error of all views, each in units of its peak, shared out by the surfels' weights in the pixels.
+
+    Args:
+        weights, renders, images: of the views; renders and images (pixels, 3).
+    """
+    total = torch.zeros(weights[0].operator.shape[1])
+    for view, render, image in zip(weights, renders, images, strict=True):
+        peak = torch.quantile(image, 0.995).clamp(min=1e-12)
+        error = ((render - image) / peak).square().mean(dim=1, keepdim=True)
+        total += (view.operator.transposed @ error)[:, 0]
+    return total
+
+
+def redistributed(surfels: Surfels, errors: Tensor, most: int, options: DensityOptions) -> tuple[Surfels, Tensor]:
+    """Surfels (M) without the faint ones and with those of the largest errors halved, and whose part each is (M,).
+
+    Surfels that no view sees stay: they cast shadows and send light on.
+
+    Args:
+        errors: (N,) of `surfel_errors`.
+        most: surfels at the end.
+    """
+    kept = (surfels.opacities >= options.faintest).nonzero()[:, 0]
+    count = max(0, min(most - len(kept), int(options.split_share * len(kept))))
+    # Stable, so that equal errors do not depend on the machine.
+    order = errors[kept].argsort(descending=True, stable=True)[:count]
+    split = kept[order[errors[kept][order] > 0.0]]
+    whole = kept[~torch.isin(kept, split)]
+    parts = [_selected(surfels, whole), *_halves(_selected(surfels, split))]
+    joined = {name: torch.cat([getattr(part, name) for part in parts]) for name in surfels.tensors()}
+    return replace(surfels, **joined), torch.cat([whole, split, split])
+
+
+def _selected(surfels: Surfels, index: Tensor) -> Surfels:
+    return replace(surfels, **{name: tensor[index] for name, tensor in surfels.tensors().items()})
+
+
+def _halves(surfels: Surfels) -> tuple[Surfels, Surfels]:
+    """Two surfels for each, side by side along its longer axis; edges stay where they are."""
+    longer = surfels.scales.argmax(dim=1)
+    chosen = torch.nn.functional.one_hot(longer, 2).to(surfels.scales)
+    step = APART * chosen * surfels.scales
+    shift = torch.einsum("na,nac->nc", step, surfels.frames[:, :2])
+    scales = surfels.scales * (1.0 - (1.0 - SHORTER) * chosen)
+    edges = torch.stack([surfels.clip_angles.cos(), surfels.clip_angles.sin()], dim=-1)
+    along = torch.einsum("na,nka->nk", step, edges)
+
+    def half(sign: float) -> Surfels:
+        offsets = torch.where(
+            surfels.clip_offsets >= NO_CLIP, surfels.clip_offsets, surfels.clip_offsets - sign * along
+        )
+        return replace(surfels, centers=surfels.centers + sign * shift, scales=scales, clip_offsets=offsets)
+
+    return half(1.0), half(-1.0)
