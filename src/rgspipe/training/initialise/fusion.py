@@ -25,6 +25,8 @@ FIRST_TURN = 0.045
 LEAST_RADIUS, MOST_RADIUS = 0.8, 0.05
 #: Facets across the widest radius.
 FACETS_ACROSS = 6.0
+#: Fewest sightings of a facet, on average.
+SIGHTINGS_PER_FACET = 10.0
 ROUNDS = 3
 
 
@@ -49,6 +51,9 @@ def fuse(sightings: Sightings, views: Sequence[View], spacing: float) -> Cloud:
         label = _renumbered(label)
         facets = fit_facets(sightings, label, radii)
         facets = replace(facets, strong=facets.strong & confirmed(facets, views, noise))
+        if not facets.strong.any():
+            # Views that agree on nothing: each one's own planes are all there is.
+            return Cloud(sightings.points, sightings.normals)
         sightings, label = _settle(sightings, facets, meet(sightings, facets, label, size))
     kept = sightings[label >= 0]
     return Cloud(kept.points, kept.normals)
@@ -62,11 +67,14 @@ def fit_radii(sightings: Sightings, spacing: float) -> np.ndarray:
     """
     points = sightings.points
     # The median, as a few close or grazing views would outweigh the rest of the scene.
-    density = len(points) * float(np.median(sightings.certainty())) / estimate_area(Cloud(points, sightings.normals))
+    per_area = len(points) / estimate_area(Cloud(points, sightings.normals))
+    density = per_area * float(np.median(sightings.certainty()))
     radius = (12.0 / (math.pi * density * FIRST_TURN**2)) ** 0.25
     low, high = np.percentile(points, [1.0, 99.0], axis=0)
-    most = max(MOST_RADIUS * float(np.linalg.norm(high - low)), LEAST_RADIUS * spacing)
-    return float(np.clip(radius, LEAST_RADIUS * spacing, most)) * GROWTH
+    filled = FACETS_ACROSS / GROWTH[-1] * math.sqrt(SIGHTINGS_PER_FACET / per_area)
+    least = max(LEAST_RADIUS * spacing, filled)
+    most = max(MOST_RADIUS * float(np.linalg.norm(high - low)), least)
+    return float(np.clip(radius, least, most)) * GROWTH
 
 
 def _renumbered(label: np.ndarray) -> np.ndarray:
@@ -81,6 +89,14 @@ def _settle(sightings: Sightings, facets: Facets, label: np.ndarray) -> tuple[Si
     """The sightings on their facets; those without one stay where they were."""
     distance = distance_to(sightings, facets, label)
     settled = np.isfinite(distance)
-    distances = np.where(settled, distance, sightings.distances)
-    normals = np.where(settled[:, None], facets.normals[label], sightings.normals)
+    normals, bends = facets.normals[label], facets.bends[label]
+    # From the plane, where it is met, to the paraboloid in one step: both are close within a facet.
+    away = sightings.origins + sightings.directions * np.where(settled, distance, 0.0)[:, None] - facets.centers[label]
+    slope = (bends @ away[..., None])[..., 0]
+    height = 0.5 * np.einsum("md,md->m", away, slope)
+    cosine = np.einsum("md,md->m", normals, sightings.directions)
+    distances = np.where(settled, distance + height / np.where(settled, cosine, 1.0), sightings.distances)
+    normals = normals - slope
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = np.where(settled[:, None], normals, sightings.normals)
     return sightings.moved(distances, normals), np.where(settled, label, -1)
