@@ -203,6 +203,34 @@ class TrainConfig:
     albedo_prior_weight: float = option(
         0.3, "what the prior counts where its maps agree; the images count 1 in the median surfel", low=0, high=1e6
     )
+    photometric_rounds: int = option(
+        1, "how often shading turns the normals of surfels that depth left rough; 0 for never", low=0, high=100
+    )
+    relight_every: int = option(
+        0,
+        "gradient steps between which shadows and indirect light lag; 0 keeps those of the start",
+        low=0,
+        high=1000000,
+    )
+    growth: float = option(
+        1.0, "most surfels after splits, which come with relight_every, over those before", low=1, high=100
+    )
+    loss: str = option("l2", "what gradient steps minimise; l1_ssim needs windows", choices=("l2", "l1", "l1_ssim"))
+    ssim_weight: float = option(0.2, "λ, the share of SSIM in the loss l1_ssim", low=0, high=1)
+    compression: float = option(
+        0.0, "µ of the loss's compression log(1 + µx)/log(1 + µ) of radiance over its peak; 0 for none", low=0, high=1e6
+    )
+    window: int = option(
+        0, "side of the windows of pixels that a step looks at; 0 for single pixels", low=0, high=100000
+    )
+    tilt_rate: float = option(0.0, "gradient step of normals, rad", low=0, high=1)
+    height_rate: float = option(0.0, "gradient step along normals, in surfel spacings", low=0, high=1)
+    continuity_weight: float = option(0.0, "weight of normals that agree with positions", low=0, high=1e6)
+    smoothness_weight: float = option(0.0, "weight of neighbours' like normals", low=0, high=1e6)
+    distortion_weight: float = option(0.0, "weight of the spread of hits within a layer", low=0, high=1e6)
+    alpha_weight: float = option(
+        0.0, "weight of the difference between coverage and the images' alpha", low=0, high=1e6
+    )
     checkpoint_every: int = option(20, "gradient steps between checkpoints", low=1, high=1000000)
     direct_only: bool = option(True, "also fit and report a model without interreflection, for comparison")
     seed: int = option(0, "draws of pixels and rays", low=0, high=2**31 - 1)

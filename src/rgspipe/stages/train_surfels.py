@@ -22,7 +22,10 @@ from rgspipe.evaluation.images import save_png
 from rgspipe.machine import peak_memory_mib
 from rgspipe.stages.base import Stage, StageContext
 from rgspipe.training.checkpoint import Checkpoint
+from rgspipe.training.density import DensityOptions
+from rgspipe.training.loss import LossOptions
 from rgspipe.training.materials import build_transport, fit_materials
+from rgspipe.training.photometric import PhotometricOptions
 from rgspipe.training.prior import prior_from_maps
 from rgspipe.training.refine import RefineOptions
 from rgspipe.training.trainer import Trained, TrainOptions, train
@@ -76,11 +79,22 @@ def train_options(config: TrainConfig) -> TrainOptions:
         edge_pixels=config.edge_pixels,
         interior_pixels=config.interior_pixels,
         subsamples=config.subsamples,
+        relight_every=config.relight_every,
+        window=config.window,
+        loss=LossOptions(config.loss, config.ssim_weight, config.compression),
+        tilt_rate=config.tilt_rate,
+        height_rate=config.height_rate,
+        continuity_weight=config.continuity_weight,
+        smoothness_weight=config.smoothness_weight,
+        distortion_weight=config.distortion_weight,
+        alpha_weight=config.alpha_weight,
         seed=config.seed,
     )
     return TrainOptions(
         rounds=config.rounds,
         refine=refine,
+        photometric=PhotometricOptions(rounds=config.photometric_rounds),
+        density=DensityOptions(growth=config.growth),
         gather_rays=config.gather_rays,
         patches=config.patches,
         supersampling=config.supersampling,
