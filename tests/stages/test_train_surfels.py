@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import pytest
+
 from rgspipe.config import TrainConfig
+from rgspipe.errors import InputError
 from rgspipe.stages.train_surfels import train_options
 
 
@@ -15,3 +18,21 @@ def test_every_option_comes_from_the_configuration() -> None:
     refine = options.refine
     assert (refine.steps, refine.views_per_step, refine.edge_pixels, refine.interior_pixels) == (5, 2, 7, 11)
     assert (refine.subsamples, refine.seed) == (2, 9)
+
+
+def test_options_of_shading_loss_and_regularisers_come_from_the_configuration() -> None:
+    names = ("relight_every", "window", "tilt_rate", "height_rate", "continuity_weight", "smoothness_weight")
+    names += ("distortion_weight", "alpha_weight")
+    values = {name: index + 1 for index, name in enumerate(names)}
+    config = TrainConfig(**values, loss="l1", ssim_weight=0.3, compression=4.0, photometric_rounds=3, growth=1.5)
+    options = train_options(config)
+    assert {name: getattr(options.refine, name) for name in names} == values
+    loss = options.refine.loss
+    assert (loss.kind, loss.ssim_weight, loss.compression) == ("l1", 0.3, 4.0)
+    assert (options.photometric.rounds, options.density.growth) == (3, 1.5)
+
+
+def test_ssim_of_single_pixels_is_refused_with_a_remedy() -> None:
+    with pytest.raises(InputError, match=r"train\.window=48"):
+        train_options(TrainConfig(loss="l1_ssim"))
+    assert train_options(TrainConfig(loss="l1_ssim", window=48)).refine.window == 48

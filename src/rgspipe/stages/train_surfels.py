@@ -17,6 +17,7 @@ from rgspipe.datasets.degrade import Capture, degraded
 from rgspipe.datasets.location import open_dataset
 from rgspipe.datasets.surfel_file import load_surfels, save_surfels
 from rgspipe.datasets.views import View
+from rgspipe.errors import InputError
 from rgspipe.evaluation.held_out import held_out_picture
 from rgspipe.evaluation.images import save_png
 from rgspipe.machine import peak_memory_mib
@@ -72,7 +73,18 @@ def run(context: StageContext) -> None:
 
 
 def train_options(config: TrainConfig) -> TrainOptions:
-    """The library's options for a configuration."""
+    """The library's options for a configuration.
+
+    Raises:
+        InputError: settings that do not go together.
+    """
+    if config.loss == "l1_ssim" and config.window == 0:
+        raise InputError(
+            "train.window",
+            expected="the side of a window of pixels, as train.loss=l1_ssim compares windows",
+            found="0: single pixels",
+            remedy="Set train.window=48, or another loss.",
+        )
     refine = RefineOptions(
         steps=config.steps,
         views_per_step=config.views_per_step,

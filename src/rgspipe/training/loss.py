@@ -52,5 +52,5 @@ def image_loss(rendered: Tensor, photographed: Tensor, peak: float, options: Los
     if options.kind == "l1":
         return absolute
     if not window:
-        raise ValueError("the loss `l1_ssim` compares windows of images: train.window must not be 0")
+        raise ValueError("the loss `l1_ssim` compares windows of images, got pixels that stand alone")
     return (1.0 - options.ssim_weight) * absolute + options.ssim_weight * (1.0 - ssim_map(x, y).mean())
