@@ -141,7 +141,10 @@ class DatasetConfig:
     test_views: int = option(24, "held-out views: new cameras and new lights", low=1, high=100000)
     targets_per_class: int = option(20, "fit targets of each occlusion class", low=0, high=10000)
     target_views: int = option(3, "fixed cameras that see each fit target", low=1, high=3)
-    samples: int = option(48, "paths per pixel", low=1, high=1000000)
+    samples: int = option(48, "paths per pixel of training views and targets", low=1, high=1000000)
+    test_samples: int = option(
+        192, "paths per pixel of held-out views: with 48 their noise hides 2 dB", low=1, high=1000000
+    )
     denoise: bool = option(True, "denoise the colour images")
     max_bounces: int = option(12, "bounces of a path; fewer than 8 lose light", low=0, high=1024)
     seed: int = option(0, "draws of cameras and lights", low=0, high=2**31 - 1)

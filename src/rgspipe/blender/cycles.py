@@ -39,11 +39,11 @@ def configure(scene: bpy.types.Scene, settings: RenderSettings) -> None:
     _make_world_black(scene)
 
 
-def use_colour_sampling(scene: bpy.types.Scene, settings: RenderSettings, seed: int) -> None:
+def use_colour_sampling(scene: bpy.types.Scene, samples: int, denoise: bool, seed: int) -> None:
     """The mean over each pixel (box filter), many samples."""
     cycles = scene.cycles
-    cycles.samples, cycles.seed = settings.samples, seed
-    cycles.use_denoising = settings.denoise
+    cycles.samples, cycles.seed = samples, seed
+    cycles.use_denoising = denoise
     cycles.pixel_filter_type = "BOX"
 
 

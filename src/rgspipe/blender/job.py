@@ -35,7 +35,8 @@ class DatasetJob:
         targets_per_class: fit targets of each class that suits the scene.
         target_views: cameras that see every target, 1 to 3.
         resolution: width and height of every image, pixels.
-        samples: Cycles samples a pixel.
+        samples: Cycles samples a pixel of training views and targets.
+        test_samples: the same of held-out views: what judges must be better than what is judged.
         denoise: whether Open Image Denoise runs over the result.
         max_bounces: bounces of light that Cycles follows.
         light_clearance: least distance of training, test and ordinary target lights from any surface.
@@ -51,7 +52,8 @@ class DatasetJob:
     targets_per_class: int = 20
     target_views: int = 3
     resolution: int = 128
-    samples: int = 96
+    samples: int = 48
+    test_samples: int = 192
     denoise: bool = True
     max_bounces: int = 12
     light_clearance: float = 0.08
@@ -59,7 +61,8 @@ class DatasetJob:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        least = {"train_views": 0, "test_views": 0, "targets_per_class": 0, "resolution": 1, "samples": 1}
+        least = {"train_views": 0, "test_views": 0, "targets_per_class": 0, "resolution": 1}
+        least |= {"samples": 1, "test_samples": 1}
         for name, lowest in least.items():
             if getattr(self, name) < lowest:
                 raise ValueError(f"{name} must be at least {lowest}, got {getattr(self, name)}")

@@ -49,13 +49,16 @@ class Studio:
         """Render `frame` and write its files below `folder`, each whole or not at all."""
         if frame.has_surfaces:
             self._write_surfaces(frame, folder)
-        write_image(folder / f"{frame.name}.exr", *self.radiance(frame.camera, frame.light, frame.seed))
+        image, alpha = self.radiance(frame.camera, frame.light, frame.seed, frame.samples)
+        write_image(folder / f"{frame.name}.exr", image, alpha)
 
-    def radiance(self, camera: Camera, light: PointLight, seed: int) -> tuple[np.ndarray, np.ndarray]:
-        """Mean over each pixel: radiance (H, W, 3) and alpha (H, W)."""
+    def radiance(
+        self, camera: Camera, light: PointLight, seed: int, samples: int | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Mean over each pixel: radiance (H, W, 3) and alpha (H, W); with the settings' samples by default."""
         place_camera(self._camera, camera)
         place_light(self._light, light)
-        cycles.use_colour_sampling(self._scene, self._settings, seed)
+        cycles.use_colour_sampling(self._scene, samples or self._settings.samples, self._settings.denoise, seed)
         passes = self._passes()
         return _stack(passes, "Combined", "RGB"), passes["Combined.A"]
 

@@ -34,6 +34,7 @@ class Frame:
         light: the only light.
         seed: of Cycles.
         has_surfaces: whether depth, normal and albedo are wanted, too.
+        samples: Cycles samples a pixel; those of the job if None.
     """
 
     name: str
@@ -41,6 +42,7 @@ class Frame:
     light: PointLight
     seed: int
     has_surfaces: bool
+    samples: int | None = None
 
 
 @dataclass(frozen=True)
@@ -83,7 +85,8 @@ def _view(job: DatasetJob, layout: Layout, geometry: Geometry, split: str, index
     camera = layout.camera(rng, index)
     position = _view_light(job, layout, geometry, camera, rng)
     light = _light(position, np.full(3, rng.uniform(0.75, 1.3)))
-    return Frame(f"{split}/r_{index:04d}", camera, light, int(rng.integers(2**31 - 1)), True)
+    samples = job.test_samples if split == "test" else None
+    return Frame(f"{split}/r_{index:04d}", camera, light, int(rng.integers(2**31 - 1)), True, samples)
 
 
 def _view_light(

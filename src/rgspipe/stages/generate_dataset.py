@@ -47,6 +47,7 @@ def dataset_job(config: RgspipeConfig) -> DatasetJob:
         target_views=wanted.target_views,
         resolution=wanted.resolution,
         samples=wanted.samples,
+        test_samples=wanted.test_samples,
         denoise=wanted.denoise,
         max_bounces=wanted.max_bounces,
         seed=wanted.seed,
