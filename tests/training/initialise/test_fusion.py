@@ -42,10 +42,10 @@ def rms(values: np.ndarray) -> float:
 @pytest.mark.parametrize(
     "capture, turn, off",
     [
-        (Capture(depth_noise=0.01, normals=False), 0.2, 0.001),  # measured 0.063, 2.6e-4
-        (Capture(depth_noise=0.03, normals=False), 0.6, 0.006),  # measured 0.185, 2.9e-3
-        (Capture(depth_noise=0.01, depth_missing=0.2, normals=False), 0.2, 0.001),  # measured 0.069, 2.2e-4
-        (Capture(depth_noise=0.01), 0.2, 0.001),  # measured 0.059 (float32), 1.9e-4
+        (Capture(depth_noise=0.01, normals=False), 0.2, 0.001),  # measured 0.091, 3.5e-4
+        (Capture(depth_noise=0.03, normals=False), 0.6, 0.006),  # measured 0.164, 2.6e-3
+        (Capture(depth_noise=0.01, depth_missing=0.2, normals=False), 0.2, 0.0015),  # measured 0.097, 6.4e-4
+        (Capture(depth_noise=0.01), 0.2, 0.001),  # measured 0.085, 2.5e-4
     ],
     ids=["1 %", "3 %", "1 % with gaps", "1 % with normals"],
 )
@@ -61,8 +61,8 @@ def test_a_curved_surface_comes_out_of_noise(torus: list[View]) -> None:
     seen, cloud = see_surfaces(noisy), cloud_from_views(noisy, 1500)
     angle = np.degrees(np.arccos(np.clip((torus_normals(cloud.points) * cloud.normals).sum(axis=1), -1.0, 1.0)))
     assert len(cloud) > 0.9 * len(seen)  # measured 0.999
-    assert np.median(angle) < 2.5  # measured 1.27
-    assert rms(torus_distance(cloud.points)) < 0.3 * rms(torus_distance(seen.measured_points))  # 0.25
+    assert np.median(angle) < 1.5  # measured 0.75
+    assert rms(torus_distance(cloud.points)) < 0.3 * rms(torus_distance(seen.measured_points))  # measured 0.20
 
 
 def test_exact_depth_is_left_as_it_is(room: list[View]) -> None:
@@ -83,9 +83,9 @@ def test_what_no_other_view_confirms_is_left_out(room: list[View]) -> None:
     noisy = list(degraded(room, Capture(depth_noise=0.01, normals=False)))
     wrong = noisy[0].depth.clone()
     wrong[10:30, 10:30] = 0.3 * (1.0 + 0.01 * torch.randn(20, 20, generator=torch.Generator().manual_seed(0)))
-    cloud = cloud_from_views([replace(noisy[0], depth=wrong), *noisy[1:]], 1500)
-    away = surface_distance(cloud.points)
-    assert not (away > 0.03).any()
+    views = [replace(noisy[0], depth=wrong), *noisy[1:]]
+    assert (surface_distance(see_surfaces(views).points) > 0.05).sum() >= 380
+    assert surface_distance(cloud_from_views(views, 1500).points).max() < 0.05  # measured SCREEN
 
 
 @settings(max_examples=8, deadline=None)

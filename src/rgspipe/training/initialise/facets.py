@@ -20,8 +20,10 @@ OUTLIER = 4.0
 LEAST_NEIGHBOURS = 6
 #: Most facets in the widest neighbourhood; their size is a sixth of its radius, so that 113 cover it.
 MOST_NEIGHBOURS = 150
-#: A facet with a smaller share of the mean weight of itself and the nearest ones, or with fewer sightings, is weak.
-WEAK, NEAREST, LEAST_SIGHTINGS = 0.2, 48, 4
+#: A facet with a smaller share of the mean weight of itself and the nearest ones is weak.
+WEAK, NEAREST = 0.2, 48
+#: So is one with fewer sightings than this share of the mean, but for these bounds.
+LEAST_SIGHTINGS = (3, 8)
 #: Facets fitted at once; bounds the memory.
 CHUNK = 2048
 
@@ -87,7 +89,9 @@ def fit_facets(sightings: Sightings, label: np.ndarray, radii: np.ndarray) -> Fa
     # Mixtures of two surfaces and strays hold few sightings. The mean is by weight: strays lie among strays.
     near = np.where(distance[:, :NEAREST] < radii[1], total[index[:, :NEAREST]], 0.0)
     around = (near**2).sum(axis=1) / near.sum(axis=1)
-    strong = supported & (total >= WEAK * around) & (np.bincount(label, minlength=count) >= LEAST_SIGHTINGS)
+    size = np.bincount(label, minlength=count)
+    least = np.clip(WEAK * (size**2).sum() / len(label), *LEAST_SIGHTINGS)
+    strong = supported & (total >= WEAK * around) & (size >= least)
     return Facets(places + normals * offset[:, None], fitted, total, bends, strong)
 
 

@@ -98,7 +98,7 @@ def _fit(depth: np.ndarray, focal: tuple[float, float], center: tuple[float, flo
     fitting = deviation[known & np.isfinite(deviation)]
     noise = float(np.median(fitting)) if len(fitting) else 0.0
     at_pixel, per_column, per_row = chosen
-    valid = known & (best < LARGEST_DEVIATION**2 + 9.0 * noise**2) & ~_straddles(best, noise, radius) & (at_pixel > 0)
+    valid = known & (best < LARGEST_DEVIATION**2 + 2.0 * noise**2) & ~_straddles(best, noise, radius) & (at_pixel > 0)
     column, row = np.arange(width) + 0.5, (np.arange(height) + 0.5)[:, None]
     a, b = per_column * focal[0], -per_row * focal[1]
     x, y = (column - center[0]) / focal[0], -(row - center[1]) / focal[1]
