@@ -46,8 +46,9 @@ class PhotometricOptions:
 
     Attributes:
         rounds: solves, each with materials of its own; 0 for none.
-        least_roughness: angle [rad] below which surfels are smoother than shading could make them: the solve of a
-            clean Cornell box, whose normals are right, turns them by 1.5° on average.
+        least_roughness: angle [rad] below which surfels are smoother than shading could make them: on a clean Cornell
+            box, whose normals are right, the solve turns them by 0.3° (10k surfels, 100 views of 128²) to 1.5° (3k
+            surfels, 30 views of 64²).
         smoothness: weight of neighbours' likeness, relative to what images say of a typical surfel.
         pull: weight of the normals as they are, likewise.
         height_pull: weight of heights as they are, relative to one neighbour's continuity.
