@@ -20,10 +20,8 @@ OUTLIER = 4.0
 LEAST_NEIGHBOURS = 6
 #: Most facets in the widest neighbourhood; their size is a sixth of its radius, so that 113 cover it.
 MOST_NEIGHBOURS = 150
-#: A facet with a smaller share of the mean weight of itself and the nearest ones is weak.
-WEAK, NEAREST = 0.2, 48
-#: So is one with fewer sightings than this share of the mean, but for these bounds.
-LEAST_SIGHTINGS = (3, 8)
+#: A facet with a smaller share of the mean weight of itself and the nearest ones, or with fewer sightings, is weak.
+WEAK, NEAREST, LEAST_SIGHTINGS = 0.2, 48, 3
 #: Facets fitted at once; bounds the memory.
 CHUNK = 2048
 
@@ -86,12 +84,13 @@ def fit_facets(sightings: Sightings, label: np.ndarray, radii: np.ndarray) -> Fa
         fitted[part], offset[part], bends[part], supported[part] = _fit_chunk(
             places, measured, normals, total, part, distance[part], index[part], radii
         )
-    # Mixtures of two surfaces and strays hold few sightings. The mean is by weight: strays lie among strays.
-    near = np.where(distance[:, :NEAREST] < radii[1], total[index[:, :NEAREST]], 0.0)
-    around = (near**2).sum(axis=1) / near.sum(axis=1)
-    size = np.bincount(label, minlength=count)
-    least = np.clip(WEAK * (size**2).sum() / len(label), *LEAST_SIGHTINGS)
-    strong = supported & (total >= WEAK * around) & (size >= least)
+    # Mixtures of two surfaces and strays hold few sightings. The mean is by weight, as strays lie among strays, and
+    # over like normals, as few views may see one surface and many the next.
+    alike = (distance[:, :NEAREST] < radii[1]) & (_dot(normals[index[:, :NEAREST]], normals) > SAME_SURFACE)
+    near = np.where(alike, total[index[:, :NEAREST]], 0.0)
+    around = (near**2).sum(axis=1) / np.maximum(near.sum(axis=1), 1e-300)
+    sightings_each = np.bincount(label, minlength=count)
+    strong = supported & (total >= WEAK * around) & (sightings_each >= LEAST_SIGHTINGS)
     return Facets(places + normals * offset[:, None], fitted, total, bends, strong)
 
 
