@@ -99,11 +99,13 @@ def _shaken(surfels: Surfels, size: float, generator: torch.Generator) -> Surfel
     return replace(surfels, centers=surfels.centers + size * noise, rotations=surfels.rotations + size * turn)
 
 
-def assert_agrees(found: Tensor, expected: Tensor, others: list[Tensor], bound: float) -> None:
-    """Finite; within `bound` of the largest value, and twice what float64 itself moves by."""
+def assert_agrees(
+    found: Tensor, expected: Tensor, others: list[Tensor], bound: float, rounding: float = 1e-30
+) -> None:
+    """Finite; within `bound` of the largest value, twice what float64 itself moves by, and `rounding`."""
     assert torch.isfinite(found).all()
     moved = torch.stack([(other - expected).abs() for other in others]).amax(dim=0)
-    allowed = bound * float(expected.abs().max()) + 2.0 * moved + 1e-30
+    allowed = bound * float(expected.abs().max()) + 2.0 * moved + rounding
     worst = ((found.double() - expected).abs() / allowed).max()
     assert float(worst) <= 1.0, f"{float(worst):.1f} times what is allowed"
 
@@ -164,8 +166,11 @@ def test_shading_of_any_soup_agrees_with_float64(surfels: Surfels, origin: list[
     found = _shade(surfels, radiance, origins, directions, kernel=True)
     expected = shade_in_double(surfels, radiance, origins, directions)
     others = [shade_in_double(moved, radiance, origins, directions) for moved in shaken(surfels)]
+    # Where a ray meets the very middle of a surfel, its turn changes nothing; float32 finds 1.4e-8 of the colour.
+    rounding = max(1e-7 * float(expected["colours"].max()), 1e-30)
     for name, value in found.items():
-        assert_agrees(value, expected[name], [other[name] for other in others], 1e-4)
+        floor = rounding if name == "rotations" else 1e-30
+        assert_agrees(value, expected[name], [other[name] for other in others], 1e-4, floor)
 
 
 #: A light by its direction and distance, or exactly on the first surfel.
