@@ -99,9 +99,7 @@ def _shaken(surfels: Surfels, size: float, generator: torch.Generator) -> Surfel
     return replace(surfels, centers=surfels.centers + size * noise, rotations=surfels.rotations + size * turn)
 
 
-def assert_agrees(
-    found: Tensor, expected: Tensor, others: list[Tensor], bound: float, rounding: float = 1e-30
-) -> None:
+def assert_agrees(found: Tensor, expected: Tensor, others: list[Tensor], bound: float, rounding: float = 1e-30) -> None:
     """Finite; within `bound` of the largest value, twice what float64 itself moves by, and `rounding`."""
     assert torch.isfinite(found).all()
     moved = torch.stack([(other - expected).abs() for other in others]).amax(dim=0)

@@ -44,7 +44,7 @@ def read_depth(path: Path, camera: Camera, convention: str) -> Tensor:
         found = f"{len(channels)}: {', '.join(sorted(channels))}"
         raise InputError(path, expected="one channel of depth", found=found, remedy="Export only the depth.")
     (stored,) = channels.values()
-    _check_size(path, stored, camera)
+    check_size(path, stored, camera)
     depth = torch.from_numpy(np.array(stored))
     if (depth < 0).any():
         found = f"{int((depth < 0).sum())} negative pixels, the lowest {float(depth.min()):g}"
@@ -66,11 +66,16 @@ def read_vectors(path: Path, names: tuple[str, ...], camera: Camera) -> Tensor:
         InputError: missing or broken file, other channels, another size than the image, NaN or infinity.
     """
     stored = read_array(path, names)
-    _check_size(path, stored, camera)
+    check_size(path, stored, camera)
     return torch.from_numpy(stored)
 
 
-def _check_size(path: Path, stored: np.ndarray, camera: Camera) -> None:
+def check_size(path: Path, stored: np.ndarray | Tensor, camera: Camera) -> None:
+    """Refuse a map (H, W, …) of another size than the image.
+
+    Raises:
+        InputError: naming the file and both sizes.
+    """
     height, width = stored.shape[:2]
     if (width, height) != (camera.width, camera.height):
         raise InputError(

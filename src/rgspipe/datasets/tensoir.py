@@ -14,7 +14,7 @@ import torch
 from torch import Tensor
 
 from rgspipe.datasets.frames import rigid_pose
-from rgspipe.datasets.images import read_colour, read_png
+from rgspipe.datasets.images import check_size, read_colour, read_png
 from rgspipe.datasets.json_file import is_number, read_json, required
 from rgspipe.datasets.views import Dataset, View
 from rgspipe.errors import InputError
@@ -117,7 +117,7 @@ def _camera(path: Path, image: Tensor) -> Camera:
 def _albedo(path: Path, camera: Camera) -> Tensor:
     """(H, W, 3) linear albedo, 0 where there is no surface."""
     colour, alpha = read_colour(path)
-    _check_size(path, colour, camera)
+    check_size(path, colour, camera)
     # Premultiplied at silhouettes; the reflectance of the surface there is wanted.
     return torch.where(alpha[..., None] > 0, colour / alpha.clamp(min=1e-6)[..., None], 0.0)
 
@@ -125,21 +125,10 @@ def _albedo(path: Path, camera: Camera) -> Tensor:
 def _normals(path: Path, camera: Camera) -> Tensor:
     """(H, W, 3) unit normals in world axes, stored as (n + 1)/2; 0 where there is no surface."""
     stored = torch.from_numpy(read_png(path))
-    _check_size(path, stored, camera)
+    check_size(path, stored, camera)
     normals = 2.0 * stored[..., :3] - 1.0
     length = normals.norm(dim=-1, keepdim=True)
     there = length > 0.5
     if stored.shape[-1] == 4:
         there &= stored[..., 3:] > 0
     return torch.where(there, normals / length.clamp(min=1e-6), 0.0)
-
-
-def _check_size(path: Path, stored: Tensor, camera: Camera) -> None:
-    height, width = stored.shape[:2]
-    if (width, height) != (camera.width, camera.height):
-        raise InputError(
-            path,
-            expected=f"{camera.width} × {camera.height} pixels, as the colour image",
-            found=f"{width} × {height}",
-            remedy="Export it at the size of the colour image.",
-        )
