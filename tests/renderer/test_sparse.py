@@ -44,6 +44,20 @@ def test_forward_products_do_not_make_the_transpose() -> None:
     assert "transposed" in vars(operator)
 
 
+def test_operators_with_entries_in_the_same_places_share_all_indices() -> None:
+    matrix = random_matrix(40, 30, seed=5)
+    operator = SparseOperator.from_scipy(matrix)
+    # Values of zero stay entries.
+    values = torch.arange(operator.entries, dtype=torch.float32)
+    other = operator.with_values(values)
+    expected = scipy.sparse.csr_matrix((values.numpy(), matrix.indices, matrix.indptr), shape=matrix.shape).toarray()
+    assert (other.to_scipy().toarray() == expected).all()
+    assert (other.transposed.to_dense().numpy() == expected.T).all()
+    for mine, lent in ((other.matrix, operator.matrix), (other.transposed, operator.transposed)):
+        assert mine.crow_indices().data_ptr() == lent.crow_indices().data_ptr()
+        assert mine.col_indices().data_ptr() == lent.col_indices().data_ptr()
+
+
 def test_operators_survive_their_tensors() -> None:
     matrix = random_matrix(40, 30, seed=2)
     again = SparseOperator.from_tensors(SparseOperator.from_scipy(matrix).tensors("name"), "name")

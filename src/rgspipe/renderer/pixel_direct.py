@@ -56,13 +56,8 @@ class PixelDirect:
         Args:
             share: `surfel_shares` of the light.
         """
-        matrix = self._view.operator.matrix
         entries = self._light.entries(position, share, self._own_shares(position, share))
-        return SparseOperator(
-            torch.sparse_csr_tensor(
-                matrix.crow_indices(), matrix.col_indices(), entries, size=matrix.shape, check_invariants=False
-            )
-        )
+        return self._view.operator.with_values(entries)
 
     def _own_shares(self, position: Tensor, share: Tensor) -> Tensor:
         """(P, 4) `own_share` of `PixelLight.image`: of pixels on a shadow's edge."""

@@ -32,10 +32,11 @@ class SparseOperator:
     Args:
         matrix: (rows, columns) float32 tensor in compressed rows with int32 indices, 8 bytes an entry; columns of
             a row in any order.
+        places: an operator with entries in the same places, in the same order; its transpose lends its indices.
     """
 
-    def __init__(self, matrix: Tensor) -> None:
-        self.matrix = matrix
+    def __init__(self, matrix: Tensor, places: SparseOperator | None = None) -> None:
+        self.matrix, self.places = matrix, places
 
     @classmethod
     def from_scipy(cls, matrix: scipy.sparse.csr_matrix, device: torch.device | str = "cpu") -> SparseOperator:
@@ -44,7 +45,14 @@ class SparseOperator:
     @cached_property
     def transposed(self) -> Tensor:
         """(columns, rows) the transpose in compressed rows."""
-        return _to_torch(self.to_scipy().T.tocsr(), self.matrix.device)
+        found = self.to_scipy().T.tocsr()
+        if self.places is None:
+            return _to_torch(found, self.matrix.device)
+        return in_places(self.places.transposed, torch.from_numpy(found.data).to(self.matrix.device))
+
+    def with_values(self, values: Tensor) -> SparseOperator:
+        """An operator with `values` (entries,) in the same places; both share the indices, also of the transposes."""
+        return SparseOperator(in_places(self.matrix, values), self.places or self)
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -81,6 +89,12 @@ class SparseOperator:
         parts = tuple(tensors[f"{prefix}.{name}"].numpy() for name in names)
         shape = tuple(tensors[f"{prefix}.shape"].tolist())
         return cls.from_scipy(scipy.sparse.csr_matrix(parts, shape=shape), device)
+
+
+def in_places(matrix: Tensor, values: Tensor) -> Tensor:
+    """A tensor in compressed rows with other values (entries,) and the indices of `matrix`, not copied."""
+    rows, columns = matrix.crow_indices(), matrix.col_indices()
+    return torch.sparse_csr_tensor(rows, columns, values, size=matrix.shape, check_invariants=False)
 
 
 def stack(operators: list[SparseOperator]) -> SparseOperator:

@@ -11,7 +11,7 @@ from torch import Tensor
 from rgspipe.progress import track
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.pixel_direct import PixelDirect
-from rgspipe.renderer.sparse import SparseOperator
+from rgspipe.renderer.sparse import SparseOperator, in_places
 from rgspipe.renderer.view_weights import ViewWeights
 from rgspipe.training.lighting import Lighting
 
@@ -47,13 +47,17 @@ class ViewModel:
 
     def squared(self, pixel_weights: Tensor, indirect: Tensor | None) -> Tensor:
         """(N, 3) diagonal of the normal equations with weights (P,): Σ_p w_p (D_pj I + W_pj L_j)²."""
-        direct, weight = self.direct.transposed, self.weights.operator.transposed
-        column = pixel_weights[:, None]
-        total = self.intensity.square() * (_product(direct, direct) @ column)
+        direct, mixed, weighted = self.moments(pixel_weights)
+        total = self.intensity.square() * direct
         if indirect is None:
             return total
-        cross = 2.0 * self.intensity * indirect * (_product(direct, weight) @ column)
-        return total + cross + indirect.square() * (_product(weight, weight) @ column)
+        return total + 2.0 * self.intensity * indirect * mixed + indirect.square() * weighted
+
+    def moments(self, pixel_weights: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """Σ_p w_p D_pj², Σ_p w_p D_pj W_pj and Σ_p w_p W_pj² with weights (P,), each (N, 1)."""
+        direct, weight = self.direct.transposed, self.weights.operator.transposed
+        column, pairs = pixel_weights[:, None], ((direct, direct), (direct, weight), (weight, weight))
+        return tuple(_product(left, right) @ column for left, right in pairs)
 
 
 def build_view_models(
@@ -69,20 +73,15 @@ def build_view_models(
         if at_pixels:
             direct = PixelDirect(bvh, view).operator(lighting.positions[index], lighting.shares[index])
         else:
-            direct = _at_centers(view.operator.matrix, lighting.irradiance[index])
+            direct = _at_centers(view.operator, lighting.irradiance[index])
         models.append(ViewModel(view, direct, lighting.intensity[index] / torch.pi))
     return tuple(models)
 
 
-def _at_centers(matrix: Tensor, irradiance: Tensor) -> SparseOperator:
-    return SparseOperator(_like(matrix, matrix.values() * irradiance[matrix.col_indices()]))
+def _at_centers(weights: SparseOperator, irradiance: Tensor) -> SparseOperator:
+    return weights.with_values(weights.matrix.values() * irradiance[weights.matrix.col_indices()])
 
 
 def _product(left: Tensor, right: Tensor) -> Tensor:
     """Element by element, of two matrices with the same places."""
-    return _like(left, left.values() * right.values())
-
-
-def _like(matrix: Tensor, values: Tensor) -> Tensor:
-    rows, columns = matrix.crow_indices(), matrix.col_indices()
-    return torch.sparse_csr_tensor(rows, columns, values, size=matrix.shape, check_invariants=False)
+    return in_places(left, left.values() * right.values())
