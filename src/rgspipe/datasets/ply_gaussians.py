@@ -169,9 +169,15 @@ def _albedo(table: VertexTable, options: PlyOptions) -> tuple[np.ndarray, list[L
     outside = np.maximum(-colour, colour - 1.0).max(axis=1)
     losses = [loss("colours are brought into 0 to 1", outside, 1e-3, "largest distance")]
     if any(name.startswith("f_rest_") for name in table.names):
-        rest = table.columns(*table.numbered("f_rest_"))
-        # Harmonics are orthonormal over the sphere of 4π; a third of the coefficients belong to each channel.
-        vary = np.sqrt((rest**2).sum(axis=1) / (3.0 * 4.0 * math.pi))
-        losses.append(loss("view-dependent colour is left out", vary, 1e-3, "largest rms over directions"))
+        losses.append(loss("view-dependent colour is left out", _variation(table), 1e-3, "largest rms over directions"))
     clamped = np.clip(colour, 0.0, 1.0)
     return (srgb.decode(clamped) if options.srgb else clamped), losses
+
+
+def _variation(table: VertexTable) -> np.ndarray:
+    """(N,) rms over directions and channels of the colour that f_rest_* adds."""
+    square = np.empty(len(table))
+    for rows, rest in table.blocks(*table.numbered("f_rest_")):
+        square[rows] = np.einsum("nk,nk->n", rest, rest)
+    # Harmonics are orthonormal over the sphere of 4π; a third of the coefficients belong to each channel.
+    return np.sqrt(square / (3.0 * 4.0 * math.pi))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,6 +13,9 @@ from plyfile import PlyData, PlyElement, PlyListProperty, PlyParseError
 from rgspipe.errors import InputError
 
 ELEMENT = "vertex"
+
+#: Rows read at once. Files lie row after row, so columns that are read one by one would read the whole file each.
+BLOCK = 8192
 
 
 @dataclass(frozen=True)
@@ -54,17 +57,34 @@ class VertexTable:
         Raises:
             InputError: one is missing, is a list, or has values that are not finite.
         """
-        self._require(names)
         values = np.empty((len(self), len(names)), np.float64)
-        for index, name in enumerate(names):
+        for rows, block in self.blocks(*names):
+            values[rows] = block
+        return values
+
+    def blocks(self, *names: str) -> Iterator[tuple[slice, np.ndarray]]:
+        """The values of properties as `columns` gives them, some rows at a time: (rows, (rows, len(names)) float64).
+
+        Raises:
+            InputError: as `columns`.
+        """
+        self._require(names)
+        for name in names:
             if isinstance(self.element.ply_property(name), PlyListProperty):
                 raise self._error(name, "one number for each vertex", "a list", "Export the file again.")
-            values[:, index] = self.element.data[name]
-            bad = np.flatnonzero(~np.isfinite(values[:, index]))
-            if len(bad):
-                found = f"{len(bad)} values that are not, the first in row {bad[0]}"
-                raise self._error(name, "finite numbers", found, "Remove those vertices, or export the file again.")
-        return values
+        for start in range(0, len(self), BLOCK):
+            rows = slice(start, min(start + BLOCK, len(self)))
+            block = np.stack([self.element.data[name][rows] for name in names], axis=1, dtype=np.float64)
+            if not np.isfinite(block).all():
+                raise self._not_finite(names)
+            yield rows, block
+
+    def _not_finite(self, names: Sequence[str]) -> InputError:
+        """The error for the first of `names` that has such values."""
+        bad = {name: np.flatnonzero(~np.isfinite(np.asarray(self.element.data[name], np.float64))) for name in names}
+        name, rows = next((name, rows) for name, rows in bad.items() if len(rows))
+        found = f"{len(rows)} values that are not, the first in row {rows[0]}"
+        return self._error(name, "finite numbers", found, "Remove those vertices, or export the file again.")
 
     def error(self, name: str, expected: str, found: str) -> InputError:
         """An error about the values of a property."""

@@ -16,12 +16,18 @@ LOOKED_AT, USED = 24, 4
 #: tangent plane as a share of the distance.
 LIKE_COSINE, FLAT_SHARE = 0.8, 0.5
 
+#: Surfels whose neighbours are looked at; of more, this many evenly through their order stand for all. The median of a
+#: sample of n is off by about 1.25·σ/√n, below 1 % of the spacing.
+SAMPLED = 20000
+
 #: Width of the ramp at a clip in spacings, as initialisation makes it.
 CLIP_SOFTNESS = 0.12
 
 
 def surfel_spacing(centers: Tensor, normals: Tensor) -> float:
     """Median over the surfels of the mean distance to the nearest four on the same surface, scene units.
+
+    Its cost is that of one tree over all of them.
 
     Args:
         centers: (N, 3).
@@ -34,11 +40,13 @@ def surfel_spacing(centers: Tensor, normals: Tensor) -> float:
     count = min(LOOKED_AT + 1, len(points))
     if count < 2:
         raise ValueError("spacing needs at least two surfels")
-    distance, index = cKDTree(points).query(points, k=count, workers=-1)
+    chosen = np.unique(np.linspace(0, len(points) - 1, SAMPLED).astype(int)) if len(points) > SAMPLED else slice(None)
+    own, axis = points[chosen], normals_[chosen, None]
+    distance, index = cKDTree(points).query(own, k=count, workers=-1)
     distance, index = distance[:, 1:], index[:, 1:]
-    offset = points[index] - points[:, None]
-    like = np.abs((normals_[index] * normals_[:, None]).sum(axis=-1)) > LIKE_COSINE
-    flat = np.abs((offset * normals_[:, None]).sum(axis=-1)) <= FLAT_SHARE * distance
+    offset = points[index] - own[:, None]
+    like = np.abs((normals_[index] * axis).sum(axis=-1)) > LIKE_COSINE
+    flat = np.abs((offset * axis).sum(axis=-1)) <= FLAT_SHARE * distance
     nearest = np.sort(np.where(like & flat & (distance > 0), distance, np.inf), axis=1)[:, :USED]
     found = np.isfinite(nearest)
     if not found.any():
