@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from torch import Tensor
 
@@ -16,6 +18,7 @@ from rgspipe.renderer.view_weights import ViewWeights, build_view_weights
 from rgspipe.scene.surfels import Surfels
 from rgspipe.training.albedo import AlbedoPrior, AlbedoProblem, solve_albedo
 from rgspipe.training.lighting import trace_lighting
+from rgspipe.training.operator_store import OperatorStore, Stored
 from rgspipe.training.view_model import build_view_models
 
 #: Rounds of the solve when light does not bounce: only the pixels' weights change.
@@ -35,6 +38,8 @@ class MaterialOptions:
         supersampling: of edge pixels in the view weights.
         at_pixels: whether direct light is taken where pixels look; otherwise at surfels' centres.
         seed: of rays and patches.
+        memory_mib: budget of the views' operators; those beyond it lie in a file, at the same results.
+        scratch: folder of that file; by default the system's for temporary files.
     """
 
     rounds: int = 5
@@ -43,6 +48,12 @@ class MaterialOptions:
     supersampling: int = 4
     at_pixels: bool = True
     seed: int = 0
+    memory_mib: float = math.inf
+    scratch: Path | None = None
+
+    def operator_store(self) -> OperatorStore:
+        """Where the operators of a fit go."""
+        return OperatorStore(self.memory_mib, self.scratch)
 
 
 @dataclass(frozen=True)
@@ -53,11 +64,13 @@ class Prepared:
         bvh: the surfels.
         weights: view weights of V views.
         transport: light between the surfels; None if it does not bounce.
+        store: where the weights are kept.
     """
 
     bvh: SurfelBvh
     weights: tuple[ViewWeights, ...]
     transport: PatchTransport | None
+    store: OperatorStore
 
 
 @dataclass(frozen=True)
@@ -69,12 +82,14 @@ class Materials:
         surfels: with their albedo.
         radiance: (V, N, 3) outgoing radiance under every view's light, with direct light at their centres.
         renders: V images (pixels, 3).
+        stored: size of the views' operators.
     """
 
     prepared: Prepared
     surfels: Surfels
     radiance: Tensor
     renders: tuple[Tensor, ...]
+    stored: Stored
 
 
 def fit_materials(
@@ -96,7 +111,8 @@ def fit_materials(
     prepared = prepared or prepare(surfels, views, options, bounces)
     transport = prepared.transport
     lighting = trace_lighting(prepared.bvh, views)
-    models = build_view_models(prepared.bvh, prepared.weights, lighting, options.at_pixels)
+    store = prepared.store.beside()
+    models = build_view_models(prepared.bvh, prepared.weights, lighting, options.at_pixels, store)
     problem = AlbedoProblem.build(surfels, models, views)
     rounds = options.rounds if bounces else min(DIRECT_ROUNDS, options.rounds)
     known = None
@@ -107,13 +123,15 @@ def fit_materials(
     albedo, indirect = solve_albedo(problem, surfels, lighting, transport, rounds, known)
     renders = tuple(problem.render(v, albedo, indirect) for v in range(len(views)))
     received = lighting.direct() if indirect is None else lighting.direct() + indirect
-    return Materials(prepared, replace(surfels, albedo=albedo), received * albedo, renders)
+    stored = prepared.store.stored + store.stored
+    return Materials(prepared, replace(surfels, albedo=albedo), received * albedo, renders, stored)
 
 
 def prepare(surfels: Surfels, views: Sequence[View], options: MaterialOptions, bounces: bool = True) -> Prepared:
     """Trace the cameras and, if light bounces, the surfels' view of each other."""
-    weights = trace_views(surfels, views, options.supersampling)
-    return Prepared(SurfelBvh(surfels), weights, build_transport(surfels, options) if bounces else None)
+    store = options.operator_store()
+    weights = trace_views(surfels, views, options.supersampling, store)
+    return Prepared(SurfelBvh(surfels), weights, build_transport(surfels, options) if bounces else None, store)
 
 
 def build_transport(surfels: Surfels, options: MaterialOptions) -> PatchTransport:
@@ -122,7 +140,12 @@ def build_transport(surfels: Surfels, options: MaterialOptions) -> PatchTranspor
     return frozen.transport
 
 
-def trace_views(surfels: Surfels, views: Sequence[View], supersampling: int) -> tuple[ViewWeights, ...]:
-    """View weights of every view."""
-    bvh = SurfelBvh(surfels)
-    return tuple(build_view_weights(bvh, view.camera, supersampling) for view in track(views, "views", unit="view"))
+def trace_views(
+    surfels: Surfels, views: Sequence[View], supersampling: int, store: OperatorStore | None = None
+) -> tuple[ViewWeights, ...]:
+    """View weights of every view, kept in `store`; in memory by default."""
+    bvh, keep, found = SurfelBvh(surfels), (store or OperatorStore()).keep, []
+    for view in track(views, "views", unit="view"):
+        weights = build_view_weights(bvh, view.camera, supersampling)
+        found.append(replace(weights, operator=keep(weights.operator)))
+    return tuple(found)

@@ -14,6 +14,7 @@ from rgspipe.renderer.pixel_direct import PixelDirect
 from rgspipe.renderer.sparse import SparseOperator, in_places
 from rgspipe.renderer.view_weights import ViewWeights
 from rgspipe.training.lighting import Lighting
+from rgspipe.training.operator_store import OperatorStore
 
 
 @dataclass(frozen=True)
@@ -61,20 +62,25 @@ class ViewModel:
 
 
 def build_view_models(
-    bvh: SurfelBvh, weights: Sequence[ViewWeights], lighting: Lighting, at_pixels: bool
+    bvh: SurfelBvh,
+    weights: Sequence[ViewWeights],
+    lighting: Lighting,
+    at_pixels: bool,
+    store: OperatorStore | None = None,
 ) -> tuple[ViewModel, ...]:
     """A model of every view under its own light.
 
     Args:
         at_pixels: whether falloff and shadows are taken where pixels look; otherwise surfels' centres stand for them.
+        store: where the operators of direct light are kept; in memory by default.
     """
-    models = []
+    models, keep = [], (store or OperatorStore()).keep
     for index, view in enumerate(track(weights, "direct light", unit="view")):
         if at_pixels:
             direct = PixelDirect(bvh, view).operator(lighting.positions[index], lighting.shares[index])
         else:
             direct = _at_centers(view.operator, lighting.irradiance[index])
-        models.append(ViewModel(view, direct, lighting.intensity[index] / torch.pi))
+        models.append(ViewModel(view, keep(direct), lighting.intensity[index] / torch.pi))
     return tuple(models)
 
 
