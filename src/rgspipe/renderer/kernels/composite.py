@@ -174,8 +174,9 @@ def _cast(bvh: SurfelBvh, rays: tuple[Tensor, Tensor], nearest: float, two_sided
 
 
 def _with_rows(hits: Hits, chosen: Tensor, wide: Hits) -> Hits:
-    """`hits` with the rows `chosen` (C,) replaced by those of `wide`, all as wide as they are."""
-    extra = (0, wide.indices.shape[1] - hits.indices.shape[1])
+    """`hits` with the rows `chosen` (C,) replaced by those of `wide`, all as wide as the fullest of them."""
+    width = max(int((wide.indices >= 0).sum(dim=1).amax()), hits.indices.shape[1])
+    extra = (0, width - hits.indices.shape[1])
     pad = torch.nn.functional.pad
     result = Hits(
         indices=pad(hits.indices, extra, value=-1),
@@ -184,6 +185,7 @@ def _with_rows(hits: Hits, chosen: Tensor, wide: Hits) -> Hits:
         weights=pad(hits.weights, extra),
         transmittance=hits.transmittance,
     )
-    for name in ("indices", "depths", "alphas", "weights", "transmittance"):
-        getattr(result, name)[chosen] = getattr(wide, name)
+    for name in ("indices", "depths", "alphas", "weights"):
+        getattr(result, name)[chosen] = getattr(wide, name)[:, :width]
+    result.transmittance[chosen] = wide.transmittance
     return result
