@@ -16,6 +16,7 @@ from rgspipe.datasets.ply_own import is_own, read_own, save_ply
 from rgspipe.datasets.ply_radiosity import is_radiosity, read_radiosity
 from rgspipe.datasets.ply_table import read_vertices
 from rgspipe.errors import InputError
+from rgspipe.renderer.fronts import backs_towards_cameras
 from rgspipe.scene.gloss import Gloss
 from rgspipe.scene.orientation import backs_towards, turned_over
 from rgspipe.scene.spacing import bounding_center, inferred_coverage
@@ -125,7 +126,7 @@ def _oriented(surfels: Surfels, path: Path, options: PlyOptions, *, own: bool) -
                 remedy="Set scene.ply.fronts=outwards for an object in empty space, inwards for a room, kept to trust "
                 "the rotations, or scene.ply.cameras=FILE (cameras.json or a transforms file).",
             )
-        away, where = backs_towards(surfels, read_viewpoints(cameras)), f"the cameras in {cameras}"
+        away, where = backs_towards_cameras(surfels, read_viewpoints(cameras)), f"the cameras in {cameras}"
     else:
         away = backs_towards(surfels, bounding_center(surfels.centers)[None])
         away, where = (away, "the middle") if fronts == "inwards" else (~away, "away from the middle")

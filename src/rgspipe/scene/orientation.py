@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 import torch
@@ -21,14 +22,20 @@ def turned_over(surfels: Surfels, chosen: Tensor) -> Surfels:
     )
 
 
-def backs_towards(surfels: Surfels, viewpoints: Tensor) -> Tensor:
+def backs_towards(
+    surfels: Surfels, viewpoints: Iterable[Tensor], seen: Callable[[Tensor], Tensor] | None = None
+) -> Tensor:
     """(N,) bool, surfels whose backs are towards the viewpoints (V, 3), the nearer ones counting more.
 
-    A surfel looks towards Σ_k (v_k − c)/|v_k − c|³, the field of equal charges at the viewpoints. What stands between
-    a viewpoint and a surfel is not looked at.
+    A surfel looks towards Σ_k s_k·(v_k − c)/|v_k − c|³, the field of charges s_k at the viewpoints.
+
+    Args:
+        seen: gives (N,) charges of a viewpoint (3,), such as the share of each surfel that is seen from there; without
+            it all are 1, and what stands between a viewpoint and a surfel is not looked at.
     """
     field = torch.zeros_like(surfels.centers)
     for viewpoint in viewpoints:
         towards = viewpoint.to(surfels.centers) - surfels.centers
-        field += towards / towards.norm(dim=1, keepdim=True).clamp(min=1e-9).pow(3)
+        pull = towards / towards.norm(dim=1, keepdim=True).clamp(min=1e-9).pow(3)
+        field += pull if seen is None else seen(viewpoint)[:, None] * pull
     return (field * surfels.normals).sum(dim=1) < 0.0
