@@ -81,10 +81,10 @@ def test_edges_stay_where_they_are_when_surfels_split() -> None:
 def test_errors_land_on_the_surfels_that_the_wrong_pixels_show(views: list[View]) -> None:
     box = painted_box()
     weights = trace_views(box, views, 1)
-    images = [view.image.reshape(-1, 3) for view in views]
-    renders = [image.clone() for image in images]
-    renders[1][500] += 1.0
-    errors = surfel_errors(weights, renders, images)
+    radiance = torch.rand(3, len(box), 3, generator=torch.Generator().manual_seed(0))
+    images = [view.operator @ shown for view, shown in zip(weights, radiance, strict=True)]
+    images[1][500] += 1.0
+    errors = surfel_errors(iter(weights), radiance, images)
     row = weights[1].operator.to_scipy()[500].toarray()[0]
     assert bool((errors[torch.from_numpy(row == 0.0)] == 0.0).all())
     assert float(errors.sum()) > 0.0

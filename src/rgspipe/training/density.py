@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import torch
@@ -31,16 +31,17 @@ class DensityOptions:
     faintest: float = 0.03
 
 
-def surfel_errors(weights: Sequence[ViewWeights], renders: Sequence[Tensor], images: Sequence[Tensor]) -> Tensor:
+def surfel_errors(weights: Iterable[ViewWeights], radiance: Tensor, images: Sequence[Tensor]) -> Tensor:
     """(N,) squared error of all views, each in units of its peak, shared out by the surfels' weights in the pixels.
 
     Args:
-        weights, renders, images: of the views; renders and images (pixels, 3).
+        weights, images: of V views; images (pixels, 3).
+        radiance: (V, N, 3) of the surfels under the views' lights.
     """
-    total = torch.zeros(weights[0].operator.shape[1])
-    for view, render, image in zip(weights, renders, images, strict=True):
+    total = torch.zeros(radiance.shape[1])
+    for view, shown, image in zip(weights, radiance, images, strict=True):
         peak = torch.quantile(image, 0.995).clamp(min=1e-12)
-        error = ((render - image) / peak).square().mean(dim=1, keepdim=True)
+        error = ((view.operator @ shown - image) / peak).square().mean(dim=1, keepdim=True)
         total += (view.operator.transposed @ error)[:, 0]
     return total
 

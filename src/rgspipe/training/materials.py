@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -144,8 +144,13 @@ def trace_views(
     surfels: Surfels, views: Sequence[View], supersampling: int, store: OperatorStore | None = None
 ) -> tuple[ViewWeights, ...]:
     """View weights of every view, kept in `store`; in memory by default."""
-    bvh, keep, found = SurfelBvh(surfels), (store or OperatorStore()).keep, []
+    keep = (store or OperatorStore()).keep
+    each = each_view(surfels, views, supersampling)
+    return tuple(replace(weights, operator=keep(weights.operator)) for weights in each)
+
+
+def each_view(surfels: Surfels, views: Sequence[View], supersampling: int) -> Iterator[ViewWeights]:
+    """View weights of one view after the other: for those who look at each once."""
+    bvh = SurfelBvh(surfels)
     for view in track(views, "views", unit="view"):
-        weights = build_view_weights(bvh, view.camera, supersampling)
-        found.append(replace(weights, operator=keep(weights.operator)))
-    return tuple(found)
+        yield build_view_weights(bvh, view.camera, supersampling)

@@ -12,7 +12,7 @@ the same surface. Images say little of a surface's height; it follows the normal
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -73,7 +73,7 @@ def roughness(surfels: Surfels, pairs: Neighbours) -> float:
 
 def fit_normals(
     surfels: Surfels,
-    weights: Sequence[ViewWeights],
+    weights: Iterable[ViewWeights],
     images: Sequence[Tensor],
     lights: Sequence[SurfelLight],
     pairs: Neighbours,

@@ -7,7 +7,7 @@ are reweighted until what disagrees counts for little, and where the views do no
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import torch
 from torch import Tensor
@@ -17,7 +17,7 @@ from rgspipe.errors import InputError
 from rgspipe.renderer.view_weights import ViewWeights
 from rgspipe.scene.surfels import Surfels
 from rgspipe.training.albedo import AlbedoPrior
-from rgspipe.training.materials import PriorOf, trace_views
+from rgspipe.training.materials import PriorOf, each_view
 
 #: A surfel that fewer pixels than this see in a view, all together, has no value in it.
 LEAST_PIXELS = 0.05
@@ -38,7 +38,7 @@ OUTLIER = 0.1
 ROUNDS = 10
 
 
-def albedo_prior(weights: Sequence[ViewWeights], views: Sequence[View]) -> tuple[Tensor, Tensor]:
+def albedo_prior(weights: Iterable[ViewWeights], views: Sequence[View]) -> tuple[Tensor, Tensor]:
     """Albedo that the views' albedo maps agree on.
 
         log a_vi = log s_v + log ρ_i
@@ -58,7 +58,7 @@ def albedo_prior(weights: Sequence[ViewWeights], views: Sequence[View]) -> tuple
         InputError: no view has an albedo map.
     """
     _require_maps(views)
-    pairs = [(weight, view) for weight, view in zip(weights, views, strict=True) if view.albedo is not None]
+    pairs = ((weight, view) for weight, view in zip(weights, views, strict=True) if view.albedo is not None)
     logs, shares = (torch.stack(parts) for parts in zip(*(_on_surfels(*pair) for pair in pairs), strict=True))
     channels = [_common(logs[:, :, channel], shares) for channel in range(3)]
     albedo = torch.stack([common for common, _ in channels], dim=1).exp().clamp(DARKEST, 1.0)
@@ -101,7 +101,7 @@ def prior_from_maps(views: Sequence[View], strength: float) -> PriorOf:
 
     def prior(surfels: Surfels) -> AlbedoPrior:
         # Edges are left out, so one ray a pixel says enough.
-        albedo, weight = albedo_prior(trace_views(surfels, views, supersampling=1), views)
+        albedo, weight = albedo_prior(each_view(surfels, views, supersampling=1), views)
         return AlbedoPrior(rescaled(albedo, weight, surfels.albedo), strength * weight)
 
     return prior

@@ -21,7 +21,7 @@ from rgspipe.training.density import DensityOptions, redistributed, surfel_error
 from rgspipe.training.initialise import Footprint
 from rgspipe.training.light_refinement import refine_lights
 from rgspipe.training.lighting import total_irradiance, trace_lighting
-from rgspipe.training.materials import MaterialOptions, Materials, PriorOf, build_transport, fit_materials, trace_views
+from rgspipe.training.materials import MaterialOptions, Materials, PriorOf, build_transport, each_view, fit_materials
 from rgspipe.training.photometric import PhotometricOptions, fit_heights, fit_normals, roughness
 from rgspipe.training.record import Record
 from rgspipe.training.refine import RefineOptions, RefineState, RefineView, refine
@@ -134,7 +134,7 @@ def _turned_by_shading(
     if roughness(surfels, pairs) < photometric.least_roughness:
         return None
     lights = surfel_lights(surfels, [view.light for view in views], radiance / surfels.albedo.clamp(min=1e-6))
-    weights = trace_views(surfels, views, supersampling=1)
+    weights = each_view(surfels, views, supersampling=1)
     images = [view.image.reshape(-1, 3).float() for view in views]
     turned = fit_normals(surfels, weights, images, lights, pairs, photometric)
     return fit_heights(turned, measured, find_neighbours(turned, spacing), photometric)
@@ -185,9 +185,8 @@ def _refine_geometry(
 def _redistributed(
     surfels: Surfels, views: Sequence[View], radiance: Tensor, most: int, options: DensityOptions
 ) -> tuple[Surfels, Tensor]:
-    weights = trace_views(surfels, views, supersampling=1)
-    renders = [view.operator @ light for view, light in zip(weights, radiance, strict=True)]
-    errors = surfel_errors(weights, renders, [view.image.reshape(-1, 3).float() for view in views])
+    weights = each_view(surfels, views, supersampling=1)
+    errors = surfel_errors(weights, radiance, [view.image.reshape(-1, 3).float() for view in views])
     return redistributed(surfels, errors, most, options)
 
 

@@ -21,6 +21,7 @@ from rgspipe.renderer.view_weights import ViewWeights
 from rgspipe.scene.surfels import Surfels
 from rgspipe.training.lighting import indirect_irradiance, trace_lighting
 from rgspipe.training.materials import trace_views
+from rgspipe.training.operator_store import OperatorStore
 from rgspipe.training.view_model import build_view_models
 
 
@@ -64,18 +65,21 @@ def render_held_out(
     transport: PatchTransport | None,
     supersampling: int,
     at_pixels: bool = True,
+    store: OperatorStore | None = None,
 ) -> HeldOut:
     """Render `views` under their own lights and compare.
 
     Args:
         transport: light between the surfels; None renders direct light only.
         at_pixels: whether direct light is taken where pixels look, otherwise at surfels' centres.
+        store: where the views' operators are kept; in memory by default.
     """
-    weights = trace_views(surfels, views, supersampling)
+    store = store or OperatorStore()
+    weights = trace_views(surfels, views, supersampling, store)
     bvh, own = SurfelBvh(surfels), surfels.albedo.float()
     lighting = trace_lighting(bvh, views)
     bounced = [None] * len(views) if transport is None else indirect_irradiance(lighting, own, transport)
-    models = build_view_models(bvh, weights, lighting, at_pixels)
+    models = build_view_models(bvh, weights, lighting, at_pixels, store.beside())
     flat = [model.image(own, indirect) for model, indirect in zip(models, bounced, strict=True)]
     images = tuple(_image(weight, pixels) for weight, pixels in zip(weights, flat, strict=True))
     albedo = tuple(weight.image(own).numpy() for weight in weights)
