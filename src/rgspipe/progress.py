@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from tqdm import tqdm
 
@@ -14,33 +14,79 @@ Item = TypeVar("Item")
 QUIET_SECONDS = 2.0
 
 
-class _Lines(tqdm):
+#: As tqdm's own, with the time that is left of everything.
+_FORMAT = "{l_bar}{bar}| {n_fmt}/{total_fmt} [{elapsed}, {left} left{postfix}]"
+
+
+class _Bar(tqdm):
+    """Progress whose estimate counts work that follows the items.
+
+    Args:
+        after: seconds of that work; None for tqdm's own estimate, of the items alone.
+    """
+
+    def __init__(self, *arguments: object, after: float | None = None, **options: object) -> None:
+        self._after = after
+        super().__init__(*arguments, bar_format=None if after is None else _FORMAT, **options)
+
+    @property
+    def format_dict(self) -> dict[str, Any]:
+        """What `_FORMAT` may name."""
+        found = super().format_dict
+        if self._after is None:
+            return found
+        done, seconds = self.n - self.initial, found["elapsed"]
+        rate = found["rate"] or (done / seconds if seconds else 0.0)
+        left = self.format_interval((self.total - self.n) / rate + self._after) if rate else "?"
+        return found | {"left": left}
+
+
+class _Lines(_Bar):
     """Progress in a log: whole lines instead of one that is written over."""
 
     def display(self, msg: str | None = None, pos: int | None = None) -> bool:
-        # tqdm asks for an empty message to wipe the line at the end.
-        if msg != "":
-            self.fp.write(f"{msg or self}\n")
-            self.fp.flush()
+        self.fp.write(f"{msg or self}\n")
+        self.fp.flush()
         return True
 
     def clear(self, *arguments: object, **options: object) -> None:
         """A line that was written stays."""
 
+    def close(self) -> None:
+        """Nothing to wipe, so no carriage return either."""
+        if not self.disable:
+            self.disable = True
+            self._decr_instances(self)
 
-def track(items: Iterable[Item], description: str, total: int | None = None, unit: str = "it") -> tqdm:
+
+def track(
+    items: Iterable[Item],
+    description: str,
+    total: int | None = None,
+    unit: str = "it",
+    *,
+    done: int = 0,
+    after: float | None = None,
+) -> tqdm:
     """Iterate over `items` while a progress line with an estimate stands on stderr.
 
     On a terminal the line is written over; in a log a new one comes every ten seconds. The returned bar can
     be iterated over, or updated by hand (`bar.update(1)`) in a `with` block; `bar.set_postfix_str("38.2 dB",
     refresh=False)` shows a figure beside the estimate.
+
+    Args:
+        total: of items, those done before and later included; by default how many `items` has.
+        done: how many were done before these.
+        after: seconds of other work that follows and that the estimate shall include.
     """
     interactive = sys.stderr.isatty()
-    return (tqdm if interactive else _Lines)(
+    return (_Bar if interactive else _Lines)(
         items,
         desc=description,
         total=total,
         unit=unit,
+        initial=done,
+        after=after,
         delay=QUIET_SECONDS,
         ncols=None if interactive else 100,
         dynamic_ncols=interactive,

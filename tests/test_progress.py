@@ -1,0 +1,55 @@
+"""Progress: quiet when short, whole lines in a log, and an estimate that counts what follows."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from rgspipe import progress
+
+
+class Clock:
+    """Time that passes when it is told to."""
+
+    now = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+def tracked(monkeypatch: pytest.MonkeyPatch, items: range, seconds: float, **options: object) -> None:
+    """Track items that take `seconds` each."""
+    clock = Clock()
+    monkeypatch.setattr("tqdm.std.time", clock)
+    bar = progress.track(items, "steps", unit="step", **options)
+    for _ in bar:
+        clock.now += seconds
+        bar.set_postfix_str("loss 0.1", refresh=False)
+
+
+def test_a_log_gets_a_whole_line_now_and_then(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    tracked(monkeypatch, range(25), seconds=2.0)
+    text = capsys.readouterr().err
+    lines = text.splitlines()
+    assert 4 <= len(lines) <= 5 and "\r" not in text
+    assert re.search(r"steps: +\d+%.* \d+/25 \[.*, loss 0\.1\]$", lines[-1])
+
+
+def test_short_work_shows_nothing(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    tracked(monkeypatch, range(25), seconds=0.05)
+    assert capsys.readouterr().err == ""
+
+
+def test_the_estimate_counts_later_items_and_what_follows(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Items 10 to 29 of 40, at 2 s each, then 100 s of something else."""
+    tracked(monkeypatch, range(10, 30), seconds=2.0, total=40, done=10, after=100.0)
+    lines = capsys.readouterr().err.splitlines()
+    for line in lines:
+        count, minutes, seconds = map(int, re.search(r" (\d+)/40 \[.*, (\d+):(\d+) left, loss", line).groups())
+        assert 60 * minutes + seconds == 2 * (40 - count) + 100
+    assert len(lines) == 4
