@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +13,9 @@ from painted_room import LIGHT, painted_box, painted_views
 from rgspipe.datasets.views import View
 from rgspipe.training.checkpoint import Checkpoint
 from rgspipe.training.density import DensityOptions
+from rgspipe.training.loss import LossOptions
 from rgspipe.training.materials import fit_materials
+from rgspipe.training.record import Record, materials_seconds
 from rgspipe.training.refine import RefineOptions
 from rgspipe.training.trainer import train
 
@@ -64,3 +67,48 @@ def test_training_goes_on_from_a_checkpoint_as_if_never_interrupted(
     for name, tensor in whole.surfels.tensors().items():
         assert torch.equal(tensor, resumed.surfels.tensors()[name]), name
     assert [record.step for record in resumed.records] == [record.step for record in whole.records]
+    assert [record.psnr for record in resumed.records] == [record.psnr for record in whole.records]
+
+
+def test_progress_says_how_training_goes_and_when_it_ends(
+    views: list[View], monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    shown, estimates = [], []
+
+    class Bar(list):
+        def set_postfix_str(self, text: str, refresh: bool) -> None:
+            shown.append(text)
+
+    def tracked(items: range, *_: object, after: float, **__: object) -> Bar:
+        estimates.append(after)
+        return Bar(items)
+
+    monkeypatch.setattr("rgspipe.training.refine.track", tracked)
+    caplog.set_level("INFO")
+    start = replace(painted_box(), albedo=torch.full((864, 3), 0.5))
+    refine_options = RefineOptions(
+        steps=3, views_per_step=4, interior_pixels=100, subsamples=1, loss=LossOptions("l1", compression=10.0)
+    )
+    trained = train(start, views, replace(OPTIONS, rounds=2, refine=refine_options))
+    first, *steps, last = trained.records
+    assert [record.phase for record in steps] == 3 * ["geometry"]
+    # The mean over steps is of errors; the loss is another measure.
+    mean = -10.0 * math.log10(sum(10.0 ** (-record.psnr / 10.0) for record in steps) / 3)
+    loss = sum(record.loss for record in steps) / 3
+    assert shown[-1] == f"loss {loss:.2e}, {mean:.1f} dB, 864 surfels"
+    assert abs(steps[0].psnr + 10.0 * math.log10(steps[0].loss)) > 3.0
+    # Materials at the end take as long as those before.
+    assert estimates == [first.seconds] and 0.0 < first.seconds < last.seconds
+    assert f"final materials: {last.psnr:.1f} dB on the training images, 864 surfels" in caplog.text
+    assert trained.stored.memory > 0 and "MiB in memory" in caplog.text
+
+
+def test_seconds_of_materials_are_those_of_the_newest_fit() -> None:
+    def records(*rows: tuple[str, float]) -> list[Record]:
+        return [Record(phase, 0, 0.0, 0.0, seconds) for phase, seconds in rows]
+
+    assert materials_seconds([]) == 0.0
+    assert materials_seconds(records(("materials", 3.0))) == 3.0
+    lights = ("materials", 3.0), ("materials and lights", 5.0)
+    assert materials_seconds(records(*lights, ("geometry", 9.0))) == 5.0
+    assert materials_seconds(records(*lights, ("materials", 9.0), ("materials and lights", 10.0))) == 5.0

@@ -46,7 +46,7 @@ class Checkpoint:
         note = {"records": [asdict(record) for record in records], "step": None}
         note["thresholds"] = [surfels.coverage.low, surfels.coverage.high]
         if state is not None:
-            note |= {"step": state.step, "losses": state.losses}
+            note |= {"step": state.step, "losses": state.losses, "errors": state.errors}
             for group in ("parameters", "first", "second"):
                 tensors |= {f"{group}.{name}": tensor for name, tensor in getattr(state, group).items()}
             tensors["start_log_scales"] = state.start_log_scales
@@ -74,7 +74,7 @@ class Checkpoint:
         return (
             surfels,
             tensors["radiance"],
-            RefineState(*groups, tensors["start_log_scales"], step=note["step"], losses=note["losses"]),
+            RefineState(*groups, tensors["start_log_scales"], note["step"], note["losses"], note["errors"]),
             lights,
         )
 

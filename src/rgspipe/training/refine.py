@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from statistics import fmean
 
 import torch
 from torch import Tensor
@@ -20,6 +22,9 @@ from rgspipe.training.parameters import build_surfels, limit, start_parameters
 from rgspipe.training.regularise import Neighbours, continuity, distortion, find_neighbours, normal_smoothness
 from rgspipe.training.sampling import PixelDraw, draw_pixels, draw_window, pixel_means, views_of_step
 from rgspipe.training.shading import SurfelLight, shaded_radiance
+
+#: Steps that progress shows the mean of.
+SHOWN_STEPS = 20
 
 #: Every so many of a step's rays, the depths of hits are compared.
 DISTORTION_STRIDE = 16
@@ -101,6 +106,7 @@ class RefineState:
         start_log_scales: (N, 2) of the surfels that training began with.
         step: steps done.
         losses: of every step.
+        errors: of every step, the mean squared error of the pixels it looked at, in units of the views' peaks.
     """
 
     parameters: dict[str, Tensor]
@@ -109,6 +115,7 @@ class RefineState:
     start_log_scales: Tensor
     step: int = 0
     losses: list[float] = field(default_factory=list)
+    errors: list[float] = field(default_factory=list)
 
     @classmethod
     def start(cls, surfels: Surfels) -> RefineState:
@@ -142,6 +149,7 @@ def refine(
     state: RefineState | None = None,
     checkpoint: Callable[[RefineState], None] | None = None,
     until: int | None = None,
+    after: float = 0.0,
 ) -> tuple[Surfels, RefineState]:
     """Surfels that render the views better, and the state at the end.
 
@@ -153,17 +161,20 @@ def refine(
         spacing: typical distance of neighbours, scene units.
         checkpoint: called with the state after every step.
         until: the step to stop before; all of `options.steps` if None.
+        after: seconds of training besides these steps that are left, for the estimate that is shown.
     """
     state = state or RefineState.start(surfels)
     rates = _rates(options, spacing)
     pairs = find_neighbours(surfels, spacing)
     last = options.steps if until is None else min(until, options.steps)
-    bar = track(range(state.step, last), "geometry", unit="step")
+    steps = range(state.step, last)
+    bar = track(steps, "geometry", options.steps, unit="step", done=state.step, after=after)
     for step in bar:
         moved = {name: value.clone().requires_grad_(rates[name] > 0.0) for name, value in state.parameters.items()}
-        data, prior = _step_loss(build_surfels(surfels, moved), moved["thresholds"], views, pairs, options, step)
+        data, prior, error = _step_loss(build_surfels(surfels, moved), moved["thresholds"], views, pairs, options, step)
         (data + prior).backward()
         state.losses.append(float(data.detach()))
+        state.errors.append(error)
         decay = min(1.0, 3.0 * (1.0 - (step + 1) / (options.steps + 1)))
         for name, value in moved.items():
             if value.grad is not None:
@@ -171,11 +182,16 @@ def refine(
                 state.parameters[name] -= decay * rates[name] * direction
         limit(state.parameters, surfels, state.start_log_scales)
         state.step = step + 1
-        bar.set_postfix_str(f"loss {sum(state.losses[-20:]) / len(state.losses[-20:]):.2e}", refresh=False)
+        bar.set_postfix_str(f"{_shown(state)}, {len(surfels)} surfels", refresh=False)
         if checkpoint is not None:
             checkpoint(state)
     with torch.no_grad():
         return build_surfels(surfels, state.parameters), state
+
+
+def _shown(state: RefineState) -> str:
+    loss, error = (max(fmean(values[-SHOWN_STEPS:]), 1e-30) for values in (state.losses, state.errors))
+    return f"loss {loss:.2e}, {-10.0 * math.log10(error):.1f} dB"
 
 
 def _step_loss(
@@ -185,8 +201,8 @@ def _step_loss(
     pairs: Neighbours,
     options: RefineOptions,
     step: int,
-) -> tuple[Tensor, Tensor]:
-    """What the images say, and what the regularisers add."""
+) -> tuple[Tensor, Tensor, float]:
+    """What the images say, what the regularisers add, and the mean squared error in units of the views' peaks."""
     generator = torch.Generator().manual_seed(options.seed * 1_000_003 + step)
     chosen = [views[index] for index in views_of_step(len(views), options.views_per_step, options.seed, step)]
     draws = [_draw(view, options, generator) for view in chosen]
@@ -209,7 +225,7 @@ def _step_loss(
         origins, directions = rays[0][::DISTORTION_STRIDE], rays[1][::DISTORTION_STRIDE]
         hits = composite(bvh, origins, directions)
         prior = prior + options.distortion_weight * distortion(surfels, hits, origins, directions)
-    return data, prior
+    return data, prior, _squared_error(chosen, draws, images)
 
 
 def _draw(view: RefineView, options: RefineOptions, generator: torch.Generator) -> PixelDraw:
@@ -241,6 +257,14 @@ def _image_term(
             pair = tuple(x.reshape(*draw.shape, 3) for x in pair)
         terms.append(image_loss(*pair, view.peak, options.loss, window=draw.shape is not None))
     return torch.stack(terms).mean()
+
+
+def _squared_error(views: Sequence[RefineView], draws: Sequence[PixelDraw], images: Sequence[Tensor]) -> float:
+    triples = zip(views, draws, images, strict=True)
+    return fmean(
+        float(((rendered.detach() - view.image[draw.pixels]) / view.peak).square().mean())
+        for view, draw, rendered in triples
+    )
 
 
 def _alpha_term(views: Sequence[RefineView], draws: Sequence[PixelDraw], covered: Tensor) -> Tensor:

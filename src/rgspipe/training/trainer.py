@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -22,11 +23,14 @@ from rgspipe.training.initialise import Footprint
 from rgspipe.training.light_refinement import refine_lights
 from rgspipe.training.lighting import total_irradiance, trace_lighting
 from rgspipe.training.materials import MaterialOptions, Materials, PriorOf, build_transport, each_view, fit_materials
+from rgspipe.training.operator_store import Stored
 from rgspipe.training.photometric import PhotometricOptions, fit_heights, fit_normals, roughness
-from rgspipe.training.record import Record
+from rgspipe.training.record import Record, materials_seconds
 from rgspipe.training.refine import RefineOptions, RefineState, RefineView, refine
 from rgspipe.training.regularise import find_neighbours
 from rgspipe.training.shading import surfel_lights
+
+logger = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -54,11 +58,13 @@ class Trained:
         surfels: as trained.
         records: the training table.
         views: training views, with their lights as refined.
+        stored: size of the views' operators, where it was largest.
     """
 
     surfels: Surfels
     records: tuple[Record, ...]
     views: tuple[View, ...]
+    stored: Stored
 
 
 def train(
@@ -97,7 +103,7 @@ def train(
             checkpoint.save(surfels, radiance, None, log.records, [view.light for view in views])
         surfels = _refine_geometry(surfels, radiance, state, views, spacing, options, log, checkpoint, most)
         surfels, _, views = _fit_materials(surfels, views, given, options, log, "final materials", prior)
-    return Trained(surfels, tuple(log.records), tuple(views))
+    return Trained(surfels, tuple(log.records), tuple(views), log.stored)
 
 
 def surfel_spacing(surfels: Surfels) -> float:
@@ -158,7 +164,7 @@ def _refine_geometry(
     """
     state = state or RefineState.start(surfels)
     steps, every = options.refine.steps, options.refine.relight_every or options.refine.steps
-    lights = [view.light for view in views]
+    lights, relighting = [view.light for view in views], 0.0
 
     def keep(progress: RefineState) -> None:
         log.steps(progress)
@@ -170,9 +176,13 @@ def _refine_geometry(
     while True:
         refined = refine_views(surfels, views, radiance)
         until = (state.step // every + 1) * every
-        surfels_after, state = refine(surfels, refined, spacing, options.refine, state, keep, until)
+        # Rounds that make light again, and the materials at the end.
+        rounds = (steps - 1) // every - state.step // every
+        after = rounds * relighting + materials_seconds(log.records)
+        surfels_after, state = refine(surfels, refined, spacing, options.refine, state, keep, until, after)
         if state.step >= steps:
             return surfels_after
+        began = time.monotonic()
         surfels, radiance = surfels_after, _relit(surfels_after, views, options)
         if options.density.growth > 1.0:
             surfels, parent = _redistributed(surfels, views, radiance, most, options.density)
@@ -180,6 +190,7 @@ def _refine_geometry(
         state = state.rebased(surfels)
         if checkpoint is not None:
             checkpoint.save(surfels, radiance, state, log.records, lights)
+        relighting = time.monotonic() - began
 
 
 def _redistributed(
@@ -213,12 +224,11 @@ class _Log:
     """The training table as it grows."""
 
     def __init__(self, records: list[Record]) -> None:
-        self.records = list(records)
+        self.records, self.stored = list(records), Stored()
         self._start = time.monotonic() - (self.records[-1].seconds if self.records else 0.0)
 
     def steps(self, state: RefineState) -> None:
-        loss = state.losses[-1]
-        self._add("geometry", state.step, loss, -10.0 * float(np.log10(max(loss, 1e-30))))
+        self._add("geometry", state.step, state.losses[-1], _decibels(state.errors[-1]))
 
     def materials(self, phase: str, views: Sequence[View], fitted: Materials) -> None:
         errors = []
@@ -226,8 +236,18 @@ class _Log:
             image = view.image.reshape(-1, 3)
             peak = torch.quantile(image, 0.995).clamp(min=1e-12)
             errors.append(float(((render - image) / peak).square().mean()))
-        psnr = float(np.mean([-10.0 * np.log10(max(error, 1e-30)) for error in errors]))
-        self._add(phase, 0, float(np.mean(errors)), psnr)
+        self._add(phase, 0, float(np.mean(errors)), float(np.mean([_decibels(error) for error in errors])))
+        self.stored = max(self.stored, fitted.stored, key=lambda stored: stored.memory + stored.file)
+        last = self.records[-1]
+        logger.info(
+            "%s: %.1f dB on the training images, %d surfels, %s, %.0f s so far",
+            *(phase, last.psnr, len(fitted.surfels), fitted.stored, last.seconds),
+        )
 
     def _add(self, phase: str, step: int, loss: float, psnr: float) -> None:
         self.records.append(Record(phase, step, loss, psnr, time.monotonic() - self._start))
+
+
+def _decibels(error: float) -> float:
+    """PSNR of a mean squared error in units of the peak."""
+    return -10.0 * float(np.log10(max(error, 1e-30)))
