@@ -25,7 +25,7 @@ from filelock import FileLock, Timeout
 
 from rgspipe.errors import InputError
 from rgspipe.files import point_at, sha256, sync, sync_tree, write_json
-from rgspipe.machine import library_versions, machine, peak_memory_mib
+from rgspipe.machine import PeakMemory, library_versions, machine
 
 SCHEMA_VERSION = 1
 MANIFEST = "manifest.json"
@@ -161,9 +161,10 @@ class ArtifactStore:
                 return found, False
             resumed = partial.exists()
             partial.mkdir(exist_ok=True)
-            start = time.perf_counter()
+            start, memory = time.perf_counter(), PeakMemory()
             facts = make(partial)
-            made = {"seconds": round(time.perf_counter() - start, 3), "resumed": resumed, "facts": dict(facts)}
+            seconds = round(time.perf_counter() - start, 3)
+            made = {"seconds": seconds, "peak_memory_mib": memory.mib(), "resumed": resumed, "facts": dict(facts)}
             self._publish(key, recipe, made)
         artifact = self.find(key)
         assert artifact is not None
@@ -182,7 +183,6 @@ class ArtifactStore:
             "created": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
             "libraries": library_versions(),
             "machine": machine(),
-            "peak_memory_mib": peak_memory_mib(),
             "files": _inventory(partial),
         }
         write_json(partial / MANIFEST, manifest)

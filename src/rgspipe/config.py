@@ -237,6 +237,12 @@ class TrainConfig:
     checkpoint_every: int = option(20, "gradient steps between checkpoints", low=1, high=1000000)
     direct_only: bool = option(True, "also fit and report a model without interreflection, for comparison")
     seed: int = option(0, "draws of pixels and rays", low=0, high=2**31 - 1)
+    memory_mib: float = option(
+        4096.0,
+        "memory [MiB] for the training views' operators; those beyond it are read from a file, with the same results",
+        low=0,
+        high=1e9,
+    )
 
 
 @dataclass

@@ -38,11 +38,23 @@ def library_versions() -> dict[str, str]:
     return installed
 
 
-def peak_memory_mib() -> int:
-    """Largest resident memory so far of this process or of a child that has ended."""
-    usage = max(resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
-    # Linux counts in KiB, macOS in bytes.
-    return round(usage / (2**20 if sys.platform == "darwin" else 2**10))
+class PeakMemory:
+    """Largest resident memory from now on, of this process or of a child.
+
+    Where `reset_peak_memory` has no effect, earlier work counts too; where it is called meanwhile, only what follows.
+    """
+
+    def __init__(self) -> None:
+        self._children = _largest_mib(resource.RUSAGE_CHILDREN)
+        reset_peak_memory()
+
+    def mib(self) -> int:
+        """Of this process, or of a child that has ended since and was larger than any before."""
+        own = peak_memory_now_mib()
+        if math.isnan(own):
+            own = _largest_mib(resource.RUSAGE_SELF)
+        children = _largest_mib(resource.RUSAGE_CHILDREN)
+        return round(max(own, children) if children > self._children else own)
 
 
 def reset_peak_memory() -> None:
@@ -56,6 +68,11 @@ def peak_memory_now_mib() -> float:
     status = Path("/proc/self/status")
     found = re.search(r"^VmHWM:\s*(\d+) kB", status.read_text(), re.MULTILINE) if status.is_file() else None
     return int(found.group(1)) / 2**10 if found else math.nan
+
+
+def _largest_mib(who: int) -> float:
+    # Linux counts in KiB, macOS in bytes.
+    return resource.getrusage(who).ru_maxrss / (2**20 if sys.platform == "darwin" else 2**10)
 
 
 def _processor() -> str:

@@ -11,10 +11,10 @@ from rgspipe.stages.train_surfels import train_options
 
 def test_every_option_comes_from_the_configuration() -> None:
     config = TrainConfig(rounds=3, steps=5, views_per_step=2, edge_pixels=7, interior_pixels=11, subsamples=2, seed=9)
-    config.light_rounds, config.at_pixels = 2, False
+    config.light_rounds, config.at_pixels, config.memory_mib = 2, False, 12.0
     options = train_options(config)
     assert (options.rounds, options.seed, options.gather_rays) == (3, 9, config.gather_rays)
-    assert (options.light_rounds, options.at_pixels) == (2, False)
+    assert (options.light_rounds, options.at_pixels, options.memory_mib) == (2, False, 12.0)
     refine = options.refine
     assert (refine.steps, refine.views_per_step, refine.edge_pixels, refine.interior_pixels) == (5, 2, 7, 11)
     assert (refine.subsamples, refine.seed) == (2, 9)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +20,7 @@ from rgspipe.datasets.views import View
 from rgspipe.errors import InputError
 from rgspipe.evaluation.held_out import held_out_picture
 from rgspipe.evaluation.images import save_png
-from rgspipe.machine import peak_memory_mib
+from rgspipe.machine import PeakMemory
 from rgspipe.stages.base import Stage, StageContext
 from rgspipe.training.checkpoint import Checkpoint
 from rgspipe.training.density import DensityOptions
@@ -35,8 +35,8 @@ from rgspipe.training.validate import render_held_out
 
 def run(context: StageContext) -> None:
     """Write surfels.safetensors, training.csv, metrics.json and comparison.png."""
-    config = context.config.train
-    options = train_options(config)
+    memory, config = PeakMemory(), context.config.train
+    options = replace(train_options(config), scratch=context.scratch)
     dataset = open_dataset(context.inputs["generate_dataset"].folder(), targets=False)
     start = load_surfels(context.inputs["init_depth"].file("surfels.safetensors"))
     checkpoint = Checkpoint(context.scratch / "checkpoint.safetensors", config.checkpoint_every)
@@ -53,12 +53,14 @@ def run(context: StageContext) -> None:
         build_transport(trained.surfels, options),
         options.supersampling,
         options.at_pixels,
+        options.operator_store(),
     )
     seconds = {"training": trained.records[-1].seconds, "held_out": time.perf_counter() - began}
     metrics = held_out.summary() | {"surfels": len(trained.surfels), "seconds": seconds["training"]}
     if config.direct_only:
         metrics["direct_only_psnr"] = _direct_only(trained, train_views, dataset.test, options)
-    metrics["peak_memory_mib"] = peak_memory_mib()
+    metrics["peak_memory_mib"] = memory.mib()
+    metrics["operators_mib"] = trained.stored.mib()
     if options.light_rounds > 0:
         metrics["lights"] = _corrections(train_views, trained.views)
     text = json.dumps(metrics, indent=1, allow_nan=False)
@@ -113,6 +115,7 @@ def train_options(config: TrainConfig) -> TrainOptions:
         at_pixels=config.at_pixels,
         light_rounds=config.light_rounds,
         seed=config.seed,
+        memory_mib=config.memory_mib,
     )
 
 
@@ -121,7 +124,9 @@ def _direct_only(
 ) -> float:
     """Mean held-out PSNR of the same geometry when light does not bounce, its albedo fitted accordingly."""
     surfels = fit_materials(trained.surfels, train_views, options, bounces=False).surfels
-    held_out = render_held_out(surfels, test_views, None, options.supersampling, options.at_pixels)
+    held_out = render_held_out(
+        surfels, test_views, None, options.supersampling, options.at_pixels, options.operator_store()
+    )
     return float(np.mean(held_out.psnr))
 
 

@@ -28,6 +28,10 @@ class Stored:
     def __add__(self, other: Stored) -> Stored:
         return Stored(self.memory + other.memory, self.file + other.file)
 
+    def mib(self) -> dict[str, float]:
+        """JSON values [MiB]."""
+        return {"memory": round(self.memory / MIB, 1), "file": round(self.file / MIB, 1)}
+
     def __str__(self) -> str:
         beside = f" and {self.file / MIB:.0f} MiB in a file" if self.file else ""
         return f"operators of views: {self.memory / MIB:.0f} MiB in memory{beside}"

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Record:
-    """One row of the training table: a phase, its loss and PSNR on the pixels looked at, and seconds since the start."""
+    """One row of the training table: a phase, its loss and PSNR on the pixels looked at, seconds since the start."""
 
     phase: str
     step: int
