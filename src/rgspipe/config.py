@@ -116,6 +116,7 @@ class PlyConfig:
     crop: list[float] | None = option(
         None, "box that is kept: lower and upper x, y, z in [x,y,z,x,y,z]", low=-1e6, high=1e6, length=6
     )
+    max_surfels: int = option(100000, "files with more are refused: operators grow with them", low=2, high=100_000_000)
 
 
 @dataclass
@@ -382,6 +383,16 @@ class ReportConfig:
 
 
 @dataclass
+class OverviewConfig:
+    """The page over scenes."""
+
+    scenes: list[str] = option(
+        ["cornell", "corner", "hotdog", "room", "cornell_glossy"],
+        "scenes by the names of their folders, in this order; the newest report of each is taken",
+    )
+
+
+@dataclass
 class BenchmarkConfig:
     """What is measured."""
 
@@ -429,6 +440,7 @@ class RgspipeConfig:
     evaluate: EvaluateConfig = section(EvaluateConfig, "how estimates are judged")
     study: StudyConfig = section(StudyConfig, "what bad captures cost")
     report: ReportConfig = section(ReportConfig, "what the report compares")
+    overview: OverviewConfig = section(OverviewConfig, "the page over scenes")
     benchmark: BenchmarkConfig = section(BenchmarkConfig, "what is timed")
     debug: DebugConfig = section(DebugConfig, "when something goes wrong")
 

@@ -176,8 +176,12 @@ def test_report_gathers_evaluations_training_and_provenance(tmp_path, config):
     for text in ("search_lm, 1 view", "search_lm, 3 views", "36.00 dB", "evaluate (search_lm, 3 views)", "e3", "t0"):
         assert text in html
     assert html.count('alt="true and recovered light positions') == 2
-    # Only the picture of held-out views is missing.
-    assert html.count('<p class="missing">') == 1 and "no picture that compares" in html
+    # Only pictures of held-out views and of the scene are missing: neither its judgement nor its dataset came along.
+    assert html.count('<p class="missing">') == 2
+    assert "no picture that compares" in html and "no pictures of the scene" in html
+    summary = json.loads((tmp_path / "report" / "summary.json").read_text(), parse_constant=pytest.fail)
+    assert summary["highlights"]["psnr"] == 36.0 and summary["highlights"]["targets"] == 3
+    assert [row["occlusion"] for row in summary["lights"]] == ["visible", "occluded"]
     assert context.facts["bytes"] == len(html.encode())
 
 

@@ -1,1 +1,1 @@
-"""Measures, tables, pictures and the report. Reads no dataset and renders nothing."""
+"""Measures, tables, pictures and figures. Reads no dataset and renders nothing."""

@@ -13,6 +13,7 @@ from rgspipe.datasets.views import View
 from rgspipe.evaluation.ceiling import transmittance_image
 from rgspipe.evaluation.error_split import pixel_kinds, split_error
 from rgspipe.evaluation.held_out import QUALITY, albedo_of_views, held_out_summary, quality_row, view_table
+from rgspipe.evaluation.images import Bytes, comparison_strip
 from rgspipe.fitting.fit import prepare_fit, render_light
 from rgspipe.fitting.problem import Effects
 from rgspipe.progress import track
@@ -50,6 +51,12 @@ class Renders:
             for place in PLACES
         ]
         return pd.DataFrame(rows, columns=["light", *QUALITY]).astype(dict.fromkeys(QUALITY[1:], float))
+
+    def typical(self, place: str) -> Bytes:
+        """Truth, render and signed difference of the view whose PSNR is the (lower) median."""
+        order = np.argsort(self.table(place)["psnr"].to_numpy())
+        index = order[(len(order) - 1) // 2]
+        return comparison_strip(self.views[index].image, self.images[place][index])
 
     def split(self, kinds: Sequence[npt.NDArray[np.int64]]) -> pd.DataFrame:
         """The table of `split_error` for each of `PLACES`, with a column `light`."""

@@ -25,6 +25,7 @@ NAMES = (
     "evaluate",
     "study",
     "report",
+    "overview",
     "render_truth",
     "benchmark",
 )

@@ -18,7 +18,7 @@ SPLIT = ["surfels", "light", "kind", "pixels", "error", "psnr"]
 
 
 def run(context: StageContext) -> None:
-    """Write quality.csv, split.csv, views.csv and comparison.png."""
+    """Write quality.csv, split.csv, views.csv, comparison.png and typical.png."""
     require_images(context.config, "held-out views")
     views = open_dataset(context.inputs["generate_dataset"].folder(), train=False, targets=False).test
     scenes = [load_frozen(artifact.file) for artifact in context.input_lists["freeze"]]
@@ -35,6 +35,7 @@ def run(context: StageContext) -> None:
     table.to_csv(context.folder / "views.csv", index=False)
     picture = held_out_picture(views, renders.images["pixels"], table["psnr"], renders.albedo)
     save_png(context.folder / "comparison.png", picture)
+    save_png(context.folder / "typical.png", renders.typical("pixels"))
     context.note(psnr=dict(zip(quality["light"], quality["psnr"].round(2), strict=True)))
 
 

@@ -5,29 +5,41 @@ from __future__ import annotations
 import dataclasses
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
-import rgspipe.evaluation
 from rgspipe.artifacts import Artifact
 from rgspipe.config import RgspipeConfig, scene_name
 from rgspipe.datasets.json_file import read_json
 from rgspipe.datasets.surfel_file import load_surfels
-from rgspipe.evaluation import report
 from rgspipe.evaluation.plots import CameraMark
+from rgspipe.files import write_json
+from rgspipe.pages import report
+from rgspipe.pages.overview import scene_summary
+from rgspipe.pages.provenance import StageRecord, stage_record
 from rgspipe.stages.base import Need, Stage, StageContext
+from rgspipe.stages.report_gallery import dataset_gallery
+from rgspipe.stages.report_study import found_study, study_file
 from rgspipe.stages.sources import has_truth
 
 REPORT = "report.html"
+#: What a page over scenes shows of this one.
+SUMMARY, VIEW, HELD_OUT = "summary.json", "view.png", "held_out.png"
 #: Sections that say how a run is done, not what comes out of it.
-_OPERATION = ("stage", "upstream", "outputs", "debug")
+_OPERATION = ("stage", "upstream", "outputs", "overview", "debug")
 
 
 def run(context: StageContext) -> None:
-    """Write report.html from the evaluations and what lies behind them."""
+    """Write report.html from the evaluations and what lies behind them, and what a page over scenes shows of it."""
     contents = _contents(context)
+    write_json(context.folder / SUMMARY, scene_summary(contents))
+    if contents.gallery is not None and contents.gallery.train:
+        shots = contents.gallery.train
+        (context.folder / VIEW).write_bytes(shots[len(shots) // 2].png)
+    held_out = _optional_bytes(next(iter(context.input_lists.get("judge", ())), None), "typical.png")
+    if held_out is not None:
+        (context.folder / HELD_OUT).write_bytes(held_out)
     page = report.render_report(contents)
     (context.folder / REPORT).write_text(page, encoding="utf-8")
     context.note(bytes=len(page.encode("utf-8")), fits=len(contents.targets))
@@ -42,10 +54,12 @@ def _contents(context: StageContext) -> report.ReportContents:
     described = [read_json(artifact.file("metrics.json"), "what an evaluation found") for artifact in evaluations]
     surfels = _surfels(context.inputs.get("freeze"))
     trained = context.inputs.get("train_surfels")
+    targets = _table(evaluations, "metrics.csv", {"success": "boolean", "result": str, "reason": str})
+    study, remark = found_study(config, judged)
     return report.ReportContents(
         scene=scene_name(config),
         summary=_table(evaluations, "summary.csv"),
-        targets=_table(evaluations, "metrics.csv", {"success": "boolean", "result": str, "reason": str}),
+        targets=targets,
         curves=_table(evaluations, "convergence.csv"),
         fits=_pictures(evaluations, described),
         cloud=None if surfels is None else surfels.centers,
@@ -57,6 +71,9 @@ def _contents(context: StageContext) -> report.ReportContents:
         split=_joined(judged, "split.csv"),
         true_summary=_table(with_truth, "summary.csv") if with_truth else None,
         comparison=_optional_bytes(judged[0] if judged else trained, "comparison.png"),
+        gallery=dataset_gallery(context.inputs.get("generate_dataset"), surfels, targets),
+        study=study,
+        study_remark=remark,
         success_limit=config.evaluate.success,
         configuration=_configuration(config),
         stages=_stages(context, described),
@@ -125,16 +142,16 @@ def _configuration(config: RgspipeConfig) -> str:
     return json.dumps(shown, indent=2)
 
 
-def _stages(context: StageContext, described: Sequence[Mapping[str, Any]]) -> list[report.StageRecord]:
+def _stages(context: StageContext, described: Sequence[Mapping[str, Any]]) -> list[StageRecord]:
     """Every artifact behind the report, in the order of the pipeline; fits and evaluations stand in pairs."""
     records = [
-        report.stage_record(stage, artifact.manifest)
-        for stage in ("generate_dataset", "init_depth", "train_surfels", "freeze", "judge")
+        stage_record(stage, artifact.manifest)
+        for stage in ("generate_dataset", "init_depth", "train_surfels", "import_ply", "freeze", "judge")
         for artifact in context.input_lists.get(stage, ())
     ]
     for stage in ("fit_light", "evaluate"):
         for artifact, content in zip(context.input_lists.get(stage, ()), described, strict=False):
-            records.append(report.stage_record(f"{stage} ({_group(content)})", artifact.manifest))
+            records.append(stage_record(f"{stage} ({_group(content)})", artifact.manifest))
     return records
 
 
@@ -158,13 +175,13 @@ def _inputs(config: RgspipeConfig) -> list[Need | str]:
             if method == "paper_adam" and config.fit.limit is None:
                 changes["fit.limit"] = config.report.paper_adam_limit
             needs += [Need("fit_light", changes), Need("evaluate", changes)]
+    if config.scene.kind == "ply":
+        return [*needs, "freeze", "import_ply"]
     return [*needs, *_judgements(config), "freeze", "train_surfels", "init_depth", "generate_dataset"]
 
 
 def _judgements(config: RgspipeConfig) -> list[Need | str]:
     """Held-out views, and where it is known the same with surfels made from the truth, with their lights."""
-    if config.scene.kind == "ply":
-        return []
     if not (config.report.truth and has_truth(config)):
         return ["judge"]
     truth: dict[str, object] = {"freeze.surfels": "truth"}
@@ -177,16 +194,12 @@ def _keys(config: RgspipeConfig) -> list[str]:
     return [field.name for field in dataclasses.fields(config) if field.name not in _OPERATION]
 
 
-def _template(config: RgspipeConfig) -> list[Path]:
-    return [Path(rgspipe.evaluation.__path__[0]) / "templates" / REPORT]
-
-
 STAGE = Stage(
     name="report",
     help="one HTML file with tables, pictures, configuration and provenance",
     inputs=_inputs,
     config_keys=_keys,
-    code=("rgspipe.evaluation",),
-    files=_template,
+    code=("rgspipe.evaluation", "rgspipe.pages", "rgspipe.stages.report_gallery", "rgspipe.stages.report_study"),
+    files=study_file,
     run=run,
 )

@@ -2,44 +2,15 @@
 
 import dataclasses
 import math
-from html.parser import HTMLParser
 
 import numpy as np
 import pandas as pd
 
-from rgspipe.evaluation import images, report, tables
-
-_VOID = {"meta", "img", "br", "link", "input", "hr"}
-
-
-class _Page(HTMLParser):
-    """Collects text and addresses, and checks that tags are closed in order."""
-
-    def __init__(self, html: str) -> None:
-        super().__init__()
-        self.addresses: list[str] = []
-        self.tags: list[str] = []
-        self.words: list[str] = []
-        self._open: list[str] = []
-        self.feed(html)
-        assert not self._open
-
-    @property
-    def text(self) -> str:
-        return " ".join(" ".join(self.words).split())
-
-    def handle_starttag(self, tag, attributes):
-        self.tags.append(tag)
-        self.addresses += [value for name, value in attributes if name in ("src", "href", "srcset", "data", "action")]
-        if tag not in _VOID:
-            self._open.append(tag)
-
-    def handle_endtag(self, tag):
-        assert self._open.pop() == tag
-
-    def handle_data(self, data):
-        if not self._open or self._open[-1] not in ("style", "script"):
-            self.words.append(data)
+from html_page import Page
+from rgspipe.evaluation import images, tables
+from rgspipe.pages import html as shared
+from rgspipe.pages import report
+from rgspipe.pages.provenance import stage_record
 
 
 def _empty(fitted) -> report.ReportContents:
@@ -49,30 +20,51 @@ def _empty(fitted) -> report.ReportContents:
 
 def test_a_report_refers_to_nothing_outside_itself(full_contents):
     html = report.render_report(full_contents)
-    page = _Page(html)
-    assert page.addresses and all(address.startswith("data:image/") for address in page.addresses)
+    page = Page(html)
+    outside = [address for address in page.addresses if not address.startswith(("data:image/", "#"))]
+    assert page.pictures and not outside
     assert "link" not in page.tags and "iframe" not in page.tags
     assert "http:" not in html and "https:" not in html and "@import" not in html and "url(" not in html
 
 
 def test_a_report_shows_everything_and_misses_nothing(full_contents):
     html = report.render_report(full_contents)
-    page = _Page(html)
+    page = Page(html)
     assert 'class="missing"' in html and "One note." in page.text  # the note is the only thing of its kind
     assert html.count('<p class="missing">') == 1
     for text in ("36.50 dB", "test/r_0001", "33.25", "occluded_002", "0123abcd", "640", "torch 2.13.0", "all classes"):
         assert text in page.text
-    # training, split, comparison, errors, two light drawings, convergence, one fit
-    assert len(page.addresses) == 8
+    # six training views, the plan, two targets; training, split, comparison, study, errors, two light drawings,
+    # convergence, one fit
+    assert len(page.pictures) == 9 + 9
+    assert all(words for _, words in page.pictures), "every picture says what it shows"
+    assert {address.removeprefix("#") for address in page.addresses if address.startswith("#")} <= set(page.names)
 
 
 def test_a_judged_scene_stands_beside_true_surfels(full_contents):
-    page = _Page(report.render_report(full_contents))
+    page = Page(report.render_report(full_contents))
     for text in ("true surfels, light at pixels", "38.25 dB", "3,825.00 %", "What the trained scene costs the lights"):
         assert text in page.text
     # Pixels that cannot be told apart leave the table.
-    page = _Page(report.render_report(dataclasses.replace(full_contents, split=full_contents.split.iloc[:0])))
+    page = Page(report.render_report(dataclasses.replace(full_contents, split=full_contents.split.iloc[:0])))
     assert "no passes by which pixels could be told apart" in page.text and "38.25 dB" in page.text
+
+
+def test_a_report_shows_the_scene_its_targets_and_their_truth(full_contents):
+    text = Page(report.render_report(full_contents)).text
+    assert "8 training views of 16 × 8 pixels, 2 held-out views, 2 targets with 1 view each" in text
+    assert "r_0007: light at (0.10, −0.20, 0.30), 1.00 / 1.50 / 2.00 W/sr" in text
+    assert "visible_000: light at (0.10, −0.20, 0.30), 1.00 / 1.50 / 2.00 W/sr; recovered 1.23 % away" in text
+    assert "occluded_000: true light not known" in text
+    without = Page(report.render_report(dataclasses.replace(full_contents, gallery=None))).text
+    assert "no pictures of the scene" in without
+
+
+def test_a_study_is_shown_with_its_remark_and_left_out_where_none_was_made(full_contents):
+    contents = dataclasses.replace(full_contents, study_remark="Made with other settings.")
+    text = Page(report.render_report(contents)).text
+    assert "What bad captures cost" in text and "views=25" in text and "Made with other settings." in text
+    assert "bad captures" not in Page(report.render_report(dataclasses.replace(contents, study=None))).text
 
 
 def test_text_from_files_is_escaped(full_contents):
@@ -82,8 +74,8 @@ def test_text_from_files_is_escaped(full_contents):
 
 
 def test_an_empty_report_says_what_is_missing(fitted):
-    page = _Page(report.render_report(_empty(fitted)))
-    assert not page.addresses
+    page = Page(report.render_report(_empty(fitted)))
+    assert not page.pictures
     for text in (
         "quality of the trained scene is not known",
         "No lights were fitted",
@@ -98,7 +90,7 @@ def test_an_empty_report_says_what_is_missing(fitted):
 def test_unknown_truth_is_stated_and_shown_as_a_dash(fitted):
     targets, curves = fitted(1, with_truth=False)
     summary = tables.summary_table(targets, 0)
-    page = _Page(
+    page = Page(
         report.render_report(dataclasses.replace(_empty(fitted), summary=summary, targets=targets, curves=curves))
     )
     assert "3 (0 with truth)" in page.text and "unknown" in page.text and "nan" not in page.text
@@ -109,7 +101,7 @@ def test_failed_fits_are_shown_as_infinitely_far_away(fitted):
     targets, curves = fitted(1)
     targets.loc[0, ["position_error", "intensity_error"]] = math.inf
     summary = tables.summary_table(targets, 0)
-    page = _Page(
+    page = Page(
         report.render_report(dataclasses.replace(_empty(fitted), summary=summary, targets=targets, curves=curves))
     )
     assert "∞" in page.text
@@ -127,8 +119,8 @@ def test_reports_of_equal_contents_are_equal(full_contents):
 
 
 def test_stage_records_do_without_what_a_manifest_lacks():
-    record = report.stage_record("freeze", {})
-    assert {record.fingerprint, record.seconds, record.memory, record.machine, record.code} == {report.MISSING}
+    record = stage_record("freeze", {})
+    assert {record.fingerprint, record.seconds, record.memory, record.machine, record.code} == {shared.MISSING}
 
 
 def test_captions_say_what_is_known():
@@ -145,4 +137,4 @@ def test_tables_read_back_from_csv_render_the_same(tmp_path, full_contents):
     contents.targets.to_csv(tmp_path / "metrics.csv", index=False)
     again = pd.read_csv(tmp_path / "metrics.csv", dtype={"success": "boolean", "result": str, "reason": str})
     html = report.render_report(dataclasses.replace(contents, targets=again))
-    assert _Page(html).text == _Page(report.render_report(contents)).text
+    assert Page(html).text == Page(report.render_report(contents)).text

@@ -2,25 +2,28 @@
 
 from __future__ import annotations
 
-import base64
-import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-import jinja2
 import pandas as pd
-from matplotlib.figure import Figure
 
-from rgspipe.evaluation import goals, images, metrics, plots
-from rgspipe.evaluation.quality_plots import split_figure
-from rgspipe.evaluation.report_quality import compared_lights, quality_columns, quality_rows
+from rgspipe.evaluation import goals, metrics, plots
+from rgspipe.evaluation.quality_plots import split_figure, study_figure
+from rgspipe.evaluation.study import TRUTH
 from rgspipe.evaluation.tables import ALL
+from rgspipe.pages.gallery import Gallery, Shot
+from rgspipe.pages.highlights import highlights, tiles
+from rgspipe.pages.html import MISSING, data_address, decimals, figure_address, percent, picture_address, render
+from rgspipe.pages.provenance import StageRecord
+from rgspipe.pages.quality import compared_lights, quality_columns, quality_rows
 
-#: All pictures together, before they are encoded as text (which adds a third).
+#: Pictures of fits and held-out views together, before they are encoded as text (which adds a third).
 PICTURE_BYTES = 4_500_000
-#: What stands where a value is not known.
-MISSING = "—"
+#: One picture of a training view or target: bytes, and pixels across.
+SHOT_BYTES, SHOT_WIDTH = 80_000, 320
+#: The drawing of cameras and lights.
+PLAN_BYTES = 400_000
 
 
 @dataclass(frozen=True)
@@ -30,19 +33,6 @@ class Picture:
     group: str
     caption: str
     png: bytes
-
-
-@dataclass(frozen=True)
-class StageRecord:
-    """Where one artifact came from, as plain text; what is not known is "—"."""
-
-    stage: str
-    fingerprint: str
-    seconds: str
-    memory: str
-    machine: str
-    code: str
-    libraries: str
 
 
 @dataclass(frozen=True)
@@ -65,6 +55,9 @@ class ReportContents:
         split: rows of the split of the squared error with `surfels` and `light`; empty if pixels cannot be told apart.
         true_summary: rows of `summary_table` for lights recovered with surfels made from the truth.
         comparison: PNG of truth, render and difference of held-out views, or None.
+        gallery: pictures of the dataset, or None.
+        study: rows of `study_row` of this scene: what bad captures cost; None if no study has been made.
+        study_remark: what the reader must know of that study, or "".
         success_limit: position error up to which a target counts as solved.
         configuration: the full configuration as YAML or JSON text.
         stages: one record per artifact behind the report.
@@ -85,6 +78,9 @@ class ReportContents:
     split: pd.DataFrame | None = None
     true_summary: pd.DataFrame | None = None
     comparison: bytes | None = None
+    gallery: Gallery | None = None
+    study: pd.DataFrame | None = None
+    study_remark: str = ""
     success_limit: float = metrics.SUCCESS_LIMIT
     configuration: str = ""
     stages: Sequence[StageRecord] = ()
@@ -93,22 +89,20 @@ class ReportContents:
 
 def render_report(contents: ReportContents) -> str:
     """The report as one HTML document without any reference to a file or an address."""
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("rgspipe.evaluation", "templates"),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters |= {"percent": _percent, "bare_percent": _bare_percent, "decimals": _decimals, "label": _label}
     method = goals.primary_method(contents.summary)
     budget = PICTURE_BYTES // max(1, len(contents.fits) + (contents.comparison is not None))
-    return environment.get_template("report.html").render(
+    found = highlights(contents.quality, contents.summary, contents.true_summary, contents.training)
+    return render(
+        "report.html",
         contents=contents,
-        goals=goals.goals(contents.summary, dict(contents.training or {}), method),
+        tiles=tiles(found),
+        gallery=_gallery(contents.gallery),
+        study=[] if contents.study is None else contents.study.to_dict("records"),
+        true_surfels=TRUTH,
+        goals=goals.goals(contents.summary, dict(contents.training or {}) | {"test_psnr_mean": found["psnr"]}, method),
         method=method,
         training=_training_rows(contents.training),
-        comparison=_picture(contents.comparison, budget),
+        comparison=picture_address(contents.comparison, budget),
         quality_columns=[] if contents.quality is None else quality_columns(contents.quality),
         quality=[] if contents.quality is None else quality_rows(contents.quality),
         compared=[] if contents.true_summary is None else compared_lights(contents.summary, contents.true_summary),
@@ -131,64 +125,35 @@ def picture_caption(target: str, kind: str, position_error: float | None, psnr: 
     """The words under a fit's picture; `kind` is "median" or "worst"."""
     measured = []
     if position_error is not None:
-        measured.append(f"position error {_percent(float(position_error))}")
+        measured.append(f"position error {percent(float(position_error))}")
     if psnr is not None:
-        measured.append(f"PSNR {_decimals(float(psnr), 1)} dB")
+        measured.append(f"PSNR {decimals(float(psnr), 1)} dB")
     return f"{target}, {kind} of its class" + (": " + ", ".join(measured) if measured else "")
 
 
-def data_address(content: bytes, kind: str) -> str:
-    """A data: address that holds `content` itself; `kind` is its MIME type."""
-    return f"data:{kind};base64,{base64.b64encode(content).decode('ascii')}"
+def _gallery(gallery: Gallery | None) -> dict[str, Any] | None:
+    """Pictures of the dataset as addresses."""
+    if gallery is None:
+        return None
+    classes = [
+        {"name": one.name, "words": one.words, "count": one.count, "shots": _shots(one.shots)}
+        for one in gallery.classes
+    ]
+    plan = picture_address(gallery.plan, PLAN_BYTES)
+    return {"counts": gallery.counts, "train": _shots(gallery.train), "classes": classes, "plan": plan}
 
 
-def stage_record(stage: str, manifest: Mapping[str, Any]) -> StageRecord:
-    """An artifact's manifest as text; every field may be missing."""
-    seconds, memory = manifest.get("seconds"), manifest.get("peak_memory_mib")
-    return StageRecord(
-        stage=stage,
-        fingerprint=str(manifest.get("fingerprint", MISSING)),
-        seconds=MISSING if seconds is None else f"{float(seconds):.1f}",
-        memory=MISSING if memory is None else f"{float(memory):.0f}",
-        machine=_flat(manifest.get("machine")),
-        code=_flat(manifest.get("code")),
-        libraries=_flat(manifest.get("libraries")),
-    )
-
-
-def _flat(value: Any) -> str:
-    """A mapping as "key value, key value"; text as it is."""
-    if isinstance(value, Mapping):
-        return ", ".join(f"{key} {_flat(item)}" for key, item in value.items()) or MISSING
-    return MISSING if value is None or value == "" else str(value)
-
-
-def _percent(value: Any, digits: int = 2) -> str:
-    return MISSING if value is None or pd.isna(value) else goals.percent(float(value), digits)
-
-
-def _bare_percent(value: Any, digits: int = 2) -> str:
-    return _percent(value, digits).removesuffix(" %")
-
-
-def _decimals(value: Any, digits: int = 2) -> str:
-    if value is None or pd.isna(value):
-        return MISSING
-    return "∞" if math.isinf(value) else f"{float(value):.{digits}f}"
-
-
-def _label(name: str) -> str:
-    return "all classes" if name == ALL else plots.LABELS.get(name, name.replace("_", " "))
-
-
-def _picture(png: bytes | None, budget: int) -> str | None:
-    return None if png is None else data_address(images.fit_within(png, budget), "image/png")
+def _shots(shots: Sequence[Shot]) -> list[dict[str, Any]]:
+    return [
+        {"caption": shot.caption, "alt": shot.alt, "source": picture_address(shot.png, SHOT_BYTES, SHOT_WIDTH)}
+        for shot in shots
+    ]
 
 
 def _grouped_fits(pictures: Sequence[Picture], budget: int) -> list[dict]:
     groups: dict[str, list[dict]] = {}
     for picture in pictures:
-        shown = {"caption": picture.caption, "source": _picture(picture.png, budget)}
+        shown = {"caption": picture.caption, "source": picture_address(picture.png, budget)}
         groups.setdefault(picture.group, []).append(shown)
     return [{"name": name, "pictures": members} for name, members in groups.items()]
 
@@ -225,7 +190,7 @@ def _target_rows(targets: pd.DataFrame) -> list[dict]:
     rows = []
     for row in targets.to_dict("records"):
         verdict = "unknown" if row["success"] is None or pd.isna(row["success"]) else ("no", "yes")[int(row["success"])]
-        estimate, truth = (", ".join(_decimals(row[axis + suffix], 3) for axis in "xyz") for suffix in ("", "_true"))
+        estimate, truth = (", ".join(decimals(row[axis + suffix], 3) for axis in "xyz") for suffix in ("", "_true"))
         ended, why = (
             row[name] if isinstance(row[name], str) and row[name] else MISSING for name in ("result", "reason")
         )
@@ -236,14 +201,15 @@ def _target_rows(targets: pd.DataFrame) -> list[dict]:
 def _figures(contents: ReportContents) -> dict[str, Any]:
     """Every figure as an address, or the reason why it is not there; lights per method and view count."""
     return {
-        "errors": _figure(lambda: plots.error_figure(contents.targets)),
-        "convergence": _figure(lambda: plots.convergence_figure(contents.curves)),
-        "training": _figure(lambda: plots.training_figure(contents.training_log))
+        "errors": figure_address(lambda: plots.error_figure(contents.targets)),
+        "convergence": figure_address(lambda: plots.convergence_figure(contents.curves)),
+        "training": figure_address(lambda: plots.training_figure(contents.training_log))
         if contents.training_log is not None
         else {"source": None, "reason": "no training log"},
-        "split": _figure(lambda: split_figure(contents.split))
+        "split": figure_address(lambda: split_figure(contents.split))
         if contents.split is not None
         else {"source": None, "reason": "nothing judged the scene"},
+        "study": None if contents.study is None else figure_address(lambda: study_figure(contents.study)),
         "lights": _light_figures(contents),
     }
 
@@ -258,11 +224,3 @@ def _light_figures(contents: ReportContents) -> list[dict]:
         # A bitmap: thousands of dots would be far larger as drawing commands.
         drawn.append({"title": title, "source": data_address(plots.png_of(figure), "image/png")})
     return drawn
-
-
-def _figure(draw: Callable[[], Figure]) -> dict[str, str | None]:
-    try:
-        figure = draw()
-    except ValueError as error:
-        return {"source": None, "reason": str(error)}
-    return {"source": data_address(plots.svg_bytes(figure), "image/svg+xml"), "reason": None}

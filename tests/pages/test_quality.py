@@ -1,4 +1,4 @@
-"""What a report says of trained surfels beside true ones."""
+"""What a page says of trained surfels beside true ones."""
 
 import math
 
@@ -6,7 +6,7 @@ import pandas as pd
 import pytest
 
 from rgspipe.evaluation.held_out import QUALITY
-from rgspipe.evaluation.report_quality import compared_lights, quality_columns, quality_rows
+from rgspipe.pages.quality import compared_lights, quality_columns, quality_rows
 
 
 def _quality() -> pd.DataFrame:

@@ -1,4 +1,4 @@
-"""What the report says of the trained scene beside one made from the truth."""
+"""What a page says of the trained scene beside one made from the truth."""
 
 from __future__ import annotations
 

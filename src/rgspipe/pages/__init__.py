@@ -1,0 +1,1 @@
+"""Pages for people, each one HTML file that holds its pictures. Reads no artifact and renders no scene."""
