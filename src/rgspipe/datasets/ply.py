@@ -22,6 +22,9 @@ from rgspipe.scene.orientation import backs_towards, turned_over
 from rgspipe.scene.spacing import bounding_center, inferred_coverage
 from rgspipe.scene.surfels import NO_CLIP, Surfels, quaternion_to_axes
 
+#: Peak memory of freezing a surfel with 256 gather rays, measured on 10 000 and 40 000.
+FREEZING_BYTES = 100e3
+
 __all__ = ["PlyOptions", "load_ply", "save_ply"]
 
 
@@ -35,16 +38,16 @@ def load_ply(path: str | Path, options: PlyOptions | None = None) -> tuple[Surfe
     path, options = Path(path), options or PlyOptions()
     table = read_vertices(path)
     if is_own(table):
-        surfels, conversion = read_own(table)
+        surfels, conversion = read_own(table, options)
         kept, losses, notes = np.ones(len(surfels), bool), conversion.losses, list(conversion.notes)
         if options.crop is not None:
             kept = _kept(surfels.centers.numpy(), np.ones(len(surfels)), options)
-        _require_some(path, kept, options)
+        _check_count(path, kept, options)
         layout, surfels = conversion.layout, _chosen(surfels, torch.from_numpy(kept))
     else:
         discs = (read_radiosity if is_radiosity(table) else read_gaussians)(table, options)
         kept = _kept(discs.centers, discs.opacities, options)
-        _require_some(path, kept, options)
+        _check_count(path, kept, options)
         layout, losses, surfels = discs.layout, discs.losses, _dressed(path, discs, kept, options)
         rule = surfels.coverage
         notes = [*discs.notes, f"Coverage is inferred: thresholds {rule.low:g} and {rule.high:g}, layers of "
@@ -54,13 +57,23 @@ def load_ply(path: str | Path, options: PlyOptions | None = None) -> tuple[Surfe
     return surfels, Conversion.of(path, layout, len(surfels), [*losses, left], [*notes, *fronts])
 
 
-def _require_some(path: Path, kept: np.ndarray, options: PlyOptions) -> None:
-    if kept.sum() < 2:
+def _check_count(path: Path, kept: np.ndarray, options: PlyOptions) -> None:
+    count = int(kept.sum())
+    if count < 2:
         raise InputError(
             path,
             expected="surfels that can be seen",
-            found=f"{kept.sum()} of {len(kept)} in the box and above an opacity of {options.minimum_alpha}",
+            found=f"{count} of {len(kept)} in the box and above an opacity of {options.minimum_alpha}",
             remedy="Correct scene.ply.crop, or lower scene.ply.minimum_alpha.",
+        )
+    if options.max_surfels is not None and count > options.max_surfels:
+        raise InputError(
+            path,
+            expected=f"at most {options.max_surfels} surfels (scene.ply.max_surfels)",
+            found=f"{count}, of {len(kept)} in the file; frozen with the default rays they take about "
+            f"{count * FREEZING_BYTES / 2**30:.0f} GiB of memory",
+            remedy="Keep a part of the scene with scene.ply.crop=[x,y,z,x,y,z], thin the file in the program that made "
+            "it, or raise scene.ply.max_surfels where there is the memory; fewer freeze.gather_rays take less.",
         )
 
 

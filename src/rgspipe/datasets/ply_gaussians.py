@@ -16,12 +16,14 @@ from rgspipe.datasets.conversion import Loss, loss
 from rgspipe.datasets.opacity_profile import smoothstep
 from rgspipe.datasets.ply_options import PlyOptions
 from rgspipe.datasets.ply_table import VertexTable
+from rgspipe.errors import InputError
 
 #: The constant spherical harmonic, ½/√π; 3DGS stores (colour − ½)/Y₀.
 Y0 = 0.5 / math.sqrt(math.pi)
 
-#: Thresholds for Gaussians as they stand. On a trained room they keep 29.6 dB where 0 and 1 keep 27.2, and where
-#: footprints fitted so that each covers alone what its opacity says keep 25.5: fitted ones grow, and hang over edges.
+#: Thresholds for Gaussians as they stand, a guess that little supports: in two views of one room that this program had
+#: trained they kept 29.6 dB where 0 and 1 kept 27.2, and footprints fitted so that each covers alone what its opacity
+#: says 25.5 (they grow, and hang over edges). Scenes that 3DGS trained were not at hand.
 LOW, HIGH = 0.5, 0.9
 
 #: Rotations that carry the axes (1, 2, 0), (2, 0, 1) and (0, 1, 2) to u, v and normal, by the axis that is dropped.
@@ -29,6 +31,9 @@ TURNS = np.array([[0.5, 0.5, 0.5, 0.5], [0.5, -0.5, -0.5, -0.5], [1.0, 0.0, 0.0,
 
 #: Log-scales beyond leave float32.
 LARGEST_LOG = 80.0
+
+#: What only files that PlayCanvas's tools packed into 16 bytes a Gaussian have.
+COMPRESSED = "packed_position"
 
 #: A Gaussian is flat if its smallest deviation is below this share of the next one.
 FLAT = 0.1
@@ -70,6 +75,13 @@ def read_gaussians(table: VertexTable, options: PlyOptions) -> Discs:
     Raises:
         InputError: a property is missing or has impossible values.
     """
+    if COMPRESSED in table.names:
+        raise InputError(
+            f"{table.path}: element vertex, property {COMPRESSED}",
+            expected="Gaussians with a property for each number",
+            found="the compressed layout of PlayCanvas",
+            remedy="Save it as a plain PLY: SuperSplat exports one, and splat-transform IN.compressed.ply OUT.ply.",
+        )
     names = table.numbered("scale_")
     if len(names) not in (2, 3):
         raise table.error("scale_0", "2 or 3 log-scales", f"{len(names)} scales")

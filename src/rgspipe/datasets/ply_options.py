@@ -26,6 +26,7 @@ class PlyOptions:
         minimum_alpha: opacity below which a surfel is not there.
         gloss: take over the gloss of RadiosityGS, too; without it only the diffuse part is.
         crop: (x, y, z, x, y, z) lower and upper corner of the box that is kept; None for all.
+        max_surfels: files of which more are kept are refused; None for no limit.
     """
 
     fronts: Fronts = "auto"
@@ -37,3 +38,4 @@ class PlyOptions:
     minimum_alpha: float = 0.01
     gloss: bool = True
     crop: tuple[float, ...] | None = None
+    max_surfels: int | None = None

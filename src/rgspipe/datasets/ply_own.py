@@ -20,15 +20,23 @@ from torch import Tensor
 from rgspipe.datasets import srgb
 from rgspipe.datasets.conversion import Conversion, Loss, loss
 from rgspipe.datasets.json_file import is_number
-from rgspipe.datasets.ply_gaussians import Y0, unit_quaternions
+from rgspipe.datasets.ply_gaussians import HIGH, LOW, Y0, unit_quaternions
+from rgspipe.datasets.ply_options import PlyOptions
 from rgspipe.datasets.ply_table import VertexTable, write_vertices
 from rgspipe.errors import InputError
 from rgspipe.scene.gloss import Gloss
-from rgspipe.scene.surfels import NO_CLIP, Coverage, Surfels
+from rgspipe.scene.spacing import inferred_coverage
+from rgspipe.scene.surfels import NO_CLIP, Coverage, Surfels, quaternion_to_axes
 
 #: The comment that marks our files, followed by JSON.
 MARK = "rgspipe-surfels"
 VERSION = 1
+
+#: Said of a file that another program wrote with our properties.
+LOST_COMMENT = (
+    f"The comment {MARK} is gone, which says how surfels cover: inferred as thresholds {{:g}} and {{:g}}, layers of "
+    "{:.3g} (scene.ply.low, high and layer change that). Edits of colours are passed over."
+)
 
 #: Third log-scale: so thin that viewers of 3DGS draw a disc.
 THIN = float(np.log(1e-6))
@@ -85,22 +93,20 @@ def save_ply(
 
 
 def is_own(table: VertexTable) -> bool:
-    """Whether a file has our mark and our properties; programs that do not know those may leave either away."""
-    wanted = [name for names in OWN.values() for name in names]
-    return _mark(table) is not None and all(name in table.names for name in wanted)
+    """Whether a file has our properties; programs that do not know those may leave them away, or just our comment."""
+    return all(name in table.names for names in OWN.values() for name in names)
 
 
-def read_own(table: VertexTable) -> tuple[Surfels, Conversion]:
+def read_own(table: VertexTable, options: PlyOptions) -> tuple[Surfels, Conversion]:
     """The surfels that `save_ply` wrote in full, with what was edited since in the properties that viewers know.
+
+    Where another program kept our properties and lost our comment, the coverage is inferred with the thresholds of
+    `options`, or else those of Gaussians.
 
     Raises:
         InputError: a property is missing, or has impossible values.
     """
-    note, where = _note(table), f"{table.path}: comment {MARK}"
-    try:
-        coverage = Coverage(**note["coverage"])
-    except (TypeError, ValueError) as error:
-        raise InputError(where, expected="coverage", found=str(error), remedy="Export the file again.") from error
+    note = None if _mark(table) is None else _note(table)
     own = {name: table.columns(*names) for name, names in OWN.items()}
     scales, resized = _unless_edited(
         own["scales"], table.columns("scale_0", "scale_1"), lambda x: np.log(np.maximum(x, 1e-30)), np.exp
@@ -109,7 +115,7 @@ def read_own(table: VertexTable) -> tuple[Surfels, Conversion]:
         own["opacities"], table.columns("opacity"), lambda x: logit(np.clip(x, *OPACITY_RANGE)), expit
     )
     albedo, painted = own["albedo"], np.zeros(len(table))
-    if note.get("colours") == "albedo":
+    if note is not None and note.get("colours") == "albedo":
         stored = table.columns("f_dc_0", "f_dc_1", "f_dc_2")
         albedo, painted = _unless_edited(
             albedo, stored, _constant, lambda dc: srgb.decode(np.clip(0.5 + Y0 * dc, 0.0, 1.0))
@@ -123,14 +129,41 @@ def read_own(table: VertexTable) -> tuple[Surfels, Conversion]:
         "clip_offsets": own["clip_offsets"],
         "clip_angles": own["clip_angles"],
     }
-    surfels = Surfels(**{k: torch.from_numpy(v).float() for k, v in tensors.items()}, coverage=coverage, gloss=None)
-    surfels = _with_gloss(surfels, table)
+    parts = {name: torch.from_numpy(values).float() for name, values in tensors.items()}
+    coverage = _inferred(table, parts, options) if note is None else _noted(table, note)
+    surfels = _with_gloss(Surfels(**parts, coverage=coverage, gloss=None), table)
     edits = [
         loss("scales were edited since: edges and coverage are as before", resized, 0.0, "largest step of log-scale"),
         loss("opacities were edited since", faded, 0.0, "largest step of the logit"),
         loss("colours were edited since and count as albedo", painted, 0.0, "largest step of f_dc"),
     ]
-    return surfels, Conversion.of(table.path, "surfels of this program", len(surfels), edits, [])
+    notes = [] if note is not None else [LOST_COMMENT.format(coverage.low, coverage.high, coverage.layer_thickness)]
+    return surfels, Conversion.of(table.path, "surfels of this program", len(surfels), edits, notes)
+
+
+def _noted(table: VertexTable, note: Mapping[str, Any]) -> Coverage:
+    try:
+        return Coverage(**note["coverage"])
+    except (TypeError, ValueError) as error:
+        where = f"{table.path}: comment {MARK}"
+        raise InputError(where, expected="coverage", found=str(error), remedy="Export the file again.") from error
+
+
+def _inferred(table: VertexTable, parts: Mapping[str, Tensor], options: PlyOptions) -> Coverage:
+    try:
+        return inferred_coverage(
+            parts["centers"],
+            quaternion_to_axes(parts["rotations"])[:, 2],
+            parts["scales"],
+            low=LOW if options.low is None else options.low,
+            high=HIGH if options.high is None else options.high,
+            layer=options.layer,
+            minimum_alpha=options.minimum_alpha,
+        )
+    except ValueError as error:
+        raise InputError(
+            table.path, expected="surfels that lie on surfaces", found=str(error), remedy="Export the file again."
+        ) from error
 
 
 def _unless_edited(

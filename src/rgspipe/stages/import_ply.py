@@ -47,6 +47,7 @@ def ply_options(config: RgspipeConfig) -> PlyOptions:
         minimum_alpha=wanted.minimum_alpha,
         gloss=wanted.gloss,
         crop=None if wanted.crop is None else tuple(wanted.crop),
+        max_surfels=wanted.max_surfels,
     )
 
 
