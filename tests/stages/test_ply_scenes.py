@@ -80,6 +80,7 @@ def test_a_fit_by_the_papers_method_starts_on_a_sphere(folder: Path) -> None:
 
 def test_an_exported_scene_comes_back(folder: Path) -> None:
     artifact = run(configured(folder, "export"), load_stage)
+    assert json.loads(artifact.file("conversion.json").read_text())["path"] == "surfels.ply"
     again, _ = load_ply(artifact.file("surfels.ply"))
     surfels = room_surfels().to(torch.float32)
     assert all(torch.equal(tensor, getattr(again, name)) for name, tensor in surfels.tensors().items())
@@ -109,6 +110,25 @@ def test_stages_that_need_images_are_refused_before_anything_is_made(folder: Pat
 def test_a_fit_needs_images_of_its_own(folder: Path) -> None:
     with pytest.raises(InputError, match=r"fit\.target=DIR"):
         resolve(configured(folder, "fit_light"), load_stage)
+
+
+@pytest.mark.parametrize(
+    ("stage", "override", "words"),
+    [("freeze", "freeze.surfels=truth", r"freeze\.surfels"), ("benchmark", "benchmark=renderer", "benchmark=fit")],
+)
+def test_what_a_file_does_not_have_is_not_measured(folder: Path, stage: str, override: str, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        resolve(configured(folder, stage, override), load_stage)
+
+
+def test_a_scene_with_too_many_surfels_is_refused_with_what_it_would_take(folder: Path) -> None:
+    count = len(room_surfels())
+    with pytest.raises(InputError, match=rf"at most 100 surfels.*found {count}.*GiB.*scene\.ply\.crop"):
+        run(configured(folder, "import_ply", "scene.ply.max_surfels=100"), load_stage)
+    few = run(
+        configured(folder, "import_ply", "scene.ply.max_surfels=100", "scene.ply.crop=[-1,-1,-1,0,0,-0.4]"), load_stage
+    )
+    assert len(load_surfels(few.file("surfels.safetensors"))) <= 100
 
 
 def test_importing_another_scene_is_refused(tmp_path: Path) -> None:

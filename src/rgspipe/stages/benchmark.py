@@ -19,6 +19,7 @@ from rgspipe.benchmark.settings import Setting
 from rgspipe.benchmark.truth import load_truth
 from rgspipe.config import RgspipeConfig, get_value
 from rgspipe.datasets.frozen_file import load_frozen
+from rgspipe.errors import InputError
 from rgspipe.evaluation.timing import load_average
 from rgspipe.machine import machine
 from rgspipe.renderer.frozen import FrozenScene
@@ -97,6 +98,13 @@ def _camera(frozen: FrozenScene, resolution: int) -> Camera:
 def _inputs(config: RgspipeConfig) -> list[Need | str]:
     if config.benchmark.kind == "fit":
         return ["freeze"]
+    if config.scene.kind == "ply":
+        raise InputError(
+            "stage=benchmark",
+            expected="benchmark=fit with scene=ply, which times the steps of a fit on its surfels",
+            found="benchmark.kind=renderer, which measures rooms of its own that Blender path-traces",
+            remedy="Add benchmark=fit, or leave scene=ply away.",
+        )
     return [Need("render_truth", {"benchmark.rooms": [name]}) for name in config.benchmark.rooms]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from rgspipe.config import RgspipeConfig
@@ -24,6 +25,7 @@ def run(context: StageContext) -> None:
         frozen = load_frozen(context.inputs["freeze"].file)
         radiance = frozen.radiance_of(read_lights(options.light))
         conversion = save_ply(path, frozen.surfels, radiance=radiance, layout=options.layout)
+    conversion = replace(conversion, path=path.name)  # the folder has another name once it is whole
     conversion.save(context.folder / "conversion.json")
     print("\n".join(conversion.lines()))
     context.note(surfels=conversion.surfels, layout=options.layout)

@@ -9,8 +9,19 @@ from rgspipe.errors import InputError
 
 
 def surfel_stage(config: RgspipeConfig) -> str:
-    """The stage whose surfels.safetensors is the scene."""
+    """The stage whose surfels.safetensors is the scene.
+
+    Raises:
+        InputError: true surfaces are wanted of a scene that is a file.
+    """
     if config.scene.kind == "ply":
+        if config.freeze.surfels == "truth":
+            raise InputError(
+                "freeze.surfels",
+                expected="trained, for scene=ply: its surfels are frozen as they are",
+                found="truth, and no surfaces but those of the file are known",
+                remedy="Leave freeze.surfels away.",
+            )
         return "import_ply"
     return "true_surfels" if config.freeze.surfels == "truth" else "train_surfels"
 
