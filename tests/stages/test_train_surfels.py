@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+
 import pytest
 
-from rgspipe.config import TrainConfig
+from rgspipe.config import RgspipeConfig, TrainConfig
 from rgspipe.errors import InputError
-from rgspipe.stages.train_surfels import train_options
+from rgspipe.stages.train_surfels import STAGE, train_options
 
 
 def test_every_option_comes_from_the_configuration() -> None:
@@ -30,6 +32,15 @@ def test_options_of_shading_loss_and_regularisers_come_from_the_configuration() 
     loss = options.refine.loss
     assert (loss.kind, loss.ssim_weight, loss.compression) == ("l1", 0.3, 4.0)
     assert (options.photometric.rounds, options.density.growth) == (3, 1.5)
+
+
+def test_a_training_can_be_resumed_with_less_memory() -> None:
+    keys = STAGE.keys(RgspipeConfig())
+    assert "train.memory_mib" not in keys and "train.checkpoint_every" not in keys
+    assert {f"train.{key.name}" for key in fields(TrainConfig)} - set(keys) == {
+        "train.memory_mib",
+        "train.checkpoint_every",
+    }
 
 
 def test_ssim_of_single_pixels_is_refused_with_a_remedy() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict, fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -31,6 +31,9 @@ from rgspipe.training.prior import prior_from_maps
 from rgspipe.training.refine import RefineOptions
 from rgspipe.training.trainer import Trained, TrainOptions, train
 from rgspipe.training.validate import render_held_out
+
+#: Settings that a training can be resumed with another value of: they do not change the surfels.
+NO_RESULT = ("memory_mib", "checkpoint_every")
 
 
 def run(context: StageContext) -> None:
@@ -152,7 +155,7 @@ STAGE = Stage(
     help="fits materials and geometry of the surfels to the training images",
     run=run,
     inputs=lambda config: ["init_depth", "generate_dataset"],
-    config_keys=("train", "capture"),
+    config_keys=(*(f"train.{key.name}" for key in fields(TrainConfig) if key.name not in NO_RESULT), "capture"),
     code=(
         "rgspipe.datasets.degrade",
         "rgspipe.training",
