@@ -22,7 +22,7 @@ from rgspipe.scene.orientation import backs_towards, turned_over
 from rgspipe.scene.spacing import bounding_center, inferred_coverage
 from rgspipe.scene.surfels import NO_CLIP, Surfels, quaternion_to_axes
 
-#: Peak memory of freezing a surfel with 256 gather rays: 1.1 GB for the 10 000 of a trained Cornell box, a third of that
+#: Peak memory of freezing a surfel with 256 gather rays: 1.1 GB for the 10 000 of a trained Cornell box, a third of it
 #: for those of an empty cube, whose rays meet fewer.
 FREEZING_BYTES = 110e3
 
