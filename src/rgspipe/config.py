@@ -244,6 +244,11 @@ class TrainConfig:
         low=0,
         high=1e9,
     )
+    gloss: str = option(
+        "none",
+        "none: every surface is diffuse; auto: surfels get a Phong lobe where it explains images it was not fitted to",
+        choices=("none", "auto"),
+    )
 
 
 @dataclass

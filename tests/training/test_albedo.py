@@ -11,7 +11,7 @@ from rgspipe.datasets.views import View
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.scene import Camera, PointLight, Surfels, look_at
 from rgspipe.scene.rectangles import inside_of_box, solid_box, surfels_on
-from rgspipe.training.albedo import AlbedoPrior, AlbedoProblem, _Mixing
+from rgspipe.training.albedo import AlbedoPrior, AlbedoProblem, Mixing
 from rgspipe.training.lighting import indirect_irradiance, trace_lighting
 from rgspipe.training.materials import MaterialOptions, build_transport, fit_materials, trace_views
 from rgspipe.training.view_model import ViewModel, build_view_models
@@ -118,7 +118,7 @@ def test_mixing_solves_a_linear_fixed_point_sooner_than_damping() -> None:
     """x = b − a x with slopes up to 1.5, where undamped steps diverge."""
     slope = torch.linspace(0.2, 1.5, 50)[:, None].repeat(1, 3)
     truth = 1.0 / (1.0 + slope)
-    mixed, damped, mixing = torch.zeros(50, 3), torch.zeros(50, 3), _Mixing(0.45)
+    mixed, damped, mixing = torch.zeros(50, 3), torch.zeros(50, 3), Mixing(0.45)
     for _ in range(5):
         mixed = mixing.next(mixed, 1.0 - slope * mixed)
         damped = damped + 0.45 * (1.0 - slope * damped - damped)

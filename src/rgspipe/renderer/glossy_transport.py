@@ -122,11 +122,19 @@ class GlossyTransport:
             radiance (N, 3, C) of the diffuse reflection, and coefficients (G, K, 3, C) of what glossy surfels reflect
             besides the highlights `emitted`.
         """
+        received, incident = self.received(transport, direct, emitted)
+        return direct + transport.albedo[..., None] * received, self._weights * incident
+
+    def received(self, transport: PatchTransport, direct: Tensor, emitted: Tensor) -> tuple[Tensor, Tensor]:
+        """What `spread` reflects: the light that arrives from other surfels.
+
+        Returns:
+            irradiance over π (N, 3, C), and coefficients (G, K, 3, C) of the mirrored light at glossy surfels.
+        """
         patches, averaged = self._between_bounces(transport, direct, emitted)
         received = transport.gather @ patches + self.operators.leaving @ averaged
         incident = self.operators.surfels.incident(patches, averaged)
-        radiance = direct + transport.albedo[..., None] * received.reshape(direct.shape)
-        return radiance, self._weights * incident.reshape(emitted.shape)
+        return received.reshape(direct.shape), incident.reshape(emitted.shape)
 
     def _between_bounces(self, transport: PatchTransport, direct: Tensor, emitted: Tensor) -> tuple[Tensor, Tensor]:
         """Light that leaves the patches, over all bounces but the last.

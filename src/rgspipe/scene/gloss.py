@@ -47,6 +47,10 @@ class Gloss:
         """A copy with both tensors moved by `Tensor.to`."""
         return Gloss(self.reflectance.to(*args), self.exponents.to(*args))
 
+    def selected(self, index: Tensor) -> Gloss:
+        """That of the surfels `index` (M,)."""
+        return Gloss(self.reflectance[index], self.exponents[index])
+
     def tensors(self) -> dict[str, Tensor]:
         """Both tensors by name, as they are stored."""
         return {"reflectance": self.reflectance, "exponents": self.exponents}

@@ -21,11 +21,12 @@ from rgspipe.errors import InputError
 from rgspipe.evaluation.held_out import held_out_picture
 from rgspipe.evaluation.images import save_png
 from rgspipe.machine import PeakMemory
+from rgspipe.scene.gloss import Gloss
 from rgspipe.stages.base import Stage, StageContext
 from rgspipe.training.checkpoint import Checkpoint
 from rgspipe.training.density import DensityOptions
 from rgspipe.training.loss import LossOptions
-from rgspipe.training.materials import build_transport, fit_materials
+from rgspipe.training.materials import build_frozen, fit_materials
 from rgspipe.training.photometric import PhotometricOptions
 from rgspipe.training.prior import prior_from_maps
 from rgspipe.training.refine import RefineOptions
@@ -50,13 +51,15 @@ def run(context: StageContext) -> None:
     _write_table(context.folder / "training.csv", trained)
 
     began = time.perf_counter()
+    frozen = build_frozen(trained.surfels, options)
     held_out = render_held_out(
         trained.surfels,
         dataset.test,
-        build_transport(trained.surfels, options),
+        frozen.transport,
         options.supersampling,
         options.at_pixels,
         options.operator_store(),
+        frozen.gather,
     )
     seconds = {"training": trained.records[-1].seconds, "held_out": time.perf_counter() - began}
     metrics = held_out.summary() | {"surfels": len(trained.surfels), "seconds": seconds["training"]}
@@ -64,6 +67,8 @@ def run(context: StageContext) -> None:
         metrics["direct_only_psnr"] = _direct_only(trained, train_views, dataset.test, options)
     metrics["peak_memory_mib"] = memory.mib()
     metrics["operators_mib"] = trained.stored.mib()
+    if trained.surfels.gloss is not None:
+        metrics["gloss"] = _gloss(trained.surfels.gloss)
     if options.light_rounds > 0:
         metrics["lights"] = _corrections(train_views, trained.views)
     text = json.dumps(metrics, indent=1, allow_nan=False)
@@ -119,6 +124,7 @@ def train_options(config: TrainConfig) -> TrainOptions:
         light_rounds=config.light_rounds,
         seed=config.seed,
         memory_mib=config.memory_mib,
+        gloss=config.gloss == "auto",
     )
 
 
@@ -131,6 +137,16 @@ def _direct_only(
         surfels, test_views, None, options.supersampling, options.at_pixels, options.operator_store()
     )
     return float(np.mean(held_out.psnr))
+
+
+def _gloss(gloss: Gloss) -> dict[str, float]:
+    """How many surfels are glossy, and the medians of what they are like."""
+    chosen = gloss.glossy
+    return {
+        "surfels": len(chosen),
+        "reflectance": float(gloss.reflectance[chosen].mean(dim=1).median()),
+        "exponent": float(gloss.exponents[chosen].median()),
+    }
 
 
 def _corrections(measured: Sequence[View], refined: Sequence[View]) -> dict[str, float]:

@@ -7,7 +7,7 @@ value that is too dark, so each round goes only part of the way.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -80,7 +80,7 @@ class AlbedoProblem:
         images = [view.image.reshape(-1, 3).float() for view in views]
         pairs = zip(views, models, strict=True)
         pixel_weights = [pixel_weight(view, model.weights.coverage) for view, model in pairs]
-        return cls(models, images, pixel_weights, _neighbours(surfels))
+        return cls(models, images, pixel_weights, nearest_surfels(surfels.centers, surfels.normals))
 
     def render(self, v: int, albedo: Tensor, indirect: Tensor | None) -> Tensor:
         """(pixels, 3) view v under `indirect` (V, N, 3)."""
@@ -103,17 +103,16 @@ def solve_albedo(
         prior: pulls towards known albedo.
     """
     albedo = surfels.albedo.float()
-    indirect, mixing = None, _Mixing(DAMPING if transport is not None else 1.0)
+    indirect, mixing = None, Mixing(DAMPING if transport is not None else 1.0)
     for index in track(range(rounds), "albedo", unit="round"):
         if transport is not None:
             transport = with_albedo(transport, albedo)
             indirect = indirect_irradiance(lighting, albedo, transport)
         pixel_weights = problem.pixel_weights
         if index > 0:
-            pixel_weights = [
-                _robust(problem, v, problem.render(v, albedo, indirect)) for v in range(len(problem.images))
-            ]
-        laplacian = _laplacian(problem.neighbours, surfels.normals.float(), albedo if index > 1 else None)
+            renders = [problem.render(v, albedo, indirect) for v in range(len(problem.images))]
+            pixel_weights = robust_weights(problem.images, problem.pixel_weights, renders)
+        laplacian = graph_laplacian(problem.neighbours, surfels.normals.float(), albedo if index > 1 else None)
         solution = _least_squares(problem, pixel_weights, indirect, laplacian, albedo, prior).clamp(*ALBEDO_RANGE)
         albedo = mixing.next(albedo, solution).clamp(*ALBEDO_RANGE)
     if transport is not None:
@@ -121,7 +120,7 @@ def solve_albedo(
     return albedo, indirect
 
 
-class _Mixing:
+class Mixing:
     """The next iterate of a fixed point x = g(x), from the last few (Anderson 1965), each channel on its own.
 
     Args:
@@ -152,7 +151,7 @@ def _least_squares(
     problem: AlbedoProblem,
     pixel_weights: Sequence[Tensor],
     indirect: Tensor | None,
-    laplacian: _Laplacian,
+    laplacian: Laplacian,
     start: Tensor,
     prior: AlbedoPrior | None,
 ) -> Tensor:
@@ -163,21 +162,21 @@ def _least_squares(
         right += model.transposed(pixel_weights[v][:, None] * problem.images[v], light)
         diagonal += model.squared(pixel_weights[v], light)
     scale = float(diagonal[diagonal > 0].median()) if bool((diagonal > 0).any()) else 1.0
-    pull, target = _pull(prior, start)
-    pull, smooth = scale * pull, SMOOTHNESS * scale
+    weight, target = pull(prior, start)
+    weight, smooth = scale * weight, SMOOTHNESS * scale
 
     def normal_operator(x: Tensor) -> Tensor:
-        result = pull * x + smooth * (laplacian.matrix @ x)
+        result = weight * x + smooth * (laplacian.matrix @ x)
         for v, model in enumerate(problem.models):
             light = _of_view(indirect, v)
             result += model.transposed(pixel_weights[v][:, None] * model.image(x, light), light)
         return result
 
-    precondition = 1.0 / (diagonal + pull + smooth * laplacian.diagonal()[:, None])
-    return _conjugate_gradients(normal_operator, right + pull * target, precondition, start)
+    precondition = 1.0 / (diagonal + weight + smooth * laplacian.diagonal()[:, None])
+    return conjugate_gradients(normal_operator, right + weight * target, lambda x: precondition * x, start)
 
 
-def _pull(prior: AlbedoPrior | None, like: Tensor) -> tuple[Tensor, Tensor]:
+def pull(prior: AlbedoPrior | None, like: Tensor) -> tuple[Tensor, Tensor]:
     """Weight (N, 1) and target (N, 3) that together stand for GREY and the prior."""
     if prior is None:
         return torch.full_like(like[:, :1], PULL), torch.full_like(like, GREY)
@@ -185,16 +184,27 @@ def _pull(prior: AlbedoPrior | None, like: Tensor) -> tuple[Tensor, Tensor]:
     return PULL + weight, (PULL * GREY + weight * prior.albedo.to(like)) / (PULL + weight)
 
 
-def _conjugate_gradients(operator, right: Tensor, precondition: Tensor, x: Tensor) -> Tensor:
+def conjugate_gradients(
+    operator: Callable[[Tensor], Tensor],
+    right: Tensor,
+    precondition: Callable[[Tensor], Tensor],
+    x: Tensor,
+    steps: int = CG_STEPS,
+) -> Tensor:
+    """So many steps from x (M, C) towards the solution of `operator` x = `right`, each column on its own.
+
+    Args:
+        precondition: about the operator's inverse, symmetric.
+    """
     residual = right - operator(x)
-    z = precondition * residual
+    z = precondition(residual)
     direction, energy = z, (residual * z).sum(dim=0)
-    for _ in range(CG_STEPS):
+    for _ in range(steps):
         image = operator(direction)
         step = energy / (direction * image).sum(dim=0).clamp(min=1e-30)
         x = x + step * direction
         residual = residual - step * image
-        z = precondition * residual
+        z = precondition(residual)
         renewed = (residual * z).sum(dim=0)
         direction = z + renewed / energy.clamp(min=1e-30) * direction
         energy = renewed
@@ -214,9 +224,12 @@ def pixel_weight(view: View, coverage: Tensor) -> Tensor:
     return torch.where(trusted, weight, torch.zeros_like(weight))
 
 
-def _robust(problem: AlbedoProblem, v: int, render: Tensor) -> Tensor:
-    """Pixel weights of view v with those that fit badly (shadow edges, occlusions) weighing less."""
-    image, weight = problem.images[v], problem.pixel_weights[v]
+def robust_weights(images: Sequence[Tensor], weights: Sequence[Tensor], renders: Sequence[Tensor]) -> list[Tensor]:
+    """Pixel weights with those that fit badly (shadow edges, occlusions) weighing less."""
+    return [_robust(*view) for view in zip(images, weights, renders, strict=True)]
+
+
+def _robust(image: Tensor, weight: Tensor, render: Tensor) -> Tensor:
     error = (render - image).abs().mean(dim=1)
     relative = error / (image.mean(dim=1) + 0.1 * torch.quantile(image, 0.99)).clamp(min=1e-12)
     used = weight > 0
@@ -224,31 +237,33 @@ def _robust(problem: AlbedoProblem, v: int, render: Tensor) -> Tensor:
     return weight / (1.0 + (relative / typical).square())
 
 
-def _neighbours(surfels: Surfels) -> Tensor:
-    size = float((surfels.centers.amax(dim=0) - surfels.centers.amin(dim=0)).amax())
-    features = torch.cat([surfels.centers / max(size, 1e-12), 0.5 * surfels.normals], dim=1).double().cpu().numpy()
+def nearest_surfels(centers: Tensor, others: Tensor) -> Tensor:
+    """(N, ≤ 6) int64 nearest surfels by position over the scene's size and `others` (N, 3), e.g. normals."""
+    size = float((centers.amax(dim=0) - centers.amin(dim=0)).amax())
+    features = torch.cat([centers / max(size, 1e-12), 0.5 * others], dim=1).double().cpu().numpy()
     count = min(7, len(features))
     return torch.from_numpy(cKDTree(features).query(features, k=count, workers=-1)[1].reshape(len(features), -1)[:, 1:])
 
 
-def _laplacian(neighbours: Tensor, normals: Tensor, albedo: Tensor | None) -> _Laplacian:
-    """Graph Laplacian over neighbours on one surface; neighbours of another colour are let go."""
+def graph_laplacian(neighbours: Tensor, normals: Tensor | None, albedo: Tensor | None) -> Laplacian:
+    """Graph Laplacian over neighbours on one surface (any if None); neighbours of another colour are let go."""
     count, degree = neighbours.shape
     row, column = torch.arange(count).repeat_interleave(degree), neighbours.reshape(-1)
-    weight = ((normals[row] * normals[column]).sum(dim=1) > 0.7).float()
+    weight = torch.ones(len(row)) if normals is None else ((normals[row] * normals[column]).sum(dim=1) > 0.7).float()
     if albedo is not None:
         weight = weight / (1.0 + ((albedo[row] - albedo[column]).abs().amax(dim=1) / ALBEDO_EDGE).square())
     parts = (weight.numpy(), (row.numpy(), column.numpy()))
     adjacency = scipy.sparse.coo_matrix(parts, shape=(count, count)).tocsr()
     adjacency = 0.5 * (adjacency + adjacency.T)
     degrees = np.asarray(adjacency.sum(axis=1)).ravel()
-    return _Laplacian(scipy.sparse.diags(degrees) - adjacency, degrees)
+    return Laplacian(scipy.sparse.diags(degrees) - adjacency, degrees)
 
 
-class _Laplacian:
+class Laplacian:
     """A symmetric operator and its diagonal."""
 
     def __init__(self, matrix: scipy.sparse.csr_matrix, degrees: np.ndarray) -> None:
+        self.sparse = matrix.tocsc()
         self.matrix = SparseOperator.from_scipy(matrix.tocsr()).matrix
         self._degrees = torch.from_numpy(degrees).float()
 

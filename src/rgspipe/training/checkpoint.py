@@ -10,6 +10,7 @@ import torch
 from torch import Tensor
 
 from rgspipe.datasets.tensor_file import load_tensors, save_tensors
+from rgspipe.scene.gloss import Gloss
 from rgspipe.scene.lights import PointLight
 from rgspipe.scene.surfels import Surfels
 from rgspipe.training.record import Record
@@ -41,6 +42,8 @@ class Checkpoint:
     ) -> None:
         """Keep a training that has its first materials and, with a `state`, has begun with the geometry."""
         tensors = {f"surfels.{name}": tensor for name, tensor in surfels.tensors().items()} | {"radiance": radiance}
+        if surfels.gloss is not None:
+            tensors |= {f"gloss.{name}": tensor for name, tensor in surfels.gloss.tensors().items()}
         for name in ("position", "intensity"):
             tensors[f"light.{name}"] = torch.stack([getattr(light, name) for light in lights])
         note = {"records": [asdict(record) for record in records], "step": None}
@@ -65,7 +68,10 @@ class Checkpoint:
             return None
         tensors, note = load_tensors(self.path)
         low, high = note["thresholds"]
-        surfels = replace(like, coverage=replace(like.coverage, low=low, high=high), **_group(tensors, "surfels"))
+        coverage, gloss = replace(like.coverage, low=low, high=high), _group(tensors, "gloss")
+        surfels = replace(
+            like, coverage=coverage, gloss=Gloss(**gloss) if gloss else None, **_group(tensors, "surfels")
+        )
         light = _group(tensors, "light")
         lights = [PointLight(*pair) for pair in zip(light["position"], light["intensity"], strict=True)]
         if note["step"] is None:

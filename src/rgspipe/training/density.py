@@ -63,11 +63,14 @@ def redistributed(surfels: Surfels, errors: Tensor, most: int, options: DensityO
     whole = kept[~torch.isin(kept, split)]
     parts = [_selected(surfels, whole), *_halves(_selected(surfels, split))]
     joined = {name: torch.cat([getattr(part, name) for part in parts]) for name in surfels.tensors()}
-    return replace(surfels, **joined), torch.cat([whole, split, split])
+    parent = torch.cat([whole, split, split])
+    gloss = None if surfels.gloss is None else surfels.gloss.selected(parent)
+    return replace(surfels, **joined, gloss=gloss), parent
 
 
 def _selected(surfels: Surfels, index: Tensor) -> Surfels:
-    return replace(surfels, **{name: tensor[index] for name, tensor in surfels.tensors().items()})
+    parts = {name: tensor[index] for name, tensor in surfels.tensors().items()}
+    return replace(surfels, **parts, gloss=None)
 
 
 def _halves(surfels: Surfels) -> tuple[Surfels, Surfels]:

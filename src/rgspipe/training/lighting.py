@@ -38,6 +38,11 @@ class Lighting:
     positions: Tensor
     intensity: Tensor
 
+    def of_views(self, views: Sequence[int]) -> Lighting:
+        """The light of some of the views."""
+        index = torch.tensor(views, dtype=torch.int64)
+        return Lighting(self.irradiance[index], self.shares[index], self.positions[index], self.intensity[index])
+
     def direct(self) -> Tensor:
         """(V, N, 3) direct irradiance over π: the radiance that a white surfel would reflect."""
         return self.irradiance[..., None] * (self.intensity[:, None, :] / math.pi)

@@ -13,10 +13,13 @@ from rgspipe.datasets.views import View
 from rgspipe.progress import track
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
+from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.transport import PatchTransport
 from rgspipe.renderer.view_weights import ViewWeights, build_view_weights
 from rgspipe.scene.surfels import Surfels
 from rgspipe.training.albedo import AlbedoPrior, AlbedoProblem, solve_albedo
+from rgspipe.training.gloss import GlossScene, fit_gloss
+from rgspipe.training.gloss_light import operators_from
 from rgspipe.training.lighting import trace_lighting
 from rgspipe.training.operator_store import OperatorStore, Stored
 from rgspipe.training.view_model import build_view_models
@@ -38,6 +41,7 @@ class MaterialOptions:
         supersampling: of edge pixels in the view weights.
         at_pixels: whether direct light is taken where pixels look; otherwise at surfels' centres.
         seed: of rays and patches.
+        gloss: whether surfels get lobes where those pay.
         memory_mib: budget of the views' operators; those beyond it lie in a file, at the same results.
         scratch: folder of that file; by default the system's for temporary files.
     """
@@ -50,6 +54,7 @@ class MaterialOptions:
     seed: int = 0
     memory_mib: float = math.inf
     scratch: Path | None = None
+    gloss: bool = False
 
     def operator_store(self) -> OperatorStore:
         """Where the operators of a fit go."""
@@ -64,12 +69,14 @@ class Prepared:
         bvh: the surfels.
         weights: view weights of V views.
         transport: light between the surfels; None if it does not bounce.
+        gather: (N, N) which surfels each of them sees; None if it does not bounce.
         store: where the weights are kept.
     """
 
     bvh: SurfelBvh
     weights: tuple[ViewWeights, ...]
     transport: PatchTransport | None
+    gather: SparseOperator | None
     store: OperatorStore
 
 
@@ -79,8 +86,8 @@ class Materials:
 
     Attributes:
         prepared: what was fitted with.
-        surfels: with their albedo.
-        radiance: (V, N, 3) outgoing radiance under every view's light, with direct light at their centres.
+        surfels: with their albedo and, where it pays, gloss.
+        radiance: (V, N, 3) radiance towards every view's camera under its light, with direct light at their centres.
         renders: V images (pixels, 3).
         stored: size of the views' operators.
     """
@@ -115,29 +122,57 @@ def fit_materials(
     models = build_view_models(prepared.bvh, prepared.weights, lighting, options.at_pixels, store)
     problem = AlbedoProblem.build(surfels, models, views)
     rounds = options.rounds if bounces else min(DIRECT_ROUNDS, options.rounds)
-    known = None
+    stored = prepared.store.stored + store.stored
+    glossy = None
+    if options.gloss and transport is not None:
+        glossy = GlossScene(
+            surfels,
+            models,
+            lighting,
+            operators_from(surfels, prepared.gather, transport),
+            transport,
+            options.at_pixels,
+        )
+    if glossy is not None and surfels.gloss is not None:
+        known = None if prior is None else prior(surfels)
+        fit = fit_gloss(glossy, problem, surfels, None, rounds, known, options.seed)
+        if fit is not None:
+            return Materials(prepared, fit.surfels, fit.radiance, fit.renders, stored)
+    surfels, known = replace(surfels, gloss=None), None
     if prior is not None:
         # What the images say alone: maps know albedo only up to a scale.
         surfels = replace(surfels, albedo=solve_albedo(problem, surfels, lighting, transport, rounds)[0])
         known = prior(surfels)
     albedo, indirect = solve_albedo(problem, surfels, lighting, transport, rounds, known)
+    surfels = replace(surfels, albedo=albedo)
+    if glossy is not None:
+        fit = fit_gloss(glossy, problem, surfels, indirect, rounds, known, options.seed)
+        if fit is not None:
+            return Materials(prepared, fit.surfels, fit.radiance, fit.renders, stored)
     renders = tuple(problem.render(v, albedo, indirect) for v in range(len(views)))
     received = lighting.direct() if indirect is None else lighting.direct() + indirect
-    stored = prepared.store.stored + store.stored
-    return Materials(prepared, replace(surfels, albedo=albedo), received * albedo, renders, stored)
+    return Materials(prepared, surfels, received * albedo, renders, stored)
 
 
 def prepare(surfels: Surfels, views: Sequence[View], options: MaterialOptions, bounces: bool = True) -> Prepared:
     """Trace the cameras and, if light bounces, the surfels' view of each other."""
     store = options.operator_store()
     weights = trace_views(surfels, views, options.supersampling, store)
-    return Prepared(SurfelBvh(surfels), weights, build_transport(surfels, options) if bounces else None, store)
+    frozen = build_frozen(surfels, options) if bounces else None
+    light = (None, None) if frozen is None else (frozen.transport, frozen.gather)
+    return Prepared(SurfelBvh(surfels), weights, *light, store)
 
 
 def build_transport(surfels: Surfels, options: MaterialOptions) -> PatchTransport:
     """Patch transport for the surfels as they stand."""
-    frozen = FrozenScene.freeze(surfels, gather_rays=options.gather_rays, patches=options.patches, seed=options.seed)
-    return frozen.transport
+    return build_frozen(surfels, options).transport
+
+
+def build_frozen(surfels: Surfels, options: MaterialOptions) -> FrozenScene:
+    """Light between the surfels as they stand, without their gloss."""
+    return FrozenScene.freeze(
+        replace(surfels, gloss=None), gather_rays=options.gather_rays, patches=options.patches, seed=options.seed
+    )
 
 
 def trace_views(

@@ -19,10 +19,12 @@ from rgspipe.scene.lights import PointLight
 from rgspipe.scene.surfels import Surfels
 from rgspipe.training.checkpoint import Checkpoint
 from rgspipe.training.density import DensityOptions, redistributed, surfel_errors
+from rgspipe.training.gloss import gloss_radiance
+from rgspipe.training.gloss_light import operators_from
 from rgspipe.training.initialise import Footprint
 from rgspipe.training.light_refinement import refine_lights
 from rgspipe.training.lighting import total_irradiance, trace_lighting
-from rgspipe.training.materials import MaterialOptions, Materials, PriorOf, build_transport, each_view, fit_materials
+from rgspipe.training.materials import MaterialOptions, Materials, PriorOf, build_frozen, each_view, fit_materials
 from rgspipe.training.operator_store import Stored
 from rgspipe.training.photometric import PhotometricOptions, fit_heights, fit_normals, roughness
 from rgspipe.training.record import Record, materials_seconds
@@ -203,8 +205,11 @@ def _redistributed(
 
 def _relit(surfels: Surfels, views: Sequence[View], options: TrainOptions) -> Tensor:
     """(V, N, 3) radiance under every view's light, by the surfels as they stand."""
-    lighting = trace_lighting(SurfelBvh(surfels), views)
-    return total_irradiance(lighting, surfels.albedo, build_transport(surfels, options)) * surfels.albedo
+    lighting, frozen = trace_lighting(SurfelBvh(surfels), views), build_frozen(surfels, options)
+    if surfels.gloss is not None:
+        operators = operators_from(surfels, frozen.gather, frozen.transport)
+        return gloss_radiance(surfels, lighting, [view.camera for view in views], operators, frozen.transport)
+    return total_irradiance(lighting, surfels.albedo, frozen.transport) * surfels.albedo
 
 
 def refine_views(surfels: Surfels, views: Sequence[View], radiance: Tensor) -> list[RefineView]:

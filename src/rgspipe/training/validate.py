@@ -16,9 +16,12 @@ from rgspipe.datasets.views import View
 from rgspipe.evaluation.held_out import albedo_of_views, held_out_summary, view_table
 from rgspipe.evaluation.metrics import psnr
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
+from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.transport import PatchTransport
 from rgspipe.renderer.view_weights import ViewWeights
 from rgspipe.scene.surfels import Surfels
+from rgspipe.training.gloss import GlossScene, render_gloss
+from rgspipe.training.gloss_light import operators_from
 from rgspipe.training.lighting import indirect_irradiance, trace_lighting
 from rgspipe.training.materials import trace_views
 from rgspipe.training.operator_store import OperatorStore
@@ -66,6 +69,7 @@ def render_held_out(
     supersampling: int,
     at_pixels: bool = True,
     store: OperatorStore | None = None,
+    gather: SparseOperator | None = None,
 ) -> HeldOut:
     """Render `views` under their own lights and compare.
 
@@ -73,14 +77,25 @@ def render_held_out(
         transport: light between the surfels; None renders direct light only.
         at_pixels: whether direct light is taken where pixels look, otherwise at surfels' centres.
         store: where the views' operators are kept; in memory by default.
+        gather: (N, N) which surfels each of them sees, with `transport`; surfels with gloss need it.
+
+    Raises:
+        ValueError: surfels with gloss, and no gather operator or no transport.
     """
     store = store or OperatorStore()
     weights = trace_views(surfels, views, supersampling, store)
     bvh, own = SurfelBvh(surfels), surfels.albedo.float()
     lighting = trace_lighting(bvh, views)
-    bounced = [None] * len(views) if transport is None else indirect_irradiance(lighting, own, transport)
     models = build_view_models(bvh, weights, lighting, at_pixels, store.beside())
-    flat = [model.image(own, indirect) for model, indirect in zip(models, bounced, strict=True)]
+    if surfels.gloss is not None and len(surfels.gloss.glossy):
+        if transport is None or gather is None:
+            raise ValueError("surfels with gloss are rendered with all bounces: pass transport and gather")
+        operators = operators_from(surfels, gather, transport)
+        scene = GlossScene(surfels, models, lighting, operators, transport, at_pixels)
+        flat = render_gloss(scene, surfels).renders
+    else:
+        bounced = [None] * len(views) if transport is None else indirect_irradiance(lighting, own, transport)
+        flat = [model.image(own, indirect) for model, indirect in zip(models, bounced, strict=True)]
     images = tuple(_image(weight, pixels) for weight, pixels in zip(weights, flat, strict=True))
     albedo = tuple(weight.image(own).numpy() for weight in weights)
     return HeldOut(tuple(views), images, albedo)

@@ -48,17 +48,17 @@ class ViewModel:
 
     def squared(self, pixel_weights: Tensor, indirect: Tensor | None) -> Tensor:
         """(N, 3) diagonal of the normal equations with weights (P,): Σ_p w_p (D_pj I + W_pj L_j)²."""
-        direct, mixed, weighted = self.moments(pixel_weights)
+        direct, mixed, weighted = products(self.direct, self.weights.operator, pixel_weights)
         total = self.intensity.square() * direct
         if indirect is None:
             return total
         return total + 2.0 * self.intensity * indirect * mixed + indirect.square() * weighted
 
-    def moments(self, pixel_weights: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """Σ_p w_p D_pj², Σ_p w_p D_pj W_pj and Σ_p w_p W_pj² with weights (P,), each (N, 1)."""
-        direct, weight = self.direct.transposed, self.weights.operator.transposed
-        column, pairs = pixel_weights[:, None], ((direct, direct), (direct, weight), (weight, weight))
-        return tuple(_product(left, right) @ column for left, right in pairs)
+
+def products(direct: SparseOperator, weights: SparseOperator, pixel_weights: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    """Σ_p w_p D_pj², Σ_p w_p D_pj W_pj and Σ_p w_p W_pj² of operators in the same places, w (P,); each (N, 1)."""
+    d, w, column = direct.transposed, weights.transposed, pixel_weights[:, None]
+    return tuple(_product(left, right) @ column for left, right in ((d, d), (d, w), (w, w)))
 
 
 def build_view_models(
