@@ -15,6 +15,7 @@ from rgspipe.evaluation.held_out import QUALITY
 from rgspipe.evaluation.judgement import PLACES, Renders, kinds_of_views, render_views
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import PointLight
+from rgspipe.scene.gloss import Gloss
 
 
 @pytest.fixture(scope="module")
@@ -84,3 +85,15 @@ def test_a_view_without_a_light_is_refused(frozen: FrozenScene, views: list[View
 def test_the_table_of_a_place_names_its_views(frozen: FrozenScene, views: list[View]) -> None:
     renders = render_views(frozen, views)
     assert isinstance(renders, Renders) and renders.table("pixels")["name"].tolist() == ["test/0", "test/1"]
+
+
+def test_a_glossy_scene_shows_its_highlights_wherever_light_is_taken(frozen: FrozenScene, views: list[View]) -> None:
+    count = len(frozen.surfels)
+    gloss = Gloss(torch.full((count, 3), 0.2), torch.full((count,), 10.0))
+    surfels = replace(frozen.surfels, gloss=gloss)
+    glossy = FrozenScene.freeze(surfels, gather_rays=64, patches=50, seed=0)
+    renders = render_views(glossy, views[:1])
+    expected = glossy.render(glossy.view(views[0].camera), (views[0].light,)).numpy()
+    assert np.abs(renders.images["centres"][0] - expected).max() < 1e-4 * expected.max()
+    plain = render_views(replace(glossy, gloss=None), views[:1]).images["pixels"][0]
+    assert renders.images["pixels"][0].mean() > 1.1 * plain.mean()

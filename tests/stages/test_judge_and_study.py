@@ -40,7 +40,7 @@ def test_frozen_surfels_come_from_where_the_configuration_says() -> None:
     assert has_truth(_config()) and not has_truth(_config(scene__kind="external"))
 
 
-def test_true_surfels_of_a_diffuse_cornell_box_are_its_rectangles(tmp_path: Path) -> None:
+def test_true_surfels_of_a_cornell_box_are_its_rectangles(tmp_path: Path) -> None:
     config = _config(init__surfels=500)
     assert true_surfels.STAGE.needs(config) == ()
     true_surfels.run(StageContext(config, {}, {}, tmp_path))
@@ -52,9 +52,19 @@ def test_true_surfels_of_a_diffuse_cornell_box_are_its_rectangles(tmp_path: Path
     assert surfels.centers.abs().amax() <= 0.5 + 1e-6
 
 
-@pytest.mark.parametrize("changes", [{"scene__kind": "room"}, {"scene__cornell__gloss": 0.2}])
-def test_true_surfels_of_other_scenes_come_from_the_passes(changes: dict) -> None:
-    assert true_surfels.STAGE.needs(_config(**changes)) == (Need("generate_dataset"),)
+def test_true_surfels_of_glossy_boxes_have_their_lobe_and_the_walls_have_none(tmp_path: Path) -> None:
+    config = _config(init__surfels=500, scene__cornell__gloss=0.2, scene__cornell__box_color=[0.5, 0.5, 0.5])
+    true_surfels.run(StageContext(config, {}, {}, tmp_path))
+    surfels = load_surfels(tmp_path / "surfels.safetensors")
+    on_box = (surfels.albedo - 0.5).abs().amax(dim=1) < 1e-6
+    assert 0 < int(on_box.sum()) < len(surfels)
+    assert surfels.gloss.glossy.tolist() == on_box.nonzero()[:, 0].tolist()
+    assert surfels.gloss.reflectance[on_box].unique().tolist() == pytest.approx([0.2])
+    assert surfels.gloss.exponents[on_box].unique().tolist() == [config.scene.cornell.shininess]
+
+
+def test_true_surfels_of_other_scenes_come_from_the_passes() -> None:
+    assert true_surfels.STAGE.needs(_config(scene__kind="room")) == (Need("generate_dataset"),)
 
 
 def test_a_scene_is_judged_beside_its_truth_where_that_is_known() -> None:

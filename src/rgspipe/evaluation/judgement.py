@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 import pandas as pd
+from torch import Tensor
 
 from rgspipe.datasets.views import View
 from rgspipe.evaluation.ceiling import transmittance_image
@@ -18,6 +19,10 @@ from rgspipe.fitting.fit import prepare_fit, render_light
 from rgspipe.fitting.problem import Effects
 from rgspipe.progress import track
 from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.renderer.view_weights import ViewWeights
+from rgspipe.training.gloss import GlossScene, render_gloss
+from rgspipe.training.lighting import trace_lighting
+from rgspipe.training.view_model import build_view_models
 
 #: Where direct light is evaluated: where pixels look, as in a fit's last steps, and at surfels' centres.
 PLACES = {"pixels": True, "centres": False}
@@ -80,9 +85,20 @@ def render_views(frozen: FrozenScene, views: Sequence[View]) -> Renders:
         weights = frozen.view(view.camera)
         albedo.append(weights.image(frozen.surfels.albedo.float()).numpy())
         for place, at_pixels in PLACES.items():
-            prepared = prepare_fit(frozen, [weights], mask_edges=False, effects=Effects(at_pixels=at_pixels))
-            images[place].append(render_light(prepared, view.light)[0].numpy())
+            images[place].append(_render(frozen, weights, view, at_pixels).numpy())
     return Renders(tuple(views), images, albedo, len(frozen.surfels))
+
+
+def _render(frozen: FrozenScene, weights: ViewWeights, view: View, at_pixels: bool) -> Tensor:
+    """(H, W, 3) under the view's own light."""
+    if frozen.gloss is None:
+        prepared = prepare_fit(frozen, [weights], mask_edges=False, effects=Effects(at_pixels=at_pixels))
+        return render_light(prepared, view.light)[0]
+    operators, lighting = frozen.gloss.operators, trace_lighting(frozen.bvh, [view])
+    models = build_view_models(frozen.bvh, [weights], lighting, at_pixels)
+    surfels = frozen.gloss.surfels
+    scene = GlossScene(surfels, models, lighting, lambda chosen: operators, frozen.transport, at_pixels)
+    return render_gloss(scene, surfels).renders[0].reshape(view.camera.height, view.camera.width, 3)
 
 
 def kinds_of_views(truth: FrozenScene, views: Sequence[View]) -> list[npt.NDArray[np.int64]] | None:

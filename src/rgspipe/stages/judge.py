@@ -55,6 +55,6 @@ STAGE = Stage(
         "rgspipe.evaluation",
         "rgspipe.fitting",
         "rgspipe.renderer",
-        "rgspipe.training.initialise",
+        "rgspipe.training",
     ),
 )

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import torch
+from torch import Tensor
 
 from rgspipe.config import RgspipeConfig
 from rgspipe.datasets.location import open_dataset
@@ -11,13 +14,14 @@ from rgspipe.errors import InputError
 from rgspipe.evaluation.ceiling import surfels_from_passes
 from rgspipe.scene import Surfels
 from rgspipe.scene.cornell import cornell_rectangles
-from rgspipe.scene.rectangles import surfels_on
+from rgspipe.scene.gloss import Gloss
+from rgspipe.scene.rectangles import Rectangles, surfels_on
 from rgspipe.stages.base import Stage, StageContext
 from rgspipe.stages.scene_model import cornell_parameters
 
 
 def run(context: StageContext) -> None:
-    """Write surfels.safetensors: exact rectangles for a diffuse Cornell box, else from depth, normals and albedo."""
+    """Write surfels.safetensors: exact rectangles for a Cornell box, else from depth, normals and albedo."""
     config = context.config
     exact = _is_exact(config)
     surfels = _exact_surfels(config) if exact else _from_passes(context)
@@ -26,14 +30,28 @@ def run(context: StageContext) -> None:
 
 
 def _is_exact(config: RgspipeConfig) -> bool:
-    return config.scene.kind == "cornell" and config.scene.cornell.gloss == 0.0
+    return config.scene.kind == "cornell"
 
 
 def _exact_surfels(config: RgspipeConfig) -> Surfels:
     room = cornell_parameters(config.scene.cornell)
     boxes = [(box.center, box.size, box.turn, box.albedo) for box in room.boxes]
     rectangles = cornell_rectangles(room.room, room.white, room.left, room.right, boxes)
-    return surfels_on(rectangles, config.init.surfels).to(torch.float32)
+    surfels = surfels_on(rectangles, config.init.surfels)
+    if config.scene.cornell.gloss > 0.0:
+        on_boxes = torch.arange(len(rectangles)) >= len(rectangles) - 6 * len(boxes)
+        surfels = replace(surfels, gloss=_gloss(config, rectangles, on_boxes))
+    return surfels.to(torch.float32)
+
+
+def _gloss(config: RgspipeConfig, rectangles: Rectangles, glossy: Tensor) -> Gloss:
+    """The lobe of the surfels on those of the rectangles that are `glossy` (Q,)."""
+    # Surfels are laid out alike whatever their albedo, so it can carry a mark.
+    marked = replace(rectangles, albedo=glossy[:, None].double().expand(-1, 3))
+    mark = surfels_on(marked, config.init.surfels).albedo
+    return Gloss(
+        config.scene.cornell.gloss * mark, torch.where(mark[:, 0] > 0.5, config.scene.cornell.shininess, 1.0).double()
+    )
 
 
 def _from_passes(context: StageContext) -> Surfels:
