@@ -137,10 +137,13 @@ def _counts(train: Sequence[View], held_out: int | None, targets: Sequence[Targe
     parts = []
     if train:
         height, width = train[0].image.shape[:2]
-        parts.append(f"{len(train)} training views of {width} × {height} pixels")
+        parts.append(f"{_many(len(train), 'training view')} of {width} × {height} pixels")
     if held_out is not None:
-        parts.append(f"{held_out} held-out views")
+        parts.append(_many(held_out, "held-out view"))
     if targets:
-        views = len(targets[0].views)
-        parts.append(f"{len(targets)} targets with {views} view{'s' if views != 1 else ''} each")
+        parts.append(f"{_many(len(targets), 'target')} with {_many(len(targets[0].views), 'view')} each")
     return ", ".join(parts)
+
+
+def _many(count: int, name: str) -> str:
+    return f"{count} {name}{'s' if count != 1 else ''}"

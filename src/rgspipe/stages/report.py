@@ -35,8 +35,8 @@ def run(context: StageContext) -> None:
     contents = _contents(context)
     write_json(context.folder / SUMMARY, scene_summary(contents))
     if contents.gallery is not None and contents.gallery.train:
-        shots = contents.gallery.train
-        (context.folder / VIEW).write_bytes(shots[len(shots) // 2].png)
+        # The view with the most to see: what varies most compresses least.
+        (context.folder / VIEW).write_bytes(max((shot.png for shot in contents.gallery.train), key=len))
     held_out = _optional_bytes(next(iter(context.input_lists.get("judge", ())), None), "typical.png")
     if held_out is not None:
         (context.folder / HELD_OUT).write_bytes(held_out)
@@ -146,7 +146,7 @@ def _stages(context: StageContext, described: Sequence[Mapping[str, Any]]) -> li
     """Every artifact behind the report, in the order of the pipeline; fits and evaluations stand in pairs."""
     records = [
         stage_record(stage, artifact.manifest)
-        for stage in ("generate_dataset", "init_depth", "train_surfels", "import_ply", "freeze", "judge")
+        for stage in ("generate_dataset", "init_depth", "train_surfels", "freeze", "judge")
         for artifact in context.input_lists.get(stage, ())
     ]
     for stage in ("fit_light", "evaluate"):
@@ -175,13 +175,13 @@ def _inputs(config: RgspipeConfig) -> list[Need | str]:
             if method == "paper_adam" and config.fit.limit is None:
                 changes["fit.limit"] = config.report.paper_adam_limit
             needs += [Need("fit_light", changes), Need("evaluate", changes)]
-    if config.scene.kind == "ply":
-        return [*needs, "freeze", "import_ply"]
     return [*needs, *_judgements(config), "freeze", "train_surfels", "init_depth", "generate_dataset"]
 
 
 def _judgements(config: RgspipeConfig) -> list[Need | str]:
     """Held-out views, and where it is known the same with surfels made from the truth, with their lights."""
+    if config.scene.kind == "ply":
+        return []
     if not (config.report.truth and has_truth(config)):
         return ["judge"]
     truth: dict[str, object] = {"freeze.surfels": "truth"}

@@ -29,7 +29,7 @@ def found_study(config: RgspipeConfig, judged: Sequence[Artifact]) -> tuple[pd.D
     if found is None:
         return None, ""
     same = bool(judged) and judged[0].fingerprint in found.manifest["inputs"].get("judge", ())
-    day = str(found.manifest.get("created", ""))[:10]
+    day = _made(found)[:10]
     remark = (
         "" if same else f"This study, of {day}, was made with other settings, data or code than the rest of this page."
     )
@@ -43,7 +43,12 @@ def _newest(config: RgspipeConfig) -> Artifact | None:
     folders = sorted(path.parents[1].name for path in root.glob("*/study/latest"))
     studies = [found for name in folders if (found := store.latest(name, "study")) is not None]
     known = [found for found in studies if len(_rows(found, scene))]
-    return max(known, key=lambda found: str(found.manifest.get("created", "")), default=None)
+    return max(known, key=_made, default=None)
+
+
+def _made(study: Artifact) -> str:
+    """When it was made, as text that sorts by time."""
+    return str(study.manifest.get("created", ""))
 
 
 def _rows(study: Artifact, scene: str) -> pd.DataFrame:
