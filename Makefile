@@ -8,7 +8,7 @@ TEST_WORKERS ?= 2
 ARGS ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup test smoke reproduce train-study bench lint
+.PHONY: help setup test test-slurm smoke reproduce train-study bench lint
 
 help:  ## this list
 	@echo "rgspipe: from images of a scene, find its lights"
@@ -26,6 +26,9 @@ $(STAMP): requirements.txt pyproject.toml
 
 test: setup  ## every test
 	$(VENV)/bin/python -m pytest -q -n $(TEST_WORKERS) --dist loadgroup $(ARGS)
+
+test-slurm: setup  ## sweeps on a Slurm cluster of this machine alone (Debian: apt-get install slurm-wlm munge)
+	$(VENV)/bin/python -m pytest -q -m slurm $(ARGS) tests/slurm
 
 smoke: setup  ## the whole way on a tiny scene, in minutes
 	$(RGSPIPE) pipeline=smoke $(ARGS)

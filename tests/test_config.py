@@ -6,7 +6,7 @@ import itertools
 
 import pytest
 
-from rgspipe.cli.compose import check_sweep, compose_config
+from rgspipe.cli.compose import check_sweep, compose_config, leaves_machine
 from rgspipe.config import RgspipeConfig, describe, get_value, scene_name, with_changes
 from rgspipe.errors import InputError
 from rgspipe.resources import resource_folder
@@ -98,6 +98,24 @@ def test_what_makes_no_sense_is_refused_with_the_key_and_a_way_out(override: str
 def test_hydra_settings_that_exist_are_accepted() -> None:
     composed("hydra.launcher.n_jobs=2", "+hydra.job.env_set.A=1")
     composed("hydra/launcher=basic", "hydra.verbose=true")
+    composed("launcher=slurm", "hydra.launcher.partition=gpu", "+hydra.launcher.additional_parameters.mail-type=END")
+    composed("hydra/launcher=slurm", "hydra.launcher.setup=[module load cuda]")
+
+
+def test_keys_of_a_launcher_are_those_of_the_chosen_one() -> None:
+    for launcher in ("launcher=slurm", "hydra/launcher=slurm"):
+        with pytest.raises(InputError, match=r"partitoin.*Did you mean hydra\.launcher\.partition"):
+            composed(launcher, "hydra.launcher.partitoin=gpu")
+    with pytest.raises(InputError, match="no such key"):
+        composed("hydra.launcher.partition=gpu")
+
+
+@pytest.mark.parametrize("group", ["launcher", "hydra/launcher"])
+def test_a_cluster_s_launcher_is_known(group: str) -> None:
+    assert leaves_machine(["stage=freeze", f"{group}=slurm"])
+    assert not leaves_machine(["stage=freeze", f"{group}=joblib"]) and not leaves_machine(["stage=freeze"])
+    with pytest.raises(InputError, match="joblib"):
+        leaves_machine([f"{group}=slurmm"])
 
 
 def test_a_missing_stage_lists_the_stages() -> None:

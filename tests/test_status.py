@@ -60,3 +60,10 @@ def test_jobs_are_listed_in_their_order(tmp_path: Path) -> None:
         RunStatus.start(tmp_path / "sweep" / str(number), "freeze", [])
     assert [folder.name for folder, _ in read_statuses(tmp_path)] == ["1", "9", "10"]
     assert read_status(tmp_path) is None
+
+
+def test_a_run_on_another_machine_is_believed(tmp_path: Path) -> None:
+    status = RunStatus.start(tmp_path, "freeze", [])
+    status.values |= {"host": "node7", "process_start": "another boot:1"}
+    status._write()
+    assert read_status(tmp_path)["state"] == "running"

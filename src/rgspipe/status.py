@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime
 import json
 import os
+import socket
 import time
 import traceback
 from collections.abc import Mapping, Sequence
@@ -60,6 +61,7 @@ class RunStatus:
             "stage": stage,
             "overrides": list(overrides),
             "command": " ".join(["python -m rgspipe", *overrides]),
+            "host": socket.gethostname(),
             "pid": os.getpid(),
             "process_start": process_start(os.getpid()),
             "started": _now(),
@@ -94,14 +96,26 @@ class RunStatus:
 def read_status(folder: Path) -> dict[str, Any] | None:
     """The status of the run in `folder`, or None if none was started there.
 
-    A run that says it is running, but whose process is gone, has the state "killed".
+    A run that says it is running, but whose process is gone, has the state "killed". Processes of another machine
+    cannot be seen: its runs are believed.
     """
     path = folder / STATUS
     if not path.is_file():
         return None
     values = json.loads(path.read_text(encoding="utf-8"))
-    if values["state"] == "running" and process_start(values["pid"]) != values["process_start"]:
+    here = values.get("host", socket.gethostname()) == socket.gethostname()
+    if values["state"] == "running" and here and process_start(values["pid"]) != values["process_start"]:
         values["state"] = "killed"
+    return values
+
+
+def record_killed(folder: Path, overrides: Sequence[str], error: str) -> dict[str, Any]:
+    """Say for a run that could not say so itself, whether it had started or not, that it was killed, and by what."""
+    folder.mkdir(parents=True, exist_ok=True)
+    command = " ".join(["python -m rgspipe", *overrides])
+    values = read_status(folder) or {"stage": "", "overrides": list(overrides), "command": command}
+    values |= {"state": "killed", "ended": _now(), "error": error, "exit_code": 1}
+    write_json(folder / STATUS, values)
     return values
 
 

@@ -31,7 +31,14 @@ FREE_SECTIONS = (
     "hydra.hydra_logging.",
     "hydra.callbacks.",
     "hydra.sweeper.params.",
+    "hydra.launcher.additional_parameters.",
 )
+
+#: How a launcher is chosen: by the group of this program or by Hydra's own.
+LAUNCHER_GROUPS = ("launcher", "hydra/launcher")
+
+#: The launcher that sends jobs to a cluster.
+SLURM_LAUNCHER = "hydra_plugins.rgspipe_slurm.SlurmLauncher"
 
 #: A sweep may have thousands of values; this many of each key are tried before the first job starts.
 CHECKED_VALUES = 50
@@ -103,6 +110,17 @@ def given_folder(overrides: Sequence[str], mode: str) -> Path | None:
     return Path(str(values.hydra[mode].dir))
 
 
+def leaves_machine(overrides: Sequence[str]) -> bool:
+    """Whether the command line names a launcher that sends jobs to a cluster, where single runs are to go too."""
+    named = [override.input_line or "" for override in _parse(overrides) if override.key_or_group in LAUNCHER_GROUPS]
+    if not named:
+        return False
+    try:
+        return str(_compose(named, hydra=True).hydra.launcher._target_) == SLURM_LAUNCHER
+    except HydraException as error:
+        raise _composition_error(error, named) from None
+
+
 def _compose(overrides: Sequence[str], hydra: bool = False) -> DictConfig:
     register_schema()
     with initialize_config_dir(version_base=HYDRA_VERSION_BASE, config_dir=config_folder(), job_name="rgspipe"):
@@ -146,7 +164,7 @@ def _check_keys(overrides: Sequence[Override]) -> None:
     """Refuse what Hydra lets through: keys that `+` would add, and deletions."""
     if not any(override.is_add() or override.is_force_add() or override.is_delete() for override in overrides):
         return
-    known = _known_keys()
+    known = _known_keys(overrides)
     for override in overrides:
         key = override.key_or_group
         if override.is_delete():
@@ -157,9 +175,15 @@ def _check_keys(overrides: Sequence[Override]) -> None:
             raise _unknown_key(key, known)
 
 
-def _known_keys() -> list[str]:
-    """Every dotted key, section and group."""
-    values = OmegaConf.to_container(_compose([], hydra=True), resolve=False)
+def _known_keys(overrides: Sequence[Override]) -> list[str]:
+    """Every dotted key, section and group; the launcher among the overrides decides about `hydra.launcher`."""
+    launchers = [override.input_line or "" for override in overrides if override.key_or_group in LAUNCHER_GROUPS]
+    try:
+        composed = _compose(launchers, hydra=True)
+    except HydraException:
+        # The launcher itself is what is wrong, and is told about elsewhere.
+        composed = _compose([], hydra=True)
+    values = OmegaConf.to_container(composed, resolve=False)
     assert isinstance(values, dict)
     folders = [path for path in resource_folder("conf").iterdir() if path.is_dir()]
     return [*_flat(values), *(path.name for path in folders), "hydra/launcher", "hydra/sweeper", "pipeline"]
@@ -175,7 +199,7 @@ def _flat(values: Mapping[Any, Any], prefix: str = "") -> Iterator[str]:
 def _composition_error(error: Exception, overrides: Sequence[str]) -> InputError:
     if isinstance(error, MissingConfigException):
         return _unknown_choice(error)
-    known = _known_keys()
+    known = _known_keys(_parse(overrides))
     for override in _parse(overrides):
         if override.key_or_group not in known and not override.key_or_group.startswith(FREE_SECTIONS):
             return _unknown_key(override.key_or_group, known)

@@ -71,6 +71,7 @@ Keys (KEY=VALUE), by section; python -m rgspipe --help SECTION shows one with it
 More:
   upstream=require      refuse, instead of making, missing inputs
   -m                    sweep over all combinations of comma-separated values; hydra.launcher.n_jobs=K jobs at once
+  launcher=slurm        the jobs of a sweep on a Slurm cluster; hydra.launcher.partition=NAME and so on
   --cfg job             show the whole configuration instead of running it
   debug.traceback=true  show tracebacks (or set RGSPIPE_TRACEBACK=1)
   --hydra-help          options of Hydra, which reads the command line

@@ -20,10 +20,12 @@ from rgspipe.cli.compose import (
     compose_config,
     config_folder,
     given_folder,
+    leaves_machine,
     register_schema,
     typed,
 )
 from rgspipe.cli.messages import EXIT_FAILED, EXIT_INPUT, show_failure, show_input_error
+from rgspipe.cli.sweep_table import write_sweep_table
 from rgspipe.errors import InputError
 from rgspipe.pipeline import StageLoader, run
 from rgspipe.stages import load_stage
@@ -33,15 +35,20 @@ from rgspipe.status import RunStatus, read_status, read_statuses
 def run_jobs(overrides: Sequence[str], stage_loader: StageLoader, multirun: bool) -> int:
     """Run one configuration, or all of a sweep.
 
+    Launchers are for sweeps, so that with launcher=slurm even a single run is one: of one job, on the cluster.
+
     Raises:
         InputError: an override cannot be used; nothing was started.
     """
+    multirun = multirun or leaves_machine(overrides)
     config = check_sweep(overrides) if multirun else compose_config(overrides)
     if stage_loader is load_stage:
         check_stage(config.stage)
     mode = "sweep" if multirun else "run"
-    folder = given_folder(overrides, mode) or new_run_folder(
-        Path(config.outputs), "sweep" if multirun else config.stage
+    folder = (
+        given_folder(overrides, mode)
+        or given_folder(overrides, "run")
+        or new_run_folder(Path(config.outputs), "sweep" if multirun else config.stage)
     )
     # Said again even where it was given: interpolations such as the time must not be resolved twice.
     chosen = f"hydra.{mode}.dir={quoted(folder)}"
@@ -119,7 +126,7 @@ def _job(values: DictConfig, stage_loader: StageLoader) -> int:
 
 
 def _sweep_summary(folder: Path, code: int) -> int:
-    """Print how each job ended; the largest exit status."""
+    """Print how each job ended and gather their tables into one; the largest exit status."""
     jobs = read_statuses(folder)
     for path, status in jobs:
         state = "killed" if status["state"] in ("killed", "running") else status["state"]
@@ -130,4 +137,5 @@ def _sweep_summary(folder: Path, code: int) -> int:
     print(f"{len(jobs) - len(failed)} of {len(jobs)} jobs done; {folder}")
     if not jobs:
         return max(code, EXIT_FAILED)
+    print(f"Table: {write_sweep_table(folder, jobs)}")
     return max([code, *(int(status.get("exit_code", EXIT_FAILED)) for status in failed)])
