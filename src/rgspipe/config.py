@@ -287,11 +287,31 @@ class ViewsConfig:
 
 
 @dataclass
+class SpotConfig:
+    """The profile of unknown spots; with fit.cone=free its kind, and a rim to begin with."""
+
+    profile: str = option(
+        "smoothstep",
+        "how intensity falls with the angle from the axis: Blender's smoothstep, gaussian, or Mitsuba's linear",
+        choices=("smoothstep", "gaussian", "linear"),
+    )
+    cone_angle: float = option(25.0, "half-angle of the cone, degrees", low=1, high=89)
+    falloff: float = option(
+        0.15,
+        "width of the rim: of smoothstep Blender's blend (0 to 1); of gaussian the standard deviation, of linear the "
+        "half-angle of the inner cone, degrees",
+        low=0,
+        high=89,
+    )
+
+
+@dataclass
 class LightConfig:
     """What is looked for."""
 
-    type: str = option("point", "type of the unknown lights", choices=("point",))
-    count: int = option(1, "how many unknown lights", low=1, high=1)
+    type: str = option("point", "type of the unknown lights", choices=("point", "spot", "auto"))
+    count: int | None = option(1, "how many unknown lights; null finds out", low=1, high=8)
+    spot: SpotConfig = section(SpotConfig, "the profile of unknown spots")
 
 
 @dataclass
@@ -327,6 +347,9 @@ class FitConfig:
     limit: int | None = option(None, "at most this many targets of each class", low=1, high=100000)
     search: SearchConfig = section(SearchConfig, "fit=search_lm")
     adam: AdamConfig = section(AdamConfig, "fit=paper_adam")
+    cone: str = option(
+        "known", "whether spots' cones are those of light.spot, or recovered, too", choices=("known", "free")
+    )
 
 
 @dataclass

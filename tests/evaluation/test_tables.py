@@ -8,11 +8,16 @@ import pytest
 import torch
 
 from rgspipe.evaluation import convergence, tables
-from rgspipe.scene import PointLight
+from rgspipe.scene import PointLight, SpotLight
 
 
 def _light(x: float, y: float, z: float, brightness: float = 1.0) -> PointLight:
     return PointLight(torch.tensor([x, y, z]), torch.full((3,), brightness))
+
+
+def _spot(x: float, axis: tuple[float, float, float], cone_angle: float) -> SpotLight:
+    position, intensity = torch.tensor([x, 0.0, 0.0]), torch.ones(3)
+    return SpotLight(position, intensity, torch.tensor(axis), "gaussian", cone_angle, 0.1)
 
 
 def _results(names: list[tuple[str, str]], **more: object) -> pd.DataFrame:
@@ -37,6 +42,25 @@ def test_rig_error_is_that_of_its_worst_light():
     assert errors.intensity == pytest.approx(0.05, abs=1e-6)  # float32 intensities: measured 3e-8 off
     assert errors.pairs == ((1, 0), (0, 1))
     assert tables.rig_errors((), truth, 2.0).position == math.inf
+
+
+def test_spots_are_judged_by_their_axes_and_cones_too():
+    truth = (_spot(0.0, (0, 0, 1), 0.5), _light(1, 0, 0))
+    found = (_light(1, 0, 0), _spot(0.1, (0, 1, 1), 0.4))
+    errors = tables.rig_errors(found, truth, 1.0)
+    assert errors.axis == pytest.approx(45.0) and errors.cone == pytest.approx(math.degrees(0.1), abs=1e-6)
+    # A point light in the place of a spot has no axis; among point lights there is none to judge.
+    assert tables.rig_errors((_light(0, 0, 0), _light(1, 0, 0)), truth, 1.0).axis == math.inf
+    assert math.isnan(tables.rig_errors((_light(1, 0, 0),), (_light(1, 0, 0),), 1.0).axis)
+    assert tables.rig_errors((), truth, 1.0).cone == math.inf
+
+
+def test_the_number_of_lights_is_judged():
+    truths = {name: (_light(0, 0, 0),) for name in "ab"}
+    estimates = {"a": (_light(0, 0, 0),), "b": (_light(0, 0, 0), _light(1, 1, 1))}
+    table = tables.target_table(_results([("a", "visible"), ("b", "visible")]), estimates, truths, 1.0)
+    assert table["count_right"].tolist() == [True, False]
+    assert tables.summary_table(table, seed=0)["count_rate"].tolist() == [0.5, 0.5]
 
 
 def test_target_table_holds_errors_verdicts_and_both_positions():
@@ -122,6 +146,9 @@ def test_convergence_measures_the_distance_to_the_nearest_true_light():
     target = {"target": "a", "occlusion": "visible", "method": "search_lm", "views": 1}
     table = convergence.convergence_table(curve, target, (_light(0.5, 0, 0), _light(2.0, 0, 1.0)), 2.0)
     assert table["position_error"].tolist() == pytest.approx([0.25, 0.5])
+    two = curve.assign(x_1=[3.0, 0.5], y_1=0.0, z_1=0.0)
+    both = convergence.convergence_table(two, target, (_light(0.5, 0, 0), _light(2.0, 0, 0)), 2.0)
+    assert both["position_error"].tolist() == pytest.approx([0.5, 0.0])
     assert table["seconds"].isna().all() and list(table.columns) == list(convergence.COLUMNS)
     assert np.isnan(convergence.convergence_table(curve, target, (), 2.0)["position_error"]).all()
     with pytest.raises(ValueError, match="loss"):

@@ -5,7 +5,8 @@ from __future__ import annotations
 import torch
 
 from lit_room import BOX_CENTER, BOX_SIZE, HIDDEN
-from rgspipe.fitting.coarse import best_candidates, block_average, candidate_costs, coarse_images
+from rgspipe.fitting.coarse import block_average, coarse_images
+from rgspipe.fitting.combinations import Scored, best_apart, candidate_costs
 from rgspipe.fitting.dictionary import build_dictionary, candidate_grid
 from rgspipe.fitting.problem import LightProblem
 from rgspipe.renderer.direct import unit_irradiance
@@ -47,17 +48,18 @@ def test_coarse_images_are_block_means_of_full_images(room, point_light):
 def test_the_nearest_candidates_of_a_hidden_light_are_among_the_best(room, point_light):
     light = point_light(HIDDEN)
     problem = LightProblem.create(room.one.prepared, room.one.prepared.stack_images(room.images(light)))
-    costs, intensities = candidate_costs(problem, room.one.coarse)
-    chosen = best_candidates(costs, room.one.coarse.positions, 4, 0.16)
-    distance = (room.one.coarse.positions[chosen] - light.position).norm(dim=1)
+    (coarse,) = room.one.coarse
+    costs = candidate_costs(Scored.of(problem, coarse))
+    chosen = best_apart(costs, coarse.positions, 4, 0.16)
+    distance = (coarse.positions[chosen] - light.position).norm(dim=1)
     assert float(distance.min()) < 0.2
-    assert bool((costs >= 0).all() and (costs <= 1 + 1e-9).all() and (intensities >= 0).all())
+    assert bool((costs >= 0).all() and (costs <= 1 + 1e-9).all())
 
 
 def test_best_candidates_are_apart():
     positions = torch.tensor([[0.0, 0, 0], [0.1, 0, 0], [1.0, 0, 0], [1.05, 0, 0]])
     costs = torch.tensor([0.1, 0.2, 0.4, 0.3])
-    assert best_candidates(costs, positions, 3, 0.16) == [0, 3]
+    assert best_apart(costs, positions, 3, 0.16) == [0, 3]
 
 
 def test_a_dictionary_may_be_coarse(room):

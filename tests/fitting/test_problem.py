@@ -7,6 +7,7 @@ import torch
 
 from lit_room import HIDDEN, VISIBLE
 from rgspipe.fitting.moments import covariance, moments
+from rgspipe.fitting.parameters import Emitter
 from rgspipe.fitting.problem import Effects, LightProblem
 from rgspipe.renderer.direct import unit_irradiance
 from rgspipe.renderer.kernels.irradiance import SOFTENING
@@ -20,7 +21,7 @@ def _problem(room, point_light, where=VISIBLE, effects=None):
 def test_unit_image_is_the_renderer_s(room, point_light):
     light = point_light(VISIBLE)
     problem = _problem(room, point_light)
-    image = problem.evaluate(light.position)[:, :, 0] * light.intensity.float() / problem.scale
+    image = problem.evaluate(Emitter(light.position))[:, :, 0] * light.intensity.float() / problem.scale
     torch.testing.assert_close(image, problem.target, rtol=1e-5, atol=1e-6)
 
 
@@ -33,11 +34,11 @@ def test_derivative_matches_finite_differences(room, point_light):
     for where in (VISIBLE, HIDDEN):
         problem = _problem(room, point_light, where)
         position, step = torch.tensor(where, dtype=torch.float64) + 0.003, 1e-4
-        slope = problem.evaluate(position)[:, :, 1:]
+        slope = problem.evaluate(Emitter(position))[:, :, 1:]
         for axis in range(3):
             offset = torch.zeros(3, dtype=torch.float64)
             offset[axis] = step
-            upper, lower = (problem.evaluate(position + sign * offset)[:, :, 0] for sign in (1, -1))
+            upper, lower = (problem.evaluate(Emitter(position + sign * offset))[:, :, 0] for sign in (1, -1))
             expected = (upper - lower) / (2 * step)
             error = float((slope[:, :, axis] - expected).norm() / expected.norm())
             assert error < 0.003, (where, axis, error)  # measured up to 2e-4
@@ -46,7 +47,7 @@ def test_derivative_matches_finite_differences(room, point_light):
 def test_effects_leave_parts_out(room, point_light):
     position = torch.tensor(HIDDEN, dtype=torch.float64)
     whole, direct, unshadowed = (
-        _problem(room, point_light, effects=effects).evaluate(position)[:, :, 0].sum()
+        _problem(room, point_light, effects=effects).evaluate(Emitter(position))[:, :, 0].sum()
         for effects in (Effects(), Effects(interreflection=False), Effects(shadows=False))
     )
     assert direct < whole < unshadowed
@@ -57,11 +58,11 @@ def test_closed_form_intensity_is_exact():
     columns = torch.rand((40, 3, 4), generator=generator, dtype=torch.float64)
     weights = torch.rand((40, 3), generator=generator, dtype=torch.float64)
     target = torch.rand((40, 3), generator=generator, dtype=torch.float64)
-    system = moments(columns, target, weights)
+    system = moments([columns], target, weights)
     for channel in range(3):
         root = weights[:, channel].sqrt()
         expected = torch.linalg.lstsq((root * columns[:, channel, 0])[:, None], (root * target[:, channel])[:, None])
-        np.testing.assert_allclose(system.intensity[channel], expected.solution[0, 0], rtol=1e-12)
+        np.testing.assert_allclose(system.intensity[0, channel], expected.solution[0, 0], rtol=1e-12)
     residual = target - columns[:, :, 0] * system.intensity
     np.testing.assert_allclose(system.cost, (weights * residual.square()).sum(), rtol=1e-12)
 
@@ -71,21 +72,21 @@ def test_intensity_is_never_negative_and_dark_channels_are_zero():
     columns[:, 2] = 0.0
     target = torch.ones((10, 3))
     target[:, 1] = -1.0
-    system = moments(columns, target, torch.ones(10, 1))
-    assert system.intensity.tolist() == [1.0, 0.0, 0.0]
-    assert np.isfinite(system.cost) and torch.isfinite(system.position_system()[0]).all()
+    system = moments([columns], target, torch.ones(10, 1))
+    assert system.intensity.tolist() == [[1.0, 0.0, 0.0]]
+    assert np.isfinite(system.cost) and torch.isfinite(system.parameter_system()[0]).all()
     assert torch.isfinite(covariance(system, system.intensity, 30)).all()
 
 
 def test_projected_system_is_the_schur_complement_of_the_joint_one(room, point_light):
     """Eliminating the intensity gives the same matrix as solving for position and intensity together."""
     problem = _problem(room, point_light)
-    columns = problem.evaluate(torch.tensor(VISIBLE, dtype=torch.float64) + 0.02)
-    system = problem.moments(columns, problem.relative_weights().square())
+    columns = problem.evaluate(Emitter(torch.tensor(VISIBLE, dtype=torch.float64) + 0.02))
+    system = problem.moments([columns], problem.relative_weights().square())
     joint, count = system.information(system.intensity), 3
     corner, side, rest = joint[:count, :count], joint[:count, count:], joint[count:, count:]
     expected = corner - side @ torch.linalg.solve(rest, side.T)
-    torch.testing.assert_close(system.position_system()[0], expected, rtol=1e-9, atol=1e-9)
+    torch.testing.assert_close(system.parameter_system()[0], expected, rtol=1e-9, atol=1e-9)
 
 
 def test_a_light_on_a_surfel_is_finite(room, point_light):
@@ -94,9 +95,9 @@ def test_a_light_on_a_surfel_is_finite(room, point_light):
     surfels = room.frozen.surfels
     spots = [surfels.centers[k] + shift * surfels.normals[k] for k in (0, 500, 1200) for shift in (0.0, 1e-6, -0.01)]
     for position in [*spots, torch.tensor([50.0, 0.0, 0.0]), torch.tensor([1e6, 1e6, 1e6])]:
-        columns = problem.evaluate(position.double())
+        columns = problem.evaluate(Emitter(position.double()))
         assert torch.isfinite(columns).all()
-        assert torch.isfinite(problem.moments(columns, problem.relative_weights()).values).all()
+        assert torch.isfinite(problem.moments([columns], problem.relative_weights()).values).all()
 
 
 def test_unit_irradiance_on_a_surfel_is_bounded_by_the_softening(room):

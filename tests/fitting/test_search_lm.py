@@ -13,7 +13,7 @@ from rgspipe import fit_lights
 from rgspipe.errors import InputError
 from rgspipe.fitting import FitStatus, SearchOptions, prepare_fit
 from rgspipe.fitting.problem import LightProblem
-from rgspipe.fitting.search_lm import search_region
+from rgspipe.fitting.refine import search_region
 
 
 def _errors(result, light):
@@ -154,4 +154,4 @@ def test_programming_mistakes_are_value_errors(room):
     with pytest.raises(ValueError, match="method"):
         fit_lights(room.frozen, room.one, images, method="guess")
     with pytest.raises(ValueError, match="dictionary"):
-        fit_lights(room.frozen, dataclasses.replace(room.one, coarse=None), images)
+        fit_lights(room.frozen, dataclasses.replace(room.one, coarse=()), images)

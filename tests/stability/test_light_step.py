@@ -12,6 +12,7 @@ import double_precision
 from double_precision import DoubleStep
 from hard_cases import CAMERAS, DEEP, INSIDE, LIGHTS, SCENES, HardScene, camera, scene_of_light
 from rgspipe.fitting.paper_adam import adam_loss
+from rgspipe.fitting.parameters import Emitter
 from rgspipe.fitting.problem import Effects, LightProblem
 from rgspipe.fitting.views import PreparedViews
 from rgspipe.renderer.frozen import FrozenScene
@@ -56,7 +57,7 @@ def compare(
     step = DoubleStep.of(views.frozen, scene.build(), views.operator.matrix)
     size, position = scene.size, scene.at(light)
     unit = torch.tensor([size**2, size**3, size**3, size**3], dtype=torch.float64)
-    found = LightProblem(views, torch.zeros(len(views.pixels), 3), 1.0, Effects()).evaluate(position)
+    found = LightProblem(views, torch.zeros(len(views.pixels), 3), 1.0, Effects()).evaluate(Emitter(position))
     expected = step.columns(position)
     # Measured at most 8e-6 and 3e-6; 5e-4 of the derivative with needles.
     within("image", found[..., 0] * unit[0], expected[..., 0] * unit[0], 2e-5)

@@ -52,11 +52,11 @@ def test_normal_equations_of_any_image(
     columns[..., 1:] *= 0.0 if flat else 10.0 ** exponents[1]
     columns = columns * ~torch.tensor(dark)[None, :, None]
     target = torch.rand(pixels, 3, generator=generator) * 10.0 ** exponents[2]
-    system = moments(columns, target, torch.ones(pixels, 1))
-    matrix, direction = system.position_system()
+    system = moments([columns], target, torch.ones(pixels, 1))
+    matrix, direction = system.parameter_system()
     spread = covariance(system, system.intensity, target.numel())
     for value in (system.intensity, matrix, direction, spread):
         assert torch.isfinite(value).all()
     assert float(system.intensity.min()) >= 0.0
-    assert float(system.intensity[torch.tensor(dark)].sum()) == 0.0
+    assert float(system.intensity[:, torch.tensor(dark)].sum()) == 0.0
     assert float(torch.linalg.eigvalsh(0.5 * (spread + spread.T)).min()) >= -1e-6 * float(spread.abs().max())

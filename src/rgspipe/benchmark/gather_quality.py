@@ -15,6 +15,7 @@ from torch import Tensor
 
 from rgspipe.benchmark.form_factors import unoccluded_form_factors, with_sampled_visibility
 from rgspipe.benchmark.rooms import Room
+from rgspipe.fitting.parameters import Emitter
 from rgspipe.fitting.problem import LightProblem
 from rgspipe.fitting.search_lm import fit_from
 from rgspipe.fitting.views import prepare_views
@@ -175,7 +176,8 @@ def _biases(bench: _Bench, gather: SparseOperator, targets: list[list[Tensor]]) 
     errors: dict[str, list[float]] = {"open": [], "near": []}
     for light, images in enumerate(targets):
         truth = bench.room.lights[light].double()
-        found = fit_from(LightProblem.create(prepared, prepared.stack_images(images)), truth).lights[0].position.cpu()
+        problem = LightProblem.create(prepared, prepared.stack_images(images))
+        found = fit_from(problem, [Emitter(truth)]).lights[0].position
         kind = "open" if bench.room.clearance(light) >= IN_THE_OPEN else "near"
         errors[kind].append(float((found - truth).norm()) / scene.size)
     largest = {f"{kind}_bias": max(found, default=float("nan")) for kind, found in errors.items()}

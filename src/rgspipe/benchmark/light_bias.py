@@ -9,6 +9,7 @@ import pandas as pd
 from rgspipe.benchmark.rooms import Room
 from rgspipe.benchmark.settings import Model
 from rgspipe.benchmark.truth import Truth
+from rgspipe.fitting.parameters import Emitter
 from rgspipe.fitting.problem import LightProblem
 from rgspipe.fitting.search_lm import fit_from
 from rgspipe.fitting.views import prepare_views
@@ -33,7 +34,7 @@ def light_biases(room: Room, truth: Truth, model: Model) -> pd.DataFrame:
         for light in range(len(room.lights)):
             images = [small.image(camera, light, "global") for camera in chosen]
             problem = LightProblem.create(prepared, prepared.stack_images(images))
-            result = fit_from(problem, room.lights[light].double())
+            result = fit_from(problem, [Emitter(room.lights[light].double())])
             found = result.lights[0]
             error = float((found.position.cpu() - room.lights[light].double()).norm()) / model.frozen.size
             rows.append(

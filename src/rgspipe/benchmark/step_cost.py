@@ -10,6 +10,7 @@ from torch import Tensor
 
 from rgspipe.benchmark.settings import Model
 from rgspipe.evaluation.timing import median_ms
+from rgspipe.fitting.parameters import Emitter
 from rgspipe.fitting.problem import Effects, LightProblem
 from rgspipe.fitting.views import prepare_views
 from rgspipe.machine import peak_memory_now_mib, reset_peak_memory
@@ -61,7 +62,7 @@ def _step_at_pixels(model: Model) -> Callable[[Tensor], Tensor]:
     problem = LightProblem.create(prepared, white, Effects(shadows=model.shadows)).sharpest()
 
     def step(position: Tensor) -> Tensor:
-        columns = problem.evaluate(position)
+        columns = problem.evaluate(Emitter(position))
         return torch.einsum("pc,pcx->x", columns[:, :, 0], columns[:, :, 1:]) * (2.0 / columns[:, :, 0].numel())
 
     return step

@@ -16,9 +16,9 @@ from rgspipe.datasets.json_file import read_json
 from rgspipe.datasets.light_file import read_lights, write_lights
 from rgspipe.evaluation.images import progress_strip, save_png, stack
 from rgspipe.evaluation.metrics import psnr
-from rgspipe.fitting.fit import FitViews, render_light
+from rgspipe.fitting.fit import FitViews, render_rig
 from rgspipe.fitting.result import FitResult, Step
-from rgspipe.scene import PointLight
+from rgspipe.scene import LightRig, SpotLight
 
 #: What the light file says beside the lights, and results.csv repeats.
 FIELDS = ("loss", "iterations", "evaluations", "lights_tried", "seconds", "psnr", "result", "reason")
@@ -37,7 +37,7 @@ def write_result(folder: Path, result: FitResult, views: FitViews, targets: Sequ
     partial = folder.with_name(f".{folder.name}.partial")
     shutil.rmtree(partial, ignore_errors=True)
     partial.mkdir(parents=True)
-    shown = [render_light(views, light) for light in _milestones(result)]
+    shown = [render_rig(views, rig) for rig in _milestones(result)]
     final = shown[-1]
     _write_light_file(partial / "lights.json", result, _psnr(final, targets))
     _write_convergence(partial / "convergence.csv", result.trajectory)
@@ -56,13 +56,12 @@ def read_result(folder: Path) -> dict[str, object]:
     return dict(zip("xyzrgb", values, strict=True)) | {name: content[name] for name in FIELDS}
 
 
-def _milestones(result: FitResult) -> list[PointLight | None]:
-    """The lights at the start, midway and at the end."""
+def _milestones(result: FitResult) -> list[LightRig]:
+    """The rigs at the start, midway and at the end."""
     steps = result.trajectory
     if not steps or not result.lights:
-        return [None, None, None]
-    chosen = (steps[0], steps[len(steps) // 2])
-    return [*(PointLight(step.position, step.intensity) for step in chosen), result.lights[0]]
+        return [(), (), ()]
+    return [steps[0].lights, steps[len(steps) // 2].lights, result.lights]
 
 
 def _psnr(images: Sequence[Tensor], targets: Sequence[Tensor]) -> float | None:
@@ -78,6 +77,7 @@ def _write_light_file(path: Path, result: FitResult, quality: float | None) -> N
         "iterations": result.iterations,
         "evaluations": result.evaluations,
         "lights_tried": result.lights_tried,
+        "costs": {str(count): cost for count, cost in result.costs.items()},
         "seconds": round(result.seconds, 4),
         "psnr": quality,
         "result": str(result.status),
@@ -88,8 +88,22 @@ def _write_light_file(path: Path, result: FitResult, quality: float | None) -> N
 
 
 def _write_convergence(path: Path, steps: Sequence[Step]) -> None:
+    """One row a step: step, loss, the lights and seconds. Columns of the second light end in _1, and so on."""
     rows = [
-        [index, step.loss, *step.position.tolist(), *step.intensity.tolist(), round(step.seconds, 4)]
+        {"step": index, "loss": step.loss} | _light_columns(step.lights) | {"seconds": round(step.seconds, 4)}
         for index, step in enumerate(steps)
     ]
-    pd.DataFrame(rows, columns=["step", "loss", *"xyzrgb", "seconds"]).to_csv(path, index=False)
+    empty = ["step", "loss", *"xyzrgb", "seconds"]
+    pd.DataFrame(rows, columns=list(rows[0]) if rows else empty).to_csv(path, index=False)
+
+
+def _light_columns(rig: LightRig) -> dict[str, float]:
+    """x … b of every light; of spots the axis (ax, ay, az) and cone_angle, too."""
+    columns: dict[str, float] = {}
+    for index, light in enumerate(rig):
+        named = dict(zip("xyzrgb", [*light.position.tolist(), *light.intensity.tolist()], strict=True))
+        if isinstance(light, SpotLight):
+            named |= dict(zip(("ax", "ay", "az"), light.direction.tolist(), strict=True))
+            named["cone_angle"] = light.cone_angle
+        columns |= {name if index == 0 else f"{name}_{index}": value for name, value in named.items()}
+    return columns

@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import numpy.typing as npt
 import pandas as pd
 
 from rgspipe.evaluation.arrays import to_array
+from rgspipe.evaluation.tables import match_positions
 from rgspipe.scene import LightRig
 
 COLUMNS = ("target", "occlusion", "method", "views", "step", "seconds", "loss", "position_error")
@@ -17,9 +19,10 @@ def convergence_table(curve: pd.DataFrame, target: dict, truth: LightRig, scene_
     """A fit's steps with the position error of each.
 
     Args:
-        curve: one row a step with `step`, `loss` and where known `seconds` and the light's `x`, `y`, `z`.
+        curve: one row a step with `step`, `loss` and where known `seconds` and the lights' `x`, `y`, `z`, then `x_1`
+            and so on.
         target: `target`, `occlusion`, `method` and `views` of the fit; repeated in every row.
-        truth: true rig, empty if unknown; the error is the distance to its nearest light.
+        truth: true rig, empty if unknown; the error is the largest of the lights after the best matching.
         scene_size: longest side of the scene's bounding box, NaN if unknown.
 
     Returns:
@@ -30,10 +33,21 @@ def convergence_table(curve: pd.DataFrame, target: dict, truth: LightRig, scene_
         raise ValueError(f"a convergence table needs the columns {missing}, found {list(curve.columns)}")
     error = np.full(len(curve), math.nan)
     if truth and {"x", "y", "z"} <= set(curve.columns):
-        positions = curve[["x", "y", "z"]].to_numpy(dtype=float)
         wanted = np.stack([to_array(light.position) for light in truth])
-        error = np.linalg.norm(positions[:, None] - wanted[None], axis=-1).min(axis=1) / scene_size
+        error = np.array([_worst_distance(step, wanted) for step in _positions(curve)]) / scene_size
     seconds = curve["seconds"].to_numpy(dtype=float) if "seconds" in curve.columns else math.nan
     described = {name: target[name] for name in COLUMNS[:4]}
     measured = {"step": curve["step"], "seconds": seconds, "loss": curve["loss"], "position_error": error}
     return pd.DataFrame(described | measured, columns=COLUMNS, index=curve.index).reset_index(drop=True)
+
+
+def _positions(curve: pd.DataFrame) -> npt.NDArray[np.float64]:
+    """(steps, lights, 3) of a fit's steps."""
+    suffixes = ["", *(f"_{k}" for k in range(1, len(curve.columns)) if f"x_{k}" in curve.columns)]
+    lights = [curve[[axis + suffix for axis in "xyz"]].to_numpy(dtype=float) for suffix in suffixes]
+    return np.stack(lights, axis=1)
+
+
+def _worst_distance(found: npt.NDArray[np.float64], wanted: npt.NDArray[np.float64]) -> float:
+    pairs = match_positions(found, wanted)
+    return max(float(np.linalg.norm(found[i] - wanted[j])) for i, j in pairs)

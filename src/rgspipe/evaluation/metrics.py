@@ -108,6 +108,15 @@ def intensity_error(estimate: ArrayLike, truth: ArrayLike) -> float:
     return float(np.abs(estimate[lit] / truth[lit] - 1.0).mean())
 
 
+def angle_between(estimate: ArrayLike, truth: ArrayLike) -> float:
+    """Angle between two directions (3,) of any length, degrees; inf for an estimate that is not finite or zero."""
+    estimate, truth = to_array(estimate), to_array(truth)
+    if not np.isfinite(estimate).all() or not estimate.any():
+        return math.inf
+    across = float(np.linalg.norm(np.cross(estimate, truth)))
+    return math.degrees(math.atan2(across, float(estimate @ truth)))
+
+
 def success(error: float, limit: float = SUCCESS_LIMIT) -> bool:
     """Whether a position error (a fraction of the scene size) is within `limit`; NaN and inf are not."""
     return bool(error <= limit)

@@ -13,7 +13,7 @@ from scipy.optimize import linear_sum_assignment
 
 from rgspipe.evaluation import metrics
 from rgspipe.evaluation.arrays import to_array
-from rgspipe.scene import LightRig
+from rgspipe.scene import Light, LightRig, SpotLight
 
 #: Occlusion classes in the order in which every table and figure shows them.
 CLASSES = ("visible", "out_of_frame", "occluded", "around_corner", "unknown")
@@ -27,11 +27,14 @@ TARGET_COLUMNS = (
     "views",
     "position_error",
     "intensity_error",
+    "axis_error",
+    "cone_error",
     "psnr",
     "seconds",
     "success",
     "lights_found",
     "lights_true",
+    "count_right",
     "x",
     "y",
     "z",
@@ -62,6 +65,9 @@ SUMMARY_COLUMNS = (
     "median_psnr",
     "median_seconds",
     "worst_seconds",
+    "median_axis_error",
+    "median_cone_error",
+    "count_rate",
 )
 
 
@@ -72,11 +78,16 @@ class RigErrors:
     Attributes:
         position: the largest position error of the matched lights, fraction of the scene size.
         intensity: the mean intensity error of the matched lights, a fraction.
+        axis: the largest angle between the axes of the true spots and their matches, degrees; infinite where a match
+            is no spot, NaN without true spots.
+        cone: the largest error of their cone angles, degrees, likewise.
         pairs: (estimate, truth) indices of the matched lights, in the order of the truth.
     """
 
     position: float
     intensity: float
+    axis: float
+    cone: float
     pairs: tuple[tuple[int, int], ...]
 
 
@@ -108,13 +119,27 @@ def rig_errors(estimate: LightRig, truth: LightRig, scene_size: float) -> RigErr
     if not truth:
         raise ValueError("the true rig has no light")
     if not estimate:
-        return RigErrors(math.inf, math.inf, ())
+        lost = math.inf if any(isinstance(light, SpotLight) for light in truth) else math.nan
+        return RigErrors(math.inf, math.inf, lost, lost, ())
     found = np.stack([to_array(light.position) for light in estimate])
     wanted = np.stack([to_array(light.position) for light in truth])
     pairs = match_positions(found, wanted)
     positions = [metrics.position_error(found[i], wanted[j], scene_size) for i, j in pairs]
     intensities = [metrics.intensity_error(estimate[i].intensity, truth[j].intensity) for i, j in pairs]
-    return RigErrors(max(positions), float(np.mean(intensities)), pairs)
+    axis, cone = _spot_errors([(estimate[i], truth[j]) for i, j in pairs])
+    return RigErrors(max(positions), float(np.mean(intensities)), axis, cone, pairs)
+
+
+def _spot_errors(pairs: Sequence[tuple[Light, Light]]) -> tuple[float, float]:
+    """The largest errors of axes and cones [degrees] of matched lights (estimate, truth)."""
+    spots = [(found, wanted) for found, wanted in pairs if isinstance(wanted, SpotLight)]
+    if not spots:
+        return math.nan, math.nan
+    if not all(isinstance(found, SpotLight) for found, _ in spots):
+        return math.inf, math.inf
+    axes = [metrics.angle_between(found.direction, wanted.direction) for found, wanted in spots]
+    cones = [abs(math.degrees(found.cone_angle - wanted.cone_angle)) for found, wanted in spots]
+    return max(axes), max(cones)
 
 
 def target_table(
@@ -148,7 +173,9 @@ def target_table(
         for row in results.to_dict("records")
     ]
     table = pd.DataFrame(rows, columns=list(TARGET_COLUMNS))
-    return table.astype({"success": "boolean", "views": int, "lights_found": int, "lights_true": "Int64"})
+    return table.astype(
+        {"success": "boolean", "count_right": "boolean", "views": int, "lights_found": int, "lights_true": "Int64"}
+    )
 
 
 def summary_table(targets: pd.DataFrame, seed: int, resamples: int = 4000) -> pd.DataFrame:
@@ -196,12 +223,12 @@ def class_order(names: Sequence[str] | pd.Series) -> list[str]:
 
 
 def _target_row(row: dict, estimate: LightRig, truth: LightRig, scene_size: float, limit: float) -> dict:
-    position, intensity, solved = math.nan, math.nan, None
+    position, intensity, axis, cone, solved = math.nan, math.nan, math.nan, math.nan, None
     pairs: tuple[tuple[int, int], ...] = ()
     if truth:
         known_size = math.isfinite(scene_size)
         errors = rig_errors(estimate, truth, scene_size if known_size else 1.0)
-        pairs, intensity = errors.pairs, errors.intensity
+        pairs, intensity, axis, cone = errors.pairs, errors.intensity, errors.axis, errors.cone
         if known_size:
             position = errors.position
             solved = metrics.success(position, limit) and len(estimate) == len(truth)
@@ -209,7 +236,8 @@ def _target_row(row: dict, estimate: LightRig, truth: LightRig, scene_size: floa
     true_light = truth[pairs[0][1]] if pairs else (truth[0] if truth else None)
     return (
         {name: row[name] for name in ("target", "occlusion", "method", "views", "seconds")}
-        | {"position_error": position, "intensity_error": intensity, "success": solved}
+        | {"position_error": position, "intensity_error": intensity, "axis_error": axis, "cone_error": cone}
+        | {"success": solved, "count_right": len(estimate) == len(truth) if truth else None}
         | {"psnr": _number(row.get("psnr")), "result": row.get("result", ""), "reason": row.get("reason", "")}
         | {"lights_found": len(estimate), "lights_true": len(truth) if truth else None}
         | _light_columns(shown, "")
@@ -240,12 +268,21 @@ def _summary(group: pd.DataFrame, seed: int, resamples: int) -> dict[str, float]
         "median_low": low,
         "median_high": high,
         "worst_position_error": float(errors.max()) if errors.size else math.nan,
-        "success_rate": float(group["success"].dropna().astype(float).mean()) if errors.size else math.nan,
+        "success_rate": _rate(group["success"]) if errors.size else math.nan,
         "median_intensity_error": _median(group["intensity_error"]),
         "median_psnr": _median(group["psnr"]),
         "median_seconds": _median(group["seconds"]),
         "worst_seconds": float(group["seconds"].max()),
+        "median_axis_error": _median(group["axis_error"]),
+        "median_cone_error": _median(group["cone_error"]),
+        "count_rate": _rate(group["count_right"]),
     }
+
+
+def _rate(verdicts: pd.Series) -> float:
+    """Share of True among what is known; NaN where nothing is."""
+    known = verdicts.dropna()
+    return float(known.astype(float).mean()) if len(known) else math.nan
 
 
 def _median(values: pd.Series) -> float:

@@ -1,11 +1,12 @@
 """From images of a frozen scene to the lights that made them."""
 
 from rgspipe.fitting.dictionary import LightDictionary, build_dictionary
-from rgspipe.fitting.fit import FitViews, fit_lights, prepare_fit, render_light
+from rgspipe.fitting.fit import FitViews, fit_lights, prepare_fit, render_light, render_rig
 from rgspipe.fitting.paper_adam import AdamOptions
 from rgspipe.fitting.problem import Effects
 from rgspipe.fitting.result import FitResult, FitStatus, Step
 from rgspipe.fitting.search_lm import SearchOptions
+from rgspipe.fitting.spec import LightSpec
 
 __all__ = [
     "AdamOptions",
@@ -14,10 +15,12 @@ __all__ = [
     "FitStatus",
     "FitViews",
     "LightDictionary",
+    "LightSpec",
     "SearchOptions",
     "Step",
     "build_dictionary",
     "fit_lights",
     "prepare_fit",
     "render_light",
+    "render_rig",
 ]

@@ -14,12 +14,15 @@ from rgspipe.fitting.paper_adam import AdamOptions, LightPrior, fit_paper_adam
 from rgspipe.fitting.problem import Effects, LightProblem
 from rgspipe.fitting.result import FitResult
 from rgspipe.fitting.search_lm import SearchOptions, fit_search_lm
+from rgspipe.fitting.spec import LightSpec
+from rgspipe.fitting.spot_candidates import spot_candidates
 from rgspipe.fitting.views import PreparedViews, prepare_views
-from rgspipe.renderer.direct import unit_irradiance
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.pixel_direct import surfel_shares
+from rgspipe.renderer.rig import Rig, unit_response
+from rgspipe.renderer.spot import spot_share
 from rgspipe.renderer.view_weights import ViewWeights
-from rgspipe.scene import Camera, PointLight
+from rgspipe.scene import Camera, Light, LightRig, PointLight, SpotLight
 
 METHODS = ("search_lm", "paper_adam")
 
@@ -30,12 +33,12 @@ class FitViews:
 
     Attributes:
         prepared: the pixels and their weights.
-        coarse: images of the dictionary's candidates; None where only `paper_adam` is used.
+        coarse: images of the dictionary's candidates, per kind of light; none where only `paper_adam` is used.
         effects: parts of light transport.
     """
 
     prepared: PreparedViews
-    coarse: CoarseImages | None
+    coarse: tuple[CoarseImages, ...]
     effects: Effects
 
 
@@ -47,15 +50,25 @@ def prepare_fit(
     mask_edges: bool = True,
     dictionary: LightDictionary | None = None,
     effects: Effects | None = None,
+    spec: LightSpec | None = None,
 ) -> FitViews:
     """What all targets of one set of cameras share; see `fit_lights` for the arguments."""
     effects = effects or Effects()
     weights = [frozen.view(view) if isinstance(view, Camera) else view for view in views]
     prepared = prepare_views(frozen, weights, masks=masks, mask_edges=mask_edges, at_pixels=effects.at_pixels)
-    coarse = None
-    if dictionary is not None:
-        coarse = coarse_images(prepared, dictionary, interreflection=effects.interreflection)
+    coarse = () if dictionary is None else _candidates(prepared, dictionary, effects, spec or LightSpec())
     return FitViews(prepared, coarse, effects)
+
+
+def _candidates(
+    prepared: PreparedViews, dictionary: LightDictionary, effects: Effects, spec: LightSpec
+) -> tuple[CoarseImages, ...]:
+    """Candidates of the kinds of light that are looked for; points first."""
+    bounces = effects.interreflection
+    points = () if spec.type == "spot" else (coarse_images(prepared, dictionary, interreflection=bounces),)
+    if not spec.spots:
+        return points
+    return (*points, spot_candidates(prepared, dictionary, spec.shapes(), interreflection=bounces))
 
 
 def fit_lights(
@@ -72,13 +85,14 @@ def fit_lights(
     adam: AdamOptions | None = None,
     training_lights: Sequence[PointLight] = (),
     seed: int = 0,
+    spec: LightSpec | None = None,
 ) -> FitResult:
-    """Recover one point light from images of a frozen scene.
+    """Recover the lights of images of a frozen scene.
 
     Args:
         frozen: the scene.
-        views: the images' cameras, or their weights; or what `prepare_fit` made of them, and then `masks`,
-            `mask_edges`, `dictionary` and `effects` are those that it was given.
+        views: the images' cameras, or their weights; or what `prepare_fit` made of them for the same `spec`, and then
+            `masks`, `mask_edges`, `dictionary` and `effects` are those that it was given.
         images: (H, W, 3) linear radiance per view, premultiplied by alpha.
         method: "search_lm" or "paper_adam".
         masks: (H, W) per view, the scene's share of each pixel (the image's alpha); 1 if None.
@@ -88,9 +102,10 @@ def fit_lights(
         search, adam: settings of the methods.
         training_lights: lights of known images, where `paper_adam` starts from.
         seed: of every draw; the same seed gives the same result.
+        spec: what is known of the lights: type, number, spots' profile; one point light if None.
 
     Returns:
-        The light, why the fit stopped, and how it got there. A target that is black gives a result without
+        The lights, why the fit stopped, and how it got there. A target that is black gives a result without
         lights, not an error.
 
     Raises:
@@ -102,32 +117,47 @@ def fit_lights(
     if not isinstance(views, FitViews):
         if method == "search_lm" and dictionary is None:
             dictionary = build_dictionary(frozen, seed=seed, shadows=(effects or Effects()).shadows)
-        views = prepare_fit(frozen, views, masks=masks, mask_edges=mask_edges, dictionary=dictionary, effects=effects)
+        views = prepare_fit(
+            frozen, views, masks=masks, mask_edges=mask_edges, dictionary=dictionary, effects=effects, spec=spec
+        )
     stacked = views.prepared.stack_images(images)
     problem = LightProblem.create(views.prepared, stacked, views.effects)
     if method == "paper_adam":
         return fit_paper_adam(problem, stacked, adam or AdamOptions(), LightPrior.of(training_lights), seed)
-    if views.coarse is None:
+    if not views.coarse:
         raise ValueError("search_lm needs a dictionary: pass one to prepare_fit")
-    return fit_search_lm(problem, views.coarse, search or SearchOptions())
+    return fit_search_lm(problem, views.coarse, search or SearchOptions(), spec)
 
 
-def render_light(views: FitViews, light: PointLight | None) -> list[Tensor]:
-    """(H, W, 3) image per view of the scene under `light`, with the fit's effects; black without a light."""
+def render_light(views: FitViews, light: Light | None) -> list[Tensor]:
+    """`render_rig` of one light, or of none."""
+    return render_rig(views, () if light is None else (light,))
+
+
+def render_rig(views: FitViews, rig: LightRig) -> list[Tensor]:
+    """(H, W, 3) image per view of the scene under `rig`, with the fit's effects; black without lights."""
     prepared, effects = views.prepared, views.effects
     operator, frozen = prepared.all_pixels, prepared.frozen
-    if light is None:
-        stacked = torch.zeros((operator.shape[0], 3), device=operator.matrix.device)
-    else:
-        irradiance, _ = unit_irradiance(frozen.bvh, light.position[None], effects.shadows)
-        direct, radiance = (frozen.radiance(irradiance.T, more)[:, :, 0] for more in (False, effects.interreflection))
+    stacked = torch.zeros((operator.shape[0], 3), device=operator.matrix.device)
+    if rig:
+        indirect = effects.interreflection
+        irradiance = unit_response(frozen.bvh, Rig.of(rig), effects.shadows).irradiance.T
+        strength = torch.stack([light.intensity for light in rig]).to(irradiance)
+        radiance = frozen.radiance(irradiance, indirect)
         if prepared.pixel_direct:
-            shares = surfel_shares(frozen.bvh, light.position, effects.shadows)
-            sharp = torch.cat([one.image(light.position, *shares)[:, :, 0] for one in prepared.pixel_direct])
-            stacked = operator @ (radiance - direct) + sharp
-        else:
-            stacked = operator @ radiance
-        stacked = stacked * light.intensity.to(radiance)
+            radiance = radiance - frozen.radiance(irradiance, indirect=False)
+            stacked = sum(_direct_at_pixels(views, light) * light.intensity.to(stacked) for light in rig)
+        stacked = stacked + operator @ torch.einsum("ncl,lc->nc", radiance, strength)
     cameras = [view.camera for view in prepared.views]
     parts = stacked.split([camera.pixel_count for camera in cameras])
     return [part.reshape(camera.height, camera.width, 3) for part, camera in zip(parts, cameras, strict=True)]
+
+
+def _direct_at_pixels(views: FitViews, light: Light) -> Tensor:
+    """(all pixels, 3) direct image of a light of unit intensity, where pixels look."""
+    prepared, position = views.prepared, light.position
+    shares = surfel_shares(prepared.frozen.bvh, position, views.effects.shadows)
+    image = torch.cat([one.image(position, *shares)[:, :, 0] for one in prepared.pixel_direct])
+    if isinstance(light, SpotLight):
+        image = image * spot_share(light, prepared.all_points.to(position))[:, None].to(image)
+    return image

@@ -14,10 +14,12 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from rgspipe.fitting.moments import covariance
+from rgspipe.fitting.parameters import Emitter
 from rgspipe.fitting.problem import Effects, LightProblem
+from rgspipe.fitting.refine import State
 from rgspipe.fitting.result import REASONS, FitResult, FitStatus, Step, dark_result
 from rgspipe.fitting.ssim import ssim
+from rgspipe.fitting.uncertainty import light_covariances
 from rgspipe.fitting.views import PreparedViews
 from rgspipe.progress import track
 from rgspipe.renderer.direct import differentiable_irradiance
@@ -152,12 +154,10 @@ def fit_paper_adam(
     steps, status = _descend(problem, target, position, log_intensity, ball, options, begin)
     last = steps[-1]
     status = FitStatus.AT_BOUND if ball.at_bound(last.position) else status
-    columns = problem.evaluate(last.position)
-    ones = torch.ones_like(problem.target[:, :1])
-    unit = torch.tensor([1.0] * 3 + [problem.scale] * 3, dtype=torch.float64)
-    spread = covariance(problem.moments(columns, ones), last.intensity / problem.scale, problem.target.numel())
+    emitter = Emitter(last.position)
+    state = State((emitter,), [problem.evaluate(emitter)], last.intensity[None] / problem.scale)
     return FitResult(
-        lights=(PointLight(last.position, last.intensity),),
+        lights=last.lights,
         status=status,
         reason=REASONS[status],
         loss=last.loss,
@@ -165,7 +165,7 @@ def fit_paper_adam(
         evaluations=len(steps) + 1,
         lights_tried=1,
         seconds=time.perf_counter() - begin,
-        covariance=(spread * unit[:, None] * unit[None, :],),
+        covariance=light_covariances(problem, state),
         trajectory=tuple(steps),
     )
 
@@ -212,7 +212,8 @@ def _descend(
 
     def record(loss: Tensor) -> Step:
         seconds = time.perf_counter() - begin
-        return Step(float(loss.detach()), position.detach().clone(), log_intensity.detach().exp(), seconds)
+        light = PointLight(position.detach().clone(), log_intensity.detach().exp())
+        return Step(float(loss.detach()), (light,), seconds)
 
     steps: list[Step] = []
     for index in track(range(options.epochs * options.steps), "Adam", unit="step"):

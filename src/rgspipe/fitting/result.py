@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 from torch import Tensor
@@ -16,6 +17,7 @@ class FitStatus(StrEnum):
     CONVERGED = "converged"
     MAX_ITERATIONS = "max_iterations"
     AT_BOUND = "at_bound"
+    AMBIGUOUS = "ambiguous"
     NOT_ENOUGH_LIGHT = "not_enough_light"
 
 
@@ -25,6 +27,8 @@ REASONS = {
     FitStatus.MAX_ITERATIONS: "All iterations were used while the loss was still falling: allow more of them.",
     FitStatus.AT_BOUND: "The light was stopped at the edge of the region that is searched: the true light may be "
     "outside, or these views do not tell its distance; give more views or a larger region.",
+    FitStatus.AMBIGUOUS: "Clearly different lights explain the target as well as these: give more views, or say more "
+    "of the lights (their number, their type).",
     FitStatus.NOT_ENOUGH_LIGHT: "The target is black, or no light in the scene can explain it: check its exposure, "
     "its mask and that it shows this scene.",
 }
@@ -36,15 +40,23 @@ class Step:
 
     Attributes:
         loss: the method's own loss.
-        position: (3,) float64, scene units.
-        intensity: (3,) float64, W/sr.
+        lights: the rig, float64.
         seconds: since the fit began.
     """
 
     loss: float
-    position: Tensor
-    intensity: Tensor
+    lights: LightRig
     seconds: float
+
+    @property
+    def position(self) -> Tensor:
+        """(3,) of the first light, scene units."""
+        return self.lights[0].position
+
+    @property
+    def intensity(self) -> Tensor:
+        """(3,) of the first light, W/sr."""
+        return self.lights[0].intensity
 
 
 @dataclass(frozen=True)
@@ -57,13 +69,16 @@ class FitResult:
         reason: the status in words, with what to do.
         loss: the method's final loss.
         iterations: accepted steps, over all starts.
-        evaluations: renderings of the scene, over all starts.
+        evaluations: renderings of a light, over all starts.
         lights_tried: the largest number of lights that was considered.
         seconds: duration.
-        covariance: per light (6, 6) float64 of (x, y, z, r, g, b): Gauss-Newton, with the residual as
-            independent noise of the pixels. Model errors are shared by neighbouring pixels, so it is too
-            small (by 6 to 12 times in standard deviation on trained scenes); its calibration is not done.
+        covariance: per light a symmetric float64 matrix, of (x, y, z, r, g, b) for a point light; for a spot the axis
+            as a vector follows the position, and where they were free the cone angle and (Gaussian) falloff [rad]:
+            (x, y, z, ax, ay, az, [cone, [falloff]], r, g, b). Gauss-Newton, with the residual as independent noise of
+            the pixels. Model errors are shared by neighbouring pixels, so it is too small (by 6 to 12 times in
+            standard deviation on trained scenes); its calibration is not done.
         trajectory: the steps from the start that won to the end, the start included.
+        costs: by number of lights that was tried, the robust cost of the best rig of so many; see `fitting.number`.
     """
 
     lights: LightRig
@@ -76,6 +91,7 @@ class FitResult:
     seconds: float
     covariance: tuple[Tensor, ...]
     trajectory: tuple[Step, ...]
+    costs: Mapping[int, float] = field(default_factory=dict)
 
 
 def dark_result(seconds: float) -> FitResult:

@@ -1,39 +1,44 @@
-"""`fit=search_lm`: candidates from a dictionary, then Levenberg-Marquardt with the intensity in closed form."""
+"""`fit=search_lm`: candidates in closed form, then Levenberg-Marquardt on all lights, intensities in closed form."""
 
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
-import torch
-from torch import Tensor
-
-from rgspipe.fitting.coarse import CoarseImages, best_candidates, candidate_costs
-from rgspipe.fitting.moments import Moments, covariance
+from rgspipe.fitting.coarse import CoarseImages
+from rgspipe.fitting.judge import (
+    CLEARLY_APART,
+    LEAST_DROP,
+    best_state,
+    drop,
+    equally_good,
+    rig_distance,
+    robust_losses,
+    worth_keeping,
+)
+from rgspipe.fitting.parameters import Emitter
 from rgspipe.fitting.problem import LightProblem
-from rgspipe.fitting.result import REASONS, FitResult, FitStatus, Step, dark_result
-from rgspipe.scene import PointLight
-
-#: Starts stand this far apart, as a part of the scene's size.
-SEPARATION = 0.16
+from rgspipe.fitting.refine import PLAIN, ROBUST, Region, State, reevaluate, refine, search_region, start_from
+from rgspipe.fitting.result import REASONS, FitResult, FitStatus, dark_result
+from rgspipe.fitting.spec import MOST_LIGHTS, LightSpec
+from rgspipe.fitting.starts import Candidates, Rig
+from rgspipe.fitting.uncertainty import light_covariances
+from rgspipe.renderer.spot_share import rim_width
 
 #: Steps of each start before the best one is chosen.
 SHORT_ITERATIONS = 6
 
-#: A step is at most this part of the scene's size.
-LONGEST_STEP = 0.12
+#: Spots are refined with rims that are wider by so much [rad], one after the other; the better half of the starts goes
+#: on each time. A rim that is narrower by nature than the last is fitted with HARD_RIM.
+SOFTNESS = (0.3, 0.15, 0.05, 0.0)
+HARD_RIM = 0.01
 
-#: A step below this part of the scene's size ends a refinement.
-SHORTEST_STEP = 2e-5
+#: Starts for each wanted one, where spots are among the candidates.
+SPOT_STARTS = 3
 
-#: How far outside the bounding box a light may go, in parts of the scene's size.
-MARGIN = 0.25
-
-#: Damping: at first, when a step succeeds, when it fails; and how often it may fail in a row.
-DAMPING, EASED, RAISED, ATTEMPTS = 1e-2, 0.2, 6.0, 5
-
-#: Residuals beyond this many medians lose their weight (Cauchy loss).
-CAUCHY_MEDIANS = 3.0
+#: A rival is refined, to see whether it is as good, if its robust cost is below this many times the best.
+NEAR_RIVAL = 2.0
 
 
 @dataclass(frozen=True)
@@ -49,197 +54,218 @@ class SearchOptions:
     iterations: int = 30
 
 
-@dataclass(frozen=True)
-class Weighting:
-    """How residuals count: relative to the pixel's brightness or linear, with a Cauchy loss or squared."""
+def fit_search_lm(
+    problem: LightProblem,
+    coarse: Sequence[CoarseImages],
+    options: SearchOptions,
+    spec: LightSpec | None = None,
+) -> FitResult:
+    """The lights that explain a target: refine the candidates that look most like it, polish the best.
 
-    relative: bool
-    robust: bool
-
-    def base(self, problem: LightProblem) -> Tensor:
-        """(P, 1) weights before the loss."""
-        return problem.relative_weights() if self.relative else torch.ones_like(problem.target[:, :1])
-
-    def squared(self, base: Tensor, residual: Tensor, scale: float) -> Tensor:
-        """(P, 1) or (P, 3) squared weights of iteratively reweighted least squares."""
-        if not self.robust:
-            return base.square()
-        return base.square() / (1.0 + (base * residual / scale).square())
-
-
-@dataclass
-class _State:
-    """Where a refinement stands."""
-
-    position: Tensor
-    columns: Tensor
-    intensity: Tensor
-    steps: list[Step] = field(default_factory=list)
-    evaluations: int = 0
-    iterations: int = 0
-    status: FitStatus = FitStatus.MAX_ITERATIONS
-
-
-@dataclass(frozen=True)
-class _Region:
-    lower: Tensor
-    upper: Tensor
-    size: float
-
-    def clip(self, position: Tensor) -> Tensor:
-        return torch.minimum(torch.maximum(position, self.lower), self.upper)
-
-    def at_bound(self, position: Tensor) -> bool:
-        near = 1e-6 * self.size
-        return bool(((position - self.lower < near) | (self.upper - position < near)).any())
-
-
-def search_region(problem: LightProblem) -> _Region:
-    """The scene's bounding box and a margin around it."""
-    frozen = problem.views.frozen
-    lower, upper = (corner.double().cpu() for corner in frozen.bounds)
-    return _Region(lower - MARGIN * frozen.size, upper + MARGIN * frozen.size, frozen.size)
-
-
-def fit_search_lm(problem: LightProblem, coarse: CoarseImages, options: SearchOptions) -> FitResult:
-    """One point light: refine the candidates that look most like the target, polish the best.
-
-    The search uses relative weights and a Cauchy loss, which forgive what the model gets wrong near edges and
-    count dim pixels; the polish uses plain squares, whose bright pixels tell the most about the light.
+    Args:
+        coarse: the candidates' images, of point lights first where there are several.
+        spec: what is known of the lights; one point light if None.
     """
     begin = time.perf_counter()
-    costs, intensities = candidate_costs(problem, coarse) if not problem.black else (torch.zeros(0), torch.zeros(0, 3))
-    lit = intensities.sum(dim=1) > 0
-    costs = torch.where(lit, costs, torch.inf)
-    if not bool(lit.any()):
+    spec = spec or LightSpec()
+    if problem.black:
         return dark_result(time.perf_counter() - begin)
-    region = search_region(problem)
-    count = min(options.starts, int(lit.sum()))
-    chosen = best_candidates(costs, coarse.positions.cpu(), count, SEPARATION * region.size)
-    robust = Weighting(relative=True, robust=True)
-    starts = [_start(problem, coarse.positions[index].double().cpu(), robust, begin) for index in chosen]
-    for state in starts:
-        refine(problem, state, robust, min(SHORT_ITERATIONS, options.iterations), region, begin)
-    best = _best(problem, starts, robust)
-    if problem.views.pixel_direct:
-        problem = problem.sharpest()
-        best.columns = problem.evaluate(best.position)
-        best.evaluations += 1
-    refine(problem, best, Weighting(relative=False, robust=False), options.iterations, region, begin)
+    candidates = [Candidates.of(problem, images, spec.cone_free) for images in coarse]
+    candidates = [one for one in candidates if one.lit]
+    if not candidates:
+        return dark_result(time.perf_counter() - begin)
+    search = _Search(problem, candidates, options, spec, search_region(problem), begin)
+    best, costs = search.known(spec.count) if spec.count is not None else search.unknown()
+    ambiguous = search.ambiguous(best)
+    search.polish(best)
     if not bool((best.intensity > 0).any()):
         return dark_result(time.perf_counter() - begin)
-    return _result(problem, best, starts, region, begin)
+    return search.result(best, costs, ambiguous)
 
 
-def fit_from(problem: LightProblem, start: Tensor, iterations: int = 30) -> FitResult:
-    """One point light from a known start (3,), by plain least squares: no search, no robust loss."""
+def fit_from(problem: LightProblem, start: Sequence[Emitter], iterations: int = 30) -> FitResult:
+    """Lights from known starts, by plain least squares: no search, no robust loss."""
     begin = time.perf_counter()
     if problem.black:
         return dark_result(0.0)
-    problem = problem.sharpest()
-    region, plain = search_region(problem), Weighting(relative=False, robust=False)
-    state = _start(problem, start.double().cpu(), plain, begin)
-    refine(problem, state, plain, iterations, region, begin)
-    return _result(problem, state, [state], region, begin)
+    search = _Search(problem.sharpest(), [], SearchOptions(0, iterations), LightSpec(), search_region(problem), begin)
+    state = start_from(search.problem, start, PLAIN, begin)
+    refine(search.problem, state, PLAIN, iterations, search.region, begin)
+    search.states.append(state)
+    return search.result(state, {}, False)
 
 
-def refine(
-    problem: LightProblem, state: _State, weighting: Weighting, iterations: int, region: _Region, begin: float
-) -> None:
-    """Move `state` to a minimum of the weighted loss, by at most `iterations` accepted steps."""
-    base, damping = weighting.base(problem), DAMPING
-    state.status = FitStatus.MAX_ITERATIONS
-    for _ in range(iterations):
-        residual = problem.residual(state.columns, state.intensity)
-        weights = weighting.squared(base, residual, cauchy_scale(base * residual))
-        system = problem.moments(state.columns, weights)
-        moved, damping = _attempt(problem, state, system, weights, damping, region)
-        if moved == 0.0:
-            state.status = FitStatus.CONVERGED
-            break
-        state.iterations += 1
-        state.steps.append(_step(problem, state, begin))
-        if moved < SHORTEST_STEP * region.size:
-            state.status = FitStatus.CONVERGED
-            break
-    # The intensity that belongs to the last position under this weighting.
-    residual = problem.residual(state.columns, state.intensity)
-    weights = weighting.squared(base, residual, cauchy_scale(base * residual))
-    state.intensity = problem.moments(state.columns, weights).intensity
+class _Search:
+    """One target's search, and what it has tried."""
+
+    def __init__(
+        self,
+        problem: LightProblem,
+        candidates: Sequence[Candidates],
+        options: SearchOptions,
+        spec: LightSpec,
+        region: Region,
+        begin: float,
+    ) -> None:
+        self.problem, self.candidates, self.options, self.spec = problem, candidates, options, spec
+        self.region, self.begin = region, begin
+        self.states: list[State] = []
+        self.rivals: list[State] = []
+
+    def known(self, lights: int) -> tuple[State, dict[int, float]]:
+        """The best rig of a given number of lights (fewer where there are too few candidates), and its cost."""
+        best = None
+        # Points and spots have candidates of their own, so rigs of both grow light by light.
+        for count in range(1, lights + 1) if self.spec.type == "auto" else (lights,):
+            best = self._best_of(count, best) or best
+        while best is None:
+            lights -= 1
+            best = self._best_of(lights, None)
+        return best, self._costs([best])
+
+    def unknown(self) -> tuple[State, dict[int, float]]:
+        """The best rig of the least number of lights to which one more adds too little, and the costs of all tried."""
+        best, tried = None, []
+        for lights in range(1, MOST_LIGHTS + 1):
+            state = self._best_of(lights, best)
+            if state is None:
+                break
+            refine(self.problem, state, ROBUST, self.options.iterations, self.region, self.begin)
+            tried.append(state)
+            if best is not None and drop(self.problem, best, state) < LEAST_DROP:
+                break
+            best, rivals = state, self.rivals
+        self.rivals = rivals
+        return self._pruned(best), self._costs(tried)
+
+    def _costs(self, tried: Sequence[State]) -> dict[int, float]:
+        """Robust cost by number of lights, all at one scale."""
+        losses = robust_losses(self.problem, tried)
+        return {len(state.emitters): float(loss.mean()) for state, loss in zip(tried, losses, strict=True)}
+
+    def _best_of(self, lights: int, previous: State | None) -> State | None:
+        """The best rig of `lights` lights of the types that are looked for; None without candidates for so many."""
+        self.rivals = []
+        starts = [self._starts(one, lights, previous) for one in self.candidates]
+        found = [self._refined(rigs) for rigs in starts if rigs]
+        if not found:
+            return None
+        best = found[0]
+        for richer in found[1:]:
+            if drop(self.problem, best, richer) >= LEAST_DROP:
+                best = richer
+        return self._with_plain_lights(best) if self.spec.type == "auto" else best
+
+    def _starts(self, candidates: Candidates, lights: int, previous: State | None) -> list[Rig]:
+        spots = candidates.coarse.axes is not None
+        count = self.options.starts * (SPOT_STARTS if spots else 1)
+        rigs = candidates.rigs(lights, count, self.region.size)
+        if previous is not None and len(previous.emitters) == lights - 1:
+            rigs = [*candidates.extended(previous, max(2, count // 2), self.region.size), *rigs]
+        return rigs
+
+    def _refined(self, rigs: Sequence[Rig]) -> State:
+        """The best of several starts after a few steps each."""
+        iterations = min(SHORT_ITERATIONS, self.options.iterations)
+        spots = any(emitter.is_spot for rig in rigs for emitter in rig)
+        states = [self._start(_soft(rig, SOFTNESS[0]) if spots else rig) for rig in rigs]
+        for softness in SOFTNESS if spots else (0.0,):
+            if spots and softness != SOFTNESS[0]:
+                states = _better_half(self.problem, states)
+                for state in states:
+                    state.emitters = _soft(state.emitters, softness)
+                    reevaluate(self.problem, state)
+            for state in states:
+                refine(self.problem, state, ROBUST, iterations, self.region, self.begin)
+        self.rivals += states
+        return best_state(self.problem, states)
+
+    def _start(self, rig: Rig) -> State:
+        state = start_from(self.problem, rig, ROBUST, self.begin)
+        self.states.append(state)
+        return state
+
+    def _with_plain_lights(self, state: State) -> State:
+        """The rig with point lights in the place of those spots whose cones explain too little."""
+        for index, emitter in enumerate(state.emitters):
+            if emitter.is_spot:
+                plain = [*state.emitters]
+                plain[index] = Emitter(emitter.position)
+                other = self._start(tuple(plain))
+                refine(self.problem, other, ROBUST, SHORT_ITERATIONS, self.region, self.begin)
+                state = state if drop(self.problem, other, state) >= LEAST_DROP else other
+        return state
+
+    def _pruned(self, state: State) -> State:
+        """The rig without lights that add next to nothing or coincide with another."""
+        kept = worth_keeping(state, self.region.size)
+        if len(kept) == len(state.emitters) or not kept:
+            return state
+        fewer = self._start(tuple(state.emitters[index] for index in kept))
+        refine(self.problem, fewer, ROBUST, self.options.iterations, self.region, self.begin)
+        return fewer
+
+    def ambiguous(self, best: State) -> bool:
+        """Whether a clearly different rig explains the target as well; rivals that come near are refined first."""
+        rivals = [
+            state
+            for state in self.rivals
+            if rig_distance(state.emitters, best.emitters) > CLEARLY_APART * self.region.size
+        ]
+        if not rivals:
+            return False
+        rival = best_state(self.problem, rivals)
+        losses = [float(loss.mean()) for loss in robust_losses(self.problem, [best, rival])]
+        if losses[1] > NEAR_RIVAL * losses[0]:
+            return False
+        pair = [replace(state, steps=[], evaluations=0, iterations=0) for state in (best, rival)]
+        self.states += pair
+        for state in pair:
+            refine(self.problem, state, ROBUST, 2 * SHORT_ITERATIONS, self.region, self.begin)
+        apart = rig_distance(pair[0].emitters, pair[1].emitters) > CLEARLY_APART * self.region.size
+        return apart and equally_good(self.problem, *pair)
+
+    def polish(self, best: State) -> None:
+        """Plain squares to the end, with direct light where pixels look if the views were made ready for that."""
+        sharpest = self.problem.sharpest()
+        if sharpest is not self.problem:
+            self.problem = sharpest
+            reevaluate(self.problem, best)
+        refine(self.problem, best, PLAIN, self.options.iterations, self.region, self.begin)
+
+    def result(self, best: State, costs: dict[int, float], ambiguous: bool) -> FitResult:
+        status = best.status
+        if ambiguous:
+            status = FitStatus.AMBIGUOUS
+        if any(self.region.at_bound(emitter.position) for emitter in best.emitters):
+            status = FitStatus.AT_BOUND
+        return FitResult(
+            lights=best.lights(self.problem),
+            status=status,
+            reason=REASONS[status],
+            loss=self.problem.unexplained(best.columns, best.intensity),
+            iterations=sum(state.iterations for state in self.states),
+            evaluations=sum(state.evaluations for state in self.states),
+            lights_tried=max([*costs, len(best.emitters)]),
+            seconds=time.perf_counter() - self.begin,
+            covariance=light_covariances(self.problem, best),
+            trajectory=(*best.steps, best.record(self.problem, self.begin)),
+            costs=costs,
+        )
 
 
-def _attempt(
-    problem: LightProblem, state: _State, system: Moments, weights: Tensor, damping: float, region: _Region
-) -> tuple[float, float]:
-    """Take one damped step that lowers the weighted cost; the length moved (0 if there is none) and new damping."""
-    matrix, direction = system.position_system()
-    cost = system.cost
-    for _ in range(ATTEMPTS):
-        position = region.clip(state.position + _damped_step(matrix, direction, damping, LONGEST_STEP * region.size))
-        moved = float((position - state.position).norm())
-        if moved < 0.01 * SHORTEST_STEP * region.size:
-            break
-        columns = problem.evaluate(position)
-        state.evaluations += 1
-        trial = problem.moments(columns, weights)
-        if trial.cost < cost:
-            state.position, state.columns, state.intensity = position, columns, trial.intensity
-            return moved, max(EASED * damping, 1e-6)
-        damping *= RAISED
-    return 0.0, damping
-
-
-def _damped_step(matrix: Tensor, direction: Tensor, damping: float, longest: float) -> Tensor:
-    """(3,) Levenberg-Marquardt step, no longer than `longest`; zero where nothing is determined."""
-    trace = float(matrix.trace())
-    if not trace > 0.0:
-        return torch.zeros(3, dtype=torch.float64)
-    damped = matrix + damping * torch.diag(matrix.diagonal()) + 1e-9 * trace * torch.eye(3, dtype=torch.float64)
-    step = torch.linalg.solve(damped, direction)
-    return step * min(1.0, longest / max(float(step.norm()), 1e-300))
-
-
-def cauchy_scale(weighted: Tensor) -> float:
-    """The residual at which the Cauchy loss lets go: three medians, above rounding."""
-    return CAUCHY_MEDIANS * float(weighted.abs().median()) + 1e-6
-
-
-def _start(problem: LightProblem, position: Tensor, weighting: Weighting, begin: float) -> _State:
-    columns = problem.evaluate(position)
-    intensity = problem.moments(columns, weighting.base(problem).square()).intensity
-    state = _State(position, columns, intensity, evaluations=1)
-    state.steps.append(_step(problem, state, begin))
-    return state
-
-
-def _step(problem: LightProblem, state: _State, begin: float) -> Step:
-    loss = problem.unexplained(state.columns, state.intensity)
-    return Step(loss, state.position.clone(), state.intensity * problem.scale, time.perf_counter() - begin)
-
-
-def _best(problem: LightProblem, states: list[_State], weighting: Weighting) -> _State:
-    """The state with the least Cauchy loss, all judged at the scale of the one that fits best."""
-    base = weighting.base(problem)
-    residuals = [base * problem.residual(state.columns, state.intensity) for state in states]
-    scale = min(cauchy_scale(residual) for residual in residuals)
-    losses = [float((residual.double() / scale).square().log1p().mean()) for residual in residuals]
-    return states[min(range(len(states)), key=losses.__getitem__)]
-
-
-def _result(problem: LightProblem, best: _State, starts: list[_State], region: _Region, begin: float) -> FitResult:
-    ones = torch.ones_like(problem.target[:, :1])
-    spread = covariance(problem.moments(best.columns, ones), best.intensity, problem.target.numel())
-    unit = torch.tensor([1.0] * 3 + [problem.scale] * 3, dtype=torch.float64)
-    status = FitStatus.AT_BOUND if region.at_bound(best.position) else best.status
-    return FitResult(
-        lights=(PointLight(best.position, best.intensity * problem.scale),),
-        status=status,
-        reason=REASONS[status],
-        loss=problem.unexplained(best.columns, best.intensity),
-        iterations=sum(state.iterations for state in starts),
-        evaluations=sum(state.evaluations for state in starts),
-        lights_tried=1,
-        seconds=time.perf_counter() - begin,
-        covariance=(spread * unit[:, None] * unit[None, :],),
-        trajectory=(*best.steps, _step(problem, best, begin)),
+def _soft(rig: Sequence[Emitter], softness: float) -> Rig:
+    """The rig with rims that are `softness` wider, but none narrower than HARD_RIM."""
+    return tuple(
+        replace(emitter, softness=max(softness, HARD_RIM if rim_width(emitter.shape) < HARD_RIM else 0.0))
+        if emitter.is_spot
+        else emitter
+        for emitter in rig
     )
+
+
+def _better_half(problem: LightProblem, states: Sequence[State]) -> list[State]:
+    """The half of the rigs with the lower robust losses, at least two, best first."""
+    losses = [float(loss.mean()) for loss in robust_losses(problem, states)]
+    order = sorted(range(len(states)), key=losses.__getitem__)
+    return [states[index] for index in order[: max(2, (len(order) + 1) // 2)]]

@@ -51,6 +51,16 @@ class PreparedViews:
         """(all pixels of all views, N) weights, edges included."""
         return stack([view.operator for view in self.views])
 
+    @cached_property
+    def all_points(self) -> Tensor:
+        """(all pixels of all views, 3) float64 place that each pixel looks at; for views with `pixel_direct`."""
+        return torch.cat([direct.points for direct in self.pixel_direct])
+
+    @cached_property
+    def points(self) -> Tensor:
+        """(P, 3) float64 place that each trusted pixel looks at; for views with `pixel_direct`."""
+        return self.all_points[self.pixels]
+
     def stack_images(self, images: Sequence[Tensor]) -> Tensor:
         """(all pixels, 3) float32 of one image (H, W, 3) per view.
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 import torch
 from torch import Tensor
@@ -18,6 +20,9 @@ SHADOW_RAYS = 16
 
 #: A pixel whose surfels are lit by more than this and less than 1 minus this lies on a shadow's edge.
 LIT_OR_NOT = 2e-3
+
+#: How far from a surfel's centre, in its scales, a pixel on an edge may look at it.
+ON_EDGE_REACH = 2.5
 
 
 class PixelDirect:
@@ -39,6 +44,25 @@ class PixelDirect:
         self._receivers = _heaviest(view)
         self._places = even_places(SHADOW_RAYS)
         self._plain = ~view.edges.to(bvh.device) & (view.coverage.to(bvh.device) > 0.5)
+
+    @cached_property
+    def points(self) -> Tensor:
+        """(P, 3) float64 place on the surface that each pixel's centre looks at, where spots are evaluated.
+
+        It lies in the plane of the surfel with the largest weight; on edges, where that plane may be missed, within
+        two and a half scales of its centre.
+        """
+        surfels, receivers = self._bvh.surfels, self._receivers.to(self._bvh.device)
+        origins, directions, _ = (part.to(self._bvh.device) for part in self._view.camera.rays())
+        centers, normals = surfels.centers.double()[receivers], surfels.normals.double()[receivers]
+        across = (directions * normals).sum(dim=1)
+        facing = across.abs() > 1e-6
+        distance = ((centers - origins) * normals).sum(dim=1) / torch.where(facing, across, 1.0)
+        beside = torch.where(facing[:, None], origins + distance[:, None] * directions - centers, 0.0)
+        reach = ON_EDGE_REACH * surfels.scales.detach().double().prod(dim=1).sqrt()[receivers]
+        held = (reach / beside.norm(dim=1).clamp(min=1e-30)).clamp(max=1.0)
+        held = torch.where(self._view.edges.to(held.device), held, torch.ones_like(held))
+        return centers + held[:, None] * beside
 
     def image(self, position: Tensor, share: Tensor, slope: Tensor) -> Tensor:
         """(P, 3, 4) radiance under a light of 1 W/sr in RGB at `position` (3,), and its derivative towards x, y, z.

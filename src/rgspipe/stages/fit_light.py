@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
@@ -24,16 +25,19 @@ from rgspipe.fitting import (
     Effects,
     FitViews,
     LightDictionary,
+    LightSpec,
     SearchOptions,
     build_dictionary,
     fit_lights,
     prepare_fit,
 )
+from rgspipe.fitting.spec import MOST_LIGHTS
 from rgspipe.progress import track
 from rgspipe.renderer.effect_bounds import EffectBounds
 from rgspipe.renderer.effects import EffectChoice, RigKind, choose_effects
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.monte_carlo import MonteCarloSolver
+from rgspipe.renderer.spot import SpotShape
 from rgspipe.scene import PointLight
 from rgspipe.stages.base import Stage, StageContext
 from rgspipe.stages.sources import image_stage, require_images
@@ -102,6 +106,7 @@ class _Fitter:
             ),
             training_lights=self.training_lights,
             seed=target_seed(target, self.config),
+            spec=light_spec(self.config),
         )
         write_result(folder / target.name, result, prepared, [view.image for view in views])
 
@@ -115,6 +120,7 @@ class _Fitter:
                 mask_edges=self.config.fit.search.mask_edges,
                 dictionary=self.dictionary,
                 effects=self.effects,
+                spec=light_spec(self.config),
             )
         return self.prepared[key]
 
@@ -149,7 +155,9 @@ def _choice(config: RgspipeConfig, freeze: Artifact) -> tuple[EffectBounds, Effe
     """What the frozen scene calls for under a rig of the kind that is looked for."""
     (bounds, costs), wanted = _measured(freeze), config.effects
     off = [name for name, on in (("shadows", wanted.shadows), ("interreflection", wanted.interreflection)) if not on]
-    kind = RigKind(points=config.light.count)
+    spec = light_spec(config)
+    count = spec.count or MOST_LIGHTS
+    kind = RigKind(0, (spec.shape,) * count) if spec.type == "spot" else RigKind(count)
     return bounds, choose_effects(bounds, wanted.tolerance, kind, milliseconds=costs, off=off)
 
 
@@ -163,6 +171,33 @@ def remarks(config: RgspipeConfig, made: Mapping[str, Artifact]) -> Sequence[str
     if "freeze" not in made:
         return ["effects: decided after freeze"]
     return _choice(config, made["freeze"])[1].reasons
+
+
+def light_spec(config: RgspipeConfig) -> LightSpec:
+    """What the configuration says of the lights that are looked for.
+
+    Raises:
+        InputError: the paper's method is asked for more than one point light, or a rim does not fit its cone.
+    """
+    light, spot = config.light, config.light.spot
+    if config.fit.method == "paper_adam" and (light.type != "point" or light.count != 1):
+        raise InputError(
+            "light",
+            expected="light.type=point light.count=1 with fit=paper_adam",
+            found=f"light.type={light.type} light.count={light.count}",
+            remedy="Use fit=search_lm for spots and several lights.",
+        )
+    largest = {"smoothstep": 1.0, "gaussian": 89.0, "linear": spot.cone_angle}[spot.profile]
+    if spot.falloff > largest:
+        raise InputError(
+            "light.spot.falloff",
+            expected=f"at most {largest:g} for {spot.profile} and a cone of {spot.cone_angle:g} degrees",
+            found=f"{spot.falloff:g}",
+            remedy="Give a narrower rim.",
+        )
+    rim = spot.falloff if spot.profile == "smoothstep" else math.radians(spot.falloff)
+    shape = SpotShape(spot.profile, math.radians(spot.cone_angle), rim)
+    return LightSpec(light.type, light.count, shape, config.fit.cone == "free")
 
 
 def select_targets(targets: Sequence[Target], config: RgspipeConfig) -> list[Target]:
@@ -251,7 +286,7 @@ def _inputs(config: RgspipeConfig) -> list[str]:
 
 def _keys(config: RgspipeConfig) -> list[str]:
     keys = ["seed", "effects", "light", "fit.method", "fit.target", "views.count", "views.indices"]
-    keys += ["fit.search"] if config.fit.method == "search_lm" else ["fit.adam"]
+    keys += ["fit.search", "fit.cone"] if config.fit.method == "search_lm" else ["fit.adam"]
     return keys if config.fit.target is not None else [*keys, "occlusion", "fit.limit"]
 
 

@@ -1,0 +1,89 @@
+"""How well rigs explain a target, one against the other: which is best, whether another is as good, how many lights."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import torch
+from scipy.optimize import linear_sum_assignment
+from torch import Tensor
+
+from rgspipe.fitting.parameters import Emitter
+from rgspipe.fitting.problem import LightProblem
+from rgspipe.fitting.refine import ROBUST, State, cauchy_scale
+
+#: One more light, or a spot in the place of a point light, must lower the robust cost by this share.
+LEAST_DROP = 0.10
+
+#: Rigs are clearly different where a light is farther from its counterpart than this part of the scene's size, or
+#: where their numbers differ.
+CLEARLY_APART = 0.05
+
+#: Errors of about so many neighbouring pixels are one error: what the model gets wrong is smooth.
+PIXELS_PER_ERROR = 25.0
+
+#: Lights of one type that end closer than this part of the scene's size are one, and a light with less than this share
+#: of the image's energy is none; where the number of lights is not known.
+MERGED, LEAST_ENERGY = 0.03, 0.01
+
+#: Standard deviations between losses within which two rigs are equally good.
+EQUALLY_GOOD = 2.0
+
+
+def robust_losses(problem: LightProblem, states: Sequence[State]) -> list[Tensor]:
+    """(P,) Cauchy loss of each pixel for each rig, relative to brightness, at the scale of the rig that fits best."""
+    base = ROBUST.base(problem)
+    residuals = [base * problem.residual(state.columns, state.intensity) for state in states]
+    scale = min(cauchy_scale(residual) for residual in residuals)
+    return [(residual.double() / scale).square().log1p().mean(dim=1) for residual in residuals]
+
+
+def best_state(problem: LightProblem, states: Sequence[State]) -> State:
+    """The rig with the least robust loss."""
+    losses = [float(loss.mean()) for loss in robust_losses(problem, states)]
+    return states[min(range(len(states)), key=losses.__getitem__)]
+
+
+def drop(problem: LightProblem, simple: State, rich: State) -> float:
+    """By what share the robust cost of `rich` is below that of `simple`."""
+    costs = [float(loss.mean()) for loss in robust_losses(problem, [simple, rich])]
+    return 1.0 - costs[1] / costs[0] if costs[0] > 0.0 else 0.0
+
+
+def equally_good(problem: LightProblem, best: State, other: State) -> bool:
+    """Whether `other` explains the target as well as `best`, within the spread of what both leave unexplained."""
+    one, two = robust_losses(problem, [best, other])
+    difference = two - one
+    errors = max(1.0, len(difference) / PIXELS_PER_ERROR)
+    return float(difference.mean()) <= EQUALLY_GOOD * float(difference.std()) / math.sqrt(errors)
+
+
+def rig_distance(one: Sequence[Emitter], other: Sequence[Emitter]) -> float:
+    """The largest distance of a light from its counterpart, scene units; infinite where the numbers differ."""
+    if len(one) != len(other):
+        return math.inf
+    first, second = (torch.stack([emitter.position for emitter in rig]).numpy() for rig in (one, other))
+    distance = np.linalg.norm(first[:, None] - second[None], axis=-1)
+    return float(distance[linear_sum_assignment(distance)].max())
+
+
+def worth_keeping(state: State, size: float) -> list[int]:
+    """Indices of the lights that send enough of the image's energy and do not coincide with a brighter one."""
+    energies = [
+        float((column[:, :, 0] * strength.to(column)).double().sum())
+        for column, strength in zip(state.columns, state.intensity, strict=True)
+    ]
+    kept: list[int] = []
+    for index in sorted(range(len(energies)), key=lambda k: -energies[k]):
+        emitter = state.emitters[index]
+        twins = [
+            other
+            for other in kept
+            if state.emitters[other].is_spot == emitter.is_spot
+            and float((state.emitters[other].position - emitter.position).norm()) < MERGED * size
+        ]
+        if not twins and energies[index] >= LEAST_ENERGY * sum(energies):
+            kept.append(index)
+    return sorted(kept)

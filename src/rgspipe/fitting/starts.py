@@ -1,0 +1,95 @@
+"""Rigs from which a refinement starts: combinations of candidates, and refined rigs with one candidate more."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from rgspipe.fitting.coarse import CoarseImages
+from rgspipe.fitting.combinations import (
+    Scored,
+    best_apart,
+    best_combinations,
+    candidate_costs,
+    extensions,
+    single_gains,
+)
+from rgspipe.fitting.judge import rig_distance
+from rgspipe.fitting.parameters import Emitter
+from rgspipe.fitting.problem import LightProblem
+from rgspipe.fitting.refine import State
+
+#: So many times the wanted number of combinations are looked at, as neighbours of the best are much like it.
+VARIETY = 40
+
+#: Starts stand this far apart, as a part of the scene's size; spots at one place may differ by TURNED in their axes
+#: (the cosine between them).
+SEPARATION, TURNED = 0.16, 0.85
+
+Rig = tuple[Emitter, ...]
+
+
+@dataclass(frozen=True)
+class Candidates:
+    """Candidates of one kind against one target."""
+
+    problem: LightProblem
+    coarse: CoarseImages
+    scored: Scored
+    cone_free: bool
+
+    @classmethod
+    def of(cls, problem: LightProblem, coarse: CoarseImages, cone_free: bool = False) -> Candidates:
+        return cls(problem, coarse, Scored.of(problem, coarse), cone_free)
+
+    @property
+    def lit(self) -> bool:
+        """Whether any candidate explains anything."""
+        return bool((single_gains(self.scored) > 0).any())
+
+    def emitters(self, combination: Sequence[int]) -> Rig:
+        return tuple(self.coarse.emitter(index, self.cone_free) for index in combination)
+
+    def rigs(self, lights: int, count: int, size: float) -> list[Rig]:
+        """At most `count` rigs of `lights` candidates each that explain most, clearly different ones, best first."""
+        if lights == 1 and self.coarse.axes is None:
+            costs = candidate_costs(self.scored)
+            costs = torch.where(costs < 1.0, costs, torch.inf)
+            count = min(count, int(costs.isfinite().sum()))
+            return [
+                self.emitters([k]) for k in best_apart(costs, self.coarse.positions.cpu(), count, SEPARATION * size)
+            ]
+        combinations = best_combinations(self.scored, self.coarse.positions, lights, VARIETY * count)
+        return different((self.emitters(combination) for combination in combinations), count, SEPARATION * size)
+
+    def extended(self, state: State, count: int, size: float) -> list[Rig]:
+        """At most `count` rigs: the lights of a refined one and one candidate more."""
+        fixed = torch.stack([self.scored.coarse_of(self.problem, self.coarse, column) for column in state.columns])
+        added = [self.emitters([index]) for index, _ in extensions(self.scored, fixed)]
+        return [(*state.emitters, *extra) for extra in different(added, count, SEPARATION * size)]
+
+
+def different(rigs: Sequence[Rig], count: int, separation: float) -> list[Rig]:
+    """The first `count` of `rigs` that differ from each other."""
+    chosen: list[Rig] = []
+    for rig in rigs:
+        if all(_apart(rig, other, separation) for other in chosen):
+            chosen.append(rig)
+        if len(chosen) == count:
+            break
+    return chosen
+
+
+def _apart(one: Rig, other: Rig, separation: float) -> bool:
+    if rig_distance(one, other) > separation:
+        return True
+    return any(a.is_spot and _turn(a, other) < TURNED for a in one)
+
+
+def _turn(emitter: Emitter, rig: Rig) -> float:
+    """The largest cosine between a spot's axis and those of the spots of another rig."""
+    axes: list[Tensor] = [other.axis for other in rig if other.is_spot]
+    return max((float(emitter.axis @ axis) for axis in axes), default=-1.0)

@@ -1,0 +1,109 @@
+"""Several lights, spots, mixed rigs and unknown numbers, in the model's own images."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import torch
+from torch import Tensor
+
+from lit_room import HIDDEN, VISIBLE
+from rgspipe.fitting import Effects, FitResult, FitStatus, LightSpec, fit_lights, prepare_fit, render_rig
+from rgspipe.renderer.spot import SpotShape
+from rgspipe.scene import LightRig, SpotLight
+
+THIRD = (-0.3, 0.3, 0.1)
+SHAPE = SpotShape("smoothstep", math.radians(30.0), 0.3)
+
+
+def spot(position=VISIBLE, axis=(-0.3, 0.5, -0.6), shape: SpotShape = SHAPE) -> SpotLight:
+    direction = torch.nn.functional.normalize(torch.tensor(axis, dtype=torch.float64), dim=0)
+    place, intensity = torch.tensor(position, dtype=torch.float64), torch.tensor([1.0, 2.0, 0.5]).double()
+    return SpotLight(place, intensity, direction, shape.profile, shape.cone_angle, shape.falloff)
+
+
+def fit(room, rig: LightRig, spec: LightSpec, noise: float = 0.0, effects: Effects | None = None) -> FitResult:
+    views = prepare_fit(room.frozen, room.views, dictionary=room.dictionary, spec=spec, effects=effects)
+    generator = torch.Generator().manual_seed(0)
+    images = [
+        image + noise * image.mean() * torch.randn(image.shape, generator=generator) for image in render_rig(views, rig)
+    ]
+    return fit_lights(room.frozen, views, images, spec=spec)
+
+
+def errors(result: FitResult, rig: LightRig) -> tuple[float, float]:
+    """The largest distance and relative error of intensity, each true light against the nearest found."""
+    distances, ratios = [], []
+    for light in rig:
+        found = min(result.lights, key=lambda other, x=light.position: float((other.position - x).norm()))
+        distances.append(float((found.position - light.position).norm()))
+        ratios.append(float((found.intensity / light.intensity - 1).abs().max()))
+    return max(distances), max(ratios)
+
+
+def assert_sound(result: FitResult) -> None:
+    """Every covariance is finite, symmetric and has no negative variance."""
+    assert len(result.covariance) == len(result.lights)
+    for matrix in result.covariance:
+        assert torch.isfinite(matrix).all() and float(matrix.diagonal().min()) >= 0.0
+        torch.testing.assert_close(matrix, matrix.T)
+
+
+def test_two_point_lights_one_of_them_hidden(room, point_light):
+    rig = (point_light(VISIBLE), point_light(HIDDEN, (0.5, 0.5, 1.0)))
+    result = fit(room, rig, LightSpec(count=2))
+    # Measured 3e-8 and 2e-7.
+    assert max(errors(result, rig)) < 1e-5 and result.status is FitStatus.CONVERGED
+    assert len(result.lights) == result.lights_tried == 2 and set(result.costs) == {2}
+    assert_sound(result)
+
+
+def test_a_spot_with_known_cone_where_pixels_look(room):
+    result = fit(room, (spot(),), LightSpec("spot", shape=SHAPE), effects=Effects(at_pixels=True))
+    (found,) = result.lights
+    # Measured 7e-8 and 1e-7.
+    assert max(errors(result, (spot(),))) < 1e-5 and isinstance(found, SpotLight)
+    assert float((found.direction - spot().direction).norm()) < 1e-5
+    assert (found.cone_angle, found.falloff) == (SHAPE.cone_angle, SHAPE.falloff)
+    assert result.covariance[0].shape == (9, 9)
+    assert_sound(result)
+
+
+@pytest.mark.parametrize("lights", [1, 2])
+def test_the_number_of_lights_is_found(room, point_light, lights):
+    rig = (point_light(VISIBLE), point_light(HIDDEN, (0.5, 0.5, 1.0)))[:lights]
+    result = fit(room, rig, LightSpec(count=None), noise=0.02)
+    assert len(result.lights) == lights and set(result.costs) == set(range(1, lights + 2))
+    assert errors(result, rig)[0] < 0.01
+    assert result.lights_tried == lights + 1
+
+
+def _ill_images(room, kind: str) -> list[Tensor]:
+    if kind == "black":
+        return [torch.zeros(48, 48, 3)] * 2
+    if kind == "saturated":
+        return [torch.ones(48, 48, 3)] * 2
+    hot = torch.zeros(48, 48, 3)
+    hot[20, 20] = 1e4
+    return [hot, hot]
+
+
+@pytest.mark.parametrize("kind", ["black", "saturated", "one hot pixel"])
+def test_images_that_no_rig_explains_stay_finite(room, kind):
+    spec = LightSpec(count=2)
+    views = prepare_fit(room.frozen, room.views, dictionary=room.dictionary, spec=spec)
+    result = fit_lights(room.frozen, views, _ill_images(room, kind), spec=spec)
+    assert result.lights or result.status is FitStatus.NOT_ENOUGH_LIGHT
+    assert bool(result.lights) or kind != "saturated"
+    assert np.isfinite(result.loss) and result.reason
+    for light in result.lights:
+        assert torch.isfinite(light.position).all() and torch.isfinite(light.intensity).all()
+
+
+def test_impossible_wishes_are_refused():
+    with pytest.raises(ValueError, match="type"):
+        LightSpec("lamp")
+    with pytest.raises(ValueError, match="count"):
+        LightSpec(count=9)
