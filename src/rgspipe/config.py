@@ -233,7 +233,7 @@ class TrainConfig:
     smoothness_weight: float = option(0.0, "weight of neighbours' like normals", low=0, high=1e6)
     distortion_weight: float = option(0.0, "weight of the spread of hits within a layer", low=0, high=1e6)
     alpha_weight: float = option(
-        0.0, "weight of the difference between coverage and the images' alpha", low=0, high=1e6
+        0.05, "weight of the difference between coverage and the images' alpha", low=0, high=1e6
     )
     checkpoint_every: int = option(20, "gradient steps between checkpoints", low=1, high=1000000)
     direct_only: bool = option(True, "also fit and report a model without interreflection, for comparison")

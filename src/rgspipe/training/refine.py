@@ -209,13 +209,14 @@ def _step_loss(
     rays = _joined(draws)
     radiance = shaded_radiance(surfels, [view.light for view in chosen])
     bvh = SurfelBvh(surfels)
-    colours = shade_rays(bvh, surfels, thresholds, radiance, *rays)
+    hits = composite(bvh, rays[0], rays[1])
+    colours = shade_rays(bvh, surfels, thresholds, radiance, *rays, hits)
     images = [pixel_means(draw, seen) for draw, seen in zip(draws, _split(draws, colours), strict=True)]
     data = _image_term(chosen, draws, images, options)
     prior = torch.zeros(())
     if options.alpha_weight > 0.0:
         ones = torch.ones_like(radiance[:1])
-        covered = shade_rays(bvh, surfels, thresholds, ones, rays[0], rays[1], torch.zeros_like(rays[2]))
+        covered = shade_rays(bvh, surfels, thresholds, ones, rays[0], rays[1], torch.zeros_like(rays[2]), hits)
         prior = prior + options.alpha_weight * _alpha_term(chosen, draws, covered)
     if options.continuity_weight > 0.0:
         prior = prior + options.continuity_weight * continuity(surfels, pairs)
@@ -223,8 +224,8 @@ def _step_loss(
         prior = prior + options.smoothness_weight * normal_smoothness(surfels, pairs)
     if options.distortion_weight > 0.0:
         origins, directions = rays[0][::DISTORTION_STRIDE], rays[1][::DISTORTION_STRIDE]
-        hits = composite(bvh, origins, directions)
-        prior = prior + options.distortion_weight * distortion(surfels, hits, origins, directions)
+        sampled = composite(bvh, origins, directions)
+        prior = prior + options.distortion_weight * distortion(surfels, sampled, origins, directions)
     return data, prior, _squared_error(chosen, draws, images)
 
 

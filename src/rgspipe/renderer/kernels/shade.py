@@ -181,9 +181,10 @@ class _ShadeRays(torch.autograd.Function):
     """Ray colours from surfel tensors; the hierarchy in `bvh` must have been built from the same tensors."""
 
     @staticmethod
-    def forward(ctx: Any, bvh: SurfelBvh, rays: tuple[Tensor, ...], radiance: Tensor, *parameters: Tensor) -> Tensor:
-        origins, directions, ray_view = rays
-        hits = composite(bvh, origins, directions)
+    def forward(
+        ctx: Any, bvh: SurfelBvh, rays: tuple[Tensor, ...], hits: Hits, radiance: Tensor, *parameters: Tensor
+    ) -> Tensor:
+        origins, _, ray_view = rays
         colours = torch.empty((origins.shape[0], 3), dtype=torch.float32, device=bvh.device)
         radiance_array = wp.from_torch(radiance.detach().float().contiguous(), dtype=wp.vec3)
         arguments = [as_array(hits.indices), as_array(hits.weights), as_array(ray_view), radiance_array]
@@ -198,9 +199,10 @@ class _ShadeRays(torch.autograd.Function):
         packed, thresholds = _surfel_gradient(ctx.bvh, ctx.rays, ctx.hits, radiance, colour_gradient)
         softness = ctx.bvh.coverage.clip_softness
         to_radiance = None
-        if ctx.needs_input_grad[2]:
+        if ctx.needs_input_grad[3]:
             to_radiance = _radiance_gradient(ctx.hits, ctx.rays[2], radiance, colour_gradient)
         return (
+            None,
             None,
             None,
             to_radiance,
@@ -268,6 +270,7 @@ def shade_rays(
     origins: Tensor,
     directions: Tensor,
     ray_view: Tensor,
+    hits: Hits | None = None,
 ) -> Tensor:
     """Colours seen along rays, with gradients towards surfels, thresholds and radiance.
 
@@ -281,15 +284,18 @@ def shade_rays(
         radiance: (V, N, 3) outgoing radiance of every surfel in each of V lightings.
         origins, directions: (R, 3).
         ray_view: (R,) which of the V lightings each ray sees.
+        hits: what `composite` made of the same rays, where they are shaded more than once.
 
     Returns:
         (R, 3) float32 radiance.
     """
     device = bvh.device
+    hits = composite(bvh, origins.detach(), directions.detach()) if hits is None else hits
     rays = (origins.detach(), directions.detach().to(device, torch.float32), ray_view.to(device, torch.int32))
     return _ShadeRays.apply(
         bvh,
         rays,
+        hits,
         radiance,
         surfels.centers,
         surfels.rotations,
