@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -121,7 +122,8 @@ def test_slopes_are_those_of_finite_differences(room: Surfels) -> None:
     ahead, behind = (at.like(at.flat() + sign * h * step.flat()) for sign in (1.0, -1.0))
     expected = (image(ahead) - image(behind)) / (2.0 * h)
     found = GlossView.of(scene.models[0], light, 0, at).change(step)
-    assert float((found - expected).abs().max()) < 1e-6 * float(expected.abs().max())
+    # Measured 3e-11.
+    assert float((found - expected).abs().max()) < 1e-8 * float(expected.abs().max())
 
 
 def test_the_transposed_slopes_and_their_diagonal_belong_to_the_slopes(room: Surfels) -> None:
@@ -134,13 +136,17 @@ def test_the_transposed_slopes_and_their_diagonal_belong_to_the_slopes(room: Sur
     pixels, weight = torch.randn(24 * 24, 3, generator=generator), torch.rand(24 * 24, generator=generator)
     forward = float((view.change(step) * pixels).double().sum())
     backward = float((view.transposed(pixels).flat() * step.flat()).double().sum())
-    assert backward == pytest.approx(forward, rel=1e-4)
+    assert backward == pytest.approx(forward, rel=1e-4)  # measured 1e-5
     diagonal = view.squared(weight).flat()
-    for index in (0, 3 * len(room) + 1, len(diagonal) - 1, int(diagonal[-len(chosen) :].argmax()) - len(chosen)):
+    starts = (0, 3 * len(room), len(diagonal) - len(chosen), len(diagonal))
+    # The largest of each kind: of albedo, reflectance and exponents.
+    for first, last in itertools.pairwise(starts):
+        index = first + int(diagonal[first:last].argmax())
         unit = torch.zeros_like(diagonal)
         unit[index] = 1.0
         expected = float((weight[:, None] * view.change(at.like(unit)).square()).sum())
-        assert float(diagonal[index]) == pytest.approx(expected, rel=1e-4, abs=1e-9)
+        assert expected > 0.0
+        assert float(diagonal[index]) == pytest.approx(expected, rel=1e-4)  # measured 2e-7
 
 
 @pytest.fixture(scope="module")
@@ -155,6 +161,7 @@ def test_gloss_is_found_where_it_is_with_its_strength_and_exponent(room: Surfels
     top = room.gloss.glossy[room.centers[room.gloss.glossy, 2] > -0.11]
     specular, exponents = fitted.gloss.reflectance[top].mean(dim=1), fitted.gloss.exponents[top]
     assert set(top.tolist()) <= found
+    # Measured: the 100 of 150 glossy surfels that views show, and none of the walls; 0.313 and 19.3.
     assert len(found - true) < 0.05 * len(true)
     assert float(specular.median()) == pytest.approx(SPECULAR, abs=0.03)
     assert float(exponents.median()) == pytest.approx(EXPONENT, rel=0.1)
@@ -169,7 +176,7 @@ def test_gloss_explains_views_that_it_was_not_fitted_to(
     for surfels in (fitted, diffuse):
         frozen = build_frozen(surfels, OPTIONS)
         psnr.append(float(render_held_out(surfels, fresh, frozen.transport, 1, gather=frozen.gather).psnr.mean()))
-    assert psnr[0] > psnr[1] + 5.0
+    assert psnr[0] > psnr[1] + 5.0  # measured 40.6 and 25.5 dB
 
 
 def test_no_gloss_is_found_in_a_diffuse_room(room: Surfels) -> None:

@@ -32,7 +32,8 @@ PATCH_SURFELS = 30
 LEAST_GAIN, LEAST_IMAGE, MOST_LOSS = 0.1, 0.003, 0.25
 
 #: Neighbours of like colour whose errors a lobe does not raise share it: their highlights may not have been seen.
-LIKE_ALBEDO = 0.06
+#: Those that images show less than this part of the median have no colour of their own.
+LIKE_ALBEDO, LEAST_SEEN = 0.06, 0.05
 
 
 def searched_views(count: int) -> list[int]:
@@ -72,9 +73,11 @@ def find_lobes(
     gains = before - torch.stack(after)
     best = gains.sum(dim=1).argmax(dim=0)
     gains = gains.gather(0, best[None, None].expand(1, *before.shape))[0]
-    pays = _pays(gains, before, errors.images())
+    images = errors.images()
+    pays = _pays(gains, before, images)
     if bool(pays.any()):
-        pays, best = _spread(pays, best, gains, patches, surfels)
+        seen = images > LEAST_SEEN * images.median()
+        pays, best = _spread(pays, best, seen & (gains.sum(dim=0) >= 0.0), patches, surfels)
     chosen = pays[patches].nonzero()[:, 0]
     return chosen, torch.tensor(EXPONENTS).log()[best][patches[chosen]]
 
@@ -86,8 +89,8 @@ def _pays(gains: Tensor, before: Tensor, images: Tensor) -> Tensor:
     return enough & (lost < MOST_LOSS * (total + lost))
 
 
-def _spread(pays: Tensor, best: Tensor, gains: Tensor, patches: Tensor, surfels: Surfels) -> tuple[Tensor, Tensor]:
-    """Patches (C,) that pay, or touch such a one and have its colour; and the exponents that go with it."""
+def _spread(pays: Tensor, best: Tensor, harmless: Tensor, patches: Tensor, surfels: Surfels) -> tuple[Tensor, Tensor]:
+    """Patches (C,) that pay, or are `harmless`, touch such a one and have its colour; and the exponents with it."""
     count, members = len(pays), torch.bincount(patches)[:, None]
     albedo, places = (
         torch.zeros(count, 3).index_add(0, patches, part.float()) / members
@@ -95,7 +98,6 @@ def _spread(pays: Tensor, best: Tensor, gains: Tensor, patches: Tensor, surfels:
     )
     near = nearest_surfels(places, albedo)
     alike = (albedo[near] - albedo[:, None]).abs().amax(dim=-1) < LIKE_ALBEDO
-    harmless = gains.sum(dim=0) >= 0.0
     while True:
         touching = alike & pays[near]
         added = ~pays & harmless & touching.any(dim=1)
