@@ -173,6 +173,9 @@ class InitConfig:
     """From depth maps to surfels."""
 
     surfels: int = option(10000, "how many surfels", low=100, high=10_000_000)
+    detail: float | None = option(
+        None, "… times this; by default 2 for hotdog and room, which have much of it, else 1", low=0.01, high=100
+    )
     scale: float = option(0.6, "standard deviation of a surfel over the spacing of its neighbours", low=0.05, high=10)
     normals: str = option(
         "auto", "fitted to the depth, or the views' normal pass", choices=("auto", "estimate", "pass")

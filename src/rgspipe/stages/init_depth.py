@@ -11,6 +11,7 @@ from rgspipe.datasets.surfel_file import save_surfels
 from rgspipe.datasets.tensoir import require_lights
 from rgspipe.scene import NO_CLIP
 from rgspipe.stages.base import Stage, StageContext
+from rgspipe.stages.detail import surfel_count
 from rgspipe.training.initialise import Footprint, initialise_surfels
 
 
@@ -23,7 +24,7 @@ def run(context: StageContext) -> None:
     start = time.perf_counter()
     surfels = initialise_surfels(
         views,
-        init.surfels,
+        surfel_count(context.config),
         seed=init.seed,
         normals=init.normals,
         clips=init.clips,
@@ -44,6 +45,6 @@ STAGE = Stage(
     help="turns the depth of the training views into surfels",
     run=run,
     inputs=lambda config: ["generate_dataset"],
-    config_keys=("init", "capture"),
-    code=("rgspipe.training.initialise", "rgspipe.datasets", "rgspipe.scene"),
+    config_keys=("init", "capture", "scene.kind"),
+    code=("rgspipe.stages.detail", "rgspipe.training.initialise", "rgspipe.datasets", "rgspipe.scene"),
 )

@@ -17,6 +17,7 @@ from rgspipe.scene.cornell import cornell_rectangles
 from rgspipe.scene.gloss import Gloss
 from rgspipe.scene.rectangles import Rectangles, surfels_on
 from rgspipe.stages.base import Stage, StageContext
+from rgspipe.stages.detail import KEYS, surfel_count
 from rgspipe.stages.scene_model import cornell_parameters
 
 
@@ -37,7 +38,7 @@ def _exact_surfels(config: RgspipeConfig) -> Surfels:
     room = cornell_parameters(config.scene.cornell)
     boxes = [(box.center, box.size, box.turn, box.albedo) for box in room.boxes]
     rectangles = cornell_rectangles(room.room, room.white, room.left, room.right, boxes)
-    surfels = surfels_on(rectangles, config.init.surfels)
+    surfels = surfels_on(rectangles, surfel_count(config))
     if config.scene.cornell.gloss > 0.0:
         on_boxes = torch.arange(len(rectangles)) >= len(rectangles) - 6 * len(boxes)
         surfels = replace(surfels, gloss=_gloss(config, rectangles, on_boxes))
@@ -48,7 +49,7 @@ def _gloss(config: RgspipeConfig, rectangles: Rectangles, glossy: Tensor) -> Glo
     """The lobe of the surfels on those of the rectangles that are `glossy` (Q,)."""
     # Surfels are laid out alike whatever their albedo, so it can carry a mark.
     marked = replace(rectangles, albedo=glossy[:, None].double().expand(-1, 3))
-    mark = surfels_on(marked, config.init.surfels).albedo
+    mark = surfels_on(marked, surfel_count(config)).albedo
     return Gloss(
         config.scene.cornell.gloss * mark, torch.where(mark[:, 0] > 0.5, config.scene.cornell.shininess, 1.0).double()
     )
@@ -58,7 +59,7 @@ def _from_passes(context: StageContext) -> Surfels:
     config = context.config
     try:
         views = open_dataset(context.inputs["generate_dataset"].folder(), test=False, targets=False).train
-        return surfels_from_passes(views, config.init.surfels, seed=config.init.seed)
+        return surfels_from_passes(views, surfel_count(config), seed=config.init.seed)
     except ValueError as error:
         raise InputError(
             "stage=true_surfels",
@@ -69,7 +70,7 @@ def _from_passes(context: StageContext) -> Surfels:
 
 
 def _keys(config: RgspipeConfig) -> tuple[str, ...]:
-    return ("scene.cornell", "init.surfels") if _is_exact(config) else ("init.surfels", "init.seed")
+    return ("scene.cornell", *KEYS) if _is_exact(config) else (*KEYS, "init.seed")
 
 
 STAGE = Stage(
@@ -84,6 +85,7 @@ STAGE = Stage(
         "rgspipe.evaluation.ceiling",
         "rgspipe.evaluation.metrics",
         "rgspipe.renderer",
+        "rgspipe.stages.detail",
         "rgspipe.stages.scene_model",
         "rgspipe.training.initialise",
     ),
