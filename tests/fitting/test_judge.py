@@ -1,0 +1,65 @@
+"""Which of several rigs is better, how much, and which lights are worth keeping."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+import torch
+
+from lit_room import HIDDEN, VISIBLE
+from rgspipe.fitting.judge import best_state, drop, equally_good, rig_distance, worth_keeping
+from rgspipe.fitting.parameters import Emitter
+from rgspipe.fitting.problem import LightProblem
+from rgspipe.fitting.refine import ROBUST, State, start_from
+
+
+@pytest.fixture(scope="module")
+def problem(room, point_light) -> LightProblem:
+    image = room.images(point_light(VISIBLE))[0]
+    noise = torch.randn(image.shape, generator=torch.Generator().manual_seed(0))
+    noisy = image + 0.02 * image.mean() * noise
+    return LightProblem.create(room.one.prepared, room.one.prepared.stack_images([noisy]))
+
+
+def state(problem: LightProblem, *places: tuple[float, float, float]) -> State:
+    emitters = [Emitter(torch.tensor(place, dtype=torch.float64)) for place in places]
+    return start_from(problem, emitters, ROBUST, 0.0)
+
+
+def shifted(place: tuple[float, float, float], by: float) -> tuple[float, float, float]:
+    return (place[0] + by, place[1], place[2])
+
+
+def test_the_true_light_is_better_than_another(problem: LightProblem) -> None:
+    true, other = state(problem, VISIBLE), state(problem, HIDDEN)
+    assert best_state(problem, [other, true]) is true
+    assert drop(problem, other, true) > 0.5 and not equally_good(problem, true, other)
+
+
+def test_a_light_more_than_there_are_gains_next_to_nothing(problem: LightProblem) -> None:
+    one, two = state(problem, VISIBLE), state(problem, VISIBLE, HIDDEN)
+    assert abs(drop(problem, one, two)) < 0.01  # measured 4e-5
+
+
+def test_rigs_within_the_noise_are_equally_good(problem: LightProblem) -> None:
+    """A shift of 1e-4 is far below what the noise allows to tell."""
+    true = state(problem, VISIBLE)
+    assert equally_good(problem, true, state(problem, shifted(VISIBLE, 1e-4)))
+    assert not equally_good(problem, true, state(problem, shifted(VISIBLE, 0.1)))
+
+
+def test_distance_of_rigs_is_that_of_the_best_matching() -> None:
+    rig = [Emitter(torch.tensor(place, dtype=torch.float64)) for place in (VISIBLE, HIDDEN)]
+    assert rig_distance(rig, rig[::-1]) == 0.0
+    moved = replace(rig[0], position=rig[0].position + torch.tensor([0.0, 0.3, 0.0]))
+    assert rig_distance(rig, [rig[1], moved]) == pytest.approx(0.3)
+    assert rig_distance(rig, rig[:1]) == float("inf")
+
+
+def test_twins_are_merged_and_faint_lights_dropped(problem: LightProblem) -> None:
+    three = state(problem, VISIBLE, shifted(VISIBLE, 0.01), HIDDEN)
+    three.intensity = torch.tensor([[0.5], [1.0], [1.0]], dtype=torch.float64).expand(3, 3)
+    assert worth_keeping(three, 1.0) == [1, 2]
+    three.intensity = torch.tensor([[0.0], [1.0], [1e-3]], dtype=torch.float64).expand(3, 3)
+    assert worth_keeping(three, 1.0) == [1]

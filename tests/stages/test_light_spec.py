@@ -1,0 +1,43 @@
+"""What the configuration says of unknown lights."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from rgspipe.config import RgspipeConfig, with_changes
+from rgspipe.errors import InputError
+from rgspipe.stages.fit_light import light_spec
+
+
+def test_one_point_light_is_looked_for_by_default() -> None:
+    spec = light_spec(RgspipeConfig(stage="fit_light"))
+    assert (spec.type, spec.count, spec.spots, spec.cone_free) == ("point", 1, False, False)
+
+
+def test_angles_become_radians_and_a_blend_stays_a_share() -> None:
+    config = with_changes(
+        RgspipeConfig(stage="fit_light"),
+        {"light.type": "spot", "light.count": None, "light.spot.cone_angle": 30.0, "fit.cone": "free"},
+    )
+    spec = light_spec(config)
+    assert spec.count is None and spec.cone_free and len(spec.shapes()) == 3
+    assert spec.shape.cone_angle == pytest.approx(math.pi / 6) and spec.shape.falloff == 0.15
+    linear = with_changes(config, {"light.spot.profile": "linear", "light.spot.falloff": 15.0})
+    assert light_spec(linear).shape.falloff == pytest.approx(math.pi / 12)
+    assert [shape.falloff / shape.cone_angle for shape in light_spec(linear).shapes()] == pytest.approx([0.5] * 3)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"light.spot.falloff": 2.0}, "at most 1"),
+        ({"light.spot.profile": "linear", "light.spot.falloff": 40.0}, "at most 25"),
+        ({"fit.method": "paper_adam", "light.count": 2}, "search_lm"),
+        ({"fit.method": "paper_adam", "light.type": "spot"}, "search_lm"),
+    ],
+)
+def test_what_does_not_fit_together_is_refused(changes: dict, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        light_spec(with_changes(RgspipeConfig(stage="fit_light"), changes))
