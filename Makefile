@@ -36,6 +36,9 @@ smoke: setup  ## the whole way on a tiny scene, in minutes
 reproduce: setup  ## everything in pipelines/reproduce.yaml, from nothing to the report
 	$(RGSPIPE) pipeline=reproduce $(ARGS)
 
+scenes: setup  ## every modelled scene, to its report, and one page over all of them (two hours)
+	$(RGSPIPE) pipeline=scenes $(ARGS)
+
 train-study: setup  ## how well scenes are trained and what bad captures cost, in one table (hours; goes on where it was)
 	$(RGSPIPE) pipeline=training $(ARGS)
 
