@@ -8,7 +8,7 @@ TEST_WORKERS ?= 2
 ARGS ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup test test-slurm smoke reproduce train-study bench lint
+.PHONY: help setup test test-slurm smoke reproduce scenes train-study bench lint
 
 help:  ## this list
 	@echo "rgspipe: from images of a scene, find its lights"
