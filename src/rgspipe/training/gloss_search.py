@@ -29,7 +29,7 @@ PATCH_SURFELS = 30
 
 #: A lobe pays where the squared error of checked views falls by this part and by this part of the squared image, and
 #: where views that lose do not undo more than this part of the gain.
-LEAST_GAIN, LEAST_IMAGE, MOST_LOSS = 0.1, 0.003, 0.25
+LEAST_GAIN, LEAST_IMAGE, MOST_LOSS = 0.1, 0.02, 0.25
 
 #: Neighbours of like colour whose errors a lobe does not raise share it: their highlights may not have been seen.
 #: Those that images show less than this part of the median have no colour of their own.
