@@ -36,7 +36,9 @@ def _artifact(root: Path, stage: str, fingerprint: str, make: Callable[[Path], N
 def test_frozen_surfels_come_from_where_the_configuration_says() -> None:
     assert surfel_stage(_config()) == "train_surfels"
     assert surfel_stage(_config(freeze__surfels="truth")) == "true_surfels"
-    assert surfel_stage(_config(scene__kind="ply", freeze__surfels="truth")) == "import_ply"
+    assert surfel_stage(_config(scene__kind="ply")) == "import_ply"
+    with pytest.raises(InputError, match=r"freeze.surfels.*scene=ply"):
+        surfel_stage(_config(scene__kind="ply", freeze__surfels="truth"))
     assert has_truth(_config()) and not has_truth(_config(scene__kind="external"))
 
 
