@@ -215,7 +215,8 @@ def _moved(emitters: Sequence[Emitter], step: Tensor, region: Region) -> tuple[E
 
 def _distance(one: Emitter, other: Emitter, size: float) -> float:
     """The largest of the move over the scene's size, the turn of the axis and the change of the cone [rad]."""
-    moved = float((one.position - other.position).norm()) / size
+    # A scene of one surfel has no size, and no room to move in.
+    moved = float((one.position - other.position).norm()) / size if size > 0.0 else 0.0
     if not one.is_spot:
         return moved
     turned = float((one.axis - other.axis).norm())

@@ -21,18 +21,10 @@ from rgspipe.fitting.parameters import Emitter
 from rgspipe.fitting.problem import LightProblem
 from rgspipe.fitting.refine import PLAIN, ROBUST, Region, State, reevaluate, refine, search_region, start_from
 from rgspipe.fitting.result import REASONS, FitResult, FitStatus, dark_result
+from rgspipe.fitting.schedule import SHORT_ITERATIONS, refine_starts
 from rgspipe.fitting.spec import MOST_LIGHTS, LightSpec
 from rgspipe.fitting.starts import Candidates, Rig
 from rgspipe.fitting.uncertainty import light_covariances
-from rgspipe.renderer.spot_share import rim_width
-
-#: Steps of each start before the best one is chosen.
-SHORT_ITERATIONS = 6
-
-#: Spots are refined with rims that are wider by so much [rad], one after the other; the better half of the starts goes
-#: on each time. A rim that is narrower by nature than the last is fitted with HARD_RIM.
-SOFTNESS = (0.3, 0.15, 0.05, 0.0)
-HARD_RIM = 0.01
 
 #: Starts for each wanted one, where spots are among the candidates.
 SPOT_STARTS = 3
@@ -130,8 +122,11 @@ class _Search:
             state = self._best_of(lights, best)
             if state is None:
                 break
-            refine(self.problem, state, ROBUST, self.options.iterations, self.region, self.begin)
             tried.append(state)
+            # More steps rarely gain as much again, so a rig that is far from worth it needs none.
+            if best is not None and drop(self.problem, best, state) < 0.5 * LEAST_DROP:
+                break
+            refine(self.problem, state, ROBUST, 2 * SHORT_ITERATIONS, self.region, self.begin)
             if best is not None and drop(self.problem, best, state) < LEAST_DROP:
                 break
             best, rivals = state, self.rivals
@@ -159,26 +154,18 @@ class _Search:
     def _starts(self, candidates: Candidates, lights: int, previous: State | None) -> list[Rig]:
         spots = candidates.coarse.axes is not None
         count = self.options.starts * (SPOT_STARTS if spots else 1)
-        rigs = candidates.rigs(lights, count, self.region.size)
-        if previous is not None and len(previous.emitters) == lights - 1:
-            rigs = [*candidates.extended(previous, max(2, count // 2), self.region.size), *rigs]
-        return rigs
+        if previous is None or len(previous.emitters) != lights - 1:
+            return candidates.rigs(lights, count, self.region.size)
+        half = max(1, count // 2)
+        extended = candidates.extended(previous, half, self.region.size)
+        return [*extended, *candidates.rigs(lights, half, self.region.size)]
 
     def _refined(self, rigs: Sequence[Rig]) -> State:
         """The best of several starts after a few steps each."""
-        iterations = min(SHORT_ITERATIONS, self.options.iterations)
-        spots = any(emitter.is_spot for rig in rigs for emitter in rig)
-        states = [self._start(_soft(rig, SOFTNESS[0]) if spots else rig) for rig in rigs]
-        for softness in SOFTNESS if spots else (0.0,):
-            if spots and softness != SOFTNESS[0]:
-                states = _better_half(self.problem, states)
-                for state in states:
-                    state.emitters = _soft(state.emitters, softness)
-                    reevaluate(self.problem, state)
-            for state in states:
-                refine(self.problem, state, ROBUST, iterations, self.region, self.begin)
-        self.rivals += states
-        return best_state(self.problem, states)
+        started, finished = refine_starts(self.problem, rigs, self.options.iterations, self.region, self.begin)
+        self.states += started
+        self.rivals += finished
+        return best_state(self.problem, finished)
 
     def _start(self, rig: Rig) -> State:
         state = start_from(self.problem, rig, ROBUST, self.begin)
@@ -202,7 +189,7 @@ class _Search:
         if len(kept) == len(state.emitters) or not kept:
             return state
         fewer = self._start(tuple(state.emitters[index] for index in kept))
-        refine(self.problem, fewer, ROBUST, self.options.iterations, self.region, self.begin)
+        refine(self.problem, fewer, ROBUST, 2 * SHORT_ITERATIONS, self.region, self.begin)
         return fewer
 
     def ambiguous(self, best: State) -> bool:
@@ -252,20 +239,3 @@ class _Search:
             trajectory=(*best.steps, best.record(self.problem, self.begin)),
             costs=costs,
         )
-
-
-def _soft(rig: Sequence[Emitter], softness: float) -> Rig:
-    """The rig with rims that are `softness` wider, but none narrower than HARD_RIM."""
-    return tuple(
-        replace(emitter, softness=max(softness, HARD_RIM if rim_width(emitter.shape) < HARD_RIM else 0.0))
-        if emitter.is_spot
-        else emitter
-        for emitter in rig
-    )
-
-
-def _better_half(problem: LightProblem, states: Sequence[State]) -> list[State]:
-    """The half of the rigs with the lower robust losses, at least two, best first."""
-    losses = [float(loss.mean()) for loss in robust_losses(problem, states)]
-    order = sorted(range(len(states)), key=losses.__getitem__)
-    return [states[index] for index in order[: max(2, (len(order) + 1) // 2)]]
