@@ -52,7 +52,7 @@ def test_choosing_a_method_by_group_or_by_key_means_the_same() -> None:
     ("override", "words"),
     [
         ("dataset.resolutoin=64", ["dataset.resolutoin", "dataset.resolution"]),
-        ("resolution=64", ["Did you mean dataset.resolution"]),
+        ("resolution=64", ["Did you mean", "dataset.resolution"]),
         ("scnee=cornell", ["scnee", "Did you mean scene"]),
         ("+foo=1", ["foo", "no such key"]),
         ("++fit.serach.starts=1", ["fit.search.starts"]),

@@ -21,6 +21,7 @@ MODELLED = SCENE_KINDS[:4]
 OCCLUSIONS = ("visible", "out_of_frame", "occluded", "around_corner", "all")
 PLY_FRONTS = ("auto", "kept", "inwards", "outwards", "cameras")
 FIT_METHODS = ("search_lm", "paper_adam")
+TARGET_KINDS = ("points", "spots", "mixed", "track")
 ROOM_NAMES = ("cornell", "corridor", "clutter")
 
 
@@ -441,6 +442,50 @@ class BenchmarkConfig:
 
 
 @dataclass
+class TargetSpotConfig:
+    """The spots of generated targets; each range is drawn from uniformly."""
+
+    profile: str = option(
+        "smoothstep", "how intensity falls with the angle from the axis", choices=("smoothstep", "gaussian", "linear")
+    )
+    cone_angle: list[float] = option(
+        [25.0, 25.0], "least and largest half-angle of the cone, degrees", low=1, high=89, length=2
+    )
+    falloff: list[float] = option(
+        [0.15, 0.15], "least and largest width of the rim, as light.spot.falloff", low=0.001, high=89, length=2
+    )
+
+
+@dataclass
+class TargetsConfig:
+    """Generated fit targets: sums of single lights, each of which is rendered once."""
+
+    kind: str = option(
+        "points",
+        "lights of a target: points, spots, of each at least one, or the headlights of a car that drives around the "
+        "bend of scene=corner",
+        choices=TARGET_KINDS,
+    )
+    number: int = option(40, "targets; a track has `frames`", low=1, high=100000)
+    count: list[int] = option([1, 1], "fewest and most lights of a target", low=1, high=8, length=2)
+    classes: list[str] = option(
+        list(OCCLUSIONS[:-1]),
+        "where lights are, in turn; classes that the scene has none of are left out",
+        choices=OCCLUSIONS[:-1],
+    )
+    weakest: float = option(0.15, "least share of a light in the mean radiance of its target", low=0, high=0.5)
+    separation: float = option(0.1, "least distance between the lights of a target, scene units", low=0, high=10)
+    seed: int = option(0, "draws of which lights make up a target, and of their intensities", low=0, high=2**31 - 1)
+    pool: int = option(60, "lights of each type that are rendered, one at a time", low=1, high=100000)
+    pool_seed: int = option(0, "draws of the lights' places, axes and cones", low=0, high=2**31 - 1)
+    frames: int = option(24, "targets of a track, equally far apart on the way", low=1, high=100000)
+    views: int = option(3, "fixed cameras that see each target", low=1, high=3)
+    resolution: int | None = option(None, "image width and height, pixels; by default the dataset's", low=8, high=8192)
+    samples: int | None = option(None, "paths per pixel of a single light; by default the dataset's", low=1, high=10**6)
+    spot: TargetSpotConfig = section(TargetSpotConfig, "what spots are like")
+
+
+@dataclass
 class DebugConfig:
     """What is shown when something goes wrong."""
 
@@ -474,6 +519,7 @@ class RgspipeConfig:
     overview: OverviewConfig = section(OverviewConfig, "the page over scenes")
     benchmark: BenchmarkConfig = section(BenchmarkConfig, "what is timed")
     debug: DebugConfig = section(DebugConfig, "when something goes wrong")
+    targets: TargetsConfig = section(TargetsConfig, "generated fit targets")
 
 
 def scene_name(config: RgspipeConfig) -> str:

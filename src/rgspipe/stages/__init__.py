@@ -20,6 +20,8 @@ NAMES = (
     "import_ply",
     "freeze",
     "export",
+    "render_olat",
+    "generate_targets",
     "fit_light",
     "judge",
     "evaluate",

@@ -1,0 +1,74 @@
+"""Where spots are aimed: at what the first camera sees, or at what hands their light on to it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import torch
+
+from rgspipe.blender.targets import PROBES, SURFACE_OFFSET
+from rgspipe.renderer.spot import SpotShape, angle_from_axis
+from rgspipe.scene import Camera
+
+if TYPE_CHECKING:
+    from rgspipe.blender.geometry import Geometry
+
+#: Axes that are tried for one position.
+MAX_AXES = 50
+
+#: Least share of what the first camera sees that lies in the light of a spot, inside half its intensity.
+MIN_SPOT_SHARE = 0.05
+
+#: Least share of what the first camera sees that sees the place that a spot around the corner is aimed at.
+MIN_RELAY_SHARE = 0.15
+
+
+def seen_points(camera: Camera, geometry: Geometry) -> np.ndarray:
+    """(P, 3) surface points behind a regular grid of PROBES × PROBES pixels, a hair before the surface."""
+    step = (torch.arange(PROBES, dtype=torch.float64) + 0.5) / PROBES
+    rows, columns = (step * camera.height).long(), (step * camera.width).long()
+    _, directions, _ = camera.rays((rows[:, None] * camera.width + columns).reshape(-1))
+    origin = camera.origin.numpy()
+    distances = [geometry.cast(origin, direction)[0] for direction in directions.numpy()]
+    points = [origin + d * (t - SURFACE_OFFSET) for d, t in zip(directions.numpy(), distances, strict=True)]
+    return np.array(points)[np.isfinite(distances)]
+
+
+def aim_at_seen(
+    rng: np.random.Generator, position: np.ndarray, shape: SpotShape, seen: np.ndarray, geometry: Geometry
+) -> np.ndarray | None:
+    """(3,) a unit axis from `position` (3,) to one of the points `seen` (P, 3) that lights enough of them.
+
+    None if `MAX_AXES` draws find none.
+    """
+    towards = seen - position
+    lit = np.array([not geometry.blocked(position, point) for point in seen], bool)
+    for _ in range(MAX_AXES if len(seen) else 0):
+        axis = _unit(towards[rng.integers(len(seen))])
+        angles = angle_from_axis(torch.from_numpy(axis), torch.from_numpy(towards))
+        if float(np.mean(lit & (shape.share(angles).numpy() >= 0.5))) >= MIN_SPOT_SHARE:
+            return axis
+    return None
+
+
+def aim_at_relay(
+    rng: np.random.Generator, position: np.ndarray, seen: np.ndarray, geometry: Geometry
+) -> np.ndarray | None:
+    """(3,) a unit axis from `position` (3,) to a place on a surface that is in sight of enough of the points `seen`.
+
+    None if `MAX_AXES` draws find none.
+    """
+    for _ in range(MAX_AXES if len(seen) else 0):
+        axis = _unit(rng.normal(size=3))
+        distance, _ = geometry.cast(position, axis)
+        if not np.isfinite(distance):
+            continue
+        relay = position + axis * (distance - SURFACE_OFFSET)
+        if np.mean([not geometry.blocked(relay, point) for point in seen]) >= MIN_RELAY_SHARE:
+            return axis
+    return None
+
+
+def _unit(vector: np.ndarray) -> np.ndarray:
+    return vector / np.linalg.norm(vector)

@@ -1,0 +1,89 @@
+"""Which single lights are to be rendered: plain values that travel to Blender's process as JSON."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from typing import Literal
+
+import numpy as np
+
+from rgspipe.blender.job import DatasetJob
+from rgspipe.renderer.spot import SpotShape
+from rgspipe.scene.lights import SpotProfile
+
+#: What a pool holds: point lights, spots, or the headlights of a car on its way.
+Kind = Literal["points", "spots", "track"]
+
+#: Lights of a car.
+HEADLIGHTS = 2
+
+
+@dataclass(frozen=True)
+class SpotRange:
+    """Spots' profile, and where its angles are drawn from.
+
+    Attributes:
+        profile: as in `SpotLight`.
+        cone_angle: least and largest half-angle, rad.
+        falloff: least and largest rim, in the units of `SpotLight.falloff`.
+
+    Raises:
+        ValueError: an end of a range is no spot, or a rim may have no width.
+    """
+
+    profile: SpotProfile = "smoothstep"
+    cone_angle: tuple[float, float] = (math.radians(25.0), math.radians(25.0))
+    falloff: tuple[float, float] = (0.15, 0.15)
+
+    def __post_init__(self) -> None:
+        for low, high in (self.cone_angle, self.falloff):
+            if not 0.0 < low <= high:
+                raise ValueError(f"a range must be above 0 and in order, got {low} to {high}")
+        if self.profile == "smoothstep" and self.falloff[1] > 1.0:
+            raise ValueError(f"the blend of a smoothstep is at most 1, got {self.falloff[1]}")
+        if self.profile == "linear" and self.falloff[1] >= self.cone_angle[0]:
+            raise ValueError("the inner cone of a linear profile must be narrower than its outer one")
+
+    @property
+    def least(self) -> SpotShape:
+        """The narrowest cone with the narrowest rim."""
+        return SpotShape(self.profile, self.cone_angle[0], self.falloff[0])
+
+    def draw(self, rng: np.random.Generator) -> SpotShape:
+        """A cone and a rim, each uniform in its range."""
+        return SpotShape(self.profile, float(rng.uniform(*self.cone_angle)), float(rng.uniform(*self.falloff)))
+
+
+@dataclass(frozen=True)
+class PoolJob:
+    """A pool of single lights, each of 1 W/sr (on its axis) in every channel.
+
+    Attributes:
+        dataset: the scene, the number of target cameras and the quality; of its seed every draw depends.
+        kind: of lights.
+        number: lights; of a track, moments of `HEADLIGHTS` lights each.
+        classes: where points and spots are, in turn; those that the scene has none of are left out.
+        spot: the profile of spots and headlights; a track takes the least of its ranges.
+    """
+
+    dataset: DatasetJob
+    kind: Kind
+    number: int
+    classes: tuple[str, ...] = ("visible", "out_of_frame", "occluded", "around_corner")
+    spot: SpotRange = SpotRange()
+
+    def __post_init__(self) -> None:
+        if self.number < 1:
+            raise ValueError(f"number must be at least 1, got {self.number}")
+
+    def to_json(self) -> dict:
+        return asdict(self) | {"dataset": self.dataset.to_json()}
+
+    @classmethod
+    def from_json(cls, content: dict) -> PoolJob:
+        """The job that `to_json` described."""
+        spot = content["spot"]
+        ranges = SpotRange(spot["profile"], tuple(spot["cone_angle"]), tuple(spot["falloff"]))
+        dataset = DatasetJob.from_json(content["dataset"])
+        return cls(dataset, content["kind"], content["number"], tuple(content["classes"]), ranges)

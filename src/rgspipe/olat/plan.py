@@ -1,0 +1,147 @@
+"""Every light of a pool, decided before the first image is rendered, so that a killed run can go on."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+
+from rgspipe.blender.cameras import MAX_DRAWS, Layout, no_room
+from rgspipe.blender.geometry import Geometry
+from rgspipe.blender.models.parameters import BlendFile, CornerParameters
+from rgspipe.blender.plan import Frame
+from rgspipe.blender.targets import classify, is_around_corner, is_of_class
+from rgspipe.olat.aim import aim_at_relay, aim_at_seen, seen_points
+from rgspipe.olat.job import PoolJob
+from rgspipe.olat.track import headlights
+from rgspipe.scene import Camera, Light, PointLight, SpotLight
+
+log = logging.getLogger(__name__)
+
+#: Numbers of the random streams; part of the seed, so never renumber them.
+STREAMS = {"points": 10, "spots": 11, "track": 12}
+
+
+@dataclass(frozen=True)
+class LightPlan:
+    """One light of a pool.
+
+    Attributes:
+        name: folder of its images below that of the pool.
+        occlusion: its class; "unknown" if it belongs to none.
+        light: 1 W/sr, on its axis if it has one.
+        frames: one image for each camera, of a point light in its place.
+    """
+
+    name: str
+    occlusion: str
+    light: Light
+    frames: tuple[Frame, ...]
+
+
+@dataclass(frozen=True)
+class _Place:
+    """What is asked about a place for a light."""
+
+    job: PoolJob
+    layout: Layout
+    geometry: Geometry
+    cameras: list[Camera]
+    seen: np.ndarray
+
+
+def make_plan(job: PoolJob, layout: Layout, geometry: Geometry) -> list[LightPlan]:
+    """Draw all lights of `job`; its cameras are the first of those that see the fit targets of the scene.
+
+    Raises:
+        InputError: the scene has no room for a light of a class that suits it, or none of the classes suits it.
+    """
+    cameras = layout.target_cameras()
+    place = _Place(job, layout, geometry, cameras, seen_points(cameras[0], geometry))
+    lights = _track(place) if job.kind == "track" else _drawn(place)
+    return [_plan(job, cameras, index, *light) for index, light in lights]
+
+
+def _plan(job: PoolJob, cameras: list[Camera], index: int, occlusion: str, light: Light) -> LightPlan:
+    rng = np.random.default_rng([job.dataset.seed, STREAMS[job.kind], index, 1])
+    name, lamp = f"light_{index:04d}", PointLight(light.position, light.intensity)
+    frames = tuple(
+        Frame(f"{name}/view_{number}", camera, lamp, int(rng.integers(2**31 - 1)), False)
+        for number, camera in enumerate(cameras[: job.dataset.target_views])
+    )
+    return LightPlan(name, occlusion, light, frames)
+
+
+def _track(place: _Place) -> list[tuple[int, tuple[str, Light]]]:
+    corridor = place.job.dataset.model
+    if not isinstance(corridor, CornerParameters):
+        raise ValueError("a track leads around the corner of a corridor")
+    shape = place.job.spot.least
+    pairs = headlights(corridor, place.job.number, shape)
+    lights = [light for pair in pairs for light in pair]
+    return list(enumerate((_class_of(place, light.position.numpy()), light) for light in lights))
+
+
+def _drawn(place: _Place) -> list[tuple[int, tuple[str, Light]]]:
+    """Lights of each class in turn; a user's scene may have no place for some classes."""
+    job = place.job
+    classes = [name for name in job.classes if name in place.layout.classes]
+    drawn: list[tuple[int, tuple[str, Light]]] = []
+    missing: set[str] = set()
+    for index in range(job.number if classes else 0):
+        occlusion = classes[index % len(classes)]
+        light = None if occlusion in missing else _draw(place, occlusion, index)
+        if light is not None:
+            drawn.append((index, (occlusion, light)))
+        elif not isinstance(job.dataset.model, BlendFile):
+            raise no_room(f"a light of the class {occlusion}")
+        elif occlusion not in missing:
+            missing.add(occlusion)
+            log.warning("The scene has no place for a light of the class %s.", occlusion)
+    if not drawn:
+        raise no_room(f"a light of the classes {', '.join(job.classes)}")
+    return drawn
+
+
+def _draw(place: _Place, occlusion: str, index: int) -> Light | None:
+    """A light of the wanted class; None if there seems to be no place for one."""
+    job = place.job
+    rng = np.random.default_rng([job.dataset.seed, STREAMS[job.kind], index, 0])
+    for _ in range(MAX_DRAWS // 4):
+        if occlusion == "occluded":
+            position = place.layout.hidden_light(rng, job.dataset.hidden_light_clearance)
+        else:
+            position = place.layout.light(rng, job.dataset.light_clearance)
+        if not is_of_class(position, occlusion, place.layout.classes, place.cameras, place.geometry):
+            continue
+        light = _spot(place, occlusion, position, rng) if job.kind == "spots" else _point(position)
+        if light is not None:
+            return light
+    return None
+
+
+def _point(position: np.ndarray) -> PointLight:
+    return PointLight(torch.from_numpy(position), torch.ones(3, dtype=torch.float64))
+
+
+def _spot(place: _Place, occlusion: str, position: np.ndarray, rng: np.random.Generator) -> SpotLight | None:
+    """A spot at `position` that lights enough; None if it can not be aimed so."""
+    shape = place.job.spot.draw(rng)
+    if occlusion == "around_corner":
+        axis = aim_at_relay(rng, position, place.seen, place.geometry)
+    else:
+        axis = aim_at_seen(rng, position, shape, place.seen, place.geometry)
+    if axis is None:
+        return None
+    lamp = _point(position)
+    direction = torch.from_numpy(axis)
+    return SpotLight(lamp.position, lamp.intensity, direction, shape.profile, shape.cone_angle, shape.falloff)
+
+
+def _class_of(place: _Place, position: np.ndarray) -> str:
+    classes, geometry = place.layout.classes, place.geometry
+    if "around_corner" in classes and is_around_corner(position, place.cameras, geometry):
+        return "around_corner"
+    return classify(position, place.cameras, geometry.blocked) or "unknown"

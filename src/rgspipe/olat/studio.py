@@ -1,0 +1,93 @@
+"""Cycles with a lamp that shines as a point light or as any of our spots.
+
+Light is emitted by a point lamp of radius 0 whose shader multiplies it with the spot's profile of the angle between
+its axis and the direction in which the light leaves: one way for all profiles, also for those that Blender's own
+spots do not have.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import bpy
+
+from rgspipe.blender.passes import Studio
+from rgspipe.olat.plan import LightPlan
+from rgspipe.scene import Light, SpotLight
+
+
+class OlatStudio(Studio):
+    """A studio whose lamp takes the profile of the light that is rendered."""
+
+    def render_light(self, plan: LightPlan, number: int, folder: Path) -> None:
+        """Render the image of a light for its camera `number`, whole or not at all."""
+        self.shape(plan.light)
+        self.render(plan.frames[number], folder)
+
+    def shape(self, light: Light) -> None:
+        """Give the lamp the profile and the axis of `light`; place and intensity come with the frame."""
+        lamp = self._light.data
+        lamp.use_nodes = True
+        nodes = _Nodes(lamp.node_tree)
+        emission, output = nodes.add("ShaderNodeEmission"), nodes.add("ShaderNodeOutputLight")
+        nodes.tree.links.new(emission.outputs["Emission"], output.inputs["Surface"])
+        if isinstance(light, SpotLight):
+            nodes.tree.links.new(_share(nodes, light), emission.inputs["Strength"])
+
+
+class _Nodes:
+    """An empty node tree of a lamp, and what is put into it."""
+
+    def __init__(self, tree: bpy.types.NodeTree) -> None:
+        self.tree = tree
+        tree.nodes.clear()
+
+    def add(self, kind: str) -> bpy.types.Node:
+        return self.tree.nodes.new(kind)
+
+    def math(self, operation: str, *values: bpy.types.NodeSocket | float) -> bpy.types.NodeSocket:
+        """The result of a scalar operation on numbers or outputs of other nodes."""
+        node = self.add("ShaderNodeMath")
+        node.operation = operation
+        for socket, value in zip(node.inputs, values, strict=False):
+            self._set(socket, value)
+        return node.outputs["Value"]
+
+    def ramp(self, kind: str, value: bpy.types.NodeSocket, zero: float, one: float) -> bpy.types.NodeSocket:
+        """0 at `zero`, 1 at `one`, in between as `kind` says: LINEAR or SMOOTHSTEP; clamped."""
+        node = self.add("ShaderNodeMapRange")
+        node.interpolation_type, node.clamp = kind, True
+        self._set(node.inputs["Value"], value)
+        self._set(node.inputs["From Min"], zero)
+        self._set(node.inputs["From Max"], one)
+        return node.outputs["Result"]
+
+    def cosine(self, axis: list[float]) -> bpy.types.NodeSocket:
+        """Cosine of the angle between `axis` and the way of the light."""
+        node = self.add("ShaderNodeVectorMath")
+        node.operation = "DOT_PRODUCT"
+        # In a lamp's shader, "Incoming" points from the lamp to what it lights.
+        self._set(node.inputs[0], self.add("ShaderNodeNewGeometry").outputs["Incoming"])
+        node.inputs[1].default_value = axis
+        return node.outputs["Value"]
+
+    def _set(self, socket: bpy.types.NodeSocket, value: bpy.types.NodeSocket | float) -> None:
+        if isinstance(value, bpy.types.NodeSocket):
+            self.tree.links.new(value, socket)
+        else:
+            socket.default_value = value
+
+
+def _share(nodes: _Nodes, light: SpotLight) -> bpy.types.NodeSocket:
+    """Share of the axial intensity; see `rgspipe.renderer.spot.spot_profile`."""
+    cosine = nodes.cosine(light.direction.tolist())
+    if light.profile == "smoothstep":
+        edge = math.cos(light.cone_angle)
+        return nodes.ramp("SMOOTHSTEP", cosine, edge, edge + light.falloff * (1.0 - edge))
+    angle = nodes.math("ARCCOSINE", nodes.math("MINIMUM", nodes.math("MAXIMUM", cosine, -1.0), 1.0))
+    if light.profile == "linear":
+        return nodes.ramp("LINEAR", angle, light.cone_angle, light.falloff)
+    outside = nodes.math("MAXIMUM", nodes.math("SUBTRACT", angle, light.cone_angle), 0.0)
+    widths = nodes.math("DIVIDE", outside, light.falloff)
+    return nodes.math("EXPONENT", nodes.math("MULTIPLY", nodes.math("MULTIPLY", widths, widths), -0.5))

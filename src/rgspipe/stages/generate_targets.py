@@ -1,0 +1,81 @@
+"""Make fit targets of one or several lights, points and spots, as sums of single lights that were rendered before."""
+
+from __future__ import annotations
+
+from itertools import chain, zip_longest
+
+import numpy as np
+
+from rgspipe.config import RgspipeConfig
+from rgspipe.olat.compose import write_targets
+from rgspipe.olat.pool_file import PooledLight, read_pool
+from rgspipe.olat.rigs import RigPlan, RigRequest, draw_rigs, headlight_rigs
+from rgspipe.progress import track
+from rgspipe.stages.base import Need, Stage, StageContext
+from rgspipe.stages.render_olat import check_scene
+
+
+def run(context: StageContext) -> None:
+    """Write targets/, truth/ and dataset_info.json; cheap, so an interrupted run begins again."""
+    folders = [pool.folder() for pool in context.input_lists["render_olat"]]
+    pool = _in_turn([read_pool(folder) for folder in folders])
+    rigs = _rigs(context.config, pool)
+    write_targets(folders[0], pool, rigs, context.folder)
+    context.note(kind=context.config.targets.kind, targets=len(rigs), pool=len(pool))
+
+
+def _in_turn(pools: list[list[PooledLight]]) -> list[PooledLight]:
+    """The lights of all pools, one of each in turn, so that targets of one light begin with each type alike."""
+    return [light for light in chain.from_iterable(zip_longest(*pools)) if light is not None]
+
+
+def _rigs(config: RgspipeConfig, pool: list[PooledLight]) -> list[RigPlan]:
+    lights = [pooled.light for pooled in pool]
+    brightness = np.array([pooled.brightness() for pooled in track(pool, "measuring lights", unit="light")])
+    wanted = config.targets
+    if wanted.kind == "track":
+        return headlight_rigs(lights, brightness)
+    fewest, most = wanted.count
+    request = RigRequest(
+        number=wanted.number,
+        count=(fewest, most),
+        mixed=wanted.kind == "mixed",
+        weakest=wanted.weakest,
+        separation=wanted.separation,
+        seed=wanted.seed,
+    )
+    return draw_rigs(lights, brightness, request)
+
+
+def _inputs(config: RgspipeConfig) -> list[Need]:
+    check_scene(config)
+    kinds = ("points", "spots") if config.targets.kind == "mixed" else (config.targets.kind,)
+    return [Need("render_olat", {"targets.kind": kind}) for kind in kinds]
+
+
+def _keys(config: RgspipeConfig) -> list[str]:
+    if config.targets.kind == "track":
+        return ["targets.kind"]
+    return [f"targets.{name}" for name in ("kind", "number", "count", "weakest", "separation", "seed")]
+
+
+STAGE = Stage(
+    name="generate_targets",
+    help="make fit targets of points, spots, mixed rigs or a moving car",
+    run=run,
+    inputs=_inputs,
+    config_keys=_keys,
+    code=(
+        "rgspipe.blender",
+        "rgspipe.datasets.exr",
+        "rgspipe.datasets.gs3_write",
+        "rgspipe.datasets.light_file",
+        "rgspipe.olat",
+        "rgspipe.renderer.spot",
+        "rgspipe.scene.camera",
+        "rgspipe.scene.lights",
+        "rgspipe.stages.generate_dataset",
+        "rgspipe.stages.render_olat",
+        "rgspipe.stages.scene_model",
+    ),
+)

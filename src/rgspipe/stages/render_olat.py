@@ -1,0 +1,155 @@
+"""Render a pool of single lights in the scene, one at a time: fit targets are sums of them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from rgspipe.config import MODELLED, RgspipeConfig, TargetSpotConfig
+from rgspipe.errors import InputError
+from rgspipe.olat.job import PoolJob, SpotRange
+from rgspipe.olat.pool_file import read_pool
+from rgspipe.olat.process import render_pool
+from rgspipe.stages.base import Stage, StageContext
+from rgspipe.stages.generate_dataset import STAGE as DATASET
+from rgspipe.stages.generate_dataset import dataset_job
+from rgspipe.stages.sources import has_truth
+
+
+def run(context: StageContext) -> None:
+    """Leave the pool's files and images; a repeated run goes on where an interrupted one ended."""
+    render_pool(pool_job(context.config), context.folder)
+    context.note(kind=context.config.targets.kind, lights=len(read_pool(context.folder)))
+
+
+def pool_job(config: RgspipeConfig) -> PoolJob:
+    """What the configuration asks Blender for.
+
+    Raises:
+        InputError: a range of spots makes no sense, or what `check_scene` and `dataset_job` refuse.
+    """
+    wanted = config.targets
+    check_scene(config)
+    dataset = dataset_job(config)
+    samples = wanted.samples or dataset.samples
+    return PoolJob(
+        # Nothing of the dataset's own images, so that what they are like changes nothing here.
+        replace(
+            dataset,
+            train_views=0,
+            test_views=0,
+            targets_per_class=0,
+            target_views=wanted.views,
+            resolution=wanted.resolution or dataset.resolution,
+            samples=samples,
+            test_samples=samples,
+            seed=wanted.pool_seed,
+        ),
+        wanted.kind,
+        wanted.frames if wanted.kind == "track" else wanted.pool,
+        tuple(wanted.classes),
+        spot_range(wanted.spot) if wanted.kind != "points" else SpotRange(),
+    )
+
+
+def check_scene(config: RgspipeConfig) -> None:
+    """Refuse scenes that Blender does not render, a track without a bend, and a pool of two types in one.
+
+    Raises:
+        InputError: says what would do.
+    """
+    kind, wanted = config.scene.kind, config.targets
+    if not has_truth(config):
+        raise InputError(
+            "scene",
+            expected=f"one that Blender renders ({', '.join(MODELLED)} or blend), to generate targets of",
+            found=f"scene={kind}",
+            remedy="Fit its own targets (fit.targets=dataset), or a folder of yours (fit.target=DIR).",
+        )
+    if wanted.kind == "track" and kind != "corner":
+        raise InputError(
+            "targets.kind",
+            expected="track with scene=corner alone: the car drives around its bend",
+            found=f"scene={kind}",
+            remedy="Use scene=corner, or targets.kind=spots.",
+        )
+    if wanted.kind == "mixed" and config.stage == "render_olat":
+        raise InputError(
+            "targets.kind",
+            expected="points, spots or track: mixed targets take one pool of points and one of spots",
+            found="mixed",
+            remedy="Use stage=generate_targets, which renders both.",
+        )
+
+
+def spot_range(spot: TargetSpotConfig) -> SpotRange:
+    """The spots of the configuration in radians.
+
+    Raises:
+        InputError: a range ends before it begins, or a rim does not fit its cone.
+    """
+    for name in ("cone_angle", "falloff"):
+        low, high = getattr(spot, name)
+        if low > high:
+            raise InputError(
+                f"targets.spot.{name}",
+                expected="the least value, then the largest",
+                found=f"[{low:g},{high:g}]",
+                remedy="Put them in order.",
+            )
+    largest = {"smoothstep": 1.0, "gaussian": 89.0, "linear": spot.cone_angle[0]}[spot.profile]
+    if spot.falloff[1] > largest or (spot.profile == "linear" and spot.falloff[1] == largest):
+        raise InputError(
+            "targets.spot.falloff",
+            expected=f"{'below' if spot.profile == 'linear' else 'at most'} {largest:g} for {spot.profile}",
+            found=f"{spot.falloff[1]:g}",
+            remedy="Give narrower rims.",
+        )
+    degrees = math.pi / 180.0
+    rim = 1.0 if spot.profile == "smoothstep" else degrees
+    cones, rims = ((unit * ends[0], unit * ends[1]) for unit, ends in ((degrees, spot.cone_angle), (rim, spot.falloff)))
+    return SpotRange(spot.profile, cones, rims)
+
+
+def _inputs(config: RgspipeConfig) -> tuple[()]:
+    check_scene(config)
+    return ()
+
+
+def _keys(config: RgspipeConfig) -> list[str]:
+    scene = [key for key in DATASET.keys(config) if key.startswith("scene")]
+    quality = [f"dataset.{name}" for name in ("resolution", "samples", "denoise", "max_bounces")]
+    wanted = ["kind", "views", "resolution", "samples", "pool_seed"]
+    wanted += ["frames"] if config.targets.kind == "track" else ["pool", "classes"]
+    wanted += [] if config.targets.kind == "points" else ["spot"]
+    return [*scene, *quality, *(f"targets.{name}" for name in wanted)]
+
+
+STAGE = Stage(
+    name="render_olat",
+    help="render single lights, one at a time, of which targets are made",
+    run=run,
+    inputs=_inputs,
+    config_keys=_keys,
+    code=(
+        "rgspipe.blender",
+        "rgspipe.datasets.exr",
+        "rgspipe.datasets.gs3_write",
+        "rgspipe.datasets.light_file",
+        # Not what makes targets of the pool: a change there renders nothing again.
+        "rgspipe.olat.__main__",
+        "rgspipe.olat.aim",
+        "rgspipe.olat.job",
+        "rgspipe.olat.plan",
+        "rgspipe.olat.pool_file",
+        "rgspipe.olat.process",
+        "rgspipe.olat.studio",
+        "rgspipe.olat.track",
+        "rgspipe.renderer.spot",
+        "rgspipe.scene.camera",
+        "rgspipe.scene.lights",
+        "rgspipe.stages.generate_dataset",
+        "rgspipe.stages.scene_model",
+    ),
+    files=DATASET.files,
+)

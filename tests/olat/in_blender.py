@@ -1,0 +1,53 @@
+"""Run in a process of its own by test_studio.py: the plane under a point light, our spots, and Blender's."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import bpy
+from mathutils import Vector
+
+from rgspipe.blender.job import RenderSettings
+from rgspipe.blender.materials import diffuse_material
+from rgspipe.blender.meshes import add, polygon
+from rgspipe.blender.plan import Frame
+from rgspipe.olat.plan import LightPlan
+from rgspipe.olat.studio import OlatStudio
+from rgspipe.scene import Light, PointLight, SpotLight
+from spots_on_plane import ALBEDO, SIZE, plane_camera, plane_lights
+
+SAMPLES = 1024
+
+
+def _plan(name: str, light: Light) -> LightPlan:
+    frame = Frame(name, plane_camera(), PointLight(light.position, light.intensity), 1, False)
+    return LightPlan(name, "visible", light, (frame,))
+
+
+def _use_blender_s_spot(spot: SpotLight) -> None:
+    """Turn the studio's lamp into Blender's spot of the same cone."""
+    lamp = bpy.data.objects["light"]
+    lamp.data.type = "SPOT"
+    lamp.data.spot_size, lamp.data.spot_blend = 2.0 * spot.cone_angle, spot.falloff
+    lamp.rotation_mode = "QUATERNION"
+    lamp.rotation_quaternion = Vector(spot.direction.tolist()).to_track_quat("-Z", "Y")
+
+
+def main(folder: Path) -> None:
+    """Every light, the first one again, and Blender's own spot of the smoothstep's cone."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    corners = [(-4.0, -4.0, 0.0), (4.0, -4.0, 0.0), (4.0, 4.0, 0.0), (-4.0, 4.0, 0.0)]
+    add(bpy.context.scene, polygon("plane", corners), diffuse_material("plane", ALBEDO))
+    studio = OlatStudio(bpy.context.scene, RenderSettings(SIZE, SAMPLES, denoise=False, max_bounces=0), folder)
+    lights = plane_lights()
+    for name, light in lights.items():
+        studio.render_light(_plan(name, light), 0, folder)
+    studio.render_light(_plan("again", lights["point"]), 0, folder)
+    spot = lights["smoothstep"]
+    _use_blender_s_spot(spot)
+    studio.render_light(_plan("blender", PointLight(spot.position, spot.intensity)), 0, folder)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

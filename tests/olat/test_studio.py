@@ -1,0 +1,48 @@
+"""Lamps shine as the equations of our lights say, whatever their profile."""
+
+from __future__ import annotations
+
+import importlib.util
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rgspipe.datasets.exr import read_image
+from spots_on_plane import plane_image, plane_lights
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(importlib.util.find_spec("bpy") is None, reason="bpy is not installed"),
+]
+
+
+@pytest.fixture(scope="module")
+def rendered(tmp_path_factory: pytest.TempPathFactory, child_environment: dict[str, str]) -> Path:
+    """The images of in_blender.py."""
+    folder = tmp_path_factory.mktemp("plane")
+    command = [sys.executable, str(Path(__file__).with_name("in_blender.py")), str(folder)]
+    done = subprocess.run(command, env=child_environment, capture_output=True, text=True, timeout=600)
+    assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
+    return folder
+
+
+@pytest.mark.parametrize("name", ["point", "smoothstep", "gaussian", "linear"])
+def test_cycles_renders_the_closed_form_of_every_profile(rendered: Path, name: str) -> None:
+    image, expected = read_image(rendered / f"{name}.exr")[0], plane_image(plane_lights()[name])
+    # 1024 samples inside a pixel against 256 subpixels, over the brightest pixel: 1.5e-4 for the point light, 1.0e-3
+    # where the smoothstep's rim crosses a pixel; means differ by 8e-5 at most.
+    np.testing.assert_allclose(image, expected, atol=2e-3 * expected.max())
+    assert abs(image.mean() / expected.mean() - 1.0) < 2e-4
+
+
+def test_our_smoothstep_is_blender_s_spot(rendered: Path) -> None:
+    ours, blender = (read_image(rendered / f"{name}.exr")[0] for name in ("smoothstep", "blender"))
+    # Same samples; measured 2.3e-6 of the brightest pixel.
+    np.testing.assert_allclose(ours, blender, atol=2e-5 * blender.max())
+
+
+def test_a_lamp_keeps_nothing_of_the_light_before(rendered: Path) -> None:
+    assert (rendered / "again.exr").read_bytes() == (rendered / "point.exr").read_bytes()

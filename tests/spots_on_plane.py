@@ -1,0 +1,44 @@
+"""A diffuse plane under a point light or a spot, seen from above, and its image in closed form."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import torch
+
+from rgspipe.renderer.spot import spot_share
+from rgspipe.scene import Camera, Light, PointLight, SpotLight, look_at
+
+POSITION, INTENSITY = [0.1, -0.2, 0.9], [0.5, 1.0, 2.0]
+ALBEDO = (0.2, 0.5, 0.8)
+SIZE = 16
+
+
+def plane_camera() -> Camera:
+    """SIZE × SIZE pixels, onto the plane z = 0 from above."""
+    return Camera.from_field_of_view(look_at(torch.tensor([0.5, -1.0, 1.5]), torch.zeros(3)), 1.0, SIZE, SIZE)
+
+
+def plane_lights() -> dict[str, Light]:
+    """A point light, and in its place a spot of each profile, aimed aslant."""
+    point = PointLight(torch.tensor(POSITION).double(), torch.tensor(INTENSITY).double())
+    axis = torch.tensor([0.3, 0.2, -1.0], dtype=torch.float64)
+    profiles = {"smoothstep": (0.45, 0.4), "gaussian": (0.25, 0.15), "linear": (0.45, 0.2)}
+    spots = {
+        name: SpotLight(point.position, point.intensity, axis / axis.norm(), name, *angles)
+        for name, angles in profiles.items()
+    }
+    return {"point": point} | spots
+
+
+def plane_image(light: Light) -> np.ndarray:
+    """L = ρ/π · I · p(θ) cosθ/r², averaged over each pixel's 16 × 16 subpixels."""
+    origins, directions, _ = plane_camera().rays(subsamples=16)
+    points = origins - (origins[:, 2] / directions[:, 2])[:, None] * directions
+    to_light = light.position - points
+    irradiance = to_light[:, 2] / to_light.norm(dim=1) ** 3
+    if isinstance(light, SpotLight):
+        irradiance = irradiance * spot_share(light, points)
+    radiance = torch.tensor(ALBEDO) / math.pi * light.intensity * irradiance[:, None]
+    return radiance.reshape(SIZE, SIZE, 256, 3).mean(dim=2).numpy()
