@@ -32,13 +32,13 @@ def plane_lights() -> dict[str, Light]:
     return {"point": point} | spots
 
 
-def plane_image(light: Light) -> np.ndarray:
-    """L = ρ/π · I · p(θ) cosθ/r², averaged over each pixel's 16 × 16 subpixels."""
-    origins, directions, _ = plane_camera().rays(subsamples=16)
+def plane_image(light: Light, subsamples: int = 16) -> np.ndarray:
+    """L = ρ/π · I · p(θ) cosθ/r², averaged over each pixel's `subsamples`² subpixels."""
+    origins, directions, _ = plane_camera().rays(subsamples=subsamples)
     points = origins - (origins[:, 2] / directions[:, 2])[:, None] * directions
     to_light = light.position - points
     irradiance = to_light[:, 2] / to_light.norm(dim=1) ** 3
     if isinstance(light, SpotLight):
         irradiance = irradiance * spot_share(light, points)
     radiance = torch.tensor(ALBEDO) / math.pi * light.intensity * irradiance[:, None]
-    return radiance.reshape(SIZE, SIZE, 256, 3).mean(dim=2).numpy()
+    return radiance.reshape(SIZE, SIZE, subsamples**2, 3).mean(dim=2).numpy()

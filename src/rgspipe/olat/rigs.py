@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 import torch
@@ -13,13 +14,13 @@ from rgspipe.blender.targets import random_intensity
 from rgspipe.errors import InputError
 from rgspipe.olat.job import HEADLIGHTS
 from rgspipe.renderer.spot import spot_power
-from rgspipe.scene import Light, LightRig, PointLight, SpotLight
+from rgspipe.scene import Light, LightRig, SpotLight
 
 #: Number of the random stream of rigs; part of the seed.
 STREAM = 20
 
 #: Draws of a rig before it counts as impossible, and those after which another light comes first.
-MAX_DRAWS, DRAWS_PER_LIGHT = 20_000, 200
+MAX_DRAWS, DRAWS_PER_LIGHT = 10_000, 100
 
 #: RGB of headlights over their mean.
 HEADLIGHT_COLOUR = (1.1, 1.0, 0.9)
@@ -74,14 +75,15 @@ def draw_rigs(pool: Sequence[Light], brightness: np.ndarray, request: RigRequest
         InputError: no such rig was found.
     """
     _check(len(pool), request)
-    return [_draw(pool, brightness, request, number) for number in range(request.number)]
+    known = _Pool.of(pool, brightness)
+    return [_draw(known, request, number) for number in range(request.number)]
 
 
 def headlight_rigs(pool: Sequence[Light], brightness: np.ndarray) -> list[RigPlan]:
     """The rigs of a track: its lights, pair by pair, all of the same intensity."""
-    pairs = [range(first, first + HEADLIGHTS) for first in range(0, len(pool), HEADLIGHTS)]
-    colour = np.array(HEADLIGHT_COLOUR)
-    return [_rig(pool, brightness, tuple(pair), [colour * unit_power(pool[k]) for k in pair]) for pair in pairs]
+    known, colour = _Pool.of(pool, brightness), np.array(HEADLIGHT_COLOUR)
+    pairs = [tuple(range(first, first + HEADLIGHTS)) for first in range(0, len(pool), HEADLIGHTS)]
+    return [known.rig(pair, [colour * known.units[index] for index in pair]) for pair in pairs]
 
 
 def unit_power(light: Light) -> float:
@@ -89,47 +91,62 @@ def unit_power(light: Light) -> float:
     return 4.0 * math.pi / float(spot_power(light).mean()) if isinstance(light, SpotLight) else 1.0
 
 
-def _draw(pool: Sequence[Light], brightness: np.ndarray, request: RigRequest, number: int) -> RigPlan:
-    rng = np.random.default_rng([request.seed, STREAM, number])
+@dataclass(frozen=True)
+class _Pool:
+    """What is asked about the lights of a pool again and again.
+
+    Attributes:
+        lights: of 1 W/sr.
+        brightness: (K, 3) mean radiance of each one's images.
+        units: (K,) `unit_power` of each.
+        places: (K, 3) positions.
+    """
+
+    lights: Sequence[Light]
+    brightness: np.ndarray
+    units: np.ndarray
+    places: np.ndarray
+
+    @classmethod
+    def of(cls, lights: Sequence[Light], brightness: np.ndarray) -> _Pool:
+        places = np.array([light.position.tolist() for light in lights])
+        return cls(lights, brightness, np.array([unit_power(light) for light in lights]), places)
+
+    def fits(self, members: tuple[int, ...], request: RigRequest) -> bool:
+        """Whether the lights are different ones, far enough from each other, and of the types that are wanted."""
+        if len(set(members)) < len(members):
+            return False
+        pairs = combinations(members, 2)
+        if any(np.linalg.norm(self.places[a] - self.places[b]) < request.separation for a, b in pairs):
+            return False
+        return not request.mixed or len(members) == 1 or len({type(self.lights[index]) for index in members}) == 2
+
+    def rig(self, members: tuple[int, ...], intensities: Sequence[np.ndarray]) -> RigPlan:
+        """These lights with these intensities [W/sr], each (3,)."""
+        pairs = list(zip(members, intensities, strict=True))
+        radiance = np.array([self.brightness[index] @ intensity for index, intensity in pairs])
+        lights = [replace(self.lights[index], intensity=torch.from_numpy(intensity)) for index, intensity in pairs]
+        return RigPlan(members, tuple(lights), tuple((radiance / radiance.sum()).tolist()))
+
+
+def _draw(pool: _Pool, request: RigRequest, number: int) -> RigPlan:
+    rng, size = np.random.default_rng([request.seed, STREAM, number]), len(pool.lights)
     count = int(rng.integers(request.count[0], request.count[1] + 1))
     for attempt in range(MAX_DRAWS):
-        first = (number + attempt // DRAWS_PER_LIGHT) % len(pool)
-        members = (first, *rng.choice(len(pool), count - 1, replace=False).tolist())
-        intensities = [random_intensity(rng, unit_power(pool[index])) for index in members]
-        if not _fits(pool, members, request):
+        first = (number + attempt // DRAWS_PER_LIGHT) % size
+        members = (first, *rng.choice(size, count - 1, replace=False).tolist())
+        if not pool.fits(members, request):
             continue
-        rig = _rig(pool, brightness, members, intensities)
+        rig = pool.rig(members, [random_intensity(rng, pool.units[index]) for index in members])
         if count == 1 or min(rig.shares) >= request.weakest:
             return rig
     raise InputError(
         "targets",
         expected=f"rigs of {count} lights, at least {request.separation:g} from each other, each with at least "
         f"{request.weakest:g} of the mean radiance",
-        found=f"none in {MAX_DRAWS} draws from {len(pool)} lights",
+        found=f"none in {MAX_DRAWS} draws from {size} lights",
         remedy="Lower targets.weakest or targets.separation, or raise targets.pool.",
     )
-
-
-def _fits(pool: Sequence[Light], members: tuple[int, ...], request: RigRequest) -> bool:
-    """Whether the lights are different ones, far enough from each other, and of the types that are wanted."""
-    if len(set(members)) < len(members):
-        return False
-    places = torch.stack([pool[index].position for index in members])
-    if len(members) > 1 and float(torch.pdist(places).min()) < request.separation:
-        return False
-    return not request.mixed or len(members) == 1 or len({type(pool[index]) for index in members}) == 2
-
-
-def _rig(
-    pool: Sequence[Light], brightness: np.ndarray, members: tuple[int, ...], intensities: Sequence[np.ndarray]
-) -> RigPlan:
-    radiance = np.array([brightness[k] @ intensity for k, intensity in zip(members, intensities, strict=True)])
-    lights = [_with_intensity(pool[k], intensity) for k, intensity in zip(members, intensities, strict=True)]
-    return RigPlan(members, tuple(lights), tuple((radiance / radiance.sum()).tolist()))
-
-
-def _with_intensity(light: PointLight | SpotLight, intensity: np.ndarray) -> Light:
-    return replace(light, intensity=torch.from_numpy(intensity))
 
 
 def _check(size: int, request: RigRequest) -> None:

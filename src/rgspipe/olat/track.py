@@ -13,8 +13,8 @@ from rgspipe.renderer.spot import SpotShape
 from rgspipe.scene import SpotLight
 
 #: Where the middle of the car is at first and at last, in widths of the corridor from the end of either leg: beyond
-#: the cabinet of the far one, and just behind the cameras of the near one.
-START, END = 0.95, 1.6
+#: the cabinet of the far one, and a little behind the cameras of the near one.
+START, END = 0.95, 1.75
 
 #: Distance between the headlights and their height over the floor, in widths of the corridor.
 GAUGE, HEIGHT = 0.2, 0.3
