@@ -74,7 +74,7 @@ def draw_rigs(pool: Sequence[Light], brightness: np.ndarray, request: RigRequest
     Raises:
         InputError: no such rig was found.
     """
-    _check(len(pool), request)
+    check_request(len(pool), request)
     known = _Pool.of(pool, brightness)
     return [_draw(known, request, number) for number in range(request.number)]
 
@@ -149,7 +149,12 @@ def _draw(pool: _Pool, request: RigRequest, number: int) -> RigPlan:
     )
 
 
-def _check(size: int, request: RigRequest) -> None:
+def check_request(size: int, request: RigRequest) -> None:
+    """Refuse what no pool of `size` lights can give, whatever they are.
+
+    Raises:
+        InputError: names the key and what would do.
+    """
     fewest, most = request.count
     if fewest > most:
         found = f"{fewest} to {most}"

@@ -9,7 +9,7 @@ import numpy as np
 from rgspipe.config import RgspipeConfig
 from rgspipe.olat.compose import write_targets
 from rgspipe.olat.pool_file import PooledLight, read_pool
-from rgspipe.olat.rigs import RigPlan, RigRequest, draw_rigs, headlight_rigs
+from rgspipe.olat.rigs import RigPlan, RigRequest, check_request, draw_rigs, headlight_rigs
 from rgspipe.progress import track
 from rgspipe.stages.base import Need, Stage, StageContext
 from rgspipe.stages.render_olat import check_scene
@@ -32,11 +32,15 @@ def _in_turn(pools: list[list[PooledLight]]) -> list[PooledLight]:
 def _rigs(config: RgspipeConfig, pool: list[PooledLight]) -> list[RigPlan]:
     lights = [pooled.light for pooled in pool]
     brightness = np.array([pooled.brightness() for pooled in track(pool, "measuring lights", unit="light")])
-    wanted = config.targets
-    if wanted.kind == "track":
+    if config.targets.kind == "track":
         return headlight_rigs(lights, brightness)
+    return draw_rigs(lights, brightness, _request(config))
+
+
+def _request(config: RgspipeConfig) -> RigRequest:
+    wanted = config.targets
     fewest, most = wanted.count
-    request = RigRequest(
+    return RigRequest(
         number=wanted.number,
         count=(fewest, most),
         mixed=wanted.kind == "mixed",
@@ -44,12 +48,14 @@ def _rigs(config: RgspipeConfig, pool: list[PooledLight]) -> list[RigPlan]:
         separation=wanted.separation,
         seed=wanted.seed,
     )
-    return draw_rigs(lights, brightness, request)
 
 
 def _inputs(config: RgspipeConfig) -> list[Need]:
+    """The pools; what can not be made of them shows now, and not after they are rendered."""
     check_scene(config)
     kinds = ("points", "spots") if config.targets.kind == "mixed" else (config.targets.kind,)
+    if config.targets.kind != "track":
+        check_request(len(kinds) * config.targets.pool, _request(config))
     return [Need("render_olat", {"targets.kind": kind}) for kind in kinds]
 
 

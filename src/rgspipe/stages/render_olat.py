@@ -113,6 +113,7 @@ def spot_range(spot: TargetSpotConfig) -> SpotRange:
 
 def _inputs(config: RgspipeConfig) -> tuple[()]:
     check_scene(config)
+    spot_range(config.targets.spot)
     return ()
 
 
