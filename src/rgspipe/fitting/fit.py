@@ -10,6 +10,7 @@ from torch import Tensor
 
 from rgspipe.fitting.coarse import CoarseImages, coarse_images
 from rgspipe.fitting.dictionary import LightDictionary, build_dictionary
+from rgspipe.fitting.gloss import bounced_light
 from rgspipe.fitting.paper_adam import AdamOptions, LightPrior, fit_paper_adam
 from rgspipe.fitting.problem import Effects, LightProblem
 from rgspipe.fitting.result import FitResult
@@ -137,6 +138,8 @@ def render_light(views: FitViews, light: Light | None) -> list[Tensor]:
 def render_rig(views: FitViews, rig: LightRig) -> list[Tensor]:
     """(H, W, 3) image per view of the scene under `rig`, with the fit's effects; black without lights."""
     prepared, effects = views.prepared, views.effects
+    if rig and prepared.frozen.gloss is not None:
+        return _render_with_gloss(views, rig)
     operator, frozen = prepared.all_pixels, prepared.frozen
     stacked = torch.zeros((operator.shape[0], 3), device=operator.matrix.device)
     if rig:
@@ -148,6 +151,25 @@ def render_rig(views: FitViews, rig: LightRig) -> list[Tensor]:
             radiance = radiance - frozen.radiance(irradiance, indirect=False)
             stacked = sum(_direct_at_pixels(views, light) * light.intensity.to(stacked) for light in rig)
         stacked = stacked + operator @ torch.einsum("ncl,lc->nc", radiance, strength)
+    return _apart(prepared, stacked)
+
+
+def _render_with_gloss(views: FitViews, rig: LightRig) -> list[Tensor]:
+    """`render_rig` of a scene with gloss."""
+    prepared, effects = views.prepared, views.effects
+    frozen = prepared.frozen
+    if not prepared.pixel_direct:
+        return [frozen.render(view, rig, effects.interreflection, effects.shadows) for view in prepared.views]
+    images = _apart(prepared, sum(_direct_at_pixels(views, light) * light.intensity.float() for light in rig))
+    if effects.interreflection:
+        light = bounced_light(frozen, rig, effects.shadows)
+        bounced = [view.image(light.seen_from(view.camera.origin)) for view in prepared.views]
+        images = [direct + others for direct, others in zip(images, bounced, strict=True)]
+    return images
+
+
+def _apart(prepared: PreparedViews, stacked: Tensor) -> list[Tensor]:
+    """(H, W, 3) per view of stacked pixels (all pixels, 3)."""
     cameras = [view.camera for view in prepared.views]
     parts = stacked.split([camera.pixel_count for camera in cameras])
     return [part.reshape(camera.height, camera.width, 3) for part, camera in zip(parts, cameras, strict=True)]
@@ -158,6 +180,8 @@ def _direct_at_pixels(views: FitViews, light: Light) -> Tensor:
     prepared, position = views.prepared, light.position
     shares = surfel_shares(prepared.frozen.bvh, position, views.effects.shadows)
     image = torch.cat([one.image(position, *shares)[:, :, 0] for one in prepared.pixel_direct])
+    if prepared.highlights:
+        image = image + torch.cat([one.image(position, *shares)[:, :, 0] for one in prepared.highlights])
     if isinstance(light, SpotLight):
         image = image * spot_share(light, prepared.all_points.to(position))[:, None].to(image)
     return image

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import torch
 from torch import Tensor
 
+from rgspipe.fitting.gloss import seen_with_gloss
 from rgspipe.fitting.moments import Moments, moments
 from rgspipe.fitting.parameters import Emitter, share_slopes, shared
 from rgspipe.fitting.views import PreparedViews
@@ -74,6 +75,8 @@ class LightProblem:
             return self._evaluate_at_pixels(emitter)
         irradiance, slope = unit_irradiance(frozen.bvh, emitter.position[None], self.effects.shadows)
         lightings = self._on_surfels(emitter, torch.cat([irradiance[0, :, None], slope[0]], dim=1))
+        if frozen.gloss is not None:
+            return seen_with_gloss(self.views, emitter.position, lightings, self.effects.interreflection)
         radiance = frozen.radiance(lightings, self.effects.interreflection)
         return _seen(self.views.operator, radiance)
 
@@ -82,6 +85,8 @@ class LightProblem:
         frozen, position = self.views.frozen, emitter.position
         share, share_slope = surfel_shares(frozen.bvh, position, self.effects.shadows)
         images = [direct.image(position, share, share_slope) for direct in self.views.pixel_direct]
+        for index, highlights in enumerate(self.views.highlights):
+            images[index] = images[index] + highlights.image(position, share, share_slope)
         columns = torch.cat(images)[self.views.pixels]
         if emitter.is_spot:
             columns = _times_share(emitter, self.views.points, columns)
@@ -90,6 +95,8 @@ class LightProblem:
         factor, slope = unit_irradiance(frozen.bvh, position[None], shadows=False)
         slope = slope[0] * share[:, None] + factor[0, :, None] * share_slope
         lightings = self._on_surfels(emitter, torch.cat([(factor[0] * share)[:, None], slope], dim=1))
+        if frozen.gloss is not None:
+            return columns + seen_with_gloss(self.views, position, lightings, True, bounced_only=True)
         bounced = frozen.radiance(lightings) - frozen.radiance(lightings, indirect=False)
         return columns + _seen(self.views.operator, bounced)
 

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
 import scipy.sparse
 import torch
 from torch import Tensor
 
 from rgspipe.errors import InputError
+from rgspipe.fitting.pixel_highlights import PixelHighlights
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.pixel_direct import PixelDirect
 from rgspipe.renderer.sparse import SparseOperator, stack
@@ -50,6 +53,22 @@ class PreparedViews:
     def all_pixels(self) -> SparseOperator:
         """(all pixels of all views, N) weights, edges included."""
         return stack([view.operator for view in self.views])
+
+    @cached_property
+    def rows(self) -> tuple[SparseOperator, ...]:
+        """Per view the rows of `operator` that are its own."""
+        counts = [view.camera.pixel_count for view in self.views]
+        ends = np.cumsum([0, *counts])
+        bounds = np.searchsorted(self.pixels.cpu().numpy(), ends)
+        matrix, device = self.operator.to_scipy(), self.operator.matrix.device
+        return tuple(SparseOperator.from_scipy(matrix[a:b], device) for a, b in itertools.pairwise(bounds))
+
+    @cached_property
+    def highlights(self) -> tuple[PixelHighlights, ...]:
+        """Of a scene with gloss, per view its highlights where pixels look; empty where `pixel_direct` is."""
+        pairs = zip(self.views, self.pixel_direct, strict=True) if self.pixel_direct else ()
+        gloss = self.frozen.gloss
+        return () if gloss is None else tuple(PixelHighlights(gloss, view, direct) for view, direct in pairs)
 
     @cached_property
     def all_points(self) -> Tensor:
