@@ -283,6 +283,40 @@ class FreezeConfig:
 
 
 @dataclass
+class ModelErrorConfig:
+    """Errors put into the scene that is frozen, to measure what they cost a fit."""
+
+    albedo: float = option(
+        0.0, "albedo: standard deviation of the log-error, smooth over 0.15 of the scene", low=0, high=2
+    )
+    albedo_factor: float = option(1.0, "albedo: factor on all of it", low=0.01, high=100)
+    position: float = option(
+        0.0, "surfels: standard deviation of a shift along the normal, parts of the scene's size", low=0, high=0.5
+    )
+    tilt: float = option(0.0, "normals: standard deviation of a turn about each of two axes, degrees", low=0, high=60)
+    missing: list[float] | None = option(
+        None, "a missing object: box [x,y,z,x,y,z] without surfels, scene units", low=-1e6, high=1e6, length=6
+    )
+    seed: int = option(0, "draws of the errors", low=0, high=2**31 - 1)
+
+
+@dataclass
+class TargetCaptureConfig:
+    """Errors of a real camera, put into the images of fit targets."""
+
+    noise: float = option(
+        0.0, "standard deviation over the value, and a tenth of it over the brightest value", low=0, high=10
+    )
+    exposure: float = option(
+        0.0, "standard deviation of the exposure of every view but the first, in stops", low=0, high=10
+    )
+    white: float | None = option(
+        None, "8-bit images that clip what is above this quantile of the target's values", low=0.01, high=1
+    )
+    seed: int = option(0, "draws of the errors", low=0, high=2**31 - 1)
+
+
+@dataclass
 class ViewsConfig:
     """How much of a fit target is seen."""
 
@@ -354,6 +388,11 @@ class FitConfig:
     cone: str = option(
         "known", "whether spots' cones are those of light.spot, or recovered, too", choices=("known", "free")
     )
+    suggest_view: bool = option(False, "say which further camera would help most, and how many views are needed")
+    wanted_accuracy: float = option(
+        0.003, "with suggest_view: position error to reach, fraction of the scene's size", low=0, high=1
+    )
+    landscape: bool = option(False, "work out the loss on three planes through the first light, for evaluate to draw; takes seconds")
 
 
 @dataclass
@@ -519,6 +558,8 @@ class RgspipeConfig:
     overview: OverviewConfig = section(OverviewConfig, "the page over scenes")
     benchmark: BenchmarkConfig = section(BenchmarkConfig, "what is timed")
     debug: DebugConfig = section(DebugConfig, "when something goes wrong")
+    model_error: ModelErrorConfig = section(ModelErrorConfig, "errors put into the frozen scene")
+    target_capture: TargetCaptureConfig = section(TargetCaptureConfig, "errors put into fit targets")
     targets: TargetsConfig = section(TargetsConfig, "generated fit targets")
 
 

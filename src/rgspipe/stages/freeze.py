@@ -11,6 +11,7 @@ from rgspipe.datasets.surfel_file import load_surfels
 from rgspipe.fitting.dictionary import build_dictionary
 from rgspipe.renderer.effect_bounds import measure_costs, measure_effects
 from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.robustness.model_error import ModelError, with_error
 from rgspipe.stages.base import Stage, StageContext
 from rgspipe.stages.sources import surfel_stage
 
@@ -19,6 +20,7 @@ def run(context: StageContext) -> None:
     """Write surfels, gather, transport and dictionary.safetensors, and effects.json."""
     options = context.config.freeze
     surfels = load_surfels(context.inputs[surfel_stage(context.config)].file(SURFELS))
+    surfels = with_error(surfels, ModelError.from_config(context.config.model_error))
     begin = time.perf_counter()
     frozen = FrozenScene.freeze(surfels, gather_rays=options.gather_rays, patches=options.patches, seed=options.seed)
     built = time.perf_counter()
@@ -52,13 +54,14 @@ STAGE = Stage(
     name="freeze",
     help="precompute the light-independent operators and the light dictionary",
     inputs=lambda config: [surfel_stage(config)],
-    config_keys=("freeze",),
+    config_keys=("freeze", "model_error"),
     code=(
         "rgspipe.renderer",
         "rgspipe.scene",
         "rgspipe.datasets.frozen_file",
         "rgspipe.datasets.surfel_file",
         "rgspipe.fitting.dictionary",
+        "rgspipe.robustness.model_error",
     ),
     run=run,
 )

@@ -1,0 +1,73 @@
+"""Fit targets as a worse camera would have taken them: noise, an exposure of its own for every view, 8 bits.
+
+Every draw comes from the seed and the target's name, so that it does not depend on which other targets are fitted.
+"""
+
+from __future__ import annotations
+
+import math
+import zlib
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from rgspipe.datasets import srgb
+from rgspipe.datasets.degrade import Capture, degraded
+from rgspipe.datasets.views import View
+
+
+@dataclass(frozen=True)
+class TargetCapture:
+    """How far the images of a target are from perfect; the default changes nothing.
+
+    Attributes:
+        noise: standard deviation of a value over the value, see `datasets.degrade.Capture.image_noise`.
+        exposure: standard deviation of the exposure of every view but the first, in stops (factors of two).
+        white: quantile of all values of the target that 8-bit images can just hold; what is brighter is clipped, and
+            the rest rounded to the levels of sRGB. None keeps floating point.
+        seed: of all draws.
+    """
+
+    noise: float = 0.0
+    exposure: float = 0.0
+    white: float | None = None
+    seed: int = 0
+
+    @classmethod
+    def from_config(cls, config: object) -> TargetCapture:
+        """The options in any object with the same fields."""
+        return cls(**{item.name: getattr(config, item.name) for item in fields(cls)})
+
+
+def captured(views: Sequence[View], name: str, capture: TargetCapture) -> tuple[list[View], float | None]:
+    """The views of target `name` as such a camera would have taken them, and the radiance at which they are clipped.
+
+    Radiance keeps its unit: 8-bit images are multiplied by what their brightest level stands for, which is the clip;
+    None where nothing is clipped.
+    """
+    seed = zlib.crc32(f"{capture.seed}/{name}".encode())
+    exposures = _exposures(len(views), capture.exposure, seed)
+    taken = [replace(view, image=view.image * factor) for view, factor in zip(views, exposures, strict=True)]
+    if capture.noise > 0.0:
+        taken = list(degraded(taken, Capture(image_noise=capture.noise, seed=seed)))
+    if capture.white is None:
+        return taken, None
+    white = float(torch.cat([view.image.reshape(-1) for view in taken]).double().quantile(capture.white))
+    if not white > 0.0:
+        return taken, None
+    return [replace(view, image=eight_bit(view.image, white)) for view in taken], white
+
+
+def eight_bit(image: Tensor, white: float) -> Tensor:
+    """The image, clipped to [0, white] and rounded to the 256 levels of sRGB."""
+    encoded = srgb.encode((image.double() / white).clamp(0.0, 1.0).numpy())
+    return torch.from_numpy(white * srgb.decode(np.round(255.0 * encoded) / 255.0)).to(image.dtype)
+
+
+def _exposures(count: int, stops: float, seed: int) -> list[float]:
+    """A factor per view; the first is 1, so that intensities stay comparable."""
+    drawn = np.random.default_rng([seed, 4]).standard_normal(count)
+    return [1.0, *(math.exp(math.log(2.0) * stops * value) for value in drawn[1:])]
