@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 #: Axes that are tried for one position.
 MAX_AXES = 50
 
-#: Least share of what the first camera sees that lies in the light of a spot, inside half its intensity.
+#: Least share of what the first camera sees that lies in the light of a spot, inside half its intensity. Where a point
+#: light would reach less, all that it reaches.
 MIN_SPOT_SHARE = 0.05
 
 #: Least share of what the first camera sees that sees the place that a spot around the corner is aimed at.
@@ -38,17 +39,17 @@ def seen_points(camera: Camera, geometry: Geometry) -> np.ndarray:
 def aim_at_seen(
     rng: np.random.Generator, position: np.ndarray, shape: SpotShape, seen: np.ndarray, geometry: Geometry
 ) -> np.ndarray | None:
-    """(3,) a unit axis from `position` (3,) to one of the points `seen` (P, 3) that lights enough of them.
+    """(3,) a unit axis from `position` (3,) to one of the points `seen` (P, 3) in its reach that lights enough of them.
 
     None if `MAX_AXES` draws find none.
     """
-    towards = seen - position
-    lit = np.array([not geometry.blocked(position, point) for point in seen], bool)
-    for _ in range(MAX_AXES if len(seen) else 0):
-        axis = _unit(towards[rng.integers(len(seen))])
-        angles = angle_from_axis(torch.from_numpy(axis), torch.from_numpy(towards))
-        if float(np.mean(lit & (shape.share(angles).numpy() >= 0.5))) >= MIN_SPOT_SHARE:
-            return axis
+    lit = seen[[not geometry.blocked(position, point) for point in seen]]
+    least = min(MIN_SPOT_SHARE * len(seen), len(lit))
+    towards = torch.from_numpy(lit - position)
+    for _ in range(MAX_AXES if len(lit) else 0):
+        axis = towards[rng.integers(len(lit))]
+        if int((shape.share(angle_from_axis(axis, towards)) >= 0.5).sum()) >= least:
+            return _unit(axis.numpy())
     return None
 
 
