@@ -128,6 +128,15 @@ def test_evaluate_writes_errors_summary_course_and_pictures(tmp_path, config):
     assert [entry["kind"] for entry in found["pictures"]] == ["median", "worst", "median"]
 
 
+def test_generated_targets_are_judged_by_their_own_truth(tmp_path, config):
+    generated = with_changes(config, {"fit.targets": "generated"})
+    assert [need.stage for need in evaluate.STAGE.needs(generated)] == ["fit_light", "generate_targets", "freeze"]
+    made = _artifact(tmp_path, "generate_targets", _write_dataset)
+    fit = _artifact(tmp_path, "fit_light", lambda folder: _write_fit(folder, 1))
+    evaluate.STAGE.run(_context(tmp_path / "result", generated, fit_light=[fit], generate_targets=[made]))
+    assert pd.read_csv(tmp_path / "result/metrics.csv")["position_error"].max() == pytest.approx(0.01)
+
+
 def test_missing_truth_is_stated_and_no_error(tmp_path, config):
     folder = _evaluate(tmp_path, config, truth=False)
     assert pd.read_csv(folder / "metrics.csv")["position_error"].isna().all()

@@ -150,6 +150,17 @@ def test_fits_a_folder_by_the_paper_s_method(inputs, tmp_path):
     assert len(pd.read_csv(tmp_path / "visible_001" / "convergence.csv")) == 6
 
 
+def test_generated_targets_come_from_their_own_stage(inputs, tmp_path):
+    made = {"freeze": inputs["freeze"], "generate_targets": inputs["generate_dataset"]}
+    table = _fit(made, tmp_path, fit__targets="generated", fit__limit=1)
+    assert table["target"].tolist() == ["visible_000", "occluded_000"]
+    config = with_changes(RgspipeConfig(stage="fit_light"), {"fit.targets": "generated"})
+    stages = ["freeze", "generate_targets", "generate_dataset"]
+    assert [need.stage for need in fit_light.STAGE.needs(config)] == stages
+    own = with_changes(config, {"fit.target": "somewhere"})
+    assert [need.stage for need in fit_light.STAGE.needs(own)] == ["freeze", "generate_dataset"]
+
+
 def test_a_black_target_gives_a_row_without_a_light(inputs, tmp_path):
     folder = tmp_path / "dark"
     folder.mkdir()

@@ -24,7 +24,7 @@ from rgspipe.errors import InputError
 from rgspipe.evaluation import convergence, metrics, tables
 from rgspipe.scene import Camera, LightRig, PointLight
 from rgspipe.stages.base import Stage, StageContext
-from rgspipe.stages.sources import image_stage
+from rgspipe.stages.sources import target_stage
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,8 @@ def run(context: StageContext) -> None:
     fit, config = context.inputs["fit_light"], context.config
     results = pd.read_csv(fit.file("results.csv"), dtype={"target": str, "result": str, "reason": str})
     estimates = {row["target"]: _estimate(fit, row) for row in results.to_dict("records")}
-    dataset, freeze = context.inputs.get("generate_dataset"), context.inputs.get("freeze")
+    dataset = next((context.inputs.get(stage) for stage in target_stage(config)), None)
+    freeze = context.inputs.get("freeze")
     truth = _truth(config, dataset, freeze, list(estimates))
     size = math.nan if truth.bounds is None else metrics.longest_side(truth.bounds)
 
@@ -197,7 +198,7 @@ def _truth_file(config: RgspipeConfig) -> list[Path]:
 STAGE = Stage(
     name="evaluate",
     help="errors of the recovered lights per target and per class",
-    inputs=lambda config: ["fit_light", *image_stage(config), "freeze"],
+    inputs=lambda config: ["fit_light", *target_stage(config), "freeze"],
     config_keys=("evaluate", "seed", "views", "fit.target", "fit.truth"),
     code=tuple(f"rgspipe.evaluation.{name}" for name in ("arrays", "metrics", "tables", "convergence")),
     files=_truth_file,

@@ -40,7 +40,7 @@ from rgspipe.renderer.monte_carlo import MonteCarloSolver
 from rgspipe.renderer.spot import SpotShape
 from rgspipe.scene import PointLight
 from rgspipe.stages.base import Stage, StageContext
-from rgspipe.stages.sources import image_stage, require_images
+from rgspipe.stages.sources import image_stage, require_images, target_stage
 
 
 def run(context: StageContext) -> None:
@@ -251,7 +251,8 @@ def target_seed(target: Target, config: RgspipeConfig) -> int:
 def _targets(context: StageContext) -> Sequence[Target]:
     if context.config.fit.target is not None:
         return [load_target(context.config.fit.target)]
-    return open_dataset(context.inputs["generate_dataset"].folder(), train=False, test=False).targets
+    [stage] = target_stage(context.config)
+    return open_dataset(context.inputs[stage].folder(), train=False, test=False).targets
 
 
 def _training_lights(context: StageContext) -> list[PointLight]:
@@ -276,12 +277,12 @@ def _row(context: StageContext, target: Target) -> dict[str, object]:
 
 
 def _inputs(config: RgspipeConfig) -> list[str]:
-    """The frozen scene, and the dataset where there is one: surfels from a file bring neither targets nor lights."""
+    """The frozen scene, its targets, and the dataset where there is one: surfels from a file bring nothing else."""
     if config.fit.target is None:
         require_images(config, "targets of its own (or fit.target=DIR)")
     if config.fit.method == "paper_adam" and config.fit.adam.init == "dataset":
         require_images(config, "the training lights that fit.adam.init=dataset draws from (or fit.adam.init=sphere)")
-    return ["freeze", *image_stage(config)]
+    return [*dict.fromkeys(["freeze", *target_stage(config), *image_stage(config)])]
 
 
 def _keys(config: RgspipeConfig) -> list[str]:

@@ -36,6 +36,13 @@ def image_stage(config: RgspipeConfig) -> list[str]:
     return [] if config.scene.kind == "ply" else ["generate_dataset"]
 
 
+def target_stage(config: RgspipeConfig) -> list[str]:
+    """The stage that has the fit targets of the scene and their truth, if there is one."""
+    if config.fit.target is None and config.fit.targets == "generated":
+        return ["generate_targets"]
+    return image_stage(config)
+
+
 def require_images(config: RgspipeConfig, what: str) -> None:
     """Refuse a scene that has no images.
 
