@@ -13,7 +13,8 @@ import torch
 from lit_room import HIDDEN, VISIBLE
 from rgspipe.fitting.combinations import Scored, best_combinations, best_pairs, extensions
 from rgspipe.fitting.problem import LightProblem
-from rgspipe.fitting.spot_candidates import AXES, fibonacci_directions, spot_candidates
+from rgspipe.fitting.spot_candidates import AXES, spot_candidates
+from rgspipe.renderer.point_sets import fibonacci_directions
 from rgspipe.renderer.spot import SpotShape
 from rgspipe.scene import SpotLight
 

@@ -9,6 +9,7 @@ import scipy.spatial
 import torch
 from torch import Tensor
 
+from rgspipe.fitting.surroundings import is_open, shell_points
 from rgspipe.progress import track
 from rgspipe.renderer.direct import unit_irradiance
 from rgspipe.renderer.frozen import FrozenScene
@@ -61,6 +62,8 @@ def candidate_grid(frozen: FrozenScene, grid: int, seed: int) -> Tensor:
 def build_dictionary(frozen: FrozenScene, grid: int = 8, *, seed: int = 0, shadows: bool = True) -> LightDictionary:
     """Candidates on a grid of the scene's bounding box, without those inside or too near to its surfaces.
 
+    An open scene has candidates around it as well, which are kept if they light anything.
+
     Args:
         grid: candidates along each axis.
         seed: of the jitter.
@@ -68,13 +71,18 @@ def build_dictionary(frozen: FrozenScene, grid: int = 8, *, seed: int = 0, shado
     """
     positions = candidate_grid(frozen, grid, seed)
     positions = positions[_clear_of_surfels(frozen, positions)]
+    within = len(positions)
+    if is_open(frozen):
+        positions = torch.cat([positions, shell_points(frozen)])
     rows = [
         unit_irradiance(frozen.bvh, positions[start : start + BATCH], shadows)[0]
         for start in track(range(0, len(positions), BATCH), "light dictionary", unit="batch")
     ]
     irradiance = torch.cat(rows) if rows else torch.zeros((0, len(frozen.surfels)))
     flux = irradiance @ frozen.areas.to(irradiance)
-    kept = flux > LEAST_FLUX * flux.amax() if len(flux) else torch.zeros(0, dtype=torch.bool)
+    kept = flux > 0.0
+    if within > 0:
+        kept[:within] = flux[:within] > LEAST_FLUX * flux[:within].amax()
     return LightDictionary(positions[kept.cpu()], irradiance[kept])
 
 

@@ -12,6 +12,7 @@ from torch import Tensor
 from rgspipe.fitting.moments import Moments
 from rgspipe.fitting.parameters import Emitter
 from rgspipe.fitting.problem import LightProblem
+from rgspipe.fitting.surroundings import region_bounds
 from rgspipe.fitting.result import FitStatus, Step
 from rgspipe.scene import LightRig
 
@@ -21,9 +22,6 @@ LONGEST_STEP, LONGEST_TURN = 0.12, 0.3
 
 #: A step below this part of the scene's size, and this angle, ends a refinement.
 SHORTEST_STEP = 2e-5
-
-#: How far outside the bounding box a light may go, in parts of the scene's size.
-MARGIN = 0.25
 
 #: Damping: at first, when a step succeeds, when it fails; and how often it may fail in a row.
 DAMPING, EASED, RAISED, ATTEMPTS = 1e-2, 0.2, 6.0, 5
@@ -107,10 +105,9 @@ class State:
 
 
 def search_region(problem: LightProblem) -> Region:
-    """The scene's bounding box and a margin around it."""
+    """Where lights are looked for; see `surroundings`."""
     frozen = problem.views.frozen
-    lower, upper = (corner.double().cpu() for corner in frozen.bounds)
-    return Region(lower - MARGIN * frozen.size, upper + MARGIN * frozen.size, frozen.size)
+    return Region(*region_bounds(frozen), frozen.size)
 
 
 def start_from(problem: LightProblem, emitters: Sequence[Emitter], weighting: Weighting, begin: float) -> State:

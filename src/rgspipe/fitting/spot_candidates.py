@@ -12,6 +12,7 @@ from rgspipe.fitting.coarse import BlockModel, CoarseImages, block_model
 from rgspipe.fitting.dictionary import LightDictionary, patch_radiance
 from rgspipe.fitting.views import PreparedViews
 from rgspipe.progress import track
+from rgspipe.renderer.point_sets import fibonacci_directions
 from rgspipe.renderer.spot import SpotShape, angle_from_axis, spot_profile
 from rgspipe.renderer.spot_share import softened
 
@@ -26,15 +27,6 @@ BLOCKS_IN_ALL = 256
 
 #: Candidates that send less than this share of the brightest one's light to the views are left out.
 LEAST_SEEN = 0.01
-
-
-def fibonacci_directions(count: int) -> Tensor:
-    """(count, 3) float32 unit vectors, spread evenly over the sphere."""
-    index = torch.arange(count, dtype=torch.float64)
-    height = 1.0 - (2.0 * index + 1.0) / count
-    turn = index * math.pi * (3.0 - math.sqrt(5.0))
-    across = (1.0 - height.square()).sqrt()
-    return torch.stack([across * turn.cos(), across * turn.sin(), height], dim=1).float()
 
 
 def spot_candidates(

@@ -20,6 +20,7 @@ from rgspipe.renderer.gather import build_gather
 from rgspipe.renderer.glossy_transport import GlossyLight, GlossyTransport, build_glossy_transport
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.monte_carlo import MonteCarloSolver
+from rgspipe.renderer.openness import openness
 from rgspipe.renderer.radiosity import GatherSolver
 from rgspipe.renderer.rig import Rig, rig_irradiance, unit_response
 from rgspipe.renderer.sparse import SparseOperator
@@ -95,6 +96,12 @@ class FrozenScene:
         """Longest side of the bounding box, scene units."""
         lower, upper = self.bounds
         return float((upper - lower).amax())
+
+    @cached_property
+    def openness(self) -> float:
+        """Share of what the surfaces look at that is void; see `renderer.openness`."""
+        placed = self.surfels if self.centers is None else replace(self.surfels, centers=self.centers)
+        return openness(self.bvh, placed)
 
     def view(self, camera: Camera, supersampling: int = 4) -> ViewWeights:
         """The camera's image as a linear function of the radiance."""

@@ -45,6 +45,15 @@ def cosine_directions(axes: Tensor, rays: int, generator: torch.Generator, point
     return torch.nn.functional.normalize(local @ axes, dim=-1)
 
 
+def fibonacci_directions(count: int) -> Tensor:
+    """(count, 3) float32 unit vectors, spread evenly over the sphere."""
+    index = torch.arange(count, dtype=torch.float64)
+    height = 1.0 - (2.0 * index + 1.0) / count
+    turn = index * math.pi * (3.0 - math.sqrt(5.0))
+    across = (1.0 - height.square()).sqrt()
+    return torch.stack([across * turn.cos(), across * turn.sin(), height], dim=1).float()
+
+
 def _golden(surfels: int, rays: int, generator: torch.Generator) -> Tensor:
     k, shift = torch.arange(rays, dtype=torch.float64), _uniform(surfels, 1, generator)
     return torch.stack([(k + shift[..., 0]) / rays, (k * GOLDEN + shift[..., 1]) % 1.0], dim=-1)
