@@ -46,5 +46,5 @@ STAGE = Stage(
     run=run,
     inputs=lambda config: ["generate_dataset"],
     config_keys=("init", "capture", "scene.kind"),
-    code=("rgspipe.stages.detail", "rgspipe.training.initialise", "rgspipe.datasets", "rgspipe.scene"),
+    code=("rgspipe.stages.detail", "rgspipe.training.initialise", "rgspipe.datasets.degrade", "rgspipe.scene"),
 )
