@@ -153,3 +153,24 @@ def test_convergence_measures_the_distance_to_the_nearest_true_light():
     assert np.isnan(convergence.convergence_table(curve, target, (), 2.0)["position_error"]).all()
     with pytest.raises(ValueError, match="loss"):
         convergence.convergence_table(curve.drop(columns="loss"), target, (), 2.0)
+
+
+def test_regions_are_judged_where_truth_and_covariance_are_known():
+    names = [("in", "visible"), ("out", "visible"), ("silent", "visible"), ("many", "visible")]
+    truths = {name: (_light(0, 0, 0),) for name, _ in names}
+    estimates = {name: (_light(0.02, 0, 0),) for name, _ in names} | {"many": (_light(0, 0, 0), _light(1, 1, 1))}
+    spread = np.diag([1e-4, 4e-4, 4e-4, 1.0])
+    covariances = {"in": [spread], "out": [0.1 * spread], "many": [spread, spread]}
+    table = tables.target_table(_results(names), estimates, truths, 2.0, covariances=covariances).set_index("target")
+    assert table.loc[["in", "out"], "inside_95"].tolist() == [True, False]
+    assert table.loc[["silent", "many"], "inside_95"].isna().all()
+    assert table.loc["in", "position_sd"] == pytest.approx(0.5 * math.sqrt(9e-4))
+    assert table.loc["in", list(tables.VARIANCES)].tolist() == pytest.approx([1e-4, 0, 0, 4e-4, 0, 4e-4])
+    assert math.isnan(table.loc["silent", "position_sd"]) and table.loc["silent", list(tables.VARIANCES)].isna().all()
+    summary = tables.summary_table(table.reset_index(), seed=0, resamples=0).set_index("occlusion")
+    assert summary.loc["visible", "inside_95"] == pytest.approx(0.5)
+
+
+def test_the_nearest_of_several_lights_is_found():
+    assert tables.nearest_position([1.0, 0.9, 1.0], (_light(0, 0, 0), _light(1, 1, 1))).tolist() == [1.0, 1.0, 1.0]
+    assert tables.nearest_position([1.0, 0.9, 1.0], ()) is None

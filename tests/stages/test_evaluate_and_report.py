@@ -1,6 +1,7 @@
 """The stages evaluate and report, on small but genuine files."""
 
 import json
+import math
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from rgspipe.artifacts import Artifact, ArtifactStore, Key
 from rgspipe.config import RgspipeConfig, with_changes
 from rgspipe.datasets.exr import write_image
 from rgspipe.datasets.gs3_write import frame_entry, write_transforms
+from rgspipe.datasets.landscape_file import PLANES, Landscape, PlaneLoss, landscape_bytes
 from rgspipe.datasets.light_file import write_lights
 from rgspipe.datasets.surfel_file import save_surfels
 from rgspipe.errors import InputError
@@ -51,12 +53,26 @@ def _write_dataset(folder: Path, truth: bool = True, bounds: bool = True) -> Non
     (folder / "dataset_info.json").write_text(json.dumps(info))
 
 
+def _landscape(answer: np.ndarray) -> bytes:
+    offsets = np.linspace(-0.1, 0.1, 3)
+    planes = {
+        name: PlaneLoss(
+            *(answer["xyz".index(letter)] + offsets for letter in name), 0.1 + offsets[:, None] ** 2 * np.ones(3)
+        )
+        for name in PLANES
+    }
+    return landscape_bytes(Landscape(planes, np.stack([answer + 0.1, answer])))
+
+
 def _write_fit(folder: Path, views: int) -> None:
     rows = []
     for index, (name, occlusion) in enumerate(TARGETS):
         (folder / name).mkdir()
         found = [0.5, 0.5, 1.0 + 0.01 * index]
-        write_lights(folder / name / "lights.json", (_light(found),), {"loss": 0.1, "reason": "small step"})
+        spread = {"covariance": np.diag([1e-4] * 3 + [1.0] * 3).tolist()}
+        extra = {"loss": 0.1, "reason": "small step", "lights": [spread]}
+        write_lights(folder / name / "lights.json", (_light(found),), extra)
+        (folder / name / "landscape.npz").write_bytes(_landscape(np.array(found)))
         steps = pd.DataFrame({"step": [0, 1], "loss": [1.0, 0.1], "x": 0.5, "y": 0.5, "z": [0.0, found[2]]})
         steps.assign(r=1.0, g=1.0, b=1.0, seconds=[0.1, 0.2]).to_csv(folder / name / "convergence.csv", index=False)
         image = np.random.default_rng(index).uniform(size=(8, 8, 3))
@@ -115,6 +131,10 @@ def test_evaluate_writes_errors_summary_course_and_pictures(tmp_path, config):
     summary = pd.read_csv(folder / "summary.csv").set_index("occlusion")
     assert summary.loc["visible", "median_position_error"] == pytest.approx(0.0025)
     assert summary.loc["all", "count"] == 3
+    # The regions have a radius of 2.8 standard deviations of 0.01; the estimates are off by 0, 0.01 and 0.02.
+    assert targets["inside_95"].tolist() == [True, True, True] and summary.loc["all", "inside_95"] == 1.0
+    assert targets["position_sd"].tolist() == pytest.approx([0.5 * math.sqrt(3e-4)] * 3)
+    assert (folder / "pictures" / "visible_worst_landscape.png").read_bytes().startswith(b"\x89PNG")
     curves = pd.read_csv(folder / "convergence.csv")
     assert curves["position_error"].iloc[0] == pytest.approx(0.5) and len(curves) == 6
     found = json.loads((folder / "metrics.json").read_text())
@@ -125,7 +145,7 @@ def test_evaluate_writes_errors_summary_course_and_pictures(tmp_path, config):
     assert {entry["file"] for entry in found["pictures"]} == {
         path.relative_to(folder).as_posix() for path in folder.rglob("*.png")
     }
-    assert [entry["kind"] for entry in found["pictures"]] == ["median", "worst", "median"]
+    assert [entry["kind"] for entry in found["pictures"]] == ["median", "worst", "median", *["landscape"] * 3]
 
 
 def test_generated_targets_are_judged_by_their_own_truth(tmp_path, config):

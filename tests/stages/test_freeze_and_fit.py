@@ -16,6 +16,7 @@ from rgspipe.artifacts import Artifact, ArtifactStore, Key
 from rgspipe.config import RgspipeConfig, with_changes
 from rgspipe.datasets.exr import write_image
 from rgspipe.datasets.gs3_write import frame_entry, write_transforms
+from rgspipe.datasets.landscape_file import read_landscape
 from rgspipe.datasets.light_file import read_lights
 from rgspipe.datasets.surfel_file import save_surfels
 from rgspipe.errors import InputError
@@ -209,3 +210,21 @@ def test_random_rays_of_a_target_do_not_depend_on_the_targets_before_it(inputs, 
     both = _fit(inputs, tmp_path / "both", **options).drop(columns="seconds")
     alone = _fit(inputs, tmp_path / "alone", occlusion="occluded", **options).drop(columns="seconds")
     pd.testing.assert_frame_equal(both[1:].reset_index(drop=True), alone, check_exact=True)
+
+
+def test_advice_and_landscape_are_written_where_they_are_asked_for(inputs, tmp_path):
+    asked = {"fit__suggest_view": True, "fit__landscape": True, "fit__wanted_accuracy": 1.0}
+    _fit(inputs, tmp_path, occlusion="occluded", **asked)
+    folder = tmp_path / "occluded_000"
+    table = pd.read_csv(folder / "suggested_views.csv")
+    alone = table[table["added"] == "alone"]
+    # The target's other view, and the three training views.
+    assert set(alone["camera"]) == {"view_1", "train/r_0", "train/r_1", "train/r_2"}
+    assert alone["position_sd"].is_monotonic_increasing and (alone["views"] == 2).all()
+    assert table.loc[table["added"] == "plan", "views"].tolist() == [2, 3, 4, 5]
+    advice = json.loads((folder / "advice.json").read_text())
+    assert advice["views_needed"] == 1 and alone["camera"].iloc[0] in advice["words"]
+    landscape = read_landscape(folder / "landscape.npz")
+    np.testing.assert_allclose(landscape.trajectory[-1], HIDDEN, atol=1e-4)  # measured 6e-8
+    for plane in landscape.planes.values():
+        assert int(np.nanargmin(plane.loss)) == plane.loss.size // 2

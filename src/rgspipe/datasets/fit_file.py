@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 import shutil
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import pandas as pd
 import torch
 from torch import Tensor
 
+from rgspipe.datasets.covariance_file import covariance_fields
 from rgspipe.datasets.exr import write_image
 from rgspipe.datasets.json_file import read_json
 from rgspipe.datasets.light_file import read_lights, write_lights
@@ -28,11 +29,17 @@ FIELDS = ("loss", "iterations", "evaluations", "lights_tried", "seconds", "psnr"
 BEST_PSNR = 200.0
 
 
-def write_result(folder: Path, result: FitResult, views: FitViews, targets: Sequence[Tensor]) -> None:
+def write_result(
+    folder: Path,
+    result: FitResult,
+    views: FitViews,
+    targets: Sequence[Tensor],
+    further: Mapping[str, bytes] | None = None,
+) -> None:
     """Write lights.json, convergence.csv, fit.png and final.exr; `folder` appears when it is whole.
 
     fit.png has one row a view: target, start, midway, end, difference. final.exr is the first view's
-    final image; those of further views are final_1.exr and so on.
+    final image; those of further views are final_1.exr and so on. `further` holds more files by name.
     """
     partial = folder.with_name(f".{folder.name}.partial")
     shutil.rmtree(partial, ignore_errors=True)
@@ -45,6 +52,8 @@ def write_result(folder: Path, result: FitResult, views: FitViews, targets: Sequ
     save_png(partial / "fit.png", stack(rows))
     for index, image in enumerate(final):
         write_image(partial / ("final.exr" if index == 0 else f"final_{index}.exr"), image.cpu().numpy())
+    for name, content in (further or {}).items():
+        (partial / name).write_bytes(content)
     partial.rename(folder)
 
 
@@ -82,7 +91,9 @@ def _write_light_file(path: Path, result: FitResult, quality: float | None) -> N
         "psnr": quality,
         "result": str(result.status),
         "reason": result.reason,
-        "lights": [{"covariance": matrix.tolist()} for matrix in result.covariance],
+        "lights": covariance_fields(
+            len(result.lights), {"covariance": result.covariance, "noise_covariance": result.noise_covariance}
+        ),
     }
     write_lights(path, result.lights, extra)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import matplotlib
@@ -16,8 +16,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patches import Ellipse
 
-from rgspipe.evaluation import metrics
+from rgspipe.evaluation import calibration, metrics
 from rgspipe.evaluation.arrays import ArrayLike, to_array
 from rgspipe.evaluation.tables import class_order
 
@@ -382,16 +383,33 @@ def _lights(axis: Axes, targets: pd.DataFrame, window: npt.NDArray, across: int,
         truth = np.array([row[f"{name}_true"] for name in names], dtype=float)
         if np.isfinite(truth).all() and np.isfinite(estimate).all():
             axis.plot(*np.stack([truth, estimate]).T, "-", color=colour, lw=0.9, alpha=0.8, zorder=3)
+        _region(axis, row, across, up, colour)
         axis.plot(*truth, "x", color=colour, ms=5.5, mew=1.3, zorder=4)
         axis.plot(*estimate, "o", ms=6.0, mfc="none", mec=colour, mew=1.1, zorder=5)
         outside += not ((estimate >= window[0]) & (estimate <= window[1])).all()
     return outside
 
 
+def _region(axis: Axes, row: Mapping[str, object], across: int, up: int, colour: str) -> None:
+    """The outline of the 95 % region of a recovered light, where the fit states one."""
+    first, second = ("xyz"[k] for k in sorted((across, up)))
+    names = (f"var_{first}{first}", f"var_{first}{second}", f"var_{second}{second}")
+    one, both, two = (float(row.get(name, math.nan)) for name in names)
+    # The smaller index comes first in the names, whichever of the two runs across.
+    matrix = [[one, both], [both, two]] if across < up else [[two, both], [both, one]]
+    outline = calibration.ellipse(matrix)
+    place = (float(row["xyz"[across]]), float(row["xyz"[up]]))
+    if outline is None or not np.isfinite(place).all():
+        return
+    width, height, angle = outline
+    axis.add_patch(Ellipse(place, width, height, angle=angle, fc=colour, ec=colour, alpha=0.18, lw=0.8, zorder=3))
+
+
 def _light_handles(cameras: bool) -> list[Line2D]:
     handles = [
         Line2D([], [], marker="x", ls="", color=INK, ms=5.5, mew=1.3, label="truth"),
         Line2D([], [], marker="o", ls="", mfc="none", mec=INK, ms=6.0, label="estimate"),
+        Line2D([], [], marker="o", ls="", mfc=INK, mew=0, alpha=0.25, ms=9.0, label="95 % region"),
     ]
     if cameras:
         camera = {"marker": ">", "ls": "", "mfc": "#e3e6ea", "mec": "#555b63"}

@@ -11,14 +11,17 @@ import numpy.typing as npt
 import pandas as pd
 from scipy.optimize import linear_sum_assignment
 
-from rgspipe.evaluation import metrics
-from rgspipe.evaluation.arrays import to_array
+from rgspipe.evaluation import calibration, metrics
+from rgspipe.evaluation.arrays import ArrayLike, to_array
 from rgspipe.scene import Light, LightRig, SpotLight
 
 #: Occlusion classes in the order in which every table and figure shows them.
 CLASSES = ("visible", "out_of_frame", "occluded", "around_corner", "unknown")
 #: The row that holds all targets of a method and view count.
 ALL = "all"
+
+#: The upper triangle of the covariance of the position that is shown, scene units².
+VARIANCES = ("var_xx", "var_xy", "var_xz", "var_yy", "var_yz", "var_zz")
 
 TARGET_COLUMNS = (
     "target",
@@ -35,6 +38,8 @@ TARGET_COLUMNS = (
     "lights_found",
     "lights_true",
     "count_right",
+    "position_sd",
+    "inside_95",
     "x",
     "y",
     "z",
@@ -47,6 +52,7 @@ TARGET_COLUMNS = (
     "r_true",
     "g_true",
     "b_true",
+    *VARIANCES,
     "result",
     "reason",
 )
@@ -68,6 +74,8 @@ SUMMARY_COLUMNS = (
     "median_axis_error",
     "median_cone_error",
     "count_rate",
+    "median_position_sd",
+    "inside_95",
 )
 
 
@@ -105,6 +113,12 @@ def match_positions(estimate: npt.ArrayLike, truth: npt.ArrayLike) -> tuple[tupl
     far = 1.0 + (float(finite.sum()) if finite.size else 0.0)
     chosen, wanted = linear_sum_assignment(np.where(np.isfinite(distance), distance, far))
     return tuple(sorted(zip(chosen.tolist(), wanted.tolist(), strict=True), key=lambda pair: pair[1]))
+
+
+def nearest_position(position: npt.ArrayLike, rig: LightRig) -> npt.NDArray | None:
+    """(3,) the position of the light of `rig` that is nearest to `position` (3,); None without lights."""
+    places = [to_array(light.position) for light in rig]
+    return min(places, key=lambda place: float(np.linalg.norm(place - np.asarray(position)))) if places else None
 
 
 def rig_errors(estimate: LightRig, truth: LightRig, scene_size: float) -> RigErrors:
@@ -148,6 +162,7 @@ def target_table(
     truths: Mapping[str, LightRig],
     scene_size: float,
     success_limit: float = metrics.SUCCESS_LIMIT,
+    covariances: Mapping[str, Sequence[ArrayLike]] | None = None,
 ) -> pd.DataFrame:
     """One row a target: what was fitted, what was true, and the errors.
 
@@ -158,23 +173,40 @@ def target_table(
         truths: true rig per target; targets without one get NaN errors and no verdict.
         scene_size: longest side of the scene's bounding box; NaN if unknown (no position errors then).
         success_limit: position error up to which a target is solved.
+        covariances: per target one of each recovered light, the position first; none for targets without.
 
     Returns:
         A table with `TARGET_COLUMNS`. `success` is True, False or missing; a rig with lights too many
         or too few is never a success. Positions and intensities are those of the true rig's first
-        light and of the estimate matched to it.
+        light and of the estimate matched to it. `position_sd` is the error that the fit expects of itself
+        (`calibration.position_sd`), `inside_95` whether the true positions lie inside its 95 % regions; missing
+        where that cannot be told or the number of lights is wrong.
     """
     required = ("target", "occlusion", "method", "views", "seconds")
     missing = [name for name in required if name not in results.columns]
     if missing:
         raise ValueError(f"the fit results lack the columns {missing}, found {list(results.columns)}")
     rows = [
-        _target_row(row, estimates.get(row["target"], ()), truths.get(row["target"], ()), scene_size, success_limit)
+        _target_row(
+            row,
+            estimates.get(row["target"], ()),
+            truths.get(row["target"], ()),
+            scene_size,
+            success_limit,
+            (covariances or {}).get(row["target"], ()),
+        )
         for row in results.to_dict("records")
     ]
     table = pd.DataFrame(rows, columns=list(TARGET_COLUMNS))
     return table.astype(
-        {"success": "boolean", "count_right": "boolean", "views": int, "lights_found": int, "lights_true": "Int64"}
+        {
+            "success": "boolean",
+            "count_right": "boolean",
+            "inside_95": "boolean",
+            "views": int,
+            "lights_found": int,
+            "lights_true": "Int64",
+        }
     )
 
 
@@ -222,7 +254,14 @@ def class_order(names: Sequence[str] | pd.Series) -> list[str]:
     return [name for name in CLASSES if name in found] + sorted(found - set(CLASSES))
 
 
-def _target_row(row: dict, estimate: LightRig, truth: LightRig, scene_size: float, limit: float) -> dict:
+def _target_row(
+    row: dict,
+    estimate: LightRig,
+    truth: LightRig,
+    scene_size: float,
+    limit: float,
+    covariances: Sequence[ArrayLike],
+) -> dict:
     position, intensity, axis, cone, solved = math.nan, math.nan, math.nan, math.nan, None
     pairs: tuple[tuple[int, int], ...] = ()
     if truth:
@@ -234,15 +273,35 @@ def _target_row(row: dict, estimate: LightRig, truth: LightRig, scene_size: floa
             solved = metrics.success(position, limit) and len(estimate) == len(truth)
     shown = estimate[pairs[0][0]] if pairs else (estimate[0] if estimate else None)
     true_light = truth[pairs[0][1]] if pairs else (truth[0] if truth else None)
+    positions = [to_array(matrix)[:3, :3] for matrix in covariances]
+    shown_spread = positions[pairs[0][0] if pairs else 0] if positions else None
     return (
         {name: row[name] for name in ("target", "occlusion", "method", "views", "seconds")}
         | {"position_error": position, "intensity_error": intensity, "axis_error": axis, "cone_error": cone}
         | {"success": solved, "count_right": len(estimate) == len(truth) if truth else None}
         | {"psnr": _number(row.get("psnr")), "result": row.get("result", ""), "reason": row.get("reason", "")}
         | {"lights_found": len(estimate), "lights_true": len(truth) if truth else None}
+        | {"position_sd": calibration.position_sd(positions, scene_size)}
+        | {"inside_95": _inside(estimate, truth, positions, pairs)}
         | _light_columns(shown, "")
         | _light_columns(true_light, "_true")
+        | _variance_columns(shown_spread)
     )
+
+
+def _inside(
+    estimate: LightRig, truth: LightRig, positions: Sequence[npt.NDArray], pairs: Sequence[tuple[int, int]]
+) -> bool | None:
+    """Whether the true positions lie inside the 95 % regions; None where there are none, or too many or few lights."""
+    if not truth or len(estimate) != len(truth) or len(positions) != len(estimate):
+        return None
+    matched = [(estimate[i].position, truth[j].position, positions[i]) for i, j in pairs]
+    return calibration.inside(*zip(*matched, strict=True))
+
+
+def _variance_columns(matrix: npt.NDArray | None) -> dict[str, float]:
+    values = [math.nan] * len(VARIANCES) if matrix is None else matrix[np.triu_indices(3)].tolist()
+    return dict(zip(VARIANCES, values, strict=True))
 
 
 def _light_columns(light: object, suffix: str) -> dict[str, float]:
@@ -276,6 +335,8 @@ def _summary(group: pd.DataFrame, seed: int, resamples: int) -> dict[str, float]
         "median_axis_error": _median(group["axis_error"]),
         "median_cone_error": _median(group["cone_error"]),
         "count_rate": _rate(group["count_right"]),
+        "median_position_sd": _median(group["position_sd"]),
+        "inside_95": _rate(group["inside_95"]),
     }
 
 

@@ -82,17 +82,39 @@ class Moments:
 
     def information(self, intensity: Tensor) -> Tensor:
         """(D + 3L, D + 3L) Gauss-Newton matrix of the parameters and then the intensities, light after light."""
-        v, count, parameters = self.values, self.lights, len(self.owners)
-        full = torch.zeros((parameters + 3 * count,) * 2, dtype=torch.float64)
-        for channel in range(3):
-            strength = intensity[self.owners, channel]
-            columns = parameters + 3 * torch.arange(count) + channel
-            full[:parameters, :parameters] += strength[:, None] * strength[None, :] * v[channel, count:-1, count:-1]
-            side = strength[:, None] * v[channel, :count, count:-1].T
-            full[:parameters, columns] = side
-            full[columns, :parameters] = side.T
-            full[columns[:, None], columns[None, :]] = v[channel, :count, :count]
-        return full
+        return information(self.values, self.owners, intensity)
+
+
+def information(values: Tensor, owners: Tensor, intensity: Tensor) -> Tensor:
+    """(…, D + 3L, D + 3L) Gauss-Newton matrices of the parameters and then the intensities (L, 3), light after light.
+
+    Args:
+        values: (…, 3, L + D + 1, L + D + 1), as in `Moments`.
+        owners: (D,) light of each derivative.
+    """
+    count, parameters = len(intensity), len(owners)
+    full = values.new_zeros((*values.shape[:-3], *(parameters + 3 * count,) * 2))
+    for channel in range(3):
+        v, strength = values[..., channel, :, :], intensity[owners, channel]
+        columns = parameters + 3 * torch.arange(count) + channel
+        outer = strength[:, None] * strength[None, :]
+        full[..., :parameters, :parameters] += outer * v[..., count:-1, count:-1]
+        side = strength[:, None] * v[..., count:-1, :count]
+        full[..., :parameters, columns] = side
+        full[..., columns, :parameters] = side.transpose(-1, -2)
+        full[..., columns[:, None], columns[None, :]] = v[..., :count, :count]
+    return full
+
+
+def scores(values: Tensor, owners: Tensor, intensity: Tensor) -> Tensor:
+    """(…, D + 3L) sums of Jacobian times target, of the unknowns of `information`; for moments of the residual."""
+    count, parameters = len(intensity), len(owners)
+    against = values[..., :-1, -1]
+    full = values.new_zeros((*values.shape[:-3], parameters + 3 * count))
+    for channel in range(3):
+        full[..., :parameters] += intensity[owners, channel] * against[..., channel, count:]
+        full[..., parameters + channel :: 3] = against[..., channel, :count]
+    return full
 
 
 def moments(columns: Sequence[Tensor], target: Tensor, weights: Tensor) -> Moments:
@@ -103,24 +125,33 @@ def moments(columns: Sequence[Tensor], target: Tensor, weights: Tensor) -> Momen
         target: (P, 3).
         weights: (P, 3) or (P, 1) squared weights w².
     """
+    joined, weighted = _joined(columns, target, weights)
+    return Moments((weighted.transpose(1, 2) @ joined).cpu(), _owners(columns), len(columns))
+
+
+def group_moments(
+    columns: Sequence[Tensor], target: Tensor, weights: Tensor, groups: Tensor, count: int
+) -> tuple[Tensor, Tensor]:
+    """`Moments.values` (count, 3, L + D + 1, L + D + 1) of each group of pixels, and the derivatives' owners (D,).
+
+    Args:
+        groups: (P,) int64 in [0, count), the group of each pixel.
+    """
+    order = torch.argsort(groups)
+    sizes = torch.bincount(groups, minlength=count).tolist()
+    ordered = [part[order] for part in columns]
+    joined, weighted = _joined(ordered, target[order], weights.expand(target.shape)[order])
+    parts = zip(weighted.split(sizes, dim=1), joined.split(sizes, dim=1), strict=True)
+    return torch.stack([left.transpose(1, 2) @ right for left, right in parts]).cpu(), _owners(columns)
+
+
+def _joined(columns: Sequence[Tensor], target: Tensor, weights: Tensor) -> tuple[Tensor, Tensor]:
+    """(3, P, L + D + 1) float64 unit images, derivatives and target; and the same times the weights."""
     images = [part[:, :, :1] for part in columns]
     slopes = [part[:, :, 1:] for part in columns]
     joined = torch.cat([*images, *slopes, target[:, :, None].to(columns[0])], dim=2).double().permute(1, 0, 2)
-    weighted = joined * weights.double().expand(target.shape).T[:, :, None]
-    owners = torch.cat([torch.full((part.shape[2],), index) for index, part in enumerate(slopes)])
-    return Moments((weighted.transpose(1, 2) @ joined).cpu(), owners, len(images))
+    return joined, joined * weights.double().expand(target.shape).T[:, :, None]
 
 
-def covariance(system: Moments, intensity: Tensor, values: int) -> Tensor:
-    """(D + 3L, D + 3L) covariance of parameters and intensities, the residual of `values` numbers as independent noise.
-
-    Directions that the views do not determine at all get a variance of zero information, expressed by the
-    pseudo-inverse as 0; a dark channel is such a direction.
-    """
-    information = system.information(intensity)
-    noise = system.cost_at(intensity) / max(1, values - len(information))
-    # Unknowns have different units: scale the matrix to a unit diagonal before its rank is judged.
-    scale = information.diagonal().clamp(min=0.0).sqrt()
-    inverse = torch.where(scale > 0, 1.0 / scale.clamp(min=1e-300), 0.0)
-    correlation = information * inverse[:, None] * inverse[None, :]
-    return noise * torch.linalg.pinv(correlation, rtol=1e-12, hermitian=True) * inverse[:, None] * inverse[None, :]
+def _owners(columns: Sequence[Tensor]) -> Tensor:
+    return torch.cat([torch.full((part.shape[2] - 1,), index) for index, part in enumerate(columns)])

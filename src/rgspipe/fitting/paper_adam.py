@@ -19,7 +19,7 @@ from rgspipe.fitting.problem import Effects, LightProblem
 from rgspipe.fitting.refine import State
 from rgspipe.fitting.result import REASONS, FitResult, FitStatus, Step, dark_result
 from rgspipe.fitting.ssim import ssim
-from rgspipe.fitting.uncertainty import light_covariances
+from rgspipe.fitting.uncertainty import light_covariances, undetermined
 from rgspipe.fitting.views import PreparedViews
 from rgspipe.progress import track
 from rgspipe.renderer.direct import differentiable_irradiance
@@ -156,17 +156,19 @@ def fit_paper_adam(
     status = FitStatus.AT_BOUND if ball.at_bound(last.position) else status
     emitter = Emitter(last.position)
     state = State((emitter,), [problem.evaluate(emitter)], last.intensity[None] / problem.scale)
+    spread = light_covariances(problem, state)
     return FitResult(
         lights=last.lights,
         status=status,
-        reason=REASONS[status],
+        reason=" ".join(filter(None, (REASONS[status], undetermined(last.lights, spread.calibrated)))),
         loss=last.loss,
         iterations=len(steps) - 1,
         evaluations=len(steps) + 1,
         lights_tried=1,
         seconds=time.perf_counter() - begin,
-        covariance=light_covariances(problem, state),
+        covariance=spread.calibrated,
         trajectory=tuple(steps),
+        noise_covariance=spread.noise,
     )
 
 

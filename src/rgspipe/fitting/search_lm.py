@@ -24,7 +24,7 @@ from rgspipe.fitting.result import REASONS, FitResult, FitStatus, dark_result
 from rgspipe.fitting.schedule import SHORT_ITERATIONS, refine_starts
 from rgspipe.fitting.spec import MOST_LIGHTS, LightSpec
 from rgspipe.fitting.starts import Candidates, Rig
-from rgspipe.fitting.uncertainty import light_covariances
+from rgspipe.fitting.uncertainty import light_covariances, undetermined
 
 #: Starts for each wanted one, where spots are among the candidates.
 SPOT_STARTS = 3
@@ -226,16 +226,18 @@ class _Search:
             status = FitStatus.AMBIGUOUS
         if any(self.region.at_bound(emitter.position) for emitter in best.emitters):
             status = FitStatus.AT_BOUND
+        lights, spread = best.lights(self.problem), light_covariances(self.problem, best)
         return FitResult(
-            lights=best.lights(self.problem),
+            lights=lights,
             status=status,
-            reason=REASONS[status],
+            reason=" ".join(filter(None, (REASONS[status], undetermined(lights, spread.calibrated)))),
             loss=self.problem.unexplained(best.columns, best.intensity),
             iterations=sum(state.iterations for state in self.states),
             evaluations=sum(state.evaluations for state in self.states),
             lights_tried=max([*costs, len(best.emitters)]),
             seconds=time.perf_counter() - self.begin,
-            covariance=light_covariances(self.problem, best),
+            covariance=spread.calibrated,
             trajectory=(*best.steps, best.record(self.problem, self.begin)),
             costs=costs,
+            noise_covariance=spread.noise,
         )

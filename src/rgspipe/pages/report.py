@@ -122,7 +122,9 @@ def group_title(method: str, views: int) -> str:
 
 
 def picture_caption(target: str, kind: str, position_error: float | None, psnr: float | None) -> str:
-    """The words under a fit's picture; `kind` is "median" or "worst"."""
+    """The words under a fit's picture; `kind` is "median", "worst" or "landscape"."""
+    if kind == "landscape":
+        return f"{target}: loss around the recovered light, intensity the best one at each place"
     measured = []
     if position_error is not None:
         measured.append(f"position error {percent(float(position_error))}")

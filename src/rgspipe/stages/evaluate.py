@@ -15,13 +15,16 @@ import torch
 
 from rgspipe.artifacts import Artifact
 from rgspipe.config import RgspipeConfig
+from rgspipe.datasets.covariance_file import read_covariances
 from rgspipe.datasets.gs3 import load_target
 from rgspipe.datasets.json_file import numbers, read_json
+from rgspipe.datasets.landscape_file import read_landscape
 from rgspipe.datasets.light_file import read_lights
 from rgspipe.datasets.location import dataset_root
 from rgspipe.datasets.surfel_file import load_surfels
 from rgspipe.errors import InputError
-from rgspipe.evaluation import convergence, metrics, tables
+from rgspipe.evaluation import convergence, metrics, plots, tables
+from rgspipe.evaluation.landscape_plot import landscape_figure
 from rgspipe.scene import Camera, LightRig, PointLight
 from rgspipe.stages.base import Stage, StageContext
 from rgspipe.stages.sources import target_stage
@@ -46,7 +49,8 @@ def run(context: StageContext) -> None:
     truth = _truth(config, dataset, freeze, list(estimates))
     size = math.nan if truth.bounds is None else metrics.longest_side(truth.bounds)
 
-    targets = tables.target_table(results, estimates, truth.rigs, size, config.evaluate.success)
+    covariances = {name: _covariances(fit, name) for name in estimates}
+    targets = tables.target_table(results, estimates, truth.rigs, size, config.evaluate.success, covariances)
     summary = tables.summary_table(targets, config.seed, config.evaluate.bootstrap)
     targets.to_csv(context.folder / "metrics.csv", index=False)
     summary.to_csv(context.folder / "summary.csv", index=False)
@@ -58,7 +62,10 @@ def run(context: StageContext) -> None:
         "success_limit": config.evaluate.success,
         "summary": summary.to_dict("records"),
         "cameras": _cameras(config, dataset, targets),
-        "pictures": _copy_pictures(fit, targets, context.folder),
+        "pictures": [
+            *_copy_pictures(fit, targets, context.folder),
+            *_draw_landscapes(fit, targets, truth.rigs, context.folder),
+        ],
         "notes": truth.notes,
     }
     text = json.dumps(_plain(content), indent=1, allow_nan=False)
@@ -83,6 +90,12 @@ def _estimate(fit: Artifact, row: Mapping[str, Any]) -> LightRig:
         return read_lights(fit.file(name))
     values = torch.tensor([float(row.get(key, math.nan)) for key in "xyzrgb"], dtype=torch.float64)
     return (PointLight(values[:3], values[3:]),) if bool(torch.isfinite(values).all()) else ()
+
+
+def _covariances(fit: Artifact, target: str) -> tuple[torch.Tensor, ...]:
+    """How sure the fit is of each light of a target; empty where it does not say."""
+    name = f"{target}/lights.json"
+    return read_covariances(fit.file(name)) if name in fit.manifest["files"] else ()
 
 
 def _truth(config: RgspipeConfig, dataset: Artifact | None, freeze: Artifact | None, names: list[str]) -> _Truth:
@@ -159,6 +172,27 @@ def _copy_pictures(fit: Artifact, targets: pd.DataFrame, folder: Path) -> list[d
     return pictures
 
 
+def _draw_landscapes(
+    fit: Artifact, targets: pd.DataFrame, truths: Mapping[str, LightRig], folder: Path
+) -> list[dict[str, Any]]:
+    """Draw the loss around the lights of each class's median and worst target, where the fit has worked it out."""
+    pictures = []
+    for occlusion, chosen in tables.exemplars(targets).items():
+        for kind, target in chosen.items():
+            source = f"{target}/landscape.npz"
+            if source not in fit.manifest["files"]:
+                continue
+            landscape, rig = read_landscape(fit.file(source)), truths.get(target, ())
+            truth = tables.nearest_position(landscape.trajectory[-1], rig)
+            name = f"pictures/{occlusion}_{kind}_landscape.png"
+            (folder / "pictures").mkdir(exist_ok=True)
+            (folder / name).write_bytes(plots.png_of(landscape_figure(landscape, truth)))
+            unmeasured = {"position_error": None, "psnr": None}
+            entry = {"file": name, "target": target, "occlusion": occlusion, "kind": "landscape"}
+            pictures.append(entry | unmeasured)
+    return pictures
+
+
 def _cameras(config: RgspipeConfig, dataset: Artifact | None, targets: pd.DataFrame) -> list[dict[str, Any]]:
     """The cameras of the first target that the fit used: all targets of a dataset are seen by the same ones."""
     if config.fit.target is not None:
@@ -200,7 +234,12 @@ STAGE = Stage(
     help="errors of the recovered lights per target and per class",
     inputs=lambda config: ["fit_light", *target_stage(config), "freeze"],
     config_keys=("evaluate", "seed", "views", "fit.target", "fit.truth"),
-    code=tuple(f"rgspipe.evaluation.{name}" for name in ("arrays", "metrics", "tables", "convergence")),
+    code=(
+        "rgspipe.datasets.covariance_file",
+        "rgspipe.datasets.landscape_file",
+        *(f"rgspipe.evaluation.{name}" for name in ("arrays", "calibration", "metrics", "tables", "convergence")),
+        *(f"rgspipe.evaluation.{name}" for name in ("plots", "landscape_plot")),
+    ),
     files=_truth_file,
     run=run,
 )

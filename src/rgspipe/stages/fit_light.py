@@ -40,6 +40,7 @@ from rgspipe.renderer.monte_carlo import MonteCarloSolver
 from rgspipe.renderer.spot import SpotShape
 from rgspipe.scene import PointLight
 from rgspipe.stages.base import Stage, StageContext
+from rgspipe.stages.fit_extras import Named, further_files, training_cameras
 from rgspipe.stages.sources import image_stage, require_images, target_stage
 
 
@@ -65,6 +66,7 @@ class _Fitter:
     dictionary: LightDictionary | None
     training_lights: Sequence[PointLight]
     effects: Effects
+    dataset: Path | None = None
     prepared: dict[bytes, FitViews] = field(default_factory=dict)
 
     @classmethod
@@ -72,14 +74,15 @@ class _Fitter:
         config, artifact = context.config, context.inputs["freeze"]
         frozen = _frozen(config, artifact)
         effects = _effects(context)
+        dataset = context.inputs["generate_dataset"].path if "generate_dataset" in context.inputs else None
         if config.fit.method == "paper_adam":
-            return cls(config, frozen, None, _training_lights(context), effects)
+            return cls(config, frozen, None, _training_lights(context), effects, dataset)
         if not effects.shadows and not _measured(artifact)[0].shadows.proved:
             # The stored candidates have shadows.
             options = config.freeze
             dictionary = build_dictionary(frozen, options.dictionary_grid, seed=options.seed, shadows=False)
-            return cls(config, frozen, dictionary, (), effects)
-        return cls(config, frozen, load_dictionary(artifact.file(DICTIONARY), frozen), (), effects)
+            return cls(config, frozen, dictionary, (), effects, dataset)
+        return cls(config, frozen, load_dictionary(artifact.file(DICTIONARY), frozen), (), effects, dataset)
 
     def fit(self, target: Target, folder: Path) -> None:
         """Fit one target and write its folder, whole or not at all."""
@@ -108,7 +111,20 @@ class _Fitter:
             seed=target_seed(target, self.config),
             spec=light_spec(self.config),
         )
-        write_result(folder / target.name, result, prepared, [view.image for view in views])
+        images = [view.image for view in views]
+        further = further_files(config, prepared, images, result, self._other_cameras(target, views))
+        write_result(folder / target.name, result, prepared, images, further)
+
+    def _other_cameras(self, target: Target, used: Sequence[View]) -> list[Named]:
+        """Cameras that could be added to a fit: the target's own others, and those of the training views."""
+        if not self.config.fit.suggest_view:
+            return []
+        others = [
+            (f"view_{index}", view.camera)
+            for index, view in enumerate(target.views)
+            if all(view is not taken for taken in used)
+        ]
+        return [*others, *training_cameras(self.dataset, used[0].camera)]
 
     def _prepare(self, views: Sequence[View]) -> FitViews:
         key = b"".join(_identity(view) for view in views)
@@ -287,6 +303,8 @@ def _inputs(config: RgspipeConfig) -> list[str]:
 
 def _keys(config: RgspipeConfig) -> list[str]:
     keys = ["seed", "effects", "light", "fit.method", "fit.target", "views.count", "views.indices"]
+    keys += ["fit.suggest_view", "fit.landscape"]
+    keys += ["fit.wanted_accuracy"] if config.fit.suggest_view else []
     keys += ["fit.search", "fit.cone"] if config.fit.method == "search_lm" else ["fit.adam"]
     return keys if config.fit.target is not None else [*keys, "occlusion", "fit.limit"]
 
@@ -308,7 +326,10 @@ STAGE = Stage(
         "rgspipe.fitting",
         "rgspipe.renderer",
         "rgspipe.scene",
+        "rgspipe.datasets.covariance_file",
         "rgspipe.datasets.fit_file",
+        "rgspipe.datasets.landscape_file",
+        "rgspipe.stages.fit_extras",
         "rgspipe.datasets.frozen_file",
         "rgspipe.evaluation.images",
         "rgspipe.evaluation.metrics",

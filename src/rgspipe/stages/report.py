@@ -54,7 +54,8 @@ def _contents(context: StageContext) -> report.ReportContents:
     described = [read_json(artifact.file("metrics.json"), "what an evaluation found") for artifact in evaluations]
     surfels = _surfels(context.inputs.get("freeze"))
     trained = context.inputs.get("train_surfels")
-    targets = _table(evaluations, "metrics.csv", {"success": "boolean", "result": str, "reason": str})
+    verdicts = {"success": "boolean", "inside_95": "boolean"}
+    targets = _table(evaluations, "metrics.csv", verdicts | {"result": str, "reason": str})
     study, remark = found_study(config, judged)
     return report.ReportContents(
         scene=scene_name(config),

@@ -1,0 +1,74 @@
+"""Slices through the loss around an answer: what a fit sees when it moves one light."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import torch
+from torch import Tensor
+
+from rgspipe.fitting.parameters import Emitter
+from rgspipe.fitting.problem import LightProblem
+from rgspipe.fitting.refine import PLAIN, search_region
+from rgspipe.progress import track
+
+#: The planes: pairs of axes.
+PLANES = ((0, 1), (0, 2), (1, 2))
+
+
+@dataclass(frozen=True)
+class LossSlice:
+    """The loss on a plane through the answer, the intensities of all lights the best ones at each place.
+
+    Attributes:
+        axes: which of x, y, z run across and up.
+        across, up: (n,) float64 coordinates, scene units; the middle of each is the answer.
+        loss: (n, n) float64, rows along `up`: Σ (target − image)² / Σ target²; NaN outside the region that is
+            searched.
+    """
+
+    axes: tuple[int, int]
+    across: Tensor
+    up: Tensor
+    loss: Tensor
+
+
+def loss_slices(
+    problem: LightProblem, rig: Sequence[Emitter], light: int = 0, *, reach: float = 0.25, points: int = 17
+) -> tuple[LossSlice, ...]:
+    """The loss on three planes through one light of a rig, while the others stay where they are.
+
+    Args:
+        light: the light that moves.
+        reach: half the side of the planes, a fraction of the scene's size.
+        points: places along each side; odd, so that the answer is one of them.
+
+    Raises:
+        ValueError: an even number of points, or fewer than three.
+    """
+    if points < 3 or points % 2 == 0:
+        raise ValueError(f"points must be odd and at least 3, got {points}")
+    region = search_region(problem)
+    fixed = [problem.evaluate(emitter) for index, emitter in enumerate(rig) if index != light]
+    weights = PLAIN.base(problem).square()
+    energy = max(float(problem.target.double().square().sum()), 1e-300)
+    offsets = torch.linspace(-reach, reach, points, dtype=torch.float64) * region.size
+    answer = rig[light].position
+
+    def loss_at(position: Tensor) -> float:
+        if not torch.equal(region.clip(position), position):
+            return float("nan")
+        columns = [*fixed, problem.evaluate(replace(rig[light], position=position))]
+        return problem.moments(columns, weights).cost / energy
+
+    slices = []
+    for axes in track(PLANES, "loss around the answer", unit="plane"):
+        loss = torch.empty((points, points), dtype=torch.float64)
+        for row, down in enumerate(offsets):
+            for column, along in enumerate(offsets):
+                position = answer.clone()
+                position[list(axes)] += torch.stack([along, down])
+                loss[row, column] = loss_at(position)
+        slices.append(LossSlice(axes, answer[axes[0]] + offsets, answer[axes[1]] + offsets, loss))
+    return tuple(slices)

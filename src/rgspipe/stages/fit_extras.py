@@ -1,0 +1,95 @@
+"""What fit_light writes beside the lights where it is asked to: advice on further views, and the loss around them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+import pandas as pd
+import torch
+from torch import Tensor
+
+from rgspipe.config import FitConfig
+from rgspipe.datasets.frames import FrameEntry, read_entries
+from rgspipe.datasets.landscape_file import Landscape, PlaneLoss, landscape_bytes
+from rgspipe.datasets.location import dataset_root
+from rgspipe.fitting import FitResult, FitViews
+from rgspipe.fitting.advice import SPOT_ROWS, ViewAdvice, suggest_views
+from rgspipe.fitting.landscape import loss_slices
+from rgspipe.fitting.parameters import Emitter
+from rgspipe.fitting.problem import LightProblem
+from rgspipe.scene import Camera
+
+#: A camera and its name.
+Named = tuple[str, Camera]
+
+
+def further_files(
+    config: FitConfig, views: FitViews, images: Sequence[Tensor], result: FitResult, candidates: Sequence[Named]
+) -> dict[str, bytes]:
+    """The files that the configuration asks for, by name; none for a fit without lights."""
+    files: dict[str, bytes] = {}
+    if not result.lights:
+        return files
+    if config.suggest_view:
+        present = [view.camera for view in views.prepared.views]
+        advice = suggest_views(
+            views.prepared.frozen,
+            result,
+            present,
+            [camera for _, camera in candidates],
+            wanted=config.wanted_accuracy,
+            effects=views.effects,
+        )
+        names = [name for name, _ in candidates]
+        files["suggested_views.csv"] = _advice_table(advice, names).to_csv(index=False).encode()
+        files["advice.json"] = _advice_words(advice, names)
+    if config.landscape:
+        files["landscape.npz"] = _landscape(views, images, result)
+    return files
+
+
+def training_cameras(dataset: Path | None, like: Camera) -> list[Named]:
+    """The cameras of the training views, named by their images; `like` has the size where the file states none."""
+    if dataset is None:
+        return []
+    path = dataset_root(dataset) / "transforms_train.json"
+    if not path.is_file():
+        return []
+    entries = read_entries(path, "the cameras of the training views")
+    return [(f"train/{entry.image_path.stem}", entry.camera(*_size(entry, like))) for entry in entries]
+
+
+def _size(entry: FrameEntry, like: Camera) -> tuple[int, int]:
+    sizes = entry.shared | entry.fields
+    return int(sizes.get("w", like.width)), int(sizes.get("h", like.height))
+
+
+def _advice_table(advice: ViewAdvice, names: Sequence[str]) -> pd.DataFrame:
+    """One row a camera that is added alone ("alone"), then those of the plan ("plan"), best first."""
+    present = advice.present_views
+    rows = [("alone", present + 1, names[view.camera], view.position_sd) for view in advice.ranked]
+    planned = enumerate(advice.plan, start=present + 1)
+    rows += [("plan", count, names[view.camera], view.position_sd) for count, view in planned]
+    return pd.DataFrame(rows, columns=["added", "views", "camera", "position_sd"])
+
+
+def _advice_words(advice: ViewAdvice, names: Sequence[str]) -> bytes:
+    numbers = {"present_sd": advice.present_sd, "wanted": advice.wanted}
+    content = {name: value if value < float("inf") else "inf" for name, value in numbers.items()}
+    content |= {"present_views": advice.present_views, "views_needed": advice.views_needed}
+    return (json.dumps(content | {"words": advice.words(names)}, indent=1, allow_nan=False) + "\n").encode()
+
+
+def _landscape(views: FitViews, images: Sequence[Tensor], result: FitResult) -> bytes:
+    """The loss around the first light."""
+    problem = LightProblem.create(views.prepared, views.prepared.stack_images(images), views.effects)
+    pairs = zip(result.lights, result.covariance, strict=True)
+    rig = [Emitter.of(light, cone_free=len(matrix) > SPOT_ROWS) for light, matrix in pairs]
+    planes = {
+        "".join("xyz"[k] for k in one.axes): PlaneLoss(one.across.numpy(), one.up.numpy(), one.loss.numpy())
+        for one in loss_slices(problem, rig)
+    }
+    path = torch.stack([step.position.double().cpu() for step in result.trajectory if step.lights])
+    return landscape_bytes(Landscape(planes, path.numpy()))

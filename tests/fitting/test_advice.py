@@ -1,0 +1,96 @@
+"""Advice on further views: what it predicts is what adding them does."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+import torch
+
+from lit_room import HIDDEN, room_cameras
+from rgspipe import fit_lights
+from rgspipe.fitting import Effects
+from rgspipe.fitting.advice import MOST_VIEWS, coarse_camera, suggest_views
+from rgspipe.scene import Camera, PointLight, look_at
+
+
+def _camera(origin: tuple[float, float, float], aim: tuple[float, float, float]) -> Camera:
+    return Camera.from_field_of_view(look_at(torch.tensor(origin), torch.tensor(aim)), 1.2, 48, 48)
+
+
+#: Looks at the corner that HIDDEN lights, from the side of the room behind the box; and one that looks away from it.
+TOWARDS, AWAY = _camera((0.1, 0.42, 0.1), (0.4, 0.3, -0.4)), _camera((-0.1, -0.3, 0.2), (-0.45, -0.45, 0.45))
+
+
+@pytest.fixture(scope="module")
+def fitted(room):
+    """A fit of the hidden light from one view, its target 2 % wrong in stripes."""
+    light = torch.tensor(HIDDEN, dtype=torch.float64)
+    (image,) = room.images(PointLight(light, torch.ones(3, dtype=torch.float64)))
+    stripes = 1.0 + 0.02 * torch.sign(torch.sin(torch.arange(48) * 0.5))[None, :, None]
+    return fit_lights(room.frozen, room.one, [image * stripes])
+
+
+def test_the_camera_that_sees_the_bright_spot_helps_most(room, fitted):
+    advice = suggest_views(room.frozen, fitted, room_cameras(48)[:1], [AWAY, TOWARDS, AWAY], wanted=1e-9)
+    assert advice.ranked[0].camera == 1 and advice.ranked[0].position_sd < 0.7 * advice.present_sd  # measured 0.57
+    assert [view.camera for view in advice.ranked[1:]] == [0, 2]
+    assert advice.plan[0] == advice.ranked[0] and len(advice.plan) == 3 and advice.views_needed is None
+    assert "the bright one would help most" in advice.words(["a", "the bright one", "b"])
+
+
+def test_the_present_uncertainty_is_the_fits_own(room, fitted):
+    advice = suggest_views(room.frozen, fitted, room_cameras(48)[:1], [], wanted=1.0)
+    own = float(fitted.covariance[0].diagonal()[:3].sum().sqrt()) / room.frozen.size
+    assert advice.present_sd == pytest.approx(own)
+    assert advice.views_needed == 1 and advice.ranked == advice.plan == ()
+    assert "no other camera" in advice.words([])
+
+
+def test_without_errors_of_the_model_the_same_view_again_halves_the_variance(room, fitted):
+    """Noise averages out over views; an error of the model, which all views share, does not."""
+    camera = room_cameras(48)[0]
+    noise_only = replace(fitted, covariance=fitted.noise_covariance)
+    again = suggest_views(room.frozen, noise_only, [camera], [camera], wanted=0.0)
+    assert again.ranked[0].position_sd == pytest.approx(again.present_sd / math.sqrt(2.0), rel=1e-6)
+    model_only = replace(fitted, noise_covariance=tuple(0.0 * matrix for matrix in fitted.covariance))
+    again = suggest_views(room.frozen, model_only, [camera], [camera], wanted=0.0)
+    assert again.ranked[0].position_sd == pytest.approx(again.present_sd, rel=1e-6)
+
+
+def test_noise_is_predicted_as_a_fit_of_both_views_finds_it(room, point_light):
+    """White noise: the predicted standard deviation of two views against the covariance of the fit of two."""
+    light = point_light(HIDDEN)
+    generator = torch.Generator().manual_seed(0)
+    images = [
+        image + 0.02 * image.mean() * torch.randn(image.shape, generator=generator) for image in room.images(light, 2)
+    ]
+    one = fit_lights(room.frozen, room.one, images[:1])
+    two = fit_lights(room.frozen, room.two, images)
+    one = replace(one, covariance=one.noise_covariance)
+    first, second = room_cameras(48)
+    advice = suggest_views(room.frozen, one, [first], [second], wanted=0.0)
+    found = float(two.noise_covariance[0].diagonal()[:3].sum().sqrt()) / room.frozen.size
+    assert advice.ranked[0].position_sd == pytest.approx(found, rel=0.15)  # measured 0.90 of it
+
+
+def test_the_plan_ends_at_the_most_views(room, fitted):
+    cameras = [_camera((0.3 * math.sin(k), 0.3 * math.cos(k), 0.2), (0.0, 0.0, -0.4)) for k in range(9)]
+    advice = suggest_views(room.frozen, fitted, room_cameras(48)[:1], cameras, wanted=1e-9, effects=Effects())
+    assert len(advice.plan) == MOST_VIEWS - 1 and len({view.camera for view in advice.plan}) == MOST_VIEWS - 1
+    reached = replace(advice, wanted=advice.plan[2].position_sd)
+    assert reached.wanted < advice.present_sd
+
+
+def test_small_cameras_see_the_same():
+    camera = _camera((0.0, 0.0, 0.0), (1.0, 0.2, 0.0))
+    small = coarse_camera(replace(camera, width=96, height=64, fx=80.0, fy=82.0, cx=47.0, cy=30.0), 48)
+    assert (small.width, small.height) == (48, 32)
+    assert (small.fx, small.fy, small.cx, small.cy) == (40.0, 41.0, 23.5, 15.0)
+    assert coarse_camera(camera, 48) == camera
+
+
+def test_a_fit_without_lights_has_no_advice(room, fitted):
+    with pytest.raises(ValueError, match="lights"):
+        suggest_views(room.frozen, replace(fitted, lights=()), room_cameras(48)[:1], [AWAY], wanted=0.0)
