@@ -392,7 +392,9 @@ class FitConfig:
     wanted_accuracy: float = option(
         0.003, "with suggest_view: position error to reach, fraction of the scene's size", low=0, high=1
     )
-    landscape: bool = option(False, "work out the loss on three planes through the first light, for evaluate to draw; takes seconds")
+    landscape: bool = option(
+        False, "work out the loss on three planes through the first light, for evaluate to draw; takes seconds a target"
+    )
     targets: str = option(
         "dataset",
         "whose targets: the dataset's, or those that stage=generate_targets makes as targets.* says",
