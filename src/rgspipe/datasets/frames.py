@@ -61,6 +61,11 @@ class FrameEntry:
         """The albedo image, if there is one."""
         return self._optional_path("albedo_path")
 
+    @property
+    def mask_path(self) -> Path | None:
+        """The image of which pixels count, if there is one."""
+        return self._optional_path("mask_path")
+
     def camera(self, width: int, height: int) -> Camera:
         """The camera for an image of this size.
 

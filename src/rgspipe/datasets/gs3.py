@@ -13,7 +13,7 @@ from pathlib import Path
 import torch
 
 from rgspipe.datasets.frames import FrameEntry, read_entries
-from rgspipe.datasets.images import read_colour, read_depth, read_vectors
+from rgspipe.datasets.images import read_colour, read_depth, read_mask, read_vectors
 from rgspipe.datasets.info import DatasetInfo, read_info
 from rgspipe.datasets.json_file import read_json, required
 from rgspipe.datasets.tensoir import is_tensoir, load_tensoir
@@ -114,6 +114,9 @@ class _Surface:
 def _load_view(entry: FrameEntry, root: Path, info: DatasetInfo | None, *, with_light: bool) -> View:
     image, alpha = read_colour(entry.image_path)
     camera = entry.camera(image.shape[1], image.shape[0])
+    if entry.mask_path is not None:
+        mask = read_mask(entry.mask_path, camera)
+        image, alpha = image * mask[..., None], alpha * mask
     surface = _load_surface(entry, camera, info)
     light = PointLight(*entry.light()) if with_light else None
     return View(

@@ -70,6 +70,28 @@ def read_vectors(path: Path, names: tuple[str, ...], camera: Camera) -> Tensor:
     return torch.from_numpy(stored)
 
 
+def read_mask(path: Path, camera: Camera) -> Tensor:
+    """A mask (H, W) float32 in [0, 1]: 8-bit grey (or RGB, of which the first channel counts), or EXR with one channel.
+
+    Raises:
+        InputError: missing or broken file, other channels, another size than the image, values outside of [0, 1].
+    """
+    if path.suffix.lower() == ".exr":
+        channels = read_channels(path)
+        if len(channels) != 1:
+            found = f"{len(channels)}: {', '.join(sorted(channels))}"
+            raise InputError(path, expected="one channel, the mask", found=found, remedy="Export only the mask.")
+        (stored,) = channels.values()
+    else:
+        stored = _read_levels(path)
+        stored = stored if stored.ndim == 2 else stored[..., 0]
+    check_size(path, stored, camera)
+    if not (stored.min() >= 0 and stored.max() <= 1):
+        found = f"{stored.min():g} to {stored.max():g}"
+        raise InputError(path, expected="values from 0 to 1", found=found, remedy="Export the mask again.")
+    return torch.from_numpy(np.array(stored, dtype=np.float32))
+
+
 def check_size(path: Path, stored: np.ndarray | Tensor, camera: Camera) -> None:
     """Refuse a map (H, W, …) of another size than the image.
 
@@ -100,6 +122,15 @@ def read_png(path: Path) -> np.ndarray:
     Raises:
         InputError: missing or broken file, or other than 8-bit RGB or RGBA.
     """
+    values = _read_levels(path)
+    if values.ndim != 3 or values.shape[2] not in (3, 4):
+        found = f"shape {values.shape}"
+        raise InputError(path, expected="8-bit RGB or RGBA", found=found, remedy="Export it so, or as OpenEXR.")
+    return values
+
+
+def _read_levels(path: Path) -> np.ndarray:
+    """(H, W) or (H, W, C) float32 values in [0, 1] of an 8-bit image."""
     from PIL import Image, UnidentifiedImageError
 
     if not path.is_file():
@@ -114,7 +145,7 @@ def read_png(path: Path) -> np.ndarray:
             found=f"an unreadable file ({error})",
             remedy="Export it again.",
         ) from error
-    if stored.ndim != 3 or stored.shape[2] not in (3, 4) or stored.dtype != np.uint8:
+    if stored.dtype != np.uint8:
         found = f"{stored.dtype} with shape {stored.shape}"
         raise InputError(path, expected="8-bit RGB or RGBA", found=found, remedy="Export it so, or as OpenEXR.")
     return stored.astype(np.float32) / 255.0
