@@ -20,7 +20,7 @@ SCENE_KINDS = ("cornell", "corner", "hotdog", "room", "blend", "external", "ply"
 MODELLED = SCENE_KINDS[:4]
 OCCLUSIONS = ("visible", "out_of_frame", "occluded", "around_corner", "all")
 PLY_FRONTS = ("auto", "kept", "inwards", "outwards", "cameras")
-FIT_METHODS = ("search_lm", "paper_adam")
+FIT_METHODS = ("search_lm", "paper_adam", "finite_differences")
 TARGET_KINDS = ("points", "spots", "mixed", "track")
 ROOM_NAMES = ("cornell", "corridor", "clutter")
 
@@ -395,6 +395,14 @@ class FitConfig:
     landscape: bool = option(
         False, "work out the loss on three planes through the first light, for evaluate to draw; takes seconds a target"
     )
+    exposure: str = option(
+        "known",
+        "whether the images hold radiance, or every view but the first has an unknown factor, too",
+        choices=("known", "free"),
+    )
+    clip: float | None = option(
+        None, "radiance at which images are clipped; by default 1 for 8-bit sRGB, else none", low=1e-12, high=1e12
+    )
     targets: str = option(
         "dataset",
         "whose targets: the dataset's, or those that stage=generate_targets makes as targets.* says",
@@ -532,6 +540,19 @@ class TargetsConfig:
 
 
 @dataclass
+class TrackConfig:
+    """Lights that move from frame to frame."""
+
+    folder: str | None = option(
+        None, "a folder whose targets/ are the frames, in order; by default those of generate_targets, kind=track"
+    )
+    lost: float = option(
+        2.0, "a frame that is so many times worse explained than those before is searched anew", low=1, high=1000
+    )
+    iterations: int = option(15, "most Levenberg-Marquardt steps of a frame", low=1, high=10000)
+
+
+@dataclass
 class DebugConfig:
     """What is shown when something goes wrong."""
 
@@ -567,6 +588,7 @@ class RgspipeConfig:
     debug: DebugConfig = section(DebugConfig, "when something goes wrong")
     model_error: ModelErrorConfig = section(ModelErrorConfig, "errors put into the frozen scene")
     target_capture: TargetCaptureConfig = section(TargetCaptureConfig, "errors put into fit targets")
+    track: TrackConfig = section(TrackConfig, "lights that move")
     targets: TargetsConfig = section(TargetsConfig, "generated fit targets")
 
 

@@ -91,6 +91,7 @@ def _write_light_file(path: Path, result: FitResult, quality: float | None) -> N
         "psnr": quality,
         "result": str(result.status),
         "reason": result.reason,
+        "exposures": list(result.exposures),
         "lights": covariance_fields(
             len(result.lights), {"covariance": result.covariance, "noise_covariance": result.noise_covariance}
         ),

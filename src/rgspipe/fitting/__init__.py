@@ -1,5 +1,6 @@
 """From images of a frozen scene to the lights that made them."""
 
+from rgspipe.fitting.capture import ImageCapture
 from rgspipe.fitting.dictionary import LightDictionary, build_dictionary
 from rgspipe.fitting.fit import FitViews, fit_lights, prepare_fit, render_light, render_rig
 from rgspipe.fitting.paper_adam import AdamOptions
@@ -14,6 +15,7 @@ __all__ = [
     "FitResult",
     "FitStatus",
     "FitViews",
+    "ImageCapture",
     "LightDictionary",
     "LightSpec",
     "SearchOptions",

@@ -43,7 +43,7 @@ class Scored:
     @classmethod
     def of(cls, problem: LightProblem, coarse: CoarseImages) -> Scored:
         target = (coarse.blocks @ problem.target).double()
-        root = problem.block_weights(target, coarse.counts.to(target)).sqrt()
+        root = problem.block_weights(target, coarse.counts.to(target), coarse.blocks).sqrt()
         images = (coarse.images * root.to(coarse.images)).permute(0, 2, 1).contiguous()
         weighted = (target * root).T
         wanted = weighted.to(images)
@@ -54,7 +54,7 @@ class Scored:
     def coarse_of(self, problem: LightProblem, coarse: CoarseImages, column: Tensor) -> Tensor:
         """(3, B) weighted coarse image of a light's full one, (P, 3, 1 + d)."""
         target = (coarse.blocks @ problem.target).double()
-        root = problem.block_weights(target, coarse.counts.to(target)).sqrt()
+        root = problem.block_weights(target, coarse.counts.to(target), coarse.blocks).sqrt()
         return ((coarse.blocks @ column[:, :, 0].contiguous()) * root.to(column)).T
 
 

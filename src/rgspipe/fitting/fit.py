@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 from torch import Tensor
 
+from rgspipe.fitting.capture import ImageCapture
 from rgspipe.fitting.coarse import CoarseImages, coarse_images
 from rgspipe.fitting.dictionary import LightDictionary, build_dictionary
 from rgspipe.fitting.gloss import bounced_light
@@ -25,7 +26,10 @@ from rgspipe.renderer.spot import spot_share
 from rgspipe.renderer.view_weights import ViewWeights
 from rgspipe.scene import Camera, Light, LightRig, PointLight, SpotLight
 
-METHODS = ("search_lm", "paper_adam")
+METHODS = ("search_lm", "paper_adam", "finite_differences")
+
+#: What a fit with an unknown exposure says of a single view.
+ONE_EXPOSURE = "One view cannot tell its exposure from the lights' intensity: intensities are relative to the exposure."
 
 
 @dataclass(frozen=True)
@@ -87,6 +91,7 @@ def fit_lights(
     training_lights: Sequence[PointLight] = (),
     seed: int = 0,
     spec: LightSpec | None = None,
+    capture: ImageCapture | None = None,
 ) -> FitResult:
     """Recover the lights of images of a frozen scene.
 
@@ -95,7 +100,7 @@ def fit_lights(
         views: the images' cameras, or their weights; or what `prepare_fit` made of them for the same `spec`, and then
             `masks`, `mask_edges`, `dictionary` and `effects` are those that it was given.
         images: (H, W, 3) linear radiance per view, premultiplied by alpha.
-        method: "search_lm" or "paper_adam".
+        method: "search_lm", "paper_adam", or "finite_differences": search_lm with derivatives by central differences.
         masks: (H, W) per view, the scene's share of each pixel (the image's alpha); 1 if None.
         mask_edges: whether `search_lm` leaves out pixels on silhouettes, creases and depth jumps.
         dictionary: candidates for `search_lm`; made anew if None, which takes seconds.
@@ -104,6 +109,7 @@ def fit_lights(
         training_lights: lights of known images, where `paper_adam` starts from.
         seed: of every draw; the same seed gives the same result.
         spec: what is known of the lights: type, number, spots' profile; one point light if None.
+        capture: what is known of how the images were taken; as radiance, with known exposures, if None.
 
     Returns:
         The lights, why the fit stopped, and how it got there. A target that is black gives a result without
@@ -111,23 +117,30 @@ def fit_lights(
 
     Raises:
         InputError: images or masks do not fit the views, are not finite, or leave no pixel.
-        ValueError: an unknown method.
+        ValueError: an unknown method, or free exposures or clipped images with `paper_adam`.
     """
     if method not in METHODS:
         raise ValueError(f"method must be one of {METHODS}, got {method!r}")
     if not isinstance(views, FitViews):
-        if method == "search_lm" and dictionary is None:
+        if method != "paper_adam" and dictionary is None:
             dictionary = build_dictionary(frozen, seed=seed, shadows=(effects or Effects()).shadows)
         views = prepare_fit(
             frozen, views, masks=masks, mask_edges=mask_edges, dictionary=dictionary, effects=effects, spec=spec
         )
     stacked = views.prepared.stack_images(images)
-    problem = LightProblem.create(views.prepared, stacked, views.effects)
+    capture = capture or ImageCapture()
+    problem = LightProblem.create(views.prepared, stacked, views.effects, capture)
     if method == "paper_adam":
+        if capture != ImageCapture():
+            raise ValueError("paper_adam takes images as radiance with known exposures: use search_lm")
         return fit_paper_adam(problem, stacked, adam or AdamOptions(), LightPrior.of(training_lights), seed)
     if not views.coarse:
-        raise ValueError("search_lm needs a dictionary: pass one to prepare_fit")
-    return fit_search_lm(problem, views.coarse, search or SearchOptions(), spec)
+        raise ValueError(f"{method} needs a dictionary: pass one to prepare_fit")
+    problem = replace(problem, differences=method == "finite_differences")
+    result = fit_search_lm(problem, views.coarse, search or SearchOptions(), spec)
+    if capture.exposure_free and len(views.prepared.views) == 1:
+        return replace(result, reason=f"{result.reason} {ONE_EXPOSURE}")
+    return result
 
 
 def render_light(views: FitViews, light: Light | None) -> list[Tensor]:

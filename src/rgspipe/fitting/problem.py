@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import torch
 from torch import Tensor
 
+from rgspipe.fitting.capture import SATURATED, ImageCapture, rounding_noise
+from rgspipe.fitting.differences import central_differences
+from rgspipe.fitting.exposure import ExposedMoments, best_factors, moments_by_view
 from rgspipe.fitting.gloss import seen_with_gloss
 from rgspipe.fitting.moments import Moments, moments
 from rgspipe.fitting.parameters import Emitter, share_slopes, shared
@@ -19,6 +23,12 @@ from rgspipe.renderer.spot_share import spot_share_slopes
 
 #: In relative weights 1/(y + floor·mean y): pixels darker than this share of the mean count no more than it does.
 RELATIVE_FLOOR = 0.05
+
+#: What a model of a scene is wrong by, relative to a pixel: rounding that is larger counts, too.
+RELATIVE_ERROR = 0.03
+
+#: What is left of the weight of a block of saturated pixels: a target of nothing else still has a brightest side.
+LEAST_BLOCK_WEIGHT = 1e-3
 
 
 @dataclass(frozen=True)
@@ -42,6 +52,11 @@ class LightProblem:
         scale: mean radiance of the target; 0 if it is black.
         effects: parts of light transport.
         at_pixels: whether direct light is taken where pixels look; see `sharpest`.
+        exposures: (V,) float64 of the views, by which the target is divided already.
+        exposure_free: whether these are only a guess, and are found together with the intensities.
+        clip: (P, 1) float32 radiance at which the target is clipped, over `scale`; None where it is not.
+        noise: (P, 3) float32 standard deviation of the target's rounding, over `scale`; None where there is none.
+        differences: whether derivatives are taken by central differences instead of analytically.
     """
 
     views: PreparedViews
@@ -49,16 +64,34 @@ class LightProblem:
     scale: float
     effects: Effects
     at_pixels: bool = False
+    exposures: Tensor | None = None
+    exposure_free: bool = False
+    clip: Tensor | None = None
+    noise: Tensor | None = None
+    differences: bool = False
 
     @classmethod
-    def create(cls, views: PreparedViews, stacked: Tensor, effects: Effects | None = None) -> LightProblem:
+    def create(
+        cls,
+        views: PreparedViews,
+        stacked: Tensor,
+        effects: Effects | None = None,
+        capture: ImageCapture | None = None,
+    ) -> LightProblem:
         """The problem for images stacked by `PreparedViews.stack_images`, (all pixels, 3)."""
+        capture = capture or ImageCapture()
         target = stacked[views.pixels].double()
         scale = max(0.0, float(target.mean()))
         normalised = target / scale if scale > 0.0 else target
         if not bool(torch.isfinite(normalised).all()):
             scale, normalised = 0.0, torch.zeros_like(target)
-        return cls(views, normalised.float(), scale, effects or Effects())
+        problem = cls(views, normalised.float(), scale, effects or Effects())
+        free = capture.exposure_free and len(views.views) > 1
+        problem = replace(problem, exposures=torch.ones(len(views.views)).double(), exposure_free=free)
+        if capture.clip is None or scale == 0.0:
+            return problem
+        clip = torch.full_like(problem.target[:, :1], capture.clip / scale)
+        return replace(problem, clip=clip, noise=rounding_noise(target / scale, capture.clip / scale).float())
 
     @property
     def black(self) -> bool:
@@ -70,6 +103,17 @@ class LightProblem:
 
         Derivatives are per scene unit and rad; see `Emitter`.
         """
+        if self.differences:
+            size = self.views.frozen.size
+            return central_differences(lambda other: self._evaluate(other)[:, :, 0], emitter, size)
+        return self._evaluate(emitter)
+
+    def renderings(self, emitters: Sequence[Emitter]) -> int:
+        """How many images `evaluate` makes of these."""
+        return sum(1 + 2 * emitter.parameters if self.differences else 1 for emitter in emitters)
+
+    def _evaluate(self, emitter: Emitter) -> Tensor:
+        """`evaluate` with analytic derivatives."""
         frozen = self.views.frozen
         if self.at_pixels:
             return self._evaluate_at_pixels(emitter)
@@ -108,26 +152,64 @@ class LightProblem:
         """The same problem with direct light where pixels look, if the views were made ready for that."""
         return replace(self, at_pixels=bool(self.views.pixel_direct))
 
-    def moments(self, columns: Sequence[Tensor], weights: Tensor) -> Moments:
+    def moments(self, columns: Sequence[Tensor], weights: Tensor) -> Moments | ExposedMoments:
         """Weighted moments of the lights' evaluations against the target."""
-        return moments(columns, self.target, weights)
+        if not self.exposure_free:
+            return moments(columns, self.target, weights)
+        return moments_by_view(columns, self.target, weights, self.views.bounds)
 
     def residual(self, columns: Sequence[Tensor], intensity: Tensor) -> Tensor:
-        """(P, 3) float32 target − image at intensities (L, 3), both over `scale`."""
-        residual = self.target
+        """(P, 3) float32 target − image at intensities (L, 3), both over `scale`.
+
+        The image has its best exposures where these are free. Where the target is clipped, and the image as bright as
+        that or brighter, nothing is known to be wrong: the residual is 0.
+        """
+        image = torch.zeros_like(self.target)
         for light, strength in zip(columns, intensity, strict=True):
-            residual = residual - light[:, :, 0] * strength.to(light)
-        return residual
+            image = image + light[:, :, 0] * strength.to(light)
+        if self.exposure_free:
+            weights, view_of = self.unclipped(self.relative_weights().square()), self.views.view_of
+            factors = best_factors(self.target, image, weights, view_of, len(self.views.views))
+            image = image * factors.to(image)[view_of][:, None]
+        residual = self.target - image
+        return residual if self.clip is None else torch.where(self.saturated & (residual <= 0.0), 0.0, residual)
+
+    @cached_property
+    def saturated(self) -> Tensor:
+        """(P, 3) bool: values that tell only that the radiance is at least so high."""
+        if self.clip is None:
+            return torch.zeros_like(self.target, dtype=torch.bool)
+        return self.target >= SATURATED * self.clip
+
+    def unclipped(self, weights: Tensor) -> Tensor:
+        """Weights (P, 1) or (P, 3) that leave out values of which it is not known whether they are met."""
+        return weights if self.clip is None else weights * ~self.saturated
+
+    def with_exposures(self, exposures: Tensor) -> LightProblem:
+        """The same problem, the target divided by (V,) exposures on top of those that it was divided by already."""
+        factors = exposures.to(self.target)[self.views.view_of][:, None]
+        clip, noise = (None if part is None else part / factors for part in (self.clip, self.noise))
+        return replace(self, target=self.target / factors, exposures=self.exposures * exposures, clip=clip, noise=noise)
 
     def relative_weights(self) -> Tensor:
-        """(P, 1) weights that make errors relative to the pixel's own brightness."""
-        return 1.0 / (self.target.mean(dim=1, keepdim=True).clamp(min=0.0) + RELATIVE_FLOOR)
+        """(P, 1) weights that make errors relative to the pixel's own brightness, where rounding is not larger."""
+        size = self.target.mean(dim=1, keepdim=True).clamp(min=0.0) + RELATIVE_FLOOR
+        if self.noise is not None:
+            size = (size.square() + (self.noise.mean(dim=1, keepdim=True) / RELATIVE_ERROR).square()).sqrt()
+        return 1.0 / size
 
-    @staticmethod
-    def block_weights(target: Tensor, counts: Tensor) -> Tensor:
-        """(B, 3) squared relative weights of block averages (B, 3) over `counts` (B,) pixels each."""
+    def block_weights(self, target: Tensor, counts: Tensor, blocks: SparseOperator) -> Tensor:
+        """(B, 3) squared relative weights of block averages (B, 3) over `counts` (B,) pixels each.
+
+        Args:
+            blocks: (B, P) the averages. Those of which more than a quarter is saturated hardly count.
+        """
         relative = 1.0 / (target.mean(dim=1).clamp(min=0.0) + RELATIVE_FLOOR)
-        return (counts * relative.square())[:, None].expand(target.shape)
+        weights = (counts * relative.square())[:, None].expand(target.shape)
+        if self.clip is None:
+            return weights
+        share = blocks @ self.saturated.float()
+        return weights * (1.0 - 4.0 * share).clamp(min=LEAST_BLOCK_WEIGHT).to(weights)
 
     def unexplained(self, columns: Sequence[Tensor], intensity: Tensor) -> float:
         """Σ (target − image)² / Σ target², the loss that is reported: 0 is a perfect fit, 1 a black image."""

@@ -12,8 +12,8 @@ from torch import Tensor
 from rgspipe.fitting.moments import Moments
 from rgspipe.fitting.parameters import Emitter
 from rgspipe.fitting.problem import LightProblem
-from rgspipe.fitting.surroundings import region_bounds
 from rgspipe.fitting.result import FitStatus, Step
+from rgspipe.fitting.surroundings import region_bounds
 from rgspipe.scene import LightRig
 
 #: A step moves no position by more than this part of the scene's size, and turns no axis and changes no cone by more
@@ -113,8 +113,9 @@ def search_region(problem: LightProblem) -> Region:
 def start_from(problem: LightProblem, emitters: Sequence[Emitter], weighting: Weighting, begin: float) -> State:
     """The state at `emitters`, with the intensities that belong to them."""
     columns = [problem.evaluate(emitter) for emitter in emitters]
-    intensity = problem.moments(columns, weighting.base(problem).square()).intensity
-    state = State(tuple(emitters), columns, intensity, evaluations=len(columns))
+    weights = problem.unclipped(weighting.base(problem).square())
+    intensity = problem.moments(columns, weights).intensity
+    state = State(tuple(emitters), columns, intensity, evaluations=problem.renderings(emitters))
     state.steps.append(state.record(problem, begin))
     return state
 
@@ -122,7 +123,7 @@ def start_from(problem: LightProblem, emitters: Sequence[Emitter], weighting: We
 def reevaluate(problem: LightProblem, state: State) -> None:
     """Take the columns anew where the problem or the emitters' softness have changed."""
     state.columns = [problem.evaluate(emitter) for emitter in state.emitters]
-    state.evaluations += len(state.columns)
+    state.evaluations += problem.renderings(state.emitters)
 
 
 def refine(
@@ -150,12 +151,17 @@ def refine(
 def weights_at(problem: LightProblem, state: State, weighting: Weighting, base: Tensor) -> Tensor:
     """Squared weights of reweighted least squares at the present residual."""
     residual = problem.residual(state.columns, state.intensity)
-    return weighting.squared(base, residual, cauchy_scale(base * residual))
+    if problem.clip is None:
+        return weighting.squared(base, residual, cauchy_scale(base * residual))
+    # The active set of this step: a clipped value counts only where the image is darker than it.
+    counted = ~problem.saturated | (residual > 0.0)
+    scale = cauchy_scale((base * residual)[~problem.saturated])
+    return weighting.squared(base, residual, scale) * counted
 
 
 def cauchy_scale(weighted: Tensor) -> float:
     """The residual at which the Cauchy loss lets go: three medians, above rounding."""
-    return CAUCHY_MEDIANS * float(weighted.abs().median()) + 1e-6
+    return CAUCHY_MEDIANS * float(weighted.abs().median()) + 1e-6 if weighted.numel() else 1.0
 
 
 def _attempt(
@@ -175,7 +181,7 @@ def _attempt(
             old if emitter is before else problem.evaluate(emitter)
             for emitter, before, old in zip(emitters, state.emitters, state.columns, strict=True)
         ]
-        state.evaluations += len(columns)
+        state.evaluations += problem.renderings(emitters)
         trial = problem.moments(columns, weights)
         if trial.cost < cost:
             state.emitters, state.columns, state.intensity = emitters, columns, trial.intensity

@@ -80,6 +80,7 @@ class FitResult:
         costs: by number of lights that was tried, the robust cost of the best rig of so many; see `fitting.number`.
         noise_covariance: the same with the residual as independent noise of the pixels, by plain Gauss-Newton. Errors
             of the model are shared by neighbouring pixels, so it is far too small for a scene that was trained.
+        exposures: of each view over the first one's; all 1 where they were known.
     """
 
     lights: LightRig
@@ -94,6 +95,7 @@ class FitResult:
     trajectory: tuple[Step, ...]
     costs: Mapping[int, float] = field(default_factory=dict)
     noise_covariance: tuple[Tensor, ...] = ()
+    exposures: tuple[float, ...] = ()
 
 
 def dark_result(seconds: float) -> FitResult:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from rgspipe.fitting.coarse import CoarseImages
+from rgspipe.fitting.exposure import rough_exposures
 from rgspipe.fitting.judge import (
     CLEARLY_APART,
     LEAST_DROP,
@@ -19,7 +20,17 @@ from rgspipe.fitting.judge import (
 )
 from rgspipe.fitting.parameters import Emitter
 from rgspipe.fitting.problem import LightProblem
-from rgspipe.fitting.refine import PLAIN, ROBUST, Region, State, reevaluate, refine, search_region, start_from
+from rgspipe.fitting.refine import (
+    PLAIN,
+    ROBUST,
+    Region,
+    State,
+    reevaluate,
+    refine,
+    search_region,
+    start_from,
+    weights_at,
+)
 from rgspipe.fitting.result import REASONS, FitResult, FitStatus, dark_result
 from rgspipe.fitting.schedule import SHORT_ITERATIONS, refine_starts
 from rgspipe.fitting.spec import MOST_LIGHTS, LightSpec
@@ -62,6 +73,7 @@ def fit_search_lm(
     spec = spec or LightSpec()
     if problem.black:
         return dark_result(time.perf_counter() - begin)
+    problem = _roughly_exposed(problem, coarse)
     candidates = [Candidates.of(problem, images, spec.cone_free) for images in coarse]
     candidates = [one for one in candidates if one.lit]
     if not candidates:
@@ -85,6 +97,19 @@ def fit_from(problem: LightProblem, start: Sequence[Emitter], iterations: int = 
     refine(search.problem, state, PLAIN, iterations, search.region, begin)
     search.states.append(state)
     return search.result(state, {}, False)
+
+
+def _roughly_exposed(problem: LightProblem, coarse: Sequence[CoarseImages]) -> LightProblem:
+    """The problem with free exposures near those of the single candidate that explains most, for the search."""
+    if not problem.exposure_free or not len(coarse[0]):
+        return problem
+    images = coarse[0]
+    target = images.blocks @ problem.target
+    weights = problem.block_weights(target, images.counts.to(target), images.blocks)
+    matrix = images.blocks.matrix
+    # Blocks do not reach over views: their first pixel says which one they are of.
+    views = problem.views.view_of[matrix.col_indices()[matrix.crow_indices()[:-1].long()].long()]
+    return problem.with_exposures(rough_exposures(images.images, target, weights, views, len(problem.exposures)))
 
 
 class _Search:
@@ -220,7 +245,15 @@ class _Search:
             reevaluate(self.problem, best)
         refine(self.problem, best, PLAIN, self.options.iterations, self.region, self.begin)
 
+    def _settle_exposures(self, best: State) -> None:
+        """Take free exposures as known from here on."""
+        if self.problem.exposure_free:
+            weights = weights_at(self.problem, best, PLAIN, PLAIN.base(self.problem))
+            exposures = self.problem.moments(best.columns, weights).exposures
+            self.problem = replace(self.problem.with_exposures(exposures), exposure_free=False)
+
     def result(self, best: State, costs: dict[int, float], ambiguous: bool) -> FitResult:
+        self._settle_exposures(best)
         status = best.status
         if ambiguous:
             status = FitStatus.AMBIGUOUS
@@ -239,5 +272,6 @@ class _Search:
             covariance=spread.calibrated,
             trajectory=(*best.steps, best.record(self.problem, self.begin)),
             costs=costs,
+            exposures=tuple(self.problem.exposures.tolist()),
             noise_covariance=spread.noise,
         )

@@ -55,13 +55,23 @@ class PreparedViews:
         return stack([view.operator for view in self.views])
 
     @cached_property
+    def bounds(self) -> list[int]:
+        """V + 1 places: view v has the trusted pixels from bounds[v] to bounds[v + 1]."""
+        ends = np.cumsum([0, *(view.camera.pixel_count for view in self.views)])
+        return np.searchsorted(self.pixels.cpu().numpy(), ends).tolist()
+
+    @cached_property
+    def view_of(self) -> Tensor:
+        """(P,) int64 view of each trusted pixel."""
+        counts = torch.tensor(self.bounds).diff()
+        return torch.repeat_interleave(torch.arange(len(counts)), counts).to(self.pixels.device)
+
+    @cached_property
     def rows(self) -> tuple[SparseOperator, ...]:
         """Per view the rows of `operator` that are its own."""
-        counts = [view.camera.pixel_count for view in self.views]
-        ends = np.cumsum([0, *counts])
-        bounds = np.searchsorted(self.pixels.cpu().numpy(), ends)
         matrix, device = self.operator.to_scipy(), self.operator.matrix.device
-        return tuple(SparseOperator.from_scipy(matrix[a:b], device) for a, b in itertools.pairwise(bounds))
+        pairs = itertools.pairwise(self.bounds)
+        return tuple(SparseOperator.from_scipy(matrix[first:last], device) for first, last in pairs)
 
     @cached_property
     def highlights(self) -> tuple[PixelHighlights, ...]:

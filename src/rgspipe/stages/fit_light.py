@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import zlib
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
 import pandas as pd
@@ -39,14 +39,16 @@ from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.monte_carlo import MonteCarloSolver
 from rgspipe.renderer.spot import SpotShape
 from rgspipe.scene import PointLight
+from rgspipe.stages import fit_capture
 from rgspipe.stages.base import Stage, StageContext
+from rgspipe.stages.fit_capture import captured_views
 from rgspipe.stages.fit_extras import Named, further_files, training_cameras
 from rgspipe.stages.sources import image_stage, require_images, target_stage
 
 
 def run(context: StageContext) -> None:
     """Write results.csv and a folder per target; targets that an earlier attempt finished are kept."""
-    fitter = _Fitter.create(context)
+    fitter = Fitter.create(context)
     targets = select_targets(_targets(context), context.config)
     rows = []
     for target in track(targets, "fitting lights", unit="target"):
@@ -58,7 +60,7 @@ def run(context: StageContext) -> None:
 
 
 @dataclass
-class _Fitter:
+class Fitter:
     """Fits targets; views that several of them share are prepared once."""
 
     config: RgspipeConfig
@@ -70,10 +72,12 @@ class _Fitter:
     prepared: dict[bytes, FitViews] = field(default_factory=dict)
 
     @classmethod
-    def create(cls, context: StageContext) -> _Fitter:
+    def create(cls, context: StageContext) -> Fitter:
         config, artifact = context.config, context.inputs["freeze"]
         frozen = _frozen(config, artifact)
         effects = _effects(context)
+        if frozen.gloss is not None and config.effects.auto and not _choice(config, artifact)[1].specular:
+            frozen = replace(frozen, gloss=None)
         dataset = context.inputs["generate_dataset"].path if "generate_dataset" in context.inputs else None
         if config.fit.method == "paper_adam":
             return cls(config, frozen, None, _training_lights(context), effects, dataset)
@@ -86,8 +90,9 @@ class _Fitter:
 
     def fit(self, target: Target, folder: Path) -> None:
         """Fit one target and write its folder, whole or not at all."""
-        views = used_views(target, self.config)
-        prepared = self._prepare(views)
+        chosen = used_views(target, self.config)
+        views, capture = captured_views(chosen, target.name, self.config)
+        prepared = self.prepare(views)
         config = self.config.fit
         if isinstance(self.frozen.solver, MonteCarloSolver):
             # Every target draws its own rays, whichever targets an earlier attempt has finished.
@@ -110,9 +115,12 @@ class _Fitter:
             training_lights=self.training_lights,
             seed=target_seed(target, self.config),
             spec=light_spec(self.config),
+            capture=capture,
         )
-        images = [view.image for view in views]
-        further = further_files(config, prepared, images, result, self._other_cameras(target, views))
+        # Pictures and their PSNR are those of the first view's exposure.
+        exposures = result.exposures or [1.0] * len(views)
+        images = [view.image / exposure for view, exposure in zip(views, exposures, strict=True)]
+        further = further_files(config, prepared, images, result, self._other_cameras(target, chosen))
         write_result(folder / target.name, result, prepared, images, further)
 
     def _other_cameras(self, target: Target, used: Sequence[View]) -> list[Named]:
@@ -126,7 +134,8 @@ class _Fitter:
         ]
         return [*others, *training_cameras(self.dataset, used[0].camera)]
 
-    def _prepare(self, views: Sequence[View]) -> FitViews:
+    def prepare(self, views: Sequence[View]) -> FitViews:
+        """What fits of these cameras and masks share; made once."""
         key = b"".join(_identity(view) for view in views)
         if key not in self.prepared:
             self.prepared[key] = prepare_fit(
@@ -302,10 +311,10 @@ def _inputs(config: RgspipeConfig) -> list[str]:
 
 
 def _keys(config: RgspipeConfig) -> list[str]:
-    keys = ["seed", "effects", "light", "fit.method", "fit.target", "views.count", "views.indices"]
+    keys = ["seed", "effects", "light", "fit.method", "fit.target", "views.count", "views.indices", *fit_capture.KEYS]
     keys += ["fit.suggest_view", "fit.landscape"]
     keys += ["fit.wanted_accuracy"] if config.fit.suggest_view else []
-    keys += ["fit.search", "fit.cone"] if config.fit.method == "search_lm" else ["fit.adam"]
+    keys += ["fit.adam"] if config.fit.method == "paper_adam" else ["fit.search", "fit.cone"]
     return keys if config.fit.target is not None else [*keys, "occlusion", "fit.limit"]
 
 
@@ -333,6 +342,7 @@ STAGE = Stage(
         "rgspipe.datasets.frozen_file",
         "rgspipe.evaluation.images",
         "rgspipe.evaluation.metrics",
+        *fit_capture.CODE,
     ),
     files=_files,
     remarks=remarks,

@@ -1,0 +1,40 @@
+"""What is known of how fit targets were taken, and errors put into them for a study."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rgspipe.config import RgspipeConfig
+from rgspipe.datasets.views import View
+from rgspipe.errors import InputError
+from rgspipe.fitting.capture import ImageCapture, stored_in_eight_bits
+from rgspipe.robustness.target_capture import TargetCapture, captured
+
+#: Configuration keys that all this depends on, and code.
+KEYS = ("target_capture", "fit.exposure", "fit.clip")
+CODE = ("rgspipe.robustness.target_capture", "rgspipe.datasets.degrade", "rgspipe.datasets.srgb", __name__)
+
+
+def captured_views(views: Sequence[View], target: str, config: RgspipeConfig) -> tuple[list[View], ImageCapture]:
+    """The views of a target with the errors of `target_capture`, and what a fit may know of how they were taken.
+
+    Images that hold nothing but the levels of 8-bit sRGB are clipped at 1; others are not, unless `fit.clip` says so.
+
+    Raises:
+        InputError: the paper's method is asked for unknown exposures.
+    """
+    free = config.fit.exposure == "free"
+    taken, white = captured(views, target, TargetCapture.from_config(config.target_capture))
+    if config.fit.method == "paper_adam":
+        if free:
+            raise InputError(
+                "fit.exposure",
+                expected="known with fit=paper_adam",
+                found="free",
+                remedy="Use fit=search_lm for images of unknown exposure.",
+            )
+        return taken, ImageCapture()
+    clip = white if white is not None else config.fit.clip
+    if clip is None and all(stored_in_eight_bits(view.image, view.alpha) for view in taken):
+        clip = 1.0
+    return taken, ImageCapture(free, clip)

@@ -1,0 +1,101 @@
+"""fit_light on targets as cameras take them: PNG images, masks, unknown exposure, and errors put in for studies."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+import torch
+
+from frozen_store import RESOLUTION, frozen_artifact, write_display_target
+from lit_room import VISIBLE, room_cameras
+from rgspipe.artifacts import Artifact
+from rgspipe.config import RgspipeConfig, with_changes
+from rgspipe.datasets.frozen_file import load_frozen
+from rgspipe.datasets.gs3 import load_target
+from rgspipe.datasets.light_file import read_lights
+from rgspipe.datasets.views import View
+from rgspipe.errors import InputError
+from rgspipe.fitting import Effects, prepare_fit, render_light
+from rgspipe.scene import PointLight
+from rgspipe.stages import fit_light
+from rgspipe.stages.base import StageContext
+from rgspipe.stages.fit_capture import captured_views
+
+LIGHT = PointLight(torch.tensor(VISIBLE, dtype=torch.float64), torch.tensor([1.0, 2.0, 0.5], dtype=torch.float64))
+
+
+@pytest.fixture(scope="module")
+def freeze(tmp_path_factory: pytest.TempPathFactory) -> Artifact:
+    return frozen_artifact(tmp_path_factory.mktemp("store"))
+
+
+@pytest.fixture(scope="module")
+def images(freeze: Artifact) -> list[torch.Tensor]:
+    """Two views of LIGHT, of which 5 % of the values are above 1."""
+    views = prepare_fit(load_frozen(freeze.file), room_cameras(RESOLUTION), effects=Effects(at_pixels=True))
+    images = render_light(views, LIGHT)
+    white = float(torch.cat([image.reshape(-1) for image in images]).quantile(0.95))
+    return [image / white for image in images]
+
+
+def _config(**changes: object) -> RgspipeConfig:
+    named = {key.replace("__", "."): value for key, value in changes.items()}
+    return with_changes(RgspipeConfig(stage="fit_light"), {"views.count": 2} | named)
+
+
+def _fitted(freeze: Artifact, folder: Path, target: Path, **changes: object) -> tuple[PointLight, dict]:
+    folder.mkdir()
+    fit_light.run(StageContext(_config(fit__target=str(target), **changes), {"freeze": freeze}, {}, folder))
+    file = folder / target.name / "lights.json"
+    return read_lights(file)[0], json.loads(file.read_text())
+
+
+def _error(light: PointLight) -> float:
+    return float((light.position - LIGHT.position).norm())
+
+
+def test_png_targets_are_fitted_as_clipped_images(freeze: Artifact, images: list[torch.Tensor], tmp_path: Path) -> None:
+    write_display_target(tmp_path / "png", images)
+    light, content = _fitted(freeze, tmp_path / "out", tmp_path / "png")
+    assert _error(light) < 2e-3 and content["result"] == "converged"
+    _, capture = captured_views(load_target(tmp_path / "png").views, "png", _config())
+    assert capture.clip == 1.0
+
+
+def test_alpha_masks_what_is_not_the_scene(freeze: Artifact, images: list[torch.Tensor], tmp_path: Path) -> None:
+    """A third of each image is someone else's, and its alpha 0."""
+    spoilt, alphas = [image.clone() for image in images], [torch.ones(RESOLUTION, RESOLUTION) for _ in images]
+    for image, alpha in zip(spoilt, alphas, strict=True):
+        image[:, : RESOLUTION // 3] = torch.rand(3)
+        alpha[:, : RESOLUTION // 3] = 0.0
+    write_display_target(tmp_path / "masked", spoilt, alphas)
+    light, _ = _fitted(freeze, tmp_path / "out", tmp_path / "masked")
+    assert _error(light) < 3e-3
+
+
+def test_views_of_unknown_exposure(freeze: Artifact, images: list[torch.Tensor], tmp_path: Path) -> None:
+    write_display_target(tmp_path / "exposed", [0.5 * images[0], 0.2 * images[1]])
+    light, content = _fitted(freeze, tmp_path / "out", tmp_path / "exposed", fit__exposure="free")
+    assert _error(light) < 2e-3 and content["exposures"][1] == pytest.approx(0.4, rel=0.02)
+
+
+def test_radiance_is_not_clipped_and_a_stated_clip_counts(images: list[torch.Tensor]) -> None:
+    views = [
+        View(f"v{k}", c, i, torch.ones(i.shape[:2]))
+        for k, (c, i) in enumerate(zip(room_cameras(RESOLUTION), images, strict=True))
+    ]
+    assert captured_views(views, "a", _config())[1].clip is None
+    assert captured_views(views, "a", _config(fit__clip=0.8))[1].clip == 0.8
+    noisy, capture = captured_views(views, "a", _config(target_capture__noise=0.05, target_capture__white=0.9))
+    assert capture.clip is not None and float(noisy[0].image.max()) <= capture.clip * (1 + 1e-6)
+    with pytest.raises(InputError, match=r"fit\.exposure"):
+        captured_views(views, "a", _config(fit__method="paper_adam", fit__exposure="free"))
+
+
+def test_a_frozen_scene_with_a_missing_object_has_fewer_surfels(freeze: Artifact, tmp_path: Path) -> None:
+    box = [-0.15, -0.15, -0.4, 0.25, 0.25, 0.0]
+    wrong = frozen_artifact(tmp_path, model_error__missing=box, model_error__albedo=0.1)
+    counts = [len(load_frozen(artifact.file).surfels) for artifact in (freeze, wrong)]
+    assert counts[1] < counts[0]
