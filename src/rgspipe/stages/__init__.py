@@ -23,6 +23,7 @@ NAMES = (
     "render_olat",
     "generate_targets",
     "fit_light",
+    "track",
     "judge",
     "evaluate",
     "study",
