@@ -19,7 +19,7 @@ from rgspipe.fitting.problem import Effects, LightProblem
 from rgspipe.fitting.refine import State
 from rgspipe.fitting.result import REASONS, FitResult, FitStatus, Step, dark_result
 from rgspipe.fitting.ssim import ssim
-from rgspipe.fitting.uncertainty import light_covariances, undetermined
+from rgspipe.fitting.uncertainty import doubts, light_covariances
 from rgspipe.fitting.views import PreparedViews
 from rgspipe.progress import track
 from rgspipe.renderer.direct import differentiable_irradiance
@@ -157,10 +157,11 @@ def fit_paper_adam(
     emitter = Emitter(last.position)
     state = State((emitter,), [problem.evaluate(emitter)], last.intensity[None] / problem.scale)
     spread = light_covariances(problem, state)
+    doubt = doubts(last.lights, spread.calibrated, problem.views.frozen.size)
     return FitResult(
         lights=last.lights,
         status=status,
-        reason=" ".join(filter(None, (REASONS[status], undetermined(last.lights, spread.calibrated)))),
+        reason=f"{REASONS[status]} {doubt}".rstrip(),
         loss=last.loss,
         iterations=len(steps) - 1,
         evaluations=len(steps) + 1,
