@@ -35,7 +35,7 @@ from rgspipe.fitting.result import REASONS, FitResult, FitStatus, dark_result
 from rgspipe.fitting.schedule import SHORT_ITERATIONS, refine_starts
 from rgspipe.fitting.spec import MOST_LIGHTS, LightSpec
 from rgspipe.fitting.starts import Candidates, Rig
-from rgspipe.fitting.uncertainty import light_covariances, undetermined
+from rgspipe.fitting.uncertainty import doubts, light_covariances
 
 #: Starts for each wanted one, where spots are among the candidates.
 SPOT_STARTS = 3
@@ -263,7 +263,7 @@ class _Search:
         return FitResult(
             lights=lights,
             status=status,
-            reason=" ".join(filter(None, (REASONS[status], undetermined(lights, spread.calibrated)))),
+            reason=" ".join(filter(None, (REASONS[status], doubts(lights, spread.calibrated, self.region.size)))),
             loss=self.problem.unexplained(best.columns, best.intensity),
             iterations=sum(state.iterations for state in self.states),
             evaluations=sum(state.evaluations for state in self.states),
