@@ -393,7 +393,7 @@ class FitConfig:
         0.003, "with suggest_view: position error to reach, fraction of the scene's size", low=0, high=1
     )
     landscape: bool = option(
-        False, "work out the loss on three planes through the first light, for evaluate to draw; takes seconds a target"
+        False, "work out the loss on three planes through the first light, for evaluate to draw; half a minute a target"
     )
     exposure: str = option(
         "known",
