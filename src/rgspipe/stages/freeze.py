@@ -61,6 +61,7 @@ STAGE = Stage(
         "rgspipe.datasets.frozen_file",
         "rgspipe.datasets.surfel_file",
         "rgspipe.fitting.dictionary",
+        "rgspipe.fitting.surroundings",
         "rgspipe.robustness.model_error",
     ),
     run=run,

@@ -132,6 +132,7 @@ STAGE = Stage(
         "rgspipe.datasets.frozen_file",
         "rgspipe.datasets.light_file",
         "rgspipe.evaluation",
+        "rgspipe.stages.fit_extras",
         "rgspipe.stages.fit_light",
         *fit_capture.CODE,
     ),
