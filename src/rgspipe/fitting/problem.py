@@ -225,4 +225,5 @@ def _times_share(emitter: Emitter, points: Tensor, columns: Tensor) -> Tensor:
 
 def _seen(operator: SparseOperator, radiance: Tensor) -> Tensor:
     """(P, 3, K) images of radiance (N, 3, K)."""
-    return (operator @ radiance.reshape(len(radiance), -1)).reshape(-1, 3, radiance.shape[2])
+    channels, lightings = radiance.shape[1:]
+    return (operator @ radiance.reshape(len(radiance), channels * lightings)).reshape(-1, channels, lightings)
