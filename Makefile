@@ -36,7 +36,7 @@ smoke: setup  ## the whole way on a tiny scene, in minutes
 reproduce: setup  ## everything in pipelines/reproduce.yaml, from nothing to the report
 	$(RGSPIPE) pipeline=reproduce $(ARGS)
 
-scenes: setup  ## every modelled scene, to its report, and one page over all of them (two hours)
+scenes: setup  ## every modelled scene, to its report, and one page over all of them (an hour of rendering, then training and fits)
 	$(RGSPIPE) pipeline=scenes $(ARGS)
 
 train-study: setup  ## how well scenes are trained and what bad captures cost, in one table (hours; goes on where it was)

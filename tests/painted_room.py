@@ -10,7 +10,7 @@ from rgspipe.datasets.views import View
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.scene import Camera, PointLight, Surfels, look_at
 from rgspipe.training.lighting import total_irradiance, trace_lighting
-from rgspipe.training.materials import build_transport, trace_views
+from rgspipe.training.materials import build_frozen, trace_views
 from rgspipe.training.refine import RefineOptions
 from rgspipe.training.trainer import TrainOptions
 from rooms import closed_box
@@ -42,6 +42,6 @@ def painted_views() -> list[View]:
         lamp = PointLight(light.double(), torch.tensor([1.0, 0.8, 1.2], dtype=torch.float64))
         empty.append(View(f"train/{index}", camera, blank, torch.ones(32, 32), lamp))
     lighting = trace_lighting(SurfelBvh(surfels), empty)
-    radiance = total_irradiance(lighting, surfels.albedo, build_transport(surfels, LIGHT)) * surfels.albedo
+    radiance = total_irradiance(lighting, surfels.albedo, build_frozen(surfels, LIGHT).transport) * surfels.albedo
     weights = trace_views(surfels, empty, supersampling=1)
     return [replace(view, image=weights[v].image(radiance[v])) for v, view in enumerate(empty)]

@@ -13,7 +13,7 @@ from rgspipe.scene import Camera, PointLight, Surfels, look_at
 from rgspipe.scene.rectangles import inside_of_box, solid_box, surfels_on
 from rgspipe.training.albedo import AlbedoPrior, AlbedoProblem, Mixing
 from rgspipe.training.lighting import indirect_irradiance, trace_lighting
-from rgspipe.training.materials import MaterialOptions, build_transport, fit_materials, trace_views
+from rgspipe.training.materials import MaterialOptions, build_frozen, fit_materials, trace_views
 from rgspipe.training.view_model import ViewModel, build_view_models
 
 OPTIONS = MaterialOptions(rounds=5, gather_rays=32, patches=60, supersampling=1)
@@ -49,7 +49,7 @@ def photographs(room: Surfels) -> list[View]:
     """Views of the room with light where pixels look and all bounces."""
     views = unlit_views()
     lighting = trace_lighting(SurfelBvh(room), views)
-    indirect = indirect_irradiance(lighting, room.albedo, build_transport(room, OPTIONS))
+    indirect = indirect_irradiance(lighting, room.albedo, build_frozen(room, OPTIONS).transport)
     models = models_of(room, views, at_pixels=True)
     return [
         replace(view, image=models[v].image(room.albedo, indirect[v]).reshape(view.image.shape))

@@ -15,7 +15,7 @@ from rgspipe.scene import Camera, PointLight, Surfels, look_at
 from rgspipe.scene.rectangles import inside_of_box, solid_box, surfels_on
 from rgspipe.training.light_refinement import refine_lights
 from rgspipe.training.lighting import indirect_irradiance, trace_lighting
-from rgspipe.training.materials import MaterialOptions, build_transport, trace_views
+from rgspipe.training.materials import MaterialOptions, build_frozen, trace_views
 from rgspipe.training.view_model import build_view_models
 
 COUNT, RESOLUTION = 8, 32
@@ -35,7 +35,7 @@ def scene() -> tuple[Surfels, list[View], tuple[ViewWeights, ...], PatchTranspor
         lamp = PointLight(light, torch.tensor([1.0, 0.8, 1.2], dtype=torch.float64))
         views.append(View(f"train/{index}", camera, blank, blank[..., 0] + 1.0, lamp))
     weights = trace_views(surfels, views, 1)
-    bvh, transport = SurfelBvh(surfels), build_transport(surfels, MaterialOptions(gather_rays=64, patches=100))
+    bvh, transport = SurfelBvh(surfels), build_frozen(surfels, MaterialOptions(gather_rays=64, patches=100)).transport
     lighting = trace_lighting(bvh, views)
     indirect = indirect_irradiance(lighting, surfels.albedo, transport)
     models = build_view_models(bvh, weights, lighting, at_pixels=True)

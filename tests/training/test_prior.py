@@ -15,7 +15,7 @@ from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.view_weights import ViewWeights, build_view_weights
 from rgspipe.scene import Camera, PointLight, look_at
 from rgspipe.training.lighting import total_irradiance, trace_lighting
-from rgspipe.training.materials import MaterialOptions, build_transport, fit_materials
+from rgspipe.training.materials import MaterialOptions, build_frozen, fit_materials
 from rgspipe.training.prior import albedo_prior, prior_from_maps, rescaled
 
 VIEWS = 12
@@ -133,7 +133,7 @@ def lit_views(weights: list[ViewWeights], truth: Tensor, noise: float) -> list[V
         for view, shift in zip(views, shifts, strict=True)
     ]
     lighting = trace_lighting(SurfelBvh(surfels), views)
-    radiance = total_irradiance(lighting, truth, build_transport(surfels, OPTIONS)) * truth
+    radiance = total_irradiance(lighting, truth, build_frozen(surfels, OPTIONS).transport) * truth
     generator = torch.Generator().manual_seed(7)
     photographs = []
     for index, view in enumerate(views):

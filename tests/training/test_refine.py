@@ -17,7 +17,7 @@ from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.scene import Surfels
 from rgspipe.scene.surfels import quaternion_to_axes, turn_in_plane
 from rgspipe.training.lighting import total_irradiance, trace_lighting
-from rgspipe.training.materials import build_transport
+from rgspipe.training.materials import build_frozen
 from rgspipe.training.parameters import build_surfels, start_parameters, tilted
 from rgspipe.training.refine import RefineOptions, RefineState, refine
 from rgspipe.training.shading import SurfelLight, shaded_radiance, surfel_lights
@@ -34,7 +34,7 @@ def radiance(views: list[View]) -> Tensor:
     """Of the true surfels under every view's light."""
     truth = painted_box()
     lighting = trace_lighting(SurfelBvh(truth), views)
-    return total_irradiance(lighting, truth.albedo, build_transport(truth, LIGHT)) * truth.albedo
+    return total_irradiance(lighting, truth.albedo, build_frozen(truth, LIGHT).transport) * truth.albedo
 
 
 def lights_of(count: int) -> list[SurfelLight]:

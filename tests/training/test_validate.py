@@ -12,7 +12,7 @@ import torch
 from lit_room import VISIBLE, room_cameras, room_surfels
 from rgspipe.datasets.views import View
 from rgspipe.scene import PointLight, Surfels
-from rgspipe.training.materials import build_transport
+from rgspipe.training.materials import build_frozen
 from rgspipe.training.trainer import TrainOptions
 from rgspipe.training.validate import HeldOut, render_held_out
 
@@ -30,7 +30,7 @@ def _rendered(surfels: Surfels) -> HeldOut:
         View(f"test/{k}", camera, torch.zeros(24, 24, 3), torch.ones(24, 24), light)
         for k, camera in enumerate(room_cameras(24))
     ]
-    return render_held_out(surfels, blank, build_transport(surfels, OPTIONS), 1)
+    return render_held_out(surfels, blank, build_frozen(surfels, OPTIONS).transport, 1)
 
 
 def test_a_scene_that_made_the_images_itself_is_without_error(surfels: Surfels) -> None:
@@ -39,7 +39,7 @@ def test_a_scene_that_made_the_images_itself_is_without_error(surfels: Surfels) 
         replace(view, image=torch.from_numpy(image), albedo=torch.from_numpy(albedo))
         for view, image, albedo in zip(first.views, first.images, first.albedo, strict=True)
     ]
-    again = render_held_out(surfels, views, build_transport(surfels, OPTIONS), 1)
+    again = render_held_out(surfels, views, build_frozen(surfels, OPTIONS).transport, 1)
     assert again.psnr.min() > 100.0  # measured inf: the same arithmetic
     summary = again.summary()
     assert summary["test_flip_max"] == 0.0 and summary["albedo"]["relative_l1"] == 0.0

@@ -9,9 +9,10 @@ import torch
 from torch import Tensor
 
 from rgspipe.renderer.kernels.irradiance import SOFTENING, transmittance
-from rgspipe.renderer.kernels.pixel_light import PixelLight
+from rgspipe.renderer.kernels.pixel_light import REACH, PixelLight
 from rgspipe.renderer.kernels.pixel_shadow import pixel_transmittance
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
+from rgspipe.renderer.looked_at import on_planes
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.view_weights import ViewWeights, even_places
 
@@ -20,9 +21,6 @@ SHADOW_RAYS = 16
 
 #: A pixel whose surfels are lit by more than this and less than 1 minus this lies on a shadow's edge.
 LIT_OR_NOT = 2e-3
-
-#: How far from a surfel's centre, in its scales, a pixel on an edge may look at it.
-ON_EDGE_REACH = 2.5
 
 
 class PixelDirect:
@@ -55,14 +53,9 @@ class PixelDirect:
         surfels, receivers = self._bvh.surfels, self._receivers.to(self._bvh.device)
         origins, directions, _ = (part.to(self._bvh.device) for part in self._view.camera.rays())
         centers, normals = surfels.centers.double()[receivers], surfels.normals.double()[receivers]
-        across = (directions * normals).sum(dim=1)
-        facing = across.abs() > 1e-6
-        distance = ((centers - origins) * normals).sum(dim=1) / torch.where(facing, across, 1.0)
-        beside = torch.where(facing[:, None], origins + distance[:, None] * directions - centers, 0.0)
-        reach = ON_EDGE_REACH * surfels.scales.detach().double().prod(dim=1).sqrt()[receivers]
-        held = (reach / beside.norm(dim=1).clamp(min=1e-30)).clamp(max=1.0)
-        held = torch.where(self._view.edges.to(held.device), held, torch.ones_like(held))
-        return centers + held[:, None] * beside
+        reach = float(REACH) * surfels.scales.detach().double().prod(dim=1).sqrt()[receivers]
+        reach = torch.where(self._view.edges.to(reach.device), reach, torch.full_like(reach, torch.inf))
+        return on_planes(origins, directions, centers, normals, reach)
 
     def image(self, position: Tensor, share: Tensor, slope: Tensor) -> Tensor:
         """(P, 3, 4) radiance under a light of 1 W/sr in RGB at `position` (3,), and its derivative towards x, y, z.

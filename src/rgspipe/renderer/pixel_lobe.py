@@ -7,6 +7,7 @@ from torch import Tensor
 
 from rgspipe.renderer.glossy import mirrored
 from rgspipe.renderer.kernels.pixel_light import REACH
+from rgspipe.renderer.looked_at import on_planes
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.view_weights import ViewWeights
 from rgspipe.scene.surfels import Surfels
@@ -46,17 +47,7 @@ def lobe_cosines(
         directions = view.camera.rays(torch.arange(view.camera.pixel_count))[1].to(centers)[rows]
         reach = float(REACH) * surfels.scales.double().prod(dim=1).sqrt()[columns]
         reach = torch.where(view.edges.to(rows.device)[rows], reach, torch.full_like(reach, torch.inf))
-        points = _on_planes(origin, directions, centers, normals, reach)
+        points = on_planes(origin, directions, centers, normals, reach)
     towards = torch.nn.functional.normalize(light.to(centers) - points, dim=-1)
     eye = torch.nn.functional.normalize(origin - points, dim=-1)
     return (towards * mirrored(eye, normals)).sum(-1).to(matrix.dtype)
-
-
-def _on_planes(origin: Tensor, directions: Tensor, centers: Tensor, normals: Tensor, reach: Tensor) -> Tensor:
-    """(E, 3) where rays meet the surfels' planes, held within `reach` of their centres."""
-    across = (directions * normals).sum(-1, keepdim=True)
-    grazing = across.abs() <= 1e-6 * directions.norm(dim=-1, keepdim=True)
-    along = ((centers - origin) * normals).sum(-1, keepdim=True) / torch.where(grazing, 1.0, across)
-    beside = origin + along * directions - centers
-    share = (reach[:, None] / beside.norm(dim=-1, keepdim=True).clamp(min=1e-30)).clamp(max=1.0)
-    return torch.where(grazing, centers, centers + beside * share)

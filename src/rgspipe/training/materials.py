@@ -163,11 +163,6 @@ def prepare(surfels: Surfels, views: Sequence[View], options: MaterialOptions, b
     return Prepared(SurfelBvh(surfels), weights, *light, store)
 
 
-def build_transport(surfels: Surfels, options: MaterialOptions) -> PatchTransport:
-    """Patch transport for the surfels as they stand."""
-    return build_frozen(surfels, options).transport
-
-
 def build_frozen(surfels: Surfels, options: MaterialOptions) -> FrozenScene:
     """Light between the surfels as they stand, without their gloss."""
     return FrozenScene.freeze(
