@@ -533,7 +533,7 @@ class TargetsConfig:
     pool: int = option(60, "lights of each type that are rendered, one at a time", low=1, high=100000)
     pool_seed: int = option(0, "draws of the lights' places, axes and cones", low=0, high=2**31 - 1)
     frames: int = option(24, "targets of a track, equally far apart on the way", low=1, high=100000)
-    views: int = option(3, "fixed cameras that see each target", low=1, high=3)
+    views: int = option(3, "fixed cameras that see each target", low=1, high=8)
     resolution: int | None = option(None, "image width and height, pixels; by default the dataset's", low=8, high=8192)
     samples: int | None = option(None, "paths per pixel of a single light; by default the dataset's", low=1, high=10**6)
     spot: TargetSpotConfig = section(TargetSpotConfig, "what spots are like")

@@ -14,7 +14,7 @@ from rgspipe.olat.job import PoolJob, SpotRange
 
 def test_a_job_survives_json() -> None:
     dataset = DatasetJob(scene="mine", model=CornerParameters(width=0.3), train_views=0, seed=4)
-    job = PoolJob(dataset, "track", 7, ("visible",), SpotRange("linear", (0.3, 0.5), (0.1, 0.2)))
+    job = PoolJob(dataset, "track", 7, ("visible",), SpotRange("linear", (0.3, 0.5), (0.1, 0.2)), 5)
     assert PoolJob.from_json(json.loads(json.dumps(job.to_json()))) == job
 
 

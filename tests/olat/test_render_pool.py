@@ -18,8 +18,8 @@ from rgspipe.olat.process import render_pool
 from rgspipe.scene import SpotLight
 
 CLASSES = ("visible", "out_of_frame", "occluded", "around_corner")
-DATASET = DatasetJob(scene="corner", model=CornerParameters(), target_views=1, resolution=16, samples=4, seed=2)
-JOB = PoolJob(DATASET, "spots", 4, CLASSES, SpotRange(cone_angle=(0.35, 0.5), falloff=(0.1, 0.3)))
+DATASET = DatasetJob(scene="corner", model=CornerParameters(), resolution=16, samples=4, seed=2)
+JOB = PoolJob(DATASET, "spots", 4, CLASSES, SpotRange(cone_angle=(0.35, 0.5), falloff=(0.1, 0.3)), 1)
 
 
 def test_without_bpy_the_way_out_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -68,5 +68,5 @@ def test_a_damaged_image_is_rendered_again_and_is_the_same(rendered: Path) -> No
 @pytest.mark.slow
 def test_another_job_s_folder_is_refused(rendered: Path) -> None:
     with pytest.raises(InputError, match=r"job\.json.*differs in number"):
-        render_pool(PoolJob(DATASET, "spots", 5, CLASSES, JOB.spot), rendered)
+        render_pool(PoolJob(DATASET, "spots", 5, CLASSES, JOB.spot, 1), rendered)
     assert np.isfinite(read_pool(rendered)[0].brightness()).all()

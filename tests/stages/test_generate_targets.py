@@ -88,10 +88,10 @@ def _values(stage, config: RgspipeConfig) -> list:
 def test_a_pool_is_like_the_dataset_s_targets_unless_told_otherwise() -> None:
     config = _config(dataset__resolution=64, dataset__samples=9, dataset__seed=5, dataset__train_views=7)
     job = render_olat.pool_job(config)
-    assert (job.dataset.resolution, job.dataset.samples, job.dataset.target_views) == (64, 9, 3)
+    assert (job.dataset.resolution, job.dataset.samples, job.views) == (64, 9, 3)
     assert (job.dataset.train_views, job.dataset.seed, job.number) == (0, 0, 60)
     own = render_olat.pool_job(_config(targets__resolution=32, targets__samples=4, targets__views=1, targets__pool=8))
-    assert (own.dataset.resolution, own.dataset.samples, own.dataset.target_views, own.number) == (32, 4, 1, 8)
+    assert (own.dataset.resolution, own.dataset.samples, own.views, own.number) == (32, 4, 1, 8)
 
 
 def test_angles_are_given_in_degrees_and_blends_as_they_are() -> None:

@@ -60,11 +60,12 @@ class PoolJob:
     """A pool of single lights, each of 1 W/sr (on its axis) in every channel.
 
     Attributes:
-        dataset: the scene, the number of target cameras and the quality; of its seed every draw depends.
+        dataset: the scene and the quality; of its seed every draw depends.
         kind: of lights.
         number: lights; of a track, moments of `HEADLIGHTS` lights each.
         classes: where points and spots are, in turn; those that the scene has none of are left out.
         spot: the profile of spots and headlights; a track takes the least of its ranges.
+        views: cameras that see every light.
     """
 
     dataset: DatasetJob
@@ -72,6 +73,7 @@ class PoolJob:
     number: int
     classes: tuple[str, ...] = ("visible", "out_of_frame", "occluded", "around_corner")
     spot: SpotRange = SpotRange()
+    views: int = 3
 
     def __post_init__(self) -> None:
         if self.number < 1:
@@ -86,4 +88,5 @@ class PoolJob:
         spot = content["spot"]
         ranges = SpotRange(spot["profile"], tuple(spot["cone_angle"]), tuple(spot["falloff"]))
         dataset = DatasetJob.from_json(content["dataset"])
-        return cls(dataset, content["kind"], content["number"], tuple(content["classes"]), ranges)
+        classes = tuple(content["classes"])
+        return cls(dataset, content["kind"], content["number"], classes, ranges, content["views"])

@@ -14,6 +14,7 @@ from rgspipe.blender.models.parameters import BlendFile, CornerParameters
 from rgspipe.blender.plan import Frame
 from rgspipe.blender.targets import classify, is_around_corner, is_of_class
 from rgspipe.olat.aim import aim_at_relay, aim_at_seen, seen_points
+from rgspipe.olat.cameras import pool_cameras
 from rgspipe.olat.job import PoolJob
 from rgspipe.olat.track import headlights
 from rgspipe.scene import Camera, Light, PointLight, SpotLight
@@ -53,12 +54,12 @@ class _Place:
 
 
 def make_plan(job: PoolJob, layout: Layout, geometry: Geometry) -> list[LightPlan]:
-    """Draw all lights of `job`; its cameras are the first of those that see the fit targets of the scene.
+    """Draw all lights of `job`; its cameras are the first of those that `pool_cameras` has.
 
     Raises:
         InputError: the scene has no room for a light of a class that suits it, or none of the classes suits it.
     """
-    cameras = layout.target_cameras()
+    cameras = pool_cameras(layout, job.views)
     place = _Place(job, layout, geometry, cameras, seen_points(cameras[0], geometry))
     lights = _track(place) if job.kind == "track" else _drawn(place)
     return [_plan(job, cameras, index, *light) for index, light in lights]
@@ -69,7 +70,7 @@ def _plan(job: PoolJob, cameras: list[Camera], index: int, occlusion: str, light
     name, lamp = f"light_{index:04d}", PointLight(light.position, light.intensity)
     frames = tuple(
         Frame(f"{name}/view_{number}", camera, lamp, int(rng.integers(2**31 - 1)), False)
-        for number, camera in enumerate(cameras[: job.dataset.target_views])
+        for number, camera in enumerate(cameras[: job.views])
     )
     return LightPlan(name, occlusion, light, frames)
 

@@ -39,7 +39,6 @@ def pool_job(config: RgspipeConfig) -> PoolJob:
             train_views=0,
             test_views=0,
             targets_per_class=0,
-            target_views=wanted.views,
             resolution=wanted.resolution or dataset.resolution,
             samples=samples,
             test_samples=samples,
@@ -49,6 +48,7 @@ def pool_job(config: RgspipeConfig) -> PoolJob:
         wanted.frames if wanted.kind == "track" else wanted.pool,
         tuple(wanted.classes),
         spot_range(wanted.spot) if wanted.kind != "points" else SpotRange(),
+        wanted.views,
     )
 
 
@@ -140,6 +140,7 @@ STAGE = Stage(
         # Not what makes targets of the pool: a change there renders nothing again.
         "rgspipe.olat.__main__",
         "rgspipe.olat.aim",
+        "rgspipe.olat.cameras",
         "rgspipe.olat.job",
         "rgspipe.olat.plan",
         "rgspipe.olat.pool_file",
