@@ -75,9 +75,19 @@ def test_noise_is_predicted_as_a_fit_of_both_views_finds_it(room, point_light):
     assert advice.ranked[0].position_sd == pytest.approx(found, rel=0.15)  # measured 0.90 of it
 
 
+def test_cameras_are_added_in_their_order_too(room, fitted):
+    advice = suggest_views(room.frozen, fitted, room_cameras(48)[:1], [AWAY, TOWARDS, AWAY], wanted=1e-9)
+    assert [view.camera for view in advice.in_order] == [0, 1, 2]
+    alone = {view.camera: view.position_sd for view in advice.ranked}
+    assert advice.in_order[0].position_sd == alone[0]
+    both = suggest_views(room.frozen, fitted, room_cameras(48)[:1], [TOWARDS, AWAY], wanted=1e-9).in_order[1]
+    assert advice.in_order[1].position_sd == pytest.approx(both.position_sd, rel=1e-9)
+
+
 def test_the_plan_ends_at_the_most_views(room, fitted):
     cameras = [_camera((0.3 * math.sin(k), 0.3 * math.cos(k), 0.2), (0.0, 0.0, -0.4)) for k in range(9)]
     advice = suggest_views(room.frozen, fitted, room_cameras(48)[:1], cameras, wanted=1e-9, effects=Effects())
+    assert len(advice.in_order) == MOST_VIEWS - 1
     assert len(advice.plan) == MOST_VIEWS - 1 and len({view.camera for view in advice.plan}) == MOST_VIEWS - 1
     reached = replace(advice, wanted=advice.plan[2].position_sd)
     assert reached.wanted < advice.present_sd

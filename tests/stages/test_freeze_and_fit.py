@@ -222,6 +222,8 @@ def test_advice_and_landscape_are_written_where_they_are_asked_for(inputs, tmp_p
     assert set(alone["camera"]) == {"view_1", "train/r_0", "train/r_1", "train/r_2"}
     assert alone["position_sd"].is_monotonic_increasing and (alone["views"] == 2).all()
     assert table.loc[table["added"] == "plan", "views"].tolist() == [2, 3, 4, 5]
+    in_order = table[table["added"] == "in_order"]
+    assert in_order["camera"].tolist() == ["view_1", "train/r_0", "train/r_1", "train/r_2"]
     advice = json.loads((folder / "advice.json").read_text())
     assert advice["views_needed"] == 1 and alone["camera"].iloc[0] in advice["words"]
     landscape = read_landscape(folder / "landscape.npz")

@@ -63,6 +63,7 @@ class ViewAdvice:
             scene's size.
         ranked: every candidate added alone, the best first.
         plan: the best candidate, then the best one beside that, and so on, up to `MOST_VIEWS` views together.
+        in_order: the candidates as they were given, each added to those before it, up to `MOST_VIEWS` views together.
         wanted: the accuracy that was asked for, in the same unit.
         views_needed: with how many views of the plan, those of the fit included, it is reached; None if it is not.
     """
@@ -71,6 +72,7 @@ class ViewAdvice:
     present_sd: float
     ranked: tuple[SuggestedView, ...]
     plan: tuple[SuggestedView, ...]
+    in_order: tuple[SuggestedView, ...]
     wanted: float
     views_needed: int | None
 
@@ -119,10 +121,11 @@ def suggest_views(
     found = [SuggestedView(view - len(present), forecast.position_sd([*first, view])) for view in others]
     ranked = tuple(sorted(found, key=lambda view: view.position_sd))
     plan = _plan(forecast, first, list(others), len(present))
+    in_order = _in_order(forecast, len(present), len(candidates))
     present_sd = forecast.present_sd
     reached = [present_sd, *(view.position_sd for view in plan)]
     needed = next((len(present) + more for more, sd in enumerate(reached) if sd <= wanted), None)
-    return ViewAdvice(len(present), present_sd, ranked, plan, wanted, needed)
+    return ViewAdvice(len(present), present_sd, ranked, plan, in_order, wanted, needed)
 
 
 def _plan(forecast: _Forecast, chosen: list[int], others: list[int], present: int) -> tuple[SuggestedView, ...]:
@@ -134,6 +137,12 @@ def _plan(forecast: _Forecast, chosen: list[int], others: list[int], present: in
         chosen.append(others.pop(best))
         plan.append(SuggestedView(chosen[-1] - present, sds[best]))
     return tuple(plan)
+
+
+def _in_order(forecast: _Forecast, present: int, candidates: int) -> tuple[SuggestedView, ...]:
+    """One candidate after the other, as they are given."""
+    ends = range(present + 1, min(MOST_VIEWS, present + candidates) + 1)
+    return tuple(SuggestedView(end - 1 - present, forecast.position_sd(range(end))) for end in ends)
 
 
 @dataclass(frozen=True)

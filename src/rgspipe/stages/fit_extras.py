@@ -21,6 +21,9 @@ from rgspipe.fitting.parameters import Emitter
 from rgspipe.fitting.problem import LightProblem
 from rgspipe.scene import Camera
 
+#: Marks the rows of suggested_views.csv in which a target's cameras are added one after the other.
+IN_ORDER = "in_order"
+
 #: A camera and its name.
 Named = tuple[str, Camera]
 
@@ -67,11 +70,15 @@ def _size(entry: FrameEntry, like: Camera) -> tuple[int, int]:
 
 
 def _advice_table(advice: ViewAdvice, names: Sequence[str]) -> pd.DataFrame:
-    """One row a camera that is added alone ("alone"), then those of the plan ("plan"), best first."""
+    """One row a camera that is added alone ("alone"), then those of the plan ("plan"), best first.
+
+    Then the candidates as they are listed, each added to those before it ("in_order"): the target's own come first.
+    """
     present = advice.present_views
     rows = [("alone", present + 1, names[view.camera], view.position_sd) for view in advice.ranked]
-    planned = enumerate(advice.plan, start=present + 1)
-    rows += [("plan", count, names[view.camera], view.position_sd) for count, view in planned]
+    for added, views in (("plan", advice.plan), (IN_ORDER, advice.in_order)):
+        together = enumerate(views, start=present + 1)
+        rows += [(added, count, names[view.camera], view.position_sd) for count, view in together]
     return pd.DataFrame(rows, columns=["added", "views", "camera", "position_sd"])
 
 
