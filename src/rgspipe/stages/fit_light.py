@@ -14,9 +14,8 @@ from rgspipe.artifacts import Artifact
 from rgspipe.config import RgspipeConfig
 from rgspipe.datasets.fit_file import read_result, write_result
 from rgspipe.datasets.frames import read_entries
-from rgspipe.datasets.frozen_file import DICTIONARY, EFFECTS, load_dictionary, load_frozen
+from rgspipe.datasets.frozen_file import DICTIONARY, load_dictionary
 from rgspipe.datasets.gs3 import load_target
-from rgspipe.datasets.json_file import read_json
 from rgspipe.datasets.location import dataset_root, open_dataset
 from rgspipe.datasets.views import Target, View
 from rgspipe.errors import InputError
@@ -34,7 +33,7 @@ from rgspipe.fitting import (
 from rgspipe.fitting.spec import MOST_LIGHTS
 from rgspipe.progress import track
 from rgspipe.renderer.effect_bounds import EffectBounds
-from rgspipe.renderer.effects import EffectChoice, RigKind, choose_effects
+from rgspipe.renderer.effects import EffectChoice, RigKind
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.monte_carlo import MonteCarloSolver
 from rgspipe.renderer.spot import SpotShape
@@ -43,6 +42,7 @@ from rgspipe.stages import fit_capture
 from rgspipe.stages.base import Stage, StageContext
 from rgspipe.stages.fit_capture import captured_views
 from rgspipe.stages.fit_extras import Named, further_files, training_cameras
+from rgspipe.stages.scene_effects import chosen_effects, frozen_scene, measured_effects
 from rgspipe.stages.sources import image_stage, require_images, target_stage
 
 
@@ -74,14 +74,14 @@ class Fitter:
     @classmethod
     def create(cls, context: StageContext) -> Fitter:
         config, artifact = context.config, context.inputs["freeze"]
-        frozen = _frozen(config, artifact)
+        frozen = frozen_scene(config, artifact)
         effects = _effects(context)
         if frozen.gloss is not None and config.effects.auto and not _choice(config, artifact)[1].specular:
             frozen = replace(frozen, gloss=None)
         dataset = context.inputs["generate_dataset"].path if "generate_dataset" in context.inputs else None
         if config.fit.method == "paper_adam":
             return cls(config, frozen, None, _training_lights(context), effects, dataset)
-        if not effects.shadows and not _measured(artifact)[0].shadows.proved:
+        if not effects.shadows and not measured_effects(artifact)[0].shadows.proved:
             # The stored candidates have shadows.
             options = config.freeze
             dictionary = build_dictionary(frozen, options.dictionary_grid, seed=options.seed, shadows=False)
@@ -150,15 +150,6 @@ class Fitter:
         return self.prepared[key]
 
 
-def _frozen(config: RgspipeConfig, artifact: Artifact) -> FrozenScene:
-    """The frozen scene, with the solver that is wanted; the full gather operator is read only for its own."""
-    wanted = config.effects
-    frozen = load_frozen(artifact.file, gather=wanted.solver == "gather")
-    if wanted.solver == "patches" and wanted.bounces is None:
-        return frozen
-    return frozen.with_solver(wanted.solver, bounces=wanted.bounces, samples=wanted.samples, seed=config.seed)
-
-
 def _effects(context: StageContext) -> Effects:
     """The effects of the configuration; with effects.auto less those that the frozen scene does not call for."""
     wanted = context.config.effects
@@ -170,20 +161,12 @@ def _effects(context: StageContext) -> Effects:
     return Effects(choice.shadows, choice.interreflection, wanted.at_pixels)
 
 
-def _measured(freeze: Artifact) -> tuple[EffectBounds, Mapping[str, float]]:
-    """What effects can change in the frozen scene, and the milliseconds that they cost."""
-    content = read_json(freeze.file(EFFECTS), "the effects of a frozen scene")
-    return EffectBounds.from_json(content["bounds"]), content["milliseconds"]
-
-
 def _choice(config: RgspipeConfig, freeze: Artifact) -> tuple[EffectBounds, EffectChoice]:
     """What the frozen scene calls for under a rig of the kind that is looked for."""
-    (bounds, costs), wanted = _measured(freeze), config.effects
-    off = [name for name, on in (("shadows", wanted.shadows), ("interreflection", wanted.interreflection)) if not on]
     spec = light_spec(config)
     count = spec.count or MOST_LIGHTS
     kind = RigKind(0, (spec.shape,) * count) if spec.type == "spot" else RigKind(count)
-    return bounds, choose_effects(bounds, wanted.tolerance, kind, milliseconds=costs, off=off)
+    return chosen_effects(config.effects, freeze, kind)
 
 
 def remarks(config: RgspipeConfig, made: Mapping[str, Artifact]) -> Sequence[str]:
@@ -339,6 +322,7 @@ STAGE = Stage(
         "rgspipe.datasets.fit_file",
         "rgspipe.datasets.landscape_file",
         "rgspipe.stages.fit_extras",
+        "rgspipe.stages.scene_effects",
         "rgspipe.datasets.frozen_file",
         "rgspipe.evaluation.images",
         "rgspipe.evaluation.metrics",

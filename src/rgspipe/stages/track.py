@@ -134,6 +134,7 @@ STAGE = Stage(
         "rgspipe.evaluation",
         "rgspipe.stages.fit_extras",
         "rgspipe.stages.fit_light",
+        "rgspipe.stages.scene_effects",
         *fit_capture.CODE,
     ),
     files=_files,
