@@ -452,7 +452,9 @@ class StudyConfig:
     """What becomes of a trained scene when its capture gets worse."""
 
     cases: list[str] = option(
-        ["clean"], "captures: `clean`, or keys of capture.* such as depth_noise=0.01; several joined by spaces"
+        ["clean"],
+        "captures: `clean`, keys of capture.* such as depth_noise=0.01, or any others such as train.steps=0; several "
+        "joined by spaces, and `NAME: ` before them where wanted",
     )
     scenes: list[str] = option([], "scenes that are compared; by default the one that is configured", choices=MODELLED)
     limit: int | None = option(6, "lights of each class that are recovered in each case", low=1, high=100000)
@@ -553,6 +555,67 @@ class TrackConfig:
 
 
 @dataclass
+class SweepConfig:
+    """The spot of relight.sweep and its way."""
+
+    frames: int = option(48, "images of the way", low=2, high=10000)
+    seconds: float = option(4.0, "how long the video shows them, s", low=0.1, high=1000)
+    position: list[float] | None = option(
+        None,
+        "aim: place of the spot, scene units; by default under the middle of a ceiling, or above an object",
+        low=-1e6,
+        high=1e6,
+        length=3,
+    )
+    aims: list[float] | None = option(
+        None,
+        "aim: points that the axis turns from and to, [x,y,z,x,y,z]; by default low at either side of the picture",
+        low=-1e6,
+        high=1e6,
+        length=6,
+    )
+    center: list[float] | None = option(
+        None, "orbit: what the spot is aimed at; by default the scene's middle", low=-1e6, high=1e6, length=3
+    )
+    radius: float | None = option(None, "orbit: radius of the circle, scene units", low=1e-6, high=1e6)
+    height: float | None = option(None, "orbit: height of the circle over `center`, scene units", low=-1e6, high=1e6)
+    intensity: list[float] = option([1.0, 1.0, 1.0], "of the spot on its axis, RGB, W/sr", low=0, high=1e9, length=3)
+    spot: SpotConfig = section(SpotConfig, "the profile of the spot")
+
+
+@dataclass
+class RelightConfig:
+    """A frozen scene in any lights."""
+
+    lights: str | None = option(None, "light file: points, spots or both; by default what `rigs` says")
+    rigs: str = option(
+        "random",
+        "lights where no file is given: drawn at random, or the true ones of fit targets, compared with their images",
+        choices=("random", "targets"),
+    )
+    count: int = option(3, "lights of a random rig", low=1, high=8)
+    seed: int = option(0, "draws of a random rig", low=0, high=2**31 - 1)
+    counts: list[int] = option(
+        [], "numbers of lights: generated targets of each are compared side by side", low=1, high=8
+    )
+    limit: int | None = option(8, "most targets of each number of lights", low=1, high=100000)
+    views: str = option(
+        "targets",
+        "whose cameras: those of the fit targets, the held-out or the training views",
+        choices=("targets", "test", "train"),
+    )
+    indices: list[int] | None = option(
+        None, "these of the cameras; by default all, for a sweep the first", low=0, high=100000
+    )
+    sweep: str = option(
+        "none",
+        "a spot that turns at its place, or goes around the scene, as a strip and a video",
+        choices=("none", "aim", "orbit"),
+    )
+    path: SweepConfig = section(SweepConfig, "the spot of a sweep and its way")
+
+
+@dataclass
 class DebugConfig:
     """What is shown when something goes wrong."""
 
@@ -590,6 +653,7 @@ class RgspipeConfig:
     target_capture: TargetCaptureConfig = section(TargetCaptureConfig, "errors put into fit targets")
     track: TrackConfig = section(TrackConfig, "lights that move")
     targets: TargetsConfig = section(TargetsConfig, "generated fit targets")
+    relight: RelightConfig = section(RelightConfig, "a frozen scene in any lights")
 
 
 def scene_name(config: RgspipeConfig) -> str:

@@ -1,34 +1,12 @@
-"""Cases in words become configuration, and tables of single runs become one."""
+"""Tables of single runs become one."""
 
 import math
 
 import pandas as pd
 import pytest
 
-from rgspipe.errors import InputError
 from rgspipe.evaluation.held_out import QUALITY
-from rgspipe.evaluation.study import TRUTH, parse_case, study_row, with_factors
-
-
-@pytest.mark.parametrize(
-    ("text", "changes"),
-    [
-        ("clean", {}),
-        (" clean ", {}),
-        ("depth_noise=0.01", {"capture.depth_noise": 0.01}),
-        ("capture.views=25 normals=false", {"capture.views": 25, "capture.normals": False}),
-        ("views=null", {"capture.views": None}),
-    ],
-)
-def test_a_case_is_what_it_says(text: str, changes: dict) -> None:
-    found = parse_case(text)
-    assert found == changes and [type(value) for value in found.values()] == [type(v) for v in changes.values()]
-
-
-@pytest.mark.parametrize("text", ["", "noise", "depth_noise=", "=3", "clean depth_noise=0.1"])
-def test_a_case_that_says_nothing_is_refused(text: str) -> None:
-    with pytest.raises(InputError, match=r"study\.cases"):
-        parse_case(text)
+from rgspipe.evaluation.study import TRUTH, study_row, with_factors
 
 
 def _quality(psnr: float) -> pd.DataFrame:

@@ -13,7 +13,8 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from rgspipe.evaluation.error_split import KINDS
 from rgspipe.evaluation.held_out import SURFELS
 from rgspipe.evaluation.plots import INK, STYLE
-from rgspipe.evaluation.study import CLEAN, TRUTH
+from rgspipe.evaluation.study import TRUTH
+from rgspipe.evaluation.study_cases import CLEAN
 
 #: Kinds of pixels in words, and their colours.
 KIND_LABELS = {

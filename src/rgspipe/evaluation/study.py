@@ -6,34 +6,12 @@ from collections.abc import Mapping
 from typing import Any
 
 import pandas as pd
-import yaml
 
-from rgspipe.errors import InputError
 from rgspipe.evaluation.held_out import QUALITY
 from rgspipe.evaluation.tables import ALL, class_order
 
-#: The case without errors, and the row of surfels made from the truth.
-CLEAN, TRUTH = "clean", "true surfels"
-
-#: Where the keys of a case belong.
-SECTION = "capture"
-
-
-def parse_case(text: str) -> dict[str, Any]:
-    """The configuration changes of a case: "depth_noise=0.01 views=25" are two keys of capture.*, "clean" is none.
-
-    Raises:
-        InputError: it is neither.
-    """
-    changes: dict[str, Any] = {}
-    for part in [] if text.strip() == CLEAN else text.split():
-        key, equals, value = part.partition("=")
-        if not equals or not key or not value:
-            raise _unclear(text)
-        changes[f"{SECTION}.{key.removeprefix(SECTION + '.')}"] = yaml.safe_load(value)
-    if not changes and text.strip() != CLEAN:
-        raise _unclear(text)
-    return changes
+#: The row of surfels made from the truth.
+TRUTH = "true surfels"
 
 
 def study_row(scene: str, case: str, quality: pd.DataFrame, lights: pd.DataFrame) -> dict[str, Any]:
@@ -63,12 +41,3 @@ def with_factors(table: pd.DataFrame) -> pd.DataFrame:
     """The table with `factor`: the median position error over that with true surfels of the same scene."""
     true = table[table["case"] == TRUTH].set_index("scene")["position_error"]
     return table.assign(factor=table["position_error"] / table["scene"].map(true).astype(float))
-
-
-def _unclear(text: str) -> InputError:
-    return InputError(
-        "study.cases",
-        expected=f"{CLEAN}, or key=value of {SECTION}.*, several joined by spaces",
-        found=repr(text),
-        remedy='Write it like "depth_noise=0.01" or "depth_noise=0.01 normals=false".',
-    )

@@ -7,13 +7,16 @@ from collections.abc import Iterator
 import pandas as pd
 
 from rgspipe.benchmark.markdown import markdown_table
-from rgspipe.config import RgspipeConfig, scene_name, with_changes
-from rgspipe.errors import InputError
+from rgspipe.config import RgspipeConfig, scene_name
 from rgspipe.evaluation.plots import png_of
 from rgspipe.evaluation.quality_plots import study_figure
-from rgspipe.evaluation.study import CLEAN, SECTION, TRUTH, parse_case, study_row, with_factors
+from rgspipe.evaluation.study import TRUTH, study_row, with_factors
 from rgspipe.stages.base import Need, Stage, StageContext
 from rgspipe.stages.sources import has_truth
+from rgspipe.stages.study_cases import checked_cases, chosen_scenes
+
+#: Where keys of a case belong that name no section.
+SECTION = "capture"
 
 #: What study.md shows of study.csv: headings and formats.
 SHOWN = {
@@ -47,28 +50,11 @@ def run(context: StageContext) -> None:
 
 def _cases(config: RgspipeConfig) -> Iterator[tuple[str, str, dict[str, object]]]:
     """(scene, case, configuration changes) of every row; the last of a scene has true surfels where they are known."""
-    kinds = config.study.scenes or [None]
-    for kind in kinds:
-        scene: dict[str, object] = {} if kind is None else {"scene.kind": kind, "scene.name": None}
-        chosen = with_changes(config, scene)
-        for text in config.study.cases:
-            yield scene_name(chosen), text.strip(), scene | _checked(chosen, text)
+    for scene, chosen in chosen_scenes(config, config.study.scenes):
+        for case in checked_cases(chosen, "study.cases", config.study.cases, SECTION):
+            yield scene_name(chosen), case.name, scene | case.changes
         if has_truth(chosen):
             yield scene_name(chosen), TRUTH, scene | {"freeze.surfels": "truth"}
-
-
-def _checked(config: RgspipeConfig, text: str) -> dict[str, object]:
-    changes = parse_case(text)
-    try:
-        with_changes(config, changes)
-    except ValueError as error:
-        raise InputError(
-            "study.cases",
-            expected=f"keys of {SECTION}.*",
-            found=f"{text!r}: {error}",
-            remedy=f"python -m rgspipe --help {SECTION} lists them; a case without errors is {CLEAN}.",
-        ) from None
-    return changes
 
 
 def _inputs(config: RgspipeConfig) -> list[Need]:
@@ -86,5 +72,5 @@ STAGE = Stage(
     run=run,
     inputs=_inputs,
     config_keys=("study",),
-    code=("rgspipe.benchmark.markdown", "rgspipe.evaluation"),
+    code=("rgspipe.benchmark.markdown", "rgspipe.evaluation", "rgspipe.stages.study_cases"),
 )
