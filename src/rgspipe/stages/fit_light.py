@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
@@ -36,7 +35,6 @@ from rgspipe.renderer.effect_bounds import EffectBounds
 from rgspipe.renderer.effects import EffectChoice, RigKind
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.monte_carlo import MonteCarloSolver
-from rgspipe.renderer.spot import SpotShape
 from rgspipe.scene import PointLight
 from rgspipe.stages import fit_capture
 from rgspipe.stages.base import Stage, StageContext
@@ -44,6 +42,7 @@ from rgspipe.stages.fit_capture import captured_views
 from rgspipe.stages.fit_extras import Named, further_files, training_cameras
 from rgspipe.stages.scene_effects import chosen_effects, frozen_scene, measured_effects
 from rgspipe.stages.sources import image_stage, require_images, target_stage
+from rgspipe.stages.spot_shape import spot_shape
 
 
 def run(context: StageContext) -> None:
@@ -187,7 +186,7 @@ def light_spec(config: RgspipeConfig) -> LightSpec:
     Raises:
         InputError: the paper's method is asked for more than one point light, or a rim does not fit its cone.
     """
-    light, spot = config.light, config.light.spot
+    light = config.light
     if config.fit.method == "paper_adam" and (light.type != "point" or light.count != 1):
         raise InputError(
             "light",
@@ -195,16 +194,7 @@ def light_spec(config: RgspipeConfig) -> LightSpec:
             found=f"light.type={light.type} light.count={light.count}",
             remedy="Use fit=search_lm for spots and several lights.",
         )
-    largest = {"smoothstep": 1.0, "gaussian": 89.0, "linear": spot.cone_angle}[spot.profile]
-    if spot.falloff > largest:
-        raise InputError(
-            "light.spot.falloff",
-            expected=f"at most {largest:g} for {spot.profile} and a cone of {spot.cone_angle:g} degrees",
-            found=f"{spot.falloff:g}",
-            remedy="Give a narrower rim.",
-        )
-    rim = spot.falloff if spot.profile == "smoothstep" else math.radians(spot.falloff)
-    shape = SpotShape(spot.profile, math.radians(spot.cone_angle), rim)
+    shape = spot_shape(light.spot, "light.spot")
     return LightSpec(light.type, light.count, shape, config.fit.cone == "free")
 
 
@@ -323,6 +313,7 @@ STAGE = Stage(
         "rgspipe.datasets.landscape_file",
         "rgspipe.stages.fit_extras",
         "rgspipe.stages.scene_effects",
+        "rgspipe.stages.spot_shape",
         "rgspipe.datasets.frozen_file",
         "rgspipe.evaluation.images",
         "rgspipe.evaluation.metrics",

@@ -135,6 +135,7 @@ STAGE = Stage(
         "rgspipe.stages.fit_extras",
         "rgspipe.stages.fit_light",
         "rgspipe.stages.scene_effects",
+        "rgspipe.stages.spot_shape",
         *fit_capture.CODE,
     ),
     files=_files,
