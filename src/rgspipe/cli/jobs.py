@@ -12,6 +12,7 @@ from hydra.core.hydra_config import HydraConfig
 from hydra.types import RunMode
 from omegaconf import DictConfig
 
+from rgspipe.artifacts import Artifact
 from rgspipe.cli.compose import (
     CONFIG_NAME,
     HYDRA_VERSION_BASE,
@@ -30,6 +31,9 @@ from rgspipe.errors import InputError
 from rgspipe.pipeline import StageLoader, run
 from rgspipe.stages import load_stage
 from rgspipe.status import RunStatus, read_status, read_statuses
+
+#: Stages whose result is told in lines on the terminal.
+TOLD = ("fit_light", "track", "evaluate")
 
 
 def run_jobs(overrides: Sequence[str], stage_loader: StageLoader, multirun: bool) -> int:
@@ -121,8 +125,18 @@ def _job(values: DictConfig, stage_loader: StageLoader) -> int:
         raise
     status.done(artifact.path)
     if settings.mode == RunMode.RUN:
-        print(f"Result: {artifact.path}")
+        print("\n".join([*_outcome(artifact), f"Result: {artifact.path}"]))
     return 0
+
+
+def _outcome(artifact: Artifact) -> list[str]:
+    """What a run found, in lines; none of stages that look for no lights."""
+    if artifact.stage not in TOLD:
+        return []
+    # It reads tables and tensors, which other runs need not wait for.
+    from rgspipe.cli.outcome import outcome
+
+    return outcome(artifact)
 
 
 def _sweep_summary(folder: Path, code: int) -> int:

@@ -30,6 +30,7 @@ LABELS = {
     "out_of_frame": "out of frame",
     "occluded": "occluded",
     "around_corner": "around the corner",
+    "mixed": "mixed",
     "unknown": "unclassified",
 }
 OTHER_COLOUR, OTHER_MARKER = "#666666", "D"

@@ -16,7 +16,7 @@ from rgspipe.evaluation.arrays import ArrayLike, to_array
 from rgspipe.scene import Light, LightRig, SpotLight
 
 #: Occlusion classes in the order in which every table and figure shows them.
-CLASSES = ("visible", "out_of_frame", "occluded", "around_corner", "unknown")
+CLASSES = ("visible", "out_of_frame", "occluded", "around_corner", "mixed", "unknown")
 #: The row that holds all targets of a method and view count.
 ALL = "all"
 
@@ -254,6 +254,11 @@ def class_order(names: Sequence[str] | pd.Series) -> list[str]:
     return [name for name in CLASSES if name in found] + sorted(found - set(CLASSES))
 
 
+def class_of(listed: str, lights: int) -> str:
+    """The class under which a target is shown: one of several lights that belong to none together is "mixed"."""
+    return "mixed" if listed == "unknown" and lights > 1 else listed
+
+
 def _target_row(
     row: dict,
     estimate: LightRig,
@@ -277,6 +282,7 @@ def _target_row(
     shown_spread = positions[pairs[0][0] if pairs else 0] if positions else None
     return (
         {name: row[name] for name in ("target", "occlusion", "method", "views", "seconds")}
+        | {"occlusion": class_of(row["occlusion"], len(truth))}
         | {"position_error": position, "intensity_error": intensity, "axis_error": axis, "cone_error": cone}
         | {"success": solved, "count_right": len(estimate) == len(truth) if truth else None}
         | {"psnr": _number(row.get("psnr")), "result": row.get("result", ""), "reason": row.get("reason", "")}

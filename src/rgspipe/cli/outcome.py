@@ -1,0 +1,151 @@
+"""What a run that looked for lights found, in a few lines: the lights of few targets, a table over many."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+
+import pandas as pd
+
+from rgspipe.artifacts import Artifact
+from rgspipe.cli.columns import columns, decibels, degrees, percent, seconds, time, without_empty, words
+from rgspipe.datasets.covariance_file import read_covariances
+from rgspipe.datasets.json_file import read_json
+from rgspipe.datasets.light_file import read_lights
+from rgspipe.evaluation.plots import LABELS
+from rgspipe.evaluation.tables import ALL, class_order
+from rgspipe.fitting.result import REASONS, FitStatus
+from rgspipe.scene import Light, SpotLight
+
+#: Each of at most so many targets is shown; of more, a row a class.
+FEW = 4
+
+Row = Mapping[str, object]
+
+
+def outcome(artifact: Artifact) -> list[str]:
+    """Lines that say what lights fit_light or track found, or how far evaluate finds them from the truth."""
+    return _TELLERS[artifact.stage](artifact)
+
+
+def _fits(artifact: Artifact) -> list[str]:
+    results = pd.read_csv(artifact.file("results.csv"), dtype={"target": str})
+    if len(results) > FEW:
+        return [*columns(_fit_rows(results)), f"Lights: {artifact.path}/<target>/lights.json"]
+    lines = [line for row in results.to_dict("records") for line in _fit(artifact, row)]
+    return [*lines, f"Lights: {artifact.path}/<target>/lights.json, pictures: fit.png beside them"]
+
+
+def _fit(artifact: Artifact, row: Row) -> list[str]:
+    path = artifact.file(f"{row['target']}/lights.json")
+    lights, spreads, told = read_lights(path), read_covariances(path), read_json(path, "a fit's light file")
+    head = f"{row['target']} ({_class(row['occlusion'])}): {words(told['result'])} in {seconds(told['seconds'])}"
+    if told["psnr"] is not None:
+        head += f", PSNR {told['psnr']:.1f} dB"
+    spread = dict(enumerate(spreads))
+    lines = [f"  {light_line(light, spread.get(index))}" for index, light in enumerate(lights)]
+    return [head, *lines, *([] if told["reason"] == REASONS[FitStatus.CONVERGED] else [f"  {told['reason']}"])]
+
+
+def light_line(light: Light, covariance: Sequence[Sequence[float]] | None = None) -> str:
+    """A light in a line: type, place and RGB intensity, each with its standard deviation where a covariance tells it.
+
+    Args:
+        covariance: as `FitResult.covariance` has it; deviations are the root of the mean variance of a coordinate.
+    """
+    variances = None if covariance is None else [float(row[index]) for index, row in enumerate(covariance)]
+    place, colour = (", ".join(f"{value:.3f}" for value in part.tolist()) for part in (light.position, light.intensity))
+    told = f"{'spot' if isinstance(light, SpotLight) else 'point'} at ({place})"
+    told += "" if variances is None else _deviation(variances[:3], "{:.4f}")
+    if isinstance(light, SpotLight):
+        axis = ", ".join(f"{value:.3f}" for value in light.direction.tolist())
+        told += f", axis ({axis}), cone {math.degrees(light.cone_angle):.1f}°"
+    told += f", RGB ({colour}) W/sr"
+    return told + ("" if variances is None else _deviation(variances[-3:], "{:.3f}"))
+
+
+def _deviation(variances: Sequence[float], form: str) -> str:
+    mean = sum(variances) / len(variances)
+    return f" ± {form.format(math.sqrt(mean))}" if math.isfinite(mean) else " ± unknown"
+
+
+def _fit_rows(results: pd.DataFrame) -> list[list[str]]:
+    rows = [["", "targets", "converged", "PSNR", "time"]]
+    for name, group in _by_class(results):
+        converged = f"{int((group['result'] == FitStatus.CONVERGED).sum())}"
+        rows.append([name, f"{len(group)}", converged, decibels(group["psnr"].median()), time(group["seconds"])])
+    return rows
+
+
+def _by_class(results: pd.DataFrame) -> list[tuple[str, pd.DataFrame]]:
+    classes = class_order(results["occlusion"])
+    parts = [(_class(name), results[results["occlusion"] == name]) for name in classes]
+    return parts if len(parts) == 1 else [*parts, ("all", results)]
+
+
+def _evaluation(artifact: Artifact) -> list[str]:
+    targets = pd.read_csv(artifact.file("metrics.csv"), dtype={"target": str})
+    if len(targets) <= FEW:
+        rows = [_target_row(row) for row in targets.to_dict("records")]
+        named = ["", "", "position error", "stated", "intensity", "axis", "PSNR", "time", ""]
+        return [*columns(without_empty([named, *rows])), f"Errors: {artifact.path / 'metrics.csv'}"]
+    summary = pd.read_csv(artifact.file("summary.csv"))
+    single = len(summary["occlusion"].drop_duplicates()) <= 2  # One class, and all of them, which is the same.
+    shown = summary[summary["occlusion"] != ALL] if single else summary
+    named = ["", "targets", "position error", "worst", "solved", "intensity", "axis", "truth in 95 %", "time"]
+    rows = [_summary_row(row) for row in shown.to_dict("records")]
+    return [*columns(without_empty([named, *rows])), f"Errors: {artifact.path / 'summary.csv'}, metrics.csv"]
+
+
+def _target_row(row: Row) -> list[str]:
+    measured = [row["position_error"], row["position_sd"], row["intensity_error"]]
+    return [
+        f"{row['target']}",
+        _class(row["occlusion"]),
+        *map(percent, measured),
+        degrees(row["axis_error"]),
+        decibels(row["psnr"]),
+        seconds(row["seconds"]),
+        words(row["result"]),
+    ]
+
+
+def _summary_row(row: Row) -> list[str]:
+    return [
+        _class(row["occlusion"]),
+        f"{row['count']}",
+        percent(row["median_position_error"]),
+        percent(row["worst_position_error"]),
+        percent(row["success_rate"], 0),
+        percent(row["median_intensity_error"]),
+        degrees(row["median_axis_error"]),
+        percent(row["inside_95"], 0),
+        seconds(row["median_seconds"]),
+    ]
+
+
+def _track(artifact: Artifact) -> list[str]:
+    table = pd.read_csv(artifact.file("track.csv"), dtype={"target": str})
+    frames = table.drop_duplicates("frame")
+    counts = ", ".join(f"{count} {name}" for name, count in frames["status"].value_counts(sort=False).items())
+    lines = [f"{len(frames)} frames: {counts}; {time(frames['seconds'])} a frame"]
+    if "position_error" in table:
+        rows = [["", "frames", "position error", "worst", "intensity", "axis"]]
+        for light, own in table.dropna(subset=["light"]).groupby("light"):
+            axis = own["axis_error"].median() if "axis_error" in own else math.nan
+            found = [f"light {int(light) + 1}", f"{len(own)}", percent(own["position_error"].median())]
+            rest = [percent(own["position_error"].max()), percent(own["intensity_error"].median()), degrees(axis)]
+            rows.append(found + rest)
+        lines += columns(without_empty(rows))
+    return [*lines, f"Track: {artifact.path / 'track.png'}, track.csv, frames/"]
+
+
+_TELLERS: Mapping[str, Callable[[Artifact], list[str]]] = {
+    "fit_light": _fits,
+    "evaluate": _evaluation,
+    "track": _track,
+}
+
+
+def _class(name: object) -> str:
+    return LABELS.get(str(name), str(name).replace("_", " "))

@@ -1,0 +1,104 @@
+"""What the command line says of lights that were found."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pandas as pd
+import torch
+
+from fitted_lights import make_fitted
+from frozen_store import artifact
+from rgspipe.artifacts import Artifact
+from rgspipe.cli.columns import columns, percent, without_empty
+from rgspipe.cli.outcome import light_line, outcome
+from rgspipe.datasets.light_file import write_lights
+from rgspipe.evaluation.tables import summary_table
+from rgspipe.fitting.result import REASONS, FitStatus
+from rgspipe.scene import LightRig, PointLight, SpotLight
+
+
+def _vector(*values: float) -> torch.Tensor:
+    return torch.tensor(values, dtype=torch.float64)
+
+
+POINT = PointLight(_vector(0.1, 0.2, 0.3), _vector(1.0, 2.0, 3.0))
+SPOT = SpotLight(_vector(0.5, 0.5, 0.5), _vector(4.0, 4.0, 4.0), _vector(0.0, 0.0, -1.0), "gaussian", 0.5236, 0.1)
+AT_BOUND = REASONS[FitStatus.AT_BOUND]
+
+
+def _fits(tmp_path: Path, count: int, rig: LightRig = (POINT, SPOT)) -> Artifact:
+    def make(folder: Path) -> None:
+        rows = []
+        for index in range(count):
+            name, status = f"rig_{index}", FitStatus.AT_BOUND if index else FitStatus.CONVERGED
+            told = {"result": str(status), "reason": REASONS[status], "seconds": 0.5 + index, "psnr": 36.04}
+            spread = [{"covariance": torch.diag(torch.full((6,), value)).tolist()} for value in (1e-4, 4e-4)]
+            write_lights(folder / name / "lights.json", rig, told | {"lights": spread[: len(rig)]})
+            rows.append({"target": name, "occlusion": "occluded"} | told)
+        pd.DataFrame(rows).to_csv(folder / "results.csv", index=False)
+
+    return artifact(tmp_path, "fit_light", make)
+
+
+def test_few_targets_show_their_lights_with_deviations_and_what_is_wrong(tmp_path: Path) -> None:
+    lines = outcome(_fits(tmp_path, 2))
+    assert lines[0] == "rig_0 (occluded): converged in 0.50 s, PSNR 36.0 dB"
+    assert lines[1] == "  point at (0.100, 0.200, 0.300) ± 0.0100, RGB (1.000, 2.000, 3.000) W/sr ± 0.010"
+    assert "spot at (0.500, 0.500, 0.500) ± 0.0200, axis (0.000, 0.000, -1.000), cone 30.0°" in lines[2]
+    assert "at bound" in lines[3] and f"  {AT_BOUND}" in lines
+    assert lines.count(f"  {AT_BOUND}") == 1 and "lights.json" in lines[-1]
+
+
+def test_many_targets_are_a_row_a_class(tmp_path: Path) -> None:
+    lines = outcome(_fits(tmp_path, 6, (POINT,)))
+    assert len(lines) == 3 and lines[0].split() == ["targets", "converged", "PSNR", "time"]
+    assert lines[1].split() == ["occluded", "6", "1", "36.0", "dB", "3.00", "s", "(worst", "5.50", "s)"]
+
+
+def test_a_light_whose_place_is_not_determined_says_so() -> None:
+    matrix = torch.diag(_vector(1e-4, 1e-4, float("inf"), 1.0, 1.0, 1.0))
+    assert ") ± unknown, RGB" in light_line(POINT, matrix)
+    assert "±" not in light_line(POINT)
+
+
+def test_an_evaluation_is_a_table_per_class_or_a_line_per_target(tmp_path: Path) -> None:
+    targets, _ = make_fitted(views=1)
+
+    def make(folder: Path, rows: pd.DataFrame) -> None:
+        rows.to_csv(folder / "metrics.csv", index=False)
+        summary_table(rows, seed=0, resamples=10).to_csv(folder / "summary.csv", index=False)
+
+    many = outcome(artifact(tmp_path / "many", "evaluate", lambda folder: make(folder, targets)))
+    assert [line.split()[0] for line in many[1:5]] == ["visible", "out", "occluded", "all"]
+    assert "axis" not in many[0] and "summary.csv" in many[-1]
+    median = 100.0 * targets["position_error"].median()
+    assert f"{median:.2f} %" in many[4]
+    few = outcome(artifact(tmp_path / "few", "evaluate", lambda folder: make(folder, targets.head(2))))
+    assert [line.split()[0] for line in few[1:3]] == ["visible_000", "visible_001"]
+    assert f"{100.0 * targets['position_error'][1]:.2f} %" in few[2] and few[2].endswith("converged")
+    alone = outcome(artifact(tmp_path / "alone", "evaluate", lambda folder: make(folder, pd.concat([targets[:3]] * 2))))
+    assert [line.split()[0] for line in alone[1:-1]] == ["visible"]
+
+
+def test_a_track_says_how_frames_were_found_and_how_far_off_each_light_is(tmp_path: Path) -> None:
+    rows = [
+        {"frame": frame, "target": f"rig_{frame}", "status": status, "seconds": 0.2 + frame, "light": light}
+        | {"position_error": 0.01 * (1 + light + frame), "intensity_error": 0.1, "axis_error": 0.5}
+        for frame, status in enumerate(("searched", "tracked"))
+        for light in range(2)
+    ]
+
+    def make(folder: Path) -> None:
+        pd.DataFrame(rows).to_csv(folder / "track.csv", index=False)
+
+    lines = outcome(artifact(tmp_path, "track", make))
+    assert lines[0] == "2 frames: 1 searched, 1 tracked; 0.70 s (worst 1.20 s) a frame"
+    assert lines[2].split() == ["light", "1", "2", "1.50", "%", "2.00", "%", "10.00", "%", "0.50°"]
+    assert lines[3].split()[4:7] == ["%", "3.00", "%"] and "track.png" in lines[-1]
+
+
+def test_columns_align_and_leave_out_what_nobody_fills() -> None:
+    rows = without_empty([["", "size", "empty", "word"], ["a", "10", "", "x"], ["bb", "9", "", "yes"]])
+    assert columns(rows) == ["      size  word", "  a     10  x", "  bb     9  yes"]
+    assert percent(float("inf")) == "unbounded" and percent(float("nan")) == ""
