@@ -5,7 +5,6 @@ from __future__ import annotations
 import torch
 
 from lit_room import BOX_CENTER, BOX_SIZE, HIDDEN
-from rgspipe.fitting.coarse import block_average, coarse_images
 from rgspipe.fitting.combinations import Scored, best_apart, candidate_costs
 from rgspipe.fitting.dictionary import build_dictionary, candidate_grid
 from rgspipe.fitting.problem import LightProblem
@@ -30,19 +29,6 @@ def test_seed_decides_the_candidates(room):
 def test_irradiance_belongs_to_the_positions(room):
     expected, _ = unit_irradiance(room.frozen.bvh, room.dictionary.positions[10:12])
     torch.testing.assert_close(room.dictionary.irradiance[10:12], expected)
-
-
-def test_coarse_images_are_block_means_of_full_images(room, point_light):
-    """The product of small matrices against rendering, with and without interreflection."""
-    prepared = room.two.prepared
-    blocks, _ = block_average(prepared)
-    for interreflection in (True, False):
-        coarse = coarse_images(prepared, room.dictionary, interreflection=interreflection)
-        for index in (0, 30, 60):
-            light = point_light(tuple(room.dictionary.positions[index].tolist()), (1.0, 1.0, 1.0))
-            images = [room.frozen.render(view, (light,), indirect=interreflection) for view in room.views]
-            expected = blocks @ prepared.stack_images(images)[prepared.pixels]
-            torch.testing.assert_close(coarse.images[index], expected, rtol=1e-4, atol=1e-5)
 
 
 def test_the_nearest_candidates_of_a_hidden_light_are_among_the_best(room, point_light):

@@ -10,6 +10,7 @@ from torch import Tensor
 
 from rgspipe.fitting.coarse import CoarseImages
 from rgspipe.fitting.nonnegative import nonnegative
+from rgspipe.fitting.parameters import Emitter
 from rgspipe.fitting.problem import LightProblem
 
 #: Up to this many candidates all pairs are tried.
@@ -51,11 +52,12 @@ class Scored:
         product = torch.stack([images[:, c] @ wanted[c] for c in range(3)], dim=1).double()
         return cls(images, wanted, square, product, float(weighted.square().sum()))
 
-    def coarse_of(self, problem: LightProblem, coarse: CoarseImages, column: Tensor) -> Tensor:
-        """(3, B) weighted coarse image of a light's full one, (P, 3, 1 + d)."""
+    def coarse_of(self, problem: LightProblem, coarse: CoarseImages, emitter: Emitter) -> Tensor:
+        """(3, B) weighted coarse image of a light that is no candidate."""
         target = (coarse.blocks @ problem.target).double()
         root = problem.block_weights(target, coarse.counts.to(target), coarse.blocks).sqrt()
-        return ((coarse.blocks @ column[:, :, 0].contiguous()) * root.to(column)).T
+        column = problem.evaluate(emitter)[:, :, 0].contiguous()
+        return ((coarse.blocks @ column) * root.to(column)).T
 
 
 def single_gains(scored: Scored) -> Tensor:

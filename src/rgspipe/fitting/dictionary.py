@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import scipy.spatial
@@ -92,9 +91,3 @@ def _clear_of_surfels(frozen: FrozenScene, positions: Tensor) -> Tensor:
     distance, nearest = tree.query(positions.double().numpy())
     scales = frozen.surfels.scales.double().cpu().prod(dim=1).sqrt()[torch.from_numpy(nearest)]
     return torch.from_numpy(distance) > CLEARANCE_SCALES * scales
-
-
-def patch_radiance(frozen: FrozenScene, dictionary: LightDictionary, channel: int) -> Tensor:
-    """(P, C) direct radiosity of one channel, averaged over the patches, under each candidate."""
-    albedo = frozen.surfels.albedo[:, channel] / math.pi
-    return frozen.transport.average @ (albedo[:, None] * dictionary.irradiance.T)

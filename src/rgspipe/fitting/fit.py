@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import torch
 from torch import Tensor
 
+from rgspipe.fitting.blocks import BlockModel, block_model
 from rgspipe.fitting.capture import ImageCapture
 from rgspipe.fitting.coarse import CoarseImages, coarse_images
 from rgspipe.fitting.dictionary import LightDictionary, build_dictionary
@@ -40,11 +41,13 @@ class FitViews:
         prepared: the pixels and their weights.
         coarse: images of the dictionary's candidates, per kind of light; none where only `paper_adam` is used.
         effects: parts of light transport.
+        blocks: the views as blocks of pixels, which searches look at; None where `coarse` is empty.
     """
 
     prepared: PreparedViews
     coarse: tuple[CoarseImages, ...]
     effects: Effects
+    blocks: BlockModel | None = None
 
 
 def prepare_fit(
@@ -61,19 +64,20 @@ def prepare_fit(
     effects = effects or Effects()
     weights = [frozen.view(view) if isinstance(view, Camera) else view for view in views]
     prepared = prepare_views(frozen, weights, masks=masks, mask_edges=mask_edges, at_pixels=effects.at_pixels)
-    coarse = () if dictionary is None else _candidates(prepared, dictionary, effects, spec or LightSpec())
-    return FitViews(prepared, coarse, effects)
+    if dictionary is None:
+        return FitViews(prepared, (), effects)
+    blocks = block_model(prepared, interreflection=effects.interreflection)
+    return FitViews(prepared, _candidates(prepared, blocks, dictionary, effects, spec or LightSpec()), effects, blocks)
 
 
 def _candidates(
-    prepared: PreparedViews, dictionary: LightDictionary, effects: Effects, spec: LightSpec
+    prepared: PreparedViews, blocks: BlockModel, dictionary: LightDictionary, effects: Effects, spec: LightSpec
 ) -> tuple[CoarseImages, ...]:
     """Candidates of the kinds of light that are looked for; points first."""
-    bounces = effects.interreflection
-    points = () if spec.type == "spot" else (coarse_images(prepared, dictionary, interreflection=bounces),)
+    points = () if spec.type == "spot" else (coarse_images(prepared.frozen, blocks, dictionary),)
     if not spec.spots:
         return points
-    return (*points, spot_candidates(prepared, dictionary, spec.shapes(), interreflection=bounces))
+    return (*points, spot_candidates(prepared, dictionary, spec.shapes(), interreflection=effects.interreflection))
 
 
 def fit_lights(
@@ -137,7 +141,7 @@ def fit_lights(
     if not views.coarse:
         raise ValueError(f"{method} needs a dictionary: pass one to prepare_fit")
     problem = replace(problem, differences=method == "finite_differences")
-    result = fit_search_lm(problem, views.coarse, search or SearchOptions(), spec)
+    result = fit_search_lm(problem, views.coarse, search or SearchOptions(), spec, views.blocks)
     if capture.exposure_free and len(views.prepared.views) == 1:
         return replace(result, reason=f"{result.reason} {ONE_EXPOSURE}")
     return result

@@ -40,10 +40,15 @@ def robust_losses(problem: LightProblem, states: Sequence[State]) -> list[Tensor
     return [(residual.double() / scale).square().log1p().mean(dim=1) for residual in residuals]
 
 
+def ranked(problem: LightProblem, states: Sequence[State]) -> list[State]:
+    """The rigs by their robust losses, best first."""
+    losses = [float(loss.mean()) for loss in robust_losses(problem, states)]
+    return [states[index] for index in sorted(range(len(states)), key=losses.__getitem__)]
+
+
 def best_state(problem: LightProblem, states: Sequence[State]) -> State:
     """The rig with the least robust loss."""
-    losses = [float(loss.mean()) for loss in robust_losses(problem, states)]
-    return states[min(range(len(states)), key=losses.__getitem__)]
+    return ranked(problem, states)[0]
 
 
 def drop(problem: LightProblem, simple: State, rich: State) -> float:
@@ -56,7 +61,8 @@ def equally_good(problem: LightProblem, best: State, other: State) -> bool:
     """Whether `other` explains the target as well as `best`, within the spread of what both leave unexplained."""
     one, two = robust_losses(problem, [best, other])
     difference = two - one
-    errors = max(1.0, len(difference) / PIXELS_PER_ERROR)
+    pixels = problem.pixels_each
+    errors = max(1.0, float((pixels / PIXELS_PER_ERROR).clamp(max=1.0).sum()))
     return float(difference.mean()) <= EQUALLY_GOOD * float(difference.std()) / math.sqrt(errors)
 
 

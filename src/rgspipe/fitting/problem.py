@@ -9,17 +9,18 @@ from functools import cached_property
 import torch
 from torch import Tensor
 
+from rgspipe.fitting.blocks import BlockModel
 from rgspipe.fitting.capture import SATURATED, ImageCapture, rounding_noise
 from rgspipe.fitting.differences import central_differences
 from rgspipe.fitting.exposure import ExposedMoments, best_factors, moments_by_view
 from rgspipe.fitting.gloss import seen_with_gloss
 from rgspipe.fitting.moments import Moments, moments
 from rgspipe.fitting.parameters import Emitter, share_slopes, shared
+from rgspipe.fitting.spot_harmonics import BandLimit, fitted_share
 from rgspipe.fitting.views import PreparedViews
 from rgspipe.renderer.direct import unit_irradiance
 from rgspipe.renderer.pixel_direct import surfel_shares
 from rgspipe.renderer.sparse import SparseOperator
-from rgspipe.renderer.spot_share import spot_share_slopes
 
 #: In relative weights 1/(y + floor·mean y): pixels darker than this share of the mean count no more than it does.
 RELATIVE_FLOOR = 0.05
@@ -39,6 +40,8 @@ class Effects:
     interreflection: bool = True
     #: Direct light where pixels look, in the last steps of a fit and in its images; else at surfels' centres.
     at_pixels: bool = False
+    #: How a fit's model encodes spots in spherical harmonics; None for their exact profile.
+    spots: BandLimit | None = None
 
 
 @dataclass(frozen=True)
@@ -57,6 +60,7 @@ class LightProblem:
         clip: (P, 1) float32 radiance at which the target is clipped, over `scale`; None where it is not.
         noise: (P, 3) float32 standard deviation of the target's rounding, over `scale`; None where there is none.
         differences: whether derivatives are taken by central differences instead of analytically.
+        blocks: where set, P counts blocks of pixels instead of pixels; see `coarsest`.
     """
 
     views: PreparedViews
@@ -69,6 +73,7 @@ class LightProblem:
     clip: Tensor | None = None
     noise: Tensor | None = None
     differences: bool = False
+    blocks: BlockModel | None = None
 
     @classmethod
     def create(
@@ -119,6 +124,8 @@ class LightProblem:
             return self._evaluate_at_pixels(emitter)
         irradiance, slope = unit_irradiance(frozen.bvh, emitter.position[None], self.effects.shadows)
         lightings = self._on_surfels(emitter, torch.cat([irradiance[0, :, None], slope[0]], dim=1))
+        if self.blocks is not None:
+            return self.blocks.seen(frozen, lightings)
         if frozen.gloss is not None:
             return seen_with_gloss(self.views, emitter.position, lightings, self.effects.interreflection)
         radiance = frozen.radiance(lightings, self.effects.interreflection)
@@ -133,7 +140,7 @@ class LightProblem:
             images[index] = images[index] + highlights.image(position, share, share_slope)
         columns = torch.cat(images)[self.views.pixels]
         if emitter.is_spot:
-            columns = _times_share(emitter, self.views.points, columns)
+            columns = _times_share(emitter, self.views.points, columns, self.effects.spots)
         if not self.effects.interreflection:
             return columns
         factor, slope = unit_irradiance(frozen.bvh, position[None], shadows=False)
@@ -146,17 +153,39 @@ class LightProblem:
 
     def _on_surfels(self, emitter: Emitter, lightings: Tensor) -> Tensor:
         """A point light's irradiance and derivatives (N, 4), as the emitter's (N, 1 + d)."""
-        return _times_share(emitter, self.views.frozen.bvh.surfels.centers, lightings) if emitter.is_spot else lightings
+        if not emitter.is_spot:
+            return lightings
+        return _times_share(emitter, self.views.frozen.bvh.surfels.centers, lightings, self.effects.spots)
 
     def sharpest(self) -> LightProblem:
         """The same problem with direct light where pixels look, if the views were made ready for that."""
         return replace(self, at_pixels=bool(self.views.pixel_direct))
 
+    def coarsest(self, blocks: BlockModel | None) -> LightProblem:
+        """The same problem for averages over blocks of pixels, if all that it asks of pixels can be asked of blocks.
+
+        Blocks see neither lobes of gloss nor which of their pixels are saturated.
+        """
+        if blocks is None or self.clip is not None or self.views.frozen.gloss is not None:
+            return self
+        return replace(self, target=blocks.average @ self.target, blocks=blocks, at_pixels=False, noise=None)
+
+    @property
+    def view_of(self) -> Tensor:
+        """(P,) int64 view of each pixel."""
+        return self.views.view_of if self.blocks is None else self.blocks.view_of
+
+    @property
+    def pixels_each(self) -> Tensor:
+        """(P,) float64 how many pixels each residual stands for."""
+        return torch.ones(len(self.target)).double() if self.blocks is None else self.blocks.counts.cpu()
+
     def moments(self, columns: Sequence[Tensor], weights: Tensor) -> Moments | ExposedMoments:
         """Weighted moments of the lights' evaluations against the target."""
         if not self.exposure_free:
             return moments(columns, self.target, weights)
-        return moments_by_view(columns, self.target, weights, self.views.bounds)
+        bounds = self.views.bounds if self.blocks is None else self.blocks.bounds
+        return moments_by_view(columns, self.target, weights, bounds)
 
     def residual(self, columns: Sequence[Tensor], intensity: Tensor) -> Tensor:
         """(P, 3) float32 target − image at intensities (L, 3), both over `scale`.
@@ -168,7 +197,7 @@ class LightProblem:
         for light, strength in zip(columns, intensity, strict=True):
             image = image + light[:, :, 0] * strength.to(light)
         if self.exposure_free:
-            weights, view_of = self.unclipped(self.relative_weights().square()), self.views.view_of
+            weights, view_of = self.unclipped(self.relative_weights().square()), self.view_of
             factors = best_factors(self.target, image, weights, view_of, len(self.views.views))
             image = image * factors.to(image)[view_of][:, None]
         residual = self.target - image
@@ -187,7 +216,7 @@ class LightProblem:
 
     def with_exposures(self, exposures: Tensor) -> LightProblem:
         """The same problem, the target divided by (V,) exposures on top of those that it was divided by already."""
-        factors = exposures.to(self.target)[self.views.view_of][:, None]
+        factors = exposures.to(self.target)[self.view_of][:, None]
         clip, noise = (None if part is None else part / factors for part in (self.clip, self.noise))
         return replace(self, target=self.target / factors, exposures=self.exposures * exposures, clip=clip, noise=noise)
 
@@ -196,7 +225,11 @@ class LightProblem:
         size = self.target.mean(dim=1, keepdim=True).clamp(min=0.0) + RELATIVE_FLOOR
         if self.noise is not None:
             size = (size.square() + (self.noise.mean(dim=1, keepdim=True) / RELATIVE_ERROR).square()).sqrt()
-        return 1.0 / size
+        if self.blocks is None:
+            return 1.0 / size
+        # A block counts as much as its pixels do together.
+        counts = self.blocks.counts.to(size)
+        return (counts / counts.mean()).sqrt()[:, None] / size
 
     def block_weights(self, target: Tensor, counts: Tensor, blocks: SparseOperator) -> Tensor:
         """(B, 3) squared relative weights of block averages (B, 3) over `counts` (B,) pixels each.
@@ -217,9 +250,9 @@ class LightProblem:
         return float(self.residual(columns, intensity).double().square().sum()) / energy if energy > 0.0 else 0.0
 
 
-def _times_share(emitter: Emitter, points: Tensor, columns: Tensor) -> Tensor:
+def _times_share(emitter: Emitter, points: Tensor, columns: Tensor, band: BandLimit | None) -> Tensor:
     """A point light's columns (N, …, 4) at `points` (N, 3) as those of a spot, (N, …, 1 + d)."""
-    share = spot_share_slopes(points, emitter.position, emitter.axis, emitter.shape, emitter.softness)
+    share = fitted_share(points, emitter.position, emitter.axis, emitter.shape, emitter.softness, band)
     return shared(columns, share.value, share_slopes(emitter, share))
 
 

@@ -120,6 +120,11 @@ def start_from(problem: LightProblem, emitters: Sequence[Emitter], weighting: We
     return state
 
 
+def fresh(state: State) -> State:
+    """A copy that goes on from where `state` stands, with its steps, and counts its own work."""
+    return replace(state, steps=[*state.steps], evaluations=0, iterations=0)
+
+
 def reevaluate(problem: LightProblem, state: State) -> None:
     """Take the columns anew where the problem or the emitters' softness have changed."""
     state.columns = [problem.evaluate(emitter) for emitter in state.emitters]

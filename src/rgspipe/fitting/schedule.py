@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from rgspipe.fitting.judge import robust_losses
+from rgspipe.fitting.judge import ranked
 from rgspipe.fitting.problem import LightProblem
 from rgspipe.fitting.refine import ROBUST, Region, State, reevaluate, refine, start_from
 from rgspipe.fitting.starts import Rig
@@ -53,6 +53,4 @@ def soft(rig: Rig, softness: float) -> Rig:
 
 def _better_half(problem: LightProblem, states: Sequence[State]) -> list[State]:
     """The half of the rigs with the lower robust losses, at least two, best first."""
-    losses = [float(loss.mean()) for loss in robust_losses(problem, states)]
-    order = sorted(range(len(states)), key=losses.__getitem__)
-    return [states[index] for index in order[: max(2, (len(order) + 1) // 2)]]
+    return ranked(problem, states)[: max(2, (len(states) + 1) // 2)]

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import zip_longest
 
+from rgspipe.fitting.blocks import BlockModel
 from rgspipe.fitting.coarse import CoarseImages
 from rgspipe.fitting.exposure import rough_exposures
 from rgspipe.fitting.judge import (
@@ -14,6 +17,7 @@ from rgspipe.fitting.judge import (
     best_state,
     drop,
     equally_good,
+    ranked,
     rig_distance,
     robust_losses,
     worth_keeping,
@@ -25,6 +29,7 @@ from rgspipe.fitting.refine import (
     ROBUST,
     Region,
     State,
+    fresh,
     reevaluate,
     refine,
     search_region,
@@ -40,8 +45,18 @@ from rgspipe.fitting.uncertainty import doubts, light_covariances
 #: Starts for each wanted one, where spots are among the candidates.
 SPOT_STARTS = 3
 
-#: A rival is refined, to see whether it is as good, if its robust cost is below this many times the best.
-NEAR_RIVAL = 2.0
+#: A number of lights that is known is searched from up to so many times the wanted starts, until the best one leaves
+#: less than this share of the blocks' energy unexplained.
+BATCHES, WELL_EXPLAINED = 4, 0.02
+
+#: So many of the starts with the least robust losses are refined with plain squares.
+SETTLED = 3
+
+#: A rival is refined, to see whether it is as good, unless the best rig's robust cost is lower by this share.
+FAR_RIVAL = 0.5
+
+#: A rival leaves at most so many times the energy unexplained that the best rig does.
+RIVAL_ENERGY = 1.5
 
 
 @dataclass(frozen=True)
@@ -62,12 +77,14 @@ def fit_search_lm(
     coarse: Sequence[CoarseImages],
     options: SearchOptions,
     spec: LightSpec | None = None,
+    blocks: BlockModel | None = None,
 ) -> FitResult:
     """The lights that explain a target: refine the candidates that look most like it, polish the best.
 
     Args:
         coarse: the candidates' images, of point lights first where there are several.
         spec: what is known of the lights; one point light if None.
+        blocks: the views as blocks of pixels, on which starts are refined; on all pixels if None.
     """
     begin = time.perf_counter()
     spec = spec or LightSpec()
@@ -78,13 +95,13 @@ def fit_search_lm(
     candidates = [one for one in candidates if one.lit]
     if not candidates:
         return dark_result(time.perf_counter() - begin)
-    search = _Search(problem, candidates, options, spec, search_region(problem), begin)
-    best, costs = search.known(spec.count) if spec.count is not None else search.unknown()
+    search = _Search(problem, problem.coarsest(blocks), candidates, options, spec, search_region(problem), begin)
+    best = search.known(spec.count) if spec.count is not None else search.unknown()
     ambiguous = search.ambiguous(best)
-    search.polish(best)
+    best = search.polish(best)
     if not bool((best.intensity > 0).any()):
         return dark_result(time.perf_counter() - begin)
-    return search.result(best, costs, ambiguous)
+    return search.result(best, ambiguous)
 
 
 def fit_from(problem: LightProblem, start: Sequence[Emitter], iterations: int = 30) -> FitResult:
@@ -92,11 +109,12 @@ def fit_from(problem: LightProblem, start: Sequence[Emitter], iterations: int = 
     begin = time.perf_counter()
     if problem.black:
         return dark_result(0.0)
-    search = _Search(problem.sharpest(), [], SearchOptions(0, iterations), LightSpec(), search_region(problem), begin)
+    problem = problem.sharpest()
+    search = _Search(problem, problem, [], SearchOptions(0, iterations), LightSpec(), search_region(problem), begin)
     state = start_from(search.problem, start, PLAIN, begin)
     refine(search.problem, state, PLAIN, iterations, search.region, begin)
     search.states.append(state)
-    return search.result(state, {}, False)
+    return search.result(state, False)
 
 
 def _roughly_exposed(problem: LightProblem, coarse: Sequence[CoarseImages]) -> LightProblem:
@@ -113,87 +131,124 @@ def _roughly_exposed(problem: LightProblem, coarse: Sequence[CoarseImages]) -> L
 
 
 class _Search:
-    """One target's search, and what it has tried."""
+    """One target's search, and what it has tried.
+
+    Everything is searched and decided on `coarse`, where a step costs little more than its shadow rays; what was chosen
+    is then polished on `problem`.
+    """
 
     def __init__(
         self,
         problem: LightProblem,
+        coarse: LightProblem,
         candidates: Sequence[Candidates],
         options: SearchOptions,
         spec: LightSpec,
         region: Region,
         begin: float,
     ) -> None:
-        self.problem, self.candidates, self.options, self.spec = problem, candidates, options, spec
+        self.problem, self.coarse = problem, coarse
+        self.candidates, self.options, self.spec = candidates, options, spec
         self.region, self.begin = region, begin
         self.states: list[State] = []
         self.rivals: list[State] = []
+        self.tried: list[State] = []
 
-    def known(self, lights: int) -> tuple[State, dict[int, float]]:
-        """The best rig of a given number of lights (fewer where there are too few candidates), and its cost."""
+    def known(self, lights: int) -> State:
+        """The best rig of a given number of lights; fewer where there are too few candidates."""
         best = None
         # Points and spots have candidates of their own, so rigs of both grow light by light.
         for count in range(1, lights + 1) if self.spec.type == "auto" else (lights,):
-            best = self._best_of(count, best) or best
+            best = self._best_of(count, best, patient=count == lights) or best
         while best is None:
             lights -= 1
-            best = self._best_of(lights, None)
-        return best, self._costs([best])
+            best = self._best_of(lights, None, patient=True)
+        self.tried = [best]
+        return best
 
-    def unknown(self) -> tuple[State, dict[int, float]]:
-        """The best rig of the least number of lights to which one more adds too little, and the costs of all tried."""
-        best, tried = None, []
+    def unknown(self) -> State:
+        """The best rig of the least number of lights to which one more adds too little."""
+        best, rivals = None, []
         for lights in range(1, MOST_LIGHTS + 1):
-            state = self._best_of(lights, best)
+            state = self._best_of(lights, best, patient=False)
             if state is None:
                 break
-            tried.append(state)
+            self.tried.append(state)
             # More steps rarely gain as much again, so a rig that is far from worth it needs none.
-            if best is not None and drop(self.problem, best, state) < 0.5 * LEAST_DROP:
+            if best is not None and drop(self.coarse, best, state) < 0.5 * LEAST_DROP:
                 break
-            refine(self.problem, state, ROBUST, 2 * SHORT_ITERATIONS, self.region, self.begin)
-            if best is not None and drop(self.problem, best, state) < LEAST_DROP:
+            refine(self.coarse, state, ROBUST, 2 * SHORT_ITERATIONS, self.region, self.begin)
+            if best is not None and drop(self.coarse, best, state) < LEAST_DROP:
                 break
             best, rivals = state, self.rivals
         self.rivals = rivals
-        return self._pruned(best), self._costs(tried)
+        return self._pruned(best)
 
-    def _costs(self, tried: Sequence[State]) -> dict[int, float]:
-        """Robust cost by number of lights, all at one scale."""
-        losses = robust_losses(self.problem, tried)
-        return {len(state.emitters): float(loss.mean()) for state, loss in zip(tried, losses, strict=True)}
+    def costs(self) -> dict[int, float]:
+        """Robust cost by number of lights of all rigs that were compared, at one scale."""
+        losses = robust_losses(self.coarse, self.tried) if self.tried else []
+        return {len(state.emitters): float(loss.mean()) for state, loss in zip(self.tried, losses, strict=True)}
 
-    def _best_of(self, lights: int, previous: State | None) -> State | None:
-        """The best rig of `lights` lights of the types that are looked for; None without candidates for so many."""
+    def _best_of(self, lights: int, previous: State | None, patient: bool) -> State | None:
+        """The best rig of `lights` lights of the types that are looked for; None without candidates for so many.
+
+        Args:
+            previous: a refined rig of one light fewer, to grow from.
+            patient: whether further starts follow while all explain little.
+        """
         self.rivals = []
-        starts = [self._starts(one, lights, previous) for one in self.candidates]
-        found = [self._refined(rigs) for rigs in starts if rigs]
+        batches = BATCHES if patient else 1
+        starts = [self._starts(one, lights, previous, batches) for one in self.candidates]
+        found = [self._refined(rigs, batches) for rigs in starts if rigs]
         if not found:
             return None
         best = found[0]
         for richer in found[1:]:
-            if drop(self.problem, best, richer) >= LEAST_DROP:
+            if drop(self.coarse, best, richer) >= LEAST_DROP:
                 best = richer
         return self._with_plain_lights(best) if self.spec.type == "auto" else best
 
-    def _starts(self, candidates: Candidates, lights: int, previous: State | None) -> list[Rig]:
+    def _starts(self, candidates: Candidates, lights: int, previous: State | None, batches: int) -> list[Rig]:
         spots = candidates.coarse.axes is not None
-        count = self.options.starts * (SPOT_STARTS if spots else 1)
+        count = self.options.starts * (SPOT_STARTS if spots else 1) * batches
         if previous is None or len(previous.emitters) != lights - 1:
             return candidates.rigs(lights, count, self.region.size)
         half = max(1, count // 2)
         extended = candidates.extended(previous, half, self.region.size)
-        return [*extended, *candidates.rigs(lights, half, self.region.size)]
+        fresh = candidates.rigs(lights, half, self.region.size)
+        return [rig for pair in zip_longest(extended, fresh) for rig in pair if rig is not None]
 
-    def _refined(self, rigs: Sequence[Rig]) -> State:
-        """The best of several starts after a few steps each."""
-        started, finished = refine_starts(self.problem, rigs, self.options.iterations, self.region, self.begin)
-        self.states += started
-        self.rivals += finished
-        return best_state(self.problem, finished)
+    def _refined(self, rigs: Sequence[Rig], batches: int) -> State:
+        """The best of several starts after a few steps each; of `batches` parts the next ones only if need be."""
+        best, size = None, math.ceil(len(rigs) / batches)
+        for first in range(0, len(rigs), size):
+            started, finished = refine_starts(
+                self.coarse, rigs[first : first + size], self.options.iterations, self.region, self.begin
+            )
+            self.states += started
+            self.rivals += finished
+            found = self._settled(finished)
+            best = found if best is None else min(best, found, key=self._unexplained)
+            if self._unexplained(best) < WELL_EXPLAINED:
+                break
+        return best
+
+    def _settled(self, states: Sequence[State]) -> State:
+        """Of the states with the least robust losses the one that explains most after some steps of plain squares.
+
+        The polish takes plain squares: a rig that only a forgiving loss likes would walk far in it.
+        """
+        settled = [fresh(state) for state in ranked(self.coarse, states)[:SETTLED]]
+        self.states += settled
+        for state in settled:
+            refine(self.coarse, state, PLAIN, min(SHORT_ITERATIONS, self.options.iterations), self.region, self.begin)
+        return min(settled, key=self._unexplained)
+
+    def _unexplained(self, state: State) -> float:
+        return self.coarse.unexplained(state.columns, state.intensity)
 
     def _start(self, rig: Rig) -> State:
-        state = start_from(self.problem, rig, ROBUST, self.begin)
+        state = start_from(self.coarse, rig, ROBUST, self.begin)
         self.states.append(state)
         return state
 
@@ -204,8 +259,8 @@ class _Search:
                 plain = [*state.emitters]
                 plain[index] = Emitter(emitter.position)
                 other = self._start(tuple(plain))
-                refine(self.problem, other, ROBUST, SHORT_ITERATIONS, self.region, self.begin)
-                state = state if drop(self.problem, other, state) >= LEAST_DROP else other
+                refine(self.coarse, other, ROBUST, SHORT_ITERATIONS, self.region, self.begin)
+                state = state if drop(self.coarse, other, state) >= LEAST_DROP else other
         return state
 
     def _pruned(self, state: State) -> State:
@@ -214,36 +269,36 @@ class _Search:
         if len(kept) == len(state.emitters) or not kept:
             return state
         fewer = self._start(tuple(state.emitters[index] for index in kept))
-        refine(self.problem, fewer, ROBUST, 2 * SHORT_ITERATIONS, self.region, self.begin)
+        refine(self.coarse, fewer, ROBUST, 2 * SHORT_ITERATIONS, self.region, self.begin)
         return fewer
 
     def ambiguous(self, best: State) -> bool:
         """Whether a clearly different rig explains the target as well; rivals that come near are refined first."""
-        rivals = [
-            state
-            for state in self.rivals
-            if rig_distance(state.emitters, best.emitters) > CLEARLY_APART * self.region.size
-        ]
+        apart = CLEARLY_APART * self.region.size
+        rivals = [state for state in self.rivals if rig_distance(state.emitters, best.emitters) > apart]
         if not rivals:
             return False
-        rival = best_state(self.problem, rivals)
-        losses = [float(loss.mean()) for loss in robust_losses(self.problem, [best, rival])]
-        if losses[1] > NEAR_RIVAL * losses[0]:
+        pair = [fresh(best), fresh(best_state(self.coarse, rivals))]
+        if drop(self.coarse, pair[1], pair[0]) > FAR_RIVAL:
             return False
-        pair = [replace(state, steps=[], evaluations=0, iterations=0) for state in (best, rival)]
         self.states += pair
         for state in pair:
-            refine(self.problem, state, ROBUST, 2 * SHORT_ITERATIONS, self.region, self.begin)
-        apart = rig_distance(pair[0].emitters, pair[1].emitters) > CLEARLY_APART * self.region.size
-        return apart and equally_good(self.problem, *pair)
+            refine(self.coarse, state, ROBUST, 2 * SHORT_ITERATIONS, self.region, self.begin)
+        if rig_distance(pair[0].emitters, pair[1].emitters) <= apart or not equally_good(self.coarse, *pair):
+            return False
+        # The answer is one of plain squares, so a rival has to be one, too.
+        refine(self.coarse, pair[1], PLAIN, SHORT_ITERATIONS, self.region, self.begin)
+        clear = rig_distance(best.emitters, pair[1].emitters) > apart
+        return clear and self._unexplained(pair[1]) <= RIVAL_ENERGY * self._unexplained(best)
 
-    def polish(self, best: State) -> None:
-        """Plain squares to the end, with direct light where pixels look if the views were made ready for that."""
-        sharpest = self.problem.sharpest()
-        if sharpest is not self.problem:
-            self.problem = sharpest
-            reevaluate(self.problem, best)
-        refine(self.problem, best, PLAIN, self.options.iterations, self.region, self.begin)
+    def polish(self, best: State) -> State:
+        """Plain squares to the end with all pixels, direct light where these look if views are ready for it."""
+        self.problem = self.problem.sharpest()
+        polished = fresh(best)
+        self.states.append(polished)
+        reevaluate(self.problem, polished)
+        refine(self.problem, polished, PLAIN, self.options.iterations, self.region, self.begin)
+        return polished
 
     def _settle_exposures(self, best: State) -> None:
         """Take free exposures as known from here on."""
@@ -252,9 +307,9 @@ class _Search:
             exposures = self.problem.moments(best.columns, weights).exposures
             self.problem = replace(self.problem.with_exposures(exposures), exposure_free=False)
 
-    def result(self, best: State, costs: dict[int, float], ambiguous: bool) -> FitResult:
+    def result(self, best: State, ambiguous: bool) -> FitResult:
         self._settle_exposures(best)
-        status = best.status
+        status, costs = best.status, self.costs()
         if ambiguous:
             status = FitStatus.AMBIGUOUS
         if any(self.region.at_bound(emitter.position) for emitter in best.emitters):

@@ -8,8 +8,9 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor
 
-from rgspipe.fitting.coarse import BlockModel, CoarseImages, block_model
-from rgspipe.fitting.dictionary import LightDictionary, patch_radiance
+from rgspipe.fitting.blocks import BlockModel, block_model, patch_radiance
+from rgspipe.fitting.coarse import CoarseImages
+from rgspipe.fitting.dictionary import LightDictionary
 from rgspipe.fitting.views import PreparedViews
 from rgspipe.progress import track
 from rgspipe.renderer.point_sets import fibonacci_directions
@@ -54,15 +55,13 @@ def spot_candidates(
     brightness = joined[0].sum(dim=(1, 2))
     kept = brightness > LEAST_SEEN * brightness.amax()
     seen, places, aims, which = (part[kept.to(part.device)] for part in joined)
-    return CoarseImages(model.blocks, model.counts, seen, places, aims, tuple(shapes), which)
+    return CoarseImages(model.average, model.counts, seen, places, aims, tuple(shapes), which)
 
 
 def _point_light_parts(views: PreparedViews, dictionary: LightDictionary, model: BlockModel) -> tuple[Tensor, Tensor]:
     """Of unit point lights the direct coarse images (C, B, 3), and the patches' direct radiosity (C, patches, 3)."""
-    lights = dictionary.irradiance.T / math.pi
-    direct = torch.stack([shaded @ lights for shaded in model.shaded], dim=2).permute(1, 0, 2)
-    patches = torch.stack([patch_radiance(views.frozen, dictionary, channel) for channel in range(3)], dim=2)
-    return direct, patches.permute(1, 0, 2)
+    lights = dictionary.irradiance.T
+    return model.direct(lights).permute(2, 0, 1), patch_radiance(views.frozen, lights).permute(2, 1, 0)
 
 
 def _places(views: PreparedViews, model: BlockModel) -> Tensor:
@@ -80,6 +79,6 @@ def _spots_seen(shape: SpotShape, angle: Tensor, direct: Tensor, patches: Tensor
     share, _ = spot_profile(profile, angle, cone, falloff)
     count = len(model.counts)
     seen = share[:, :count, None] * direct
-    for channel, bounced in enumerate(model.bounced):
+    for channel, bounced in enumerate(() if model.bounced is None else model.bounced):
         seen[:, :, channel] += (share[:, count:] * patches[:, channel]) @ bounced.T
     return seen

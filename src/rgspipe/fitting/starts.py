@@ -67,7 +67,7 @@ class Candidates:
 
     def extended(self, state: State, count: int, size: float) -> list[Rig]:
         """At most `count` rigs: the lights of a refined one and one candidate more."""
-        fixed = torch.stack([self.scored.coarse_of(self.problem, self.coarse, column) for column in state.columns])
+        fixed = torch.stack([self.scored.coarse_of(self.problem, self.coarse, emitter) for emitter in state.emitters])
         added = [self.emitters([index]) for index, _ in extensions(self.scored, fixed)]
         return [(*state.emitters, *extra) for extra in different(added, count, SEPARATION * size)]
 
