@@ -22,6 +22,7 @@ OCCLUSIONS = ("visible", "out_of_frame", "occluded", "around_corner", "all")
 PLY_FRONTS = ("auto", "kept", "inwards", "outwards", "cameras")
 FIT_METHODS = ("search_lm", "paper_adam", "finite_differences")
 TARGET_KINDS = ("points", "spots", "mixed", "track")
+LIGHT_STUDIES = ("views", "robustness", "classes")
 ROOM_NAMES = ("cornell", "corridor", "clutter")
 
 
@@ -616,6 +617,26 @@ class RelightConfig:
 
 
 @dataclass
+class LightStudyConfig:
+    """What recovered lights are like over numbers of views, bad images and models, or where the lights are."""
+
+    kind: str = option(
+        "robustness",
+        "the figure: errors against the number of views; cases of errors in images and model; or classes of lights",
+        choices=LIGHT_STUDIES,
+    )
+    cases: list[str] = option(
+        ["clean"],
+        "what is compared: `clean`, or keys such as target_capture.noise=0.03, several joined by spaces, and `NAME: ` "
+        "before them where wanted",
+    )
+    scenes: list[str] = option([], "scenes that are compared; by default the one that is configured", choices=MODELLED)
+    views: list[int] = option([1], "numbers of views", low=1, high=1000)
+    methods: list[str] = option(["search_lm"], "methods", choices=FIT_METHODS)
+    paper_adam_limit: int | None = option(1, "targets of each class that paper_adam is run on", low=1, high=100000)
+
+
+@dataclass
 class DebugConfig:
     """What is shown when something goes wrong."""
 
@@ -653,6 +674,7 @@ class RgspipeConfig:
     target_capture: TargetCaptureConfig = section(TargetCaptureConfig, "errors put into fit targets")
     track: TrackConfig = section(TrackConfig, "lights that move")
     targets: TargetsConfig = section(TargetsConfig, "generated fit targets")
+    light_study: LightStudyConfig = section(LightStudyConfig, "what recovered lights are like")
     relight: RelightConfig = section(RelightConfig, "a frozen scene in any lights")
 
 

@@ -15,6 +15,7 @@ STAGE_TABLES = {
     "evaluate": "metrics.csv",
     "judge": "quality.csv",
     "study": "study.csv",
+    "light_study": "study.csv",
     "benchmark": "benchmark.csv",
 }
 

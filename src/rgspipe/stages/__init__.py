@@ -27,6 +27,7 @@ NAMES = (
     "judge",
     "evaluate",
     "study",
+    "light_study",
     "report",
     "overview",
     "render_truth",

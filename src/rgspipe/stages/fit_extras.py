@@ -11,7 +11,9 @@ import torch
 from torch import Tensor
 
 from rgspipe.config import FitConfig
+from rgspipe.datasets.advice_file import ALONE, IN_ORDER, PLAN, SUGGESTED
 from rgspipe.datasets.frames import FrameEntry, read_entries
+from rgspipe.datasets.json_file import numbers
 from rgspipe.datasets.landscape_file import Landscape, PlaneLoss, landscape_bytes
 from rgspipe.datasets.location import dataset_root
 from rgspipe.fitting import FitResult, FitViews
@@ -20,9 +22,6 @@ from rgspipe.fitting.landscape import loss_slices
 from rgspipe.fitting.parameters import Emitter
 from rgspipe.fitting.problem import LightProblem
 from rgspipe.scene import Camera
-
-#: Marks the rows of suggested_views.csv in which a target's cameras are added one after the other.
-IN_ORDER = "in_order"
 
 #: A camera and its name.
 Named = tuple[str, Camera]
@@ -46,7 +45,7 @@ def further_files(
             effects=views.effects,
         )
         names = [name for name, _ in candidates]
-        files["suggested_views.csv"] = _advice_table(advice, names).to_csv(index=False).encode()
+        files[SUGGESTED] = _advice_table(advice, names).to_csv(index=False).encode()
         files["advice.json"] = _advice_words(advice, names)
     if config.landscape:
         files["landscape.npz"] = _landscape(views, images, result)
@@ -54,7 +53,7 @@ def further_files(
 
 
 def training_cameras(dataset: Path | None, like: Camera) -> list[Named]:
-    """The cameras of the training views, named by their images; `like` has the size where the file states none."""
+    """The cameras of the training views, named by their images; `like` has the size where nothing tells it."""
     if dataset is None:
         return []
     path = dataset_root(dataset) / "transforms_train.json"
@@ -65,8 +64,13 @@ def training_cameras(dataset: Path | None, like: Camera) -> list[Named]:
 
 
 def _size(entry: FrameEntry, like: Camera) -> tuple[int, int]:
-    sizes = entry.shared | entry.fields
-    return int(sizes.get("w", like.width)), int(sizes.get("h", like.height))
+    """Width and height of a training image: as the file says, or twice its principal point, or like `like`."""
+    stated = entry.shared | entry.fields
+    middle = [0.5 * like.width, 0.5 * like.height]
+    if "camera_intrinsics" in stated:
+        middle = numbers(stated["camera_intrinsics"], 4, entry.where, "camera_intrinsics")[:2]
+    width, height = (round(2.0 * half) for half in middle)
+    return int(stated.get("w", width)), int(stated.get("h", height))
 
 
 def _advice_table(advice: ViewAdvice, names: Sequence[str]) -> pd.DataFrame:
@@ -75,8 +79,8 @@ def _advice_table(advice: ViewAdvice, names: Sequence[str]) -> pd.DataFrame:
     Then the candidates as they are listed, each added to those before it ("in_order"): the target's own come first.
     """
     present = advice.present_views
-    rows = [("alone", present + 1, names[view.camera], view.position_sd) for view in advice.ranked]
-    for added, views in (("plan", advice.plan), (IN_ORDER, advice.in_order)):
+    rows = [(ALONE, present + 1, names[view.camera], view.position_sd) for view in advice.ranked]
+    for added, views in ((PLAN, advice.plan), (IN_ORDER, advice.in_order)):
         together = enumerate(views, start=present + 1)
         rows += [(added, count, names[view.camera], view.position_sd) for count, view in together]
     return pd.DataFrame(rows, columns=["added", "views", "camera", "position_sd"])

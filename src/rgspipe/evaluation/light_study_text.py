@@ -1,0 +1,91 @@
+"""The table of a study of recovered lights as people read it: values with their intervals, as text."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import pandas as pd
+
+from rgspipe.evaluation.goals import percent
+from rgspipe.evaluation.light_study import STATUSES, several
+from rgspipe.evaluation.plots import LABELS
+from rgspipe.evaluation.tables import ALL
+
+Row = dict[str, Any]
+
+#: What stands over the rows and says what the columns mean, by kind of study.
+NOTES = {
+    "views": "Medians with 95 % bootstrap intervals, shares with Wilson’s; position errors are parts of the scene’s "
+    "longest side. Stated: the root mean square position error that fits expect of themselves (median over targets). "
+    "Predicted: the same for the target’s first views, as the fits with the fewest views foretell it by their Fisher "
+    "information. Times are wall times of single fits, beside whatever else ran.",
+    "robustness": "Medians with 95 % bootstrap intervals, shares with Wilson’s; all classes together. Silent: the fit "
+    "says converged, is off by more than the limit, and no region that it states holds the truth. With a wrong number "
+    "of lights no target counts as solved; position errors are then those of the lights that have a match.",
+    "classes": "Medians with 95 % bootstrap intervals, shares with Wilson’s; position errors are parts of the scene’s "
+    "longest side. True surfels are made from the true surfaces and albedo.",
+}
+
+
+def shown_rows(table: pd.DataFrame, kind: str) -> tuple[list[str], list[Row]]:
+    """Headings, and for each row its cells by heading as text.
+
+    Args:
+        table: rows of `light_study.case_rows`; of views also with `predicted`.
+        kind: one of `light_study.KINDS`; robustness shows all classes together, the others each.
+    """
+    rows = table[table["occlusion"] == ALL] if kind == "robustness" else table
+    columns = _columns(rows, kind)
+    return list(columns), [{name: cell(row) for name, cell in columns.items()} for row in rows.to_dict("records")]
+
+
+def markdown(table: pd.DataFrame, kind: str) -> str:
+    """The same as a Markdown table."""
+    headings, rows = shown_rows(table, kind)
+    lines = ["| " + " | ".join(headings) + " |", "| " + "--- | " * len(headings)]
+    lines += ["| " + " | ".join(row.values()) + " |" for row in rows]
+    return "\n".join(line.rstrip() for line in lines) + "\n"
+
+
+def _columns(rows: pd.DataFrame, kind: str) -> dict[str, Callable[[Row], str]]:
+    columns: dict[str, Callable[[Row], str]] = {}
+    for name in several(rows, ["scene", "case", "method"]) or ["case"]:
+        columns[name] = lambda row, name=name: str(row[name])
+    columns["views"] = lambda row: str(row["views"])
+    if kind != "robustness":
+        columns["light"] = _class
+    columns["targets"] = lambda row: str(row["count"])
+    columns["position error"] = lambda row: _interval(row, "position", 2)
+    columns["intensity error"] = lambda row: _interval(row, "intensity", 1)
+    columns["solved"] = lambda row: _interval(row, "success", 0)
+    columns["s a fit"] = lambda row: "—" if math.isnan(row["seconds"]) else f"{row['seconds']:.2f}"
+    if kind == "views":
+        columns["stated"] = lambda row: percent(row["stated"])
+        columns["predicted"] = lambda row: percent(row.get("predicted", math.nan))
+    columns["truth in 95 % region"] = lambda row: percent(row["inside_95"], 0)
+    if kind == "robustness":
+        columns["silent"] = lambda row: percent(row["silent"], 0)
+        columns["says"] = _statuses
+    return columns
+
+
+def _class(row: Row) -> str:
+    name = str(row["occlusion"])
+    return "all classes" if name == ALL else LABELS.get(name, name)
+
+
+def _interval(row: Row, name: str, digits: int) -> str:
+    """ "0.31 % (0.22–0.45)"."""
+    low, high = row[f"{name}_low"], row[f"{name}_high"]
+    middle = percent(row[name], digits)
+    if math.isnan(low) or math.isnan(row[name]):
+        return middle
+    return f"{middle} ({percent(low, digits).removesuffix(' %')}–{percent(high, digits).removesuffix(' %')})"
+
+
+def _statuses(row: Row) -> str:
+    """What fits said of themselves, the most frequent first."""
+    shares = sorted(((row[status], status) for status in STATUSES if row[status] > 0.0), reverse=True)
+    return ", ".join(f"{status.replace('_', ' ')} {percent(share, 0)}" for share, status in shares) or "—"

@@ -1,0 +1,109 @@
+"""Compare recovered lights over numbers of views, errors of images and model, or classes: a table and a figure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import pandas as pd
+
+from rgspipe.artifacts import Artifact
+from rgspipe.config import RgspipeConfig, scene_name
+from rgspipe.datasets.advice_file import SUGGESTED, own_views_in_order
+from rgspipe.evaluation.light_study import case_rows, predicted_errors
+from rgspipe.evaluation.light_study_plots import light_study_figure
+from rgspipe.evaluation.light_study_text import markdown
+from rgspipe.evaluation.plots import png_of
+from rgspipe.stages.base import Need, Stage, StageContext
+from rgspipe.stages.study_cases import checked_cases, chosen_scenes
+
+TABLE, TEXT, FIGURE = "study.csv", "study.md", "study.png"
+
+#: What an evaluation says of each target: columns that are not numbers.
+TYPES = {"target": str, "result": str, "reason": str, "success": "boolean", "inside_95": "boolean"}
+
+
+@dataclass(frozen=True)
+class Cell:
+    """The fits of one case with one method and number of views.
+
+    Attributes:
+        scene, case: their names.
+        changes: of the configuration.
+        foretells: whether the fits say what more views would leave uncertain.
+    """
+
+    scene: str
+    case: str
+    changes: dict[str, object]
+    foretells: bool
+
+
+def run(context: StageContext) -> None:
+    """Write study.csv, study.md and study.png."""
+    config, cells = context.config, _cells(context.config)
+    fits = iter(context.input_lists.get("fit_light", ()))
+    parts, predictions = [], []
+    for cell, evaluated in zip(cells, context.input_lists["evaluate"], strict=True):
+        targets = pd.read_csv(evaluated.file("metrics.csv"), dtype=TYPES)
+        rows = case_rows(cell.scene, cell.case, targets, config.seed, config.evaluate.bootstrap)
+        parts.append(rows)
+        if cell.foretells:
+            found = predicted_errors(targets, _advice(next(fits), targets))
+            named = {name: rows[name].iloc[0] for name in ("scene", "case", "method")}
+            predictions.append(found.assign(**named))
+    table = pd.concat(parts, ignore_index=True)
+    if predictions:
+        table = table.merge(pd.concat(predictions), how="left")
+    kind = config.light_study.kind
+    table.insert(0, "kind", kind)
+    table.to_csv(context.folder / TABLE, index=False)
+    (context.folder / TEXT).write_text(markdown(table, kind), encoding="utf-8")
+    (context.folder / FIGURE).write_bytes(png_of(light_study_figure(table, kind)))
+    context.note(kind=kind, rows=len(table))
+
+
+def _advice(fit: Artifact, targets: pd.DataFrame) -> dict[str, pd.DataFrame]:
+    """By target what its own further cameras would leave uncertain; a fit without lights says nothing."""
+    files = {name: f"{name}/{SUGGESTED}" for name in targets["target"]}
+    return {name: own_views_in_order(fit.file(file)) for name, file in files.items() if file in fit.manifest["files"]}
+
+
+def _cells(config: RgspipeConfig) -> list[Cell]:
+    return list(_each_cell(config))
+
+
+def _each_cell(config: RgspipeConfig) -> Iterator[Cell]:
+    wanted = config.light_study
+    for scene, chosen in chosen_scenes(config, wanted.scenes):
+        for case in checked_cases(chosen, "light_study.cases", wanted.cases):
+            for method in wanted.methods:
+                for views in wanted.views:
+                    foretells = wanted.kind == "views" and method == "search_lm" and views == min(wanted.views)
+                    changes = scene | _fit_changes(chosen, method, views, foretells) | case.changes
+                    yield Cell(scene_name(chosen), case.name, changes, foretells)
+
+
+def _fit_changes(config: RgspipeConfig, method: str, views: int, foretells: bool) -> dict[str, object]:
+    changes: dict[str, object] = {"fit.method": method, "views.count": views, "views.indices": None}
+    if method == "paper_adam" and config.fit.limit is None:
+        changes["fit.limit"] = config.light_study.paper_adam_limit
+    return changes | ({"fit.suggest_view": True} if foretells else {})
+
+
+def _inputs(config: RgspipeConfig) -> list[Need]:
+    needs = []
+    for cell in _each_cell(config):
+        needs += [Need("fit_light", cell.changes)] if cell.foretells else []
+        needs.append(Need("evaluate", cell.changes))
+    return needs
+
+
+STAGE = Stage(
+    name="light_study",
+    help="recovered lights over numbers of views, errors of images and model, or classes: a table and a figure",
+    run=run,
+    inputs=_inputs,
+    config_keys=("light_study", "seed", "evaluate.bootstrap"),
+    code=("rgspipe.datasets.advice_file", "rgspipe.evaluation", "rgspipe.stages.study_cases"),
+)

@@ -1,0 +1,147 @@
+"""The studies of recovered lights: what they ask for, and what they make of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from rgspipe.artifacts import Artifact, ArtifactStore, Key
+from rgspipe.cli.compose import compose_config
+from rgspipe.config import RgspipeConfig, with_changes
+from rgspipe.datasets.advice_file import own_views_in_order
+from rgspipe.errors import InputError
+from rgspipe.evaluation.tables import TARGET_COLUMNS
+from rgspipe.stages import light_study
+from rgspipe.stages.base import StageContext
+
+ADVICE = "added,views,camera,position_sd\nalone,2,view_1,0.004\nplan,2,train/r_0,0.001\n"
+ADVICE += "in_order,2,view_1,0.004\nin_order,3,view_2,0.003\nin_order,4,train/r_0,0.002\nin_order,5,view_3,0.001\n"
+
+
+def _config(**changes: object) -> RgspipeConfig:
+    named = {f"light_study.{key}": value for key, value in changes.items()}
+    return with_changes(RgspipeConfig(), {"stage": "light_study"} | named)
+
+
+def _artifact(root: Path, stage: str, fingerprint: str, files: Mapping[str, str]) -> Artifact:
+    def build(folder: Path) -> dict:
+        for name, text in files.items():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            (folder / name).write_text(text)
+        return {}
+
+    recipe = {"config": {}, "inputs": {}, "code": {}}
+    return ArtifactStore(root).build(Key("cornell", stage, fingerprint), recipe, build)[0]
+
+
+def _metrics(views: int, error: float) -> str:
+    rows = [
+        dict.fromkeys(TARGET_COLUMNS, math.nan)
+        | {"target": f"{name}_000", "occlusion": name, "method": "search_lm", "views": views}
+        | {"position_error": error, "intensity_error": 0.02, "seconds": 0.5, "success": error < 0.01}
+        | {"position_sd": 1.2 * error, "inside_95": True, "result": "converged", "reason": ""}
+        for name in ("visible", "occluded")
+    ]
+    return pd.DataFrame(rows).to_csv(index=False)
+
+
+def _run(config: RgspipeConfig, lists: Mapping[str, list[Artifact]], folder: Path) -> pd.DataFrame:
+    folder.mkdir()
+    light_study.run(StageContext(config, {name: found[0] for name, found in lists.items()}, lists, folder))
+    assert (folder / "study.png").read_bytes().startswith(b"\x89PNG")
+    assert (folder / "study.md").read_text().startswith("| ")
+    return pd.read_csv(folder / "study.csv")
+
+
+def test_a_study_asks_for_every_case_method_and_number_of_views_of_every_scene() -> None:
+    cases = ["clean", "noise: target_capture.noise=0.03"]
+    config = _config(cases=cases, scenes=["cornell", "corner"], views=[1, 3], methods=["search_lm", "paper_adam"])
+    needs = light_study.STAGE.needs(config)
+    assert [need.stage for need in needs] == ["evaluate"] * 16
+    assert needs[0].changes["scene.kind"] == "cornell" and needs[8].changes["scene.kind"] == "corner"
+    noisy = needs[7].changes
+    assert noisy["target_capture.noise"] == 0.03 and noisy["views.count"] == 3 and noisy["fit.method"] == "paper_adam"
+    assert noisy["fit.limit"] == 1 and "fit.limit" not in needs[0].changes
+    for need in needs:
+        with_changes(config, need.changes)
+
+
+def test_the_fits_of_fewest_views_foretell_the_others() -> None:
+    needs = light_study.STAGE.needs(_config(kind="views", views=[2, 4], methods=["search_lm", "paper_adam"]))
+    asked = [(need.stage, need.changes["fit.method"], need.changes["views.count"]) for need in needs]
+    assert asked[:3] == [("fit_light", "search_lm", 2), ("evaluate", "search_lm", 2), ("evaluate", "search_lm", 4)]
+    assert [bool(need.changes.get("fit.suggest_view")) for need in needs] == [True, True, False, False, False]
+
+
+def test_a_case_has_the_last_word() -> None:
+    (need,) = light_study.STAGE.needs(_config(cases=["four: views.count=4 fit.limit=2"]))
+    assert need.changes["views.count"] == 4 and need.changes["fit.limit"] == 2
+
+
+def test_a_case_that_is_none_is_refused_before_anything_is_made() -> None:
+    with pytest.raises(InputError, match=r"light_study\.cases.*target_capture\.noise"):
+        light_study.STAGE.needs(_config(cases=["target_capture.nose=0.1"]))
+
+
+@pytest.mark.parametrize("name", ["light_views", "light_robustness", "light_classes"])
+def test_every_study_that_is_prepared_composes_and_names_its_cases(name: str) -> None:
+    config = compose_config(["stage=light_study", f"experiment={name}"])
+    assert config.light_study.kind == name.removeprefix("light_")
+    needs = light_study.STAGE.needs(config)
+    fits = [need for need in needs if need.stage == "evaluate"]
+    assert len(fits) == max(1, len(config.light_study.scenes)) * len(config.light_study.cases) * len(
+        config.light_study.views
+    )
+
+
+def test_views_are_one_table_with_what_was_foretold(tmp_path: Path) -> None:
+    config = _config(kind="views", views=[1, 2, 3])
+    evaluated = [
+        _artifact(tmp_path, "evaluate", f"{views:02x}", {"metrics.csv": _metrics(views, 0.012 / views)})
+        for views in (1, 2, 3)
+    ]
+    fit = _artifact(tmp_path, "fit_light", "aa", {"visible_000/suggested_views.csv": ADVICE, "results.csv": ""})
+    table = _run(config, {"fit_light": [fit], "evaluate": evaluated}, tmp_path / "study")
+    assert len(table) == 9 and set(table["kind"]) == {"views"} and set(table["scene"]) == {"cornell"}
+    whole = table[table["occlusion"] == "all"].set_index("views")
+    assert whole["position"].tolist() == pytest.approx([0.012, 0.006, 0.004])
+    assert whole["success"].tolist() == [0.0, 1.0, 1.0]
+    assert whole["predicted"].tolist() == pytest.approx([0.0144, 0.004, 0.003])
+    assert table.loc[table["occlusion"] == "occluded", "predicted"].isna().all(), "its fit has no advice"
+    assert "predicted" in (tmp_path / "study" / "study.md").read_text()
+
+
+def _cases_of(kind: str) -> Callable[[Path], pd.DataFrame]:
+    def made(tmp_path: Path) -> pd.DataFrame:
+        evaluated = [
+            _artifact(tmp_path, "evaluate", f"{index:02x}", {"metrics.csv": _metrics(1, error)})
+            for index, error in enumerate((0.004, 0.02))
+        ]
+        config = _config(kind=kind, cases=["clean", "noise 3 %: target_capture.noise=0.03"])
+        return _run(config, {"evaluate": evaluated}, tmp_path / "study")
+
+    return made
+
+
+def test_cases_stand_below_each_other(tmp_path: Path) -> None:
+    table = _cases_of("robustness")(tmp_path)
+    whole = table[table["occlusion"] == "all"].set_index("case")
+    assert whole["position"].to_dict() == pytest.approx({"clean": 0.004, "noise 3 %": 0.02})
+    text = (tmp_path / "study" / "study.md").read_text()
+    assert "| noise 3 % | 1 | 2 | 2.00 % (2.00–2.00) |" in text and "visible" not in text
+
+
+def test_classes_stand_below_each_other(tmp_path: Path) -> None:
+    _cases_of("classes")(tmp_path)
+    text = (tmp_path / "study" / "study.md").read_text()
+    assert "| clean | 1 | visible | 1 |" in text and "| noise 3 % | 1 | all classes | 2 |" in text
+
+
+def test_advice_counts_up_to_the_first_camera_of_another_place(tmp_path: Path) -> None:
+    (tmp_path / "suggested_views.csv").write_text(ADVICE)
+    found = own_views_in_order(tmp_path / "suggested_views.csv")
+    assert found.to_dict("list") == {"views": [2, 3], "position_sd": [0.004, 0.003]}
