@@ -24,6 +24,7 @@ NAMES = (
     "generate_targets",
     "fit_light",
     "track",
+    "relight",
     "judge",
     "evaluate",
     "study",

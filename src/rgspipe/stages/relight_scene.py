@@ -1,0 +1,188 @@
+"""The frozen scene as the stage relight renders it: cameras, effects, and what an image takes."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from torch import Tensor
+
+from rgspipe.artifacts import Artifact
+from rgspipe.config import RgspipeConfig
+from rgspipe.datasets.exr import write_image
+from rgspipe.datasets.gs3 import load_target
+from rgspipe.datasets.light_file import write_lights
+from rgspipe.datasets.location import dataset_root, open_dataset
+from rgspipe.errors import InputError
+from rgspipe.fitting.fit import FitViews, render_rig
+from rgspipe.fitting.problem import Effects
+from rgspipe.fitting.views import PreparedViews, prepare_views
+from rgspipe.renderer.effects import RigKind
+from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.renderer.view_weights import ViewWeights
+from rgspipe.scene import Camera, Light, LightRig, PointLight, SpotLight
+from rgspipe.stages.scene_effects import chosen_effects, frozen_scene
+
+
+@dataclass
+class Relighter:
+    """Renders rigs; what rigs of one kind and cameras share is made once.
+
+    Attributes:
+        config: the whole configuration.
+        freeze: the artifact of the frozen scene.
+        frozen: the scene, with all of its effects.
+        reasons: why effects are simulated or not, by the kind of rig, of those that were rendered.
+    """
+
+    config: RgspipeConfig
+    freeze: Artifact
+    frozen: FrozenScene
+    reasons: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    _weights: dict[bytes, ViewWeights] = field(default_factory=dict)
+    _prepared: dict[tuple[bytes, bool], PreparedViews] = field(default_factory=dict)
+    _rendered: PreparedViews | None = None
+    _kinds: dict[RigKind, tuple[Effects, bool, bool]] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, config: RgspipeConfig, freeze: Artifact) -> Relighter:
+        return cls(config, freeze, frozen_scene(config, freeze))
+
+    def render(self, cameras: Sequence[Camera], rig: LightRig) -> tuple[list[Tensor], float]:
+        """(H, W, 3) image of every camera under `rig`, and the seconds that all of them took once they are prepared."""
+        effects, spots, lobes = self._effects(rig)
+        prepared, lights = self._prepare(cameras, lobes), rig if spots else tuple(map(_without_cone, rig))
+        views = FitViews(prepared, (), effects)
+        if prepared is not self._rendered:
+            # The first image of a camera works out what the others share.
+            render_rig(views, lights)
+            self._rendered = prepared
+        began = time.perf_counter()
+        images = render_rig(views, lights)
+        return [image.cpu() for image in images], time.perf_counter() - began
+
+    def write(
+        self, folder: Path, name: str, rig: LightRig, views: Sequence[tuple[int, Camera]]
+    ) -> tuple[list[dict[str, object]], list[np.ndarray]]:
+        """Render a rig in cameras with their indices, and write images/<name>/view_<index>.exr and lights/<name>.json.
+
+        Returns:
+            a row of what is known of each image, and the images, (H, W, 3) linear radiance.
+        """
+        images, seconds = self.render([camera for _, camera in views], rig)
+        arrays = [image.numpy() for image in images]
+        for (index, _), array in zip(views, arrays, strict=True):
+            write_image(image_path(folder, name, index), array)
+        write_lights(folder / "lights" / f"{name}.json", rig)
+        known = {"rig": name, "lights": len(rig)}
+        rows = [known | {"view": index, "milliseconds": 1e3 * seconds / len(views)} for index, _ in views]
+        return rows, arrays
+
+    def _effects(self, rig: LightRig) -> tuple[Effects, bool, bool]:
+        """The effects of a rig; whether its spots have cones; whether the scene has lobes."""
+        wanted, kind = self.config.effects, RigKind.of(rig)
+        if not wanted.auto:
+            return Effects(wanted.shadows, wanted.interreflection, wanted.at_pixels), True, True
+        if kind not in self._kinds:
+            choice = chosen_effects(wanted, self.freeze, kind)[1]
+            self.reasons[_words(kind)] = choice.reasons
+            effects = Effects(choice.shadows, choice.interreflection, wanted.at_pixels)
+            self._kinds[kind] = effects, choice.spots, choice.specular
+        return self._kinds[kind]
+
+    def _prepare(self, cameras: Sequence[Camera], lobes: bool) -> PreparedViews:
+        key = b"".join(map(_identity, cameras)), lobes
+        if key not in self._prepared:
+            frozen = self.frozen if lobes else replace(self.frozen, gloss=None)
+            weights = [self._view(camera) for camera in cameras]
+            at_pixels = self.config.effects.at_pixels
+            self._prepared[key] = prepare_views(frozen, weights, mask_edges=False, at_pixels=at_pixels)
+        return self._prepared[key]
+
+    def _view(self, camera: Camera) -> ViewWeights:
+        key = _identity(camera)
+        if key not in self._weights:
+            self._weights[key] = self.frozen.view(camera)
+        return self._weights[key]
+
+
+def image_path(folder: Path, rig: str, view: int) -> Path:
+    """Where the image of a rig in a camera is."""
+    return folder / "images" / rig / f"view_{view}.exr"
+
+
+def _words(kind: RigKind) -> str:
+    """A kind of rig in words: "2 points, 1 spot"."""
+    counted = [(kind.points, "point"), (len(kind.spots), "spot")]
+    return ", ".join(f"{count} {name}{'s' if count != 1 else ''}" for count, name in counted if count)
+
+
+def _without_cone(light: Light) -> PointLight:
+    return PointLight(light.position, light.intensity) if isinstance(light, SpotLight) else light
+
+
+def _identity(camera: Camera) -> bytes:
+    numbers = (camera.fx, camera.fy, camera.cx, camera.cy, camera.width, camera.height)
+    return camera.camera_to_world.numpy().tobytes() + repr(numbers).encode()
+
+
+def configured_cameras(config: RgspipeConfig, folder: Path | None) -> list[Camera]:
+    """The cameras that `relight.views` names.
+
+    Args:
+        folder: the artifact that has the views; None for those of `fit.target`.
+
+    Raises:
+        InputError: there are none.
+    """
+    split = config.relight.views
+    if split == "targets":
+        return [view.camera for view in load_target(_first_target(config, folder)).views]
+    dataset = open_dataset(folder, train=split == "train", test=split == "test", targets=False)
+    return [view.camera for view in (dataset.train if split == "train" else dataset.test)]
+
+
+def _first_target(config: RgspipeConfig, folder: Path | None) -> Path:
+    """All targets of a dataset are seen by the same cameras."""
+    if folder is None:
+        return Path(str(config.fit.target))
+    return target_folders(folder)[0]
+
+
+def target_folders(folder: Path) -> list[Path]:
+    """The targets of a dataset, or of the one that its artifact points at.
+
+    Raises:
+        InputError: there are none.
+    """
+    targets = dataset_root(folder) / "targets"
+    found = sorted(path for path in targets.glob("*") if path.is_dir())
+    if not found:
+        raise InputError(
+            targets,
+            expected="fit targets, for their cameras",
+            found="none",
+            remedy="Take other cameras: relight.views=test.",
+        )
+    return found
+
+
+def chosen_indices(wanted: Sequence[int] | None, count: int) -> list[int]:
+    """Which of `count` cameras are used: all of them if nothing is said.
+
+    Raises:
+        InputError: there are fewer, or one is named twice.
+    """
+    if wanted is None:
+        return list(range(count))
+    if not wanted or max(wanted) >= count or len(set(wanted)) < len(wanted):
+        raise InputError(
+            "relight.indices",
+            expected=f"different ones of the {count} cameras, from 0",
+            found=str(list(wanted)),
+            remedy="Leave it away for all of them.",
+        )
+    return list(wanted)
