@@ -21,6 +21,7 @@ MODELLED = SCENE_KINDS[:4]
 OCCLUSIONS = ("visible", "out_of_frame", "occluded", "around_corner", "all")
 PLY_FRONTS = ("auto", "kept", "inwards", "outwards", "cameras")
 FIT_METHODS = ("search_lm", "paper_adam", "finite_differences")
+ADAM_AIMS = ("center", "random")
 TARGET_KINDS = ("points", "spots", "mixed", "track")
 LIGHT_STUDIES = ("views", "robustness", "classes")
 ROOM_NAMES = ("cornell", "corridor", "clutter")
@@ -374,6 +375,8 @@ class AdamConfig:
     init: str = option("dataset", "where starts are drawn from", choices=("dataset", "sphere"))
     random_intensity: bool = option(False, "draw the first intensity too")
     seed: int = option(0, "draws of starts", low=0, high=2**31 - 1)
+    axis_rate: float = option(0.005, "learning rate of spots' axes", low=0, high=10)
+    aim: str = option("center", "where spots point at first: to the scene's middle, or anywhere", choices=ADAM_AIMS)
 
 
 @dataclass
@@ -409,6 +412,13 @@ class FitConfig:
         "whose targets: the dataset's, or those that stage=generate_targets makes as targets.* says",
         choices=("dataset", "generated"),
     )
+    spot_basis: str = option(
+        "exact",
+        "how a fit's model has spots: by their profile, or as the paper in spherical harmonics",
+        choices=("exact", "sh"),
+    )
+    sh_degree: int = option(8, "with spot_basis=sh: the highest degree", low=0, high=64)
+    sh_mirrored: bool = option(True, "with spot_basis=sh: light goes backwards as it does forwards, as in the paper")
 
 
 @dataclass

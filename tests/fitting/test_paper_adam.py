@@ -10,7 +10,8 @@ import torch
 from lit_room import VISIBLE
 from rgspipe import fit_lights
 from rgspipe.fitting import AdamOptions, Effects, FitStatus
-from rgspipe.fitting.paper_adam import Ball, LightPrior, adam_loss, draw_start, light_ball
+from rgspipe.fitting.paper_adam_loss import MovingRig, adam_loss
+from rgspipe.fitting.paper_adam_start import Ball, LightPrior, StartOptions, draw_start, light_ball
 from rgspipe.fitting.ssim import WINDOW, ssim, ssim_map
 
 SHORT = AdamOptions(epochs=2, steps=15)
@@ -46,7 +47,8 @@ def test_ssim_of_equal_images_is_one_and_its_gradient_is_right():
 
 
 def _loss(room, target, position, log_intensity, weight=0.2):
-    return adam_loss(room.two.prepared, target, position, log_intensity, weight, Effects())
+    rig = MovingRig(position[None], log_intensity[None])
+    return adam_loss(room.two.prepared, target, rig, weight, Effects())
 
 
 def test_loss_is_the_published_formula(room, point_light):
@@ -127,17 +129,35 @@ def test_starts_follow_the_training_lights():
     positions = torch.tensor([1.0, 2.0, 3.0]) + 0.1 * torch.randn((50, 3), generator=generator, dtype=torch.float64)
     prior = LightPrior(positions, torch.full((50, 3), 2.0, dtype=torch.float64))
     ball = Ball(torch.zeros(3, dtype=torch.float64), 100.0)
-    starts = torch.stack([draw_start(ball, 1.0, prior, AdamOptions(), seed)[0] for seed in range(200)])
+    starts = torch.stack([draw_start(ball, 1.0, prior, StartOptions(), seed).positions[0] for seed in range(200)])
     torch.testing.assert_close(starts.mean(dim=0), prior.positions.mean(dim=0), atol=0.03, rtol=0)
     assert float(starts.std(dim=0).mean()) == pytest.approx(0.1, rel=0.15)
-    _, log_intensity = draw_start(ball, 1.0, prior, AdamOptions(), 0)
-    torch.testing.assert_close(log_intensity.exp(), torch.full((3,), 2.0, dtype=torch.float64))
-    sphere, _ = draw_start(ball, 1.0, prior, AdamOptions(init="sphere"), 0)
-    assert float(sphere.norm()) == pytest.approx(2.0)
-    _, varied = draw_start(ball, 1.0, prior, AdamOptions(random_intensity=True), 0)
-    assert not torch.equal(varied, log_intensity)
+    start = draw_start(ball, 1.0, prior, StartOptions(), 0)
+    torch.testing.assert_close(start.log_intensities.exp(), torch.full((1, 3), 2.0, dtype=torch.float64))
+    sphere = draw_start(ball, 1.0, prior, StartOptions(init="sphere"), 0)
+    assert float(sphere.positions.norm()) == pytest.approx(2.0)
+    varied = draw_start(ball, 1.0, prior, StartOptions(random_intensity=True), 0)
+    assert not torch.equal(varied.log_intensities, start.log_intensities)
     with pytest.raises(ValueError, match="init"):
-        draw_start(ball, 1.0, prior, AdamOptions(init="moon"), 0)
+        StartOptions(init="moon")
+
+
+def test_the_intensity_is_split_over_the_lights_and_axes_point_inwards_or_anywhere():
+    prior = LightPrior(torch.randn((20, 3)).double(), torch.full((20, 3), 2.0, dtype=torch.float64))
+    ball = Ball(torch.tensor([0.5, 0.0, 0.0], dtype=torch.float64), 100.0)
+    one, four = (draw_start(ball, 1.0, prior, StartOptions(), 0, count) for count in (1, 4))
+    torch.testing.assert_close(four.log_intensities.exp(), torch.full((4, 3), 0.5, dtype=torch.float64))
+    assert torch.equal(four.positions[:1], one.positions)
+    inwards = torch.nn.functional.normalize(ball.center - four.positions, dim=1)
+    torch.testing.assert_close(four.axes, inwards)
+    anywhere = draw_start(ball, 1.0, prior, StartOptions(aim="random"), 0, 200)
+    torch.testing.assert_close(anywhere.axes.norm(dim=1), torch.ones(200).double())
+    assert float(anywhere.axes.mean(dim=0).norm()) < 0.2  # measured 0.05; 0.07 is to be expected
+    # The ball's middle has no direction to itself.
+    middle = LightPrior(ball.center.expand(3, 3), torch.ones(3, 3).double())
+    assert float(draw_start(ball, 1.0, middle, StartOptions(), 0).axes.norm()) == pytest.approx(1.0)
+    with pytest.raises(ValueError, match="aim"):
+        StartOptions(aim="moon")
 
 
 def test_patience_stops_early(room, point_light):

@@ -12,7 +12,8 @@ import double_precision
 from hard_cases import INSIDE, a_few, camera, room
 from rgspipe.errors import InputError
 from rgspipe.fitting import build_dictionary, fit_lights, prepare_fit
-from rgspipe.fitting.paper_adam import Ball, adam_loss, light_ball
+from rgspipe.fitting.paper_adam_loss import MovingRig, adam_loss
+from rgspipe.fitting.paper_adam_start import Ball, light_ball
 from rgspipe.fitting.problem import Effects
 from rgspipe.fitting.ssim import ssim
 from rgspipe.fitting.views import PreparedViews, prepare_views
@@ -63,7 +64,7 @@ def test_structural_similarity(first: str, second: str, within) -> None:
 
 def loss_and_gradients(views: PreparedViews, target: Tensor) -> list[Tensor]:
     leaves = [(INSIDE + 0.1).requires_grad_(), torch.zeros(3, dtype=torch.float64, requires_grad=True)]
-    loss = adam_loss(views, target, *leaves, 0.2, Effects())
+    loss = adam_loss(views, target, MovingRig(*(leaf[None] for leaf in leaves)), 0.2, Effects())
     loss.backward()
     return [loss.detach(), *(leaf.grad for leaf in leaves)]
 

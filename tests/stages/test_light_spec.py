@@ -8,7 +8,8 @@ import pytest
 
 from rgspipe.config import RgspipeConfig, with_changes
 from rgspipe.errors import InputError
-from rgspipe.stages.fit_light import light_spec
+from rgspipe.fitting.spot_harmonics import BandLimit
+from rgspipe.stages.fit_light import STAGE, band_limit, light_spec
 
 
 def test_one_point_light_is_looked_for_by_default() -> None:
@@ -34,10 +35,27 @@ def test_angles_become_radians_and_a_blend_stays_a_share() -> None:
     [
         ({"light.spot.falloff": 2.0}, "at most 1"),
         ({"light.spot.profile": "linear", "light.spot.falloff": 40.0}, "at most 25"),
-        ({"fit.method": "paper_adam", "light.count": 2}, "search_lm"),
-        ({"fit.method": "paper_adam", "light.type": "spot"}, "search_lm"),
+        ({"fit.method": "paper_adam", "light.count": None}, "light.count: .* 1 to 8"),
+        ({"fit.method": "paper_adam", "light.type": "auto"}, "light.type: .* point or spot"),
+        ({"fit.method": "paper_adam", "light.type": "spot", "fit.cone": "free"}, "fit.cone: .* known"),
     ],
 )
 def test_what_does_not_fit_together_is_refused(changes: dict, message: str) -> None:
     with pytest.raises(InputError, match=message):
         light_spec(with_changes(RgspipeConfig(stage="fit_light"), changes))
+
+
+def test_the_paper_s_method_takes_rigs_and_spots_of_known_number() -> None:
+    config = with_changes(
+        RgspipeConfig(stage="fit_light"), {"fit.method": "paper_adam", "light.type": "spot", "light.count": 3}
+    )
+    spec = light_spec(config)
+    assert (spec.type, spec.count, spec.cone_free) == ("spot", 3, False)
+
+
+def test_spots_are_exact_unless_harmonics_are_asked_for() -> None:
+    config = RgspipeConfig(stage="fit_light")
+    assert band_limit(config) is None and "fit.sh_degree" not in STAGE.keys(config)
+    config = with_changes(config, {"fit.spot_basis": "sh", "fit.sh_degree": 5, "fit.sh_mirrored": False})
+    assert band_limit(config) == BandLimit(5, mirrored=False)
+    assert {"fit.spot_basis", "fit.sh_degree", "fit.sh_mirrored"} <= {*STAGE.keys(config)}

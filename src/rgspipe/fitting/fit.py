@@ -13,7 +13,8 @@ from rgspipe.fitting.capture import ImageCapture
 from rgspipe.fitting.coarse import CoarseImages, coarse_images
 from rgspipe.fitting.dictionary import LightDictionary, build_dictionary
 from rgspipe.fitting.gloss import bounced_light
-from rgspipe.fitting.paper_adam import AdamOptions, LightPrior, fit_paper_adam
+from rgspipe.fitting.paper_adam import AdamOptions, fit_paper_adam
+from rgspipe.fitting.paper_adam_start import LightPrior
 from rgspipe.fitting.problem import Effects, LightProblem
 from rgspipe.fitting.result import FitResult
 from rgspipe.fitting.search_lm import SearchOptions, fit_search_lm
@@ -121,7 +122,8 @@ def fit_lights(
 
     Raises:
         InputError: images or masks do not fit the views, are not finite, or leave no pixel.
-        ValueError: an unknown method, or free exposures or clipped images with `paper_adam`.
+        ValueError: an unknown method; with `paper_adam` free exposures, clipped images, or lights whose type, number
+            or cone is not known.
     """
     if method not in METHODS:
         raise ValueError(f"method must be one of {METHODS}, got {method!r}")
@@ -137,7 +139,8 @@ def fit_lights(
     if method == "paper_adam":
         if capture != ImageCapture():
             raise ValueError("paper_adam takes images as radiance with known exposures: use search_lm")
-        return fit_paper_adam(problem, stacked, adam or AdamOptions(), LightPrior.of(training_lights), seed)
+        prior = LightPrior.of(training_lights)
+        return fit_paper_adam(problem, stacked, adam or AdamOptions(), prior, seed, spec)
     if not views.coarse:
         raise ValueError(f"{method} needs a dictionary: pass one to prepare_fit")
     problem = replace(problem, differences=method == "finite_differences")

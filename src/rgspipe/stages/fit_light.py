@@ -30,6 +30,7 @@ from rgspipe.fitting import (
     prepare_fit,
 )
 from rgspipe.fitting.spec import MOST_LIGHTS
+from rgspipe.fitting.spot_harmonics import BandLimit
 from rgspipe.progress import track
 from rgspipe.renderer.effect_bounds import EffectBounds
 from rgspipe.renderer.effects import EffectChoice, RigKind
@@ -110,6 +111,8 @@ class Fitter:
                 ssim_weight=config.adam.ssim_weight,
                 init=config.adam.init,
                 random_intensity=config.adam.random_intensity,
+                axis_rate=config.adam.axis_rate,
+                aim=config.adam.aim,
             ),
             training_lights=self.training_lights,
             seed=target_seed(target, self.config),
@@ -151,20 +154,22 @@ class Fitter:
 
 def _effects(context: StageContext) -> Effects:
     """The effects of the configuration; with effects.auto less those that the frozen scene does not call for."""
-    wanted = context.config.effects
+    wanted, band = context.config.effects, band_limit(context.config)
     if not wanted.auto:
-        return Effects(wanted.shadows, wanted.interreflection, wanted.at_pixels)
+        return Effects(wanted.shadows, wanted.interreflection, wanted.at_pixels, band)
     bounds, choice = _choice(context.config, context.inputs["freeze"])
     print("effects: " + "; ".join(choice.reasons))
     context.note(effects={"choice": asdict(choice), "bounds": asdict(bounds), "tolerance": wanted.tolerance})
-    return Effects(choice.shadows, choice.interreflection, wanted.at_pixels)
+    return Effects(choice.shadows, choice.interreflection, wanted.at_pixels, band)
 
 
 def _choice(config: RgspipeConfig, freeze: Artifact) -> tuple[EffectBounds, EffectChoice]:
     """What the frozen scene calls for under a rig of the kind that is looked for."""
     spec = light_spec(config)
     count = spec.count or MOST_LIGHTS
-    kind = RigKind(0, (spec.shape,) * count) if spec.type == "spot" else RigKind(count)
+    # In harmonics a spot's light leaves its cone.
+    in_cones = spec.type == "spot" and config.fit.spot_basis == "exact"
+    kind = RigKind(0, (spec.shape,) * count) if in_cones else RigKind(count)
     return chosen_effects(config.effects, freeze, kind)
 
 
@@ -184,18 +189,41 @@ def light_spec(config: RgspipeConfig) -> LightSpec:
     """What the configuration says of the lights that are looked for.
 
     Raises:
-        InputError: the paper's method is asked for more than one point light, or a rim does not fit its cone.
+        InputError: the paper's method is asked for lights of unknown type, number or cone, or a rim does not fit its
+            cone.
     """
+    if config.fit.method == "paper_adam":
+        _refuse_unknowns(config)
     light = config.light
-    if config.fit.method == "paper_adam" and (light.type != "point" or light.count != 1):
-        raise InputError(
-            "light",
-            expected="light.type=point light.count=1 with fit=paper_adam",
-            found=f"light.type={light.type} light.count={light.count}",
-            remedy="Use fit=search_lm for spots and several lights.",
-        )
     shape = spot_shape(light.spot, "light.spot")
     return LightSpec(light.type, light.count, shape, config.fit.cone == "free")
+
+
+def _refuse_unknowns(config: RgspipeConfig) -> None:
+    """The paper's method moves a given number of lights of one type, with given cones.
+
+    Raises:
+        InputError: it is asked for others.
+    """
+    asked = [
+        ("light.type", "point or spot", config.light.type, config.light.type == "auto"),
+        ("light.count", "a number from 1 to 8", "null", config.light.count is None),
+        ("fit.cone", "known", config.fit.cone, config.fit.cone == "free"),
+    ]
+    for key, expected, found, unknown in asked:
+        if unknown:
+            raise InputError(
+                key,
+                expected=f"{expected} with fit=paper_adam",
+                found=found,
+                remedy="Say what is known, or use fit=search_lm, which finds it out.",
+            )
+
+
+def band_limit(config: RgspipeConfig) -> BandLimit | None:
+    """How the model of a fit encodes spots; None for exact profiles."""
+    fit = config.fit
+    return BandLimit(fit.sh_degree, fit.sh_mirrored) if fit.spot_basis == "sh" else None
 
 
 def select_targets(targets: Sequence[Target], config: RgspipeConfig) -> list[Target]:
@@ -284,10 +312,21 @@ def _inputs(config: RgspipeConfig) -> list[str]:
 
 
 def _keys(config: RgspipeConfig) -> list[str]:
-    keys = ["seed", "effects", "light", "fit.method", "fit.target", "views.count", "views.indices", *fit_capture.KEYS]
+    keys = [
+        "seed",
+        "effects",
+        "light",
+        "fit.method",
+        "fit.target",
+        "fit.spot_basis",
+        "views.count",
+        "views.indices",
+        *fit_capture.KEYS,
+    ]
     keys += ["fit.suggest_view", "fit.landscape"]
     keys += ["fit.wanted_accuracy"] if config.fit.suggest_view else []
     keys += ["fit.adam"] if config.fit.method == "paper_adam" else ["fit.search", "fit.cone"]
+    keys += ["fit.sh_degree", "fit.sh_mirrored"] if config.fit.spot_basis == "sh" else []
     return keys if config.fit.target is not None else [*keys, "occlusion", "fit.limit"]
 
 
