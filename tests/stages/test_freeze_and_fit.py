@@ -151,6 +151,16 @@ def test_fits_a_folder_by_the_paper_s_method(inputs, tmp_path):
     assert len(pd.read_csv(tmp_path / "visible_001" / "convergence.csv")) == 6
 
 
+def test_fits_a_rig_of_spots_in_harmonics_by_the_paper_s_method(inputs, tmp_path):
+    target = inputs["generate_dataset"].path / "targets" / "visible_001"
+    changes = {"fit__target": str(target), "fit__method": "paper_adam", "fit__adam__epochs": 1, "fit__adam__steps": 3}
+    rig = {"light__type": "spot", "light__count": 2}
+    exact = _fit(inputs, tmp_path / "exact", **changes, **rig)
+    harmonics = _fit(inputs, tmp_path / "sh", **changes, **rig, fit__spot_basis="sh", fit__sh_degree=4)
+    assert len(read_lights(tmp_path / "sh/visible_001/lights.json")) == 2
+    assert float(exact["loss"].iloc[0]) != float(harmonics["loss"].iloc[0])
+
+
 def test_generated_targets_come_from_their_own_stage(inputs, tmp_path):
     made = {"freeze": inputs["freeze"], "generate_targets": inputs["generate_dataset"]}
     table = _fit(made, tmp_path, fit__targets="generated", fit__limit=1)
