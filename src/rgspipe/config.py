@@ -647,6 +647,14 @@ class LightStudyConfig:
 
 
 @dataclass
+class ConvergenceConfig:
+    """How methods get from their start to their answer."""
+
+    methods: list[str] = option(list(FIT_METHODS), "methods that are compared", choices=FIT_METHODS)
+    limit: int = option(1, "targets of each class, where fit.limit does not say", low=1, high=100000)
+
+
+@dataclass
 class DebugConfig:
     """What is shown when something goes wrong."""
 
@@ -686,6 +694,7 @@ class RgspipeConfig:
     targets: TargetsConfig = section(TargetsConfig, "generated fit targets")
     light_study: LightStudyConfig = section(LightStudyConfig, "what recovered lights are like")
     relight: RelightConfig = section(RelightConfig, "a frozen scene in any lights")
+    convergence: ConvergenceConfig = section(ConvergenceConfig, "from start to answer")
 
 
 def scene_name(config: RgspipeConfig) -> str:

@@ -7,19 +7,19 @@ from collections.abc import Sequence
 
 import matplotlib
 import numpy as np
-import numpy.typing as npt
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from rgspipe.evaluation import metrics, plots
 from rgspipe.evaluation.arrays import ArrayLike, to_array
+from rgspipe.evaluation.scene_drawing import PANELS, TRUTH, draw_surfaces, frame_panel, window
 from rgspipe.evaluation.tables import match_positions
 from rgspipe.fitting.track import TrackedFrame
 from rgspipe.scene import Light, LightRig, SpotLight
 
-#: Colours of the lights, in turn, and what the truth is drawn in.
-COLOURS, TRUTH = ("#0072B2", "#E69F00", "#6A1B4D", "#2DB58A"), "#222222"
+#: Colours of the lights, in turn.
+COLOURS = ("#0072B2", "#E69F00", "#6A1B4D", "#2DB58A")
 
 #: Length of a spot's axis in the drawing, parts of its longest side.
 REACH = 0.05
@@ -59,18 +59,16 @@ def track_figure(
     found = table.dropna(subset=["x"]) if "x" in table else table.iloc[:0]
     true = np.array([light.position.tolist() for rig in truths for light in rig]).reshape(-1, 3)
     places = found[["x", "y", "z"]].to_numpy() if len(found) else np.zeros((0, 3))
-    low, high = _window(np.concatenate([points, eyes, places, true]))
+    low, high = window(np.concatenate([points, eyes, places, true]))
     with matplotlib.rc_context(plots.STYLE):
         figure = Figure(figsize=(10.0, 5.0), layout="constrained")
         axes = figure.subplots(1, 2)
-        for axis, title, across, up in zip(axes, ("from above", "from the side"), (0, 0), (1, 2), strict=True):
-            _surfaces(axis, points, facing, across, up)
+        for axis, (title, across, up) in zip(axes, PANELS, strict=True):
+            draw_surfaces(axis, points, facing, across, up)
             axis.plot(eyes[:, across], eyes[:, up], "^", color="#8a9099", ms=6, mew=0, label="camera")
             axis.plot(true[:, across], true[:, up], "+", color=TRUTH, ms=6, mew=1.0, label="truth")
             _tracks(axis, found, across, up, REACH * float((high - low).max()))
-            axis.set(xlim=(low[across], high[across]), ylim=(low[up], high[up]), aspect="equal", title=title)
-            axis.set_xlabel(f"{'xyz'[across]} (scene units)")
-            axis.set_ylabel(f"{'xyz'[up]} (scene units)")
+            frame_panel(axis, title, across, up, low, high)
         axes[0].legend(fontsize=8)
     return figure
 
@@ -87,20 +85,6 @@ def _tracks(axis: Axes, found: pd.DataFrame, across: int, up: int, reach: float)
             ends = places + reach * rows[["ax", "ay", "az"]].to_numpy()
             for start, end in zip(places, ends, strict=True):
                 axis.plot([start[across], end[across]], [start[up], end[up]], "-", color=colour, lw=0.8)
-
-
-def _surfaces(axis: Axes, points: npt.NDArray, normals: npt.NDArray, across: int, up: int) -> None:
-    """Surfels that do not face the viewer, so that walls stand out as lines."""
-    kept = points[np.abs(normals[:, 3 - across - up]) < 0.7]
-    if len(kept) > plots.CLOUD_POINTS:
-        kept = kept[np.random.default_rng(0).permutation(len(kept))[: plots.CLOUD_POINTS]]
-    axis.plot(kept[:, across], kept[:, up], ".", ms=1.4, color="#c4c9d0", mew=0, zorder=0)
-
-
-def _window(points: npt.NDArray) -> tuple[npt.NDArray, npt.NDArray]:
-    low, high = points.min(axis=0), points.max(axis=0)
-    margin = 0.05 * float((high - low).max())
-    return low - margin, high + margin
 
 
 def _light(light: Light) -> dict[str, object]:

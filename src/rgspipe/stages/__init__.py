@@ -25,6 +25,7 @@ NAMES = (
     "fit_light",
     "track",
     "relight",
+    "convergence",
     "judge",
     "evaluate",
     "study",

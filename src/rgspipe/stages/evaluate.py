@@ -17,17 +17,15 @@ from rgspipe.artifacts import Artifact
 from rgspipe.config import RgspipeConfig
 from rgspipe.datasets.covariance_file import read_covariances
 from rgspipe.datasets.gs3 import load_target
-from rgspipe.datasets.json_file import numbers, read_json
 from rgspipe.datasets.landscape_file import read_landscape
 from rgspipe.datasets.light_file import read_lights
 from rgspipe.datasets.location import dataset_root
-from rgspipe.datasets.surfel_file import load_surfels
-from rgspipe.errors import InputError
 from rgspipe.evaluation import convergence, metrics, plots, tables
 from rgspipe.evaluation.landscape_plot import landscape_figure
 from rgspipe.scene import Camera, LightRig, PointLight
 from rgspipe.stages.base import Stage, StageContext
 from rgspipe.stages.sources import target_stage
+from rgspipe.stages.true_lights import scene_bounds, truth_file
 
 
 @dataclass(frozen=True)
@@ -73,16 +71,6 @@ def run(context: StageContext) -> None:
     context.note(targets=len(targets), judged=int(targets["position_error"].notna().sum()))
 
 
-def _dataset_file(dataset: Artifact | None, name: str) -> Path | None:
-    """A file of the dataset, verified where it is the artifact's own; None if there is none."""
-    if dataset is None:
-        return None
-    if name in dataset.manifest["files"]:
-        return dataset.file(name)
-    foreign = dataset_root(dataset.path) / name
-    return foreign if foreign.is_file() else None
-
-
 def _estimate(fit: Artifact, row: Mapping[str, Any]) -> LightRig:
     """The recovered rig of a target: its light file, or else the one light of its row; empty if the fit failed."""
     name = f"{row['target']}/lights.json"
@@ -99,50 +87,15 @@ def _covariances(fit: Artifact, target: str) -> tuple[torch.Tensor, ...]:
 
 
 def _truth(config: RgspipeConfig, dataset: Artifact | None, freeze: Artifact | None, names: list[str]) -> _Truth:
-    files = {name: _truth_path(config, dataset, name) for name in names}
+    files = {name: truth_file(config, dataset, name) for name in names}
     rigs = {name: read_lights(path) for name, path in files.items() if path is not None}
-    bounds, note = _bounds(dataset, freeze)
+    bounds, note = scene_bounds(dataset, freeze)
     unknown = [name for name in names if not rigs.get(name)]
     notes = [note] if note else []
     if unknown:
         shown = ", ".join(unknown[:5]) + (", …" if len(unknown) > 5 else "")
         notes.append(f"No true lights are known for {len(unknown)} of {len(names)} targets ({shown}): no errors there.")
     return _Truth(rigs, bounds, notes)
-
-
-def _truth_path(config: RgspipeConfig, dataset: Artifact | None, target: str) -> Path | None:
-    if config.fit.target is None:
-        return _dataset_file(dataset, f"truth/{target}.json")
-    return None if config.fit.truth is None else Path(config.fit.truth)
-
-
-def _bounds(dataset: Artifact | None, freeze: Artifact | None) -> tuple[list[list[float]] | None, str]:
-    """The corners of the scene's box, and a note where they are not what the dataset states."""
-    info = _dataset_file(dataset, "dataset_info.json")
-    stated = None if info is None else read_json(info, "what is known of the dataset").get("bounds")
-    if stated is not None:
-        return _checked_bounds(stated, info), ""
-    if freeze is None:
-        return None, "The size of the scene is not known, so there are no position errors."
-    centers = load_surfels(freeze.file("surfels.safetensors")).centers.double()
-    box = [centers.min(dim=0).values.tolist(), centers.max(dim=0).values.tolist()]
-    return box, "The dataset does not state the scene's bounds; those of the surfels' centres stand in for them."
-
-
-def _checked_bounds(stated: object, path: Path) -> list[list[float]]:
-    if not isinstance(stated, list) or len(stated) != 2:
-        raise InputError(
-            f"{path}: bounds",
-            expected="[[low x, y, z], [high x, y, z]]",
-            found=repr(stated)[:120],
-            remedy="Correct it.",
-        )
-    low, high = (numbers(corner, 3, path, "bounds") for corner in stated)
-    if max(b - a for a, b in zip(low, high, strict=True)) <= 0.0:
-        raise InputError(
-            f"{path}: bounds", expected="a lower and then an upper corner", found=repr(stated), remedy="Correct it."
-        )
-    return [low, high]
 
 
 def _curves(fit: Artifact, targets: pd.DataFrame, truths: Mapping[str, LightRig], size: float) -> pd.DataFrame:
@@ -237,6 +190,7 @@ STAGE = Stage(
     code=(
         "rgspipe.datasets.covariance_file",
         "rgspipe.datasets.landscape_file",
+        "rgspipe.stages.true_lights",
         *(f"rgspipe.evaluation.{name}" for name in ("arrays", "calibration", "metrics", "tables", "convergence")),
         *(f"rgspipe.evaluation.{name}" for name in ("plots", "landscape_plot")),
     ),

@@ -19,7 +19,7 @@ from rgspipe.fitting.capture import ImageCapture
 from rgspipe.fitting.fit import FitViews
 from rgspipe.fitting.track import FrameStatus, TrackOptions, track_lights
 from rgspipe.scene import LightRig
-from rgspipe.stages import fit_capture
+from rgspipe.stages import fit_capture, fit_light
 from rgspipe.stages.base import Need, Stage, StageContext
 from rgspipe.stages.fit_capture import captured_views
 from rgspipe.stages.fit_light import Fitter, light_spec, used_views
@@ -128,18 +128,6 @@ STAGE = Stage(
         "views.indices",
         *fit_capture.KEYS,
     ),
-    code=(
-        "rgspipe.fitting",
-        "rgspipe.renderer",
-        "rgspipe.scene",
-        "rgspipe.datasets.frozen_file",
-        "rgspipe.datasets.light_file",
-        "rgspipe.evaluation",
-        "rgspipe.stages.fit_extras",
-        "rgspipe.stages.fit_light",
-        "rgspipe.stages.scene_effects",
-        "rgspipe.stages.spot_shape",
-        *fit_capture.CODE,
-    ),
+    code=("rgspipe.datasets.light_file", "rgspipe.evaluation", "rgspipe.stages.fit_light", *fit_light.STAGE.code),
     files=_files,
 )

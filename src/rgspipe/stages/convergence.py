@@ -1,0 +1,138 @@
+"""Compare how methods get from their start to their answer, on a few targets."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pandas as pd
+import torch
+
+from rgspipe.artifacts import Artifact
+from rgspipe.config import RgspipeConfig
+from rgspipe.datasets.gs3 import load_target
+from rgspipe.datasets.json_file import read_json
+from rgspipe.datasets.light_file import read_lights
+from rgspipe.datasets.location import dataset_root
+from rgspipe.datasets.views import View
+from rgspipe.evaluation.course_figure import course_figure
+from rgspipe.evaluation.courses import CourseStep, course_of, course_summary, course_table
+from rgspipe.evaluation.metrics import longest_side
+from rgspipe.evaluation.plots import png_of
+from rgspipe.evaluation.tables import class_of
+from rgspipe.fitting import FitViews, render_rig
+from rgspipe.progress import track
+from rgspipe.scene import LightRig
+from rgspipe.stages import fit_light
+from rgspipe.stages.base import Need, Stage, StageContext
+from rgspipe.stages.fit_capture import captured_views
+from rgspipe.stages.fit_light import Fitter, used_views
+from rgspipe.stages.sources import target_stage
+from rgspipe.stages.true_lights import scene_bounds, truth_file
+
+#: A row a step, a row a fit, and a picture a target.
+COURSES, SUMMARY, PICTURES = "courses.csv", "convergence.csv", "pictures"
+
+
+def run(context: StageContext) -> None:
+    """Write courses.csv, convergence.csv and pictures/<target>.png; quick, so an interrupted run begins again."""
+    config, fits = context.config, context.input_lists["fit_light"]
+    dataset = next((context.inputs.get(stage) for stage in target_stage(config)), None)
+    bounds, _ = scene_bounds(dataset, context.inputs["freeze"])
+    size = math.nan if bounds is None else longest_side(bounds)
+    fitter = Fitter.create(context)
+    results = pd.read_csv(fits[0].file("results.csv"), dtype={"target": str})
+    (context.folder / PICTURES).mkdir(exist_ok=True)
+    parts = []
+    for row in track(results.to_dict("records"), "comparing courses", unit="target"):
+        name, path = row["target"], truth_file(config, dataset, row["target"])
+        truth = () if path is None else read_lights(path)
+        views, prepared = _views(fitter, _target_folder(config, dataset, name), name)
+        courses = _courses(fits, config.convergence.methods, name, truth, size, views, prepared)
+        courses.insert(0, "target", name)
+        courses.insert(1, "occlusion", class_of(row["occlusion"], len(truth)))
+        surfels, origins = prepared.prepared.frozen.surfels, torch.stack([view.camera.origin for view in views])
+        figure = course_figure(courses, truth, surfels.centers, surfels.normals, origins)
+        (context.folder / PICTURES / f"{name}.png").write_bytes(png_of(figure, dpi=130))
+        parts.append(courses)
+    joined = pd.concat(parts, ignore_index=True)
+    joined.to_csv(context.folder / COURSES, index=False)
+    course_summary(joined, config.evaluate.success).to_csv(context.folder / SUMMARY, index=False)
+    context.note(targets=len(results), methods=list(config.convergence.methods))
+
+
+def _target_folder(config: RgspipeConfig, dataset: Artifact | None, name: str) -> Path:
+    if config.fit.target is not None:
+        return Path(config.fit.target)
+    assert dataset is not None
+    return dataset_root(dataset.folder()) / "targets" / name
+
+
+def _views(fitter: Fitter, folder: Path, name: str) -> tuple[list[View], FitViews]:
+    views, _ = captured_views(used_views(load_target(folder), fitter.config), name, fitter.config)
+    return views, fitter.prepare(views)
+
+
+def _courses(
+    fits: list[Artifact],
+    methods: list[str],
+    name: str,
+    truth: LightRig,
+    size: float,
+    views: list[View],
+    prepared: FitViews,
+) -> pd.DataFrame:
+    """The courses of all methods on one target, one below the other."""
+    parts = []
+    for method, fit in zip(methods, fits, strict=True):
+        path = fit.file(f"{name}/lights.json")
+        exposures = read_json(path, "a fit's light file")["exposures"] or [1.0] * len(views)
+        curve = pd.read_csv(fit.file(f"{name}/convergence.csv"))
+        steps = course_of(curve, read_lights(path))
+        if not steps:
+            continue
+        course = course_table(steps, truth, size)
+        images = [view.image / exposure for view, exposure in zip(views, exposures, strict=True)]
+        course["image_error"] = [_image_error(prepared, one, images) for one in steps]
+        course.insert(0, "method", method)
+        parts.append(course)
+    return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=["method", "step", "seconds"])
+
+
+def _image_error(prepared: FitViews, step: CourseStep, images: list[torch.Tensor]) -> float:
+    """Σ (C − C*)² / Σ C*² over all pixels of all views: the same measure for every method."""
+    pairs = list(zip(render_rig(prepared, step.rig), images, strict=True))
+    squared = sum(float((image.cpu() - target.to(image.dtype)).double().square().sum()) for image, target in pairs)
+    return squared / sum(float(target.double().square().sum()) for _, target in pairs)
+
+
+def _inputs(config: RgspipeConfig) -> list[Need | str]:
+    limit = config.convergence.limit if config.fit.limit is None else config.fit.limit
+    fits = [Need("fit_light", {"fit.method": method, "fit.limit": limit}) for method in config.convergence.methods]
+    return [*fits, *target_stage(config), "freeze"]
+
+
+def _keys(config: RgspipeConfig) -> list[str]:
+    return [*fit_light.STAGE.keys(config), "convergence", "evaluate.success", "fit.truth"]
+
+
+def _files(config: RgspipeConfig) -> list[Path]:
+    """The user's own target and its truth."""
+    return [Path(given) for given in (config.fit.target, config.fit.truth) if given is not None]
+
+
+STAGE = Stage(
+    name="convergence",
+    help="how each method gets from its start to its answer",
+    run=run,
+    inputs=_inputs,
+    config_keys=_keys,
+    code=(
+        "rgspipe.datasets.light_file",
+        "rgspipe.evaluation",
+        "rgspipe.stages.fit_light",
+        "rgspipe.stages.true_lights",
+        *fit_light.STAGE.code,
+    ),
+    files=_files,
+)
