@@ -8,7 +8,7 @@ TEST_WORKERS ?= 2
 ARGS ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup test test-slurm smoke reproduce scenes train-study bench lint
+.PHONY: help setup test test-slurm smoke reproduce scenes train-study light-study bench lint
 
 help:  ## this list
 	@echo "rgspipe: from images of a scene, find its lights"
@@ -41,6 +41,9 @@ scenes: setup  ## every modelled scene, to its report, and one page over all of 
 
 train-study: setup  ## how well scenes are trained and what bad captures cost, in one table (hours; goes on where it was)
 	$(RGSPIPE) pipeline=training $(ARGS)
+
+light-study: setup  ## how recovered lights depend on views, errors and places, with the reports that show it (hours; goes on where it was)
+	$(RGSPIPE) pipeline=lights $(ARGS)
 
 bench: setup $(BENCH_STAMP)  ## accuracy against path-traced truth and what it costs on this machine (an hour, idle)
 	$(RGSPIPE) stage=benchmark $(ARGS)

@@ -67,10 +67,16 @@ def views_figure(table: pd.DataFrame) -> Figure:
         (scene, name) for scene, part in table.groupby("scene", sort=False) for name in _classes(part["occlusion"])
     ]
     series = several(table, ["case", "method"]) or ["method"]
+    many_methods = table["method"].nunique() > 1
     order = list(dict.fromkeys(table[series].itertuples(index=False, name=None)))
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(1.2 + 2.3 * len(columns), 6.4), layout="constrained")
         axes = figure.subplots(len(VIEW_PANELS), len(columns), squeeze=False, sharex=True, sharey="row")
+        _logarithmic(axes[0, 0].yaxis, axes[0, :], "y")
+        if many_methods:
+            _logarithmic(axes[2, 0].yaxis, axes[2, :], "y")
+        for row, (_, label, _) in enumerate(VIEW_PANELS):
+            axes[row, 0].set_ylabel(label)
         for column, (scene, name) in enumerate(columns):
             part = table[(table["scene"] == scene) & (table["occlusion"] == name)]
             axes[0, column].set_title(_title(scene, name, table))
@@ -78,13 +84,8 @@ def views_figure(table: pd.DataFrame) -> Figure:
                 _view_lines(axes[row, column], part, series, order, measure, factor)
             axes[-1, column].set_xlabel("views")
             axes[-1, column].xaxis.set_major_locator(MaxNLocator(integer=True))
-        for row, (_, label, _) in enumerate(VIEW_PANELS):
-            axes[row, 0].set_ylabel(label)
-        _logarithmic(axes[0, 0].yaxis, axes[0, :], "y")
         axes[1, 0].set_ylim(-4.0, 104.0)
-        if table["method"].nunique() > 1:
-            _logarithmic(axes[2, 0].yaxis, axes[2, :], "y")
-        else:
+        if not many_methods:
             axes[2, 0].set_ylim(bottom=0.0)
         figure.legend(handles=_view_handles(table, series), loc="outside upper center", ncols=4)
     return figure
@@ -103,11 +104,11 @@ def rows_figure(table: pd.DataFrame, rows: Sequence[str], series: Sequence[str])
         figure = Figure(figsize=(2.6 + 2.1 * len(panels), height), layout="constrained")
         axes = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
         for axis, panel in zip(axes, panels, strict=True):
+            _panel(axis, panel)
             for index, (_, group) in enumerate(groups):
                 shift = SERIES_STEP * (index - 0.5 * (len(groups) - 1))
                 known = {tuple(row[name] for name in rows): row for row in group.to_dict("records")}
                 _row_points(axis, [known.get(place) for place in places], panel, shift, index)
-            _panel(axis, panel)
         axes[0].set_yticks(range(len(places)), [_row_title(rows, place, table) for place in places])
         axes[0].set_ylim(len(places) - 0.5, -0.5)
         if len(groups) > 1:

@@ -15,6 +15,7 @@ from rgspipe.evaluation.tables import ALL
 from rgspipe.pages.gallery import Gallery, Shot
 from rgspipe.pages.highlights import highlights, tiles
 from rgspipe.pages.html import MISSING, data_address, decimals, figure_address, percent, picture_address, render
+from rgspipe.pages.light_studies import LightStudy, light_studies
 from rgspipe.pages.provenance import StageRecord
 from rgspipe.pages.quality import compared_lights, quality_columns, quality_rows
 
@@ -58,6 +59,7 @@ class ReportContents:
         gallery: pictures of the dataset, or None.
         study: rows of `study_row` of this scene: what bad captures cost; None if no study has been made.
         study_remark: what the reader must know of that study, or "".
+        light_studies: studies of recovered lights that have been made, with the rows of this scene.
         success_limit: position error up to which a target counts as solved.
         configuration: the full configuration as YAML or JSON text.
         stages: one record per artifact behind the report.
@@ -81,6 +83,7 @@ class ReportContents:
     gallery: Gallery | None = None
     study: pd.DataFrame | None = None
     study_remark: str = ""
+    light_studies: Sequence[LightStudy] = ()
     success_limit: float = metrics.SUCCESS_LIMIT
     configuration: str = ""
     stages: Sequence[StageRecord] = ()
@@ -98,6 +101,7 @@ def render_report(contents: ReportContents) -> str:
         tiles=tiles(found),
         gallery=_gallery(contents.gallery),
         study=[] if contents.study is None else contents.study.to_dict("records"),
+        light_studies=light_studies(contents.light_studies),
         true_surfels=TRUTH,
         goals=goals.goals(contents.summary, dict(contents.training or {}) | {"test_psnr_mean": found["psnr"]}, method),
         method=method,

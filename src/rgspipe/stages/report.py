@@ -20,6 +20,7 @@ from rgspipe.pages.overview import scene_summary
 from rgspipe.pages.provenance import StageRecord, stage_record
 from rgspipe.stages.base import Need, Stage, StageContext
 from rgspipe.stages.report_gallery import dataset_gallery
+from rgspipe.stages.report_light_study import found_light_studies, light_study_files
 from rgspipe.stages.report_study import found_study, study_file
 from rgspipe.stages.sources import has_truth
 
@@ -75,6 +76,7 @@ def _contents(context: StageContext) -> report.ReportContents:
         gallery=dataset_gallery(context.inputs.get("generate_dataset"), surfels, targets),
         study=study,
         study_remark=remark,
+        light_studies=found_light_studies(config, context.inputs.get("freeze")),
         success_limit=config.evaluate.success,
         configuration=_configuration(config),
         stages=_stages(context, described),
@@ -200,7 +202,13 @@ STAGE = Stage(
     help="one HTML file with tables, pictures, configuration and provenance",
     inputs=_inputs,
     config_keys=_keys,
-    code=("rgspipe.evaluation", "rgspipe.pages", "rgspipe.stages.report_gallery", "rgspipe.stages.report_study"),
-    files=study_file,
+    code=(
+        "rgspipe.evaluation",
+        "rgspipe.pages",
+        "rgspipe.stages.report_gallery",
+        "rgspipe.stages.report_light_study",
+        "rgspipe.stages.report_study",
+    ),
+    files=lambda config: [*study_file(config), *light_study_files(config)],
     run=run,
 )

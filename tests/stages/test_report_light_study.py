@@ -1,0 +1,65 @@
+"""Which studies of recovered lights a report takes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from rgspipe.artifacts import Artifact, ArtifactStore, Key
+from rgspipe.config import RgspipeConfig, with_changes
+from rgspipe.stages import report_light_study
+from rgspipe.stages.report_light_study import found_light_studies, light_study_files
+
+
+def _config(root: Path, scene: str = "cornell") -> RgspipeConfig:
+    return with_changes(RgspipeConfig(), {"stage": "report", "scene.name": scene, "outputs": str(root)})
+
+
+def _build(
+    root: Path, key: Key, inputs: dict[str, list[str]], kind: str = "", scenes: tuple[str, ...] = ()
+) -> Artifact:
+    def make(folder: Path) -> dict:
+        pd.DataFrame({"scene": scenes, "made": key.fingerprint}).to_csv(folder / "study.csv", index=False)
+        return {"kind": kind}
+
+    return ArtifactStore(root).build(key, {"config": {}, "inputs": inputs, "code": {}}, make)[0]
+
+
+def _study(
+    root: Path, fingerprint: str, kind: str, *scenes: str, evaluated: str = "e1", folder: str = "cornell"
+) -> None:
+    _build(root, Key(folder, "light_study", fingerprint), {"evaluate": [evaluated]}, kind, scenes)
+
+
+@pytest.fixture
+def days(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Artifacts that are made one after the other within a second are a day apart, in the order of their names."""
+    monkeypatch.setattr(report_light_study, "_made", lambda found: found.fingerprint)
+
+
+def test_of_each_kind_the_newest_study_that_has_the_scene_is_taken(tmp_path: Path, days: None) -> None:
+    _study(tmp_path, "01", "views", "cornell")
+    _study(tmp_path, "02", "views", "cornell")
+    _study(tmp_path, "03", "classes", "cornell", "corner", "cornell", folder="corner")
+    _study(tmp_path, "04", "views", "corner")
+    (tmp_path / "cornell" / "light_study" / "05").mkdir()
+    (tmp_path / "cornell" / "light_study" / "05" / "study.csv").write_text("scene\ncornell\n")
+    found = found_light_studies(_config(tmp_path), None)
+    assert [(study.kind, study.table["made"].astype(int).tolist()) for study in found] == [
+        ("views", [2]),
+        ("classes", [3, 3]),
+    ]
+    assert sorted(path.parent.name for path in light_study_files(_config(tmp_path))) == ["02", "03"]
+    assert found_light_studies(_config(tmp_path, "room"), None) == light_study_files(_config(tmp_path, "room")) == []
+
+
+def test_a_study_of_another_frozen_scene_is_marked(tmp_path: Path) -> None:
+    freeze = _build(tmp_path, Key("cornell", "freeze", "f1"), {})
+    _build(tmp_path, Key("cornell", "evaluate", "e1"), {"freeze": ["f1"]})
+    _study(tmp_path, "01", "views", "cornell")
+    (same,) = found_light_studies(_config(tmp_path), freeze)
+    assert same.remark == ""
+    (other,) = found_light_studies(_config(tmp_path), _build(tmp_path, Key("cornell", "freeze", "f2"), {}))
+    assert "not of the frozen scene" in other.remark
