@@ -18,6 +18,7 @@ from rgspipe.pages.html import MISSING, data_address, decimals, figure_address, 
 from rgspipe.pages.light_studies import LightStudy, light_studies
 from rgspipe.pages.provenance import StageRecord
 from rgspipe.pages.quality import compared_lights, quality_columns, quality_rows
+from rgspipe.pages.relit import Relighting, relightings
 
 #: Pictures of fits and held-out views together, before they are encoded as text (which adds a third).
 PICTURE_BYTES = 4_500_000
@@ -60,6 +61,7 @@ class ReportContents:
         study: rows of `study_row` of this scene: what bad captures cost; None if no study has been made.
         study_remark: what the reader must know of that study, or "".
         light_studies: studies of recovered lights that have been made, with the rows of this scene.
+        relightings: the scene in other lights, as far as that was made.
         success_limit: position error up to which a target counts as solved.
         configuration: the full configuration as YAML or JSON text.
         stages: one record per artifact behind the report.
@@ -84,6 +86,7 @@ class ReportContents:
     study: pd.DataFrame | None = None
     study_remark: str = ""
     light_studies: Sequence[LightStudy] = ()
+    relightings: Sequence[Relighting] = ()
     success_limit: float = metrics.SUCCESS_LIMIT
     configuration: str = ""
     stages: Sequence[StageRecord] = ()
@@ -102,6 +105,7 @@ def render_report(contents: ReportContents) -> str:
         gallery=_gallery(contents.gallery),
         study=[] if contents.study is None else contents.study.to_dict("records"),
         light_studies=light_studies(contents.light_studies),
+        relightings=relightings(contents.relightings),
         true_surfels=TRUTH,
         goals=goals.goals(contents.summary, dict(contents.training or {}) | {"test_psnr_mean": found["psnr"]}, method),
         method=method,

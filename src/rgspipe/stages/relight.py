@@ -25,6 +25,9 @@ from rgspipe.stages.spot_shape import spot_shape
 #: All images of a rig in one picture; a row for each of them.
 SHEET, TABLE = "sheet.png", "relight.csv"
 
+#: What shows the true rigs of targets.
+COMPARED = ("counts", "targets")
+
 
 def run(context: StageContext) -> None:
     """Write images, their lights and pictures of them; quick, so an interrupted run begins again."""
@@ -35,7 +38,8 @@ def run(context: StageContext) -> None:
         times = [1e3 * seconds for seconds in write_sweep(relighter, camera, context.folder)]
         context.note(view=index)
     else:
-        table = relight_targets(context, relighter) if _compares(wanted) else _relight_rig(context, relighter)
+        compares = shows(wanted) in COMPARED
+        table = relight_targets(context, relighter) if compares else _relight_rig(context, relighter)
         table.to_csv(context.folder / TABLE, index=False)
         times = table["milliseconds"].tolist()
     for kind, reasons in relighter.reasons.items():
@@ -46,10 +50,12 @@ def run(context: StageContext) -> None:
 
 
 def shows(wanted: RelightConfig) -> str:
-    """What an artifact of this configuration is about: "aim", "orbit", "targets", or "rig"."""
+    """What an artifact of this configuration is about: "aim", "orbit", "counts", "targets", or "rig"."""
     if wanted.sweep != "none":
         return wanted.sweep
-    return "targets" if _compares(wanted) else "rig"
+    if wanted.lights is not None:
+        return "rig"
+    return "counts" if wanted.counts else {"random": "rig", "targets": "targets"}[wanted.rigs]
 
 
 def _relight_rig(context: StageContext, relighter: Relighter) -> pd.DataFrame:
@@ -84,10 +90,6 @@ def _cameras(context: StageContext) -> list[tuple[int, Camera]]:
     return [(index, cameras[index]) for index in chosen_indices(config.relight.indices, len(cameras))]
 
 
-def _compares(wanted: RelightConfig) -> bool:
-    return wanted.lights is None and (bool(wanted.counts) or wanted.rigs == "targets")
-
-
 def _camera_stage(config: RgspipeConfig) -> list[str]:
     """The stage whose cameras are taken; none for those of a target's folder."""
     if config.relight.views != "targets":
@@ -102,7 +104,7 @@ def _inputs(config: RgspipeConfig) -> list[Need | str]:
         InputError: keys exclude each other, the scene has no images, or the spot of a sweep makes no sense.
     """
     _check(config)
-    if shows(config.relight) == "targets":
+    if shows(config.relight) in COMPARED:
         return ["freeze", *target_needs(config)]
     if config.relight.views != "targets" or config.fit.target is None:
         require_images(config, "cameras (or fit.target=DIR with those of a target)")
