@@ -563,6 +563,7 @@ class TrackConfig:
         2.0, "a frame that is so many times worse explained than those before is searched anew", low=1, high=1000
     )
     iterations: int = option(15, "most Levenberg-Marquardt steps of a frame", low=1, high=10000)
+    back: bool = option(True, "follow frames without a sure answer back from those after them")
 
 
 @dataclass

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import pytest
 import torch
 
 from lit_room import VISIBLE
-from rgspipe.fitting import LightSpec, SearchOptions, prepare_fit
+from rgspipe.fitting import FitResult, FitStatus, ImageCapture, LightSpec, SearchOptions, prepare_fit
 from rgspipe.fitting.parameters import Emitter
-from rgspipe.fitting.track import FrameStatus, in_order, predicted, track_lights
+from rgspipe.fitting.track import FrameStatus, TrackOptions, _Tracker, in_order, predicted, track_lights
 from rgspipe.renderer.spot import SpotShape
-from rgspipe.scene import SpotLight
+from rgspipe.scene import LightRig, SpotLight
 
 SHAPE = SpotShape("gaussian", math.radians(30.0), math.radians(12.0))
 
@@ -47,6 +48,39 @@ def test_a_light_that_jumps_is_found_again_and_a_dark_frame_does_not_end_the_tra
         if place:
             found = frame.result.lights[0].position
             assert float((found - torch.tensor(place, dtype=torch.float64)).norm()) < 1e-3
+
+
+def _ambiguous_at_first(monkeypatch, wrong: LightRig, frames: int) -> None:
+    """The searches of so many frames end ambiguous, at `wrong`; those after them as they do."""
+    searched, calls = _Tracker._searched, []
+
+    def search(tracker: _Tracker, images: Sequence[torch.Tensor], capture: ImageCapture) -> FitResult:
+        result = searched(tracker, images, capture)
+        calls.append(result)
+        return replace(result, lights=wrong, status=FitStatus.AMBIGUOUS) if len(calls) <= frames else result
+
+    monkeypatch.setattr(_Tracker, "_searched", search)
+
+
+def test_frames_before_the_first_sure_one_are_followed_back_from_it(monkeypatch, room, point_light) -> None:
+    """A car that is still around the corner: where it was follows from where it came into sight."""
+    places = _line(VISIBLE, (-0.05, 0.04, -0.03), 4)
+    frames = [room.images(point_light(place), 2) for place in places]
+    _ambiguous_at_first(monkeypatch, (point_light((0.3, 0.3, -0.3)),), 2)
+    track = track_lights(room.two, frames, options=TrackOptions())
+    assert [frame.status for frame in track] == [
+        FrameStatus.TRACED_BACK,
+        FrameStatus.TRACED_BACK,
+        FrameStatus.REDETECTED,
+        FrameStatus.TRACKED,
+    ]
+    for frame, place in zip(track, places, strict=True):
+        found = frame.result.lights[0].position
+        assert float((found - torch.tensor(place, dtype=torch.float64)).norm()) < 1e-3
+    _ambiguous_at_first(monkeypatch, (point_light((0.3, 0.3, -0.3)),), 2)
+    forward = track_lights(room.two, frames[:2], options=TrackOptions(back=False))
+    assert not any(frame.sure for frame in forward)
+    assert {frame.result.status for frame in forward} == {FitStatus.AMBIGUOUS}
 
 
 def test_two_spots_that_move_and_turn_keep_their_order(room) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import matplotlib
@@ -106,5 +105,5 @@ def _errors(rig: LightRig, truth: LightRig, scene_size: float) -> list[dict[str,
         errors[k]["position_error"] = metrics.position_error(one.position, other.position, scene_size)
         errors[k]["intensity_error"] = metrics.intensity_error(one.intensity, other.intensity)
         if isinstance(one, SpotLight) and isinstance(other, SpotLight):
-            errors[k]["axis_error"] = math.degrees(metrics.angle_between(one.direction, other.direction))
+            errors[k]["axis_error"] = metrics.angle_between(one.direction, other.direction)
     return errors

@@ -15,7 +15,7 @@ from rgspipe.fitting.capture import ImageCapture
 from rgspipe.fitting.fit import FitViews, fit_lights
 from rgspipe.fitting.parameters import Emitter
 from rgspipe.fitting.problem import LightProblem
-from rgspipe.fitting.result import FitResult, FitStatus
+from rgspipe.fitting.result import REASONS, FitResult, FitStatus
 from rgspipe.fitting.schedule import soft
 from rgspipe.fitting.search_lm import SearchOptions, fit_from
 from rgspipe.fitting.spec import LightSpec
@@ -30,6 +30,12 @@ SMALL_COST = 1e-3
 REMEMBERED = 5
 
 
+#: Of two answers to a frame the one from a search with a single answer wins, unless it costs so many times the other.
+AS_GOOD = 1.1
+
+#: Results with one answer, which a track may go on from.
+ONE_ANSWER = (FitStatus.CONVERGED, FitStatus.MAX_ITERATIONS)
+
 #: What a result tells of every light.
 PER_LIGHT = ("lights", "covariance", "noise_covariance")
 
@@ -40,6 +46,7 @@ class FrameStatus(StrEnum):
     SEARCHED = "searched"
     TRACKED = "tracked"
     REDETECTED = "redetected"
+    TRACED_BACK = "traced_back"
     LOST = "lost"
 
 
@@ -50,10 +57,12 @@ class TrackOptions:
     Attributes:
         lost: a frame whose cost rises beyond so many times that of the frames before is searched from nothing.
         iterations: most Levenberg-Marquardt steps of a tracked frame.
+        back: whether frames without a sure answer are followed back from the frames after them.
     """
 
     lost: float = 2.0
     iterations: int = 15
+    back: bool = True
 
 
 @dataclass(frozen=True)
@@ -70,6 +79,11 @@ class TrackedFrame:
     status: FrameStatus
     cost: float
 
+    @property
+    def sure(self) -> bool:
+        """Whether there is one answer: what is followed from an ambiguous frame is as ambiguous itself."""
+        return self.status != FrameStatus.LOST and self.result.status in ONE_ANSWER
+
 
 def track_lights(
     views: FitViews,
@@ -83,8 +97,10 @@ def track_lights(
     """Follow the lights of a sequence.
 
     The first frame is searched. A later one starts where the lights would be if they went on as between the two frames
-    before, or where they were, whichever explains it better. It is searched from nothing if that ends at the bound,
-    without light, or with a cost beyond `options.lost` times the median of the frames before; the better one is taken.
+    before, or where they were, whichever explains it better. It is searched from nothing, too, if that ends at the
+    bound, without light, or with a cost beyond `options.lost` times the median of the frames before, or if the frame
+    before has no sure answer; the better one is taken. With `options.back` frames without a sure answer, such as those
+    of a light that is still around the corner, are at last followed back from the frames after them.
 
     Args:
         views: made by `prepare_fit` with a dictionary, for the same `spec`.
@@ -94,10 +110,11 @@ def track_lights(
     tracker = _Tracker(views, spec or LightSpec(), search or SearchOptions(), options or TrackOptions())
     same = capture is None or isinstance(capture, ImageCapture)
     captures = [capture or ImageCapture()] * len(frames) if same else capture
+    taken = list(zip(frames, captures, strict=True))
     found: list[TrackedFrame] = []
-    for images, taken in track(list(zip(frames, captures, strict=True)), "following lights", unit="frame"):
-        found.append(tracker.follow(found, images, taken))
-    return found
+    for images, how in track(taken, "following lights", unit="frame"):
+        found.append(tracker.follow(found, images, how))
+    return tracker.trace_back(found, taken) if tracker.options.back else found
 
 
 @dataclass(frozen=True)
@@ -109,43 +126,68 @@ class _Tracker:
 
     def follow(self, before: Sequence[TrackedFrame], images: Sequence[Tensor], capture: ImageCapture) -> TrackedFrame:
         """The next frame."""
-        stacked = self.views.prepared.stack_images(images)
-        problem = LightProblem.create(self.views.prepared, stacked, self.views.effects, capture).sharpest()
+        problem = self._problem(images, capture)
         seen = [frame for frame in before if frame.result.lights]
         if not seen:
             result = self._searched(images, capture)
             return TrackedFrame(result, FrameStatus.SEARCHED, frame_cost(problem, result.lights))
-        limit = self.options.lost * max(SMALL_COST, float(np.median([frame.cost for frame in seen[-REMEMBERED:]])))
-        result = self._tracked(problem, before)
+        last, limit = seen[-1], self._limit(seen[-REMEMBERED:])
+        # Where the lights were lost or found anew the step before says nothing of the next one.
+        earlier = before[-2] if len(before) > 1 and before[-1].status == FrameStatus.TRACKED else None
+        result = self._tracked(problem, last, earlier)
         cost = frame_cost(problem, result.lights)
-        if cost <= limit and result.status != FitStatus.AT_BOUND:
-            return TrackedFrame(in_order(result, seen[-1].result.lights), FrameStatus.TRACKED, cost)
+        if last.sure and cost <= limit and result.status != FitStatus.AT_BOUND:
+            return TrackedFrame(in_order(result, last.result.lights), FrameStatus.TRACKED, cost)
         other = self._searched(images, capture)
         status, rival = FrameStatus.REDETECTED, frame_cost(problem, other.lights)
-        if rival >= cost:
-            status, rival, other = FrameStatus.TRACKED, cost, result
+        bonus = AS_GOOD if not last.sure and other.status in ONE_ANSWER else 1.0
+        if rival >= bonus * cost:
+            status, rival, other = FrameStatus.TRACKED, cost, result if last.sure else _ambiguous(result)
         if rival > limit:
             status = FrameStatus.LOST
-        return TrackedFrame(in_order(other, seen[-1].result.lights), status, rival)
+        return TrackedFrame(in_order(other, last.result.lights), status, rival)
+
+    def trace_back(
+        self, found: Sequence[TrackedFrame], taken: Sequence[tuple[Sequence[Tensor], ImageCapture]]
+    ) -> list[TrackedFrame]:
+        """Frames without a sure answer followed back from those after them, as far as that explains them."""
+        kept = list(found)
+        for index in range(len(kept) - 2, -1, -1):
+            after = kept[index + 1 : index + 1 + REMEMBERED]
+            if kept[index].sure or not after[0].sure:
+                continue
+            problem = self._problem(*taken[index])
+            result = self._tracked(problem, after[0], after[1] if _chained(after) else None)
+            cost = frame_cost(problem, result.lights)
+            if cost <= self._limit(after) and result.status in ONE_ANSWER:
+                kept[index] = TrackedFrame(in_order(result, after[0].result.lights), FrameStatus.TRACED_BACK, cost)
+        return kept
+
+    def _problem(self, images: Sequence[Tensor], capture: ImageCapture) -> LightProblem:
+        stacked = self.views.prepared.stack_images(images)
+        return LightProblem.create(self.views.prepared, stacked, self.views.effects, capture).sharpest()
+
+    def _limit(self, frames: Sequence[TrackedFrame]) -> float:
+        """The cost from which on a frame counts as lost, by frames near it: by the sure ones where there are any."""
+        costs = [frame.cost for frame in frames if frame.sure] or [frame.cost for frame in frames]
+        return self.options.lost * max(SMALL_COST, float(np.median(costs)))
 
     def _searched(self, images: Sequence[Tensor], capture: ImageCapture) -> FitResult:
         return fit_lights(
             self.views.prepared.frozen, self.views, images, search=self.search, spec=self.spec, capture=capture
         )
 
-    def _tracked(self, problem: LightProblem, before: Sequence[TrackedFrame]) -> FitResult:
-        starts = self._starts(before)
+    def _tracked(self, problem: LightProblem, last: TrackedFrame, earlier: TrackedFrame | None) -> FitResult:
+        """The lights followed from those of `last`, or from where another step like the one from `earlier` leads."""
+        starts = self._starts(last, earlier)
         costs = [frame_cost(problem, tuple(emitter.light(torch.ones(3)) for emitter in rig)) for rig in starts]
         return fit_from(problem, starts[int(np.argmin(costs))], self.options.iterations)
 
-    def _starts(self, before: Sequence[TrackedFrame]) -> list[Rig]:
-        """The lights of the last frame that has any, and those after one more step like the last one."""
-        last = self._emitters([frame for frame in before if frame.result.lights][-1].result.lights)
-        # Where the lights were lost or found anew the step before says nothing of the next one.
-        if len(before) < 2 or before[-1].status != FrameStatus.TRACKED:
-            return [last]
-        earlier = self._emitters(before[-2].result.lights)
-        return [predicted(earlier, last), last] if len(earlier) == len(last) else [last]
+    def _starts(self, last: TrackedFrame, earlier: TrackedFrame | None) -> list[Rig]:
+        rig = self._emitters(last.result.lights)
+        if earlier is None or len(earlier.result.lights) != len(rig):
+            return [rig]
+        return [predicted(self._emitters(earlier.result.lights), rig), rig]
 
     def _emitters(self, rig: LightRig) -> Rig:
         return soft(tuple(Emitter.of(light, self.spec.cone_free) for light in rig), 0.0)
@@ -172,6 +214,16 @@ def frame_cost(problem: LightProblem, rig: LightRig) -> float:
     intensity = problem.moments(columns, problem.unclipped(weights.square())).intensity
     # The weights' floor is part of the brightness, so a black image has a cost below 1 in dark pixels.
     return min(1.0, float((weights * problem.residual(columns, intensity)).abs().median()))
+
+
+def _chained(after: Sequence[TrackedFrame]) -> bool:
+    """Whether of two frames one was followed from the other, so that the step between them says something."""
+    return len(after) > 1 and (after[1].status == FrameStatus.TRACKED or after[0].status == FrameStatus.TRACED_BACK)
+
+
+def _ambiguous(result: FitResult) -> FitResult:
+    """What was followed from an ambiguous frame: as good as other answers that were not followed."""
+    return replace(result, status=FitStatus.AMBIGUOUS, reason=REASONS[FitStatus.AMBIGUOUS])
 
 
 def in_order(result: FitResult, before: LightRig) -> FitResult:
