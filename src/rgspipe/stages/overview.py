@@ -68,6 +68,7 @@ STAGE = Stage(
         "rgspipe.resources",
         "rgspipe.stages.report",
         "rgspipe.stages.report_gallery",
+        "rgspipe.stages.report_light_study",
         "rgspipe.stages.report_relight",
         "rgspipe.stages.report_study",
     ),
