@@ -95,7 +95,7 @@ def test_text_shows_what_differs_and_says_what_is_not_known() -> None:
     headings, rows = shown_rows(table, "robustness")
     assert len(rows) == 1 and headings[0] == "case" and "scene" not in headings and "light" not in headings
     assert rows[0]["case"] == "noise 3 %" and rows[0]["says"] == "converged 75 %, ambiguous 25 %"
-    assert rows[0]["silent"] == "25 %" and rows[0]["solved"].startswith("25 % (5–70")
+    assert rows[0]["silent"].startswith("25 % (") and rows[0]["solved"].startswith("25 % (5–70")
     text = markdown(pd.concat([table, table.assign(scene="corner")]), "classes")
     assert text.startswith("| scene | views | light |") and text.count("\n") == 8 and "| corner |" in text
     table = pd.concat([table, table.assign(views=2, predicted=0.01, position=math.inf)])

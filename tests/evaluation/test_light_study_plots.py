@@ -17,6 +17,7 @@ def _row(**named: object) -> dict:
     for name, value in (("position", 0.004), ("intensity", 0.01), ("success", 0.9), ("seconds", 0.8)):
         row |= {name: value, f"{name}_low": 0.5 * value, f"{name}_high": 1.1 * value}
     row |= {"inside_95": 0.95, "inside_95_low": 0.8, "inside_95_high": 1.0, "stated": 0.005}
+    row |= {"silent": 0.02, "silent_low": 0.0, "silent_high": 0.1}
     return row | named
 
 
@@ -54,6 +55,7 @@ def test_cases_are_rows_and_scenes_series() -> None:
     figure = light_study_figure(table, "robustness")
     assert [label.get_text() for label in figure.axes[0].get_yticklabels()] == ["clean", "noise 3 %"]
     assert [text.get_text() for text in figure.legends[0].get_texts()] == ["cornell", "corner"]
+    assert [axis.get_title(loc="left") for axis in figure.axes][-1] == "wrong without a word (%)"
     points = [line for line in figure.axes[0].lines if line.get_marker() in ("o", "s")]
     assert [line.get_ydata()[0] for line in points] == pytest.approx([-0.11, 0.89, 0.11, 1.11])
 

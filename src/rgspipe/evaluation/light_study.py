@@ -46,8 +46,8 @@ def case_rows(scene: str, case: str, targets: pd.DataFrame, seed: int, resamples
         - `success` (within the limit, with the right number of lights) and `inside_95` (the truth lies inside the 95 %
           region that the fit states): shares of those where it is known, with `_low` and `_high`;
         - `stated`: the median of the position errors that fits expect of themselves;
-        - `silent`: the share of judged targets whose fit says that it converged, misses the limit, and states no region
-          that holds the truth: wrong without a word;
+        - `silent`, likewise: the share of judged targets whose fit says that it converged, misses the limit, and states
+          no region that holds the truth: wrong without a word;
         - the share of each of `STATUSES`.
     """
     rows = []
@@ -103,7 +103,7 @@ def _figures(group: pd.DataFrame, seed: int, resamples: int) -> dict[str, float]
         found |= _share(name, group[column])
     found["stated"] = float(group["position_sd"].median()) if group["position_sd"].notna().any() else math.nan
     missed = ~_true(group["success"]) & ~_true(group["inside_95"]) & (group["result"] == "converged")
-    found["silent"] = float(missed[judged].mean()) if judged.any() else math.nan
+    found |= _share("silent", missed[judged])
     return found | {status: float((group["result"] == status).mean()) for status in STATUSES}
 
 

@@ -18,6 +18,9 @@ from rgspipe.evaluation.light_study import several
 from rgspipe.evaluation.plots import INK, LABELS, STYLE
 from rgspipe.evaluation.tables import ALL, class_order
 
+#: Column, title, factor, whether logarithmic.
+Panel = tuple[str, str, float, bool]
+
 COLOURS = ("#0072B2", "#E69F00", "#6A1B4D", "#009E73", "#56B4E9", "#222222")
 MARKERS = "os^Dv*"
 #: Lines of what fits state of themselves, and of what one view foretells.
@@ -27,12 +30,13 @@ PERCENT_RANGE = (0.01, 200.0)
 #: How far apart the series of a row stand, in rows.
 SERIES_STEP = 0.22
 
-#: Panels of a comparison of rows: column, title, factor, whether logarithmic.
-PANELS = (
+#: Panels of a comparison of rows. The last is of robustness alone.
+PANELS: tuple[Panel, ...] = (
     ("position", "position error (%)", 100.0, True),
     ("intensity", "intensity error (%)", 100.0, True),
     ("success", "solved (%)", 100.0, False),
     ("inside_95", "truth in 95 % region (%)", 100.0, False),
+    ("silent", "wrong without a word (%)", 100.0, False),
 )
 #: Rows of the figure over numbers of views: column, label, factor.
 VIEW_PANELS = (("position", "position error (%)", 100.0), ("success", "solved (%)", 100.0), ("seconds", "s a fit", 1.0))
@@ -53,8 +57,9 @@ def light_study_figure(table: pd.DataFrame, kind: str) -> Figure:
     if kind == "views":
         return views_figure(table)
     if kind == "robustness":
-        return rows_figure(table[table["occlusion"] == ALL], ["case"], ["scene", "method", "views"])
-    return rows_figure(table[table["occlusion"] != ALL], ["scene", "occlusion"], ["case", "method", "views"])
+        return rows_figure(table[table["occlusion"] == ALL], ["case"], ["scene", "method", "views"], PANELS, True)
+    rows = table[table["occlusion"] != ALL]
+    return rows_figure(rows, ["scene", "occlusion"], ["case", "method", "views"], PANELS[:-1])
 
 
 def views_figure(table: pd.DataFrame) -> Figure:
@@ -91,14 +96,16 @@ def views_figure(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def rows_figure(table: pd.DataFrame, rows: Sequence[str], series: Sequence[str]) -> Figure:
+def rows_figure(
+    table: pd.DataFrame, rows: Sequence[str], series: Sequence[str], shown: Sequence[Panel], reference: bool = False
+) -> Figure:
     """Measures with their 95 % intervals, a panel each: `rows` name the rows, `series` colours and markers.
 
-    The line through each panel is where the series stands in the first row.
+    With `reference` a line through each panel says where the series stands in the first row.
     """
     places = list(dict.fromkeys(table[list(rows)].itertuples(index=False, name=None)))
     groups = list(table.groupby(list(several(table, series) or series[:1]), sort=False))
-    panels = [panel for panel in PANELS if table[panel[0]].notna().any()]
+    panels = [panel for panel in shown if table[panel[0]].notna().any()]
     with matplotlib.rc_context(STYLE):
         height = 1.3 + len(places) * max(0.3, SERIES_STEP * len(groups) * 0.8)
         figure = Figure(figsize=(2.6 + 2.1 * len(panels), height), layout="constrained")
@@ -108,7 +115,7 @@ def rows_figure(table: pd.DataFrame, rows: Sequence[str], series: Sequence[str])
             for index, (_, group) in enumerate(groups):
                 shift = SERIES_STEP * (index - 0.5 * (len(groups) - 1))
                 known = {tuple(row[name] for name in rows): row for row in group.to_dict("records")}
-                _row_points(axis, [known.get(place) for place in places], panel, shift, index)
+                _row_points(axis, [known.get(place) for place in places], panel, shift, index, reference)
         axes[0].set_yticks(range(len(places)), [_row_title(rows, place, table) for place in places])
         axes[0].set_ylim(len(places) - 0.5, -0.5)
         if len(groups) > 1:
@@ -143,7 +150,7 @@ def _drawn(values: pd.Series, factor: float) -> np.ndarray:
 
 
 def _row_points(
-    axis: Axes, rows: Sequence[dict | None], panel: tuple[str, str, float, bool], shift: float, index: int
+    axis: Axes, rows: Sequence[dict | None], panel: Panel, shift: float, index: int, reference: bool
 ) -> None:
     """The points of one series; a row that it lacks stays empty."""
     column, _, factor, logarithmic = panel
@@ -155,11 +162,11 @@ def _row_points(
         low, middle, high = np.clip(factor * values, *PERCENT_RANGE) if logarithmic else factor * values
         axis.plot([low, high], [place + shift] * 2, "-", color=colour, lw=1.3, alpha=0.6)
         axis.plot([middle], [place + shift], marker, color=colour, ms=5)
-        if place == 0:
+        if reference and place == 0:
             axis.axvline(middle, color=colour, lw=0.8, alpha=0.5, zorder=0)
 
 
-def _panel(axis: Axes, panel: tuple[str, str, float, bool]) -> None:
+def _panel(axis: Axes, panel: Panel) -> None:
     _, title, _, logarithmic = panel
     axis.set_title(title)
     axis.grid(True, axis="x")

@@ -66,7 +66,7 @@ def _columns(rows: pd.DataFrame, kind: str) -> dict[str, Callable[[Row], str]]:
         columns["predicted"] = lambda row: percent(row.get("predicted", math.nan))
     columns["truth in 95 % region"] = lambda row: percent(row["inside_95"], 0)
     if kind == "robustness":
-        columns["silent"] = lambda row: percent(row["silent"], 0)
+        columns["silent"] = lambda row: _interval(row, "silent", 0)
         columns["says"] = _statuses
     return columns
 
