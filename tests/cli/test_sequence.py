@@ -17,7 +17,7 @@ from rgspipe.stages import NAMES, load_stage
 TOYS = (sys.executable, "-m", "toys")
 
 
-@pytest.mark.parametrize("name", ["reproduce", "smoke", "training"])
+@pytest.mark.parametrize("name", ["reproduce", "smoke", "training", "relight"])
 def test_every_step_of_the_shipped_pipelines_composes(name: str) -> None:
     for step in load_sequence(name):
         assert step.stage in NAMES

@@ -144,6 +144,14 @@ def test_a_sweep_that_lights_nothing_in_sight_is_refused(inputs, tmp_path: Path)
         run(inputs, tmp_path / "out", relight__sweep="aim", relight__path__frames=2, **beyond)
 
 
+def test_a_sweep_that_is_black_for_a_while_says_so(inputs, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    # From above a room whose walls cast no shadow: first away from it, then at its floor.
+    way = {"relight__path__position": [0.0, 0.0, 5.0], "relight__path__aims": [-9.0, 0.0, 9.0, 0.5, 0.0, 0.0]}
+    cone = {"relight__path__spot__cone_angle": 10.0, "effects__shadows": False}
+    run(inputs, tmp_path, relight__sweep="aim", relight__path__frames=3, **way, **cone)
+    assert "of 3 frames are black" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(
     ("changes", "words"),
     [

@@ -46,7 +46,10 @@ def write_sweep(relighter: Relighter, camera: Camera, folder: Path) -> list[floa
         (image,), took = relighter.render([camera], (spot,))
         images.append(image.numpy())
         seconds.append(took)
-    if not any(image.any() for image in images):
+    black = sum(not image.any() for image in images)
+    if 0 < black < len(images):
+        print(f"{black} of {len(images)} frames are black: the spot may be behind a wall, see relight.path")
+    if black == len(images):
         raise InputError(
             "relight.path",
             expected="a spot whose light meets what the camera sees",
