@@ -11,7 +11,7 @@ from rgspipe.datasets.views import Target, View
 from rgspipe.evaluation import images
 from rgspipe.evaluation.tables import class_order
 from rgspipe.pages.html import label
-from rgspipe.scene import LightRig
+from rgspipe.scene import LightRig, SpotLight
 
 #: Training views that are shown, and targets of each class.
 SHOWN_VIEWS, SHOWN_TARGETS = 6, 2
@@ -22,6 +22,7 @@ CLASSES = {
     "out_of_frame": "The light is outside the picture; nothing hides it.",
     "occluded": "Something stands between the camera and the light.",
     "around_corner": "The light is around a corner: it reaches what the camera sees only by bouncing.",
+    "mixed": "Several lights, which are of different classes.",
     "unknown": "Nothing is known of where the light is.",
 }
 
@@ -80,7 +81,7 @@ def make_gallery(
         errors: position error of the recovered light by target, fraction of the scene's size, as far as known.
         plan: PNG of where cameras and lights are.
     """
-    shown = _spread(len(train), SHOWN_VIEWS)
+    shown = spread(len(train), SHOWN_VIEWS)
     shots = tuple(_train_shot(train[index]) for index in shown)
     classes = tuple(_target_class(name, targets, truths, errors) for name in class_order(_classes(targets)))
     return Gallery(_counts(train, held_out, targets), shots, classes, plan)
@@ -92,16 +93,16 @@ def picture(view: View) -> bytes:
 
 
 def light_words(rig: LightRig) -> str:
-    """Where lights are and how strong: "light at (0.10, 0.20, 0.30), 1.0 / 1.0 / 0.9 W/sr"."""
+    """Where lights are and how strong: "light at (0.10, 0.20, 0.30), 1.0 / 1.0 / 0.9 W/sr"; spots say so."""
     parts = []
     for light in rig:
         place = ", ".join(f"{value:.2f}" for value in light.position.tolist())
         strength = " / ".join(f"{value:.2f}" for value in light.intensity.tolist())
-        parts.append(f"light at ({place}), {strength} W/sr")
+        parts.append(f"{'spot' if isinstance(light, SpotLight) else 'light'} at ({place}), {strength} W/sr")
     return "; ".join(parts).replace("-", "−")
 
 
-def _spread(count: int, wanted: int) -> list[int]:
+def spread(count: int, wanted: int) -> list[int]:
     """Up to `wanted` indices below `count`, evenly spread."""
     return sorted(set(np.linspace(0, count - 1, min(count, wanted)).round().astype(int).tolist())) if count else []
 

@@ -19,6 +19,7 @@ from rgspipe.pages.light_studies import LightStudy, light_studies
 from rgspipe.pages.provenance import StageRecord
 from rgspipe.pages.quality import compared_lights, quality_columns, quality_rows
 from rgspipe.pages.relit import Relighting, relightings
+from rgspipe.pages.section import Section, shown_sections
 
 #: Pictures of fits and held-out views together, before they are encoded as text (which adds a third).
 PICTURE_BYTES = 4_500_000
@@ -62,6 +63,8 @@ class ReportContents:
         study_remark: what the reader must know of that study, or "".
         light_studies: studies of recovered lights that have been made, with the rows of this scene.
         relightings: the scene in other lights, as far as that was made.
+        galleries: fit targets that were generated.
+        sections: what else was made: courses of fits, a track.
         success_limit: position error up to which a target counts as solved.
         configuration: the full configuration as YAML or JSON text.
         stages: one record per artifact behind the report.
@@ -87,6 +90,8 @@ class ReportContents:
     study_remark: str = ""
     light_studies: Sequence[LightStudy] = ()
     relightings: Sequence[Relighting] = ()
+    galleries: Sequence[Section] = ()
+    sections: Sequence[Section] = ()
     success_limit: float = metrics.SUCCESS_LIMIT
     configuration: str = ""
     stages: Sequence[StageRecord] = ()
@@ -106,6 +111,8 @@ def render_report(contents: ReportContents) -> str:
         study=[] if contents.study is None else contents.study.to_dict("records"),
         light_studies=light_studies(contents.light_studies),
         relightings=relightings(contents.relightings),
+        galleries=shown_sections(contents.galleries),
+        found=shown_sections(contents.sections),
         true_surfels=TRUTH,
         goals=goals.goals(contents.summary, dict(contents.training or {}) | {"test_psnr_mean": found["psnr"]}, method),
         method=method,

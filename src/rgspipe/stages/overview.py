@@ -70,6 +70,7 @@ STAGE = Stage(
         "rgspipe.stages.report_gallery",
         "rgspipe.stages.report_light_study",
         "rgspipe.stages.report_relight",
+        "rgspipe.stages.report_sections",
         "rgspipe.stages.report_study",
     ),
     files=_manifests,

@@ -22,6 +22,7 @@ from rgspipe.stages.base import Need, Stage, StageContext
 from rgspipe.stages.report_gallery import dataset_gallery
 from rgspipe.stages.report_light_study import found_light_studies, light_study_files
 from rgspipe.stages.report_relight import found_relightings, relight_files
+from rgspipe.stages.report_sections import found_galleries, found_sections, section_files
 from rgspipe.stages.report_study import found_study, study_file
 from rgspipe.stages.sources import has_truth
 
@@ -79,6 +80,8 @@ def _contents(context: StageContext) -> report.ReportContents:
         study_remark=remark,
         light_studies=found_light_studies(config, context.inputs.get("freeze")),
         relightings=found_relightings(config, context.inputs.get("freeze")),
+        galleries=found_galleries(config, surfels),
+        sections=found_sections(config, context.inputs.get("freeze")),
         success_limit=config.evaluate.success,
         configuration=_configuration(config),
         stages=_stages(context, described),
@@ -210,8 +213,14 @@ STAGE = Stage(
         "rgspipe.stages.report_gallery",
         "rgspipe.stages.report_light_study",
         "rgspipe.stages.report_relight",
+        "rgspipe.stages.report_sections",
         "rgspipe.stages.report_study",
     ),
-    files=lambda config: [*study_file(config), *light_study_files(config), *relight_files(config)],
+    files=lambda config: [
+        *study_file(config),
+        *light_study_files(config),
+        *relight_files(config),
+        *section_files(config),
+    ],
     run=run,
 )

@@ -1,0 +1,181 @@
+"""What a report shows of stages that may have been run beside it: generated targets, courses of fits, a track."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import pandas as pd
+import torch
+
+from rgspipe.artifacts import MANIFEST, Artifact, ArtifactStore, Key
+from rgspipe.config import RgspipeConfig, scene_name
+from rgspipe.datasets.light_file import read_lights
+from rgspipe.datasets.location import open_dataset
+from rgspipe.errors import InputError
+from rgspipe.evaluation.plots import png_of
+from rgspipe.evaluation.tables import class_of
+from rgspipe.pages.gallery import Shot, light_words, picture, spread
+from rgspipe.pages.html import decimals, label, percent
+from rgspipe.pages.section import Section
+from rgspipe.pages.targets_figure import targets_figure
+from rgspipe.scene import Surfels
+
+#: Generated targets that are shown of each kind.
+SHOWN = 4
+
+#: What the lights of each kind of generated targets are.
+KINDS = {
+    "points": "point lights",
+    "spots": "spots",
+    "mixed": "points and spots",
+    "track": "the headlights of a car that drives around the bend",
+}
+
+
+def section_files(config: RgspipeConfig) -> list[Path]:
+    """The manifests of what `found_galleries` and `found_sections` take: they hold the checksums of all files."""
+    found = [*_generated(config), *_newest(config, "convergence").values(), *_newest(config, "track").values()]
+    return [artifact.path / MANIFEST for artifact in found]
+
+
+def found_galleries(config: RgspipeConfig, surfels: Surfels | None) -> list[Section]:
+    """Of each kind and number of lights the newest generated targets."""
+    return [] if surfels is None else [_targets(made, surfels) for made in _generated(config)]
+
+
+def found_sections(config: RgspipeConfig, freeze: Artifact | None) -> list[Section]:
+    """The newest courses of fits and the newest track.
+
+    Args:
+        freeze: the frozen scene that the report shows.
+    """
+    makers: Mapping[str, Callable[[Artifact, str], Section]] = {"convergence": _courses, "track": _track}
+    return [
+        make(made, _remark(made, freeze)) for stage, make in makers.items() for made in _newest(config, stage).values()
+    ]
+
+
+def _targets(made: Artifact, surfels: Surfels) -> Section:
+    folder = made.folder()
+    targets = open_dataset(folder, train=False, test=False).targets
+    rigs = {target.name: read_lights(folder / "truth" / f"{target.name}.json") for target in targets}
+    chosen = [targets[index] for index in spread(len(targets), SHOWN)]
+    numbered = {target.name: f"{number}" for number, target in enumerate(chosen, 1)}
+    origins = torch.stack([view.camera.origin for view in targets[0].views])
+    figure = targets_figure(
+        {numbered[name]: rigs[name] for name in numbered},
+        [rig for name, rig in rigs.items() if name not in numbered],
+        surfels.centers,
+        surfels.normals,
+        origins,
+    )
+    kind = str(made.facts["kind"])
+    shots = []
+    for target in chosen:
+        rig, number = rigs[target.name], numbered[target.name]
+        name = label(class_of(target.occlusion, len(rig)))
+        words = f"{number} · {target.name}, {name}: {light_words(rig)}"
+        shots.append(Shot(words, f"target {target.name}, {name}", picture(target.views[0])))
+    many = sorted({len(rig) for rig in rigs.values()})
+    counted = f"{many[0]}" if len(many) == 1 else f"{many[0]} to {many[-1]}"
+    return Section(
+        f"generated-{made.fingerprint}",
+        f"Generated targets: {KINDS.get(kind, kind)}",
+        [
+            f"{len(targets)} targets of {counted} light{'s' if many[-1] > 1 else ''} each, seen by "
+            f"{len(targets[0].views)} cameras: sums of path-traced images of single lights. "
+            "Each picture is the first camera’s, exposed for itself."
+        ],
+        drawings=[Shot("", "lights of the targets, from above and from the side", png_of(figure, dpi=120))],
+        shots=shots,
+    )
+
+
+def _courses(made: Artifact, remark: str) -> Section:
+    summary = pd.read_csv(made.file("convergence.csv"), dtype={"target": str})
+    columns = ["<Target", "<Light", "<Method", "Steps", "Time (s)", "Solved after (s)", "Position error: start", "end"]
+    columns += ["Intensity error: start", "end", "Image error: start", "end"]
+    rows = [
+        [row["target"], label(row["occlusion"]), row["method"], f"{row['steps']}", decimals(row["seconds"])]
+        + [decimals(row["seconds_to_limit"])]
+        + [percent(row[f"{name}_{end}"]) for name in _COMPARED for end in ("start", "end")]
+        for row in summary.to_dict("records")
+    ]
+    pictures = {name: made.file(f"pictures/{name}.png").read_bytes() for name in dict.fromkeys(summary["target"])}
+    return Section(
+        "courses",
+        "From start to answer",
+        ["What each method does with the same targets, from where it starts to what it answers."],
+        columns,
+        rows,
+        "Steps and start are those of the start that won; seconds count from the beginning of the fit, so that they "
+        "hold the search before it and other starts. Position errors are fractions of the scene; the image’s error "
+        "is the sum of squared differences to the target over that of its squares, of all pixels.",
+        drawings=[Shot(name, f"the course of fits of {name}", png) for name, png in pictures.items()],
+        remark=remark,
+    )
+
+
+def _track(made: Artifact, remark: str) -> Section:
+    table = pd.read_csv(made.file("track.csv"), dtype={"target": str})
+    frames = table.drop_duplicates("frame")
+    counts = ", ".join(f"{count} {name}" for name, count in frames["status"].value_counts(sort=False).items())
+    known = "position_error" in table
+    rows = []
+    for light, own in table.dropna(subset=["light"]).groupby("light") if known else ():
+        axis = decimals(own["axis_error"].median()) if "axis_error" in own else "—"
+        errors = [own["position_error"].median(), own["position_error"].max(), own["intensity_error"].median()]
+        rows.append([f"light {int(light) + 1}", f"{len(own)}", *map(percent, errors), axis])
+    drawn = Shot("Circled: found anew, or lost.", "the track of the lights", made.file("track.png").read_bytes())
+    return Section(
+        "track",
+        "Lights that move",
+        [
+            f"{len(frames)} frames: {counts}; {decimals(frames['seconds'].median())} s a frame "
+            f"(worst {decimals(frames['seconds'].max())} s)."
+        ],
+        ["<Light", "Frames", "Median position error", "Worst", "Median intensity error", "Median axis error (°)"],
+        rows,
+        drawings=[drawn],
+        remark=remark,
+    )
+
+
+_COMPARED = ("position_error", "intensity_error", "image_error")
+
+
+def _remark(made: Artifact, freeze: Artifact | None) -> str:
+    same = freeze is not None and freeze.fingerprint in made.manifest["inputs"].get("freeze", ())
+    return "" if same else f"Made on {_made(made)[:10]}, of another frozen scene than the rest of this page shows."
+
+
+def _generated(config: RgspipeConfig) -> list[Artifact]:
+    newest = _newest(config, "generate_targets", lambda made: f"{made.facts['kind']} {_count(made)}")
+    return [newest[name] for name in sorted(newest)]
+
+
+def _count(made: Artifact) -> object:
+    return made.manifest["config"].get("targets.count")
+
+
+def _newest(
+    config: RgspipeConfig, stage: str, group: Callable[[Artifact], str] = lambda made: ""
+) -> dict[str, Artifact]:
+    """The newest artifact of a stage, of each group."""
+    store, newest = ArtifactStore(Path(config.outputs)), {}
+    for path in sorted((Path(config.outputs) / scene_name(config) / stage).glob(f"[!.]*/{MANIFEST}")):
+        if path.parent.is_symlink():
+            continue
+        try:
+            found = store.find(Key(scene_name(config), stage, path.parent.name))
+        except InputError:
+            continue
+        if found is not None and (group(found) not in newest or _made(found) > _made(newest[group(found)])):
+            newest[group(found)] = found
+    return newest
+
+
+def _made(artifact: Artifact) -> str:
+    """When it was made, as text that sorts by time."""
+    return str(artifact.manifest.get("created", ""))

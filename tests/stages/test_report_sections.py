@@ -1,0 +1,115 @@
+"""What a report shows of generated targets, courses of fits and tracks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import torch
+
+from frozen_store import RESOLUTION, write_targets
+from lit_room import room_surfels
+from rgspipe.artifacts import Artifact, ArtifactStore, Key
+from rgspipe.config import RgspipeConfig, with_changes
+from rgspipe.evaluation import images
+from rgspipe.pages.html import render
+from rgspipe.pages.section import shown_sections
+from rgspipe.scene import LightRig, PointLight, SpotLight
+from rgspipe.stages import report_sections
+from rgspipe.stages.report_sections import found_galleries, found_sections, section_files
+
+PNG = images.png_bytes(np.random.default_rng(0).integers(0, 255, (8, 8, 3), dtype=np.uint8))
+
+
+def _vector(*values: float) -> torch.Tensor:
+    return torch.tensor(values, dtype=torch.float64)
+
+
+RIG: LightRig = (
+    PointLight(_vector(0.1, 0.2, 0.3), torch.ones(3).double()),
+    SpotLight(_vector(-0.2, 0.0, 0.3), torch.ones(3).double(), _vector(0.0, 0.0, -1.0), "gaussian", 0.5, 0.1),
+)
+
+
+@pytest.fixture(autouse=True)
+def days(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Artifacts that are made one after the other within a second are made in the order of their names."""
+    monkeypatch.setattr(report_sections, "_made", lambda found: found.fingerprint)
+
+
+def config(root: Path) -> RgspipeConfig:
+    return with_changes(RgspipeConfig(), {"stage": "report", "scene.name": "room", "outputs": str(root)})
+
+
+def build(root: Path, stage: str, fingerprint: str, make: Callable[[Path], None], **facts: object) -> Artifact:
+    def whole(folder: Path) -> dict:
+        make(folder)
+        return facts
+
+    recipe = {"config": {"targets.count": [2, 2]}, "inputs": {"freeze": ["f1"]}, "code": {}}
+    return ArtifactStore(root).build(Key("room", stage, fingerprint), recipe, whole)[0]
+
+
+def _targets(folder: Path, count: int) -> None:
+    views = [torch.rand(RESOLUTION, RESOLUTION, 3, generator=torch.Generator().manual_seed(k)) for k in range(2)]
+    names = [f"rig_{index:04d}" for index in range(count)]
+    write_targets(folder, dict.fromkeys(names, views), dict.fromkeys(names, RIG))
+    listed = (folder / "targets" / "targets.json").read_text().replace("visible", "unknown")
+    (folder / "targets" / "targets.json").write_text(listed)
+
+
+def _courses(folder: Path) -> None:
+    row = {"target": "visible_000", "occlusion": "visible", "method": "paper_adam", "steps": 1250, "seconds": 31.5}
+    row |= {"position_error_start": 0.5, "position_error_end": 0.012, "seconds_to_limit": float("nan")}
+    row |= {f"{name}_{end}": 0.25 for name in ("intensity_error", "image_error") for end in ("start", "end")}
+    pd.DataFrame([row]).to_csv(folder / "convergence.csv", index=False)
+    (folder / "pictures").mkdir()
+    (folder / "pictures" / "visible_000.png").write_bytes(PNG)
+
+
+def _track(folder: Path, truth: bool = True) -> None:
+    found = [{"frame": k, "target": f"rig_{k}", "status": "tracked", "seconds": 0.25, "light": 0} for k in range(3)]
+    errors = {"position_error": [0.01, 0.02, 0.09], "intensity_error": 0.05, "axis_error": 0.5} if truth else {}
+    pd.DataFrame(found).assign(**errors).to_csv(folder / "track.csv", index=False)
+    (folder / "track.png").write_bytes(PNG)
+
+
+def test_generated_targets_are_numbered_on_the_plan_and_beside_it(tmp_path: Path) -> None:
+    build(tmp_path, "generate_targets", "01", lambda folder: _targets(folder, 2), kind="mixed")
+    build(tmp_path, "generate_targets", "02", lambda folder: _targets(folder, 6), kind="mixed")
+    (section,) = found_galleries(config(tmp_path), room_surfels())
+    assert section.title == "Generated targets: points and spots" and section.words[0].startswith(
+        "6 targets of 2 lights"
+    )
+    assert len(section.shots) == report_sections.SHOWN and len(section.drawings) == 1
+    assert section.shots[0].caption.startswith("1 · rig_0000, mixed: light at (0.10, 0.20, 0.30)")
+    assert "spot at (−0.20, 0.00, 0.30)" in section.shots[0].caption
+    assert found_galleries(config(tmp_path), None) == []
+    assert [path.parent.name for path in section_files(config(tmp_path))] == ["02"]
+
+
+def test_courses_and_tracks_are_shown_with_what_was_measured(tmp_path: Path) -> None:
+    build(tmp_path, "convergence", "01", _courses)
+    build(tmp_path, "track", "01", _track)
+    courses, track = found_sections(config(tmp_path), None)
+    assert courses.rows == [
+        ["visible_000", "visible", "paper_adam", "1250", "31.50", "—", "50.00 %", "1.20 %"] + ["25.00 %"] * 4
+    ]
+    assert track.words == ["3 frames: 3 tracked; 0.25 s a frame (worst 0.25 s)."]
+    assert track.rows == [["light 1", "3", "2.00 %", "9.00 %", "5.00 %", "0.50"]]
+    assert "another frozen scene" in courses.remark and "another frozen scene" in track.remark
+    assert len(section_files(config(tmp_path))) == 2
+    page = render("sections.html", sections=shown_sections([courses, track]))
+    assert page.count("<img") == 2 and page.count("data:image/png;base64,") == 2
+    assert '<td class="text">paper_adam</td>' in page and "<td>1250</td>" in page
+
+
+def test_a_track_without_truth_has_no_errors_and_nothing_made_shows_nothing(tmp_path: Path) -> None:
+    assert found_sections(config(tmp_path), None) == [] and section_files(config(tmp_path)) == []
+    made = build(tmp_path, "track", "01", lambda folder: _track(folder, truth=False))
+    freeze = Artifact(made.path, {"fingerprint": "f1"})
+    (track,) = found_sections(config(tmp_path), freeze)
+    assert track.rows == [] and track.remark == ""
