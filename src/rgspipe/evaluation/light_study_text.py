@@ -51,7 +51,8 @@ def markdown(table: pd.DataFrame, kind: str) -> str:
 
 def _columns(rows: pd.DataFrame, kind: str) -> dict[str, Callable[[Row], str]]:
     columns: dict[str, Callable[[Row], str]] = {}
-    for name in several(rows, ["scene", "case", "method"]) or ["case"]:
+    alike = ["case"] if kind == "robustness" else []
+    for name in several(rows, ["scene", "case", "method"]) or alike:
         columns[name] = lambda row, name=name: str(row[name])
     columns["views"] = lambda row: str(row["views"])
     if kind != "robustness":
