@@ -18,7 +18,7 @@ from rgspipe.evaluation.tables import ALL, class_order
 KINDS = ("views", "robustness", "classes")
 
 #: Why fits end; a column each, with the share of the targets.
-STATUSES = ("converged", "ambiguous", "at_bound", "not_enough_light", "max_iterations")
+STATUSES = ("converged", "undetermined", "ambiguous", "unexplained", "at_bound", "not_enough_light", "max_iterations")
 
 #: Medians: column, and where `tables.target_table` has the values.
 MEDIANS = {"position": "position_error", "intensity": "intensity_error", "seconds": "seconds"}

@@ -14,8 +14,11 @@ from rgspipe.fitting.parameters import Emitter
 from rgspipe.fitting.problem import LightProblem
 from rgspipe.fitting.refine import ROBUST, State, cauchy_scale
 
-#: One more light, or a spot in the place of a point light, must lower the robust cost by this share.
-LEAST_DROP = 0.10
+#: One more light, or a spot in the place of a point light, must lower the robust cost of the blocks by this share …
+LEAST_DROP = 0.2
+
+#: … and one that lowers it by more than this share may be there, which the answer says.
+DOUBTFUL_DROP = 0.07
 
 #: Rigs are clearly different where a light is farther from its counterpart than this part of the scene's size, or
 #: where their numbers differ.

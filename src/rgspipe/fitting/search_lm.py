@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import zip_longest
 
@@ -13,6 +13,7 @@ from rgspipe.fitting.coarse import CoarseImages
 from rgspipe.fitting.exposure import rough_exposures
 from rgspipe.fitting.judge import (
     CLEARLY_APART,
+    DOUBTFUL_DROP,
     LEAST_DROP,
     best_state,
     drop,
@@ -48,6 +49,9 @@ SPOT_STARTS = 3
 #: A number of lights that is known is searched from up to so many times the wanted starts, until the best one leaves
 #: less than this share of the blocks' energy unexplained.
 BATCHES, WELL_EXPLAINED = 4, 0.02
+
+#: An answer that leaves more than this share of the target's energy unexplained is none.
+POORLY_EXPLAINED = 0.05
 
 #: So many of the starts with the least robust losses are refined with plain squares.
 SETTLED = 3
@@ -164,7 +168,7 @@ class _Search:
             lights -= 1
             best = self._best_of(lights, None, patient=True)
         self.tried = [best]
-        return best
+        return self._settled([best] if self.spec.type == "auto" else self.rivals)
 
     def unknown(self) -> State:
         """The best rig of the least number of lights to which one more adds too little."""
@@ -182,7 +186,7 @@ class _Search:
                 break
             best, rivals = state, self.rivals
         self.rivals = rivals
-        return self._pruned(best)
+        return self._settled([self._pruned(best)])
 
     def costs(self) -> dict[int, float]:
         """Robust cost by number of lights of all rigs that were compared, at one scale."""
@@ -220,18 +224,17 @@ class _Search:
 
     def _refined(self, rigs: Sequence[Rig], batches: int) -> State:
         """The best of several starts after a few steps each; of `batches` parts the next ones only if need be."""
-        best, size = None, math.ceil(len(rigs) / batches)
+        refined, size = [], math.ceil(len(rigs) / batches)
         for first in range(0, len(rigs), size):
             started, finished = refine_starts(
                 self.coarse, rigs[first : first + size], self.options.iterations, self.region, self.begin
             )
             self.states += started
-            self.rivals += finished
-            found = self._settled(finished)
-            best = found if best is None else min(best, found, key=self._unexplained)
-            if self._unexplained(best) < WELL_EXPLAINED:
+            refined += finished
+            if first + size < len(rigs) and self._unexplained(self._settled(refined)) < WELL_EXPLAINED:
                 break
-        return best
+        self.rivals += refined
+        return best_state(self.coarse, refined)
 
     def _settled(self, states: Sequence[State]) -> State:
         """Of the states with the least robust losses the one that explains most after some steps of plain squares.
@@ -309,17 +312,15 @@ class _Search:
 
     def result(self, best: State, ambiguous: bool) -> FitResult:
         self._settle_exposures(best)
-        status, costs = best.status, self.costs()
-        if ambiguous:
-            status = FitStatus.AMBIGUOUS
-        if any(self.region.at_bound(emitter.position) for emitter in best.emitters):
-            status = FitStatus.AT_BOUND
+        costs, loss = self.costs(), self.problem.unexplained(best.columns, best.intensity)
         lights, spread = best.lights(self.problem), light_covariances(self.problem, best)
+        doubt = doubts(lights, spread.calibrated, self.region.size)
+        status = self._status(best, ambiguous, loss, doubt)
         return FitResult(
             lights=lights,
             status=status,
-            reason=" ".join(filter(None, (REASONS[status], doubts(lights, spread.calibrated, self.region.size)))),
-            loss=self.problem.unexplained(best.columns, best.intensity),
+            reason=" ".join(filter(None, (REASONS[status], doubt, _one_more(len(lights), costs)))),
+            loss=loss,
             iterations=sum(state.iterations for state in self.states),
             evaluations=sum(state.evaluations for state in self.states),
             lights_tried=max([*costs, len(best.emitters)]),
@@ -330,3 +331,24 @@ class _Search:
             exposures=tuple(self.problem.exposures.tolist()),
             noise_covariance=spread.noise,
         )
+
+    def _status(self, best: State, ambiguous: bool, loss: float, doubt: str) -> FitStatus:
+        """Why the fit ended, the gravest reason first."""
+        if any(self.region.at_bound(emitter.position) for emitter in best.emitters):
+            return FitStatus.AT_BOUND
+        if loss > POORLY_EXPLAINED:
+            return FitStatus.UNEXPLAINED
+        if ambiguous:
+            return FitStatus.AMBIGUOUS
+        return FitStatus.UNDETERMINED if doubt and best.status == FitStatus.CONVERGED else best.status
+
+
+def _one_more(count: int, costs: Mapping[int, float]) -> str:
+    """A sentence where one light more than were found might be there."""
+    if count not in costs or count + 1 not in costs:
+        return ""
+    share = 1.0 - costs[count + 1] / costs[count]
+    if share <= DOUBTFUL_DROP:
+        return ""
+    shares = f"{100.0 * share:.0f} %: there may be one (it counts from {100.0 * LEAST_DROP:.0f} % on)"
+    return f"One more light would lower the cost by {shares}."

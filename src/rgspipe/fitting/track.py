@@ -34,7 +34,7 @@ REMEMBERED = 5
 AS_GOOD = 1.1
 
 #: Results with one answer, which a track may go on from.
-ONE_ANSWER = (FitStatus.CONVERGED, FitStatus.MAX_ITERATIONS)
+ONE_ANSWER = (FitStatus.CONVERGED, FitStatus.UNDETERMINED, FitStatus.MAX_ITERATIONS)
 
 #: What a result tells of every light.
 PER_LIGHT = ("lights", "covariance", "noise_covariance")
