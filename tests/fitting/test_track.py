@@ -12,7 +12,8 @@ import torch
 from lit_room import VISIBLE
 from rgspipe.fitting import FitResult, FitStatus, ImageCapture, LightSpec, SearchOptions, prepare_fit
 from rgspipe.fitting.parameters import Emitter
-from rgspipe.fitting.track import FrameStatus, TrackOptions, _Tracker, in_order, predicted, track_lights
+from rgspipe.fitting.result import dark_result
+from rgspipe.fitting.track import FrameStatus, TrackedFrame, TrackOptions, _Tracker, in_order, predicted, track_lights
 from rgspipe.renderer.spot import SpotShape
 from rgspipe.scene import LightRig, SpotLight
 
@@ -81,6 +82,15 @@ def test_frames_before_the_first_sure_one_are_followed_back_from_it(monkeypatch,
     forward = track_lights(room.two, frames[:2], options=TrackOptions(back=False))
     assert not any(frame.sure for frame in forward)
     assert {frame.result.status for frame in forward} == {FitStatus.AMBIGUOUS}
+
+
+def test_an_answer_with_a_light_that_explains_nothing_is_not_sure(point_light) -> None:
+    """Two headlights that one light explains almost as well: the other one of the answer may be anywhere."""
+    strong, weak = point_light(VISIBLE), replace(point_light((0.3, 0.3, -0.3)), intensity=0.01 * torch.ones(3).double())
+    result = replace(dark_result(0.0), lights=(strong, strong), status=FitStatus.CONVERGED)
+    assert TrackedFrame(result, FrameStatus.TRACKED, 0.01).sure
+    assert not TrackedFrame(replace(result, lights=(strong, weak)), FrameStatus.TRACKED, 0.01).sure
+    assert not TrackedFrame(replace(result, status=FitStatus.AMBIGUOUS), FrameStatus.TRACKED, 0.01).sure
 
 
 def test_two_spots_that_move_and_turn_keep_their_order(room) -> None:

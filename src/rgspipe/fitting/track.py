@@ -36,6 +36,9 @@ AS_GOOD = 1.1
 #: Results with one answer, which a track may go on from.
 ONE_ANSWER = (FitStatus.CONVERGED, FitStatus.UNDETERMINED, FitStatus.MAX_ITERATIONS)
 
+#: A light with less than this part of the strongest one's intensity explains nothing: it may be anywhere.
+FAINT = 0.02
+
 #: What a result tells of every light.
 PER_LIGHT = ("lights", "covariance", "noise_covariance")
 
@@ -81,8 +84,10 @@ class TrackedFrame:
 
     @property
     def sure(self) -> bool:
-        """Whether there is one answer: what is followed from an ambiguous frame is as ambiguous itself."""
-        return self.status != FrameStatus.LOST and self.result.status in ONE_ANSWER
+        """Whether there is one answer, with all of its lights; what follows an unsure frame is unsure, too."""
+        strengths = [float(light.intensity.mean()) for light in self.result.lights]
+        faint = bool(strengths) and min(strengths) < FAINT * max(strengths)
+        return self.status != FrameStatus.LOST and self.result.status in ONE_ANSWER and not faint
 
 
 def track_lights(
