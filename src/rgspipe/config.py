@@ -23,7 +23,7 @@ PLY_FRONTS = ("auto", "kept", "inwards", "outwards", "cameras")
 FIT_METHODS = ("search_lm", "paper_adam", "finite_differences")
 ADAM_AIMS = ("center", "random")
 TARGET_KINDS = ("points", "spots", "mixed", "track")
-LIGHT_STUDIES = ("views", "robustness", "classes")
+LIGHT_STUDIES = ("views", "robustness", "classes", "kinds")
 ROOM_NAMES = ("cornell", "corridor", "clutter")
 
 
@@ -633,7 +633,8 @@ class LightStudyConfig:
 
     kind: str = option(
         "robustness",
-        "the figure: errors against the number of views; cases of errors in images and model; or classes of lights",
+        "the figure: errors against the number of views; cases of errors in images and model; classes of lights; or "
+        "kinds of lights",
         choices=LIGHT_STUDIES,
     )
     cases: list[str] = option(

@@ -26,6 +26,9 @@ def _targets(views: int = 1) -> pd.DataFrame:
             "inside_95": pd.array([True, True, False, pd.NA], dtype="boolean"),
             "position_sd": [0.002, 0.02, 0.001, math.nan],
             "result": ["converged", "converged", "converged", "ambiguous"],
+            "axis_error": [math.nan, 0.5, 1.5, math.nan],
+            "cone_error": math.nan,
+            "count_right": pd.array([True, True, True, False], dtype="boolean"),
         }
     )
     return table.assign(method="search_lm", views=views)
@@ -43,6 +46,7 @@ def test_a_case_has_a_row_for_each_class_and_one_for_all() -> None:
     assert whole["position_low"] == 0.002 and whole["position_high"] == math.inf
     assert (whole["success"], whole["inside_95"]) == (0.25, pytest.approx(2 / 3))
     assert whole["stated"] == 0.002 and whole["converged"] == 0.75 and whole["ambiguous"] == 0.25
+    assert whole["axis"] == 1.0 and math.isnan(whole["cone"]) and whole["right_number"] == 0.75
     # Only "c" says converged, is off and states no region with the truth.
     assert rows["silent"].tolist() == [0.0, 0.5, 0.25]
 
@@ -98,6 +102,9 @@ def test_text_shows_what_differs_and_says_what_is_not_known() -> None:
     assert rows[0]["silent"].startswith("25 % (") and rows[0]["solved"].startswith("25 % (5–70")
     text = markdown(pd.concat([table, table.assign(scene="corner")]), "classes")
     assert text.startswith("| scene | views | light |") and text.count("\n") == 8 and "| corner |" in text
+    headings, rows = shown_rows(table, "kinds")
+    assert len(rows) == 1 and rows[0]["axis"] == "1.00° (0.50–1.50)" and rows[0]["cone"] == "—"
+    assert rows[0]["right number"].startswith("75 %")
     table = pd.concat([table, table.assign(views=2, predicted=0.01, position=math.inf)])
     headings, rows = shown_rows(table, "views")
     assert rows[-1]["predicted"] == "1.00 %" and rows[0]["predicted"] == "—" and rows[-1]["position error"][0] == "∞"

@@ -10,7 +10,7 @@ import pytest
 from fitted_lights import make_fitted
 from html_page import Page
 from rgspipe.evaluation.light_study import KINDS, case_rows
-from rgspipe.evaluation.light_study_text import NOTES
+from rgspipe.evaluation.light_study_text import NOTES, TOGETHER
 from rgspipe.pages import report
 from rgspipe.pages.light_studies import ALT, TITLES, LightStudy, light_studies
 
@@ -30,7 +30,7 @@ def test_a_study_is_a_figure_and_a_table(table: pd.DataFrame, kind: str) -> None
     (shown,) = light_studies([LightStudy(kind, table)])
     assert shown["figure"]["source"].startswith("data:image/svg+xml")
     assert all(len(row) == len(shown["headings"]) for row in shown["rows"])
-    assert len(shown["rows"]) == (2 if kind == "robustness" else len(table))
+    assert len(shown["rows"]) == (2 if kind in TOGETHER else len(table))
 
 
 def test_a_study_without_truth_says_so(table: pd.DataFrame) -> None:

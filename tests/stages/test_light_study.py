@@ -87,7 +87,7 @@ def test_a_case_that_is_none_is_refused_before_anything_is_made() -> None:
         light_study.STAGE.needs(_config(cases=["target_capture.nose=0.1"]))
 
 
-@pytest.mark.parametrize("name", ["light_views", "light_robustness", "light_classes"])
+@pytest.mark.parametrize("name", ["light_views", "light_robustness", "light_classes", "light_kinds"])
 def test_every_study_that_is_prepared_composes_and_names_its_cases(name: str) -> None:
     config = compose_config(["stage=light_study", f"experiment={name}"])
     assert config.light_study.kind == name.removeprefix("light_")

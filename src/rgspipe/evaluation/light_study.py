@@ -15,15 +15,21 @@ from rgspipe.evaluation import metrics
 from rgspipe.evaluation.tables import ALL, class_order
 
 #: What is studied.
-KINDS = ("views", "robustness", "classes")
+KINDS = ("views", "robustness", "classes", "kinds")
 
 #: Why fits end; a column each, with the share of the targets.
 STATUSES = ("converged", "undetermined", "ambiguous", "unexplained", "at_bound", "not_enough_light", "max_iterations")
 
 #: Medians: column, and where `tables.target_table` has the values.
-MEDIANS = {"position": "position_error", "intensity": "intensity_error", "seconds": "seconds"}
+MEDIANS = {
+    "position": "position_error",
+    "intensity": "intensity_error",
+    "seconds": "seconds",
+    "axis": "axis_error",
+    "cone": "cone_error",
+}
 #: Shares of the targets, likewise.
-SHARES = {"success": "success", "inside_95": "inside_95"}
+SHARES = {"success": "success", "inside_95": "inside_95", "right_number": "count_right"}
 
 #: What names a row.
 KEYS = ["scene", "case", "method", "views", "occlusion"]
@@ -42,9 +48,11 @@ def case_rows(scene: str, case: str, targets: pd.DataFrame, seed: int, resamples
 
     Returns:
         `KEYS`, `count` and `judged` (targets, and those with a known truth), and
-        - `position` (fraction of the scene), `intensity` (fraction), `seconds`: medians, each with `_low` and `_high`;
-        - `success` (within the limit, with the right number of lights) and `inside_95` (the truth lies inside the 95 %
-          region that the fit states): shares of those where it is known, with `_low` and `_high`;
+        - `position` (fraction of the scene), `intensity` (fraction), `seconds`, of spots `axis` and `cone` (degrees):
+          medians, each with `_low` and `_high`;
+        - `success` (within the limit, with the right number of lights), `inside_95` (the truth lies inside the region
+          that the fit states for 95 %) and `right_number` (of lights): shares of those where it is known, with `_low`
+          and `_high`;
         - `stated`: the median of the position errors that fits expect of themselves;
         - `silent`, likewise: the share of judged targets whose fit says that it converged, misses the limit, and states
           no region that holds the truth: wrong without a word;
@@ -98,7 +106,7 @@ def _figures(group: pd.DataFrame, seed: int, resamples: int) -> dict[str, float]
     judged = group["position_error"].notna()
     found: dict[str, float] = {"count": len(group), "judged": int(judged.sum())}
     for name, column in MEDIANS.items():
-        found |= _median(name, group[column], seed, resamples)
+        found |= _median(name, group[column].astype(float), seed, resamples)
     for name, column in SHARES.items():
         found |= _share(name, group[column])
     found["stated"] = float(group["position_sd"].median()) if group["position_sd"].notna().any() else math.nan

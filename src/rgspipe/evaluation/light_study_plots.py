@@ -15,6 +15,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormat
 
 from rgspipe.evaluation import metrics
 from rgspipe.evaluation.light_study import several
+from rgspipe.evaluation.light_study_text import TOGETHER
 from rgspipe.evaluation.plots import INK, LABELS, STYLE
 from rgspipe.evaluation.tables import ALL, class_order
 
@@ -56,8 +57,9 @@ def light_study_figure(table: pd.DataFrame, kind: str) -> Figure:
         raise ValueError("no target of the study has a known truth and a light that was found")
     if kind == "views":
         return views_figure(table)
-    if kind == "robustness":
-        return rows_figure(table[table["occlusion"] == ALL], ["case"], ["scene", "method", "views"], PANELS, True)
+    if kind in TOGETHER:
+        series = ["scene", "method", "views"] if kind == "robustness" else ["scene", "method"]
+        return rows_figure(table[table["occlusion"] == ALL], ["case"], series, PANELS, kind == "robustness")
     rows = table[table["occlusion"] != ALL]
     return rows_figure(rows, ["scene", "occlusion"], ["case", "method", "views"], PANELS[:-1])
 

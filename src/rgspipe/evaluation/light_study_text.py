@@ -24,9 +24,16 @@ NOTES = {
     "robustness": "Medians with 95 % bootstrap intervals, shares with Wilson’s; all classes together. Silent: the fit "
     "says converged, is off by more than the limit, and no region that it states holds the truth. With a wrong number "
     "of lights no target counts as solved; position errors are then those of the lights that have a match.",
+    "kinds": "Medians with 95 % bootstrap intervals, shares with Wilson’s; position errors are parts of the scene’s "
+    "longest side, of several lights the worst. Silent: the fit says converged, is off by more than the limit, and no "
+    "region that it states holds the truth. Times are wall times of single fits, beside whatever else ran.",
     "classes": "Medians with 95 % bootstrap intervals, shares with Wilson’s; position errors are parts of the scene’s "
     "longest side. True surfels are made from the true surfaces and albedo.",
 }
+
+
+#: Kinds whose rows are cases, with all classes of lights together.
+TOGETHER = ("robustness", "kinds")
 
 
 def shown_rows(table: pd.DataFrame, kind: str) -> tuple[list[str], list[Row]]:
@@ -34,9 +41,9 @@ def shown_rows(table: pd.DataFrame, kind: str) -> tuple[list[str], list[Row]]:
 
     Args:
         table: rows of `light_study.case_rows`; of views also with `predicted`.
-        kind: one of `light_study.KINDS`; robustness shows all classes together, the others each.
+        kind: one of `light_study.KINDS`; those of `TOGETHER` show all classes together, the others each.
     """
-    rows = table[table["occlusion"] == ALL] if kind == "robustness" else table
+    rows = table[table["occlusion"] == ALL] if kind in TOGETHER else table
     columns = _columns(rows, kind)
     return list(columns), [{name: cell(row) for name, cell in columns.items()} for row in rows.to_dict("records")]
 
@@ -51,25 +58,33 @@ def markdown(table: pd.DataFrame, kind: str) -> str:
 
 def _columns(rows: pd.DataFrame, kind: str) -> dict[str, Callable[[Row], str]]:
     columns: dict[str, Callable[[Row], str]] = {}
-    alike = ["case"] if kind == "robustness" else []
+    alike = ["case"] if kind in TOGETHER else []
     for name in several(rows, ["scene", "case", "method"]) or alike:
         columns[name] = lambda row, name=name: str(row[name])
     columns["views"] = lambda row: str(row["views"])
-    if kind != "robustness":
+    if kind not in TOGETHER:
         columns["light"] = _class
     columns["targets"] = lambda row: str(row["count"])
     columns["position error"] = lambda row: _interval(row, "position", 2)
     columns["intensity error"] = lambda row: _interval(row, "intensity", 1)
+    if kind == "kinds":
+        columns["axis"] = lambda row: _degrees(row, "axis")
+        columns["cone"] = lambda row: _degrees(row, "cone")
+        columns["right number"] = lambda row: _interval(row, "right_number", 0)
     columns["solved"] = lambda row: _interval(row, "success", 0)
     columns["s a fit"] = lambda row: "—" if math.isnan(row["seconds"]) else f"{row['seconds']:.2f}"
     if kind == "views":
         columns["stated"] = lambda row: percent(row["stated"])
         columns["predicted"] = lambda row: percent(row.get("predicted", math.nan))
     columns["truth in 95 % region"] = lambda row: percent(row["inside_95"], 0)
-    if kind == "robustness":
+    if kind in TOGETHER:
         columns["silent"] = lambda row: _interval(row, "silent", 0)
         columns["says"] = _statuses
     return columns
+
+
+def _degrees(row: Row, name: str) -> str:
+    return "—" if math.isnan(row[name]) else f"{row[name]:.2f}° ({row[f'{name}_low']:.2f}–{row[f'{name}_high']:.2f})"
 
 
 def _class(row: Row) -> str:

@@ -53,8 +53,8 @@ BATCHES, WELL_EXPLAINED = 4, 0.02
 #: An answer that leaves more than this share of the target's energy unexplained is none.
 POORLY_EXPLAINED = 0.05
 
-#: So many of the starts with the least robust losses are refined with plain squares.
-SETTLED = 3
+#: So many of the starts with the least robust losses, and of those that explain most, are refined with plain squares.
+SETTLED = 2
 
 #: A rival is refined, to see whether it is as good, unless the best rig's robust cost is lower by this share.
 FAR_RIVAL = 0.5
@@ -237,11 +237,13 @@ class _Search:
         return best_state(self.coarse, refined)
 
     def _settled(self, states: Sequence[State]) -> State:
-        """Of the states with the least robust losses the one that explains most after some steps of plain squares.
+        """Of the best states the one that explains most after some steps of plain squares.
 
-        The polish takes plain squares: a rig that only a forgiving loss likes would walk far in it.
+        The polish takes plain squares: a rig that only a forgiving loss likes, for which the brightest pixels are
+        outliers, would walk far in it. So the best by plain squares are among those that are tried.
         """
-        settled = [fresh(state) for state in ranked(self.coarse, states)[:SETTLED]]
+        chosen = [*ranked(self.coarse, states)[:SETTLED], *sorted(states, key=self._unexplained)[:SETTLED]]
+        settled = [fresh(state) for index, state in enumerate(chosen) if not any(state is s for s in chosen[:index])]
         self.states += settled
         for state in settled:
             refine(self.coarse, state, PLAIN, min(SHORT_ITERATIONS, self.options.iterations), self.region, self.begin)

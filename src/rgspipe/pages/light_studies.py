@@ -20,6 +20,11 @@ TITLES = {
         "The same targets, taken by worse cameras, or fitted with a scene or a number of lights that is wrong by a "
         "stated amount; the line through each panel is the first case.",
     ),
+    "kinds": (
+        "Kinds of lights",
+        "Points and spots, alone and several, of known and unknown number and cone, drawn at random and rendered by "
+        "Cycles; fits in the trained scene, and beside them in the true one.",
+    ),
     "classes": (
         "Where the light is",
         "Lights that the first camera sees, that are outside its picture, hidden from it, or around the corner.",
@@ -29,6 +34,7 @@ TITLES = {
 ALT = {
     "views": "error, success and time against the number of views",
     "robustness": "errors of each case",
+    "kinds": "errors of each kind of light",
     "classes": "errors of each class",
 }
 
