@@ -65,6 +65,14 @@ def test_true_surfels_of_glossy_boxes_have_their_lobe_and_the_walls_have_none(tm
     assert surfels.gloss.exponents[on_box].unique().tolist() == [config.scene.cornell.shininess]
 
 
+def test_true_surfels_of_the_corridor_are_its_rectangles(tmp_path: Path) -> None:
+    config = _config(scene__kind="corner", init__surfels=900)
+    assert true_surfels.STAGE.needs(config) == ()
+    true_surfels.run(StageContext(config, {}, {}, tmp_path))
+    surfels = load_surfels(tmp_path / "surfels.safetensors")
+    assert 700 < len(surfels) < 1100 and surfels.centers.abs().amax() <= 0.5 + 1e-6
+
+
 def test_true_surfels_of_other_scenes_come_from_the_passes() -> None:
     assert true_surfels.STAGE.needs(_config(scene__kind="room")) == (Need("generate_dataset"),)
 

@@ -12,17 +12,18 @@ from rgspipe.datasets.location import open_dataset
 from rgspipe.datasets.surfel_file import save_surfels
 from rgspipe.errors import InputError
 from rgspipe.evaluation.ceiling import surfels_from_passes
+from rgspipe.evaluation.exact_corner import corner_rectangles
 from rgspipe.scene import Surfels
 from rgspipe.scene.cornell import cornell_rectangles
 from rgspipe.scene.gloss import Gloss
 from rgspipe.scene.rectangles import Rectangles, surfels_on
 from rgspipe.stages.base import Stage, StageContext
 from rgspipe.stages.detail import KEYS, surfel_count
-from rgspipe.stages.scene_model import cornell_parameters
+from rgspipe.stages.scene_model import cornell_parameters, scene_model
 
 
 def run(context: StageContext) -> None:
-    """Write surfels.safetensors: exact rectangles for a Cornell box, else from depth, normals and albedo."""
+    """Write surfels.safetensors: exact where a scene is made of rectangles, else from depth, normals and albedo."""
     config = context.config
     exact = _is_exact(config)
     surfels = _exact_surfels(config) if exact else _from_passes(context)
@@ -31,10 +32,12 @@ def run(context: StageContext) -> None:
 
 
 def _is_exact(config: RgspipeConfig) -> bool:
-    return config.scene.kind == "cornell"
+    return config.scene.kind in ("cornell", "corner")
 
 
 def _exact_surfels(config: RgspipeConfig) -> Surfels:
+    if config.scene.kind == "corner":
+        return surfels_on(corner_rectangles(scene_model(config.scene)), surfel_count(config)).to(torch.float32)
     room = cornell_parameters(config.scene.cornell)
     boxes = [(box.center, box.size, box.turn, box.albedo) for box in room.boxes]
     rectangles = cornell_rectangles(room.room, room.white, room.left, room.right, boxes)
@@ -70,7 +73,7 @@ def _from_passes(context: StageContext) -> Surfels:
 
 
 def _keys(config: RgspipeConfig) -> tuple[str, ...]:
-    return ("scene.cornell", *KEYS) if _is_exact(config) else (*KEYS, "init.seed")
+    return (f"scene.{config.scene.kind}", *KEYS) if _is_exact(config) else (*KEYS, "init.seed")
 
 
 STAGE = Stage(
@@ -83,6 +86,7 @@ STAGE = Stage(
         "rgspipe.blender.models.parameters",
         "rgspipe.evaluation.arrays",
         "rgspipe.evaluation.ceiling",
+        "rgspipe.evaluation.exact_corner",
         "rgspipe.evaluation.metrics",
         "rgspipe.renderer",
         "rgspipe.stages.detail",
