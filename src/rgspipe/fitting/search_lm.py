@@ -168,7 +168,7 @@ class _Search:
             lights -= 1
             best = self._best_of(lights, None, patient=True)
         self.tried = [best]
-        return self._settled([best] if self.spec.type == "auto" else self.rivals)
+        return self._settled([best]) if self.spec.type == "auto" else best
 
     def unknown(self) -> State:
         """The best rig of the least number of lights to which one more adds too little."""
@@ -223,7 +223,11 @@ class _Search:
         return [rig for pair in zip_longest(extended, fresh) for rig in pair if rig is not None]
 
     def _refined(self, rigs: Sequence[Rig], batches: int) -> State:
-        """The best of several starts after a few steps each; of `batches` parts the next ones only if need be."""
+        """The best of several starts after a few steps each; of `batches` parts the next ones only if need be.
+
+        Rigs that are to be compared with others have the least robust loss; else they are settled.
+        """
+        compared = batches == 1 or self.spec.type == "auto"
         refined, size = [], math.ceil(len(rigs) / batches)
         for first in range(0, len(rigs), size):
             started, finished = refine_starts(
@@ -231,10 +235,11 @@ class _Search:
             )
             self.states += started
             refined += finished
-            if first + size < len(rigs) and self._unexplained(self._settled(refined)) < WELL_EXPLAINED:
+            best = best_state(self.coarse, refined) if compared else self._settled(refined)
+            if self._unexplained(best) < WELL_EXPLAINED:
                 break
         self.rivals += refined
-        return best_state(self.coarse, refined)
+        return best
 
     def _settled(self, states: Sequence[State]) -> State:
         """Of the best states the one that explains most after some steps of plain squares.
