@@ -87,15 +87,20 @@ def block_model(views: PreparedViews, blocks: int = BLOCKS, *, interreflection: 
         gathered = transport.gather.to_scipy()
         seen = [torch.from_numpy((matrix @ gathered).toarray()).to(transport.inverse) for matrix in shaded]
         bounced = torch.stack([part @ inverse for part, inverse in zip(seen, transport.inverse, strict=True)])
-    first = torch.from_numpy(average.to_scipy().indices[average.to_scipy().indptr[:-1]]).long()
     return BlockModel(
         average,
         counts,
-        views.view_of.cpu()[first].to(device),
+        view_of_blocks(average, views),
         weights,
         SparseOperator.from_scipy(scipy.sparse.vstack(shaded, format="csr"), device),
         bounced,
     )
+
+
+def view_of_blocks(average: SparseOperator, views: PreparedViews) -> Tensor:
+    """(B,) int64 view of each block of `average` (B, P): blocks reach over no two, so their first pixel says it."""
+    matrix = average.matrix
+    return views.view_of[matrix.col_indices()[matrix.crow_indices()[:-1].long()].long()]
 
 
 def block_average(views: PreparedViews, blocks: int = BLOCKS) -> tuple[SparseOperator, Tensor]:

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import zip_longest
 
-from rgspipe.fitting.blocks import BlockModel
+from rgspipe.fitting.blocks import BlockModel, view_of_blocks
 from rgspipe.fitting.coarse import CoarseImages
 from rgspipe.fitting.exposure import rough_exposures
 from rgspipe.fitting.judge import (
@@ -128,9 +128,7 @@ def _roughly_exposed(problem: LightProblem, coarse: Sequence[CoarseImages]) -> L
     images = coarse[0]
     target = images.blocks @ problem.target
     weights = problem.block_weights(target, images.counts.to(target), images.blocks)
-    matrix = images.blocks.matrix
-    # Blocks do not reach over views: their first pixel says which one they are of.
-    views = problem.views.view_of[matrix.col_indices()[matrix.crow_indices()[:-1].long()].long()]
+    views = view_of_blocks(images.blocks, problem.views)
     return problem.with_exposures(rough_exposures(images.images, target, weights, views, len(problem.exposures)))
 
 
@@ -219,8 +217,8 @@ class _Search:
             return candidates.rigs(lights, count, self.region.size)
         half = max(1, count // 2)
         extended = candidates.extended(previous, half, self.region.size)
-        fresh = candidates.rigs(lights, half, self.region.size)
-        return [rig for pair in zip_longest(extended, fresh) for rig in pair if rig is not None]
+        from_nothing = candidates.rigs(lights, half, self.region.size)
+        return [rig for pair in zip_longest(extended, from_nothing) for rig in pair if rig is not None]
 
     def _refined(self, rigs: Sequence[Rig], batches: int) -> State:
         """The best of several starts after a few steps each; of `batches` parts the next ones only if need be.
