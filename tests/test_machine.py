@@ -1,7 +1,7 @@
 """What a result says of the memory that it took.
 
-Each test measures in an interpreter of its own: in the one that runs all tests, memory of earlier ones may be given back
-at any moment and hide what is taken.
+Each test measures in an interpreter of its own: in the one that runs all tests, memory of earlier ones may be given
+back at any moment and hide what is taken.
 """
 
 from __future__ import annotations
