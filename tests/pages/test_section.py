@@ -26,11 +26,14 @@ def test_the_report_shows_galleries_before_the_training_and_the_rest_after_the_f
     )
     contents = dataclasses.replace(full_contents, galleries=[gallery], sections=[track])
     page = report.render_report(contents)
-    places = [page.index(f'id="{name}"') for name in ("scene", "made", "trained", "fits", "track", "targets")]
+    places = [
+        page.index(f'id="{name}"') for name in ("scene", "generated", "made", "trained", "fits", "track", "targets")
+    ]
     assert places == sorted(places)
     assert '<a href="#track">Lights that move</a>' in page
     assert "rig_0 &lt;one&gt;" in page and '<td class="text">light 1</td><td>24</td>' in page
-    assert 'id="made"' not in report.render_report(full_contents)
+    assert '<a href="#generated">Generated targets</a>' in page
+    assert 'id="generated"' not in report.render_report(full_contents)
 
 
 def test_lights_of_shown_targets_are_numbered_in_both_drawings_and_spots_have_an_axis() -> None:

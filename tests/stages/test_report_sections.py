@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -44,19 +45,26 @@ def config(root: Path) -> RgspipeConfig:
     return with_changes(RgspipeConfig(), {"stage": "report", "scene.name": "room", "outputs": str(root)})
 
 
-def build(root: Path, stage: str, fingerprint: str, make: Callable[[Path], None], **facts: object) -> Artifact:
+def build(
+    root: Path,
+    stage: str,
+    fingerprint: str,
+    make: Callable[[Path], None],
+    count: Sequence[int] = (2, 2),
+    **facts: object,
+) -> Artifact:
     def whole(folder: Path) -> dict:
         make(folder)
         return facts
 
-    recipe = {"config": {"targets.count": [2, 2]}, "inputs": {"freeze": ["f1"]}, "code": {}}
+    recipe = {"config": {"targets.count": list(count)}, "inputs": {"freeze": ["f1"]}, "code": {}}
     return ArtifactStore(root).build(Key("room", stage, fingerprint), recipe, whole)[0]
 
 
-def _targets(folder: Path, count: int) -> None:
+def _targets(folder: Path, count: int, rig: LightRig = RIG) -> None:
     views = [torch.rand(RESOLUTION, RESOLUTION, 3, generator=torch.Generator().manual_seed(k)) for k in range(2)]
     names = [f"rig_{index:04d}" for index in range(count)]
-    write_targets(folder, dict.fromkeys(names, views), dict.fromkeys(names, RIG))
+    write_targets(folder, dict.fromkeys(names, views), dict.fromkeys(names, rig))
     listed = (folder / "targets" / "targets.json").read_text().replace("visible", "unknown")
     (folder / "targets" / "targets.json").write_text(listed)
 
@@ -81,14 +89,32 @@ def test_generated_targets_are_numbered_on_the_plan_and_beside_it(tmp_path: Path
     build(tmp_path, "generate_targets", "01", lambda folder: _targets(folder, 2), kind="mixed")
     build(tmp_path, "generate_targets", "02", lambda folder: _targets(folder, 6), kind="mixed")
     (section,) = found_galleries(config(tmp_path), room_surfels())
-    assert section.title == "Generated targets: points and spots" and section.words[0].startswith(
-        "6 targets of 2 lights"
-    )
+    assert section.title == "Points and spots, 2 a target" and section.words[0].startswith("6 targets, each seen by 2")
     assert len(section.shots) == report_sections.SHOWN and len(section.drawings) == 1
     assert section.shots[0].caption.startswith("1 · rig_0000, mixed: light at (0.10, 0.20, 0.30)")
     assert "spot at (−0.20, 0.00, 0.30)" in section.shots[0].caption
     assert found_galleries(config(tmp_path), None) == []
     assert [path.parent.name for path in section_files(config(tmp_path))] == ["02"]
+
+
+def test_lights_of_large_rigs_are_counted_instead_of_listed(tmp_path: Path) -> None:
+    rig = (*RIG, *RIG, RIG[0])
+    build(tmp_path, "generate_targets", "01", lambda folder: _targets(folder, 1, rig), kind="mixed")
+    (section,) = found_galleries(config(tmp_path), room_surfels())
+    assert section.shots[0].caption == "1 · rig_0000, mixed: 3 point lights and 2 spots"
+
+
+def test_generated_targets_are_in_the_order_of_kinds_and_numbers_of_lights(tmp_path: Path) -> None:
+    for fingerprint, kind, count in (("01", "track", 2), ("02", "spots", 1), ("03", "points", 2), ("04", "points", 1)):
+        make = partial(_targets, count=1, rig=RIG[:1] * count)
+        build(tmp_path, "generate_targets", fingerprint, make, count=[count, count], kind=kind)
+    titles = [section.title for section in found_galleries(config(tmp_path), room_surfels())]
+    assert titles == [
+        "Point lights, 1 a target",
+        "Point lights, 2 a target",
+        "Spots, 1 a target",
+        "Headlights of a car that drives around the bend, 2 a target",
+    ]
 
 
 def test_courses_and_tracks_are_shown_with_what_was_measured(tmp_path: Path) -> None:

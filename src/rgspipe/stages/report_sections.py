@@ -19,17 +19,20 @@ from rgspipe.pages.gallery import Shot, light_words, picture, spread
 from rgspipe.pages.html import decimals, label, percent
 from rgspipe.pages.section import Section
 from rgspipe.pages.targets_figure import targets_figure
-from rgspipe.scene import Surfels
+from rgspipe.scene import LightRig, SpotLight, Surfels
 
 #: Generated targets that are shown of each kind.
 SHOWN = 4
 
-#: What the lights of each kind of generated targets are.
+#: Most lights of a target that are named one by one.
+NAMED = 2
+
+#: What the lights of each kind of generated targets are, in the order in which they are shown.
 KINDS = {
-    "points": "point lights",
-    "spots": "spots",
-    "mixed": "points and spots",
-    "track": "the headlights of a car that drives around the bend",
+    "points": "Point lights",
+    "spots": "Spots",
+    "mixed": "Points and spots",
+    "track": "Headlights of a car that drives around the bend",
 }
 
 
@@ -40,7 +43,7 @@ def section_files(config: RgspipeConfig) -> list[Path]:
 
 
 def found_galleries(config: RgspipeConfig, surfels: Surfels | None) -> list[Section]:
-    """Of each kind and number of lights the newest generated targets."""
+    """Of each kind and number of lights the newest generated targets, kind by kind, from few lights to many."""
     return [] if surfels is None else [_targets(made, surfels) for made in _generated(config)]
 
 
@@ -70,26 +73,34 @@ def _targets(made: Artifact, surfels: Surfels) -> Section:
         surfels.normals,
         origins,
     )
-    kind = str(made.facts["kind"])
     shots = []
     for target in chosen:
         rig, number = rigs[target.name], numbered[target.name]
         name = label(class_of(target.occlusion, len(rig)))
-        words = f"{number} · {target.name}, {name}: {light_words(rig)}"
+        words = f"{number} · {target.name}, {name}: {_rig_words(rig)}"
         shots.append(Shot(words, f"target {target.name}, {name}", picture(target.views[0])))
-    many = sorted({len(rig) for rig in rigs.values()})
-    counted = f"{many[0]}" if len(many) == 1 else f"{many[0]} to {many[-1]}"
     return Section(
         f"generated-{made.fingerprint}",
-        f"Generated targets: {KINDS.get(kind, kind)}",
-        [
-            f"{len(targets)} targets of {counted} light{'s' if many[-1] > 1 else ''} each, seen by "
-            f"{len(targets[0].views)} cameras: sums of path-traced images of single lights. "
-            "Each picture is the first camera’s, exposed for itself."
-        ],
+        _title(str(made.facts["kind"]), sorted({len(rig) for rig in rigs.values()})),
+        [f"{len(targets)} targets, each seen by {len(targets[0].views)} cameras."],
         drawings=[Shot("", "lights of the targets, from above and from the side", png_of(figure, dpi=120))],
         shots=shots,
     )
+
+
+def _title(kind: str, counts: list[int]) -> str:
+    """Kind and numbers of the lights of generated targets: "Spots, 1 to 3 a target"."""
+    many = f"{counts[0]} to {counts[-1]}" if len(counts) > 1 else f"{counts[0]}"
+    return f"{KINDS.get(kind, kind)}, {many} a target"
+
+
+def _rig_words(rig: LightRig) -> str:
+    """The lights of a target; of many only how many."""
+    if len(rig) <= NAMED:
+        return light_words(rig)
+    spots = sum(isinstance(light, SpotLight) for light in rig)
+    counted = [(len(rig) - spots, "point light"), (spots, "spot")]
+    return " and ".join(f"{count} {name}{'s' if count > 1 else ''}" for count, name in counted if count)
 
 
 def _courses(made: Artifact, remark: str) -> Section:
@@ -152,11 +163,13 @@ def _remark(made: Artifact, freeze: Artifact | None) -> str:
 
 def _generated(config: RgspipeConfig) -> list[Artifact]:
     newest = _newest(config, "generate_targets", lambda made: f"{made.facts['kind']} {_count(made)}")
-    return [newest[name] for name in sorted(newest)]
+    order = {kind: place for place, kind in enumerate(KINDS)}
+    return sorted(newest.values(), key=lambda made: (order.get(str(made.facts["kind"]), len(order)), _count(made)))
 
 
-def _count(made: Artifact) -> object:
-    return made.manifest["config"].get("targets.count")
+def _count(made: Artifact) -> list[int]:
+    """Fewest and most lights of generated targets."""
+    return list(made.manifest["config"].get("targets.count") or ())
 
 
 def _newest(
