@@ -11,7 +11,7 @@ import torch
 from lit_room import HIDDEN, room_cameras
 from rgspipe import fit_lights
 from rgspipe.fitting import Effects
-from rgspipe.fitting.advice import MOST_VIEWS, coarse_camera, suggest_views
+from rgspipe.fitting.advice import COMMON, MOST_VIEWS, coarse_camera, suggest_views
 from rgspipe.scene import Camera, PointLight, look_at
 
 
@@ -48,15 +48,16 @@ def test_the_present_uncertainty_is_the_fits_own(room, fitted):
     assert "no other camera" in advice.words([])
 
 
-def test_without_errors_of_the_model_the_same_view_again_halves_the_variance(room, fitted):
-    """Noise averages out over views; an error of the model, which all views share, does not."""
+def test_a_view_more_halves_what_is_not_common_to_views(room, fitted):
+    """Noise averages out over views, and so do errors of the model but for the share that all views have in common."""
     camera = room_cameras(48)[0]
     noise_only = replace(fitted, covariance=fitted.noise_covariance)
     again = suggest_views(room.frozen, noise_only, [camera], [camera], wanted=0.0)
     assert again.ranked[0].position_sd == pytest.approx(again.present_sd / math.sqrt(2.0), rel=1e-6)
     model_only = replace(fitted, noise_covariance=tuple(0.0 * matrix for matrix in fitted.covariance))
-    again = suggest_views(room.frozen, model_only, [camera], [camera], wanted=0.0)
-    assert again.ranked[0].position_sd == pytest.approx(again.present_sd, rel=1e-6)
+    again = suggest_views(room.frozen, model_only, [camera], [camera, camera], wanted=0.0)
+    left = [math.sqrt(COMMON + (1.0 - COMMON) / views) * again.present_sd for views in (2, 3)]
+    assert [view.position_sd for view in again.plan] == pytest.approx(left, rel=1e-6)
 
 
 def test_noise_is_predicted_as_a_fit_of_both_views_finds_it(room, point_light):
