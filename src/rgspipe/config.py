@@ -619,6 +619,9 @@ class RelightConfig:
     indices: list[int] | None = option(
         None, "these of the cameras; by default all, for a sweep the first", low=0, high=100000
     )
+    resolution: int | None = option(
+        None, "width of the images, pixels; by default that of the cameras' own; not beside truth", low=8, high=8192
+    )
     sweep: str = option(
         "none",
         "a spot that turns at its place, or goes around the scene, as a strip and a video",

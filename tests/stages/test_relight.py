@@ -26,6 +26,7 @@ from rgspipe.fitting.problem import Effects
 from rgspipe.scene import LightRig, PointLight, SpotLight
 from rgspipe.stages import relight
 from rgspipe.stages.base import Need, StageContext
+from rgspipe.stages.relight_scene import resized
 
 
 def vector(*values: float) -> torch.Tensor:
@@ -125,7 +126,7 @@ def test_a_sweep_is_a_strip_a_video_and_a_table(inputs, tmp_path: Path, sweep: s
     with Image.open(io.BytesIO((tmp_path / "out" / "sweep.webp").read_bytes())) as video:
         assert video.n_frames == frames
     with Image.open(tmp_path / "out" / "strip.png") as strip:
-        assert strip.width == 5 * 32 + 4 * 4 and strip.height == 32
+        assert strip.width == 4 * 32 + 3 * 4 and strip.height == 2 * 32 + 4
 
 
 def test_places_and_cone_of_a_sweep_are_those_of_the_configuration(inputs, tmp_path: Path) -> None:
@@ -136,6 +137,25 @@ def test_places_and_cone_of_a_sweep_are_those_of_the_configuration(inputs, tmp_p
     assert table[["x", "y", "z"]].to_numpy().tolist() == [[0.0, -0.3, 0.4]] * 3
     first = np.array([-0.3, 0.3, -0.9]) / math.sqrt(0.09 + 0.09 + 0.81)
     np.testing.assert_allclose(table[["direction_x", "direction_y", "direction_z"]].to_numpy()[0], first, atol=1e-12)
+
+
+def test_images_of_another_size_see_the_same(inputs, tmp_path: Path) -> None:
+    write_lights(tmp_path / "one.json", RIGS["one"])
+    lights = {"relight__lights": str(tmp_path / "one.json"), "relight__indices": [0]}
+    run(inputs, tmp_path / "small", **lights)
+    run(inputs, tmp_path / "large", relight__resolution=64, **lights)
+    small, large = (read_image(tmp_path / name / "images/one/view_0.exr")[0] for name in ("small", "large"))
+    assert small.shape == (32, 32, 3) and large.shape == (64, 64, 3)
+    means = large.reshape(32, 2, 32, 2, 3).mean(axis=(1, 3))
+    assert np.median(np.abs(means - small)) < 2e-3 * small.mean()  # measured 4e-4
+
+
+def test_cameras_keep_their_field_of_view_at_another_size() -> None:
+    camera = room_cameras(32)[0]
+    larger = resized(camera, 80)
+    points = vector(0.1, 0.2, 0.3).expand(1, 3)
+    np.testing.assert_allclose(larger.project(points)[0], 2.5 * camera.project(points)[0], rtol=1e-12)
+    assert (larger.width, larger.height) == (80, 80)
 
 
 def test_a_sweep_that_lights_nothing_in_sight_is_refused(inputs, tmp_path: Path) -> None:
@@ -173,6 +193,7 @@ def test_cameras_and_ways_that_make_no_sense_are_refused(inputs, tmp_path: Path,
         ({"relight__sweep": "aim", "relight__path__spot__falloff": 3.0}, r"relight\.path\.spot\.falloff"),
         ({"scene__kind": "ply", "scene__path": "x.ply"}, "a scene with images"),
         ({"relight__counts": [2], "fit__target": "here"}, r"fit\.target"),
+        ({"relight__counts": [2], "relight__resolution": 64}, r"relight\.resolution"),
     ],
 )
 def test_configurations_that_make_no_sense_are_refused_before_anything_is_made(changes, words: str) -> None:

@@ -21,7 +21,7 @@ COLUMNS = 6
 #: the single pixels of small ones.
 VIDEO_WIDTH = 384
 #: Quality of a video's frames, of 100.
-VIDEO_QUALITY = 88
+VIDEO_QUALITY = 93
 #: Width of a column of a comparison, inches.
 COLUMN_WIDTH = 1.75
 

@@ -123,6 +123,13 @@ def _check(config: RgspipeConfig) -> None:
             found=" and ".join(given),
             remedy="Run the stage once for each.",
         )
+    if wanted.resolution is not None and shows(wanted) in COMPARED:
+        raise InputError(
+            "relight.resolution",
+            expected="nothing beside truth, whose images have a size of their own",
+            found=str(wanted.resolution),
+            remedy="Generate the targets at another size: targets.resolution.",
+        )
     if wanted.sweep != "none":
         spot_shape(wanted.path.spot, "relight.path.spot")
 

@@ -16,6 +16,7 @@ from rgspipe.datasets.exr import write_image
 from rgspipe.datasets.gs3 import load_target
 from rgspipe.datasets.light_file import write_lights
 from rgspipe.datasets.location import dataset_root, open_dataset
+from rgspipe.datasets.views import View
 from rgspipe.errors import InputError
 from rgspipe.fitting.fit import FitViews, render_rig
 from rgspipe.fitting.problem import Effects
@@ -130,7 +131,7 @@ def _identity(camera: Camera) -> bytes:
 
 
 def configured_cameras(config: RgspipeConfig, folder: Path | None) -> list[Camera]:
-    """The cameras that `relight.views` names.
+    """The cameras that `relight.views` names, with images of `relight.resolution`.
 
     Args:
         folder: the artifact that has the views; None for those of `fit.target`.
@@ -138,11 +139,31 @@ def configured_cameras(config: RgspipeConfig, folder: Path | None) -> list[Camer
     Raises:
         InputError: there are none.
     """
+    width = config.relight.resolution
+    return [view.camera if width is None else resized(view.camera, width) for view in _camera_views(config, folder)]
+
+
+def _camera_views(config: RgspipeConfig, folder: Path | None) -> Sequence[View]:
     split = config.relight.views
     if split == "targets":
-        return [view.camera for view in load_target(_first_target(config, folder)).views]
+        return load_target(_first_target(config, folder)).views
     dataset = open_dataset(folder, train=split == "train", test=split == "test", targets=False)
-    return [view.camera for view in (dataset.train if split == "train" else dataset.test)]
+    return dataset.train if split == "train" else dataset.test
+
+
+def resized(camera: Camera, width: int) -> Camera:
+    """The camera with images `width` pixels across, which see the same, but for the rounding of their height."""
+    height = max(1, round(camera.height * width / camera.width))
+    across, down = width / camera.width, height / camera.height
+    return replace(
+        camera,
+        fx=across * camera.fx,
+        cx=across * camera.cx,
+        fy=down * camera.fy,
+        cy=down * camera.cy,
+        width=width,
+        height=height,
+    )
 
 
 def _first_target(config: RgspipeConfig, folder: Path | None) -> Path:

@@ -29,8 +29,8 @@ from rgspipe.stages.spot_shape import spot_shape
 
 STRIP, VIDEO, TABLE = "strip.png", "sweep.webp", "sweep.csv"
 
-#: Frames of the strip.
-SHOWN = 8
+#: Frames of the strip, and of each of its rows.
+SHOWN, A_ROW = 8, 4
 
 
 def write_sweep(relighter: Relighter, camera: Camera, folder: Path) -> list[float]:
@@ -61,7 +61,7 @@ def write_sweep(relighter: Relighter, camera: Camera, folder: Path) -> list[floa
     # A spot that turns plays forth and back; one that goes around ends where it began.
     turns = wanted.sweep == "aim"
     chosen = spread_frames(len(frames), SHOWN, closed=not turns)
-    save_png(folder / STRIP, grid([frames[index] for index in chosen], SHOWN))
+    save_png(folder / STRIP, grid([frames[index] for index in chosen], A_ROW))
     shown = there_and_back(frames) if turns else frames
     length = wanted.path.seconds * len(shown) / len(frames)
     (folder / VIDEO).write_bytes(video(shown, length))
