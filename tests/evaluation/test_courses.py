@@ -80,3 +80,16 @@ def test_the_figure_draws_each_method_over_steps_and_seconds_and_its_way_twice(t
     measured = [0, 1, 2, 3, 4, 5] if truth else [2, 5]
     assert all(wanted <= colours[index] for index in (*measured, 6, 7))
     assert bool(axes[0].texts) == (not truth)
+    (legend,) = figure.legends
+    marks = ["start", "answer", *(["truth"] if truth else []), "camera"]
+    assert [text.get_text() for text in legend.get_texts()] == ["search_lm", "paper_adam", *marks]
+
+
+def test_a_start_far_outside_is_in_both_drawings_and_a_camera_out_of_sight_has_no_mark() -> None:
+    course = course_table(course_of(_curve(3), TRUTH), TRUTH, 2.0).assign(method="paper_adam", image_error=0.1)
+    course = course.assign(x=[0.5, 1.5, 0.5], y=[0.5, -0.4, 0.5], z=[1.9, 1.0, 1.0])
+    cloud = np.random.default_rng(0).uniform(size=(200, 3))
+    figure = course_figure(course, TRUTH, cloud, np.tile([0.0, 0.0, 1.0], (200, 1)), np.full((1, 3), 9.0))
+    (above, side), way = figure.subfigs[1].axes, course[["x", "y", "z"]].to_numpy()
+    assert all(above.viewLim.contains(x, y) and side.viewLim.contains(x, z) for x, y, z in way)
+    assert "camera" not in [text.get_text() for text in figure.legends[0].get_texts()]

@@ -28,7 +28,7 @@ MEASURES = (
 )
 
 #: A way that leaves the scene is followed so far, fraction of its longest side.
-BEYOND = 0.5
+BEYOND = 1.0
 
 
 def course_figure(
@@ -50,11 +50,11 @@ def course_figure(
             for axis, (name, title) in zip(axes[row], MEASURES, strict=True):
                 _curves(axis, courses, clock, name)
                 axis.set(xlabel=label, title=title if row == 0 else "")
-        _ways(
-            lower.subplots(1, 2), courses, truth, to_array(cloud), to_array(normals), to_array(cameras).reshape(-1, 3)
-        )
+        surfaces, eyes = (to_array(cloud), to_array(normals)), to_array(cameras).reshape(-1, 3)
+        in_sight = _ways(lower.subplots(1, 2), courses, truth, *surfaces, eyes)
         handles = [_handle(str(name)) for name in dict.fromkeys(courses["method"])]
-        figure.legend(handles=[*handles, *_marks()], loc="outside lower center", ncols=len(handles) + 4, fontsize=8.5)
+        handles += _marks(bool(truth), in_sight)
+        figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), fontsize=8.5)
     return figure
 
 
@@ -83,7 +83,8 @@ def _ways(
     points: npt.NDArray,
     facing: npt.NDArray,
     eyes: npt.NDArray,
-) -> None:
+) -> bool:
+    """Draw both panels; whether a camera is in sight."""
     true = np.array([light.position.tolist() for light in truth]).reshape(-1, 3)
     ways = [(str(method), way) for method, course in courses.groupby("method", sort=False) for way in _lights(course)]
     low, high = points.min(axis=0), points.max(axis=0)
@@ -100,6 +101,8 @@ def _ways(
         axis.plot(true[:, across], true[:, up], "+", color=TRUTH, ms=12, mew=1.6, zorder=5)
         axis.plot(eyes[:, across], eyes[:, up], "^", color="#8a9099", ms=6, mew=0)
         frame_panel(axis, title, across, up, low, high)
+    inside = (eyes >= low) & (eyes <= high)
+    return any(bool(inside[:, [across, up]].all(axis=1).any()) for _, across, up in PANELS)
 
 
 def _lights(course: pd.DataFrame) -> list[npt.NDArray]:
@@ -117,10 +120,12 @@ def _handle(method: str) -> Line2D:
     return Line2D([], [], color=_colour(method), ls=DASHES.get(method, "-"), lw=1.8, label=method)
 
 
-def _marks() -> list[Line2D]:
-    return [
+def _marks(truth: bool, cameras: bool) -> list[Line2D]:
+    marks = [
         Line2D([], [], ls="", marker="s", mfc="white", mec=TRUTH, ms=6, label="start"),
         Line2D([], [], ls="", marker="o", color=TRUTH, ms=6, label="answer"),
-        Line2D([], [], ls="", marker="+", color=TRUTH, ms=10, mew=1.6, label="truth"),
-        Line2D([], [], ls="", marker="^", color="#8a9099", ms=6, mew=0, label="camera"),
     ]
+    marks += [Line2D([], [], ls="", marker="+", color=TRUTH, ms=10, mew=1.6, label="truth")] if truth else []
+    return marks + (
+        [Line2D([], [], ls="", marker="^", color="#8a9099", ms=6, mew=0, label="camera")] if cameras else []
+    )

@@ -14,7 +14,7 @@ from rgspipe.evaluation.tables import rig_errors
 from rgspipe.scene import Light, LightRig, PointLight, SpotLight
 
 #: At most so many steps of a fit are looked at: the first ones densely, as most happens there.
-MOST_STEPS = 60
+MOST_STEPS = 150
 
 
 @dataclass(frozen=True)
