@@ -100,6 +100,8 @@ def test_adam_goes_downhill_and_is_deterministic(room, point_light):
     )
     assert one.loss < 0.5 * one.trajectory[0].loss
     assert len(one.trajectory) == 31 and one.iterations == 30 and one.status is FitStatus.MAX_ITERATIONS
+    fell = 100.0 * (1.0 - one.loss / one.trajectory[-1 - SHORT.steps].loss)
+    assert one.reason.startswith(f"All 30 steps were taken; over the last epoch the loss fell by {fell:.0f} %.")
     assert torch.equal(one.lights[0].position, two.lights[0].position)
     assert torch.isfinite(one.covariance[0]).all()
 

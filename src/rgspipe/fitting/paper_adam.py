@@ -171,7 +171,7 @@ def _result(problem: LightProblem, descent: _Descent, status: FitStatus, begin: 
     return FitResult(
         lights=last.lights,
         status=status,
-        reason=f"{REASONS[status]} {doubt}".rstrip(),
+        reason=f"{_ended(descent) if status is FitStatus.MAX_ITERATIONS else REASONS[status]} {doubt}".rstrip(),
         loss=last.loss,
         iterations=len(descent.steps) - 1,
         evaluations=len(emitters) * (len(descent.steps) + 1),
@@ -181,6 +181,15 @@ def _result(problem: LightProblem, descent: _Descent, status: FitStatus, begin: 
         trajectory=tuple(descent.steps),
         noise_covariance=spread.noise,
     )
+
+
+def _ended(descent: _Descent) -> str:
+    """What the last epoch brought: the method takes all of its steps, whether the loss still falls or not."""
+    losses = [step.loss for step in descent.steps]
+    before = losses[-min(len(losses), descent.options.steps + 1)]
+    change = 100.0 * (losses[-1] / before - 1.0) if before > 0.0 else 0.0
+    words = "hardly changed" if abs(change) < 1.0 else f"{'fell' if change < 0.0 else 'rose'} by {abs(change):.0f} %"
+    return f"All {len(losses) - 1} steps were taken; over the last epoch the loss {words}."
 
 
 def _stalled(steps: list[Step], index: int, options: AdamOptions) -> bool:
