@@ -53,3 +53,8 @@ def test_a_video_is_inside_the_page_unless_it_is_too_large() -> None:
     assert kind == "data:image/webp" and base64.b64decode(content) == clip and not shown["too_long"]
     (shown,) = relightings([Relighting("aim", PNG, 9.0, video=b"0" * (VIDEO_BYTES + 1))])
     assert shown["video"] is None and shown["too_long"]
+
+
+def test_pictures_that_are_wider_than_the_page_are_made_smaller_smoothly() -> None:
+    wide = Relighting("aim", png_bytes(np.zeros((2, 1500, 3), np.uint8)), 9.0)
+    assert [one["smooth"] for one in relightings([wide, Relighting("aim", PNG, 9.0)])] == [True, False]

@@ -13,6 +13,9 @@ from rgspipe.pages.html import data_address, decimals, picture_address
 #: Most bytes of a picture and of a video, before they are encoded as text.
 PICTURE_BYTES, VIDEO_BYTES = 700_000, 1_500_000
 
+#: Pictures that are wider than the page, in pixels, are made smaller smoothly; single pixels of others stay sharp.
+PAGE_WIDTH = 980
+
 #: The kinds of relighting in the order in which they are shown: what each is called, and what it is.
 KINDS = {
     "counts": (
@@ -76,6 +79,7 @@ def _shown(one: Relighting) -> dict[str, Any]:
         "words": words,
         "remark": one.remark,
         "drawn": one.summary is not None,
+        "smooth": _width(one.png) > PAGE_WIDTH,
         "source": picture_address(one.png, PICTURE_BYTES),
         "alt": ALT[one.kind],
         "caption": f"{one.words}{'; ' if one.words else ''}{decimals(one.milliseconds, 1)} ms an image",
@@ -83,3 +87,8 @@ def _shown(one: Relighting) -> dict[str, Any]:
         "too_long": one.video is not None and not fits,
         "rows": [] if one.summary is None else one.summary.to_dict("records"),
     }
+
+
+def _width(png: bytes) -> int:
+    """Pixels across, from the file's header."""
+    return int.from_bytes(png[16:20], "big")
