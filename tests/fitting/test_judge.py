@@ -8,7 +8,17 @@ import pytest
 import torch
 
 from lit_room import HIDDEN, VISIBLE
-from rgspipe.fitting.judge import best_state, drop, equally_good, rig_distance, worth_keeping
+from rgspipe.fitting.judge import (
+    FAINT,
+    FAINT_DROP,
+    LEAST_DROP,
+    best_state,
+    drop,
+    equally_good,
+    rig_distance,
+    worth_keeping,
+    worth_one_more,
+)
 from rgspipe.fitting.parameters import Emitter
 from rgspipe.fitting.problem import LightProblem
 from rgspipe.fitting.refine import ROBUST, State, start_from
@@ -40,6 +50,28 @@ def test_the_true_light_is_better_than_another(problem: LightProblem) -> None:
 def test_a_light_more_than_there_are_gains_next_to_nothing(problem: LightProblem) -> None:
     one, two = state(problem, VISIBLE), state(problem, VISIBLE, HIDDEN)
     assert abs(drop(problem, one, two)) < 0.01  # measured 4e-5
+
+
+def lit_by_two(room, point_light, strength: float, noise: float) -> tuple[float, float, bool]:
+    """The hidden light at `strength` beside the visible one: its share, by how much it lowers the cost, the verdict."""
+    first, second = (room.images(point_light(place))[0] for place in (VISIBLE, HIDDEN))
+    image = first + strength * second
+    grain = torch.randn(image.shape, generator=torch.Generator().manual_seed(0))
+    stacked = room.one.prepared.stack_images([image * (1.0 + noise * grain)])
+    problem = LightProblem.create(room.one.prepared, stacked)
+    one, two = state(problem, VISIBLE), state(problem, VISIBLE, HIDDEN)
+    share = float(strength * second.mean() / image.mean())
+    return share, drop(problem, one, two), worth_one_more(problem, one, two)
+
+
+def test_a_faint_light_must_explain_more_than_a_bright_one(room, point_light) -> None:
+    """One at 17 % of the energy is taken for what lowers the cost by 31 %, one at 4 % is not, but for 84 %."""
+    share, gain, there = lit_by_two(room, point_light, strength=0.25, noise=0.1)
+    assert share > FAINT and LEAST_DROP < gain < FAINT_DROP and there  # measured 0.167, 0.309
+    share, gain, there = lit_by_two(room, point_light, strength=0.05, noise=0.03)
+    assert share < FAINT and LEAST_DROP < gain < FAINT_DROP and not there  # measured 0.039, 0.258
+    share, gain, there = lit_by_two(room, point_light, strength=0.05, noise=0.003)
+    assert share < FAINT and gain > FAINT_DROP and there  # measured 0.039, 0.838
 
 
 def test_rigs_within_the_noise_are_equally_good(problem: LightProblem) -> None:

@@ -14,6 +14,8 @@ from rgspipe.fitting.exposure import rough_exposures
 from rgspipe.fitting.judge import (
     CLEARLY_APART,
     DOUBTFUL_DROP,
+    FAINT,
+    FAINT_DROP,
     LEAST_DROP,
     best_state,
     drop,
@@ -22,6 +24,7 @@ from rgspipe.fitting.judge import (
     rig_distance,
     robust_losses,
     worth_keeping,
+    worth_one_more,
 )
 from rgspipe.fitting.parameters import Emitter
 from rgspipe.fitting.problem import LightProblem
@@ -180,7 +183,7 @@ class _Search:
             if best is not None and drop(self.coarse, best, state) < 0.5 * LEAST_DROP:
                 break
             refine(self.coarse, state, ROBUST, 2 * SHORT_ITERATIONS, self.region, self.begin)
-            if best is not None and drop(self.coarse, best, state) < LEAST_DROP:
+            if best is not None and not worth_one_more(self.coarse, best, state):
                 break
             best, rivals = state, self.rivals
         self.rivals = rivals
@@ -355,5 +358,10 @@ def _one_more(count: int, costs: Mapping[int, float]) -> str:
     share = 1.0 - costs[count + 1] / costs[count]
     if share <= DOUBTFUL_DROP:
         return ""
-    shares = f"{100.0 * share:.0f} %: there may be one (it counts from {100.0 * LEAST_DROP:.0f} % on)"
-    return f"One more light would lower the cost by {shares}."
+    limits = f"from {_percent(LEAST_DROP)} on, of a light with less than {_percent(FAINT)} of the energy from "
+    limits += f"{_percent(FAINT_DROP)} on"
+    return f"One more light would lower the cost by {_percent(share)}: there may be one (it counts {limits})."
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.0f} %"
