@@ -11,7 +11,7 @@ import scipy.optimize
 import torch
 
 from lit_room import HIDDEN, VISIBLE
-from rgspipe.fitting.combinations import Scored, best_combinations, best_pairs, extensions
+from rgspipe.fitting.combinations import Scored, best_combinations, best_pairs, bright_gains, extensions
 from rgspipe.fitting.problem import LightProblem
 from rgspipe.fitting.spot_candidates import AXES, spot_candidates
 from rgspipe.renderer.point_sets import fibonacci_directions
@@ -98,3 +98,21 @@ def test_a_spot_candidate_near_the_truth_explains_most(room) -> None:
     distance = min(float((coarse.positions[k].double() - place).norm()) for (k,) in ranked)
     turn = max(float(coarse.axes[k].double() @ axis) for (k,) in ranked)
     assert distance < 0.25 and turn > math.cos(math.radians(25.0))
+
+
+def test_a_narrow_pool_decides_by_plain_squares(room) -> None:
+    """Of a narrow spot the candidate that explains the bright pool comes first by plain squares."""
+    shape = SpotShape("gaussian", math.radians(10.0), 0.1)
+    prepared = room.two.prepared
+    coarse = spot_candidates(prepared, room.dictionary, [shape])
+    emitter = coarse.emitter(int(coarse.square.sum(dim=1).argmax()))
+    ones = torch.ones(3, dtype=torch.float64)
+    light = SpotLight(emitter.position, ones, emitter.axis, shape.profile, shape.cone_angle, shape.falloff)
+    images = [room.frozen.render(view, (light,)) for view in room.views]
+    problem = LightProblem.create(prepared, prepared.stack_images(images))
+    gains = bright_gains(problem, coarse)
+    (best,) = gains.topk(1).indices.tolist()
+    assert float((coarse.positions[best].double() - emitter.position).norm()) < 0.25
+    assert float(coarse.axes[best].double() @ emitter.axis) > math.cos(math.radians(25.0))
+    # The rims of candidates are wider; measured 0.89.
+    assert 0.8 < float(gains[best]) <= 1.0

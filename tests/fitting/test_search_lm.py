@@ -12,8 +12,10 @@ from lit_room import HIDDEN, VISIBLE
 from rgspipe import fit_lights
 from rgspipe.errors import InputError
 from rgspipe.fitting import FitStatus, SearchOptions, prepare_fit
+from rgspipe.fitting.parameters import Emitter
 from rgspipe.fitting.problem import LightProblem
 from rgspipe.fitting.refine import search_region
+from rgspipe.fitting.search_lm import fit_from
 
 
 def _errors(result, light):
@@ -103,9 +105,10 @@ def test_a_light_that_no_candidate_explains_stays_finite(room):
 
 
 def test_too_few_iterations_are_said_so(room, point_light):
-    result = fit_lights(
-        room.frozen, room.one, room.images(point_light(HIDDEN)), search=SearchOptions(starts=1, iterations=1)
-    )
+    prepared = room.one.prepared
+    problem = LightProblem.create(prepared, prepared.stack_images(room.images(point_light(HIDDEN))))
+    start = Emitter(torch.tensor(HIDDEN, dtype=torch.float64) + 0.02)
+    result = fit_from(problem, [start], iterations=1)
     assert result.status is FitStatus.MAX_ITERATIONS and "more" in result.reason
 
 

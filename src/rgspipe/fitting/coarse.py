@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import torch
 from torch import Tensor
@@ -39,6 +40,12 @@ class CoarseImages:
 
     def __len__(self) -> int:
         return len(self.positions)
+
+    @cached_property
+    def square(self) -> Tensor:
+        """(C, 3) float64 squared length of each image, every block as often as it has pixels."""
+        counts = self.counts.to(self.images)
+        return torch.einsum("kbc,kbc,b->kc", self.images, self.images, counts).double()
 
     def emitter(self, index: int, cone_free: bool = False) -> Emitter:
         """The candidate `index`."""

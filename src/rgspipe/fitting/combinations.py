@@ -67,6 +67,16 @@ def single_gains(scored: Scored) -> Tensor:
     return torch.where(reached, explained, 0.0).sum(dim=1) / scored.energy
 
 
+def bright_gains(problem: LightProblem, coarse: CoarseImages) -> Tensor:
+    """(C,) `single_gains` of plain squares, in which bright blocks count more than dim ones."""
+    target = coarse.blocks @ problem.target
+    counts = coarse.counts.to(target)
+    product = torch.einsum("kbc,bc->kc", coarse.images, counts[:, None] * target).double().clamp(min=0.0)
+    reached = coarse.square > 0
+    explained = torch.where(reached, product.square() / torch.where(reached, coarse.square, 1.0), 0.0)
+    return explained.sum(dim=1) / float((counts[:, None] * target.square()).sum())
+
+
 def best_pairs(scored: Scored, count: int) -> list[tuple[int, int]]:
     """The `count` pairs of candidates that explain most of the target, best first; all pairs are tried."""
     gains = torch.zeros((len(scored.square),) * 2, dtype=torch.float64)

@@ -14,6 +14,7 @@ from rgspipe.fitting.capture import SATURATED, ImageCapture, rounding_noise
 from rgspipe.fitting.differences import central_differences
 from rgspipe.fitting.exposure import ExposedMoments, best_factors, moments_by_view
 from rgspipe.fitting.gloss import seen_with_gloss
+from rgspipe.fitting.lit_shares import LEAST_LIT, lit_shares
 from rgspipe.fitting.moments import Moments, moments
 from rgspipe.fitting.parameters import Emitter, share_slopes, shared
 from rgspipe.fitting.spot_harmonics import BandLimit, fitted_share
@@ -21,6 +22,7 @@ from rgspipe.fitting.views import PreparedViews
 from rgspipe.renderer.direct import unit_irradiance
 from rgspipe.renderer.pixel_direct import surfel_shares
 from rgspipe.renderer.sparse import SparseOperator
+from rgspipe.renderer.spot_share import SpotShare
 
 #: In relative weights 1/(y + floor·mean y): pixels darker than this share of the mean count no more than it does.
 RELATIVE_FLOOR = 0.05
@@ -120,10 +122,11 @@ class LightProblem:
     def _evaluate(self, emitter: Emitter) -> Tensor:
         """`evaluate` with analytic derivatives."""
         frozen = self.views.frozen
+        spot = self._spot(emitter, frozen.bvh.surfels.centers)
+        share, slope = self._shares(emitter.position, spot)
+        lightings = self._on_surfels(emitter, spot, share, slope)
         if self.at_pixels:
-            return self._evaluate_at_pixels(emitter)
-        irradiance, slope = unit_irradiance(frozen.bvh, emitter.position[None], self.effects.shadows)
-        lightings = self._on_surfels(emitter, torch.cat([irradiance[0, :, None], slope[0]], dim=1))
+            return self._seen_at_pixels(emitter, share, slope, lightings)
         if self.blocks is not None:
             return self.blocks.seen(frozen, lightings)
         if frozen.gloss is not None:
@@ -131,31 +134,43 @@ class LightProblem:
         radiance = frozen.radiance(lightings, self.effects.interreflection)
         return _seen(self.views.operator, radiance)
 
-    def _evaluate_at_pixels(self, emitter: Emitter) -> Tensor:
+    def _spot(self, emitter: Emitter, points: Tensor) -> SpotShare | None:
+        """Share of a spot's light towards `points` (N, 3); None for a point light."""
+        if not emitter.is_spot:
+            return None
+        return fitted_share(points, emitter.position, emitter.axis, emitter.shape, emitter.softness, self.effects.spots)
+
+    def _shares(self, position: Tensor, spot: SpotShare | None) -> tuple[Tensor, Tensor]:
+        """Share (N,) of a light that reaches each surfel that it shines on, and its derivative (N, 3)."""
+        bvh, shadows = self.views.frozen.bvh, self.effects.shadows
+        if spot is None or not shadows:
+            return surfel_shares(bvh, position, shadows)
+        return lit_shares(bvh, position, spot.value.abs() > LEAST_LIT)
+
+    def _on_surfels(self, emitter: Emitter, spot: SpotShare | None, share: Tensor, slope: Tensor) -> Tensor:
+        """(N, 1 + d) irradiance of a unit light on surfels and its derivatives, at their centres."""
+        factor, factor_slope = unit_irradiance(self.views.frozen.bvh, emitter.position[None], shadows=False)
+        factor, factor_slope = factor[0], factor_slope[0]
+        slope = factor_slope * share[:, None] + factor[:, None] * slope
+        columns = torch.cat([(factor * share)[:, None], slope], dim=1)
+        return columns if spot is None else shared(columns, spot.value, share_slopes(emitter, spot))
+
+    def _seen_at_pixels(self, emitter: Emitter, share: Tensor, slope: Tensor, lightings: Tensor) -> Tensor:
         """`evaluate` with direct light where pixels look; what bounces still starts from surfels' centres."""
         frozen, position = self.views.frozen, emitter.position
-        share, share_slope = surfel_shares(frozen.bvh, position, self.effects.shadows)
-        images = [direct.image(position, share, share_slope) for direct in self.views.pixel_direct]
+        images = [direct.image(position, share, slope) for direct in self.views.pixel_direct]
         for index, highlights in enumerate(self.views.highlights):
-            images[index] = images[index] + highlights.image(position, share, share_slope)
+            images[index] = images[index] + highlights.image(position, share, slope)
         columns = torch.cat(images)[self.views.pixels]
-        if emitter.is_spot:
-            columns = _times_share(emitter, self.views.points, columns, self.effects.spots)
+        spot = self._spot(emitter, self.views.points) if emitter.is_spot else None
+        if spot is not None:
+            columns = shared(columns, spot.value, share_slopes(emitter, spot))
         if not self.effects.interreflection:
             return columns
-        factor, slope = unit_irradiance(frozen.bvh, position[None], shadows=False)
-        slope = slope[0] * share[:, None] + factor[0, :, None] * share_slope
-        lightings = self._on_surfels(emitter, torch.cat([(factor[0] * share)[:, None], slope], dim=1))
         if frozen.gloss is not None:
             return columns + seen_with_gloss(self.views, position, lightings, True, bounced_only=True)
         bounced = frozen.radiance(lightings) - frozen.radiance(lightings, indirect=False)
         return columns + _seen(self.views.operator, bounced)
-
-    def _on_surfels(self, emitter: Emitter, lightings: Tensor) -> Tensor:
-        """A point light's irradiance and derivatives (N, 4), as the emitter's (N, 1 + d)."""
-        if not emitter.is_spot:
-            return lightings
-        return _times_share(emitter, self.views.frozen.bvh.surfels.centers, lightings, self.effects.spots)
 
     def sharpest(self) -> LightProblem:
         """The same problem with direct light where pixels look, if the views were made ready for that."""
@@ -248,12 +263,6 @@ class LightProblem:
         """Σ (target − image)² / Σ target², the loss that is reported: 0 is a perfect fit, 1 a black image."""
         energy = float(self.target.double().square().sum())
         return float(self.residual(columns, intensity).double().square().sum()) / energy if energy > 0.0 else 0.0
-
-
-def _times_share(emitter: Emitter, points: Tensor, columns: Tensor, band: BandLimit | None) -> Tensor:
-    """A point light's columns (N, …, 4) at `points` (N, 3) as those of a spot, (N, …, 1 + d)."""
-    share = fitted_share(points, emitter.position, emitter.axis, emitter.shape, emitter.softness, band)
-    return shared(columns, share.value, share_slopes(emitter, share))
 
 
 def _seen(operator: SparseOperator, radiance: Tensor) -> Tensor:

@@ -23,6 +23,9 @@ LONGEST_STEP, LONGEST_TURN = 0.12, 0.3
 #: A step below this part of the scene's size, and this angle, ends a refinement.
 SHORTEST_STEP = 2e-5
 
+#: A step that is expected to lower the cost by less than this share of it ends a refinement, too.
+LEAST_GAIN = 1e-6
+
 #: Damping: at first, when a step succeeds, when it fails; and how often it may fail in a row.
 DAMPING, EASED, RAISED, ATTEMPTS = 1e-2, 0.2, 6.0, 5
 
@@ -178,7 +181,10 @@ def _attempt(
     matrix, direction = matrix * units[:, None] * units[None, :], direction * units
     cost = system.cost
     for _ in range(ATTEMPTS):
-        emitters = _moved(state.emitters, _damped_step(matrix, direction, damping, state.emitters), region)
+        step = _damped_step(matrix, direction, damping, state.emitters)
+        if float(2.0 * step @ direction - step @ matrix @ step) < LEAST_GAIN * cost:
+            break
+        emitters = _moved(state.emitters, step, region)
         moved = max(_distance(a, b, region.size) for a, b in zip(emitters, state.emitters, strict=True))
         if moved < 0.01 * SHORTEST_STEP:
             break

@@ -231,8 +231,9 @@ class _Search:
         compared = batches == 1 or self.spec.type == "auto"
         refined, size = [], math.ceil(len(rigs) / batches)
         for first in range(0, len(rigs), size):
+            part, iterations = rigs[first : first + size], self.options.iterations
             started, finished = refine_starts(
-                self.coarse, rigs[first : first + size], self.options.iterations, self.region, self.begin
+                self.coarse, part, iterations, self.region, self.begin, thorough=first > 0
             )
             self.states += started
             refined += finished

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
 
 import torch
 from torch import Tensor
@@ -13,6 +14,7 @@ from rgspipe.fitting.combinations import (
     Scored,
     best_apart,
     best_combinations,
+    bright_gains,
     candidate_costs,
     extensions,
     single_gains,
@@ -54,7 +56,11 @@ class Candidates:
         return tuple(self.coarse.emitter(index, self.cone_free) for index in combination)
 
     def rigs(self, lights: int, count: int, size: float) -> list[Rig]:
-        """At most `count` rigs of `lights` candidates each that explain most, clearly different ones, best first."""
+        """At most `count` rigs of `lights` candidates each that explain most, clearly different ones, best first.
+
+        Of single spots those that explain most of dim and bright parts alike take turns with those of plain squares,
+        which a narrow cone's pool decides.
+        """
         if lights == 1 and self.coarse.axes is None:
             costs = candidate_costs(self.scored)
             costs = torch.where(costs < 1.0, costs, torch.inf)
@@ -63,7 +69,13 @@ class Candidates:
                 self.emitters([k]) for k in best_apart(costs, self.coarse.positions.cpu(), count, SEPARATION * size)
             ]
         combinations = best_combinations(self.scored, self.coarse.positions, lights, VARIETY * count)
-        return different((self.emitters(combination) for combination in combinations), count, SEPARATION * size)
+        rigs = different((self.emitters(combination) for combination in combinations), count, SEPARATION * size)
+        if lights > 1:
+            return rigs
+        bright = bright_gains(self.problem, self.coarse).topk(min(VARIETY * count, len(self.coarse))).indices
+        pools = different((self.emitters([index]) for index in bright.tolist()), count, SEPARATION * size)
+        both = [rig for pair in zip_longest(rigs, pools) for rig in pair if rig is not None]
+        return different(both, count, SEPARATION * size)
 
     def extended(self, state: State, count: int, size: float) -> list[Rig]:
         """At most `count` rigs: the lights of a refined one and one candidate more."""
