@@ -560,10 +560,11 @@ class TrackConfig:
         None, "a folder whose targets/ are the frames, in order; by default those of generate_targets, kind=track"
     )
     lost: float = option(
-        2.0, "a frame that is so many times worse explained than those before is searched anew", low=1, high=1000
+        2.0, "a frame that is so many times worse explained than those next to it is searched anew", low=1, high=1000
     )
     iterations: int = option(15, "most Levenberg-Marquardt steps of a frame", low=1, high=10000)
-    back: bool = option(True, "follow frames without a sure answer back from those after them")
+    searches: int = option(6, "most frames that are searched from nothing", low=1, high=10000)
+    together: bool = option(False, "the lights are carried by one thing, such as a car: they move and turn together")
 
 
 @dataclass

@@ -1,4 +1,4 @@
-"""Moving lights: a sequence of frames of a fixed scene, each fit started from the last."""
+"""Moving lights: a sequence of frames of a fixed scene, followed both ways from the frame that is easiest to search."""
 
 from __future__ import annotations
 
@@ -13,13 +13,16 @@ from torch import Tensor
 
 from rgspipe.fitting.capture import ImageCapture
 from rgspipe.fitting.fit import FitViews, fit_lights
+from rgspipe.fitting.motion import Motion
 from rgspipe.fitting.parameters import Emitter
 from rgspipe.fitting.problem import LightProblem
-from rgspipe.fitting.result import REASONS, FitResult, FitStatus
+from rgspipe.fitting.result import FitResult, FitStatus, dark_result
 from rgspipe.fitting.schedule import soft
-from rgspipe.fitting.search_lm import SearchOptions, fit_from
+from rgspipe.fitting.search_lm import SearchOptions
 from rgspipe.fitting.spec import LightSpec
-from rgspipe.fitting.starts import Rig
+from rgspipe.fitting.tracked_fit import Followed, follow, observed
+from rgspipe.fitting.twins import split_lights
+from rgspipe.fitting.uncertainty import IN_DOUBT
 from rgspipe.progress import track
 from rgspipe.scene import LightRig
 
@@ -29,12 +32,8 @@ SMALL_COST = 1e-3
 #: The cost of a frame is judged by the median of so many frames before it.
 REMEMBERED = 5
 
-
-#: Of two answers to a frame the one from a search with a single answer wins, unless it costs so many times the other.
-AS_GOOD = 1.1
-
-#: Results with one answer, which a track may go on from.
-ONE_ANSWER = (FitStatus.CONVERGED, FitStatus.UNDETERMINED, FitStatus.MAX_ITERATIONS)
+#: Results with one answer that the images tell.
+SURE = (FitStatus.CONVERGED, FitStatus.MAX_ITERATIONS)
 
 #: A light with less than this part of the strongest one's intensity explains nothing: it may be anywhere.
 FAINT = 0.02
@@ -48,8 +47,9 @@ class FrameStatus(StrEnum):
 
     SEARCHED = "searched"
     TRACKED = "tracked"
-    REDETECTED = "redetected"
     TRACED_BACK = "traced_back"
+    REDETECTED = "redetected"
+    UNCERTAIN = "uncertain"
     LOST = "lost"
 
 
@@ -58,14 +58,16 @@ class TrackOptions:
     """How a sequence is followed.
 
     Attributes:
-        lost: a frame whose cost rises beyond so many times that of the frames before is searched from nothing.
-        iterations: most Levenberg-Marquardt steps of a tracked frame.
-        back: whether frames without a sure answer are followed back from the frames after them.
+        lost: a frame whose cost rises beyond so many times that of the frames next to it is lost, and searched.
+        iterations: most Levenberg-Marquardt steps of a followed frame.
+        searches: most frames that are searched from nothing, those of the beginning and lost ones together.
+        together: whether one thing carries all lights, so that they move and turn together.
     """
 
     lost: float = 2.0
     iterations: int = 15
-    back: bool = True
+    searches: int = 6
+    together: bool = False
 
 
 @dataclass(frozen=True)
@@ -73,21 +75,24 @@ class TrackedFrame:
     """One frame of a track.
 
     Attributes:
-        result: the fit; its lights are in the order of the frames before.
-        status: how they were found; LOST where neither the track nor the search explains the frame.
+        result: the fit; its lights have the same order in all frames. Its status is that of the frame's own images, its
+            covariance that of these and of the frames from which it was followed.
+        status: how they were found. UNCERTAIN where neither the frame's images nor the motion tell the positions to
+            5 % of the scene, or where the track has no sure frame; LOST where nothing explains the frame.
         cost: median of the pixels' residuals over their brightness, 1 without lights.
+        position_errors: per light the error that is to be expected, root mean square over the scene's size.
     """
 
     result: FitResult
     status: FrameStatus
     cost: float
+    position_errors: tuple[float, ...] = ()
 
     @property
     def sure(self) -> bool:
-        """Whether there is one answer, with all of its lights; what follows an unsure frame is unsure, too."""
-        strengths = [float(light.intensity.mean()) for light in self.result.lights]
-        faint = bool(strengths) and min(strengths) < FAINT * max(strengths)
-        return self.status != FrameStatus.LOST and self.result.status in ONE_ANSWER and not faint
+        """Whether the frame's own images tell all of its lights."""
+        known = self.status not in (FrameStatus.LOST, FrameStatus.UNCERTAIN)
+        return known and self.result.status in SURE and not has_faint_light(self.result.lights)
 
 
 def track_lights(
@@ -101,113 +106,196 @@ def track_lights(
 ) -> list[TrackedFrame]:
     """Follow the lights of a sequence.
 
-    The first frame is searched. A later one starts where the lights would be if they went on as between the two frames
-    before, or where they were, whichever explains it better. It is searched from nothing, too, if that ends at the
-    bound, without light, or with a cost beyond `options.lost` times the median of the frames before, or if the frame
-    before has no sure answer; the better one is taken. With `options.back` frames without a sure answer, such as those
-    of a light that is still around the corner, are at last followed back from the frames after them.
+    Frames are searched from nothing in the order of their energy, Σ y² (much where light falls directly on what is
+    seen), until one has a sure answer. From there the lights are followed to the end of the sequence and back to its
+    beginning: each frame is fitted with what the frames before tell of positions, axes, their rates and intensities
+    (`motion`), which counts as far as its own images leave them open. A frame that is lost is fitted from the same
+    start without that, then searched, as long as `options.searches` allows for; one that stays lost is tried once more
+    from its other neighbour.
 
     Args:
         views: made by `prepare_fit` with a dictionary, for the same `spec`.
         frames: per frame one image (H, W, 3) a view.
         capture: of all frames, or one for each.
     """
-    tracker = _Tracker(views, spec or LightSpec(), search or SearchOptions(), options or TrackOptions())
     same = capture is None or isinstance(capture, ImageCapture)
     captures = [capture or ImageCapture()] * len(frames) if same else capture
     taken = list(zip(frames, captures, strict=True))
-    found: list[TrackedFrame] = []
-    for images, how in track(taken, "following lights", unit="frame"):
-        found.append(tracker.follow(found, images, how))
-    return tracker.trace_back(found, taken) if tracker.options.back else found
+    tracker = _Tracker(views, spec or LightSpec(), search or SearchOptions(), options or TrackOptions(), taken)
+    return tracker.run()
 
 
 @dataclass(frozen=True)
+class _Known:
+    """A frame, where the lights go from there, f, and whether the track began at a sure frame."""
+
+    frame: TrackedFrame
+    motion: Motion | None
+    inflation: float
+    anchored: bool
+
+
 class _Tracker:
-    views: FitViews
-    spec: LightSpec
-    search: SearchOptions
-    options: TrackOptions
+    """One sequence and what has been found of it, frame by frame."""
 
-    def follow(self, before: Sequence[TrackedFrame], images: Sequence[Tensor], capture: ImageCapture) -> TrackedFrame:
-        """The next frame."""
-        problem = self._problem(images, capture)
-        seen = [frame for frame in before if frame.result.lights]
-        if not seen:
-            result = self._searched(images, capture)
-            return TrackedFrame(result, FrameStatus.SEARCHED, frame_cost(problem, result.lights))
-        last, limit = seen[-1], self._limit(seen[-REMEMBERED:])
-        # Where the lights were lost or found anew the step before says nothing of the next one.
-        earlier = before[-2] if len(before) > 1 and before[-1].status == FrameStatus.TRACKED else None
-        result = self._tracked(problem, last, earlier)
-        cost = frame_cost(problem, result.lights)
-        if last.sure and cost <= limit and result.status != FitStatus.AT_BOUND:
-            return TrackedFrame(in_order(result, last.result.lights), FrameStatus.TRACKED, cost)
-        other = self._searched(images, capture)
-        status, rival = FrameStatus.REDETECTED, frame_cost(problem, other.lights)
-        bonus = AS_GOOD if not last.sure and other.status in ONE_ANSWER else 1.0
-        if rival >= bonus * cost:
-            status, rival, other = FrameStatus.TRACKED, cost, result if last.sure else _ambiguous(result)
-        if rival > limit:
-            status = FrameStatus.LOST
-        return TrackedFrame(in_order(other, last.result.lights), status, rival)
+    def __init__(
+        self,
+        views: FitViews,
+        spec: LightSpec,
+        search: SearchOptions,
+        options: TrackOptions,
+        taken: Sequence[tuple[Sequence[Tensor], ImageCapture]],
+    ) -> None:
+        self.views, self.spec, self.search, self.options, self.taken = views, spec, search, options, taken
+        self.found: dict[int, _Known] = {}
+        self.left = options.searches
 
-    def trace_back(
-        self, found: Sequence[TrackedFrame], taken: Sequence[tuple[Sequence[Tensor], ImageCapture]]
-    ) -> list[TrackedFrame]:
-        """Frames without a sure answer followed back from those after them, as far as that explains them."""
-        kept = list(found)
-        for index in range(len(kept) - 2, -1, -1):
-            after = kept[index + 1 : index + 1 + REMEMBERED]
-            if kept[index].sure or not after[0].sure:
-                continue
-            problem = self._problem(*taken[index])
-            result = self._tracked(problem, after[0], after[1] if _chained(after) else None)
-            cost = frame_cost(problem, result.lights)
-            if cost <= self._limit(after) and result.status in ONE_ANSWER:
-                kept[index] = TrackedFrame(in_order(result, after[0].result.lights), FrameStatus.TRACED_BACK, cost)
-        return kept
+    def run(self) -> list[TrackedFrame]:
+        """All frames."""
+        start = self._anchor()
+        if start is not None:
+            count = len(self.taken)
+            ways = [*range(start + 1, count), *range(start - 1, -1, -1)]
+            for index in track(ways, "following lights", unit="frame"):
+                self._follow(index, 1 if index > start else -1)
+            for way in (-1, 1):
+                for index in range(count)[::way]:
+                    self._retrace(index, way)
+        dark = TrackedFrame(dark_result(0.0), FrameStatus.LOST, 1.0)
+        return [self.found[index].frame if index in self.found else dark for index in range(len(self.taken))]
 
-    def _problem(self, images: Sequence[Tensor], capture: ImageCapture) -> LightProblem:
+    def _anchor(self) -> int | None:
+        """The frame to follow the lights from: the first sure one, or else the one that is explained best."""
+        tried: dict[int, _Known] = {}
+        for index in search_order([frame_energy(images) for images, _ in self.taken], self.options.searches):
+            self.left -= 1
+            known = self._searched(index, FrameStatus.SEARCHED, None)
+            if known is not None:
+                tried[index] = known
+            if known is not None and known.frame.sure:
+                break
+        if not tried:
+            return None
+        best = min(tried, key=lambda index: (not tried[index].frame.sure, tried[index].frame.cost))
+        self.found[best] = self._judged(tried[best], anchored=tried[best].frame.sure)
+        return best
+
+    def _follow(self, index: int, way: int) -> None:
+        """Fit the next frame in the direction `way`, or search it if it is lost."""
+        before = self.found[index - way]
+        problem = self._problem(index)
+        if problem.black:
+            dark = TrackedFrame(dark_result(0.0), FrameStatus.LOST, 1.0)
+            self.found[index] = replace(before, frame=dark, motion=before.motion.predicted())
+            return
+        limit = self._limit(index, way)
+        known = self._followed(problem, before, way)
+        if self._is_lost(known, limit):
+            known = self._followed(problem, replace(before, motion=before.motion.released()), way)
+        if self._is_lost(known, limit):
+            known = self._found_again(index, before, known, limit)
+        self.found[index] = known
+
+    def _found_again(self, index: int, before: _Known, followed: _Known, limit: float) -> _Known:
+        """A lost frame searched from nothing if that is still allowed; what was predicted of it if that fails, too."""
+        if self.left > 0:
+            self.left -= 1
+            other = self._searched(index, FrameStatus.REDETECTED, before)
+            if other is not None and other.frame.cost < followed.frame.cost:
+                lost = other.frame.cost > limit
+                status = FrameStatus.LOST if lost else other.frame.status
+                return self._judged(replace(other, frame=replace(other.frame, status=status)), other.frame.sure)
+        lost = replace(followed.frame, status=FrameStatus.LOST)
+        return replace(before, frame=lost, motion=before.motion.predicted())
+
+    def _retrace(self, index: int, way: int) -> None:
+        """Try a lost frame from its neighbour at `index - way`."""
+        neighbour = self.found.get(index - way)
+        if neighbour is None or neighbour.frame.status == FrameStatus.LOST:
+            return
+        problem = self._problem(index)
+        if self.found[index].frame.status != FrameStatus.LOST or problem.black:
+            return
+        known = self._followed(problem, neighbour, way)
+        if not self._is_lost(known, self._limit(index, way)):
+            self.found[index] = known
+
+    def _followed(self, problem: LightProblem, before: _Known, way: int) -> _Known:
+        made = follow(problem, before.motion.predicted(), before.inflation, self.options.iterations)
+        status = FrameStatus.TRACKED if way > 0 else FrameStatus.TRACED_BACK
+        return self._judged(self._known(problem, made, status), before.anchored)
+
+    @staticmethod
+    def _is_lost(known: _Known, limit: float) -> bool:
+        return known.frame.cost > limit or known.frame.result.status == FitStatus.AT_BOUND
+
+    def _searched(self, index: int, status: FrameStatus, before: _Known | None) -> _Known | None:
+        """A frame searched from nothing, in the order of the lights before; None where no light is found."""
+        images, capture = self.taken[index]
+        result = fit_lights(
+            self.views.prepared.frozen, self.views, images, search=self.search, spec=self.spec, capture=capture
+        )
+        problem = self._problem(index)
+        if result.status not in SURE or has_faint_light(result.lights):
+            result = split_lights(problem, result, self.views.blocks, self.search.iterations)
+        if not result.lights:
+            return None
+        if before is not None:
+            result = in_order(result, tuple(light for light in before.frame.result.lights))
+        made = observed(problem, self._emitters(result.lights), self.options.together)
+        return self._known(problem, replace(made, result=result), status)
+
+    def _known(self, problem: LightProblem, made: Followed, status: FrameStatus) -> _Known:
+        errors = tuple(made.motion.position_errors())
+        frame = TrackedFrame(made.result, status, frame_cost(problem, made.result.lights), errors)
+        return _Known(frame, made.motion, made.inflation, True)
+
+    def _judged(self, known: _Known, anchored: bool) -> _Known:
+        """The frame as part of a track that had a sure frame, or had none."""
+        frame = known.frame
+        doubtful = not anchored or max(frame.position_errors, default=1.0) > IN_DOUBT
+        if doubtful and frame.status != FrameStatus.LOST:
+            frame = replace(frame, status=FrameStatus.UNCERTAIN)
+        return replace(known, frame=frame, anchored=anchored)
+
+    def _problem(self, index: int) -> LightProblem:
+        images, capture = self.taken[index]
         stacked = self.views.prepared.stack_images(images)
         return LightProblem.create(self.views.prepared, stacked, self.views.effects, capture).sharpest()
 
-    def _limit(self, frames: Sequence[TrackedFrame]) -> float:
-        """The cost from which on a frame counts as lost, by frames near it: by the sure ones where there are any."""
-        costs = [frame.cost for frame in frames if frame.sure] or [frame.cost for frame in frames]
-        return self.options.lost * max(SMALL_COST, float(np.median(costs)))
+    def _limit(self, index: int, way: int) -> float:
+        """The cost from which on a frame is lost, by the frames next to it on the side that it is followed from."""
+        near = [self.found.get(index - way * back) for back in range(1, REMEMBERED + 1)]
+        costs = [known.frame.cost for known in near if known is not None and known.frame.status != FrameStatus.LOST]
+        return self.options.lost * max(SMALL_COST, float(np.median(costs))) if costs else 1.0
 
-    def _searched(self, images: Sequence[Tensor], capture: ImageCapture) -> FitResult:
-        return fit_lights(
-            self.views.prepared.frozen, self.views, images, search=self.search, spec=self.spec, capture=capture
-        )
-
-    def _tracked(self, problem: LightProblem, last: TrackedFrame, earlier: TrackedFrame | None) -> FitResult:
-        """The lights followed from those of `last`, or from where another step like the one from `earlier` leads."""
-        starts = self._starts(last, earlier)
-        costs = [frame_cost(problem, tuple(emitter.light(torch.ones(3)) for emitter in rig)) for rig in starts]
-        return fit_from(problem, starts[int(np.argmin(costs))], self.options.iterations)
-
-    def _starts(self, last: TrackedFrame, earlier: TrackedFrame | None) -> list[Rig]:
-        rig = self._emitters(last.result.lights)
-        if earlier is None or len(earlier.result.lights) != len(rig):
-            return [rig]
-        return [predicted(self._emitters(earlier.result.lights), rig), rig]
-
-    def _emitters(self, rig: LightRig) -> Rig:
+    def _emitters(self, rig: LightRig) -> tuple[Emitter, ...]:
         return soft(tuple(Emitter.of(light, self.spec.cone_free) for light in rig), 0.0)
 
 
-def predicted(earlier: Rig, last: Rig) -> Rig:
-    """The lights after one more step like that from `earlier` to `last`, of which counterparts have the same place."""
-    moved = []
-    for one, other in zip(earlier, last, strict=True):
-        ahead = replace(other, position=2.0 * other.position - one.position)
-        if one.is_spot and other.is_spot:
-            axis = torch.nn.functional.normalize(2.0 * other.axis - one.axis, dim=0)
-            ahead = replace(ahead, axis=axis)
-        moved.append(ahead)
-    return tuple(moved)
+def frame_energy(images: Sequence[Tensor]) -> float:
+    """Σ y² over the images of a frame."""
+    return sum(float(torch.nan_to_num(image).double().square().sum()) for image in images)
+
+
+def search_order(energies: Sequence[float], searches: int) -> list[int]:
+    """Up to `searches` frames, those with most energy first, but none next to one that was searched in vain.
+
+    The sequence is divided into 2 · `searches` equal stretches; no two of the frames are closer than one of these.
+    """
+    apart, chosen = max(1, len(energies) // max(1, 2 * searches)), []
+    for index in sorted(range(len(energies)), key=lambda k: -energies[k]):
+        if len(chosen) == searches or not energies[index] > 0.0:
+            break
+        if all(abs(index - other) >= apart for other in chosen):
+            chosen.append(index)
+    return chosen
+
+
+def has_faint_light(rig: LightRig) -> bool:
+    """Whether a light is so weak beside the strongest that it explains nothing."""
+    strengths = [float(light.intensity.mean()) for light in rig]
+    return bool(strengths) and min(strengths) < FAINT * max(strengths)
 
 
 def frame_cost(problem: LightProblem, rig: LightRig) -> float:
@@ -219,16 +307,6 @@ def frame_cost(problem: LightProblem, rig: LightRig) -> float:
     intensity = problem.moments(columns, problem.unclipped(weights.square())).intensity
     # The weights' floor is part of the brightness, so a black image has a cost below 1 in dark pixels.
     return min(1.0, float((weights * problem.residual(columns, intensity)).abs().median()))
-
-
-def _chained(after: Sequence[TrackedFrame]) -> bool:
-    """Whether of two frames one was followed from the other, so that the step between them says something."""
-    return len(after) > 1 and (after[1].status == FrameStatus.TRACKED or after[0].status == FrameStatus.TRACED_BACK)
-
-
-def _ambiguous(result: FitResult) -> FitResult:
-    """What was followed from an ambiguous frame: as good as other answers that were not followed."""
-    return replace(result, status=FitStatus.AMBIGUOUS, reason=REASONS[FitStatus.AMBIGUOUS])
 
 
 def in_order(result: FitResult, before: LightRig) -> FitResult:

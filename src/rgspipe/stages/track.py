@@ -40,7 +40,7 @@ def run(context: StageContext) -> None:
         frames,
         light_spec(config),
         search=SearchOptions(config.fit.search.starts, config.fit.search.iterations),
-        options=TrackOptions(config.track.lost, config.track.iterations, config.track.back),
+        options=TrackOptions(config.track.lost, config.track.iterations, config.track.searches, config.track.together),
         capture=captures,
     )
     names = [target.name for target in targets]
