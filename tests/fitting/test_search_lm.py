@@ -11,7 +11,7 @@ import torch
 from lit_room import HIDDEN, VISIBLE
 from rgspipe import fit_lights
 from rgspipe.errors import InputError
-from rgspipe.fitting import FitStatus, SearchOptions, prepare_fit
+from rgspipe.fitting import FitStatus, prepare_fit
 from rgspipe.fitting.parameters import Emitter
 from rgspipe.fitting.problem import LightProblem
 from rgspipe.fitting.refine import search_region
