@@ -98,6 +98,14 @@ def test_every_study_that_is_prepared_composes_and_names_its_cases(name: str) ->
     )
 
 
+def test_the_papers_method_is_compared_on_the_targets_of_the_search() -> None:
+    config = compose_config(["stage=light_study", "experiment=light_adam"])
+    fits = [need.changes for need in light_study.STAGE.needs(config)]
+    assert config.fit.limit == 1 and all("fit.limit" not in changes for changes in fits)
+    methods = [changes["fit.method"] for changes in fits]
+    assert methods == ["search_lm", "paper_adam"] * 4 and fits[0]["views.count"] == 1
+
+
 def test_views_are_one_table_with_what_was_foretold(tmp_path: Path) -> None:
     config = _config(kind="views", views=[1, 2, 3])
     evaluated = [

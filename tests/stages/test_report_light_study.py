@@ -18,13 +18,19 @@ def _config(root: Path, scene: str = "cornell") -> RgspipeConfig:
 
 
 def _build(
-    root: Path, key: Key, inputs: dict[str, list[str]], kind: str = "", scenes: tuple[str, ...] = ()
+    root: Path,
+    key: Key,
+    inputs: dict[str, list[str]],
+    kind: str = "",
+    scenes: tuple[str, ...] = (),
+    methods: tuple[str, ...] = ("search_lm",),
 ) -> Artifact:
     def make(folder: Path) -> dict:
         pd.DataFrame({"scene": scenes, "made": key.fingerprint}).to_csv(folder / "study.csv", index=False)
         return {"kind": kind}
 
-    return ArtifactStore(root).build(key, {"config": {}, "inputs": inputs, "code": {}}, make)[0]
+    recipe = {"config": {"light_study": {"methods": list(methods)}}, "inputs": inputs, "code": {}}
+    return ArtifactStore(root).build(key, recipe, make)[0]
 
 
 def _study(
@@ -53,6 +59,15 @@ def test_of_each_kind_the_newest_study_that_has_the_scene_is_taken(tmp_path: Pat
     ]
     assert sorted(path.parent.name for path in light_study_files(_config(tmp_path))) == ["02", "03"]
     assert found_light_studies(_config(tmp_path, "room"), None) == light_study_files(_config(tmp_path, "room")) == []
+
+
+def test_a_study_of_other_methods_does_not_hide_one_of_its_kind(tmp_path: Path, days: None) -> None:
+    both = ("search_lm", "paper_adam")
+    for fingerprint, methods in (("01", both), ("02", ("search_lm",)), ("03", both)):
+        key = Key("cornell", "light_study", fingerprint)
+        _build(tmp_path, key, {"evaluate": ["e1"]}, "kinds", ("cornell",), methods)
+    found = found_light_studies(_config(tmp_path), None)
+    assert [study.table["made"].astype(int).tolist() for study in found] == [[2], [3]]
 
 
 def test_a_study_of_another_frozen_scene_is_marked(tmp_path: Path) -> None:

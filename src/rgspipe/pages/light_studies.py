@@ -23,7 +23,7 @@ TITLES = {
     "kinds": (
         "Kinds of lights",
         "Points and spots, alone and several, of known and unknown number and cone, drawn at random and rendered by "
-        "Cycles; fits in the trained scene, and beside them in the true one.",
+        "Cycles; fits in the trained scene, and in the true one where a row says so.",
     ),
     "classes": (
         "Where the light is",
@@ -62,8 +62,9 @@ def light_studies(studies: Sequence[LightStudy]) -> list[dict[str, Any]]:
 def _shown(study: LightStudy) -> dict[str, Any]:
     headings, rows = shown_rows(study.table, study.kind)
     title, words = TITLES[study.kind]
+    methods = list(study.table["method"].unique())
     return {
-        "title": title,
+        "title": f"{title}: {' beside '.join(methods)}" if len(methods) > 1 else title,
         "words": words,
         "remark": study.remark,
         "note": NOTES[study.kind],

@@ -1,4 +1,4 @@
-"""The studies of recovered lights that a report shows: of each kind the newest that has this scene."""
+"""The studies of recovered lights that a report shows: of each kind and set of methods the newest with this scene."""
 
 from __future__ import annotations
 
@@ -28,14 +28,15 @@ def found_light_studies(config: RgspipeConfig, freeze: Artifact | None) -> list[
     """
     found = _newest(config)
     return [
-        LightStudy(kind, _rows(found[kind], scene_name(config)), _remark(config, found[kind], freeze))
+        LightStudy(kind, _rows(study, scene_name(config)), _remark(config, study, freeze))
         for kind in KINDS
-        if kind in found
+        for (its_kind, _), study in sorted(found.items(), key=lambda item: len(item[0][1]))
+        if its_kind == kind
     ]
 
 
-def _newest(config: RgspipeConfig) -> dict[str, Artifact]:
-    """By kind. A study over several scenes lies in the folder of the one that was configured: all are looked at."""
+def _newest(config: RgspipeConfig) -> dict[tuple[str, tuple[str, ...]], Artifact]:
+    """By kind and methods; all folders are looked at, as a study over several scenes lies in one scene's."""
     root, scene = Path(config.outputs), scene_name(config)
     store, newest = ArtifactStore(root), {}
     for path in sorted(root.glob(f"*/{STAGE_NAME}/*/{TABLE}")):
@@ -44,9 +45,9 @@ def _newest(config: RgspipeConfig) -> dict[str, Artifact]:
         found = _readable(store, Key(path.parents[2].name, STAGE_NAME, path.parent.name))
         if found is None or not len(_rows(found, scene)):
             continue
-        kind = str(found.facts["kind"])
-        if kind not in newest or _made(found) > _made(newest[kind]):
-            newest[kind] = found
+        asked = str(found.facts["kind"]), tuple(found.manifest["config"].get("light_study", {}).get("methods", ()))
+        if asked not in newest or _made(found) > _made(newest[asked]):
+            newest[asked] = found
     return newest
 
 
