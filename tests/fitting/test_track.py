@@ -109,6 +109,10 @@ def test_an_answer_with_a_light_that_explains_nothing_is_not_sure(point_light) -
     assert not TrackedFrame(replace(result, lights=(strong, weak)), FrameStatus.TRACKED, 0.01).sure
     assert not TrackedFrame(replace(result, status=FitStatus.AMBIGUOUS), FrameStatus.TRACKED, 0.01).sure
     assert not TrackedFrame(result, FrameStatus.UNCERTAIN, 0.01).sure
+    # A fit that ran out of steps does not say what its images leave open: the expected errors do.
+    steps = replace(result, status=FitStatus.MAX_ITERATIONS)
+    assert TrackedFrame(steps, FrameStatus.SEARCHED, 0.01, (0.01, 0.02)).sure
+    assert not TrackedFrame(steps, FrameStatus.SEARCHED, 0.01, (0.01, 0.2)).sure
 
 
 def test_two_spots_that_move_and_turn_keep_their_order(room) -> None:

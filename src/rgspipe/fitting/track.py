@@ -32,7 +32,7 @@ SMALL_COST = 1e-3
 #: The cost of a frame is judged by the median of so many frames before it.
 REMEMBERED = 5
 
-#: Results with one answer that the images tell.
+#: Results with one answer.
 SURE = (FitStatus.CONVERGED, FitStatus.MAX_ITERATIONS)
 
 #: A light with less than this part of the strongest one's intensity explains nothing: it may be anywhere.
@@ -92,7 +92,8 @@ class TrackedFrame:
     def sure(self) -> bool:
         """Whether the frame's own images tell all of its lights."""
         known = self.status not in (FrameStatus.LOST, FrameStatus.UNCERTAIN)
-        return known and self.result.status in SURE and not has_faint_light(self.result.lights)
+        told = self.result.status in SURE and max(self.position_errors, default=0.0) <= IN_DOUBT
+        return known and told and not has_faint_light(self.result.lights)
 
 
 def track_lights(
@@ -236,8 +237,7 @@ class _Tracker:
             self.views.prepared.frozen, self.views, images, search=self.search, spec=self.spec, capture=capture
         )
         problem = self._problem(index)
-        if result.status not in SURE or has_faint_light(result.lights):
-            result = split_lights(problem, result, self.views.blocks, self.search.iterations)
+        result = split_lights(problem, result, self.views.blocks, self.search.iterations)
         if not result.lights:
             return None
         if before is not None:
