@@ -122,7 +122,7 @@ def test_courses_and_tracks_are_shown_with_what_was_measured(tmp_path: Path) -> 
     build(tmp_path, "track", "01", _track)
     courses, track = found_sections(config(tmp_path), None)
     assert courses.rows == [
-        ["visible_000", "visible", "paper_adam", "1250", "31.50", "—", "50.00 %", "1.20 %"] + ["25.00 %"] * 4
+        ["visible_000", "visible", "paper_adam", "1250", "31.50", "—", "50.00 → 1.20"] + ["25.00 → 25.00"] * 2
     ]
     assert track.words == ["3 frames: 3 tracked; 0.25 s a frame (worst 0.25 s)."]
     assert track.rows == [["light 1", "3", "2.00 %", "9.00 %", "5.00 %", "0.50"]]

@@ -16,7 +16,7 @@ from rgspipe.errors import InputError
 from rgspipe.evaluation.plots import png_of
 from rgspipe.evaluation.tables import class_of
 from rgspipe.pages.gallery import Shot, light_words, picture, spread
-from rgspipe.pages.html import decimals, label, percent
+from rgspipe.pages.html import bare_percent, decimals, label, percent
 from rgspipe.pages.section import Section
 from rgspipe.pages.targets_figure import targets_figure
 from rgspipe.scene import LightRig, SpotLight, Surfels
@@ -105,12 +105,12 @@ def _rig_words(rig: LightRig) -> str:
 
 def _courses(made: Artifact, remark: str) -> Section:
     summary = pd.read_csv(made.file("convergence.csv"), dtype={"target": str})
-    columns = ["<Target", "<Light", "<Method", "Steps", "Time (s)", "Solved after (s)", "Position error: start", "end"]
-    columns += ["Intensity error: start", "end", "Image error: start", "end"]
+    columns = ["<Target", "<Light", "<Method", "Steps", "Time (s)", "Solved after (s)"]
+    columns += ["Position error (%)", "Intensity error (%)", "Image error (%)"]
     rows = [
         [row["target"], label(row["occlusion"]), row["method"], f"{row['steps']}", decimals(row["seconds"])]
         + [decimals(row["seconds_to_limit"])]
-        + [percent(row[f"{name}_{end}"]) for name in _COMPARED for end in ("start", "end")]
+        + [" → ".join(bare_percent(row[f"{name}_{end}"]) for end in ("start", "end")) for name in _COMPARED]
         for row in summary.to_dict("records")
     ]
     pictures = {name: made.file(f"pictures/{name}.png").read_bytes() for name in dict.fromkeys(summary["target"])}
