@@ -85,7 +85,7 @@ def test_a_track_says_how_frames_were_found_and_how_far_off_each_light_is(tmp_pa
     rows = [
         {"frame": frame, "target": f"rig_{frame}", "status": status, "seconds": 0.2 + frame, "light": light}
         | {"position_error": 0.01 * (1 + light + frame), "intensity_error": 0.1, "axis_error": 0.5}
-        for frame, status in enumerate(("searched", "tracked"))
+        for frame, status in enumerate(("searched", "tracked", "uncertain"))
         for light in range(2)
     ]
 
@@ -93,7 +93,8 @@ def test_a_track_says_how_frames_were_found_and_how_far_off_each_light_is(tmp_pa
         pd.DataFrame(rows).to_csv(folder / "track.csv", index=False)
 
     lines = outcome(artifact(tmp_path, "track", make))
-    assert lines[0] == "2 frames: 1 searched, 1 tracked; 0.70 s (worst 1.20 s) a frame"
+    assert lines[0] == "3 frames: 1 searched, 1 tracked, 1 uncertain; 1.20 s (worst 2.20 s) a frame"
+    # The uncertain frame is no part of the errors.
     assert lines[2].split() == ["light", "1", "2", "1.50", "%", "2.00", "%", "10.00", "%", "0.50°"]
     assert lines[3].split()[4:7] == ["%", "3.00", "%"] and "track.png" in lines[-1]
 

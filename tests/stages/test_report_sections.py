@@ -79,8 +79,12 @@ def _courses(folder: Path) -> None:
 
 
 def _track(folder: Path, truth: bool = True) -> None:
-    found = [{"frame": k, "target": f"rig_{k}", "status": "tracked", "seconds": 0.25, "light": 0} for k in range(3)]
-    errors = {"position_error": [0.01, 0.02, 0.09], "intensity_error": 0.05, "axis_error": 0.5} if truth else {}
+    statuses = ("tracked", "tracked", "tracked", "uncertain")
+    found = [
+        {"frame": k, "target": f"rig_{k}", "status": status, "seconds": 0.25, "light": 0}
+        for k, status in enumerate(statuses)
+    ]
+    errors = {"position_error": [0.01, 0.02, 0.09, 0.5], "intensity_error": 0.05, "axis_error": 0.5} if truth else {}
     pd.DataFrame(found).assign(**errors).to_csv(folder / "track.csv", index=False)
     (folder / "track.png").write_bytes(PNG)
 
@@ -124,7 +128,8 @@ def test_courses_and_tracks_are_shown_with_what_was_measured(tmp_path: Path) -> 
     assert courses.rows == [
         ["visible_000", "visible", "paper_adam", "1250", "31.50", "—", "50.00 → 1.20"] + ["25.00 → 25.00"] * 2
     ]
-    assert track.words == ["3 frames: 3 tracked; 0.25 s a frame (worst 0.25 s)."]
+    assert track.words == ["4 frames: 3 tracked, 1 uncertain; 0.25 s a frame (worst 0.25 s)."]
+    # The uncertain frame is no part of the errors.
     assert track.rows == [["light 1", "3", "2.00 %", "9.00 %", "5.00 %", "0.50"]]
     assert "another frozen scene" in courses.remark and "another frozen scene" in track.remark
     assert len(section_files(config(tmp_path))) == 2

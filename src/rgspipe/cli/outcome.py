@@ -130,8 +130,10 @@ def _track(artifact: Artifact) -> list[str]:
     counts = ", ".join(f"{count} {name}" for name, count in frames["status"].value_counts(sort=False).items())
     lines = [f"{len(frames)} frames: {counts}; {time(frames['seconds'])} a frame"]
     if "position_error" in table:
-        rows = [["", "frames", "position error", "worst", "intensity", "axis"]]
-        for light, own in table.dropna(subset=["light"]).groupby("light"):
+        # Errors of frames that say that they are uncertain are no measure of the others.
+        known = table[~table["status"].isin(["uncertain", "lost"])].dropna(subset=["light"])
+        rows = [["", "known in", "position error", "worst", "intensity", "axis"]]
+        for light, own in known.groupby("light"):
             axis = own["axis_error"].median() if "axis_error" in own else math.nan
             found = [f"light {int(light) + 1}", f"{len(own)}", percent(own["position_error"].median())]
             rest = [percent(own["position_error"].max()), percent(own["intensity_error"].median()), degrees(axis)]

@@ -132,13 +132,15 @@ def _track(made: Artifact, remark: str) -> Section:
     table = pd.read_csv(made.file("track.csv"), dtype={"target": str})
     frames = table.drop_duplicates("frame")
     counts = ", ".join(f"{count} {name}" for name, count in frames["status"].value_counts(sort=False).items())
-    known = "position_error" in table
+    known = table[~table["status"].isin(["uncertain", "lost"])].dropna(subset=["light"])
     rows = []
-    for light, own in table.dropna(subset=["light"]).groupby("light") if known else ():
+    for light, own in known.groupby("light") if "position_error" in table else ():
         axis = decimals(own["axis_error"].median()) if "axis_error" in own else "—"
         errors = [own["position_error"].median(), own["position_error"].max(), own["intensity_error"].median()]
         rows.append([f"light {int(light) + 1}", f"{len(own)}", *map(percent, errors), axis])
-    drawn = Shot("Circled: found anew, or lost.", "the track of the lights", made.file("track.png").read_bytes())
+    drawn = Shot(
+        "Pale: uncertain. Circled: found anew, or lost.", "the track of the lights", made.file("track.png").read_bytes()
+    )
     return Section(
         "track",
         "Lights that move",
@@ -146,8 +148,9 @@ def _track(made: Artifact, remark: str) -> Section:
             f"{len(frames)} frames: {counts}; {decimals(frames['seconds'].median())} s a frame "
             f"(worst {decimals(frames['seconds'].max())} s)."
         ],
-        ["<Light", "Frames", "Median position error", "Worst", "Median intensity error", "Median axis error (°)"],
+        ["<Light", "Known in", "Median position error", "Worst", "Median intensity error", "Median axis error (°)"],
         rows,
+        "Errors are those of the frames in which the lights are known: neither uncertain nor lost.",
         drawings=[drawn],
         remark=remark,
     )
