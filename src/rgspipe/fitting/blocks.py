@@ -13,6 +13,7 @@ from torch import Tensor
 from rgspipe.fitting.views import PreparedViews
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.sparse import SparseOperator
+from rgspipe.renderer.transport import PatchTransport
 
 #: A view has at most this many blocks along each side.
 BLOCKS = 16
@@ -77,7 +78,9 @@ def block_model(views: PreparedViews, blocks: int = BLOCKS, *, interreflection: 
         blocks: at most so many along each side of a view.
     """
     average, counts = block_average(views, blocks)
-    frozen, transport = views.frozen, views.frozen.transport
+    frozen = views.frozen
+    # Solvers that are no product of small matrices are left to the polish.
+    transport = frozen.solver if isinstance(frozen.solver, PatchTransport) else frozen.transport
     device = frozen.surfels.albedo.device
     weights = (average.to_scipy() @ views.operator.to_scipy()).tocsr()
     albedo = frozen.surfels.albedo.float().cpu().numpy()

@@ -82,7 +82,7 @@ class FitResult:
             (x, y, z, ax, ay, az, [cone, [falloff]], r, g, b). Of noise and errors of the model together, calibrated;
             see `fitting.uncertainty`. What the views do not determine has an infinite variance, and `reason` says so.
         trajectory: the steps from the start that won to the end, the start included.
-        costs: by number of lights that was tried, the robust cost of the best rig of so many; see `fitting.number`.
+        costs: by number of lights that was tried, the robust cost of the best rig of so many; see `fitting.judge`.
         noise_covariance: the same with the residual as independent noise of the pixels, by plain Gauss-Newton. Errors
             of the model are shared by neighbouring pixels, so it is far too small for a scene that was trained.
         exposures: of each view over the first one's; all 1 where they were known.
