@@ -11,7 +11,8 @@ import torch
 from lit_room import VISIBLE
 from rgspipe.fitting import FitStatus, LightSpec, SearchOptions, fit_lights, prepare_fit
 from rgspipe.fitting.result import dark_result
-from rgspipe.fitting.track import FrameStatus, TrackedFrame, TrackOptions, in_order, search_order, track_lights
+from rgspipe.fitting.track import TrackOptions, search_order, track_lights
+from rgspipe.fitting.tracked_frame import FrameStatus, TrackedFrame, in_order
 from rgspipe.renderer.spot import SpotShape
 from rgspipe.scene import LightRig, SpotLight
 

@@ -17,7 +17,8 @@ from rgspipe.evaluation.track_table import track_figure, track_table
 from rgspipe.fitting import SearchOptions
 from rgspipe.fitting.capture import ImageCapture
 from rgspipe.fitting.fit import FitViews
-from rgspipe.fitting.track import FrameStatus, TrackOptions, track_lights
+from rgspipe.fitting.track import TrackOptions, track_lights
+from rgspipe.fitting.tracked_frame import FrameStatus
 from rgspipe.scene import LightRig
 from rgspipe.stages import fit_capture, fit_light
 from rgspipe.stages.base import Need, Stage, StageContext
