@@ -98,8 +98,8 @@ def test_random_spots_are_found(room, seed):
     """Rims make many minima."""
     rig = (_random_spot(seed),)
     result = fit(room, rig, LightSpec("spot", 1, SHAPE))
-    # Measured 7e-8, 8e-9 and 4e-7. Of twenty seeds seventeen are found: numbers 6 and 16 say ambiguous, 18 unexplained.
-    # Number 3 is off by 0.009, as there another place makes the same image to within float32's rounding.
+    # Measured 7e-8, 8e-9 and 4e-7. Of twenty seeds sixteen are found; numbers 6 and 16 say ambiguous, 18 unexplained.
+    # Number 3 is off by 0.009: another place makes the same image to within float32's rounding.
     assert result.status is FitStatus.CONVERGED and errors(result, rig)[0] < 1e-5
 
 
