@@ -14,7 +14,7 @@ from rgspipe.fitting.capture import SATURATED, ImageCapture, rounding_noise
 from rgspipe.fitting.differences import central_differences
 from rgspipe.fitting.exposure import ExposedMoments, best_factors, moments_by_view
 from rgspipe.fitting.gloss import seen_with_gloss
-from rgspipe.fitting.lit_shares import LEAST_LIT, lit_shares
+from rgspipe.fitting.kernels.lit_shares import LEAST_LIT, lit_shares
 from rgspipe.fitting.moments import Moments, moments
 from rgspipe.fitting.parameters import Emitter, share_slopes, shared
 from rgspipe.fitting.spot_harmonics import BandLimit, fitted_share

@@ -1,1 +1,1 @@
-"""Warp kernels, one source for CPU and CUDA. The only place that imports warp."""
+"""Warp kernels, one source for CPU and CUDA; those that only fits need are in `fitting.kernels`."""

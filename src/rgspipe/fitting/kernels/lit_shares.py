@@ -32,7 +32,7 @@ def _lit_shares(
     item = wp.tid() + offset
     i = receivers[item]
     d = light - surfels[i].center
-    passing = 1.0
+    passing = float(1.0)
     slope = wp.vec3(0.0, 0.0, 0.0)
     if wp.dot(d, surfels[i].normal) > 0.0 and wp.dot(d, d) > 0.0:
         passing, slope = light_transmittance(bvh, surfels, rule, i, surfels[i].center, light, d)

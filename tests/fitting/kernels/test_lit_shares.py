@@ -5,7 +5,7 @@ from __future__ import annotations
 import torch
 
 from lit_room import HIDDEN, VISIBLE
-from rgspipe.fitting.lit_shares import lit_shares
+from rgspipe.fitting.kernels.lit_shares import lit_shares
 from rgspipe.renderer.pixel_direct import surfel_shares
 
 
