@@ -141,3 +141,22 @@ def test_the_plan_says_what_is_decided_before_anything_is_made(tmp_path: Path) -
 
     fitted = made(tmp_path / "store", "fit_light", make)
     assert fit_light.remarks(config, {"fit_light": fitted}) == list(reasons)
+
+
+def test_the_plan_never_says_that_there_are_no_spots_where_spots_may_be_found(tmp_path: Path) -> None:
+    """Of unknown type, each light counts as the spot that it may be, which no bound is smaller for."""
+    surfels = room_surfels()
+    artifact = freeze_scene(tmp_path / "store", replace(surfels, albedo=1e-5 * surfels.albedo))
+
+    def reasons(**light: object) -> list[str]:
+        return list(fit_light.remarks(configured("fit_light", light), {"freeze": artifact}))
+
+    assert reasons(**{"light.type": "point"})[2] == "spot cones left out: the rig has no spots"
+    assert reasons(**{"light.type": "auto"}) == reasons(**{"light.type": "spot"})
+    assert reasons(**{"light.type": "auto"})[2].startswith("spot cones simulated: no bound on what this changes, costs")
+    harmonics = {"fit.spot_basis": "sh", "fit.sh_degree": 5}
+    points = reasons(**{"light.type": "point"}, **harmonics)
+    for kind in ("spot", "auto"):
+        said = reasons(**{"light.type": kind}, **harmonics)
+        assert said[2] == "spot cones simulated: in spherical harmonics up to degree 5, as configured"
+        assert said[:2] + said[3:] == points[:2] + points[3:]

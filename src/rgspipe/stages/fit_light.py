@@ -32,8 +32,8 @@ from rgspipe.fitting import (
 from rgspipe.fitting.spec import MOST_LIGHTS
 from rgspipe.fitting.spot_harmonics import BandLimit
 from rgspipe.progress import track
-from rgspipe.renderer.effect_bounds import EffectBounds
-from rgspipe.renderer.effects import EffectChoice, RigKind
+from rgspipe.renderer.effect_bounds import NO_BOUND, EffectBounds
+from rgspipe.renderer.effects import Decision, EffectChoice, RigKind
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.monte_carlo import MonteCarloSolver
 from rgspipe.scene import PointLight
@@ -164,13 +164,27 @@ def _effects(context: StageContext) -> Effects:
 
 
 def _choice(config: RgspipeConfig, freeze: Artifact) -> tuple[EffectBounds, EffectChoice]:
-    """What the frozen scene calls for under a rig of the kind that is looked for."""
-    spec = light_spec(config)
+    """What the frozen scene calls for under a rig of the kind that is looked for.
+
+    Lights that may be of either type count as spots: no bound is smaller for a spot than for a point light.
+    """
+    spec, band = light_spec(config), band_limit(config)
     count = spec.count or MOST_LIGHTS
     # In harmonics a spot's light leaves its cone.
-    in_cones = spec.type == "spot" and config.fit.spot_basis == "exact"
+    in_cones = spec.spots and band is None
     kind = RigKind(0, (spec.shape,) * count) if in_cones else RigKind(count)
-    return chosen_effects(config.effects, freeze, kind)
+    bounds, choice = chosen_effects(config.effects, freeze, kind)
+    return bounds, choice if band is None or not spec.spots else _in_harmonics(choice, band)
+
+
+def _in_harmonics(choice: EffectChoice, band: BandLimit) -> EffectChoice:
+    """The choice for spots that are simulated, though the lights that it was taken for have no cones."""
+    reason = f"spot cones simulated: in spherical harmonics up to degree {band.degree}, as configured"
+    decisions = [
+        Decision(decision.effect, True, NO_BOUND, reason) if decision.effect == "spot cones" else decision
+        for decision in choice.decisions
+    ]
+    return EffectChoice(tuple(decisions))
 
 
 def remarks(config: RgspipeConfig, made: Mapping[str, Artifact]) -> Sequence[str]:
