@@ -547,8 +547,21 @@ class TargetsConfig:
     pool_seed: int = option(0, "draws of the lights' places, axes and cones", low=0, high=2**31 - 1)
     frames: int = option(24, "targets of a track, equally far apart on the way", low=1, high=100000)
     views: int = option(3, "fixed cameras that see each target", low=1, high=8)
+    cameras: list[float] | None = option(
+        None,
+        "cameras in the place of the scene's own: of each the place and a point that it looks at, scene units, and "
+        "degrees across, [x,y,z,x,y,z,degrees,…]",
+        low=-1e6,
+        high=1e6,
+    )
     resolution: int | None = option(None, "image width and height, pixels; by default the dataset's", low=8, high=8192)
     samples: int | None = option(None, "paths per pixel of a single light; by default the dataset's", low=1, high=10**6)
+    max_bounces: int | None = option(
+        None,
+        "bounces of a path; by default the dataset's. Around a corner 12 lose 2 to 4 %",
+        low=0,
+        high=1024,
+    )
     spot: TargetSpotConfig = section(TargetSpotConfig, "what spots are like")
 
 

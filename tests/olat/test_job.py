@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 
+from rgspipe.blender.cameras import FixedView
 from rgspipe.blender.job import DatasetJob
 from rgspipe.blender.models.parameters import CornerParameters
 from rgspipe.olat.job import PoolJob, SpotRange
@@ -14,13 +15,19 @@ from rgspipe.olat.job import PoolJob, SpotRange
 
 def test_a_job_survives_json() -> None:
     dataset = DatasetJob(scene="mine", model=CornerParameters(width=0.3), train_views=0, seed=4)
-    job = PoolJob(dataset, "track", 7, ("visible",), SpotRange("linear", (0.3, 0.5), (0.1, 0.2)), 5)
+    cameras = (FixedView((0.1, 0.2, 0.3), (0.5, 0.2, 0.3), 60.0), FixedView((0.0, 0.0, 1.0), (0.0, 0.3, 0.0), 90.0))
+    job = PoolJob(dataset, "track", 7, ("visible",), SpotRange("linear", (0.3, 0.5), (0.1, 0.2)), 2, cameras)
     assert PoolJob.from_json(json.loads(json.dumps(job.to_json()))) == job
 
 
 def test_an_empty_pool_is_refused() -> None:
     with pytest.raises(ValueError, match="number must be"):
         PoolJob(DatasetJob(), "points", 0)
+
+
+def test_more_views_than_cameras_are_refused() -> None:
+    with pytest.raises(ValueError, match="as many cameras"):
+        PoolJob(DatasetJob(), "points", 1, views=2, cameras=(FixedView((0.0, 0.0, 1.0), (0.0, 0.3, 0.0), 90.0),))
 
 
 @pytest.mark.parametrize(

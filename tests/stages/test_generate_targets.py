@@ -72,6 +72,38 @@ def test_a_track_pairs_its_lights(tmp_path: Path) -> None:
     assert [round(light.position[0].item(), 6) for light in lights] == [0.6, 0.9]
 
 
+#: Two cameras: where each stands, what it looks at, degrees across.
+CAMERAS = [0.1, 0.2, 0.3, 0.5, 0.2, 0.3, 60.0, 0.0, 0.0, 1.0, 0.0, 0.3, 0.0, 90.0]
+
+
+def test_cameras_and_bounces_of_a_pool_may_differ_from_the_dataset_s() -> None:
+    own, given = _config(), _config(targets__cameras=CAMERAS, targets__views=2, targets__max_bounces=64)
+    assert render_olat.pool_job(own).cameras == ()
+    assert render_olat.pool_job(own).dataset.max_bounces == own.dataset.max_bounces
+    job = render_olat.pool_job(given)
+    assert [(view.origin, view.focus, view.degrees) for view in job.cameras] == [
+        ((0.1, 0.2, 0.3), (0.5, 0.2, 0.3), 60.0),
+        ((0.0, 0.0, 1.0), (0.0, 0.3, 0.0), 90.0),
+    ]
+    assert job.dataset.max_bounces == 64
+    assert {"targets.cameras", "targets.max_bounces"} <= set(render_olat.STAGE.keys(given))
+    assert not {"targets.cameras", "targets.max_bounces"} & set(render_olat.STAGE.keys(own))
+
+
+@pytest.mark.parametrize(
+    ("changes", "found"),
+    [
+        ({"targets__cameras": CAMERAS[:-1], "targets__views": 1}, "13 numbers"),
+        ({"targets__cameras": CAMERAS, "targets__views": 3}, "14 numbers"),
+        ({"targets__cameras": [0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 60.0], "targets__views": 1}, r"0,0,1,0,0,1,60"),
+        ({"targets__cameras": [0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 180.0], "targets__views": 1}, r"0,0,0,180"),
+    ],
+)
+def test_cameras_that_are_none_are_refused(changes: dict, found: str) -> None:
+    with pytest.raises(InputError, match=found):
+        render_olat.STAGE.needs(_config(**changes))
+
+
 def test_targets_of_another_number_need_no_other_pool() -> None:
     few, many = _config(targets__number=3), _config(targets__number=9, targets__count=[1, 3], targets__seed=7)
     assert _values(render_olat.STAGE, few) == _values(render_olat.STAGE, many)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+import numpy as np
 import torch
 
-from rgspipe.blender.cameras import Layout
+from rgspipe.blender.cameras import FixedView, Layout, aimed
 from rgspipe.scene import Camera, look_at
 
 #: Where further cameras stand between the three that see the fit targets of a scene: their shares of each.
@@ -20,13 +23,16 @@ BETWEEN = (
 MOST_CAMERAS = 3 + len(BETWEEN)
 
 
-def pool_cameras(layout: Layout, views: int) -> list[Camera]:
-    """The scene's three target cameras, and between them as many more as `views` asks for.
+def pool_cameras(layout: Layout, views: int, fixed: Sequence[FixedView] = ()) -> list[Camera]:
+    """The cameras of `fixed`; without any the scene's own three, and between them as many more as `views` asks for.
 
     Further cameras stand among the first three, so that a light that is out of the sight of those is so for the
     others as a rule, and its class (which all cameras decide) means the same for any number of views.
     """
     first = layout.target_cameras()
+    if fixed:
+        size = first[0].width
+        return [aimed(np.array(view.origin), np.array(view.focus), view.degrees, size) for view in fixed]
     return [*first, *(_between(first, shares) for shares in BETWEEN[: max(0, views - len(first))])]
 
 

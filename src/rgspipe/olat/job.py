@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from rgspipe.blender.cameras import FixedView
 from rgspipe.blender.job import DatasetJob
 from rgspipe.renderer.spot import SpotShape
 from rgspipe.scene.lights import SpotProfile
@@ -66,6 +67,7 @@ class PoolJob:
         classes: where points and spots are, in turn; those that the scene has none of are left out.
         spot: the profile of spots and headlights; a track takes the least of its ranges.
         views: cameras that see every light.
+        cameras: where they are; by default the scene's own (`pool_cameras`).
     """
 
     dataset: DatasetJob
@@ -74,10 +76,13 @@ class PoolJob:
     classes: tuple[str, ...] = ("visible", "out_of_frame", "occluded", "around_corner")
     spot: SpotRange = SpotRange()
     views: int = 3
+    cameras: tuple[FixedView, ...] = ()
 
     def __post_init__(self) -> None:
         if self.number < 1:
             raise ValueError(f"number must be at least 1, got {self.number}")
+        if self.cameras and len(self.cameras) < self.views:
+            raise ValueError(f"{self.views} views take as many cameras, got {len(self.cameras)}")
 
     def to_json(self) -> dict:
         return asdict(self) | {"dataset": self.dataset.to_json()}
@@ -89,4 +94,7 @@ class PoolJob:
         ranges = SpotRange(spot["profile"], tuple(spot["cone_angle"]), tuple(spot["falloff"]))
         dataset = DatasetJob.from_json(content["dataset"])
         classes = tuple(content["classes"])
-        return cls(dataset, content["kind"], content["number"], classes, ranges, content["views"])
+        cameras = tuple(
+            FixedView(tuple(view["origin"]), tuple(view["focus"]), view["degrees"]) for view in content["cameras"]
+        )
+        return cls(dataset, content["kind"], content["number"], classes, ranges, content["views"], cameras)

@@ -59,7 +59,7 @@ def make_plan(job: PoolJob, layout: Layout, geometry: Geometry) -> list[LightPla
     Raises:
         InputError: the scene has no room for a light of a class that suits it, or none of the classes suits it.
     """
-    cameras = pool_cameras(layout, job.views)
+    cameras = pool_cameras(layout, job.views, job.cameras)
     place = _Place(job, layout, geometry, cameras, seen_points(cameras[0], geometry))
     lights = _track(place) if job.kind == "track" else _drawn(place)
     return [_plan(job, cameras, index, *light) for index, light in lights]

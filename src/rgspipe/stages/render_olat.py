@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from rgspipe.config import MODELLED, RgspipeConfig, TargetSpotConfig
+from rgspipe.blender.cameras import FixedView
+from rgspipe.config import MODELLED, RgspipeConfig, TargetsConfig, TargetSpotConfig
 from rgspipe.errors import InputError
 from rgspipe.olat.job import PoolJob, SpotRange
 from rgspipe.olat.pool_file import read_pool
@@ -14,6 +15,9 @@ from rgspipe.stages.base import Stage, StageContext
 from rgspipe.stages.generate_dataset import STAGE as DATASET
 from rgspipe.stages.generate_dataset import dataset_job
 from rgspipe.stages.sources import has_truth
+
+#: Of a camera: where it stands, what it looks at, degrees across.
+CAMERA_NUMBERS = 7
 
 
 def run(context: StageContext) -> None:
@@ -26,7 +30,7 @@ def pool_job(config: RgspipeConfig) -> PoolJob:
     """What the configuration asks Blender for.
 
     Raises:
-        InputError: a range of spots makes no sense, or what `check_scene` and `dataset_job` refuse.
+        InputError: spots or cameras make no sense, or what `check_scene` and `dataset_job` refuse.
     """
     wanted = config.targets
     check_scene(config)
@@ -42,6 +46,7 @@ def pool_job(config: RgspipeConfig) -> PoolJob:
             resolution=wanted.resolution or dataset.resolution,
             samples=samples,
             test_samples=samples,
+            max_bounces=dataset.max_bounces if wanted.max_bounces is None else wanted.max_bounces,
             seed=wanted.pool_seed,
         ),
         wanted.kind,
@@ -49,6 +54,7 @@ def pool_job(config: RgspipeConfig) -> PoolJob:
         tuple(wanted.classes),
         spot_range(wanted.spot) if wanted.kind != "points" else SpotRange(),
         wanted.views,
+        fixed_views(wanted),
     )
 
 
@@ -111,9 +117,36 @@ def spot_range(spot: TargetSpotConfig) -> SpotRange:
     return SpotRange(spot.profile, cones, rims)
 
 
+def fixed_views(targets: TargetsConfig) -> tuple[FixedView, ...]:
+    """The cameras of the configuration; none where they are the scene's own.
+
+    Raises:
+        InputError: they are no cameras, or fewer than there are views.
+    """
+    numbers = targets.cameras or []
+    rows = [numbers[first : first + CAMERA_NUMBERS] for first in range(0, len(numbers), CAMERA_NUMBERS)]
+    if len(numbers) % CAMERA_NUMBERS or (rows and len(rows) < targets.views):
+        raise InputError(
+            "targets.cameras",
+            expected=f"{CAMERA_NUMBERS} numbers for each of targets.views={targets.views} cameras or more",
+            found=f"{len(numbers)} numbers",
+            remedy="Give place, point looked at and degrees of each, [x,y,z,x,y,z,degrees,…], or fewer views.",
+        )
+    for row in rows:
+        if not 1.0 <= row[6] <= 170.0 or math.dist(row[:3], row[3:6]) == 0.0:
+            raise InputError(
+                "targets.cameras",
+                expected="cameras that look at another place than they stand at, 1 to 170 degrees across",
+                found=f"[{','.join(f'{number:g}' for number in row)}]",
+                remedy="Correct these seven numbers.",
+            )
+    return tuple(FixedView(tuple(row[:3]), tuple(row[3:6]), row[6]) for row in rows)
+
+
 def _inputs(config: RgspipeConfig) -> tuple[()]:
     check_scene(config)
     spot_range(config.targets.spot)
+    fixed_views(config.targets)
     return ()
 
 
@@ -123,6 +156,8 @@ def _keys(config: RgspipeConfig) -> list[str]:
     wanted = ["kind", "views", "resolution", "samples", "pool_seed"]
     wanted += ["frames"] if config.targets.kind == "track" else ["pool", "classes"]
     wanted += [] if config.targets.kind == "points" else ["spot"]
+    # Named only where they are set, so that a pool made before there were such keys is still the same one.
+    wanted += [name for name in ("cameras", "max_bounces") if getattr(config.targets, name) is not None]
     return [*scene, *quality, *(f"targets.{name}" for name in wanted)]
 
 
