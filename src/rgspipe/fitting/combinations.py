@@ -54,10 +54,14 @@ class Scored:
 
     def coarse_of(self, problem: LightProblem, coarse: CoarseImages, emitter: Emitter) -> Tensor:
         """(3, B) weighted coarse image of a light that is no candidate."""
+        return self.weighted(problem, coarse, coarse.blocks @ problem.evaluate(emitter)[:, :, 0].contiguous())
+
+    @staticmethod
+    def weighted(problem: LightProblem, coarse: CoarseImages, image: Tensor) -> Tensor:
+        """(3, B) coarse image (B, 3), weighted as those of the candidates are."""
         target = (coarse.blocks @ problem.target).double()
         root = problem.block_weights(target, coarse.counts.to(target), coarse.blocks).sqrt()
-        column = problem.evaluate(emitter)[:, :, 0].contiguous()
-        return ((coarse.blocks @ column) * root.to(column)).T
+        return (image * root.to(image)).T
 
 
 def single_gains(scored: Scored) -> Tensor:
@@ -129,6 +133,17 @@ def extensions(scored: Scored, fixed: Tensor, count: int = JOINING) -> list[tupl
         exact += _explained(gram, cross[chosen], wanted, scored, chosen, channel).cpu()
     order = exact.argsort(descending=True, stable=True)
     return [(int(chosen[k]), float(exact[k]) / scored.energy) for k in order.tolist()]
+
+
+def explained(scored: Scored, fixed: Tensor) -> float:
+    """Share of the target's energy that lights with weighted coarse images (n, 3, B) explain at intensities ≥ 0."""
+    energy = 0.0
+    for channel in range(3):
+        there = fixed[:, channel]
+        gram, product = (there @ there.T).double(), (there @ scored.target[channel]).double()
+        strength = nonnegative(gram, product)
+        energy += float(2.0 * strength @ product - strength @ gram @ strength)
+    return energy / scored.energy
 
 
 def _explained(gram: Tensor, cross: Tensor, wanted: Tensor, scored: Scored, chosen: Tensor, channel: int) -> Tensor:

@@ -31,7 +31,7 @@ REASONS = {
     "outside, or these views do not tell its distance; give more views or a larger region.",
     FitStatus.AMBIGUOUS: "Clearly different lights explain the target as well as these: give more views, or say more "
     "of the lights (their number, their type).",
-    FitStatus.UNDETERMINED: "The loss has a minimum here, but these views do not tell all of the lights.",
+    FitStatus.UNDETERMINED: "These views do not tell all of the lights.",
     FitStatus.UNEXPLAINED: "These lights leave much of the target unexplained: their number or type may be another, or "
     "the scene that was photographed is not the one that was frozen; say more of the lights, or search more starts.",
     FitStatus.NOT_ENOUGH_LIGHT: "The target is black, or no light in the scene can explain it: check its exposure, "

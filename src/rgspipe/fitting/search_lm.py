@@ -26,6 +26,7 @@ from rgspipe.fitting.judge import (
     worth_keeping,
     worth_one_more,
 )
+from rgspipe.fitting.one_more import one_more_light
 from rgspipe.fitting.parameters import Emitter
 from rgspipe.fitting.problem import LightProblem
 from rgspipe.fitting.refine import (
@@ -40,11 +41,12 @@ from rgspipe.fitting.refine import (
     start_from,
     weights_at,
 )
-from rgspipe.fitting.result import REASONS, FitResult, FitStatus, dark_result
+from rgspipe.fitting.result import FitResult, dark_result
 from rgspipe.fitting.schedule import SHORT_ITERATIONS, refine_starts
 from rgspipe.fitting.spec import MOST_LIGHTS, LightSpec
 from rgspipe.fitting.starts import Candidates, Rig
 from rgspipe.fitting.uncertainty import doubts, light_covariances
+from rgspipe.fitting.verdict import Findings, percent
 
 #: Starts for each wanted one, where spots are among the candidates.
 SPOT_STARTS = 3
@@ -52,9 +54,6 @@ SPOT_STARTS = 3
 #: A number of lights that is known is searched from up to so many times the wanted starts, until the best one leaves
 #: less than this share of the blocks' energy unexplained.
 BATCHES, WELL_EXPLAINED = 4, 0.02
-
-#: An answer that leaves more than this share of the target's energy unexplained is none.
-POORLY_EXPLAINED = 0.05
 
 #: So many of the starts with the least robust losses, and of those that explain most, are refined with plain squares.
 SETTLED = 2
@@ -104,11 +103,11 @@ def fit_search_lm(
         return dark_result(time.perf_counter() - begin)
     search = _Search(problem, problem.coarsest(blocks), candidates, options, spec, search_region(problem), begin)
     best = search.known(spec.count) if spec.count is not None else search.unknown()
-    ambiguous = search.ambiguous(best)
+    found = Findings(ambiguous=search.ambiguous(best), too_few=search.too_few(best))
     best = search.polish(best)
     if not bool((best.intensity > 0).any()):
         return dark_result(time.perf_counter() - begin)
-    return search.result(best, ambiguous)
+    return search.result(best, found)
 
 
 def fit_from(problem: LightProblem, start: Sequence[Emitter], iterations: int = 30) -> FitResult:
@@ -121,7 +120,7 @@ def fit_from(problem: LightProblem, start: Sequence[Emitter], iterations: int = 
     state = start_from(search.problem, start, PLAIN, begin)
     refine(search.problem, state, PLAIN, iterations, search.region, begin)
     search.states.append(state)
-    return search.result(state, False)
+    return search.result(state, Findings())
 
 
 def _roughly_exposed(problem: LightProblem, coarse: Sequence[CoarseImages]) -> LightProblem:
@@ -319,16 +318,31 @@ class _Search:
             exposures = self.problem.moments(best.columns, weights).exposures
             self.problem = replace(self.problem.with_exposures(exposures), exposure_free=False)
 
-    def result(self, best: State, ambiguous: bool) -> FitResult:
+    def too_few(self, best: State) -> float:
+        """By what share one light more than the known number lowers the robust cost; 0 where it is not worth it."""
+        count = self.spec.count
+        if count is None or count == MOST_LIGHTS or len(best.emitters) != count:
+            return 0.0
+        compared = one_more_light(self.coarse, self.candidates, best, self.region, self.begin)
+        if compared is None:
+            return 0.0
+        self.states += compared.refined
+        self.tried = [compared.simple, compared.rich]
+        worth = worth_one_more(self.coarse, compared.simple, compared.rich)
+        return drop(self.coarse, compared.simple, compared.rich) if worth else 0.0
+
+    def result(self, best: State, found: Findings) -> FitResult:
         self._settle_exposures(best)
         costs, loss = self.costs(), self.problem.unexplained(best.columns, best.intensity)
         lights, spread = best.lights(self.problem), light_covariances(self.problem, best)
+        at_bound = any(self.region.at_bound(emitter.position) for emitter in best.emitters)
         doubt = doubts(lights, spread.calibrated, self.region.size)
-        status = self._status(best, ambiguous, loss, doubt)
+        found = replace(found, at_bound=at_bound, loss=loss, doubt=doubt, ended=best.status)
+        maybe = "" if found.too_few else _one_more(len(lights), costs)
         return FitResult(
             lights=lights,
-            status=status,
-            reason=" ".join(filter(None, (REASONS[status], doubt, _one_more(len(lights), costs)))),
+            status=found.status,
+            reason=" ".join(filter(None, (found.reason(len(lights)), maybe))),
             loss=loss,
             iterations=sum(state.iterations for state in self.states),
             evaluations=sum(state.evaluations for state in self.states),
@@ -341,16 +355,6 @@ class _Search:
             noise_covariance=spread.noise,
         )
 
-    def _status(self, best: State, ambiguous: bool, loss: float, doubt: str) -> FitStatus:
-        """Why the fit ended, the gravest reason first."""
-        if any(self.region.at_bound(emitter.position) for emitter in best.emitters):
-            return FitStatus.AT_BOUND
-        if loss > POORLY_EXPLAINED:
-            return FitStatus.UNEXPLAINED
-        if ambiguous:
-            return FitStatus.AMBIGUOUS
-        return FitStatus.UNDETERMINED if doubt and best.status == FitStatus.CONVERGED else best.status
-
 
 def _one_more(count: int, costs: Mapping[int, float]) -> str:
     """A sentence where one light more than were found might be there."""
@@ -359,10 +363,6 @@ def _one_more(count: int, costs: Mapping[int, float]) -> str:
     share = 1.0 - costs[count + 1] / costs[count]
     if share <= DOUBTFUL_DROP:
         return ""
-    limits = f"from {_percent(LEAST_DROP)} on, of a light with less than {_percent(FAINT)} of the energy from "
-    limits += f"{_percent(FAINT_DROP)} on"
-    return f"One more light would lower the cost by {_percent(share)}: there may be one (it counts {limits})."
-
-
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.0f} %"
+    limits = f"from {percent(LEAST_DROP)} on, of a light with less than {percent(FAINT)} of the energy from "
+    limits += f"{percent(FAINT_DROP)} on"
+    return f"One more light would lower the cost by {percent(share)}: there may be one (it counts {limits})."

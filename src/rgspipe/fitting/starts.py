@@ -16,6 +16,7 @@ from rgspipe.fitting.combinations import (
     best_combinations,
     bright_gains,
     candidate_costs,
+    explained,
     extensions,
     single_gains,
 )
@@ -80,7 +81,26 @@ class Candidates:
     def extended(self, state: State, count: int, size: float) -> list[Rig]:
         """At most `count` rigs: the lights of a refined one and one candidate more."""
         fixed = torch.stack([self.scored.coarse_of(self.problem, self.coarse, emitter) for emitter in state.emitters])
-        added = [self.emitters([index]) for index, _ in extensions(self.scored, fixed)]
+        return self._extended(state, extensions(self.scored, fixed), count, size)
+
+    def promised(self, state: State, searched: LightProblem, count: int, size: float) -> tuple[float, list[Rig]]:
+        """By what share one candidate more lowers the blocks' squared relative error, and `extended`.
+
+        Args:
+            searched: that `state` was refined on; where its blocks are those of the candidates nothing is rendered.
+        """
+        if searched.blocks is not None and searched.blocks.average is self.coarse.blocks:
+            seen = [column[:, :, 0] for column in state.columns]
+        else:
+            seen = [self.coarse.blocks @ self.problem.evaluate(one)[:, :, 0].contiguous() for one in state.emitters]
+        fixed = torch.stack([self.scored.weighted(self.problem, self.coarse, image) for image in seen])
+        left = 1.0 - explained(self.scored, fixed)
+        found = extensions(self.scored, fixed)
+        promise = (found[0][1] - (1.0 - left)) / left if left > 0.0 else 0.0
+        return promise, self._extended(state, found, count, size)
+
+    def _extended(self, state: State, found: Sequence[tuple[int, float]], count: int, size: float) -> list[Rig]:
+        added = [self.emitters([index]) for index, _ in found]
         return [(*state.emitters, *extra) for extra in different(added, count, SEPARATION * size)]
 
 

@@ -36,9 +36,9 @@ from rgspipe.fitting.refine import (
     weights_at,
 )
 from rgspipe.fitting.result import REASONS, FitResult, FitStatus
-from rgspipe.fitting.search_lm import POORLY_EXPLAINED
 from rgspipe.fitting.starts import Rig
 from rgspipe.fitting.uncertainty import Covariances, doubts, light_covariances
+from rgspipe.fitting.verdict import POORLY_EXPLAINED
 
 #: Residuals below this part of the mean radiance are rounding.
 LEAST_NOISE = 1e-6

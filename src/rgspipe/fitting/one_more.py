@@ -1,0 +1,61 @@
+"""Whether one light more than were asked for would explain clearly more, so that too small a number is told.
+
+What a wrong number leaves unexplained may be little: one light explains more than 95 % of the energy of two that stand
+close together, or of which one is weak. So a search with a known number asks the candidates in closed form whether one
+of them beside the answer promises enough, and only then refines a few rigs of one light more, to be judged as those of
+unknown numbers are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from rgspipe.fitting.judge import best_state
+from rgspipe.fitting.problem import LightProblem
+from rgspipe.fitting.refine import ROBUST, Region, State, fresh, refine
+from rgspipe.fitting.schedule import SHORT_ITERATIONS, refine_starts
+from rgspipe.fitting.starts import Candidates, Rig
+
+#: The best candidate beside the answer must promise to lower the squared relative error by this share.
+PROMISED = 0.3
+
+#: So many rigs of each kind of candidate are refined.
+TRIES = 2
+
+
+@dataclass(frozen=True)
+class OneMore:
+    """An answer, and the best rig found that has one light more, both refined under the robust loss.
+
+    Attributes:
+        simple, rich: the two rigs.
+        refined: all states that were refined for this.
+    """
+
+    simple: State
+    rich: State
+    refined: Sequence[State]
+
+
+def one_more_light(
+    problem: LightProblem, candidates: Sequence[Candidates], answer: State, region: Region, begin: float
+) -> OneMore | None:
+    """The answer beside the best rig with one light more; None where no candidate promises enough.
+
+    Args:
+        problem: that the answer was searched on.
+        candidates: of each kind of light.
+    """
+    rigs: list[Rig] = []
+    for kind in candidates:
+        promise, extended = kind.promised(answer, problem, TRIES, region.size)
+        rigs += extended if promise >= PROMISED else []
+    if not rigs:
+        return None
+    simple = fresh(answer)
+    refine(problem, simple, ROBUST, SHORT_ITERATIONS, region, begin)
+    started, finished = refine_starts(problem, rigs, SHORT_ITERATIONS, region, begin)
+    rich = best_state(problem, finished)
+    refine(problem, rich, ROBUST, SHORT_ITERATIONS, region, begin)
+    return OneMore(simple, rich, [simple, *started])
