@@ -13,7 +13,8 @@ from rgspipe.artifacts import Artifact
 from rgspipe.cli.columns import columns, percent, without_empty
 from rgspipe.cli.outcome import light_line, outcome
 from rgspipe.datasets.light_file import write_lights
-from rgspipe.evaluation.tables import summary_table
+from rgspipe.evaluation.tables import summary_table, target_table
+from rgspipe.files import write_json
 from rgspipe.fitting.result import REASONS, FitStatus
 from rgspipe.scene import LightRig, PointLight, SpotLight
 
@@ -68,6 +69,7 @@ def test_an_evaluation_is_a_table_per_class_or_a_line_per_target(tmp_path: Path)
     def make(folder: Path, rows: pd.DataFrame) -> None:
         rows.to_csv(folder / "metrics.csv", index=False)
         summary_table(rows, seed=0, resamples=10).to_csv(folder / "summary.csv", index=False)
+        write_json(folder / "metrics.json", {"sought": {"number": False, "types": False}})
 
     many = outcome(artifact(tmp_path / "many", "evaluate", lambda folder: make(folder, targets)))
     assert [line.split()[0] for line in many[1:5]] == ["visible", "out", "occluded", "all"]
@@ -79,6 +81,40 @@ def test_an_evaluation_is_a_table_per_class_or_a_line_per_target(tmp_path: Path)
     assert f"{100.0 * targets['position_error'][1]:.2f} %" in few[2] and few[2].endswith("converged")
     alone = outcome(artifact(tmp_path / "alone", "evaluate", lambda folder: make(folder, pd.concat([targets[:3]] * 2))))
     assert [line.split()[0] for line in alone[1:-1]] == ["visible"]
+
+
+def _sought(tmp_path: Path, types: bool, many: bool) -> list[str]:
+    """What is said of a point taken for a spot, one light of two, and others that are right."""
+    names = [f"rig_{index}" for index in range(6 if many else 3)]
+    results = pd.DataFrame({"target": names, "occlusion": "visible", "method": "search_lm", "views": 1, "seconds": 1.0})
+    found = dict.fromkeys(names, (POINT, SPOT)) | {"rig_0": (POINT, replace_type(SPOT)), "rig_1": (POINT,)}
+    rows = target_table(results.assign(result="converged"), found, dict.fromkeys(names, (POINT, SPOT)), 1.0)
+
+    def make(folder: Path) -> None:
+        rows.to_csv(folder / "metrics.csv", index=False)
+        summary_table(rows, seed=0, resamples=10).to_csv(folder / "summary.csv", index=False)
+        write_json(folder / "metrics.json", {"sought": {"number": types, "types": types}})
+
+    return outcome(artifact(tmp_path, "evaluate", make))
+
+
+def replace_type(light: SpotLight) -> PointLight:
+    return PointLight(light.position, light.intensity)
+
+
+def test_an_evaluation_says_what_number_and_types_are_wrong(tmp_path: Path) -> None:
+    few = _sought(tmp_path / "few", types=True, many=False)
+    assert "lights" in few[0] and "types" in few[0]
+    assert "wrong" in few[1] and "there" not in few[1]
+    assert "1 found, 2 there" in few[2] and "wrong" not in few[2]
+    assert "wrong" not in few[3] and "there" not in few[3]
+
+
+def test_shares_of_right_numbers_and_types_are_said_where_they_were_sought(tmp_path: Path) -> None:
+    sought = _sought(tmp_path / "sought", types=True, many=True)
+    assert "right number  right types" in sought[0] and "83 %" in sought[1] and "67 %" in sought[1]
+    told = _sought(tmp_path / "told", types=False, many=True)
+    assert "right" not in told[0] and "67 %" not in told[1]
 
 
 def test_a_track_says_how_frames_were_found_and_how_far_off_each_light_is(tmp_path: Path) -> None:

@@ -29,6 +29,7 @@ def _targets(views: int = 1) -> pd.DataFrame:
             "axis_error": [math.nan, 0.5, 1.5, math.nan],
             "cone_error": math.nan,
             "count_right": pd.array([True, True, True, False], dtype="boolean"),
+            "types_right": pd.array([True, False, True, False], dtype="boolean"),
         }
     )
     return table.assign(method="search_lm", views=views)
@@ -47,6 +48,7 @@ def test_a_case_has_a_row_for_each_class_and_one_for_all() -> None:
     assert (whole["success"], whole["inside_95"]) == (0.25, pytest.approx(2 / 3))
     assert whole["stated"] == 0.002 and whole["converged"] == 0.75 and whole["ambiguous"] == 0.25
     assert whole["axis"] == 1.0 and math.isnan(whole["cone"]) and whole["right_number"] == 0.75
+    assert whole["right_types"] == 0.5
     # Only "c" says converged, is off and states no region with the truth.
     assert rows["silent"].tolist() == [0.0, 0.5, 0.25]
 
@@ -104,7 +106,9 @@ def test_text_shows_what_differs_and_says_what_is_not_known() -> None:
     assert text.startswith("| scene | views | light |") and text.count("\n") == 8 and "| corner |" in text
     headings, rows = shown_rows(table, "kinds")
     assert len(rows) == 1 and rows[0]["axis"] == "1.00° (0.50–1.50)" and rows[0]["cone"] == "—"
-    assert rows[0]["right number"].startswith("75 %")
+    assert rows[0]["right number"].startswith("75 %") and rows[0]["right types"].startswith("50 %")
+    # A study that was made before types were judged can still be shown.
+    assert "right types" not in shown_rows(table.drop(columns="right_types"), "kinds")[0]
     table = pd.concat([table, table.assign(views=2, predicted=0.01, position=math.inf)])
     headings, rows = shown_rows(table, "views")
     assert rows[-1]["predicted"] == "1.00 %" and rows[0]["predicted"] == "—" and rows[-1]["position error"][0] == "∞"

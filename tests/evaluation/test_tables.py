@@ -63,6 +63,17 @@ def test_the_number_of_lights_is_judged():
     assert tables.summary_table(table, seed=0)["count_rate"].tolist() == [0.5, 0.5]
 
 
+def test_the_types_of_lights_are_judged_where_their_number_is_right():
+    rig = (_spot(0.0, (0, 0, 1), 0.5), _light(1, 0, 0))
+    found = {"a": rig[::-1], "b": (_light(0, 0, 0), _spot(1.0, (0, 0, 1), 0.5)), "c": rig[:1], "d": rig}
+    results = _results([(name, "visible") for name in found])
+    table = tables.target_table(results, found, dict.fromkeys("abc", rig), 1.0)
+    # "b" has a spot and a point, but each in the place of the other; of "d" the truth is not known.
+    assert table["types_right"].tolist()[:3] == [True, False, False] and pd.isna(table["types_right"][3])
+    assert table["count_right"].tolist()[:3] == [True, True, False]
+    assert tables.summary_table(table, seed=0)["types_rate"].tolist() == pytest.approx([1 / 3, 1 / 3])
+
+
 def test_target_table_holds_errors_verdicts_and_both_positions():
     results = _results([("a", "visible"), ("b", "occluded"), ("c", "occluded"), ("d", "visible")])
     estimates = {"a": (_light(0.5, 0.5, 0.51, 1.1),), "b": (_light(0.5, 0.5, 0.9),), "d": (_light(0, 0, 0),)}

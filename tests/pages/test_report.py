@@ -67,6 +67,17 @@ def test_a_study_is_shown_with_its_remark_and_left_out_where_none_was_made(full_
     assert "bad captures" not in Page(report.render_report(dataclasses.replace(contents, study=None))).text
 
 
+def test_right_numbers_and_types_are_shown_where_they_were_sought(full_contents):
+    targets = full_contents.targets.copy()
+    targets.loc[0, ["types_right", "success"]] = [False, True]
+    targets.loc[1, ["count_right", "types_right", "success", "lights_found"]] = [False, False, False, 2]
+    told = dataclasses.replace(full_contents, targets=targets, summary=tables.summary_table(targets, 0, 0))
+    page = Page(report.render_report(told)).text
+    assert "yes, wrong type" in page and "no: 2 found, 1 there" in page and "Right" not in page
+    page = Page(report.render_report(dataclasses.replace(told, number_sought=True, types_sought=True))).text
+    assert page.count("Right") == 2 and "89 %" in page and "78 %" in page
+
+
 def test_text_from_files_is_escaped(full_contents):
     html = report.render_report(full_contents)
     assert "<step>" not in html and "small &lt;step&gt;" in html

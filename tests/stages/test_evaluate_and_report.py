@@ -120,8 +120,9 @@ def _evaluate(tmp_path: Path, config: RgspipeConfig, name: str = "out", **datase
 
 
 @pytest.fixture
-def config() -> RgspipeConfig:
-    return with_changes(RgspipeConfig(), {"stage": "evaluate"})
+def config(tmp_path: Path) -> RgspipeConfig:
+    # A report shows studies and targets that it finds among the outputs.
+    return with_changes(RgspipeConfig(), {"stage": "evaluate", "outputs": str(tmp_path / "outputs")})
 
 
 def test_evaluate_writes_errors_summary_course_and_pictures(tmp_path, config):
@@ -139,6 +140,7 @@ def test_evaluate_writes_errors_summary_course_and_pictures(tmp_path, config):
     assert curves["position_error"].iloc[0] == pytest.approx(0.5) and len(curves) == 6
     found = json.loads((folder / "metrics.json").read_text())
     assert found["scene_size"] == 2.0 and found["notes"] == []
+    assert found["sought"] == {"number": False, "types": False} and targets["types_right"].all()
     assert found["cameras"][0]["origin"] == pytest.approx([0.5, -1.5, 0.5])
     assert found["cameras"][0]["direction"] == pytest.approx([0.0, 1.0, 0.0], abs=1e-12)
     assert found["cameras"][0]["angle"] == pytest.approx(0.7)

@@ -87,13 +87,15 @@ def _evaluation(artifact: Artifact) -> list[str]:
     targets = pd.read_csv(artifact.file("metrics.csv"), dtype={"target": str})
     if len(targets) <= FEW:
         rows = [_target_row(row) for row in targets.to_dict("records")]
-        named = ["", "", "position error", "stated", "intensity", "axis", "PSNR", "time", ""]
+        named = ["", "", "position error", "stated", "intensity", "axis", "lights", "types", "PSNR", "time", ""]
         return [*columns(without_empty([named, *rows])), f"Errors: {artifact.path / 'metrics.csv'}"]
     summary = pd.read_csv(artifact.file("summary.csv"))
     single = len(summary["occlusion"].drop_duplicates()) <= 2  # One class, and all of them, which is the same.
     shown = summary[summary["occlusion"] != ALL] if single else summary
-    named = ["", "targets", "position error", "worst", "solved", "intensity", "axis", "truth in 95 %", "time"]
-    rows = [_summary_row(row) for row in shown.to_dict("records")]
+    named = ["", "targets", "position error", "worst", "solved", "intensity", "axis", "right number", "right types"]
+    named += ["truth in 95 %", "time"]
+    sought = read_json(artifact.file("metrics.json"), "what an evaluation found")["sought"]
+    rows = [_summary_row(row, sought) for row in shown.to_dict("records")]
     return [*columns(without_empty([named, *rows])), f"Errors: {artifact.path / 'summary.csv'}, metrics.csv"]
 
 
@@ -104,13 +106,21 @@ def _target_row(row: Row) -> list[str]:
         _class(row["occlusion"]),
         *map(percent, measured),
         degrees(row["axis_error"]),
+        _wrong_number(row),
+        "wrong" if row["count_right"] is True and row["types_right"] is False else "",
         decibels(row["psnr"]),
         seconds(row["seconds"]),
         words(row["result"]),
     ]
 
 
-def _summary_row(row: Row) -> list[str]:
+def _wrong_number(row: Row) -> str:
+    """ "2 found, 3 there"; nothing where the number of lights is right or not known."""
+    return f"{row['lights_found']} found, {row['lights_true']:.0f} there" if row["count_right"] is False else ""
+
+
+def _summary_row(row: Row, sought: Mapping[str, bool]) -> list[str]:
+    """A row a class; of how often number and types are right only where these were sought."""
     return [
         _class(row["occlusion"]),
         f"{row['count']}",
@@ -119,6 +129,8 @@ def _summary_row(row: Row) -> list[str]:
         percent(row["success_rate"], 0),
         percent(row["median_intensity_error"]),
         degrees(row["median_axis_error"]),
+        percent(row["count_rate"], 0) if sought["number"] else "",
+        percent(row["types_rate"], 0) if sought["types"] else "",
         percent(row["inside_95"], 0),
         seconds(row["median_seconds"]),
     ]

@@ -29,7 +29,12 @@ MEDIANS = {
     "cone": "cone_error",
 }
 #: Shares of the targets, likewise.
-SHARES = {"success": "success", "inside_95": "inside_95", "right_number": "count_right"}
+SHARES = {
+    "success": "success",
+    "inside_95": "inside_95",
+    "right_number": "count_right",
+    "right_types": "types_right",
+}
 
 #: What names a row.
 KEYS = ["scene", "case", "method", "views", "occlusion"]
@@ -51,8 +56,8 @@ def case_rows(scene: str, case: str, targets: pd.DataFrame, seed: int, resamples
         - `position` (fraction of the scene), `intensity` (fraction), `seconds`, of spots `axis` and `cone` (degrees):
           medians, each with `_low` and `_high`;
         - `success` (within the limit, with the right number of lights), `inside_95` (the truth lies inside the region
-          that the fit states for 95 %) and `right_number` (of lights): shares of those where it is known, with `_low`
-          and `_high`;
+          that the fit states for 95 %), `right_number` (of lights) and `right_types` (their number is right, and each
+          is a point or a spot where it should be): shares of those where it is known, with `_low` and `_high`;
         - `stated`: the median of the position errors that fits expect of themselves;
         - `silent`, likewise: the share of judged targets whose fit says that it converged, misses the limit, and states
           no region that holds the truth: wrong without a word;

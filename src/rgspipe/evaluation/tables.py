@@ -38,6 +38,7 @@ TARGET_COLUMNS = (
     "lights_found",
     "lights_true",
     "count_right",
+    "types_right",
     "position_sd",
     "inside_95",
     "x",
@@ -74,6 +75,7 @@ SUMMARY_COLUMNS = (
     "median_axis_error",
     "median_cone_error",
     "count_rate",
+    "types_rate",
     "median_position_sd",
     "inside_95",
 )
@@ -177,7 +179,8 @@ def target_table(
 
     Returns:
         A table with `TARGET_COLUMNS`. `success` is True, False or missing; a rig with lights too many
-        or too few is never a success. Positions and intensities are those of the true rig's first
+        or too few is never a success, and has no right types: `types_right` is whether every true light is matched
+        by one of its own type, point or spot, and none is left over. Positions and intensities are those of the true rig's first
         light and of the estimate matched to it. `position_sd` is the error that the fit expects of itself
         (`calibration.position_sd`), `inside_95` whether the true positions lie inside its 95 % regions; missing
         where that cannot be told or the number of lights is wrong.
@@ -202,6 +205,7 @@ def target_table(
         {
             "success": "boolean",
             "count_right": "boolean",
+            "types_right": "boolean",
             "inside_95": "boolean",
             "views": int,
             "lights_found": int,
@@ -285,6 +289,7 @@ def _target_row(
         | {"occlusion": class_of(row["occlusion"], len(truth))}
         | {"position_error": position, "intensity_error": intensity, "axis_error": axis, "cone_error": cone}
         | {"success": solved, "count_right": len(estimate) == len(truth) if truth else None}
+        | {"types_right": _types_right(estimate, truth, pairs)}
         | {"psnr": _number(row.get("psnr")), "result": row.get("result", ""), "reason": row.get("reason", "")}
         | {"lights_found": len(estimate), "lights_true": len(truth) if truth else None}
         | {"position_sd": calibration.position_sd(positions, scene_size)}
@@ -293,6 +298,13 @@ def _target_row(
         | _light_columns(true_light, "_true")
         | _variance_columns(shown_spread)
     )
+
+
+def _types_right(estimate: LightRig, truth: LightRig, pairs: Sequence[tuple[int, int]]) -> bool | None:
+    """Whether the lights are as many as there are, each of the type of its match; None where the truth is not known."""
+    if not truth:
+        return None
+    return len(estimate) == len(truth) and all(isinstance(estimate[i], type(truth[j])) for i, j in pairs)
 
 
 def _inside(
@@ -341,6 +353,7 @@ def _summary(group: pd.DataFrame, seed: int, resamples: int) -> dict[str, float]
         "median_axis_error": _median(group["axis_error"]),
         "median_cone_error": _median(group["cone_error"]),
         "count_rate": _rate(group["count_right"]),
+        "types_rate": _rate(group["types_right"]),
         "median_position_sd": _median(group["position_sd"]),
         "inside_95": _rate(group["inside_95"]),
     }

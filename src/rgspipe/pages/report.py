@@ -66,6 +66,7 @@ class ReportContents:
         galleries: fit targets that were generated.
         sections: what else was made: courses of fits, a track.
         success_limit: position error up to which a target counts as solved.
+        number_sought, types_sought: whether the number and the types of the lights were to be found out, not told.
         configuration: the full configuration as YAML or JSON text.
         stages: one record per artifact behind the report.
         notes: what the reader must know: what is missing and why.
@@ -93,6 +94,8 @@ class ReportContents:
     galleries: Sequence[Section] = ()
     sections: Sequence[Section] = ()
     success_limit: float = metrics.SUCCESS_LIMIT
+    number_sought: bool = False
+    types_sought: bool = False
     configuration: str = ""
     stages: Sequence[StageRecord] = ()
     notes: Sequence[str] = field(default_factory=tuple)
@@ -207,6 +210,10 @@ def _target_rows(targets: pd.DataFrame) -> list[dict]:
     rows = []
     for row in targets.to_dict("records"):
         verdict = "unknown" if row["success"] is None or pd.isna(row["success"]) else ("no", "yes")[int(row["success"])]
+        if verdict != "unknown" and not row["count_right"]:
+            verdict = f"no: {row['lights_found']} found, {row['lights_true']:.0f} there"
+        elif verdict != "unknown" and not row["types_right"]:
+            verdict += ", wrong type"
         estimate, truth = (", ".join(decimals(row[axis + suffix], 3) for axis in "xyz") for suffix in ("", "_true"))
         ended, why = (
             row[name] if isinstance(row[name], str) and row[name] else MISSING for name in ("result", "reason")

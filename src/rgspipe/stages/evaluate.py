@@ -58,6 +58,7 @@ def run(context: StageContext) -> None:
         "scene_size": size,
         "bounds": truth.bounds,
         "success_limit": config.evaluate.success,
+        "sought": {"number": config.light.count is None, "types": config.light.type == "auto"},
         "summary": summary.to_dict("records"),
         "cameras": _cameras(config, dataset, targets),
         "pictures": [
@@ -186,7 +187,7 @@ STAGE = Stage(
     name="evaluate",
     help="errors of the recovered lights per target and per class",
     inputs=lambda config: ["fit_light", *target_stage(config), "freeze"],
-    config_keys=("evaluate", "seed", "views", "fit.target", "fit.truth"),
+    config_keys=("evaluate", "seed", "views", "fit.target", "fit.truth", "light.type", "light.count"),
     code=(
         "rgspipe.datasets.covariance_file",
         "rgspipe.datasets.landscape_file",

@@ -57,7 +57,7 @@ def _contents(context: StageContext) -> report.ReportContents:
     described = [read_json(artifact.file("metrics.json"), "what an evaluation found") for artifact in evaluations]
     surfels = _surfels(context.inputs.get("freeze"))
     trained = context.inputs.get("train_surfels")
-    verdicts = {"success": "boolean", "inside_95": "boolean"}
+    verdicts = {"success": "boolean", "inside_95": "boolean", "count_right": "boolean", "types_right": "boolean"}
     targets = _table(evaluations, "metrics.csv", verdicts | {"result": str, "reason": str})
     study, remark = found_study(config, judged)
     return report.ReportContents(
@@ -83,6 +83,8 @@ def _contents(context: StageContext) -> report.ReportContents:
         galleries=found_galleries(config, surfels),
         sections=found_sections(config, context.inputs.get("freeze")),
         success_limit=config.evaluate.success,
+        number_sought=any(content["sought"]["number"] for content in described),
+        types_sought=any(content["sought"]["types"] for content in described),
         configuration=_configuration(config),
         stages=_stages(context, described),
         notes=_notes(described),
