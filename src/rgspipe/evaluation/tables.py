@@ -180,8 +180,8 @@ def target_table(
     Returns:
         A table with `TARGET_COLUMNS`. `success` is True, False or missing; a rig with lights too many
         or too few is never a success, and has no right types: `types_right` is whether every true light is matched
-        by one of its own type, point or spot, and none is left over. Positions and intensities are those of the true rig's first
-        light and of the estimate matched to it. `position_sd` is the error that the fit expects of itself
+        by one of its own type, point or spot, and none is left over. Positions and intensities are those of the true
+        rig's first light and of the estimate matched to it. `position_sd` is the error that the fit expects of itself
         (`calibration.position_sd`), `inside_95` whether the true positions lie inside its 95 % regions; missing
         where that cannot be told or the number of lights is wrong.
     """
