@@ -10,7 +10,7 @@ import torch
 
 from lit_room import HIDDEN, room_cameras
 from rgspipe import fit_lights
-from rgspipe.fitting import Effects
+from rgspipe.fitting import Effects, ImageCapture
 from rgspipe.fitting.advice import COMMON, MOST_VIEWS, coarse_camera, suggest_views
 from rgspipe.scene import Camera, PointLight, look_at
 
@@ -105,3 +105,39 @@ def test_small_cameras_see_the_same():
 def test_a_fit_without_lights_has_no_advice(room, fitted):
     with pytest.raises(ValueError, match="lights"):
         suggest_views(room.frozen, replace(fitted, lights=()), room_cameras(48)[:1], [AWAY], wanted=0.0)
+
+
+def test_a_camera_whose_image_would_be_saturated_helps_no_more(room, fitted):
+    """TOWARDS sees the bright spot, but not with a clip far below it; one that nothing reaches changes nothing."""
+    image = room.frozen.render(room.frozen.view(TOWARDS), fitted.lights)
+    (present,) = room_cameras(48)[:1]
+
+    def left(clip: float | None) -> float:
+        capture = ImageCapture(clip=clip)
+        advice = suggest_views(room.frozen, fitted, [present], [TOWARDS], wanted=0.0, capture=capture)
+        return advice.ranked[0].position_sd / advice.present_sd
+
+    free = left(None)
+    assert left(10.0 * float(image.max())) == pytest.approx(free, rel=1e-9)
+    seen = room.frozen.render(room.frozen.view(present), fitted.lights)
+    assert float(image.quantile(0.5)) > float(seen.quantile(0.1))
+    assert left(float(image.quantile(0.5))) > free + 0.1
+
+
+def test_the_clip_of_a_view_is_that_of_its_exposure(room, fitted):
+    """A view of twice the exposure is saturated from half the radiance on; one that is all saturated tells nothing."""
+    (present,) = room_cameras(48)[:1]
+    brightest = float(room.frozen.render(room.frozen.view(TOWARDS), fitted.lights).max())
+    bright = float(room.frozen.render(room.frozen.view(present), fitted.lights).max())
+    capture = ImageCapture(clip=2.0 * max(bright, brightest))
+
+    def left(exposure: float) -> float:
+        both = replace(fitted, exposures=(1.0, exposure))
+        return (
+            suggest_views(room.frozen, both, [present, TOWARDS], [AWAY], wanted=0.0, capture=capture)
+            .ranked[0]
+            .position_sd
+        )
+
+    assert left(1.9) == left(1.0)
+    assert left(1e9) != left(1.0)

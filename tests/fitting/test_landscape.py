@@ -8,7 +8,8 @@ import pytest
 import torch
 
 from lit_room import VISIBLE
-from rgspipe.fitting.landscape import PLANES, loss_slices
+from rgspipe.fitting import ImageCapture
+from rgspipe.fitting.landscape import PLANES, best_intensity, loss_slices
 from rgspipe.fitting.parameters import Emitter
 from rgspipe.fitting.problem import LightProblem
 
@@ -56,3 +57,40 @@ def test_outside_the_region_nothing_is_known(room, point_light):
 def test_an_even_number_of_points_has_no_middle(room, point_light):
     with pytest.raises(ValueError, match="odd"):
         loss_slices(_problem(room, point_light(VISIBLE)), [], points=4)
+
+
+def _clipped(room, light, capture_known: bool = True) -> LightProblem:
+    """The image of a light, its brightest quarter of values clipped."""
+    (image,) = room.images(light)
+    white = float(image.reshape(-1).quantile(0.75))
+    capture = ImageCapture(clip=white if capture_known else None)
+    prepared = room.one.prepared
+    return LightProblem.create(prepared, prepared.stack_images([image.clamp(max=white)]), capture=capture)
+
+
+def test_clipped_values_do_not_move_the_least_of_the_loss(room, point_light):
+    light = point_light(VISIBLE)
+    known, unknown = (
+        loss_slices(_clipped(room, light, said), [Emitter.of(light)], reach=0.1, points=3) for said in (True, False)
+    )
+    for one, other in zip(known, unknown, strict=True):
+        assert int(one.loss.argmin()) == 4 and float(one.loss[1, 1]) < 1e-9  # measured 2e-14
+        assert float(other.loss[1, 1]) > 1e-2
+
+
+def test_intensities_beside_clipped_values_are_those_of_one_sided_squares(room, point_light):
+    """At a place that the light is not at, against a search over the strength of one channel."""
+    light = point_light(VISIBLE)
+    problem = _clipped(room, light)
+    moved = Emitter.of(point_light((-VISIBLE[0], -VISIBLE[1], VISIBLE[2])))
+    columns = [problem.evaluate(moved)]
+    found = best_intensity(problem, columns)
+    # What is left out of the first solution matters here: some clipped values are darker in the image.
+    free = problem.moments(columns, problem.unclipped(torch.ones_like(problem.target))).intensity
+    assert float((found / free - 1.0).abs().max()) > 1e-2
+    least = problem.unexplained(columns, found)
+    for channel in range(3):
+        for factor in (0.98, 0.995, 1.005, 1.02):
+            other = found.clone()
+            other[:, channel] *= factor
+            assert problem.unexplained(columns, other) > least

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +24,7 @@ from rgspipe.errors import InputError
 from rgspipe.fitting.fit import prepare_fit, render_light
 from rgspipe.fitting.problem import Effects
 from rgspipe.scene import PointLight
-from rgspipe.stages import fit_light, freeze
+from rgspipe.stages import fit_extras, fit_light, freeze
 from rgspipe.stages.base import StageContext
 
 LIGHTS = {
@@ -240,3 +241,12 @@ def test_advice_and_landscape_are_written_where_they_are_asked_for(inputs, tmp_p
     np.testing.assert_allclose(landscape.trajectory[-1], HIDDEN, atol=1e-4)  # measured 6e-8
     for plane in landscape.planes.values():
         assert int(np.nanargmin(plane.loss)) == plane.loss.size // 2
+
+
+def test_the_landscape_knows_of_clipped_values_and_exposures(inputs, tmp_path, monkeypatch):
+    monkeypatch.setattr(fit_extras, "loss_slices", partial(fit_extras.loss_slices, points=3))
+    taken = {"target_capture__white": 0.8, "target_capture__exposure": 1.0, "views__count": 2}
+    _fit(inputs, tmp_path, occlusion="occluded", fit__landscape=True, fit__exposure="free", **taken)
+    landscape = read_landscape(tmp_path / "occluded_000" / "landscape.npz")
+    for plane in landscape.planes.values():
+        assert plane.loss[1, 1] == np.nanmin(plane.loss) < 1e-3  # measured 1.1e-4, of 8 bits

@@ -10,7 +10,8 @@ of the model that brightens or darkens the cell y as a whole moves the answer by
 variance is the same for all views (an albedo, the light that bounces onto the cell), so that more of them help only if
 they weigh the cells differently or see others; the rest each view has to itself (where its rays end, what it sees of an
 edge or of a shadow's rim) and averages out over views, as noise does. σ² and τ² are set such that the views of the fit
-itself give its own covariance (see `fitting.uncertainty`).
+itself give its own covariance (see `fitting.uncertainty`). Where images are clipped, values that would be saturated
+tell nothing; views that are added are taken with the exposure of the first one.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from dataclasses import dataclass, replace
 import torch
 from torch import Tensor
 
+from rgspipe.fitting.capture import SATURATED, ImageCapture
 from rgspipe.fitting.moments import group_moments, information, scores
 from rgspipe.fitting.parameters import Emitter
 from rgspipe.fitting.problem import Effects, LightProblem
@@ -105,6 +107,7 @@ def suggest_views(
     *,
     wanted: float,
     effects: Effects | None = None,
+    capture: ImageCapture | None = None,
 ) -> ViewAdvice:
     """Rank further cameras for a fit by what they would leave uncertain.
 
@@ -115,13 +118,16 @@ def suggest_views(
         candidates: cameras that could be added.
         wanted: position error to reach, a fraction of the scene's size.
         effects: parts of light transport of the fit; direct light is taken at surfels' centres here.
+        capture: how its images were taken, and others would be; as radiance if None.
 
     Raises:
         ValueError: the fit found no light, or used no camera.
     """
     if not result.lights or not present:
         raise ValueError("views can be suggested only for a fit with lights and cameras")
-    evidence = _evidence(frozen, result, [*present, *candidates], effects or Effects())
+    cameras = [*present, *candidates]
+    clips = _clips(result, capture or ImageCapture(), len(present), len(cameras))
+    evidence = _evidence(frozen, result, cameras, effects or Effects(), clips)
     first = list(range(len(present)))
     forecast = _Forecast.fitted_to(result, evidence, first, frozen.size)
     others = range(len(present), len(present) + len(candidates))
@@ -133,6 +139,15 @@ def suggest_views(
     reached = [present_sd, *(view.position_sd for view in plan)]
     needed = next((len(present) + more for more, sd in enumerate(reached) if sd <= wanted), None)
     return ViewAdvice(len(present), present_sd, ranked, plan, in_order, wanted, needed)
+
+
+def _clips(result: FitResult, capture: ImageCapture, present: int, count: int) -> Tensor:
+    """(count,) radiance from which on each view is saturated, in the exposure of the first one."""
+    limit = math.inf if capture.clip is None else SATURATED * capture.clip
+    clips = torch.full((count,), limit, dtype=torch.float64)
+    if result.exposures:
+        clips[:present] /= torch.tensor(result.exposures, dtype=torch.float64)
+    return clips
 
 
 def _plan(forecast: _Forecast, chosen: list[int], others: list[int], present: int) -> tuple[SuggestedView, ...]:
@@ -209,8 +224,14 @@ class _Forecast:
         return math.sqrt(worst) / self.size if not math.isnan(worst) else math.inf
 
 
-def _evidence(frozen: FrozenScene, result: FitResult, cameras: Sequence[Camera], effects: Effects) -> _Evidence:
-    """The evidence of every camera, from small images of the lights that were found."""
+def _evidence(
+    frozen: FrozenScene, result: FitResult, cameras: Sequence[Camera], effects: Effects, clips: Tensor
+) -> _Evidence:
+    """The evidence of every camera, from small images of the lights that were found.
+
+    Args:
+        clips: (V,) radiance from which on values tell nothing.
+    """
     small = [coarse_camera(camera) for camera in cameras]
     weights = [frozen.view(camera, supersampling=1) for camera in track(small, "looking through cameras", unit="view")]
     views = prepare_views(frozen, weights)
@@ -227,7 +248,7 @@ def _evidence(frozen: FrozenScene, result: FitResult, cameras: Sequence[Camera],
     # A small pixel stands for as many as it covers of the camera's own.
     scale = torch.tensor([a.pixel_count / b.pixel_count for a, b in zip(cameras, small, strict=True)])[view]
     groups = (view * count + cells).to(image.device)
-    weight = scale[:, None].to(image)
+    weight = scale[:, None].to(image) * (image < clips[view][:, None].to(image))
     values, owners = group_moments(columns, image, weight, groups, count * len(cameras))
     values = values.reshape(len(cameras), count, *values.shape[1:])
     brightening = scores(values, owners, intensity)

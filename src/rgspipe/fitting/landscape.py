@@ -10,11 +10,14 @@ from torch import Tensor
 
 from rgspipe.fitting.parameters import Emitter
 from rgspipe.fitting.problem import LightProblem
-from rgspipe.fitting.refine import PLAIN, search_region
+from rgspipe.fitting.refine import PLAIN, State, search_region, weights_at
 from rgspipe.progress import track
 
 #: The planes: pairs of axes.
 PLANES = ((0, 1), (0, 2), (1, 2))
+
+#: Solutions for the intensities at one place, each with the clipped values that count at the one before.
+CLIPPED_ROUNDS = 8
 
 
 @dataclass(frozen=True)
@@ -25,7 +28,7 @@ class LossSlice:
         axes: which of x, y, z run across and up.
         across, up: (n,) float64 coordinates, scene units; the middle of each is the answer.
         loss: (n, n) float64, rows along `up`: Σ (target − image)² / Σ target²; NaN outside the region that is
-            searched.
+            searched. Clipped values of the target count only where the image is darker than they are.
     """
 
     axes: tuple[int, int]
@@ -51,16 +54,15 @@ def loss_slices(
         raise ValueError(f"points must be odd and at least 3, got {points}")
     region = search_region(problem)
     fixed = [problem.evaluate(emitter) for index, emitter in enumerate(rig) if index != light]
-    weights = PLAIN.base(problem).square()
-    energy = max(float(problem.target.double().square().sum()), 1e-300)
     offsets = torch.linspace(-reach, reach, points, dtype=torch.float64) * region.size
     answer = rig[light].position
 
     def loss_at(position: Tensor) -> float:
         if not torch.equal(region.clip(position), position):
             return float("nan")
-        columns = [*fixed, problem.evaluate(replace(rig[light], position=position))]
-        return problem.moments(columns, weights).cost / energy
+        moved = replace(rig[light], position=position)
+        columns = [*fixed, problem.evaluate(moved)]
+        return problem.unexplained(columns, best_intensity(problem, columns))
 
     slices = []
     for axes in track(PLANES, "loss around the answer", unit="plane"):
@@ -72,3 +74,23 @@ def loss_slices(
                 loss[row, column] = loss_at(position)
         slices.append(LossSlice(axes, answer[axes[0]] + offsets, answer[axes[1]] + offsets, loss))
     return tuple(slices)
+
+
+def best_intensity(problem: LightProblem, columns: Sequence[Tensor]) -> Tensor:
+    """(L, 3) intensities ≥ 0 of least squares for the lights' evaluations `columns`.
+
+    Clipped values are left out of the first solution; of the others those count where the image of the one before is
+    darker than the clip, as in the steps of a fit. Squares of one-sided residuals are convex, and these are Newton's
+    steps on them.
+    """
+    base = PLAIN.base(problem)
+    intensity = problem.moments(columns, problem.unclipped(base.square())).intensity
+    if problem.clip is None:
+        return intensity
+    for _ in range(CLIPPED_ROUNDS):
+        before = intensity
+        weights = weights_at(problem, State((), list(columns), before), PLAIN, base)
+        intensity = problem.moments(columns, weights).intensity
+        if torch.allclose(intensity, before, rtol=1e-9, atol=0.0):
+            break
+    return intensity

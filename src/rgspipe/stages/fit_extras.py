@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
@@ -18,6 +19,7 @@ from rgspipe.datasets.landscape_file import Landscape, PlaneLoss, landscape_byte
 from rgspipe.datasets.location import dataset_root
 from rgspipe.fitting import FitResult, FitViews
 from rgspipe.fitting.advice import SPOT_ROWS, ViewAdvice, suggest_views
+from rgspipe.fitting.capture import ImageCapture
 from rgspipe.fitting.landscape import loss_slices
 from rgspipe.fitting.parameters import Emitter
 from rgspipe.fitting.problem import LightProblem
@@ -28,9 +30,20 @@ Named = tuple[str, Camera]
 
 
 def further_files(
-    config: FitConfig, views: FitViews, images: Sequence[Tensor], result: FitResult, candidates: Sequence[Named]
+    config: FitConfig,
+    views: FitViews,
+    images: Sequence[Tensor],
+    result: FitResult,
+    candidates: Sequence[Named],
+    capture: ImageCapture,
 ) -> dict[str, bytes]:
-    """The files that the configuration asks for, by name; none for a fit without lights."""
+    """The files that the configuration asks for, by name; none for a fit without lights.
+
+    Args:
+        images: (H, W, 3) per view, as they were taken.
+        candidates: cameras that could be added.
+        capture: how the images were taken.
+    """
     files: dict[str, bytes] = {}
     if not result.lights:
         return files
@@ -43,12 +56,13 @@ def further_files(
             [camera for _, camera in candidates],
             wanted=config.wanted_accuracy,
             effects=views.effects,
+            capture=capture,
         )
         names = [name for name, _ in candidates]
         files[SUGGESTED] = _advice_table(advice, names).to_csv(index=False).encode()
         files["advice.json"] = _advice_words(advice, names)
     if config.landscape:
-        files["landscape.npz"] = _landscape(views, images, result)
+        files["landscape.npz"] = _landscape(views, images, result, capture)
     return files
 
 
@@ -93,9 +107,12 @@ def _advice_words(advice: ViewAdvice, names: Sequence[str]) -> bytes:
     return (json.dumps(content | {"words": advice.words(names)}, indent=1, allow_nan=False) + "\n").encode()
 
 
-def _landscape(views: FitViews, images: Sequence[Tensor], result: FitResult) -> bytes:
-    """The loss around the first light."""
-    problem = LightProblem.create(views.prepared, views.prepared.stack_images(images), views.effects)
+def _landscape(views: FitViews, images: Sequence[Tensor], result: FitResult, capture: ImageCapture) -> bytes:
+    """The loss around the first light, with the exposures that were found."""
+    known = replace(capture, exposure_free=False)
+    problem = LightProblem.create(views.prepared, views.prepared.stack_images(images), views.effects, known)
+    if result.exposures:
+        problem = problem.with_exposures(torch.tensor(result.exposures, dtype=torch.float64))
     pairs = zip(result.lights, result.covariance, strict=True)
     rig = [Emitter.of(light, cone_free=len(matrix) > SPOT_ROWS) for light, matrix in pairs]
     planes = {

@@ -93,6 +93,7 @@ class Fitter:
         chosen = used_views(target, self.config)
         views, capture = captured_views(chosen, target.name, self.config)
         prepared = self.prepare(views)
+        taken = [view.image for view in views]
         config = self.config.fit
         if isinstance(self.frozen.solver, MonteCarloSolver):
             # Every target draws its own rays, whichever targets an earlier attempt has finished.
@@ -100,7 +101,7 @@ class Fitter:
         result = fit_lights(
             self.frozen,
             prepared,
-            [view.image for view in views],
+            taken,
             method=config.method,
             search=SearchOptions(config.search.starts, config.search.iterations),
             adam=AdamOptions(
@@ -119,10 +120,10 @@ class Fitter:
             spec=light_spec(self.config),
             capture=capture,
         )
+        further = further_files(config, prepared, taken, result, self._other_cameras(target, chosen), capture)
         # Pictures and their PSNR are those of the first view's exposure.
         exposures = result.exposures or [1.0] * len(views)
-        images = [view.image / exposure for view, exposure in zip(views, exposures, strict=True)]
-        further = further_files(config, prepared, images, result, self._other_cameras(target, chosen))
+        images = [image / exposure for image, exposure in zip(taken, exposures, strict=True)]
         write_result(folder / target.name, result, prepared, images, further)
 
     def _other_cameras(self, target: Target, used: Sequence[View]) -> list[Named]:
