@@ -11,11 +11,12 @@ import torch
 
 from rgspipe.config import RgspipeConfig, with_changes
 from rgspipe.datasets.exr import write_image
+from rgspipe.datasets.json_file import read_json
 from rgspipe.datasets.light_file import read_lights
 from rgspipe.datasets.location import open_dataset
 from rgspipe.errors import InputError
 from rgspipe.olat.job import SpotRange
-from rgspipe.olat.pool_file import write_pool
+from rgspipe.olat.pool_file import PooledLight, write_pool
 from rgspipe.scene import PointLight, SpotLight
 from rgspipe.stages import generate_targets, render_olat
 from rgspipe.stages.base import Need, StageContext
@@ -42,7 +43,7 @@ def _pool(folder: Path, kind: str, number: int) -> SimpleNamespace:
 
 
 def _made(config: RgspipeConfig, tmp_path: Path, *pools: SimpleNamespace) -> StageContext:
-    (tmp_path / "made").mkdir()
+    (tmp_path / "made").mkdir(parents=True)
     context = StageContext(config, {}, {"render_olat": pools}, tmp_path / "made")
     generate_targets.run(context)
     return context
@@ -62,6 +63,18 @@ def test_mixed_targets_take_a_pool_of_each_type(tmp_path: Path) -> None:
         lights = read_lights(context.folder / "truth" / f"{target.name}.json")
         assert {type(light) for light in lights} == {PointLight, SpotLight}
         assert target.occlusion == "visible"
+
+
+def test_lights_that_are_alone_are_not_measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(light: PooledLight) -> None:
+        raise AssertionError("an image was read to measure its light")
+
+    monkeypatch.setattr(PooledLight, "brightness", refuse)
+    context = _made(_config(targets__number=3), tmp_path, _pool(tmp_path / "p", "points", 2))
+    truths = [read_json(context.folder / f"truth/rig_000{index}.json", "a truth") for index in range(3)]
+    assert [[light["share"] for light in truth["lights"]] for truth in truths] == [[1.0]] * 3
+    with pytest.raises(AssertionError, match="was read"):
+        _made(_config(targets__count=[1, 2]), tmp_path / "two", _pool(tmp_path / "q", "points", 2))
 
 
 def test_a_track_pairs_its_lights(tmp_path: Path) -> None:

@@ -31,10 +31,17 @@ def _in_turn(pools: list[list[PooledLight]]) -> list[PooledLight]:
 
 def _rigs(config: RgspipeConfig, pool: list[PooledLight]) -> list[RigPlan]:
     lights = [pooled.light for pooled in pool]
-    brightness = np.array([pooled.brightness() for pooled in track(pool, "measuring lights", unit="light")])
     if config.targets.kind == "track":
-        return headlight_rigs(lights, brightness)
-    return draw_rigs(lights, brightness, _request(config))
+        return headlight_rigs(lights, _brightness(pool))
+    request = _request(config)
+    # A light that is alone has all of the energy, however bright it is; measuring reads every image of the pool.
+    alone = request.count == (1, 1)
+    return draw_rigs(lights, np.ones((len(pool), 3)) if alone else _brightness(pool), request)
+
+
+def _brightness(pool: list[PooledLight]) -> np.ndarray:
+    """(K, 3) mean radiance of each light's images, per W/sr."""
+    return np.array([pooled.brightness() for pooled in track(pool, "measuring lights", unit="light")])
 
 
 def _request(config: RgspipeConfig) -> RigRequest:
