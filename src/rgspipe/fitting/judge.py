@@ -67,7 +67,7 @@ def drop(problem: LightProblem, simple: State, rich: State) -> float:
 
 def worth_one_more(problem: LightProblem, simple: State, rich: State) -> bool:
     """Whether the light that `rich` has and `simple` has not is there, rather than an error of the model."""
-    energies = _energies(rich)
+    energies = light_energies(rich)
     faint = min(energies) < FAINT * sum(energies)
     return drop(problem, simple, rich) >= (FAINT_DROP if faint else LEAST_DROP)
 
@@ -92,7 +92,7 @@ def rig_distance(one: Sequence[Emitter], other: Sequence[Emitter]) -> float:
 
 def worth_keeping(state: State, size: float) -> list[int]:
     """Indices of the lights that send enough of the image's energy and do not coincide with a brighter one."""
-    energies = _energies(state)
+    energies = light_energies(state)
     kept: list[int] = []
     for index in sorted(range(len(energies)), key=lambda k: -energies[k]):
         emitter = state.emitters[index]
@@ -107,7 +107,7 @@ def worth_keeping(state: State, size: float) -> list[int]:
     return sorted(kept)
 
 
-def _energies(state: State) -> list[float]:
+def light_energies(state: State) -> list[float]:
     """What each light sends into the image, summed over its pixels and colours."""
     return [
         float((column[:, :, 0] * strength.to(column)).double().sum())

@@ -11,14 +11,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from rgspipe.fitting.judge import best_state
+from rgspipe.fitting.judge import FAINT_DROP, best_state, light_energies
 from rgspipe.fitting.problem import LightProblem
-from rgspipe.fitting.refine import ROBUST, Region, State, fresh, refine
+from rgspipe.fitting.refine import ROBUST, Region, State, fresh, refine, start_from
 from rgspipe.fitting.schedule import SHORT_ITERATIONS, refine_starts
 from rgspipe.fitting.starts import Candidates, Rig
 
-#: The best candidate beside the answer must promise to lower the squared relative error by this share.
-PROMISED = 0.3
+#: An answer that leaves less than this share of the blocks' energy unexplained is not doubted.
+NOTICEABLE = 1e-4
+
+#: The best candidate beside the answer must promise to lower the squared relative error by this share, …
+PROMISED = 0.25
+
+#: … and a light that begins with less than this share of the image's energy, by as much as faint ones must.
+BEGINS_FAINT = 0.04
 
 #: So many rigs of each kind of candidate are refined.
 TRIES = 2
@@ -47,10 +53,13 @@ def one_more_light(
         problem: that the answer was searched on.
         candidates: of each kind of light.
     """
+    if problem.unexplained(answer.columns, answer.intensity) < NOTICEABLE:
+        return None
     rigs: list[Rig] = []
     for kind in candidates:
         promise, extended = kind.promised(answer, problem, TRIES, region.size)
-        rigs += extended if promise >= PROMISED else []
+        if promise >= PROMISED and (promise >= FAINT_DROP or _noticed(problem, extended[0], begin)):
+            rigs += extended
     if not rigs:
         return None
     simple = fresh(answer)
@@ -59,3 +68,9 @@ def one_more_light(
     rich = best_state(problem, finished)
     refine(problem, rich, ROBUST, SHORT_ITERATIONS, region, begin)
     return OneMore(simple, rich, [simple, *started])
+
+
+def _noticed(problem: LightProblem, rig: Rig, begin: float) -> bool:
+    """Whether the last light of a rig sends enough of the energy to be no error of the model at first sight."""
+    energies = light_energies(start_from(problem, rig, ROBUST, begin))
+    return energies[-1] >= BEGINS_FAINT * sum(energies)
