@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -64,16 +65,15 @@ def loss_slices(
         columns = [*fixed, problem.evaluate(moved)]
         return problem.unexplained(columns, best_intensity(problem, columns))
 
-    slices = []
-    for axes in track(PLANES, "loss around the answer", unit="plane"):
-        loss = torch.empty((points, points), dtype=torch.float64)
-        for row, down in enumerate(offsets):
-            for column, along in enumerate(offsets):
-                position = answer.clone()
-                position[list(axes)] += torch.stack([along, down])
-                loss[row, column] = loss_at(position)
-        slices.append(LossSlice(axes, answer[axes[0]] + offsets, answer[axes[1]] + offsets, loss))
-    return tuple(slices)
+    losses = torch.empty((len(PLANES), points, points), dtype=torch.float64)
+    rows = list(itertools.product(range(len(PLANES)), range(points)))
+    for plane, row in track(rows, "loss around the answer", unit="row"):
+        for column, along in enumerate(offsets):
+            position = answer.clone()
+            position[list(PLANES[plane])] += torch.stack([along, offsets[row]])
+            losses[plane, row, column] = loss_at(position)
+    pairs = zip(PLANES, losses, strict=True)
+    return tuple(LossSlice(axes, answer[axes[0]] + offsets, answer[axes[1]] + offsets, loss) for axes, loss in pairs)
 
 
 def best_intensity(problem: LightProblem, columns: Sequence[Tensor]) -> Tensor:
