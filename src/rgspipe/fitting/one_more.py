@@ -17,7 +17,8 @@ from rgspipe.fitting.refine import ROBUST, Region, State, fresh, refine, start_f
 from rgspipe.fitting.schedule import SHORT_ITERATIONS, refine_starts
 from rgspipe.fitting.starts import Candidates, Rig
 
-#: An answer that leaves less than this share of the blocks' energy unexplained is not doubted.
+#: An answer that leaves less than this share of the blocks' energy unexplained is not doubted: that is rounding, or
+#: noise.
 NOTICEABLE = 1e-4
 
 #: The best candidate beside the answer must promise to lower the squared relative error by this share, …

@@ -87,9 +87,11 @@ class Candidates:
         """By what share one candidate more lowers the blocks' squared relative error, and `extended`.
 
         Args:
-            searched: that `state` was refined on; where its blocks are those of the candidates nothing is rendered.
+            searched: what `state` was refined on; only where its blocks are not the candidates' something is rendered.
         """
-        if searched.blocks is not None and searched.blocks.average is self.coarse.blocks:
+        if searched.blocks is None:
+            seen = [self.coarse.blocks @ column[:, :, 0].contiguous() for column in state.columns]
+        elif searched.blocks.average is self.coarse.blocks:
             seen = [column[:, :, 0] for column in state.columns]
         else:
             seen = [self.coarse.blocks @ self.problem.evaluate(one)[:, :, 0].contiguous() for one in state.emitters]
