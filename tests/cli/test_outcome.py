@@ -28,14 +28,19 @@ SPOT = SpotLight(_vector(0.5, 0.5, 0.5), _vector(4.0, 4.0, 4.0), _vector(0.0, 0.
 AT_BOUND = REASONS[FitStatus.AT_BOUND]
 
 
-def _fits(tmp_path: Path, count: int, rig: LightRig = (POINT, SPOT)) -> Artifact:
+def _fits(
+    tmp_path: Path, count: int, rig: LightRig = (POINT, SPOT), exposures: tuple[float, ...] = (), advice: str = ""
+) -> Artifact:
     def make(folder: Path) -> None:
         rows = []
         for index in range(count):
             name, status = f"rig_{index}", FitStatus.AT_BOUND if index else FitStatus.CONVERGED
             told = {"result": str(status), "reason": REASONS[status], "seconds": 0.5 + index, "psnr": 36.04}
+            told["exposures"] = list(exposures)
             spread = [{"covariance": torch.diag(torch.full((6,), value)).tolist()} for value in (1e-4, 4e-4)]
             write_lights(folder / name / "lights.json", rig, told | {"lights": spread[: len(rig)]})
+            if advice:
+                write_json(folder / name / "advice.json", {"words": advice})
             rows.append({"target": name, "occlusion": "occluded"} | told)
         pd.DataFrame(rows).to_csv(folder / "results.csv", index=False)
 
@@ -49,6 +54,16 @@ def test_few_targets_show_their_lights_with_deviations_and_what_is_wrong(tmp_pat
     assert "spot at (0.500, 0.500, 0.500) ± 0.0200, axis (0.000, 0.000, -1.000), cone 30.0°" in lines[2]
     assert "at bound" in lines[3] and f"  {AT_BOUND}" in lines
     assert lines.count(f"  {AT_BOUND}") == 1 and "lights.json" in lines[-1]
+
+
+def test_a_fit_tells_the_exposures_and_the_advice_that_it_was_asked_for(tmp_path: Path) -> None:
+    lines = outcome(_fits(tmp_path / "asked", 1, exposures=(1.0 - 2e-16, 1.25, 0.5), advice="r_1 would help most."))
+    assert lines[-3:-1] == [
+        "  exposures of the views over the first one's: 1.000, 1.250, 0.500",
+        "  further views: r_1 would help most.",
+    ]
+    known = outcome(_fits(tmp_path / "known", 1, exposures=(1.0, 1.0)))
+    assert len(known) == len(lines) - 2 and "over the first" not in "".join(known)
 
 
 def test_many_targets_are_a_row_a_class(tmp_path: Path) -> None:

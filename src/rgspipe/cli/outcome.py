@@ -9,6 +9,7 @@ import pandas as pd
 
 from rgspipe.artifacts import Artifact
 from rgspipe.cli.columns import columns, decibels, degrees, percent, seconds, time, without_empty, words
+from rgspipe.datasets.advice_file import ADVICE
 from rgspipe.datasets.covariance_file import read_covariances
 from rgspipe.datasets.json_file import read_json
 from rgspipe.datasets.light_file import read_lights
@@ -16,6 +17,9 @@ from rgspipe.evaluation.plots import LABELS
 from rgspipe.evaluation.tables import ALL, class_order
 from rgspipe.fitting.result import REASONS, FitStatus
 from rgspipe.scene import Light, SpotLight
+
+#: Exposures that differ by less from 1 are those that were known.
+KNOWN_EXPOSURE = 1e-9
 
 #: Each of at most so many targets is shown; of more, a row a class.
 FEW = 4
@@ -44,7 +48,23 @@ def _fit(artifact: Artifact, row: Row) -> list[str]:
         head += f", PSNR {told['psnr']:.1f} dB"
     spread = dict(enumerate(spreads))
     lines = [f"  {light_line(light, spread.get(index))}" for index, light in enumerate(lights)]
-    return [head, *lines, *([] if told["reason"] == REASONS[FitStatus.CONVERGED] else [f"  {told['reason']}"])]
+    lines += [] if told["reason"] == REASONS[FitStatus.CONVERGED] else [f"  {told['reason']}"]
+    return [head, *lines, *_exposures(told["exposures"]), *_advice(artifact, str(row["target"]))]
+
+
+def _exposures(exposures: Sequence[float]) -> list[str]:
+    """Exposures over that of the first view, where they were found out; those that are known are all 1."""
+    if all(abs(exposure - 1.0) < KNOWN_EXPOSURE for exposure in exposures):
+        return []
+    return [f"  exposures of the views over the first one's: {', '.join(f'{value:.3f}' for value in exposures)}"]
+
+
+def _advice(artifact: Artifact, target: str) -> list[str]:
+    """What further views would help, where the fit was asked."""
+    name = f"{target}/{ADVICE}"
+    if name not in artifact.manifest["files"]:
+        return []
+    return [f"  further views: {read_json(artifact.file(name), 'advice on further views')['words']}"]
 
 
 def light_line(light: Light, covariance: Sequence[Sequence[float]] | None = None) -> str:

@@ -1,4 +1,4 @@
-"""suggested_views.csv: what further cameras would leave uncertain, as `fit.suggest_view` writes it beside a fit."""
+"""What further cameras would leave uncertain, as `fit.suggest_view` writes it beside a fit."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pandas as pd
 
-#: A fit's file of it.
-SUGGESTED = "suggested_views.csv"
+#: A fit's table of it, and what it says in short: `words` and the numbers in them.
+SUGGESTED, ADVICE = "suggested_views.csv", "advice.json"
 
 #: Values of the column `added`: each camera alone, the best ones together, and all in the order of their list.
 ALONE, PLAN, IN_ORDER = "alone", "plan", "in_order"

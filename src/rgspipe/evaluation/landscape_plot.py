@@ -49,7 +49,7 @@ def _contours(axis: Axes, plane: PlaneLoss) -> None:
     levels = np.linspace(low, high, LEVELS)
     axis.contourf(across, up, shown, levels=levels, cmap="Blues_r", alpha=0.8)
     axis.contour(across, up, shown, levels=levels, colors="#40506a", linewidths=0.35, linestyles="solid")
-    axis.set_title(f"loss {10.0**low:.1e} to {10.0**high:.1e}")
+    axis.set_title(f"loss {10.0**low:.2g} to {10.0**high:.2g}")
 
 
 def _course(axis: Axes, path: npt.NDArray, truth: npt.NDArray | None) -> None:

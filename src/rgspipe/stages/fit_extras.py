@@ -12,7 +12,7 @@ import torch
 from torch import Tensor
 
 from rgspipe.config import FitConfig
-from rgspipe.datasets.advice_file import ALONE, IN_ORDER, PLAN, SUGGESTED
+from rgspipe.datasets.advice_file import ADVICE, ALONE, IN_ORDER, PLAN, SUGGESTED
 from rgspipe.datasets.frames import FrameEntry, read_entries
 from rgspipe.datasets.json_file import numbers
 from rgspipe.datasets.landscape_file import Landscape, PlaneLoss, landscape_bytes
@@ -60,7 +60,7 @@ def further_files(
         )
         names = [name for name, _ in candidates]
         files[SUGGESTED] = _advice_table(advice, names).to_csv(index=False).encode()
-        files["advice.json"] = _advice_words(advice, names)
+        files[ADVICE] = _advice_words(advice, names)
     if config.landscape:
         files["landscape.npz"] = _landscape(views, images, result, capture)
     return files
