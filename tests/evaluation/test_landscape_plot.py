@@ -35,7 +35,7 @@ def test_three_planes_are_drawn_with_the_way_and_the_truth() -> None:
     figure = landscape_figure(_landscape(AXIS[:, None] ** 2 + AXIS**2 + 0.01), np.array([0.1, 0.0, 0.2]))
     assert [(axis.get_xlabel()[0], axis.get_ylabel()[0]) for axis in figure.axes] == [tuple(name) for name in PLANES]
     assert [text.get_text() for text in figure.legends[0].get_texts()] == ["start", "steps", "answer", "truth"]
-    assert "1.0e-02 to 2.0e+00" in figure.axes[0].get_title(loc="left")
+    assert "loss 0.01 to 2" in figure.axes[0].get_title(loc="left")
     assert plots.png_of(figure, dpi=50).startswith(b"\x89PNG")
 
 
