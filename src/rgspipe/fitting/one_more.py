@@ -22,10 +22,10 @@ from rgspipe.fitting.starts import Candidates, Rig
 NOTICEABLE = 1e-4
 
 #: The best candidate beside the answer must promise to lower the squared relative error by this share, …
-PROMISED = 0.25
+PROMISED = 0.23
 
 #: … and a light that begins with less than this share of the image's energy, by as much as faint ones must.
-BEGINS_FAINT = 0.04
+BEGINS_FAINT = 0.03
 
 #: So many rigs of each kind of candidate are refined.
 TRIES = 2
