@@ -199,6 +199,7 @@ class TrainConfig:
     subsamples: int = option(3, "rays per pixel of a step, squared", low=1, high=16)
     supersampling: int = option(4, "rays per edge pixel in view weights, squared", low=1, high=16)
     at_pixels: bool = option(True, "direct light where pixels look, otherwise at surfels' centres: softer shadows")
+    unseen: bool = option(True, "close rooms where no camera saw what is there: backs of boxes, floors behind them")
     light_rounds: int = option(
         0, "how often each fit of materials refines the training lights; their mean stays", low=0, high=100
     )

@@ -122,6 +122,7 @@ def train_options(config: TrainConfig) -> TrainOptions:
         supersampling=config.supersampling,
         at_pixels=config.at_pixels,
         light_rounds=config.light_rounds,
+        unseen=config.unseen,
         seed=config.seed,
         memory_mib=config.memory_mib,
         gloss=config.gloss == "auto",
@@ -173,6 +174,7 @@ STAGE = Stage(
     inputs=lambda config: ["init_depth", "generate_dataset"],
     config_keys=(*(f"train.{key.name}" for key in fields(TrainConfig) if key.name not in NO_RESULT), "capture"),
     code=(
+        "rgspipe.completion",
         "rgspipe.datasets.degrade",
         "rgspipe.training",
         "rgspipe.renderer",

@@ -11,6 +11,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from rgspipe.completion import with_unseen_surfaces
 from rgspipe.datasets.views import View
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.transport import with_albedo
@@ -44,12 +45,14 @@ class TrainOptions(MaterialOptions):
         photometric: of normals from shading, where depth was too noisy to tell them.
         density: of surfels that split and vanish whenever light is made again.
         light_rounds: how often lights that were measured with errors are refined, before the geometry and after it.
+        unseen: whether rooms get surfels where no view saw what is there, after the geometry.
     """
 
     refine: RefineOptions = field(default_factory=RefineOptions)
     photometric: PhotometricOptions = field(default_factory=PhotometricOptions)
     density: DensityOptions = field(default_factory=DensityOptions)
     light_rounds: int = 0
+    unseen: bool = True
 
 
 @dataclass(frozen=True)
@@ -93,6 +96,8 @@ def train(
         surfels, radiance, state, lights = found
         views = [replace(view, light=light) for view, light in zip(views, lights, strict=True)]
     else:
+        if options.refine.steps == 0:
+            surfels = _closed(surfels, views, options)
         surfels, radiance, views = _fit_materials(surfels, views, given, options, log, "materials", prior)
         centers, state = surfels.centers, None
         for _ in range(options.photometric.rounds):
@@ -104,8 +109,15 @@ def train(
         if checkpoint is not None and state is None:
             checkpoint.save(surfels, radiance, None, log.records, [view.light for view in views])
         surfels = _refine_geometry(surfels, radiance, state, views, spacing, options, log, checkpoint, most)
+        # Before the materials: else the albedo of what is seen makes up for light that is lost where nothing is.
+        surfels = _closed(surfels, views, options)
         surfels, _, views = _fit_materials(surfels, views, given, options, log, "final materials", prior)
     return Trained(surfels, tuple(log.records), tuple(views), log.stored)
+
+
+def _closed(surfels: Surfels, views: Sequence[View], options: TrainOptions) -> Surfels:
+    """With surfels on the surfaces that no view shows, if those are wanted."""
+    return with_unseen_surfaces(surfels, [view.camera for view in views]) if options.unseen else surfels
 
 
 def surfel_spacing(surfels: Surfels) -> float:

@@ -1,0 +1,94 @@
+"""Which part of a scene's bounding box its cameras look through (space carving, Kutulakos and Seitz 2000)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from rgspipe.renderer.kernels.composite import composite
+from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
+from rgspipe.scene import Camera
+
+#: Most pixels along a side that are traced of a camera.
+LONGEST_SIDE = 96
+
+#: Most cells along a side of a grid.
+MOST_CELLS = 128
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Cells of a box.
+
+    Attributes:
+        lower: (3,) float64 corner of the first cell.
+        cell: (3,) float64 sides of a cell; nearly equal.
+        shape: cells along x, y and z.
+    """
+
+    lower: Tensor
+    cell: Tensor
+    shape: tuple[int, int, int]
+
+    @classmethod
+    def over(cls, lower: Tensor, upper: Tensor, edge: float) -> Grid:
+        """Cells of about `edge` between two corners (3,), MOST_CELLS along the longest side at most."""
+        extent = (upper - lower).double()
+        edge = max(edge, float(extent.max()) / MOST_CELLS)
+        shape = (extent / edge).round().clamp(min=2).long()
+        # A box may be flat.
+        return cls(lower.double(), (extent / shape).clamp(min=1e-9 * edge), tuple(shape.tolist()))
+
+    @property
+    def centers(self) -> Tensor:
+        """(X · Y · Z, 3) float64 middles of the cells."""
+        index = torch.cartesian_prod(*(torch.arange(count, dtype=torch.float64) for count in self.shape))
+        return self.lower + (index + 0.5) * self.cell
+
+
+def seen_through(grid: Grid, bvh: SurfelBvh, cameras: Sequence[Camera], margin: float) -> Tensor:
+    """(X, Y, Z) bool: cells whose middles lie nearer to a camera, by `margin`, than the surface behind them.
+
+    Args:
+        bvh: the surfaces; both of their sides end a ray.
+        cameras: those that saw the scene. Of large images as many pixels are traced as LONGEST_SIDE allows.
+    """
+    centers = grid.centers
+    free = torch.zeros(len(centers), dtype=torch.bool)
+    for camera in map(_small, cameras):
+        open_cells = (~free).nonzero()[:, 0]
+        pixel, depth = camera.project(centers[open_cells])
+        column, row = pixel.floor().long().unbind(-1)
+        framed = (depth > 0) & (column >= 0) & (column < camera.width) & (row >= 0) & (row < camera.height)
+        reach = _reach(bvh, camera)[row[framed] * camera.width + column[framed]]
+        chosen = open_cells[framed]
+        free[chosen[(centers[chosen] - camera.origin.double()).norm(dim=-1) < reach - margin]] = True
+    return free.reshape(grid.shape)
+
+
+def _reach(bvh: SurfelBvh, camera: Camera) -> Tensor:
+    """(H · W,) float64 distance at which the ray of each pixel ends; infinite where most of it ends nowhere."""
+    origins, directions, _ = camera.rays(torch.arange(camera.pixel_count))
+    hits = composite(bvh, origins, directions, two_sided=True)
+    covered = hits.weights.sum(dim=1)
+    mean = (hits.weights * hits.depths.nan_to_num(posinf=0.0)).sum(dim=1) / covered.clamp(min=1e-6)
+    return torch.where(hits.transmittance < 0.5, mean, torch.inf).double().cpu()
+
+
+def _small(camera: Camera) -> Camera:
+    """The same view with at most LONGEST_SIDE pixels along a side."""
+    scale = min(1.0, LONGEST_SIDE / max(camera.width, camera.height))
+    width, height = (max(1, round(scale * side)) for side in (camera.width, camera.height))
+    across, down = width / camera.width, height / camera.height
+    return Camera(
+        camera.camera_to_world,
+        camera.fx * across,
+        camera.fy * down,
+        camera.cx * across,
+        camera.cy * down,
+        width,
+        height,
+    )
