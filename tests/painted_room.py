@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import torch
@@ -30,18 +31,24 @@ def painted_box() -> Surfels:
     return replace(surfels, albedo=colours[side % len(colours)].contiguous())
 
 
-def painted_views() -> list[View]:
-    """Sixteen 32² views from inside, each with a light of its own, rendered with all bounces."""
-    surfels = painted_box()
-    generator = torch.Generator().manual_seed(0)
-    blank = torch.zeros(32, 32, 3)
+def photographed(surfels: Surfels, cameras: Sequence[Camera], lamps: Sequence[PointLight]) -> list[View]:
+    """What each camera sees under its lamp, rendered with all bounces."""
     empty = []
-    for index in range(16):
-        origin, target, light = (0.7 * (torch.rand(3, generator=generator) - 0.5) for _ in range(3))
-        camera = Camera.from_field_of_view(look_at(origin, target - origin), 1.6, 32, 32)
-        lamp = PointLight(light.double(), torch.tensor([1.0, 0.8, 1.2], dtype=torch.float64))
-        empty.append(View(f"train/{index}", camera, blank, torch.ones(32, 32), lamp))
+    for index, (camera, lamp) in enumerate(zip(cameras, lamps, strict=True)):
+        blank = torch.zeros(camera.height, camera.width, 3)
+        empty.append(View(f"train/{index}", camera, blank, torch.ones(camera.height, camera.width), lamp))
     lighting = trace_lighting(SurfelBvh(surfels), empty)
     radiance = total_irradiance(lighting, surfels.albedo, build_frozen(surfels, LIGHT).transport) * surfels.albedo
     weights = trace_views(surfels, empty, supersampling=1)
     return [replace(view, image=weights[v].image(radiance[v])) for v, view in enumerate(empty)]
+
+
+def painted_views() -> list[View]:
+    """Sixteen 32² views from inside, each with a light of its own."""
+    generator = torch.Generator().manual_seed(0)
+    cameras, lamps = [], []
+    for _ in range(16):
+        origin, target, light = (0.7 * (torch.rand(3, generator=generator) - 0.5) for _ in range(3))
+        cameras.append(Camera.from_field_of_view(look_at(origin, target - origin), 1.6, 32, 32))
+        lamps.append(PointLight(light.double(), torch.tensor([1.0, 0.8, 1.2], dtype=torch.float64)))
+    return photographed(painted_box(), cameras, lamps)

@@ -1,0 +1,142 @@
+"""Surfels where no camera saw what is there."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+import torch
+from scipy.spatial import cKDTree
+
+from half_seen_room import (
+    BACK,
+    BOX,
+    SIDES,
+    TOP,
+    WALLS,
+    at_back,
+    box,
+    camera_at,
+    cameras_all_around,
+    cameras_in_front,
+    rows,
+    true_room,
+    without_back,
+)
+from rgspipe.completion import with_unseen_surfaces
+from rgspipe.completion.unseen import MOST_UNSEEN
+from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.scene import PointLight, Surfels
+from rgspipe.scene.gloss import Gloss
+from rgspipe.scene.rectangles import rectangle, surfels_on
+
+#: Distance of the room's surfels, and the side of a cell.
+SPACING, CELL = 1.0 / 15.0, 0.5 / 15.0
+
+
+@pytest.fixture(scope="module")
+def seen() -> Surfels:
+    return without_back(true_room())
+
+
+@pytest.fixture(scope="module")
+def closed(seen: Surfels) -> Surfels:
+    return with_unseen_surfaces(seen, cameras_in_front())
+
+
+def equal(first: Surfels, second: Surfels) -> bool:
+    other = second.tensors()
+    return all(torch.equal(tensor, other[name]) for name, tensor in first.tensors().items())
+
+
+def first_of(surfels: Surfels, count: int) -> Surfels:
+    return replace(surfels, **{name: tensor[:count] for name, tensor in surfels.tensors().items()})
+
+
+def test_the_back_of_a_box_that_no_camera_saw_gets_surfels_and_nothing_else_does(
+    seen: Surfels, closed: Surfels
+) -> None:
+    centers, normals = closed.centers[len(seen) :], closed.normals[len(seen) :]
+    assert equal(first_of(closed, len(seen)), seen)
+    assert 10 <= len(centers) <= 36  # measured 16; of the 36 that are missing those at the edges have neighbours
+    assert float((centers[:, 0] - BACK).abs().max()) < 0.5 * CELL  # measured 0.11 cells
+    assert bool(((centers[:, 1] > SIDES[0]) & (centers[:, 1] < SIDES[1]) & (centers[:, 2] < TOP)).all())
+    assert float(normals[:, 0].min()) > 0.95  # measured 0.994: free space is behind the box
+    distance, _ = cKDTree(centers.numpy()).query(centers.numpy(), k=2)
+    assert float(distance[:, 1].min()) >= SPACING - 1e-9
+    missing = true_room().centers[at_back(true_room())]
+    gap, _ = cKDTree(closed.centers.numpy()).query(missing.numpy())
+    assert float(gap.max()) < SPACING  # measured 0.72 distances
+
+
+def test_they_reflect_as_their_neighbours_do(seen: Surfels, closed: Surfels) -> None:
+    albedo = closed.albedo[len(seen) :]
+    ends = torch.tensor([WALLS, BOX], dtype=torch.float64)
+    assert bool(((albedo >= ends.amin(dim=0) - 1e-9) & (albedo <= ends.amax(dim=0) + 1e-9)).all())
+    # Measured 0.056 from the box's, which the walls' is 0.27 from: the floor is near the lowest.
+    assert float((albedo - ends[1]).abs().mean()) < 0.1
+
+
+def test_a_room_that_was_seen_entirely_is_left_alone() -> None:
+    room = true_room()
+    assert with_unseen_surfaces(room, cameras_all_around()) is room
+
+
+def test_without_cameras_or_with_a_handful_of_surfels_nothing_is_known(seen: Surfels) -> None:
+    assert with_unseen_surfaces(seen, []) is seen
+    few = first_of(seen, 8)
+    assert with_unseen_surfaces(few, cameras_in_front()) is few
+
+
+def test_an_object_in_empty_space_is_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    floor = rectangle([0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], WALLS)
+    table = surfels_on(floor + rows(box(), [0, 1, 2, 3]), 500)
+    assert with_unseen_surfaces(table, cameras_in_front()) is table
+    monkeypatch.setattr("rgspipe.completion.unseen.MOST_OPEN", 1.0)
+    assert len(with_unseen_surfaces(table, cameras_in_front())) > len(table)
+
+
+def test_one_camera_that_sees_little_adds_nothing(seen: Surfels, monkeypatch: pytest.MonkeyPatch) -> None:
+    camera = camera_at([0.1, 0.1, 0.3], [0.9, 0.9, 0.3], 64, 1.2)
+    assert with_unseen_surfaces(seen, [camera]) is seen
+    monkeypatch.setattr("rgspipe.completion.unseen.MOST_UNSEEN", 10.0)
+    assert len(with_unseen_surfaces(seen, [camera])) > (1.0 + MOST_UNSEEN) * len(seen)
+
+
+def test_the_result_is_the_same_twice(seen: Surfels, closed: Surfels) -> None:
+    assert equal(with_unseen_surfaces(seen, cameras_in_front()), closed)
+
+
+def test_single_precision_finds_as_many(seen: Surfels, closed: Surfels) -> None:
+    single = with_unseen_surfaces(seen.to(torch.float32), cameras_in_front())
+    assert all(tensor.dtype == torch.float32 for tensor in single.tensors().values())
+    assert all(tensor.dtype == torch.float64 for tensor in closed.tensors().values())
+    assert len(single) == len(closed) and closed.gloss is None
+
+
+def test_gloss_is_kept_and_new_surfels_have_none(seen: Surfels) -> None:
+    exponents = torch.linspace(5.0, 50.0, len(seen), dtype=torch.float32)
+    gloss = Gloss(torch.full((len(seen), 3), 0.1), exponents)
+    closed = with_unseen_surfaces(replace(seen.to(torch.float32), gloss=gloss), cameras_in_front())
+    assert len(closed) > len(seen) and closed.gloss is not None
+    assert torch.equal(closed.gloss.reflectance[: len(seen)], gloss.reflectance)
+    assert torch.equal(closed.gloss.exponents[: len(seen)], gloss.exponents)
+    assert not bool(closed.gloss.reflectance[len(seen) :].any())
+    assert closed.gloss.reflectance.dtype == closed.gloss.exponents.dtype == torch.float32
+
+
+def test_light_that_fell_into_the_box_comes_back(seen: Surfels, closed: Surfels) -> None:
+    lamp = PointLight(torch.tensor([BACK + 0.12, 0.5, 0.25]), torch.ones(3))
+    truth, lost, found = (bounced_light(room, lamp)[: len(seen)] for room in (true_room(), seen, closed))
+    lost_error, found_error = (float((light - truth).abs().mean() / truth.mean()) for light in (lost, found))
+    assert float(lost.mean() / truth.mean()) < 0.9  # measured 0.87
+    assert abs(float(found.mean() / truth.mean()) - 1.0) < 0.09  # measured 1.06
+    assert lost_error > 0.15  # measured 0.18
+    assert found_error < 0.6 * lost_error  # measured 0.071 over 0.177
+
+
+def bounced_light(surfels: Surfels, lamp: PointLight) -> torch.Tensor:
+    """(N, 3) radiance of the light that bounces."""
+    frozen = FrozenScene.freeze(surfels, gather_rays=64, patches=100, seed=0)
+    rig = (lamp,)
+    return frozen.radiance_of(rig) - frozen.radiance_of(rig, indirect=False)
