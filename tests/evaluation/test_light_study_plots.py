@@ -55,7 +55,7 @@ def test_cases_are_rows_and_scenes_series() -> None:
     figure = light_study_figure(table, "robustness")
     assert [label.get_text() for label in figure.axes[0].get_yticklabels()] == ["clean", "noise 3 %"]
     assert [text.get_text() for text in figure.legends[0].get_texts()] == ["cornell", "corner"]
-    assert [axis.get_title(loc="left") for axis in figure.axes][-1] == "wrong without a word (%)"
+    assert [axis.get_title(loc="left") for axis in figure.axes][-1] == "silently wrong (%)"
     points = [line for line in figure.axes[0].lines if line.get_marker() in ("o", "s")]
     assert [line.get_ydata()[0] for line in points] == pytest.approx([-0.11, 0.89, 0.11, 1.11])
 

@@ -37,7 +37,7 @@ PANELS: tuple[Panel, ...] = (
     ("intensity", "intensity error (%)", 100.0, True),
     ("success", "solved (%)", 100.0, False),
     ("inside_95", "truth in 95 % region (%)", 100.0, False),
-    ("silent", "wrong without a word (%)", 100.0, False),
+    ("silent", "silently wrong (%)", 100.0, False),
 )
 #: Rows of the figure over numbers of views: column, label, factor.
 VIEW_PANELS = (("position", "position error (%)", 100.0), ("success", "solved (%)", 100.0), ("seconds", "s a fit", 1.0))
