@@ -156,7 +156,7 @@ def _keys(config: RgspipeConfig) -> list[str]:
     wanted = ["kind", "views", "resolution", "samples", "pool_seed"]
     wanted += ["frames"] if config.targets.kind == "track" else ["pool", "classes"]
     wanted += [] if config.targets.kind == "points" else ["spot"]
-    # Named only where they are set, so that a pool made before there were such keys is still the same one.
+    # Named only where they are set: else they say nothing that the scene and the dataset's keys do not.
     wanted += [name for name in ("cameras", "max_bounces") if getattr(config.targets, name) is not None]
     return [*scene, *quality, *(f"targets.{name}" for name in wanted)]
 
