@@ -664,6 +664,9 @@ class LightStudyConfig:
     views: list[int] = option([1], "numbers of views", low=1, high=1000)
     methods: list[str] = option(["search_lm"], "methods", choices=FIT_METHODS)
     paper_adam_limit: int | None = option(1, "targets of each class that paper_adam is run on", low=1, high=100000)
+    paper_adam_views: list[int] | None = option(
+        None, "numbers of views that paper_adam, which takes minutes a target, is run on; all if null", low=1, high=1000
+    )
 
 
 @dataclass

@@ -93,17 +93,28 @@ def test_every_study_that_is_prepared_composes_and_names_its_cases(name: str) ->
     assert config.light_study.kind == name.removeprefix("light_")
     needs = light_study.STAGE.needs(config)
     fits = [need for need in needs if need.stage == "evaluate"]
-    assert len(fits) == max(1, len(config.light_study.scenes)) * len(config.light_study.cases) * len(
-        config.light_study.views
-    )
+    searches = [need for need in fits if need.changes["fit.method"] == "search_lm"]
+    study = config.light_study
+    assert len(searches) == max(1, len(study.scenes)) * len(study.cases) * len(study.views)
+    assert len(fits) - len(searches) == (2 if name == "light_views" else 0)
 
 
 def test_the_papers_method_is_compared_on_the_targets_of_the_search() -> None:
     config = compose_config(["stage=light_study", "experiment=light_adam"])
     fits = [need.changes for need in light_study.STAGE.needs(config)]
-    assert config.fit.limit == 1 and all("fit.limit" not in changes for changes in fits)
+    assert config.fit.limit == 1 and [changes.get("fit.limit") for changes in fits] == [20, 20, None, None, None, None]
     methods = [changes["fit.method"] for changes in fits]
-    assert methods == ["search_lm", "paper_adam"] * 4 and fits[0]["views.count"] == 1
+    assert methods == ["search_lm", "paper_adam"] * 3
+
+
+def test_the_papers_method_has_numbers_of_views_of_its_own() -> None:
+    config = compose_config(["stage=light_study", "experiment=light_views"])
+    fits = [need.changes for need in light_study.STAGE.needs(config) if need.stage == "evaluate"]
+    slow = [changes for changes in fits if changes["fit.method"] == "paper_adam"]
+    assert [changes["views.count"] for changes in slow] == [1, 3] and len(fits) == 10
+    assert all(changes["fit.limit"] == 20 for changes in slow)
+    everywhere = _config(views=[1, 2], methods=["paper_adam"])
+    assert [need.changes["views.count"] for need in light_study.STAGE.needs(everywhere)] == [1, 2]
 
 
 def test_views_are_one_table_with_what_was_foretold(tmp_path: Path) -> None:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
+from functools import lru_cache
 
 import torch
-import torch.nn.functional as F
 from torch import Tensor
 
 #: Gaussian window: width in pixels and standard deviation.
@@ -31,14 +30,14 @@ def ssim_map(image: Tensor, target: Tensor) -> Tensor:
     # In units of the brightest value where that is above 1: squares of very bright images would leave float32.
     unit = torch.maximum(image.detach().abs().amax(), target.detach().abs().amax()).clamp(min=1.0)
     c1, c2 = ((c / unit / unit).clamp(min=LEAST_CONSTANT) for c in (C1, C2))
-    x, y = (values.permute(2, 0, 1)[:, None] / unit for values in (image, target))
-    mean_x, mean_y, square_x, square_y, product = _Blur.apply(torch.cat([x, y, x * x, y * y, x * y])).chunk(5)
+    x, y = (values.permute(2, 0, 1).contiguous() / unit for values in (image, target))
+    mean_x, mean_y, square_x, square_y, product = _blur(torch.cat([x, y, x * x, y * y, x * y])).chunk(5)
     # Differences of near squares: rounding may leave less than nothing, or more covariance than there is variance.
     spread = (square_x - mean_x * mean_x).clamp(min=0.0) + (square_y - mean_y * mean_y).clamp(min=0.0)
     covariance = torch.minimum(torch.maximum(product - mean_x * mean_y, -0.5 * spread), 0.5 * spread)
     luminance = (2.0 * mean_x * mean_y + c1) / (mean_x * mean_x + mean_y * mean_y + c1)
     structure = (2.0 * covariance + c2) / (spread + c2)
-    return (luminance * structure)[:, 0].permute(1, 2, 0)
+    return (luminance * structure).permute(1, 2, 0)
 
 
 def ssim(image: Tensor, target: Tensor) -> Tensor:
@@ -46,25 +45,21 @@ def ssim(image: Tensor, target: Tensor) -> Tensor:
     return ssim_map(image, target).mean()
 
 
-class _Blur(torch.autograd.Function):
-    """Gaussian-weighted means of (B, 1, H, W), zero beyond the border.
-
-    The window is symmetric, so the operator is its own adjoint; the general gradient of a convolution is
-    fifteen times slower here.
-    """
-
-    @staticmethod
-    def forward(ctx: Any, images: Tensor) -> Tensor:
-        return _blur(images)
-
-    @staticmethod
-    def backward(ctx: Any, gradient: Tensor) -> Tensor:
-        return _Blur.apply(gradient)
-
-
 def _blur(images: Tensor) -> Tensor:
+    """Gaussian-weighted means of (B, H, W), zero beyond the border.
+
+    One dense product a direction: 2 (H + W) operations a pixel instead of 44, and yet less time up to 512 pixels
+    across, forwards and backwards, than the convolutions that it replaces (9 images of 128²: 0.9 instead of 2.0 ms).
+    """
+    height, width = images.shape[-2:]
+    return torch.matmul(_window(height).to(images), images @ _window(width).to(images))
+
+
+@lru_cache(maxsize=16)
+def _window(size: int) -> Tensor:
+    """(size, size) float64 weights of each pixel of a line in the mean of another, symmetric."""
+    places = torch.arange(size, dtype=torch.float64)
+    distance = (places[:, None] - places).abs()
+    weights = torch.exp(-0.5 * (distance / SIGMA).square()).where(distance <= WINDOW // 2, torch.zeros(()))
     offsets = torch.arange(WINDOW, dtype=torch.float64) - WINDOW // 2
-    kernel = torch.exp(-0.5 * (offsets / SIGMA).square())
-    kernel = (kernel / kernel.sum()).to(images)
-    across = F.conv2d(images, kernel.view(1, 1, 1, -1), padding=(0, WINDOW // 2))
-    return F.conv2d(across, kernel.view(1, 1, -1, 1), padding=(WINDOW // 2, 0))
+    return weights / torch.exp(-0.5 * (offsets / SIGMA).square()).sum()

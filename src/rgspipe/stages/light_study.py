@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import pandas as pd
 
 from rgspipe.artifacts import Artifact
-from rgspipe.config import RgspipeConfig, scene_name
+from rgspipe.config import LightStudyConfig, RgspipeConfig, scene_name
 from rgspipe.datasets.advice_file import SUGGESTED, own_views_in_order
 from rgspipe.evaluation.light_study import case_rows, predicted_errors
 from rgspipe.evaluation.light_study_plots import light_study_figure
@@ -78,10 +78,15 @@ def _each_cell(config: RgspipeConfig) -> Iterator[Cell]:
     for scene, chosen in chosen_scenes(config, wanted.scenes):
         for case in checked_cases(chosen, "light_study.cases", wanted.cases):
             for method in wanted.methods:
-                for views in wanted.views:
+                for views in _numbers_of_views(wanted, method):
                     foretells = wanted.kind == "views" and method == "search_lm" and views == min(wanted.views)
                     changes = scene | _fit_changes(chosen, method, views, foretells) | case.changes
                     yield Cell(scene_name(chosen), case.name, changes, foretells)
+
+
+def _numbers_of_views(wanted: LightStudyConfig, method: str) -> list[int]:
+    own = wanted.paper_adam_views if method == "paper_adam" else None
+    return wanted.views if own is None else own
 
 
 def _fit_changes(config: RgspipeConfig, method: str, views: int, foretells: bool) -> dict[str, object]:
