@@ -132,7 +132,8 @@ def suggest_views(
     forecast = _Forecast.fitted_to(result, evidence, first, frozen.size)
     others = range(len(present), len(present) + len(candidates))
     found = [SuggestedView(view - len(present), forecast.position_sd([*first, view])) for view in others]
-    ranked = tuple(sorted(found, key=lambda view: view.position_sd))
+    # Cameras that differ by rounding alone keep their order.
+    ranked = tuple(sorted(found, key=lambda view: float(f"{view.position_sd:.9g}")))
     plan = _plan(forecast, first, list(others), len(present))
     in_order = _in_order(forecast, len(present), len(candidates))
     present_sd = forecast.present_sd

@@ -12,7 +12,7 @@ from torch import Tensor
 
 from rgspipe.fitting.parameters import Emitter
 from rgspipe.fitting.problem import LightProblem
-from rgspipe.fitting.refine import ROBUST, State, cauchy_scale
+from rgspipe.fitting.refine import ROBUST, State, cauchy_scale, emitter_distance
 
 #: One more light, or a spot in the place of a point light, must lower the robust cost of the blocks by this share …
 LEAST_DROP = 0.2
@@ -28,6 +28,10 @@ FAINT, FAINT_DROP = 0.12, 0.5
 #: Rigs are clearly different where a light is farther from its counterpart than this part of the scene's size, or
 #: where their numbers differ.
 CLEARLY_APART = 0.05
+
+#: Rigs whose lights are within this part of the scene's size of each other, and their axes and cones within as many
+#: radians, are on their way to the same place.
+MET = 0.01
 
 #: Errors of about so many neighbouring pixels are one error: what the model gets wrong is smooth.
 PIXELS_PER_ERROR = 25.0
@@ -85,9 +89,31 @@ def rig_distance(one: Sequence[Emitter], other: Sequence[Emitter]) -> float:
     """The largest distance of a light from its counterpart, scene units; infinite where the numbers differ."""
     if len(one) != len(other):
         return math.inf
+    return max(float((first.position - second.position).norm()) for first, second in _counterparts(one, other))
+
+
+def distinct(states: Sequence[State], size: float) -> list[State]:
+    """The rigs without those that met one before them."""
+    kept: list[State] = []
+    for state in states:
+        if not any(_met(state.emitters, other.emitters, size) for other in kept):
+            kept.append(state)
+    return kept
+
+
+def _met(one: Sequence[Emitter], other: Sequence[Emitter], size: float) -> bool:
+    """Whether each light of a rig is within MET of its counterpart."""
+    if len(one) != len(other):
+        return False
+    pairs = _counterparts(one, other)
+    return all(a.is_spot == b.is_spot and emitter_distance(a, b, size) < MET for a, b in pairs)
+
+
+def _counterparts(one: Sequence[Emitter], other: Sequence[Emitter]) -> list[tuple[Emitter, Emitter]]:
+    """The lights of one rig, each with one of another of as many lights, such that they are closest together."""
     first, second = (torch.stack([emitter.position for emitter in rig]).numpy() for rig in (one, other))
-    distance = np.linalg.norm(first[:, None] - second[None], axis=-1)
-    return float(distance[linear_sum_assignment(distance)].max())
+    rows, columns = linear_sum_assignment(np.linalg.norm(first[:, None] - second[None], axis=-1))
+    return [(one[row], other[column]) for row, column in zip(rows, columns, strict=True)]
 
 
 def worth_keeping(state: State, size: float) -> list[int]:

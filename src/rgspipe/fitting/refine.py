@@ -20,11 +20,15 @@ from rgspipe.scene import LightRig
 #: than `LONGEST_TURN` (rad; of a cone, of its transformed parameter).
 LONGEST_STEP, LONGEST_TURN = 0.12, 0.3
 
-#: A step below this part of the scene's size, and this angle, ends a refinement.
-SHORTEST_STEP = 2e-5
+#: A step below this part of the scene's size, and this angle, ends a refinement if it lowered the cost by less than
+#: this share: where next to nothing is left unexplained, short steps still gain.
+SHORTEST_STEP, SMALL_GAIN = 1e-4, 0.05
+
+#: A step that moves by less than this is none.
+SHORTEST_MOVE = 2e-7
 
 #: A step that is expected to lower the cost by less than this share of it ends a refinement, too.
-LEAST_GAIN = 1e-6
+LEAST_GAIN = 1e-5
 
 #: Damping: at first, when a step succeeds, when it fails; and how often it may fail in a row.
 DAMPING, EASED, RAISED, ATTEMPTS = 1e-2, 0.2, 6.0, 5
@@ -142,13 +146,14 @@ def refine(
     state.status = FitStatus.MAX_ITERATIONS
     for _ in range(iterations):
         weights = weights_at(problem, state, weighting, base)
-        moved, damping = _attempt(problem, state, problem.moments(state.columns, weights), weights, damping, region)
+        system = problem.moments(state.columns, weights)
+        moved, gained, damping = _attempt(problem, state, system, weights, damping, region)
         if moved == 0.0:
             state.status = FitStatus.CONVERGED
             break
         state.iterations += 1
         state.steps.append(state.record(problem, begin))
-        if moved < SHORTEST_STEP:
+        if moved < SHORTEST_STEP and gained < SMALL_GAIN:
             state.status = FitStatus.CONVERGED
             break
     # The intensity that belongs to the last position under this weighting.
@@ -174,8 +179,12 @@ def cauchy_scale(weighted: Tensor) -> float:
 
 def _attempt(
     problem: LightProblem, state: State, system: Moments, weights: Tensor, damping: float, region: Region
-) -> tuple[float, float]:
-    """Take one damped step that lowers the weighted cost; how far it moved (0 if there is none) and new damping."""
+) -> tuple[float, float, float]:
+    """Take one damped step that lowers the weighted cost.
+
+    Returns:
+        How far it moved (0 if there is none), by what share it lowered the cost, and new damping.
+    """
     units = torch.cat([emitter.units(region.size) for emitter in state.emitters])
     matrix, direction = system.parameter_system()
     matrix, direction = matrix * units[:, None] * units[None, :], direction * units
@@ -185,8 +194,8 @@ def _attempt(
         if float(2.0 * step @ direction - step @ matrix @ step) < LEAST_GAIN * cost:
             break
         emitters = _moved(state.emitters, step, region)
-        moved = max(_distance(a, b, region.size) for a, b in zip(emitters, state.emitters, strict=True))
-        if moved < 0.01 * SHORTEST_STEP:
+        moved = max(emitter_distance(a, b, region.size) for a, b in zip(emitters, state.emitters, strict=True))
+        if moved < SHORTEST_MOVE:
             break
         columns = [
             old if emitter is before else problem.evaluate(emitter)
@@ -196,9 +205,11 @@ def _attempt(
         trial = problem.moments(columns, weights)
         if trial.cost < cost:
             state.emitters, state.columns, state.intensity = emitters, columns, trial.intensity
-            return moved, max(EASED * damping, 1e-6)
+            return moved, 1.0 - trial.cost / cost, max(EASED * damping, 1e-6)
+        if moved < SHORTEST_STEP:
+            break
         damping *= RAISED
-    return 0.0, damping
+    return 0.0, 0.0, damping
 
 
 def _damped_step(matrix: Tensor, direction: Tensor, damping: float, emitters: Sequence[Emitter]) -> Tensor:
@@ -227,7 +238,7 @@ def _moved(emitters: Sequence[Emitter], step: Tensor, region: Region) -> tuple[E
     return tuple(moved)
 
 
-def _distance(one: Emitter, other: Emitter, size: float) -> float:
+def emitter_distance(one: Emitter, other: Emitter, size: float) -> float:
     """The largest of the move over the scene's size, the turn of the axis and the change of the cone [rad]."""
     # A scene of one surfel has no size, and no room to move in.
     moved = float((one.position - other.position).norm()) / size if size > 0.0 else 0.0

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from rgspipe.fitting.judge import ranked
+from rgspipe.fitting.judge import distinct, ranked
 from rgspipe.fitting.problem import LightProblem
 from rgspipe.fitting.refine import PLAIN, ROBUST, Region, State, Weighting, reevaluate, refine, start_from
 from rgspipe.fitting.starts import Rig
@@ -45,7 +45,7 @@ def refine_starts(
     states = _best(problem, started, PROMISING, weighting) if spots and not thorough else started
     for turn, (softness, steps) in enumerate(turns):
         if turn > 0:
-            states = _best(problem, states, share, weighting)
+            states = distinct(_best(problem, states, share, weighting), region.size)
         if softness != rim:
             rim = softness
             for state in states:

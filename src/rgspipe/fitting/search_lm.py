@@ -18,6 +18,7 @@ from rgspipe.fitting.judge import (
     FAINT_DROP,
     LEAST_DROP,
     best_state,
+    distinct,
     drop,
     equally_good,
     ranked,
@@ -249,7 +250,8 @@ class _Search:
         outliers, would walk far in it. So the best by plain squares are among those that are tried.
         """
         chosen = [*ranked(self.coarse, states)[:SETTLED], *sorted(states, key=self._unexplained)[:SETTLED]]
-        settled = [fresh(state) for index, state in enumerate(chosen) if not any(state is s for s in chosen[:index])]
+        unique = [state for index, state in enumerate(chosen) if not any(state is s for s in chosen[:index])]
+        settled = [fresh(state) for state in distinct(unique, self.region.size)]
         self.states += settled
         for state in settled:
             refine(self.coarse, state, PLAIN, min(SHORT_ITERATIONS, self.options.iterations), self.region, self.begin)
