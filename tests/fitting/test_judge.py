@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import pytest
@@ -12,7 +13,9 @@ from rgspipe.fitting.judge import (
     FAINT,
     FAINT_DROP,
     LEAST_DROP,
+    MET,
     best_state,
+    distinct,
     drop,
     equally_good,
     rig_distance,
@@ -22,6 +25,7 @@ from rgspipe.fitting.judge import (
 from rgspipe.fitting.parameters import Emitter
 from rgspipe.fitting.problem import LightProblem
 from rgspipe.fitting.refine import ROBUST, State, start_from
+from rgspipe.renderer.spot import SpotShape
 
 
 @pytest.fixture(scope="module")
@@ -95,3 +99,26 @@ def test_twins_are_merged_and_faint_lights_dropped(problem: LightProblem) -> Non
     assert worth_keeping(three, 1.0) == [1, 2]
     three.intensity = torch.tensor([[0.0], [1.0], [1e-3]], dtype=torch.float64).expand(3, 3)
     assert worth_keeping(three, 1.0) == [1]
+
+
+def test_rigs_that_met_are_refined_once(problem: LightProblem) -> None:
+    """Of rigs on their way to the same place the first is left, in whichever order their lights stand."""
+    size = problem.views.frozen.size
+    near, far = shifted(VISIBLE, 0.9 * MET * size), shifted(VISIBLE, 1.1 * MET * size)
+    first, second, third = state(problem, VISIBLE), state(problem, near), state(problem, far)
+    kept = distinct([first, second, third], size)
+    assert [one is other for one, other in zip(kept, [first, third], strict=True)] == [True, True]
+    pair, swapped = state(problem, VISIBLE, HIDDEN), state(problem, HIDDEN, near)
+    assert distinct([pair, swapped], size) == [pair]
+    assert distinct([first, pair], size) == [first, pair], "another number of lights is another rig"
+
+
+def test_spots_that_point_elsewhere_have_not_met(problem: LightProblem) -> None:
+    shape = SpotShape("smoothstep", 0.5, 0.3)
+    place = torch.tensor(VISIBLE, dtype=torch.float64)
+    turned = [torch.tensor([math.sin(angle), 0.0, -math.cos(angle)], dtype=torch.float64) for angle in (0, 0.005, 0.3)]
+    spots = [start_from(problem, [Emitter(place, axis, shape)], ROBUST, 0.0) for axis in turned]
+    assert distinct(spots, 1.0) == [spots[0], spots[2]]
+    wider = start_from(problem, [Emitter(place, turned[0], SpotShape("smoothstep", 0.6, 0.3))], ROBUST, 0.0)
+    assert distinct([spots[0], wider], 1.0) == [spots[0], wider]
+    assert distinct([state(problem, VISIBLE), spots[0]], 1.0)[1] is spots[0], "a point light is no spot"
