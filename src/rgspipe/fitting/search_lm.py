@@ -186,8 +186,12 @@ class _Search:
             if best is not None and not worth_one_more(self.coarse, best, state):
                 break
             best, rivals = state, self.rivals
-        self.rivals = rivals
-        return self._settled([self._pruned(best)])
+        answer = self._without_twins(best)
+        if len(answer.emitters) < len(best.emitters):
+            self.tried.append(answer)
+        # A rig of more lights, two of which are one, explains as much and is no other answer.
+        self.rivals = [state for state in rivals if len(state.emitters) <= len(answer.emitters)]
+        return answer
 
     def costs(self) -> dict[int, float]:
         """Robust cost by number of lights of all rigs that were compared, at one scale."""
@@ -275,6 +279,13 @@ class _Search:
                 refine(self.coarse, other, ROBUST, SHORT_ITERATIONS, self.region, self.begin)
                 state = state if drop(self.coarse, other, state) >= LEAST_DROP else other
         return state
+
+    def _without_twins(self, best: State) -> State:
+        """The rig by plain squares; lights that meet on the way there are one, as a worse rig of fewer was accepted."""
+        kept = self._pruned(best)
+        settled = self._settled([kept])
+        fewer = self._pruned(settled)
+        return settled if fewer is settled else self._without_twins(fewer)
 
     def _pruned(self, state: State) -> State:
         """The rig without lights that add next to nothing or coincide with another."""
