@@ -281,9 +281,8 @@ class _Search:
         return state
 
     def _without_twins(self, best: State) -> State:
-        """The rig by plain squares; lights that meet on the way there are one, as a worse rig of fewer was accepted."""
-        kept = self._pruned(best)
-        settled = self._settled([kept])
+        """The rig by plain squares. Lights that meet on the way there are one: with one fewer the search had failed."""
+        settled = self._settled([self._pruned(best)])
         fewer = self._pruned(settled)
         return settled if fewer is settled else self._without_twins(fewer)
 
