@@ -26,6 +26,9 @@ from rgspipe.renderer.glossy_transport import build_glossy_transport
 from rgspipe.renderer.transport import with_bounces
 from rgspipe.scene import Gloss, PointLight
 
+#: Products with one lighting add in an order that depends on where a matrix lies in memory; measured: 2.3e-7.
+ROUNDING = 2e-6
+
 
 @pytest.fixture(scope="module")
 def scene():
@@ -43,7 +46,8 @@ def test_a_scene_renders_the_same_after_the_round_trip(scene, folder):
     loaded = load_frozen(folder.joinpath, gather=True)
     light = PointLight(torch.tensor(VISIBLE), torch.ones(3))
     camera = room_cameras(24)[0]
-    assert torch.equal(loaded.render(loaded.view(camera), (light,)), scene.render(scene.view(camera), (light,)))
+    first, second = loaded.render(loaded.view(camera), (light,)), scene.render(scene.view(camera), (light,))
+    torch.testing.assert_close(first, second, rtol=ROUNDING, atol=0.0)
     assert torch.equal(loaded.areas, scene.areas)
     assert torch.equal(loaded.gather.matrix.values(), scene.gather.matrix.values())
 
@@ -52,7 +56,7 @@ def test_a_fit_does_not_need_the_gather(scene, folder):
     (folder / GATHER).unlink()
     loaded, light = load_frozen(folder.joinpath), (PointLight(torch.tensor(VISIBLE), torch.ones(3)),)
     assert loaded.gather is None
-    assert torch.equal(loaded.radiance_of(light), scene.radiance_of(light))
+    torch.testing.assert_close(loaded.radiance_of(light), scene.radiance_of(light), rtol=ROUNDING, atol=0.0)
     with pytest.raises(ValueError, match="gather=True"):
         loaded.with_solver("gather")
 

@@ -63,4 +63,5 @@ def test_the_centres_are_stored(far: FrozenScene, tmp_path) -> None:
     save_frozen(tmp_path, far)
     loaded = load_frozen(tmp_path.joinpath)
     assert torch.equal(loaded.centers, far.centers)
-    assert torch.equal(lit(loaded, AWAY)["radiance"], lit(far, AWAY)["radiance"])
+    # Products with one lighting add in an order that depends on where a matrix lies in memory; measured: 2.3e-7.
+    torch.testing.assert_close(lit(loaded, AWAY)["radiance"], lit(far, AWAY)["radiance"], rtol=2e-6, atol=0.0)

@@ -231,7 +231,9 @@ def test_advice_and_landscape_are_written_where_they_are_asked_for(inputs, tmp_p
     alone = table[table["added"] == "alone"]
     # The target's other view, and the three training views.
     assert set(alone["camera"]) == {"view_1", "train/r_0", "train/r_1", "train/r_2"}
-    assert alone["position_sd"].is_monotonic_increasing and (alone["views"] == 2).all()
+    # Cameras that differ by rounding alone keep their order.
+    assert (alone["position_sd"].diff().dropna() >= -1e-8 * alone["position_sd"].iloc[0]).all()
+    assert (alone["views"] == 2).all()
     assert table.loc[table["added"] == "plan", "views"].tolist() == [2, 3, 4, 5]
     in_order = table[table["added"] == "in_order"]
     assert in_order["camera"].tolist() == ["view_1", "train/r_0", "train/r_1", "train/r_2"]
