@@ -254,8 +254,7 @@ class _Search:
         outliers, would walk far in it. So the best by plain squares are among those that are tried.
         """
         chosen = [*ranked(self.coarse, states)[:SETTLED], *sorted(states, key=self._unexplained)[:SETTLED]]
-        unique = [state for index, state in enumerate(chosen) if not any(state is s for s in chosen[:index])]
-        settled = [fresh(state) for state in distinct(unique, self.region.size)]
+        settled = [fresh(state) for state in distinct(chosen, self.region.size)]
         self.states += settled
         for state in settled:
             refine(self.coarse, state, PLAIN, min(SHORT_ITERATIONS, self.options.iterations), self.region, self.begin)

@@ -49,7 +49,7 @@ def _blur(images: Tensor) -> Tensor:
     """Gaussian-weighted means of (B, H, W), zero beyond the border.
 
     One dense product a direction: 2 (H + W) operations a pixel instead of 44, and yet less time up to 512 pixels
-    across, forwards and backwards, than the convolutions that it replaces (9 images of 128²: 0.9 instead of 2.0 ms).
+    across than the convolutions that it replaces (9 images of 128²: 0.9 instead of 2.0 ms; of 512²: 61 instead of 194).
     """
     height, width = images.shape[-2:]
     return torch.matmul(_window(height).to(images), images @ _window(width).to(images))
