@@ -2,32 +2,12 @@
 
 from __future__ import annotations
 
-import ast
-import inspect
-from pathlib import Path
-
 import pytest
 import torch
 
-import rgspipe
+from rgspipe.blender.models.corridor import FURNITURE
 from rgspipe.blender.models.parameters import CornerParameters
-from rgspipe.evaluation.exact_corner import FURNITURE, Furniture, corner_rectangles
-
-MODEL = Path(inspect.getfile(rgspipe)).parent / "blender/models/corner.py"
-
-
-def test_furniture_is_that_of_the_blender_model() -> None:
-    """Read from its source, as the module itself needs bpy."""
-    (value,) = [
-        node.value
-        for node in ast.parse(MODEL.read_text(encoding="utf-8")).body
-        if isinstance(node, ast.Assign) and node.targets[0].id == "FURNITURE"
-    ]
-    drawn = {
-        key.value: Furniture(*(ast.literal_eval(argument) for argument in call.args))
-        for key, call in zip(value.keys, value.values, strict=True)
-    }
-    assert drawn == FURNITURE
+from rgspipe.evaluation.exact_corner import corner_rectangles
 
 
 @pytest.mark.parametrize("corridor", [CornerParameters(), CornerParameters(width=0.28, height=0.6)])

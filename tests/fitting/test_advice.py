@@ -11,7 +11,7 @@ import torch
 from lit_room import HIDDEN, room_cameras
 from rgspipe import fit_lights
 from rgspipe.fitting import Effects, ImageCapture
-from rgspipe.fitting.advice import COMMON, MOST_VIEWS, coarse_camera, suggest_views
+from rgspipe.fitting.advice import COMMON, MOST_VIEWS, suggest_views
 from rgspipe.scene import Camera, PointLight, look_at
 
 
@@ -92,14 +92,6 @@ def test_the_plan_ends_at_the_most_views(room, fitted):
     assert len(advice.plan) == MOST_VIEWS - 1 and len({view.camera for view in advice.plan}) == MOST_VIEWS - 1
     reached = replace(advice, wanted=advice.plan[2].position_sd)
     assert reached.wanted < advice.present_sd
-
-
-def test_small_cameras_see_the_same():
-    camera = _camera((0.0, 0.0, 0.0), (1.0, 0.2, 0.0))
-    small = coarse_camera(replace(camera, width=96, height=64, fx=80.0, fy=82.0, cx=47.0, cy=30.0), 48)
-    assert (small.width, small.height) == (48, 32)
-    assert (small.fx, small.fy, small.cx, small.cy) == (40.0, 41.0, 23.5, 15.0)
-    assert coarse_camera(camera, 48) == camera
 
 
 def test_a_fit_without_lights_has_no_advice(room, fitted):

@@ -39,6 +39,20 @@ def test_subsamples_average_to_the_centre() -> None:
     torch.testing.assert_close(planar, centre[0] * one[0], atol=1e-12, rtol=0)
 
 
+def test_a_reduced_camera_sees_the_same() -> None:
+    large = replace(camera(), width=96, height=64, fx=80.0, fy=82.0, cx=47.0, cy=30.0)
+    small = large.reduced(48)
+    assert (small.width, small.height) == (48, 32)
+    assert (small.fx, small.fy, small.cx, small.cy) == (40.0, 41.0, 23.5, 15.0)
+    thin = replace(large, height=1).reduced(48)
+    assert (thin.width, thin.height) == (48, 1)
+
+
+def test_a_camera_is_never_enlarged() -> None:
+    view = camera()
+    assert view.reduced(view.width) == view.reduced(1000) == view
+
+
 @given(coordinate, coordinate, coordinate)
 def test_looking_anywhere_gives_a_rotation(x: float, y: float, z: float) -> None:
     origin = torch.tensor([5.0, 5.0, 5.0])

@@ -10,10 +10,11 @@ from mathutils import Matrix
 
 from rgspipe.blender import cycles
 from rgspipe.blender.job import RenderSettings
+from rgspipe.blender.lamp import shape_lamp
 from rgspipe.blender.plan import Frame
 from rgspipe.datasets.exr import read_channels, write_channels, write_image
 from rgspipe.errors import InputError
-from rgspipe.scene import Camera, PointLight
+from rgspipe.scene import Camera, Light, PointLight
 from rgspipe.scene.lights import WATTS_PER_INTENSITY
 
 #: Suffixes of the surface files beside an image, and their channels.
@@ -44,6 +45,10 @@ class Studio:
         for item in (self._camera, self._light):
             scene.collection.objects.link(item)
         scene.camera = self._camera
+
+    def shape(self, light: Light) -> None:
+        """Let the lamp shine as `light` does, a point or a spot; place and intensity come with each frame."""
+        shape_lamp(self._light.data, light)
 
     def render(self, frame: Frame, folder: Path) -> None:
         """Render `frame` and write its files below `folder`, each whole or not at all."""

@@ -37,8 +37,8 @@ def render_dataset(job: DatasetJob, folder: Path) -> None:
         RuntimeError: Blender died; the message ends with the last lines it wrote.
     """
     remedy = "Install it (pip install 'rgspipe[blender]'), or use scene=external with a dataset from disk."
-    _require_bpy("scene", remedy)
-    _render("dataset", job.to_json(), job.scene, folder)
+    require_bpy("scene", remedy)
+    run_blender(["rgspipe.blender", "dataset"], job.to_json(), job.scene, folder)
 
 
 def render_room(job: RoomJob, folder: Path) -> None:
@@ -50,11 +50,12 @@ def render_room(job: RoomJob, folder: Path) -> None:
         InputError: bpy is not installed, or `folder` holds the images of another job.
         RuntimeError: Blender died; the message ends with the last lines it wrote.
     """
-    _require_bpy("path-traced truth", "Install it: pip install 'rgspipe[blender]'.")
-    _render("room", job.to_json(), job.room, folder)
+    require_bpy("path-traced truth", "Install it: pip install 'rgspipe[blender]'.")
+    run_blender(["rgspipe.blender", "room"], job.to_json(), job.room, folder)
 
 
-def _require_bpy(where: str, remedy: str) -> None:
+def require_bpy(where: str, remedy: str) -> None:
+    """Raise InputError about `where` if Blender's module is not installed."""
     if importlib.util.find_spec("bpy") is None:
         raise InputError(
             where,
@@ -64,13 +65,22 @@ def _require_bpy(where: str, remedy: str) -> None:
         )
 
 
-def _render(kind: str, job: dict, name: str, folder: Path) -> None:
-    """Have a child process render `job` into `folder`, and follow it."""
+def run_blender(module: list[str], job: dict, name: str, folder: Path) -> None:
+    """Have a child process render `job` into `folder`, and follow it.
+
+    Args:
+        module: what Python runs, with its first arguments; paths of job and folder and our own number come after them.
+        job: plain values.
+        name: what the progress says is rendered.
+
+    Raises:
+        InputError: the job cannot be used, or `folder` holds the images of another one.
+        RuntimeError: Blender died; the message ends with the last lines it wrote.
+    """
     folder = Path(folder).resolve()
     folder.mkdir(parents=True, exist_ok=True)
     _claim(job, folder)
-    arguments = [kind, str(folder / JOB_FILE), str(folder), str(os.getpid())]
-    command = [sys.executable, "-u", "-m", "rgspipe.blender", *arguments]
+    command = [sys.executable, "-u", "-m", *module, str(folder / JOB_FILE), str(folder), str(os.getpid())]
     with subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, text=True,
         errors="replace", env=_environment(),

@@ -58,7 +58,7 @@ def seen_through(grid: Grid, bvh: SurfelBvh, cameras: Sequence[Camera], margin: 
     """
     centers = grid.centers
     free = torch.zeros(len(centers), dtype=torch.bool)
-    for camera in map(_small, cameras):
+    for camera in (camera.reduced(LONGEST_SIDE) for camera in cameras):
         open_cells = (~free).nonzero()[:, 0]
         pixel, depth = camera.project(centers[open_cells])
         column, row = pixel.floor().long().unbind(-1)
@@ -76,19 +76,3 @@ def _reach(bvh: SurfelBvh, camera: Camera) -> Tensor:
     covered = hits.weights.sum(dim=1)
     mean = (hits.weights * hits.depths.nan_to_num(posinf=0.0)).sum(dim=1) / covered.clamp(min=1e-6)
     return torch.where(hits.transmittance < 0.5, mean, torch.inf).double().cpu()
-
-
-def _small(camera: Camera) -> Camera:
-    """The same view with at most LONGEST_SIDE pixels along a side."""
-    scale = min(1.0, LONGEST_SIDE / max(camera.width, camera.height))
-    width, height = (max(1, round(scale * side)) for side in (camera.width, camera.height))
-    across, down = width / camera.width, height / camera.height
-    return Camera(
-        camera.camera_to_world,
-        camera.fx * across,
-        camera.fy * down,
-        camera.cx * across,
-        camera.cy * down,
-        width,
-        height,
-    )

@@ -45,7 +45,11 @@ def read_array(path: str | Path, names: tuple[str, ...]) -> np.ndarray:
     Raises:
         InputError: as `read_channels`; also when the file has other channels, or NaN or infinite pixels.
     """
-    channels = read_channels(path)
+    return _stacked(path, read_channels(path), names)
+
+
+def _stacked(path: str | Path, channels: dict[str, np.ndarray], names: tuple[str, ...]) -> np.ndarray:
+    """`read_array` of the channels that a file was found to have."""
     if set(channels) != set(names):
         raise InputError(
             path,
@@ -75,11 +79,11 @@ def read_image(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
     Raises:
         InputError: as `read_array`.
     """
-    names = read_channels(path).keys()
-    if set(names) == {"R", "G", "B"}:
-        image = read_array(path, ("R", "G", "B"))
+    channels = read_channels(path)
+    if set(channels) == {"R", "G", "B"}:
+        image = _stacked(path, channels, ("R", "G", "B"))
         return image, np.ones(image.shape[:2], np.float32)
-    image = read_array(path, ("R", "G", "B", "A"))
+    image = _stacked(path, channels, ("R", "G", "B", "A"))
     return np.ascontiguousarray(image[..., :3]), np.ascontiguousarray(image[..., 3])
 
 

@@ -233,7 +233,7 @@ def _evidence(
     Args:
         clips: (V,) radiance from which on values tell nothing.
     """
-    small = [coarse_camera(camera) for camera in cameras]
+    small = [camera.reduced(COARSE_PIXELS) for camera in cameras]
     weights = [frozen.view(camera, supersampling=1) for camera in track(small, "looking through cameras", unit="view")]
     views = prepare_views(frozen, weights)
     black = torch.zeros((len(views.pixels), 3), device=views.operator.matrix.device)
@@ -255,22 +255,6 @@ def _evidence(
     brightening = scores(values, owners, intensity)
     positions = tuple((owners == index).nonzero()[:3, 0] for index in range(len(emitters)))
     return _Evidence(information(values.sum(dim=1), owners, intensity), brightening, positions)
-
-
-def coarse_camera(camera: Camera, most: int = COARSE_PIXELS) -> Camera:
-    """The same view with at most `most` pixels along the longer side."""
-    factor = max(1.0, max(camera.width, camera.height) / most)
-    width, height = max(1, round(camera.width / factor)), max(1, round(camera.height / factor))
-    across, down = width / camera.width, height / camera.height
-    return replace(
-        camera,
-        fx=camera.fx * across,
-        fy=camera.fy * down,
-        cx=camera.cx * across,
-        cy=camera.cy * down,
-        width=width,
-        height=height,
-    )
 
 
 def _trace(matrix: Tensor) -> float:

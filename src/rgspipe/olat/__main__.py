@@ -30,11 +30,10 @@ def main() -> int:
 
 def render_pool(job: PoolJob, folder: Path, parent: int) -> None:
     """Write what is known of the pool, then render every image that is missing in `folder`."""
-    from rgspipe.blender.passes import is_whole
+    from rgspipe.blender.passes import Studio, is_whole
     from rgspipe.blender.scenes import open_scene
     from rgspipe.olat.plan import make_plan
     from rgspipe.olat.pool_file import write_pool
-    from rgspipe.olat.studio import OlatStudio
 
     prepared = open_scene(job.dataset)
     lights = make_plan(job, prepared.layout, prepared.geometry)
@@ -46,10 +45,11 @@ def render_pool(job: PoolJob, folder: Path, parent: int) -> None:
     missing = [(plan, number) for plan, number in images if not is_whole(plan.frames[number], folder)]
     tell(total=len(images), done=len(images) - len(missing))
     scratch = make_scratch(folder)
-    studio = OlatStudio(prepared.scene, job.dataset.settings, scratch)
+    studio = Studio(prepared.scene, job.dataset.settings, scratch)
     for plan, number in missing:
         stop_without(parent)
-        studio.render_light(plan, number, folder)
+        studio.shape(plan.light)
+        studio.render(plan.frames[number], folder)
         tell(frame=plan.frames[number].name)
     shutil.rmtree(scratch)
 

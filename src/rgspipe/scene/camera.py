@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 from torch import Tensor
@@ -44,6 +44,21 @@ class Camera:
     @property
     def pixel_count(self) -> int:
         return self.width * self.height
+
+    def reduced(self, longest_side: int) -> Camera:
+        """The same view with at most `longest_side` pixels along the longer side, at least one along the other."""
+        factor = max(1.0, max(self.width, self.height) / longest_side)
+        width, height = max(1, round(self.width / factor)), max(1, round(self.height / factor))
+        across, down = width / self.width, height / self.height
+        return replace(
+            self,
+            fx=self.fx * across,
+            fy=self.fy * down,
+            cx=self.cx * across,
+            cy=self.cy * down,
+            width=width,
+            height=height,
+        )
 
     def rays(
         self, pixels: Tensor | None = None, subsamples: int = 1, places: Tensor | None = None

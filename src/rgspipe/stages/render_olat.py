@@ -180,7 +180,6 @@ STAGE = Stage(
         "rgspipe.olat.plan",
         "rgspipe.olat.pool_file",
         "rgspipe.olat.process",
-        "rgspipe.olat.studio",
         "rgspipe.olat.track",
         "rgspipe.renderer.spot",
         "rgspipe.scene.camera",

@@ -83,6 +83,7 @@ STAGE = Stage(
     inputs=lambda config: [] if _is_exact(config) else ["generate_dataset"],
     config_keys=_keys,
     code=(
+        "rgspipe.blender.models.corridor",
         "rgspipe.blender.models.parameters",
         "rgspipe.evaluation.arrays",
         "rgspipe.evaluation.ceiling",

@@ -21,9 +21,9 @@ pytestmark = [
 
 @pytest.fixture(scope="module")
 def rendered(tmp_path_factory: pytest.TempPathFactory, child_environment: dict[str, str]) -> Path:
-    """The images of in_blender.py."""
+    """The images of lamp_in_blender.py."""
     folder = tmp_path_factory.mktemp("plane")
-    command = [sys.executable, str(Path(__file__).with_name("in_blender.py")), str(folder)]
+    command = [sys.executable, str(Path(__file__).with_name("lamp_in_blender.py")), str(folder)]
     done = subprocess.run(command, env=child_environment, capture_output=True, text=True, timeout=600)
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
     return folder

@@ -1,4 +1,4 @@
-"""Cycles with a lamp that shines as a point light or as any of our spots.
+"""A lamp that shines as a point light or as any of our spots.
 
 Light is emitted by a point lamp of radius 0 whose shader multiplies it with the spot's profile of the angle between
 its axis and the direction in which the light leaves: one way for all profiles, also for those that Blender's own
@@ -8,32 +8,20 @@ spots do not have.
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import bpy
 
-from rgspipe.blender.passes import Studio
-from rgspipe.olat.plan import LightPlan
 from rgspipe.scene import Light, SpotLight
 
 
-class OlatStudio(Studio):
-    """A studio whose lamp takes the profile of the light that is rendered."""
-
-    def render_light(self, plan: LightPlan, number: int, folder: Path) -> None:
-        """Render the image of a light for its camera `number`, whole or not at all."""
-        self.shape(plan.light)
-        self.render(plan.frames[number], folder)
-
-    def shape(self, light: Light) -> None:
-        """Give the lamp the profile and the axis of `light`; place and intensity come with the frame."""
-        lamp = self._light.data
-        lamp.use_nodes = True
-        nodes = _Nodes(lamp.node_tree)
-        emission, output = nodes.add("ShaderNodeEmission"), nodes.add("ShaderNodeOutputLight")
-        nodes.tree.links.new(emission.outputs["Emission"], output.inputs["Surface"])
-        if isinstance(light, SpotLight):
-            nodes.tree.links.new(_share(nodes, light), emission.inputs["Strength"])
+def shape_lamp(lamp: bpy.types.Light, light: Light) -> None:
+    """Give `lamp` the profile and the axis of `light`; its place and intensity are not looked at."""
+    lamp.use_nodes = True
+    nodes = _Nodes(lamp.node_tree)
+    emission, output = nodes.add("ShaderNodeEmission"), nodes.add("ShaderNodeOutputLight")
+    nodes.tree.links.new(emission.outputs["Emission"], output.inputs["Surface"])
+    if isinstance(light, SpotLight):
+        nodes.tree.links.new(_share(nodes, light), emission.inputs["Strength"])
 
 
 class _Nodes:

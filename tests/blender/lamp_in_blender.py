@@ -1,4 +1,4 @@
-"""Run in a process of its own by test_studio.py: the plane under a point light, our spots, and Blender's."""
+"""Run in a process of its own by test_lamp.py: the plane under a point light, our spots, and Blender's."""
 
 from __future__ import annotations
 
@@ -11,18 +11,17 @@ from mathutils import Vector
 from rgspipe.blender.job import RenderSettings
 from rgspipe.blender.materials import diffuse_material
 from rgspipe.blender.meshes import add, polygon
+from rgspipe.blender.passes import Studio
 from rgspipe.blender.plan import Frame
-from rgspipe.olat.plan import LightPlan
-from rgspipe.olat.studio import OlatStudio
 from rgspipe.scene import Light, PointLight, SpotLight
 from spots_on_plane import ALBEDO, SIZE, plane_camera, plane_lights
 
 SAMPLES = 1024
 
 
-def _plan(name: str, light: Light) -> LightPlan:
-    frame = Frame(name, plane_camera(), PointLight(light.position, light.intensity), 1, False)
-    return LightPlan(name, "visible", light, (frame,))
+def _render(studio: Studio, name: str, light: Light, folder: Path) -> None:
+    studio.shape(light)
+    studio.render(Frame(name, plane_camera(), PointLight(light.position, light.intensity), 1, False), folder)
 
 
 def _use_blender_s_spot(spot: SpotLight) -> None:
@@ -39,14 +38,14 @@ def main(folder: Path) -> None:
     bpy.ops.wm.read_factory_settings(use_empty=True)
     corners = [(-4.0, -4.0, 0.0), (4.0, -4.0, 0.0), (4.0, 4.0, 0.0), (-4.0, 4.0, 0.0)]
     add(bpy.context.scene, polygon("plane", corners), diffuse_material("plane", ALBEDO))
-    studio = OlatStudio(bpy.context.scene, RenderSettings(SIZE, SAMPLES, denoise=False, max_bounces=0), folder)
+    studio = Studio(bpy.context.scene, RenderSettings(SIZE, SAMPLES, denoise=False, max_bounces=0), folder)
     lights = plane_lights()
     for name, light in lights.items():
-        studio.render_light(_plan(name, light), 0, folder)
-    studio.render_light(_plan("again", lights["point"]), 0, folder)
+        _render(studio, name, light, folder)
+    _render(studio, "again", lights["point"], folder)
     spot = lights["smoothstep"]
     _use_blender_s_spot(spot)
-    studio.render_light(_plan("blender", PointLight(spot.position, spot.intensity)), 0, folder)
+    _render(studio, "blender", PointLight(spot.position, spot.intensity), folder)
 
 
 if __name__ == "__main__":
