@@ -107,6 +107,9 @@ def test_text_shows_what_differs_and_says_what_is_not_known() -> None:
     headings, rows = shown_rows(table, "kinds")
     assert len(rows) == 1 and rows[0]["axis"] == "1.00° (0.50–1.50)" and rows[0]["cone"] == "—"
     assert rows[0]["right number"].startswith("75 %") and rows[0]["right types"].startswith("50 %")
+    assert rows[0]["truth in 95 % region"].count("–") == 0
+    (row,) = shown_rows(table, "regions")[1]
+    assert row["truth in 95 % region"].count("–") == 1
     # A study that was made before types were judged can still be shown.
     assert "right types" not in shown_rows(table.drop(columns="right_types"), "kinds")[0]
     table = pd.concat([table, table.assign(views=2, predicted=0.01, position=math.inf)])

@@ -87,7 +87,9 @@ def test_a_case_that_is_none_is_refused_before_anything_is_made() -> None:
         light_study.STAGE.needs(_config(cases=["target_capture.nose=0.1"]))
 
 
-@pytest.mark.parametrize("name", ["light_views", "light_robustness", "light_classes", "light_kinds"])
+@pytest.mark.parametrize(
+    "name", ["light_views", "light_robustness", "light_classes", "light_kinds", "light_regions", "light_adam"]
+)
 def test_every_study_that_is_prepared_composes_and_names_its_cases(name: str) -> None:
     config = compose_config(["stage=light_study", f"experiment={name}"])
     assert config.light_study.kind == name.removeprefix("light_")
@@ -96,7 +98,7 @@ def test_every_study_that_is_prepared_composes_and_names_its_cases(name: str) ->
     searches = [need for need in fits if need.changes["fit.method"] == "search_lm"]
     study = config.light_study
     assert len(searches) == max(1, len(study.scenes)) * len(study.cases) * len(study.views)
-    assert len(fits) - len(searches) == (2 if name == "light_views" else 0)
+    assert len(fits) - len(searches) == {"light_views": 2, "light_adam": 3}.get(name, 0)
 
 
 def test_the_papers_method_is_compared_on_the_targets_of_the_search() -> None:

@@ -15,7 +15,7 @@ from rgspipe.evaluation import metrics
 from rgspipe.evaluation.tables import ALL, class_order
 
 #: What is studied.
-KINDS = ("views", "robustness", "classes", "kinds")
+KINDS = ("views", "robustness", "classes", "kinds", "regions", "adam")
 
 #: Why fits end; a column each, with the share of the targets.
 STATUSES = ("converged", "undetermined", "ambiguous", "unexplained", "at_bound", "not_enough_light", "max_iterations")

@@ -15,6 +15,13 @@ from rgspipe.evaluation.tables import ALL
 
 Row = dict[str, Any]
 
+#: Of all kinds whose rows are kinds of lights.
+LIGHTS_NOTE = (
+    "Medians with 95 % bootstrap intervals, shares with Wilson’s; position errors are parts of the scene’s longest "
+    "side, of several lights the worst. Silent: the fit says converged, is off by more than the limit, and no region "
+    "that it states holds the truth. Times are wall times of single fits, beside whatever else ran."
+)
+
 #: What stands over the rows and says what the columns mean, by kind of study.
 NOTES = {
     "views": "Medians with 95 % bootstrap intervals, shares with Wilson’s; position errors are parts of the scene’s "
@@ -24,16 +31,19 @@ NOTES = {
     "robustness": "Medians with 95 % bootstrap intervals, shares with Wilson’s; all classes together. Silent: the fit "
     "says converged, is off by more than the limit, and no region that it states holds the truth. With a wrong number "
     "of lights no target counts as solved; position errors are then those of the lights that have a match.",
-    "kinds": "Medians with 95 % bootstrap intervals, shares with Wilson’s; position errors are parts of the scene’s "
-    "longest side, of several lights the worst. Silent: the fit says converged, is off by more than the limit, and no "
-    "region that it states holds the truth. Times are wall times of single fits, beside whatever else ran.",
+    "kinds": LIGHTS_NOTE,
+    "regions": LIGHTS_NOTE,
+    "adam": LIGHTS_NOTE,
     "classes": "Medians with 95 % bootstrap intervals, shares with Wilson’s; position errors are parts of the scene’s "
     "longest side. True surfels are made from the true surfaces and albedo.",
 }
 
 
-#: Kinds whose rows are cases, with all classes of lights together.
-TOGETHER = ("robustness", "kinds")
+#: Kinds whose rows are kinds of lights …
+OF_LIGHTS = ("kinds", "regions", "adam")
+
+#: … and those whose rows are any cases, with all classes of lights together.
+TOGETHER = ("robustness", *OF_LIGHTS)
 
 
 def shown_rows(table: pd.DataFrame, kind: str) -> tuple[list[str], list[Row]]:
@@ -67,7 +77,7 @@ def _columns(rows: pd.DataFrame, kind: str) -> dict[str, Callable[[Row], str]]:
     columns["targets"] = lambda row: str(row["count"])
     columns["position error"] = lambda row: _interval(row, "position", 2)
     columns["intensity error"] = lambda row: _interval(row, "intensity", 1)
-    if kind == "kinds":
+    if kind in OF_LIGHTS:
         columns["axis"] = lambda row: _degrees(row, "axis")
         columns["cone"] = lambda row: _degrees(row, "cone")
         columns["right number"] = lambda row: _interval(row, "right_number", 0)
@@ -79,7 +89,8 @@ def _columns(rows: pd.DataFrame, kind: str) -> dict[str, Callable[[Row], str]]:
     if kind == "views":
         columns["stated"] = lambda row: percent(row["stated"])
         columns["predicted"] = lambda row: percent(row.get("predicted", math.nan))
-    columns["truth in 95 % region"] = lambda row: percent(row["inside_95"], 0)
+    inside = _interval if kind == "regions" else lambda row, name, digits: percent(row[name], digits)
+    columns["truth in 95 % region"] = lambda row: inside(row, "inside_95", 0)
     if kind in TOGETHER:
         columns["silent"] = lambda row: _interval(row, "silent", 0)
         columns["says"] = _statuses
