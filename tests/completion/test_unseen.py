@@ -100,7 +100,18 @@ def test_one_camera_that_sees_little_adds_nothing(seen: Surfels, monkeypatch: py
     camera = camera_at([0.1, 0.1, 0.3], [0.9, 0.9, 0.3], 64, 1.2)
     assert with_unseen_surfaces(seen, [camera]) is seen
     monkeypatch.setattr("rgspipe.completion.unseen.MOST_UNSEEN", 10.0)
+    monkeypatch.setattr("rgspipe.completion.unseen.MOST_THROUGH", 2.0)
     assert len(with_unseen_surfaces(seen, [camera])) > (1.0 + MOST_UNSEEN) * len(seen)
+
+
+def test_room_that_a_thing_hides_stays_open(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The box hides what is behind it from cameras in front: a wall along the limit of sight would stand in the room."""
+    room, cameras = true_room(), cameras_in_front()[:4]
+    behind = with_unseen_surfaces(room, cameras).centers[len(room) :]
+    assert len(behind) == 0  # measured
+    monkeypatch.setattr("rgspipe.completion.unseen.MOST_THROUGH", 2.0)
+    monkeypatch.setattr("rgspipe.completion.unseen.MOST_UNSEEN", 10.0)
+    assert len(with_unseen_surfaces(room, cameras)) > 1.02 * len(room)
 
 
 def test_the_result_is_the_same_twice(seen: Surfels, closed: Surfels) -> None:

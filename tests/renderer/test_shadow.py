@@ -12,8 +12,10 @@ from clouds import DEVICES, FAR, cloud, moved, one_full_layer, stack, thousand_f
 from rgspipe.renderer import reference
 from rgspipe.renderer.direct import unit_irradiance
 from rgspipe.renderer.kernels.irradiance import transmittance
+from rgspipe.renderer.kernels.shadow import RECEIVER_SKIP
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.scene import Coverage, Surfels
+from rgspipe.scene.surfels import quaternion_from_normal
 
 LIGHTS = torch.tensor([[0.1, 0.2, 0.3], [0.0, 0.0, 0.9], [-0.7, 0.3, -0.2]], dtype=torch.float64)
 
@@ -53,6 +55,22 @@ def test_the_reference_matches_finite_differences() -> None:
     surfels = cloud(40, seed=8)
     light = torch.tensor([[0.1, 0.2, 0.3]], dtype=torch.float64)
     assert torch.autograd.gradcheck(lambda x: reference.transmittance(surfels, x), light.requires_grad_(), atol=1e-5)
+
+
+@pytest.mark.parametrize("device", DEVICES)
+def test_slopes_are_finite_where_an_occluder_begins_to_fade_in(device: str) -> None:
+    """Rounding decides there whether it is met; 4 of these 20 sizes gave NaN when fade was worked out in two ways."""
+    coverage = Coverage(low=0.0, high=0.9, layer_thickness=0.03, clip_softness=0.01)
+    surfels = receiver_below(stack(torch.tensor([0.0]), 0.5, coverage)).to(torch.float32)
+    surfels.rotations[1] = quaternion_from_normal(torch.nn.functional.normalize(torch.tensor([[0.5, 0.0, 1.0]]), dim=1))
+    lights = torch.linspace(0.3, 2.0, 500, dtype=torch.float64)[:, None] * torch.tensor([0.0, 0.0, 1.0]).double()
+    for size in range(100, 120):
+        one = replace(surfels, centers=torch.zeros(2, 3), scales=0.01 * size * surfels.scales)
+        one.centers[1, 2] = RECEIVER_SKIP * one.scales[0].prod().sqrt()
+        shares, found = (x.cpu() for x in transmittance(SurfelBvh(one.to(device)), lights))
+        assert torch.isfinite(shares).all() and torch.isfinite(found).all(), size
+        # What only begins to fade in takes nothing away. Measured 0 and 5.6e-7 per unit of length.
+        assert float((shares[:, 0] - 1.0).abs().max()) < 1e-6 and float(found[:, 0].abs().max()) < 1e-4
 
 
 def receiver_below(occluders: Surfels) -> Surfels:

@@ -3,7 +3,9 @@
 Between the space that cameras look through and the rest lies a boundary. Most of it is surface, and has surfels. Where
 it has none no camera saw what is there: the back of a box, the floor behind it. Left open, such places swallow light;
 a closed room has none that does. So they get surfels whose albedo is that of their neighbours. Where a shadow of sight
-hides more than a thin layer the boundary is not where the surface is, but still a place that light does not pass.
+hides more than a thin layer the boundary is not where the surface is, but still a place that light does not pass. A
+pillar, though, hides room, where a light may stand: from its boundary one looks through what is hidden at the fronts of
+surfaces that were seen. Such places are left open; from the boundary of a thing one looks at the backs of its own.
 """
 
 from __future__ import annotations
@@ -19,11 +21,13 @@ from scipy.spatial import cKDTree
 from skimage.measure import marching_cubes
 
 from rgspipe.completion.free_space import Grid, seen_through
+from rgspipe.renderer.kernels.composite import composite
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.openness import openness
+from rgspipe.renderer.point_sets import cosine_directions
 from rgspipe.scene import Camera
 from rgspipe.scene.gloss import Gloss
-from rgspipe.scene.surfels import NO_CLIP, Surfels, quaternion_from_normal
+from rgspipe.scene.surfels import NO_CLIP, Surfels, quaternion_from_normal, quaternion_to_axes
 
 log = logging.getLogger(__name__)
 
@@ -43,6 +47,15 @@ BARE = 1.1
 #: More unseen surfels than this part of the seen ones are not added: so few cameras do not tell surfaces from space
 #: that nobody looked into, and walls across it would hide what is there.
 MOST_UNSEEN = 0.1
+
+#: Nothing is added where more than this part of what would be hidden is the front of seen surfaces: there is a way
+#: through. Of 66 places in the Cornell box the part is 0.01 (median; 0.07 at the ninth decile), of 284 behind the
+#: pillar of the corridor 0.60 (0.06 at the least).
+MOST_THROUGH = 0.25
+
+#: Rays of each place into what would be hidden, and how many distances away neighbours count as much: the boundary is
+#: round at edges, where single places look past the thing that they close.
+LOOKS, AROUND = 64, 3.0
 
 #: Neighbours whose albedo an unseen surfel gets, and how much of a distance a full turn of the normal counts for.
 NEIGHBOURS, TURN = 8, 2.5
@@ -75,10 +88,13 @@ def with_unseen_surfaces(surfels: Surfels, cameras: Sequence[Camera]) -> Surfels
     if len(chosen) > MOST_UNSEEN * len(surfels):
         log.info("The cameras saw too little of the scene to close it where they saw nothing.")
         return surfels
-    if not chosen:
+    places, normals = places[chosen], normals[chosen]
+    closing = _around(places, _through(bvh, surfels, places, normals), AROUND * spacing) < MOST_THROUGH
+    places, normals = places[closing], normals[closing]
+    if not len(places):
         return surfels
-    log.info("%d surfels close the scene where no camera saw what is there.", len(chosen))
-    return _joined(surfels, places[chosen], normals[chosen], spacing)
+    log.info("%d surfels close the scene where no camera saw what is there.", len(places))
+    return _joined(surfels, places, normals, spacing)
 
 
 def _boundary(grid: Grid, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -111,6 +127,25 @@ def _apart(places: np.ndarray, spacing: float) -> list[int]:
             chosen.append(int(index))
             taken[tree.query_ball_point(places[index], spacing)] = True
     return chosen
+
+
+def _through(bvh: SurfelBvh, surfels: Surfels, places: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """(U,) part of what lies behind each place, cosine-weighted, that is the front of a seen surface."""
+    if not len(places):
+        return np.empty(0)
+    frames = quaternion_to_axes(quaternion_from_normal(torch.from_numpy(-normals)))
+    directions = cosine_directions(frames, LOOKS, torch.Generator().manual_seed(0)).reshape(-1, 3)
+    hits = composite(bvh, torch.from_numpy(places).repeat_interleave(LOOKS, dim=0), directions, two_sided=True)
+    facing = surfels.normals.to(hits.weights)[hits.indices.long().clamp(min=0)]
+    facing = (facing * directions.to(hits.weights)[:, None]).sum(dim=2)
+    fronts = (hits.weights * (facing < 0.0)).sum(dim=1)
+    return fronts.reshape(len(places), LOOKS).mean(dim=1).cpu().numpy()
+
+
+def _around(places: np.ndarray, values: np.ndarray, reach: float) -> np.ndarray:
+    """(U,) median of the values of all places within `reach` of each, itself among them."""
+    near = cKDTree(places).query_ball_point(places, reach) if len(places) else []
+    return np.array([np.median(values[index]) for index in near])
 
 
 def _joined(surfels: Surfels, places: np.ndarray, normals: np.ndarray, spacing: float) -> Surfels:

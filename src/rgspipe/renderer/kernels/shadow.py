@@ -35,6 +35,15 @@ OCCLUDERS = wp.constant(16)
 
 
 @wp.func
+def faded_in(way: float, scale: float):
+    """Share of its opacity that an occluder has at the distance `way` from a receiver of `scale`; none up to 0.
+
+    Opacity and slope both ask here: were it worked out in two ways, one might round to 0 where the other does not.
+    """
+    return wp.min((way / scale - RECEIVER_SKIP) / RECEIVER_FADE, 1.0)
+
+
+@wp.func
 def occluder(
     surfels: wp.array(dtype=SurfelRecord),
     minimum_alpha: float,
@@ -54,7 +63,7 @@ def occluder(
         # From the receiver: the light may be so far away that rounding there is larger than the scene.
         between = surfels[j].center - at
         depth = wp.dot(between, n) / facing
-        fade = wp.min((depth * distance / surfels[receiver].scale - RECEIVER_SKIP) / RECEIVER_FADE, 1.0)
+        fade = faded_in(depth * distance, surfels[receiver].scale)
         if fade > 0.0 and wp.dot(light - surfels[j].center, n) * facing > 0.0:
             alpha = surfel_alpha(surfels, j, depth * path - between)
             own = surfels[receiver].normal
@@ -107,13 +116,13 @@ def occluder_slope(
     """−dα/d(light) of an `occluder`."""
     n = surfels[j].normal
     facing = wp.dot(path, n)
-    steepness = RECEIVER_FADE * surfels[receiver].scale
-    fade = wp.min((depth * distance - RECEIVER_SKIP * surfels[receiver].scale) / steepness, 1.0)
+    fade = faded_in(depth * distance, surfels[receiver].scale)
     x = depth * path - (surfels[j].center - at)
     slope = alpha * opacity_slope(surfels, j, x)
     # As the light moves by dl, the meeting point moves by its share of the way, corrected to stay on the plane.
     change = depth * (slope - n * (wp.dot(slope, path) / facing))
     if fade < 1.0:
+        steepness = RECEIVER_FADE * surfels[receiver].scale
         change -= (alpha / fade * depth / steepness) * (path / distance - n * (distance / facing))
     return change
 
