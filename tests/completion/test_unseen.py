@@ -105,7 +105,7 @@ def test_one_camera_that_sees_little_adds_nothing(seen: Surfels, monkeypatch: py
 
 
 def test_room_that_a_thing_hides_stays_open(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The box hides what is behind it from cameras in front: a wall along the limit of sight would stand in the room."""
+    """The box hides what is behind it from cameras in front: a wall at the limit of sight would stand in the room."""
     room, cameras = true_room(), cameras_in_front()[:4]
     behind = with_unseen_surfaces(room, cameras).centers[len(room) :]
     assert len(behind) == 0  # measured

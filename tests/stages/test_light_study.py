@@ -11,9 +11,10 @@ import pytest
 
 from rgspipe.artifacts import Artifact, ArtifactStore, Key
 from rgspipe.cli.compose import compose_config
-from rgspipe.config import RgspipeConfig, with_changes
+from rgspipe.config import LIGHT_STUDIES, RgspipeConfig, with_changes
 from rgspipe.datasets.advice_file import own_views_in_order
 from rgspipe.errors import InputError
+from rgspipe.evaluation.light_study import KINDS
 from rgspipe.evaluation.tables import TARGET_COLUMNS
 from rgspipe.stages import light_study
 from rgspipe.stages.base import StageContext
@@ -75,6 +76,10 @@ def test_the_fits_of_fewest_views_foretell_the_others() -> None:
     asked = [(need.stage, need.changes["fit.method"], need.changes["views.count"]) for need in needs]
     assert asked[:3] == [("fit_light", "search_lm", 2), ("evaluate", "search_lm", 2), ("evaluate", "search_lm", 4)]
     assert [bool(need.changes.get("fit.suggest_view")) for need in needs] == [True, True, False, False, False]
+
+
+def test_every_kind_that_can_be_asked_for_can_be_shown() -> None:
+    assert LIGHT_STUDIES == KINDS
 
 
 def test_a_case_has_the_last_word() -> None:

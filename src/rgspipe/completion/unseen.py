@@ -50,7 +50,7 @@ MOST_UNSEEN = 0.1
 
 #: Nothing is added where more than this part of what would be hidden is the front of seen surfaces: there is a way
 #: through. Of 66 places in the Cornell box the part is 0.01 (median; 0.07 at the ninth decile), of 284 behind the
-#: pillar of the corridor 0.60 (0.06 at the least).
+#: pillar of the corridor 0.60.
 MOST_THROUGH = 0.25
 
 #: Rays of each place into what would be hidden, and how many distances away neighbours count as much: the boundary is
@@ -88,11 +88,13 @@ def with_unseen_surfaces(surfels: Surfels, cameras: Sequence[Camera]) -> Surfels
     if len(chosen) > MOST_UNSEEN * len(surfels):
         log.info("The cameras saw too little of the scene to close it where they saw nothing.")
         return surfels
+    if not chosen:
+        return surfels
     places, normals = places[chosen], normals[chosen]
     closing = _around(places, _through(bvh, surfels, places, normals), AROUND * spacing) < MOST_THROUGH
-    places, normals = places[closing], normals[closing]
-    if not len(places):
+    if not closing.any():
         return surfels
+    places, normals = places[closing], normals[closing]
     log.info("%d surfels close the scene where no camera saw what is there.", len(places))
     return _joined(surfels, places, normals, spacing)
 
@@ -131,8 +133,6 @@ def _apart(places: np.ndarray, spacing: float) -> list[int]:
 
 def _through(bvh: SurfelBvh, surfels: Surfels, places: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """(U,) part of what lies behind each place, cosine-weighted, that is the front of a seen surface."""
-    if not len(places):
-        return np.empty(0)
     frames = quaternion_to_axes(quaternion_from_normal(torch.from_numpy(-normals)))
     directions = cosine_directions(frames, LOOKS, torch.Generator().manual_seed(0)).reshape(-1, 3)
     hits = composite(bvh, torch.from_numpy(places).repeat_interleave(LOOKS, dim=0), directions, two_sided=True)
@@ -144,7 +144,7 @@ def _through(bvh: SurfelBvh, surfels: Surfels, places: np.ndarray, normals: np.n
 
 def _around(places: np.ndarray, values: np.ndarray, reach: float) -> np.ndarray:
     """(U,) median of the values of all places within `reach` of each, itself among them."""
-    near = cKDTree(places).query_ball_point(places, reach) if len(places) else []
+    near = cKDTree(places).query_ball_point(places, reach)
     return np.array([np.median(values[index]) for index in near])
 
 
