@@ -29,8 +29,10 @@ def box() -> Rectangles:
 
 
 def true_room(count: int = COUNT) -> Surfels:
-    """Walls and all of the box; the surfels of its back are the last."""
-    return surfels_on(inside_of_box([0.5, 0.5, 0.5], [1.0, 1.0, 1.0], WALLS) + box(), count)
+    """Walls, all of the box and the floor around it; the surfels of the box's back are the last."""
+    surfels = surfels_on(inside_of_box([0.5, 0.5, 0.5], [1.0, 1.0, 1.0], WALLS) + box(), count)
+    x, y, z = surfels.centers.unbind(1)
+    return only(surfels, ~((z.abs() < 1e-6) & (x > 0.3) & (x < BACK) & (y > SIDES[0]) & (y < SIDES[1])))
 
 
 def at_back(surfels: Surfels) -> torch.Tensor:
@@ -40,7 +42,10 @@ def at_back(surfels: Surfels) -> torch.Tensor:
 
 def without_back(surfels: Surfels) -> Surfels:
     """The surfels that cameras saw."""
-    kept = ~at_back(surfels)
+    return only(surfels, ~at_back(surfels))
+
+
+def only(surfels: Surfels, kept: torch.Tensor) -> Surfels:
     return replace(surfels, **{name: tensor[kept] for name, tensor in surfels.tensors().items()})
 
 

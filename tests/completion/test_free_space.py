@@ -100,9 +100,9 @@ def test_large_images_are_traced_coarsely_and_show_the_same_cells(
     large = replace(large, height=3 * LONGEST_SIDE)
     traced, rays = [], Camera.rays
 
-    def noted_rays(own: Camera, pixels: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+    def noted_rays(own: Camera) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
         traced.append((own.width, own.height))
-        return rays(own, pixels)
+        return rays(own)
 
     monkeypatch.setattr(Camera, "rays", noted_rays)
     coarse = free(room, large)

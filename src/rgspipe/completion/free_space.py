@@ -71,7 +71,7 @@ def seen_through(grid: Grid, bvh: SurfelBvh, cameras: Sequence[Camera], margin: 
 
 def _reach(bvh: SurfelBvh, camera: Camera) -> Tensor:
     """(H · W,) float64 distance at which the ray of each pixel ends; infinite where most of it ends nowhere."""
-    origins, directions, _ = camera.rays(torch.arange(camera.pixel_count))
+    origins, directions, _ = camera.rays()
     hits = composite(bvh, origins, directions, two_sided=True)
     covered = hits.weights.sum(dim=1)
     mean = (hits.weights * hits.depths.nan_to_num(posinf=0.0)).sum(dim=1) / covered.clamp(min=1e-6)

@@ -1,0 +1,52 @@
+"""Which part of a scene is room although no camera looked into it.
+
+Of what things hide from the cameras one part is their inside and another is room, in which a light may stand. From a
+point in a room one sees the fronts of surfaces, from one inside a thing the backs of its own. The share of fronts is a
+winding number (Jacobson et al. 2013) of what is in sight. In the plane of a flat hole it is a half: where surfaces are
+missing, as at the back of a box or the floor behind it, the room ends about where they should be.
+"""
+
+from __future__ import annotations
+
+import torch
+from scipy.ndimage import binary_dilation
+from torch import Tensor
+
+from rgspipe.completion.free_space import Grid
+from rgspipe.renderer.kernels.composite import composite
+from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
+from rgspipe.renderer.point_sets import fibonacci_directions
+
+#: Directions in which one looks from a point, and points whose rays are cast at once.
+LOOKS, CHUNK = 64, 8192
+
+
+def with_hidden_room(grid: Grid, bvh: SurfelBvh, seen: Tensor, unsure: Tensor) -> Tensor:
+    """(X, Y, Z) bool: the cells that were `seen` to be free, and those of room that is connected with them.
+
+    Args:
+        bvh: the surfaces.
+        seen: (X, Y, Z) bool.
+        unsure: (X, Y, Z) bool, cells that are taken for no room: those so near to surfaces that one sees past them.
+    """
+    centers = grid.centers.reshape(*grid.shape, 3)
+    free, known = seen.numpy().copy(), (seen | unsure).numpy()
+    while (rim := binary_dilation(free) & ~known).any():
+        free[rim] = (part_of_fronts(bvh, centers[torch.from_numpy(rim)]) > 0.5).numpy()
+        known |= rim
+    return torch.from_numpy(free)
+
+
+def part_of_fronts(bvh: SurfelBvh, points: Tensor) -> Tensor:
+    """(P,) float32 part of all directions from each of `points` (P, 3) in which the front of a surface is met first."""
+    directions = fibonacci_directions(LOOKS)
+    parts = [_part_of_fronts(bvh, chunk, directions) for chunk in points.split(CHUNK)]
+    return torch.cat(parts)
+
+
+def _part_of_fronts(bvh: SurfelBvh, points: Tensor, directions: Tensor) -> Tensor:
+    rays = directions.repeat(len(points), 1)
+    hits = composite(bvh, points.repeat_interleave(len(directions), dim=0), rays, two_sided=True)
+    normals = bvh.surfels.normals.to(hits.weights)[hits.indices.long().clamp(min=0)]
+    facing = (normals * rays.to(hits.weights)[:, None]).sum(dim=2) < 0.0
+    return (hits.weights * facing).sum(dim=1).reshape(len(points), -1).mean(dim=1).cpu()
