@@ -18,7 +18,7 @@ from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.point_sets import fibonacci_directions
 
 #: Directions in which one looks from a point, and points whose rays are cast at once.
-LOOKS, CHUNK = 64, 8192
+LOOKS, CHUNK = 64, 1024
 
 
 def with_hidden_room(grid: Grid, bvh: SurfelBvh, seen: Tensor, unsure: Tensor) -> Tensor:
