@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import torch
 from torch import Tensor
 
+from rgspipe.fitting.doubts import doubts
 from rgspipe.fitting.paper_adam_loss import MovingRig, adam_loss
 from rgspipe.fitting.paper_adam_start import (
     LOG_INTENSITY_LIMIT,
@@ -25,7 +26,7 @@ from rgspipe.fitting.problem import LightProblem
 from rgspipe.fitting.refine import State
 from rgspipe.fitting.result import REASONS, FitResult, FitStatus, Step, dark_result
 from rgspipe.fitting.spec import LightSpec
-from rgspipe.fitting.uncertainty import doubts, light_covariances
+from rgspipe.fitting.uncertainty import light_covariances
 from rgspipe.progress import track
 
 
@@ -167,7 +168,7 @@ def _result(problem: LightProblem, descent: _Descent, status: FitStatus, begin: 
     intensities = torch.stack([light.intensity for light in last.lights])
     state = State(emitters, [problem.evaluate(emitter) for emitter in emitters], intensities / problem.scale)
     spread = light_covariances(problem, state)
-    doubt = doubts(last.lights, spread.calibrated, problem.views.frozen.size)
+    doubt = doubts(last.lights, spread.calibrated, problem.views.frozen.surfels, problem.views.frozen.size)
     return FitResult(
         lights=last.lights,
         status=status,

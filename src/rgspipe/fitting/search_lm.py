@@ -10,6 +10,7 @@ from itertools import zip_longest
 
 from rgspipe.fitting.blocks import BlockModel, view_of_blocks
 from rgspipe.fitting.coarse import CoarseImages
+from rgspipe.fitting.doubts import doubts
 from rgspipe.fitting.exposure import rough_exposures
 from rgspipe.fitting.judge import (
     CLEARLY_APART,
@@ -46,7 +47,7 @@ from rgspipe.fitting.result import FitResult, dark_result
 from rgspipe.fitting.schedule import SHORT_ITERATIONS, refine_starts
 from rgspipe.fitting.spec import MOST_LIGHTS, LightSpec
 from rgspipe.fitting.starts import Candidates, Rig
-from rgspipe.fitting.uncertainty import doubts, light_covariances
+from rgspipe.fitting.uncertainty import light_covariances
 from rgspipe.fitting.verdict import Findings, percent
 
 #: Starts for each wanted one, where spots are among the candidates.
@@ -347,7 +348,7 @@ class _Search:
         costs, loss = self.costs(), self.problem.unexplained(best.columns, best.intensity)
         lights, spread = best.lights(self.problem), light_covariances(self.problem, best)
         at_bound = any(self.region.at_bound(emitter.position) for emitter in best.emitters)
-        doubt = doubts(lights, spread.calibrated, self.region.size)
+        doubt = doubts(lights, spread.calibrated, self.problem.views.frozen.surfels, self.region.size)
         found = replace(found, at_bound=at_bound, loss=loss, doubt=doubt, ended=best.status)
         maybe = "" if found.too_few else _one_more(len(lights), costs)
         return FitResult(

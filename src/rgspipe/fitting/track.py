@@ -10,6 +10,7 @@ import torch
 from torch import Tensor
 
 from rgspipe.fitting.capture import ImageCapture
+from rgspipe.fitting.doubts import IN_DOUBT
 from rgspipe.fitting.fit import FitViews, fit_lights
 from rgspipe.fitting.motion import Motion
 from rgspipe.fitting.parameters import Emitter
@@ -21,7 +22,6 @@ from rgspipe.fitting.spec import LightSpec
 from rgspipe.fitting.tracked_fit import Followed, follow, observed
 from rgspipe.fitting.tracked_frame import FrameStatus, TrackedFrame, frame_cost, in_order
 from rgspipe.fitting.twins import split_lights
-from rgspipe.fitting.uncertainty import IN_DOUBT
 from rgspipe.progress import track
 from rgspipe.scene import LightRig
 

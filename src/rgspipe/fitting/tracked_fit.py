@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 import torch
 from torch import Tensor
 
+from rgspipe.fitting.doubts import doubts
 from rgspipe.fitting.moments import Moments, scores
 from rgspipe.fitting.motion import Motion, offset, references, turns
 from rgspipe.fitting.problem import LightProblem
@@ -37,7 +38,7 @@ from rgspipe.fitting.refine import (
 )
 from rgspipe.fitting.result import REASONS, FitResult, FitStatus
 from rgspipe.fitting.starts import Rig
-from rgspipe.fitting.uncertainty import Covariances, doubts, light_covariances
+from rgspipe.fitting.uncertainty import Covariances, light_covariances
 from rgspipe.fitting.verdict import POORLY_EXPLAINED
 
 #: Residuals below this part of the mean radiance are rounding.
@@ -232,7 +233,7 @@ def _result(problem: LightProblem, state: State, motion: Motion, spread: Covaria
     """The fit of a frame; its status is that of the frame's images alone, its covariance that of all frames so far."""
     loss, lights = problem.unexplained(state.columns, state.intensity), state.lights(problem)
     region = search_region(problem)
-    doubt = doubts(lights, spread.calibrated, region.size)
+    doubt = doubts(lights, spread.calibrated, problem.views.frozen.surfels, region.size)
     status = state.status
     if any(region.at_bound(emitter.position) for emitter in state.emitters):
         status = FitStatus.AT_BOUND

@@ -9,11 +9,11 @@ import numpy as np
 import torch
 from scipy.optimize import linear_sum_assignment
 
+from rgspipe.fitting.doubts import IN_DOUBT
 from rgspipe.fitting.parameters import Emitter
 from rgspipe.fitting.problem import LightProblem
 from rgspipe.fitting.result import FitResult, FitStatus
 from rgspipe.fitting.schedule import soft
-from rgspipe.fitting.uncertainty import IN_DOUBT
 from rgspipe.scene import LightRig
 
 #: Results with one answer.

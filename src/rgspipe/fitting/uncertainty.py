@@ -15,8 +15,6 @@ for what the residual cannot show, as the fit has explained it away; it was chos
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import torch
@@ -26,7 +24,6 @@ from rgspipe.fitting.moments import group_moments, information, scores
 from rgspipe.fitting.problem import LightProblem
 from rgspipe.fitting.refine import PLAIN, State, weights_at
 from rgspipe.fitting.views import PreparedViews
-from rgspipe.scene import LightRig
 
 #: Errors of the model are shared within cells of this part of the scene's size.
 CELL = 0.2
@@ -37,9 +34,6 @@ INFLATION = 3.5
 
 #: No cell's share of the evidence counts as more than this: one that tells everything cannot be left out.
 LARGEST_SHARE = 0.95
-
-#: A position whose error is expected to be larger than this part of the scene's size is said to be in doubt.
-IN_DOUBT = 0.05
 
 #: Directions with less information than this part of the largest are not determined.
 RANK = 1e-11
@@ -97,46 +91,6 @@ def surface_cells(views: PreparedViews, cell: float = CELL) -> tuple[Tensor, int
     index = torch.round(places / side).long()
     found, labels = torch.unique(index, dim=0, return_inverse=True)
     return labels, len(found)
-
-
-def doubts(rig: LightRig, covariance: Sequence[Tensor], scene_size: float) -> str:
-    """What the views do not determine, or hardly, in a sentence or two; empty if nothing is in doubt."""
-    return " ".join(filter(None, (_undetermined(rig, covariance), _uncertain(covariance, scene_size))))
-
-
-def _uncertain(covariance: Sequence[Tensor], scene_size: float) -> str:
-    """The positions that may be far off, with by how much."""
-    variances = [float(matrix.diagonal()[:3].sum()) for matrix in covariance]
-    errors = [math.sqrt(variance) / scene_size if scene_size > 0.0 else 0.0 for variance in variances]
-    parts = [
-        (f"light {index + 1}" if len(errors) > 1 else "the position") + f" by {100.0 * error:.0f} %"
-        for index, error in enumerate(errors)
-        if IN_DOUBT < error < math.inf
-    ]
-    if not parts:
-        return ""
-    return f"Uncertain, in parts of the scene's size: {', '.join(parts)}; give more views, or a sharper scene."
-
-
-def _undetermined(rig: LightRig, covariance: Sequence[Tensor]) -> str:
-    """What the views do not determine, as a sentence; empty if everything is."""
-    parts = []
-    for index, (light, matrix) in enumerate(zip(rig, covariance, strict=True)):
-        unknown = torch.isinf(matrix.diagonal())
-        names = [
-            name
-            for name, chosen in _named(len(unknown))
-            if bool(unknown[chosen].any()) and not (name == "intensity" and not bool((light.intensity > 0).any()))
-        ]
-        if names:
-            parts.append(" and ".join(names) + (f" of light {index + 1}" if len(rig) > 1 else ""))
-    return f"Not determined by these views: {'; '.join(parts)}." if parts else ""
-
-
-def _named(rows: int) -> list[tuple[str, slice]]:
-    """The rows of a light's covariance by what they are."""
-    named = [("position", slice(0, 3)), ("axis", slice(3, 6)), ("cone", slice(6, rows - 3))]
-    return [*(named[:1] if rows == 6 else named), ("intensity", slice(rows - 3, rows))]
 
 
 def _joint(problem: LightProblem, state: State) -> tuple[tuple[Tensor, Tensor], tuple[Tensor, Tensor]]:
