@@ -45,7 +45,7 @@ def without_back(surfels: Surfels) -> Surfels:
     return only(surfels, ~at_back(surfels))
 
 
-def only(surfels: Surfels, kept: torch.Tensor) -> Surfels:
+def only(surfels: Surfels, kept: torch.Tensor | slice) -> Surfels:
     return replace(surfels, **{name: tensor[kept] for name, tensor in surfels.tensors().items()})
 
 
