@@ -6,7 +6,7 @@ import pytest
 
 from rgspipe.fitting import FitStatus
 from rgspipe.fitting.result import REASONS
-from rgspipe.fitting.verdict import POORLY_EXPLAINED, Findings
+from rgspipe.fitting.verdict import POORLY_EXPLAINED, Findings, SpareLight
 
 DOUBT = "These views do not determine the intensity."
 
@@ -48,3 +48,16 @@ def test_a_number_that_is_too_small_is_told_with_the_next_one() -> None:
 def test_what_is_left_unexplained_is_told_beside_a_light_that_is_missing() -> None:
     reason = Findings(loss=2.0 * POORLY_EXPLAINED, too_few=0.62).reason(1)
     assert REASONS[FitStatus.UNEXPLAINED] in reason and "light.count=2" in reason
+
+
+def test_a_number_that_is_too_large_is_told_with_the_light_that_may_not_be_there() -> None:
+    found = Findings(spare=SpareLight(number=3, gain=0.04))
+    assert found.status is FitStatus.AMBIGUOUS
+    reason = found.reason(3)
+    assert reason.startswith("Light 3 lowers the cost by 4 % only") and REASONS[FitStatus.AMBIGUOUS] not in reason
+    assert "light.count=2" in reason and "light.count=null" in reason and "from 20 % on" in reason
+
+
+def test_other_lights_that_explain_as_much_are_told_beside_a_light_too_many() -> None:
+    reason = Findings(ambiguous=True, spare=SpareLight(2, 0.04), doubt=DOUBT).reason(2)
+    assert reason.startswith(REASONS[FitStatus.AMBIGUOUS]) and "Light 2" in reason and DOUBT in reason

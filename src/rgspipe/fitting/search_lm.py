@@ -15,8 +15,6 @@ from rgspipe.fitting.exposure import rough_exposures
 from rgspipe.fitting.judge import (
     CLEARLY_APART,
     DOUBTFUL_DROP,
-    FAINT,
-    FAINT_DROP,
     LEAST_DROP,
     best_state,
     distinct,
@@ -28,6 +26,7 @@ from rgspipe.fitting.judge import (
     worth_keeping,
     worth_one_more,
 )
+from rgspipe.fitting.one_less import one_light_less
 from rgspipe.fitting.one_more import one_more_light
 from rgspipe.fitting.parameters import Emitter
 from rgspipe.fitting.problem import LightProblem
@@ -48,7 +47,7 @@ from rgspipe.fitting.schedule import SHORT_ITERATIONS, refine_starts
 from rgspipe.fitting.spec import MOST_LIGHTS, LightSpec
 from rgspipe.fitting.starts import Candidates, Rig
 from rgspipe.fitting.uncertainty import light_covariances
-from rgspipe.fitting.verdict import Findings, percent
+from rgspipe.fitting.verdict import Findings, SpareLight, counted_from, percent
 
 #: Starts for each wanted one, where spots are among the candidates.
 SPOT_STARTS = 3
@@ -105,7 +104,7 @@ def fit_search_lm(
         return dark_result(time.perf_counter() - begin)
     search = _Search(problem, problem.coarsest(blocks), candidates, options, spec, search_region(problem), begin)
     best = search.known(spec.count) if spec.count is not None else search.unknown()
-    found = Findings(ambiguous=search.ambiguous(best), too_few=search.too_few(best))
+    found = Findings(ambiguous=search.ambiguous(best), too_few=search.too_few(best), spare=search.spare(best))
     best = search.polish(best)
     if not bool((best.intensity > 0).any()):
         return dark_result(time.perf_counter() - begin)
@@ -343,6 +342,15 @@ class _Search:
         worth = worth_one_more(self.coarse, compared.simple, compared.rich)
         return drop(self.coarse, compared.simple, compared.rich) if worth else 0.0
 
+    def spare(self, best: State) -> SpareLight | None:
+        """A light of a known number that is not worth it; None if there is none."""
+        if self.spec.count is None or len(best.emitters) < 2:
+            return None
+        compared = one_light_less(self.coarse, best, self.region, self.begin)
+        self.states += compared.refined
+        self.tried = [compared.simple, compared.rich, *self.tried[1:]]
+        return None if compared.worth else SpareLight(compared.index + 1, compared.gain)
+
     def result(self, best: State, found: Findings) -> FitResult:
         self._settle_exposures(best)
         costs, loss = self.costs(), self.problem.unexplained(best.columns, best.intensity)
@@ -375,6 +383,4 @@ def _one_more(count: int, costs: Mapping[int, float]) -> str:
     share = 1.0 - costs[count + 1] / costs[count]
     if share <= DOUBTFUL_DROP:
         return ""
-    limits = f"from {percent(LEAST_DROP)} on, of a light with less than {percent(FAINT)} of the energy from "
-    limits += f"{percent(FAINT_DROP)} on"
-    return f"One more light would lower the cost by {percent(share)}: there may be one (it counts {limits})."
+    return f"One more light would lower the cost by {percent(share)}: there may be one (it counts {counted_from()})."

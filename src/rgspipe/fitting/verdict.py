@@ -4,10 +4,24 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from rgspipe.fitting.judge import FAINT, FAINT_DROP, LEAST_DROP
 from rgspipe.fitting.result import REASONS, FitStatus
 
 #: An answer that leaves more than this share of the target's energy unexplained is none.
 POORLY_EXPLAINED = 0.05
+
+
+@dataclass(frozen=True)
+class SpareLight:
+    """A light that may not be there.
+
+    Attributes:
+        number: which, from 1.
+        gain: by what share it lowers the robust cost.
+    """
+
+    number: int
+    gain: float
 
 
 @dataclass(frozen=True)
@@ -18,6 +32,7 @@ class Findings:
         at_bound: whether a light stands on the edge of the region.
         loss: share of the target's energy that is left.
         too_few: by what share one light more lowers the robust cost, where it is worth that; else 0.
+        spare: a light without which the others explain nearly as much; None if there is none.
         ambiguous: whether clearly different lights explain the target as well.
         doubt: what the views do not tell, in words; empty if nothing.
         ended: whether the refinement ended in a minimum (CONVERGED) or before (MAX_ITERATIONS).
@@ -26,6 +41,7 @@ class Findings:
     at_bound: bool = False
     loss: float = 0.0
     too_few: float = 0.0
+    spare: SpareLight | None = None
     ambiguous: bool = False
     doubt: str = ""
     ended: FitStatus = FitStatus.CONVERGED
@@ -36,7 +52,7 @@ class Findings:
         held = {
             FitStatus.AT_BOUND: self.at_bound,
             FitStatus.UNEXPLAINED: self.loss > POORLY_EXPLAINED or self.too_few > 0.0,
-            FitStatus.AMBIGUOUS: self.ambiguous,
+            FitStatus.AMBIGUOUS: self.ambiguous or self.spare is not None,
             FitStatus.UNDETERMINED: bool(self.doubt),
             FitStatus.MAX_ITERATIONS: self.ended == FitStatus.MAX_ITERATIONS,
         }
@@ -55,11 +71,31 @@ class Findings:
         if status == FitStatus.UNDETERMINED:
             # What is in doubt says enough beside another status.
             return f"{REASONS[status]} {self.doubt}" if status == self.status else self.doubt
-        if status != FitStatus.UNEXPLAINED or not self.too_few:
-            return REASONS[status]
+        if status == FitStatus.UNEXPLAINED and self.too_few:
+            return _with(self.loss > POORLY_EXPLAINED, status, self._one_more(lights))
+        if status == FitStatus.AMBIGUOUS and self.spare:
+            return _with(self.ambiguous, status, self._one_less(lights))
+        return REASONS[status]
+
+    def _one_more(self, lights: int) -> str:
         more = f"One more light would lower the cost by {percent(self.too_few)}: fit with light.count={lights + 1}, or "
-        more += "light.count=null to have them counted."
-        return f"{REASONS[status]} {more}" if self.loss > POORLY_EXPLAINED else more
+        return f"{more}light.count=null to have them counted."
+
+    def _one_less(self, lights: int) -> str:
+        less = f"Light {self.spare.number} lowers the cost by {percent(self.spare.gain)} only and may not be there "
+        less += f"(it counts {counted_from()}): fit with light.count={lights - 1}, or "
+        return f"{less}light.count=null to have them counted."
+
+
+def _with(also: bool, status: FitStatus, sentence: str) -> str:
+    """The sentence, after that of the status where this holds as well."""
+    return f"{REASONS[status]} {sentence}" if also else sentence
+
+
+def counted_from() -> str:
+    """From where on a light more is taken for one that is there."""
+    limits = f"from {percent(LEAST_DROP)} on, of a light with less than {percent(FAINT)} of the energy from "
+    return f"{limits}{percent(FAINT_DROP)} on"
 
 
 def percent(share: float) -> str:

@@ -1,0 +1,57 @@
+"""Whether an answer has a light more than the target calls for, so that too large a number is told.
+
+A light too many does not look wrong by itself: it stands in for what the model gets wrong, or splits a true one in two.
+So a search with a known number leaves out its lights one at a time, the faintest first, lets the others move, and asks
+whether the light was worth it, as a search with an unknown number does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from rgspipe.fitting.judge import drop, light_energies, worth_one_more
+from rgspipe.fitting.problem import LightProblem
+from rgspipe.fitting.refine import ROBUST, Region, State, fresh, refine, start_from
+from rgspipe.fitting.schedule import SHORT_ITERATIONS
+
+
+@dataclass(frozen=True)
+class OneLess:
+    """An answer, and a rig with one of its lights less, both refined under the robust loss.
+
+    Attributes:
+        rich, simple: the two rigs; of all rigs with one light less the first that is as good, else the last.
+        index: which light was left out.
+        worth: whether that light is there, rather than an error of the model.
+        gain: by what share it lowers the robust cost.
+        refined: all states that were refined for this.
+    """
+
+    rich: State
+    simple: State
+    index: int
+    worth: bool
+    gain: float
+    refined: Sequence[State]
+
+
+def one_light_less(problem: LightProblem, answer: State, region: Region, begin: float) -> OneLess:
+    """The answer beside its rigs with one light less.
+
+    Args:
+        problem: that the answer was searched on.
+        answer: of two lights or more.
+    """
+    rich = fresh(answer)
+    refine(problem, rich, ROBUST, SHORT_ITERATIONS, region, begin)
+    refined, energies = [rich], light_energies(rich)
+    for index in sorted(range(len(energies)), key=energies.__getitem__):
+        others = [emitter for k, emitter in enumerate(rich.emitters) if k != index]
+        simple = start_from(problem, others, ROBUST, begin)
+        refine(problem, simple, ROBUST, SHORT_ITERATIONS, region, begin)
+        refined.append(simple)
+        worth = worth_one_more(problem, simple, rich)
+        if not worth:
+            break
+    return OneLess(rich, simple, index, worth, drop(problem, simple, rich), refined)
