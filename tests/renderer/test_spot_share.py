@@ -58,6 +58,17 @@ def test_derivatives_agree_with_finite_differences(shape: SpotShape, softness: f
         assert float(error) < 1e-3
 
 
+@pytest.mark.parametrize("softness", [0.0, 0.15])
+@pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: shape.profile)
+def test_a_cone_that_is_known_changes_nothing_else(shape: SpotShape, softness: float) -> None:
+    free = spot_share_slopes(points(), POSITION, AXIS, shape, softness)
+    known = spot_share_slopes(points(), POSITION, AXIS, shape, softness, cone_free=False)
+    assert known.by_cone is None and known.by_falloff is None
+    for name in ("value", "by_position", "by_axis"):
+        # Measured: no difference. One cone for all points may round otherwise elsewhere.
+        torch.testing.assert_close(getattr(known, name), getattr(free, name), rtol=0.0, atol=2e-6)
+
+
 def _value(where, position, axis, shape, softness) -> torch.Tensor:
     return spot_share_slopes(where, position, axis, shape, softness).value
 

@@ -62,7 +62,9 @@ class BlockModel:
         image = self.direct(irradiance)
         if self.bounced is None:
             return image
-        return image + (self.bounced @ patch_radiance(frozen, irradiance)).transpose(0, 1)
+        # The other way round, for which a product with so few columns takes four times as long: (X B)ᵀ = Bᵀ Xᵀ.
+        bounced = patch_radiance(frozen, irradiance).transpose(1, 2) @ self.bounced.transpose(1, 2)
+        return image + bounced.permute(2, 0, 1)
 
 
 def patch_radiance(frozen: FrozenScene, irradiance: Tensor) -> Tensor:

@@ -111,6 +111,8 @@ def _met(one: Sequence[Emitter], other: Sequence[Emitter], size: float) -> bool:
 
 def _counterparts(one: Sequence[Emitter], other: Sequence[Emitter]) -> list[tuple[Emitter, Emitter]]:
     """The lights of one rig, each with one of another of as many lights, such that they are closest together."""
+    if len(one) == 1:
+        return [(one[0], other[0])]
     first, second = (torch.stack([emitter.position for emitter in rig]).numpy() for rig in (one, other))
     rows, columns = linear_sum_assignment(np.linalg.norm(first[:, None] - second[None], axis=-1))
     return [(one[row], other[column]) for row, column in zip(rows, columns, strict=True)]

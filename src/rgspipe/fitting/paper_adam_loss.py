@@ -57,7 +57,8 @@ class _Share(torch.autograd.Function):
     def forward(
         ctx: Any, position: Tensor, axis: Tensor, points: Tensor, emitter: Emitter, band: BandLimit | None
     ) -> Tensor:
-        share = fitted_share(points, position.detach(), axis.detach(), emitter.shape, emitter.softness, band)
+        spot = position.detach(), axis.detach(), emitter.shape, emitter.softness
+        share = fitted_share(points, *spot, band, emitter.cone_free)
         ctx.save_for_backward(share.by_position, share.by_axis)
         ctx.like = position.dtype, position.device
         return share.value

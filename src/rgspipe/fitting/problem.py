@@ -138,7 +138,8 @@ class LightProblem:
         """Share of a spot's light towards `points` (N, 3); None for a point light."""
         if not emitter.is_spot:
             return None
-        return fitted_share(points, emitter.position, emitter.axis, emitter.shape, emitter.softness, self.effects.spots)
+        spot = emitter.position, emitter.axis, emitter.shape, emitter.softness
+        return fitted_share(points, *spot, self.effects.spots, emitter.cone_free)
 
     def _shares(self, position: Tensor, spot: SpotShare | None) -> tuple[Tensor, Tensor]:
         """Share (N,) of a light that reaches each surfel that it shines on, and its derivative (N, 3)."""

@@ -50,7 +50,13 @@ class BandLimit:
 
 
 def fitted_share(
-    points: Tensor, position: Tensor, axis: Tensor, shape: SpotShape, softness: float, band: BandLimit | None
+    points: Tensor,
+    position: Tensor,
+    axis: Tensor,
+    shape: SpotShape,
+    softness: float,
+    band: BandLimit | None,
+    cone_free: bool = True,
 ) -> SpotShare:
     """What a fit takes for the share of a spot's light towards `points`: exact, or band-limited.
 
@@ -60,9 +66,10 @@ def fitted_share(
         shape: its profile.
         softness: widens the rim by so much [rad]; see `renderer.spot_share.softened`.
         band: None for the exact profile.
+        cone_free: whether the exact profile's derivatives towards cone angle and falloff are wanted.
     """
     if band is None:
-        return spot_share_slopes(points, position, axis, shape, softness)
+        return spot_share_slopes(points, position, axis, shape, softness, cone_free)
     towards = (points.double() - position.to(points.device, torch.float64)).float()
     unit = torch.nn.functional.normalize(axis.to(towards), dim=0)[None]
     angle, by_towards, by_axis = angle_slopes(unit, towards)

@@ -23,19 +23,19 @@ class SpotShare:
         value: (N,) p.
         by_position: (N, 3) towards the spot's position, per scene unit.
         by_axis: (N, 3) towards its axis of unit length; across the axis only.
-        by_cone: (N,) towards its cone angle, per rad.
-        by_falloff: (N,) towards its falloff, in the falloff's own unit.
+        by_cone: (N,) towards its cone angle, per rad; None if not asked for.
+        by_falloff: (N,) towards its falloff, in the falloff's own unit; None if not asked for.
     """
 
     value: Tensor
     by_position: Tensor
     by_axis: Tensor
-    by_cone: Tensor
-    by_falloff: Tensor
+    by_cone: Tensor | None
+    by_falloff: Tensor | None
 
 
 def spot_share_slopes(
-    points: Tensor, position: Tensor, axis: Tensor, shape: SpotShape, softness: float = 0.0
+    points: Tensor, position: Tensor, axis: Tensor, shape: SpotShape, softness: float = 0.0, cone_free: bool = True
 ) -> SpotShare:
     """`SpotShare` of one spot, float32.
 
@@ -45,24 +45,29 @@ def spot_share_slopes(
         position, axis: (3,) of the spot, away from it.
         shape: its profile.
         softness: widens the rim by so much [rad]; see `softened`.
+        cone_free: whether derivatives towards cone angle and falloff are wanted, which take half of the time.
     """
     towards = (points.double() - position.to(points.device, torch.float64)).float()
     unit = torch.nn.functional.normalize(axis.to(towards), dim=0)[None]
     angle, by_towards, by_axis = angle_slopes(unit, towards)
-    cone, falloff = (torch.full_like(angle, x).requires_grad_() for x in (shape.cone_angle, shape.falloff))
-    with torch.enable_grad():
-        profile, *rim = softened(shape.profile, cone, falloff, softness)
+    # One cone for all points, or one each where every point has a derivative of its own.
+    extent = angle.shape if cone_free else ()
+    cone, falloff = (torch.full(extent, x).to(angle) for x in (shape.cone_angle, shape.falloff))
+    with torch.set_grad_enabled(cone_free):
+        profile, *rim = softened(
+            shape.profile, cone.requires_grad_(cone_free), falloff.requires_grad_(cone_free), softness
+        )
         value, slope = spot_profile(profile, angle, *rim)
-        by_cone, by_falloff = torch.autograd.grad(value.sum(), (cone, falloff), allow_unused=True)
+    by_cone, by_falloff = _towards_cone(value, cone, falloff) if cone_free else (None, None)
     value, slope = value.detach(), slope.detach()[:, None]
-    unmoved = torch.zeros_like(angle)
-    return SpotShare(
-        value,
-        -slope * by_towards,
-        slope * by_axis,
-        unmoved if by_cone is None else by_cone,
-        unmoved if by_falloff is None else by_falloff,
-    )
+    return SpotShare(value, -slope * by_towards, slope * by_axis, by_cone, by_falloff)
+
+
+def _towards_cone(value: Tensor, cone: Tensor, falloff: Tensor) -> tuple[Tensor, Tensor]:
+    """Derivatives (N,) of shares (N,) towards their own cone angles and falloffs (N,)."""
+    slopes = torch.autograd.grad(value.sum(), (cone, falloff), allow_unused=True)
+    by_cone, by_falloff = (torch.zeros_like(value) if slope is None else slope for slope in slopes)
+    return by_cone, by_falloff
 
 
 def softened(profile: SpotProfile, cone: Tensor, falloff: Tensor, width: float) -> tuple[SpotProfile, Tensor, Tensor]:
