@@ -10,7 +10,7 @@ import torch
 from lit_room import VISIBLE
 from rgspipe import fit_lights
 from rgspipe.fitting import AdamOptions, Effects, FitStatus
-from rgspipe.fitting.paper_adam_loss import MovingRig, adam_loss
+from rgspipe.fitting.paper_adam_loss import AdamLoss, MovingRig
 from rgspipe.fitting.paper_adam_start import Ball, LightPrior, StartOptions, draw_start, light_ball
 from rgspipe.fitting.ssim import WINDOW, ssim, ssim_map
 
@@ -48,7 +48,7 @@ def test_ssim_of_equal_images_is_one_and_its_gradient_is_right():
 
 def _loss(room, target, position, log_intensity, weight=0.2):
     rig = MovingRig(position[None], log_intensity[None])
-    return adam_loss(room.two.prepared, target, rig, weight, Effects())
+    return AdamLoss(room.two.prepared, target, weight, Effects())(rig)
 
 
 def test_loss_is_the_published_formula(room, point_light):

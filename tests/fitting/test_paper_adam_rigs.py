@@ -15,7 +15,7 @@ from hard_cases import room as small_room
 from lit_room import VISIBLE
 from rgspipe import fit_lights
 from rgspipe.fitting import AdamOptions, Effects, LightSpec
-from rgspipe.fitting.paper_adam_loss import MovingRig, adam_loss, rig_image
+from rgspipe.fitting.paper_adam_loss import AdamLoss, MovingRig, rig_image
 from rgspipe.fitting.parameters import Emitter
 from rgspipe.fitting.problem import LightProblem
 from rgspipe.fitting.search_lm import fit_from
@@ -70,7 +70,7 @@ def test_loss_and_gradients_of_two_spots_are_those_of_float64(band: BandLimit | 
         else:
             positions, strengths, axes = leaves
             rig = MovingRig(positions, strengths, axes, SHAPE)
-            loss = adam_loss(views, target, rig, 0.2, Effects(spots=band))
+            loss = AdamLoss(views, target, 0.2, Effects(spots=band))(rig)
         loss.backward()
         results.append((loss.detach()[None], *(leaf.grad for leaf in leaves)))
     # The exact profile's derivative towards an axis of unit length has no part along it.
@@ -159,7 +159,7 @@ def test_a_hard_edge_has_a_gradient(room, point_light) -> None:
     hard = SpotShape("smoothstep", math.radians(30.0), 0.0)
     positions, strengths, axes = (leaf[:1].detach().requires_grad_() for leaf in two_spots())
     target = torch.zeros((room.one.prepared.all_pixels.shape[0], 3))
-    adam_loss(room.one.prepared, target, MovingRig(positions, strengths, axes, hard), 0.2, Effects()).backward()
+    AdamLoss(room.one.prepared, target, 0.2, Effects())(MovingRig(positions, strengths, axes, hard)).backward()
     assert float(axes.grad.norm()) > 0.0 and torch.isfinite(axes.grad).all()
 
 

@@ -11,7 +11,7 @@ from torch import Tensor
 import double_precision
 from double_precision import DoubleStep
 from hard_cases import CAMERAS, DEEP, INSIDE, LIGHTS, SCENES, HardScene, camera, scene_of_light
-from rgspipe.fitting.paper_adam_loss import MovingRig, adam_loss
+from rgspipe.fitting.paper_adam_loss import AdamLoss, MovingRig
 from rgspipe.fitting.parameters import Emitter
 from rgspipe.fitting.problem import Effects, LightProblem
 from rgspipe.fitting.views import PreparedViews
@@ -74,7 +74,7 @@ def compare(
             loss = double_precision.adam_loss(step.image(*leaves), target, sizes, list(views.masks), 0.2)
         else:
             rig = MovingRig(*(leaf[None] for leaf in leaves))
-            loss = adam_loss(views, target.float(), rig, 0.2, Effects())
+            loss = AdamLoss(views, target.float(), 0.2, Effects())(rig)
         loss.backward()
         results.append((loss[None], *(leaf.grad for leaf in leaves)))
     for name, single, double in zip(("loss", "position", "log_intensity"), *results, strict=True):

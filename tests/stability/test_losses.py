@@ -12,7 +12,7 @@ import double_precision
 from hard_cases import INSIDE, a_few, camera, room
 from rgspipe.errors import InputError
 from rgspipe.fitting import build_dictionary, fit_lights, prepare_fit
-from rgspipe.fitting.paper_adam_loss import MovingRig, adam_loss
+from rgspipe.fitting.paper_adam_loss import AdamLoss, MovingRig
 from rgspipe.fitting.paper_adam_start import Ball, light_ball
 from rgspipe.fitting.problem import Effects
 from rgspipe.fitting.ssim import ssim
@@ -64,7 +64,7 @@ def test_structural_similarity(first: str, second: str, within) -> None:
 
 def loss_and_gradients(views: PreparedViews, target: Tensor) -> list[Tensor]:
     leaves = [(INSIDE + 0.1).requires_grad_(), torch.zeros(3, dtype=torch.float64, requires_grad=True)]
-    loss = adam_loss(views, target, MovingRig(*(leaf[None] for leaf in leaves)), 0.2, Effects())
+    loss = AdamLoss(views, target, 0.2, Effects())(MovingRig(*(leaf[None] for leaf in leaves)))
     loss.backward()
     return [loss.detach(), *(leaf.grad for leaf in leaves)]
 

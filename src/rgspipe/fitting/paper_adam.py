@@ -13,7 +13,7 @@ import torch
 from torch import Tensor
 
 from rgspipe.fitting.doubts import doubts
-from rgspipe.fitting.paper_adam_loss import MovingRig, adam_loss
+from rgspipe.fitting.paper_adam_loss import AdamLoss, MovingRig
 from rgspipe.fitting.paper_adam_start import (
     LOG_INTENSITY_LIMIT,
     Ball,
@@ -96,8 +96,7 @@ def fit_paper_adam(
 class _Descent:
     """Adam on one rig, with all steps that it took; the start is the first."""
 
-    problem: LightProblem
-    target: Tensor
+    loss: AdamLoss
     options: AdamOptions
     ball: Ball
     rig: MovingRig
@@ -120,14 +119,15 @@ class _Descent:
         rig = MovingRig(start.positions.clone().requires_grad_(), start.log_intensities.clone().requires_grad_())
         if spec.spots:
             rig = replace(rig, axes=start.axes.clone().requires_grad_(), shape=spec.shape)
-        return cls(problem, target, options, ball, rig, begin, [])
+        loss = AdamLoss(problem.views, target, options.ssim_weight, problem.effects)
+        return cls(loss, options, ball, rig, begin, [])
 
     def run(self) -> FitStatus:
         """All steps; each one's loss is that of its own lights."""
         options, optimiser = self.options, self._optimiser()
         for index in track(range(options.epochs * options.steps), "Adam", unit="step"):
             optimiser.zero_grad()
-            loss = self._loss()
+            loss = self.loss(self.rig)
             self._record(loss)
             if _stalled(self.steps, index, options):
                 return FitStatus.CONVERGED
@@ -135,7 +135,7 @@ class _Descent:
             optimiser.step()
             self._bound()
         with torch.no_grad():
-            self._record(self._loss())
+            self._record(self.loss(self.rig))
         return FitStatus.MAX_ITERATIONS
 
     def _optimiser(self) -> torch.optim.Adam:
@@ -143,10 +143,6 @@ class _Descent:
         rates = [(rig.positions, options.position_rate), (rig.log_intensities, options.intensity_rate)]
         rates += [] if rig.axes is None else [(rig.axes, options.axis_rate)]
         return torch.optim.Adam([{"params": [leaf], "lr": rate} for leaf, rate in rates])
-
-    def _loss(self) -> Tensor:
-        problem = self.problem
-        return adam_loss(problem.views, self.target, self.rig, self.options.ssim_weight, problem.effects)
 
     def _record(self, loss: Tensor) -> None:
         self.steps.append(Step(float(loss.detach()), self.rig.lights(), time.perf_counter() - self.begin))

@@ -13,7 +13,7 @@ from rgspipe.fitting.parameters import Emitter
 from rgspipe.fitting.problem import Effects
 from rgspipe.fitting.schedule import soft
 from rgspipe.fitting.spot_harmonics import BandLimit, fitted_share
-from rgspipe.fitting.ssim import ssim
+from rgspipe.fitting.ssim_reference import SsimReference
 from rgspipe.fitting.views import PreparedViews
 from rgspipe.renderer.direct import differentiable_irradiance
 from rgspipe.renderer.spot import SpotShape
@@ -88,21 +88,31 @@ def rig_image(views: PreparedViews, rig: MovingRig, effects: Effects) -> Tensor:
     return views.all_pixels @ radiance
 
 
-def adam_loss(views: PreparedViews, target: Tensor, rig: MovingRig, ssim_weight: float, effects: Effects) -> Tensor:
-    """(1−λ)·mean|M⊙(I − I*)| + λ·(1 − SSIM(M⊙I, M⊙I*)), averaged over the views.
+class AdamLoss:
+    """(1−λ)·mean|M⊙(I − I*)| + λ·(1 − SSIM(M⊙I, M⊙I*)), averaged over the views, as a function of the rig.
 
     Args:
         target: (all pixels, 3), the views' images stacked.
         ssim_weight: λ.
     """
-    stacked = rig_image(views, rig, effects)
-    losses, start = [], 0
-    for view, mask in zip(views.views, views.masks, strict=True):
-        pixels = slice(start, start + view.camera.pixel_count)
-        start = pixels.stop
-        shape = (view.camera.height, view.camera.width, 3)
-        covered = mask.to(stacked)[:, :, None]
-        image, wanted = covered * stacked[pixels].reshape(shape), covered * target[pixels].reshape(shape)
-        absolute = (image - wanted).abs().mean()
-        losses.append((1.0 - ssim_weight) * absolute + ssim_weight * (1.0 - ssim(image, wanted)))
-    return torch.stack(losses).mean()
+
+    def __init__(self, views: PreparedViews, target: Tensor, ssim_weight: float, effects: Effects) -> None:
+        self._views, self._weight, self._effects = views, ssim_weight, effects
+        self._covered = [mask.to(target)[:, :, None] for mask in views.masks]
+        wanted = [mask * image for mask, image in zip(self._covered, self._apart(target), strict=True)]
+        self._wanted = [(image, SsimReference.of(image)) for image in wanted]
+
+    def __call__(self, rig: MovingRig) -> Tensor:
+        images = self._apart(rig_image(self._views, rig, self._effects))
+        losses = []
+        for image, mask, (wanted, reference) in zip(images, self._covered, self._wanted, strict=True):
+            image = mask * image
+            absolute = (image - wanted).abs().mean()
+            losses.append((1.0 - self._weight) * absolute + self._weight * (1.0 - reference.similarity(image)))
+        return torch.stack(losses).mean()
+
+    def _apart(self, stacked: Tensor) -> list[Tensor]:
+        """(H, W, 3) per view."""
+        cameras = [view.camera for view in self._views.views]
+        parts = stacked.split([camera.pixel_count for camera in cameras])
+        return [part.reshape(camera.height, camera.width, 3) for part, camera in zip(parts, cameras, strict=True)]
