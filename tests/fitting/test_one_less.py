@@ -2,35 +2,18 @@
 
 from __future__ import annotations
 
-import math
-
 import pytest
 import torch
 
 from lit_room import HIDDEN, VISIBLE
-from rgspipe.fitting import FitResult, FitStatus, LightSpec, fit_lights, prepare_fit, render_rig
+from noisy_fits import SHAPE, THIRD, noisy_fit, noisy_images
+from rgspipe.fitting import FitResult, FitStatus, LightSpec, prepare_fit
 from rgspipe.fitting.judge import LEAST_DROP
 from rgspipe.fitting.one_less import one_light_less
 from rgspipe.fitting.parameters import Emitter
 from rgspipe.fitting.problem import LightProblem
 from rgspipe.fitting.refine import ROBUST, search_region, start_from
-from rgspipe.renderer.spot import SpotShape
-from rgspipe.scene import LightRig, SpotLight
-
-THIRD = (-0.3, 0.3, 0.1)
-SHAPE = SpotShape("smoothstep", math.radians(30.0), 0.3)
-
-
-def noisy_images(room, views, rig: LightRig) -> list[torch.Tensor]:
-    """The rig's images of the model itself with noise of 2 %."""
-    draw = torch.Generator().manual_seed(0)
-    images = render_rig(views, rig)
-    return [image + 0.02 * image.mean() * torch.randn(image.shape, generator=draw) for image in images]
-
-
-def fit(room, rig: LightRig, spec: LightSpec) -> FitResult:
-    views = prepare_fit(room.frozen, room.views, dictionary=room.dictionary, spec=spec)
-    return fit_lights(room.frozen, views, noisy_images(room, views, rig), spec=spec)
+from rgspipe.scene import SpotLight
 
 
 def said_to_be_too_many(result: FitResult) -> bool:
@@ -40,13 +23,13 @@ def said_to_be_too_many(result: FitResult) -> bool:
 
 @pytest.mark.parametrize("place", [VISIBLE, HIDDEN, THIRD])
 def test_two_lights_for_one_say_so(room, point_light, place):
-    result = fit(room, (point_light(place),), LightSpec(count=2))
+    result = noisy_fit(room, (point_light(place),), LightSpec(count=2))
     assert len(result.lights) == 2 and said_to_be_too_many(result)
     assert 1.0 - result.costs[2] / result.costs[1] < 0.1  # measured at most 0.015
 
 
 def test_three_lights_for_two_say_so(room, point_light):
-    result = fit(room, (point_light(VISIBLE), point_light(HIDDEN)), LightSpec(count=3))
+    result = noisy_fit(room, (point_light(VISIBLE), point_light(HIDDEN)), LightSpec(count=3))
     assert len(result.lights) == 3 and said_to_be_too_many(result)
 
 
@@ -54,13 +37,13 @@ def test_two_spots_for_one_say_so(room):
     axis = torch.nn.functional.normalize(torch.tensor((-0.3, 0.5, -0.6), dtype=torch.float64), dim=0)
     strength, position = torch.tensor([1.0, 2.0, 0.5]).double(), torch.tensor(VISIBLE, dtype=torch.float64)
     spot = SpotLight(position, strength, axis, SHAPE.profile, SHAPE.cone_angle, SHAPE.falloff)
-    assert said_to_be_too_many(fit(room, (spot,), LightSpec("spot", 2, SHAPE)))
+    assert said_to_be_too_many(noisy_fit(room, (spot,), LightSpec("spot", 2, SHAPE)))
 
 
 @pytest.mark.parametrize("places", [(VISIBLE, HIDDEN), (HIDDEN, THIRD), (VISIBLE, HIDDEN, THIRD)])
 def test_a_right_number_is_not_doubted(room, point_light, places):
     count = len(places)
-    result = fit(room, tuple(point_light(place) for place in places), LightSpec(count=count))
+    result = noisy_fit(room, tuple(point_light(place) for place in places), LightSpec(count=count))
     assert result.status is FitStatus.CONVERGED and set(result.costs) == {count - 1, count}
     assert 1.0 - result.costs[count] / result.costs[count - 1] > 2.0 * LEAST_DROP  # measured at least 0.919
 
@@ -68,7 +51,7 @@ def test_a_right_number_is_not_doubted(room, point_light, places):
 def test_the_light_that_is_spare_is_named_and_the_others_take_its_part(room, point_light):
     """Of a light that is split in two one half is left out, though each is far from faint."""
     views = prepare_fit(room.frozen, room.views, dictionary=room.dictionary)
-    images = noisy_images(room, views, (point_light(VISIBLE), point_light(HIDDEN)))
+    images = noisy_images(views, (point_light(VISIBLE), point_light(HIDDEN)))
     problem = LightProblem.create(views.prepared, views.prepared.stack_images(images))
     beside = (VISIBLE[0] + 0.05, *VISIBLE[1:])
     places = [HIDDEN, VISIBLE, beside]
