@@ -171,7 +171,7 @@ def render_rig(views: FitViews, rig: LightRig) -> list[Tensor]:
             radiance = radiance - frozen.radiance(irradiance, indirect=False)
             stacked = sum(_direct_at_pixels(views, light) * light.intensity.to(stacked) for light in rig)
         stacked = stacked + operator @ torch.einsum("ncl,lc->nc", radiance, strength)
-    return _apart(prepared, stacked)
+    return prepared.split_images(stacked)
 
 
 def _render_with_gloss(views: FitViews, rig: LightRig) -> list[Tensor]:
@@ -180,19 +180,12 @@ def _render_with_gloss(views: FitViews, rig: LightRig) -> list[Tensor]:
     frozen = prepared.frozen
     if not prepared.pixel_direct:
         return [frozen.render(view, rig, effects.interreflection, effects.shadows) for view in prepared.views]
-    images = _apart(prepared, sum(_direct_at_pixels(views, light) * light.intensity.float() for light in rig))
+    images = prepared.split_images(sum(_direct_at_pixels(views, light) * light.intensity.float() for light in rig))
     if effects.interreflection:
         light = bounced_light(frozen, rig, effects.shadows)
         bounced = [view.image(light.seen_from(view.camera.origin)) for view in prepared.views]
         images = [direct + others for direct, others in zip(images, bounced, strict=True)]
     return images
-
-
-def _apart(prepared: PreparedViews, stacked: Tensor) -> list[Tensor]:
-    """(H, W, 3) per view of stacked pixels (all pixels, 3)."""
-    cameras = [view.camera for view in prepared.views]
-    parts = stacked.split([camera.pixel_count for camera in cameras])
-    return [part.reshape(camera.height, camera.width, 3) for part, camera in zip(parts, cameras, strict=True)]
 
 
 def _direct_at_pixels(views: FitViews, light: Light) -> Tensor:

@@ -47,29 +47,24 @@ def one_light_less(problem: LightProblem, answer: State, region: Region, begin: 
         problem: that the answer was searched on.
         answer: of two lights or more.
     """
-    energies, refined = light_energies(answer), []
+    energies, rich, refined = light_energies(answer), answer, []
     for index in sorted(range(len(energies)), key=energies.__getitem__):
         simple = start_from(problem, _without(answer, index), ROBUST, begin)
         refined.append(simple)
-        rich, worth = _worth(problem, simple, answer, region, begin)
-        if rich is not answer:
+        refine(problem, simple, ROBUST, TURN, region, begin)
+        # An answer of plain squares has a higher robust cost than it would have to have.
+        worth = drop(problem, simple, rich) >= FAINT_DROP
+        if worth:
+            continue
+        if rich is answer:
+            rich = fresh(answer)
             refined.append(rich)
+            refine(problem, rich, ROBUST, SHORT_ITERATIONS, region, begin)
+        refine(problem, simple, ROBUST, TURN, region, begin)
+        worth = worth_one_more(problem, simple, rich)
         if not worth:
             break
     return OneLess(rich, simple, index, worth, drop(problem, simple, rich), refined)
-
-
-def _worth(problem: LightProblem, simple: State, answer: State, region: Region, begin: float) -> tuple[State, bool]:
-    """Whether the answer's light more is there, after some steps of the rig without it; and the answer, refined as well
-    where it is not clear at first sight."""
-    refine(problem, simple, ROBUST, TURN, region, begin)
-    # An answer of plain squares has a higher robust cost than it would have to have.
-    if drop(problem, simple, answer) >= FAINT_DROP:
-        return answer, True
-    rich = fresh(answer)
-    refine(problem, simple, ROBUST, TURN, region, begin)
-    refine(problem, rich, ROBUST, SHORT_ITERATIONS, region, begin)
-    return rich, worth_one_more(problem, simple, rich)
 
 
 def _without(answer: State, index: int) -> list[Emitter]:

@@ -99,20 +99,14 @@ class AdamLoss:
     def __init__(self, views: PreparedViews, target: Tensor, ssim_weight: float, effects: Effects) -> None:
         self._views, self._weight, self._effects = views, ssim_weight, effects
         self._covered = [mask.to(target)[:, :, None] for mask in views.masks]
-        wanted = [mask * image for mask, image in zip(self._covered, self._apart(target), strict=True)]
+        wanted = [mask * image for mask, image in zip(self._covered, views.split_images(target), strict=True)]
         self._wanted = [(image, SsimReference.of(image)) for image in wanted]
 
     def __call__(self, rig: MovingRig) -> Tensor:
-        images = self._apart(rig_image(self._views, rig, self._effects))
+        images = self._views.split_images(rig_image(self._views, rig, self._effects))
         losses = []
         for image, mask, (wanted, reference) in zip(images, self._covered, self._wanted, strict=True):
             image = mask * image
             absolute = (image - wanted).abs().mean()
             losses.append((1.0 - self._weight) * absolute + self._weight * (1.0 - reference.similarity(image)))
         return torch.stack(losses).mean()
-
-    def _apart(self, stacked: Tensor) -> list[Tensor]:
-        """(H, W, 3) per view."""
-        cameras = [view.camera for view in self._views.views]
-        parts = stacked.split([camera.pixel_count for camera in cameras])
-        return [part.reshape(camera.height, camera.width, 3) for part, camera in zip(parts, cameras, strict=True)]

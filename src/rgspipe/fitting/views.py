@@ -107,6 +107,12 @@ class PreparedViews:
             _check_image(f"target image {index}", view, image)
         return torch.cat([image.reshape(-1, 3).float() for image in images]).to(self.operator.matrix.device)
 
+    def split_images(self, stacked: Tensor) -> list[Tensor]:
+        """(H, W, 3) per view of stacked pixels (all pixels, 3)."""
+        cameras = [view.camera for view in self.views]
+        parts = stacked.split([camera.pixel_count for camera in cameras])
+        return [part.reshape(camera.height, camera.width, 3) for part, camera in zip(parts, cameras, strict=True)]
+
 
 def prepare_views(
     frozen: FrozenScene,
