@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
 import sys
 from pathlib import Path
@@ -38,6 +39,14 @@ def test_a_failure_shows_its_status(fake_blender, tmp_path: Path) -> None:
     fake_blender("echo no licence >&2; exit 3")
     with pytest.raises(RuntimeError, match=r"status 3(.|\n)*no licence"):
         process.render_dataset(DatasetJob(), tmp_path / "data")
+
+
+@pytest.mark.parametrize("ending", ["exit 0", "exit 3"])
+def test_nothing_of_blender_s_own_is_left(fake_blender, tmp_path: Path, ending: str) -> None:
+    fake_blender(f'mkdir "$TMPDIR/blender_x" && touch "$TMPDIR/blender_x/quit.blend"; {ending}')
+    with contextlib.nullcontext() if ending == "exit 0" else pytest.raises(RuntimeError, match="status 3"):
+        process.render_dataset(DatasetJob(), tmp_path / "data")
+    assert [path.name for path in (tmp_path / "data").iterdir()] == [process.JOB_FILE]
 
 
 def test_an_input_error_comes_through_whole(fake_blender, tmp_path: Path) -> None:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import torch
 
-from rgspipe.blender.cameras import FixedView, aimed
+from rgspipe.blender.cameras import aimed
+from rgspipe.blender.fixed_view import FixedView
 from rgspipe.olat.cameras import MOST_CAMERAS, pool_cameras
 from rgspipe.scene import Camera
 

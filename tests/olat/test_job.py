@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from rgspipe.blender.cameras import FixedView
+from rgspipe.blender.fixed_view import FixedView
 from rgspipe.blender.job import DatasetJob
 from rgspipe.blender.models.parameters import CornerParameters
 from rgspipe.olat.job import PoolJob, SpotRange

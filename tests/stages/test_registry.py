@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ast
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -79,6 +81,12 @@ def test_a_change_of_any_code_behind_a_result_rebuilds_it(name: str) -> None:
         module for module in closure(f"rgspipe.stages.{name}") if not below(module, tuple(load_stage(name).code))
     }
     assert not missing, f"add {sorted(missing)} to the `code` of stages/{name}.py"
+
+
+def test_no_stage_loads_blender_into_its_own_process() -> None:
+    # It weighs hundreds of MB, and who fits targets that are already rendered may not have it.
+    script = "import sys; sys.modules['bpy'] = None; from rgspipe.stages import NAMES, load_stage; "
+    subprocess.run([sys.executable, "-c", script + "[load_stage(name) for name in NAMES]"], check=True)
 
 
 def test_an_unknown_stage_is_refused_with_the_nearest_name() -> None:

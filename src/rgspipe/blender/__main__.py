@@ -6,13 +6,12 @@ import ctypes
 import json
 import logging
 import os
-import shutil
 import signal
 import sys
 from pathlib import Path
 
 from rgspipe.blender.job import DatasetJob
-from rgspipe.blender.process import MESSAGE_PREFIX
+from rgspipe.blender.process import MESSAGE_PREFIX, SCRATCH
 from rgspipe.blender.room_job import RoomJob
 from rgspipe.errors import InputError
 
@@ -50,13 +49,11 @@ def render_dataset(job: DatasetJob, folder: Path, parent: int) -> None:
     write_dataset_files(job, plan, prepared, folder)
     missing = [frame for frame in plan.frames if not is_whole(frame, folder)]
     tell(total=len(plan.frames), done=len(plan.frames) - len(missing))
-    scratch = make_scratch(folder)
-    studio = Studio(prepared.scene, job.settings, scratch)
+    studio = Studio(prepared.scene, job.settings, folder / SCRATCH)
     for frame in missing:
         stop_without(parent)
         studio.render(frame, folder)
         tell(frame=frame.name)
-    shutil.rmtree(scratch)
 
 
 def render_room(job: RoomJob, folder: Path, parent: int) -> None:
@@ -66,22 +63,13 @@ def render_room(job: RoomJob, folder: Path, parent: int) -> None:
 
     missing = [frame for frame in job.frames() if not is_whole(frame, folder)]
     tell(total=len(job.frames()), done=len(job.frames()) - len(missing))
-    scratch = make_scratch(folder)
     for kind in job.settings:
         frames = [frame for frame in missing if frame.kind == kind]
-        studio = Studio(build_room(job), job.settings[kind], scratch)
+        studio = Studio(build_room(job), job.settings[kind], folder / SCRATCH)
         for frame in frames:
             stop_without(parent)
             write_frame(studio, frame, folder)
             tell(frame=frame.name)
-    shutil.rmtree(scratch)
-
-
-def make_scratch(folder: Path) -> Path:
-    """A folder for Blender's own output."""
-    scratch = folder / ".scratch"
-    scratch.mkdir(parents=True, exist_ok=True)
-    return scratch
 
 
 def stop_without(parent: int) -> None:

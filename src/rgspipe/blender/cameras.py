@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 import torch
 
+from rgspipe.blender.fixed_view import FixedView
 from rgspipe.blender.geometry import FreeSpace, sphere_points
 from rgspipe.errors import InputError
 from rgspipe.scene import Camera, look_at
@@ -47,15 +48,6 @@ class Layout(Protocol):
 
     def target_cameras(self) -> list[Camera]:
         """The three fixed cameras that see every fit target."""
-
-
-@dataclass(frozen=True)
-class FixedView:
-    """A camera at `origin` that looks at `focus`, `degrees` across; both (3,)."""
-
-    origin: tuple[float, float, float]
-    focus: tuple[float, float, float]
-    degrees: float
 
 
 @dataclass(frozen=True)

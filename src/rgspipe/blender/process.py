@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import json
 import os
+import shutil
 import subprocess
 import sys
 from collections import deque
@@ -22,6 +23,9 @@ MESSAGE_PREFIX = "@rgspipe "
 
 #: The job is kept beside its images, so that those of another job are never mixed in.
 JOB_FILE = "job.json"
+
+#: Folder of Blender's own files while it renders, beside the images; Blender itself leaves some of them behind.
+SCRATCH = ".scratch"
 
 #: Lines of Blender's output that an error shows.
 TAIL_LINES = 15
@@ -80,16 +84,19 @@ def run_blender(module: list[str], job: dict, name: str, folder: Path) -> None:
     folder = Path(folder).resolve()
     folder.mkdir(parents=True, exist_ok=True)
     _claim(job, folder)
+    scratch = folder / SCRATCH
+    scratch.mkdir(exist_ok=True)
     command = [sys.executable, "-u", "-m", *module, str(folder / JOB_FILE), str(folder), str(os.getpid())]
     with subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, text=True,
-        errors="replace", env=_environment(),
+        errors="replace", env=_environment(scratch),
     ) as child:  # fmt: skip
         try:
             tail, input_error = _follow(child, name)
         except BaseException:
             child.kill()
             raise
+    shutil.rmtree(scratch)
     if input_error is not None:
         raise InputError(input_error.pop("where"), **input_error)
     if child.returncode != 0:
@@ -114,11 +121,11 @@ def _claim(job: dict, folder: Path) -> None:
         )
 
 
-def _environment() -> dict[str, str]:
-    """The child finds the package where we found it, however that was."""
+def _environment(scratch: Path) -> dict[str, str]:
+    """The child finds the package where we found it, however that was, and has its temporary files in `scratch`."""
     source = str(Path(rgspipe.__file__).resolve().parents[1])
     paths = [source, *filter(None, [os.environ.get("PYTHONPATH")])]
-    return os.environ | {"PYTHONPATH": os.pathsep.join(paths)}
+    return os.environ | {"PYTHONPATH": os.pathsep.join(paths), "TMPDIR": str(scratch)}
 
 
 def _follow(child: subprocess.Popen, scene: str) -> tuple[str, dict | None]:

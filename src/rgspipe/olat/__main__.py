@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 import logging
 import os
-import shutil
 import sys
 from pathlib import Path
 
-from rgspipe.blender.__main__ import die_with, make_scratch, stop_without, tell
+from rgspipe.blender.__main__ import die_with, stop_without, tell
+from rgspipe.blender.process import SCRATCH
 from rgspipe.errors import InputError
 from rgspipe.olat.job import PoolJob
 
@@ -44,14 +44,12 @@ def render_pool(job: PoolJob, folder: Path, parent: int) -> None:
     images = [(plan, number) for plan in lights for number in range(len(cameras))]
     missing = [(plan, number) for plan, number in images if not is_whole(plan.frames[number], folder)]
     tell(total=len(images), done=len(images) - len(missing))
-    scratch = make_scratch(folder)
-    studio = Studio(prepared.scene, job.dataset.settings, scratch)
+    studio = Studio(prepared.scene, job.dataset.settings, folder / SCRATCH)
     for plan, number in missing:
         stop_without(parent)
         studio.shape(plan.light)
         studio.render(plan.frames[number], folder)
         tell(frame=plan.frames[number].name)
-    shutil.rmtree(scratch)
 
 
 if __name__ == "__main__":

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 import torch
 
-from rgspipe.blender.cameras import FixedView, Layout, aimed
+from rgspipe.blender.cameras import Layout, aimed
+from rgspipe.blender.fixed_view import FixedView
 from rgspipe.scene import Camera, look_at
 
 #: Where further cameras stand between the three that see the fit targets of a scene: their shares of each.

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from rgspipe.blender.cameras import FixedView
+from rgspipe.blender.fixed_view import FixedView
 from rgspipe.blender.job import DatasetJob
 from rgspipe.renderer.spot import SpotShape
 from rgspipe.scene.lights import SpotProfile

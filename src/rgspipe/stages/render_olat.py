@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from rgspipe.blender.cameras import FixedView
+from rgspipe.blender.fixed_view import FixedView
 from rgspipe.config import MODELLED, RgspipeConfig, TargetsConfig, TargetSpotConfig
 from rgspipe.errors import InputError
 from rgspipe.olat.job import PoolJob, SpotRange

@@ -6,7 +6,8 @@ import math
 
 import bpy
 
-from rgspipe.blender.cameras import USUAL_CLASSES, FixedView, RoomLayout
+from rgspipe.blender.cameras import USUAL_CLASSES, RoomLayout
+from rgspipe.blender.fixed_view import FixedView
 from rgspipe.blender.geometry import FreeSpace
 from rgspipe.blender.materials import diffuse_material
 from rgspipe.blender.meshes import add, box, new_scene, polygon

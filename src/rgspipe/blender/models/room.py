@@ -7,7 +7,8 @@ import math
 import bpy
 import numpy as np
 
-from rgspipe.blender.cameras import USUAL_CLASSES, FixedView, RoomLayout
+from rgspipe.blender.cameras import USUAL_CLASSES, RoomLayout
+from rgspipe.blender.fixed_view import FixedView
 from rgspipe.blender.geometry import FreeSpace
 from rgspipe.blender.materials import (
     brick_material,
