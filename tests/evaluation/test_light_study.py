@@ -117,6 +117,13 @@ def test_text_shows_what_differs_and_says_what_is_not_known() -> None:
     assert rows[-1]["predicted"] == "1.00 %" and rows[0]["predicted"] == "—" and rows[-1]["position error"][0] == "∞"
 
 
+def test_text_does_not_repeat_a_single_class() -> None:
+    targets = _targets()
+    table = case_rows("corner", "", targets[targets["occlusion"] == "occluded"], seed=0, resamples=0)
+    assert len(table) == 2
+    assert [row["light"] for row in shown_rows(table, "views")[1]] == ["occluded"]
+
+
 def test_columns_that_do_not_differ_are_left_out() -> None:
     table = pd.DataFrame({"a": [1, 2], "b": [1, 1]})
     assert several(table, ["a", "b"]) == ["a"]

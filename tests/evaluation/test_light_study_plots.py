@@ -29,17 +29,22 @@ def _table(**lists: list) -> pd.DataFrame:
 
 
 def test_errors_are_drawn_over_views_with_what_was_stated_and_foretold() -> None:
-    table = _table(occlusion=["visible", "all"], views=[1, 2, 4]).assign(predicted=0.006)
+    table = _table(occlusion=["visible", "occluded", "all"], views=[1, 2, 4]).assign(predicted=0.006)
     figure = light_study_figure(table, "views")
-    assert [axis.get_title(loc="left") for axis in figure.axes[:2]] == ["visible", "all classes"]
+    assert [axis.get_title(loc="left") for axis in figure.axes[:3]] == ["visible", "occluded", "all classes"]
     first = figure.axes[0]
     assert [list(line.get_xdata()) for line in first.lines[:3]] == [[1, 2, 4]] * 3
     assert [line.get_ydata()[0] for line in first.lines[:3]] == pytest.approx([0.4, 0.5, 0.6])
-    assert first.get_yscale() == "log" and figure.axes[2].get_ylim() == (-4.0, 104.0)
+    assert first.get_yscale() == "log" and figure.axes[3].get_ylim() == (-4.0, 104.0)
     (legend,) = figure.legends
     words = [text.get_text() for text in legend.get_texts()]
     assert words == ["search_lm", "error that fits state", "predicted by fits of 1 view"]
     assert len(png_of(figure)) > 5000
+
+
+def test_a_single_class_is_not_drawn_twice() -> None:
+    figure = light_study_figure(_table(occlusion=["around_corner", "all"], views=[1, 3]), "views")
+    assert [axis.get_title(loc="left") for axis in figure.axes] == ["around the corner", "", ""]
 
 
 def test_without_predictions_none_are_drawn() -> None:

@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
+import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 import pandas as pd
 import pytest
+from omegaconf import OmegaConf
 
 from rgspipe.artifacts import Artifact, ArtifactStore, Key
 from rgspipe.cli.compose import compose_config
-from rgspipe.config import LIGHT_STUDIES, RgspipeConfig, with_changes
+from rgspipe.config import LIGHT_STUDIES, RgspipeConfig, get_value, with_changes
 from rgspipe.datasets.advice_file import own_views_in_order
 from rgspipe.errors import InputError
 from rgspipe.evaluation.light_study import KINDS
 from rgspipe.evaluation.tables import TARGET_COLUMNS
-from rgspipe.stages import light_study
+from rgspipe.stages import light_study, load_stage
 from rgspipe.stages.base import StageContext
+
+PIPELINES = Path(__file__).parents[2] / "pipelines"
 
 ADVICE = "added,views,camera,position_sd\nalone,2,view_1,0.004\nplan,2,train/r_0,0.001\n"
 ADVICE += "in_order,2,view_1,0.004\nin_order,3,view_2,0.003\nin_order,4,train/r_0,0.002\nin_order,5,view_3,0.001\n"
@@ -92,33 +96,72 @@ def test_a_case_that_is_none_is_refused_before_anything_is_made() -> None:
         light_study.STAGE.needs(_config(cases=["target_capture.nose=0.1"]))
 
 
-@pytest.mark.parametrize(
-    "name", ["light_views", "light_robustness", "light_classes", "light_kinds", "light_regions", "light_adam"]
-)
+#: Studies that are prepared: their kinds, and on how many cells the paper's method runs.
+PREPARED = {
+    "light_views": ("views", 3),
+    "light_views_corner": ("views", 3),
+    "light_robustness": ("robustness", 0),
+    "light_classes": ("classes", 0),
+    "light_kinds": ("kinds", 0),
+    "light_regions": ("regions", 0),
+    "light_adam": ("adam", 2),
+}
+
+
+@pytest.mark.parametrize("name", PREPARED)
 def test_every_study_that_is_prepared_composes_and_names_its_cases(name: str) -> None:
     config = compose_config(["stage=light_study", f"experiment={name}"])
-    assert config.light_study.kind == name.removeprefix("light_")
+    kind, slow = PREPARED[name]
+    assert config.light_study.kind == kind
     needs = light_study.STAGE.needs(config)
     fits = [need for need in needs if need.stage == "evaluate"]
     searches = [need for need in fits if need.changes["fit.method"] == "search_lm"]
     study = config.light_study
     assert len(searches) == max(1, len(study.scenes)) * len(study.cases) * len(study.views)
-    assert len(fits) - len(searches) == {"light_views": 2, "light_adam": 3}.get(name, 0)
+    assert len(fits) - len(searches) == slow
+
+
+@pytest.mark.parametrize("name", ["light_views", "light_views_corner"])
+def test_sweeps_of_the_pipeline_make_the_fits_that_a_study_takes(name: str) -> None:
+    # Several at a time, and not twice.
+    study = compose_config(["stage=light_study", f"experiment={name}"])
+    needs = [need for need in light_study.STAGE.needs(study) if need.stage == "evaluate"]
+    wanted = [_recipe(with_changes(study, need.changes)) for need in needs]
+    steps = OmegaConf.to_container(OmegaConf.load(PIPELINES / "lights.yaml"))["steps"]
+    sweeps = [step["overrides"] for step in steps if step["stage"] == "evaluate"]
+    sweeps = [overrides for overrides in sweeps if f"experiment={name}" in overrides]
+    made = [_recipe(compose_config(["stage=evaluate", *job])) for overrides in sweeps for job in _jobs(overrides)]
+    assert sorted(made) == sorted(wanted)
+
+
+def _jobs(overrides: list[str]) -> Iterator[list[str]]:
+    """The jobs of a sweep over numbers of views."""
+    for text in overrides:
+        if text.startswith("views.count="):
+            others = [other for other in overrides if other != text]
+            yield from ([*others, f"views.count={count}"] for count in text.partition("=")[2].split(","))
+            return
+    yield overrides
+
+
+def _recipe(config: RgspipeConfig) -> str:
+    """What fits depend on."""
+    return json.dumps({key: get_value(config, key) for key in sorted(load_stage("fit_light").keys(config))})
 
 
 def test_the_papers_method_is_compared_on_the_targets_of_the_search() -> None:
     config = compose_config(["stage=light_study", "experiment=light_adam"])
     fits = [need.changes for need in light_study.STAGE.needs(config)]
-    assert config.fit.limit == 1 and [changes.get("fit.limit") for changes in fits] == [20, 20, None, None, None, None]
+    assert config.fit.limit == 5 and not any("fit.limit" in changes for changes in fits)
     methods = [changes["fit.method"] for changes in fits]
-    assert methods == ["search_lm", "paper_adam"] * 3
+    assert methods == ["search_lm", "paper_adam"] * 2
 
 
 def test_the_papers_method_has_numbers_of_views_of_its_own() -> None:
     config = compose_config(["stage=light_study", "experiment=light_views"])
     fits = [need.changes for need in light_study.STAGE.needs(config) if need.stage == "evaluate"]
     slow = [changes for changes in fits if changes["fit.method"] == "paper_adam"]
-    assert [changes["views.count"] for changes in slow] == [1, 3] and len(fits) == 10
+    assert [changes["views.count"] for changes in slow] == [1, 4, 8] and len(fits) == 11
     assert all(changes["fit.limit"] == 20 for changes in slow)
     everywhere = _config(views=[1, 2], methods=["paper_adam"])
     assert [need.changes["views.count"] for need in light_study.STAGE.needs(everywhere)] == [1, 2]

@@ -140,6 +140,12 @@ def _true(verdicts: pd.Series) -> pd.Series:
     return verdicts.astype("boolean").fillna(False).astype(bool)
 
 
+def without_repeats(table: pd.DataFrame) -> pd.DataFrame:
+    """The table without rows of all classes together where the scene has only one class, which they repeat."""
+    alone = table.groupby("scene")["occlusion"].transform(lambda names: names[names != ALL].nunique() == 1)
+    return table[~(alone.astype(bool) & (table["occlusion"] == ALL))]
+
+
 def several(table: pd.DataFrame, columns: Sequence[str]) -> list[str]:
     """Those of the columns in which the rows differ."""
     return [name for name in columns if table[name].nunique() > 1]

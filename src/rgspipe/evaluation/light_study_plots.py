@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from rgspipe.evaluation import metrics
-from rgspipe.evaluation.light_study import several
+from rgspipe.evaluation.light_study import several, without_repeats
 from rgspipe.evaluation.light_study_text import TOGETHER
 from rgspipe.evaluation.plots import INK, LABELS, STYLE
 from rgspipe.evaluation.tables import ALL, class_order
@@ -70,6 +70,7 @@ def views_figure(table: pd.DataFrame) -> Figure:
     Beside the measured median error stand the median of what fits state of themselves (dashed) and, where the table
     has it, what the fits with the fewest views foretell (dotted).
     """
+    table = without_repeats(table)
     columns = [
         (scene, name) for scene, part in table.groupby("scene", sort=False) for name in _classes(part["occlusion"])
     ]
@@ -203,7 +204,7 @@ def _handle(index: int, label: str, line: str = "none") -> Line2D:
 
 
 def _classes(names: pd.Series) -> list[str]:
-    return [*class_order([name for name in names if name != ALL]), ALL]
+    return [*class_order([name for name in names if name != ALL]), *names[names == ALL].unique()]
 
 
 def _title(scene: str, name: str, table: pd.DataFrame) -> str:

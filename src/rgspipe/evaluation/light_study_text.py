@@ -9,7 +9,7 @@ from typing import Any
 import pandas as pd
 
 from rgspipe.evaluation.goals import percent
-from rgspipe.evaluation.light_study import STATUSES, several
+from rgspipe.evaluation.light_study import STATUSES, several, without_repeats
 from rgspipe.evaluation.plots import LABELS
 from rgspipe.evaluation.tables import ALL
 
@@ -51,9 +51,10 @@ def shown_rows(table: pd.DataFrame, kind: str) -> tuple[list[str], list[Row]]:
 
     Args:
         table: rows of `light_study.case_rows`; of views also with `predicted`.
-        kind: one of `light_study.KINDS`; those of `TOGETHER` show all classes together, the others each.
+        kind: one of `light_study.KINDS`; those of `TOGETHER` show all classes together, the others each, and all of
+            them together where there are several.
     """
-    rows = table[table["occlusion"] == ALL] if kind in TOGETHER else table
+    rows = table[table["occlusion"] == ALL] if kind in TOGETHER else without_repeats(table)
     columns = _columns(rows, kind)
     return list(columns), [{name: cell(row) for name, cell in columns.items()} for row in rows.to_dict("records")]
 
