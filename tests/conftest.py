@@ -22,3 +22,8 @@ def child_environment() -> dict[str, str]:
     """Environment of a process that imports rgspipe and the helpers beside the tests, from any folder."""
     paths = [str(TESTS.parent / "src"), str(TESTS)]
     return {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Slow tests first, so that no worker is left with one of minutes when the others are done."""
+    items.sort(key=lambda item: item.get_closest_marker("slow") is None)

@@ -41,7 +41,7 @@ def test_every_step_composes() -> None:
         check([f"stage={step.stage}", *step.overrides])
 
 
-@pytest.mark.parametrize(("study", "left"), [("views", 0), ("robustness", 9), ("classes", 0)])
+@pytest.mark.parametrize(("study", "left"), [("views", 0), ("views_corner", 0), ("robustness", 9), ("classes", 0)])
 def test_what_is_swept_is_what_the_studies_need(study: str, left: int) -> None:
     """All of it, but for the single cases of robustness, which the study makes itself."""
     swept: set[str] = set()

@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import pandas as pd
 import pytest
-from omegaconf import OmegaConf
 
 from rgspipe.artifacts import Artifact, ArtifactStore, Key
 from rgspipe.cli.compose import compose_config
-from rgspipe.config import LIGHT_STUDIES, RgspipeConfig, get_value, with_changes
+from rgspipe.config import LIGHT_STUDIES, RgspipeConfig, with_changes
 from rgspipe.datasets.advice_file import own_views_in_order
 from rgspipe.errors import InputError
 from rgspipe.evaluation.light_study import KINDS
 from rgspipe.evaluation.tables import TARGET_COLUMNS
-from rgspipe.stages import light_study, load_stage
+from rgspipe.stages import light_study
 from rgspipe.stages.base import StageContext
-
-PIPELINES = Path(__file__).parents[2] / "pipelines"
 
 ADVICE = "added,views,camera,position_sd\nalone,2,view_1,0.004\nplan,2,train/r_0,0.001\n"
 ADVICE += "in_order,2,view_1,0.004\nin_order,3,view_2,0.003\nin_order,4,train/r_0,0.002\nin_order,5,view_3,0.001\n"
@@ -119,34 +115,6 @@ def test_every_study_that_is_prepared_composes_and_names_its_cases(name: str) ->
     study = config.light_study
     assert len(searches) == max(1, len(study.scenes)) * len(study.cases) * len(study.views)
     assert len(fits) - len(searches) == slow
-
-
-@pytest.mark.parametrize("name", ["light_views", "light_views_corner"])
-def test_sweeps_of_the_pipeline_make_the_fits_that_a_study_takes(name: str) -> None:
-    # Several at a time, and not twice.
-    study = compose_config(["stage=light_study", f"experiment={name}"])
-    needs = [need for need in light_study.STAGE.needs(study) if need.stage == "evaluate"]
-    wanted = [_recipe(with_changes(study, need.changes)) for need in needs]
-    steps = OmegaConf.to_container(OmegaConf.load(PIPELINES / "lights.yaml"))["steps"]
-    sweeps = [step["overrides"] for step in steps if step["stage"] == "evaluate"]
-    sweeps = [overrides for overrides in sweeps if f"experiment={name}" in overrides]
-    made = [_recipe(compose_config(["stage=evaluate", *job])) for overrides in sweeps for job in _jobs(overrides)]
-    assert sorted(made) == sorted(wanted)
-
-
-def _jobs(overrides: list[str]) -> Iterator[list[str]]:
-    """The jobs of a sweep over numbers of views."""
-    for text in overrides:
-        if text.startswith("views.count="):
-            others = [other for other in overrides if other != text]
-            yield from ([*others, f"views.count={count}"] for count in text.partition("=")[2].split(","))
-            return
-    yield overrides
-
-
-def _recipe(config: RgspipeConfig) -> str:
-    """What fits depend on."""
-    return json.dumps({key: get_value(config, key) for key in sorted(load_stage("fit_light").keys(config))})
 
 
 def test_the_papers_method_is_compared_on_the_targets_of_the_search() -> None:
