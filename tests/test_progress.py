@@ -53,3 +53,22 @@ def test_the_estimate_counts_later_items_and_what_follows(
         count, minutes, seconds = map(int, re.search(r" (\d+)/40 \[.*, (\d+):(\d+) left, loss", line).groups())
         assert 60 * minutes + seconds == 2 * (40 - count) + 100
     assert len(lines) == 4
+
+
+def test_what_was_done_before_tells_nothing_of_the_pace(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Work that is taken up at item 48 of 160, which is known only after 5 s; 12 s an item."""
+    clock = Clock()
+    monkeypatch.setattr("tqdm.std.time", clock)
+    with progress.track([], "frames", unit="frame") as bar:
+        clock.now += 5.0
+        bar.begin(total=160, done=48)
+        for _ in range(3):
+            clock.now += 12.0
+            bar.update(1)
+    lines = capsys.readouterr().err.splitlines()
+    for line in lines[1:]:
+        count, minutes, seconds = map(int, re.search(r" (\d+)/160 \[\d+:\d+<(\d+):(\d+),", line).groups())
+        assert abs(60 * minutes + seconds - 12 * (160 - count)) <= 1
+    assert count == 51 and len(lines) == 4

@@ -29,6 +29,16 @@ class _Bar(tqdm):
         self._after = after
         super().__init__(*arguments, bar_format=None if after is None else _FORMAT, **options)
 
+    def begin(self, total: int, done: int) -> None:
+        """Say only now how many items there are, of which `done` were done before and tell nothing of the pace.
+
+        The time up to now does not count either.
+        """
+        self.unpause()
+        self.total, self.initial = total, done
+        self.n = self.last_print_n = done
+        self.refresh()
+
     @property
     def format_dict(self) -> dict[str, Any]:
         """What `_FORMAT` may name."""
@@ -67,12 +77,12 @@ def track(
     *,
     done: int = 0,
     after: float | None = None,
-) -> tqdm:
+) -> _Bar:
     """Iterate over `items` while a progress line with an estimate stands on stderr.
 
     On a terminal the line is written over; in a log a new one comes every ten seconds. The returned bar can
-    be iterated over, or updated by hand (`bar.update(1)`) in a `with` block; `bar.set_postfix_str("38.2 dB",
-    refresh=False)` shows a figure beside the estimate.
+    be iterated over, or updated by hand (`bar.update(1)`) in a `with` block, where `bar.begin(total, done)` may say
+    later how much there is; `bar.set_postfix_str("38.2 dB", refresh=False)` shows a figure beside the estimate.
 
     Args:
         total: of items, those done before and later included; by default how many `items` has.

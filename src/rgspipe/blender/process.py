@@ -140,9 +140,7 @@ def _follow(child: subprocess.Popen, scene: str) -> tuple[str, dict | None]:
             message = json.loads(line[len(MESSAGE_PREFIX) :])
             input_error = message.get("input_error", input_error)
             if "total" in message:
-                bar.total, bar.initial = message["total"], message["done"]
-                bar.n = message["done"]
-                bar.refresh()
+                bar.begin(message["total"], message["done"])
             if "frame" in message:
                 bar.update(1)
     return "\n".join(tail), input_error
