@@ -47,6 +47,17 @@ def test_a_single_class_is_not_drawn_twice() -> None:
     assert [axis.get_title(loc="left") for axis in figure.axes] == ["around the corner", "", ""]
 
 
+@pytest.mark.parametrize("classes", [["around_corner", "all"], ["visible", "occluded", "all"]])
+def test_the_key_of_a_figure_over_views_has_room(classes: list[str]) -> None:
+    """A lone column of panels would cut off half of it."""
+    table = _table(occlusion=classes, views=[1, 3], method=["search_lm", "paper_adam"]).assign(predicted=0.006)
+    figure = light_study_figure(table, "views")
+    png_of(figure)
+    key = figure.legends[0].get_window_extent()
+    assert len(figure.legends[0].get_texts()) == 4 and key.x0 >= 0 and key.x1 <= figure.bbox.width
+    assert [axis.get_xlabel() for axis in figure.axes[-len(classes) :]] == ["views"] * len(classes)
+
+
 def test_without_predictions_none_are_drawn() -> None:
     figure = light_study_figure(_table(views=[1, 2], method=["search_lm", "paper_adam"]), "views")
     # Of each method what was measured and what fits state, and the limit of a success.

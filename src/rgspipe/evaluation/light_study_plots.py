@@ -68,7 +68,8 @@ def views_figure(table: pd.DataFrame) -> Figure:
     """Error, success rate and time against the number of views: a column a class, bands are 95 % intervals.
 
     Beside the measured median error stand the median of what fits state of themselves (dashed) and, where the table
-    has it, what the fits with the fewest views foretell (dotted).
+    has it, what the fits with the fewest views foretell (dotted). A single class has its panels side by side, as a
+    lone column is too narrow for the key above it.
     """
     table = without_repeats(table)
     columns = [
@@ -78,8 +79,7 @@ def views_figure(table: pd.DataFrame) -> Figure:
     many_methods = table["method"].nunique() > 1
     order = list(dict.fromkeys(table[series].itertuples(index=False, name=None)))
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(1.2 + 2.3 * len(columns), 6.4), layout="constrained")
-        axes = figure.subplots(len(VIEW_PANELS), len(columns), squeeze=False, sharex=True, sharey="row")
+        figure, axes = _view_axes(len(columns))
         _logarithmic(axes[0, 0].yaxis, axes[0, :], "y")
         if many_methods:
             _logarithmic(axes[2, 0].yaxis, axes[2, :], "y")
@@ -90,13 +90,23 @@ def views_figure(table: pd.DataFrame) -> Figure:
             axes[0, column].set_title(_title(scene, name, table))
             for row, (measure, _, factor) in enumerate(VIEW_PANELS):
                 _view_lines(axes[row, column], part, series, order, measure, factor)
-            axes[-1, column].set_xlabel("views")
-            axes[-1, column].xaxis.set_major_locator(MaxNLocator(integer=True))
+        for axis in axes[-1, :] if len(columns) > 1 else axes[:, 0]:
+            axis.set_xlabel("views")
+            axis.xaxis.set_major_locator(MaxNLocator(integer=True))
         axes[1, 0].set_ylim(-4.0, 104.0)
         if not many_methods:
             axes[2, 0].set_ylim(bottom=0.0)
         figure.legend(handles=_view_handles(table, series), loc="outside upper center", ncols=4)
     return figure
+
+
+def _view_axes(columns: int) -> tuple[Figure, np.ndarray]:
+    """A figure and its axes by measure and class."""
+    if columns == 1:
+        figure = Figure(figsize=(9.0, 3.2), layout="constrained")
+        return figure, figure.subplots(1, len(VIEW_PANELS), squeeze=False, sharex=True).T
+    figure = Figure(figsize=(1.2 + 2.3 * columns, 6.4), layout="constrained")
+    return figure, figure.subplots(len(VIEW_PANELS), columns, squeeze=False, sharex=True, sharey="row")
 
 
 def rows_figure(
