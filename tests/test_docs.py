@@ -15,6 +15,8 @@ LINK = re.compile(r"\]\((?!https?://)([^)#\s]+)[^)]*\)")
 #: page.md, "Section"; the page may be a link.
 SECTION = re.compile(r"([a-z_]+\.md)\)?, \"([^\"]+)\"")
 HEADING = re.compile(r"^#+ (.+)$", re.MULTILINE)
+#: Lines of a table, one after the other.
+TABLE = re.compile(r"(?:^\|.*\n)+", re.MULTILINE)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
@@ -28,6 +30,15 @@ def test_sections_that_are_named_exist(page: Path) -> None:
     named = SECTION.findall(page.read_text())
     found = {name: HEADING.findall((ROOT / "docs" / name).read_text()) for name, _ in named}
     assert [(name, section) for name, section in named if section not in found[name]] == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_tables_are_whole(page: Path) -> None:
+    """Each has a head, and as many cells in all rows: an empty line would make text of the rows after it."""
+    for table in TABLE.findall(page.read_text()):
+        rows = table.splitlines()
+        assert len(rows) > 1 and set(rows[1]) == set("|- "), rows[0]
+        assert len({row.count("|") for row in rows}) == 1, rows[0]
 
 
 def test_readme_lists_every_page() -> None:

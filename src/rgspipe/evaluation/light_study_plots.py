@@ -90,9 +90,10 @@ def views_figure(table: pd.DataFrame) -> Figure:
             axes[0, column].set_title(_title(scene, name, table))
             for row, (measure, _, factor) in enumerate(VIEW_PANELS):
                 _view_lines(axes[row, column], part, series, order, measure, factor)
-        for axis in axes[-1, :] if len(columns) > 1 else axes[:, 0]:
-            axis.set_xlabel("views")
+        for axis in axes.flat:
             axis.xaxis.set_major_locator(MaxNLocator(integer=True))
+            if axis.get_subplotspec().is_last_row():
+                axis.set_xlabel("views")
         axes[1, 0].set_ylim(-4.0, 104.0)
         if not many_methods:
             axes[2, 0].set_ylim(bottom=0.0)
