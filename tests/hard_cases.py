@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from lit_room import solid_box
-from rgspipe.fitting.paper_adam_start import SCENE_REACH
+from rgspipe.fitting.baselines.paper_adam_start import SCENE_REACH
 from rgspipe.scene import Camera, SpotLight, Surfels, look_at
 from rooms import closed_box, rectangle, surfels_on
 

@@ -8,7 +8,7 @@ import torch
 from scipy.ndimage import gaussian_filter
 
 from rgspipe.evaluation import image_metrics, metrics
-from rgspipe.fitting import ssim as loss
+from rgspipe.optim import ssim as loss
 
 MEASURES = (image_metrics.ssim, image_metrics.hdr_flip)
 

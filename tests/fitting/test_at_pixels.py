@@ -6,10 +6,10 @@ import pytest
 import torch
 
 from rgspipe.benchmark.rooms import ROOMS
-from rgspipe.fitting.dictionary import LightDictionary, build_dictionary
 from rgspipe.fitting.fit import fit_lights, prepare_fit, render_light
-from rgspipe.fitting.parameters import Emitter
-from rgspipe.fitting.problem import Effects, LightProblem
+from rgspipe.fitting.model.parameters import Emitter
+from rgspipe.fitting.model.problem import Effects, LightProblem
+from rgspipe.fitting.search.dictionary import LightDictionary, build_dictionary
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.pixel_direct import PixelDirect, surfel_shares
 from rgspipe.scene import PointLight

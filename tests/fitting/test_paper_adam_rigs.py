@@ -15,12 +15,12 @@ from hard_cases import room as small_room
 from lit_room import VISIBLE
 from rgspipe import fit_lights
 from rgspipe.fitting import AdamOptions, Effects, LightSpec
-from rgspipe.fitting.paper_adam_loss import AdamLoss, MovingRig, rig_image
-from rgspipe.fitting.parameters import Emitter
-from rgspipe.fitting.problem import LightProblem
+from rgspipe.fitting.baselines.paper_adam_loss import AdamLoss, MovingRig, rig_image
+from rgspipe.fitting.model.parameters import Emitter
+from rgspipe.fitting.model.problem import LightProblem
+from rgspipe.fitting.model.spot_harmonics import BandLimit, legendre, zonal_coefficients
+from rgspipe.fitting.model.views import prepare_views
 from rgspipe.fitting.search_lm import fit_from
-from rgspipe.fitting.spot_harmonics import BandLimit, legendre, zonal_coefficients
-from rgspipe.fitting.views import prepare_views
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.spot import SpotShape, angle_from_axis
 from rgspipe.scene import SpotLight

@@ -12,10 +12,10 @@ from lit_room import HIDDEN, VISIBLE
 from rgspipe import fit_lights
 from rgspipe.errors import InputError
 from rgspipe.fitting import FitStatus, LightSpec, SearchOptions, prepare_fit
-from rgspipe.fitting.judge import MERGED, worth_keeping
-from rgspipe.fitting.parameters import Emitter
-from rgspipe.fitting.problem import LightProblem
-from rgspipe.fitting.refine import ROBUST, search_region, start_from
+from rgspipe.fitting.model.parameters import Emitter
+from rgspipe.fitting.model.problem import LightProblem
+from rgspipe.fitting.search.judge import MERGED, worth_keeping
+from rgspipe.fitting.search.refine import ROBUST, search_region, start_from
 from rgspipe.fitting.search_lm import _Search, fit_from
 
 

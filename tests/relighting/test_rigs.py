@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 import torch
 
-from rgspipe.fitting.dictionary import LightDictionary
+from rgspipe.fitting.search.dictionary import LightDictionary
 from rgspipe.relighting.rigs import TINT, random_rig
 
 POSITIONS = torch.arange(15.0).reshape(5, 3)

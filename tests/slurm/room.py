@@ -11,7 +11,7 @@ from rgspipe.datasets.exr import write_image
 from rgspipe.datasets.gs3_write import frame_entry, write_transforms
 from rgspipe.datasets.ply import save_ply
 from rgspipe.fitting.fit import prepare_fit, render_light
-from rgspipe.fitting.problem import Effects
+from rgspipe.fitting.model.problem import Effects
 from rgspipe.scene import PointLight
 
 #: Where the light of each target is.

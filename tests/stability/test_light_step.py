@@ -11,10 +11,10 @@ from torch import Tensor
 import double_precision
 from double_precision import DoubleStep
 from hard_cases import CAMERAS, DEEP, INSIDE, LIGHTS, SCENES, HardScene, camera, scene_of_light
-from rgspipe.fitting.paper_adam_loss import AdamLoss, MovingRig
-from rgspipe.fitting.parameters import Emitter
-from rgspipe.fitting.problem import Effects, LightProblem
-from rgspipe.fitting.views import PreparedViews
+from rgspipe.fitting.baselines.paper_adam_loss import AdamLoss, MovingRig
+from rgspipe.fitting.model.parameters import Emitter
+from rgspipe.fitting.model.problem import Effects, LightProblem
+from rgspipe.fitting.model.views import PreparedViews
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import PointLight
 

@@ -12,11 +12,11 @@ import double_precision
 from hard_cases import INSIDE, a_few, camera, room
 from rgspipe.errors import InputError
 from rgspipe.fitting import build_dictionary, fit_lights, prepare_fit
-from rgspipe.fitting.paper_adam_loss import AdamLoss, MovingRig
-from rgspipe.fitting.paper_adam_start import Ball, light_ball
-from rgspipe.fitting.problem import Effects
-from rgspipe.fitting.ssim import ssim
-from rgspipe.fitting.views import PreparedViews, prepare_views
+from rgspipe.fitting.baselines.paper_adam_loss import AdamLoss, MovingRig
+from rgspipe.fitting.baselines.paper_adam_start import Ball, light_ball
+from rgspipe.fitting.model.problem import Effects
+from rgspipe.fitting.model.views import PreparedViews, prepare_views
+from rgspipe.optim.ssim import ssim
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import PointLight
 

@@ -7,9 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import double_precision
-from rgspipe.fitting.moments import moments
-from rgspipe.fitting.ssim import ssim
-from rgspipe.fitting.uncertainty import whitener
+from rgspipe.fitting.certainty.uncertainty import whitener
+from rgspipe.fitting.model.moments import moments
+from rgspipe.optim.ssim import ssim
 
 search = settings(max_examples=100, derandomize=True, deadline=None, database=None)
 

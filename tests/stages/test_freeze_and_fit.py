@@ -22,7 +22,7 @@ from rgspipe.datasets.light_file import read_lights
 from rgspipe.datasets.surfel_file import save_surfels
 from rgspipe.errors import InputError
 from rgspipe.fitting.fit import prepare_fit, render_light
-from rgspipe.fitting.problem import Effects
+from rgspipe.fitting.model.problem import Effects
 from rgspipe.scene import PointLight
 from rgspipe.stages import fit_extras, fit_light, freeze
 from rgspipe.stages.base import StageContext

@@ -8,7 +8,7 @@ import pytest
 
 from rgspipe.config import RgspipeConfig, with_changes
 from rgspipe.errors import InputError
-from rgspipe.fitting.spot_harmonics import BandLimit
+from rgspipe.fitting.model.spot_harmonics import BandLimit
 from rgspipe.stages.fit_light import STAGE, band_limit, light_spec
 
 

@@ -23,7 +23,7 @@ from rgspipe.datasets.ply import load_ply, save_ply
 from rgspipe.datasets.surfel_file import load_surfels
 from rgspipe.errors import InputError
 from rgspipe.fitting.fit import prepare_fit, render_light
-from rgspipe.fitting.problem import Effects
+from rgspipe.fitting.model.problem import Effects
 from rgspipe.pipeline import resolve, run
 from rgspipe.scene import PointLight
 from rgspipe.stages import load_stage

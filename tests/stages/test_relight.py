@@ -22,7 +22,7 @@ from rgspipe.datasets.frozen_file import load_frozen
 from rgspipe.datasets.light_file import read_lights, write_lights
 from rgspipe.errors import InputError
 from rgspipe.fitting.fit import prepare_fit, render_rig
-from rgspipe.fitting.problem import Effects
+from rgspipe.fitting.model.problem import Effects
 from rgspipe.scene import LightRig, PointLight, SpotLight
 from rgspipe.stages import relight
 from rgspipe.stages.base import Need, StageContext

@@ -8,9 +8,9 @@ import torch
 from torch import Tensor
 
 from rgspipe.evaluation.timing import Timing, measure
-from rgspipe.fitting.parameters import Emitter
-from rgspipe.fitting.problem import LightProblem
-from rgspipe.fitting.views import prepare_views
+from rgspipe.fitting.model.parameters import Emitter
+from rgspipe.fitting.model.problem import LightProblem
+from rgspipe.fitting.model.views import prepare_views
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.radiosity import solve_radiosity
 from rgspipe.renderer.sparse import stack

@@ -15,10 +15,10 @@ from torch import Tensor
 
 from rgspipe.benchmark.form_factors import unoccluded_form_factors, with_sampled_visibility
 from rgspipe.benchmark.rooms import Room
-from rgspipe.fitting.parameters import Emitter
-from rgspipe.fitting.problem import LightProblem
+from rgspipe.fitting.model.parameters import Emitter
+from rgspipe.fitting.model.problem import LightProblem
+from rgspipe.fitting.model.views import prepare_views
 from rgspipe.fitting.search_lm import fit_from
-from rgspipe.fitting.views import prepare_views
 from rgspipe.progress import track
 from rgspipe.renderer.areas import surfel_areas
 from rgspipe.renderer.clusters import cluster_patches

@@ -9,10 +9,10 @@ import pandas as pd
 from rgspipe.benchmark.rooms import Room
 from rgspipe.benchmark.settings import Model
 from rgspipe.benchmark.truth import Truth
-from rgspipe.fitting.parameters import Emitter
-from rgspipe.fitting.problem import LightProblem
+from rgspipe.fitting.model.parameters import Emitter
+from rgspipe.fitting.model.problem import LightProblem
+from rgspipe.fitting.model.views import prepare_views
 from rgspipe.fitting.search_lm import fit_from
-from rgspipe.fitting.views import prepare_views
 
 #: Lights at least this far from any surface [scene units] count as in the open.
 IN_THE_OPEN = 0.1

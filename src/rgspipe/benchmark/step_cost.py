@@ -10,9 +10,9 @@ from torch import Tensor
 
 from rgspipe.benchmark.settings import Model
 from rgspipe.evaluation.timing import median_ms
-from rgspipe.fitting.parameters import Emitter
-from rgspipe.fitting.problem import Effects, LightProblem
-from rgspipe.fitting.views import prepare_views
+from rgspipe.fitting.model.parameters import Emitter
+from rgspipe.fitting.model.problem import Effects, LightProblem
+from rgspipe.fitting.model.views import prepare_views
 from rgspipe.machine import peak_memory_now_mib, reset_peak_memory
 from rgspipe.scene import PointLight
 

@@ -11,7 +11,7 @@ from torch import Tensor
 from rgspipe.datasets.surfel_file import load_surfels, save_surfels
 from rgspipe.datasets.tensor_file import load_tensors, save_tensors
 from rgspipe.errors import InputError
-from rgspipe.fitting.dictionary import LightDictionary
+from rgspipe.fitting.search.dictionary import LightDictionary
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.glossy_operators import OPERATOR_NAMES, PAIR_NAMES, Exchange, GlossyOperators
 from rgspipe.renderer.glossy_transport import GlossyTransport

@@ -16,7 +16,7 @@ from rgspipe.evaluation.error_split import pixel_kinds, split_error
 from rgspipe.evaluation.held_out import QUALITY, albedo_of_views, held_out_summary, quality_row, view_table
 from rgspipe.evaluation.images import Bytes, comparison_strip
 from rgspipe.fitting.fit import prepare_fit, render_light
-from rgspipe.fitting.problem import Effects
+from rgspipe.fitting.model.problem import Effects
 from rgspipe.progress import track
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.view_weights import ViewWeights

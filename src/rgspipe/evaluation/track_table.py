@@ -16,7 +16,7 @@ from rgspipe.evaluation import metrics, plots
 from rgspipe.evaluation.arrays import ArrayLike, to_array
 from rgspipe.evaluation.scene_drawing import PANELS, TRUTH, draw_surfaces, frame_panel, window
 from rgspipe.evaluation.tables import match_positions
-from rgspipe.fitting.tracked_frame import TrackedFrame
+from rgspipe.fitting.tracking.frame import TrackedFrame
 from rgspipe.scene import Light, LightRig, SpotLight
 
 #: Colours of the lights, in turn.

@@ -8,19 +8,19 @@ from dataclasses import dataclass, replace
 import torch
 from torch import Tensor
 
-from rgspipe.fitting.blocks import BlockModel, block_model
-from rgspipe.fitting.capture import ImageCapture
-from rgspipe.fitting.coarse import CoarseImages, coarse_images
-from rgspipe.fitting.dictionary import LightDictionary, build_dictionary
-from rgspipe.fitting.gloss import bounced_light
-from rgspipe.fitting.paper_adam import AdamOptions, fit_paper_adam
-from rgspipe.fitting.paper_adam_start import LightPrior
-from rgspipe.fitting.problem import Effects, LightProblem
+from rgspipe.fitting.baselines.paper_adam import AdamOptions, fit_paper_adam
+from rgspipe.fitting.baselines.paper_adam_start import LightPrior
+from rgspipe.fitting.model.blocks import BlockModel, block_model
+from rgspipe.fitting.model.capture import ImageCapture
+from rgspipe.fitting.model.gloss import bounced_light
+from rgspipe.fitting.model.problem import Effects, LightProblem
+from rgspipe.fitting.model.views import PreparedViews, prepare_views
 from rgspipe.fitting.result import FitResult
+from rgspipe.fitting.search.coarse import CoarseImages, coarse_images
+from rgspipe.fitting.search.dictionary import LightDictionary, build_dictionary
+from rgspipe.fitting.search.spot_candidates import spot_candidates
 from rgspipe.fitting.search_lm import SearchOptions, fit_search_lm
 from rgspipe.fitting.spec import LightSpec
-from rgspipe.fitting.spot_candidates import spot_candidates
-from rgspipe.fitting.views import PreparedViews, prepare_views
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.pixel_direct import surfel_shares
 from rgspipe.renderer.rig import Rig, unit_response

@@ -80,9 +80,9 @@ class FitResult:
         covariance: per light a symmetric float64 matrix, of (x, y, z, r, g, b) for a point light; for a spot the axis
             as a vector follows the position, and where they were free the cone angle and (Gaussian) falloff [rad]:
             (x, y, z, ax, ay, az, [cone, [falloff]], r, g, b). Of noise and errors of the model together, calibrated;
-            see `fitting.uncertainty`. What the views do not determine has an infinite variance, and `reason` says so.
+            see `certainty.uncertainty`. What the views do not determine has an infinite variance, and `reason` says so.
         trajectory: the steps from the start that won to the end, the start included.
-        costs: by number of lights that was tried, the robust cost of the best rig of so many; see `fitting.judge`.
+        costs: by number of lights that was tried, the robust cost of the best rig of so many; see `search.judge`.
         noise_covariance: the same with the residual as independent noise of the pixels, by plain Gauss-Newton. Errors
             of the model are shared by neighbouring pixels, so it is far too small for a scene that was trained.
         exposures: of each view over the first one's; all 1 where they were known.

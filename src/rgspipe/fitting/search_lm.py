@@ -8,11 +8,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import zip_longest
 
-from rgspipe.fitting.blocks import BlockModel, view_of_blocks
-from rgspipe.fitting.coarse import CoarseImages
-from rgspipe.fitting.doubts import doubts
-from rgspipe.fitting.exposure import rough_exposures
-from rgspipe.fitting.judge import (
+from rgspipe.fitting.certainty.doubts import doubts
+from rgspipe.fitting.certainty.uncertainty import light_covariances
+from rgspipe.fitting.model.blocks import BlockModel, view_of_blocks
+from rgspipe.fitting.model.exposure import rough_exposures
+from rgspipe.fitting.model.parameters import Emitter
+from rgspipe.fitting.model.problem import LightProblem
+from rgspipe.fitting.result import FitResult, dark_result
+from rgspipe.fitting.search.coarse import CoarseImages
+from rgspipe.fitting.search.judge import (
     CLEARLY_APART,
     DOUBTFUL_DROP,
     LEAST_DROP,
@@ -26,11 +30,7 @@ from rgspipe.fitting.judge import (
     worth_keeping,
     worth_one_more,
 )
-from rgspipe.fitting.one_less import one_light_less
-from rgspipe.fitting.one_more import one_more_light
-from rgspipe.fitting.parameters import Emitter
-from rgspipe.fitting.problem import LightProblem
-from rgspipe.fitting.refine import (
+from rgspipe.fitting.search.refine import (
     PLAIN,
     ROBUST,
     Region,
@@ -42,12 +42,12 @@ from rgspipe.fitting.refine import (
     start_from,
     weights_at,
 )
-from rgspipe.fitting.result import FitResult, dark_result
-from rgspipe.fitting.schedule import SHORT_ITERATIONS, refine_starts
+from rgspipe.fitting.search.schedule import SHORT_ITERATIONS, refine_starts
+from rgspipe.fitting.search.starts import Candidates, Rig
+from rgspipe.fitting.selection.one_less import one_light_less
+from rgspipe.fitting.selection.one_more import one_more_light
+from rgspipe.fitting.selection.verdict import Findings, SpareLight, counted_from, percent
 from rgspipe.fitting.spec import MOST_LIGHTS, LightSpec
-from rgspipe.fitting.starts import Candidates, Rig
-from rgspipe.fitting.uncertainty import light_covariances
-from rgspipe.fitting.verdict import Findings, SpareLight, counted_from, percent
 
 #: Starts for each wanted one, where spots are among the candidates.
 SPOT_STARTS = 3

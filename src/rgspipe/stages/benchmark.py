@@ -125,6 +125,7 @@ STAGE = Stage(
         "rgspipe.blender",
         "rgspipe.evaluation",
         "rgspipe.fitting",
+        "rgspipe.optim",
         "rgspipe.renderer",
         "rgspipe.resources",
     ),

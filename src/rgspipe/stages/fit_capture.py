@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from rgspipe.config import RgspipeConfig
 from rgspipe.datasets.views import View
 from rgspipe.errors import InputError
-from rgspipe.fitting.capture import ImageCapture, stored_in_eight_bits
+from rgspipe.fitting.model.capture import ImageCapture, stored_in_eight_bits
 from rgspipe.robustness.target_capture import TargetCapture, captured
 
 #: Configuration keys that all this depends on, and code.

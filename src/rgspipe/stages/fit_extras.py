@@ -18,11 +18,11 @@ from rgspipe.datasets.json_file import numbers
 from rgspipe.datasets.landscape_file import Landscape, PlaneLoss, landscape_bytes
 from rgspipe.datasets.location import dataset_root
 from rgspipe.fitting import FitResult, FitViews
-from rgspipe.fitting.advice import SPOT_ROWS, ViewAdvice, suggest_views
-from rgspipe.fitting.capture import ImageCapture
-from rgspipe.fitting.landscape import loss_slices
-from rgspipe.fitting.parameters import Emitter
-from rgspipe.fitting.problem import LightProblem
+from rgspipe.fitting.certainty.advice import SPOT_ROWS, ViewAdvice, suggest_views
+from rgspipe.fitting.certainty.landscape import loss_slices
+from rgspipe.fitting.model.capture import ImageCapture
+from rgspipe.fitting.model.parameters import Emitter
+from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.scene import Camera
 
 #: A camera and its name.

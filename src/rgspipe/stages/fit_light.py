@@ -29,8 +29,8 @@ from rgspipe.fitting import (
     fit_lights,
     prepare_fit,
 )
+from rgspipe.fitting.model.spot_harmonics import BandLimit
 from rgspipe.fitting.spec import MOST_LIGHTS
-from rgspipe.fitting.spot_harmonics import BandLimit
 from rgspipe.progress import track
 from rgspipe.renderer.effect_bounds import NO_BOUND, EffectBounds
 from rgspipe.renderer.effects import Decision, EffectChoice, RigKind
@@ -360,6 +360,7 @@ STAGE = Stage(
     config_keys=_keys,
     code=(
         "rgspipe.fitting",
+        "rgspipe.optim",
         "rgspipe.renderer",
         "rgspipe.scene",
         "rgspipe.datasets.covariance_file",

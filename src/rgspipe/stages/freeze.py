@@ -8,7 +8,7 @@ from dataclasses import asdict
 from rgspipe.datasets.frozen_file import DICTIONARY, EFFECTS, SURFELS, save_dictionary, save_frozen
 from rgspipe.datasets.json_file import write_json
 from rgspipe.datasets.surfel_file import load_surfels
-from rgspipe.fitting.dictionary import build_dictionary
+from rgspipe.fitting.search.dictionary import build_dictionary
 from rgspipe.renderer.effect_bounds import measure_costs, measure_effects
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.robustness.model_error import ModelError, with_error
@@ -60,8 +60,8 @@ STAGE = Stage(
         "rgspipe.scene",
         "rgspipe.datasets.frozen_file",
         "rgspipe.datasets.surfel_file",
-        "rgspipe.fitting.dictionary",
-        "rgspipe.fitting.surroundings",
+        "rgspipe.fitting.search.dictionary",
+        "rgspipe.fitting.search.surroundings",
         "rgspipe.robustness.model_error",
     ),
     run=run,

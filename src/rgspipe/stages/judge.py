@@ -54,6 +54,7 @@ STAGE = Stage(
         "rgspipe.datasets.frozen_file",
         "rgspipe.evaluation",
         "rgspipe.fitting",
+        "rgspipe.optim",
         "rgspipe.renderer",
         "rgspipe.training",
     ),

@@ -157,6 +157,7 @@ STAGE = Stage(
         "rgspipe.datasets.light_file",
         "rgspipe.evaluation",
         "rgspipe.fitting",
+        "rgspipe.optim",
         "rgspipe.relighting",
         "rgspipe.renderer",
         "rgspipe.scene",

@@ -19,8 +19,8 @@ from rgspipe.datasets.location import dataset_root, open_dataset
 from rgspipe.datasets.views import View
 from rgspipe.errors import InputError
 from rgspipe.fitting.fit import FitViews, render_rig
-from rgspipe.fitting.problem import Effects
-from rgspipe.fitting.views import PreparedViews, prepare_views
+from rgspipe.fitting.model.problem import Effects
+from rgspipe.fitting.model.views import PreparedViews, prepare_views
 from rgspipe.renderer.effects import RigKind
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.view_weights import ViewWeights

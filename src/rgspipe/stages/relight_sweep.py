@@ -11,7 +11,7 @@ import torch
 from rgspipe.config import RelightConfig
 from rgspipe.errors import InputError
 from rgspipe.evaluation.images import save_png
-from rgspipe.fitting.surroundings import is_open
+from rgspipe.fitting.search.surroundings import is_open
 from rgspipe.progress import track
 from rgspipe.relighting.pictures import developed, grid, video
 from rgspipe.relighting.sweeps import (

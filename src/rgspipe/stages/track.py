@@ -15,10 +15,10 @@ from rgspipe.errors import InputError
 from rgspipe.evaluation.plots import png_of
 from rgspipe.evaluation.track_table import track_figure, track_table
 from rgspipe.fitting import SearchOptions
-from rgspipe.fitting.capture import ImageCapture
 from rgspipe.fitting.fit import FitViews
-from rgspipe.fitting.track import TrackOptions, track_lights
-from rgspipe.fitting.tracked_frame import FrameStatus
+from rgspipe.fitting.model.capture import ImageCapture
+from rgspipe.fitting.tracking.frame import FrameStatus
+from rgspipe.fitting.tracking.track import TrackOptions, track_lights
 from rgspipe.scene import LightRig
 from rgspipe.stages import fit_capture, fit_light
 from rgspipe.stages.base import Need, Stage, StageContext

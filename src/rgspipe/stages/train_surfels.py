@@ -185,6 +185,6 @@ STAGE = Stage(
         "rgspipe.evaluation.image_metrics",
         "rgspipe.evaluation.images",
         "rgspipe.evaluation.metrics",
-        "rgspipe.fitting.ssim",
+        "rgspipe.optim.ssim",
     ),
 )

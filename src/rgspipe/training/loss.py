@@ -9,7 +9,7 @@ from typing import Literal
 import torch
 from torch import Tensor
 
-from rgspipe.fitting.ssim import ssim_map
+from rgspipe.optim.ssim import ssim_map
 
 LossKind = Literal["l2", "l1", "l1_ssim"]
 

@@ -1,0 +1,1 @@
+"""The published method, as it is written: a problem in, lights out."""

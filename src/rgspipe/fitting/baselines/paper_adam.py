@@ -1,0 +1,197 @@
+"""`fit=paper_adam`: the baseline, Adam on positions, log-intensities and axes from one start.
+
+Loss, bounds, learning rates and starts are those of the published method; nothing here is improved on it,
+so that it can be compared with.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+
+import torch
+from torch import Tensor
+
+from rgspipe.fitting.baselines.paper_adam_loss import AdamLoss, MovingRig
+from rgspipe.fitting.baselines.paper_adam_start import (
+    LOG_INTENSITY_LIMIT,
+    Ball,
+    LightPrior,
+    StartOptions,
+    draw_start,
+    light_ball,
+)
+from rgspipe.fitting.certainty.doubts import doubts
+from rgspipe.fitting.certainty.uncertainty import light_covariances
+from rgspipe.fitting.model.problem import LightProblem
+from rgspipe.fitting.result import REASONS, FitResult, FitStatus, Step, dark_result
+from rgspipe.fitting.search.refine import State
+from rgspipe.fitting.spec import LightSpec
+from rgspipe.progress import track
+
+
+@dataclass(frozen=True)
+class AdamOptions:
+    """The published method's settings.
+
+    Attributes:
+        epochs, steps: epochs of so many steps each.
+        position_rate: learning rate of the positions.
+        intensity_rate: learning rate of the log-intensities.
+        ssim_weight: λ, the share of structural similarity in the loss.
+        init, random_intensity: see `StartOptions`.
+        patience: stop after so many epochs without a lower loss; None never stops early.
+        axis_rate: learning rate of spots' axes.
+        aim: see `StartOptions`.
+    """
+
+    epochs: int = 25
+    steps: int = 50
+    position_rate: float = 0.01
+    intensity_rate: float = 0.05
+    ssim_weight: float = 0.2
+    init: str = "dataset"
+    random_intensity: bool = False
+    patience: int | None = None
+    axis_rate: float = 0.005
+    aim: str = "center"
+
+    @property
+    def start(self) -> StartOptions:
+        return StartOptions(self.init, self.random_intensity, self.aim)
+
+
+def fit_paper_adam(
+    problem: LightProblem,
+    target: Tensor,
+    options: AdamOptions,
+    prior: LightPrior | None,
+    seed: int,
+    spec: LightSpec | None = None,
+) -> FitResult:
+    """A known number of point lights, or of spots with known cones, by Adam.
+
+    Args:
+        problem: the same target, for its covariance and effects.
+        target: (all pixels, 3), the views' images stacked.
+        prior: the training lights; without them the start is drawn from the sphere.
+        seed: of the start.
+        spec: type and number of the lights, spots' profile; one point light if None.
+
+    Raises:
+        ValueError: type, number or cones are not known.
+    """
+    begin = time.perf_counter()
+    spec = spec or LightSpec()
+    if spec.type == "auto" or spec.count is None or spec.cone_free:
+        raise ValueError("paper_adam needs lights of known type, number and cone: use search_lm")
+    if problem.black:
+        return dark_result(time.perf_counter() - begin)
+    descent = _Descent.create(problem, target, options, prior, seed, spec, begin)
+    status = descent.run()
+    return _result(problem, descent, status, begin)
+
+
+@dataclass
+class _Descent:
+    """Adam on one rig, with all steps that it took; the start is the first."""
+
+    loss: AdamLoss
+    options: AdamOptions
+    ball: Ball
+    rig: MovingRig
+    begin: float
+    steps: list[Step]
+
+    @classmethod
+    def create(
+        cls,
+        problem: LightProblem,
+        target: Tensor,
+        options: AdamOptions,
+        prior: LightPrior | None,
+        seed: int,
+        spec: LightSpec,
+        begin: float,
+    ) -> _Descent:
+        ball, scene_radius = light_ball(problem.views.frozen, prior)
+        start = draw_start(ball, scene_radius, prior, options.start, seed, spec.count)
+        rig = MovingRig(start.positions.clone().requires_grad_(), start.log_intensities.clone().requires_grad_())
+        if spec.spots:
+            rig = replace(rig, axes=start.axes.clone().requires_grad_(), shape=spec.shape)
+        loss = AdamLoss(problem.views, target, options.ssim_weight, problem.effects)
+        return cls(loss, options, ball, rig, begin, [])
+
+    def run(self) -> FitStatus:
+        """All steps; each one's loss is that of its own lights."""
+        options, optimiser = self.options, self._optimiser()
+        for index in track(range(options.epochs * options.steps), "Adam", unit="step"):
+            optimiser.zero_grad()
+            loss = self.loss(self.rig)
+            self._record(loss)
+            if _stalled(self.steps, index, options):
+                return FitStatus.CONVERGED
+            loss.backward()
+            optimiser.step()
+            self._bound()
+        with torch.no_grad():
+            self._record(self.loss(self.rig))
+        return FitStatus.MAX_ITERATIONS
+
+    def _optimiser(self) -> torch.optim.Adam:
+        options, rig = self.options, self.rig
+        rates = [(rig.positions, options.position_rate), (rig.log_intensities, options.intensity_rate)]
+        rates += [] if rig.axes is None else [(rig.axes, options.axis_rate)]
+        return torch.optim.Adam([{"params": [leaf], "lr": rate} for leaf, rate in rates])
+
+    def _record(self, loss: Tensor) -> None:
+        self.steps.append(Step(float(loss.detach()), self.rig.lights(), time.perf_counter() - self.begin))
+
+    @torch.no_grad()
+    def _bound(self) -> None:
+        """Positions back into the ball, log-intensities into their range, axes to unit length."""
+        rig = self.rig
+        rig.positions.copy_(self.ball.project(rig.positions))
+        rig.log_intensities.clamp_(-LOG_INTENSITY_LIMIT, LOG_INTENSITY_LIMIT)
+        if rig.axes is not None:
+            rig.axes.copy_(torch.nn.functional.normalize(rig.axes, dim=1))
+
+
+def _result(problem: LightProblem, descent: _Descent, status: FitStatus, begin: float) -> FitResult:
+    rig, last = descent.rig, descent.steps[-1]
+    status = FitStatus.AT_BOUND if descent.ball.at_bound(rig.positions.detach()) else status
+    emitters = rig.emitters()
+    intensities = torch.stack([light.intensity for light in last.lights])
+    state = State(emitters, [problem.evaluate(emitter) for emitter in emitters], intensities / problem.scale)
+    spread = light_covariances(problem, state)
+    doubt = doubts(last.lights, spread.calibrated, problem.views.frozen.surfels, problem.views.frozen.size)
+    return FitResult(
+        lights=last.lights,
+        status=status,
+        reason=f"{_ended(descent) if status is FitStatus.MAX_ITERATIONS else REASONS[status]} {doubt}".rstrip(),
+        loss=last.loss,
+        iterations=len(descent.steps) - 1,
+        evaluations=len(emitters) * (len(descent.steps) + 1),
+        lights_tried=len(emitters),
+        seconds=time.perf_counter() - begin,
+        covariance=spread.calibrated,
+        trajectory=tuple(descent.steps),
+        noise_covariance=spread.noise,
+    )
+
+
+def _ended(descent: _Descent) -> str:
+    """What the last epoch brought: the method takes all of its steps, whether the loss still falls or not."""
+    losses = [step.loss for step in descent.steps]
+    before = losses[-min(len(losses), descent.options.steps + 1)]
+    change = 100.0 * (losses[-1] / before - 1.0) if before > 0.0 else 0.0
+    words = "hardly changed" if abs(change) < 1.0 else f"{'fell' if change < 0.0 else 'rose'} by {abs(change):.0f} %"
+    return f"All {len(losses) - 1} steps were taken; over the last epoch the loss {words}."
+
+
+def _stalled(steps: list[Step], index: int, options: AdamOptions) -> bool:
+    """Whether the last `patience` epochs brought no lower loss."""
+    if options.patience is None or index < options.patience * options.steps or index == 0:
+        return False
+    recent = options.patience * options.steps
+    return min(step.loss for step in steps[-recent:]) >= min(step.loss for step in steps[:-recent])

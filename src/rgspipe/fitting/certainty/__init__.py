@@ -1,0 +1,1 @@
+"""How sure a fit is: a fitted rig in; covariances, doubts, the loss around it and views that would help out."""

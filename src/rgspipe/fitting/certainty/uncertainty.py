@@ -1,0 +1,150 @@
+"""How sure a fit is of its lights: the noise of the pixels, and errors of the model that neighbouring places share.
+
+With J the derivatives of the image towards the n unknowns x (parameters of all lights and their intensities), r the
+residual and H = Σ JᵀJ, the covariance is
+
+    H^{-½} (σ² I + κ² (V − σ² I)₊) H^{-½} ,     V = Σ_k d_k d_kᵀ ,     d_k = (I − G_k)⁻¹ H^{-½} s_k
+
+σ² is the residual's variance: what the noise alone leaves uncertain. V is the sandwich estimate over cells k of the
+surface (Huber 1967, White 1980, clustered as by Liang and Zeger 1986): s_k = Σ Jᵀr over the pixels of all views that
+look at the cell, so an error of the model counts once, however many pixels and views show it. G_k = H^{-½} H_k H^{-½}
+is the share of the evidence that the cell gives; with it d_k is how the answer moves when the cell is left out (the
+jackknife, Bell and McCaffrey 2002). ( )₊ keeps eigenvalues above zero, so that the noise is a lower bound. κ makes up
+for what the residual cannot show, as the fit has explained it away; it was chosen on fits with known truth.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from rgspipe.fitting.model.moments import group_moments, information, scores
+from rgspipe.fitting.model.problem import LightProblem
+from rgspipe.fitting.model.views import PreparedViews
+from rgspipe.fitting.search.refine import PLAIN, State, weights_at
+
+#: Errors of the model are shared within cells of this part of the scene's size.
+CELL = 0.2
+
+#: κ: by what factor, in standard deviations, errors of the model are larger than the residual shows. The 95 % quantile
+#: of what it takes to hold the truth, over half of the targets of one trained scene; judged on others.
+INFLATION = 3.5
+
+#: No cell's share of the evidence counts as more than this: one that tells everything cannot be left out.
+LARGEST_SHARE = 0.95
+
+#: Directions with less information than this part of the largest are not determined.
+RANK = 1e-11
+
+
+@dataclass(frozen=True)
+class Covariances:
+    """Per light a symmetric float64 matrix; see `FitResult.covariance` for its rows.
+
+    Attributes:
+        calibrated: of noise and errors of the model.
+        noise: of noise alone, which takes the residual as independent in every pixel.
+    """
+
+    calibrated: tuple[Tensor, ...] = ()
+    noise: tuple[Tensor, ...] = ()
+
+
+def light_covariances(problem: LightProblem, state: State) -> Covariances:
+    """The covariances of a fit's lights.
+
+    All lights are uncertain together: each matrix is a block of the joint covariance. What the views do not determine
+    has an infinite variance and no covariance with the rest.
+    """
+    owners = torch.cat([torch.full((emitter.parameters,), index) for index, emitter in enumerate(state.emitters)])
+    blocks = []
+    for joint, unknown in _joint(problem, state):
+        per_light = []
+        for index, emitter in enumerate(state.emitters):
+            colours = len(owners) + 3 * index + torch.arange(3)
+            chosen = torch.cat([(owners == index).nonzero()[:, 0], colours])
+            spread = torch.block_diag(emitter.spread(), problem.scale * torch.eye(3, dtype=torch.float64))
+            undetermined = (spread.abs() @ unknown[chosen].double()) > 0.0
+            per_light.append(_open(spread @ joint[chosen][:, chosen] @ spread.T, undetermined))
+        blocks.append(tuple(per_light))
+    return Covariances(*blocks)
+
+
+def surface_cells(views: PreparedViews, cell: float = CELL) -> tuple[Tensor, int]:
+    """(P,) int64 cell of the surface that each trusted pixel looks at, and how many there are.
+
+    A pixel looks at the mean place of its surfels; cells are cubes of side `cell` times the scene's size, the same for
+    all views.
+    """
+    frozen = views.frozen
+    lower = frozen.bounds[0]
+    centers = (frozen.bvh.surfels.centers.detach().double() - lower.to(frozen.bvh.device)).float()
+    ones = torch.ones((len(centers), 1), device=centers.device)
+    sums = views.operator @ torch.cat([centers, ones], dim=1)
+    places = (sums[:, :3] / sums[:, 3:].clamp(min=1e-6)).cpu()
+    side = cell * frozen.size
+    if not side > 0.0:
+        return torch.zeros(len(places), dtype=torch.int64), 1
+    # The first cell is centred on the scene's corner, so that walls lie well inside of their cells.
+    index = torch.round(places / side).long()
+    found, labels = torch.unique(index, dim=0, return_inverse=True)
+    return labels, len(found)
+
+
+def _joint(problem: LightProblem, state: State) -> tuple[tuple[Tensor, Tensor], tuple[Tensor, Tensor]]:
+    """Calibrated and noise-only covariance (n, n) of all unknowns, each with what is not determined (n,)."""
+    residual = problem.residual(state.columns, state.intensity)
+    weights = weights_at(problem, state, PLAIN, PLAIN.base(problem))
+    labels, count = surface_cells(problem.views)
+    labels = labels.to(residual.device)
+    values, owners = group_moments(state.columns, residual, weights, labels, count)
+    cells = information(values, owners, state.intensity)
+    cell_scores = scores(values, owners, state.intensity)
+    noise = float(values[..., -1, -1].sum()) / max(1, residual.numel() - cells.shape[-1])
+    root, unknown = whitener(cells.sum(dim=0))
+    model = sandwich(root, cells, cell_scores)
+    return (root @ inflated(model, noise) @ root.T, unknown), (noise * root @ root.T, unknown)
+
+
+def whitener(matrix: Tensor) -> tuple[Tensor, Tensor]:
+    """Columns R (n, m) with RᵀHR = I that span what H (n, n) determines, and which unknowns it does not (n,).
+
+    Unknowns have different units, so H is scaled to a unit diagonal before its rank is judged.
+    """
+    scale = matrix.diagonal().clamp(min=0.0).sqrt()
+    inverse = torch.where(scale > 0, 1.0 / scale.clamp(min=1e-300), 0.0)
+    values, vectors = torch.linalg.eigh(matrix * inverse[:, None] * inverse[None, :])
+    known = values > RANK * max(float(values[-1]), 1e-300)
+    root = inverse[:, None] * vectors[:, known] / values[known].sqrt()
+    unknown = vectors[:, ~known].square().sum(dim=1) > 1e-6
+    return root, unknown
+
+
+def sandwich(root: Tensor, cells: Tensor, cell_scores: Tensor) -> Tensor:
+    """(m, m) V: the spread of the answer when one cell after the other is left out, in whitened unknowns.
+
+    Args:
+        root: (n, m) of `whitener`, for the sum of all cells.
+        cells: (K, n, n) information of each cell.
+        cell_scores: (K, n) its Σ Jᵀr.
+    """
+    shares, vectors = torch.linalg.eigh(root.T @ cells @ root)
+    amplified = 1.0 / (1.0 - shares.clamp(min=0.0, max=LARGEST_SHARE))
+    turned = torch.einsum("kij,ki->kj", vectors, cell_scores @ root)
+    moves = torch.einsum("kij,kj->ki", vectors, amplified * turned)
+    return moves.T @ moves
+
+
+def inflated(model: Tensor, noise: float, inflation: float = INFLATION) -> Tensor:
+    """(m, m) σ²I + κ²(V − σ²I)₊ for V = `model` and σ² = `noise`."""
+    values, vectors = torch.linalg.eigh(model)
+    total = noise + inflation**2 * (values - noise).clamp(min=0.0)
+    return (vectors * total) @ vectors.T
+
+
+def _open(matrix: Tensor, undetermined: Tensor) -> Tensor:
+    """The matrix with infinite variance, and no covariance, where nothing is determined."""
+    matrix = torch.where(undetermined[:, None] | undetermined[None, :], 0.0, matrix)
+    return matrix + torch.diag(torch.where(undetermined, torch.inf, 0.0))

@@ -1,0 +1,182 @@
+"""The views of a fit, made ready once and shared by all targets that the same cameras see."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse
+import torch
+from torch import Tensor
+
+from rgspipe.errors import InputError
+from rgspipe.fitting.model.pixel_highlights import PixelHighlights
+from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.renderer.pixel_direct import PixelDirect
+from rgspipe.renderer.sparse import SparseOperator, stack
+from rgspipe.renderer.view_weights import ViewWeights
+
+#: Pixels that surfels cover less than this show something the scene does not have.
+LEAST_COVERAGE = 0.9
+
+#: Pixels with a mask below this are not the scene's.
+LEAST_MASK = 0.9
+
+#: A light has six unknowns, and each pixel tells three numbers; fewer pixels than this tell nothing reliable.
+LEAST_PIXELS = 8
+
+
+@dataclass(frozen=True)
+class PreparedViews:
+    """One or several views, stacked.
+
+    Attributes:
+        frozen: the scene that they show.
+        views: their weights, V of them.
+        masks: (H, W) in [0, 1] per view, the scene's share of each pixel.
+        pixels: (P,) int64 pixels that a fit trusts, in the order of all views' pixels stacked.
+        operator: (P, N) weights of those pixels.
+        pixel_direct: per view its direct light where pixels look; empty where surfels' centres stand for them.
+    """
+
+    frozen: FrozenScene
+    views: tuple[ViewWeights, ...]
+    masks: tuple[Tensor, ...]
+    pixels: Tensor
+    operator: SparseOperator
+    pixel_direct: tuple[PixelDirect, ...] = ()
+
+    @cached_property
+    def all_pixels(self) -> SparseOperator:
+        """(all pixels of all views, N) weights, edges included."""
+        return stack([view.operator for view in self.views])
+
+    @cached_property
+    def bounds(self) -> list[int]:
+        """V + 1 places: view v has the trusted pixels from bounds[v] to bounds[v + 1]."""
+        ends = np.cumsum([0, *(view.camera.pixel_count for view in self.views)])
+        return np.searchsorted(self.pixels.cpu().numpy(), ends).tolist()
+
+    @cached_property
+    def view_of(self) -> Tensor:
+        """(P,) int64 view of each trusted pixel."""
+        counts = torch.tensor(self.bounds).diff()
+        return torch.repeat_interleave(torch.arange(len(counts)), counts).to(self.pixels.device)
+
+    @cached_property
+    def rows(self) -> tuple[SparseOperator, ...]:
+        """Per view the rows of `operator` that are its own."""
+        matrix, device = self.operator.to_scipy(), self.operator.matrix.device
+        pairs = itertools.pairwise(self.bounds)
+        return tuple(SparseOperator.from_scipy(matrix[first:last], device) for first, last in pairs)
+
+    @cached_property
+    def highlights(self) -> tuple[PixelHighlights, ...]:
+        """Of a scene with gloss, per view its highlights where pixels look; empty where `pixel_direct` is."""
+        pairs = zip(self.views, self.pixel_direct, strict=True) if self.pixel_direct else ()
+        gloss = self.frozen.gloss
+        return () if gloss is None else tuple(PixelHighlights(gloss, view, direct) for view, direct in pairs)
+
+    @cached_property
+    def all_points(self) -> Tensor:
+        """(all pixels of all views, 3) float64 place that each pixel looks at; for views with `pixel_direct`."""
+        return torch.cat([direct.points for direct in self.pixel_direct])
+
+    @cached_property
+    def points(self) -> Tensor:
+        """(P, 3) float64 place that each trusted pixel looks at; for views with `pixel_direct`."""
+        return self.all_points[self.pixels]
+
+    def stack_images(self, images: Sequence[Tensor]) -> Tensor:
+        """(all pixels, 3) float32 of one image (H, W, 3) per view.
+
+        Raises:
+            InputError: a wrong number of images, a wrong size, or pixels that are not finite.
+        """
+        if len(images) != len(self.views):
+            raise InputError(
+                "target images",
+                expected=f"one for each of the {len(self.views)} views",
+                found=f"{len(images)}",
+                remedy="Pass as many images as views.",
+            )
+        for index, (view, image) in enumerate(zip(self.views, images, strict=True)):
+            _check_image(f"target image {index}", view, image)
+        return torch.cat([image.reshape(-1, 3).float() for image in images]).to(self.operator.matrix.device)
+
+    def split_images(self, stacked: Tensor) -> list[Tensor]:
+        """(H, W, 3) per view of stacked pixels (all pixels, 3)."""
+        cameras = [view.camera for view in self.views]
+        parts = stacked.split([camera.pixel_count for camera in cameras])
+        return [part.reshape(camera.height, camera.width, 3) for part, camera in zip(parts, cameras, strict=True)]
+
+
+def prepare_views(
+    frozen: FrozenScene,
+    views: Sequence[ViewWeights],
+    *,
+    masks: Sequence[Tensor] | None = None,
+    mask_edges: bool = True,
+    at_pixels: bool = False,
+) -> PreparedViews:
+    """Choose the pixels that a fit trusts and stack their weights.
+
+    Surfels overhang silhouettes a little, and those pixels hold most of the squared error of a trained
+    scene, so they are left out.
+
+    Args:
+        masks: (H, W) per view, the scene's share of each pixel (the images' alpha); 1 if None.
+        mask_edges: whether pixels on silhouettes, creases and depth jumps are left out.
+        at_pixels: whether the last steps of a fit take direct light where pixels look.
+
+    Raises:
+        InputError: a mask of the wrong size, or too few pixels left.
+    """
+    if not views:
+        raise InputError("views", expected="at least one", found="none", remedy="Choose views of the target.")
+    masks = masks if masks is not None else [torch.ones(v.camera.height, v.camera.width) for v in views]
+    _check_masks(views, masks)
+    trusted = [_trusted(view, mask, mask_edges) for view, mask in zip(views, masks, strict=True)]
+    pixels = torch.cat(trusted).nonzero()[:, 0]
+    if len(pixels) < LEAST_PIXELS:
+        raise InputError(
+            "target",
+            expected=f"at least {LEAST_PIXELS} pixels that show the scene away from edges",
+            found=f"{len(pixels)} of {sum(v.camera.pixel_count for v in views)}",
+            remedy="Check the masks and cameras; keep edge pixels with fit.search.mask_edges=false.",
+        )
+    rows = [
+        view.operator.to_scipy()[chosen.cpu().numpy().nonzero()[0]] for view, chosen in zip(views, trusted, strict=True)
+    ]
+    operator = SparseOperator.from_scipy(scipy.sparse.vstack(rows, format="csr"), frozen.surfels.centers.device)
+    direct = tuple(PixelDirect(frozen.bvh, view) for view in views) if at_pixels else ()
+    return PreparedViews(frozen, tuple(views), tuple(masks), pixels, operator, direct)
+
+
+def _trusted(view: ViewWeights, mask: Tensor, mask_edges: bool) -> Tensor:
+    chosen = (view.coverage.cpu() > LEAST_COVERAGE) & (mask.reshape(-1).cpu() >= LEAST_MASK)
+    return chosen & ~view.edges.cpu() if mask_edges else chosen
+
+
+def _check_masks(views: Sequence[ViewWeights], masks: Sequence[Tensor]) -> None:
+    sizes = [(v.camera.height, v.camera.width) for v in views]
+    found = [tuple(mask.shape) for mask in masks]
+    if sizes != found:
+        raise InputError(
+            "target masks", expected=f"the sizes {sizes} of the views", found=str(found), remedy="Correct the masks."
+        )
+    if not all(bool(torch.isfinite(mask).all()) for mask in masks):
+        raise InputError("target masks", expected="finite values", found="NaN or infinity", remedy="Correct the masks.")
+
+
+def _check_image(where: str, view: ViewWeights, image: Tensor) -> None:
+    expected = (view.camera.height, view.camera.width, 3)
+    if tuple(image.shape) != expected:
+        raise InputError(
+            where, expected=f"shape {expected}", found=str(tuple(image.shape)), remedy="Pass the camera's own image."
+        )
+    if not bool(torch.isfinite(image).all()):
+        raise InputError(where, expected="finite pixels", found="NaN or infinity", remedy="Render this image again.")

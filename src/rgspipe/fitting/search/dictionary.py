@@ -1,0 +1,93 @@
+"""Candidate positions of a light, with what a light there would send to every surfel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import scipy.spatial
+import torch
+from torch import Tensor
+
+from rgspipe.fitting.search.surroundings import is_open, shell_points
+from rgspipe.progress import track
+from rgspipe.renderer.direct import unit_irradiance
+from rgspipe.renderer.frozen import FrozenScene
+
+#: A candidate moves from its grid point by up to this share of the grid's step, so that no wall of a box-shaped
+#: scene is met by a whole layer of candidates in the same way.
+JITTER = 0.15
+
+#: The outermost candidates stand this share of a grid step inside the bounding box.
+INSET = 0.4
+
+#: A light nearer to a surfel than this many of its scales is inside the surface as the scene knows it.
+CLEARANCE_SCALES = 2.0
+
+#: A candidate that sends less than this share of the best candidate's flux to the scene's front sides is inside
+#: a solid, or behind a wall.
+LEAST_FLUX = 0.02
+
+#: Candidates whose shadows are computed at once; bounds the memory of the derivative that comes with them.
+BATCH = 8
+
+
+@dataclass(frozen=True)
+class LightDictionary:
+    """Unit lights all over a scene.
+
+    Attributes:
+        positions: (C, 3) float32.
+        irradiance: (C, N) float32 on every surfel, per W/sr.
+    """
+
+    positions: Tensor
+    irradiance: Tensor
+
+    def __len__(self) -> int:
+        return len(self.positions)
+
+
+def candidate_grid(frozen: FrozenScene, grid: int, seed: int) -> Tensor:
+    """(grid³, 3) jittered points in the bounding box of the surfels, float32."""
+    generator = torch.Generator().manual_seed(seed)
+    lower, upper = (corner.double().cpu() for corner in frozen.bounds)
+    step = (torch.arange(grid, dtype=torch.float64) + 0.5) / grid
+    step = 0.5 + (step - 0.5) * (grid - 2 * INSET) / max(1, grid - 1)
+    unit = torch.stack(torch.meshgrid(step, step, step, indexing="ij"), dim=-1).reshape(-1, 3)
+    unit = unit + (2.0 * torch.rand(unit.shape, generator=generator, dtype=torch.float64) - 1.0) * JITTER / grid
+    return (lower + unit * (upper - lower)).float()
+
+
+def build_dictionary(frozen: FrozenScene, grid: int = 8, *, seed: int = 0, shadows: bool = True) -> LightDictionary:
+    """Candidates on a grid of the scene's bounding box, without those inside or too near to its surfaces.
+
+    An open scene has candidates around it as well, which are kept if they light anything.
+
+    Args:
+        grid: candidates along each axis.
+        seed: of the jitter.
+        shadows: whether surfels block light.
+    """
+    positions = candidate_grid(frozen, grid, seed)
+    positions = positions[_clear_of_surfels(frozen, positions)]
+    within = len(positions)
+    if is_open(frozen):
+        positions = torch.cat([positions, shell_points(frozen)])
+    rows = [
+        unit_irradiance(frozen.bvh, positions[start : start + BATCH], shadows)[0]
+        for start in track(range(0, len(positions), BATCH), "light dictionary", unit="batch")
+    ]
+    irradiance = torch.cat(rows) if rows else torch.zeros((0, len(frozen.surfels)))
+    flux = irradiance @ frozen.areas.to(irradiance)
+    kept = flux > 0.0
+    if within > 0:
+        kept[:within] = flux[:within] > LEAST_FLUX * flux[:within].amax()
+    return LightDictionary(positions[kept.cpu()], irradiance[kept])
+
+
+def _clear_of_surfels(frozen: FrozenScene, positions: Tensor) -> Tensor:
+    """(C,) bool: the nearest surfel is farther than CLEARANCE_SCALES of its scales."""
+    tree = scipy.spatial.cKDTree(frozen.surfels.centers.double().cpu().numpy())
+    distance, nearest = tree.query(positions.double().numpy())
+    scales = frozen.surfels.scales.double().cpu().prod(dim=1).sqrt()[torch.from_numpy(nearest)]
+    return torch.from_numpy(distance) > CLEARANCE_SCALES * scales

@@ -1,0 +1,75 @@
+"""How starts are refined: points at once, spots with rims that are wide at first and sharpen in steps."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+from rgspipe.fitting.model.problem import LightProblem
+from rgspipe.fitting.search.judge import distinct, ranked
+from rgspipe.fitting.search.refine import PLAIN, ROBUST, Region, State, Weighting, reevaluate, refine, start_from
+from rgspipe.fitting.search.starts import Rig
+from rgspipe.renderer.spot_share import rim_width
+
+#: Steps of a start to the end.
+SHORT_ITERATIONS = 6
+
+#: Turns of a refinement: rims that are wider by so much [rad], and steps at most.
+POINT_TURNS = ((0.0, 3), (0.0, SHORT_ITERATIONS - 3))
+SPOT_TURNS = ((0.3, 3), (0.15, 4), (0.05, 4), (0.0, SHORT_ITERATIONS))
+
+#: Shares of the starts, at least two of them, that take a turn after the one before: the best go on. Thoroughly: where
+#: the best starts of all failed.
+GOING_ON, GOING_ON_THOROUGHLY = 0.4, 0.5
+
+#: Share of spots' starts that take the first turn, by how they look before it.
+PROMISING = 0.67
+
+#: A rim that is narrower by nature is fitted with this width: a hard edge has no derivative.
+HARD_RIM = 0.01
+
+
+def refine_starts(
+    problem: LightProblem, rigs: Sequence[Rig], iterations: int, region: Region, begin: float, thorough: bool = False
+) -> tuple[list[State], list[State]]:
+    """All starts, and those of them that were refined to the end, by at most `iterations` steps at a time.
+
+    Points are refined under a robust loss. A spot that is a little off has all of its pool wrong, which a robust loss
+    takes for outliers; so rigs with spots are refined by plain squares.
+    """
+    spots = any(emitter.is_spot for rig in rigs for emitter in rig)
+    turns, weighting = (SPOT_TURNS, PLAIN) if spots else (POINT_TURNS, ROBUST)
+    share, rim = GOING_ON_THOROUGHLY if thorough else GOING_ON, turns[0][0]
+    started = [start_from(problem, soft(rig, rim), weighting, begin) for rig in rigs]
+    states = _best(problem, started, PROMISING, weighting) if spots and not thorough else started
+    for turn, (softness, steps) in enumerate(turns):
+        if turn > 0:
+            states = distinct(_best(problem, states, share, weighting), region.size)
+        if softness != rim:
+            rim = softness
+            for state in states:
+                state.emitters = soft(state.emitters, rim)
+                reevaluate(problem, state)
+        for state in states:
+            refine(problem, state, weighting, min(steps, iterations), region, begin)
+    return started, states
+
+
+def soft(rig: Rig, softness: float) -> Rig:
+    """The rig with rims that are `softness` wider, but none narrower than HARD_RIM."""
+    return tuple(
+        replace(emitter, softness=max(softness, HARD_RIM if rim_width(emitter.shape) < HARD_RIM else 0.0))
+        if emitter.is_spot
+        else emitter
+        for emitter in rig
+    )
+
+
+def _best(problem: LightProblem, states: Sequence[State], share: float, weighting: Weighting) -> list[State]:
+    """The given share of the rigs, at least two: those with the lowest losses, best first."""
+    count = max(2, math.ceil(share * len(states)))
+    if weighting.robust:
+        return ranked(problem, states)[:count]
+    weights = problem.unclipped(weighting.base(problem))
+    return sorted(states, key=lambda state: problem.moments(state.columns, weights).cost)[:count]

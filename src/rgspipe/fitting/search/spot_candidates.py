@@ -1,0 +1,123 @@
+"""Coarse images of candidate spots: every candidate position, aimed everywhere."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from rgspipe.fitting.model.blocks import BlockModel, block_model, patch_radiance
+from rgspipe.fitting.model.views import PreparedViews
+from rgspipe.fitting.search.coarse import CoarseImages
+from rgspipe.fitting.search.dictionary import LightDictionary
+from rgspipe.progress import track
+from rgspipe.renderer.clusters import cluster_patches
+from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.renderer.point_sets import fibonacci_directions
+from rgspipe.renderer.spot import SpotShape, angle_from_axis, spot_profile
+from rgspipe.renderer.spot_share import softened
+
+#: Directions in which every candidate position is aimed.
+AXES = 60
+
+#: Candidates' rims are this much wider than they are [rad], as directions are so far apart.
+SEARCH_SOFTNESS = 0.15
+
+#: All views together have about this many blocks: there are many candidates.
+BLOCKS_IN_ALL = 256
+
+#: What bounces is followed from about this many groups of patches: a wide rim needs no more.
+GROUPS = 250
+
+#: Candidates that send less than this share of the brightest one's light to the views are left out.
+LEAST_SEEN = 0.01
+
+
+def spot_candidates(
+    views: PreparedViews, dictionary: LightDictionary, shapes: Sequence[SpotShape], *, interreflection: bool = True
+) -> CoarseImages:
+    """Candidate spots of given profiles at the dictionary's positions, with their coarse images.
+
+    A spot's coarse image follows from that of a point light at its place: the share of light that the profile lets
+    through is taken at the mean place of what each block sees, and of each group of patches.
+    """
+    side = max(6, round(math.sqrt(BLOCKS_IN_ALL / len(views.views))))
+    model = block_model(views, side, interreflection=interreflection)
+    lit = _lit_by_points(views, dictionary, model)
+    directions = fibonacci_directions(AXES).to(lit.places)
+    images, positions, axes, kinds = [], [], [], []
+    for index in track(range(len(dictionary)), "candidate spots", unit="place"):
+        angle = angle_from_axis(directions[:, None], lit.places - dictionary.positions[index].to(lit.places))
+        seen = torch.cat([_spots_seen(shape, angle, lit, index) for shape in shapes])
+        images.append(seen)
+        positions.append(dictionary.positions[index].expand(len(seen), 3))
+        axes.append(directions.repeat(len(shapes), 1))
+        kinds.append(torch.arange(len(shapes)).repeat_interleave(AXES))
+    joined = [torch.cat(parts) for parts in (images, positions, axes, kinds)]
+    brightness = joined[0].sum(dim=(1, 2))
+    kept = brightness > LEAST_SEEN * brightness.amax()
+    seen, origins, aims, which = (part[kept.to(part.device)] for part in joined)
+    return CoarseImages(model.average, model.counts, seen, origins, aims, tuple(shapes), which)
+
+
+@dataclass(frozen=True)
+class _LitByPoints:
+    """What unit point lights at C places light, of which spots there let shares through.
+
+    Attributes:
+        places: (B + K, 3) float32 mean place of what each block sees, and of each group of patches.
+        direct: (C, B, 3) direct coarse images.
+        grouped: (C, K, 3) direct radiosity of the groups' patches, added up.
+        bounced: (3, B, K) what blocks see of that after bounces; None without interreflection.
+    """
+
+    places: Tensor
+    direct: Tensor
+    grouped: Tensor
+    bounced: Tensor | None
+
+
+def _lit_by_points(views: PreparedViews, dictionary: LightDictionary, model: BlockModel) -> _LitByPoints:
+    lights = dictionary.irradiance.T
+    direct = model.direct(lights).permute(2, 0, 1)
+    patches = patch_radiance(views.frozen, lights).permute(2, 1, 0)
+    groups, places = _groups(views.frozen)
+    bounced = model.bounced
+    if bounced is not None:
+        # Within a group each patch counts as much as it does on the average over all lights.
+        usual = patches.mean(dim=0).T.clamp(min=1e-12)
+        bounced = ((bounced * usual[:, None]) @ groups.T) / (usual @ groups.T)[:, None]
+    seen = torch.cat([_seen_places(views.frozen, model), places])
+    return _LitByPoints(seen, direct, torch.einsum("kp,lpc->lkc", groups, patches), bounced)
+
+
+def _groups(frozen: FrozenScene) -> tuple[Tensor, Tensor]:
+    """Compact groups of the frozen scene's patches: which they hold, 1 or 0, (K, patches), and mean places (K, 3)."""
+    average, surfels = frozen.transport.average, frozen.surfels
+    centers, normals = average @ surfels.centers.float(), average @ surfels.normals.float()
+    labels = torch.from_numpy(cluster_patches(centers, normals, GROUPS, seed=0)).long()
+    groups = torch.nn.functional.one_hot(labels).T.to(centers)
+    return groups, (groups @ centers) / groups.sum(dim=1, keepdim=True)
+
+
+def _seen_places(frozen: FrozenScene, model: BlockModel) -> Tensor:
+    """(B, 3) float32 mean place of what each block sees."""
+    centers = frozen.surfels.centers.float()
+    total = torch.from_numpy(model.weights @ centers.cpu().numpy()).to(centers)
+    weight = torch.from_numpy(model.weights.sum(axis=1)).to(centers).clamp(min=1e-12)
+    return total / weight.reshape(-1, 1)
+
+
+def _spots_seen(shape: SpotShape, angle: Tensor, lit: _LitByPoints, index: int) -> Tensor:
+    """(A, B, 3) coarse images of spots at place `index`, from the angles (A, B + K) of what they light."""
+    rim = (torch.tensor(x, dtype=angle.dtype) for x in (shape.cone_angle, shape.falloff))
+    profile, cone, falloff = softened(shape.profile, *rim, SEARCH_SOFTNESS)
+    share, _ = spot_profile(profile, angle, cone, falloff)
+    count = lit.direct.shape[1]
+    seen = share[:, :count, None] * lit.direct[index]
+    for channel, bounced in enumerate(() if lit.bounced is None else lit.bounced):
+        seen[:, :, channel] += (share[:, count:] * lit.grouped[index, :, channel]) @ bounced.T
+    return seen

@@ -1,0 +1,193 @@
+"""Lights in motion: what the frames so far tell of the next one, as a Kalman filter over parameters and their rates.
+
+Parameters go on at the rates that they have, and a rate changes from frame to frame by a random amount; intensities and
+cones hardly change (white-noise acceleration; Bar-Shalom, Li and Kirubarajan 2001, chapter 6).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import torch
+from torch import Tensor
+
+from rgspipe.fitting.model.parameters import Emitter
+from rgspipe.fitting.search.starts import Rig
+
+#: Standard deviations of a rate at first, and of its change from one frame to the next: of positions over the scene's
+#: size, and of axes [rad].
+FIRST_RATE, RATE_CHANGE = (0.1, 0.3), (0.01, 0.05)
+
+#: Correlation of the random changes of different lights' rates where the lights are carried by one thing: the rest is
+#: what a turn does to lights some way apart.
+TOGETHER = 0.95
+
+#: Standard deviation of the relative change of an intensity from one frame to the next, and of a cone's parameter.
+INTENSITY_CHANGE, CONE_CHANGE = 0.02, 0.02
+
+#: Standard deviations of what views do not tell at all: a place anywhere in the scene, any axis, any intensity.
+NOTHING_KNOWN = 1.0
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What is known of L moving lights at a frame.
+
+    Unknowns are the D parameters of all lights (see `Emitter`), then their intensities over `reference`, light after
+    light; and M rates, the changes a frame of positions and axes.
+
+    Attributes:
+        rig: the expected lights.
+        intensity: (L, 3) float64 W/sr.
+        reference: (L,) float64 W/sr, unit of the intensities in the covariance.
+        rates: (M,) float64.
+        covariance: (D + 3L + M,) * 2 float64.
+        size: the scene's, scene units.
+        together: whether one thing carries the lights, so that they move and turn together.
+    """
+
+    rig: Rig
+    intensity: Tensor
+    reference: Tensor
+    rates: Tensor
+    covariance: Tensor
+    size: float
+    together: bool = False
+
+    @classmethod
+    def starting(cls, rig: Rig, intensity: Tensor, information: Tensor, size: float, together: bool = False) -> Motion:
+        """At rest, with the information (D + 3L,) * 2 that a first frame gives."""
+        known = torch.linalg.inv(information + torch.eye(len(information)).double() / NOTHING_KNOWN**2)
+        rates = _rate_covariance(rig, FIRST_RATE, together)
+        still = torch.zeros(len(rates), dtype=torch.float64)
+        return cls(rig, intensity, references(intensity), still, torch.block_diag(known, rates), size, together)
+
+    @property
+    def unknowns(self) -> int:
+        """D + 3L."""
+        return len(self.covariance) - len(self.rates)
+
+    def predicted(self) -> Motion:
+        """One frame later, before it is looked at."""
+        moving, count = moving_parameters(self.rig), self.unknowns
+        step = torch.zeros(_parameters(self.rig), dtype=torch.float64)
+        step[moving] = self.rates
+        parts = step.split([emitter.parameters for emitter in self.rig])
+        rig = tuple(one.moved(part, self.size) for one, part in zip(self.rig, parts, strict=True))
+        turned = turns(self.rig, rig)
+        forward = torch.eye(len(self.covariance), dtype=torch.float64)
+        forward[moving, count + torch.arange(len(moving))] = 1.0
+        basis = torch.block_diag(turned, torch.eye(count - len(turned)).double(), turned[moving][:, moving])
+        forward = basis @ forward
+        drift = torch.full((count,), INTENSITY_CHANGE, dtype=torch.float64)
+        drift[: len(turned)] = CONE_CHANGE
+        drift[moving] = 0.0
+        noise = torch.block_diag(torch.diag(drift.square()), _rate_covariance(self.rig, RATE_CHANGE, self.together))
+        covariance = forward @ (self.covariance + noise) @ forward.T
+        return replace(self, rig=rig, rates=turned[moving][:, moving] @ self.rates, covariance=covariance)
+
+    def released(self) -> Motion:
+        """The same lights, which may have moved, turned and changed in any way: they are only where to start from."""
+        return replace(self, covariance=self.covariance + NOTHING_KNOWN**2 * torch.eye(len(self.covariance)).double())
+
+    def updated(self, rig: Rig, intensity: Tensor, information: Tensor) -> Motion:
+        """After a frame whose images, with what was predicted here, led to `rig` and `intensity`.
+
+        Args:
+            information: (D + 3L,) * 2 of the images alone, in the parameters of `rig`.
+        """
+        count = self.unknowns
+        moved = torch.cat(
+            [offset(self.rig, rig, self.size), ((intensity - self.intensity) / self.reference[:, None]).flatten()]
+        )
+        gain = torch.linalg.solve(self.covariance[:count, :count], self.covariance[:count, count:]).T
+        turned = turns(self.rig, rig)
+        moving = moving_parameters(rig)
+        basis = torch.block_diag(turned, torch.eye(count - len(turned)).double(), turned[moving][:, moving])
+        before = basis @ self.covariance @ basis.T
+        seen = torch.zeros_like(before)
+        seen[:count, :count] = information
+        covariance = before @ torch.linalg.inv(torch.eye(len(before)).double() + seen @ before)
+        rates = turned[moving][:, moving] @ (self.rates + gain @ moved)
+        return replace(self, rig=rig, intensity=intensity, rates=rates, covariance=0.5 * (covariance + covariance.T))
+
+    def position_errors(self) -> list[float]:
+        """Per light the error that is to be expected of its position, root mean square over the scene's size."""
+        errors, first = [], 0
+        for emitter in self.rig:
+            errors.append(float(self.covariance.diagonal()[first : first + 3].clamp(min=0.0).sum().sqrt()))
+            first += emitter.parameters
+        return errors
+
+    def light_covariances(self) -> tuple[Tensor, ...]:
+        """Per light the covariance of its natural parameters and intensity; see `FitResult.covariance`."""
+        parameters, found, first = _parameters(self.rig), [], 0
+        for index, emitter in enumerate(self.rig):
+            colours = parameters + 3 * index + torch.arange(3)
+            chosen = torch.cat([first + torch.arange(emitter.parameters), colours])
+            natural = emitter.spread() * emitter.units(self.size)
+            spread = torch.block_diag(natural, self.reference[index] * torch.eye(3).double())
+            found.append(spread @ self.covariance[chosen][:, chosen] @ spread.T)
+            first += emitter.parameters
+        return tuple(found)
+
+
+def references(intensity: Tensor) -> Tensor:
+    """(L,) units of intensities (L, 3): each light's mean, or a part of the strongest one's where that is tiny."""
+    means = intensity.mean(dim=1)
+    return means.clamp(min=max(1e-3 * float(means.max()), 1e-300))
+
+
+def moving_parameters(rig: Rig) -> Tensor:
+    """(M,) int64 which of the D parameters are positions and axes."""
+    first, chosen = 0, []
+    for emitter in rig:
+        chosen.append(first + torch.arange(min(5, emitter.parameters)))
+        first += emitter.parameters
+    return torch.cat(chosen)
+
+
+def offset(start: Rig, end: Rig, size: float) -> Tensor:
+    """(D,) parameters of `end` over those of `start`, axes in the tangents at `start`."""
+    parts = []
+    for one, other in zip(start, end, strict=True):
+        parts.append((other.position - one.position) / size if size > 0.0 else 0.0 * one.position)
+        if one.is_spot:
+            parts.append(one.tangents() @ (other.axis - one.axis))
+        if one.parameters > 5:
+            changes = [other.shape.cone_angle - one.shape.cone_angle, other.shape.falloff - one.shape.falloff]
+            count = one.parameters - 5
+            parts.append(torch.tensor(changes[:count], dtype=torch.float64) / one.units(size)[5:])
+    return torch.cat(parts)
+
+
+def turns(start: Rig, end: Rig) -> Tensor:
+    """(D, D) from changes of the parameters at `start` to those at `end`: axes have other tangents there."""
+    blocks = []
+    for one, other in zip(start, end, strict=True):
+        block = torch.eye(one.parameters, dtype=torch.float64)
+        if one.is_spot:
+            block[3:5, 3:5] = other.tangents() @ one.tangents().T
+        blocks.append(block)
+    return torch.block_diag(*blocks)
+
+
+def _parameters(rig: Sequence[Emitter]) -> int:
+    return sum(emitter.parameters for emitter in rig)
+
+
+def _rate_covariance(rig: Rig, scales: tuple[float, float], together: bool) -> Tensor:
+    """(M, M) of random rates with standard deviations `scales` of positions and axes."""
+    rows = []
+    for emitter in rig:
+        row = torch.zeros((5 if emitter.is_spot else 3, 6), dtype=torch.float64)
+        row[:3, :3] = scales[0] * torch.eye(3).double()
+        if emitter.is_spot:
+            row[3:, 3:] = scales[1] * emitter.tangents()
+        rows.append(row)
+    alone = torch.block_diag(*(row @ row.T for row in rows))
+    if not together:
+        return alone
+    common = torch.cat(rows)
+    return TOGETHER * common @ common.T + (1.0 - TOGETHER) * alone

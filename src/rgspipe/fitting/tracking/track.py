@@ -1,0 +1,245 @@
+"""Moving lights: a sequence of frames of a fixed scene, followed both ways from the frame that is easiest to search."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from rgspipe.fitting.certainty.doubts import IN_DOUBT
+from rgspipe.fitting.fit import FitViews, fit_lights
+from rgspipe.fitting.model.capture import ImageCapture
+from rgspipe.fitting.model.parameters import Emitter
+from rgspipe.fitting.model.problem import LightProblem
+from rgspipe.fitting.result import FitStatus, dark_result
+from rgspipe.fitting.search.schedule import soft
+from rgspipe.fitting.search_lm import SearchOptions
+from rgspipe.fitting.spec import LightSpec
+from rgspipe.fitting.tracking.frame import FrameStatus, TrackedFrame, frame_cost, in_order
+from rgspipe.fitting.tracking.frame_fit import Followed, follow, observed
+from rgspipe.fitting.tracking.motion import Motion
+from rgspipe.fitting.tracking.twins import split_lights
+from rgspipe.progress import track
+from rgspipe.scene import LightRig
+
+#: Median residuals below this part of a pixel are as good as none.
+SMALL_COST = 1e-3
+
+#: The cost of a frame is judged by the median of so many frames before it.
+REMEMBERED = 5
+
+
+@dataclass(frozen=True)
+class TrackOptions:
+    """How a sequence is followed.
+
+    Attributes:
+        lost: a frame whose cost rises beyond so many times that of the frames next to it is lost, and searched.
+        iterations: most Levenberg-Marquardt steps of a followed frame.
+        searches: most frames that are searched from nothing, those of the beginning and lost ones together.
+        together: whether one thing carries all lights, so that they move and turn together.
+    """
+
+    lost: float = 2.0
+    iterations: int = 15
+    searches: int = 6
+    together: bool = False
+
+
+def track_lights(
+    views: FitViews,
+    frames: Sequence[Sequence[Tensor]],
+    spec: LightSpec | None = None,
+    *,
+    search: SearchOptions | None = None,
+    options: TrackOptions | None = None,
+    capture: ImageCapture | Sequence[ImageCapture] | None = None,
+) -> list[TrackedFrame]:
+    """Follow the lights of a sequence.
+
+    Frames are searched from nothing in the order of their energy, Σ y² (much where light falls directly on what is
+    seen), until one has a sure answer. From there the lights are followed to the end of the sequence and back to its
+    beginning: each frame is fitted with what the frames before tell of positions, axes, their rates and intensities
+    (`motion`), which counts as far as its own images leave them open. A frame that is lost is fitted from the same
+    start without that, then searched, as long as `options.searches` allows for; one that stays lost is tried once more
+    from its other neighbour.
+
+    Args:
+        views: made by `prepare_fit` with a dictionary, for the same `spec`.
+        frames: per frame one image (H, W, 3) a view.
+        capture: of all frames, or one for each.
+    """
+    same = capture is None or isinstance(capture, ImageCapture)
+    captures = [capture or ImageCapture()] * len(frames) if same else capture
+    taken = list(zip(frames, captures, strict=True))
+    tracker = _Tracker(views, spec or LightSpec(), search or SearchOptions(), options or TrackOptions(), taken)
+    return tracker.run()
+
+
+@dataclass(frozen=True)
+class _Known:
+    """A frame, where the lights go from there, f, and whether the track began at a sure frame."""
+
+    frame: TrackedFrame
+    motion: Motion | None
+    inflation: float
+    anchored: bool
+
+
+class _Tracker:
+    """One sequence and what has been found of it, frame by frame."""
+
+    def __init__(
+        self,
+        views: FitViews,
+        spec: LightSpec,
+        search: SearchOptions,
+        options: TrackOptions,
+        taken: Sequence[tuple[Sequence[Tensor], ImageCapture]],
+    ) -> None:
+        self.views, self.spec, self.search, self.options, self.taken = views, spec, search, options, taken
+        self.found: dict[int, _Known] = {}
+        self.left = options.searches
+
+    def run(self) -> list[TrackedFrame]:
+        """All frames."""
+        start = self._anchor()
+        if start is not None:
+            count = len(self.taken)
+            ways = [*range(start + 1, count), *range(start - 1, -1, -1)]
+            for index in track(ways, "following lights", unit="frame"):
+                self._follow(index, 1 if index > start else -1)
+            for way in (-1, 1):
+                for index in range(count)[::way]:
+                    self._retrace(index, way)
+        dark = TrackedFrame(dark_result(0.0), FrameStatus.LOST, 1.0)
+        return [self.found[index].frame if index in self.found else dark for index in range(len(self.taken))]
+
+    def _anchor(self) -> int | None:
+        """The frame to follow the lights from: the first sure one, or else the one that is explained best."""
+        tried: dict[int, _Known] = {}
+        for index in search_order([frame_energy(images) for images, _ in self.taken], self.options.searches):
+            self.left -= 1
+            known = self._searched(index, FrameStatus.SEARCHED, None)
+            if known is not None:
+                tried[index] = known
+            if known is not None and known.frame.sure:
+                break
+        if not tried:
+            return None
+        best = min(tried, key=lambda index: (not tried[index].frame.sure, tried[index].frame.cost))
+        self.found[best] = self._judged(tried[best], anchored=tried[best].frame.sure)
+        return best
+
+    def _follow(self, index: int, way: int) -> None:
+        """Fit the next frame in the direction `way`, or search it if it is lost."""
+        before = self.found[index - way]
+        problem = self._problem(index)
+        if problem.black:
+            dark = TrackedFrame(dark_result(0.0), FrameStatus.LOST, 1.0)
+            self.found[index] = replace(before, frame=dark, motion=before.motion.predicted())
+            return
+        limit = self._limit(index, way)
+        known = self._followed(problem, before, way)
+        if self._is_lost(known, limit):
+            known = self._followed(problem, replace(before, motion=before.motion.released()), way)
+        if self._is_lost(known, limit):
+            known = self._found_again(index, before, known, limit)
+        self.found[index] = known
+
+    def _found_again(self, index: int, before: _Known, followed: _Known, limit: float) -> _Known:
+        """A lost frame searched from nothing if that is still allowed; what was predicted of it if that fails, too."""
+        if self.left > 0:
+            self.left -= 1
+            other = self._searched(index, FrameStatus.REDETECTED, before)
+            if other is not None and other.frame.cost < followed.frame.cost:
+                lost = other.frame.cost > limit
+                status = FrameStatus.LOST if lost else other.frame.status
+                return self._judged(replace(other, frame=replace(other.frame, status=status)), other.frame.sure)
+        lost = replace(followed.frame, status=FrameStatus.LOST)
+        return replace(before, frame=lost, motion=before.motion.predicted())
+
+    def _retrace(self, index: int, way: int) -> None:
+        """Try a lost frame from its neighbour at `index - way`."""
+        neighbour = self.found.get(index - way)
+        if neighbour is None or neighbour.frame.status == FrameStatus.LOST:
+            return
+        problem = self._problem(index)
+        if self.found[index].frame.status != FrameStatus.LOST or problem.black:
+            return
+        known = self._followed(problem, neighbour, way)
+        if not self._is_lost(known, self._limit(index, way)):
+            self.found[index] = known
+
+    def _followed(self, problem: LightProblem, before: _Known, way: int) -> _Known:
+        made = follow(problem, before.motion.predicted(), before.inflation, self.options.iterations)
+        status = FrameStatus.TRACKED if way > 0 else FrameStatus.TRACED_BACK
+        return self._judged(self._known(problem, made, status), before.anchored)
+
+    @staticmethod
+    def _is_lost(known: _Known, limit: float) -> bool:
+        return known.frame.cost > limit or known.frame.result.status == FitStatus.AT_BOUND
+
+    def _searched(self, index: int, status: FrameStatus, before: _Known | None) -> _Known | None:
+        """A frame searched from nothing, in the order of the lights before; None where no light is found."""
+        images, capture = self.taken[index]
+        result = fit_lights(
+            self.views.prepared.frozen, self.views, images, search=self.search, spec=self.spec, capture=capture
+        )
+        problem = self._problem(index)
+        result = split_lights(problem, result, self.views.blocks, self.search.iterations)
+        if not result.lights:
+            return None
+        if before is not None:
+            result = in_order(result, tuple(light for light in before.frame.result.lights))
+        made = observed(problem, self._emitters(result.lights), self.options.together)
+        return self._known(problem, replace(made, result=result), status)
+
+    def _known(self, problem: LightProblem, made: Followed, status: FrameStatus) -> _Known:
+        errors = tuple(made.motion.position_errors())
+        frame = TrackedFrame(made.result, status, frame_cost(problem, made.result.lights), errors)
+        return _Known(frame, made.motion, made.inflation, True)
+
+    def _judged(self, known: _Known, anchored: bool) -> _Known:
+        """The frame as part of a track that had a sure frame, or had none."""
+        frame = known.frame
+        doubtful = not anchored or max(frame.position_errors, default=1.0) > IN_DOUBT
+        if doubtful and frame.status != FrameStatus.LOST:
+            frame = replace(frame, status=FrameStatus.UNCERTAIN)
+        return replace(known, frame=frame, anchored=anchored)
+
+    def _problem(self, index: int) -> LightProblem:
+        images, capture = self.taken[index]
+        stacked = self.views.prepared.stack_images(images)
+        return LightProblem.create(self.views.prepared, stacked, self.views.effects, capture).sharpest()
+
+    def _limit(self, index: int, way: int) -> float:
+        """The cost from which on a frame is lost, by the frames next to it on the side that it is followed from."""
+        near = [self.found.get(index - way * back) for back in range(1, REMEMBERED + 1)]
+        costs = [known.frame.cost for known in near if known is not None and known.frame.status != FrameStatus.LOST]
+        return self.options.lost * max(SMALL_COST, float(np.median(costs))) if costs else 1.0
+
+    def _emitters(self, rig: LightRig) -> tuple[Emitter, ...]:
+        return soft(tuple(Emitter.of(light, self.spec.cone_free) for light in rig), 0.0)
+
+
+def frame_energy(images: Sequence[Tensor]) -> float:
+    """Σ y² over the images of a frame."""
+    return sum(float(torch.nan_to_num(image).double().square().sum()) for image in images)
+
+
+def search_order(energies: Sequence[float], searches: int) -> list[int]:
+    """Up to `searches` frames, those with most energy first, but none next to one that was searched in vain.
+
+    The sequence is divided into 2 · `searches` equal stretches; no two of the frames are closer than one of these.
+    """
+    apart, chosen = max(1, len(energies) // max(1, 2 * searches)), []
+    for index in sorted(range(len(energies)), key=lambda k: -energies[k]):
+        if len(chosen) == searches or not energies[index] > 0.0:
+            break
+        if all(abs(index - other) >= apart for other in chosen):
+            chosen.append(index)
+    return chosen

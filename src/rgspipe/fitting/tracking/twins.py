@@ -1,0 +1,92 @@
+"""Lights that stand close together: a search that took two of them for one is mended by splitting the strong one.
+
+Two headlights make about the image of one light between them. A search with a coarse grid of candidates finds that one,
+and a second light somewhere that explains some of the rest; from there the true pair is uphill. So the strongest lights
+are split into two halves, in the place of the faintest one, along several directions, and the best of all that goes on.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+
+import torch
+
+from rgspipe.fitting.model.blocks import BlockModel
+from rgspipe.fitting.model.parameters import Emitter
+from rgspipe.fitting.model.problem import LightProblem
+from rgspipe.fitting.result import FitResult
+from rgspipe.fitting.search.refine import PLAIN, reevaluate, refine, search_region, start_from
+from rgspipe.fitting.search.schedule import soft
+from rgspipe.fitting.search.starts import Rig
+from rgspipe.fitting.search_lm import fit_from
+
+#: How far apart the halves of a light are put, parts of the scene's size.
+APART = 0.06
+
+#: Steps of each split rig, with rims that are wider by so much [rad], and of the best ones as they are.
+ROUNDS = ((0.15, 4), (0.05, 4), (0.0, 8))
+
+#: So many split rigs take the last round, and the better ones of these are polished.
+KEPT, POLISHED = 5, 2
+
+#: A split rig takes the place of the rig it comes from where it leaves less than this part of its error unexplained.
+BETTER = 0.8
+
+
+def split_lights(
+    problem: LightProblem, result: FitResult, blocks: BlockModel | None, iterations: int = 30
+) -> FitResult:
+    """The result, or one with a light split in two in the place of its faintest if that explains clearly more.
+
+    Args:
+        problem: of all pixels.
+        blocks: the views as blocks of pixels, on which split rigs are refined.
+    """
+    if len(result.lights) < 2:
+        return result
+    begin = time.perf_counter()
+    coarse, region = problem.coarsest(blocks), search_region(problem)
+    states = [start_from(coarse, rig, PLAIN, begin) for rig in split_rigs(result, region.size)]
+    for softness, steps in ROUNDS:
+        for state in states:
+            state.emitters = soft(state.emitters, softness)
+            reevaluate(coarse, state)
+            refine(coarse, state, PLAIN, steps, region, begin)
+        states = sorted(states, key=lambda state: coarse.unexplained(state.columns, state.intensity))[:KEPT]
+    polished = [fit_from(problem, state.emitters, iterations) for state in states[:POLISHED]]
+    best = min(polished, key=lambda other: other.loss)
+    chosen = best if best.loss < BETTER * result.loss else result
+    return replace(
+        chosen,
+        seconds=result.seconds + time.perf_counter() - begin,
+        evaluations=result.evaluations + sum(one.evaluations for one in polished),
+        iterations=result.iterations + sum(one.iterations for one in polished),
+    )
+
+
+def split_rigs(result: FitResult, size: float) -> list[Rig]:
+    """The rig with one light after the other split in the place of the faintest, along three directions each."""
+    emitters = [Emitter.of(light) for light in result.lights]
+    strengths = [float(light.intensity.mean()) for light in result.lights]
+    faint = min(range(len(strengths)), key=strengths.__getitem__)
+    rigs = []
+    for index, emitter in enumerate(emitters):
+        if index == faint:
+            continue
+        for direction in _directions(emitter):
+            apart = 0.5 * APART * size * direction
+            halves = [replace(emitter, position=emitter.position + sign * apart) for sign in (1.0, -1.0)]
+            others = [one for k, one in enumerate(emitters) if k not in (index, faint)]
+            rigs.append((*halves, *others))
+    return rigs
+
+
+def _directions(emitter: Emitter) -> Sequence[torch.Tensor]:
+    """Along which a light is split: across its axis, in four directions, and along it; of a point light the axes."""
+    if not emitter.is_spot:
+        return list(torch.eye(3, dtype=torch.float64))
+    one, other = emitter.tangents()
+    turned = [(one + other) / 2.0**0.5, (one - other) / 2.0**0.5]
+    return [one, other, *turned, emitter.axis]

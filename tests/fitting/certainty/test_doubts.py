@@ -1,0 +1,51 @@
+"""What a fit says to be in doubt."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rgspipe.fitting.certainty.doubts import ON_SURFACE, distance_to_surface, doubts
+from rgspipe.scene import PointLight, Surfels
+from rgspipe.scene.rectangles import rectangle, surfels_on
+
+SURE, FAR = 1e-4 * torch.eye(6), torch.diag(torch.tensor([0.01, 0.02, 0.06, 9.0, 9.0, 9.0]))
+
+
+def light_at(*place: float) -> PointLight:
+    return PointLight(torch.tensor(place, dtype=torch.float64), torch.ones(3, dtype=torch.float64))
+
+
+@pytest.fixture(scope="module")
+def floor() -> Surfels:
+    """A square from 0 to 1 at z = 0."""
+    return surfels_on(rectangle([0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.5] * 3), 400)
+
+
+def test_positions_that_may_be_far_off_are_said_to_be(floor: Surfels) -> None:
+    light = light_at(0.5, 0.5, 0.4)
+    assert doubts((light,), (SURE,), floor, 1.0) == "" and doubts((light,), (FAR,), floor, 100.0) == ""
+    assert "the position by 30 %" in doubts((light,), (FAR,), floor, 1.0)
+    assert "light 2 by 15 %" in doubts((light, light), (SURE, FAR), floor, 2.0)
+
+
+def test_a_light_that_stands_on_a_surface_is_said_to(floor: Surfels) -> None:
+    above, on, behind = (light_at(0.31, 0.52, height * ON_SURFACE) for height in (1.1, 0.9, -0.9))
+    assert doubts((above,), (SURE,), floor, 1.0) == ""
+    for light in (on, behind):
+        assert doubts((light,), (SURE,), floor, 1.0).startswith("The light stands on a surface")
+    assert doubts((above, on), (SURE, SURE), floor, 1.0).startswith("Light 2 stands on a surface")
+    assert doubts((on, above, behind), 3 * (SURE,), floor, 1.0).startswith("Lights 1 and 3 stand on a surface")
+
+
+@given(x=st.floats(0.05, 0.95), y=st.floats(0.05, 0.95), z=st.floats(-10.0, 10.0))
+def test_the_distance_to_a_surface_is_that_to_its_plane(floor: Surfels, x: float, y: float, z: float) -> None:
+    assert distance_to_surface(floor, torch.tensor([x, y, z])) == pytest.approx(abs(z), abs=1e-6)
+
+
+def test_beside_a_surface_there_is_none(floor: Surfels) -> None:
+    assert distance_to_surface(floor, torch.tensor([1.5, 0.5, 0.0])) == math.inf

@@ -1,0 +1,28 @@
+"""Shadows that are traced only where a spot's light goes are those of all surfels."""
+
+from __future__ import annotations
+
+import torch
+
+from lit_room import HIDDEN, VISIBLE
+from rgspipe.fitting.model.kernels.lit_shares import lit_shares
+from rgspipe.renderer.pixel_direct import surfel_shares
+
+
+def test_lit_surfels_have_their_shadows_and_the_others_none(room) -> None:
+    bvh = room.frozen.bvh
+    for place in (VISIBLE, HIDDEN):
+        position = torch.tensor(place, dtype=torch.float64)
+        lit = torch.rand(len(bvh.surfels), generator=torch.Generator().manual_seed(0)) < 0.3
+        share, slope = lit_shares(bvh, position, lit)
+        all_shares, all_slopes = surfel_shares(bvh, position)
+        assert bool((all_shares[lit] < 0.5).any()), "some of them must be in shadow for this to prove anything"
+        torch.testing.assert_close(share[lit], all_shares[lit], rtol=0.0, atol=0.0)
+        torch.testing.assert_close(slope[lit], all_slopes[lit], rtol=0.0, atol=0.0)
+        assert bool((share[~lit] == 1.0).all()) and bool((slope[~lit] == 0.0).all())
+
+
+def test_no_surfel_needs_to_be_lit(room) -> None:
+    nothing = torch.zeros(len(room.frozen.bvh.surfels), dtype=torch.bool)
+    share, slope = lit_shares(room.frozen.bvh, torch.zeros(3), nothing)
+    assert bool((share == 1.0).all()) and not bool(slope.any())

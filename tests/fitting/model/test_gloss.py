@@ -1,0 +1,106 @@
+"""Lights of glossy scenes: the fit's image is the renderer's, its derivatives are right, and fits use the lobes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+import torch
+
+from lit_room import VISIBLE, room_cameras, room_surfels
+from rgspipe.fitting import Effects, FitViews, build_dictionary, fit_lights, prepare_fit, render_rig
+from rgspipe.fitting.model.parameters import Emitter
+from rgspipe.fitting.model.problem import LightProblem
+from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.renderer.spot import SpotShape
+from rgspipe.scene import Gloss, PointLight
+
+LIGHT = PointLight(torch.tensor(VISIBLE, dtype=torch.float64), torch.tensor([1.0, 2.0, 0.5], dtype=torch.float64))
+SPOT = Emitter(
+    torch.tensor([0.05, -0.2, 0.25], dtype=torch.float64),
+    torch.nn.functional.normalize(torch.tensor([0.3, 0.4, -1.0], dtype=torch.float64), dim=0),
+    SpotShape("gaussian", 0.4, 0.3),
+    cone_free=True,
+)
+
+
+@pytest.fixture(scope="module")
+def frozen() -> FrozenScene:
+    """The room of the other tests with a glossy floor and back wall."""
+    surfels = room_surfels()
+    glossy = (surfels.centers[:, 2] < -0.45) | (surfels.centers[:, 1] > 0.45)
+    reflectance = torch.where(glossy[:, None], 0.2, 0.0).expand(-1, 3).double()
+    gloss = Gloss(reflectance, torch.where(glossy, 12.0, 1.0).double())
+    return FrozenScene.freeze(replace(surfels, gloss=gloss), gather_rays=64, patches=100, seed=0)
+
+
+def _views(frozen: FrozenScene, **effects: bool) -> FitViews:
+    return prepare_fit(frozen, room_cameras(24), effects=Effects(**effects))
+
+
+def _problem(views: FitViews) -> LightProblem:
+    stacked = views.prepared.stack_images(render_rig(views, (LIGHT,)))
+    return LightProblem.create(views.prepared, stacked, views.effects)
+
+
+def _largest_error(problem: LightProblem, emitter: Emitter, share: float = 1.0) -> list[float]:
+    """Per parameter the relative error of the derivative, over that share of the pixels which agrees best."""
+    columns, step = problem.evaluate(emitter), 1e-4
+    errors = []
+    for index in range(emitter.parameters):
+        shift = torch.zeros(emitter.parameters, dtype=torch.float64)
+        shift[index] = step
+        units = emitter.units(1.0)
+        ahead, behind = (problem.evaluate(emitter.moved(sign * shift / units, 1.0))[:, :, 0] for sign in (1, -1))
+        expected = (ahead - behind) / (2.0 * step)
+        apart = (columns[:, :, 1 + index] - expected).norm(dim=1)
+        kept = apart.sort().values[: int(share * len(apart))]
+        errors.append(float(kept.norm() / expected.norm()))
+    return errors
+
+
+def test_at_centres_the_image_is_the_renderer_s(frozen: FrozenScene) -> None:
+    views = _views(frozen)
+    image = _problem(views).evaluate(Emitter(LIGHT.position))[:, :, 0] * LIGHT.intensity.float()
+    expected = torch.cat([frozen.render(view, (LIGHT,)).reshape(-1, 3) for view in views.prepared.views])
+    torch.testing.assert_close(image, expected[views.prepared.pixels], rtol=1e-4, atol=1e-6)
+
+
+@pytest.mark.parametrize("interreflection", [True, False])
+def test_at_pixels_the_image_is_that_of_render_rig(frozen: FrozenScene, interreflection: bool) -> None:
+    views = _views(frozen, at_pixels=True, interreflection=interreflection)
+    problem = _problem(views).sharpest()
+    for light, emitter in ((LIGHT, Emitter(LIGHT.position)), (SPOT.light(LIGHT.intensity), SPOT)):
+        image = problem.evaluate(emitter)[:, :, 0] * light.intensity.float()
+        expected = torch.cat([image.reshape(-1, 3) for image in render_rig(views, (light,))])
+        torch.testing.assert_close(image, expected[views.prepared.pixels], rtol=1e-4, atol=1e-5)
+
+
+def test_highlights_at_pixels_are_those_of_centres_where_surfels_are_small(frozen: FrozenScene) -> None:
+    """They differ by what a lobe changes within a surfel; without lobes both images lose the same light."""
+    sharp, plain = (render_rig(_views(frozen, at_pixels=at_pixels), (LIGHT,)) for at_pixels in (True, False))
+    diffuse = replace(frozen, gloss=None)
+    without = [render_rig(_views(diffuse, at_pixels=at_pixels), (LIGHT,)) for at_pixels in (True, False)]
+    pairs = ((sharp, without[0]), (plain, without[1]))
+    lobes = [sum(float((a - b).sum()) for a, b in zip(*pair, strict=True)) for pair in pairs]
+    assert lobes[0] == pytest.approx(lobes[1], rel=0.03)
+
+
+@pytest.mark.parametrize("at_pixels", [False, True])
+@pytest.mark.parametrize("emitter", [Emitter(LIGHT.position + 0.003), SPOT], ids=["point", "spot"])
+def test_derivatives_match_finite_differences(frozen: FrozenScene, at_pixels: bool, emitter: Emitter) -> None:
+    problem = _problem(_views(frozen, at_pixels=at_pixels)).sharpest()
+    errors = _largest_error(problem, emitter, 0.95)
+    assert max(errors) < 0.02, errors
+
+
+def test_a_fit_finds_the_light_that_made_a_glossy_image_and_without_lobes_misplaces_it(frozen: FrozenScene) -> None:
+    images = render_rig(_views(frozen, at_pixels=True), (LIGHT,))
+    errors = []
+    for scene in (frozen, replace(frozen, gloss=None)):
+        dictionary = build_dictionary(scene, 5, seed=0)
+        views = prepare_fit(scene, room_cameras(24), dictionary=dictionary, effects=Effects(at_pixels=True))
+        light = fit_lights(scene, views, images).lights[0]
+        errors.append(float((light.position - LIGHT.position).norm()))
+    assert errors[0] < 1e-4, errors
+    assert errors[1] > 10.0 * errors[0], errors

@@ -1,0 +1,48 @@
+"""When a refinement ends: where steps gain nothing that matters, and not where they still do."""
+
+from __future__ import annotations
+
+import pytest
+import torch
+
+from lit_room import VISIBLE
+from rgspipe.fitting.model.parameters import Emitter
+from rgspipe.fitting.model.problem import LightProblem
+from rgspipe.fitting.result import FitStatus
+from rgspipe.fitting.search.refine import PLAIN, SHORTEST_STEP, State, fresh, refine, search_region, start_from
+
+
+def _problem(room, point_light, noise: float) -> LightProblem:
+    image = room.images(point_light(VISIBLE))[0]
+    grain = torch.randn(image.shape, generator=torch.Generator().manual_seed(0))
+    stacked = room.one.prepared.stack_images([image * (1.0 + noise * grain)])
+    return LightProblem.create(room.one.prepared, stacked)
+
+
+def _refined(problem: LightProblem, off: float) -> State:
+    place = torch.tensor(VISIBLE, dtype=torch.float64)
+    state = start_from(problem, [Emitter(place + off)], PLAIN, 0.0)
+    refine(problem, state, PLAIN, 30, search_region(problem), 0.0)
+    return state
+
+
+def _error(state: State) -> float:
+    return float((state.emitters[0].position - torch.tensor(VISIBLE, dtype=torch.float64)).norm())
+
+
+@pytest.mark.parametrize("off", [0.02, 0.05])
+def test_without_noise_steps_go_on_far_below_the_shortest(room, point_light, off: float) -> None:
+    state = _refined(_problem(room, point_light, 0.0), off)
+    assert state.status is FitStatus.CONVERGED
+    assert _error(state) < 0.02 * SHORTEST_STEP  # measured 2e-8 and 1e-8
+
+
+def test_with_noise_one_more_look_at_most_is_taken_at_the_answer(room, point_light) -> None:
+    problem = _problem(room, point_light, 0.05)
+    found = _refined(problem, 0.05)
+    again = fresh(found)
+    refine(problem, again, PLAIN, 30, search_region(problem), 0.0)
+    assert again.status is FitStatus.CONVERGED and again.evaluations <= 1
+    moved = float((again.emitters[0].position - found.emitters[0].position).norm())
+    assert moved < SHORTEST_STEP * problem.views.frozen.size  # measured 0
+    assert moved < 0.2 * _error(found), "what is left out is small beside what noise does"
