@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import ast
 import hashlib
-import importlib.util
 import json
-from collections.abc import Iterable, Mapping
-from pathlib import Path
+from collections.abc import Mapping
 from typing import Any
 
 #: Hexadecimal digits of a fingerprint; 64 bits are plenty for the artifacts of one folder.
@@ -18,61 +15,6 @@ def fingerprint(value: Any) -> str:
     """The fingerprint of JSON data; equal data in another order of keys has the same one."""
     text = json.dumps(value, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()[:DIGITS]
-
-
-def code_fingerprints(prefixes: Iterable[str]) -> dict[str, str]:
-    """For each module or package name, the fingerprint of its source and data files.
-
-    Python counts by what it does: comments, docstrings and formatting leave the fingerprint as it is. Nothing is
-    imported but the top-level package.
-
-    Raises:
-        ValueError: there is no such module.
-    """
-    return {prefix: fingerprint(_sources(prefix)) for prefix in sorted(set(prefixes))}
-
-
-def _sources(module: str) -> dict[str, str]:
-    base = _location(module)
-    if base.is_file():
-        return {base.name: _normalised(base)}
-    files = sorted(path for path in base.rglob("*") if path.is_file() and path.suffix != ".pyc")
-    return {path.relative_to(base).as_posix(): _normalised(path) for path in files}
-
-
-def _location(module: str) -> Path:
-    """The file of a module or the folder of a package."""
-    top, *rest = module.split(".")
-    spec = importlib.util.find_spec(top)
-    if spec is None or spec.origin is None:
-        raise ValueError(f"no module {module!r}")
-    path = Path(spec.origin)
-    if path.name == "__init__.py":
-        path = path.parent.joinpath(*rest)
-        if not path.is_dir():
-            path = path.with_suffix(".py")
-    if not path.exists():
-        raise ValueError(f"no module {module!r}")
-    return path
-
-
-def _normalised(path: Path) -> str:
-    if path.suffix != ".py":
-        return hashlib.sha256(path.read_bytes()).hexdigest()
-    tree = ast.parse(path.read_text(encoding="utf-8"), str(path))
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
-            node.body = [statement for statement in node.body if not _is_text(statement)]
-    return hashlib.sha256(ast.dump(tree).encode()).hexdigest()
-
-
-def _is_text(statement: ast.stmt) -> bool:
-    """Whether a statement is a bare string: a docstring, or a comment in its place."""
-    return (
-        isinstance(statement, ast.Expr)
-        and isinstance(statement.value, ast.Constant)
-        and isinstance(statement.value.value, str)
-    )
 
 
 def differences(now: Mapping[str, Any], before: Mapping[str, Any]) -> list[str]:

@@ -17,10 +17,26 @@ from rgspipe.artifacts import Artifact, ArtifactStore, Key
 from rgspipe.config import RgspipeConfig, get_value, scene_name, with_changes
 from rgspipe.errors import InputError
 from rgspipe.files import tree_digest
-from rgspipe.fingerprints import code_fingerprints, differences, fingerprint
+from rgspipe.fingerprints import differences, fingerprint
+from rgspipe.source_code import SourceCode
 from rgspipe.stages.base import Stage, StageContext
 
 StageLoader = Callable[[str], Stage]
+
+#: Code that runs stages and talks to people: it decides over no result but by what the configuration and inputs are.
+NO_RESULT = (
+    "rgspipe.artifacts",
+    "rgspipe.cli",
+    "rgspipe.config",
+    "rgspipe.errors",
+    "rgspipe.files",
+    "rgspipe.machine",
+    "rgspipe.pipeline",
+    "rgspipe.progress",
+    "rgspipe.stages.base",
+    "rgspipe.stages.sources",
+    "rgspipe.status",
+)
 
 #: At most this many causes are named for one stage in the plan.
 SHOWN_CAUSES = 3
@@ -64,7 +80,7 @@ class _Resolver:
     """Builds the graph; every module and foreign file is read once."""
 
     load_stage: StageLoader
-    code: dict[str, str] = field(default_factory=dict)
+    code: SourceCode = field(default_factory=lambda: SourceCode(NO_RESULT))
     files: dict[str, str] = field(default_factory=dict)
 
     def resolve(self, name: str, config: RgspipeConfig, changes: Mapping[str, object]) -> Node:
@@ -77,7 +93,7 @@ class _Resolver:
             "config": {key: get_value(config, key) for key in sorted(stage.keys(config))},
             "inputs": _input_fingerprints(inputs),
             "foreign": {str(path): self._file(path) for path in stage.files(config)},
-            "code": self._code(stage),
+            "code": self.code.fingerprints(stage.run.__module__),
         }
         key = Key(scene_name(config), stage.name, fingerprint({"stage": stage.name, **recipe}))
         return Node(stage, config, changes, key, recipe, inputs)
@@ -86,12 +102,6 @@ class _Resolver:
         if str(path) not in self.files:
             self.files[str(path)] = tree_digest(path)
         return self.files[str(path)]
-
-    def _code(self, stage: Stage) -> dict[str, str]:
-        names = sorted({*stage.code, stage.run.__module__})
-        missing = [name for name in names if name not in self.code]
-        self.code |= code_fingerprints(missing)
-        return {name: self.code[name] for name in names}
 
 
 def _input_fingerprints(inputs: Sequence[Node]) -> dict[str, list[str]]:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from rgspipe.fingerprints import fingerprint
 from rgspipe.pages.html import MISSING
 
 
@@ -31,9 +32,13 @@ def stage_record(stage: str, manifest: Mapping[str, Any]) -> StageRecord:
         seconds=MISSING if seconds is None else f"{float(seconds):.1f}",
         memory=MISSING if memory is None else f"{float(memory):.0f}",
         machine=_flat(manifest.get("machine")),
-        code=_flat(manifest.get("code")),
+        code=_code(manifest.get("code")),
         libraries=_flat(manifest.get("libraries")),
     )
+
+
+def _code(modules: Mapping[str, str] | None) -> str:
+    return f"{fingerprint(modules)} ({len(modules)} modules)" if modules else MISSING
 
 
 def _flat(value: Any) -> str:

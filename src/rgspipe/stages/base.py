@@ -66,6 +66,8 @@ def _no_remarks(config: RgspipeConfig, inputs: Mapping[str, Artifact]) -> tuple[
 class Stage:
     """One step of the way from images to lights.
 
+    Its result depends on the code of the module where `run` is and of all that this module imports, too.
+
     Attributes:
         name: as in `stage=<name>`.
         help: one line for people.
@@ -73,8 +75,6 @@ class Stage:
         inputs: which artifacts it needs, for a configuration; a plain name stands for `Need(name)`.
         config_keys: dotted keys (or whole sections) that the result depends on; a function of the configuration
             where that depends on a choice.
-        code: module prefixes whose source the result depends on, such as "rgspipe.renderer"; the stage's own module
-            is always one. Comments, docstrings and formatting do not count.
         files: files and folders outside the store that the result depends on; their content counts.
         remarks: lines that the plan shows below the stage, from the configuration and, by stage, the artifact itself
             where it is reused, or else those of its inputs that are made already.
@@ -85,7 +85,6 @@ class Stage:
     run: Callable[[StageContext], None]
     inputs: Callable[[RgspipeConfig], Sequence[Need | str]] = _nothing
     config_keys: Sequence[str] | Callable[[RgspipeConfig], Sequence[str]] = ()
-    code: Sequence[str] = ()
     files: Callable[[RgspipeConfig], Sequence[Path]] = _nothing
     remarks: Callable[[RgspipeConfig, Mapping[str, Artifact]], Sequence[str]] = _no_remarks
 

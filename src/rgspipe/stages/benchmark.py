@@ -120,13 +120,4 @@ STAGE = Stage(
     run=run,
     inputs=_inputs,
     config_keys=_keys,
-    code=(
-        "rgspipe.benchmark",
-        "rgspipe.blender",
-        "rgspipe.evaluation",
-        "rgspipe.fitting",
-        "rgspipe.optim",
-        "rgspipe.renderer",
-        "rgspipe.resources",
-    ),
 )

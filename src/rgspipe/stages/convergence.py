@@ -127,12 +127,5 @@ STAGE = Stage(
     run=run,
     inputs=_inputs,
     config_keys=_keys,
-    code=(
-        "rgspipe.datasets.light_file",
-        "rgspipe.evaluation",
-        "rgspipe.stages.fit_light",
-        "rgspipe.stages.true_lights",
-        *fit_light.STAGE.code,
-    ),
     files=_files,
 )

@@ -188,13 +188,6 @@ STAGE = Stage(
     help="errors of the recovered lights per target and per class",
     inputs=lambda config: ["fit_light", *target_stage(config), "freeze"],
     config_keys=("evaluate", "seed", "views", "fit.target", "fit.truth", "light.type", "light.count"),
-    code=(
-        "rgspipe.datasets.covariance_file",
-        "rgspipe.datasets.landscape_file",
-        "rgspipe.stages.true_lights",
-        *(f"rgspipe.evaluation.{name}" for name in ("arrays", "calibration", "metrics", "tables", "convergence")),
-        *(f"rgspipe.evaluation.{name}" for name in ("plots", "landscape_plot")),
-    ),
     files=_truth_file,
     run=run,
 )

@@ -49,6 +49,5 @@ STAGE = Stage(
     run=run,
     inputs=_inputs,
     config_keys=("export",),
-    code=("rgspipe.datasets", "rgspipe.renderer", "rgspipe.scene"),
     files=_files,
 )

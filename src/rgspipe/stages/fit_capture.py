@@ -10,9 +10,8 @@ from rgspipe.errors import InputError
 from rgspipe.fitting.model.capture import ImageCapture, stored_in_eight_bits
 from rgspipe.robustness.target_capture import TargetCapture, captured
 
-#: Configuration keys that all this depends on, and code.
+#: Configuration keys that all this depends on.
 KEYS = ("target_capture", "fit.exposure", "fit.clip")
-CODE = ("rgspipe.robustness.target_capture", "rgspipe.datasets.degrade", "rgspipe.datasets.srgb", __name__)
 
 
 def captured_views(views: Sequence[View], target: str, config: RgspipeConfig) -> tuple[list[View], ImageCapture]:

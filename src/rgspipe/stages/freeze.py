@@ -55,14 +55,5 @@ STAGE = Stage(
     help="precompute the light-independent operators and the light dictionary",
     inputs=lambda config: [surfel_stage(config)],
     config_keys=("freeze", "model_error"),
-    code=(
-        "rgspipe.renderer",
-        "rgspipe.scene",
-        "rgspipe.datasets.frozen_file",
-        "rgspipe.datasets.surfel_file",
-        "rgspipe.fitting.search.dictionary",
-        "rgspipe.fitting.search.surroundings",
-        "rgspipe.robustness.model_error",
-    ),
     run=run,
 )

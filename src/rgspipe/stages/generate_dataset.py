@@ -95,13 +95,5 @@ STAGE = Stage(
     run=run,
     inputs=_inputs,
     config_keys=_config_keys,
-    code=(
-        "rgspipe.blender",
-        "rgspipe.datasets.exr",
-        "rgspipe.datasets.gs3_write",
-        "rgspipe.datasets.light_file",
-        "rgspipe.scene.camera",
-        "rgspipe.stages.scene_model",
-    ),
     files=_files,
 )

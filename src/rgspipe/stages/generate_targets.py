@@ -78,17 +78,4 @@ STAGE = Stage(
     run=run,
     inputs=_inputs,
     config_keys=_keys,
-    code=(
-        "rgspipe.blender",
-        "rgspipe.datasets.exr",
-        "rgspipe.datasets.gs3_write",
-        "rgspipe.datasets.light_file",
-        "rgspipe.olat",
-        "rgspipe.renderer.spot",
-        "rgspipe.scene.camera",
-        "rgspipe.scene.lights",
-        "rgspipe.stages.generate_dataset",
-        "rgspipe.stages.render_olat",
-        "rgspipe.stages.scene_model",
-    ),
 )

@@ -72,6 +72,5 @@ STAGE = Stage(
     help="takes surfels from a PLY file (scene=ply) in the place of trained ones",
     run=run,
     config_keys=("scene.kind", "scene.ply"),
-    code=("rgspipe.datasets", "rgspipe.renderer", "rgspipe.scene"),
     files=_files,
 )

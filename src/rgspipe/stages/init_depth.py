@@ -46,5 +46,4 @@ STAGE = Stage(
     run=run,
     inputs=lambda config: ["generate_dataset"],
     config_keys=("init", "capture", "scene.kind"),
-    code=("rgspipe.stages.detail", "rgspipe.training.initialise", "rgspipe.datasets.degrade", "rgspipe.scene"),
 )

@@ -50,12 +50,4 @@ STAGE = Stage(
     run=run,
     inputs=_inputs,
     config_keys=("freeze.surfels",),
-    code=(
-        "rgspipe.datasets.frozen_file",
-        "rgspipe.evaluation",
-        "rgspipe.fitting",
-        "rgspipe.optim",
-        "rgspipe.renderer",
-        "rgspipe.training",
-    ),
 )

@@ -110,5 +110,4 @@ STAGE = Stage(
     run=run,
     inputs=_inputs,
     config_keys=("light_study", "seed", "evaluate.bootstrap"),
-    code=("rgspipe.datasets.advice_file", "rgspipe.evaluation", "rgspipe.stages.study_cases"),
 )

@@ -62,16 +62,5 @@ STAGE = Stage(
     help="one page over scenes, from their reports",
     run=run,
     config_keys=("overview",),
-    code=(
-        "rgspipe.evaluation",
-        "rgspipe.pages",
-        "rgspipe.resources",
-        "rgspipe.stages.report",
-        "rgspipe.stages.report_gallery",
-        "rgspipe.stages.report_light_study",
-        "rgspipe.stages.report_relight",
-        "rgspipe.stages.report_sections",
-        "rgspipe.stages.report_study",
-    ),
     files=_manifests,
 )

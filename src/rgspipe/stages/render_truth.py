@@ -44,15 +44,4 @@ STAGE = Stage(
     help="path-trace the rooms that the renderer is measured on",
     run=run,
     config_keys=("benchmark.rooms", "benchmark.truth_resolution", "benchmark.truth_samples"),
-    code=(
-        "rgspipe.benchmark.rooms",
-        "rgspipe.benchmark.truth",
-        "rgspipe.blender",
-        "rgspipe.datasets.exr",
-        "rgspipe.evaluation.arrays",
-        "rgspipe.evaluation.metrics",
-        "rgspipe.scene.camera",
-        "rgspipe.scene.lights",
-        "rgspipe.scene.rectangles",
-    ),
 )

@@ -209,15 +209,6 @@ STAGE = Stage(
     help="one HTML file with tables, pictures, configuration and provenance",
     inputs=_inputs,
     config_keys=_keys,
-    code=(
-        "rgspipe.evaluation",
-        "rgspipe.pages",
-        "rgspipe.stages.report_gallery",
-        "rgspipe.stages.report_light_study",
-        "rgspipe.stages.report_relight",
-        "rgspipe.stages.report_sections",
-        "rgspipe.stages.report_study",
-    ),
     files=lambda config: [
         *study_file(config),
         *light_study_files(config),

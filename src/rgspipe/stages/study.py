@@ -72,5 +72,4 @@ STAGE = Stage(
     run=run,
     inputs=_inputs,
     config_keys=("study",),
-    code=("rgspipe.benchmark.markdown", "rgspipe.evaluation", "rgspipe.stages.study_cases"),
 )

@@ -20,7 +20,7 @@ from rgspipe.fitting.model.capture import ImageCapture
 from rgspipe.fitting.tracking.frame import FrameStatus
 from rgspipe.fitting.tracking.track import TrackOptions, track_lights
 from rgspipe.scene import LightRig
-from rgspipe.stages import fit_capture, fit_light
+from rgspipe.stages import fit_capture
 from rgspipe.stages.base import Need, Stage, StageContext
 from rgspipe.stages.fit_capture import captured_views
 from rgspipe.stages.fit_light import Fitter, light_spec, used_views
@@ -129,6 +129,5 @@ STAGE = Stage(
         "views.indices",
         *fit_capture.KEYS,
     ),
-    code=("rgspipe.datasets.light_file", "rgspipe.evaluation", "rgspipe.stages.fit_light", *fit_light.STAGE.code),
     files=_files,
 )

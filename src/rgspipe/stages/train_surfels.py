@@ -173,18 +173,4 @@ STAGE = Stage(
     run=run,
     inputs=lambda config: ["init_depth", "generate_dataset"],
     config_keys=(*(f"train.{key.name}" for key in fields(TrainConfig) if key.name not in NO_RESULT), "capture"),
-    code=(
-        "rgspipe.completion",
-        "rgspipe.datasets.degrade",
-        "rgspipe.training",
-        "rgspipe.renderer",
-        "rgspipe.scene",
-        "rgspipe.evaluation.albedo",
-        "rgspipe.evaluation.arrays",
-        "rgspipe.evaluation.held_out",
-        "rgspipe.evaluation.image_metrics",
-        "rgspipe.evaluation.images",
-        "rgspipe.evaluation.metrics",
-        "rgspipe.optim.ssim",
-    ),
 )

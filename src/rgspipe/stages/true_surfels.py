@@ -82,16 +82,4 @@ STAGE = Stage(
     run=run,
     inputs=lambda config: [] if _is_exact(config) else ["generate_dataset"],
     config_keys=_keys,
-    code=(
-        "rgspipe.blender.models.corridor",
-        "rgspipe.blender.models.parameters",
-        "rgspipe.evaluation.arrays",
-        "rgspipe.evaluation.ceiling",
-        "rgspipe.evaluation.exact_corner",
-        "rgspipe.evaluation.metrics",
-        "rgspipe.renderer",
-        "rgspipe.stages.detail",
-        "rgspipe.stages.scene_model",
-        "rgspipe.training.initialise",
-    ),
 )
