@@ -8,7 +8,7 @@ TEST_WORKERS ?= 2
 ARGS ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup test test-slurm smoke reproduce scenes train-study light-study bench lint
+.PHONY: help setup test test-slurm smoke reproduce scenes train-study light-study bench lint house
 
 help:  ## this list
 	@echo "rgspipe: from images of a scene, find its lights"
@@ -53,5 +53,8 @@ $(BENCH_STAMP): requirements-bench.txt $(STAMP)
 	@touch $@
 
 lint: setup  ## style and mistakes
-	$(VENV)/bin/ruff check src tests
-	$(VENV)/bin/ruff format --check src tests
+	$(VENV)/bin/ruff check src tests tools
+	$(VENV)/bin/ruff format --check src tests tools
+
+house: setup  ## the measures of the code: rooms, functions, imports, what stands twice (ARGS="--since REV --list")
+	$(VENV)/bin/python tools/house.py $(ARGS)
