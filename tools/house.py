@@ -147,7 +147,8 @@ class House:
         """The package as it was at a commit."""
         archive = subprocess.run(["git", "archive", revision, "src"], check=True, capture_output=True).stdout
         with tempfile.TemporaryDirectory() as folder:
-            tarfile.open(fileobj=io.BytesIO(archive)).extractall(folder, filter="data")
+            with tarfile.open(fileobj=io.BytesIO(archive)) as files:
+                files.extractall(folder, filter="data")
             return cls.at(Path(folder))
 
     def arrows(self) -> Iterator[tuple[str, str]]:
