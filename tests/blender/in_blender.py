@@ -15,10 +15,10 @@ from rgspipe.blender.job import RenderSettings
 from rgspipe.blender.materials import diffuse_material
 from rgspipe.blender.meshes import add, polygon
 from rgspipe.blender.models import cornell
-from rgspipe.blender.models.parameters import CornellParameters
 from rgspipe.blender.passes import Studio
 from rgspipe.blender.plan import Frame
 from rgspipe.scene import Camera, PointLight, look_at
+from rgspipe.scene.models import CornellBox
 
 
 def _quad(scene: bpy.types.Scene, half: float, height: float, albedo: tuple[float, float, float]) -> None:
@@ -45,7 +45,7 @@ def plane(folder: Path) -> None:
 
 def free_space(folder: Path) -> None:
     """Which of these places are free in the Cornell box, and in a closed room with a box in it."""
-    space = FreeSpace(scene_geometry(cornell.build(CornellParameters())))
+    space = FreeSpace(scene_geometry(cornell.build(CornellBox())))
     points = {
         "middle": (0, 0, 0.3),
         "in the tall box": (-0.17, 0.12, -0.2),

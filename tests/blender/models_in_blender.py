@@ -15,25 +15,19 @@ from rgspipe.blender.job import DatasetJob, RenderSettings
 from rgspipe.blender.materials import checker_material, diffuse_material, glossy_material, striped_material
 from rgspipe.blender.meshes import add, new_scene, polygon
 from rgspipe.blender.models import hotdog
-from rgspipe.blender.models.parameters import (
-    CornellParameters,
-    CornerParameters,
-    HotdogParameters,
-    Model,
-    RoomParameters,
-    kind_of,
-)
+from rgspipe.blender.models.parameters import HotdogParameters, Model, RoomParameters, kind_of
 from rgspipe.blender.passes import Studio
 from rgspipe.blender.plan import Frame, make_plan
 from rgspipe.blender.scenes import MODELS, open_scene
 from rgspipe.blender.targets import lit_share
 from rgspipe.scene import Camera, PointLight, look_at
+from rgspipe.scene.models import CornellBox, Corridor
 
 SCENES: dict[str, Model] = {
-    "cornell": CornellParameters(),
-    "corner": CornerParameters(),
-    "narrow_corner": CornerParameters(width=0.28, height=0.35),
-    "wide_corner": CornerParameters(width=0.36, height=1.0),
+    "cornell": CornellBox(),
+    "corner": Corridor(),
+    "narrow_corner": Corridor(width=0.28, height=0.35),
+    "wide_corner": Corridor(width=0.36, height=1.0),
     "hotdog": HotdogParameters(segments=48),
     "room": RoomParameters(segments=48),
 }
@@ -65,6 +59,7 @@ def _describe(job: DatasetJob) -> dict:
     ]
     return {
         "bounds": [geometry.lo.tolist(), geometry.hi.tolist()],
+        "area": sum(face.area for item in prepared.scene.objects for face in item.data.polygons),
         "objects": sorted(item.name for item in prepared.scene.objects),
         "shaders": sorted({node.type for m in bpy.data.materials for node in m.node_tree.nodes if "BSDF" in node.type}),
         "cameras": [frame.camera.origin.tolist() for frame in plan.train],
@@ -77,7 +72,7 @@ def _describe(job: DatasetJob) -> dict:
 def normals(folder: Path) -> None:
     """Angles [degrees] between the smooth normals at the corners of faces and the faces' own, weighted by area."""
     found = {}
-    for model in (HotdogParameters(), RoomParameters(), CornerParameters()):
+    for model in (HotdogParameters(), RoomParameters(), Corridor()):
         scene = MODELS[kind_of(model)].build(model)
         found[kind_of(model)] = {item.name: _mean_turn(item.data) for item in scene.objects}
     (folder / "normals.json").write_text(json.dumps(found))

@@ -7,18 +7,11 @@ import json
 import pytest
 
 from rgspipe.blender.job import DatasetJob
-from rgspipe.blender.models.parameters import (
-    BlendFile,
-    Box,
-    CornellParameters,
-    CornerParameters,
-    HotdogParameters,
-    Model,
-    RoomParameters,
-)
+from rgspipe.blender.models.parameters import BlendFile, HotdogParameters, Model, RoomParameters
+from rgspipe.scene.models import Box, CornellBox, Corridor
 
-ROOM = CornellParameters(room=(1, 0.8, 0.6), boxes=(Box((0, 0, 0), (0.1, 0.2, 0.3), 0.4, (0.5, 0.6, 0.7)),), gloss=0.2)
-CORRIDOR = CornerParameters(wall=(0.1, 0.2, 0.3))
+ROOM = CornellBox(room=(1, 0.8, 0.6), boxes=(Box((0, 0, 0), (0.1, 0.2, 0.3), 0.4, (0.5, 0.6, 0.7)),), gloss=0.2)
+CORRIDOR = Corridor(wall=(0.1, 0.2, 0.3))
 MODELS = [ROOM, CORRIDOR, HotdogParameters(False, 50), RoomParameters(), BlendFile("a.blend")]
 
 

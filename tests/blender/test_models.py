@@ -13,6 +13,7 @@ import torch
 
 from rgspipe.datasets.exr import read_channels, read_image
 from rgspipe.scene import Camera, look_at
+from rgspipe.scene.models import CornellBox, Corridor
 
 pytestmark = pytest.mark.slow
 
@@ -36,6 +37,14 @@ def test_a_scene_fills_the_unit_cube_and_is_diffuse(found: dict, name: str) -> N
     assert (lo >= -0.5 - 1e-6).all() and (hi <= 0.5 + 1e-6).all()
     assert (hi - lo)[:2] == pytest.approx(1.0, abs=0.02)  # the hot dog's plate is 0.99 across
     assert found[name]["shaders"] == ["BSDF_DIFFUSE"]
+
+
+def test_blender_and_exact_surfels_are_given_the_same_surfaces(found: dict) -> None:
+    exact = {"cornell": CornellBox(), "corner": Corridor()}
+    exact |= {"narrow_corner": Corridor(0.28, 0.35), "wide_corner": Corridor(0.36, 1.0)}
+    for name, model in exact.items():
+        area = float(model.rectangles().areas.sum())
+        assert found[name]["area"] == pytest.approx(area, rel=1e-5)  # Blender's coordinates are float32
 
 
 @pytest.mark.parametrize("name", ALL)

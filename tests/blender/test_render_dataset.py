@@ -19,13 +19,14 @@ import numpy as np
 import pytest
 
 from rgspipe.blender.job import DatasetJob
-from rgspipe.blender.models.parameters import BlendFile, Box
+from rgspipe.blender.models.parameters import BlendFile
 from rgspipe.blender.process import render_dataset
 from rgspipe.blender.targets import in_frame
 from rgspipe.datasets.gs3 import load_dataset
 from rgspipe.datasets.light_file import read_lights
 from rgspipe.datasets.views import Dataset
 from rgspipe.errors import InputError
+from rgspipe.scene.models import Box
 
 pytestmark = [
     pytest.mark.slow,

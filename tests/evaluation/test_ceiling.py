@@ -12,8 +12,7 @@ from rgspipe.evaluation.ceiling import project_albedo, surfels_from_passes, tran
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.view_weights import build_view_weights
 from rgspipe.scene import Camera, Surfels, look_at
-from rgspipe.scene.cornell import cornell_rectangles
-from rgspipe.scene.rectangles import surfels_on
+from rgspipe.scene.models import Box, CornellBox, exact_surfels
 
 
 def _colour(normals: torch.Tensor) -> torch.Tensor:
@@ -53,11 +52,10 @@ def test_views_without_passes_are_refused(views: list[View]) -> None:
 
 
 def test_transmittance_is_that_of_cast_rays() -> None:
-    box = (BLOCK.center, BLOCK.size, BLOCK.turn, (0.5, 0.5, 0.5))
-    surfels = surfels_on(cornell_rectangles((1.0, 1.0, 1.0), *[(0.7, 0.7, 0.7)] * 3, [box]), 3000)
+    surfels = exact_surfels(CornellBox(boxes=(Box(BLOCK.center, BLOCK.size, BLOCK.turn),)), 3000)
     light = torch.tensor([0.35, -0.35, 0.1], dtype=torch.float64)
     camera = Camera.from_field_of_view(look_at(torch.tensor([0.0, -1.9, 0.4]), torch.zeros(3)), 0.6, 32, 32)
-    bvh = SurfelBvh(surfels.to(torch.float32))
+    bvh = SurfelBvh(surfels)
     found = transmittance_image(bvh, build_view_weights(bvh, camera, 1), light)
     origins, directions, _ = (part.numpy() for part in camera.rays())
     walls = replace(BLOCK, center=(0.0, 0.0, 0.0), size=(1.0, 1.0, 1.0), turn=0.0, room=True)

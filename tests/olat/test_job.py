@@ -9,12 +9,12 @@ import pytest
 
 from rgspipe.blender.fixed_view import FixedView
 from rgspipe.blender.job import DatasetJob
-from rgspipe.blender.models.parameters import CornerParameters
 from rgspipe.olat.job import PoolJob, SpotRange
+from rgspipe.scene.models import Corridor
 
 
 def test_a_job_survives_json() -> None:
-    dataset = DatasetJob(scene="mine", model=CornerParameters(width=0.3), train_views=0, seed=4)
+    dataset = DatasetJob(scene="mine", model=Corridor(width=0.3), train_views=0, seed=4)
     cameras = (FixedView((0.1, 0.2, 0.3), (0.5, 0.2, 0.3), 60.0), FixedView((0.0, 0.0, 1.0), (0.0, 0.3, 0.0), 90.0))
     job = PoolJob(dataset, "track", 7, ("visible",), SpotRange("linear", (0.3, 0.5), (0.1, 0.2)), 2, cameras)
     assert PoolJob.from_json(json.loads(json.dumps(job.to_json()))) == job

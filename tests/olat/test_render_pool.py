@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 
 from rgspipe.blender.job import DatasetJob
-from rgspipe.blender.models.parameters import CornerParameters
 from rgspipe.errors import InputError
 from rgspipe.olat.job import PoolJob, SpotRange
 from rgspipe.olat.pool_file import PooledLight, read_pool
 from rgspipe.olat.process import render_pool
 from rgspipe.scene import SpotLight
+from rgspipe.scene.models import Corridor
 
 CLASSES = ("visible", "out_of_frame", "occluded", "around_corner")
-DATASET = DatasetJob(scene="corner", model=CornerParameters(), resolution=16, samples=4, seed=2)
+DATASET = DatasetJob(scene="corner", model=Corridor(), resolution=16, samples=4, seed=2)
 JOB = PoolJob(DATASET, "spots", 4, CLASSES, SpotRange(cone_angle=(0.35, 0.5), falloff=(0.1, 0.3)), 1)
 
 

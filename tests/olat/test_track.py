@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rgspipe.blender.models.parameters import CornerParameters
 from rgspipe.olat.track import DIP, GAUGE, headlights, path, path_length
 from rgspipe.renderer.spot import SpotShape
+from rgspipe.scene.models import Corridor
 
-CORRIDORS = [CornerParameters(), CornerParameters(width=0.28, height=0.6), CornerParameters(width=0.36)]
+CORRIDORS = [Corridor(), Corridor(width=0.28, height=0.6), Corridor(width=0.36)]
 SHAPE = SpotShape("smoothstep", 0.4, 0.2)
 
 
 @pytest.mark.parametrize("corridor", CORRIDORS)
-def test_the_way_is_smooth_and_as_long_as_it_says(corridor: CornerParameters) -> None:
+def test_the_way_is_smooth_and_as_long_as_it_says(corridor: Corridor) -> None:
     steps = np.linspace(0.0, path_length(corridor), 2001)
     places, ahead = (np.array(values) for values in zip(*(path(corridor, s) for s in steps), strict=True))
     np.testing.assert_allclose(np.linalg.norm(ahead, axis=1), 1.0)
@@ -25,7 +25,7 @@ def test_the_way_is_smooth_and_as_long_as_it_says(corridor: CornerParameters) ->
 
 
 @pytest.mark.parametrize("corridor", CORRIDORS)
-def test_headlights_keep_away_from_the_walls(corridor: CornerParameters) -> None:
+def test_headlights_keep_away_from_the_walls(corridor: Corridor) -> None:
     lights = [light for pair in headlights(corridor, 50, SHAPE) for light in pair]
     x, y, z = np.array([light.position.numpy() for light in lights]).T
     inner, least = 0.5 - corridor.width, 0.35 * corridor.width
@@ -36,7 +36,7 @@ def test_headlights_keep_away_from_the_walls(corridor: CornerParameters) -> None
 
 
 def test_a_pair_is_side_by_side_and_shines_ahead() -> None:
-    corridor = CornerParameters()
+    corridor = Corridor()
     moments = np.linspace(0.0, path_length(corridor), 9)
     for moment, (left, right) in zip(moments, headlights(corridor, 9, SHAPE), strict=True):
         middle, ahead = path(corridor, float(moment))
@@ -52,6 +52,6 @@ def test_a_pair_is_side_by_side_and_shines_ahead() -> None:
 
 
 def test_a_single_moment_is_the_first() -> None:
-    corridor = CornerParameters()
+    corridor = Corridor()
     [pair] = headlights(corridor, 1, SHAPE)
     np.testing.assert_array_equal(pair[0].position, headlights(corridor, 5, SHAPE)[0][0].position)

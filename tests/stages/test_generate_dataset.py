@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 import torch
 
-from rgspipe.blender.models.parameters import CornerParameters, kind_of
+from rgspipe.blender.models.parameters import kind_of
 from rgspipe.config import MODELLED, RgspipeConfig
 from rgspipe.datasets.exr import write_image
 from rgspipe.datasets.gs3_write import frame_entry, write_transforms
 from rgspipe.datasets.location import open_dataset
 from rgspipe.errors import InputError
 from rgspipe.scene import Camera, PointLight, look_at
+from rgspipe.scene.models import Corridor
 from rgspipe.stages.base import StageContext
 from rgspipe.stages.generate_dataset import STAGE, dataset_job
 
@@ -89,7 +90,7 @@ def test_every_scene_of_ours_is_built_from_its_own_section(kind: str) -> None:
 
 
 def test_the_configured_corridor_is_the_model_s_default() -> None:
-    assert dataset_job(_config(kind="corner")).model == CornerParameters()
+    assert dataset_job(_config(kind="corner")).model == Corridor()
 
 
 def test_gloss_that_makes_light_is_refused() -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import torch
@@ -60,7 +60,7 @@ def ball(count: int, albedo: float) -> Surfels:
     )
 
 
-def _room(albedo: list[float]) -> Rectangles:
+def _room(albedo: Sequence[float]) -> Rectangles:
     """Open towards −y, with a box on the floor."""
     walls = inside_of_box([0.0, 0.0, 0.0], [1.0, 1.0, 1.0], albedo)
     closed = walls.origins, walls.sides_a, walls.sides_b, walls.albedo

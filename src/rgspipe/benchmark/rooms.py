@@ -9,10 +9,11 @@ import torch
 from torch import Tensor
 
 from rgspipe.scene import Camera, PointLight, look_at
-from rgspipe.scene.rectangles import Rectangles, inside_of_box, rectangle, solid_box
+from rgspipe.scene.models import CornellBox, FloorPlan
+from rgspipe.scene.rectangles import Rectangles, inside_of_box, solid_box
 
-WHITE, RED, GREEN = [0.73, 0.73, 0.73], [0.65, 0.05, 0.05], [0.12, 0.45, 0.15]
-WOOD, BLUE, GREY = [0.55, 0.35, 0.2], [0.15, 0.25, 0.6], [0.5, 0.5, 0.5]
+WHITE, RED, GREEN = (0.73, 0.73, 0.73), (0.65, 0.05, 0.05), (0.12, 0.45, 0.15)
+WOOD, BLUE, GREY = (0.55, 0.35, 0.2), (0.15, 0.25, 0.6), (0.5, 0.5, 0.5)
 
 
 @dataclass(frozen=True)
@@ -54,42 +55,24 @@ class Room:
 
 def _cornell() -> Room:
     """Open towards −y, with two boxes; the same room as `scene=cornell`."""
-    h = 0.5
-    walls = (
-        rectangle([-h, -h, -h], [1, 0, 0], [0, 1, 0], WHITE)
-        + rectangle([-h, -h, h], [0, 1, 0], [1, 0, 0], WHITE)
-        + rectangle([-h, h, -h], [1, 0, 0], [0, 0, 1], WHITE)
-        + rectangle([-h, -h, -h], [0, 1, 0], [0, 0, 1], RED)
-        + rectangle([h, -h, -h], [0, 0, 1], [0, 1, 0], GREEN)
-    )
-    tall = solid_box([-0.17, 0.12, -0.2], [0.28, 0.28, 0.6], WHITE, 0.3)
-    low = solid_box([0.18, -0.15, -0.35], [0.28, 0.28, 0.3], WHITE, -0.3)
     viewpoints = [[[0.0, -1.6, 0.0], [0.0, 0.0, 0.0]], [[0.35, -1.2, 0.3], [0.0, 0.1, -0.15]]]
     lights = [[0.0, 0.0, 0.38], [-0.3, -0.3, 0.2], [0.3, 0.25, -0.1], [0.44, 0.1, 0.1], [-0.1, -0.2, -0.45]]
-    return Room("cornell", walls + tall + low, torch.tensor(viewpoints), torch.tensor(lights))
+    return Room("cornell", CornellBox().rectangles(), torch.tensor(viewpoints), torch.tensor(lights))
 
 
 def _corridor() -> Room:
     """A closed L-shaped corridor; one light stands in the leg that the camera does not see."""
-    h, c = 0.5, 0.4  # half the outer size, width of the corridor
-    low, high = -0.2, 0.2
-    inner = -h + c
-    up = [0.0, 0.0, high - low]
-    walls = (
-        rectangle([-h, -h, low], [2 * h, 0, 0], [0, c, 0], WOOD)
-        + rectangle([-h, inner, low], [c, 0, 0], [0, 2 * h - c, 0], WOOD)
-        + rectangle([-h, -h, high], [0, c, 0], [2 * h, 0, 0], WHITE)
-        + rectangle([-h, inner, high], [0, 2 * h - c, 0], [c, 0, 0], WHITE)
-        + rectangle([-h, -h, low], up, [2 * h, 0, 0], WHITE)  # the long outer wall, y = −h, faces +y
-        + rectangle([-h, -h, low], [0, 2 * h, 0], up, BLUE)  # x = −h, faces +x
-        + rectangle([h, -h, low], up, [0, c, 0], WHITE)  # end of the first leg, faces −x
-        + rectangle([-h, h, low], [c, 0, 0], up, WHITE)  # end of the second leg, faces −y
-        + rectangle([inner, inner, low], [h - inner, 0, 0], up, RED)  # inner wall of the first leg, faces −y
-        + rectangle([inner, inner, low], up, [0, h - inner, 0], WHITE)  # inner wall of the second leg, faces −x
+    h, inner = 0.5, -0.1  # half the outer size, the corner inside; the corridor is 0.4 wide
+    plan = FloorPlan(
+        outline=((-h, -h), (h, -h), (h, inner), (inner, inner), (inner, h), (-h, h)),
+        height=0.4,
+        walls=(WHITE, WHITE, RED, WHITE, WHITE, BLUE),
+        floor=WOOD,
+        ceiling=WHITE,
     )
     viewpoints = [[[0.42, -0.3, 0.0], [-0.5, -0.28, -0.03]], [[0.1, -0.42, 0.12], [-0.4, 0.0, -0.1]]]
     lights = [[-0.3, 0.3, 0.05], [0.2, -0.3, 0.08], [-0.25, -0.15, -0.08], [-0.45, -0.2, 0.0], [0.3, -0.3, 0.16]]
-    return Room("corridor", walls, torch.tensor(viewpoints), torch.tensor(lights), field_of_view=1.2)
+    return Room("corridor", plan.rectangles(), torch.tensor(viewpoints), torch.tensor(lights), field_of_view=1.2)
 
 
 def _clutter() -> Room:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass, field
 
-from rgspipe.blender.models.parameters import KINDS, CornellParameters, Model, kind_of
+from rgspipe.blender.models.parameters import Model, kind_of, model_from_json
+from rgspipe.scene.models import CornellBox
 
 
 @dataclass(frozen=True)
@@ -46,7 +47,7 @@ class DatasetJob:
     """
 
     scene: str = "cornell"
-    model: Model = field(default_factory=CornellParameters)
+    model: Model = field(default_factory=CornellBox)
     train_views: int = 100
     test_views: int = 24
     targets_per_class: int = 20
@@ -81,5 +82,5 @@ class DatasetJob:
     def from_json(cls, content: dict) -> DatasetJob:
         """The job that `to_json` described."""
         values = dict(content)
-        model = KINDS[values.pop("kind")].from_plain(values.pop("model"))
+        model = model_from_json(values.pop("kind"), values.pop("model"))
         return cls(**values, model=model)

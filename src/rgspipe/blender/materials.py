@@ -9,7 +9,7 @@ from pathlib import Path
 import bpy
 from cycles.osl import osl_compile
 
-from rgspipe.blender.models.parameters import Vector
+from rgspipe.scene.models import Vector
 
 #: The Phong lobe of `scene/gloss.py`. Of Cycles' own nodes none is it: all follow the half vector.
 PHONG_SHADER = """

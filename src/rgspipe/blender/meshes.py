@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import bmesh
 import bpy
 import numpy as np
 
-from rgspipe.blender.models.parameters import Vector
+from rgspipe.blender.materials import diffuse_material
+from rgspipe.scene.models import Vector
+from rgspipe.scene.rectangles import Rectangles
 
 #: Faces that meet at more than this [rad] form an edge; all others are parts of one smooth surface.
 EDGE_ANGLE = math.radians(15.0)
@@ -36,7 +39,13 @@ def add(
     return item
 
 
-def polygon(name: str, corners: list[Vector]) -> bpy.types.Mesh:
+def add_rectangles(scene: bpy.types.Scene, rectangles: Rectangles, names: Sequence[str]) -> None:
+    """Put flat, diffuse rectangles into the scene, each an object of its own."""
+    for name, corners, albedo in zip(names, rectangles.corners.tolist(), rectangles.albedo.tolist(), strict=True):
+        add(scene, polygon(name, corners), diffuse_material(name, tuple(albedo)))
+
+
+def polygon(name: str, corners: Sequence[Sequence[float]]) -> bpy.types.Mesh:
     """One flat face; its front is the side from which the corners run counter-clockwise."""
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata(corners, [], [tuple(range(len(corners)))])

@@ -10,7 +10,7 @@ import torch
 
 from rgspipe.blender.cameras import MAX_DRAWS, Layout, no_room
 from rgspipe.blender.geometry import Geometry
-from rgspipe.blender.models.parameters import BlendFile, CornerParameters
+from rgspipe.blender.models.parameters import BlendFile
 from rgspipe.blender.plan import Frame
 from rgspipe.blender.targets import classify, is_around_corner, is_of_class
 from rgspipe.olat.aim import aim_at_relay, aim_at_seen, seen_points
@@ -18,6 +18,7 @@ from rgspipe.olat.cameras import pool_cameras
 from rgspipe.olat.job import PoolJob
 from rgspipe.olat.track import headlights
 from rgspipe.scene import Camera, Light, PointLight, SpotLight
+from rgspipe.scene.models import Corridor
 
 log = logging.getLogger(__name__)
 
@@ -77,7 +78,7 @@ def _plan(job: PoolJob, cameras: list[Camera], index: int, occlusion: str, light
 
 def _track(place: _Place) -> list[tuple[int, tuple[str, Light]]]:
     corridor = place.job.dataset.model
-    if not isinstance(corridor, CornerParameters):
+    if not isinstance(corridor, Corridor):
         raise ValueError("a track leads around the corner of a corridor")
     shape = place.job.spot.least
     pairs = headlights(corridor, place.job.number, shape)

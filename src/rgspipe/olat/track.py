@@ -7,10 +7,10 @@ import math
 import numpy as np
 import torch
 
-from rgspipe.blender.models.parameters import CornerParameters
 from rgspipe.olat.job import HEADLIGHTS
 from rgspipe.renderer.spot import SpotShape
 from rgspipe.scene import SpotLight
+from rgspipe.scene.models import Corridor
 
 #: Where the middle of the car is at first and at last, in widths of the corridor from the end of either leg: beyond
 #: the cabinet of the far one, and a little behind the cameras of the near one.
@@ -23,7 +23,7 @@ GAUGE, HEIGHT = 0.2, 0.3
 DIP = math.radians(4.0)
 
 
-def headlights(corridor: CornerParameters, moments: int, shape: SpotShape) -> list[tuple[SpotLight, ...]]:
+def headlights(corridor: Corridor, moments: int, shape: SpotShape) -> list[tuple[SpotLight, ...]]:
     """The left and the right headlight at moments equally far apart on the path, 1 W/sr on their axes.
 
     The middle of the car follows the middle of the corridor: straight through the far leg, a quarter of a circle
@@ -33,12 +33,12 @@ def headlights(corridor: CornerParameters, moments: int, shape: SpotShape) -> li
     return [_pair(corridor, float(place), shape) for place in places]
 
 
-def path_length(corridor: CornerParameters) -> float:
+def path_length(corridor: Corridor) -> float:
     """Length of the path, scene units."""
     return sum(_pieces(corridor))
 
 
-def path(corridor: CornerParameters, along: float) -> tuple[np.ndarray, np.ndarray]:
+def path(corridor: Corridor, along: float) -> tuple[np.ndarray, np.ndarray]:
     """The middle of the car (2,) and the direction it drives in (2,), after `along` scene units."""
     straight, bend, _ = _pieces(corridor)
     width, inner = corridor.width, np.array([0.5 - corridor.width, corridor.width - 0.5])
@@ -52,13 +52,13 @@ def path(corridor: CornerParameters, along: float) -> tuple[np.ndarray, np.ndarr
     return inner + np.array([straight + bend - along, -radius]), np.array([-1.0, 0.0])
 
 
-def _pieces(corridor: CornerParameters) -> tuple[float, float, float]:
+def _pieces(corridor: Corridor) -> tuple[float, float, float]:
     """Lengths of the straight, the bend and the straight after it."""
     leg = 1.0 - corridor.width
     return leg - START * corridor.width, 0.25 * math.pi * corridor.width, leg - END * corridor.width
 
 
-def _pair(corridor: CornerParameters, along: float, shape: SpotShape) -> tuple[SpotLight, ...]:
+def _pair(corridor: Corridor, along: float, shape: SpotShape) -> tuple[SpotLight, ...]:
     middle, ahead = path(corridor, along)
     left = np.array([-ahead[1], ahead[0]])
     height = HEIGHT * corridor.width - 0.5 * corridor.height

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import torch
@@ -63,12 +64,14 @@ class Rectangles:
         return self.sides_a.norm(dim=1) * self.sides_b.norm(dim=1)
 
 
-def rectangle(origin: list[float], side_a: list[float], side_b: list[float], albedo: list[float]) -> Rectangles:
+def rectangle(
+    origin: Sequence[float], side_a: Sequence[float], side_b: Sequence[float], albedo: Sequence[float]
+) -> Rectangles:
     """One rectangle."""
     return Rectangles(*(torch.tensor([x], dtype=torch.float64) for x in (origin, side_a, side_b, albedo)))
 
 
-def solid_box(center: list[float], size: list[float], albedo: list[float], turn: float = 0.0) -> Rectangles:
+def solid_box(center: Sequence[float], size: Sequence[float], albedo: Sequence[float], turn: float = 0.0) -> Rectangles:
     """The outside of a box, turned about +z by `turn` [rad]."""
     x, y, z = torch.diag(torch.tensor(size, dtype=torch.float64))
     middle = torch.tensor(center, dtype=torch.float64)
@@ -81,7 +84,7 @@ def solid_box(center: list[float], size: list[float], albedo: list[float], turn:
     return Rectangles(origins + middle, sides_a, sides_b, colour)
 
 
-def inside_of_box(center: list[float], size: list[float], albedo: list[float]) -> Rectangles:
+def inside_of_box(center: Sequence[float], size: Sequence[float], albedo: Sequence[float]) -> Rectangles:
     """The same box seen from inside: a closed room."""
     outside = solid_box(center, size, albedo)
     return Rectangles(outside.origins, outside.sides_b, outside.sides_a, outside.albedo)

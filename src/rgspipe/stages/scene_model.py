@@ -4,17 +4,10 @@ from __future__ import annotations
 
 import math
 
-from rgspipe.blender.models.parameters import (
-    BlendFile,
-    Box,
-    CornellParameters,
-    CornerParameters,
-    HotdogParameters,
-    Model,
-    RoomParameters,
-)
+from rgspipe.blender.models.parameters import BlendFile, HotdogParameters, Model, RoomParameters
 from rgspipe.config import CornellConfig, CornerConfig, SceneConfig
 from rgspipe.errors import InputError
+from rgspipe.scene.models import Box, CornellBox, Corridor
 
 
 def scene_model(scene: SceneConfig) -> Model:
@@ -24,9 +17,9 @@ def scene_model(scene: SceneConfig) -> Model:
         InputError: a material would reflect more light than it gets.
     """
     if scene.kind == "cornell":
-        return cornell_parameters(scene.cornell)
+        return _cornell_box(scene.cornell)
     if scene.kind == "corner":
-        return _corner_parameters(scene.corner)
+        return _corridor(scene.corner)
     if scene.kind == "hotdog":
         return HotdogParameters(scene.hotdog.textured, scene.hotdog.segments)
     if scene.kind == "room":
@@ -34,7 +27,7 @@ def scene_model(scene: SceneConfig) -> Model:
     return BlendFile(scene.path)
 
 
-def cornell_parameters(wanted: CornellConfig) -> CornellParameters:
+def _cornell_box(wanted: CornellConfig) -> CornellBox:
     """The room around the origin; the configuration measures from the front left corner of the floor.
 
     Raises:
@@ -52,7 +45,7 @@ def cornell_parameters(wanted: CornellConfig) -> CornellParameters:
         _standing_box(wanted, wanted.tall_size, wanted.tall_center, wanted.tall_angle),
         _standing_box(wanted, wanted.short_size, wanted.short_center, wanted.short_angle),
     )
-    return CornellParameters(
+    return CornellBox(
         room=tuple(wanted.room),
         white=tuple(wanted.wall_color),
         left=tuple(wanted.left_color),
@@ -69,8 +62,8 @@ def _standing_box(wanted: CornellConfig, size: list[float], foot: list[float], d
     return Box(center, tuple(size), math.radians(degrees), tuple(wanted.box_color))
 
 
-def _corner_parameters(wanted: CornerConfig) -> CornerParameters:
-    return CornerParameters(
+def _corridor(wanted: CornerConfig) -> Corridor:
+    return Corridor(
         width=wanted.width,
         height=wanted.height,
         wall=tuple(wanted.wall_color),

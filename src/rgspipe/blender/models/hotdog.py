@@ -11,7 +11,8 @@ from rgspipe.blender.cameras import ObjectLayout
 from rgspipe.blender.geometry import FreeSpace
 from rgspipe.blender.materials import diffuse_material, mottled_material, striped_material
 from rgspipe.blender.meshes import add, new_scene, revolved, swept
-from rgspipe.blender.models.parameters import HotdogParameters, Vector
+from rgspipe.blender.models.parameters import HotdogParameters
+from rgspipe.scene.models import Vector
 
 #: Half lengths of bun and sausage along x, and how far above the middle of the scene they are.
 BUN_LENGTH, BUN_WIDTH, BUN_HEIGHT, BUN_LEVEL = 0.34, 0.155, 0.1, -0.005

@@ -18,7 +18,8 @@ from rgspipe.blender.materials import (
     striped_material,
 )
 from rgspipe.blender.meshes import add, box, new_scene, polygon, revolved
-from rgspipe.blender.models.parameters import RoomParameters, Vector
+from rgspipe.blender.models.parameters import RoomParameters
+from rgspipe.scene.models import Vector
 
 #: Half the width (x) and depth (y), and half the height of the room.
 SIDE, TOP = 0.5, 0.35
