@@ -8,10 +8,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from rgspipe.datasets import srgb
 from rgspipe.datasets.exr import read_array, read_channels, read_image
 from rgspipe.errors import InputError
-from rgspipe.scene import Camera
+from rgspipe.scene import Camera, srgb
 
 #: Depths from here on (Blender writes 1e10) say that there is no surface.
 NO_SURFACE = 1e9

@@ -11,12 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import expit
 
-from rgspipe.datasets import srgb
 from rgspipe.datasets.conversion import Loss, loss
 from rgspipe.datasets.opacity_profile import smoothstep
 from rgspipe.datasets.ply_options import PlyOptions
 from rgspipe.datasets.ply_table import VertexTable
 from rgspipe.errors import InputError
+from rgspipe.scene import srgb
 
 #: The constant spherical harmonic, ½/√π; 3DGS stores (colour − ½)/Y₀.
 Y0 = 0.5 / math.sqrt(math.pi)

@@ -17,13 +17,13 @@ import torch
 from scipy.special import expit, logit
 from torch import Tensor
 
-from rgspipe.datasets import srgb
 from rgspipe.datasets.conversion import Conversion, Loss, loss
 from rgspipe.datasets.json_file import is_number
 from rgspipe.datasets.ply_gaussians import HIGH, LOW, Y0, unit_quaternions
 from rgspipe.datasets.ply_options import PlyOptions
 from rgspipe.datasets.ply_table import VertexTable, write_vertices
 from rgspipe.errors import InputError
+from rgspipe.scene import srgb
 from rgspipe.scene.gloss import Gloss
 from rgspipe.scene.spacing import inferred_coverage
 from rgspipe.scene.surfels import NO_CLIP, Coverage, Surfels, quaternion_to_axes

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from PIL import Image
 
 from rgspipe.evaluation.arrays import ArrayLike, to_array
+from rgspipe.scene import srgb
 
 Bytes = npt.NDArray[np.uint8]
 
@@ -38,8 +39,7 @@ def tone_map(image: ArrayLike, factor: float) -> Bytes:
     linear = _image(image) * factor
     broken = np.isnan(linear).any(axis=-1)
     linear = np.clip(np.nan_to_num(linear, nan=0.0, posinf=1.0, neginf=0.0), 0.0, 1.0)
-    srgb = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1.0 / 2.4) - 0.055)
-    result = np.round(255.0 * srgb).astype(np.uint8)
+    result = np.round(255.0 * srgb.encode(linear)).astype(np.uint8)
     result[broken] = (255, 0, 255)
     return result
 

@@ -1,4 +1,4 @@
-"""Plain data: cameras, surfels and lights. Nothing here reads a file or renders."""
+"""Plain data: cameras, surfels, lights, the curve of display values. Nothing here reads a file or renders."""
 
 from rgspipe.scene.camera import Camera, look_at
 from rgspipe.scene.gloss import Gloss

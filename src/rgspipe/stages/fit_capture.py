@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 from rgspipe.config import RgspipeConfig
 from rgspipe.datasets.views import View
+from rgspipe.degradation.target_capture import TargetCapture, captured
 from rgspipe.errors import InputError
 from rgspipe.fitting.model.capture import ImageCapture, stored_in_eight_bits
-from rgspipe.robustness.target_capture import TargetCapture, captured
 
 #: Configuration keys that all this depends on.
 KEYS = ("target_capture", "fit.exposure", "fit.clip")

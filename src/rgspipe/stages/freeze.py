@@ -8,10 +8,10 @@ from dataclasses import asdict
 from rgspipe.datasets.frozen_file import DICTIONARY, EFFECTS, SURFELS, save_dictionary, save_frozen
 from rgspipe.datasets.json_file import write_json
 from rgspipe.datasets.surfel_file import load_surfels
+from rgspipe.degradation.model_error import ModelError, with_error
 from rgspipe.fitting.search.dictionary import build_dictionary
 from rgspipe.renderer.effect_bounds import measure_costs, measure_effects
 from rgspipe.renderer.frozen import FrozenScene
-from rgspipe.robustness.model_error import ModelError, with_error
 from rgspipe.stages.base import Stage, StageContext
 from rgspipe.stages.sources import surfel_stage
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import time
 
-from rgspipe.datasets.degrade import Capture, degraded
 from rgspipe.datasets.gs3 import load_dataset
 from rgspipe.datasets.location import dataset_root
 from rgspipe.datasets.surfel_file import save_surfels
 from rgspipe.datasets.tensoir import require_lights
+from rgspipe.degradation.capture import Capture, degraded
 from rgspipe.scene import NO_CLIP
 from rgspipe.stages.base import Stage, StageContext
 from rgspipe.stages.detail import surfel_count

@@ -13,10 +13,10 @@ import pandas as pd
 import torch
 
 from rgspipe.config import TrainConfig
-from rgspipe.datasets.degrade import Capture, degraded
 from rgspipe.datasets.location import open_dataset
 from rgspipe.datasets.surfel_file import load_surfels, save_surfels
 from rgspipe.datasets.views import View
+from rgspipe.degradation.capture import Capture, degraded
 from rgspipe.errors import InputError
 from rgspipe.evaluation.held_out import held_out_picture
 from rgspipe.evaluation.images import save_png

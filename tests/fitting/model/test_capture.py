@@ -6,11 +6,11 @@ import pytest
 import torch
 
 from lit_room import VISIBLE
+from rgspipe.degradation.target_capture import eight_bit
 from rgspipe.fitting import ImageCapture, fit_lights
 from rgspipe.fitting.model.capture import rounding_noise, stored_in_eight_bits
 from rgspipe.fitting.model.parameters import Emitter
 from rgspipe.fitting.model.problem import LightProblem
-from rgspipe.robustness.target_capture import eight_bit
 
 
 def _clipped(room, light, share: float) -> tuple[list[torch.Tensor], float]:

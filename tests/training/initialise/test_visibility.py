@@ -9,7 +9,7 @@ import pytest
 import torch
 
 from raycast import room_views
-from rgspipe.datasets.degrade import Capture, degraded
+from rgspipe.degradation.capture import Capture, degraded
 from rgspipe.training.initialise.facets import Facets
 from rgspipe.training.initialise.visibility import confirmed
 

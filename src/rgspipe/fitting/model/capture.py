@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from rgspipe.datasets import srgb
+from rgspipe.scene import srgb
 
 #: Levels of an 8-bit image.
 LEVELS = 255.0

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from raycast import room_views
 from rgspipe.config import CaptureConfig
-from rgspipe.datasets.degrade import Capture, degraded
 from rgspipe.datasets.views import View
+from rgspipe.degradation.capture import Capture, degraded
 from rgspipe.scene import PointLight
 
 

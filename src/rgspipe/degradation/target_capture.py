@@ -14,9 +14,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from rgspipe.datasets import srgb
-from rgspipe.datasets.degrade import Capture, degraded
 from rgspipe.datasets.views import View
+from rgspipe.degradation.capture import Capture, degraded
+from rgspipe.scene import srgb
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class TargetCapture:
     """How far the images of a target are from perfect; the default changes nothing.
 
     Attributes:
-        noise: standard deviation of a value over the value, see `datasets.degrade.Capture.image_noise`.
+        noise: standard deviation of a value over the value, see `capture.Capture.image_noise`.
         exposure: standard deviation of the exposure of every view but the first, in stops (factors of two).
         white: quantile of all values of the target that 8-bit images can just hold; what is brighter is clipped, and
             the rest rounded to the levels of sRGB. None keeps floating point.

@@ -9,9 +9,9 @@ import pytest
 import torch
 
 from lit_room import room_cameras
-from rgspipe.datasets import srgb
 from rgspipe.datasets.views import View
-from rgspipe.robustness.target_capture import TargetCapture, captured
+from rgspipe.degradation.target_capture import TargetCapture, captured
+from rgspipe.scene import srgb
 
 
 @pytest.fixture(scope="module")
