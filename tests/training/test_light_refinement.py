@@ -61,7 +61,8 @@ def test_wrong_lights_are_put_right(scene) -> None:
     found = refine_lights(SurfelBvh(surfels), weights, transport, wrong, measured)
     offsets = [float((a.light.position - b.light.position).norm()) for a, b in zip(found, truth, strict=True)]
     gains = [float((a.light.intensity / b.light.intensity - 1).abs().max()) for a, b in zip(found, truth, strict=True)]
-    assert max(offsets) < 0.002 and max(gains) < 0.01, (offsets, gains)
+    # Measured 4e-5 and 7e-5.
+    assert max(offsets) < 3e-4 and max(gains) < 5e-4, (offsets, gains)
 
 
 def test_what_all_lights_are_wrong_by_stays(scene) -> None:

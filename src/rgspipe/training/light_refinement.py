@@ -14,11 +14,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import torch
 from torch import Tensor
 
 from rgspipe.datasets.views import View
+from rgspipe.optim.levenberg_marquardt import NormalEquations, least_squares, within
 from rgspipe.progress import track
 from rgspipe.renderer.direct import unit_irradiance
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
@@ -28,17 +30,11 @@ from rgspipe.renderer.view_weights import ViewWeights
 from rgspipe.scene.lights import PointLight
 from rgspipe.training.albedo import pixel_weight
 
-#: Gauss-Newton steps of a light; each at most so long, in scene sizes and in log-intensity.
+#: Steps of a light; each at most so long, in scene sizes and in log-intensity.
 STEPS, LONGEST, STRONGEST = 4, 0.03, 0.2
-
-#: Halvings of a step that does not lower the cost before the light is left where it is.
-HALVINGS = 4
 
 #: Relative error, in medians of all pixels, from which on a pixel counts less (Cauchy).
 OUTLIER = 3.0
-
-#: Added to the diagonal of the normal equations, as a part of it.
-RIDGE = 1e-6
 
 
 def refine_lights(
@@ -70,70 +66,51 @@ def _in_gauge(lights: Sequence[PointLight], measured: Sequence[PointLight]) -> l
 
 
 @dataclass(frozen=True)
-class _Fit:
-    """A light, its cost, and the Gauss-Newton step from it (6,): position, then log-intensity."""
+class _Seen:
+    """A light, and `unit` (P, 3, 4): the image of one of 1 W/sr in its place, and its derivative towards x, y and z."""
 
     light: PointLight
-    cost: float
-    step: Tensor
+    unit: Tensor
+
+    @property
+    def image(self) -> Tensor:
+        """(P, 3)."""
+        return self.unit[:, :, 0] * self.light.intensity.float()
 
 
 class _OneLight:
     """The light of one view as the unknown of a robust least-squares problem."""
 
     def __init__(self, bvh: SurfelBvh, weight: ViewWeights, transport: PatchTransport, view: View) -> None:
-        self._bvh, self._weight, self._transport, self._view = bvh, weight, transport, view
+        self._bvh, self._weight, self._transport = bvh, weight, transport
         self._direct = PixelDirect(bvh, weight)
-        self._image = view.image.reshape(-1, 3).float()
-        self._trust = torch.where(weight.edges, torch.zeros(()), pixel_weight(view, weight.coverage))
+        self.image = view.image.reshape(-1, 3).float()
         centers = bvh.surfels.centers
-        self._size = float((centers.amax(dim=0) - centers.amin(dim=0)).amax())
+        self.size = float((centers.amax(dim=0) - centers.amin(dim=0)).amax())
+        self.start = self.seen(PointLight(view.light.position.double(), view.light.intensity.double()))
+        trust = torch.where(weight.edges, torch.zeros(()), pixel_weight(view, weight.coverage))
+        self.weights = self._robust(trust) if bool((trust > 0.0).any()) else trust
 
     def refined(self) -> PointLight:
-        """The light after a few Gauss-Newton steps, each of which lowers the cost."""
-        light = PointLight(self._view.light.position.double(), self._view.light.intensity.double())
-        if not bool((self._trust > 0.0).any()):
-            return light
-        pixels = self._trust * self._robust(light)
-        current = self._fit(light, pixels)
-        for _ in range(STEPS):
-            better = self._searched(current, pixels)
-            if better is None:
-                break
-            current = better
-        return current.light
+        """The light after a few steps, each of which lowers the cost."""
+        return least_squares(self, self.start, STEPS).value.light
 
-    def _searched(self, current: _Fit, pixels: Tensor) -> _Fit | None:
-        """The first of ever shorter steps that lowers the cost."""
-        for halving in range(HALVINGS):
-            step = 0.5**halving * current.step
-            moved = PointLight(current.light.position + step[:3], current.light.intensity * step[3:].exp())
-            candidate = self._fit(moved, pixels)
-            if candidate.cost < current.cost:
-                return candidate
-        return None
+    def around(self, seen: _Seen) -> _AroundLight:
+        return _AroundLight(self, seen)
 
-    def _fit(self, light: PointLight, pixels: Tensor) -> _Fit:
-        unit = self._unit_image(light.position)
-        intensity = light.intensity.float()
-        residual = unit[:, :, 0] * intensity - self._image
-        by_position = unit[:, :, 1:] * intensity[:, None]
-        by_gain = torch.diag_embed(unit[:, :, 0] * intensity)
-        jacobian = torch.cat([by_position, by_gain], dim=2).double()
-        weighted = jacobian * pixels[:, None, None]
-        normal = torch.einsum("pck,pcl->kl", weighted, jacobian)
-        right = torch.einsum("pck,pc->k", weighted, residual.double())
-        ridge = torch.diag(RIDGE * normal.diagonal() + 1e-30)
-        step = -torch.linalg.solve(normal + ridge, right)
-        cost = float((pixels[:, None] * residual.square()).sum(dtype=torch.float64))
-        return _Fit(light, cost, _shortened(step, LONGEST * self._size))
+    def seen(self, light: PointLight) -> _Seen:
+        return _Seen(light, self._unit_image(light.position))
 
-    def _robust(self, light: PointLight) -> Tensor:
-        """(P,) in (0, 1]: how far pixels that fit badly under the first light are trusted."""
-        error = (self._unit_image(light.position)[:, :, 0] * light.intensity.float() - self._image).abs().mean(dim=1)
-        relative = error * self._trust.sqrt()
-        typical = OUTLIER * relative[self._trust > 0.0].median() + 1e-12
-        return 1.0 / (1.0 + (relative / typical).square())
+    def cost(self, seen: _Seen) -> float:
+        residual = seen.image - self.image
+        return float((self.weights[:, None] * residual.square()).sum(dtype=torch.float64))
+
+    def _robust(self, trust: Tensor) -> Tensor:
+        """`trust` (P,), less in pixels that fit badly under the first light."""
+        error = (self.start.image - self.image).abs().mean(dim=1)
+        relative = error * trust.sqrt()
+        typical = OUTLIER * relative[trust > 0.0].median() + 1e-12
+        return trust / (1.0 + (relative / typical).square())
 
     def _unit_image(self, position: Tensor) -> Tensor:
         """(P, 3, 4) image of a light of 1 W/sr with all bounces, and its derivative towards x, y and z."""
@@ -146,7 +123,35 @@ class _OneLight:
         return image + (self._weight.operator @ bounced.reshape(len(albedo), 12)).reshape(-1, 3, 4)
 
 
-def _shortened(step: Tensor, longest: float) -> Tensor:
-    """A step (6,) of at most `longest` in position and STRONGEST in any log-intensity, in the same direction."""
-    excess = torch.maximum(step[:3].norm() / longest, step[3:].abs().amax() / STRONGEST)
-    return step / excess.clamp(min=1.0)
+@dataclass(frozen=True)
+class _AroundLight:
+    """The problem around a light; parameters are its position over the scene's size and its log-intensity."""
+
+    view: _OneLight
+    seen: _Seen
+
+    @cached_property
+    def normal(self) -> NormalEquations:
+        view, seen = self.view, self.seen
+        by_position = view.size * seen.unit[:, :, 1:] * seen.light.intensity.float()[:, None]
+        jacobian = torch.cat([by_position, torch.diag_embed(seen.image)], dim=2).double()
+        weighted = jacobian * view.weights[:, None, None]
+        matrix = torch.einsum("pck,pcl->kl", weighted, jacobian)
+        direction = torch.einsum("pck,pc->k", weighted, (view.image - seen.image).double())
+        return NormalEquations(matrix, direction, view.cost(seen))
+
+    def allowed(self, step: Tensor) -> float:
+        return min(within(float(step[:3].norm()), LONGEST), within(float(step[3:].abs().max()), STRONGEST))
+
+    def moved(self, step: Tensor) -> PointLight:
+        light = self.seen.light
+        return PointLight(light.position + self.view.size * step[:3], light.intensity * step[3:].exp())
+
+    def distance(self, light: PointLight) -> float:
+        before = self.seen.light
+        brightened = (light.intensity - before.intensity).abs() / before.intensity.clamp(min=1e-300)
+        return max(float((light.position - before.position).norm()) / self.view.size, float(brightened.max()))
+
+    def evaluated(self, light: PointLight) -> tuple[float, _Seen]:
+        seen = self.view.seen(light)
+        return self.view.cost(seen), seen

@@ -9,7 +9,8 @@ from lit_room import VISIBLE
 from rgspipe.fitting.model.parameters import Emitter
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.result import FitStatus
-from rgspipe.fitting.search.refine import PLAIN, SHORTEST_STEP, State, fresh, refine, search_region, start_from
+from rgspipe.fitting.search.refine import PLAIN, State, fresh, refine, search_region, start_from
+from rgspipe.optim.levenberg_marquardt import Stopping
 
 
 def _problem(room, point_light, noise: float) -> LightProblem:
@@ -34,7 +35,7 @@ def _error(state: State) -> float:
 def test_without_noise_steps_go_on_far_below_the_shortest(room, point_light, off: float) -> None:
     state = _refined(_problem(room, point_light, 0.0), off)
     assert state.status is FitStatus.CONVERGED
-    assert _error(state) < 0.02 * SHORTEST_STEP  # measured 2e-8 and 1e-8
+    assert _error(state) < 0.02 * Stopping().shortest_step  # measured 2e-8 and 1e-8
 
 
 def test_with_noise_one_more_look_at_most_is_taken_at_the_answer(room, point_light) -> None:
@@ -44,5 +45,5 @@ def test_with_noise_one_more_look_at_most_is_taken_at_the_answer(room, point_lig
     refine(problem, again, PLAIN, 30, search_region(problem), 0.0)
     assert again.status is FitStatus.CONVERGED and again.evaluations <= 1
     moved = float((again.emitters[0].position - found.emitters[0].position).norm())
-    assert moved < SHORTEST_STEP * problem.views.frozen.size  # measured 0
+    assert moved < Stopping().shortest_step * problem.views.frozen.size  # measured 0
     assert moved < 0.2 * _error(found), "what is left out is small beside what noise does"

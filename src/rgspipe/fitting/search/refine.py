@@ -5,33 +5,20 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import torch
 from torch import Tensor
 
+from rgspipe.fitting.model.exposure import ExposedMoments
 from rgspipe.fitting.model.moments import Moments
 from rgspipe.fitting.model.parameters import Emitter
 from rgspipe.fitting.model.problem import LightProblem
+from rgspipe.fitting.model.step_limits import StepLimits, allowed_share
 from rgspipe.fitting.result import FitStatus, Step
 from rgspipe.fitting.search.surroundings import region_bounds
+from rgspipe.optim.levenberg_marquardt import Ended, NormalEquations, least_squares
 from rgspipe.scene import LightRig
-
-#: A step moves no position by more than this part of the scene's size, and turns no axis and changes no cone by more
-#: than `LONGEST_TURN` (rad; of a cone, of its transformed parameter).
-LONGEST_STEP, LONGEST_TURN = 0.12, 0.3
-
-#: A step below this part of the scene's size, and this angle, ends a refinement if it lowered the cost by less than
-#: this share: where next to nothing is left unexplained, short steps still gain.
-SHORTEST_STEP, SMALL_GAIN = 1e-4, 0.05
-
-#: A step that moves by less than this is none.
-SHORTEST_MOVE = 2e-7
-
-#: A step that is expected to lower the cost by less than this share of it ends a refinement, too.
-LEAST_GAIN = 1e-5
-
-#: Damping: at first, when a step succeeds, when it fails; and how often it may fail in a row.
-DAMPING, EASED, RAISED, ATTEMPTS = 1e-2, 0.2, 6.0, 5
 
 #: Residuals beyond this many medians lose their weight (Cauchy loss).
 CAUCHY_MEDIANS = 3.0
@@ -58,6 +45,13 @@ class Weighting:
 #: The search forgives what the model gets wrong near edges and counts dim pixels; the polish uses plain squares, whose
 #: bright pixels tell the most about the lights.
 ROBUST, PLAIN = Weighting(relative=True, robust=True), Weighting(relative=False, robust=False)
+
+#: What a descent's end is for a fit: where no step lowers the cost any more, a minimum is reached, to rounding.
+STATUSES = {
+    Ended.CONVERGED: FitStatus.CONVERGED,
+    Ended.STALLED: FitStatus.CONVERGED,
+    Ended.OUT_OF_STEPS: FitStatus.MAX_ITERATIONS,
+}
 
 
 @dataclass(frozen=True)
@@ -142,23 +136,14 @@ def refine(
     problem: LightProblem, state: State, weighting: Weighting, iterations: int, region: Region, begin: float
 ) -> None:
     """Move `state` to a minimum of the weighted loss, by at most `iterations` accepted steps."""
-    base, damping = weighting.base(problem), DAMPING
-    state.status = FitStatus.MAX_ITERATIONS
-    for _ in range(iterations):
-        weights = weights_at(problem, state, weighting, base)
-        system = problem.moments(state.columns, weights)
-        moved, gained, damping = _attempt(problem, state, system, weights, damping, region)
-        if moved == 0.0:
-            state.status = FitStatus.CONVERGED
-            break
-        state.iterations += 1
-        state.steps.append(state.record(problem, begin))
-        if moved < SHORTEST_STEP and gained < SMALL_GAIN:
-            state.status = FitStatus.CONVERGED
-            break
+    projected = _ProjectedRig(problem, weighting, weighting.base(problem), region, StepLimits())
+    found = least_squares(projected, state, iterations, watch=lambda at: state.steps.append(at.record(problem, begin)))
+    state.emitters, state.columns = found.value.emitters, found.value.columns
+    state.iterations += found.iterations
+    state.evaluations += found.evaluations * problem.renderings(state.emitters)
+    state.status = STATUSES[found.ended]
     # The intensity that belongs to the last position under this weighting.
-    weights = weights_at(problem, state, weighting, base)
-    state.intensity = problem.moments(state.columns, weights).intensity
+    state.intensity = projected.around(found.value).moments.intensity
 
 
 def weights_at(problem: LightProblem, state: State, weighting: Weighting, base: Tensor) -> Tensor:
@@ -177,58 +162,57 @@ def cauchy_scale(weighted: Tensor) -> float:
     return CAUCHY_MEDIANS * float(weighted.abs().median()) + 1e-6 if weighted.numel() else 1.0
 
 
-def _attempt(
-    problem: LightProblem, state: State, system: Moments, weights: Tensor, damping: float, region: Region
-) -> tuple[float, float, float]:
-    """Take one damped step that lowers the weighted cost.
+@dataclass(frozen=True)
+class _ProjectedRig:
+    """Lights whose intensities answer every step in closed form, as a problem of least squares."""
 
-    Returns:
-        How far it moved (0 if there is none), by what share it lowered the cost, and new damping.
-    """
-    units = torch.cat([emitter.units(region.size) for emitter in state.emitters])
-    matrix, direction = system.parameter_system()
-    matrix, direction = matrix * units[:, None] * units[None, :], direction * units
-    cost = system.cost
-    for _ in range(ATTEMPTS):
-        step = _damped_step(matrix, direction, damping, state.emitters)
-        if float(2.0 * step @ direction - step @ matrix @ step) < LEAST_GAIN * cost:
-            break
-        emitters = _moved(state.emitters, step, region)
-        moved = max(emitter_distance(a, b, region.size) for a, b in zip(emitters, state.emitters, strict=True))
-        if moved < SHORTEST_MOVE:
-            break
+    problem: LightProblem
+    weighting: Weighting
+    base: Tensor
+    region: Region
+    limits: StepLimits
+
+    def around(self, state: State) -> _AroundRig:
+        weights = weights_at(self.problem, state, self.weighting, self.base)
+        return _AroundRig(self, state, weights, self.problem.moments(state.columns, weights))
+
+
+@dataclass(frozen=True)
+class _AroundRig:
+    """The problem around a state, with the weights that it gives the pixels."""
+
+    whole: _ProjectedRig
+    state: State
+    weights: Tensor
+    moments: Moments | ExposedMoments
+
+    @cached_property
+    def normal(self) -> NormalEquations:
+        units = torch.cat([emitter.units(self.whole.region.size) for emitter in self.state.emitters])
+        matrix, direction = self.moments.parameter_system()
+        return NormalEquations(matrix * units[:, None] * units[None, :], direction * units, self.moments.cost)
+
+    def allowed(self, step: Tensor) -> float:
+        return allowed_share(self.state.emitters, step, self.whole.limits)
+
+    def moved(self, step: Tensor) -> tuple[Emitter, ...]:
+        return moved_rig(self.state.emitters, step, self.whole.region)
+
+    def distance(self, rig: tuple[Emitter, ...]) -> float:
+        return rig_move(self.state.emitters, rig, self.whole.region.size)
+
+    def evaluated(self, rig: tuple[Emitter, ...]) -> tuple[float, State]:
+        problem = self.whole.problem
         columns = [
             old if emitter is before else problem.evaluate(emitter)
-            for emitter, before, old in zip(emitters, state.emitters, state.columns, strict=True)
+            for emitter, before, old in zip(rig, self.state.emitters, self.state.columns, strict=True)
         ]
-        state.evaluations += problem.renderings(emitters)
-        trial = problem.moments(columns, weights)
-        if trial.cost < cost:
-            state.emitters, state.columns, state.intensity = emitters, columns, trial.intensity
-            return moved, 1.0 - trial.cost / cost, max(EASED * damping, 1e-6)
-        if moved < SHORTEST_STEP:
-            break
-        damping *= RAISED
-    return 0.0, 0.0, damping
+        moments = problem.moments(columns, self.weights)
+        return moments.cost, replace(self.state, emitters=rig, columns=columns, intensity=moments.intensity)
 
 
-def _damped_step(matrix: Tensor, direction: Tensor, damping: float, emitters: Sequence[Emitter]) -> Tensor:
-    """(D,) Levenberg-Marquardt step, no longer than allowed; zero where nothing is determined."""
-    trace = float(matrix.trace())
-    if not trace > 0.0:
-        return torch.zeros(len(matrix), dtype=torch.float64)
-    damped = matrix + damping * torch.diag(matrix.diagonal()) + 1e-9 * trace * torch.eye(len(matrix)).double()
-    step = torch.linalg.solve(damped, direction)
-    share = 1.0
-    for part in step.split([emitter.parameters for emitter in emitters]):
-        share = min(share, LONGEST_STEP / max(float(part[:3].norm()), 1e-300))
-        if len(part) > 3:
-            share = min(share, LONGEST_TURN / max(float(part[3:].abs().max()), 1e-300))
-    return step * share
-
-
-def _moved(emitters: Sequence[Emitter], step: Tensor, region: Region) -> tuple[Emitter, ...]:
-    """The lights after a step; one that does not move is the same object."""
+def moved_rig(emitters: Sequence[Emitter], step: Tensor, region: Region) -> tuple[Emitter, ...]:
+    """The lights after a step (D,); one that does not move is the same object."""
     parts = step.split([emitter.parameters for emitter in emitters])
     moved = []
     for emitter, part in zip(emitters, parts, strict=True):
@@ -236,6 +220,11 @@ def _moved(emitters: Sequence[Emitter], step: Tensor, region: Region) -> tuple[E
         other = replace(other, position=region.clip(other.position))
         moved.append(emitter if float(part.abs().max()) == 0.0 else other)
     return tuple(moved)
+
+
+def rig_move(one: Sequence[Emitter], other: Sequence[Emitter], size: float) -> float:
+    """The largest `emitter_distance` of a light from itself."""
+    return max(emitter_distance(a, b, size) for a, b in zip(one, other, strict=True))
 
 
 def emitter_distance(one: Emitter, other: Emitter, size: float) -> float:

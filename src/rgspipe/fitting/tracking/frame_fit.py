@@ -3,7 +3,7 @@
 With r the residual of N values, J its derivatives towards the unknowns u, d = u − u₀ their distance from the
 prediction and C its covariance, the cost
 
-    Σ r² / 2f²σ² + dᵀ C⁻¹ d / 2 ,     σ² = min_a Σ r² / N
+    Σ r² / f²σ² + dᵀ C⁻¹ d ,     σ² = min_a Σ r² / N
 
 (at the best intensities a, so that a lamp that is dimmed is no noise) is lowered by Levenberg-Marquardt (iterated
 extended Kalman filter; Bell and Cathey 1993). f makes up for errors of the model, which neighbouring pixels share, so
@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import torch
 from torch import Tensor
@@ -22,17 +23,15 @@ from rgspipe.fitting.certainty.doubts import doubts
 from rgspipe.fitting.certainty.uncertainty import Covariances, light_covariances
 from rgspipe.fitting.model.moments import Moments, scores
 from rgspipe.fitting.model.problem import LightProblem
+from rgspipe.fitting.model.step_limits import StepLimits, allowed_share
 from rgspipe.fitting.result import REASONS, FitResult, FitStatus
 from rgspipe.fitting.search.refine import (
-    ATTEMPTS,
-    DAMPING,
-    EASED,
-    LONGEST_STEP,
-    LONGEST_TURN,
     PLAIN,
-    RAISED,
-    SHORTEST_STEP,
+    STATUSES,
+    Region,
     State,
+    moved_rig,
+    rig_move,
     search_region,
     start_from,
     weights_at,
@@ -40,12 +39,10 @@ from rgspipe.fitting.search.refine import (
 from rgspipe.fitting.search.starts import Rig
 from rgspipe.fitting.selection.verdict import POORLY_EXPLAINED
 from rgspipe.fitting.tracking.motion import Motion, offset, references, turns
+from rgspipe.optim.levenberg_marquardt import NormalEquations, least_squares
 
 #: Residuals below this part of the mean radiance are rounding.
 LEAST_NOISE = 1e-6
-
-#: A step that lowers the cost by less than this ends a fit: 1/2 is what one standard deviation costs.
-LEAST_GAIN = 5e-3
 
 #: f stays in these bounds.
 INFLATIONS = (1.0, 100.0)
@@ -81,16 +78,14 @@ def follow(problem: LightProblem, predicted: Motion, inflation: float, iteration
     problem = _with_known_exposures(problem, predicted.rig, begin)
     state = start_from(problem, predicted.rig, PLAIN, begin)
     state.intensity = predicted.intensity / problem.scale
-    fit = _PriorFit(problem, predicted, inflation)
-    damping = DAMPING
-    for _ in range(iterations):
-        gain, damping = fit.step(state, damping)
-        if gain > 0.0:
-            state.iterations += 1
-            state.steps.append(state.record(problem, begin))
-        if gain < LEAST_GAIN:
-            state.status = FitStatus.CONVERGED
-            break
+    expected = _PredictedRig(problem, predicted, inflation, search_region(problem), StepLimits())
+    found = least_squares(expected, state, iterations, watch=lambda at: state.steps.append(at.record(problem, begin)))
+    state = replace(
+        found.value,
+        iterations=found.iterations,
+        evaluations=state.evaluations + found.evaluations * problem.renderings(state.emitters),
+        status=STATUSES[found.ended],
+    )
     system, variance = _system(problem, state)
     unknowns = _Unknowns.at(state.emitters, problem, predicted.reference)
     information = unknowns.information(system, state.intensity) / (variance * inflation**2)
@@ -134,82 +129,83 @@ class _Unknowns:
 
 
 @dataclass(frozen=True)
-class _PriorFit:
+class _PredictedRig:
+    """A frame's lights, parameters and intensities together, as a problem of least squares."""
+
     problem: LightProblem
     predicted: Motion
     inflation: float
+    region: Region
+    limits: StepLimits
 
-    def step(self, state: State, damping: float) -> tuple[float, float]:
-        """One damped step that lowers the cost; by how much (0 if there is none), and new damping."""
-        problem, region = self.problem, search_region(self.problem)
-        system, variance = _system(problem, state)
-        tempered = 1.0 / (variance * self.inflation**2)
-        unknowns = _Unknowns.at(state.emitters, problem, self.predicted.reference)
-        prior, pull = self._prior(state)
-        matrix = tempered * unknowns.information(system, state.intensity) + prior
-        direction = tempered * unknowns.direction(system, state.intensity) - pull
-        cost = 0.5 * tempered * float(system.cost_at(state.intensity))
-        cost += 0.5 * self._distance(state.emitters, state.intensity)
-        weights = weights_at(problem, state, PLAIN, PLAIN.base(problem))
-        for _ in range(ATTEMPTS):
-            step = torch.linalg.solve(matrix + damping * torch.diag(matrix.diagonal()), direction)
-            step = step * _allowed(step, state.emitters)
-            emitters, intensity = self._moved(state, step)
-            emitters = tuple(replace(one, position=region.clip(one.position)) for one in emitters)
-            columns = [problem.evaluate(emitter) for emitter in emitters]
-            state.evaluations += problem.renderings(emitters)
-            trial = 0.5 * tempered * float(problem.moments(columns, weights).cost_at(intensity))
-            trial += 0.5 * self._distance(emitters, intensity)
-            if trial < cost:
-                state.emitters, state.columns, state.intensity = emitters, columns, intensity
-                return cost - trial, max(EASED * damping, 1e-6)
-            if float(step.abs().max()) < SHORTEST_STEP:
-                break
-            damping *= RAISED
-        return 0.0, damping
+    def around(self, state: State) -> _AroundPrediction:
+        system, variance = _system(self.problem, state)
+        weights = weights_at(self.problem, state, PLAIN, PLAIN.base(self.problem))
+        return _AroundPrediction(self, state, weights, system, 1.0 / (variance * self.inflation**2))
 
-    def _offset(self, rig: Rig, intensity: Tensor) -> Tensor:
-        """(D + 3L,) from the prediction."""
+    @cached_property
+    def precision(self) -> Tensor:
+        """C⁻¹."""
+        count = self.predicted.unknowns
+        return torch.linalg.inv(self.predicted.covariance[:count, :count])
+
+    def offset(self, rig: Rig, intensity: Tensor) -> Tensor:
+        """(D + 3L,) d, from the prediction."""
         before = self.predicted
         change = (self.problem.scale * intensity - before.intensity) / before.reference[:, None]
         return torch.cat([offset(before.rig, rig, before.size), change.flatten()])
 
-    def _distance(self, rig: Rig, intensity: Tensor) -> float:
-        """dᵀ C⁻¹ d."""
-        away = self._offset(rig, intensity)
-        return float(away @ self._precision @ away)
+    def cost(self, system: Moments, tempered: float, rig: Rig, intensity: Tensor) -> float:
+        away = self.offset(rig, intensity)
+        return tempered * float(system.cost_at(intensity)) + float(away @ self.precision @ away)
 
-    def _prior(self, state: State) -> tuple[Tensor, Tensor]:
-        """C⁻¹ and C⁻¹d in the parameters of `state`."""
-        turned = turns(state.emitters, self.predicted.rig)
-        basis = torch.block_diag(turned, torch.eye(self.predicted.unknowns - len(turned)).double())
-        away = self._offset(state.emitters, state.intensity)
-        return basis.T @ self._precision @ basis, basis.T @ (self._precision @ away)
+
+@dataclass(frozen=True)
+class _AroundPrediction:
+    """The problem around a state, with `tempered` = 1 / f²σ² there."""
+
+    whole: _PredictedRig
+    state: State
+    weights: Tensor
+    system: Moments
+    tempered: float
+
+    @cached_property
+    def normal(self) -> NormalEquations:
+        whole, state = self.whole, self.state
+        unknowns = _Unknowns.at(state.emitters, whole.problem, whole.predicted.reference)
+        turned = turns(state.emitters, whole.predicted.rig)
+        basis = torch.block_diag(turned, torch.eye(whole.predicted.unknowns - len(turned)).double())
+        pull = basis.T @ (whole.precision @ whole.offset(state.emitters, state.intensity))
+        matrix = self.tempered * unknowns.information(self.system, state.intensity)
+        direction = self.tempered * unknowns.direction(self.system, state.intensity) - pull
+        cost = whole.cost(self.system, self.tempered, state.emitters, state.intensity)
+        return NormalEquations(matrix + basis.T @ whole.precision @ basis, direction, cost)
+
+    def allowed(self, step: Tensor) -> float:
+        return allowed_share(self.state.emitters, step[: self._parameters], self.whole.limits)
+
+    def moved(self, step: Tensor) -> tuple[Rig, Tensor]:
+        whole, count = self.whole, self._parameters
+        colours = step[count:].reshape(-1, 3) * whole.predicted.reference[:, None] / whole.problem.scale
+        rig = moved_rig(self.state.emitters, step[:count], whole.region)
+        return rig, (self.state.intensity + colours).clamp(min=0.0)
+
+    def distance(self, place: tuple[Rig, Tensor]) -> float:
+        whole, (rig, intensity) = self.whole, place
+        brightened = whole.problem.scale * (intensity - self.state.intensity) / whole.predicted.reference[:, None]
+        return max(rig_move(self.state.emitters, rig, whole.region.size), float(brightened.abs().max()))
+
+    def evaluated(self, place: tuple[Rig, Tensor]) -> tuple[float, State]:
+        whole, (rig, intensity) = self.whole, place
+        columns = [whole.problem.evaluate(emitter) for emitter in rig]
+        system = whole.problem.moments(columns, self.weights)
+        cost = whole.cost(system, self.tempered, rig, intensity)
+        return cost, replace(self.state, emitters=rig, columns=columns, intensity=intensity)
 
     @property
-    def _precision(self) -> Tensor:
-        count = self.predicted.unknowns
-        return torch.linalg.inv(self.predicted.covariance[:count, :count])
-
-    def _moved(self, state: State, step: Tensor) -> tuple[Rig, Tensor]:
-        sizes = [emitter.parameters for emitter in state.emitters]
-        parts = step[: sum(sizes)].split(sizes)
-        size = self.problem.views.frozen.size
-        emitters = tuple(emitter.moved(part, size) for emitter, part in zip(state.emitters, parts, strict=True))
-        colours = step[sum(sizes) :].reshape(-1, 3) * self.predicted.reference[:, None] / self.problem.scale
-        return emitters, (state.intensity + colours).clamp(min=0.0)
-
-
-def _allowed(step: Tensor, rig: Rig) -> float:
-    """By which part of the step no light moves or turns too far."""
-    share, first = 1.0, 0
-    for emitter in rig:
-        part = step[first : first + emitter.parameters]
-        share = min(share, LONGEST_STEP / max(float(part[:3].norm()), 1e-300))
-        if emitter.is_spot:
-            share = min(share, LONGEST_TURN / max(float(part[3:].abs().max()), 1e-300))
-        first += emitter.parameters
-    return share
+    def _parameters(self) -> int:
+        return sum(emitter.parameters for emitter in self.state.emitters)
 
 
 def _system(problem: LightProblem, state: State) -> tuple[Moments, float]:
