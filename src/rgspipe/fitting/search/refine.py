@@ -13,7 +13,6 @@ from rgspipe.fitting.model.moments import Moments
 from rgspipe.fitting.model.parameters import Emitter
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.result import FitStatus, Step
-from rgspipe.fitting.search.surroundings import region_bounds
 from rgspipe.scene import LightRig
 
 #: A step moves no position by more than this part of the scene's size, and turns no axis and changes no cone by more
@@ -112,9 +111,9 @@ class State:
 
 
 def search_region(problem: LightProblem) -> Region:
-    """Where lights are looked for; see `surroundings`."""
+    """Where lights are looked for; see `renderer.surroundings`."""
     frozen = problem.views.frozen
-    return Region(*region_bounds(frozen), frozen.size)
+    return Region(*frozen.surroundings.bounds, frozen.size)
 
 
 def start_from(problem: LightProblem, emitters: Sequence[Emitter], weighting: Weighting, begin: float) -> State:
