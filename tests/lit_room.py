@@ -44,6 +44,13 @@ def frozen_room() -> FrozenScene:
     return FrozenScene.freeze(room_surfels(), gather_rays=64, patches=150, seed=0)
 
 
+def frozen_cube() -> FrozenScene:
+    """The outside of a cube of side 0.5, in empty space."""
+    albedo = torch.tensor([0.6, 0.5, 0.4], dtype=torch.float64)
+    surfels = surfels_on(*solid_box((0.0, 0.0, 0.0), 0.5, 0.05), 0.05, albedo)
+    return FrozenScene.freeze(surfels, gather_rays=16, patches=50, seed=0)
+
+
 def room_cameras(resolution: int) -> list[Camera]:
     """Two cameras near the same edge of the ceiling; neither sees HIDDEN."""
     origins = torch.tensor([[-0.4, -0.4, 0.3], [-0.42, -0.1, 0.25]])

@@ -25,9 +25,10 @@ PACKAGE = "rgspipe"
 #: are the ground, unless they are named here.
 FLOORS = (
     ("scene", "optim"),
+    ("datasets",),
     ("renderer",),
     ("fitting", "completion"),
-    ("training", "datasets"),
+    ("training",),
     ("degradation", "robustness", "blender", "olat", "evaluation"),
     ("relighting", "studies", "benchmark", "pages"),
     ("config",),

@@ -12,9 +12,10 @@ import torch
 from plyfile import PlyData
 
 from clouds import cloud
-from rgspipe.datasets.ply import PlyOptions, load_ply, save_ply
+from rgspipe.datasets.ply import PlyOptions, save_ply
 from rgspipe.datasets.ply_own import Layout
 from rgspipe.errors import InputError
+from rgspipe.renderer.ply import load_ply
 from rgspipe.scene import Surfels
 from rooms import closed_box
 

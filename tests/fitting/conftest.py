@@ -9,7 +9,8 @@ import pytest
 import torch
 
 from lit_room import frozen_room, room_cameras
-from rgspipe.fitting import FitViews, LightDictionary, build_dictionary, prepare_fit
+from rgspipe.fitting import FitViews, prepare_fit
+from rgspipe.renderer.dictionary import LightDictionary
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.view_weights import ViewWeights
 from rgspipe.scene import PointLight
@@ -33,7 +34,7 @@ class Room:
 def room() -> Room:
     frozen = frozen_room()
     views = [frozen.view(camera) for camera in room_cameras(48)]
-    dictionary = build_dictionary(frozen, 6, seed=0)
+    dictionary = frozen.with_dictionary(6).dictionary
     one, two = (prepare_fit(frozen, views[:count], dictionary=dictionary) for count in (1, 2))
     return Room(frozen, views, dictionary, one, two)
 

@@ -9,7 +9,7 @@ from rgspipe.benchmark.rooms import ROOMS
 from rgspipe.fitting.fit import fit_lights, prepare_fit, render_light
 from rgspipe.fitting.model.parameters import Emitter
 from rgspipe.fitting.model.problem import Effects, LightProblem
-from rgspipe.fitting.search.dictionary import LightDictionary, build_dictionary
+from rgspipe.renderer.dictionary import LightDictionary
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.pixel_direct import PixelDirect, surfel_shares
 from rgspipe.scene import PointLight
@@ -26,7 +26,7 @@ def frozen() -> FrozenScene:
 
 @pytest.fixture(scope="module")
 def dictionary(frozen: FrozenScene) -> LightDictionary:
-    return build_dictionary(frozen, 5, seed=0)
+    return frozen.with_dictionary(5).dictionary
 
 
 def test_a_fit_at_pixels_finds_a_light_near_a_wall_that_centres_misplace(

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 import torch
 
-from rgspipe.fitting.search.dictionary import LightDictionary
 from rgspipe.relighting.rigs import TINT, random_rig
+from rgspipe.renderer.dictionary import LightDictionary
 
 POSITIONS = torch.arange(15.0).reshape(5, 3)
 IRRADIANCE = torch.rand(5, 40, generator=torch.Generator().manual_seed(1))

@@ -9,7 +9,6 @@ import torch
 from torch import Tensor
 
 from hard_cases import INSIDE, room
-from rgspipe.datasets.frozen_file import load_frozen, save_frozen
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.rig import Rig
 from rgspipe.renderer.spot import SpotShape
@@ -60,8 +59,8 @@ def test_light_and_its_derivatives_are_the_same(near: FrozenScene, far: FrozenSc
 
 
 def test_the_centres_are_stored(far: FrozenScene, tmp_path) -> None:
-    save_frozen(tmp_path, far)
-    loaded = load_frozen(tmp_path.joinpath)
+    far.save(tmp_path)
+    loaded = FrozenScene.load(tmp_path)
     assert torch.equal(loaded.centers, far.centers)
     # Products with one lighting add in an order that depends on where a matrix lies in memory; measured: 2.3e-7.
     torch.testing.assert_close(lit(loaded, AWAY)["radiance"], lit(far, AWAY)["radiance"], rtol=2e-6, atol=0.0)

@@ -10,8 +10,9 @@ from torch import Tensor
 
 from hard_cases import DEEP, INSIDE, LIGHTS, SCENES, HardScene, camera, scene_of_light
 from rgspipe.errors import InputError
-from rgspipe.fitting import AdamOptions, FitResult, FitStatus, LightDictionary, SearchOptions, fit_lights, prepare_fit
+from rgspipe.fitting import AdamOptions, FitResult, FitStatus, SearchOptions, fit_lights, prepare_fit
 from rgspipe.fitting.fit import FitViews
+from rgspipe.renderer.dictionary import LightDictionary
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import PointLight
 

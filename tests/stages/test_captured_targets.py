@@ -12,12 +12,12 @@ from frozen_store import RESOLUTION, frozen_artifact, write_display_target
 from lit_room import VISIBLE, room_cameras
 from rgspipe.artifacts import Artifact
 from rgspipe.config import RgspipeConfig, with_changes
-from rgspipe.datasets.frozen_file import load_frozen
 from rgspipe.datasets.gs3 import load_target
 from rgspipe.datasets.light_file import read_lights
 from rgspipe.datasets.views import View
 from rgspipe.errors import InputError
 from rgspipe.fitting import Effects, prepare_fit, render_light
+from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import PointLight
 from rgspipe.stages import fit_light
 from rgspipe.stages.base import StageContext
@@ -34,7 +34,7 @@ def freeze(tmp_path_factory: pytest.TempPathFactory) -> Artifact:
 @pytest.fixture(scope="module")
 def images(freeze: Artifact) -> list[torch.Tensor]:
     """Two views of LIGHT, of which 5 % of the values are above 1."""
-    views = prepare_fit(load_frozen(freeze.file), room_cameras(RESOLUTION), effects=Effects(at_pixels=True))
+    views = prepare_fit(FrozenScene.load(freeze.folder()), room_cameras(RESOLUTION), effects=Effects(at_pixels=True))
     images = render_light(views, LIGHT)
     white = float(torch.cat([image.reshape(-1) for image in images]).quantile(0.95))
     return [image / white for image in images]
@@ -97,5 +97,5 @@ def test_radiance_is_not_clipped_and_a_stated_clip_counts(images: list[torch.Ten
 def test_a_frozen_scene_with_a_missing_object_has_fewer_surfels(freeze: Artifact, tmp_path: Path) -> None:
     box = [-0.15, -0.15, -0.4, 0.25, 0.25, 0.0]
     wrong = frozen_artifact(tmp_path, model_error__missing=box, model_error__albedo=0.1)
-    counts = [len(load_frozen(artifact.file).surfels) for artifact in (freeze, wrong)]
+    counts = [len(FrozenScene.load(artifact.folder()).surfels) for artifact in (freeze, wrong)]
     assert counts[1] < counts[0]

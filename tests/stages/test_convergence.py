@@ -14,9 +14,9 @@ from PIL import Image
 from frozen_store import RESOLUTION, artifact, frozen_artifact, write_targets
 from lit_room import room_cameras
 from rgspipe.config import RgspipeConfig, with_changes
-from rgspipe.datasets.frozen_file import load_frozen
 from rgspipe.datasets.light_file import write_lights
 from rgspipe.fitting import Effects, prepare_fit, render_light
+from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import PointLight
 from rgspipe.stages import convergence
 from rgspipe.stages.base import StageContext
@@ -40,7 +40,7 @@ def _write_fit(folder: Path, steps: int) -> None:
 
 def test_methods_are_compared_by_the_same_measures(tmp_path: Path) -> None:
     freeze = frozen_artifact(tmp_path / "store")
-    views = prepare_fit(load_frozen(freeze.file), room_cameras(RESOLUTION), effects=Effects(at_pixels=True))
+    views = prepare_fit(FrozenScene.load(freeze.folder()), room_cameras(RESOLUTION), effects=Effects(at_pixels=True))
     images = {"rig_0000": render_light(views, _light(PLACE))}
     truths = {"rig_0000": (_light(PLACE),)}
     targets = artifact(tmp_path / "store", "generate_dataset", lambda folder: write_targets(folder, images, truths))

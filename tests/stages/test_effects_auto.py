@@ -16,7 +16,6 @@ from rgspipe.artifacts import Artifact, ArtifactStore, Key
 from rgspipe.benchmark.effect_scenes import EFFECT_SCENES, ball
 from rgspipe.config import RgspipeConfig, with_changes
 from rgspipe.datasets.exr import write_image
-from rgspipe.datasets.frozen_file import load_frozen
 from rgspipe.datasets.gs3_write import frame_entry, write_transforms
 from rgspipe.datasets.surfel_file import save_surfels
 from rgspipe.renderer import direct, frozen, transport
@@ -111,7 +110,7 @@ def test_a_convex_object_pays_for_no_shadow_ray_and_no_bounce(
 def test_what_is_left_out_of_a_fit_stands_in_its_artifact_with_reason_bound_and_saving(tmp_path: Path) -> None:
     surfels = room_surfels()
     artifact = freeze_scene(tmp_path / "store", replace(surfels, albedo=1e-5 * surfels.albedo))
-    write_target(tmp_path / "target", load_frozen(artifact.file))
+    write_target(tmp_path / "target", FrozenScene.load(artifact.folder()))
     _, facts = fit(artifact, tmp_path / "fit", tmp_path / "target")
     noted = json.loads(json.dumps(facts["effects"], allow_nan=False))
     shadows, bounces = noted["choice"]["decisions"][:2]
@@ -131,7 +130,7 @@ def test_the_plan_says_what_is_decided_before_anything_is_made(tmp_path: Path) -
     off = fit_light.remarks(configured("fit_light", {"effects.interreflection": False}), {"freeze": artifact})
     assert off[1] == "interreflection left out: as configured"
     assert fit_light.remarks(configured("fit_light", {"effects.auto": False}), {"freeze": artifact}) == ()
-    write_target(tmp_path / "target", load_frozen(artifact.file))
+    write_target(tmp_path / "target", FrozenScene.load(artifact.folder()))
     folder = tmp_path / "target"
 
     def make(where: Path) -> dict:

@@ -19,12 +19,13 @@ from rgspipe.config import RgspipeConfig
 from rgspipe.datasets.exr import write_image
 from rgspipe.datasets.gs3_write import frame_entry, write_transforms
 from rgspipe.datasets.light_file import write_lights
-from rgspipe.datasets.ply import load_ply, save_ply
+from rgspipe.datasets.ply import save_ply
 from rgspipe.datasets.surfel_file import load_surfels
 from rgspipe.errors import InputError
 from rgspipe.fitting.fit import prepare_fit, render_light
 from rgspipe.fitting.model.problem import Effects
 from rgspipe.pipeline import resolve, run
+from rgspipe.renderer.ply import load_ply
 from rgspipe.scene import PointLight
 from rgspipe.stages import load_stage
 

@@ -25,7 +25,7 @@ REACHED = {
     "render_truth": ("blender.room", "benchmark.rooms"),
     "benchmark": ("benchmark.mitsuba_worker", "blender.__main__", "renderer.kernels.shadow"),
     "train_surfels": ("training.trainer", "scene.camera", "optim.ssim"),
-    "fit_light": ("fitting.fit", "renderer.kernels.composite", "datasets.frozen_file"),
+    "fit_light": ("fitting.fit", "renderer.kernels.composite", "renderer.frozen_file"),
     "track": ("stages.fit_light", "fitting.tracking.track"),
     "report": ("pages", "pages.html"),
 }

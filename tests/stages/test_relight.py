@@ -18,11 +18,11 @@ from lit_room import VISIBLE, room_cameras
 from rgspipe.artifacts import Artifact
 from rgspipe.config import RgspipeConfig, with_changes
 from rgspipe.datasets.exr import read_image
-from rgspipe.datasets.frozen_file import load_frozen
 from rgspipe.datasets.light_file import read_lights, write_lights
 from rgspipe.errors import InputError
 from rgspipe.fitting.fit import prepare_fit, render_rig
 from rgspipe.fitting.model.problem import Effects
+from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import LightRig, PointLight, SpotLight
 from rgspipe.stages import relight
 from rgspipe.stages.base import Need, StageContext
@@ -43,7 +43,7 @@ def inputs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Artifact]:
     """The frozen room, and targets whose images the library's own renderer made."""
     root = tmp_path_factory.mktemp("store")
     freeze = frozen_artifact(root)
-    views = prepare_fit(load_frozen(freeze.file), room_cameras(32), effects=Effects(at_pixels=True))
+    views = prepare_fit(FrozenScene.load(freeze.folder()), room_cameras(32), effects=Effects(at_pixels=True))
     images = {name: render_rig(views, rig) for name, rig in RIGS.items()}
     return {
         "freeze": freeze,

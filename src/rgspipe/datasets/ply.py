@@ -1,7 +1,8 @@
-"""Surfels from PLY files: our own, 3DGS, 2DGS and RadiosityGS; see docs/conventions.md."""
+"""Surfels in PLY files: our own, 3DGS, 2DGS and RadiosityGS; see docs/conventions.md."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -9,36 +10,47 @@ import torch
 from torch import Tensor
 
 from rgspipe.datasets.conversion import Conversion, loss
-from rgspipe.datasets.ply_cameras import find_cameras, read_viewpoints
 from rgspipe.datasets.ply_gaussians import Discs, read_gaussians
 from rgspipe.datasets.ply_options import PlyOptions
 from rgspipe.datasets.ply_own import is_own, read_own, save_ply
 from rgspipe.datasets.ply_radiosity import is_radiosity, read_radiosity
 from rgspipe.datasets.ply_table import read_vertices
 from rgspipe.errors import InputError
-from rgspipe.renderer.fronts import backs_towards_cameras
 from rgspipe.scene.gloss import Gloss
-from rgspipe.scene.orientation import backs_towards, turned_over
-from rgspipe.scene.spacing import bounding_center, inferred_coverage
+from rgspipe.scene.spacing import inferred_coverage
 from rgspipe.scene.surfels import NO_CLIP, Surfels, quaternion_to_axes
 
 #: Peak memory of freezing a surfel with 256 gather rays: 1.1 GB for the 10 000 of a trained Cornell box, a third of it
 #: for those of an empty cube, whose rays meet fewer.
 FREEZING_BYTES = 110e3
 
-__all__ = ["PlyOptions", "load_ply", "save_ply"]
+__all__ = ["PlyOptions", "PlySurfels", "read_ply", "save_ply"]
 
 
-def load_ply(path: str | Path, options: PlyOptions | None = None) -> tuple[Surfels, Conversion]:
-    """The surfels in a PLY file, float32 on the CPU, and what could not be taken over.
+@dataclass(frozen=True)
+class PlySurfels:
+    """What is in a PLY file.
+
+    Attributes:
+        surfels: float32, on the CPU, with their fronts as the rotations have them.
+        own: whether the file is of this program, and says which side is the front.
+        conversion: what could not be taken over.
+    """
+
+    surfels: Surfels
+    own: bool
+    conversion: Conversion
+
+
+def read_ply(path: Path, options: PlyOptions) -> PlySurfels:
+    """The surfels in a PLY file, with their fronts where the file has them.
 
     Raises:
-        InputError: no PLY file, a property is missing or has impossible values, or nothing says which side of the
-            surfels is their front.
+        InputError: no PLY file, or a property is missing or has impossible values.
     """
-    path, options = Path(path), options or PlyOptions()
     table = read_vertices(path)
-    if is_own(table):
+    own = is_own(table)
+    if own:
         surfels, conversion = read_own(table, options)
         kept, losses, notes = np.ones(len(surfels), bool), conversion.losses, list(conversion.notes)
         if options.crop is not None:
@@ -54,8 +66,7 @@ def load_ply(path: str | Path, options: PlyOptions | None = None) -> tuple[Surfe
         notes = [*discs.notes, f"Coverage is inferred: thresholds {rule.low:g} and {rule.high:g}, layers of "
                  f"{rule.layer_thickness:.3g}."]  # fmt: skip
     left = loss("left out: outside of the box, or too faint to be there", 1.0 * ~kept, 0.0, "each")
-    surfels, fronts = _oriented(surfels, path, options, own=is_own(table))
-    return surfels, Conversion.of(path, layout, len(surfels), [*losses, left], [*notes, *fronts])
+    return PlySurfels(surfels, own, Conversion.of(path, layout, len(surfels), [*losses, left], notes))
 
 
 def _check_count(path: Path, kept: np.ndarray, options: PlyOptions) -> None:
@@ -121,27 +132,3 @@ def _chosen(surfels: Surfels, kept: Tensor) -> Surfels:
     gloss = None if surfels.gloss is None else Gloss(*(x[kept] for x in surfels.gloss.tensors().values()))
     parts = {name: tensor[kept] for name, tensor in surfels.tensors().items()}
     return Surfels(**parts, coverage=surfels.coverage, gloss=gloss)
-
-
-def _oriented(surfels: Surfels, path: Path, options: PlyOptions, *, own: bool) -> tuple[Surfels, list[str]]:
-    """The surfels with their fronts where the options say, and that in words."""
-    fronts = options.fronts
-    cameras = options.cameras or (None if own else find_cameras(path))
-    if fronts == "auto":
-        fronts = "cameras" if options.cameras is not None else "kept" if own else "cameras"
-    if fronts == "kept":
-        return surfels, [] if own else ["Fronts are kept as the rotations have them."]
-    if fronts == "cameras":
-        if cameras is None:
-            raise InputError(
-                f"{path}: fronts",
-                expected="to know which side of each surfel is seen: other programs draw both, light falls on one",
-                found=f"scene.ply.fronts={options.fronts} and no cameras.json beside the file or in its model's folder",
-                remedy="Set scene.ply.fronts=outwards for an object in empty space, inwards for a room, kept to trust "
-                "the rotations, or scene.ply.cameras=FILE (cameras.json or a transforms file).",
-            )
-        away, where = backs_towards_cameras(surfels, read_viewpoints(cameras)), f"the cameras in {cameras}"
-    else:
-        away = backs_towards(surfels, bounding_center(surfels.centers)[None])
-        away, where = (away, "the middle") if fronts == "inwards" else (~away, "away from the middle")
-    return turned_over(surfels, away), [f"Fronts look towards {where}: {int(away.sum())} surfels were turned over."]

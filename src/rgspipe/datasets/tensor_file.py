@@ -17,8 +17,12 @@ from rgspipe.errors import InputError
 def save_tensors(path: Path, tensors: dict[str, Tensor], note: dict[str, Any] | None = None) -> None:
     """Write `tensors` and a JSON-able `note` to `path`; a reader never sees half a file."""
     temporary = path.with_name(f".{path.name}.{os.getpid()}")
+    temporary.touch()
+    permissions = temporary.stat().st_mode
     whole = {name: tensor.detach().cpu().contiguous() for name, tensor in tensors.items()}
     safetensors.torch.save_file(whole, temporary, metadata={"note": json.dumps(note or {}, sort_keys=True)})
+    # safetensors writes for the owner alone; here, as everywhere, the umask decides.
+    temporary.chmod(permissions)
     temporary.replace(path)
 
 

@@ -5,7 +5,6 @@ from rgspipe.fitting.fit import FitViews, fit_lights, prepare_fit, render_light,
 from rgspipe.fitting.model.capture import ImageCapture
 from rgspipe.fitting.model.problem import Effects
 from rgspipe.fitting.result import FitResult, FitStatus, Step
-from rgspipe.fitting.search.dictionary import LightDictionary, build_dictionary
 from rgspipe.fitting.search_lm import SearchOptions
 from rgspipe.fitting.spec import LightSpec
 
@@ -16,11 +15,9 @@ __all__ = [
     "FitStatus",
     "FitViews",
     "ImageCapture",
-    "LightDictionary",
     "LightSpec",
     "SearchOptions",
     "Step",
-    "build_dictionary",
     "fit_lights",
     "prepare_fit",
     "render_light",

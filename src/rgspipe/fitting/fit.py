@@ -17,10 +17,10 @@ from rgspipe.fitting.model.problem import Effects, LightProblem
 from rgspipe.fitting.model.views import PreparedViews, prepare_views
 from rgspipe.fitting.result import FitResult
 from rgspipe.fitting.search.coarse import CoarseImages, coarse_images
-from rgspipe.fitting.search.dictionary import LightDictionary, build_dictionary
 from rgspipe.fitting.search.spot_candidates import spot_candidates
 from rgspipe.fitting.search_lm import SearchOptions, fit_search_lm
 from rgspipe.fitting.spec import LightSpec
+from rgspipe.renderer.dictionary import LightDictionary
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.pixel_direct import surfel_shares
 from rgspipe.renderer.rig import Rig, unit_response
@@ -108,7 +108,7 @@ def fit_lights(
         method: "search_lm", "paper_adam", or "finite_differences": search_lm with derivatives by central differences.
         masks: (H, W) per view, the scene's share of each pixel (the image's alpha); 1 if None.
         mask_edges: whether `search_lm` leaves out pixels on silhouettes, creases and depth jumps.
-        dictionary: candidates for `search_lm`; made anew if None, which takes seconds.
+        dictionary: candidates for `search_lm`; the scene's own if None.
         effects: parts of light transport; all if None.
         search, adam: settings of the methods.
         training_lights: lights of known images, where `paper_adam` starts from.
@@ -129,7 +129,8 @@ def fit_lights(
         raise ValueError(f"method must be one of {METHODS}, got {method!r}")
     if not isinstance(views, FitViews):
         if method != "paper_adam" and dictionary is None:
-            dictionary = build_dictionary(frozen, seed=seed, shadows=(effects or Effects()).shadows)
+            shaded = (effects or Effects()).shadows
+            dictionary = (frozen if shaded else frozen.with_dictionary(shadows=False)).dictionary
         views = prepare_fit(
             frozen, views, masks=masks, mask_edges=mask_edges, dictionary=dictionary, effects=effects, spec=spec
         )

@@ -6,7 +6,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from rgspipe.fitting.search.dictionary import LightDictionary
+from rgspipe.renderer.dictionary import LightDictionary
 from rgspipe.scene import LightRig, PointLight
 
 #: A channel of a light is this many times its mean over colours, or so much less.

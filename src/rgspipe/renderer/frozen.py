@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal, Protocol
+from pathlib import Path
+from typing import Literal, Protocol, Self
 
 import numpy as np
 import scipy.sparse
@@ -14,8 +15,10 @@ from torch import Tensor
 
 from rgspipe.renderer.areas import surfel_areas
 from rgspipe.renderer.clusters import cluster_patches
+from rgspipe.renderer.dictionary import GRID, LightDictionary, build_dictionary
 from rgspipe.renderer.direct import unit_irradiance
 from rgspipe.renderer.exposure import exposure
+from rgspipe.renderer.frozen_file import load_parts, save_parts
 from rgspipe.renderer.gather import build_gather
 from rgspipe.renderer.glossy_transport import GlossyLight, GlossyTransport, build_glossy_transport
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
@@ -24,6 +27,7 @@ from rgspipe.renderer.openness import openness
 from rgspipe.renderer.radiosity import GatherSolver
 from rgspipe.renderer.rig import Rig, rig_irradiance, unit_response
 from rgspipe.renderer.sparse import SparseOperator
+from rgspipe.renderer.surroundings import OPEN, Surroundings
 from rgspipe.renderer.transport import PatchTransport, build_patch_transport, with_bounces
 from rgspipe.renderer.view_weights import ViewWeights, build_view_weights
 from rgspipe.scene.camera import Camera
@@ -43,6 +47,10 @@ class IndirectSolver(Protocol):
         """(N, 3, K) indirect part of the radiosity for K lightings with direct radiosity (N, 3, K)."""
         ...
 
+    def to(self, device: torch.device | str) -> Self:
+        """The same on another device."""
+        ...
+
 
 @dataclass(frozen=True)
 class FrozenScene:
@@ -58,6 +66,7 @@ class FrozenScene:
         gloss: how light goes over glossy surfels; None for a diffuse scene.
         centers: (N, 3) float64 centres as they were given, which rays and lights are measured from: far from the origin
             float32 cannot hold them. None for `surfels.centers`.
+        candidates: its dictionary of lights, if it is made already; see `dictionary`.
     """
 
     surfels: Surfels
@@ -67,10 +76,17 @@ class FrozenScene:
     solver: IndirectSolver | None = None
     gloss: GlossyTransport | None = None
     centers: Tensor | None = None
+    candidates: LightDictionary | None = None
 
     @classmethod
-    def freeze(cls, surfels: Surfels, *, gather_rays: int, patches: int, seed: int) -> FrozenScene:
-        """Precompute the operators of `surfels`: the gather from hemisphere rays, then patch transport."""
+    def freeze(cls, surfels: Surfels, *, gather_rays: int = 256, patches: int = 1000, seed: int = 0) -> FrozenScene:
+        """Precompute the operators of `surfels`: the gather from hemisphere rays, then patch transport.
+
+        Args:
+            gather_rays: hemisphere rays of a surfel.
+            patches: of the indirect light.
+            seed: of the rays.
+        """
         centers, surfels = surfels.centers.double(), surfels.to(torch.float32)
         bvh = SurfelBvh(replace(surfels, centers=centers))
         areas = surfel_areas(bvh, seed=seed)
@@ -79,6 +95,57 @@ class FrozenScene:
         transport = build_patch_transport(gather, labels, areas, surfels.albedo)
         gloss = build_glossy_transport(replace(surfels, centers=centers), gather, transport)
         return cls(surfels, areas, gather, transport, gloss=gloss, centers=centers)
+
+    @classmethod
+    def load(cls, folder: str | Path, *, gather: bool = False) -> FrozenScene:
+        """The scene in a folder that `save` or the stage freeze wrote, on the CPU.
+
+        Args:
+            gather: whether the gather operator is loaded, too, which is most of the bytes; fits work on the patches.
+
+        Raises:
+            InputError: a file is missing, broken, or does not belong to the others.
+        """
+        return cls(**load_parts(Path(folder), gather=gather))
+
+    def save(self, folder: str | Path) -> None:
+        """Write surfels and operators, and the dictionary if it is made; docs/conventions.md has the files.
+
+        Raises:
+            ValueError: the transport has a limited number of bounces: what is stored is the scene with all of them.
+        """
+        if self.transport.bounces is not None:
+            raise ValueError(f"a frozen scene is stored with all bounces, got {self.transport.bounces}")
+        save_parts(
+            Path(folder),
+            surfels=self.surfels,
+            areas=self.areas,
+            centers=(self.surfels.centers if self.centers is None else self.centers).double(),
+            gather=self.gather,
+            transport=self.transport,
+            gloss=self.gloss,
+            candidates=self.__dict__.get("dictionary", self.candidates),
+        )
+
+    @property
+    def device(self) -> torch.device:
+        """Where the scene is, and its images are made."""
+        return self.surfels.centers.device
+
+    def to(self, device: torch.device | str) -> FrozenScene:
+        """The same scene on another device; this one if it is there already."""
+        device = torch.device(device)
+        if device.type == self.device.type and device.index in (None, self.device.index):
+            return self
+        candidates = self.__dict__.get("dictionary", self.candidates)
+        parts = {"gather": self.gather, "solver": self.solver, "gloss": self.gloss, "centers": self.centers}
+        return FrozenScene(
+            self.surfels.to(device),
+            self.areas.to(device),
+            transport=self.transport.to(device),
+            candidates=None if candidates is None else candidates.to(device),
+            **{name: None if part is None else part.to(device) for name, part in parts.items()},
+        )
 
     @cached_property
     def bvh(self) -> SurfelBvh:
@@ -102,6 +169,22 @@ class FrozenScene:
         """Share of what the surfaces look at that is void; see `renderer.openness`."""
         placed = self.surfels if self.centers is None else replace(self.surfels, centers=self.centers)
         return openness(self.bvh, placed)
+
+    @cached_property
+    def surroundings(self) -> Surroundings:
+        """Where lights may be."""
+        lower, upper = (corner.double().cpu() for corner in self.bounds)
+        return Surroundings(lower, upper, self.size, self.openness > OPEN)
+
+    @cached_property
+    def dictionary(self) -> LightDictionary:
+        """Unit lights all over the scene, where searches begin; made when first asked for, which takes seconds."""
+        return self.with_dictionary().candidates if self.candidates is None else self.candidates
+
+    def with_dictionary(self, grid: int = GRID, *, seed: int = 0, shadows: bool = True) -> FrozenScene:
+        """The same scene with a dictionary of its own; see `build_dictionary`."""
+        made = build_dictionary(self.bvh, self.areas, self.surroundings, grid, seed=seed, shadows=shadows)
+        return replace(self, candidates=made)
 
     def view(self, camera: Camera, supersampling: int = 4) -> ViewWeights:
         """The camera's image as a linear function of the radiance."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from itertools import pairwise
 from operator import attrgetter
 
@@ -56,6 +56,10 @@ class Exchange:
     arriving: SparseOperator
     patches: Tensor
 
+    def to(self, device: torch.device | str) -> Exchange:
+        """The same on another device."""
+        return Exchange(self.between.to(device), self.arriving.to(device), self.patches.to(device))
+
     def incident(self, radiance: Tensor, coefficients: Tensor) -> Tensor:
         """(receivers·K, C) from patches with diffuse radiance (P, C) and glossy coefficients (P_g·K, C)."""
         return self.arriving @ (radiance[self.patches] + self.between @ coefficients)
@@ -78,6 +82,10 @@ class GlossyOperators:
     surfels: Exchange
     patch_leaving: SparseOperator
     patches: Exchange
+
+    def to(self, device: torch.device | str) -> GlossyOperators:
+        """The same on another device."""
+        return GlossyOperators(*(getattr(self, field.name).to(device) for field in fields(self)))
 
     @property
     def degree(self) -> int:

@@ -57,6 +57,10 @@ class GlossyTransport:
     glossy: Tensor
     operators: GlossyOperators
 
+    def to(self, device: torch.device | str) -> GlossyTransport:
+        """The same on another device."""
+        return GlossyTransport(self.surfels.to(device), self.glossy.to(device), self.operators.to(device))
+
     @property
     def degree(self) -> int:
         """Degree of the harmonics."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse
@@ -47,6 +47,10 @@ class MonteCarloSolver:
     def __post_init__(self) -> None:
         if self.samples < 1 or self.bounces < 0:
             raise ValueError(f"Monte Carlo needs samples ≥ 1 and bounces ≥ 0, got {self.samples} and {self.bounces}")
+
+    def to(self, device: torch.device | str) -> MonteCarloSolver:
+        """The same on another device; rays are still drawn on the CPU."""
+        return replace(self, bvh=SurfelBvh(self.bvh.surfels.to(device)))
 
     def indirect(self, direct: Tensor) -> Tensor:
         """(N, 3, K) estimate of the indirect part of the radiosity for K lightings with direct radiosity (N, 3, K)."""

@@ -32,6 +32,10 @@ class GatherSolver:
     bounces: int | None = None
     tolerance: float = 1e-4
 
+    def to(self, device: torch.device | str) -> GatherSolver:
+        """The same on another device."""
+        return GatherSolver(self.gather.to(device), self.albedo.to(device), self.bounces, self.tolerance)
+
     def indirect(self, direct: Tensor) -> Tensor:
         """(N, 3, K) indirect part of the radiosity for K lightings with direct radiosity (N, 3, K)."""
         count, _, lightings = direct.shape

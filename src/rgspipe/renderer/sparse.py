@@ -72,6 +72,10 @@ class SparseOperator:
         parts = (m.values().cpu().numpy(), m.col_indices().cpu().numpy(), m.crow_indices().cpu().numpy())
         return scipy.sparse.csr_matrix(parts, shape=self.shape)
 
+    def to(self, device: torch.device | str) -> SparseOperator:
+        """The same operator on another device."""
+        return SparseOperator(self.matrix.to(device))
+
     def tensors(self, prefix: str) -> dict[str, Tensor]:
         """What `from_tensors` needs to make the operator again."""
         m = self.matrix
@@ -85,10 +89,20 @@ class SparseOperator:
     def from_tensors(
         cls, tensors: dict[str, Tensor], prefix: str, device: torch.device | str = "cpu"
     ) -> SparseOperator:
+        """The operator of these tensors, as another program may have written them.
+
+        Raises:
+            ValueError: rows or columns that lie outside of the matrix, or values that are not finite.
+        """
         names = ("values", "columns", "rows")
         parts = tuple(tensors[f"{prefix}.{name}"].numpy() for name in names)
         shape = tuple(tensors[f"{prefix}.shape"].tolist())
-        return cls.from_scipy(scipy.sparse.csr_matrix(parts, shape=shape), device)
+        matrix = scipy.sparse.csr_matrix(parts, shape=shape)
+        # Products read and write where the indices say, unchecked.
+        matrix.check_format(full_check=True)
+        if not np.isfinite(matrix.data).all():
+            raise ValueError("values that are not finite")
+        return cls.from_scipy(matrix, device)
 
 
 def in_places(matrix: Tensor, values: Tensor) -> Tensor:

@@ -40,6 +40,11 @@ class PatchTransport:
     albedo: Tensor
     bounces: int | None = None
 
+    def to(self, device: torch.device | str) -> PatchTransport:
+        """The same transport on another device."""
+        moved = (part.to(device) for part in (self.average, self.gather, self.inverse, self.albedo))
+        return PatchTransport(*moved, self.bounces)
+
     def gathered(self, direct: Tensor) -> Tensor:
         """(N, 3, K) mean radiance that each surfel receives from the others, F_p H R D, over all bounces.
 

@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 import torch
 from torch import Tensor
 
+from rgspipe.scene.arrays import ArrayLike, as_tensor
+
 
 @dataclass(frozen=True)
 class Camera:
@@ -16,7 +18,7 @@ class Camera:
     Pixel (column x, row y) has its centre at (x + 0.5, y + 0.5); row 0 is the top of the image.
 
     Attributes:
-        camera_to_world: (4, 4) float64 rigid transform, scene units.
+        camera_to_world: (4, 4) float64 rigid transform, scene units; given as a list, numpy array or tensor.
         fx, fy: focal lengths in pixels.
         cx, cy: principal point in pixels.
         width, height: image size in pixels.
@@ -30,8 +32,35 @@ class Camera:
     width: int
     height: int
 
+    def __post_init__(self) -> None:
+        pose = as_tensor(self.camera_to_world, "camera_to_world", (4, 4), torch.float64)
+        object.__setattr__(self, "camera_to_world", pose)
+
     @classmethod
-    def from_field_of_view(cls, camera_to_world: Tensor, angle_x: float, width: int, height: int) -> Camera:
+    def look_at(
+        cls,
+        eye: ArrayLike,
+        target: ArrayLike,
+        *,
+        fov_degrees: float = 40.0,
+        width: int = 256,
+        height: int = 256,
+        up: ArrayLike | None = None,
+    ) -> Camera:
+        """A camera at `eye` whose axis goes through `target`, both (3,) scene units.
+
+        Args:
+            fov_degrees: field of view across the width.
+            width, height: image size in pixels, which are square.
+            up: (3,) what is up in the image; +z if None, or +y for a view along z.
+
+        Raises:
+            InputError: a point that is not three numbers.
+        """
+        return cls.from_field_of_view(look_at(eye, target, up), math.radians(fov_degrees), width, height)
+
+    @classmethod
+    def from_field_of_view(cls, camera_to_world: ArrayLike, angle_x: float, width: int, height: int) -> Camera:
         """A camera with square pixels, its axis through the middle, and `angle_x` [rad] across the width."""
         focal = 0.5 * width / math.tan(0.5 * angle_x)
         return cls(camera_to_world, focal, focal, 0.5 * width, 0.5 * height, width, height)
@@ -102,13 +131,13 @@ class Camera:
         return torch.stack([x, y], dim=-1), depth
 
 
-def look_at(origin: Tensor, target: Tensor, up: Tensor | None = None) -> Tensor:
+def look_at(origin: ArrayLike, target: ArrayLike, up: ArrayLike | None = None) -> Tensor:
     """(4, 4) float64 camera-to-world matrix of a camera at `origin` that looks at `target`.
 
     `up` defaults to +z; when the view is along it, +y takes its place.
     """
-    origin, target = origin.double(), target.double()
-    up = torch.tensor([0.0, 0.0, 1.0], dtype=torch.float64) if up is None else up.double()
+    origin, target = (as_tensor(x, name, (3,), torch.float64) for x, name in ((origin, "eye"), (target, "target")))
+    up = as_tensor([0.0, 0.0, 1.0] if up is None else up, "up", (3,), torch.float64)
     backward = torch.nn.functional.normalize(origin - target, dim=0)
     if torch.linalg.cross(up, backward).norm() < 1e-6:
         up = torch.tensor([0.0, 1.0, 0.0], dtype=torch.float64)

@@ -18,7 +18,6 @@ from rgspipe.benchmark.rooms import ROOMS
 from rgspipe.benchmark.settings import Setting
 from rgspipe.benchmark.truth import load_truth
 from rgspipe.config import RgspipeConfig, get_value
-from rgspipe.datasets.frozen_file import load_frozen
 from rgspipe.errors import InputError
 from rgspipe.evaluation.timing import load_average
 from rgspipe.machine import machine
@@ -76,7 +75,7 @@ def _truths(context: StageContext) -> Sequence:
 
 
 def _fit(context: StageContext) -> None:
-    frozen = load_frozen(context.inputs["freeze"].file, gather=True)
+    frozen = FrozenScene.load(context.inputs["freeze"].folder(), gather=True)
     position = 0.5 * (frozen.bounds[0] + frozen.bounds[1]) + 0.1 * frozen.size
     cameras = _camera(frozen, 128), _camera(frozen, 256)
     timings = fit_steps(frozen, *cameras, position.float(), context.config.benchmark.repetitions)

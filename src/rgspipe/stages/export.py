@@ -6,10 +6,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from rgspipe.config import RgspipeConfig
-from rgspipe.datasets.frozen_file import SURFELS, load_frozen
 from rgspipe.datasets.light_file import read_lights
 from rgspipe.datasets.ply import save_ply
 from rgspipe.datasets.surfel_file import load_surfels
+from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.renderer.frozen_file import SURFELS
 from rgspipe.stages.base import Stage, StageContext
 from rgspipe.stages.sources import surfel_stage
 
@@ -22,7 +23,7 @@ def run(context: StageContext) -> None:
         (source,) = context.inputs.values()
         conversion = save_ply(path, load_surfels(source.file(SURFELS)), layout=options.layout)
     else:
-        frozen = load_frozen(context.inputs["freeze"].file)
+        frozen = FrozenScene.load(context.inputs["freeze"].folder())
         radiance = frozen.radiance_of(read_lights(options.light))
         conversion = save_ply(path, frozen.surfels, radiance=radiance, layout=options.layout)
     conversion = replace(conversion, path=path.name)  # the folder has another name once it is whole

@@ -11,27 +11,25 @@ import pandas as pd
 
 from rgspipe.artifacts import Artifact
 from rgspipe.config import RgspipeConfig
-from rgspipe.datasets.fit_file import read_result, write_result
 from rgspipe.datasets.frames import read_entries
-from rgspipe.datasets.frozen_file import DICTIONARY, load_dictionary
 from rgspipe.datasets.gs3 import load_target
 from rgspipe.datasets.location import dataset_root, open_dataset
 from rgspipe.datasets.views import Target, View
 from rgspipe.errors import InputError
+from rgspipe.evaluation.fit_folder import read_result, write_result
 from rgspipe.fitting import (
     AdamOptions,
     Effects,
     FitViews,
-    LightDictionary,
     LightSpec,
     SearchOptions,
-    build_dictionary,
     fit_lights,
     prepare_fit,
 )
 from rgspipe.fitting.model.spot_harmonics import BandLimit
 from rgspipe.fitting.spec import MOST_LIGHTS
 from rgspipe.progress import track
+from rgspipe.renderer.dictionary import LightDictionary
 from rgspipe.renderer.effect_bounds import NO_BOUND, EffectBounds
 from rgspipe.renderer.effects import Decision, EffectChoice, RigKind
 from rgspipe.renderer.frozen import FrozenScene
@@ -84,9 +82,8 @@ class Fitter:
         if not effects.shadows and not measured_effects(artifact)[0].shadows.proved:
             # The stored candidates have shadows.
             options = config.freeze
-            dictionary = build_dictionary(frozen, options.dictionary_grid, seed=options.seed, shadows=False)
-            return cls(config, frozen, dictionary, (), effects, dataset)
-        return cls(config, frozen, load_dictionary(artifact.file(DICTIONARY), frozen), (), effects, dataset)
+            frozen = frozen.with_dictionary(options.dictionary_grid, seed=options.seed, shadows=False)
+        return cls(config, frozen, frozen.dictionary, (), effects, dataset)
 
     def fit(self, target: Target, folder: Path) -> None:
         """Fit one target and write its folder, whole or not at all."""

@@ -5,19 +5,19 @@ from __future__ import annotations
 import time
 from dataclasses import asdict
 
-from rgspipe.datasets.frozen_file import DICTIONARY, EFFECTS, SURFELS, save_dictionary, save_frozen
 from rgspipe.datasets.json_file import write_json
 from rgspipe.datasets.surfel_file import load_surfels
 from rgspipe.degradation.model_error import ModelError, with_error
-from rgspipe.fitting.search.dictionary import build_dictionary
 from rgspipe.renderer.effect_bounds import measure_costs, measure_effects
 from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.renderer.frozen_file import SURFELS
 from rgspipe.stages.base import Stage, StageContext
+from rgspipe.stages.scene_effects import EFFECTS
 from rgspipe.stages.sources import surfel_stage
 
 
 def run(context: StageContext) -> None:
-    """Write surfels, gather, transport and dictionary.safetensors, and effects.json."""
+    """Write the folder of a frozen scene, and effects.json."""
     options = context.config.freeze
     surfels = load_surfels(context.inputs[surfel_stage(context.config)].file(SURFELS))
     surfels = with_error(surfels, ModelError.from_config(context.config.model_error))
@@ -28,18 +28,17 @@ def run(context: StageContext) -> None:
     measured = time.perf_counter()
     # Where no surfel can shade another, candidates without shadow rays are the same.
     shadows = not bounds.shadows.proved
-    dictionary = build_dictionary(frozen, options.dictionary_grid, seed=options.seed, shadows=shadows)
+    frozen = frozen.with_dictionary(options.dictionary_grid, seed=options.seed, shadows=shadows)
     end = time.perf_counter()
     effects = {"bounds": asdict(bounds), "milliseconds": measure_costs(frozen)}
     write_json(context.folder / EFFECTS, effects)
-    save_frozen(context.folder, frozen)
-    save_dictionary(context.folder / DICTIONARY, dictionary)
+    frozen.save(context.folder)
     sizes = {path.stem: path.stat().st_size for path in sorted(context.folder.glob("*.safetensors"))}
     context.note(
         surfels=len(surfels),
         gather_entries=frozen.gather.entries,
         patches=frozen.transport.average.shape[0],
-        candidates=len(dictionary),
+        candidates=len(frozen.dictionary),
         seconds={
             "gather and transport": round(built - begin, 3),
             "effects": round(measured - built, 3),

@@ -5,11 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 from rgspipe.config import RgspipeConfig
-from rgspipe.datasets.ply import PlyOptions, load_ply
+from rgspipe.datasets.ply import PlyOptions
 from rgspipe.datasets.ply_cameras import find_cameras
 from rgspipe.datasets.ply_radiosity import find_config
 from rgspipe.datasets.surfel_file import save_surfels
 from rgspipe.errors import InputError
+from rgspipe.renderer.ply import load_ply
 from rgspipe.stages.base import Stage, StageContext
 
 

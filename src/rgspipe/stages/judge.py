@@ -5,11 +5,11 @@ from __future__ import annotations
 import pandas as pd
 
 from rgspipe.config import RgspipeConfig
-from rgspipe.datasets.frozen_file import load_frozen
 from rgspipe.datasets.location import open_dataset
 from rgspipe.evaluation.held_out import held_out_picture
 from rgspipe.evaluation.images import save_png
 from rgspipe.evaluation.judgement import kinds_of_views, render_views
+from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.stages.base import Need, Stage, StageContext
 from rgspipe.stages.sources import has_truth, require_images
 
@@ -21,7 +21,7 @@ def run(context: StageContext) -> None:
     """Write quality.csv, split.csv, views.csv, comparison.png and typical.png."""
     require_images(context.config, "held-out views")
     views = open_dataset(context.inputs["generate_dataset"].folder(), train=False, targets=False).test
-    scenes = [load_frozen(artifact.file) for artifact in context.input_lists["freeze"]]
+    scenes = [FrozenScene.load(artifact.folder()) for artifact in context.input_lists["freeze"]]
     renders, surfels = render_views(scenes[0], views), context.config.freeze.surfels
     # Edges of shadows are told by the true surfels, so that scenes are split alike.
     kinds = kinds_of_views(scenes[1], views) if len(scenes) > 1 else None

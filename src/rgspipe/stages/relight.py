@@ -8,7 +8,6 @@ from statistics import median
 import pandas as pd
 
 from rgspipe.config import RelightConfig, RgspipeConfig
-from rgspipe.datasets.frozen_file import DICTIONARY, load_dictionary
 from rgspipe.datasets.light_file import read_lights
 from rgspipe.errors import InputError
 from rgspipe.evaluation.images import save_png
@@ -71,7 +70,7 @@ def _rig(context: StageContext, relighter: Relighter) -> tuple[str, LightRig]:
     wanted = context.config.relight
     if wanted.lights is not None:
         return Path(wanted.lights).stem, read_lights(wanted.lights)
-    dictionary = load_dictionary(context.inputs["freeze"].file(DICTIONARY), relighter.frozen)
+    dictionary = relighter.frozen.dictionary
     if len(dictionary) < wanted.count:
         raise InputError(
             "relight.count",

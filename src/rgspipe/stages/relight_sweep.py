@@ -11,7 +11,6 @@ import torch
 from rgspipe.config import RelightConfig
 from rgspipe.errors import InputError
 from rgspipe.evaluation.images import save_png
-from rgspipe.fitting.search.surroundings import is_open
 from rgspipe.progress import track
 from rgspipe.relighting.pictures import developed, grid, video
 from rgspipe.relighting.sweeps import (
@@ -94,7 +93,7 @@ def sweep_lights(wanted: RelightConfig, places: SweepPlaces) -> list[SpotLight]:
 def _places(relighter: Relighter, camera: Camera) -> SweepPlaces:
     frozen = relighter.frozen
     across = int(camera.camera_to_world[:2, 0].abs().argmax())
-    return default_places(frozen.bounds, is_open(frozen), across)
+    return default_places(frozen.bounds, frozen.surroundings.open, across)
 
 
 def _point(values: Sequence[float] | None, otherwise: torch.Tensor | None = None) -> torch.Tensor:

@@ -6,17 +6,19 @@ from collections.abc import Mapping
 
 from rgspipe.artifacts import Artifact
 from rgspipe.config import EffectsConfig, RgspipeConfig
-from rgspipe.datasets.frozen_file import EFFECTS, load_frozen
 from rgspipe.datasets.json_file import read_json
 from rgspipe.renderer.effect_bounds import EffectBounds
 from rgspipe.renderer.effects import EffectChoice, RigKind, choose_effects
 from rgspipe.renderer.frozen import FrozenScene
 
+#: What each effect can change in a frozen scene, and its cost, beside the scene's own files.
+EFFECTS = "effects.json"
+
 
 def frozen_scene(config: RgspipeConfig, artifact: Artifact) -> FrozenScene:
     """The frozen scene, with the solver that is wanted; the full gather operator is read only for its own."""
     wanted = config.effects
-    frozen = load_frozen(artifact.file, gather=wanted.solver == "gather")
+    frozen = FrozenScene.load(artifact.folder(), gather=wanted.solver == "gather")
     if wanted.solver == "patches" and wanted.bounces is None:
         return frozen
     return frozen.with_solver(wanted.solver, bounces=wanted.bounces, samples=wanted.samples, seed=config.seed)

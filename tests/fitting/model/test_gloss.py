@@ -8,7 +8,7 @@ import pytest
 import torch
 
 from lit_room import VISIBLE, room_cameras, room_surfels
-from rgspipe.fitting import Effects, FitViews, build_dictionary, fit_lights, prepare_fit, render_rig
+from rgspipe.fitting import Effects, FitViews, fit_lights, prepare_fit, render_rig
 from rgspipe.fitting.model.parameters import Emitter
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.renderer.frozen import FrozenScene
@@ -98,7 +98,7 @@ def test_a_fit_finds_the_light_that_made_a_glossy_image_and_without_lobes_mispla
     images = render_rig(_views(frozen, at_pixels=True), (LIGHT,))
     errors = []
     for scene in (frozen, replace(frozen, gloss=None)):
-        dictionary = build_dictionary(scene, 5, seed=0)
+        dictionary = scene.with_dictionary(5).dictionary
         views = prepare_fit(scene, room_cameras(24), dictionary=dictionary, effects=Effects(at_pixels=True))
         light = fit_lights(scene, views, images).lights[0]
         errors.append(float((light.position - LIGHT.position).norm()))

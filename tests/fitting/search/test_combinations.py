@@ -12,7 +12,15 @@ import torch
 
 from lit_room import HIDDEN, VISIBLE
 from rgspipe.fitting.model.problem import LightProblem
-from rgspipe.fitting.search.combinations import Scored, best_combinations, best_pairs, bright_gains, extensions
+from rgspipe.fitting.search.combinations import (
+    Scored,
+    best_apart,
+    best_combinations,
+    best_pairs,
+    bright_gains,
+    candidate_costs,
+    extensions,
+)
 from rgspipe.fitting.search.spot_candidates import AXES, spot_candidates
 from rgspipe.renderer.point_sets import fibonacci_directions
 from rgspipe.renderer.spot import SpotShape
@@ -116,3 +124,20 @@ def test_a_narrow_pool_decides_by_plain_squares(room) -> None:
     assert float(coarse.axes[best].double() @ emitter.axis) > math.cos(math.radians(25.0))
     # The rims of candidates are wider; measured 0.89.
     assert 0.8 < float(gains[best]) <= 1.0
+
+
+def test_the_nearest_candidates_of_a_hidden_light_are_among_the_best(room, point_light):
+    light = point_light(HIDDEN)
+    problem = LightProblem.create(room.one.prepared, room.one.prepared.stack_images(room.images(light)))
+    (coarse,) = room.one.coarse
+    costs = candidate_costs(Scored.of(problem, coarse))
+    chosen = best_apart(costs, coarse.positions, 4, 0.16)
+    distance = (coarse.positions[chosen] - light.position).norm(dim=1)
+    assert float(distance.min()) < 0.2
+    assert bool((costs >= 0).all() and (costs <= 1 + 1e-9).all())
+
+
+def test_best_candidates_are_apart():
+    positions = torch.tensor([[0.0, 0, 0], [0.1, 0, 0], [1.0, 0, 0], [1.05, 0, 0]])
+    costs = torch.tensor([0.1, 0.2, 0.4, 0.3])
+    assert best_apart(costs, positions, 3, 0.16) == [0, 3]

@@ -10,7 +10,7 @@ from torch import Tensor
 
 from rgspipe.fitting.model.blocks import BlockModel
 from rgspipe.fitting.model.parameters import Emitter
-from rgspipe.fitting.search.dictionary import LightDictionary
+from rgspipe.renderer.dictionary import LightDictionary
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.spot import SpotShape

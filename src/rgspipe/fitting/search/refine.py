@@ -16,7 +16,6 @@ from rgspipe.fitting.model.parameters import Emitter
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.model.step_limits import StepLimits, allowed_share
 from rgspipe.fitting.result import FitStatus, Step
-from rgspipe.fitting.search.surroundings import region_bounds
 from rgspipe.optim.levenberg_marquardt import Ended, NormalEquations, least_squares
 from rgspipe.scene import LightRig
 
@@ -106,9 +105,9 @@ class State:
 
 
 def search_region(problem: LightProblem) -> Region:
-    """Where lights are looked for; see `surroundings`."""
+    """Where lights are looked for; see `renderer.surroundings`."""
     frozen = problem.views.frozen
-    return Region(*region_bounds(frozen), frozen.size)
+    return Region(*frozen.surroundings.bounds, frozen.size)
 
 
 def start_from(problem: LightProblem, emitters: Sequence[Emitter], weighting: Weighting, begin: float) -> State:

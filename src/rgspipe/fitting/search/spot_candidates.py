@@ -12,9 +12,9 @@ from torch import Tensor
 from rgspipe.fitting.model.blocks import BlockModel, block_model, patch_radiance
 from rgspipe.fitting.model.views import PreparedViews
 from rgspipe.fitting.search.coarse import CoarseImages
-from rgspipe.fitting.search.dictionary import LightDictionary
 from rgspipe.progress import track
 from rgspipe.renderer.clusters import cluster_patches
+from rgspipe.renderer.dictionary import LightDictionary
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.point_sets import fibonacci_directions
 from rgspipe.renderer.spot import SpotShape, angle_from_axis, spot_profile

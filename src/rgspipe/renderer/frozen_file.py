@@ -1,18 +1,19 @@
-"""A frozen scene on disk: its surfels, its operators and its light dictionary, each in a safetensors file."""
+"""A frozen scene as a folder: its surfels, its operators and its light dictionary, each in a safetensors file."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from torch import Tensor
 
 from rgspipe.datasets.surfel_file import load_surfels, save_surfels
 from rgspipe.datasets.tensor_file import load_tensors, save_tensors
 from rgspipe.errors import InputError
-from rgspipe.fitting.search.dictionary import LightDictionary
-from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.renderer.dictionary import LightDictionary
 from rgspipe.renderer.glossy_operators import OPERATOR_NAMES, PAIR_NAMES, Exchange, GlossyOperators
 from rgspipe.renderer.glossy_transport import GlossyTransport
 from rgspipe.renderer.sparse import SparseOperator
@@ -23,69 +24,84 @@ SURFELS, GATHER, TRANSPORT, GLOSS, DICTIONARY = (
     f"{name}.safetensors" for name in ("surfels", "gather", "transport", "gloss", "dictionary")
 )
 
-#: What each effect can change, for effects=auto.
-EFFECTS = "effects.json"
-
-MAKE_AGAIN = "Remove it and run the stage freeze again."
+MAKE_AGAIN = "Freeze the scene again: FrozenScene.freeze and save, or the stage freeze."
 
 
-def save_frozen(folder: Path, frozen: FrozenScene) -> None:
-    """Write surfels, patch transport (with areas and exact centres) and, where the scene has them, gather and gloss.
-
-    Raises:
-        ValueError: the transport has a limited number of bounces: what is stored is the scene with all of them.
-    """
-    transport = frozen.transport
-    if transport.bounces is not None:
-        raise ValueError(f"a frozen scene is stored with all bounces, got {transport.bounces}")
-    save_surfels(folder / SURFELS, frozen.surfels)
-    if frozen.gather is not None:
-        save_tensors(folder / GATHER, frozen.gather.tensors("gather"))
+def save_parts(
+    folder: Path,
+    *,
+    surfels: Surfels,
+    areas: Tensor,
+    centers: Tensor,
+    gather: SparseOperator | None,
+    transport: PatchTransport,
+    gloss: GlossyTransport | None,
+    candidates: LightDictionary | None,
+) -> None:
+    """Write the parts of a frozen scene; those that are None have no file."""
+    folder.mkdir(parents=True, exist_ok=True)
+    save_surfels(folder / SURFELS, surfels)
     operators = transport.average.tensors("average") | transport.gather.tensors("gather")
-    centers = (frozen.surfels.centers if frozen.centers is None else frozen.centers).double()
-    more = {"inverse": transport.inverse, "areas": frozen.areas, "centers": centers}
-    save_tensors(folder / TRANSPORT, operators | more)
-    if frozen.gloss is not None:
-        save_tensors(folder / GLOSS, frozen.gloss.operators.tensors())
+    more = {"inverse": transport.inverse, "areas": areas, "centers": centers}
+    files = {TRANSPORT: (operators | more, {})}
+    if gather is not None:
+        files[GATHER] = gather.tensors("gather"), {}
+    if gloss is not None:
+        files[GLOSS] = gloss.operators.tensors(), {}
+    if candidates is not None:
+        tensors = {"positions": candidates.positions, "irradiance": candidates.irradiance}
+        files[DICTIONARY] = tensors, {"grid": candidates.grid, "seed": candidates.seed}
+    for name in (GATHER, TRANSPORT, GLOSS, DICTIONARY):
+        (folder / name).unlink(missing_ok=True)
+    for name, (tensors, note) in files.items():
+        save_tensors(folder / name, tensors, note)
 
 
-def load_frozen(locate: Callable[[str], Path], *, gather: bool = False) -> FrozenScene:
-    """The scene that `save_frozen` wrote, on the CPU.
-
-    Args:
-        locate: gives the path of a file by its name, e.g. `folder.joinpath` or an artifact's `file`.
-        gather: whether the gather operator is loaded, too, which is most of the bytes; fits work on the patches.
+def load_parts(folder: Path, *, gather: bool) -> dict[str, Any]:
+    """The parts that `save_parts` wrote, by name, on the CPU; the gather operator only where it is asked for.
 
     Raises:
-        InputError: a file is missing, broken, or does not belong to the others.
+        InputError: no such folder, or a file is missing, broken, or does not belong to the others.
     """
-    surfels = load_surfels(locate(SURFELS))
-    areas, centers, transport = _load_transport(locate(TRANSPORT), surfels.albedo.float())
-    operator = _load_gather(locate(GATHER), len(surfels)) if gather else None
+    if not folder.is_dir():
+        raise InputError(folder, expected="the folder of a frozen scene", found="no such folder", remedy=MAKE_AGAIN)
+    surfels = load_surfels(folder / SURFELS)
+    areas, centers, transport = _load_transport(folder / TRANSPORT, surfels.albedo.float())
     glossy = surfels.gloss is not None and len(surfels.gloss.glossy) > 0
-    gloss = _load_gloss(locate(GLOSS), replace(surfels, centers=centers), transport) if glossy else None
-    return FrozenScene(surfels, areas, operator, transport, gloss=gloss, centers=centers)
+    known = folder / DICTIONARY
+    return {
+        "surfels": surfels,
+        "areas": areas,
+        "centers": centers,
+        "gather": _load_gather(folder / GATHER, len(surfels)) if gather else None,
+        "transport": transport,
+        "gloss": _load_gloss(folder / GLOSS, replace(surfels, centers=centers), transport) if glossy else None,
+        "candidates": _load_dictionary(known, len(surfels)) if known.exists() else None,
+    }
 
 
 def _load_gather(path: Path, count: int) -> SparseOperator:
-    return _operator(path, _load(path, set(), ("gather",)), "gather", (count, count))
+    tensors, _ = _load(path, set(), ("gather",))
+    return _operator(path, tensors, "gather", (count, count))
 
 
 def _load_transport(path: Path, albedo: Tensor) -> tuple[Tensor, Tensor, PatchTransport]:
     """Areas, exact centres and patch transport."""
-    tensors = _load(path, {"inverse", "areas", "centers"}, ("average", "gather"))
+    tensors, _ = _load(path, {"inverse", "areas", "centers"}, ("average", "gather"))
     areas, centers, inverse = tensors["areas"], tensors["centers"], tensors["inverse"]
     count, patches = len(albedo), inverse.shape[-1]
     _require(path, "areas", areas.shape, (count,))
     _require(path, "centers", centers.shape, (count, 3))
     _require(path, "inverse", inverse.shape, (3, patches, patches))
+    _require_range(path, {"areas": areas}, 0.0)
+    _require_range(path, {"centers": centers, "inverse": inverse})
     average = _operator(path, tensors, "average", (patches, count))
     transport = PatchTransport(average, _operator(path, tensors, "gather", (count, patches)), inverse, albedo)
     return areas, centers, transport
 
 
 def _load_gloss(path: Path, surfels: Surfels, transport: PatchTransport) -> GlossyTransport:
-    tensors = _load(path, set(PAIR_NAMES), OPERATOR_NAMES)
+    tensors, _ = _load(path, set(PAIR_NAMES), OPERATOR_NAMES)
     glossy, patches = surfels.gloss.glossy, transport.average.shape[0]
     for name in PAIR_NAMES:
         beyond = (tensors[name] < 0) | (tensors[name] >= patches)
@@ -112,32 +128,25 @@ def _load_gloss(path: Path, surfels: Surfels, transport: PatchTransport) -> Glos
     )
 
 
-def save_dictionary(path: Path, dictionary: LightDictionary) -> None:
-    """Write a light dictionary."""
-    save_tensors(path, {"positions": dictionary.positions, "irradiance": dictionary.irradiance})
-
-
-def load_dictionary(path: Path, frozen: FrozenScene) -> LightDictionary:
-    """The dictionary of `frozen` that `save_dictionary` wrote.
-
-    Raises:
-        InputError: the file is missing, broken, or of another scene.
-    """
-    tensors = _load(path, {"positions", "irradiance"}, ())
+def _load_dictionary(path: Path, count: int) -> LightDictionary:
+    tensors, note = _load(path, {"positions", "irradiance"}, ())
     positions, irradiance = tensors["positions"], tensors["irradiance"]
     _require(path, "positions", positions.shape, (positions.shape[0], 3))
-    _require(path, "irradiance", irradiance.shape, (positions.shape[0], len(frozen.surfels)))
-    return LightDictionary(positions, irradiance)
+    _require(path, "irradiance", irradiance.shape, (positions.shape[0], count))
+    _require_range(path, {"positions": positions})
+    _require_range(path, {"irradiance": irradiance}, 0.0)
+    made_with = {name: int(note[name]) for name in ("grid", "seed") if name in note}
+    return LightDictionary(positions, irradiance, **made_with)
 
 
-def _load(path: Path, names: set[str], operators: tuple[str, ...]) -> dict[str, Tensor]:
-    """The tensors of a file that holds exactly `names` and sparse `operators`."""
-    tensors, _ = load_tensors(path)
+def _load(path: Path, names: set[str], operators: tuple[str, ...]) -> tuple[dict[str, Tensor], dict[str, Any]]:
+    """The tensors of a file that holds exactly `names` and sparse `operators`, and its note."""
+    tensors, note = load_tensors(path)
     wanted = names | {f"{operator}.{part}" for operator in operators for part in ("shape", "rows", "columns", "values")}
     if set(tensors) != wanted:
         listed = ", ".join(sorted(tensors)) or "none"
         raise InputError(path, expected=f"the tensors {', '.join(sorted(wanted))}", found=listed, remedy=MAKE_AGAIN)
-    return tensors
+    return tensors, note
 
 
 def _operator(path: Path, tensors: dict[str, Tensor], name: str, shape: tuple[int, int]) -> SparseOperator:
@@ -152,3 +161,12 @@ def _operator(path: Path, tensors: dict[str, Tensor], name: str, shape: tuple[in
 def _require(path: Path, name: str, found: Sequence[int], expected: tuple[int, ...]) -> None:
     if tuple(found) != expected:
         raise InputError(path, expected=f"{name} of shape {expected}", found=str(tuple(found)), remedy=MAKE_AGAIN)
+
+
+def _require_range(path: Path, tensors: dict[str, Tensor], low: float = -math.inf) -> None:
+    """Refuse values that are not finite, or below `low`."""
+    for name, tensor in tensors.items():
+        good = tensor.isfinite() & (tensor >= low)
+        if not bool(good.all()):
+            expected = f"finite {name}" if low == -math.inf else f"finite {name} of at least {low:g}"
+            raise InputError(path, expected=expected, found=f"{float(tensor[~good][0]):g}", remedy=MAKE_AGAIN)

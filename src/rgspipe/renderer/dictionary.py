@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import scipy.spatial
 import torch
 from torch import Tensor
 
-from rgspipe.fitting.search.surroundings import is_open, shell_points
 from rgspipe.progress import track
 from rgspipe.renderer.direct import unit_irradiance
-from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
+from rgspipe.renderer.surroundings import Surroundings
+from rgspipe.scene.surfels import Surfels
+
+#: Candidates along each axis.
+GRID = 8
 
 #: A candidate moves from its grid point by up to this share of the grid's step, so that no wall of a box-shaped
 #: scene is met by a whole layer of candidates in the same way.
@@ -36,21 +40,27 @@ class LightDictionary:
     """Unit lights all over a scene.
 
     Attributes:
-        positions: (C, 3) float32.
+        positions: (C, 3) float32, on the CPU.
         irradiance: (C, N) float32 on every surfel, per W/sr.
+        grid, seed: what they were made with.
     """
 
     positions: Tensor
     irradiance: Tensor
+    grid: int = GRID
+    seed: int = 0
 
     def __len__(self) -> int:
         return len(self.positions)
 
+    def to(self, device: torch.device | str) -> LightDictionary:
+        """The same with the irradiance on another device."""
+        return replace(self, irradiance=self.irradiance.to(device))
 
-def candidate_grid(frozen: FrozenScene, grid: int, seed: int) -> Tensor:
-    """(grid³, 3) jittered points in the bounding box of the surfels, float32."""
+
+def candidate_grid(lower: Tensor, upper: Tensor, grid: int, seed: int) -> Tensor:
+    """(grid³, 3) jittered points in the box from `lower` to `upper` (3,), float32."""
     generator = torch.Generator().manual_seed(seed)
-    lower, upper = (corner.double().cpu() for corner in frozen.bounds)
     step = (torch.arange(grid, dtype=torch.float64) + 0.5) / grid
     step = 0.5 + (step - 0.5) * (grid - 2 * INSET) / max(1, grid - 1)
     unit = torch.stack(torch.meshgrid(step, step, step, indexing="ij"), dim=-1).reshape(-1, 3)
@@ -58,36 +68,46 @@ def candidate_grid(frozen: FrozenScene, grid: int, seed: int) -> Tensor:
     return (lower + unit * (upper - lower)).float()
 
 
-def build_dictionary(frozen: FrozenScene, grid: int = 8, *, seed: int = 0, shadows: bool = True) -> LightDictionary:
+def build_dictionary(
+    bvh: SurfelBvh,
+    areas: Tensor,
+    surroundings: Surroundings,
+    grid: int = GRID,
+    *,
+    seed: int = 0,
+    shadows: bool = True,
+) -> LightDictionary:
     """Candidates on a grid of the scene's bounding box, without those inside or too near to its surfaces.
 
     An open scene has candidates around it as well, which are kept if they light anything.
 
     Args:
+        bvh: N surfels.
+        areas: (N,) surface of each, scene units².
         grid: candidates along each axis.
         seed: of the jitter.
         shadows: whether surfels block light.
     """
-    positions = candidate_grid(frozen, grid, seed)
-    positions = positions[_clear_of_surfels(frozen, positions)]
+    positions = candidate_grid(surroundings.lower, surroundings.upper, grid, seed)
+    positions = positions[_clear_of_surfels(bvh.surfels, positions)]
     within = len(positions)
-    if is_open(frozen):
-        positions = torch.cat([positions, shell_points(frozen)])
+    if surroundings.open:
+        positions = torch.cat([positions, surroundings.shell_points()])
     rows = [
-        unit_irradiance(frozen.bvh, positions[start : start + BATCH], shadows)[0]
+        unit_irradiance(bvh, positions[start : start + BATCH], shadows)[0]
         for start in track(range(0, len(positions), BATCH), "light dictionary", unit="batch")
     ]
-    irradiance = torch.cat(rows) if rows else torch.zeros((0, len(frozen.surfels)))
-    flux = irradiance @ frozen.areas.to(irradiance)
+    irradiance = torch.cat(rows) if rows else torch.zeros((0, len(bvh.surfels)), device=bvh.device)
+    flux = irradiance @ areas.to(irradiance)
     kept = flux > 0.0
     if within > 0:
         kept[:within] = flux[:within] > LEAST_FLUX * flux[:within].amax()
-    return LightDictionary(positions[kept.cpu()], irradiance[kept])
+    return LightDictionary(positions[kept.cpu()], irradiance[kept], grid, seed)
 
 
-def _clear_of_surfels(frozen: FrozenScene, positions: Tensor) -> Tensor:
+def _clear_of_surfels(surfels: Surfels, positions: Tensor) -> Tensor:
     """(C,) bool: the nearest surfel is farther than CLEARANCE_SCALES of its scales."""
-    tree = scipy.spatial.cKDTree(frozen.surfels.centers.double().cpu().numpy())
+    tree = scipy.spatial.cKDTree(surfels.centers.double().cpu().numpy())
     distance, nearest = tree.query(positions.double().numpy())
-    scales = frozen.surfels.scales.double().cpu().prod(dim=1).sqrt()[torch.from_numpy(nearest)]
+    scales = surfels.scales.double().cpu().prod(dim=1).sqrt()[torch.from_numpy(nearest)]
     return torch.from_numpy(distance) > CLEARANCE_SCALES * scales

@@ -9,9 +9,9 @@ import pytest
 import torch
 
 from lit_room import frozen_room, room_cameras
-from rgspipe.datasets.fit_file import read_result, write_result
 from rgspipe.datasets.json_file import read_json
 from rgspipe.datasets.light_file import read_lights
+from rgspipe.evaluation.fit_folder import read_result, write_result
 from rgspipe.fitting import FitResult, FitStatus, Step, prepare_fit, render_rig
 from rgspipe.scene import PointLight, SpotLight
 

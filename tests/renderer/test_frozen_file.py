@@ -8,20 +8,10 @@ import pytest
 import torch
 
 from lit_room import VISIBLE, frozen_room, room_cameras
-from rgspipe.datasets.frozen_file import (
-    DICTIONARY,
-    GATHER,
-    GLOSS,
-    SURFELS,
-    TRANSPORT,
-    load_dictionary,
-    load_frozen,
-    save_dictionary,
-    save_frozen,
-)
 from rgspipe.datasets.tensor_file import load_tensors, save_tensors
 from rgspipe.errors import InputError
-from rgspipe.fitting import build_dictionary
+from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.renderer.frozen_file import DICTIONARY, GATHER, GLOSS, SURFELS, TRANSPORT
 from rgspipe.renderer.glossy_transport import build_glossy_transport
 from rgspipe.renderer.transport import with_bounces
 from rgspipe.scene import Gloss, PointLight
@@ -32,18 +22,17 @@ ROUNDING = 2e-6
 
 @pytest.fixture(scope="module")
 def scene():
-    return frozen_room()
+    return frozen_room().with_dictionary(3)
 
 
 @pytest.fixture
 def folder(scene, tmp_path):
-    save_frozen(tmp_path, scene)
-    save_dictionary(tmp_path / DICTIONARY, build_dictionary(scene, 3))
-    return tmp_path
+    scene.save(tmp_path / "room")
+    return tmp_path / "room"
 
 
 def test_a_scene_renders_the_same_after_the_round_trip(scene, folder):
-    loaded = load_frozen(folder.joinpath, gather=True)
+    loaded = FrozenScene.load(folder, gather=True)
     light = PointLight(torch.tensor(VISIBLE), torch.ones(3))
     camera = room_cameras(24)[0]
     first, second = loaded.render(loaded.view(camera), (light,)), scene.render(scene.view(camera), (light,))
@@ -54,7 +43,7 @@ def test_a_scene_renders_the_same_after_the_round_trip(scene, folder):
 
 def test_a_fit_does_not_need_the_gather(scene, folder):
     (folder / GATHER).unlink()
-    loaded, light = load_frozen(folder.joinpath), (PointLight(torch.tensor(VISIBLE), torch.ones(3)),)
+    loaded, light = FrozenScene.load(folder), (PointLight(torch.tensor(VISIBLE), torch.ones(3)),)
     assert loaded.gather is None
     torch.testing.assert_close(loaded.radiance_of(light), scene.radiance_of(light), rtol=ROUNDING, atol=0.0)
     with pytest.raises(ValueError, match="gather=True"):
@@ -63,7 +52,7 @@ def test_a_fit_does_not_need_the_gather(scene, folder):
 
 def test_a_scene_with_few_bounces_is_not_stored(scene, tmp_path):
     with pytest.raises(ValueError, match="all bounces"):
-        save_frozen(tmp_path, replace(scene, transport=with_bounces(scene.transport, 2)))
+        replace(scene, transport=with_bounces(scene.transport, 2)).save(tmp_path)
 
 
 @pytest.fixture(scope="module")
@@ -77,8 +66,8 @@ def glossy(scene):
 
 
 def test_a_glossy_scene_renders_the_same_after_the_round_trip(glossy, tmp_path):
-    save_frozen(tmp_path, glossy)
-    loaded = load_frozen(tmp_path.joinpath)
+    glossy.save(tmp_path)
+    loaded = FrozenScene.load(tmp_path)
     light, view = PointLight(torch.tensor(VISIBLE), torch.ones(3)), glossy.view(room_cameras(12)[0])
     assert loaded.gloss.degree == 2
     assert torch.equal(loaded.render(view, (light,)), glossy.render(view, (light,)))
@@ -90,26 +79,47 @@ def test_a_diffuse_scene_stores_no_gloss(folder):
 
 @pytest.mark.parametrize("tensor", ["surfels.patches", "leaving.shape", "average.shape", "patches.arriving.shape"])
 def test_gloss_of_another_scene_is_refused(glossy, tmp_path, tensor):
-    save_frozen(tmp_path, glossy)
+    glossy.save(tmp_path)
     tensors, note = load_tensors(tmp_path / GLOSS)
     save_tensors(tmp_path / GLOSS, tensors | {tensor: tensors[tensor] + 1000}, note)
     with pytest.raises(InputError, match=GLOSS):
-        load_frozen(tmp_path.joinpath)
+        FrozenScene.load(tmp_path)
     (tmp_path / GLOSS).unlink()
     with pytest.raises(InputError, match=GLOSS):
-        load_frozen(tmp_path.joinpath)
+        FrozenScene.load(tmp_path)
 
 
 def test_a_dictionary_is_the_same_after_the_round_trip(scene, folder):
-    loaded, expected = load_dictionary(folder / DICTIONARY, scene), build_dictionary(scene, 3)
-    assert torch.equal(loaded.positions, expected.positions)
-    assert torch.equal(loaded.irradiance, expected.irradiance)
+    loaded = FrozenScene.load(folder).dictionary
+    assert torch.equal(loaded.positions, scene.dictionary.positions)
+    assert torch.equal(loaded.irradiance, scene.dictionary.irradiance)
+    assert (loaded.grid, loaded.seed) == (3, 0)
+
+
+def test_a_dictionary_that_was_asked_for_is_stored_and_one_that_was_not_is_not_made(scene, tmp_path):
+    plain = replace(scene, candidates=None)
+    plain.save(tmp_path)
+    assert not (tmp_path / DICTIONARY).exists()
+    _ = plain.dictionary
+    plain.save(tmp_path)
+    assert len(FrozenScene.load(tmp_path).candidates) == len(plain.dictionary)
+
+
+def test_a_scene_saved_over_another_leaves_nothing_of_it(scene, glossy, tmp_path):
+    glossy.save(tmp_path)
+    replace(scene, gather=None, candidates=None).save(tmp_path)
+    assert sorted(path.name for path in tmp_path.iterdir()) == [SURFELS, TRANSPORT]
+
+
+def test_a_scene_moved_to_its_own_device_is_itself(scene):
+    assert scene.to("cpu") is scene
+    assert scene.device == torch.device("cpu")
 
 
 def test_saving_twice_gives_the_same_bytes(scene, folder, tmp_path_factory):
     other = tmp_path_factory.mktemp("again")
-    save_frozen(other, scene)
-    for name in (SURFELS, GATHER, TRANSPORT):
+    scene.save(other)
+    for name in (SURFELS, GATHER, TRANSPORT, DICTIONARY):
         assert (other / name).read_bytes() == (folder / name).read_bytes()
 
 
@@ -122,7 +132,7 @@ def test_a_damaged_file_is_refused_by_name(folder, name, damage):
     else:
         path.write_bytes(path.read_bytes()[:100])
     with pytest.raises(InputError, match=name):
-        load_frozen(folder.joinpath, gather=True)
+        FrozenScene.load(folder, gather=True)
 
 
 @pytest.mark.parametrize(
@@ -134,14 +144,41 @@ def test_operators_of_another_scene_are_refused(folder, name, tensor):
     tensors[tensor] = tensors[tensor][:-1].clone() if not tensor.endswith("shape") else tensors[tensor] + 1
     save_tensors(folder / name, tensors, note)
     with pytest.raises(InputError, match=name):
-        load_frozen(folder.joinpath, gather=True)
+        FrozenScene.load(folder, gather=True)
 
 
-def test_a_missing_tensor_and_another_dictionary_are_refused(scene, folder):
+@pytest.mark.parametrize(
+    ("name", "tensor", "value", "found"),
+    [
+        (TRANSPORT, "average.columns", 10**6, "column|indices"),
+        (TRANSPORT, "gather.columns", -1, "column|indices"),
+        (GATHER, "gather.rows", 10**6, "ind"),
+        (GATHER, "gather.values", float("nan"), "not finite"),
+        (TRANSPORT, "areas", -1.0, "areas of at least 0"),
+        (TRANSPORT, "inverse", float("inf"), "finite inverse"),
+        (DICTIONARY, "irradiance", -0.5, "irradiance of at least 0"),
+        (DICTIONARY, "positions", float("nan"), "finite positions"),
+    ],
+)
+def test_values_that_no_scene_has_are_refused(folder, name, tensor, value, found):
+    tensors, note = load_tensors(folder / name)
+    changed = tensors[tensor].clone()
+    changed.view(-1)[len(changed.view(-1)) // 2] = value
+    save_tensors(folder / name, tensors | {tensor: changed}, note)
+    with pytest.raises(InputError, match=f"{name}.*({found})"):
+        FrozenScene.load(folder, gather=True)
+
+
+def test_a_missing_tensor_and_another_dictionary_are_refused(folder):
     tensors, note = load_tensors(folder / DICTIONARY)
     save_tensors(folder / DICTIONARY, tensors | {"irradiance": tensors["irradiance"][:, :-1]}, note)
     with pytest.raises(InputError, match="irradiance"):
-        load_dictionary(folder / DICTIONARY, scene)
+        FrozenScene.load(folder)
     save_tensors(folder / DICTIONARY, {"positions": tensors["positions"]}, note)
     with pytest.raises(InputError, match="irradiance"):
-        load_dictionary(folder / DICTIONARY, scene)
+        FrozenScene.load(folder)
+
+
+def test_a_folder_that_is_none_is_refused(tmp_path):
+    with pytest.raises(InputError, match="no such folder"):
+        FrozenScene.load(tmp_path / "nowhere")

@@ -1,0 +1,69 @@
+"""Numbers, lists, numpy arrays and tensors as the tensors that the library works on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NoReturn, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+import torch
+from torch import Tensor
+
+from rgspipe.errors import InputError
+
+#: What is taken wherever a tensor is meant: numbers, lists of them, numpy arrays, tensors.
+ArrayLike: TypeAlias = "Tensor | npt.ArrayLike"
+
+#: Kinds of numpy's types that are numbers: booleans, integers, floats.
+NUMBERS = "biuf"
+
+#: How many entries an axis has; a name for any number of them.
+Axis = int | str
+
+
+def as_tensor(value: ArrayLike, name: str, shape: Sequence[Axis], dtype: torch.dtype | None = None) -> Tensor:
+    """`value` as a floating-point tensor of `shape`.
+
+    A tensor of floats stays the one that it is, with its device and its gradients, unless `dtype` says otherwise;
+    everything else becomes float64 on the CPU.
+
+    Args:
+        name: what errors call it.
+        shape: entries along each axis, names where any number will do, such as ("H", "W", 3).
+
+    Raises:
+        InputError: it holds no numbers, or has another shape.
+    """
+    tensor = value if isinstance(value, Tensor) else _from_numbers(value, name, shape)
+    if not tensor.is_floating_point():
+        tensor = tensor.double()
+    if not _fits(tensor.shape, shape):
+        _refuse(name, shape, f"shape {_written(tensor.shape)}")
+    return tensor if dtype is None else tensor.to(dtype)
+
+
+def _from_numbers(value: object, name: str, shape: Sequence[Axis]) -> Tensor:
+    if isinstance(value, list | tuple) and any(isinstance(part, Tensor) for part in value):
+        return torch.stack([torch.as_tensor(part).double() for part in value])
+    try:
+        array = np.array(value)
+    except ValueError:  # rows of different lengths
+        array = np.array(None)
+    if array.dtype.kind not in NUMBERS:
+        _refuse(name, shape, f"{type(value).__name__} {value!r}"[:120])
+    return torch.from_numpy(array.astype(np.float64))
+
+
+def _fits(found: Sequence[int], wanted: Sequence[Axis]) -> bool:
+    return len(found) == len(wanted) and all(isinstance(b, str) or a == b for a, b in zip(found, wanted, strict=True))
+
+
+def _refuse(name: str, shape: Sequence[Axis], found: str) -> NoReturn:
+    raise InputError(
+        name, expected=f"numbers of shape {_written(shape)}", found=found, remedy="Pass a list, numpy array or tensor."
+    )
+
+
+def _written(shape: Sequence[Axis]) -> str:
+    return f"({', '.join(map(str, shape))}{',' if len(shape) == 1 else ''})"

@@ -1,0 +1,33 @@
+"""Tensors come back as they were, in files that others may read as far as the umask allows."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+import torch
+
+from rgspipe.datasets.tensor_file import load_tensors, save_tensors
+from rgspipe.errors import InputError
+
+
+@pytest.mark.parametrize(("umask", "mode"), [(0o022, 0o644), (0o077, 0o600), (0o002, 0o664)])
+def test_the_umask_decides_who_reads(tmp_path: Path, umask: int, mode: int) -> None:
+    before = os.umask(umask)
+    try:
+        save_tensors(tmp_path / "a.safetensors", {"x": torch.ones(2)})
+    finally:
+        os.umask(before)
+    assert (tmp_path / "a.safetensors").stat().st_mode & 0o777 == mode
+    assert [path.name for path in tmp_path.iterdir()] == ["a.safetensors"]
+
+
+def test_tensors_and_note_come_back(tmp_path: Path) -> None:
+    tensors = {"x": torch.arange(6.0).reshape(2, 3).T, "i": torch.tensor([1, 2], dtype=torch.int32)}
+    save_tensors(tmp_path / "a.safetensors", tensors, {"grid": 8})
+    found, note = load_tensors(tmp_path / "a.safetensors")
+    assert note == {"grid": 8}
+    assert all(torch.equal(found[name], tensors[name]) and found[name].dtype == tensors[name].dtype for name in tensors)
+    with pytest.raises(InputError, match=r"b\.safetensors"):
+        load_tensors(tmp_path / "b.safetensors")
