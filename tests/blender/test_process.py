@@ -11,6 +11,7 @@ import pytest
 
 from rgspipe.blender import process
 from rgspipe.blender.job import DatasetJob
+from rgspipe.blender.render_dataset import render_dataset
 from rgspipe.errors import InputError
 
 
@@ -31,21 +32,21 @@ def fake_blender(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
 def test_a_crash_shows_the_last_lines(fake_blender, tmp_path: Path) -> None:
     fake_blender("for i in $(seq 40); do echo line $i; done; kill -SEGV $$")
     with pytest.raises(RuntimeError, match="killed by signal 11") as caught:
-        process.render_dataset(DatasetJob(), tmp_path / "data")
+        render_dataset(DatasetJob(), tmp_path / "data")
     assert "line 40" in str(caught.value) and "line 20\n" not in str(caught.value)
 
 
 def test_a_failure_shows_its_status(fake_blender, tmp_path: Path) -> None:
     fake_blender("echo no licence >&2; exit 3")
     with pytest.raises(RuntimeError, match=r"status 3(.|\n)*no licence"):
-        process.render_dataset(DatasetJob(), tmp_path / "data")
+        render_dataset(DatasetJob(), tmp_path / "data")
 
 
 @pytest.mark.parametrize("ending", ["exit 0", "exit 3"])
 def test_nothing_of_blender_s_own_is_left(fake_blender, tmp_path: Path, ending: str) -> None:
     fake_blender(f'mkdir "$TMPDIR/blender_x" && touch "$TMPDIR/blender_x/quit.blend"; {ending}')
     with contextlib.nullcontext() if ending == "exit 0" else pytest.raises(RuntimeError, match="status 3"):
-        process.render_dataset(DatasetJob(), tmp_path / "data")
+        render_dataset(DatasetJob(), tmp_path / "data")
     assert [path.name for path in (tmp_path / "data").iterdir()] == [process.JOB_FILE]
 
 
@@ -53,18 +54,18 @@ def test_an_input_error_comes_through_whole(fake_blender, tmp_path: Path) -> Non
     parts = '{"where": "x.blend", "expected": "meshes", "found": "none", "remedy": "Add one."}'
     fake_blender(f"echo '{process.MESSAGE_PREFIX}{{\"input_error\": {parts}}}'; exit 2")
     with pytest.raises(InputError, match=r"x\.blend: expected meshes, found none\. Add one\."):
-        process.render_dataset(DatasetJob(), tmp_path / "data")
+        render_dataset(DatasetJob(), tmp_path / "data")
 
 
 def test_a_folder_with_another_job_s_images_is_refused(fake_blender, tmp_path: Path) -> None:
     fake_blender("exit 0")
-    process.render_dataset(DatasetJob(seed=1), tmp_path)
-    process.render_dataset(DatasetJob(seed=1), tmp_path)
+    render_dataset(DatasetJob(seed=1), tmp_path)
+    render_dataset(DatasetJob(seed=1), tmp_path)
     with pytest.raises(InputError, match=r"job\.json.*differs in seed"):
-        process.render_dataset(DatasetJob(seed=2), tmp_path)
+        render_dataset(DatasetJob(seed=2), tmp_path)
 
 
 def test_without_bpy_the_way_out_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     with pytest.raises(InputError, match=r"bpy.*pip install.*scene=external"):
-        process.render_dataset(DatasetJob(), tmp_path)
+        render_dataset(DatasetJob(), tmp_path)

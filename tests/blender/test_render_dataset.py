@@ -20,7 +20,7 @@ import pytest
 
 from rgspipe.blender.job import DatasetJob
 from rgspipe.blender.models.parameters import BlendFile
-from rgspipe.blender.process import render_dataset
+from rgspipe.blender.render_dataset import render_dataset
 from rgspipe.blender.targets import in_frame
 from rgspipe.datasets.gs3 import load_dataset
 from rgspipe.datasets.light_file import read_lights
@@ -130,7 +130,7 @@ def test_damage_is_repaired_and_the_rest_is_kept(rendered: Path, tmp_path: Path)
 def _start(folder: Path, environment: dict[str, str]) -> subprocess.Popen:
     code = (
         "import json, sys; from pathlib import Path; from rgspipe.blender.job import DatasetJob;"
-        "from rgspipe.blender.process import render_dataset;"
+        "from rgspipe.blender.render_dataset import render_dataset;"
         "render_dataset(DatasetJob.from_json(json.loads(sys.argv[1])), Path(sys.argv[2]))"
     )
     command = [sys.executable, "-c", code, json.dumps(JOB.to_json()), str(folder)]
@@ -153,7 +153,7 @@ def _children(folder: Path) -> list[int]:
             state = (path / "stat").read_text().rsplit(")", 1)[1].split()[0]
         except (OSError, IndexError):
             continue
-        if b"rgspipe.blender" in words and str(folder).encode() in words and state != "Z":
+        if b"rgspipe.blender.render_dataset" in words and str(folder).encode() in words and state != "Z":
             found.append(int(path.name))
     return found
 

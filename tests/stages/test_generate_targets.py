@@ -9,14 +9,14 @@ from types import SimpleNamespace
 import pytest
 import torch
 
+from rgspipe.blender.pool.job import SpotRange
+from rgspipe.blender.pool.pool_file import PooledLight, write_pool
 from rgspipe.config import RgspipeConfig, with_changes
 from rgspipe.datasets.exr import write_image
 from rgspipe.datasets.json_file import read_json
 from rgspipe.datasets.light_file import read_lights
 from rgspipe.datasets.location import open_dataset
 from rgspipe.errors import InputError
-from rgspipe.olat.job import SpotRange
-from rgspipe.olat.pool_file import PooledLight, write_pool
 from rgspipe.scene import PointLight, SpotLight
 from rgspipe.stages import generate_targets, render_olat
 from rgspipe.stages.base import Need, StageContext

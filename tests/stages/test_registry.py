@@ -20,10 +20,10 @@ PACKAGE = Path(rgspipe.__file__).parent
 
 #: Some modules that stages reach by ways of their own: within functions, by another process, through another stage.
 REACHED = {
-    "generate_dataset": ("blender.__main__", "blender.passes", "blender.models.hotdog", "datasets.exr"),
-    "render_olat": ("olat.__main__", "olat.plan", "blender.cameras", "stages.generate_dataset"),
+    "generate_dataset": ("blender.child", "blender.passes", "blender.models.hotdog", "datasets.exr"),
+    "render_olat": ("blender.pool.plan", "blender.cameras", "stages.generate_dataset"),
     "render_truth": ("blender.room", "benchmark.rooms"),
-    "benchmark": ("benchmark.mitsuba_worker", "blender.__main__", "renderer.kernels.shadow"),
+    "benchmark": ("benchmark.mitsuba_worker", "blender.room", "renderer.kernels.shadow"),
     "train_surfels": ("training.trainer", "scene.camera", "optim.ssim"),
     "fit_light": ("fitting.fit", "renderer.kernels.composite", "renderer.frozen_file"),
     "track": ("stages.fit_light", "fitting.tracking.track"),
@@ -35,7 +35,8 @@ NOT_REACHED = {
     "freeze": ("fitting.fit", "training.trainer"),
     "fit_light": ("blender.passes", "training.trainer", "fitting.tracking.track"),
     "train_surfels": ("fitting.fit",),
-    "render_olat": ("olat.compose",),
+    "generate_dataset": ("blender.room", "blender.pool.plan"),
+    "render_olat": ("blender.pool.compose", "blender.room"),
     "true_surfels": ("blender.passes",),
 }
 

@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 
 from rgspipe.benchmark.rooms import Room
-from rgspipe.blender.process import render_room
+from rgspipe.blender.render_room import render_room
 from rgspipe.blender.room_job import Kind, RoomJob, image_name
 from rgspipe.datasets.exr import read_array
 from rgspipe.datasets.json_file import read_json, required, write_json

@@ -12,8 +12,6 @@ from collections import deque
 from pathlib import Path
 
 import rgspipe
-from rgspipe.blender.job import DatasetJob
-from rgspipe.blender.room_job import RoomJob
 from rgspipe.datasets.json_file import read_json, write_json
 from rgspipe.errors import InputError
 from rgspipe.progress import track
@@ -31,33 +29,6 @@ SCRATCH = ".scratch"
 TAIL_LINES = 15
 
 
-def render_dataset(job: DatasetJob, folder: Path) -> None:
-    """Render the dataset of `job` into `folder`; frames that are already there and whole are kept.
-
-    May be killed at any moment and called again: the result is the same.
-
-    Raises:
-        InputError: bpy is not installed, the scene cannot be used, or `folder` holds the images of another job.
-        RuntimeError: Blender died; the message ends with the last lines it wrote.
-    """
-    remedy = "Install it (pip install 'rgspipe[blender]'), or use scene=external with a dataset from disk."
-    require_bpy("scene", remedy)
-    run_blender(["rgspipe.blender", "dataset"], job.to_json(), job.scene, folder)
-
-
-def render_room(job: RoomJob, folder: Path) -> None:
-    """Render the room of `job` into `folder`; images that are already there and whole are kept.
-
-    May be killed at any moment and called again: the result is the same.
-
-    Raises:
-        InputError: bpy is not installed, or `folder` holds the images of another job.
-        RuntimeError: Blender died; the message ends with the last lines it wrote.
-    """
-    require_bpy("path-traced truth", "Install it: pip install 'rgspipe[blender]'.")
-    run_blender(["rgspipe.blender", "room"], job.to_json(), job.room, folder)
-
-
 def require_bpy(where: str, remedy: str) -> None:
     """Raise InputError about `where` if Blender's module is not installed."""
     if importlib.util.find_spec("bpy") is None:
@@ -69,11 +40,11 @@ def require_bpy(where: str, remedy: str) -> None:
         )
 
 
-def run_blender(module: list[str], job: dict, name: str, folder: Path) -> None:
+def run_blender(module: str, job: dict, name: str, folder: Path) -> None:
     """Have a child process render `job` into `folder`, and follow it.
 
     Args:
-        module: what Python runs, with its first arguments; paths of job and folder and our own number come after them.
+        module: what Python runs, with the paths of job and folder and our own process id; see `child.serve`.
         job: plain values.
         name: what the progress says is rendered.
 
@@ -86,7 +57,7 @@ def run_blender(module: list[str], job: dict, name: str, folder: Path) -> None:
     _claim(job, folder)
     scratch = folder / SCRATCH
     scratch.mkdir(exist_ok=True)
-    command = [sys.executable, "-u", "-m", *module, str(folder / JOB_FILE), str(folder), str(os.getpid())]
+    command = [sys.executable, "-u", "-m", module, str(folder / JOB_FILE), str(folder), str(os.getpid())]
     with subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, text=True,
         errors="replace", env=_environment(scratch),

@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from rgspipe.blender.job import DatasetJob
-from rgspipe.blender.process import render_dataset
+from rgspipe.blender.render_dataset import render_dataset
 from rgspipe.config import MODELLED, RgspipeConfig, scene_name
 from rgspipe.datasets.gs3 import load_dataset
 from rgspipe.datasets.location import point_at_dataset

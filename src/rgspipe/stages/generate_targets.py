@@ -6,10 +6,10 @@ from itertools import chain, zip_longest
 
 import numpy as np
 
+from rgspipe.blender.pool.compose import write_targets
+from rgspipe.blender.pool.pool_file import PooledLight, read_pool
+from rgspipe.blender.pool.rigs import RigPlan, RigRequest, check_request, draw_rigs, headlight_rigs
 from rgspipe.config import RgspipeConfig
-from rgspipe.olat.compose import write_targets
-from rgspipe.olat.pool_file import PooledLight, read_pool
-from rgspipe.olat.rigs import RigPlan, RigRequest, check_request, draw_rigs, headlight_rigs
 from rgspipe.progress import track
 from rgspipe.stages.base import Need, Stage, StageContext
 from rgspipe.stages.render_olat import check_scene

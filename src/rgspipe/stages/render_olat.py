@@ -6,11 +6,11 @@ import math
 from dataclasses import replace
 
 from rgspipe.blender.fixed_view import FixedView
+from rgspipe.blender.pool.job import PoolJob, SpotRange
+from rgspipe.blender.pool.pool_file import read_pool
+from rgspipe.blender.pool.render_pool import render_pool
 from rgspipe.config import MODELLED, RgspipeConfig, TargetsConfig, TargetSpotConfig
 from rgspipe.errors import InputError
-from rgspipe.olat.job import PoolJob, SpotRange
-from rgspipe.olat.pool_file import read_pool
-from rgspipe.olat.process import render_pool
 from rgspipe.stages.base import Stage, StageContext
 from rgspipe.stages.generate_dataset import STAGE as DATASET
 from rgspipe.stages.generate_dataset import dataset_job

@@ -3,6 +3,5 @@
 Light is linear, so the image of a rig is the sum of its lights' images, each times its RGB intensity. A pool is
 rendered once; any number of rigs of one, two or more lights follow from it, their true lights known exactly.
 
-`process.render_pool` is the way in to Blender; `plan`, `cameras` and `__main__` run in its process, all other modules
-import without bpy.
+`render_pool` is the way in to Blender; `plan` and `cameras` run in its process, all other modules import without bpy.
 """

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 import torch
 
+from rgspipe.blender.pool.compose import common_class, write_targets
+from rgspipe.blender.pool.pool_file import read_pool, write_pool
+from rgspipe.blender.pool.rigs import RigRequest, draw_rigs
 from rgspipe.datasets.exr import write_image
 from rgspipe.datasets.gs3 import load_dataset
 from rgspipe.datasets.light_file import read_lights
 from rgspipe.errors import InputError
-from rgspipe.olat.compose import common_class, write_targets
-from rgspipe.olat.pool_file import read_pool, write_pool
-from rgspipe.olat.rigs import RigRequest, draw_rigs
 from rgspipe.scene import SpotLight
 from spots_on_plane import plane_camera, plane_image, plane_lights
 

@@ -10,9 +10,9 @@ from itertools import combinations
 import numpy as np
 import torch
 
+from rgspipe.blender.pool.job import HEADLIGHTS
 from rgspipe.blender.targets import random_intensity
 from rgspipe.errors import InputError
-from rgspipe.olat.job import HEADLIGHTS
 from rgspipe.renderer.spot import spot_power
 from rgspipe.scene import Light, LightRig, SpotLight
 

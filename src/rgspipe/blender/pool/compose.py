@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
+from rgspipe.blender.pool.pool_file import CAMERAS, INFO, PooledLight
+from rgspipe.blender.pool.rigs import RigPlan
 from rgspipe.datasets.exr import write_image
 from rgspipe.datasets.gs3_write import write_target_list
 from rgspipe.datasets.light_file import write_lights
-from rgspipe.olat.pool_file import CAMERAS, INFO, PooledLight
-from rgspipe.olat.rigs import RigPlan
 from rgspipe.progress import track
 
 

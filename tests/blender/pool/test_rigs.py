@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import torch
 
+from rgspipe.blender.pool.rigs import HEADLIGHT_COLOUR, RigRequest, draw_rigs, headlight_rigs, unit_power
 from rgspipe.errors import InputError
-from rgspipe.olat.rigs import HEADLIGHT_COLOUR, RigRequest, draw_rigs, headlight_rigs, unit_power
 from rgspipe.renderer.spot import spot_power
 from rgspipe.scene import Light, PointLight, SpotLight
 

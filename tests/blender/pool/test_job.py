@@ -9,7 +9,7 @@ import pytest
 
 from rgspipe.blender.fixed_view import FixedView
 from rgspipe.blender.job import DatasetJob
-from rgspipe.olat.job import PoolJob, SpotRange
+from rgspipe.blender.pool.job import PoolJob, SpotRange
 from rgspipe.scene.models import Corridor
 
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import torch
 
-from rgspipe.olat.job import HEADLIGHTS
+from rgspipe.blender.pool.job import HEADLIGHTS
 from rgspipe.renderer.spot import SpotShape
 from rgspipe.scene import SpotLight
 from rgspipe.scene.models import Corridor

@@ -12,11 +12,11 @@ from rgspipe.blender.cameras import MAX_DRAWS, Layout, no_room
 from rgspipe.blender.geometry import Geometry
 from rgspipe.blender.models.parameters import BlendFile
 from rgspipe.blender.plan import Frame
+from rgspipe.blender.pool.aim import aim_at_relay, aim_at_seen, seen_points
+from rgspipe.blender.pool.cameras import pool_cameras
+from rgspipe.blender.pool.job import PoolJob
+from rgspipe.blender.pool.track import headlights
 from rgspipe.blender.targets import classify, is_around_corner, is_of_class
-from rgspipe.olat.aim import aim_at_relay, aim_at_seen, seen_points
-from rgspipe.olat.cameras import pool_cameras
-from rgspipe.olat.job import PoolJob
-from rgspipe.olat.track import headlights
 from rgspipe.scene import Camera, Light, PointLight, SpotLight
 from rgspipe.scene.models import Corridor
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rgspipe.olat.track import DIP, GAUGE, headlights, path, path_length
+from rgspipe.blender.pool.track import DIP, GAUGE, headlights, path, path_length
 from rgspipe.renderer.spot import SpotShape
 from rgspipe.scene.models import Corridor
 

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from rgspipe.blender.job import DatasetJob
+from rgspipe.blender.pool.job import PoolJob, SpotRange
+from rgspipe.blender.pool.pool_file import PooledLight, read_pool
+from rgspipe.blender.pool.render_pool import render_pool
 from rgspipe.errors import InputError
-from rgspipe.olat.job import PoolJob, SpotRange
-from rgspipe.olat.pool_file import PooledLight, read_pool
-from rgspipe.olat.process import render_pool
 from rgspipe.scene import SpotLight
 from rgspipe.scene.models import Corridor
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from rgspipe.olat.aim import MIN_SPOT_SHARE, aim_at_relay, aim_at_seen, seen_points
+from rgspipe.blender.pool.aim import MIN_SPOT_SHARE, aim_at_relay, aim_at_seen, seen_points
 from rgspipe.renderer.spot import SpotShape
 from rgspipe.scene import Camera, look_at
 

@@ -7,7 +7,7 @@ import torch
 
 from rgspipe.blender.cameras import aimed
 from rgspipe.blender.fixed_view import FixedView
-from rgspipe.olat.cameras import MOST_CAMERAS, pool_cameras
+from rgspipe.blender.pool.cameras import MOST_CAMERAS, pool_cameras
 from rgspipe.scene import Camera
 
 ORIGINS = np.array([[0.0, -1.5, 0.0], [-0.4, -1.2, 0.3], [0.4, -1.2, 0.3]])

@@ -1,0 +1,93 @@
+"""The process in which Blender renders: it takes a job, tells how far it is, and dies with who wants the images."""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import logging
+import os
+import signal
+import sys
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol, TypeVar
+
+from rgspipe.blender.process import MESSAGE_PREFIX
+from rgspipe.errors import InputError
+
+#: Linux: prctl option by which a process is killed when its parent dies.
+PR_SET_PDEATHSIG = 1
+
+
+class Named(Protocol):
+    """An image to render."""
+
+    @property
+    def name(self) -> str: ...
+
+
+FrameType = TypeVar("FrameType", bound=Named)
+
+
+@dataclass(frozen=True)
+class Parent:
+    """The process that wants the images.
+
+    Attributes:
+        number: its process id.
+    """
+
+    number: int
+
+    def missing(self, frames: Sequence[FrameType], is_whole: Callable[[FrameType], bool]) -> list[FrameType]:
+        """The frames that are not there yet; the parent is told how many there are and how many are done."""
+        missing = [frame for frame in frames if not is_whole(frame)]
+        _tell(total=len(frames), done=len(frames) - len(missing))
+        return missing
+
+    def each(self, frames: Iterable[FrameType]) -> Iterator[FrameType]:
+        """Frame by frame, which the parent is told of when it is done; ends this process if the parent is gone."""
+        for frame in frames:
+            self.require()
+            yield frame
+            _tell(frame=frame.name)
+
+    def require(self) -> None:
+        """End this process if the parent has ended."""
+        if os.getppid() != self.number:
+            sys.exit("The process that asked for these images is gone.")
+
+
+def serve(render: Callable[[dict, Path, Parent], None]) -> None:
+    """Be the process that `run_blender` starts: `render(job, folder, parent)`, and end."""
+    status = _serve(render)
+    sys.stdout.flush()
+    sys.stderr.flush()
+    # Blender's destructors may crash after all work is done; nothing is left to be closed.
+    os._exit(status)
+
+
+def _serve(render: Callable[[dict, Path, Parent], None]) -> int:
+    job, folder, parent = Path(sys.argv[1]), Path(sys.argv[2]), Parent(int(sys.argv[3]))
+    logging.basicConfig(level=logging.INFO, format="%(message)s")
+    _die_with(parent)
+    try:
+        render(json.loads(job.read_text(encoding="utf-8")), folder, parent)
+    except InputError as error:
+        parts = {"where": error.where, "expected": error.expected, "found": error.found, "remedy": error.remedy}
+        _tell(input_error=parts)
+        return 2
+    return 0
+
+
+def _tell(**message: object) -> None:
+    """Send one message to the parent."""
+    print(MESSAGE_PREFIX + json.dumps(message), flush=True)
+
+
+def _die_with(parent: Parent) -> None:
+    """Have this process killed when its parent dies, so that no orphan goes on writing (Linux)."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None, use_errno=True).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+    parent.require()  # it may have died before the call

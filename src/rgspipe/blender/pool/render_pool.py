@@ -1,0 +1,49 @@
+"""Render a pool of single lights, in a process of Blender's own: this module again, run as a program."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rgspipe.blender.child import Parent, serve
+from rgspipe.blender.pool.job import PoolJob
+from rgspipe.blender.process import SCRATCH, require_bpy, run_blender
+
+
+def render_pool(job: PoolJob, folder: Path) -> None:
+    """Render the lights of `job` into `folder`; images that are already there and whole are kept.
+
+    May be killed at any moment and called again: the result is the same.
+
+    Raises:
+        InputError: bpy is not installed, the scene cannot be used, or `folder` holds the images of another job.
+        RuntimeError: Blender died; the message ends with the last lines it wrote.
+    """
+    require_bpy("fit.targets", "Install it (pip install 'rgspipe[blender]'), or use fit.targets=dataset.")
+    run_blender(__name__, job.to_json(), job.dataset.scene, folder)
+
+
+def _render(content: dict, folder: Path, parent: Parent) -> None:
+    """Write what is known of the pool, then render every image that is missing in `folder`."""
+    from rgspipe.blender.passes import Studio, is_whole
+    from rgspipe.blender.pool.plan import make_plan
+    from rgspipe.blender.pool.pool_file import write_pool
+    from rgspipe.blender.scenes import open_scene
+
+    job = PoolJob.from_json(content)
+    prepared = open_scene(job.dataset)
+    lights = make_plan(job, prepared.layout, prepared.geometry)
+    bounds = [prepared.geometry.lo.tolist(), prepared.geometry.hi.tolist()]
+    cameras = [frame.camera for frame in lights[0].frames]
+    entries = [(plan.name, plan.occlusion, plan.light) for plan in lights]
+    write_pool(folder, job.dataset.scene, entries, cameras, bounds, prepared.rescale, list(prepared.offset))
+    shapes = {frame.name: plan.light for plan in lights for frame in plan.frames}
+    frames = [frame for plan in lights for frame in plan.frames]
+    missing = parent.missing(frames, lambda frame: is_whole(frame, folder))
+    studio = Studio(prepared.scene, job.dataset.settings, folder / SCRATCH)
+    for frame in parent.each(missing):
+        studio.shape(shapes[frame.name])
+        studio.render(frame, folder)
+
+
+if __name__ == "__main__":
+    serve(_render)

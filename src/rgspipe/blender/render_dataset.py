@@ -1,0 +1,44 @@
+"""Render a dataset, in a process of Blender's own: this module again, run as a program."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rgspipe.blender.child import Parent, serve
+from rgspipe.blender.job import DatasetJob
+from rgspipe.blender.process import SCRATCH, require_bpy, run_blender
+
+
+def render_dataset(job: DatasetJob, folder: Path) -> None:
+    """Render the dataset of `job` into `folder`; frames that are already there and whole are kept.
+
+    May be killed at any moment and called again: the result is the same.
+
+    Raises:
+        InputError: bpy is not installed, the scene cannot be used, or `folder` holds the images of another job.
+        RuntimeError: Blender died; the message ends with the last lines it wrote.
+    """
+    remedy = "Install it (pip install 'rgspipe[blender]'), or use scene=external with a dataset from disk."
+    require_bpy("scene", remedy)
+    run_blender(__name__, job.to_json(), job.scene, folder)
+
+
+def _render(content: dict, folder: Path, parent: Parent) -> None:
+    """Write the dataset's JSON files, then render every frame that is missing in `folder`."""
+    from rgspipe.blender.passes import Studio, is_whole
+    from rgspipe.blender.plan import make_plan
+    from rgspipe.blender.scenes import open_scene
+    from rgspipe.blender.write import write_dataset_files
+
+    job = DatasetJob.from_json(content)
+    prepared = open_scene(job)
+    plan = make_plan(job, prepared.layout, prepared.geometry)
+    write_dataset_files(job, plan, prepared, folder)
+    missing = parent.missing(plan.frames, lambda frame: is_whole(frame, folder))
+    studio = Studio(prepared.scene, job.settings, folder / SCRATCH)
+    for frame in parent.each(missing):
+        studio.render(frame, folder)
+
+
+if __name__ == "__main__":
+    serve(_render)

@@ -1,0 +1,39 @@
+"""Render a room of rectangles, in a process of Blender's own: this module again, run as a program."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rgspipe.blender.child import Parent, serve
+from rgspipe.blender.process import SCRATCH, require_bpy, run_blender
+from rgspipe.blender.room_job import RoomJob
+
+
+def render_room(job: RoomJob, folder: Path) -> None:
+    """Render the room of `job` into `folder`; images that are already there and whole are kept.
+
+    May be killed at any moment and called again: the result is the same.
+
+    Raises:
+        InputError: bpy is not installed, or `folder` holds the images of another job.
+        RuntimeError: Blender died; the message ends with the last lines it wrote.
+    """
+    require_bpy("path-traced truth", "Install it: pip install 'rgspipe[blender]'.")
+    run_blender(__name__, job.to_json(), job.room, folder)
+
+
+def _render(content: dict, folder: Path, parent: Parent) -> None:
+    """Render every image of a room that is missing in `folder`."""
+    from rgspipe.blender.passes import Studio
+    from rgspipe.blender.room import build_room, is_whole, write_frame
+
+    job = RoomJob.from_json(content)
+    missing = parent.missing(job.frames(), lambda frame: is_whole(frame, folder))
+    for kind in job.settings:
+        studio = Studio(build_room(job), job.settings[kind], folder / SCRATCH)
+        for frame in parent.each(frame for frame in missing if frame.kind == kind):
+            write_frame(studio, frame, folder)
+
+
+if __name__ == "__main__":
+    serve(_render)
