@@ -2,13 +2,14 @@ SHELL := /bin/bash
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV := .venv
 RGSPIPE := $(VENV)/bin/python -m rgspipe
+MKDOCS := NO_MKDOCS_2_WARNING=1 $(VENV)/bin/python -m mkdocs
 STAMP := $(VENV)/.installed
 BENCH_STAMP := $(VENV)/.bench_installed
 TEST_WORKERS ?= 2
 ARGS ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup test test-slurm smoke reproduce scenes train-study light-study bench lint house
+.PHONY: help setup test test-slurm smoke reproduce scenes train-study light-study bench docs lint house
 
 help:  ## this list
 	@echo "rgspipe: from images of a scene, find its lights"
@@ -51,6 +52,9 @@ bench: setup $(BENCH_STAMP)  ## accuracy against path-traced truth and what it c
 $(BENCH_STAMP): requirements-bench.txt $(STAMP)
 	$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check -r requirements-bench.txt
 	@touch $@
+
+docs: setup  ## the documentation as a site in site/, which is read without a server or a network
+	$(MKDOCS) build --strict --quiet
 
 lint: setup  ## style and mistakes
 	$(VENV)/bin/ruff check src tests tools

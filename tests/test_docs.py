@@ -1,51 +1,140 @@
-"""What README and docs/ point at is there: pages, pictures and the sections that they name."""
+"""The documentation holds together: links, anchors, pictures, tables, names of code, a site that builds strictly."""
 
 from __future__ import annotations
 
+import ast
+import os
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
+from markdown.extensions.toc import unique
+from pymdownx.slugs import slugify
+
+from rgspipe.evaluation import goals
 
 ROOT = Path(__file__).parents[1]
-PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").glob("*.md"))]
+DOCS = ROOT / "docs"
+PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted(DOCS.rglob("*.md"))]
 
-#: [text](page.md), ![text](picture.png); not what is on the web.
-LINK = re.compile(r"\]\((?!https?://)([^)#\s]+)[^)]*\)")
-#: page.md, "Section"; the page may be a link.
-SECTION = re.compile(r"([a-z_]+\.md)\)?, \"([^\"]+)\"")
+#: [text](page.md#anchor), ![text](picture.png); not what is on the web.
+LINK = re.compile(r"\]\((?!https?://)([^)\s]+)\)")
 HEADING = re.compile(r"^#+ (.+)$", re.MULTILINE)
 #: Lines of a table, one after the other.
 TABLE = re.compile(r"(?:^\|.*\n)+", re.MULTILINE)
+#: Code between fences, or indented.
+CODE = re.compile(r"^```.*?^```$|^(?: {4}|\t).*$", re.MULTILINE | re.DOTALL)
+#: `fitting/search/judge.py`, or a name in it: `fitting/search/judge.py:FAINT`.
+SOURCE = re.compile(r"`((?!outputs/)[a-z_0-9/]+/(?:[a-z_0-9]+\.py)?)(?::([A-Z_]+))?`")
+#: A constant with its value, as cells of a table.
+VALUE = re.compile(r"\| `([a-z_/]+\.py):([A-Z_]+)` \| ([^|]+) \|")
+#: Words of a page that is read in one sitting; the laboratory may be longer.
+LONGEST = 1600
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_links_lead_to_files_of_the_repository(page: Path) -> None:
-    targets = [page.parent / name for name in LINK.findall(page.read_text())]
-    assert [target for target in targets if not target.resolve().is_relative_to(ROOT) or not target.exists()] == []
+def _name(page: Path) -> str:
+    return page.relative_to(ROOT).as_posix()
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_sections_that_are_named_exist(page: Path) -> None:
-    named = SECTION.findall(page.read_text())
-    found = {name: HEADING.findall((ROOT / "docs" / name).read_text()) for name, _ in named}
-    assert [(name, section) for name, section in named if section not in found[name]] == []
+every_page = pytest.mark.parametrize("page", PAGES, ids=_name)
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@every_page
+def test_links_lead_to_files_and_sections(page: Path) -> None:
+    broken = []
+    for link in LINK.findall(page.read_text()):
+        name, _, anchor = link.partition("#")
+        target = (page.parent / name).resolve() if name else page
+        if not target.is_relative_to(ROOT) or not target.exists() or (anchor and anchor not in _anchors(target)):
+            broken.append(link)
+    assert broken == []
+
+
+@every_page
 def test_tables_are_whole(page: Path) -> None:
     """Each has a head, and as many cells in all rows: an empty line would make text of the rows after it."""
     for table in TABLE.findall(page.read_text()):
-        rows = table.splitlines()
+        rows = [re.sub(r"\\\|", "", row) for row in table.splitlines()]
         assert len(rows) > 1 and set(rows[1]) == set("|- "), rows[0]
         assert len({row.count("|") for row in rows}) == 1, rows[0]
 
 
-def test_readme_lists_every_page() -> None:
-    listed = LINK.findall((ROOT / "README.md").read_text())
-    assert [page.name for page in PAGES[2:] if f"docs/{page.name}" not in listed] == []
+@every_page
+def test_code_that_is_named_exists(page: Path) -> None:
+    if page.name == "CHANGELOG.md":
+        return  # It tells of what was there once.
+    missing = [
+        f"{path}:{name}"
+        for path, name in SOURCE.findall(CODE.sub("", page.read_text()))
+        if (file := _source(path)) is None or (name and name not in _constants(file))
+    ]
+    assert missing == []
+
+
+def test_values_of_constants_are_those_of_the_code() -> None:
+    told = VALUE.findall((DOCS / "guides" / "doubtful_answers.md").read_text())
+    assert len(told) >= 10
+    assert {name: float(value) for _, name, value in told} == {
+        name: _constants(ROOT / "src" / "rgspipe" / path)[name] for path, name, _ in told
+    }
+
+
+def test_what_is_wanted_is_what_the_report_wants() -> None:
+    text = (DOCS / "laboratory" / "index.md").read_text()
+    places = [("visible", 1), ("visible", 3), ("occluded", 1), ("occluded", 3)]
+    for scene, floor in goals.FLOORS.items():
+        time = None if floor.fit_seconds is None else goals.at_most(floor.fit_seconds * goals.SLOWER)
+        cells = [scene, goals.at_least(floor.psnr - goals.PSNR_NOISE)]
+        cells += [goals.at_most(floor.training_seconds * goals.SLOWER)]
+        cells += [goals.percent(floor.medians.get(place, float("nan"))) for place in places]
+        assert f"| {' | '.join([*cells, time or '—'])} |\n" in text
+    for case, limit in goals.KINDS.items():
+        assert f"| {case} | {goals.percent(limit)} |\n" in text
 
 
 def test_every_picture_is_shown() -> None:
     shown = {(page.parent / name).resolve() for page in PAGES for name in LINK.findall(page.read_text())}
-    assert [path.name for path in (ROOT / "docs" / "images").iterdir() if path.resolve() not in shown] == []
+    assert [path.name for path in (DOCS / "images").iterdir() if path.resolve() not in shown] == []
+
+
+def test_pages_are_read_in_one_sitting() -> None:
+    kinds = [page for kind in ("tutorial", "guides", "reference") for page in (DOCS / kind).rglob("*.md")]
+    assert {_name(page): size for page in kinds if (size := len(page.read_text().split())) > LONGEST} == {}
+
+
+def test_the_site_builds_strictly_and_needs_nothing_from_the_web(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(tmp_path)]
+    environment = os.environ | {"PYTHONPATH": str(ROOT / "src"), "NO_MKDOCS_2_WARNING": "1"}
+    built = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
+    assert built.returncode == 0, built.stderr
+    fetched = re.compile(r"<(?:script|link|img|iframe)\b[^>]*(?:src|href)=\"?(?:https?:)?//")
+    pages = {path.relative_to(tmp_path).as_posix(): path.read_text() for path in tmp_path.rglob("*.html")}
+    assert {name for name, text in pages.items() if fetched.search(text)} == set()
+    assert "fit.search.starts" in pages["reference/settings.html"]
+    assert "fit_lights" in pages["reference/api.html"]
+
+
+def _anchors(page: Path) -> set[str]:
+    """The anchors of a page's headings, as the site has them; GitHub's are the same."""
+    make, seen = slugify(case="lower"), set()
+    text = re.sub(r"^```.*?^```$", "", page.read_text(), flags=re.MULTILINE | re.DOTALL)
+    return {unique(make(re.sub(r"[`*]", "", heading), "-"), seen) for heading in HEADING.findall(text)}
+
+
+def _source(path: str) -> Path | None:
+    """A file or folder of the package or of the checkout."""
+    places = [ROOT / "src" / "rgspipe" / path, ROOT / path]
+    return next((place for place in places if place.exists()), None)
+
+
+def _constants(file: Path) -> dict[str, float]:
+    """The numbers that a module names in capitals."""
+    found = {}
+    for node in ast.parse(file.read_text()).body:
+        if isinstance(node, ast.Assign) and isinstance(target := node.targets[0], ast.Name | ast.Tuple):
+            names = target.elts if isinstance(target, ast.Tuple) else [target]
+            values = node.value.elts if isinstance(target, ast.Tuple) else [node.value]
+            found |= {n.id: v.value for n, v in zip(names, values, strict=True) if isinstance(v, ast.Constant)}
+    return found

@@ -1,4 +1,4 @@
-"""What public loaders of Gaussians demand of a PLY file, as their sources have it (docs/conventions.md), and ours."""
+"""What public loaders of Gaussians demand of a PLY file by their sources (docs/laboratory/ply.md), and ours."""
 
 from __future__ import annotations
 

@@ -93,7 +93,7 @@ def test_an_empty_report_says_what_is_missing(fitted):
         "no pictures of single fits",
         "Nothing is known of the stages",
         "configuration is not known",
-        "not measured",
+        "Nothing is wanted of this scene",
     ):
         assert text in page.text
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 from rgspipe.config import RgspipeConfig, describe
 from rgspipe.errors import InputError
@@ -27,6 +28,29 @@ EXAMPLES = """\
   python -m rgspipe stage=evaluate views=multi occlusion=occluded   lights out of sight, from three views
   python -m rgspipe -m stage=evaluate views.count=1,2,3             a sweep: one job for each value
   python -m rgspipe status                                          how the runs so far ended"""
+
+
+class Setting(NamedTuple):
+    """A key of the configuration, its meaning with unit and range, and its default as the command line has it."""
+
+    key: str
+    meaning: str
+    default: str
+
+
+def sections() -> dict[str, list[Setting]]:
+    """Every setting by section; those outside of one are under ""."""
+    found: dict[str, list[Setting]] = {}
+    for key, meaning, default in describe(RgspipeConfig):
+        section, _, name = key.partition(".")
+        found.setdefault(section if name else "", []).append(Setting(key, meaning, _shown(default)))
+    return found
+
+
+def groups() -> dict[str, list[Path]]:
+    """The files with the choices of each group of settings."""
+    folders = sorted(path for path in resource_folder("conf").iterdir() if path.is_dir())
+    return {folder.name: sorted(folder.glob("*.yaml")) for folder in folders}
 
 
 def overview() -> str:
@@ -83,38 +107,31 @@ def _stages() -> str:
 
 
 def _groups() -> str:
-    lines = []
-    for folder in sorted(path for path in resource_folder("conf").iterdir() if path.is_dir()):
-        lines.append(f"  {folder.name:<11} {' | '.join(_choices(folder))}")
-    return "\n".join(lines)
+    return "\n".join(f"  {name:<11} {_choices(files)}" for name, files in groups().items())
 
 
-def _choices(folder: Path) -> list[str]:
-    return [path.stem for path in sorted(folder.glob("*.yaml"))]
+def _choices(files: Sequence[Path]) -> str:
+    return " | ".join(path.stem for path in files)
 
 
 def _sections() -> str:
-    sections: dict[str, list[str]] = {}
-    for key, _, _ in describe(RgspipeConfig):
-        section, _, name = key.partition(".")
-        sections.setdefault(section, []).append(name)
-    single = [name for name, keys in sections.items() if keys == [""]]
-    lines = [f"  {'':<11} {', '.join(single)}"]
-    lines += [f"  {name:<11} {', '.join(keys)}" for name, keys in sections.items() if keys != [""]]
-    return "\n".join(lines)
+    return "\n".join(
+        f"  {name:<11} {', '.join(setting.key.removeprefix(f'{name}.') for setting in settings)}"
+        for name, settings in sections().items()
+    )
 
 
 def _topic(topic: str) -> str:
-    rows = [row for row in describe(RgspipeConfig) if row[0] == topic or row[0].startswith(f"{topic}.")]
-    folder = resource_folder("conf") / topic
-    if not rows and not folder.is_dir():
-        names = [key for key, _, _ in describe(RgspipeConfig)]
+    every = [setting for settings in sections().values() for setting in settings]
+    rows = [setting for setting in every if setting.key == topic or setting.key.startswith(f"{topic}.")]
+    if not rows and topic not in groups():
+        names = [setting.key for setting in every]
         near = difflib.get_close_matches(topic, [*names, *(name.partition(".")[0] for name in names)], n=1)
         remedy = f"Did you mean {near[0]}?" if near else "python -m rgspipe --help lists them."
         raise InputError(f"--help {topic}", expected="a section, a key or a group", found="none", remedy=remedy)
-    lines = [f"{topic}={' | '.join(_choices(folder))}"] if folder.is_dir() else []
-    width = max((len(key) for key, _, _ in rows), default=0)
-    lines += [f"  {key:<{width}}  {help}; default {_shown(default)}" for key, help, default in rows]
+    lines = [f"{topic}={_choices(groups()[topic])}"] if topic in groups() else []
+    width = max((len(setting.key) for setting in rows), default=0)
+    lines += [f"  {setting.key:<{width}}  {setting.meaning}; default {setting.default}" for setting in rows]
     return "\n".join(lines)
 
 

@@ -52,7 +52,7 @@ def load_sequence(name: str) -> list[SequenceStep]:
         raise InputError(path, expected="YAML", found=found, remedy="Correct the file.") from None
     steps = data.get("steps") if isinstance(data, dict) else None
     if not isinstance(steps, list) or not steps:
-        remedy = "See docs/extending.md for an example."
+        remedy = "See docs/guides/add_setting.md for an example."
         raise InputError(path, expected="a list under 'steps'", found=type(data).__name__, remedy=remedy)
     return [_step(path, number, item) for number, item in enumerate(steps, 1)]
 

@@ -1,4 +1,4 @@
-"""Read datasets and fit targets in the GS³ / NRHints format; see docs/conventions.md.
+"""Read datasets and fit targets in the GS³ / NRHints format; see docs/reference/formats.md.
 
 Whatever is wrong with the files is an InputError that names the file and the key: nothing that is
 broken, missing or ambiguous gets past this module.

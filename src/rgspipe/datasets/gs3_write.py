@@ -1,4 +1,4 @@
-"""Write the JSON files of a dataset in the GS³ format; see docs/conventions.md."""
+"""Write the JSON files of a dataset in the GS³ format; see docs/reference/formats.md."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Surfels in PLY files: our own, 3DGS, 2DGS and RadiosityGS; see docs/conventions.md."""
+"""Surfels in PLY files: our own, 3DGS, 2DGS and RadiosityGS; see docs/reference/ply.md."""
 
 from __future__ import annotations
 

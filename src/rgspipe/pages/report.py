@@ -117,7 +117,7 @@ def render_report(contents: ReportContents) -> str:
         galleries=shown_sections(contents.galleries),
         found=shown_sections(contents.sections),
         true_surfels=TRUTH,
-        goals=goals.goals(contents.summary, dict(contents.training or {}) | {"test_psnr_mean": found["psnr"]}, method),
+        goals=_goals(contents, found["psnr"], method),
         method=method,
         training=_training_rows(contents.training),
         comparison=picture_address(contents.comparison, budget),
@@ -132,6 +132,12 @@ def render_report(contents: ReportContents) -> str:
         all_classes=ALL,
         success_limit=contents.success_limit,
     )
+
+
+def _goals(contents: ReportContents, psnr: float | None, method: str) -> list[goals.Goal]:
+    training = dict(contents.training or {}) | {"test_psnr_mean": psnr}
+    kinds = [study.table for study in contents.light_studies if study.kind == "kinds"]
+    return goals.goals(contents.scene, contents.summary, training, method, kinds[0] if kinds else None)
 
 
 def group_title(method: str, views: int) -> str:

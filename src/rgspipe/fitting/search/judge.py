@@ -22,7 +22,7 @@ DOUBTFUL_DROP = 0.07
 
 #: A rig with a light that sends less than FAINT of the image's energy must lower the cost by FAINT_DROP: a light too
 #: many, which explains what the model gets wrong, is a faint one. Chosen on other scenes than it is judged on, see
-#: docs/number_of_lights.md.
+#: docs/laboratory/number_of_lights.md.
 FAINT, FAINT_DROP = 0.12, 0.5
 
 #: Rigs are clearly different where a light is farther from its counterpart than this part of the scene's size, or

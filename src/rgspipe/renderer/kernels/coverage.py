@@ -1,4 +1,4 @@
-"""The one definition of coverage that camera, gather and shadow rays share (docs/model.md).
+"""The one definition of coverage that camera, gather and shadow rays share (docs/reference/model/surfels.md).
 
 Hits of a ray are ordered by depth. A layer starts at its front, the first hit that is in no layer yet, and
 holds every hit within one thickness behind it:
