@@ -104,7 +104,7 @@ def test_a_failed_build_leaves_nothing_that_looks_whole_and_goes_on_later(tmp_pa
     with pytest.raises(RuntimeError, match="half way"):
         store.build(KEY, RECIPE, fail)
     assert store.find(KEY) is None
-    assert store.latest("scene", "stage") is None
+    assert store.newest("scene", "stage") is None
 
     def go_on(folder: Path) -> Mapping[str, object]:
         assert (folder / "first.txt").read_text() == "kept\n"

@@ -1,7 +1,8 @@
 """The artifact store: what a stage made, published whole or not at all, and verified when it is read.
 
     <root>/<scene>/<stage>/<fingerprint>/              an artifact: its files and manifest.json
-    <root>/<scene>/<stage>/latest                      link to the newest one
+    <root>/<scene>/<stage>/latest                      link to the newest one that the plain command makes
+    <root>/<scene>/<stage>/latest-<settings>           link to the newest one with other settings
     <root>/<scene>/<stage>/.partial-<fingerprint>/     an artifact in the making
     <root>/<scene>/<stage>/.lock-<fingerprint>         held while it is made
 
@@ -29,6 +30,9 @@ from rgspipe.machine import PeakMemory, library_versions, machine
 
 SCHEMA_VERSION = 1
 MANIFEST = "manifest.json"
+
+#: What links to the newest artifacts are called, or begin with.
+LATEST = "latest"
 
 log = logging.getLogger(__name__)
 
@@ -130,18 +134,28 @@ class ArtifactStore:
             self._known[key] = Artifact(path, _read_manifest(path, key))
         return self._known[key]
 
-    def latest(self, scene: str, stage: str) -> Artifact | None:
-        """The newest artifact of a stage, or None if there is none that can be read."""
-        link = self.root / scene / stage / "latest"
-        if not link.is_symlink() or not link.exists():
+    def newest(self, scene: str, stage: str) -> Artifact | None:
+        """The artifact of a stage that was made or asked for last, or None if it cannot be read or there is none."""
+        links = [link for link in (self.root / scene / stage).glob(f"{LATEST}*") if link.is_symlink() and link.exists()]
+        if not links:
             return None
+        last = max(links, key=lambda link: link.lstat().st_mtime_ns)
         try:
-            return self.find(Key(scene, stage, link.resolve().name))
+            return self.find(Key(scene, stage, last.resolve().name))
         except InputError:
             return None
 
+    def point_at(self, key: Key, variant: str = "") -> None:
+        """Let `latest`, or `latest-<variant>`, be this artifact."""
+        link = LATEST + (f"-{variant}" if variant else "")
+        point_at(self.root / key.scene / key.stage / link, key.fingerprint)
+
     def build(
-        self, key: Key, recipe: Mapping[str, Any], make: Callable[[Path], Mapping[str, Any]]
+        self,
+        key: Key,
+        recipe: Mapping[str, Any],
+        make: Callable[[Path], Mapping[str, Any]],
+        variant: str = "",
     ) -> tuple[Artifact, bool]:
         """Make an artifact and publish it, or wait for the process that is making it and take its result.
 
@@ -150,6 +164,7 @@ class ArtifactStore:
             recipe: what identifies it; goes into the manifest as it is.
             make: writes the files into the folder it is given and returns facts for the manifest. The folder may
                 hold files of an earlier, interrupted attempt. Names that start with a dot are not published.
+            variant: what `latest-<variant>` is called; empty for `latest`.
 
         Returns:
             the artifact, and whether this call made it.
@@ -166,6 +181,7 @@ class ArtifactStore:
             seconds = round(time.perf_counter() - start, 3)
             made = {"seconds": seconds, "peak_memory_mib": memory.mib(), "resumed": resumed, "facts": dict(facts)}
             self._publish(key, recipe, made)
+            self.point_at(key, variant)
         artifact = self.find(key)
         assert artifact is not None
         return artifact, True
@@ -189,7 +205,6 @@ class ArtifactStore:
         sync_tree(partial)
         partial.rename(path)
         sync(path.parent)
-        point_at(path.parent / "latest", key.fingerprint)
 
 
 def _locked(lock_file: Path, key: Key) -> FileLock:

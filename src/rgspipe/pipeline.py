@@ -20,6 +20,7 @@ from rgspipe.files import tree_digest
 from rgspipe.fingerprints import differences, fingerprint
 from rgspipe.source_code import SourceCode
 from rgspipe.stages.base import Stage, StageContext
+from rgspipe.variants import variant_name
 
 StageLoader = Callable[[str], Stage]
 
@@ -36,6 +37,7 @@ NO_RESULT = (
     "rgspipe.stages.base",
     "rgspipe.stages.sources",
     "rgspipe.status",
+    "rgspipe.variants",
 )
 
 #: At most this many causes are named for one stage in the plan.
@@ -137,10 +139,10 @@ def plan(root: Node, store: ArtifactStore) -> list[Step]:
 def _reason(node: Node, store: ArtifactStore) -> str:
     if store.partial(node.key).exists():
         return "goes on where it was interrupted"
-    latest = store.latest(node.key.scene, node.key.stage)
-    if latest is None:
+    newest = store.newest(node.key.scene, node.key.stage)
+    if newest is None:
         return "not made yet"
-    causes = differences(node.recipe, latest.manifest)
+    causes = differences(node.recipe, newest.manifest)
     shown = ", ".join(causes[:SHOWN_CAUSES]) or "the one that was made is gone"
     return shown + (f" and {len(causes) - SHOWN_CAUSES} more" if len(causes) > SHOWN_CAUSES else "")
 
@@ -163,37 +165,64 @@ def describe_plan(steps: Sequence[Step]) -> str:
     return "\n".join(lines)
 
 
-def run(config: RgspipeConfig, load_stage: StageLoader, overrides: Sequence[str] = ()) -> Artifact:
+def run(
+    config: RgspipeConfig,
+    load_stage: StageLoader,
+    overrides: Sequence[str] = (),
+    plain: RgspipeConfig | None = None,
+) -> Artifact:
     """Make `config.stage`, and before it what is missing of its inputs; reuse what is there.
 
     Args:
         config: the whole configuration, checked.
         load_stage: gives a stage by name.
-        overrides: the command line's overrides, for the commands that messages suggest.
+        overrides: the command line's overrides, for the commands that messages suggest, and names of variants.
+        plain: the configuration of the command without them, but for the scene: what that makes is called `latest`.
+            None calls everything so.
 
     Raises:
         InputError: an input cannot be used, or is missing under `upstream=require`.
     """
     store = ArtifactStore(Path(config.outputs))
-    root = resolve(config, load_stage)
+    resolver = _Resolver(load_stage)
+    root = resolver.resolve(config.stage, config, {})
     steps = plan(root, store)
     log.info(describe_plan(steps))
     if config.upstream == "require":
         _refuse_missing(steps, overrides)
-    artifacts = {step.node.key: _take(step.node, store) for step in steps if step.reused}
+    names = {step.node.key: "" if plain is None else _variant(step.node, resolver, plain, overrides) for step in steps}
+    artifacts = {step.node.key: _take(step.node, store, names[step.node.key]) for step in steps if step.reused}
     for step in steps:
         if not step.reused:
-            artifacts[step.node.key] = _make(step.node, store, artifacts)
+            artifacts[step.node.key] = _make(step.node, store, artifacts, names[step.node.key])
     return artifacts[root.key]
 
 
-def _take(node: Node, store: ArtifactStore) -> Artifact:
+def _variant(node: Node, resolver: _Resolver, plain: RgspipeConfig, overrides: Sequence[str]) -> str:
+    """What tells a node from the one that the plain command makes; empty for that one."""
+    try:
+        usual = resolver.resolve(node.stage.name, plain, {})
+    except InputError:  # it cannot do without further settings, so all of them are as plain
+        return ""
+    if usual.key == node.key:
+        return ""
+    changes = {key: _as_override(value) for key, value in node.changes.items()}
+    return variant_name(overrides, changes, _keys(node)) or node.key.fingerprint
+
+
+def _keys(node: Node) -> set[str]:
+    """What a node and all behind it depend on."""
+    return set(node.recipe["config"]).union(*map(_keys, node.inputs))
+
+
+def _take(node: Node, store: ArtifactStore, variant: str) -> Artifact:
     artifact = store.find(node.key)
     assert artifact is not None
+    store.point_at(node.key, variant)
     return artifact
 
 
-def _make(node: Node, store: ArtifactStore, artifacts: Mapping[Key, Artifact]) -> Artifact:
+def _make(node: Node, store: ArtifactStore, artifacts: Mapping[Key, Artifact], variant: str) -> Artifact:
     lists: dict[str, list[Artifact]] = {}
     for needed in node.inputs:
         lists.setdefault(needed.stage.name, []).append(artifacts[needed.key])
@@ -206,7 +235,7 @@ def _make(node: Node, store: ArtifactStore, artifacts: Mapping[Key, Artifact]) -
 
     log.info("%s: %s", node.stage.name, node.stage.help)
     start = time.perf_counter()
-    artifact, made = store.build(node.key, node.recipe, make)
+    artifact, made = store.build(node.key, node.recipe, make, variant)
     verb = "made" if made else "made by another process"
     log.info("%s: %s in %.1f s: %s", node.stage.name, verb, time.perf_counter() - start, artifact.path)
     return artifact

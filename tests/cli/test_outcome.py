@@ -11,7 +11,7 @@ from fitted_lights import make_fitted
 from frozen_store import artifact
 from rgspipe.artifacts import Artifact
 from rgspipe.cli.columns import columns, percent, without_empty
-from rgspipe.cli.outcome import light_line, outcome
+from rgspipe.cli.outcome import outcome
 from rgspipe.datasets.light_file import write_lights
 from rgspipe.evaluation.tables import summary_table, target_table
 from rgspipe.files import write_json
@@ -70,12 +70,6 @@ def test_many_targets_are_a_row_a_class(tmp_path: Path) -> None:
     lines = outcome(_fits(tmp_path, 6, (POINT,)))
     assert len(lines) == 3 and lines[0].split() == ["targets", "converged", "PSNR", "time"]
     assert lines[1].split() == ["occluded", "6", "1", "36.0", "dB", "3.00", "s", "(worst", "5.50", "s)"]
-
-
-def test_a_light_whose_place_is_not_determined_says_so() -> None:
-    matrix = torch.diag(_vector(1e-4, 1e-4, float("inf"), 1.0, 1.0, 1.0))
-    assert ") ± unknown, RGB" in light_line(POINT, matrix)
-    assert "±" not in light_line(POINT)
 
 
 def test_an_evaluation_is_a_table_per_class_or_a_line_per_target(tmp_path: Path) -> None:

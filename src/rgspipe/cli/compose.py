@@ -20,6 +20,7 @@ from rgspipe.config import RgspipeConfig, check_values
 from rgspipe.errors import InputError
 from rgspipe.resources import resource_folder
 from rgspipe.stages import NAMES, load_stage
+from rgspipe.variants import plain_overrides
 
 CONFIG_NAME = "config"
 HYDRA_VERSION_BASE = "1.3"
@@ -84,6 +85,12 @@ def compose_config(overrides: Sequence[str]) -> RgspipeConfig:
         return typed(_compose(overrides))
     except (HydraException, OmegaConfBaseException) as error:
         raise _composition_error(error, overrides) from None
+
+
+def plain_config(overrides: Sequence[str]) -> RgspipeConfig:
+    """The configuration of a command without its overrides, but for the stage and the scene."""
+    stage = [text for text in overrides if text.startswith("stage=")]
+    return compose_config([*stage, *plain_overrides(overrides)])
 
 
 def check_sweep(overrides: Sequence[str]) -> RgspipeConfig:

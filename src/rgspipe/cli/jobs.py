@@ -22,6 +22,7 @@ from rgspipe.cli.compose import (
     config_folder,
     given_folder,
     leaves_machine,
+    plain_config,
     register_schema,
     typed,
 )
@@ -111,7 +112,7 @@ def _job(values: DictConfig, stage_loader: StageLoader) -> int:
     wanted = bool(values.debug.traceback)
     try:
         config = typed(values)
-        artifact = run(config, stage_loader, overrides)
+        artifact = run(config, stage_loader, overrides, plain_config(overrides))
     except InputError as error:
         status.failed(error, EXIT_INPUT)
         show_input_error(error, wanted)

@@ -16,7 +16,7 @@ from rgspipe.datasets.light_file import read_lights
 from rgspipe.evaluation.plots import LABELS
 from rgspipe.evaluation.tables import ALL, class_order
 from rgspipe.fitting.result import REASONS, FitStatus
-from rgspipe.scene import Light, SpotLight
+from rgspipe.fitting.result_text import light_line
 
 #: Exposures that differ by less from 1 are those that were known.
 KNOWN_EXPOSURE = 1e-9
@@ -65,28 +65,6 @@ def _advice(artifact: Artifact, target: str) -> list[str]:
     if name not in artifact.manifest["files"]:
         return []
     return [f"  further views: {read_json(artifact.file(name), 'advice on further views')['words']}"]
-
-
-def light_line(light: Light, covariance: Sequence[Sequence[float]] | None = None) -> str:
-    """A light in a line: type, place and RGB intensity, each with its standard deviation where a covariance tells it.
-
-    Args:
-        covariance: as `FitResult.covariance` has it; deviations are the root of the mean variance of a coordinate.
-    """
-    variances = None if covariance is None else [float(row[index]) for index, row in enumerate(covariance)]
-    place, colour = (", ".join(f"{value:.3f}" for value in part.tolist()) for part in (light.position, light.intensity))
-    told = f"{'spot' if isinstance(light, SpotLight) else 'point'} at ({place})"
-    told += "" if variances is None else _deviation(variances[:3], "{:.4f}")
-    if isinstance(light, SpotLight):
-        axis = ", ".join(f"{value:.3f}" for value in light.direction.tolist())
-        told += f", axis ({axis}), cone {math.degrees(light.cone_angle):.1f}°"
-    told += f", RGB ({colour}) W/sr"
-    return told + ("" if variances is None else _deviation(variances[-3:], "{:.3f}"))
-
-
-def _deviation(variances: Sequence[float], form: str) -> str:
-    mean = sum(variances) / len(variances)
-    return f" ± {form.format(math.sqrt(mean))}" if math.isfinite(mean) else " ± unknown"
 
 
 def _fit_rows(results: pd.DataFrame) -> list[list[str]]:

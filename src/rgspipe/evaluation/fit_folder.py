@@ -11,10 +11,9 @@ import pandas as pd
 import torch
 from torch import Tensor
 
-from rgspipe.datasets.covariance_file import covariance_fields
 from rgspipe.datasets.exr import write_image
 from rgspipe.datasets.json_file import read_json
-from rgspipe.datasets.light_file import read_lights, write_lights
+from rgspipe.datasets.light_file import read_lights
 from rgspipe.evaluation.images import progress_strip, save_png, stack
 from rgspipe.evaluation.metrics import psnr
 from rgspipe.fitting.fit import FitViews, render_rig
@@ -46,7 +45,7 @@ def write_result(
     partial.mkdir(parents=True)
     shown = [render_rig(views, rig) for rig in _milestones(result)]
     final = shown[-1]
-    _write_light_file(partial / "lights.json", result, _psnr(final, targets))
+    result.save(partial / "lights.json", psnr=_psnr(final, targets))
     _write_convergence(partial / "convergence.csv", result.trajectory)
     rows = [progress_strip(target, [images[k] for images in shown]) for k, target in enumerate(targets)]
     save_png(partial / "fit.png", stack(rows))
@@ -78,25 +77,6 @@ def _psnr(images: Sequence[Tensor], targets: Sequence[Tensor]) -> float | None:
     joined = [torch.cat([image.detach().reshape(-1, 1, 3).cpu() for image in group]) for group in (images, targets)]
     value = psnr(*joined)
     return None if math.isnan(value) else min(value, BEST_PSNR)
-
-
-def _write_light_file(path: Path, result: FitResult, quality: float | None) -> None:
-    extra = {
-        "loss": result.loss,
-        "iterations": result.iterations,
-        "evaluations": result.evaluations,
-        "lights_tried": result.lights_tried,
-        "costs": {str(count): cost for count, cost in result.costs.items()},
-        "seconds": round(result.seconds, 4),
-        "psnr": quality,
-        "result": str(result.status),
-        "reason": result.reason,
-        "exposures": list(result.exposures),
-        "lights": covariance_fields(
-            len(result.lights), {"covariance": result.covariance, "noise_covariance": result.noise_covariance}
-        ),
-    }
-    write_lights(path, result.lights, extra)
 
 
 def _write_convergence(path: Path, steps: Sequence[Step]) -> None:

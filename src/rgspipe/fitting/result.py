@@ -5,9 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from pathlib import Path
 
 from torch import Tensor
 
+from rgspipe.datasets.covariance_file import covariance_fields
+from rgspipe.datasets.light_file import write_lights
+from rgspipe.fitting.result_text import as_html, as_text
 from rgspipe.scene import LightRig
 
 
@@ -64,9 +68,9 @@ class Step:
         return self.lights[0].intensity
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class FitResult:
-    """Recovered lights.
+    """Recovered lights. Printed, it says what was found, how sure that is, and why the fit ended.
 
     Attributes:
         lights: the rig; empty if there was not enough light.
@@ -101,6 +105,35 @@ class FitResult:
     costs: Mapping[int, float] = field(default_factory=dict)
     noise_covariance: tuple[Tensor, ...] = ()
     exposures: tuple[float, ...] = ()
+
+    def __repr__(self) -> str:
+        return as_text(self)
+
+    def _repr_html_(self) -> str:
+        """For notebooks."""
+        return as_html(self)
+
+    def save(self, path: str | Path, **more: object) -> None:
+        """Write a light file with the covariances, and beside the lights how the fit went.
+
+        Args:
+            more: further fields of the file, such as JSON holds.
+        """
+        fit = {
+            "loss": self.loss,
+            "iterations": self.iterations,
+            "evaluations": self.evaluations,
+            "lights_tried": self.lights_tried,
+            "costs": {str(count): cost for count, cost in self.costs.items()},
+            "seconds": round(self.seconds, 4),
+            "result": str(self.status),
+            "reason": self.reason,
+            "exposures": list(self.exposures),
+            "lights": covariance_fields(
+                len(self.lights), {"covariance": self.covariance, "noise_covariance": self.noise_covariance}
+            ),
+        }
+        write_lights(path, self.lights, fit | more)
 
 
 def dark_result(seconds: float) -> FitResult:

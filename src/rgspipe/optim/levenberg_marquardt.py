@@ -163,7 +163,7 @@ class Stopping:
         shortest_step, small_gain: a descent ends after a step shorter than `shortest_step` that lowered the cost by
             less than the share `small_gain`: where next to nothing is left unexplained, short steps still gain. Nor is
             a step so short tried again if it fails. Fits that end by the default differ by at most half of it from
-            those that go on to a hundredth of it, and take a sixth less time (docs/fitting.md).
+            those that go on to a hundredth of it, and take a sixth less time (docs/reference/model/search.md).
         shortest_move: shorter steps are none.
     """
 

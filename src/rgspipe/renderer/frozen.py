@@ -109,7 +109,7 @@ class FrozenScene:
         return cls(**load_parts(Path(folder), gather=gather))
 
     def save(self, folder: str | Path) -> None:
-        """Write surfels and operators, and the dictionary if it is made; docs/conventions.md has the files.
+        """Write surfels and operators, and the dictionary if it is made; docs/reference/formats.md has the files.
 
         Raises:
             ValueError: the transport has a limited number of bounces: what is stored is the scene with all of them.

@@ -29,7 +29,7 @@ def run(context: StageContext) -> None:
 def _reports(config: RgspipeConfig) -> Mapping[str, Artifact]:
     """By scene, its newest report that says what a page over scenes needs."""
     store = ArtifactStore(Path(config.outputs))
-    newest = {name: store.latest(name, "report") for name in dict.fromkeys(config.overview.scenes)}
+    newest = {name: store.newest(name, "report") for name in dict.fromkeys(config.overview.scenes)}
     return {name: made for name, made in newest.items() if made is not None and SUMMARY in made.manifest["files"]}
 
 

@@ -40,8 +40,8 @@ def _newest(config: RgspipeConfig) -> Artifact | None:
     """A study over several scenes lies in the folder of the one that was configured, so all folders are looked at."""
     root, scene = Path(config.outputs), scene_name(config)
     store = ArtifactStore(root)
-    folders = sorted(path.parents[1].name for path in root.glob("*/study/latest"))
-    studies = [found for name in folders if (found := store.latest(name, "study")) is not None]
+    folders = sorted(path.parent.name for path in root.glob("*/study"))
+    studies = [found for name in folders if (found := store.newest(name, "study")) is not None]
     known = [found for found in studies if len(_rows(found, scene))]
     return max(known, key=_made, default=None)
 

@@ -1,0 +1,58 @@
+"""A fit's result as people read it: lines of text, and a table for notebooks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from html import escape
+from typing import TYPE_CHECKING
+
+from rgspipe.scene import Light, SpotLight
+
+if TYPE_CHECKING:
+    from rgspipe.fitting.result import FitResult
+
+
+def as_text(result: FitResult) -> str:
+    """Status, a line for each light with how sure it is, and why the fit ended."""
+    return "\n".join([headline(result), *(f"  {line}" for line in _light_lines(result)), result.reason])
+
+
+def as_html(result: FitResult) -> str:
+    """`as_text` as a piece of HTML."""
+    items = "".join(f"<li>{escape(line)}</li>" for line in _light_lines(result))
+    return f"<b>{escape(headline(result))}</b><ul>{items}</ul>{escape(result.reason)}"
+
+
+def headline(result: FitResult) -> str:
+    """How many lights, how the fit ended, and what it took: "2 lights, converged in 1.4 s"."""
+    count = len(result.lights)
+    found = "no light" if count == 0 else f"{count} light{'s' if count > 1 else ''}"
+    return f"{found}, {result.status.replace('_', ' ')} in {result.seconds:.2g} s"
+
+
+def _light_lines(result: FitResult) -> list[str]:
+    spreads = dict(enumerate(result.covariance))
+    return [light_line(light, spreads.get(index)) for index, light in enumerate(result.lights)]
+
+
+def light_line(light: Light, covariance: Sequence[Sequence[float]] | None = None) -> str:
+    """A light in a line: type, place and RGB intensity, each with its standard deviation where a covariance tells it.
+
+    Args:
+        covariance: as `FitResult.covariance` has it; deviations are the root of the mean variance of a coordinate.
+    """
+    variances = None if covariance is None else [float(row[index]) for index, row in enumerate(covariance)]
+    place, colour = (", ".join(f"{value:.3f}" for value in part.tolist()) for part in (light.position, light.intensity))
+    told = f"{'spot' if isinstance(light, SpotLight) else 'point'} at ({place})"
+    told += "" if variances is None else _deviation(variances[:3], "{:.4f}")
+    if isinstance(light, SpotLight):
+        axis = ", ".join(f"{value:.3f}" for value in light.direction.tolist())
+        told += f", axis ({axis}), cone {math.degrees(light.cone_angle):.1f}°"
+    told += f", RGB ({colour}) W/sr"
+    return told + ("" if variances is None else _deviation(variances[-3:], "{:.3f}"))
+
+
+def _deviation(variances: Sequence[float], form: str) -> str:
+    mean = sum(variances) / len(variances)
+    return f" ± {form.format(math.sqrt(mean))}" if math.isfinite(mean) else " ± unknown"

@@ -1,0 +1,59 @@
+"""A result prints as people read it, and is saved with how sure it is."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+import torch
+
+from rgspipe.datasets.covariance_file import read_covariances
+from rgspipe.datasets.light_file import read_lights
+from rgspipe.fitting.result import REASONS, FitResult, FitStatus, dark_result
+from rgspipe.fitting.result_text import light_line
+from rgspipe.scene import LightRig, PointLight
+
+NEAR, FAR = PointLight([0.1, 0.2, 0.3], [1.0, 2.0, 3.0]), PointLight([0.5, 0.5, 0.5], 4.0)
+
+#: Variances of position and intensity; the height is not determined.
+SURE, UNSURE = [1e-4] * 3 + [4e-4] * 3, [1e-4, 1e-4, float("inf"), 1.0, 1.0, 1.0]
+
+
+def result(rig: LightRig = (NEAR, FAR), status: FitStatus = FitStatus.UNDETERMINED) -> FitResult:
+    spread = tuple(torch.diag(torch.tensor(row, dtype=torch.float64)) for row in (SURE, UNSURE))[: len(rig)]
+    return FitResult(rig, status, f"{REASONS[status]} Is z < 1?", 0.01, 7, 20, 2, 1.234, spread, ())
+
+
+def test_a_result_reads_like_a_sentence_and_a_list() -> None:
+    assert (
+        str(result()).splitlines()
+        == repr(result()).splitlines()
+        == [
+            "2 lights, undetermined in 1.2 s",
+            "  point at (0.100, 0.200, 0.300) ± 0.0100, RGB (1.000, 2.000, 3.000) W/sr ± 0.020",
+            "  point at (0.500, 0.500, 0.500) ± unknown, RGB (4.000, 4.000, 4.000) W/sr ± 1.000",
+            f"{REASONS[FitStatus.UNDETERMINED]} Is z < 1?",
+        ]
+    )
+    assert str(dark_result(0.1)).startswith("no light, not enough light in 0.1 s")
+    assert "±" not in light_line(NEAR)
+
+
+def test_a_notebook_shows_the_same_as_a_list() -> None:
+    page = result((NEAR,))._repr_html_()
+    assert page.startswith("<b>1 light, undetermined in 1.2 s</b><ul><li>point at (0.100,")
+    assert page.endswith("Is z &lt; 1?")
+
+
+def test_a_saved_result_is_a_light_file_with_its_uncertainty(tmp_path: Path) -> None:
+    found = result()
+    found.save(tmp_path / "lights.json", psnr=41.5)
+    for light, again in zip(found.lights, read_lights(tmp_path / "lights.json"), strict=True):
+        assert torch.equal(light.position, again.position) and torch.equal(light.intensity, again.intensity)
+    for matrix, again in zip(found.covariance, read_covariances(tmp_path / "lights.json"), strict=True):
+        assert torch.equal(matrix, again)
+    told = json.loads((tmp_path / "lights.json").read_text())
+    assert (told["version"], told["result"], told["psnr"]) == (1, "undetermined", 41.5)
+    with pytest.raises(ValueError, match="version"):
+        found.save(tmp_path / "other.json", version=2)
