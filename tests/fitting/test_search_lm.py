@@ -15,7 +15,9 @@ from rgspipe.fitting import FitStatus, LightSpec, SearchOptions, prepare_fit
 from rgspipe.fitting.model.parameters import Emitter
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.search.judge import MERGED, worth_keeping
-from rgspipe.fitting.search.refine import ROBUST, search_region, start_from
+from rgspipe.fitting.search.moves import Region
+from rgspipe.fitting.search.refine import Refiner
+from rgspipe.fitting.search.weighting import ROBUST
 from rgspipe.fitting.search_lm import _Search, fit_from
 
 
@@ -117,7 +119,7 @@ def test_lights_stay_in_the_region(room, point_light):
     """A wall's mean colour everywhere pulls a light away from everything; it ends inside the region."""
     flat = [torch.ones(48, 48, 3)]
     result = fit_lights(room.frozen, room.one, flat)
-    region = search_region(LightProblem.create(room.one.prepared, room.one.prepared.stack_images(flat)))
+    region = Region.of(room.frozen)
     position = result.lights[0].position
     assert bool((position >= region.lower).all() and (position <= region.upper).all())
     assert region.at_bound(region.upper) and not region.at_bound(0.5 * (region.lower + region.upper))
@@ -166,10 +168,11 @@ def test_lights_that_meet_by_plain_squares_are_one(room, point_light):
     problem = LightProblem.create(
         room.two.prepared, room.two.prepared.stack_images(room.images(point_light(VISIBLE), 2))
     )
-    search = _Search(problem, problem, [], SearchOptions(), LightSpec(count=None), search_region(problem), 0.0)
+    refiner = Refiner.of(problem)
+    search = _Search(problem, refiner, [], SearchOptions(), LightSpec(count=None))
     place = torch.tensor(VISIBLE, dtype=torch.float64)
     apart = torch.tensor([0.6 * MERGED * problem.views.frozen.size, 0.0, 0.0], dtype=torch.float64)
-    twins = start_from(problem, [Emitter(place - apart), Emitter(place + apart)], ROBUST, 0.0)
+    twins = refiner.start([Emitter(place - apart), Emitter(place + apart)], ROBUST)
     assert len(worth_keeping(twins, problem.views.frozen.size)) == 2
     (found,) = search._without_twins(twins).emitters
     assert float((found.position - place).norm()) < 1e-4  # measured 3e-8

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import zip_longest
 
 from rgspipe.fitting.certainty.doubts import doubts
 from rgspipe.fitting.certainty.uncertainty import light_covariances
+from rgspipe.fitting.meter import Meter
 from rgspipe.fitting.model.blocks import BlockModel, view_of_blocks
 from rgspipe.fitting.model.exposure import rough_exposures
 from rgspipe.fitting.model.parameters import Emitter
@@ -30,20 +30,10 @@ from rgspipe.fitting.search.judge import (
     worth_keeping,
     worth_one_more,
 )
-from rgspipe.fitting.search.refine import (
-    PLAIN,
-    ROBUST,
-    Region,
-    State,
-    fresh,
-    reevaluate,
-    refine,
-    search_region,
-    start_from,
-    weights_at,
-)
+from rgspipe.fitting.search.refine import Refiner, State
 from rgspipe.fitting.search.schedule import SHORT_ITERATIONS, refine_starts
 from rgspipe.fitting.search.starts import Candidates, Rig
+from rgspipe.fitting.search.weighting import PLAIN, ROBUST
 from rgspipe.fitting.selection.one_less import one_light_less
 from rgspipe.fitting.selection.one_more import one_more_light
 from rgspipe.fitting.selection.verdict import Findings, SpareLight, counted_from, percent
@@ -93,35 +83,31 @@ def fit_search_lm(
         spec: what is known of the lights; one point light if None.
         blocks: the views as blocks of pixels, on which starts are refined; on all pixels if None.
     """
-    begin = time.perf_counter()
-    spec = spec or LightSpec()
+    meter, spec = Meter(), spec or LightSpec()
     if problem.black:
-        return dark_result(time.perf_counter() - begin)
+        return dark_result(meter.seconds)
     problem = _roughly_exposed(problem, coarse)
     candidates = [Candidates.of(problem, images, spec.cone_free) for images in coarse]
     candidates = [one for one in candidates if one.lit]
     if not candidates:
-        return dark_result(time.perf_counter() - begin)
-    search = _Search(problem, problem.coarsest(blocks), candidates, options, spec, search_region(problem), begin)
+        return dark_result(meter.seconds)
+    search = _Search(problem, Refiner.of(problem.coarsest(blocks), meter), candidates, options, spec)
     best = search.known(spec.count) if spec.count is not None else search.unknown()
     found = Findings(ambiguous=search.ambiguous(best), too_few=search.too_few(best), spare=search.spare(best))
     best = search.polish(best)
     if not bool((best.intensity > 0).any()):
-        return dark_result(time.perf_counter() - begin)
+        return dark_result(meter.seconds)
     return search.result(best, found)
 
 
 def fit_from(problem: LightProblem, start: Sequence[Emitter], iterations: int = 30) -> FitResult:
     """Lights from known starts, by plain least squares: no search, no robust loss."""
-    begin = time.perf_counter()
     if problem.black:
         return dark_result(0.0)
     problem = problem.sharpest()
-    search = _Search(problem, problem, [], SearchOptions(0, iterations), LightSpec(), search_region(problem), begin)
-    state = start_from(search.problem, start, PLAIN, begin)
-    refine(search.problem, state, PLAIN, iterations, search.region, begin)
-    search.states.append(state)
-    return search.result(state, Findings())
+    refiner = Refiner.of(problem)
+    search = _Search(problem, refiner, [], SearchOptions(0, iterations), LightSpec())
+    return search.result(refiner.refined(refiner.start(start, PLAIN), PLAIN, iterations), Findings())
 
 
 def _roughly_exposed(problem: LightProblem, coarse: Sequence[CoarseImages]) -> LightProblem:
@@ -138,24 +124,21 @@ def _roughly_exposed(problem: LightProblem, coarse: Sequence[CoarseImages]) -> L
 class _Search:
     """One target's search, and what it has tried.
 
-    Everything is searched and decided on `coarse`, where a step costs little more than its shadow rays; what was chosen
-    is then polished on `problem`.
+    Everything is searched and decided on the refiner's problem, `coarse`, where a step costs little more than its
+    shadow rays; what was chosen is then polished on `problem`.
     """
 
     def __init__(
         self,
         problem: LightProblem,
-        coarse: LightProblem,
+        refiner: Refiner,
         candidates: Sequence[Candidates],
         options: SearchOptions,
         spec: LightSpec,
-        region: Region,
-        begin: float,
     ) -> None:
-        self.problem, self.coarse = problem, coarse
+        self.problem, self.coarse, self.refiner = problem, refiner.problem, refiner
         self.candidates, self.options, self.spec = candidates, options, spec
-        self.region, self.begin = region, begin
-        self.states: list[State] = []
+        self.region = refiner.region
         self.rivals: list[State] = []
         self.tried: list[State] = []
 
@@ -178,11 +161,14 @@ class _Search:
             state = self._best_of(lights, best, patient=False)
             if state is None:
                 break
-            self.tried.append(state)
             # More steps rarely gain as much again, so a rig that is far from worth it needs none.
             if best is not None and drop(self.coarse, best, state) < 0.5 * LEAST_DROP:
+                self.tried.append(state)
                 break
-            refine(self.coarse, state, ROBUST, 2 * SHORT_ITERATIONS, self.region, self.begin)
+            further = self.refiner.refined(state, ROBUST, 2 * SHORT_ITERATIONS)
+            self.rivals = [further if rival is state else rival for rival in self.rivals]
+            state = further
+            self.tried.append(state)
             if best is not None and not worth_one_more(self.coarse, best, state):
                 break
             best, rivals = state, self.rivals
@@ -236,13 +222,9 @@ class _Search:
         refined, size = [], math.ceil(len(rigs) / batches)
         for first in range(0, len(rigs), size):
             part, iterations = rigs[first : first + size], self.options.iterations
-            started, finished = refine_starts(
-                self.coarse, part, iterations, self.region, self.begin, thorough=first > 0
-            )
-            self.states += started
-            refined += finished
+            refined += refine_starts(self.refiner, part, iterations, thorough=first > 0)
             best = best_state(self.coarse, refined) if compared else self._settled(refined)
-            if self._unexplained(best) < WELL_EXPLAINED:
+            if self.refiner.unexplained(best) < WELL_EXPLAINED:
                 break
         self.rivals += refined
         return best
@@ -253,20 +235,10 @@ class _Search:
         The polish takes plain squares: a rig that only a forgiving loss likes, for which the brightest pixels are
         outliers, would walk far in it. So the best by plain squares are among those that are tried.
         """
-        chosen = [*ranked(self.coarse, states)[:SETTLED], *sorted(states, key=self._unexplained)[:SETTLED]]
-        settled = [fresh(state) for state in distinct(chosen, self.region.size)]
-        self.states += settled
-        for state in settled:
-            refine(self.coarse, state, PLAIN, min(SHORT_ITERATIONS, self.options.iterations), self.region, self.begin)
-        return min(settled, key=self._unexplained)
-
-    def _unexplained(self, state: State) -> float:
-        return self.coarse.unexplained(state.columns, state.intensity)
-
-    def _start(self, rig: Rig) -> State:
-        state = start_from(self.coarse, rig, ROBUST, self.begin)
-        self.states.append(state)
-        return state
+        chosen = [*ranked(self.coarse, states)[:SETTLED], *sorted(states, key=self.refiner.unexplained)[:SETTLED]]
+        steps = min(SHORT_ITERATIONS, self.options.iterations)
+        settled = [self.refiner.refined(state, PLAIN, steps) for state in distinct(chosen, self.region.size)]
+        return min(settled, key=self.refiner.unexplained)
 
     def _with_plain_lights(self, state: State) -> State:
         """The rig with point lights in the place of those spots whose cones explain too little."""
@@ -274,8 +246,7 @@ class _Search:
             if emitter.is_spot:
                 plain = [*state.emitters]
                 plain[index] = Emitter(emitter.position)
-                other = self._start(tuple(plain))
-                refine(self.coarse, other, ROBUST, SHORT_ITERATIONS, self.region, self.begin)
+                other = self.refiner.refined(self.refiner.start(plain, ROBUST), ROBUST, SHORT_ITERATIONS)
                 state = state if drop(self.coarse, other, state) >= LEAST_DROP else other
         return state
 
@@ -290,9 +261,8 @@ class _Search:
         kept = worth_keeping(state, self.region.size)
         if len(kept) == len(state.emitters) or not kept:
             return state
-        fewer = self._start(tuple(state.emitters[index] for index in kept))
-        refine(self.coarse, fewer, ROBUST, 2 * SHORT_ITERATIONS, self.region, self.begin)
-        return fewer
+        fewer = self.refiner.start([state.emitters[index] for index in kept], ROBUST)
+        return self.refiner.refined(fewer, ROBUST, 2 * SHORT_ITERATIONS)
 
     def ambiguous(self, best: State) -> bool:
         """Whether a clearly different rig explains the target as well; rivals that come near are refined first."""
@@ -300,32 +270,27 @@ class _Search:
         rivals = [state for state in self.rivals if rig_distance(state.emitters, best.emitters) > apart]
         if not rivals:
             return False
-        pair = [fresh(best), fresh(best_state(self.coarse, rivals))]
-        if drop(self.coarse, pair[1], pair[0]) > FAR_RIVAL:
+        rival = best_state(self.coarse, rivals)
+        if drop(self.coarse, rival, best) > FAR_RIVAL:
             return False
-        self.states += pair
-        for state in pair:
-            refine(self.coarse, state, ROBUST, 2 * SHORT_ITERATIONS, self.region, self.begin)
-        if rig_distance(pair[0].emitters, pair[1].emitters) <= apart or not equally_good(self.coarse, *pair):
+        one, other = (self.refiner.refined(state, ROBUST, 2 * SHORT_ITERATIONS) for state in (best, rival))
+        if rig_distance(one.emitters, other.emitters) <= apart or not equally_good(self.coarse, one, other):
             return False
         # The answer is one of plain squares, so a rival has to be one, too.
-        refine(self.coarse, pair[1], PLAIN, SHORT_ITERATIONS, self.region, self.begin)
-        clear = rig_distance(best.emitters, pair[1].emitters) > apart
-        return clear and self._unexplained(pair[1]) <= RIVAL_ENERGY * self._unexplained(best)
+        other = self.refiner.refined(other, PLAIN, SHORT_ITERATIONS)
+        clear = rig_distance(best.emitters, other.emitters) > apart
+        return clear and self.refiner.unexplained(other) <= RIVAL_ENERGY * self.refiner.unexplained(best)
 
     def polish(self, best: State) -> State:
         """Plain squares to the end with all pixels, direct light where these look if views are ready for it."""
         self.problem = self.problem.sharpest()
-        polished = fresh(best)
-        self.states.append(polished)
-        reevaluate(self.problem, polished)
-        refine(self.problem, polished, PLAIN, self.options.iterations, self.region, self.begin)
-        return polished
+        refiner = self.refiner.on(self.problem)
+        return refiner.refined(refiner.at(best, best.emitters), PLAIN, self.options.iterations)
 
     def _settle_exposures(self, best: State) -> None:
         """Take free exposures as known from here on."""
         if self.problem.exposure_free:
-            weights = weights_at(self.problem, best, PLAIN, PLAIN.base(self.problem))
+            weights = PLAIN.at(self.problem, best.columns, best.intensity)
             exposures = self.problem.moments(best.columns, weights).exposures
             self.problem = replace(self.problem.with_exposures(exposures), exposure_free=False)
 
@@ -334,10 +299,9 @@ class _Search:
         count = self.spec.count
         if count is None or count == MOST_LIGHTS or len(best.emitters) != count:
             return 0.0
-        compared = one_more_light(self.coarse, self.candidates, best, self.region, self.begin)
+        compared = one_more_light(self.refiner, self.candidates, best)
         if compared is None:
             return 0.0
-        self.states += compared.refined
         self.tried = [compared.simple, compared.rich]
         worth = worth_one_more(self.coarse, compared.simple, compared.rich)
         return drop(self.coarse, compared.simple, compared.rich) if worth else 0.0
@@ -346,15 +310,15 @@ class _Search:
         """A light of a known number that is not worth it; None if there is none."""
         if self.spec.count is None or len(best.emitters) < 2:
             return None
-        compared = one_light_less(self.coarse, best, self.region, self.begin)
-        self.states += compared.refined
+        compared = one_light_less(self.refiner, best)
         self.tried = [compared.simple, compared.rich, *self.tried[1:]]
         return None if compared.worth else SpareLight(compared.index + 1, compared.gain)
 
     def result(self, best: State, found: Findings) -> FitResult:
         self._settle_exposures(best)
-        costs, loss = self.costs(), self.problem.unexplained(best.columns, best.intensity)
-        lights, spread = best.lights(self.problem), light_covariances(self.problem, best)
+        meter, last = self.refiner.meter, self.refiner.on(self.problem).step(best)
+        costs, loss, lights = self.costs(), last.loss, last.lights
+        spread = light_covariances(self.problem, best)
         at_bound = any(self.region.at_bound(emitter.position) for emitter in best.emitters)
         doubt = doubts(lights, spread.calibrated, self.problem.views.frozen.surfels, self.region.size)
         found = replace(found, at_bound=at_bound, loss=loss, doubt=doubt, ended=best.status)
@@ -364,12 +328,12 @@ class _Search:
             status=found.status,
             reason=" ".join(filter(None, (found.reason(len(lights)), maybe))),
             loss=loss,
-            iterations=sum(state.iterations for state in self.states),
-            evaluations=sum(state.evaluations for state in self.states),
+            iterations=meter.iterations,
+            evaluations=meter.evaluations,
             lights_tried=max([*costs, len(best.emitters)]),
-            seconds=time.perf_counter() - self.begin,
+            seconds=meter.seconds,
             covariance=spread.calibrated,
-            trajectory=(*best.steps, best.record(self.problem, self.begin)),
+            trajectory=(*best.steps, last),
             costs=costs,
             exposures=tuple(self.problem.exposures.tolist()),
             noise_covariance=spread.noise,

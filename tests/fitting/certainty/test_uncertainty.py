@@ -111,7 +111,7 @@ def test_cells_are_places_of_the_surface_whichever_view_looks(room):
 def _covariances(room, light: PointLight, intensity: torch.Tensor):
     problem = LightProblem.create(room.one.prepared, room.one.prepared.stack_images(room.images(light)))
     emitter = Emitter.of(light)
-    return light_covariances(problem, State((emitter,), [problem.evaluate(emitter)], intensity / problem.scale))
+    return light_covariances(problem, State((emitter,), (problem.evaluate(emitter),), intensity / problem.scale))
 
 
 def test_a_light_that_is_off_has_no_place(room, point_light):
@@ -132,7 +132,7 @@ def test_errors_of_the_model_widen_the_region(room, point_light, where):
     spoiled = image * (1.0 + 0.05 * torch.sign(torch.linspace(-1.0, 1.0, 48) + 0.2))[:, None, None]
     problem = LightProblem.create(room.one.prepared, room.one.prepared.stack_images([spoiled]))
     emitter = Emitter.of(light)
-    state = State((emitter,), [problem.evaluate(emitter)], light.intensity[None] / problem.scale)
+    state = State((emitter,), (problem.evaluate(emitter),), light.intensity[None] / problem.scale)
     found = light_covariances(problem, state)
     wide, narrow = (float(part[0].diagonal()[:3].sum().sqrt()) for part in (found.calibrated, found.noise))
     assert wide > 3.0 * narrow > 0.0  # measured 59 and 44

@@ -24,7 +24,8 @@ from rgspipe.fitting.search.judge import (
     worth_keeping,
     worth_one_more,
 )
-from rgspipe.fitting.search.refine import ROBUST, State, start_from
+from rgspipe.fitting.search.refine import Refiner, State
+from rgspipe.fitting.search.weighting import ROBUST
 from rgspipe.renderer.spot import SpotShape
 
 
@@ -38,7 +39,7 @@ def problem(room, point_light) -> LightProblem:
 
 def state(problem: LightProblem, *places: tuple[float, float, float]) -> State:
     emitters = [Emitter(torch.tensor(place, dtype=torch.float64)) for place in places]
-    return start_from(problem, emitters, ROBUST, 0.0)
+    return Refiner.of(problem).start(emitters, ROBUST)
 
 
 def shifted(place: tuple[float, float, float], by: float) -> tuple[float, float, float]:
@@ -95,10 +96,9 @@ def test_distance_of_rigs_is_that_of_the_best_matching() -> None:
 
 def test_twins_are_merged_and_faint_lights_dropped(problem: LightProblem) -> None:
     three = state(problem, VISIBLE, shifted(VISIBLE, 0.01), HIDDEN)
-    three.intensity = torch.tensor([[0.5], [1.0], [1.0]], dtype=torch.float64).expand(3, 3)
-    assert worth_keeping(three, 1.0) == [1, 2]
-    three.intensity = torch.tensor([[0.0], [1.0], [1e-3]], dtype=torch.float64).expand(3, 3)
-    assert worth_keeping(three, 1.0) == [1]
+    for strengths, kept in (((0.5, 1.0, 1.0), [1, 2]), ((0.0, 1.0, 1e-3), [1])):
+        intensity = torch.tensor(strengths, dtype=torch.float64)[:, None].expand(3, 3)
+        assert worth_keeping(replace(three, intensity=intensity), 1.0) == kept
 
 
 def test_rigs_that_met_are_refined_once(problem: LightProblem) -> None:
@@ -117,8 +117,8 @@ def test_spots_that_point_elsewhere_have_not_met(problem: LightProblem) -> None:
     shape = SpotShape("smoothstep", 0.5, 0.3)
     place = torch.tensor(VISIBLE, dtype=torch.float64)
     turned = [torch.tensor([math.sin(angle), 0.0, -math.cos(angle)], dtype=torch.float64) for angle in (0, 0.005, 0.3)]
-    spots = [start_from(problem, [Emitter(place, axis, shape)], ROBUST, 0.0) for axis in turned]
+    spots = [Refiner.of(problem).start([Emitter(place, axis, shape)], ROBUST) for axis in turned]
     assert distinct(spots, 1.0) == [spots[0], spots[2]]
-    wider = start_from(problem, [Emitter(place, turned[0], SpotShape("smoothstep", 0.6, 0.3))], ROBUST, 0.0)
+    wider = Refiner.of(problem).start([Emitter(place, turned[0], SpotShape("smoothstep", 0.6, 0.3))], ROBUST)
     assert distinct([spots[0], wider], 1.0) == [spots[0], wider]
     assert distinct([state(problem, VISIBLE), spots[0]], 1.0)[1] is spots[0], "a point light is no spot"

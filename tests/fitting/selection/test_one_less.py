@@ -11,7 +11,8 @@ from rgspipe.fitting import FitResult, FitStatus, LightSpec, prepare_fit
 from rgspipe.fitting.model.parameters import Emitter
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.search.judge import LEAST_DROP
-from rgspipe.fitting.search.refine import ROBUST, search_region, start_from
+from rgspipe.fitting.search.refine import Refiner
+from rgspipe.fitting.search.weighting import ROBUST
 from rgspipe.fitting.selection.one_less import one_light_less
 from rgspipe.scene import SpotLight
 
@@ -56,10 +57,9 @@ def test_the_light_that_is_spare_is_named_and_the_others_take_its_part(room, poi
     beside = (VISIBLE[0] + 0.05, *VISIBLE[1:])
     places = [HIDDEN, VISIBLE, beside]
     emitters = [Emitter(torch.tensor(place, dtype=torch.float64)) for place in places]
-    answer = start_from(problem, emitters, ROBUST, 0.0)
-    found = one_light_less(problem, answer, search_region(problem), 0.0)
+    refiner = Refiner.of(problem)
+    found = one_light_less(refiner, refiner.start(emitters, ROBUST))
     assert not found.worth and found.index in (1, 2) and found.gain < 0.1  # measured 0.001
     assert [len(state.emitters) for state in (found.rich, found.simple)] == [3, 2]
     nearest = min(float((one.position - emitters[1].position).norm()) for one in found.simple.emitters)
     assert nearest < 0.005  # measured 0.0004
-    assert answer.emitters == tuple(emitters), "the answer itself is left as it is"

@@ -6,7 +6,6 @@ so that it can be compared with.
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass, replace
 
 import torch
@@ -23,6 +22,7 @@ from rgspipe.fitting.baselines.paper_adam_start import (
 )
 from rgspipe.fitting.certainty.doubts import doubts
 from rgspipe.fitting.certainty.uncertainty import light_covariances
+from rgspipe.fitting.meter import Meter
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.result import REASONS, FitResult, FitStatus, Step, dark_result
 from rgspipe.fitting.search.refine import State
@@ -81,15 +81,15 @@ def fit_paper_adam(
     Raises:
         ValueError: type, number or cones are not known.
     """
-    begin = time.perf_counter()
+    meter = Meter()
     spec = spec or LightSpec()
     if spec.type == "auto" or spec.count is None or spec.cone_free:
         raise ValueError("paper_adam needs lights of known type, number and cone: use search_lm")
     if problem.black:
-        return dark_result(time.perf_counter() - begin)
-    descent = _Descent.create(problem, target, options, prior, seed, spec, begin)
+        return dark_result(meter.seconds)
+    descent = _Descent.create(problem, target, options, prior, seed, spec, meter)
     status = descent.run()
-    return _result(problem, descent, status, begin)
+    return _result(problem, descent, status)
 
 
 @dataclass
@@ -100,7 +100,7 @@ class _Descent:
     options: AdamOptions
     ball: Ball
     rig: MovingRig
-    begin: float
+    meter: Meter
     steps: list[Step]
 
     @classmethod
@@ -112,7 +112,7 @@ class _Descent:
         prior: LightPrior | None,
         seed: int,
         spec: LightSpec,
-        begin: float,
+        meter: Meter,
     ) -> _Descent:
         ball, scene_radius = light_ball(problem.views.frozen, prior)
         start = draw_start(ball, scene_radius, prior, options.start, seed, spec.count)
@@ -120,7 +120,7 @@ class _Descent:
         if spec.spots:
             rig = replace(rig, axes=start.axes.clone().requires_grad_(), shape=spec.shape)
         loss = AdamLoss(problem.views, target, options.ssim_weight, problem.effects)
-        return cls(loss, options, ball, rig, begin, [])
+        return cls(loss, options, ball, rig, meter, [])
 
     def run(self) -> FitStatus:
         """All steps; each one's loss is that of its own lights."""
@@ -145,7 +145,7 @@ class _Descent:
         return torch.optim.Adam([{"params": [leaf], "lr": rate} for leaf, rate in rates])
 
     def _record(self, loss: Tensor) -> None:
-        self.steps.append(Step(float(loss.detach()), self.rig.lights(), time.perf_counter() - self.begin))
+        self.steps.append(Step(float(loss.detach()), self.rig.lights(), self.meter.seconds))
 
     @torch.no_grad()
     def _bound(self) -> None:
@@ -157,12 +157,12 @@ class _Descent:
             rig.axes.copy_(torch.nn.functional.normalize(rig.axes, dim=1))
 
 
-def _result(problem: LightProblem, descent: _Descent, status: FitStatus, begin: float) -> FitResult:
+def _result(problem: LightProblem, descent: _Descent, status: FitStatus) -> FitResult:
     rig, last = descent.rig, descent.steps[-1]
     status = FitStatus.AT_BOUND if descent.ball.at_bound(rig.positions.detach()) else status
     emitters = rig.emitters()
     intensities = torch.stack([light.intensity for light in last.lights])
-    state = State(emitters, [problem.evaluate(emitter) for emitter in emitters], intensities / problem.scale)
+    state = State(emitters, tuple(map(problem.evaluate, emitters)), intensities / problem.scale)
     spread = light_covariances(problem, state)
     doubt = doubts(last.lights, spread.calibrated, problem.views.frozen.surfels, problem.views.frozen.size)
     return FitResult(
@@ -173,7 +173,7 @@ def _result(problem: LightProblem, descent: _Descent, status: FitStatus, begin: 
         iterations=len(descent.steps) - 1,
         evaluations=len(emitters) * (len(descent.steps) + 1),
         lights_tried=len(emitters),
-        seconds=time.perf_counter() - begin,
+        seconds=descent.meter.seconds,
         covariance=spread.calibrated,
         trajectory=tuple(descent.steps),
         noise_covariance=spread.noise,

@@ -11,7 +11,8 @@ from torch import Tensor
 
 from rgspipe.fitting.model.parameters import Emitter
 from rgspipe.fitting.model.problem import LightProblem
-from rgspipe.fitting.search.refine import PLAIN, State, search_region, weights_at
+from rgspipe.fitting.search.moves import Region
+from rgspipe.fitting.search.weighting import PLAIN
 from rgspipe.progress import track
 
 #: The planes: pairs of axes.
@@ -53,7 +54,7 @@ def loss_slices(
     """
     if points < 3 or points % 2 == 0:
         raise ValueError(f"points must be odd and at least 3, got {points}")
-    region = search_region(problem)
+    region = Region.of(problem.views.frozen)
     fixed = [problem.evaluate(emitter) for index, emitter in enumerate(rig) if index != light]
     offsets = torch.linspace(-reach, reach, points, dtype=torch.float64) * region.size
     answer = rig[light].position
@@ -83,14 +84,12 @@ def best_intensity(problem: LightProblem, columns: Sequence[Tensor]) -> Tensor:
     darker than the clip, as in the steps of a fit. Squares of one-sided residuals are convex, and these are Newton's
     steps on them.
     """
-    base = PLAIN.base(problem)
-    intensity = problem.moments(columns, problem.unclipped(base.square())).intensity
+    intensity = problem.moments(columns, problem.unclipped(PLAIN.base(problem).square())).intensity
     if problem.clip is None:
         return intensity
     for _ in range(CLIPPED_ROUNDS):
         before = intensity
-        weights = weights_at(problem, State((), list(columns), before), PLAIN, base)
-        intensity = problem.moments(columns, weights).intensity
+        intensity = problem.moments(columns, PLAIN.at(problem, columns, before)).intensity
         if torch.allclose(intensity, before, rtol=1e-9, atol=0.0):
             break
     return intensity

@@ -23,7 +23,8 @@ from torch import Tensor
 from rgspipe.fitting.model.moments import group_moments, information, scores
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.model.views import PreparedViews
-from rgspipe.fitting.search.refine import PLAIN, State, weights_at
+from rgspipe.fitting.search.refine import State
+from rgspipe.fitting.search.weighting import PLAIN
 
 #: Errors of the model are shared within cells of this part of the scene's size.
 CELL = 0.2
@@ -96,7 +97,7 @@ def surface_cells(views: PreparedViews, cell: float = CELL) -> tuple[Tensor, int
 def _joint(problem: LightProblem, state: State) -> tuple[tuple[Tensor, Tensor], tuple[Tensor, Tensor]]:
     """Calibrated and noise-only covariance (n, n) of all unknowns, each with what is not determined (n,)."""
     residual = problem.residual(state.columns, state.intensity)
-    weights = weights_at(problem, state, PLAIN, PLAIN.base(problem))
+    weights = PLAIN.at(problem, state.columns, state.intensity)
     labels, count = surface_cells(problem.views)
     labels = labels.to(residual.device)
     values, owners = group_moments(state.columns, residual, weights, labels, count)

@@ -12,7 +12,9 @@ from torch import Tensor
 
 from rgspipe.fitting.model.parameters import Emitter
 from rgspipe.fitting.model.problem import LightProblem
-from rgspipe.fitting.search.refine import ROBUST, State, cauchy_scale, emitter_distance
+from rgspipe.fitting.search.moves import emitter_distance
+from rgspipe.fitting.search.refine import State
+from rgspipe.fitting.search.weighting import ROBUST, cauchy_scale
 
 #: One more light, or a spot in the place of a point light, must lower the robust cost of the blocks by this share …
 LEAST_DROP = 0.2

@@ -8,8 +8,9 @@ from dataclasses import replace
 
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.search.judge import distinct, ranked
-from rgspipe.fitting.search.refine import PLAIN, ROBUST, Region, State, Weighting, reevaluate, refine, start_from
+from rgspipe.fitting.search.refine import Refiner, State
 from rgspipe.fitting.search.starts import Rig
+from rgspipe.fitting.search.weighting import PLAIN, ROBUST, Weighting
 from rgspipe.renderer.spot_share import rim_width
 
 #: Steps of a start to the end.
@@ -30,10 +31,8 @@ PROMISING = 0.67
 HARD_RIM = 0.01
 
 
-def refine_starts(
-    problem: LightProblem, rigs: Sequence[Rig], iterations: int, region: Region, begin: float, thorough: bool = False
-) -> tuple[list[State], list[State]]:
-    """All starts, and those of them that were refined to the end, by at most `iterations` steps at a time.
+def refine_starts(refiner: Refiner, rigs: Sequence[Rig], iterations: int, thorough: bool = False) -> list[State]:
+    """Those of the starts that are refined to the end, by at most `iterations` steps at a time.
 
     Points are refined under a robust loss. A spot that is a little off has all of its pool wrong, which a robust loss
     takes for outliers; so rigs with spots are refined by plain squares.
@@ -41,19 +40,17 @@ def refine_starts(
     spots = any(emitter.is_spot for rig in rigs for emitter in rig)
     turns, weighting = (SPOT_TURNS, PLAIN) if spots else (POINT_TURNS, ROBUST)
     share, rim = GOING_ON_THOROUGHLY if thorough else GOING_ON, turns[0][0]
-    started = [start_from(problem, soft(rig, rim), weighting, begin) for rig in rigs]
-    states = _best(problem, started, PROMISING, weighting) if spots and not thorough else started
+    states = [refiner.start(soft(rig, rim), weighting) for rig in rigs]
+    if spots and not thorough:
+        states = _best(refiner.problem, states, PROMISING, weighting)
     for turn, (softness, steps) in enumerate(turns):
         if turn > 0:
-            states = distinct(_best(problem, states, share, weighting), region.size)
+            states = distinct(_best(refiner.problem, states, share, weighting), refiner.region.size)
         if softness != rim:
             rim = softness
-            for state in states:
-                state.emitters = soft(state.emitters, rim)
-                reevaluate(problem, state)
-        for state in states:
-            refine(problem, state, weighting, min(steps, iterations), region, begin)
-    return started, states
+            states = [refiner.at(state, soft(state.emitters, rim)) for state in states]
+        states = [refiner.refined(state, weighting, min(steps, iterations)) for state in states]
+    return states
 
 
 def soft(rig: Rig, softness: float) -> Rig:

@@ -7,14 +7,13 @@ whether the light was worth it, as a search with an unknown number does.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rgspipe.fitting.model.parameters import Emitter
-from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.search.judge import FAINT_DROP, drop, light_energies, worth_one_more
-from rgspipe.fitting.search.refine import ROBUST, Region, State, fresh, refine, start_from
+from rgspipe.fitting.search.refine import Refiner, State
 from rgspipe.fitting.search.schedule import SHORT_ITERATIONS
+from rgspipe.fitting.search.weighting import ROBUST
 
 #: Steps of the others before it is clear that a light is there, and as many more where it is not.
 TURN = SHORT_ITERATIONS // 2
@@ -29,7 +28,6 @@ class OneLess:
         index: which light was left out.
         worth: whether that light is there, rather than an error of the model.
         gain: by what share it lowers the robust cost.
-        refined: all states that were refined for this.
     """
 
     rich: State
@@ -37,34 +35,29 @@ class OneLess:
     index: int
     worth: bool
     gain: float
-    refined: Sequence[State]
 
 
-def one_light_less(problem: LightProblem, answer: State, region: Region, begin: float) -> OneLess:
+def one_light_less(refiner: Refiner, answer: State) -> OneLess:
     """The answer beside its rigs with one light less.
 
     Args:
-        problem: that the answer was searched on.
+        refiner: on the problem that the answer was searched on.
         answer: of two lights or more.
     """
-    energies, rich, refined = light_energies(answer), answer, []
+    energies, rich, problem = light_energies(answer), answer, refiner.problem
     for index in sorted(range(len(energies)), key=energies.__getitem__):
-        simple = start_from(problem, _without(answer, index), ROBUST, begin)
-        refined.append(simple)
-        refine(problem, simple, ROBUST, TURN, region, begin)
+        simple = refiner.refined(refiner.start(_without(answer, index), ROBUST), ROBUST, TURN)
         # An answer of plain squares has a higher robust cost than it would have to have.
         worth = drop(problem, simple, rich) >= FAINT_DROP
         if worth:
             continue
         if rich is answer:
-            rich = fresh(answer)
-            refined.append(rich)
-            refine(problem, rich, ROBUST, SHORT_ITERATIONS, region, begin)
-        refine(problem, simple, ROBUST, TURN, region, begin)
+            rich = refiner.refined(answer, ROBUST, SHORT_ITERATIONS)
+        simple = refiner.refined(simple, ROBUST, TURN)
         worth = worth_one_more(problem, simple, rich)
         if not worth:
             break
-    return OneLess(rich, simple, index, worth, drop(problem, simple, rich), refined)
+    return OneLess(rich, simple, index, worth, drop(problem, simple, rich))
 
 
 def _without(answer: State, index: int) -> list[Emitter]:

@@ -11,11 +11,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.search.judge import FAINT_DROP, best_state, light_energies
-from rgspipe.fitting.search.refine import ROBUST, Region, State, fresh, refine, start_from
+from rgspipe.fitting.search.refine import Refiner, State
 from rgspipe.fitting.search.schedule import SHORT_ITERATIONS, refine_starts
 from rgspipe.fitting.search.starts import Candidates, Rig
+from rgspipe.fitting.search.weighting import ROBUST
 
 #: An answer that leaves less than this share of the blocks' energy unexplained is not doubted: that is rounding, or
 #: noise.
@@ -37,41 +37,34 @@ class OneMore:
 
     Attributes:
         simple, rich: the two rigs.
-        refined: all states that were refined for this.
     """
 
     simple: State
     rich: State
-    refined: Sequence[State]
 
 
-def one_more_light(
-    problem: LightProblem, candidates: Sequence[Candidates], answer: State, region: Region, begin: float
-) -> OneMore | None:
+def one_more_light(refiner: Refiner, candidates: Sequence[Candidates], answer: State) -> OneMore | None:
     """The answer beside the best rig with one light more; None where no candidate promises enough.
 
     Args:
-        problem: that the answer was searched on.
+        refiner: on the problem that the answer was searched on.
         candidates: of each kind of light.
     """
-    if problem.unexplained(answer.columns, answer.intensity) < NOTICEABLE:
+    if refiner.unexplained(answer) < NOTICEABLE:
         return None
     rigs: list[Rig] = []
     for kind in candidates:
-        promise, extended = kind.promised(answer, problem, TRIES, region.size)
-        if promise >= PROMISED and (promise >= FAINT_DROP or _noticed(problem, extended[0], begin)):
+        promise, extended = kind.promised(answer, refiner.problem, TRIES, refiner.region.size)
+        if promise >= PROMISED and (promise >= FAINT_DROP or _noticed(refiner, extended[0])):
             rigs += extended
     if not rigs:
         return None
-    simple = fresh(answer)
-    refine(problem, simple, ROBUST, SHORT_ITERATIONS, region, begin)
-    started, finished = refine_starts(problem, rigs, SHORT_ITERATIONS, region, begin)
-    rich = best_state(problem, finished)
-    refine(problem, rich, ROBUST, SHORT_ITERATIONS, region, begin)
-    return OneMore(simple, rich, [simple, *started])
+    rich = best_state(refiner.problem, refine_starts(refiner, rigs, SHORT_ITERATIONS))
+    simple, rich = (refiner.refined(state, ROBUST, SHORT_ITERATIONS) for state in (answer, rich))
+    return OneMore(simple, rich)
 
 
-def _noticed(problem: LightProblem, rig: Rig, begin: float) -> bool:
+def _noticed(refiner: Refiner, rig: Rig) -> bool:
     """Whether the last light of a rig sends enough of the energy to be no error of the model at first sight."""
-    energies = light_energies(start_from(problem, rig, ROBUST, begin))
+    energies = light_energies(refiner.start(rig, ROBUST))
     return energies[-1] >= BEGINS_FAINT * sum(energies)

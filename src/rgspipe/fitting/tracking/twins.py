@@ -7,7 +7,6 @@ are split into two halves, in the place of the faintest one, along several direc
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -17,9 +16,10 @@ from rgspipe.fitting.model.blocks import BlockModel
 from rgspipe.fitting.model.parameters import Emitter
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.result import FitResult
-from rgspipe.fitting.search.refine import PLAIN, reevaluate, refine, search_region, start_from
+from rgspipe.fitting.search.refine import Refiner
 from rgspipe.fitting.search.schedule import soft
 from rgspipe.fitting.search.starts import Rig
+from rgspipe.fitting.search.weighting import PLAIN
 from rgspipe.fitting.search_lm import fit_from
 
 #: How far apart the halves of a light are put, parts of the scene's size.
@@ -46,23 +46,20 @@ def split_lights(
     """
     if len(result.lights) < 2:
         return result
-    begin = time.perf_counter()
-    coarse, region = problem.coarsest(blocks), search_region(problem)
-    states = [start_from(coarse, rig, PLAIN, begin) for rig in split_rigs(result, region.size)]
+    coarse = Refiner.of(problem.coarsest(blocks))
+    states = [coarse.start(rig, PLAIN) for rig in split_rigs(result, coarse.region.size)]
     for softness, steps in ROUNDS:
-        for state in states:
-            state.emitters = soft(state.emitters, softness)
-            reevaluate(coarse, state)
-            refine(coarse, state, PLAIN, steps, region, begin)
-        states = sorted(states, key=lambda state: coarse.unexplained(state.columns, state.intensity))[:KEPT]
+        states = [coarse.at(state, soft(state.emitters, softness)) for state in states]
+        states = [coarse.refined(state, PLAIN, steps) for state in states]
+        states = sorted(states, key=coarse.unexplained)[:KEPT]
     polished = [fit_from(problem, state.emitters, iterations) for state in states[:POLISHED]]
     best = min(polished, key=lambda other: other.loss)
     chosen = best if best.loss < BETTER * result.loss else result
     return replace(
         chosen,
-        seconds=result.seconds + time.perf_counter() - begin,
-        evaluations=result.evaluations + sum(one.evaluations for one in polished),
-        iterations=result.iterations + sum(one.iterations for one in polished),
+        seconds=result.seconds + coarse.meter.seconds,
+        evaluations=result.evaluations + coarse.meter.evaluations + sum(one.evaluations for one in polished),
+        iterations=result.iterations + coarse.meter.iterations + sum(one.iterations for one in polished),
     )
 
 

@@ -1,0 +1,57 @@
+"""How much each pixel counts in a refinement."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from rgspipe.fitting.model.problem import LightProblem
+
+#: Residuals beyond this many medians lose their weight (Cauchy loss).
+CAUCHY_MEDIANS = 3.0
+
+
+@dataclass(frozen=True)
+class Weighting:
+    """How residuals count: relative to the pixel's brightness or linear, with a Cauchy loss or squared."""
+
+    relative: bool
+    robust: bool
+
+    def base(self, problem: LightProblem) -> Tensor:
+        """(P, 1) weights before the loss."""
+        return problem.relative_weights() if self.relative else torch.ones_like(problem.target[:, :1])
+
+    def squared(self, base: Tensor, residual: Tensor, scale: float) -> Tensor:
+        """(P, 1) or (P, 3) squared weights of iteratively reweighted least squares."""
+        if not self.robust:
+            return base.square()
+        return base.square() / (1.0 + (base * residual / scale).square())
+
+    def at(self, problem: LightProblem, columns: Sequence[Tensor], intensity: Tensor) -> Tensor:
+        """(P, 1) or (P, 3) squared weights at the residual that lights leave.
+
+        Args:
+            columns: per light its image, see `LightProblem.evaluate`.
+            intensity: (L, 3) over the problem's scale.
+        """
+        base, residual = self.base(problem), problem.residual(columns, intensity)
+        if problem.clip is None:
+            return self.squared(base, residual, cauchy_scale(base * residual))
+        # The active set of this step: a clipped value counts only where the image is darker than it.
+        counted = ~problem.saturated | (residual > 0.0)
+        scale = cauchy_scale((base * residual)[~problem.saturated])
+        return self.squared(base, residual, scale) * counted
+
+
+#: The search forgives what the model gets wrong near edges and counts dim pixels; the polish uses plain squares, whose
+#: bright pixels tell the most about the lights.
+ROBUST, PLAIN = Weighting(relative=True, robust=True), Weighting(relative=False, robust=False)
+
+
+def cauchy_scale(weighted: Tensor) -> float:
+    """The residual at which the Cauchy loss lets go: three medians, above rounding."""
+    return CAUCHY_MEDIANS * float(weighted.abs().median()) + 1e-6 if weighted.numel() else 1.0
