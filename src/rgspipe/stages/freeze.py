@@ -6,9 +6,9 @@ import time
 from dataclasses import asdict
 
 from rgspipe.datasets.frozen_file import DICTIONARY, EFFECTS, SURFELS, save_dictionary, save_frozen
-from rgspipe.datasets.json_file import write_json
 from rgspipe.datasets.surfel_file import load_surfels
 from rgspipe.degradation.model_error import ModelError, with_error
+from rgspipe.files import write_json
 from rgspipe.fitting.search.dictionary import build_dictionary
 from rgspipe.renderer.effect_bounds import measure_costs, measure_effects
 from rgspipe.renderer.frozen import FrozenScene
