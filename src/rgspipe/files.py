@@ -21,8 +21,13 @@ def write_text(path: Path, text: str) -> None:
 
 
 def write_json(path: Path, value: Any) -> None:
-    """`write_text` of indented JSON; refuses NaN and infinity, which JSON does not know."""
-    write_text(path, json.dumps(value, indent=2, allow_nan=False, ensure_ascii=False) + "\n")
+    """`write_text` of indented JSON, its folder made where it is not there.
+
+    Raises:
+        ValueError: there is a NaN or an infinity, which JSON does not know.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_text(path, json.dumps(value, indent=1, allow_nan=False, ensure_ascii=False) + "\n")
 
 
 def point_at(link: Path, target: str) -> None:

@@ -48,7 +48,17 @@ def test_a_reduced_camera_sees_the_same() -> None:
     assert (thin.width, thin.height) == (48, 1)
 
 
-def test_a_camera_is_never_enlarged() -> None:
+def test_a_resized_camera_keeps_its_field_of_view() -> None:
+    small = replace(camera(), width=32, height=21)
+    large = small.resized(80)
+    point = torch.tensor([[0.1, 0.2, 0.3]], dtype=torch.float64)
+    (x, y), (u, v) = small.project(point)[0][0].tolist(), large.project(point)[0][0].tolist()
+    assert (large.width, large.height) == (80, 52)  # 52.5, rounded to even
+    assert (u / x, v / y) == pytest.approx((80 / 32, 52 / 21), rel=1e-12)
+    assert small.resized(64, 64).height == 64
+
+
+def test_a_camera_is_never_enlarged_by_reducing_it() -> None:
     view = camera()
     assert view.reduced(view.width) == view.reduced(1000) == view
 

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 import rgspipe
+from rgspipe.files import write_json
 
 #: LLVM versions below crash on processors with AVX-512.
 OLDEST_LLVM = 16
@@ -93,7 +94,7 @@ def ask_mitsuba(task: str, arrays: dict[str, np.ndarray], **settings: object) ->
     with tempfile.TemporaryDirectory(prefix="rgspipe-mitsuba-") as name:
         folder = Path(name)
         np.savez(folder / REQUEST, **arrays)
-        (folder / SETTINGS).write_text(json.dumps(settings), encoding="utf-8")
+        write_json(folder / SETTINGS, settings)
         command = [sys.executable, "-m", "rgspipe.benchmark.mitsuba_worker", task, name]
         try:
             done = subprocess.run(

@@ -26,6 +26,7 @@ from rgspipe.benchmark.settings import Setting, Workshop, sweep
 from rgspipe.benchmark.truth import Truth
 from rgspipe.evaluation.plots import png_of, svg_bytes
 from rgspipe.evaluation.timing import load_average
+from rgspipe.files import write_json
 
 #: Surfels of the comparison of gather operators, whose reference has thousands of rays a surfel.
 GATHER_SURFELS, GATHER_RAYS = 2_500, (32, 128, 512)
@@ -83,7 +84,7 @@ def _part(bench: Bench, name: str, measure: Callable[[Bench], pd.DataFrame]) -> 
     if not path.exists():
         load = load_average()
         table = measure(bench)
-        _load_path(bench, name).write_text(json.dumps({"load_average": round(load, 2)}) + "\n")
+        write_json(_load_path(bench, name), {"load_average": round(load, 2)})
         hidden = path.with_name(f".{path.name}")
         table.to_csv(hidden, index=False)
         hidden.rename(path)

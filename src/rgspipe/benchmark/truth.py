@@ -14,9 +14,10 @@ from rgspipe.benchmark.rooms import Room
 from rgspipe.blender.render_room import render_room
 from rgspipe.blender.room_job import Kind, RoomJob, image_name
 from rgspipe.datasets.exr import read_array
-from rgspipe.datasets.json_file import read_json, required, write_json
+from rgspipe.datasets.json_file import read_json, required
 from rgspipe.errors import InputError
 from rgspipe.evaluation.metrics import peak, psnr
+from rgspipe.files import write_json
 
 KINDS: tuple[Kind, ...] = ("direct", "global")
 

@@ -12,8 +12,9 @@ from collections import deque
 from pathlib import Path
 
 import rgspipe
-from rgspipe.datasets.json_file import read_json, write_json
+from rgspipe.datasets.json_file import read_json
 from rgspipe.errors import InputError
+from rgspipe.files import write_json
 from rgspipe.progress import track
 
 #: Prefix of the lines on the child's stdout that are messages; the rest is Blender's own talk.

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rgspipe.datasets.json_file import write_json
+from rgspipe.files import write_json
 
 VERSION = 1
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rgspipe.datasets.json_file import write_json
+from rgspipe.files import write_json
 from rgspipe.scene import Camera, PointLight
 from rgspipe.scene.lights import WATTS_PER_INTENSITY
 

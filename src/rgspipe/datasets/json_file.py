@@ -1,10 +1,9 @@
-"""JSON files, read with errors that name the file and the key, written atomically."""
+"""JSON files, read with errors that name the file and the key."""
 
 from __future__ import annotations
 
 import json
 import math
-import os
 from pathlib import Path
 
 from rgspipe.errors import InputError
@@ -28,18 +27,6 @@ def read_json(path: str | Path, what: str) -> dict:
     if not isinstance(content, dict):
         raise InputError(path, expected=f"{what} as a JSON object", found=type(content).__name__, remedy="Repair it.")
     return content
-
-
-def write_json(path: str | Path, content: dict) -> None:
-    """Write `content` so that the file appears under its name only when it is whole."""
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    try:
-        temporary.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def required(content: dict, key: str, where: str | Path) -> object:

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import torch
 
-from rgspipe.datasets.json_file import is_number, numbers, read_json, required, write_json
+from rgspipe.datasets.json_file import is_number, numbers, read_json, required
 from rgspipe.errors import InputError
+from rgspipe.files import write_json
 from rgspipe.scene import Light, LightRig, PointLight, SpotLight
 
 VERSION = 1
@@ -47,7 +48,7 @@ def write_lights(path: str | Path, rig: LightRig, extra: dict | None = None) -> 
     lights = []
     for light, fields in zip(rig, further, strict=True):
         lights.append(_merged(_light_fields(light), fields))
-    write_json(path, _merged({"version": VERSION, "lights": lights}, extra))
+    write_json(Path(path), _merged({"version": VERSION, "lights": lights}, extra))
 
 
 def _merged(fields: dict, further: dict) -> dict:

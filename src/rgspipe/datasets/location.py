@@ -5,9 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from rgspipe.datasets.gs3 import load_dataset
-from rgspipe.datasets.json_file import read_json, required, write_json
+from rgspipe.datasets.json_file import read_json, required
 from rgspipe.datasets.views import Dataset
 from rgspipe.errors import InputError
+from rgspipe.files import write_json
 
 POINTER = "dataset.json"
 

@@ -74,10 +74,9 @@ class Camera:
     def pixel_count(self) -> int:
         return self.width * self.height
 
-    def reduced(self, longest_side: int) -> Camera:
-        """The same view with at most `longest_side` pixels along the longer side, at least one along the other."""
-        factor = max(1.0, max(self.width, self.height) / longest_side)
-        width, height = max(1, round(self.width / factor)), max(1, round(self.height / factor))
+    def resized(self, width: int, height: int | None = None) -> Camera:
+        """The same view in images of another size; without a height as high as the width asks for, rounded."""
+        height = max(1, round(self.height * width / self.width)) if height is None else height
         across, down = width / self.width, height / self.height
         return replace(
             self,
@@ -88,6 +87,11 @@ class Camera:
             width=width,
             height=height,
         )
+
+    def reduced(self, longest_side: int) -> Camera:
+        """The same view with at most `longest_side` pixels along the longer side, at least one along the other."""
+        factor = max(1.0, max(self.width, self.height) / longest_side)
+        return self.resized(max(1, round(self.width / factor)), max(1, round(self.height / factor)))
 
     def rays(
         self, pixels: Tensor | None = None, subsamples: int = 1, places: Tensor | None = None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -20,6 +19,7 @@ from rgspipe.benchmark.truth import load_truth
 from rgspipe.config import RgspipeConfig, get_value
 from rgspipe.errors import InputError
 from rgspipe.evaluation.timing import load_average
+from rgspipe.files import write_json
 from rgspipe.machine import machine
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.resources import resource_folder
@@ -82,8 +82,7 @@ def _fit(context: StageContext) -> None:
     table = pd.DataFrame([asdict(timing) for timing in timings])
     table.to_csv(context.folder / "benchmark.csv", index=False)
     context.note(surfels=len(frozen.surfels), gather_entries=frozen.gather.entries)
-    text = json.dumps({"machine": machine(), "timings": table.to_dict("records")}, indent=1)
-    (context.folder / "benchmark.json").write_text(text + "\n", encoding="utf-8")
+    write_json(context.folder / "benchmark.json", {"machine": machine(), "timings": table.to_dict("records")})
     print(table.to_string(index=False, float_format="%.2f"))
 
 

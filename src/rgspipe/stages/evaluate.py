@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import shutil
 from collections.abc import Mapping
@@ -22,6 +21,7 @@ from rgspipe.datasets.light_file import read_lights
 from rgspipe.datasets.location import dataset_root
 from rgspipe.evaluation import convergence, metrics, plots, tables
 from rgspipe.evaluation.landscape_plot import landscape_figure
+from rgspipe.files import write_json
 from rgspipe.scene import Camera, LightRig, PointLight
 from rgspipe.stages.base import Stage, StageContext
 from rgspipe.stages.sources import target_stage
@@ -67,8 +67,7 @@ def run(context: StageContext) -> None:
         ],
         "notes": truth.notes,
     }
-    text = json.dumps(_plain(content), indent=1, allow_nan=False)
-    (context.folder / "metrics.json").write_text(text + "\n", encoding="utf-8")
+    write_json(context.folder / "metrics.json", _plain(content))
     context.note(targets=len(targets), judged=int(targets["position_error"].notna().sum()))
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import time
 from dataclasses import asdict
 
-from rgspipe.datasets.json_file import write_json
 from rgspipe.datasets.surfel_file import load_surfels
 from rgspipe.degradation.model_error import ModelError, with_error
+from rgspipe.files import write_json
 from rgspipe.renderer.effect_bounds import measure_costs, measure_effects
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.frozen_file import SURFELS

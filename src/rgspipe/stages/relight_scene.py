@@ -140,7 +140,7 @@ def configured_cameras(config: RgspipeConfig, folder: Path | None) -> list[Camer
         InputError: there are none.
     """
     width = config.relight.resolution
-    return [view.camera if width is None else resized(view.camera, width) for view in _camera_views(config, folder)]
+    return [view.camera if width is None else view.camera.resized(width) for view in _camera_views(config, folder)]
 
 
 def _camera_views(config: RgspipeConfig, folder: Path | None) -> Sequence[View]:
@@ -149,21 +149,6 @@ def _camera_views(config: RgspipeConfig, folder: Path | None) -> Sequence[View]:
         return load_target(_first_target(config, folder)).views
     dataset = open_dataset(folder, train=split == "train", test=split == "test", targets=False)
     return dataset.train if split == "train" else dataset.test
-
-
-def resized(camera: Camera, width: int) -> Camera:
-    """The camera with images `width` pixels across, which see the same, but for the rounding of their height."""
-    height = max(1, round(camera.height * width / camera.width))
-    across, down = width / camera.width, height / camera.height
-    return replace(
-        camera,
-        fx=across * camera.fx,
-        cx=across * camera.cx,
-        fy=down * camera.fy,
-        cy=down * camera.cy,
-        width=width,
-        height=height,
-    )
 
 
 def _first_target(config: RgspipeConfig, folder: Path | None) -> Path:

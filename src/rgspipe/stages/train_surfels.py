@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Sequence
 from dataclasses import asdict, fields, replace
@@ -20,6 +19,7 @@ from rgspipe.degradation.capture import Capture, degraded
 from rgspipe.errors import InputError
 from rgspipe.evaluation.held_out import held_out_picture
 from rgspipe.evaluation.images import save_png
+from rgspipe.files import write_json
 from rgspipe.machine import PeakMemory
 from rgspipe.scene.gloss import Gloss
 from rgspipe.stages.base import Stage, StageContext
@@ -71,8 +71,7 @@ def run(context: StageContext) -> None:
         metrics["gloss"] = _gloss(trained.surfels.gloss)
     if options.light_rounds > 0:
         metrics["lights"] = _corrections(train_views, trained.views)
-    text = json.dumps(metrics, indent=1, allow_nan=False)
-    (context.folder / "metrics.json").write_text(text + "\n", encoding="utf-8")
+    write_json(context.folder / "metrics.json", metrics)
     picture = held_out_picture(held_out.views, held_out.images, held_out.psnr, held_out.albedo)
     save_png(context.folder / "comparison.png", picture)
     context.note(

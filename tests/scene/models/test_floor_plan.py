@@ -6,7 +6,7 @@ from itertools import accumulate
 
 import pytest
 import torch
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rgspipe.scene.models import Corridor, FloorPlan
@@ -29,6 +29,7 @@ def test_the_corridor_is_closed(corridor: Corridor) -> None:
     check_closed(corridor.plan(), 1.0 - (1.0 - corridor.width) ** 2)
 
 
+@settings(deadline=None)
 @given(st.lists(st.tuples(st.floats(0.1, 1.0), st.floats(0.1, 1.0)), min_size=1, max_size=4), st.floats(0.1, 2.0))
 def test_stairs_are_closed(steps: list[tuple[float, float]], height: float) -> None:
     """A floor below steps, each (wide, high), that go up to the right."""
