@@ -31,7 +31,7 @@ SOURCE = re.compile(r"`((?!outputs/)[a-z_0-9/]+/(?:[a-z_0-9]+\.py)?)(?::([A-Z_]+
 #: A constant with its value, as cells of a table.
 VALUE = re.compile(r"\| `([a-z_/]+\.py):([A-Z_]+)` \| ([^|]+) \|")
 #: Words of a page that is read in one sitting; the laboratory may be longer.
-LONGEST = 1600
+LONGEST = 1500
 
 
 def _name(page: Path) -> str:

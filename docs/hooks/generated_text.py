@@ -75,7 +75,7 @@ def _flat(content: dict, prefix: str = "") -> Iterator[tuple[str, str]]:
         if isinstance(value, dict):
             yield from _flat(value, f"{prefix}{key}.")
         else:
-            yield f"{prefix}{key}", _cell(json.dumps(value))
+            yield f"{prefix}{key}", _cell(value if isinstance(value, str) else json.dumps(value).replace('"', ""))
 
 
 def _comment(path: Path) -> str:
