@@ -64,7 +64,7 @@ def require_lights(views: Sequence[View], root: Path) -> None:
         found=f"{len(dark)} of {len(views)} views without one, such as {dark[0].name}: TensoIR folders have "
         "environment light, and no depth",
         remedy="Render the scene with point lights (scene=blend scene.path=its .blend file), or photograph it so and "
-        "describe the images in transforms_train.json (docs/reference/formats.md); albedo maps of this folder can go with "
+        "describe the images in transforms_train.json (docs/reference/formats.md); albedo maps can go with "
         "them as albedo_path, for train.albedo_prior=dataset.",
     )
 

@@ -132,7 +132,8 @@ def exposure(surfels: Surfels) -> Exposure:
     """What cannot be ruled out between N surfels; edges are ignored, so that footprints count as whole ellipses.
 
     Rules out both for convex objects whose footprints are small against their curvature: spheres from some 2500
-    surfels on. Cost grows as N^1.5 there (docs/reference/model/effects.md), and the test ends early where surfels face each other.
+    surfels on. Cost grows as N^1.5 there (docs/reference/model/effects.md), and the test ends early where surfels face
+    each other.
     """
     shadow, sight = False, False
     if len(surfels) < 2:
