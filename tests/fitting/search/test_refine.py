@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 import torch
 
+from emitters import emitter_at
 from lit_room import VISIBLE
-from rgspipe.fitting.model.parameters import Emitter
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.result import FitStatus
 from rgspipe.fitting.search.refine import PLAIN, State, fresh, refine, search_region, start_from
@@ -22,7 +22,7 @@ def _problem(room, point_light, noise: float) -> LightProblem:
 
 def _refined(problem: LightProblem, off: float) -> State:
     place = torch.tensor(VISIBLE, dtype=torch.float64)
-    state = start_from(problem, [Emitter(place + off)], PLAIN, 0.0)
+    state = start_from(problem, [emitter_at(place + off)], PLAIN, 0.0)
     refine(problem, state, PLAIN, 30, search_region(problem), 0.0)
     return state
 

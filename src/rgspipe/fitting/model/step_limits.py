@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from torch import Tensor
 
-from rgspipe.fitting.model.parameters import Emitter
+from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.optim.levenberg_marquardt import within
 
 
@@ -17,7 +17,7 @@ class StepLimits:
 
     Attributes:
         move: of a position, a part of the scene's size.
-        turn: of an axis [rad], and of the transformed parameters of a cone.
+        turn: of an axis [rad], and of the parameters of a shape.
     """
 
     move: float = 0.12
@@ -25,8 +25,8 @@ class StepLimits:
 
     def allowed(self, emitter: Emitter, step: Tensor) -> float:
         """By which part a step (d,) of a light's parameters has to be shortened."""
-        share = within(float(step[:3].norm()), self.move)
-        return min(share, within(float(step[3:].abs().max()), self.turn)) if emitter.is_spot else share
+        moved, turned = emitter.stretch(step)
+        return min(within(moved, self.move), within(turned, self.turn))
 
 
 def allowed_share(emitters: Sequence[Emitter], step: Tensor, limits: StepLimits) -> float:

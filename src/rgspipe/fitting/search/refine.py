@@ -10,9 +10,9 @@ from functools import cached_property
 import torch
 from torch import Tensor
 
+from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.exposure import ExposedMoments
 from rgspipe.fitting.model.moments import Moments
-from rgspipe.fitting.model.parameters import Emitter
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.model.step_limits import StepLimits, allowed_share
 from rgspipe.fitting.result import FitStatus, Step
@@ -94,7 +94,7 @@ class State:
 
     def lights(self, problem: LightProblem) -> LightRig:
         return tuple(
-            emitter.light(problem.scale * strength)
+            emitter.shining(problem.scale * strength)
             for emitter, strength in zip(self.emitters, self.intensity, strict=True)
         )
 
@@ -216,24 +216,11 @@ def moved_rig(emitters: Sequence[Emitter], step: Tensor, region: Region) -> tupl
     moved = []
     for emitter, part in zip(emitters, parts, strict=True):
         other = emitter.moved(part, region.size)
-        other = replace(other, position=region.clip(other.position))
+        other = other.placed(region.clip(other.position))
         moved.append(emitter if float(part.abs().max()) == 0.0 else other)
     return tuple(moved)
 
 
 def rig_move(one: Sequence[Emitter], other: Sequence[Emitter], size: float) -> float:
-    """The largest `emitter_distance` of a light from itself."""
-    return max(emitter_distance(a, b, size) for a, b in zip(one, other, strict=True))
-
-
-def emitter_distance(one: Emitter, other: Emitter, size: float) -> float:
-    """The largest of the move over the scene's size, the turn of the axis and the change of the cone [rad]."""
-    # A scene of one surfel has no size, and no room to move in.
-    moved = float((one.position - other.position).norm()) / size if size > 0.0 else 0.0
-    if not one.is_spot:
-        return moved
-    turned = float((one.axis - other.axis).norm())
-    changed = abs(one.shape.cone_angle - other.shape.cone_angle)
-    if one.shape.profile == "gaussian":
-        changed = max(changed, abs(one.shape.falloff - other.shape.falloff))
-    return max(moved, turned, changed)
+    """The largest `Emitter.distance` of a light from itself."""
+    return max(a.distance(b, size) for a, b in zip(one, other, strict=True))

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from rgspipe.fitting.model.parameters import Emitter
+from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.search.judge import FAINT_DROP, drop, light_energies, worth_one_more
 from rgspipe.fitting.search.refine import ROBUST, Region, State, fresh, refine, start_from
