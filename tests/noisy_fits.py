@@ -7,13 +7,13 @@ import math
 import torch
 
 from rgspipe.fitting import FitResult, FitViews, LightSpec, fit_lights, prepare_fit, render_rig
-from rgspipe.renderer.spot import SpotShape
 from rgspipe.scene import LightRig
+from rgspipe.scene.lights import SpotLight
 
 #: A third place for a light in the lit room.
 THIRD = (-0.3, 0.3, 0.1)
 
-SHAPE = SpotShape("smoothstep", math.radians(30.0), 0.3)
+SHAPE = SpotLight.shaped("smoothstep", math.radians(30.0), 0.3)
 
 
 def noisy_images(views: FitViews, rig: LightRig) -> list[torch.Tensor]:

@@ -7,7 +7,6 @@ import math
 import numpy as np
 import torch
 
-from rgspipe.renderer.spot import spot_share
 from rgspipe.scene import Camera, Light, PointLight, SpotLight, look_at
 
 POSITION, INTENSITY = [0.1, -0.2, 0.9], [0.5, 1.0, 2.0]
@@ -38,7 +37,7 @@ def plane_image(light: Light, subsamples: int = 16) -> np.ndarray:
     points = origins - (origins[:, 2] / directions[:, 2])[:, None] * directions
     to_light = light.position - points
     irradiance = to_light[:, 2] / to_light.norm(dim=1) ** 3
-    if isinstance(light, SpotLight):
-        irradiance = irradiance * spot_share(light, points)
+    if light.axis is not None:
+        irradiance = irradiance * light.share_towards(points)
     radiance = torch.tensor(ALBEDO) / math.pi * light.intensity * irradiance[:, None]
     return radiance.reshape(SIZE, SIZE, subsamples**2, 3).mean(dim=2).numpy()

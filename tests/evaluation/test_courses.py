@@ -49,9 +49,10 @@ def test_steps_with_other_lights_than_the_answer_are_passed_over() -> None:
 
 def test_spots_take_their_profile_from_the_answer() -> None:
     spot = SpotLight(*(torch.ones(3, dtype=torch.float64) for _ in range(3)), "gaussian", 0.5, 0.1)
-    curve = _curve(3).assign(ax=0.0, ay=0.0, az=-1.0, cone_angle=[0.4, 0.45, 0.5])
+    curve = _curve(3).assign(ax=0.0, ay=0.0, az=-1.0, cone_angle=[0.4, 0.45, 0.5], falloff=0.2)
     (light,) = course_of(curve, (spot,))[0].rig
-    assert isinstance(light, SpotLight) and light.profile == "gaussian" and light.cone_angle == pytest.approx(0.4)
+    assert isinstance(light, SpotLight) and light.profile == "gaussian"
+    assert (light.cone_angle, light.falloff) == (0.4, 0.2)
     assert light.direction.tolist() == [0.0, 0.0, -1.0]
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 import torch
 
+from emitters import emitter_at
 from rgspipe.benchmark.rooms import ROOMS
 from rgspipe.fitting.fit import fit_lights, prepare_fit, render_light
-from rgspipe.fitting.model.parameters import Emitter
 from rgspipe.fitting.model.problem import Effects, LightProblem
 from rgspipe.renderer.dictionary import LightDictionary
 from rgspipe.renderer.frozen import FrozenScene
@@ -58,7 +58,7 @@ def test_without_bounces_the_image_is_the_direct_light_of_the_pixels(frozen: Fro
         for view in views.prepared.views
     ]
     torch.testing.assert_close(
-        problem.sharpest().evaluate(Emitter(LIGHT.position)), torch.cat(expected)[views.prepared.pixels]
+        problem.sharpest().evaluate(emitter_at(LIGHT.position)), torch.cat(expected)[views.prepared.pixels]
     )
 
 
@@ -67,10 +67,10 @@ def test_derivatives_agree_with_finite_differences(frozen: FrozenScene) -> None:
     views = prepare_fit(frozen, ROOMS["cornell"]().cameras(16), effects=Effects(at_pixels=True))
     problem = LightProblem.create(views.prepared, views.prepared.stack_images(render_light(views, LIGHT))).sharpest()
     position, step = torch.tensor([0.05, -0.1, 0.2], dtype=torch.float64), 1e-3
-    columns = problem.evaluate(Emitter(position))
+    columns = problem.evaluate(emitter_at(position))
     for axis in range(3):
         shift = step * torch.eye(3, dtype=torch.float64)[axis]
-        ahead, behind = (problem.evaluate(Emitter(position + sign * shift))[:, :, 0] for sign in (1, -1))
+        ahead, behind = (problem.evaluate(emitter_at(position + sign * shift))[:, :, 0] for sign in (1, -1))
         expected = (ahead - behind) / (2.0 * step)
         error = (columns[:, :, 1 + axis] - expected).abs().median() / expected.abs().median()
         # Measured 0.012 at most: some penumbrae are narrower than the step.

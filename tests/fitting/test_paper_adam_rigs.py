@@ -10,22 +10,22 @@ from torch import Tensor
 
 import double_precision
 from double_precision import DoubleTransport
+from emitters import emitter_at
 from hard_cases import camera
 from hard_cases import room as small_room
 from lit_room import VISIBLE
 from rgspipe import fit_lights
 from rgspipe.fitting import AdamOptions, Effects, LightSpec
 from rgspipe.fitting.baselines.paper_adam_loss import AdamLoss, MovingRig, rig_image
-from rgspipe.fitting.model.parameters import Emitter
+from rgspipe.fitting.model.harmonics import BandLimit, legendre, zonal_coefficients
 from rgspipe.fitting.model.problem import LightProblem
-from rgspipe.fitting.model.spot_harmonics import BandLimit, legendre, zonal_coefficients
 from rgspipe.fitting.model.views import prepare_views
 from rgspipe.fitting.search_lm import fit_from
 from rgspipe.renderer.frozen import FrozenScene
-from rgspipe.renderer.spot import SpotShape, angle_from_axis
 from rgspipe.scene import SpotLight
+from rgspipe.scene.lights.angles import angle_from_axis
 
-SHAPE = SpotShape("gaussian", math.radians(25.0), math.radians(12.0))
+SHAPE = SpotLight.shaped("gaussian", math.radians(25.0), math.radians(12.0))
 SPOTS = LightSpec("spot", shape=SHAPE)
 
 
@@ -44,8 +44,8 @@ def two_spots() -> tuple[Tensor, Tensor, Tensor]:
 def share_in_double(points: Tensor, position: Tensor, axis: Tensor, band: BandLimit | None) -> Tensor:
     angle = angle_from_axis(axis, points - position)
     if band is None:
-        return SHAPE.share(angle)
-    return legendre(torch.cos(angle), band.degree)[0] @ zonal_coefficients(SHAPE, band)[:, 0]
+        return SHAPE.share_at(angle)
+    return legendre(torch.cos(angle), band.degree)[0] @ zonal_coefficients(SHAPE, band)[0]
 
 
 @pytest.mark.parametrize("band", [None, BandLimit(6), BandLimit(9, mirrored=False)])
@@ -69,7 +69,7 @@ def test_loss_and_gradients_of_two_spots_are_those_of_float64(band: BandLimit | 
             loss = double_precision.adam_loss(image, target.double(), [shape], list(views.masks), 0.2)
         else:
             positions, strengths, axes = leaves
-            rig = MovingRig(positions, strengths, axes, SHAPE)
+            rig = MovingRig(positions, strengths, SHAPE, axes)
             loss = AdamLoss(views, target, 0.2, Effects(spots=band))(rig)
         loss.backward()
         results.append((loss.detach()[None], *(leaf.grad for leaf in leaves)))
@@ -84,7 +84,7 @@ def test_loss_and_gradients_of_two_spots_are_those_of_float64(band: BandLimit | 
 def test_the_image_of_a_rig_is_the_scene_s(room, point_light) -> None:
     """Exact spots, all bounces, several lights at once: as every other stage renders them."""
     positions, strengths, axes = (leaf.detach() for leaf in two_spots())
-    rig = MovingRig(positions, strengths, axes, SHAPE)
+    rig = MovingRig(positions, strengths, SHAPE, axes)
     found = rig_image(room.one.prepared, rig, Effects())
     expected = room.frozen.render(room.views[0], rig.lights()).reshape(-1, 3)
     torch.testing.assert_close(found, expected, atol=1e-6, rtol=1e-5)  # measured 0
@@ -114,7 +114,7 @@ def test_adam_finds_two_points(room, point_light) -> None:
 def test_adam_finds_a_spot_and_its_axis(room, point_light) -> None:
     axis = unit(-0.3, 0.5, -0.6)
     light = point_light(VISIBLE)
-    truth = SpotLight(light.position, light.intensity, axis, SHAPE.profile, SHAPE.cone_angle, SHAPE.falloff)
+    truth = SHAPE.at(light.position, axis, light.intensity)
     images = [room.frozen.render(view, (truth,)) for view in room.views]
     start = point_light((0.05, -0.2, 0.2), (1.0, 1.0, 1.0))
     options = AdamOptions(epochs=1, steps=60, intensity_rate=0.1, axis_rate=0.02)
@@ -147,7 +147,7 @@ def test_the_same_seed_gives_the_same_rig_and_axes_stay_of_unit_length(room, poi
 
 
 @pytest.mark.parametrize(
-    "spec", [LightSpec("auto"), LightSpec(count=None), LightSpec("spot", shape=SHAPE, cone_free=True)]
+    "spec", [LightSpec("auto"), LightSpec(count=None), LightSpec("spot", shape=SHAPE, shape_free=True)]
 )
 def test_what_is_not_known_is_refused(room, point_light, spec: LightSpec) -> None:
     with pytest.raises(ValueError, match="known"):
@@ -156,18 +156,18 @@ def test_what_is_not_known_is_refused(room, point_light, spec: LightSpec) -> Non
 
 def test_a_hard_edge_has_a_gradient(room, point_light) -> None:
     """It is taken with the least rim of fits; a derivative of zero would never turn the axis."""
-    hard = SpotShape("smoothstep", math.radians(30.0), 0.0)
+    hard = SpotLight.shaped("smoothstep", math.radians(30.0), 0.0)
     positions, strengths, axes = (leaf[:1].detach().requires_grad_() for leaf in two_spots())
     target = torch.zeros((room.one.prepared.all_pixels.shape[0], 3))
-    AdamLoss(room.one.prepared, target, 0.2, Effects())(MovingRig(positions, strengths, axes, hard)).backward()
+    AdamLoss(room.one.prepared, target, 0.2, Effects())(MovingRig(positions, strengths, hard, axes)).backward()
     assert float(axes.grad.norm()) > 0.0 and torch.isfinite(axes.grad).all()
 
 
 def test_least_squares_finds_a_spot_in_the_images_of_its_harmonics(room, point_light) -> None:
     """The image and every derivative of the other methods' model are band-limited, too."""
     axis, light = unit(-0.3, 0.5, -0.6), point_light(VISIBLE)
-    rig = MovingRig(light.position[None], light.intensity[None].log(), axis[None], SHAPE)
-    start = Emitter(light.position + 0.05, unit(-0.4, 0.4, -0.6), SHAPE)
+    rig = MovingRig(light.position[None], light.intensity[None].log(), SHAPE, axis[None])
+    start = emitter_at(light.position + 0.05, unit(-0.4, 0.4, -0.6), SHAPE)
     images = rig_image(room.two.prepared, rig, Effects(spots=BandLimit(6)))
     banded, exact = (
         fit_from(LightProblem.create(room.two.prepared, images, Effects(spots=band)), [start])

@@ -11,17 +11,16 @@ from torch import Tensor
 
 from lit_room import HIDDEN, VISIBLE
 from rgspipe.fitting import Effects, FitResult, FitStatus, LightSpec, fit_lights, prepare_fit, render_rig
-from rgspipe.renderer.spot import SpotShape
 from rgspipe.scene import LightRig, SpotLight
 
 THIRD = (-0.3, 0.3, 0.1)
-SHAPE = SpotShape("smoothstep", math.radians(30.0), 0.3)
+SHAPE = SpotLight.shaped("smoothstep", math.radians(30.0), 0.3)
 
 
-def spot(position=VISIBLE, axis=(-0.3, 0.5, -0.6), shape: SpotShape = SHAPE) -> SpotLight:
+def spot(position=VISIBLE, axis=(-0.3, 0.5, -0.6), shape: SpotLight = SHAPE) -> SpotLight:
     direction = torch.nn.functional.normalize(torch.tensor(axis, dtype=torch.float64), dim=0)
     place, intensity = torch.tensor(position, dtype=torch.float64), torch.tensor([1.0, 2.0, 0.5]).double()
-    return SpotLight(place, intensity, direction, shape.profile, shape.cone_angle, shape.falloff)
+    return shape.at(place, direction, intensity)
 
 
 def fit(room, rig: LightRig, spec: LightSpec, noise: float = 0.0, effects: Effects | None = None) -> FitResult:

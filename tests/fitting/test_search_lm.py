@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 import torch
 
+from emitters import emitter_at
 from lit_room import HIDDEN, VISIBLE
 from rgspipe import fit_lights
 from rgspipe.errors import InputError
 from rgspipe.fitting import FitStatus, LightSpec, SearchOptions, prepare_fit
-from rgspipe.fitting.model.parameters import Emitter
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.search.judge import MERGED, worth_keeping
 from rgspipe.fitting.search.moves import Region
@@ -110,7 +110,7 @@ def test_a_light_that_no_candidate_explains_stays_finite(room):
 def test_too_few_iterations_are_said_so(room, point_light):
     prepared = room.one.prepared
     problem = LightProblem.create(prepared, prepared.stack_images(room.images(point_light(HIDDEN))))
-    start = Emitter(torch.tensor(HIDDEN, dtype=torch.float64) + 0.02)
+    start = emitter_at(torch.tensor(HIDDEN, dtype=torch.float64) + 0.02)
     result = fit_from(problem, [start], iterations=1)
     assert result.status is FitStatus.MAX_ITERATIONS and "more" in result.reason
 
@@ -172,7 +172,7 @@ def test_lights_that_meet_by_plain_squares_are_one(room, point_light):
     search = _Search(problem, refiner, [], SearchOptions(), LightSpec(count=None))
     place = torch.tensor(VISIBLE, dtype=torch.float64)
     apart = torch.tensor([0.6 * MERGED * problem.views.frozen.size, 0.0, 0.0], dtype=torch.float64)
-    twins = refiner.start([Emitter(place - apart), Emitter(place + apart)], ROBUST)
+    twins = refiner.start([emitter_at(place - apart), emitter_at(place + apart)], ROBUST)
     assert len(worth_keeping(twins, problem.views.frozen.size)) == 2
     (found,) = search._without_twins(twins).emitters
     assert float((found.position - place).norm()) < 1e-4  # measured 3e-8

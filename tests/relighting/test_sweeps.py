@@ -16,9 +16,10 @@ from rgspipe.relighting.sweeps import (
     spread_frames,
     there_and_back,
 )
-from rgspipe.renderer.spot import SpotShape, angle_from_axis
+from rgspipe.scene.lights import SpotLight
+from rgspipe.scene.lights.angles import angle_from_axis
 
-SPOT = SpotKind(SpotShape("smoothstep", 0.4, 0.15), torch.tensor([1.0, 2.0, 3.0], dtype=torch.float64))
+SPOT = SpotKind(SpotLight.shaped("smoothstep", 0.4, 0.15), torch.tensor([1.0, 2.0, 3.0], dtype=torch.float64))
 
 
 def vector(*values: float) -> torch.Tensor:

@@ -23,8 +23,8 @@ from rgspipe.renderer.effect_bounds import (
 from rgspipe.renderer.effects import EFFECTS, RigKind, choose_effects, cone_bound, rig_bounds
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.shadow_bound import ShadowBound, sample_lights, shadow_losses
-from rgspipe.renderer.spot import SpotShape
 from rgspipe.scene import Camera, PointLight, look_at
+from rgspipe.scene.lights import SpotLight
 from rgspipe.scene.rectangles import surfels_on
 from rgspipe.scene.surfels import NO_CLIP
 from rooms import closed_box
@@ -108,18 +108,17 @@ def test_each_light_adds_its_shadow_and_a_spot_may_be_aimed_at_the_worst() -> No
     bounds = replace(DARK, interreflection=1.0, shadows=shadows)
     # Twice for the sample, twice for the light that bounces on.
     assert rig_bounds(bounds, RigKind(3))["shadows"] == pytest.approx(3 * 1e-5 * 4)
-    assert rig_bounds(bounds, RigKind(1, (SpotShape("linear", 1.0, 0.5),)))["shadows"] == pytest.approx(2.0, rel=1e-3)
+    assert rig_bounds(bounds, RigKind(1, (0.0,)))["shadows"] == pytest.approx(2.0, rel=1e-3)
 
 
 def test_the_choice_is_taken_again_for_another_kind_of_rig() -> None:
     """One point light loses nothing that matters, many do, and so does one spot."""
     shadows = ShadowBound(point=1e-4, spot=0.3, proved=False, lights=100, uniform=80)
     bounds = replace(DARK, shadows=shadows)
-    cone = SpotShape("gaussian", 0.4, 0.1)
-    light = PointLight(torch.zeros(3), torch.ones(3))
+    cone, light = SpotLight.shaped("gaussian", 0.4, 0.1), PointLight(torch.zeros(3), torch.ones(3))
     decided = {
         kind: choose_effects(bounds, 1e-3, kind)
-        for kind in (RigKind.of((light,)), RigKind.of((light,) * 6), RigKind(0, (cone,)))
+        for kind in (RigKind.of((light,)), RigKind.of((light,) * 6), RigKind.of((cone,)))
     }
     assert [choice.shadows for choice in decided.values()] == [False, True, True]
     assert [choice.spots for choice in decided.values()] == [False, False, True]
@@ -135,13 +134,12 @@ def test_the_choice_is_taken_again_for_another_kind_of_rig() -> None:
 def test_no_direction_of_a_spot_differs_from_a_point_light_by_more_than_the_bound(
     profile, cone, falloff, angle
 ) -> None:
-    shape = SpotShape(profile, cone, falloff)
-    share = float(shape.share(torch.tensor(angle, dtype=torch.float64)))
-    smallest = float(shape.share(torch.tensor(pi, dtype=torch.float64)))
+    shape = SpotLight.shaped(profile, cone, falloff)
+    share, smallest = float(shape.share_at(torch.tensor(angle, dtype=torch.float64))), shape.least_share
     assert smallest <= share + 1e-12
-    if cone_bound(shape) < NO_BOUND:
+    if cone_bound(smallest) < NO_BOUND:
         # Of the brightest, which has at least the smallest share.
-        assert (1.0 - share) / smallest <= cone_bound(shape) * (1.0 + 1e-9)
+        assert (1.0 - share) / smallest <= cone_bound(smallest) * (1.0 + 1e-9)
 
 
 def test_effects_left_out_together_stay_within_the_tolerance() -> None:

@@ -10,8 +10,7 @@ from torch import Tensor
 
 from hard_cases import INSIDE, room
 from rgspipe.renderer.frozen import FrozenScene
-from rgspipe.renderer.rig import Rig
-from rgspipe.renderer.spot import SpotShape
+from rgspipe.scene import PointLight, SpotLight
 
 #: Where a float32 is rounded to 1e-3, a sixtieth of a surfel's spacing.
 AWAY = torch.tensor([1e4, -1e4, 1e4], dtype=torch.float64)
@@ -37,15 +36,15 @@ def lit(frozen: FrozenScene, offset: Tensor) -> dict[str, Tensor]:
     """Radiance of a point and a spot, and derivatives of its sum."""
     inside = INSIDE.double()
     positions = (torch.stack([inside, -inside]) + offset).requires_grad_()
-    axes = torch.tensor([[0.0, 0.0, 1.0], [0.3, 0.5, -1.0]], dtype=torch.float64, requires_grad=True)
+    axis = torch.tensor([0.3, 0.5, -1.0], dtype=torch.float64, requires_grad=True)
     intensities = torch.ones(2, 3, dtype=torch.float64, requires_grad=True)
-    shapes = (None, SpotShape("gaussian", 0.4, 0.3))
-    radiance = frozen.radiance_of(Rig(positions, intensities, axes, shapes))
+    spot = SpotLight(positions[1], intensities[1], axis, "gaussian", 0.4, 0.3)
+    radiance = frozen.radiance_of((PointLight(positions[0], intensities[0]), spot))
     radiance.sum().backward()
     return {
         "radiance": radiance.detach(),
         "positions": positions.grad,
-        "axes": axes.grad,
+        "axis": axis.grad,
         "intensity": intensities.grad,
     }
 

@@ -9,8 +9,7 @@ import torch
 
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.glossy_columns import unit_light_columns
-from rgspipe.renderer.rig import Rig
-from rgspipe.scene import Gloss
+from rgspipe.scene import Gloss, PointLight
 from rooms import closed_box
 
 EYE = torch.tensor([-0.3, 0.25, 0.2])
@@ -32,7 +31,7 @@ def test_columns_are_radiance_and_its_derivatives(room: FrozenScene, indirect: b
     found = columns.seen_from(EYE)
 
     def radiance(place: torch.Tensor) -> torch.Tensor:
-        return room.glossy_light(Rig(place[None], torch.ones(1, 3)), indirect).seen_from(EYE)
+        return room.glossy_light((PointLight(place, torch.ones(3)),), indirect).seen_from(EYE)
 
     weights = torch.rand(5, len(room.surfels), 3, generator=torch.Generator().manual_seed(0))
     slopes = torch.autograd.functional.jacobian(lambda p: (weights * radiance(p)).sum(dim=(1, 2)), position)

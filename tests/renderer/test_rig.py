@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import pytest
@@ -13,21 +12,22 @@ from rgspipe.renderer import reference
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.kernels.irradiance import SOFTENING
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
-from rgspipe.renderer.rig import Rig, rig_irradiance, unit_response
-from rgspipe.renderer.spot import SpotShape, angle_from_axis
+from rgspipe.renderer.rig import rig_irradiance, unit_response
 from rgspipe.scene import PointLight, SpotLight, Surfels
+from rgspipe.scene.lights import LightRig
+from rgspipe.scene.lights.angles import angle_from_axis
 from rooms import closed_box, rectangle, surfels_on
 
 #: Every profile with a rim, one with a hard edge, one that is wider than a half-space, and point lights between them.
 SHAPES = (
-    None,
-    SpotShape("gaussian", 0.4, 0.2),
-    SpotShape("smoothstep", 0.7, 0.5),
-    None,
-    SpotShape("linear", 0.9, 0.3),
-    SpotShape("smoothstep", 0.8, 0.0),
-    SpotShape("gaussian", 2.0, 0.4),
-    None,
+    PointLight.shaped(),
+    SpotLight.shaped("gaussian", 0.4, 0.2),
+    SpotLight.shaped("smoothstep", 0.7, 0.5),
+    PointLight.shaped(),
+    SpotLight.shaped("linear", 0.9, 0.3),
+    SpotLight.shaped("smoothstep", 0.8, 0.0),
+    SpotLight.shaped("gaussian", 2.0, 0.4),
+    PointLight.shaped(),
 )
 
 
@@ -50,8 +50,9 @@ def parameters() -> dict[str, Tensor]:
     }
 
 
-def rig(positions: Tensor, log_intensities: Tensor, axes: Tensor) -> Rig:
-    return Rig(positions, log_intensities.exp(), axes, SHAPES)
+def rig(positions: Tensor, log_intensities: Tensor, axes: Tensor) -> LightRig:
+    tensors = zip(positions, axes, log_intensities.exp(), strict=True)
+    return tuple(shape.at(*each) for shape, each in zip(SHAPES, tensors, strict=True))
 
 
 def expected_irradiance(
@@ -64,7 +65,7 @@ def expected_irradiance(
     geometry = cosine / (towards.square().sum(dim=-1).square() + softening).pow(0.75)
     point = geometry * reference.transmittance(surfels, positions)
     shares = [
-        torch.ones_like(row) if shape is None else shape.share(angle_from_axis(axis, v))
+        torch.ones_like(row) if shape.axis is None else shape.share_at(angle_from_axis(axis, v))
         for shape, axis, v, row in zip(shapes, axes, towards, point, strict=True)
     ]
     return (torch.stack(shares) * point).T @ log_intensities.exp()
@@ -121,7 +122,7 @@ def test_axes_of_point_lights_do_nothing(bvh: SurfelBvh) -> None:
     values = parameters()
     axes = values["axes"].clone().requires_grad_()
     rig_irradiance(bvh, rig(**(values | {"axes": axes}))).sum().backward()
-    points = torch.tensor([shape is None for shape in SHAPES])
+    points = torch.tensor([shape.axis is None for shape in SHAPES])
     assert bool((axes.grad[points] == 0).all())
     assert bool((axes.grad[~points].abs().amax(dim=1) > 0).any())
 
@@ -130,15 +131,21 @@ def test_a_rig_without_spots_pays_for_no_profile(bvh: SurfelBvh, monkeypatch: py
     def refuse(*_: object) -> None:
         raise AssertionError("a point light has no profile")
 
-    monkeypatch.setattr("rgspipe.renderer.rig.spot_profile", refuse)
-    monkeypatch.setattr("rgspipe.renderer.rig.angle_slopes", refuse)
-    lamps = Rig.of(tuple(PointLight(p, torch.ones(3).double()) for p in parameters()["positions"]))
-    assert unit_response(bvh, lamps).by_axis is None
+    monkeypatch.setattr("rgspipe.scene.lights.axial.angle_slopes", refuse)
+    lamps = tuple(PointLight(p, torch.ones(3).double()) for p in parameters()["positions"])
+    assert all({*slopes} == {"position"} for slopes in unit_response(bvh, lamps).slopes)
     assert rig_irradiance(bvh, lamps).shape == (len(bvh.surfels), 3)
 
 
+def test_only_a_shape_that_moves_pays_for_its_derivatives(bvh: SurfelBvh) -> None:
+    spot = SHAPES[1]
+    moving = replace(spot, cone_angle=torch.tensor(spot.cone_angle, requires_grad=True))
+    known, free = unit_response(bvh, (spot, moving)).slopes
+    assert {*free} - {*known} == {"cone_angle", "falloff"}
+
+
 def test_eight_mixed_lights_are_the_sum_of_each(frozen: FrozenScene) -> None:
-    lights = rig(**parameters()).lights()
+    lights = rig(**parameters())
     assert {type(light) for light in lights} == {PointLight, SpotLight}
     together = frozen.radiance_of(lights)
     alone = torch.stack([frozen.radiance_of((light,)) for light in lights]).sum(dim=0)
@@ -148,16 +155,8 @@ def test_eight_mixed_lights_are_the_sum_of_each(frozen: FrozenScene) -> None:
 
 def test_radiance_is_linear_in_intensity(frozen: FrozenScene) -> None:
     once = rig(**parameters())
-    twice = replace(once, intensities=2.0 * once.intensities)
+    twice = tuple(replace(light, intensity=2.0 * light.intensity) for light in once)
     torch.testing.assert_close(frozen.radiance_of(twice), 2.0 * frozen.radiance_of(once), rtol=0, atol=0)
-
-
-def test_a_rig_comes_back_as_lights(bvh: SurfelBvh) -> None:
-    once = rig(**parameters())
-    again = Rig.of(once.lights())
-    assert again.shapes == SHAPES
-    # Measured 1e-7: axes come back with unit length.
-    torch.testing.assert_close(rig_irradiance(bvh, again), rig_irradiance(bvh, once), rtol=2e-6, atol=1e-6)
 
 
 def test_gradients_reach_the_tensors_of_the_lights(frozen: FrozenScene) -> None:
@@ -173,15 +172,3 @@ def test_gradients_reach_the_tensors_of_the_lights(frozen: FrozenScene) -> None:
 
 def test_a_rig_without_lights_is_dark(frozen: FrozenScene) -> None:
     assert float(frozen.radiance_of(()).abs().max()) == 0.0
-
-
-def test_rigs_that_do_not_fit_together_are_refused() -> None:
-    values = parameters()
-    with pytest.raises(ValueError, match="intensities must have shape"):
-        Rig(values["positions"], torch.ones(3, 3))
-    with pytest.raises(ValueError, match="a shape"):
-        Rig(values["positions"], torch.ones(8, 3), values["axes"], SHAPES[:3])
-    with pytest.raises(ValueError, match="and axes"):
-        Rig(values["positions"], torch.ones(8, 3), None, SHAPES)
-    with pytest.raises(ValueError, match="cone_angle"):
-        SpotShape("gaussian", 2.0 * math.pi, 0.1)

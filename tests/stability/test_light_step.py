@@ -10,9 +10,9 @@ from torch import Tensor
 
 import double_precision
 from double_precision import DoubleStep
+from emitters import emitter_at
 from hard_cases import CAMERAS, DEEP, INSIDE, LIGHTS, SCENES, HardScene, camera, scene_of_light
 from rgspipe.fitting.baselines.paper_adam_loss import AdamLoss, MovingRig
-from rgspipe.fitting.model.parameters import Emitter
 from rgspipe.fitting.model.problem import Effects, LightProblem
 from rgspipe.fitting.model.views import PreparedViews
 from rgspipe.renderer.frozen import FrozenScene
@@ -57,7 +57,7 @@ def compare(
     step = DoubleStep.of(views.frozen, scene.build(), views.operator.matrix)
     size, position = scene.size, scene.at(light)
     unit = torch.tensor([size**2, size**3, size**3, size**3], dtype=torch.float64)
-    found = LightProblem(views, torch.zeros(len(views.pixels), 3), 1.0, Effects()).evaluate(Emitter(position))
+    found = LightProblem(views, torch.zeros(len(views.pixels), 3), 1.0, Effects()).evaluate(emitter_at(position))
     expected = step.columns(position)
     # Measured at most 8e-6 and 3e-6; 5e-4 of the derivative with needles.
     within("image", found[..., 0] * unit[0], expected[..., 0] * unit[0], 2e-5)
@@ -73,7 +73,7 @@ def compare(
         if exact:
             loss = double_precision.adam_loss(step.image(*leaves), target, sizes, list(views.masks), 0.2)
         else:
-            rig = MovingRig(*(leaf[None] for leaf in leaves))
+            rig = MovingRig(*(leaf[None] for leaf in leaves), PointLight.shaped())
             loss = AdamLoss(views, target.float(), 0.2, Effects())(rig)
         loss.backward()
         results.append((loss[None], *(leaf.grad for leaf in leaves)))

@@ -64,7 +64,7 @@ def test_structural_similarity(first: str, second: str, within) -> None:
 
 def loss_and_gradients(views: PreparedViews, target: Tensor) -> list[Tensor]:
     leaves = [(INSIDE + 0.1).requires_grad_(), torch.zeros(3, dtype=torch.float64, requires_grad=True)]
-    loss = AdamLoss(views, target, 0.2, Effects())(MovingRig(*(leaf[None] for leaf in leaves)))
+    loss = AdamLoss(views, target, 0.2, Effects())(MovingRig(*(leaf[None] for leaf in leaves), PointLight.shaped()))
     loss.backward()
     return [loss.detach(), *(leaf.grad for leaf in leaves)]
 

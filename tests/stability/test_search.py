@@ -21,8 +21,7 @@ from rgspipe.renderer import reference
 from rgspipe.renderer.direct import unit_irradiance
 from rgspipe.renderer.kernels.shade import shade_rays
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
-from rgspipe.renderer.rig import Rig, unit_response
-from rgspipe.renderer.spot import spot_share
+from rgspipe.renderer.rig import unit_response
 from rgspipe.scene import NO_CLIP, Coverage, SpotLight, Surfels
 
 #: How far inputs move to see where the result stands still: a little and more, as jumps lie near or far.
@@ -218,13 +217,13 @@ def test_any_spot_on_any_soup(
     where = tensor(position)
     light = SpotLight(where, tensor([1.0, 1.0, 1.0]), length * direction, profile, cone, falloff)
     bvh = SurfelBvh(surfels)
-    response = unit_response(bvh, Rig.of((light,)), shadows=False)
-    for value in (response.irradiance, response.by_position, response.by_axis):
+    response = unit_response(bvh, (light,), shadows=False)
+    for value in (response.irradiance, *response.slopes[0].values()):
         assert torch.isfinite(value).all()
     point, _ = unit_irradiance(bvh, where[None], shadows=False)
     unit = replace(light, direction=torch.nn.functional.normalize(direction, dim=0))
-    expected = spot_share(unit, surfels.centers)
-    others = [spot_share(unit, moved.centers) for moved in shaken(surfels)]
+    expected = unit.share_towards(surfels.centers)
+    others = [unit.share_towards(moved.centers) for moved in shaken(surfels)]
     lit = point[0] > 0
     share = torch.where(lit, response.irradiance[0] / torch.where(lit, point[0], 1.0), expected.float())
     assert_agrees(share, expected, others, 1e-5)

@@ -11,7 +11,6 @@ from torch import Tensor
 from double_precision import DoubleTransport, in_double, irradiance
 from hard_cases import AXES, INSIDE, LIGHTS, ON_AXES, SOFT_SPOTS, SPOTS, room, spot
 from rgspipe.renderer.frozen import FrozenScene
-from rgspipe.renderer.spot import spot_share
 from rgspipe.scene import SpotLight
 
 PLACES = [name for name in LIGHTS if name != "inside a solid"]
@@ -40,7 +39,7 @@ def with_leaves(light: SpotLight, leaves: dict[str, Tensor]) -> SpotLight:
 
 def radiance_in_double(double: DoubleTransport, light: SpotLight, leaves: dict[str, Tensor]) -> Tensor:
     surfels = in_double(room())
-    share = spot_share(light, surfels.centers, leaves["position"], leaves["axis"])
+    share = with_leaves(light, leaves).share_towards(surfels.centers)
     lit = irradiance(surfels, leaves["position"]) * share
     return double.radiance(lit[:, None])[:, :, 0] * leaves["log_intensity"].exp()
 
@@ -71,7 +70,7 @@ def test_share_and_derivative(name: str, axis: list[float], within) -> None:
     light, centers, results = spot(name, axis), room().centers, []
     for dtype in (torch.float32, torch.float64):
         leaves = leaves_of(light, dtype)
-        share = spot_share(light, centers.to(dtype), leaves["position"], leaves["axis"])
+        share = with_leaves(light, leaves).share_towards(centers.to(dtype))
         weighted(share).backward()
         results.append((share, leaves["position"].grad, leaves["axis"].grad))
     for what, found, expected in zip(("share", "position", "axis"), *results, strict=True):

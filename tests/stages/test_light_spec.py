@@ -8,13 +8,13 @@ import pytest
 
 from rgspipe.config import RgspipeConfig, with_changes
 from rgspipe.errors import InputError
-from rgspipe.fitting.model.spot_harmonics import BandLimit
+from rgspipe.fitting.model.harmonics import BandLimit
 from rgspipe.stages.fit_light import STAGE, band_limit, light_spec
 
 
 def test_one_point_light_is_looked_for_by_default() -> None:
     spec = light_spec(RgspipeConfig(stage="fit_light"))
-    assert (spec.type, spec.count, spec.spots, spec.cone_free) == ("point", 1, False, False)
+    assert (spec.type, spec.count, spec.aimed, spec.shape_free) == ("point", 1, False, False)
 
 
 def test_angles_become_radians_and_a_blend_stays_a_share() -> None:
@@ -23,18 +23,20 @@ def test_angles_become_radians_and_a_blend_stays_a_share() -> None:
         {"light.type": "spot", "light.count": None, "light.spot.cone_angle": 30.0, "fit.cone": "free"},
     )
     spec = light_spec(config)
-    assert spec.count is None and spec.cone_free and len(spec.shapes()) == 3
+    assert spec.count is None and spec.shape_free and len(spec.kinds[0].variants()) == 3
     assert spec.shape.cone_angle == pytest.approx(math.pi / 6) and spec.shape.falloff == 0.15
     linear = with_changes(config, {"light.spot.profile": "linear", "light.spot.falloff": 15.0})
     assert light_spec(linear).shape.falloff == pytest.approx(math.pi / 12)
-    assert [shape.falloff / shape.cone_angle for shape in light_spec(linear).shapes()] == pytest.approx([0.5] * 3)
+    assert [shape.falloff / shape.cone_angle for shape in light_spec(linear).shape.variants()] == pytest.approx(
+        [0.5] * 3
+    )
 
 
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"light.spot.falloff": 2.0}, "at most 1"),
-        ({"light.spot.profile": "linear", "light.spot.falloff": 40.0}, "at most 25"),
+        ({"light.type": "spot", "light.spot.falloff": 2.0}, "at most 1"),
+        ({"light.type": "auto", "light.spot.profile": "linear", "light.spot.falloff": 40.0}, "at most 25"),
         ({"fit.method": "paper_adam", "light.count": None}, "light.count: .* 1 to 8"),
         ({"fit.method": "paper_adam", "light.type": "auto"}, "light.type: .* point or spot"),
         ({"fit.method": "paper_adam", "light.type": "spot", "fit.cone": "free"}, "fit.cone: .* known"),
@@ -50,7 +52,7 @@ def test_the_paper_s_method_takes_rigs_and_spots_of_known_number() -> None:
         RgspipeConfig(stage="fit_light"), {"fit.method": "paper_adam", "light.type": "spot", "light.count": 3}
     )
     spec = light_spec(config)
-    assert (spec.type, spec.count, spec.cone_free) == ("spot", 3, False)
+    assert (spec.type, spec.count, spec.shape_free) == ("spot", 3, False)
 
 
 def test_spots_are_exact_unless_harmonics_are_asked_for() -> None:

@@ -9,7 +9,6 @@ from dataclasses import replace
 
 import pandas as pd
 import torch
-from torch import Tensor
 
 from rgspipe.benchmark.effect_scenes import EffectScene
 from rgspipe.evaluation.timing import median_ms
@@ -17,8 +16,7 @@ from rgspipe.renderer.effect_bounds import EffectBounds, measure_effects
 from rgspipe.renderer.effects import ChosenScene, RigKind, choose_effects
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.shadow_bound import sample_lights, shadow_losses
-from rgspipe.renderer.spot import SpotShape
-from rgspipe.scene import LightRig, PointLight, SpotLight
+from rgspipe.scene import LightRig, PointLight
 
 #: Timed images with each set of effects, of which the fastest counts.
 RUNS = 5
@@ -65,7 +63,7 @@ def _row(
     begin = time.perf_counter()
     bounds = measure_effects(frozen, seed=seed)
     measured = 1e3 * (time.perf_counter() - begin)
-    choice = choose_effects(bounds, tolerance, RigKind(scene.points, scene.spots))
+    choice = choose_effects(bounds, tolerance, RigKind(scene.points, tuple(spot.least_share for spot in scene.spots)))
     chosen, view = ChosenScene.of(frozen, choice), frozen.view(scene.camera(resolution))
     generator = torch.Generator().manual_seed(seed + 1)
     rigs = [random_rig(scene, frozen, generator) for _ in range(lights)]
@@ -95,9 +93,7 @@ def random_rig(scene: EffectScene, frozen: FrozenScene, generator: torch.Generat
     aims = frozen.surfels.centers.to(positions)[torch.randint(len(frozen.surfels), (count,), generator=generator)]
     axes = torch.nn.functional.normalize(aims - positions, dim=1)
     points = [PointLight(positions[k], intensities[k]) for k in range(scene.points)]
-    spots = [
-        _spot(shape, positions[k], intensities[k], axes[k]) for k, shape in enumerate(scene.spots, start=scene.points)
-    ]
+    spots = [shape.at(positions[k], axes[k], intensities[k]) for k, shape in enumerate(scene.spots, start=scene.points)]
     return (*points, *spots)
 
 
@@ -105,10 +101,6 @@ def brightest_direct(frozen: FrozenScene, rig: LightRig) -> float:
     """The largest diffuse radiance of a surfel under a rig, without shadows and bounces; infinite if all is dark."""
     diffuse = replace(frozen, gloss=None)
     return float(diffuse.radiance_of(rig, indirect=False, shadows=False).max()) or math.inf
-
-
-def _spot(shape: SpotShape, position: Tensor, intensity: Tensor, axis: Tensor) -> SpotLight:
-    return SpotLight(position, intensity, axis, shape.profile, shape.cone_angle, shape.falloff)
 
 
 def _missed(frozen: FrozenScene, bounds: EffectBounds, lights: int, generator: torch.Generator) -> float:

@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 import torch
 
 from rgspipe.benchmark.rooms import GREY, RED, ROOMS, WHITE
-from rgspipe.renderer.spot import SpotShape
 from rgspipe.scene import Camera, Coverage, Surfels, look_at
 from rgspipe.scene.gloss import Gloss
+from rgspipe.scene.lights import SpotLight
 from rgspipe.scene.rectangles import Rectangles, inside_of_box, rectangle, solid_box, surfels_on
 from rgspipe.scene.surfels import NO_CLIP, quaternion_from_normal
 
@@ -25,7 +25,7 @@ class EffectScene:
         build: gives about so many surfels.
         eye, aim: where the camera stands and what it looks at.
         points: number of point lights of its rigs.
-        spots: shapes of the spots of its rigs.
+        spots: spots of the shapes that its rigs have.
     """
 
     name: str
@@ -33,7 +33,7 @@ class EffectScene:
     eye: tuple[float, float, float]
     aim: tuple[float, float, float]
     points: int = 1
-    spots: tuple[SpotShape, ...] = ()
+    spots: tuple[SpotLight, ...] = ()
 
     def camera(self, resolution: int) -> Camera:
         """A square image of the scene."""
@@ -133,9 +133,9 @@ def _scenes() -> dict[str, EffectScene]:
         "white walls": EffectScene("white walls", _on_rectangles(_room([0.9] * 3)), _OUTSIDE, _MIDDLE),
     }
     spots = {
-        "cornell": (SpotShape("gaussian", 0.5, 0.2), SpotShape("smoothstep", 0.6, 0.3)),
-        "ball": (SpotShape("linear", 0.5, 0.3),),
-        "flood": (SpotShape("gaussian", 3.1, 1.0),),
+        "cornell": (SpotLight.shaped("gaussian", 0.5, 0.2), SpotLight.shaped("smoothstep", 0.6, 0.3)),
+        "ball": (SpotLight.shaped("linear", 0.5, 0.3),),
+        "flood": (SpotLight.shaped("gaussian", 3.1, 1.0),),
     }
     lit_by_spots = {
         "cornell, two spots": replace(

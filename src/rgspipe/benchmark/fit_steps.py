@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 
 from rgspipe.evaluation.timing import Timing, measure
-from rgspipe.fitting.model.parameters import Emitter
+from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.model.views import prepare_views
 from rgspipe.renderer.frozen import FrozenScene
@@ -46,8 +46,8 @@ def fit_steps(frozen: FrozenScene, small: Camera, large: Camera, position: Tenso
         "irradiance and derivative": lambda: frozen.unit_irradiance(position[None]),
         "patch transport of four lightings": lambda: frozen.radiance(lightings),
         "view product": lambda: view.operator @ radiance,
-        "image and analytic derivative": lambda: problem.evaluate(Emitter(position)),
-        "… with direct light at pixels": lambda: sharp.evaluate(Emitter(position)),
+        "image and analytic derivative": lambda: problem.evaluate(Emitter(PointLight(position, 1.0))),
+        "… with direct light at pixels": lambda: sharp.evaluate(Emitter(PointLight(position, 1.0))),
         "forward and backward, one 128² view": lambda: forward_and_backward(frozen, [view], position),
         f"forward and backward, {MANY} 256² views": lambda: _many_views(frozen, many, position),
         "image by central differences": lambda: _central_differences(frozen, view, position),

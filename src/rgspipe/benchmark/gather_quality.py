@@ -15,7 +15,7 @@ from torch import Tensor
 
 from rgspipe.benchmark.form_factors import unoccluded_form_factors, with_sampled_visibility
 from rgspipe.benchmark.rooms import Room
-from rgspipe.fitting.model.parameters import Emitter
+from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.model.views import prepare_views
 from rgspipe.fitting.search_lm import fit_from
@@ -30,6 +30,7 @@ from rgspipe.renderer.point_sets import PointSet
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.transport import build_patch_transport
 from rgspipe.renderer.view_weights import ViewWeights, build_view_weights
+from rgspipe.scene import PointLight
 from rgspipe.scene.surfels import Surfels
 
 #: Numbers of rays that are compared.
@@ -177,7 +178,7 @@ def _biases(bench: _Bench, gather: SparseOperator, targets: list[list[Tensor]]) 
     for light, images in enumerate(targets):
         truth = bench.room.lights[light].double()
         problem = LightProblem.create(prepared, prepared.stack_images(images))
-        found = fit_from(problem, [Emitter(truth)]).lights[0].position
+        found = fit_from(problem, [Emitter(PointLight(truth, 1.0))]).lights[0].position
         kind = "open" if bench.room.clearance(light) >= IN_THE_OPEN else "near"
         errors[kind].append(float((found - truth).norm()) / scene.size)
     largest = {f"{kind}_bias": max(found, default=float("nan")) for kind, found in errors.items()}

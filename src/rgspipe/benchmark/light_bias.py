@@ -9,10 +9,11 @@ import pandas as pd
 from rgspipe.benchmark.rooms import Room
 from rgspipe.benchmark.settings import Model
 from rgspipe.benchmark.truth import Truth
-from rgspipe.fitting.model.parameters import Emitter
+from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.model.views import prepare_views
 from rgspipe.fitting.search_lm import fit_from
+from rgspipe.scene import PointLight
 
 #: Lights at least this far from any surface [scene units] count as in the open.
 IN_THE_OPEN = 0.1
@@ -34,7 +35,7 @@ def light_biases(room: Room, truth: Truth, model: Model) -> pd.DataFrame:
         for light in range(len(room.lights)):
             images = [small.image(camera, light, "global") for camera in chosen]
             problem = LightProblem.create(prepared, prepared.stack_images(images))
-            result = fit_from(problem, [Emitter(room.lights[light].double())])
+            result = fit_from(problem, [Emitter(PointLight(room.lights[light].double(), 1.0))])
             found = result.lights[0]
             error = float((found.position.cpu() - room.lights[light].double()).norm()) / model.frozen.size
             rows.append(

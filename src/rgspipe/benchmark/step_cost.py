@@ -10,7 +10,7 @@ from torch import Tensor
 
 from rgspipe.benchmark.settings import Model
 from rgspipe.evaluation.timing import median_ms
-from rgspipe.fitting.model.parameters import Emitter
+from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.problem import Effects, LightProblem
 from rgspipe.fitting.model.views import prepare_views
 from rgspipe.machine import peak_memory_now_mib, reset_peak_memory
@@ -62,7 +62,7 @@ def _step_at_pixels(model: Model) -> Callable[[Tensor], Tensor]:
     problem = LightProblem.create(prepared, white, Effects(shadows=model.shadows)).sharpest()
 
     def step(position: Tensor) -> Tensor:
-        columns = problem.evaluate(Emitter(position))
+        columns = problem.evaluate(Emitter(PointLight(position, 1.0)))
         return torch.einsum("pc,pcx->x", columns[:, :, 0], columns[:, :, 1:]) * (2.0 / columns[:, :, 0].numel())
 
     return step

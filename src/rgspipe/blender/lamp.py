@@ -1,17 +1,20 @@
-"""A lamp that shines as a point light or as any of our spots.
+"""A lamp that shines as any of our lights that stand in one point.
 
-Light is emitted by a point lamp of radius 0 whose shader multiplies it with the spot's profile of the angle between
+Light is emitted by a point lamp of radius 0 whose shader multiplies it with the light's profile of the angle between
 its axis and the direction in which the light leaves: one way for all profiles, also for those that Blender's own
 spots do not have.
 """
 
 from __future__ import annotations
 
-import math
+from collections.abc import Callable
+from functools import partial
 
 import bpy
 
-from rgspipe.scene import Light, SpotLight
+from rgspipe.scene import Light
+
+Value = bpy.types.NodeSocket | float
 
 
 def shape_lamp(lamp: bpy.types.Light, light: Light) -> None:
@@ -20,8 +23,9 @@ def shape_lamp(lamp: bpy.types.Light, light: Light) -> None:
     nodes = _Nodes(lamp.node_tree)
     emission, output = nodes.add("ShaderNodeEmission"), nodes.add("ShaderNodeOutputLight")
     nodes.tree.links.new(emission.outputs["Emission"], output.inputs["Surface"])
-    if isinstance(light, SpotLight):
-        nodes.tree.links.new(_share(nodes, light), emission.inputs["Strength"])
+    if light.axis is not None:
+        share = light.emission(_Maths(nodes), nodes.cosine(light.axis.tolist()))
+        nodes.tree.links.new(share, emission.inputs["Strength"])
 
 
 class _Nodes:
@@ -67,15 +71,27 @@ class _Nodes:
             socket.default_value = value
 
 
-def _share(nodes: _Nodes, light: SpotLight) -> bpy.types.NodeSocket:
-    """Share of the axial intensity; see `rgspipe.renderer.spot.spot_profile`."""
-    cosine = nodes.cosine(light.direction.tolist())
-    if light.profile == "smoothstep":
-        edge = math.cos(light.cone_angle)
-        return nodes.ramp("SMOOTHSTEP", cosine, edge, edge + light.falloff * (1.0 - edge))
-    angle = nodes.math("ARCCOSINE", nodes.math("MINIMUM", nodes.math("MAXIMUM", cosine, -1.0), 1.0))
-    if light.profile == "linear":
-        return nodes.ramp("LINEAR", angle, light.cone_angle, light.falloff)
-    outside = nodes.math("MAXIMUM", nodes.math("SUBTRACT", angle, light.cone_angle), 0.0)
-    widths = nodes.math("DIVIDE", outside, light.falloff)
-    return nodes.math("EXPONENT", nodes.math("MULTIPLY", nodes.math("MULTIPLY", widths, widths), -0.5))
+class _Maths:
+    """The expressions that profiles are made of, as nodes."""
+
+    def __init__(self, nodes: _Nodes) -> None:
+        self._nodes = nodes
+
+    def __getattr__(self, operation: str) -> Callable[..., bpy.types.NodeSocket]:
+        """Blender's own scalar operations: add, subtract, multiply, divide, power, minimum, maximum …"""
+        return partial(self._nodes.math, operation.upper())
+
+    def exponential(self, value: Value) -> bpy.types.NodeSocket:
+        return self._nodes.math("EXPONENT", value)
+
+    def arccosine(self, value: Value) -> bpy.types.NodeSocket:
+        """Of a cosine that rounding may have brought out of [−1, 1]."""
+        return self._nodes.math("ARCCOSINE", self.minimum(self.maximum(value, -1.0), 1.0))
+
+    def linear(self, value: Value, zero: float, one: float) -> bpy.types.NodeSocket:
+        """0 at `zero`, 1 at `one`, linear in between."""
+        return self._nodes.ramp("LINEAR", value, zero, one)
+
+    def smoothstep(self, value: Value, zero: float, one: float) -> bpy.types.NodeSocket:
+        """0 at `zero`, 1 at `one`, smooth in between."""
+        return self._nodes.ramp("SMOOTHSTEP", value, zero, one)

@@ -1,7 +1,9 @@
-"""Light files: a rig of point and spot lights as JSON, in scene units, W/sr and world axes."""
+"""Light files: a rig as JSON, in scene units, W/sr and world axes."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import torch
@@ -9,12 +11,9 @@ import torch
 from rgspipe.datasets.json_file import is_number, numbers, read_json, required
 from rgspipe.errors import InputError
 from rgspipe.files import write_json
-from rgspipe.scene import Light, LightRig, PointLight, SpotLight
+from rgspipe.scene.lights import KINDS, Light, LightRig
 
 VERSION = 1
-
-#: The key of a spot profile's `falloff`.
-FALLOFF_KEYS = {"gaussian": "falloff", "smoothstep": "blend", "linear": "beam_angle"}
 
 
 def read_lights(path: str | Path) -> LightRig:
@@ -59,50 +58,47 @@ def _merged(fields: dict, further: dict) -> dict:
 
 
 def _light_fields(light: Light) -> dict:
-    fields = {
-        "type": "spot" if isinstance(light, SpotLight) else "point",
-        "position": light.position.double().tolist(),
-        "intensity": light.intensity.double().tolist(),
-    }
-    if isinstance(light, SpotLight):
-        fields |= {"direction": light.direction.double().tolist(), "profile": light.profile}
-        fields |= {"cone_angle": light.cone_angle, FALLOFF_KEYS[light.profile]: light.falloff}
-    return fields
+    fields = {"type": light.kind}
+    fields |= {name: getattr(light, name).double().tolist() for name in ("position", "intensity")}
+    return fields | light.file_fields()
 
 
 def _read_light(fields: dict, path: str | Path, where: str) -> Light:
-    kind = required(fields, "type", f"{path}: {where}")
-    position = _vector(fields, "position", path, where)
-    intensity = _vector(fields, "intensity", path, where)
+    reader = _Fields(fields, f"{path}: {where}")
+    kind = KINDS[reader.choice("type", tuple(KINDS))]
+    position, intensity = reader.vector("position"), reader.vector("intensity")
     if (intensity < 0).any():
-        raise InputError(
-            f"{path}: {where}.intensity", expected="W/sr ≥ 0", found=str(intensity.tolist()), remedy="Correct it."
-        )
-    if kind == "point":
-        return PointLight(position, intensity)
-    if kind != "spot":
-        raise InputError(f"{path}: {where}.type", expected="point or spot", found=repr(kind), remedy="Correct it.")
-    direction = _vector(fields, "direction", path, where)
-    if direction.norm() == 0:
-        raise InputError(
-            f"{path}: {where}.direction", expected="a vector longer than 0", found="zero", remedy="Correct it."
-        )
-    profile = required(fields, "profile", f"{path}: {where}")
-    if profile not in FALLOFF_KEYS:
-        raise InputError(
-            f"{path}: {where}.profile", expected=" or ".join(FALLOFF_KEYS), found=repr(profile), remedy="Correct it."
-        )
-    cone_angle, falloff = (_scalar(fields, key, path, where) for key in ("cone_angle", FALLOFF_KEYS[profile]))
-    return SpotLight(position, intensity, direction / direction.norm(), profile, cone_angle, falloff)
+        raise reader.refusal("intensity", "W/sr ≥ 0", str(intensity.tolist()))
+    return kind.from_fields(position, intensity, reader)
 
 
-def _vector(fields: dict, key: str, path: str | Path, where: str) -> torch.Tensor:
-    place = f"{path}: {where}"
-    return torch.tensor(numbers(required(fields, key, place), 3, place, key), dtype=torch.float64)
+@dataclass(frozen=True)
+class _Fields:
+    """The fields of one light; see `rgspipe.scene.lights.light.Reader`."""
 
+    fields: dict
+    place: str
 
-def _scalar(fields: dict, key: str, path: str | Path, where: str) -> float:
-    value = required(fields, key, f"{path}: {where}")
-    if not is_number(value):
-        raise InputError(f"{path}: {where}.{key}", expected="a number", found=repr(value), remedy="Correct it.")
-    return float(value)
+    def vector(self, key: str) -> torch.Tensor:
+        return torch.tensor(numbers(required(self.fields, key, self.place), 3, self.place, key), dtype=torch.float64)
+
+    def direction(self, key: str) -> torch.Tensor:
+        vector = self.vector(key)
+        if vector.norm() == 0:
+            raise self.refusal(key, "a vector longer than 0", "zero")
+        return vector / vector.norm()
+
+    def number(self, key: str) -> float:
+        value = required(self.fields, key, self.place)
+        if not is_number(value):
+            raise self.refusal(key, "a number", repr(value))
+        return float(value)
+
+    def choice(self, key: str, names: Sequence[str]) -> str:
+        value = required(self.fields, key, self.place)
+        if value not in names:
+            raise self.refusal(key, " or ".join(names), repr(value))
+        return value
+
+    def refusal(self, key: str, expected: str, found: str) -> InputError:
+        return InputError(f"{self.place}.{key}", expected=expected, found=found, remedy="Correct it.")

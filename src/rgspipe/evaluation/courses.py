@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-import torch
 
 from rgspipe.evaluation.tables import rig_errors
-from rgspipe.scene import Light, LightRig, PointLight, SpotLight
+from rgspipe.scene import Light, LightRig
+from rgspipe.scene.lights.light import AXIS_COLUMNS
 
 #: At most so many steps of a fit are looked at: the first ones densely, as most happens there.
 MOST_STEPS = 150
@@ -106,16 +106,10 @@ def _rig(row: dict, found: LightRig) -> LightRig | None:
 
 
 def _light(row: dict, suffix: str, found: Light) -> Light | None:
-    values = [float(row.get(name + suffix, math.nan)) for name in "xyzrgb"]
-    axis = [float(row.get(name + suffix, math.nan)) for name in ("ax", "ay", "az")]
-    is_spot = bool(np.isfinite(axis).all())
-    if not np.isfinite(values).all() or is_spot != isinstance(found, SpotLight):
-        return None
-    numbers = torch.tensor(values, dtype=torch.float64)
-    if not isinstance(found, SpotLight):
-        return PointLight(numbers[:3], numbers[3:])
-    direction, cone = torch.tensor(axis, dtype=torch.float64), float(row[f"cone_angle{suffix}"])
-    return replace(found, position=numbers[:3], intensity=numbers[3:], direction=direction, cone_angle=cone)
+    """The light of a row; None where there is none, or one of another kind than `found`."""
+    values = {name: float(row.get(name + suffix, math.nan)) for name in (*found.columns(), *AXIS_COLUMNS)}
+    has_axis = all(math.isfinite(values[name]) for name in AXIS_COLUMNS)
+    return found.with_columns(values) if has_axis == (found.axis is not None) else None
 
 
 def _places(rig: LightRig) -> dict[str, float]:

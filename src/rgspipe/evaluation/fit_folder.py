@@ -18,7 +18,7 @@ from rgspipe.evaluation.images import progress_strip, save_png, stack
 from rgspipe.evaluation.metrics import psnr
 from rgspipe.fitting.fit import FitViews, render_rig
 from rgspipe.fitting.result import FitResult, Step
-from rgspipe.scene import LightRig, SpotLight
+from rgspipe.scene import LightRig
 
 #: What the light file says beside the lights, and results.csv repeats.
 FIELDS = ("loss", "iterations", "evaluations", "lights_tried", "seconds", "psnr", "result", "reason")
@@ -90,12 +90,8 @@ def _write_convergence(path: Path, steps: Sequence[Step]) -> None:
 
 
 def _light_columns(rig: LightRig) -> dict[str, float]:
-    """x … b of every light; of spots the axis (ax, ay, az) and cone_angle, too."""
+    """`Light.columns` of every light."""
     columns: dict[str, float] = {}
     for index, light in enumerate(rig):
-        named = dict(zip("xyzrgb", [*light.position.tolist(), *light.intensity.tolist()], strict=True))
-        if isinstance(light, SpotLight):
-            named |= dict(zip(("ax", "ay", "az"), light.direction.tolist(), strict=True))
-            named["cone_angle"] = light.cone_angle
-        columns |= {name if index == 0 else f"{name}_{index}": value for name, value in named.items()}
+        columns |= {name if index == 0 else f"{name}_{index}": value for name, value in light.columns().items()}
     return columns

@@ -13,7 +13,7 @@ from scipy.optimize import linear_sum_assignment
 
 from rgspipe.evaluation import calibration, metrics
 from rgspipe.evaluation.arrays import ArrayLike, to_array
-from rgspipe.scene import Light, LightRig, SpotLight
+from rgspipe.scene import Light, LightRig
 
 #: Occlusion classes in the order in which every table and figure shows them.
 CLASSES = ("visible", "out_of_frame", "occluded", "around_corner", "mixed", "unknown")
@@ -135,27 +135,32 @@ def rig_errors(estimate: LightRig, truth: LightRig, scene_size: float) -> RigErr
     if not truth:
         raise ValueError("the true rig has no light")
     if not estimate:
-        lost = math.inf if any(isinstance(light, SpotLight) for light in truth) else math.nan
+        lost = math.inf if any(light.axis is not None for light in truth) else math.nan
         return RigErrors(math.inf, math.inf, lost, lost, ())
     found = np.stack([to_array(light.position) for light in estimate])
     wanted = np.stack([to_array(light.position) for light in truth])
     pairs = match_positions(found, wanted)
     positions = [metrics.position_error(found[i], wanted[j], scene_size) for i, j in pairs]
     intensities = [metrics.intensity_error(estimate[i].intensity, truth[j].intensity) for i, j in pairs]
-    axis, cone = _spot_errors([(estimate[i], truth[j]) for i, j in pairs])
-    return RigErrors(max(positions), float(np.mean(intensities)), axis, cone, pairs)
+    axis, shape = _shape_errors([(estimate[i], truth[j]) for i, j in pairs])
+    return RigErrors(max(positions), float(np.mean(intensities)), axis, shape, pairs)
 
 
-def _spot_errors(pairs: Sequence[tuple[Light, Light]]) -> tuple[float, float]:
-    """The largest errors of axes and cones [degrees] of matched lights (estimate, truth)."""
-    spots = [(found, wanted) for found, wanted in pairs if isinstance(wanted, SpotLight)]
-    if not spots:
+def _shape_errors(pairs: Sequence[tuple[Light, Light]]) -> tuple[float, float]:
+    """The largest errors of axes [degrees] and of the first numbers of shapes of matched lights (estimate, truth)."""
+    aimed = [(found, wanted) for found, wanted in pairs if wanted.axis is not None]
+    if not aimed:
         return math.nan, math.nan
-    if not all(isinstance(found, SpotLight) for found, _ in spots):
+    if not all(found.kind == wanted.kind for found, wanted in aimed):
         return math.inf, math.inf
-    axes = [metrics.angle_between(found.direction, wanted.direction) for found, wanted in spots]
-    cones = [abs(math.degrees(found.cone_angle - wanted.cone_angle)) for found, wanted in spots]
-    return max(axes), max(cones)
+    axes = [metrics.angle_between(found.axis, wanted.axis) for found, wanted in aimed]
+    return max(axes), max((_first_number(found, wanted) for found, wanted in aimed), default=math.nan)
+
+
+def _first_number(found: Light, wanted: Light) -> float:
+    """By how much the first number of a shape is off, a spot's cone angle for one, in its own unit."""
+    number = wanted.shape[0]
+    return abs(number.shown(getattr(found, number.name) - getattr(wanted, number.name)))
 
 
 def target_table(
@@ -304,7 +309,7 @@ def _types_right(estimate: LightRig, truth: LightRig, pairs: Sequence[tuple[int,
     """Whether the lights are as many as there are, each of the type of its match; None where the truth is not known."""
     if not truth:
         return None
-    return len(estimate) == len(truth) and all(isinstance(estimate[i], type(truth[j])) for i, j in pairs)
+    return len(estimate) == len(truth) and all(estimate[i].kind == truth[j].kind for i, j in pairs)
 
 
 def _inside(

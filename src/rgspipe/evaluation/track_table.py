@@ -17,7 +17,7 @@ from rgspipe.evaluation.arrays import ArrayLike, to_array
 from rgspipe.evaluation.scene_drawing import PANELS, TRUTH, draw_surfaces, frame_panel, window
 from rgspipe.evaluation.tables import match_positions
 from rgspipe.fitting.tracking.frame import TrackedFrame
-from rgspipe.scene import Light, LightRig, SpotLight
+from rgspipe.scene import Light, LightRig
 
 #: Colours of the lights, in turn.
 COLOURS = ("#0072B2", "#E69F00", "#6A1B4D", "#2DB58A")
@@ -135,12 +135,7 @@ def _errors_by_frame(axis: Axes, found: pd.DataFrame) -> None:
 
 
 def _light(light: Light) -> dict[str, object]:
-    named: dict[str, object] = {"type": "spot" if isinstance(light, SpotLight) else "point"}
-    named |= dict(zip("xyzrgb", [*light.position.tolist(), *light.intensity.tolist()], strict=True))
-    if isinstance(light, SpotLight):
-        named |= dict(zip(("ax", "ay", "az"), light.direction.tolist(), strict=True))
-        named["cone_angle"] = light.cone_angle
-    return named
+    return {"type": light.kind, **light.columns()}
 
 
 def _errors(rig: LightRig, truth: LightRig, scene_size: float) -> list[dict[str, float]]:
@@ -152,6 +147,6 @@ def _errors(rig: LightRig, truth: LightRig, scene_size: float) -> list[dict[str,
         one, other = rig[k], truth[j]
         errors[k]["position_error"] = metrics.position_error(one.position, other.position, scene_size)
         errors[k]["intensity_error"] = metrics.intensity_error(one.intensity, other.intensity)
-        if isinstance(one, SpotLight) and isinstance(other, SpotLight):
-            errors[k]["axis_error"] = metrics.angle_between(one.direction, other.direction)
+        if one.axis is not None and other.axis is not None:
+            errors[k]["axis_error"] = metrics.angle_between(one.axis, other.axis)
     return errors

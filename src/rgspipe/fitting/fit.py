@@ -16,17 +16,16 @@ from rgspipe.fitting.model.gloss import bounced_light
 from rgspipe.fitting.model.problem import Effects, LightProblem
 from rgspipe.fitting.model.views import PreparedViews, prepare_views
 from rgspipe.fitting.result import FitResult
+from rgspipe.fitting.search.aimed_candidates import aimed_candidates
 from rgspipe.fitting.search.coarse import CoarseImages, coarse_images
-from rgspipe.fitting.search.spot_candidates import spot_candidates
 from rgspipe.fitting.search_lm import SearchOptions, fit_search_lm
 from rgspipe.fitting.spec import LightSpec
 from rgspipe.renderer.dictionary import LightDictionary
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.pixel_direct import surfel_shares
-from rgspipe.renderer.rig import Rig, unit_response
-from rgspipe.renderer.spot import spot_share
+from rgspipe.renderer.rig import unit_response
 from rgspipe.renderer.view_weights import ViewWeights
-from rgspipe.scene import Camera, Light, LightRig, PointLight, SpotLight
+from rgspipe.scene import Camera, Light, LightRig, PointLight
 
 METHODS = ("search_lm", "paper_adam", "finite_differences")
 
@@ -74,11 +73,15 @@ def prepare_fit(
 def _candidates(
     prepared: PreparedViews, blocks: BlockModel, dictionary: LightDictionary, effects: Effects, spec: LightSpec
 ) -> tuple[CoarseImages, ...]:
-    """Candidates of the kinds of light that are looked for; points first."""
-    points = () if spec.type == "spot" else (coarse_images(prepared.frozen, blocks, dictionary),)
-    if not spec.spots:
-        return points
-    return (*points, spot_candidates(prepared, dictionary, spec.shapes(), interreflection=effects.interreflection))
+    """Candidates of each kind of light that is looked for, the plainest first."""
+
+    def of(kind: Light) -> CoarseImages:
+        if kind.axis is None:
+            return coarse_images(prepared.frozen, blocks, dictionary)
+        shapes = kind.variants() if spec.shape_free else (kind,)
+        return aimed_candidates(prepared, dictionary, shapes, interreflection=effects.interreflection)
+
+    return tuple(map(of, spec.kinds))
 
 
 def fit_lights(
@@ -165,7 +168,7 @@ def render_rig(views: FitViews, rig: LightRig) -> list[Tensor]:
     stacked = torch.zeros((operator.shape[0], 3), device=operator.matrix.device)
     if rig:
         indirect = effects.interreflection
-        irradiance = unit_response(frozen.bvh, Rig.of(rig), effects.shadows).irradiance.T
+        irradiance = unit_response(frozen.bvh, rig, effects.shadows).irradiance.T
         strength = torch.stack([light.intensity for light in rig]).to(irradiance)
         radiance = frozen.radiance(irradiance, indirect)
         if prepared.pixel_direct:
@@ -196,6 +199,5 @@ def _direct_at_pixels(views: FitViews, light: Light) -> Tensor:
     image = torch.cat([one.image(position, *shares)[:, :, 0] for one in prepared.pixel_direct])
     if prepared.highlights:
         image = image + torch.cat([one.image(position, *shares)[:, :, 0] for one in prepared.highlights])
-    if isinstance(light, SpotLight):
-        image = image * spot_share(light, prepared.all_points.to(position))[:, None].to(image)
-    return image
+    share = light.share(prepared.all_points)
+    return image if share is None else image * share.value[:, None]

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from html import escape
 from typing import TYPE_CHECKING
 
-from rgspipe.scene import Light, SpotLight
+from rgspipe.scene import Light
 
 if TYPE_CHECKING:
     from rgspipe.fitting.result import FitResult
@@ -44,11 +44,12 @@ def light_line(light: Light, covariance: Sequence[Sequence[float]] | None = None
     """
     variances = None if covariance is None else [float(row[index]) for index, row in enumerate(covariance)]
     place, colour = (", ".join(f"{value:.3f}" for value in part.tolist()) for part in (light.position, light.intensity))
-    told = f"{'spot' if isinstance(light, SpotLight) else 'point'} at ({place})"
+    told = f"{light.kind} at ({place})"
     told += "" if variances is None else _deviation(variances[:3], "{:.4f}")
-    if isinstance(light, SpotLight):
-        axis = ", ".join(f"{value:.3f}" for value in light.direction.tolist())
-        told += f", axis ({axis}), cone {math.degrees(light.cone_angle):.1f}°"
+    if light.axis is not None:
+        told += f", axis ({', '.join(f'{value:.3f}' for value in light.axis.tolist())})"
+        number = light.shape[0]
+        told += f", {number.key.replace('_', ' ')} {number.shown(getattr(light, number.name)):.1f}{number.unit}"
     told += f", RGB ({colour}) W/sr"
     return told + ("" if variances is None else _deviation(variances[-3:], "{:.3f}"))
 

@@ -11,8 +11,8 @@ from rgspipe.fitting.certainty.doubts import doubts
 from rgspipe.fitting.certainty.uncertainty import light_covariances
 from rgspipe.fitting.meter import Meter
 from rgspipe.fitting.model.blocks import BlockModel, view_of_blocks
+from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.exposure import rough_exposures
-from rgspipe.fitting.model.parameters import Emitter
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.result import FitResult, dark_result
 from rgspipe.fitting.search.coarse import CoarseImages
@@ -39,8 +39,8 @@ from rgspipe.fitting.selection.one_more import one_more_light
 from rgspipe.fitting.selection.verdict import Findings, SpareLight, counted_from, percent
 from rgspipe.fitting.spec import MOST_LIGHTS, LightSpec
 
-#: Starts for each wanted one, where spots are among the candidates.
-SPOT_STARTS = 3
+#: Starts for each wanted one, where candidates have an axis.
+AIMED_STARTS = 3
 
 #: A number of lights that is known is searched from up to so many times the wanted starts, until the best one leaves
 #: less than this share of the blocks' energy unexplained.
@@ -87,7 +87,7 @@ def fit_search_lm(
     if problem.black:
         return dark_result(meter.seconds)
     problem = _roughly_exposed(problem, coarse)
-    candidates = [Candidates.of(problem, images, spec.cone_free) for images in coarse]
+    candidates = [Candidates.of(problem, images, spec.shape_free) for images in coarse]
     candidates = [one for one in candidates if one.lit]
     if not candidates:
         return dark_result(meter.seconds)
@@ -204,8 +204,8 @@ class _Search:
         return self._with_plain_lights(best) if self.spec.type == "auto" else best
 
     def _starts(self, candidates: Candidates, lights: int, previous: State | None, batches: int) -> list[Rig]:
-        spots = candidates.coarse.axes is not None
-        count = self.options.starts * (SPOT_STARTS if spots else 1) * batches
+        aimed = candidates.coarse.axes is not None
+        count = self.options.starts * (AIMED_STARTS if aimed else 1) * batches
         if previous is None or len(previous.emitters) != lights - 1:
             return candidates.rigs(lights, count, self.region.size)
         half = max(1, count // 2)
@@ -241,11 +241,11 @@ class _Search:
         return min(settled, key=self.refiner.unexplained)
 
     def _with_plain_lights(self, state: State) -> State:
-        """The rig with point lights in the place of those spots whose cones explain too little."""
+        """The rig with plain lights in the place of those whose shapes explain too little."""
         for index, emitter in enumerate(state.emitters):
-            if emitter.is_spot:
+            if emitter.axis is not None:
                 plain = [*state.emitters]
-                plain[index] = Emitter(emitter.position)
+                plain[index] = Emitter(emitter.light.plain)
                 other = self.refiner.refined(self.refiner.start(plain, ROBUST), ROBUST, SHORT_ITERATIONS)
                 state = state if drop(self.coarse, other, state) >= LEAST_DROP else other
         return state

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 
-from rgspipe.renderer.spot import SpotShape
+from rgspipe.scene.lights import KINDS, Light
 
-TYPES = ("point", "spot", "auto")
+#: Each light may be a point or a spot: it is a spot where that is worth it.
+AUTO = "auto"
+
+#: The kinds among which "auto" chooses, the plainest first.
+AUTO_KINDS = ("point", "spot")
+
+TYPES = (*KINDS, AUTO)
 
 #: Where the number of lights is not known, at most so many are tried.
 MOST_LIGHTS = 8
-
-#: Cone angles that a search tries where the cone is free, rad.
-CONES = tuple(math.radians(angle) for angle in (15.0, 25.0, 40.0))
 
 
 @dataclass(frozen=True)
@@ -21,38 +23,43 @@ class LightSpec:
     """The lights that are looked for.
 
     Attributes:
-        type: "point", "spot", or "auto": each light may be either, and is a spot where that is worth it.
+        type: a kind of light by name, or "auto": each light may be a point or a spot.
         count: how many; None where it is not known (1 to MOST_LIGHTS).
-        shape: the spots' profile; where the cone is free, only the kind of profile and a rim to begin with.
-        cone_free: whether the cone angle, and the falloff of a Gaussian profile, are recovered, too.
+        shape: a light of that kind ("auto": a spot), of which the shape is meant and not the place, such as
+            `SpotLight.shaped("gaussian", 0.4, 0.1)`; the kind's usual one if None.
+        shape_free: whether the numbers of the shape (cone angle, exponent …) are recovered, too; what `shape` says of
+            them is then only where to begin.
 
     Raises:
-        ValueError: an unknown type, or a count out of range.
+        ValueError: an unknown type, a count out of range, or a shape of another kind.
     """
 
     type: str = "point"
     count: int | None = 1
-    shape: SpotShape = field(default_factory=lambda: SpotShape("smoothstep", math.radians(25.0), 0.15))
-    cone_free: bool = False
+    shape: Light | None = None
+    shape_free: bool = False
 
     def __post_init__(self) -> None:
         if self.type not in TYPES:
             raise ValueError(f"type must be one of {TYPES}, got {self.type!r}")
         if self.count is not None and not 1 <= self.count <= MOST_LIGHTS:
             raise ValueError(f"count must be None or 1 to {MOST_LIGHTS}, got {self.count}")
+        kind = shaped_kind(self.type)
+        if self.shape is not None and self.shape.kind != kind:
+            raise ValueError(f"the shape of lights of type {self.type!r} must be a {kind}, got {self.shape}")
 
     @property
-    def spots(self) -> bool:
-        """Whether spots may be among the lights."""
-        return self.type != "point"
+    def kinds(self) -> tuple[Light, ...]:
+        """A light of each kind that may be there, of the shape that it has; the plainest first."""
+        names = AUTO_KINDS if self.type == AUTO else (self.type,)
+        return (*(KINDS[name].shaped() for name in names[:-1]), self.shape or KINDS[names[-1]].shaped())
 
-    def shapes(self) -> tuple[SpotShape, ...]:
-        """The profiles that a search tries."""
-        return tuple(_with_cone(self.shape, cone) for cone in CONES) if self.cone_free else (self.shape,)
+    @property
+    def aimed(self) -> bool:
+        """Whether lights with an axis may be among them."""
+        return any(light.axis is not None for light in self.kinds)
 
 
-def _with_cone(shape: SpotShape, cone: float) -> SpotShape:
-    """The profile with another cone angle; a linear one keeps the ratio of its two angles."""
-    if shape.profile == "linear" and shape.cone_angle > 0.0:
-        return replace(shape, cone_angle=cone, falloff=shape.falloff * cone / shape.cone_angle)
-    return replace(shape, cone_angle=cone)
+def shaped_kind(type: str) -> str:
+    """The kind whose shape is that of lights of a type."""
+    return AUTO_KINDS[-1] if type == AUTO else type

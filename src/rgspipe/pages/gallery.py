@@ -11,7 +11,7 @@ from rgspipe.datasets.views import Target, View
 from rgspipe.evaluation import images
 from rgspipe.evaluation.tables import class_order
 from rgspipe.pages.html import label
-from rgspipe.scene import LightRig, SpotLight
+from rgspipe.scene import LightRig
 
 #: Training views that are shown, and targets of each class.
 SHOWN_VIEWS, SHOWN_TARGETS = 6, 2
@@ -98,7 +98,7 @@ def light_words(rig: LightRig) -> str:
     for light in rig:
         place = ", ".join(f"{value:.2f}" for value in light.position.tolist())
         strength = " / ".join(f"{value:.2f}" for value in light.intensity.tolist())
-        parts.append(f"{'spot' if isinstance(light, SpotLight) else 'light'} at ({place}), {strength} W/sr")
+        parts.append(f"{'light' if light.axis is None else light.kind} at ({place}), {strength} W/sr")
     return "; ".join(parts).replace("-", "−")
 
 

@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from rgspipe.evaluation import plots
 from rgspipe.evaluation.arrays import ArrayLike, to_array
 from rgspipe.evaluation.scene_drawing import PANELS, TRUTH, draw_surfaces, frame_panel, window
-from rgspipe.scene import LightRig, SpotLight
+from rgspipe.scene import LightRig
 
 #: Colours of the targets that are shown, in turn.
 COLOURS = ("#0072B2", "#E69F00", "#6A1B4D", "#2DB58A", "#56B4E9", "#D55E00")
@@ -60,8 +60,8 @@ def targets_figure(
 def _lights(axis: Axes, rig: LightRig, across: int, up: int, reach: float, colour: str, size: float) -> None:
     for light in rig:
         place = np.array(light.position.tolist())
-        if isinstance(light, SpotLight):
-            end = place + reach * np.array(light.direction.tolist()) / float(light.direction.norm())
+        if light.axis is not None:
+            end = place + reach * np.array(light.axis.tolist()) / float(light.axis.norm())
             axis.plot(*np.stack([place, end])[:, [across, up]].T, "-", color=colour, lw=0.25 * size, zorder=3)
         axis.plot(place[across], place[up], "o", color=colour, ms=size, mew=0, zorder=4)
 

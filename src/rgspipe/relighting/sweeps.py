@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from rgspipe.renderer.spot import SpotShape, angle_from_axis
 from rgspipe.scene import SpotLight
+from rgspipe.scene.lights.angles import angle_from_axis
 
 #: Two axes are different, and turn into each other in one way, where the angle between them is this far from 0 and π.
 LEAST_TURN = 1e-3
@@ -31,18 +31,17 @@ class SpotKind:
     """The spot of a sweep.
 
     Attributes:
-        shape: its profile.
+        shape: a spot of its profile, wherever it is.
         intensity: (3,) W/sr on the axis.
     """
 
-    shape: SpotShape
+    shape: SpotLight
     intensity: Tensor
 
     def light(self, position: Tensor, direction: Tensor) -> SpotLight:
         """The spot at `position` (3,), along `direction` (3,) of any length but zero."""
         axis = torch.nn.functional.normalize(direction.double(), dim=0)
-        shape = self.shape
-        return SpotLight(position.double(), self.intensity, axis, shape.profile, shape.cone_angle, shape.falloff)
+        return self.shape.at(position.double(), axis, self.intensity)
 
 
 @dataclass(frozen=True)

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
-from math import pi
 
 import torch
 
 from rgspipe.renderer.effect_bounds import NO_BOUND, EffectBounds, bounces_needed
 from rgspipe.renderer.frozen import FrozenScene
-from rgspipe.renderer.rig import Rig
-from rgspipe.renderer.spot import SpotShape
 from rgspipe.renderer.view_weights import ViewWeights
-from rgspipe.scene.lights import LightRig, SpotLight
+from rgspipe.scene.lights import LightRig
 
 #: The effects that are decided on.
 EFFECTS = ("shadows", "interreflection", "spot cones", "specular lobes")
@@ -27,16 +24,16 @@ class RigKind:
     """What the choice of effects depends on in a rig; it does not depend on where lights are, how bright, how aimed.
 
     Attributes:
-        points: number of point lights.
-        spots: the shapes of the spots.
+        points: number of lights that shine alike in all directions.
+        spots: of every other light the smallest share of its intensity that it sends anywhere.
     """
 
     points: int
-    spots: tuple[SpotShape, ...] = ()
+    spots: tuple[float, ...] = ()
 
     @classmethod
     def of(cls, rig: LightRig) -> RigKind:
-        spots = tuple(SpotShape.of(light) for light in rig if isinstance(light, SpotLight))
+        spots = tuple(light.least_share for light in rig if light.axis is not None)
         return cls(len(rig) - len(spots), spots)
 
 
@@ -149,13 +146,11 @@ def rig_bounds(bounds: EffectBounds, rig: RigKind) -> dict[str, float]:
     }
 
 
-def cone_bound(shape: SpotShape) -> float:
-    """What a spot's profile can change against a point light, (1 − p(π))/p(π), wherever it stands and is aimed.
+def cone_bound(smallest: float) -> float:
+    """What a profile with smallest share p can change against a point light, (1 − p)/p, wherever it is aimed.
 
-    No profile rises with the angle, so no share is smaller than that straight backwards, and the brightest surfel has
-    at least this share of what it has under a point light.
+    The brightest surfel has at least this share of what it has under a point light.
     """
-    smallest = float(shape.share(torch.tensor([pi], dtype=torch.float64)))
     return min(NO_BOUND, (1.0 - smallest) / smallest) if smallest > 0.0 else NO_BOUND
 
 
@@ -175,11 +170,9 @@ class ChosenScene:
     def of(cls, frozen: FrozenScene, choice: EffectChoice) -> ChosenScene:
         return cls(frozen if choice.specular else replace(frozen, gloss=None), choice)
 
-    def render(self, view: ViewWeights, rig: LightRig | Rig) -> torch.Tensor:
+    def render(self, view: ViewWeights, rig: LightRig) -> torch.Tensor:
         """(height, width, 3) image under a rig of the kind that the choice was made for."""
-        rig = rig if isinstance(rig, Rig) else Rig.of(rig)
-        if not self.choice.spots and any(rig.shapes):
-            rig = Rig(rig.positions, rig.intensities)
+        rig = rig if self.choice.spots else tuple(light.plain for light in rig)
         return self.frozen.render(view, rig, self.choice.interreflection, self.choice.shadows)
 
 

@@ -25,7 +25,7 @@ from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.monte_carlo import MonteCarloSolver
 from rgspipe.renderer.openness import openness
 from rgspipe.renderer.radiosity import GatherSolver
-from rgspipe.renderer.rig import Rig, rig_irradiance, unit_response
+from rgspipe.renderer.rig import rig_irradiance, unit_response
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.surroundings import OPEN, Surroundings
 from rgspipe.renderer.transport import PatchTransport, build_patch_transport, with_bounces
@@ -236,25 +236,24 @@ class FrozenScene:
         direct = self.surfels.albedo[:, :, None] * (irradiance / math.pi)[:, None, :]
         return direct + self.indirect(direct) if indirect else direct
 
-    def radiance_of(self, rig: LightRig | Rig, indirect: bool = True, shadows: bool = True) -> Tensor:
-        """Outgoing radiance (N, 3) under a rig of point and spot lights, differentiable towards its tensors.
+    def radiance_of(self, rig: LightRig, indirect: bool = True, shadows: bool = True) -> Tensor:
+        """Outgoing radiance (N, 3) under a rig, differentiable towards the tensors of its lights.
 
         The lights are added up before their light bounces, so a rig costs as many bounces as one light. Of a glossy
         scene this is the diffuse part, which is the same in all directions; `glossy_light` has all of it.
         """
-        rig = rig if isinstance(rig, Rig) else Rig.of(rig)
         if self.gloss is not None:
             return self.glossy_light(rig, indirect, shadows).radiance
         direct = self.surfels.albedo * (rig_irradiance(self.bvh, rig, shadows) / math.pi)
         return direct + self.indirect(direct[:, :, None])[:, :, 0] if indirect else direct
 
-    def render(self, view: ViewWeights, rig: LightRig | Rig, indirect: bool = True, shadows: bool = True) -> Tensor:
+    def render(self, view: ViewWeights, rig: LightRig, indirect: bool = True, shadows: bool = True) -> Tensor:
         """(height, width, 3) image of the scene under `rig`."""
         if self.gloss is not None:
             return view.image(self.glossy_light(rig, indirect, shadows).seen_from(view.camera.origin))
         return view.image(self.radiance_of(rig, indirect, shadows))
 
-    def glossy_light(self, rig: LightRig | Rig, indirect: bool = True, shadows: bool = True) -> GlossyLight:
+    def glossy_light(self, rig: LightRig, indirect: bool = True, shadows: bool = True) -> GlossyLight:
         """The light of a scene with gloss under `rig`, to be seen from anywhere; differentiable like `radiance_of`.
 
         Raises:
@@ -262,8 +261,7 @@ class FrozenScene:
         """
         if self.gloss is None:
             raise ValueError("a diffuse scene has no glossy light: use radiance_of")
-        rig = rig if isinstance(rig, Rig) else Rig.of(rig)
-        return self.gloss.light(self.solver or self.transport, rig, unit_response(self.bvh, rig, shadows), indirect)
+        return self.gloss.light(self.solver or self.transport, unit_response(self.bvh, rig, shadows), indirect)
 
 
 def _gather(bvh: SurfelBvh, rays: int, areas: Tensor, seed: int) -> SparseOperator:

@@ -26,7 +26,7 @@ from torch import Tensor
 
 from rgspipe.renderer.glossy import lobe_coefficients, mirrored, phong_lobe, soft_directions
 from rgspipe.renderer.glossy_operators import GlossyOperators, build_glossy_operators
-from rgspipe.renderer.rig import Rig, RigResponse
+from rgspipe.renderer.rig import RigResponse
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.spherical_harmonics import coefficient_count, per_harmonic, real_harmonics
 from rgspipe.renderer.transport import PatchTransport
@@ -97,18 +97,17 @@ class GlossyTransport:
         """(…, G, 3) unit directions from the glossy surfels to points (…, 3), with a finite derivative everywhere."""
         return soft_directions(self.vectors(points), self.geometry[2])
 
-    def light(self, transport: PatchTransport, rig: Rig, response: RigResponse, indirect: bool = True) -> GlossyLight:
-        """All light of the scene under a rig of L lights, differentiable towards the rig's tensors.
+    def light(self, transport: PatchTransport, response: RigResponse, indirect: bool = True) -> GlossyLight:
+        """All light of the scene under a rig of L lights, differentiable towards their tensors.
 
         Args:
             transport: the diffuse bounces of the scene.
-            response: of all N surfels to `rig`.
+            response: of all N surfels to the rig.
             indirect: whether light that has been reflected is followed.
         """
-        intensities = rig.intensities.to(response.irradiance)
-        coloured = _attached(rig, response)[:, :, None] * intensities[:, None]
+        coloured = response.attached()[:, :, None] * response.intensities[:, None]
         radiance = self.surfels.albedo * coloured.sum(dim=0) / math.pi
-        towards, on_gloss = self.directions(rig.positions), coloured[:, self.glossy]
+        towards, on_gloss = self.directions(response.positions), coloured[:, self.glossy]
         reflected = radiance.new_zeros(len(self.glossy), coefficient_count(self.degree), 3)
         if indirect:
             emitted = self.highlights(towards, on_gloss).sum(dim=0)[..., None]
@@ -223,19 +222,6 @@ def build_glossy_transport(
         return None
     operators = build_glossy_operators(surfels, glossy, gather, transport.average, degree)
     return GlossyTransport(surfels, glossy, operators)
-
-
-def _attached(rig: Rig, response: RigResponse) -> Tensor:
-    """(L, N) irradiance of unit intensity that autograd knows how to differentiate towards the rig's tensors.
-
-    What is added is zero, and its derivative is the response's: exact to first order, as any derivative is.
-    """
-    positions = (rig.positions - rig.positions.detach()).to(response.irradiance)
-    irradiance = response.irradiance + torch.einsum("lnc,lc->ln", response.by_position, positions)
-    if response.by_axis is None:
-        return irradiance
-    axes = (rig.axes - rig.axes.detach()).to(response.irradiance)
-    return irradiance + torch.einsum("lnc,lc->ln", response.by_axis, axes)
 
 
 def _largest(values: Tensor, inner: torch.Size) -> Tensor:

@@ -18,10 +18,10 @@ from rgspipe.datasets.json_file import numbers
 from rgspipe.datasets.landscape_file import Landscape, PlaneLoss, landscape_bytes
 from rgspipe.datasets.location import dataset_root
 from rgspipe.fitting import FitResult, FitViews
-from rgspipe.fitting.certainty.advice import SPOT_ROWS, ViewAdvice, suggest_views
+from rgspipe.fitting.certainty.advice import ViewAdvice, suggest_views
 from rgspipe.fitting.certainty.landscape import loss_slices
 from rgspipe.fitting.model.capture import ImageCapture
-from rgspipe.fitting.model.parameters import Emitter
+from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.scene import Camera
 
@@ -114,7 +114,7 @@ def _landscape(views: FitViews, images: Sequence[Tensor], result: FitResult, cap
     if result.exposures:
         problem = problem.with_exposures(torch.tensor(result.exposures, dtype=torch.float64))
     pairs = zip(result.lights, result.covariance, strict=True)
-    rig = [Emitter.of(light, cone_free=len(matrix) > SPOT_ROWS) for light, matrix in pairs]
+    rig = [Emitter.fitted(light, matrix) for light, matrix in pairs]
     planes = {
         "".join("xyz"[k] for k in one.axes): PlaneLoss(one.across.numpy(), one.up.numpy(), one.loss.numpy())
         for one in loss_slices(problem, rig)

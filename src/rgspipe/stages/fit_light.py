@@ -26,8 +26,8 @@ from rgspipe.fitting import (
     fit_lights,
     prepare_fit,
 )
-from rgspipe.fitting.model.spot_harmonics import BandLimit
-from rgspipe.fitting.spec import MOST_LIGHTS
+from rgspipe.fitting.model.harmonics import BandLimit
+from rgspipe.fitting.spec import MOST_LIGHTS, shaped_kind
 from rgspipe.progress import track
 from rgspipe.renderer.dictionary import LightDictionary
 from rgspipe.renderer.effect_bounds import NO_BOUND, EffectBounds
@@ -39,9 +39,9 @@ from rgspipe.stages import fit_capture
 from rgspipe.stages.base import Stage, StageContext
 from rgspipe.stages.fit_capture import captured_views
 from rgspipe.stages.fit_extras import Named, further_files, training_cameras
+from rgspipe.stages.light_shape import light_shape
 from rgspipe.stages.scene_effects import chosen_effects, frozen_scene, measured_effects
 from rgspipe.stages.sources import image_stage, require_images, target_stage
-from rgspipe.stages.spot_shape import spot_shape
 
 
 def run(context: StageContext) -> None:
@@ -169,10 +169,10 @@ def _choice(config: RgspipeConfig, freeze: Artifact) -> tuple[EffectBounds, Effe
     spec, band = light_spec(config), band_limit(config)
     count = spec.count or MOST_LIGHTS
     # In harmonics a spot's light leaves its cone.
-    in_cones = spec.spots and band is None
-    kind = RigKind(0, (spec.shape,) * count) if in_cones else RigKind(count)
+    in_cones = spec.aimed and band is None
+    kind = RigKind(0, (spec.kinds[-1].least_share,) * count) if in_cones else RigKind(count)
     bounds, choice = chosen_effects(config.effects, freeze, kind)
-    return bounds, choice if band is None or not spec.spots else _in_harmonics(choice, band)
+    return bounds, choice if band is None or not spec.aimed else _in_harmonics(choice, band)
 
 
 def _in_harmonics(choice: EffectChoice, band: BandLimit) -> EffectChoice:
@@ -206,8 +206,9 @@ def light_spec(config: RgspipeConfig) -> LightSpec:
     """
     if config.fit.method == "paper_adam":
         _refuse_unknowns(config)
-    light = config.light
-    shape = spot_shape(light.spot, "light.spot")
+    light, kind = config.light, shaped_kind(config.light.type)
+    section = getattr(light, kind, None)
+    shape = None if section is None else light_shape(kind, section, f"light.{kind}")
     return LightSpec(light.type, light.count, shape, config.fit.cone == "free")
 
 

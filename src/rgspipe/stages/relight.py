@@ -15,11 +15,11 @@ from rgspipe.relighting.pictures import contact_sheet
 from rgspipe.relighting.rigs import random_rig
 from rgspipe.scene import Camera, LightRig
 from rgspipe.stages.base import Need, Stage, StageContext
+from rgspipe.stages.light_shape import light_shape
 from rgspipe.stages.relight_scene import Relighter, chosen_indices, configured_cameras
 from rgspipe.stages.relight_sweep import write_sweep
 from rgspipe.stages.relight_targets import relight_targets, target_needs
 from rgspipe.stages.sources import image_stage, require_images, target_stage
-from rgspipe.stages.spot_shape import spot_shape
 
 #: All images of a rig in one picture; a row for each of them.
 SHEET, TABLE = "sheet.png", "relight.csv"
@@ -130,7 +130,7 @@ def _check(config: RgspipeConfig) -> None:
             remedy="Generate the targets at another size: targets.resolution.",
         )
     if wanted.sweep != "none":
-        spot_shape(wanted.path.spot, "relight.path.spot")
+        light_shape("spot", wanted.path.spot, "relight.path.spot")
 
 
 def _files(config: RgspipeConfig) -> list[Path]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -24,7 +25,8 @@ from rgspipe.fitting.model.views import PreparedViews, prepare_views
 from rgspipe.renderer.effects import RigKind
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.view_weights import ViewWeights
-from rgspipe.scene import Camera, Light, LightRig, PointLight, SpotLight
+from rgspipe.scene import Camera, LightRig
+from rgspipe.scene.lights import KINDS
 from rgspipe.stages.scene_effects import chosen_effects, frozen_scene
 
 
@@ -55,7 +57,7 @@ class Relighter:
     def render(self, cameras: Sequence[Camera], rig: LightRig) -> tuple[list[Tensor], float]:
         """(H, W, 3) image of every camera under `rig`, and the seconds that all of them took once they are prepared."""
         effects, spots, lobes = self._effects(rig)
-        prepared, lights = self._prepare(cameras, lobes), rig if spots else tuple(map(_without_cone, rig))
+        prepared, lights = self._prepare(cameras, lobes), rig if spots else tuple(light.plain for light in rig)
         views = FitViews(prepared, (), effects)
         if prepared is not self._rendered:
             # The first image of a camera works out what the others share.
@@ -89,7 +91,7 @@ class Relighter:
             return Effects(wanted.shadows, wanted.interreflection, wanted.at_pixels), True, True
         if kind not in self._kinds:
             choice = chosen_effects(wanted, self.freeze, kind)[1]
-            self.reasons[_words(kind)] = choice.reasons
+            self.reasons[_words(rig)] = choice.reasons
             effects = Effects(choice.shadows, choice.interreflection, wanted.at_pixels)
             self._kinds[kind] = effects, choice.spots, choice.specular
         return self._kinds[kind]
@@ -115,14 +117,10 @@ def image_path(folder: Path, rig: str, view: int) -> Path:
     return folder / "images" / rig / f"view_{view}.exr"
 
 
-def _words(kind: RigKind) -> str:
-    """A kind of rig in words: "2 points, 1 spot"."""
-    counted = [(kind.points, "point"), (len(kind.spots), "spot")]
-    return ", ".join(f"{count} {name}{'s' if count != 1 else ''}" for count, name in counted if count)
-
-
-def _without_cone(light: Light) -> PointLight:
-    return PointLight(light.position, light.intensity) if isinstance(light, SpotLight) else light
+def _words(rig: LightRig) -> str:
+    """A rig in words: "2 points, 1 spot"."""
+    counted = Counter(light.kind for light in rig)
+    return ", ".join(f"{counted[name]} {name}{'s' if counted[name] != 1 else ''}" for name in KINDS if counted[name])
 
 
 def _identity(camera: Camera) -> bytes:

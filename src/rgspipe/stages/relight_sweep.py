@@ -23,8 +23,8 @@ from rgspipe.relighting.sweeps import (
     there_and_back,
 )
 from rgspipe.scene import Camera, SpotLight
+from rgspipe.stages.light_shape import light_shape
 from rgspipe.stages.relight_scene import Relighter
-from rgspipe.stages.spot_shape import spot_shape
 
 STRIP, VIDEO, TABLE = "strip.png", "sweep.webp", "sweep.csv"
 
@@ -74,7 +74,8 @@ def sweep_lights(wanted: RelightConfig, places: SweepPlaces) -> list[SpotLight]:
         InputError: the spot's way makes no sense.
     """
     path = wanted.path
-    spot = SpotKind(spot_shape(path.spot, "relight.path.spot"), torch.tensor(path.intensity, dtype=torch.float64))
+    shape = light_shape("spot", path.spot, "relight.path.spot")
+    spot = SpotKind(shape, torch.tensor(path.intensity, dtype=torch.float64))
     if wanted.sweep == "orbit":
         height = places.height if path.height is None else path.height
         return orbit_sweep(_point(path.center, places.center), path.radius or places.radius, height, path.frames, spot)

@@ -11,6 +11,8 @@ from rgspipe.blender.pool.pool_file import read_pool
 from rgspipe.blender.pool.render_pool import render_pool
 from rgspipe.config import MODELLED, RgspipeConfig, TargetsConfig, TargetSpotConfig
 from rgspipe.errors import InputError
+from rgspipe.scene import SpotLight
+from rgspipe.scene.lights.spot_profiles import PROFILES
 from rgspipe.stages.base import Stage, StageContext
 from rgspipe.stages.generate_dataset import STAGE as DATASET
 from rgspipe.stages.generate_dataset import dataset_job
@@ -103,17 +105,18 @@ def spot_range(spot: TargetSpotConfig) -> SpotRange:
                 found=f"[{low:g},{high:g}]",
                 remedy="Put them in order.",
             )
-    largest = {"smoothstep": 1.0, "gaussian": 89.0, "linear": spot.cone_angle[0]}[spot.profile]
-    if spot.falloff[1] > largest or (spot.profile == "linear" and spot.falloff[1] == largest):
+    profile, degree = PROFILES[spot.profile], math.radians(1.0)
+    rim = degree if profile.falloff_unit else 1.0
+    largest = profile.largest_falloff(degree * spot.cone_angle[0]) / rim
+    widest = SpotLight.shaped(spot.profile, degree * spot.cone_angle[0], rim * spot.falloff[1])
+    if spot.falloff[1] > largest * (1.0 + 1e-12) or widest.rim == 0.0:
         raise InputError(
             "targets.spot.falloff",
-            expected=f"{'below' if spot.profile == 'linear' else 'at most'} {largest:g} for {spot.profile}",
+            expected=f"{'below' if widest.rim == 0.0 else 'at most'} {largest:g} for {spot.profile}",
             found=f"{spot.falloff[1]:g}",
             remedy="Give narrower rims.",
         )
-    degrees = math.pi / 180.0
-    rim = 1.0 if spot.profile == "smoothstep" else degrees
-    cones, rims = ((unit * ends[0], unit * ends[1]) for unit, ends in ((degrees, spot.cone_angle), (rim, spot.falloff)))
+    cones, rims = ((unit * ends[0], unit * ends[1]) for unit, ends in ((degree, spot.cone_angle), (rim, spot.falloff)))
     return SpotRange(spot.profile, cones, rims)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -19,7 +20,7 @@ from rgspipe.pages.gallery import Shot, light_words, picture, spread
 from rgspipe.pages.html import bare_percent, decimals, label, percent
 from rgspipe.pages.section import Section
 from rgspipe.pages.targets_figure import targets_figure
-from rgspipe.scene import LightRig, SpotLight, Surfels
+from rgspipe.scene import LightRig, Surfels
 
 #: Generated targets that are shown of each kind.
 SHOWN = 4
@@ -98,9 +99,8 @@ def _rig_words(rig: LightRig) -> str:
     """The lights of a target; of many only how many."""
     if len(rig) <= NAMED:
         return light_words(rig)
-    spots = sum(isinstance(light, SpotLight) for light in rig)
-    counted = [(len(rig) - spots, "point light"), (spots, "spot")]
-    return " and ".join(f"{count} {name}{'s' if count > 1 else ''}" for count, name in counted if count)
+    counted = Counter("point light" if light.axis is None else light.kind for light in rig)
+    return " and ".join(f"{count} {name}{'s' if count > 1 else ''}" for name, count in sorted(counted.items()))
 
 
 def _courses(made: Artifact, remark: str) -> Section:

@@ -9,10 +9,10 @@ import pytest
 import torch
 
 from rgspipe.blender.pool.aim import MIN_SPOT_SHARE, aim_at_relay, aim_at_seen, seen_points
-from rgspipe.renderer.spot import SpotShape
 from rgspipe.scene import Camera, look_at
+from rgspipe.scene.lights import SpotLight
 
-SHAPE = SpotShape("smoothstep", 0.3, 0.2)
+SHAPE = SpotLight.shaped("smoothstep", 0.3, 0.2)
 
 
 class _Floor:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -28,8 +29,7 @@ def pool(tmp_path: Path) -> Path:
     for number, (name, light) in enumerate(lights.items()):
         image = plane_image(light, 2) / light.intensity.numpy()
         write_image(tmp_path / f"pool/{name}/view_0.exr", image, np.full(image.shape[:2], 0.5 + 0.1 * number))
-        fields = {key: getattr(light, key) for key in light.__dataclass_fields__} | {"intensity": ones}
-        entries.append((name, "visible" if name == "point" else "occluded", type(light)(**fields)))
+        entries.append((name, "visible" if name == "point" else "occluded", replace(light, intensity=ones)))
     write_pool(tmp_path / "pool", "plane", entries, [plane_camera()], [[-4.0] * 3, [4.0] * 3], 1.0, [0.0] * 3)
     return tmp_path / "pool"
 

@@ -11,7 +11,6 @@ import torch
 
 from rgspipe.blender.pool.rigs import HEADLIGHT_COLOUR, RigRequest, draw_rigs, headlight_rigs, unit_power
 from rgspipe.errors import InputError
-from rgspipe.renderer.spot import spot_power
 from rgspipe.scene import Light, PointLight, SpotLight
 
 ONES = torch.ones(3, dtype=torch.float64)
@@ -67,7 +66,7 @@ def test_mixed_rigs_hold_both_types() -> None:
 
 def test_a_spot_has_the_power_of_a_point_light() -> None:
     spot = POOL[1]
-    assert float(spot_power(replace(spot, intensity=unit_power(spot) * ONES))[0]) == pytest.approx(4.0 * math.pi)
+    assert float(replace(spot, intensity=unit_power(spot) * ONES).power()[0]) == pytest.approx(4.0 * math.pi)
     assert unit_power(POOL[0]) == 1.0
 
 

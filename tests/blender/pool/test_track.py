@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from rgspipe.blender.pool.track import DIP, GAUGE, headlights, path, path_length
-from rgspipe.renderer.spot import SpotShape
+from rgspipe.scene.lights import SpotLight
 from rgspipe.scene.models import Corridor
 
 CORRIDORS = [Corridor(), Corridor(width=0.28, height=0.6), Corridor(width=0.36)]
-SHAPE = SpotShape("smoothstep", 0.4, 0.2)
+SHAPE = SpotLight.shaped("smoothstep", 0.4, 0.2)
 
 
 @pytest.mark.parametrize("corridor", CORRIDORS)

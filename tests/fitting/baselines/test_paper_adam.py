@@ -13,6 +13,7 @@ from rgspipe.fitting import AdamOptions, Effects, FitStatus
 from rgspipe.fitting.baselines.paper_adam_loss import AdamLoss, MovingRig
 from rgspipe.fitting.baselines.paper_adam_start import Ball, LightPrior, StartOptions, draw_start, light_ball
 from rgspipe.optim.ssim import WINDOW, ssim, ssim_map
+from rgspipe.scene import PointLight
 
 SHORT = AdamOptions(epochs=2, steps=15)
 
@@ -47,7 +48,7 @@ def test_ssim_of_equal_images_is_one_and_its_gradient_is_right():
 
 
 def _loss(room, target, position, log_intensity, weight=0.2):
-    rig = MovingRig(position[None], log_intensity[None])
+    rig = MovingRig(position[None], log_intensity[None], PointLight.shaped())
     return AdamLoss(room.two.prepared, target, weight, Effects())(rig)
 
 

@@ -7,10 +7,11 @@ import math
 import pytest
 import torch
 
+from emitters import emitter_at
 from lit_room import VISIBLE
 from rgspipe.fitting import ImageCapture
 from rgspipe.fitting.certainty.landscape import PLANES, best_intensity, loss_slices
-from rgspipe.fitting.model.parameters import Emitter
+from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.problem import LightProblem
 
 
@@ -33,7 +34,7 @@ def test_rows_run_along_the_second_axis(room, point_light):
     light = point_light(VISIBLE)
     problem = _problem(room, light)
     (plane, _, _) = loss_slices(problem, [Emitter.of(light)], reach=0.1, points=3)
-    moved = Emitter(torch.tensor([VISIBLE[0], float(plane.up[2]), VISIBLE[2]], dtype=torch.float64))
+    moved = emitter_at(torch.tensor([VISIBLE[0], float(plane.up[2]), VISIBLE[2]], dtype=torch.float64))
     columns = [problem.evaluate(moved)]
     intensity = problem.moments(columns, torch.ones_like(problem.target[:, :1])).intensity
     assert float(plane.loss[2, 1]) == pytest.approx(problem.unexplained(columns, intensity), rel=1e-5)

@@ -11,8 +11,8 @@ import torch
 from lit_room import HIDDEN, VISIBLE
 from rgspipe.fitting.certainty.doubts import doubts
 from rgspipe.fitting.certainty.uncertainty import inflated, light_covariances, sandwich, surface_cells, whitener
+from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.moments import group_moments, information, scores
-from rgspipe.fitting.model.parameters import Emitter
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.search.refine import State
 from rgspipe.scene import PointLight

@@ -7,13 +7,13 @@ import dataclasses
 import pytest
 import torch
 
+from emitters import emitter_at
 from rgspipe.fitting.model.blocks import block_average, block_model
 from rgspipe.fitting.model.capture import ImageCapture
-from rgspipe.fitting.model.parameters import Emitter
 from rgspipe.fitting.model.problem import Effects, LightProblem
 from rgspipe.fitting.model.views import prepare_views
 from rgspipe.fitting.search.coarse import coarse_images
-from rgspipe.renderer.spot import SpotShape
+from rgspipe.scene.lights import SpotLight
 
 PLACE = torch.tensor([0.1, -0.2, 0.15], dtype=torch.float64)
 AXIS = torch.nn.functional.normalize(torch.tensor([0.2, 1.0, -0.3], dtype=torch.float64), dim=0)
@@ -50,7 +50,9 @@ def test_candidates_are_seen_as_block_means_of_full_images(room, point_light, in
 
 
 @pytest.mark.parametrize("interreflection", [True, False])
-@pytest.mark.parametrize("emitter", [Emitter(PLACE), Emitter(PLACE, AXIS, SpotShape("smoothstep", 0.5, 0.3))])
+@pytest.mark.parametrize(
+    "emitter", [emitter_at(PLACE), emitter_at(PLACE, AXIS, SpotLight.shaped("smoothstep", 0.5, 0.3))]
+)
 def test_lights_and_their_derivatives_are_block_means(room, emitter, interreflection):
     full = _problem(room, interreflection)
     coarse = full.coarsest(block_model(full.views, interreflection=interreflection))
@@ -78,7 +80,7 @@ def test_clipped_images_keep_their_pixels(room):
 def test_free_exposures_are_those_of_the_pixels(room):
     full = _problem(room, capture=ImageCapture(exposure_free=True))
     coarse = full.coarsest(block_model(full.views))
-    emitter = Emitter(PLACE)
+    emitter = emitter_at(PLACE)
     found = [
         problem.moments([problem.evaluate(emitter)], torch.ones_like(problem.target)).exposures
         for problem in (full, coarse)
@@ -93,8 +95,8 @@ def test_blocks_follow_as_many_bounces_as_the_scene(room):
     image = torch.ones(sum(view.camera.pixel_count for view in views.views), 3)
     full = LightProblem.create(views, image)
     coarse = full.coarsest(block_model(views))
-    seen, expected = (problem.evaluate(Emitter(PLACE))[:, :, 0] for problem in (coarse, full))
+    seen, expected = (problem.evaluate(emitter_at(PLACE))[:, :, 0] for problem in (coarse, full))
     torch.testing.assert_close(seen, coarse.blocks.average @ expected.contiguous(), rtol=1e-4, atol=1e-5)
     every = LightProblem.create(room.two.prepared, image).coarsest(block_model(room.two.prepared))
     # All bounces make the blocks brighter; measured 15 %.
-    assert float((every.evaluate(Emitter(PLACE))[:, :, 0] / seen).median()) > 1.01
+    assert float((every.evaluate(emitter_at(PLACE))[:, :, 0] / seen).median()) > 1.01

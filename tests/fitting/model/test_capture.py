@@ -5,11 +5,11 @@ from __future__ import annotations
 import pytest
 import torch
 
+from emitters import emitter_at
 from lit_room import VISIBLE
 from rgspipe.degradation.target_capture import eight_bit
 from rgspipe.fitting import ImageCapture, fit_lights
 from rgspipe.fitting.model.capture import rounding_noise, stored_in_eight_bits
-from rgspipe.fitting.model.parameters import Emitter
 from rgspipe.fitting.model.problem import LightProblem
 
 
@@ -43,7 +43,7 @@ def test_a_clipped_value_counts_only_where_the_image_is_darker(room, point_light
     prepared = room.two.prepared
     problem = LightProblem.create(prepared, prepared.stack_images(images), capture=ImageCapture(clip=white))
     assert 0.1 < float(problem.saturated.double().mean()) < 0.4
-    columns = [problem.evaluate(Emitter(light.position))]
+    columns = [problem.evaluate(emitter_at(light.position))]
     strength = light.intensity[None] / problem.scale
     assert float(problem.residual(columns, strength).abs().max()) < 1e-4
     dim = problem.residual(columns, 0.5 * strength)

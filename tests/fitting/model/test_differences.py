@@ -8,30 +8,33 @@ from dataclasses import replace
 import pytest
 import torch
 
+from emitters import emitter_at
 from lit_room import VISIBLE
 from rgspipe.fitting import fit_lights
 from rgspipe.fitting.model.differences import central_differences
-from rgspipe.fitting.model.parameters import Emitter
+from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.problem import LightProblem
-from rgspipe.renderer.spot import SpotShape
+from rgspipe.scene.lights import SpotLight
+from rgspipe.scene.lights.coordinates import tangents
 
 
 def test_differences_are_those_of_an_analytic_function() -> None:
     """Of sin x + y² + z·axis·(0, 1, 0) and the cone, in natural units: measured 4e-7."""
-    spot = Emitter(
+    spot = emitter_at(
         torch.tensor([0.3, -0.2, 0.5], dtype=torch.float64),
         torch.tensor([0.0, 0.0, 1.0], dtype=torch.float64),
-        SpotShape("gaussian", 0.5, 0.2),
-        cone_free=True,
+        SpotLight.shaped("gaussian", 0.5, 0.2),
+        shape_free=True,
     )
 
     def image(emitter: Emitter) -> torch.Tensor:
         x, y, z = emitter.position
-        value = x.sin() + y.square() + z * emitter.axis[1] + emitter.shape.cone_angle**2 + 3.0 * emitter.shape.falloff
+        light = emitter.light
+        value = x.sin() + y.square() + z * light.direction[1] + light.cone_angle**2 + 3.0 * light.falloff
         return value.reshape(1, 1).expand(1, 3)
 
     slopes = central_differences(image, spot, 2.0)[0, 0, 1:]
-    by_axis = 0.5 * spot.tangents()[:, 1]
+    by_axis = 0.5 * tangents(spot.axis)[:, 1]
     expected = torch.tensor([math.cos(0.3), -0.4, 0.0, float(by_axis[0]), float(by_axis[1]), 1.0, 3.0])
     torch.testing.assert_close(slopes, expected.double(), rtol=1e-5, atol=1e-5)
 
@@ -51,7 +54,7 @@ def test_both_methods_find_the_same_light_and_differences_render_more(room, poin
 def test_derivatives_of_both_kinds_agree_in_smooth_pixels(room, point_light) -> None:
     prepared = room.one.prepared
     problem = LightProblem.create(prepared, prepared.stack_images(room.images(point_light(VISIBLE))))
-    emitter = Emitter(torch.tensor(VISIBLE, dtype=torch.float64) + 0.003)
+    emitter = emitter_at(torch.tensor(VISIBLE, dtype=torch.float64) + 0.003)
     ours, theirs = (replace(problem, differences=on).evaluate(emitter) for on in (False, True))
     apart = (ours - theirs)[:, :, 1:].abs().median() / theirs[:, :, 1:].abs().median()
     assert float(apart) < 0.01 and problem.renderings([emitter]) == 1

@@ -7,20 +7,21 @@ from dataclasses import replace
 import pytest
 import torch
 
+from emitters import emitter_at
 from lit_room import VISIBLE, room_cameras, room_surfels
 from rgspipe.fitting import Effects, FitViews, fit_lights, prepare_fit, render_rig
-from rgspipe.fitting.model.parameters import Emitter
+from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.renderer.frozen import FrozenScene
-from rgspipe.renderer.spot import SpotShape
 from rgspipe.scene import Gloss, PointLight
+from rgspipe.scene.lights import SpotLight
 
 LIGHT = PointLight(torch.tensor(VISIBLE, dtype=torch.float64), torch.tensor([1.0, 2.0, 0.5], dtype=torch.float64))
-SPOT = Emitter(
+SPOT = emitter_at(
     torch.tensor([0.05, -0.2, 0.25], dtype=torch.float64),
     torch.nn.functional.normalize(torch.tensor([0.3, 0.4, -1.0], dtype=torch.float64), dim=0),
-    SpotShape("gaussian", 0.4, 0.3),
-    cone_free=True,
+    SpotLight.shaped("gaussian", 0.4, 0.3),
+    shape_free=True,
 )
 
 
@@ -61,7 +62,7 @@ def _largest_error(problem: LightProblem, emitter: Emitter, share: float = 1.0) 
 
 def test_at_centres_the_image_is_the_renderer_s(frozen: FrozenScene) -> None:
     views = _views(frozen)
-    image = _problem(views).evaluate(Emitter(LIGHT.position))[:, :, 0] * LIGHT.intensity.float()
+    image = _problem(views).evaluate(emitter_at(LIGHT.position))[:, :, 0] * LIGHT.intensity.float()
     expected = torch.cat([frozen.render(view, (LIGHT,)).reshape(-1, 3) for view in views.prepared.views])
     torch.testing.assert_close(image, expected[views.prepared.pixels], rtol=1e-4, atol=1e-6)
 
@@ -70,7 +71,7 @@ def test_at_centres_the_image_is_the_renderer_s(frozen: FrozenScene) -> None:
 def test_at_pixels_the_image_is_that_of_render_rig(frozen: FrozenScene, interreflection: bool) -> None:
     views = _views(frozen, at_pixels=True, interreflection=interreflection)
     problem = _problem(views).sharpest()
-    for light, emitter in ((LIGHT, Emitter(LIGHT.position)), (SPOT.light(LIGHT.intensity), SPOT)):
+    for light, emitter in ((LIGHT, emitter_at(LIGHT.position)), (SPOT.shining(LIGHT.intensity), SPOT)):
         image = problem.evaluate(emitter)[:, :, 0] * light.intensity.float()
         expected = torch.cat([image.reshape(-1, 3) for image in render_rig(views, (light,))])
         torch.testing.assert_close(image, expected[views.prepared.pixels], rtol=1e-4, atol=1e-5)
@@ -87,7 +88,7 @@ def test_highlights_at_pixels_are_those_of_centres_where_surfels_are_small(froze
 
 
 @pytest.mark.parametrize("at_pixels", [False, True])
-@pytest.mark.parametrize("emitter", [Emitter(LIGHT.position + 0.003), SPOT], ids=["point", "spot"])
+@pytest.mark.parametrize("emitter", [emitter_at(LIGHT.position + 0.003), SPOT], ids=["point", "spot"])
 def test_derivatives_match_finite_differences(frozen: FrozenScene, at_pixels: bool, emitter: Emitter) -> None:
     problem = _problem(_views(frozen, at_pixels=at_pixels)).sharpest()
     errors = _largest_error(problem, emitter, 0.95)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import torch
 
+from emitters import emitter_at
 from lit_room import HIDDEN, VISIBLE
 from rgspipe.fitting.model.moments import moments
-from rgspipe.fitting.model.parameters import Emitter
 from rgspipe.fitting.model.problem import Effects, LightProblem
 from rgspipe.renderer.direct import unit_irradiance
 from rgspipe.renderer.kernels.irradiance import SOFTENING
@@ -21,7 +21,7 @@ def _problem(room, point_light, where=VISIBLE, effects=None):
 def test_unit_image_is_the_renderer_s(room, point_light):
     light = point_light(VISIBLE)
     problem = _problem(room, point_light)
-    image = problem.evaluate(Emitter(light.position))[:, :, 0] * light.intensity.float() / problem.scale
+    image = problem.evaluate(emitter_at(light.position))[:, :, 0] * light.intensity.float() / problem.scale
     torch.testing.assert_close(image, problem.target, rtol=1e-5, atol=1e-6)
 
 
@@ -34,11 +34,11 @@ def test_derivative_matches_finite_differences(room, point_light):
     for where in (VISIBLE, HIDDEN):
         problem = _problem(room, point_light, where)
         position, step = torch.tensor(where, dtype=torch.float64) + 0.003, 1e-4
-        slope = problem.evaluate(Emitter(position))[:, :, 1:]
+        slope = problem.evaluate(emitter_at(position))[:, :, 1:]
         for axis in range(3):
             offset = torch.zeros(3, dtype=torch.float64)
             offset[axis] = step
-            upper, lower = (problem.evaluate(Emitter(position + sign * offset))[:, :, 0] for sign in (1, -1))
+            upper, lower = (problem.evaluate(emitter_at(position + sign * offset))[:, :, 0] for sign in (1, -1))
             expected = (upper - lower) / (2 * step)
             error = float((slope[:, :, axis] - expected).norm() / expected.norm())
             assert error < 0.003, (where, axis, error)  # measured up to 2e-4
@@ -47,7 +47,7 @@ def test_derivative_matches_finite_differences(room, point_light):
 def test_effects_leave_parts_out(room, point_light):
     position = torch.tensor(HIDDEN, dtype=torch.float64)
     whole, direct, unshadowed = (
-        _problem(room, point_light, effects=effects).evaluate(Emitter(position))[:, :, 0].sum()
+        _problem(room, point_light, effects=effects).evaluate(emitter_at(position))[:, :, 0].sum()
         for effects in (Effects(), Effects(interreflection=False), Effects(shadows=False))
     )
     assert direct < whole < unshadowed
@@ -81,7 +81,7 @@ def test_intensity_is_never_negative_and_dark_channels_are_zero():
 def test_projected_system_is_the_schur_complement_of_the_joint_one(room, point_light):
     """Eliminating the intensity gives the same matrix as solving for position and intensity together."""
     problem = _problem(room, point_light)
-    columns = problem.evaluate(Emitter(torch.tensor(VISIBLE, dtype=torch.float64) + 0.02))
+    columns = problem.evaluate(emitter_at(torch.tensor(VISIBLE, dtype=torch.float64) + 0.02))
     system = problem.moments([columns], problem.relative_weights().square())
     joint, count = system.information(system.intensity), 3
     corner, side, rest = joint[:count, :count], joint[:count, count:], joint[count:, count:]
@@ -95,7 +95,7 @@ def test_a_light_on_a_surfel_is_finite(room, point_light):
     surfels = room.frozen.surfels
     spots = [surfels.centers[k] + shift * surfels.normals[k] for k in (0, 500, 1200) for shift in (0.0, 1e-6, -0.01)]
     for position in [*spots, torch.tensor([50.0, 0.0, 0.0]), torch.tensor([1e6, 1e6, 1e6])]:
-        columns = problem.evaluate(Emitter(position.double()))
+        columns = problem.evaluate(emitter_at(position.double()))
         assert torch.isfinite(columns).all()
         assert torch.isfinite(problem.moments([columns], problem.relative_weights()).values).all()
 

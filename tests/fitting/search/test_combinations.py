@@ -12,6 +12,7 @@ import torch
 
 from lit_room import HIDDEN, VISIBLE
 from rgspipe.fitting.model.problem import LightProblem
+from rgspipe.fitting.search.aimed_candidates import AXES, aimed_candidates
 from rgspipe.fitting.search.combinations import (
     Scored,
     best_apart,
@@ -21,9 +22,7 @@ from rgspipe.fitting.search.combinations import (
     candidate_costs,
     extensions,
 )
-from rgspipe.fitting.search.spot_candidates import AXES, spot_candidates
 from rgspipe.renderer.point_sets import fibonacci_directions
-from rgspipe.renderer.spot import SpotShape
 from rgspipe.scene import SpotLight
 
 
@@ -77,15 +76,14 @@ def test_directions_are_spread_evenly() -> None:
 
 def test_coarse_images_of_spots_are_like_renderings(room) -> None:
     """Shares at the mean place of a block stand for those of its surfels, so they agree but for the cones' rims."""
-    shape = SpotShape("gaussian", math.radians(40.0), 0.2)
-    coarse = spot_candidates(room.one.prepared, room.dictionary, [shape])
+    shape = SpotLight.shaped("gaussian", math.radians(40.0), 0.2)
+    coarse = aimed_candidates(room.one.prepared, room.dictionary, [shape])
     wide = math.hypot(shape.falloff, 0.15)
     half = shape.cone_angle + math.sqrt(2.0 * math.log(2.0)) * (shape.falloff - wide)
     errors = []
     for index in range(0, len(coarse), len(coarse) // 12):
         emitter = coarse.emitter(index)
-        ones = torch.ones(3, dtype=torch.float64)
-        light = SpotLight(emitter.position, ones, emitter.axis, "gaussian", half, wide)
+        light = SpotLight.shaped("gaussian", half, wide).at(emitter.position, emitter.axis)
         image = room.frozen.render(room.views[0], (light,)).reshape(-1, 3)[room.one.prepared.pixels]
         expected = coarse.blocks @ image
         errors.append(float((coarse.images[index] - expected).norm() / expected.norm()))
@@ -94,14 +92,14 @@ def test_coarse_images_of_spots_are_like_renderings(room) -> None:
 
 
 def test_a_spot_candidate_near_the_truth_explains_most(room) -> None:
-    shape = SpotShape("gaussian", math.radians(30.0), 0.2)
+    shape = SpotLight.shaped("gaussian", math.radians(30.0), 0.2)
     place = torch.tensor(VISIBLE, dtype=torch.float64)
     axis = torch.nn.functional.normalize(torch.tensor(HIDDEN, dtype=torch.float64) - place, dim=0)
-    light = SpotLight(place, torch.ones(3, dtype=torch.float64), axis, shape.profile, shape.cone_angle, shape.falloff)
+    light = shape.at(place, axis)
     prepared = room.two.prepared
     images = [room.frozen.render(view, (light,)) for view in room.views]
     problem = LightProblem.create(prepared, prepared.stack_images(images))
-    coarse = spot_candidates(prepared, room.dictionary, [shape])
+    coarse = aimed_candidates(prepared, room.dictionary, [shape])
     ranked = best_combinations(Scored.of(problem, coarse), coarse.positions, 1, 12)
     distance = min(float((coarse.positions[k].double() - place).norm()) for (k,) in ranked)
     turn = max(float(coarse.axes[k].double() @ axis) for (k,) in ranked)
@@ -110,12 +108,11 @@ def test_a_spot_candidate_near_the_truth_explains_most(room) -> None:
 
 def test_a_narrow_pool_decides_by_plain_squares(room) -> None:
     """Of a narrow spot the candidate that explains the bright pool comes first by plain squares."""
-    shape = SpotShape("gaussian", math.radians(10.0), 0.1)
+    shape = SpotLight.shaped("gaussian", math.radians(10.0), 0.1)
     prepared = room.two.prepared
-    coarse = spot_candidates(prepared, room.dictionary, [shape])
+    coarse = aimed_candidates(prepared, room.dictionary, [shape])
     emitter = coarse.emitter(int(coarse.square.sum(dim=1).argmax()))
-    ones = torch.ones(3, dtype=torch.float64)
-    light = SpotLight(emitter.position, ones, emitter.axis, shape.profile, shape.cone_angle, shape.falloff)
+    light = shape.at(emitter.position, emitter.axis)
     images = [room.frozen.render(view, (light,)) for view in room.views]
     problem = LightProblem.create(prepared, prepared.stack_images(images))
     gains = bright_gains(problem, coarse)

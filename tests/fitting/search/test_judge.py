@@ -8,8 +8,8 @@ from dataclasses import replace
 import pytest
 import torch
 
+from emitters import emitter_at
 from lit_room import HIDDEN, VISIBLE
-from rgspipe.fitting.model.parameters import Emitter
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.search.judge import (
     FAINT,
@@ -26,7 +26,7 @@ from rgspipe.fitting.search.judge import (
 )
 from rgspipe.fitting.search.refine import Refiner, State
 from rgspipe.fitting.search.weighting import ROBUST
-from rgspipe.renderer.spot import SpotShape
+from rgspipe.scene.lights import SpotLight
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +38,7 @@ def problem(room, point_light) -> LightProblem:
 
 
 def state(problem: LightProblem, *places: tuple[float, float, float]) -> State:
-    emitters = [Emitter(torch.tensor(place, dtype=torch.float64)) for place in places]
+    emitters = [emitter_at(torch.tensor(place, dtype=torch.float64)) for place in places]
     return Refiner.of(problem).start(emitters, ROBUST)
 
 
@@ -87,9 +87,9 @@ def test_rigs_within_the_noise_are_equally_good(problem: LightProblem) -> None:
 
 
 def test_distance_of_rigs_is_that_of_the_best_matching() -> None:
-    rig = [Emitter(torch.tensor(place, dtype=torch.float64)) for place in (VISIBLE, HIDDEN)]
+    rig = [emitter_at(torch.tensor(place, dtype=torch.float64)) for place in (VISIBLE, HIDDEN)]
     assert rig_distance(rig, rig[::-1]) == 0.0
-    moved = replace(rig[0], position=rig[0].position + torch.tensor([0.0, 0.3, 0.0]))
+    moved = rig[0].placed(rig[0].position + torch.tensor([0.0, 0.3, 0.0]))
     assert rig_distance(rig, [rig[1], moved]) == pytest.approx(0.3)
     assert rig_distance(rig, rig[:1]) == float("inf")
 
@@ -114,11 +114,11 @@ def test_rigs_that_met_are_refined_once(problem: LightProblem) -> None:
 
 
 def test_spots_that_point_elsewhere_have_not_met(problem: LightProblem) -> None:
-    shape = SpotShape("smoothstep", 0.5, 0.3)
+    shape = SpotLight.shaped("smoothstep", 0.5, 0.3)
     place = torch.tensor(VISIBLE, dtype=torch.float64)
     turned = [torch.tensor([math.sin(angle), 0.0, -math.cos(angle)], dtype=torch.float64) for angle in (0, 0.005, 0.3)]
-    spots = [Refiner.of(problem).start([Emitter(place, axis, shape)], ROBUST) for axis in turned]
+    spots = [Refiner.of(problem).start([emitter_at(place, axis, shape)], ROBUST) for axis in turned]
     assert distinct(spots, 1.0) == [spots[0], spots[2]]
-    wider = Refiner.of(problem).start([Emitter(place, turned[0], SpotShape("smoothstep", 0.6, 0.3))], ROBUST)
+    wider = Refiner.of(problem).start([emitter_at(place, turned[0], SpotLight.shaped("smoothstep", 0.6, 0.3))], ROBUST)
     assert distinct([spots[0], wider], 1.0) == [spots[0], wider]
     assert distinct([state(problem, VISIBLE), spots[0]], 1.0)[1] is spots[0], "a point light is no spot"

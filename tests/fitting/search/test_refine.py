@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 import torch
 
+from emitters import emitter_at
 from lit_room import VISIBLE
-from rgspipe.fitting.model.parameters import Emitter
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.result import FitStatus
 from rgspipe.fitting.search.refine import Refiner, State
@@ -24,7 +24,7 @@ def _problem(room, point_light, noise: float) -> LightProblem:
 def _refined(problem: LightProblem, off: float) -> State:
     place = torch.tensor(VISIBLE, dtype=torch.float64)
     refiner = Refiner.of(problem)
-    return refiner.refined(refiner.start([Emitter(place + off)], PLAIN), PLAIN, 30)
+    return refiner.refined(refiner.start([emitter_at(place + off)], PLAIN), PLAIN, 30)
 
 
 def _error(state: State) -> float:
@@ -53,7 +53,7 @@ def test_a_refined_state_is_another_and_goes_on_the_same_way(room, point_light) 
     """States are values: the one before is as it was, its steps are the beginning of the new one's."""
     problem = _problem(room, point_light, 0.05)
     refiner = Refiner.of(problem)
-    start = refiner.start([Emitter(torch.tensor(VISIBLE, dtype=torch.float64) + 0.05)], PLAIN)
+    start = refiner.start([emitter_at(torch.tensor(VISIBLE, dtype=torch.float64) + 0.05)], PLAIN)
     before = start.emitters, start.intensity.clone()
     found = refiner.refined(start, PLAIN, 30)
     assert start.emitters is before[0] and torch.equal(start.intensity, before[1]) and len(start.steps) == 1

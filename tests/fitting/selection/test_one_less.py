@@ -5,16 +5,15 @@ from __future__ import annotations
 import pytest
 import torch
 
+from emitters import emitter_at
 from lit_room import HIDDEN, VISIBLE
 from noisy_fits import SHAPE, THIRD, noisy_fit, noisy_images
 from rgspipe.fitting import FitResult, FitStatus, LightSpec, prepare_fit
-from rgspipe.fitting.model.parameters import Emitter
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.search.judge import LEAST_DROP
 from rgspipe.fitting.search.refine import Refiner
 from rgspipe.fitting.search.weighting import ROBUST
 from rgspipe.fitting.selection.one_less import one_light_less
-from rgspipe.scene import SpotLight
 
 
 def said_to_be_too_many(result: FitResult) -> bool:
@@ -37,7 +36,7 @@ def test_three_lights_for_two_say_so(room, point_light):
 def test_two_spots_for_one_say_so(room):
     axis = torch.nn.functional.normalize(torch.tensor((-0.3, 0.5, -0.6), dtype=torch.float64), dim=0)
     strength, position = torch.tensor([1.0, 2.0, 0.5]).double(), torch.tensor(VISIBLE, dtype=torch.float64)
-    spot = SpotLight(position, strength, axis, SHAPE.profile, SHAPE.cone_angle, SHAPE.falloff)
+    spot = SHAPE.at(position, axis, strength)
     assert said_to_be_too_many(noisy_fit(room, (spot,), LightSpec("spot", 2, SHAPE)))
 
 
@@ -56,7 +55,7 @@ def test_the_light_that_is_spare_is_named_and_the_others_take_its_part(room, poi
     problem = LightProblem.create(views.prepared, views.prepared.stack_images(images))
     beside = (VISIBLE[0] + 0.05, *VISIBLE[1:])
     places = [HIDDEN, VISIBLE, beside]
-    emitters = [Emitter(torch.tensor(place, dtype=torch.float64)) for place in places]
+    emitters = [emitter_at(torch.tensor(place, dtype=torch.float64)) for place in places]
     refiner = Refiner.of(problem)
     found = one_light_less(refiner, refiner.start(emitters, ROBUST))
     assert not found.worth and found.index in (1, 2) and found.gain < 0.1  # measured 0.001

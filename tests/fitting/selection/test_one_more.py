@@ -44,7 +44,7 @@ def test_one_spot_for_two_says_so(room):
     def spot(place: tuple[float, ...], axis: tuple[float, ...], share: float) -> SpotLight:
         direction = torch.nn.functional.normalize(torch.tensor(axis, dtype=torch.float64), dim=0)
         strength, position = share * torch.tensor([1.0, 2.0, 0.5]).double(), torch.tensor(place, dtype=torch.float64)
-        return SpotLight(position, strength, direction, SHAPE.profile, SHAPE.cone_angle, SHAPE.falloff)
+        return SHAPE.at(position, direction, strength)
 
     rig = (spot(VISIBLE, (-0.3, 0.5, -0.6), 1.0), spot(THIRD, (0.2, -0.4, -0.7), 0.15))
     result = noisy_fit(room, rig, LightSpec("spot", 1, SHAPE))

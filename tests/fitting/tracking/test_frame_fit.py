@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import torch
 
+from emitters import emitter_at
 from lit_room import VISIBLE
 from rgspipe.fitting import FitStatus
-from rgspipe.fitting.model.parameters import Emitter
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.tracking.frame_fit import follow, observed
 from rgspipe.fitting.tracking.motion import Motion
@@ -27,7 +27,7 @@ def _problem(room, light, noise: float = 0.0) -> LightProblem:
 def _predicted(light, size: float, position_sd: float, intensity_sd: float = 0.05) -> Motion:
     """The light at WRONG from where it is, and 10 % too bright."""
     variances = torch.tensor([position_sd] * 3 + [intensity_sd] * 3 + [0.1] * 3, dtype=torch.float64).square()
-    rig = (Emitter(light.position + WRONG),)
+    rig = (emitter_at(light.position + WRONG),)
     intensity = 1.1 * light.intensity[None]
     return Motion(rig, intensity, intensity.mean(dim=1), torch.zeros(3).double(), torch.diag(variances), size)
 
@@ -64,7 +64,7 @@ def test_in_between_the_answer_is_the_most_likely_one(room, point_light) -> None
     assert 0.05 < float(shares) < 0.95
 
     def squares(position: torch.Tensor, intensity: torch.Tensor) -> float:
-        column = problem.evaluate(Emitter(position))
+        column = problem.evaluate(emitter_at(position))
         return float(problem.residual([column], intensity / problem.scale).double().square().sum())
 
     variance = squares(made.motion.rig[0].position, made.motion.intensity) / problem.target.numel()
@@ -93,7 +93,7 @@ def test_in_between_the_answer_is_the_most_likely_one(room, point_light) -> None
 def test_a_searched_frame_starts_a_motion_at_rest(room, point_light) -> None:
     light = point_light(VISIBLE)
     problem = _problem(room, light, noise=0.05)
-    made = observed(problem, (Emitter(light.position),))
+    made = observed(problem, (emitter_at(light.position),))
     assert float(made.motion.rates.abs().max()) == 0.0
     torch.testing.assert_close(made.motion.intensity[0], light.intensity, rtol=0.02, atol=0.0)
     # 5 % of noise in 4400 pixels: measured 2e-4.

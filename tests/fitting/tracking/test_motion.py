@@ -8,16 +8,17 @@ from dataclasses import replace
 import pytest
 import torch
 
-from rgspipe.fitting.model.parameters import Emitter
+from emitters import emitter_at
+from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.tracking.motion import RATE_CHANGE, Motion, offset, turns
-from rgspipe.renderer.spot import SpotShape
+from rgspipe.scene.lights import SpotLight
 
-SHAPE = SpotShape("gaussian", math.radians(30.0), math.radians(12.0))
+SHAPE = SpotLight.shaped("gaussian", math.radians(30.0), math.radians(12.0))
 
 
-def _spot(place: tuple[float, ...], axis: tuple[float, ...], cone_free: bool = False) -> Emitter:
+def _spot(place: tuple[float, ...], axis: tuple[float, ...], shape_free: bool = False) -> Emitter:
     direction = torch.nn.functional.normalize(torch.tensor(axis, dtype=torch.float64), dim=0)
-    return Emitter(torch.tensor(place, dtype=torch.float64), direction, SHAPE, cone_free)
+    return emitter_at(torch.tensor(place, dtype=torch.float64), direction, SHAPE, shape_free=shape_free)
 
 
 def _motion(*rig: Emitter, sd: float = 0.01, together: bool = False) -> Motion:
@@ -42,7 +43,9 @@ def test_lights_go_on_at_their_rates_and_become_less_certain() -> None:
 
 def test_an_update_is_that_of_a_kalman_filter() -> None:
     """A linear problem: the mean, the rate that follows from it, and the covariance have textbook values."""
-    motion = replace(_motion(Emitter(torch.zeros(3).double()), sd=0.05), rates=torch.tensor([0.1, 0.0, 0.0]).double())
+    motion = replace(
+        _motion(emitter_at(torch.zeros(3).double()), sd=0.05), rates=torch.tensor([0.1, 0.0, 0.0]).double()
+    )
     ahead = motion.predicted()
     noise = 0.02
     measured = torch.tensor([0.16, 0.0, 0.0], dtype=torch.float64)
@@ -53,7 +56,7 @@ def test_an_update_is_that_of_a_kalman_filter() -> None:
     information = torch.zeros((6, 6), dtype=torch.float64)
     information[:3, :3] = torch.eye(3) / noise**2
     # The most likely lights of prediction and measurement together are what `follow` finds.
-    found = Emitter(ahead.rig[0].position + change[:3])
+    found = emitter_at(ahead.rig[0].position + change[:3])
     intensity = ahead.intensity + (ahead.reference[:, None] * change[3:6])
     after = ahead.updated((found,), intensity, information)
     torch.testing.assert_close(after.rates, ahead.rates + change[6:])
@@ -74,7 +77,7 @@ def test_lights_of_one_carrier_change_their_rates_together() -> None:
 
 
 def test_an_offset_is_the_step_that_leads_there() -> None:
-    start = _spot((0.1, 0.2, 0.3), (0.3, -0.5, 0.8), cone_free=True)
+    start = _spot((0.1, 0.2, 0.3), (0.3, -0.5, 0.8), shape_free=True)
     step = torch.tensor([0.01, -0.02, 0.03, 0.02, -0.01, 0.03, -0.02], dtype=torch.float64)
     end = start.moved(step, 2.0)
     # Chords of the sphere and differences of cones are steps but for their squares.

@@ -13,10 +13,9 @@ from rgspipe.fitting import FitStatus, LightSpec, SearchOptions, fit_lights, pre
 from rgspipe.fitting.result import dark_result
 from rgspipe.fitting.tracking.frame import FrameStatus, TrackedFrame, in_order
 from rgspipe.fitting.tracking.track import TrackOptions, search_order, track_lights
-from rgspipe.renderer.spot import SpotShape
 from rgspipe.scene import LightRig, SpotLight
 
-SHAPE = SpotShape("gaussian", math.radians(30.0), math.radians(12.0))
+SHAPE = SpotLight.shaped("gaussian", math.radians(30.0), math.radians(12.0))
 
 
 def _error(frame: TrackedFrame, place: Sequence[float] | torch.Tensor) -> float:
@@ -125,10 +124,7 @@ def test_two_spots_that_move_and_turn_keep_their_order(room) -> None:
         turn = math.radians(4.0 * k)
         axis = torch.tensor([math.cos(turn), math.sin(turn), -0.5], dtype=torch.float64)
         places = torch.tensor([[-0.35 + 0.04 * k, -0.3, 0.1], [-0.35 + 0.04 * k, 0.2, 0.1]], dtype=torch.float64)
-        rig = tuple(
-            SpotLight(p, (1.0 + j) * torch.ones(3).double(), axis, SHAPE.profile, SHAPE.cone_angle, SHAPE.falloff)
-            for j, p in enumerate(places)
-        )
+        rig = tuple(SHAPE.at(p, axis, (1.0 + j) * torch.ones(3).double()) for j, p in enumerate(places))
         truth.append(rig)
         frames.append([room.frozen.render(view, rig) for view in room.views])
     track = track_lights(views, frames, spec, search=SearchOptions(starts=3))

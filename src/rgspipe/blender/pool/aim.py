@@ -8,8 +8,9 @@ import numpy as np
 import torch
 
 from rgspipe.blender.targets import PROBES, SURFACE_OFFSET
-from rgspipe.renderer.spot import SpotShape, angle_from_axis
 from rgspipe.scene import Camera
+from rgspipe.scene.lights import AxialLight
+from rgspipe.scene.lights.angles import angle_from_axis
 
 if TYPE_CHECKING:
     from rgspipe.blender.geometry import Geometry
@@ -37,7 +38,7 @@ def seen_points(camera: Camera, geometry: Geometry) -> np.ndarray:
 
 
 def aim_at_seen(
-    rng: np.random.Generator, position: np.ndarray, shape: SpotShape, seen: np.ndarray, geometry: Geometry
+    rng: np.random.Generator, position: np.ndarray, shape: AxialLight, seen: np.ndarray, geometry: Geometry
 ) -> np.ndarray | None:
     """(3,) a unit axis from `position` (3,) to one of the points `seen` (P, 3) in its reach that lights enough of them.
 
@@ -48,7 +49,7 @@ def aim_at_seen(
     towards = torch.from_numpy(lit - position)
     for _ in range(MAX_AXES if len(lit) else 0):
         axis = towards[rng.integers(len(lit))]
-        if int((shape.share(angle_from_axis(axis, towards)) >= 0.5).sum()) >= least:
+        if int((shape.share_at(angle_from_axis(axis, towards)) >= 0.5).sum()) >= least:
             return _unit(axis.numpy())
     return None
 

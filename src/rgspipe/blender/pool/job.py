@@ -10,8 +10,8 @@ import numpy as np
 
 from rgspipe.blender.fixed_view import FixedView
 from rgspipe.blender.job import DatasetJob
-from rgspipe.renderer.spot import SpotShape
-from rgspipe.scene.lights import SpotProfile
+from rgspipe.scene.lights import SpotLight, SpotProfile
+from rgspipe.scene.lights.spot_profiles import PROFILES
 
 #: What a pool holds: point lights, spots, or the headlights of a car on its way.
 Kind = Literal["points", "spots", "track"]
@@ -41,19 +41,19 @@ class SpotRange:
         for low, high in (self.cone_angle, self.falloff):
             if not 0.0 < low <= high:
                 raise ValueError(f"a range must be above 0 and in order, got {low} to {high}")
-        if self.profile == "smoothstep" and self.falloff[1] > 1.0:
-            raise ValueError(f"the blend of a smoothstep is at most 1, got {self.falloff[1]}")
-        if self.profile == "linear" and self.falloff[1] >= self.cone_angle[0]:
-            raise ValueError("the inner cone of a linear profile must be narrower than its outer one")
+        largest = PROFILES[self.profile].largest_falloff(self.cone_angle[0])
+        widest = SpotLight.shaped(self.profile, self.cone_angle[0], self.falloff[1])
+        if self.falloff[1] > largest or widest.rim == 0.0:
+            raise ValueError(f"a {self.profile} rim must fit its cone and have a width, got {self.falloff[1]:g}")
 
     @property
-    def least(self) -> SpotShape:
+    def least(self) -> SpotLight:
         """The narrowest cone with the narrowest rim."""
-        return SpotShape(self.profile, self.cone_angle[0], self.falloff[0])
+        return SpotLight.shaped(self.profile, self.cone_angle[0], self.falloff[0])
 
-    def draw(self, rng: np.random.Generator) -> SpotShape:
+    def draw(self, rng: np.random.Generator) -> SpotLight:
         """A cone and a rim, each uniform in its range."""
-        return SpotShape(self.profile, float(rng.uniform(*self.cone_angle)), float(rng.uniform(*self.falloff)))
+        return SpotLight.shaped(self.profile, float(rng.uniform(*self.cone_angle)), float(rng.uniform(*self.falloff)))
 
 
 @dataclass(frozen=True)

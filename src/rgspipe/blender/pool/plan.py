@@ -137,9 +137,7 @@ def _spot(place: _Place, occlusion: str, position: np.ndarray, rng: np.random.Ge
         axis = aim_at_seen(rng, position, shape, place.seen, place.geometry)
     if axis is None:
         return None
-    lamp = _point(position)
-    direction = torch.from_numpy(axis)
-    return SpotLight(lamp.position, lamp.intensity, direction, shape.profile, shape.cone_angle, shape.falloff)
+    return shape.at(torch.from_numpy(position), torch.from_numpy(axis))
 
 
 def _class_of(place: _Place, position: np.ndarray) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
@@ -13,8 +12,8 @@ import torch
 from rgspipe.blender.pool.job import HEADLIGHTS
 from rgspipe.blender.targets import random_intensity
 from rgspipe.errors import InputError
-from rgspipe.renderer.spot import spot_power
-from rgspipe.scene import Light, LightRig, SpotLight
+from rgspipe.scene import Light, LightRig
+from rgspipe.scene.lights import WATTS_PER_INTENSITY
 
 #: Number of the random stream of rigs; part of the seed.
 STREAM = 20
@@ -88,7 +87,7 @@ def headlight_rigs(pool: Sequence[Light], brightness: np.ndarray) -> list[RigPla
 
 def unit_power(light: Light) -> float:
     """Axial intensity [W/sr] with which `light`, of 1 W/sr, has the power of a point light of 1 W/sr."""
-    return 4.0 * math.pi / float(spot_power(light).mean()) if isinstance(light, SpotLight) else 1.0
+    return WATTS_PER_INTENSITY / float(light.power().mean())
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,6 @@ import numpy as np
 import torch
 
 from rgspipe.blender.pool.job import HEADLIGHTS
-from rgspipe.renderer.spot import SpotShape
 from rgspipe.scene import SpotLight
 from rgspipe.scene.models import Corridor
 
@@ -23,7 +22,7 @@ GAUGE, HEIGHT = 0.2, 0.3
 DIP = math.radians(4.0)
 
 
-def headlights(corridor: Corridor, moments: int, shape: SpotShape) -> list[tuple[SpotLight, ...]]:
+def headlights(corridor: Corridor, moments: int, shape: SpotLight) -> list[tuple[SpotLight, ...]]:
     """The left and the right headlight at moments equally far apart on the path, 1 W/sr on their axes.
 
     The middle of the car follows the middle of the corridor: straight through the far leg, a quarter of a circle
@@ -58,12 +57,11 @@ def _pieces(corridor: Corridor) -> tuple[float, float, float]:
     return leg - START * corridor.width, 0.25 * math.pi * corridor.width, leg - END * corridor.width
 
 
-def _pair(corridor: Corridor, along: float, shape: SpotShape) -> tuple[SpotLight, ...]:
+def _pair(corridor: Corridor, along: float, shape: SpotLight) -> tuple[SpotLight, ...]:
     middle, ahead = path(corridor, along)
     left = np.array([-ahead[1], ahead[0]])
     height = HEIGHT * corridor.width - 0.5 * corridor.height
     axis = torch.tensor([*(math.cos(DIP) * ahead), -math.sin(DIP)], dtype=torch.float64)
     sides = np.linspace(0.5, -0.5, HEADLIGHTS) * GAUGE * corridor.width
     places = [torch.tensor([*(middle + side * left), height], dtype=torch.float64) for side in sides]
-    ones = torch.ones(3, dtype=torch.float64)
-    return tuple(SpotLight(place, ones, axis, shape.profile, shape.cone_angle, shape.falloff) for place in places)
+    return tuple(shape.at(place, axis) for place in places)

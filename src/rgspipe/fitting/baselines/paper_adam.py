@@ -6,7 +6,7 @@ so that it can be compared with.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import torch
 from torch import Tensor
@@ -83,7 +83,7 @@ def fit_paper_adam(
     """
     meter = Meter()
     spec = spec or LightSpec()
-    if spec.type == "auto" or spec.count is None or spec.cone_free:
+    if spec.type == "auto" or spec.count is None or spec.shape_free:
         raise ValueError("paper_adam needs lights of known type, number and cone: use search_lm")
     if problem.black:
         return dark_result(meter.seconds)
@@ -116,9 +116,9 @@ class _Descent:
     ) -> _Descent:
         ball, scene_radius = light_ball(problem.views.frozen, prior)
         start = draw_start(ball, scene_radius, prior, options.start, seed, spec.count)
-        rig = MovingRig(start.positions.clone().requires_grad_(), start.log_intensities.clone().requires_grad_())
-        if spec.spots:
-            rig = replace(rig, axes=start.axes.clone().requires_grad_(), shape=spec.shape)
+        axes = start.axes.clone().requires_grad_() if spec.aimed else None
+        leaves = (leaf.clone().requires_grad_() for leaf in (start.positions, start.log_intensities))
+        rig = MovingRig(*leaves, spec.kinds[0], axes)
         loss = AdamLoss(problem.views, target, options.ssim_weight, problem.effects)
         return cls(loss, options, ball, rig, meter, [])
 

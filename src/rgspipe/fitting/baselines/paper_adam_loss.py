@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import torch
 from torch import Tensor
 
-from rgspipe.fitting.model.parameters import Emitter
+from rgspipe.fitting.model.emitter import Emitter
+from rgspipe.fitting.model.harmonics import BandLimit, emitted_share
 from rgspipe.fitting.model.problem import Effects
-from rgspipe.fitting.model.spot_harmonics import BandLimit, fitted_share
 from rgspipe.fitting.model.views import PreparedViews
 from rgspipe.fitting.search.schedule import soft
 from rgspipe.optim.ssim_reference import SsimReference
 from rgspipe.renderer.direct import differentiable_irradiance
-from rgspipe.renderer.spot import SpotShape
-from rgspipe.scene import LightRig
+from rgspipe.scene import Light, LightRig
 
 
 @dataclass(frozen=True)
@@ -27,47 +25,36 @@ class MovingRig:
     Attributes:
         positions: (L, 3) scene units.
         log_intensities: (L, 3) of W/sr.
-        axes: (L, 3) of spots, of unit length; None for point lights.
-        shape: the spots' profile, the same for all; None for point lights.
+        shape: a light of their kind and shape, wherever it is.
+        axes: (L, 3) of unit length; None where they shine alike in all directions.
     """
 
     positions: Tensor
     log_intensities: Tensor
+    shape: Light
     axes: Tensor | None = None
-    shape: SpotShape | None = None
 
     def emitters(self) -> tuple[Emitter, ...]:
         """The lights without intensity and gradients; a rim without width gets the width that fits take it with."""
         positions = self.positions.detach().clone()
-        if self.axes is None:
-            return tuple(Emitter(position) for position in positions)
-        axes = self.axes.detach().clone()
-        return soft(tuple(Emitter(*both, self.shape) for both in zip(positions, axes, strict=True)), 0.0)
+        axes = [None] * len(positions) if self.axes is None else self.axes.detach().clone()
+        lights = (self.shape.at(*both) for both in zip(positions, axes, strict=True))
+        return soft(tuple(map(Emitter.of, lights)), 0.0)
 
     def lights(self) -> LightRig:
         """The lights, without gradients."""
         intensities = self.log_intensities.detach().exp()
-        return tuple(one.light(intensity) for one, intensity in zip(self.emitters(), intensities, strict=True))
+        return tuple(one.shining(intensity) for one, intensity in zip(self.emitters(), intensities, strict=True))
 
 
-class _Share(torch.autograd.Function):
-    """The share of a spot's light towards points, differentiable towards its position and axis."""
+def _share(position: Tensor, axis: Tensor, points: Tensor, emitter: Emitter, band: BandLimit | None) -> Tensor:
+    """(N,) the share of a light towards points, differentiable towards its position and axis.
 
-    @staticmethod
-    def forward(
-        ctx: Any, position: Tensor, axis: Tensor, points: Tensor, emitter: Emitter, band: BandLimit | None
-    ) -> Tensor:
-        spot = position.detach(), axis.detach(), emitter.shape, emitter.softness
-        share = fitted_share(points, *spot, band, emitter.cone_free)
-        ctx.save_for_backward(share.by_position, share.by_axis)
-        ctx.like = position.dtype, position.device
-        return share.value
-
-    @staticmethod
-    def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor | None, ...]:
-        dtype, device = ctx.like
-        by_position, by_axis = (slope.T @ gradient for slope in ctx.saved_tensors)
-        return by_position.to(device, dtype), by_axis.to(device, dtype), None, None, None
+    What is added is zero, and its derivative that of the share.
+    """
+    share = emitted_share(emitter, points, band)
+    moves = ((share.by["position"], position), (share.by["direction"], axis))
+    return share.value + sum(slope @ (leaf - leaf.detach()).to(slope) for slope, leaf in moves)
 
 
 def rig_image(views: PreparedViews, rig: MovingRig, effects: Effects) -> Tensor:
@@ -80,7 +67,7 @@ def rig_image(views: PreparedViews, rig: MovingRig, effects: Effects) -> Tensor:
     if rig.axes is not None:
         points = frozen.bvh.surfels.centers
         spots = zip(rig.positions, rig.axes, rig.emitters(), strict=True)
-        lit = lit * torch.stack([_Share.apply(*spot[:2], points, spot[2], effects.spots) for spot in spots])
+        lit = lit * torch.stack([_share(*spot[:2], points, spot[2], effects.spots) for spot in spots])
     irradiance = lit.T @ rig.log_intensities.exp().to(lit)
     radiance = frozen.surfels.albedo * (irradiance / math.pi)
     if effects.interreflection:

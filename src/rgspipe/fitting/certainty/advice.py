@@ -25,8 +25,8 @@ from torch import Tensor
 
 from rgspipe.fitting.certainty.uncertainty import surface_cells, whitener
 from rgspipe.fitting.model.capture import SATURATED, ImageCapture
+from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.moments import group_moments, information, scores
-from rgspipe.fitting.model.parameters import Emitter
 from rgspipe.fitting.model.problem import Effects, LightProblem
 from rgspipe.fitting.model.views import prepare_views
 from rgspipe.fitting.result import FitResult
@@ -36,9 +36,6 @@ from rgspipe.scene import Camera
 
 #: Images that are only predicted need no more pixels than this along their longer side.
 COARSE_PIXELS = 48
-
-#: Rows of the covariance of a spot whose cone is known.
-SPOT_ROWS = 9
 
 #: η: the share of the variance of the model's errors that all views have in common. Chosen on every other of 60 targets
 #: of one trained scene, such that fits of one and of two views foretell what fits of two and of four then state.
@@ -239,7 +236,7 @@ def _evidence(
     black = torch.zeros((len(views.pixels), 3), device=views.operator.matrix.device)
     problem = LightProblem(views, black, 1.0, replace(effects, at_pixels=False))
     pairs = zip(result.lights, result.covariance, strict=True)
-    emitters = [Emitter.of(light, cone_free=len(matrix) > SPOT_ROWS) for light, matrix in pairs]
+    emitters = [Emitter.fitted(light, matrix) for light, matrix in pairs]
     intensity = torch.stack([light.intensity.double().cpu() for light in result.lights])
     columns = [problem.evaluate(emitter) for emitter in emitters]
     image = -problem.residual(columns, intensity)

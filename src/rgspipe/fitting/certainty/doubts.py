@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor
 
+from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.scene import LightRig
 from rgspipe.scene.surfels import Surfels
 
@@ -19,6 +20,9 @@ ON_SURFACE = 0.002
 
 #: A point lies over a surfel if it is within so many standard deviations of the middle, in the surfel's plane.
 OVER = 2.0
+
+#: What people call a light's fields.
+NAMES = {"direction": "axis"}
 
 
 def doubts(rig: LightRig, covariance: Sequence[Tensor], surfels: Surfels, scene_size: float) -> str:
@@ -46,20 +50,16 @@ def _undetermined(rig: LightRig, covariance: Sequence[Tensor]) -> str:
     parts = []
     for index, (light, matrix) in enumerate(zip(rig, covariance, strict=True)):
         unknown = torch.isinf(matrix.diagonal())
+        dark = not bool((light.intensity > 0).any())
+        rows = Emitter.fitted(light, matrix).rows()
         names = [
-            name
-            for name, chosen in _named(len(unknown))
-            if bool(unknown[chosen].any()) and not (name == "intensity" and not bool((light.intensity > 0).any()))
+            NAMES.get(name, name.replace("_", " "))
+            for name, chosen in rows.items()
+            if bool(unknown[chosen].any()) and not (name == "intensity" and dark)
         ]
         if names:
             parts.append(" and ".join(names) + (f" of light {index + 1}" if len(rig) > 1 else ""))
     return f"Not determined by these views: {'; '.join(parts)}." if parts else ""
-
-
-def _named(rows: int) -> list[tuple[str, slice]]:
-    """The rows of a light's covariance by what they are."""
-    named = [("position", slice(0, 3)), ("axis", slice(3, 6)), ("cone", slice(6, rows - 3))]
-    return [*(named[:1] if rows == 6 else named), ("intensity", slice(rows - 3, rows))]
 
 
 def _stopped(rig: LightRig, surfels: Surfels, scene_size: float) -> str:

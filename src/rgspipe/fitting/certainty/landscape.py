@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import torch
 from torch import Tensor
 
-from rgspipe.fitting.model.parameters import Emitter
+from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.search.moves import Region
 from rgspipe.fitting.search.weighting import PLAIN
@@ -62,7 +62,7 @@ def loss_slices(
     def loss_at(position: Tensor) -> float:
         if not torch.equal(region.clip(position), position):
             return float("nan")
-        moved = replace(rig[light], position=position)
+        moved = rig[light].placed(position)
         columns = [*fixed, problem.evaluate(moved)]
         return problem.unexplained(columns, best_intensity(problem, columns))
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import torch
 from torch import Tensor
 
-from rgspipe.fitting.model.parameters import Emitter
+from rgspipe.fitting.model.emitter import Emitter
 
 #: Step of a parameter: of the scene's size for positions, rad for axes; see `Emitter`.
 STEP = 1e-3

@@ -12,17 +12,17 @@ from torch import Tensor
 from rgspipe.fitting.model.blocks import BlockModel
 from rgspipe.fitting.model.capture import SATURATED, ImageCapture, rounding_noise
 from rgspipe.fitting.model.differences import central_differences
+from rgspipe.fitting.model.emitter import Emitter, shared
 from rgspipe.fitting.model.exposure import ExposedMoments, best_factors, moments_by_view
 from rgspipe.fitting.model.gloss import seen_with_gloss
+from rgspipe.fitting.model.harmonics import BandLimit, emitted_share
 from rgspipe.fitting.model.kernels.lit_shares import LEAST_LIT, lit_shares
 from rgspipe.fitting.model.moments import Moments, moments
-from rgspipe.fitting.model.parameters import Emitter, share_slopes, shared
-from rgspipe.fitting.model.spot_harmonics import BandLimit, fitted_share
 from rgspipe.fitting.model.views import PreparedViews
 from rgspipe.renderer.direct import unit_irradiance
 from rgspipe.renderer.pixel_direct import surfel_shares
 from rgspipe.renderer.sparse import SparseOperator
-from rgspipe.renderer.spot_share import SpotShare
+from rgspipe.scene.lights import Share
 
 #: In relative weights 1/(y + floor·mean y): pixels darker than this share of the mean count no more than it does.
 RELATIVE_FLOOR = 0.05
@@ -122,9 +122,9 @@ class LightProblem:
     def _evaluate(self, emitter: Emitter) -> Tensor:
         """`evaluate` with analytic derivatives."""
         frozen = self.views.frozen
-        spot = self._spot(emitter, frozen.bvh.surfels.centers)
-        share, slope = self._shares(emitter.position, spot)
-        lightings = self._on_surfels(emitter, spot, share, slope)
+        sent = emitted_share(emitter, frozen.bvh.surfels.centers, self.effects.spots)
+        share, slope = self._shares(emitter.position, sent)
+        lightings = self._on_surfels(emitter, sent, share, slope)
         if self.at_pixels:
             return self._seen_at_pixels(emitter, share, slope, lightings)
         if self.blocks is not None:
@@ -134,27 +134,19 @@ class LightProblem:
         radiance = frozen.radiance(lightings, self.effects.interreflection)
         return _seen(self.views.operator, radiance)
 
-    def _spot(self, emitter: Emitter, points: Tensor) -> SpotShare | None:
-        """Share of a spot's light towards `points` (N, 3); None for a point light."""
-        if not emitter.is_spot:
-            return None
-        spot = emitter.position, emitter.axis, emitter.shape, emitter.softness
-        return fitted_share(points, *spot, self.effects.spots, emitter.cone_free)
-
-    def _shares(self, position: Tensor, spot: SpotShare | None) -> tuple[Tensor, Tensor]:
+    def _shares(self, position: Tensor, sent: Share | None) -> tuple[Tensor, Tensor]:
         """Share (N,) of a light that reaches each surfel that it shines on, and its derivative (N, 3)."""
         bvh, shadows = self.views.frozen.bvh, self.effects.shadows
-        if spot is None or not shadows:
+        if sent is None or not shadows:
             return surfel_shares(bvh, position, shadows)
-        return lit_shares(bvh, position, spot.value.abs() > LEAST_LIT)
+        return lit_shares(bvh, position, sent.value.abs() > LEAST_LIT)
 
-    def _on_surfels(self, emitter: Emitter, spot: SpotShare | None, share: Tensor, slope: Tensor) -> Tensor:
+    def _on_surfels(self, emitter: Emitter, sent: Share | None, share: Tensor, slope: Tensor) -> Tensor:
         """(N, 1 + d) irradiance of a unit light on surfels and its derivatives, at their centres."""
         factor, factor_slope = unit_irradiance(self.views.frozen.bvh, emitter.position[None], shadows=False)
         factor, factor_slope = factor[0], factor_slope[0]
         slope = factor_slope * share[:, None] + factor[:, None] * slope
-        columns = torch.cat([(factor * share)[:, None], slope], dim=1)
-        return columns if spot is None else shared(columns, spot.value, share_slopes(emitter, spot))
+        return shared(torch.cat([(factor * share)[:, None], slope], dim=1), sent, emitter)
 
     def _seen_at_pixels(self, emitter: Emitter, share: Tensor, slope: Tensor, lightings: Tensor) -> Tensor:
         """`evaluate` with direct light where pixels look; what bounces still starts from surfels' centres."""
@@ -163,9 +155,8 @@ class LightProblem:
         for index, highlights in enumerate(self.views.highlights):
             images[index] = images[index] + highlights.image(position, share, slope)
         columns = torch.cat(images)[self.views.pixels]
-        spot = self._spot(emitter, self.views.points) if emitter.is_spot else None
-        if spot is not None:
-            columns = shared(columns, spot.value, share_slopes(emitter, spot))
+        if emitter.axis is not None:
+            columns = shared(columns, emitted_share(emitter, self.views.points, self.effects.spots), emitter)
         if not self.effects.interreflection:
             return columns
         if frozen.gloss is not None:

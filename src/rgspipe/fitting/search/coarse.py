@@ -9,11 +9,11 @@ import torch
 from torch import Tensor
 
 from rgspipe.fitting.model.blocks import BlockModel
-from rgspipe.fitting.model.parameters import Emitter
+from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.renderer.dictionary import LightDictionary
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.sparse import SparseOperator
-from rgspipe.renderer.spot import SpotShape
+from rgspipe.scene.lights import Light, PointLight
 
 
 @dataclass(frozen=True)
@@ -25,18 +25,18 @@ class CoarseImages:
         counts: (B,) used pixels of each block.
         images: (C, B, 3) float32 of unit lights.
         positions: (C, 3) of the candidates.
-        axes: (C, 3) of spots; None for point lights.
-        shapes: the spots' profiles; none for point lights.
-        kinds: (C,) int64 index into `shapes` of each spot; None for point lights.
+        shapes: lights of the kind and of each shape that is tried, wherever they are.
+        axes: (C, 3) of the candidates; None where they shine alike in all directions.
+        which: (C,) int64 index into `shapes` of each candidate; None for the first.
     """
 
     blocks: SparseOperator
     counts: Tensor
     images: Tensor
     positions: Tensor
+    shapes: tuple[Light, ...]
     axes: Tensor | None = None
-    shapes: tuple[SpotShape, ...] = ()
-    kinds: Tensor | None = None
+    which: Tensor | None = None
 
     def __len__(self) -> int:
         return len(self.positions)
@@ -47,16 +47,14 @@ class CoarseImages:
         counts = self.counts.to(self.images)
         return torch.einsum("kbc,kbc,b->kc", self.images, self.images, counts).double()
 
-    def emitter(self, index: int, cone_free: bool = False) -> Emitter:
+    def emitter(self, index: int, shape_free: bool = False) -> Emitter:
         """The candidate `index`."""
-        position = self.positions[index].double().cpu()
-        if self.axes is None:
-            return Emitter(position)
-        axis = torch.nn.functional.normalize(self.axes[index].double().cpu(), dim=0)
-        return Emitter(position, axis, self.shapes[int(self.kinds[index])], cone_free)
+        shape = self.shapes[0 if self.which is None else int(self.which[index])]
+        axis = None if self.axes is None else self.axes[index].double()
+        return Emitter.of(shape.at(self.positions[index], axis), shape_free)
 
 
 def coarse_images(frozen: FrozenScene, model: BlockModel, dictionary: LightDictionary) -> CoarseImages:
     """Coarse images of all candidates by products of small matrices, instead of one rendering each."""
     images = model.seen(frozen, dictionary.irradiance.T).permute(2, 0, 1).contiguous()
-    return CoarseImages(model.average, model.counts, images, dictionary.positions)
+    return CoarseImages(model.average, model.counts, images, dictionary.positions, (PointLight.shaped(),))

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.nonnegative import nonnegative
-from rgspipe.fitting.model.parameters import Emitter
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.search.coarse import CoarseImages
 

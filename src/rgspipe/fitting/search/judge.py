@@ -10,9 +10,8 @@ import torch
 from scipy.optimize import linear_sum_assignment
 from torch import Tensor
 
-from rgspipe.fitting.model.parameters import Emitter
+from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.problem import LightProblem
-from rgspipe.fitting.search.moves import emitter_distance
 from rgspipe.fitting.search.refine import State
 from rgspipe.fitting.search.weighting import ROBUST, cauchy_scale
 
@@ -108,7 +107,7 @@ def _met(one: Sequence[Emitter], other: Sequence[Emitter], size: float) -> bool:
     if len(one) != len(other):
         return False
     pairs = _counterparts(one, other)
-    return all(a.is_spot == b.is_spot and emitter_distance(a, b, size) < MET for a, b in pairs)
+    return all(a.light.kind == b.light.kind and a.distance(b, size) < MET for a, b in pairs)
 
 
 def _counterparts(one: Sequence[Emitter], other: Sequence[Emitter]) -> list[tuple[Emitter, Emitter]]:
@@ -129,7 +128,7 @@ def worth_keeping(state: State, size: float) -> list[int]:
         twins = [
             other
             for other in kept
-            if state.emitters[other].is_spot == emitter.is_spot
+            if state.emitters[other].light.kind == emitter.light.kind
             and float((state.emitters[other].position - emitter.position).norm()) < MERGED * size
         ]
         if not twins and energies[index] >= LEAST_ENERGY * sum(energies):

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import torch
 from torch import Tensor
 
-from rgspipe.fitting.model.parameters import Emitter
+from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.optim.levenberg_marquardt import within
 from rgspipe.renderer.frozen import FrozenScene
 
@@ -45,7 +45,7 @@ class StepLimits:
 
     Attributes:
         move: of a position, a part of the scene's size.
-        turn: of an axis [rad], and of the transformed parameters of a cone.
+        turn: of an axis [rad], and of the parameters of a shape.
     """
 
     move: float = 0.12
@@ -56,8 +56,8 @@ class StepLimits:
         return min(self._allowed(emitter, part) for emitter, part in _parts(rig, step))
 
     def _allowed(self, emitter: Emitter, step: Tensor) -> float:
-        share = within(float(step[:3].norm()), self.move)
-        return min(share, within(float(step[3:].abs().max()), self.turn)) if emitter.is_spot else share
+        moved, turned = emitter.stretch(step)
+        return min(within(moved, self.move), within(turned, self.turn))
 
 
 def moved_rig(rig: Sequence[Emitter], step: Tensor, region: Region) -> tuple[Emitter, ...]:
@@ -65,27 +65,14 @@ def moved_rig(rig: Sequence[Emitter], step: Tensor, region: Region) -> tuple[Emi
     moved = []
     for emitter, part in _parts(rig, step):
         other = emitter.moved(part, region.size)
-        other = replace(other, position=region.clip(other.position))
+        other = other.placed(region.clip(other.position))
         moved.append(emitter if float(part.abs().max()) == 0.0 else other)
     return tuple(moved)
 
 
 def rig_move(one: Sequence[Emitter], other: Sequence[Emitter], size: float) -> float:
-    """The largest `emitter_distance` of a light from itself."""
-    return max(emitter_distance(a, b, size) for a, b in zip(one, other, strict=True))
-
-
-def emitter_distance(one: Emitter, other: Emitter, size: float) -> float:
-    """The largest of the move over the scene's size, the turn of the axis and the change of the cone [rad]."""
-    # A scene of one surfel has no size, and no room to move in.
-    moved = float((one.position - other.position).norm()) / size if size > 0.0 else 0.0
-    if not one.is_spot:
-        return moved
-    turned = float((one.axis - other.axis).norm())
-    changed = abs(one.shape.cone_angle - other.shape.cone_angle)
-    if one.shape.profile == "gaussian":
-        changed = max(changed, abs(one.shape.falloff - other.shape.falloff))
-    return max(moved, turned, changed)
+    """The largest `Emitter.distance` of a light from itself."""
+    return max(a.distance(b, size) for a, b in zip(one, other, strict=True))
 
 
 def _parts(rig: Sequence[Emitter], step: Tensor) -> list[tuple[Emitter, Tensor]]:

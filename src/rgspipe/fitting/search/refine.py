@@ -10,9 +10,9 @@ import torch
 from torch import Tensor
 
 from rgspipe.fitting.meter import Meter
+from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.exposure import ExposedMoments
 from rgspipe.fitting.model.moments import Moments
-from rgspipe.fitting.model.parameters import Emitter
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.result import FitStatus, Step
 from rgspipe.fitting.search.moves import Region, StepLimits, moved_rig, rig_move
@@ -48,7 +48,7 @@ class State:
 
     def lights(self, problem: LightProblem) -> LightRig:
         return tuple(
-            emitter.light(problem.scale * strength)
+            emitter.shining(problem.scale * strength)
             for emitter, strength in zip(self.emitters, self.intensity, strict=True)
         )
 

@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.search.judge import distinct, ranked
 from rgspipe.fitting.search.refine import Refiner, State
 from rgspipe.fitting.search.starts import Rig
 from rgspipe.fitting.search.weighting import PLAIN, ROBUST, Weighting
-from rgspipe.renderer.spot_share import rim_width
 
 #: Steps of a start to the end.
 SHORT_ITERATIONS = 6
 
 #: Turns of a refinement: rims that are wider by so much [rad], and steps at most.
 POINT_TURNS = ((0.0, 3), (0.0, SHORT_ITERATIONS - 3))
-SPOT_TURNS = ((0.3, 3), (0.15, 4), (0.05, 4), (0.0, SHORT_ITERATIONS))
+AIMED_TURNS = ((0.3, 3), (0.15, 4), (0.05, 4), (0.0, SHORT_ITERATIONS))
 
 #: Shares of the starts, at least two of them, that take a turn after the one before: the best go on. Thoroughly: where
 #: the best starts of all failed.
@@ -37,11 +35,11 @@ def refine_starts(refiner: Refiner, rigs: Sequence[Rig], iterations: int, thorou
     Points are refined under a robust loss. A spot that is a little off has all of its pool wrong, which a robust loss
     takes for outliers; so rigs with spots are refined by plain squares.
     """
-    spots = any(emitter.is_spot for rig in rigs for emitter in rig)
-    turns, weighting = (SPOT_TURNS, PLAIN) if spots else (POINT_TURNS, ROBUST)
+    aimed = any(emitter.axis is not None for rig in rigs for emitter in rig)
+    turns, weighting = (AIMED_TURNS, PLAIN) if aimed else (POINT_TURNS, ROBUST)
     share, rim = GOING_ON_THOROUGHLY if thorough else GOING_ON, turns[0][0]
     states = [refiner.start(soft(rig, rim), weighting) for rig in rigs]
-    if spots and not thorough:
+    if aimed and not thorough:
         states = _best(refiner.problem, states, PROMISING, weighting)
     for turn, (softness, steps) in enumerate(turns):
         if turn > 0:
@@ -55,12 +53,7 @@ def refine_starts(refiner: Refiner, rigs: Sequence[Rig], iterations: int, thorou
 
 def soft(rig: Rig, softness: float) -> Rig:
     """The rig with rims that are `softness` wider, but none narrower than HARD_RIM."""
-    return tuple(
-        replace(emitter, softness=max(softness, HARD_RIM if rim_width(emitter.shape) < HARD_RIM else 0.0))
-        if emitter.is_spot
-        else emitter
-        for emitter in rig
-    )
+    return tuple(emitter.softened(max(softness, HARD_RIM if emitter.light.rim < HARD_RIM else 0.0)) for emitter in rig)
 
 
 def _best(problem: LightProblem, states: Sequence[State], share: float, weighting: Weighting) -> list[State]:

@@ -9,7 +9,7 @@ from itertools import zip_longest
 import torch
 from torch import Tensor
 
-from rgspipe.fitting.model.parameters import Emitter
+from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.search.coarse import CoarseImages
 from rgspipe.fitting.search.combinations import (
@@ -42,11 +42,11 @@ class Candidates:
     problem: LightProblem
     coarse: CoarseImages
     scored: Scored
-    cone_free: bool
+    shape_free: bool
 
     @classmethod
-    def of(cls, problem: LightProblem, coarse: CoarseImages, cone_free: bool = False) -> Candidates:
-        return cls(problem, coarse, Scored.of(problem, coarse), cone_free)
+    def of(cls, problem: LightProblem, coarse: CoarseImages, shape_free: bool = False) -> Candidates:
+        return cls(problem, coarse, Scored.of(problem, coarse), shape_free)
 
     @property
     def lit(self) -> bool:
@@ -54,7 +54,7 @@ class Candidates:
         return bool((single_gains(self.scored) > 0).any())
 
     def emitters(self, combination: Sequence[int]) -> Rig:
-        return tuple(self.coarse.emitter(index, self.cone_free) for index in combination)
+        return tuple(self.coarse.emitter(index, self.shape_free) for index in combination)
 
     def rigs(self, lights: int, count: int, size: float) -> list[Rig]:
         """At most `count` rigs of `lights` candidates each that explain most, clearly different ones, best first.
@@ -120,10 +120,10 @@ def different(rigs: Sequence[Rig], count: int, separation: float) -> list[Rig]:
 def _apart(one: Rig, other: Rig, separation: float) -> bool:
     if rig_distance(one, other) > separation:
         return True
-    return any(a.is_spot and _turn(a, other) < TURNED for a in one)
+    return any(a.axis is not None and _turn(a, other) < TURNED for a in one)
 
 
 def _turn(emitter: Emitter, rig: Rig) -> float:
-    """The largest cosine between a spot's axis and those of the spots of another rig."""
-    axes: list[Tensor] = [other.axis for other in rig if other.is_spot]
+    """The largest cosine between a light's axis and those of another rig."""
+    axes: list[Tensor] = [other.axis for other in rig if other.axis is not None]
     return max((float(emitter.axis @ axis) for axis in axes), default=-1.0)

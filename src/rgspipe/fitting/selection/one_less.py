@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rgspipe.fitting.model.parameters import Emitter
+from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.search.judge import FAINT_DROP, drop, light_energies, worth_one_more
 from rgspipe.fitting.search.refine import Refiner, State
 from rgspipe.fitting.search.schedule import SHORT_ITERATIONS

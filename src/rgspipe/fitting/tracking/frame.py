@@ -10,7 +10,7 @@ import torch
 from scipy.optimize import linear_sum_assignment
 
 from rgspipe.fitting.certainty.doubts import IN_DOUBT
-from rgspipe.fitting.model.parameters import Emitter
+from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.result import FitResult, FitStatus
 from rgspipe.fitting.search.schedule import soft
@@ -87,8 +87,8 @@ def in_order(result: FitResult, before: LightRig) -> FitResult:
         return result
     places = [torch.stack([light.position.double().cpu() for light in rig]).numpy() for rig in (before, result.lights)]
     apart = np.linalg.norm(places[0][:, None] - places[1][None], axis=-1)
-    # Types stay apart: a spot is no point light's successor.
-    kinds = np.array([[type(one) is not type(other) for other in result.lights] for one in before])
+    # Kinds stay apart: a spot is no point light's successor.
+    kinds = np.array([[one.kind != other.kind for other in result.lights] for one in before])
     order = linear_sum_assignment(apart + kinds * (1.0 + apart.max()) * count)[1]
     told = {item.name: getattr(result, item.name) for item in fields(result) if item.name in PER_LIGHT}
     return replace(result, **{name: tuple(values[k] for k in order) for name, values in told.items() if values})

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import torch
 from torch import Tensor
 
-from rgspipe.fitting.model.parameters import Emitter
+from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.search.starts import Rig
 
 #: Standard deviations of a rate at first, and of its change from one frame to the next: of positions over the scene's
@@ -141,36 +141,17 @@ def references(intensity: Tensor) -> Tensor:
 
 def moving_parameters(rig: Rig) -> Tensor:
     """(M,) int64 which of the D parameters are positions and axes."""
-    first, chosen = 0, []
-    for emitter in rig:
-        chosen.append(first + torch.arange(min(5, emitter.parameters)))
-        first += emitter.parameters
-    return torch.cat(chosen)
+    return torch.cat([emitter.moving() for emitter in rig]).nonzero()[:, 0]
 
 
 def offset(start: Rig, end: Rig, size: float) -> Tensor:
     """(D,) parameters of `end` over those of `start`, axes in the tangents at `start`."""
-    parts = []
-    for one, other in zip(start, end, strict=True):
-        parts.append((other.position - one.position) / size if size > 0.0 else 0.0 * one.position)
-        if one.is_spot:
-            parts.append(one.tangents() @ (other.axis - one.axis))
-        if one.parameters > 5:
-            changes = [other.shape.cone_angle - one.shape.cone_angle, other.shape.falloff - one.shape.falloff]
-            count = one.parameters - 5
-            parts.append(torch.tensor(changes[:count], dtype=torch.float64) / one.units(size)[5:])
-    return torch.cat(parts)
+    return torch.cat([one.offset(other, size) for one, other in zip(start, end, strict=True)])
 
 
 def turns(start: Rig, end: Rig) -> Tensor:
     """(D, D) from changes of the parameters at `start` to those at `end`: axes have other tangents there."""
-    blocks = []
-    for one, other in zip(start, end, strict=True):
-        block = torch.eye(one.parameters, dtype=torch.float64)
-        if one.is_spot:
-            block[3:5, 3:5] = other.tangents() @ one.tangents().T
-        blocks.append(block)
-    return torch.block_diag(*blocks)
+    return torch.block_diag(*(one.turned(other) for one, other in zip(start, end, strict=True)))
 
 
 def _parameters(rig: Sequence[Emitter]) -> int:
@@ -179,13 +160,7 @@ def _parameters(rig: Sequence[Emitter]) -> int:
 
 def _rate_covariance(rig: Rig, scales: tuple[float, float], together: bool) -> Tensor:
     """(M, M) of random rates with standard deviations `scales` of positions and axes."""
-    rows = []
-    for emitter in rig:
-        row = torch.zeros((5 if emitter.is_spot else 3, 6), dtype=torch.float64)
-        row[:3, :3] = scales[0] * torch.eye(3).double()
-        if emitter.is_spot:
-            row[3:, 3:] = scales[1] * emitter.tangents()
-        rows.append(row)
+    rows = [emitter.carried(*scales) for emitter in rig]
     alone = torch.block_diag(*(row @ row.T for row in rows))
     if not together:
         return alone

@@ -12,7 +12,7 @@ from torch import Tensor
 from rgspipe.fitting.certainty.doubts import IN_DOUBT
 from rgspipe.fitting.fit import FitViews, fit_lights
 from rgspipe.fitting.model.capture import ImageCapture
-from rgspipe.fitting.model.parameters import Emitter
+from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.result import FitStatus, dark_result
 from rgspipe.fitting.search.schedule import soft
@@ -223,7 +223,7 @@ class _Tracker:
         return self.options.lost * max(SMALL_COST, float(np.median(costs))) if costs else 1.0
 
     def _emitters(self, rig: LightRig) -> tuple[Emitter, ...]:
-        return soft(tuple(Emitter.of(light, self.spec.cone_free) for light in rig), 0.0)
+        return soft(tuple(Emitter.of(light, self.spec.shape_free) for light in rig), 0.0)
 
 
 def frame_energy(images: Sequence[Tensor]) -> float:

@@ -13,7 +13,7 @@ from dataclasses import replace
 import torch
 
 from rgspipe.fitting.model.blocks import BlockModel
-from rgspipe.fitting.model.parameters import Emitter
+from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.result import FitResult
 from rgspipe.fitting.search.refine import Refiner
@@ -21,6 +21,7 @@ from rgspipe.fitting.search.schedule import soft
 from rgspipe.fitting.search.starts import Rig
 from rgspipe.fitting.search.weighting import PLAIN
 from rgspipe.fitting.search_lm import fit_from
+from rgspipe.scene.lights.coordinates import tangents
 
 #: How far apart the halves of a light are put, parts of the scene's size.
 APART = 0.06
@@ -74,7 +75,7 @@ def split_rigs(result: FitResult, size: float) -> list[Rig]:
             continue
         for direction in _directions(emitter):
             apart = 0.5 * APART * size * direction
-            halves = [replace(emitter, position=emitter.position + sign * apart) for sign in (1.0, -1.0)]
+            halves = [emitter.placed(emitter.position + sign * apart) for sign in (1.0, -1.0)]
             others = [one for k, one in enumerate(emitters) if k not in (index, faint)]
             rigs.append((*halves, *others))
     return rigs
@@ -82,8 +83,8 @@ def split_rigs(result: FitResult, size: float) -> list[Rig]:
 
 def _directions(emitter: Emitter) -> Sequence[torch.Tensor]:
     """Along which a light is split: across its axis, in four directions, and along it; of a point light the axes."""
-    if not emitter.is_spot:
+    if emitter.axis is None:
         return list(torch.eye(3, dtype=torch.float64))
-    one, other = emitter.tangents()
+    one, other = tangents(emitter.axis)
     turned = [(one + other) / 2.0**0.5, (one - other) / 2.0**0.5]
     return [one, other, *turned, emitter.axis]

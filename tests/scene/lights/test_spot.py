@@ -1,17 +1,18 @@
-"""Spots in closed form: profiles, power, and derivatives on and off the axis."""
+"""Spots in closed form: power, and derivatives on and off the axis."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 import torch
-from scipy.stats import qmc
 
 from rgspipe.renderer.frozen import FrozenScene
-from rgspipe.renderer.spot import angle_from_axis, angle_slopes, spot_power, spot_profile, spot_share
 from rgspipe.scene import PointLight, SpotLight
+from rgspipe.scene.lights.angles import angle_from_axis, angle_slopes
 from rooms import rectangle, surfels_on
+from sampled_power import sampled_power
 
 AXES = [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.6, -0.48, 0.64]]
 
@@ -31,30 +32,17 @@ def test_power_is_the_integral_over_all_directions(profile: str, cone: float, fa
     light = spot(profile, cone, falloff)
     # All the light is within the cone, but for the rim of a Gaussian; samples elsewhere would be zeros.
     limit = min(math.pi, cone + 8.0 * falloff if profile == "gaussian" else cone)
-    u = torch.from_numpy(qmc.Sobol(2, seed=0).random(2**14))
-    height, turn = 1.0 - (1.0 - math.cos(limit)) * u[:, 0], 2.0 * math.pi * u[:, 1]
-    ring = (1.0 - height * height).clamp(min=0.0).sqrt()
-    x, y = torch.linalg.qr(torch.stack([light.direction, *torch.eye(3).double()[:2]], dim=1))[0][:, 1:].T
-    directions = height[:, None] * light.direction + ring[:, None] * (turn.cos()[:, None] * x + turn.sin()[:, None] * y)
-    sampled = 2.0 * math.pi * (1.0 - math.cos(limit)) * spot_share(light, light.position + directions).mean()
     # Measured below 3e-5.
-    assert float(spot_power(light)[0]) == pytest.approx(float(sampled), rel=1e-3)
+    torch.testing.assert_close(light.power(), sampled_power(light, limit), rtol=1e-3, atol=0.0)
 
 
 def test_a_spot_of_no_width_has_no_power() -> None:
-    assert float(spot_power(spot("gaussian", 0.0, 0.0)).abs().max()) < 1e-15
+    assert float(spot("gaussian", 0.0, 0.0).power().abs().max()) < 1e-15
     # A Gaussian of no cone is a lobe: 2π ∫ exp(−θ²/2σ²) sin θ dθ ≈ 2πσ² (1 − σ²/3 + σ⁴/15).
     width = 0.1
     expected = 2.0 * math.pi * width**2 * (1.0 - width**2 / 3.0 + width**4 / 15.0)
     # Measured 1e-8.
-    assert float(spot_power(spot("gaussian", 0.0, width))[0]) == pytest.approx(expected, rel=1e-6)
-
-
-@pytest.mark.parametrize("axis", AXES)
-def test_angles_are_exact_along_and_against_the_axis(axis: list[float]) -> None:
-    direction = torch.tensor(axis, dtype=torch.float64)
-    angles = angle_from_axis(direction, torch.stack([direction, -direction, 3.0 * direction]))
-    torch.testing.assert_close(angles, torch.tensor([0.0, math.pi, 0.0], dtype=torch.float64), atol=2e-9, rtol=0)
+    assert float(spot("gaussian", 0.0, width).power()[0]) == pytest.approx(expected, rel=1e-6)
 
 
 @pytest.mark.parametrize("profile", ["gaussian", "smoothstep", "linear"])
@@ -66,7 +54,7 @@ def test_values_and_derivatives_are_finite_everywhere(profile: str, cone: float,
     axis = light.direction.to(dtype).clone().requires_grad_()
     position = light.position.to(dtype).clone().requires_grad_()
     offsets = torch.tensor([[0, 0, 1], [0, 0, -1], [1, 0, 0], [0, 0, 0], [1e-12, 0, 1], [1, 1, 1]], dtype=dtype)
-    share = spot_share(light, position.detach() + offsets, position, axis)
+    share = replace(light, position=position, direction=axis).share_towards(position.detach() + offsets)
     share.sum().backward()
     for value in (share, axis.grad, position.grad):
         assert torch.isfinite(value).all()
@@ -78,20 +66,25 @@ def test_derivatives_match_finite_differences(profile: str, falloff: float) -> N
     light = spot(profile, 0.8, falloff)
     points = torch.randn(20, 3, generator=torch.Generator().manual_seed(0), dtype=torch.float64)
     position, axis = light.position.clone().requires_grad_(), light.direction.clone().requires_grad_()
-    assert torch.autograd.gradcheck(lambda p, a: spot_share(light, points, p, a), (position, axis), atol=1e-6)
+
+    def share(position: torch.Tensor, axis: torch.Tensor) -> torch.Tensor:
+        return replace(light, position=position, direction=axis).share_towards(points)
+
+    assert torch.autograd.gradcheck(share, (position, axis), atol=1e-6)
 
 
 @pytest.mark.parametrize("profile", ["gaussian", "smoothstep", "linear"])
 @pytest.mark.parametrize("cone", [0.05, 1.0, 2.5])
 @pytest.mark.parametrize("falloff", [0.0, 0.04, 0.5])
 def test_slopes_are_those_of_autograd(profile: str, cone: float, falloff: float) -> None:
-    """The analytic derivatives of profile and angle, which fits use, for spots of all shapes at once."""
+    """The analytic derivatives of profile and angle, which fits use, together."""
     generator = torch.Generator().manual_seed(0)
     towards = torch.randn(500, 3, generator=generator, dtype=torch.float64)
     axis = torch.tensor([0.3, -0.5, 0.9], dtype=torch.float64)
     leaves = towards.clone().requires_grad_(), axis.expand(500, 3).clone().requires_grad_()
     angle = angle_from_axis(leaves[1], leaves[0])
-    value, slope = spot_profile(profile, angle, cone, falloff)
+    light = spot(profile, cone, falloff)
+    value, slope = light.profile_at(angle, light.numbers(angle))
     if value.requires_grad:
         value.sum().backward()
     again, by_towards, by_axis = angle_slopes(axis, towards)
@@ -100,25 +93,6 @@ def test_slopes_are_those_of_autograd(profile: str, cone: float, falloff: float)
         expected = torch.zeros_like(by) if leaf.grad is None else leaf.grad
         # Measured 1e-13 of the largest.
         torch.testing.assert_close(slope.detach()[:, None] * by, expected, rtol=0, atol=1e-10)
-
-
-def test_narrow_cones_keep_their_digits_in_float32() -> None:
-    angles = torch.linspace(0.0, 0.02, 200, dtype=torch.float64)
-    exact, _ = spot_profile("smoothstep", angles, 0.015, 0.5)
-    # Measured 3e-7; by the difference of two cosines it would be 1e-3.
-    torch.testing.assert_close(
-        spot_profile("smoothstep", angles.float(), 0.015, 0.5)[0].double(), exact, atol=3e-6, rtol=0
-    )
-
-
-def test_blender_s_profile_has_its_blend() -> None:
-    """Half-way (in the cosine) through the blend the smoothstep is one half; inside it is 1, outside 0."""
-    cone, blend = 0.6, 0.5
-    edge = math.cos(cone)
-    middle = math.acos(edge + 0.5 * blend * (1.0 - edge))
-    angles = torch.tensor([0.0, middle, cone, cone + 0.1], dtype=torch.float64)
-    expected = torch.tensor([1.0, 0.5, 0.0, 0.0], dtype=torch.float64)
-    torch.testing.assert_close(spot_profile("smoothstep", angles, cone, blend)[0], expected, atol=1e-12, rtol=0)
 
 
 def test_a_spot_of_half_turn_lights_like_a_point_light() -> None:
@@ -131,3 +105,19 @@ def test_a_spot_of_half_turn_lights_like_a_point_light() -> None:
     inside = (floor[:, :2] - torch.tensor([0.1, -0.2])).norm(dim=1) < 0.3 * math.tan(0.3)
     torch.testing.assert_close(narrow[inside], as_point[inside])
     assert float(narrow[~inside].abs().max()) == 0.0
+
+
+def test_a_hard_edge_has_no_rim() -> None:
+    assert SpotLight.shaped("gaussian", 0.4, 0.0).rim == SpotLight.shaped("linear", 0.4, 0.4).rim == 0.0
+    assert SpotLight.shaped("gaussian", 0.4, 0.1).rim == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize(("profile", "cone", "falloff"), [("gaussian", 2.0 * math.pi, 0.1), ("linear", 0.4, -0.1)])
+def test_angles_out_of_range_are_refused(profile: str, cone: float, falloff: float) -> None:
+    with pytest.raises(ValueError, match="cone_angle"):
+        SpotLight.shaped(profile, cone, falloff)
+
+
+def test_profiles_of_no_name_are_refused() -> None:
+    with pytest.raises(ValueError, match="gaussian, smoothstep, linear"):
+        SpotLight.shaped("round")

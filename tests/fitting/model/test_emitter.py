@@ -7,36 +7,42 @@ import math
 import pytest
 import torch
 
+from emitters import emitter_at
 from rgspipe.fitting import prepare_fit
-from rgspipe.fitting.model.parameters import LARGEST_CONE, Emitter
 from rgspipe.fitting.model.problem import Effects, LightProblem
-from rgspipe.renderer.spot import SpotShape
+from rgspipe.scene.lights import SpotLight
+from rgspipe.scene.lights.coordinates import tangents
+from rgspipe.scene.lights.spot import CONE
 
 PLACE = torch.tensor([0.1, -0.25, 0.3], dtype=torch.float64)
 AXIS = torch.nn.functional.normalize(torch.tensor([-0.3, 0.5, -0.6], dtype=torch.float64), dim=0)
-SHAPES = [SpotShape("gaussian", 0.4, 0.3), SpotShape("smoothstep", 0.7, 0.8), SpotShape("linear", 0.8, 0.3)]
+SHAPES = [
+    SpotLight.shaped("gaussian", 0.4, 0.3),
+    SpotLight.shaped("smoothstep", 0.7, 0.8),
+    SpotLight.shaped("linear", 0.8, 0.3),
+]
 
 
 def test_steps_keep_axes_on_the_sphere_and_cones_in_range() -> None:
-    emitter = Emitter(PLACE, AXIS, SpotShape("gaussian", 0.4, 0.2), cone_free=True)
+    emitter = emitter_at(PLACE, AXIS, SpotLight.shaped("gaussian", 0.4, 0.2), shape_free=True)
     generator = torch.Generator().manual_seed(0)
     for scale in (0.01, 1.0, 100.0):
         moved = emitter.moved(scale * torch.randn(7, generator=generator, dtype=torch.float64), 2.0)
         assert float(moved.axis.norm()) == pytest.approx(1.0, abs=1e-12)
-        assert 0.0 < moved.shape.cone_angle <= LARGEST_CONE and 0.0 < moved.shape.falloff < math.pi
+        assert 0.0 < moved.light.cone_angle <= CONE.high and 0.0 < moved.light.falloff < math.pi
 
 
 def test_a_turn_is_as_long_as_its_step() -> None:
-    emitter = Emitter(PLACE, AXIS, SHAPES[0])
+    emitter = emitter_at(PLACE, AXIS, SHAPES[0])
     turned = emitter.moved(torch.tensor([0, 0, 0, 0.03, -0.04], dtype=torch.float64), 1.0)
     assert math.acos(float(turned.axis @ AXIS)) == pytest.approx(0.05, abs=1e-8)
-    basis = torch.cat([emitter.tangents(), AXIS[None]])
+    basis = torch.cat([tangents(emitter.axis), AXIS[None]])
     torch.testing.assert_close(basis @ basis.T, torch.eye(3, dtype=torch.float64), rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("at_pixels", [False, True])
 @pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: shape.profile)
-def test_derivatives_of_a_spot_s_image_agree_with_finite_differences(room, shape: SpotShape, at_pixels: bool) -> None:
+def test_derivatives_of_a_spot_s_image_agree_with_finite_differences(room, shape: SpotLight, at_pixels: bool) -> None:
     """Towards every parameter, direct light and bounces, at surfels' centres and where pixels look.
 
     Without shadows, which are the same as a point light's and jump where hits part into layers.
@@ -45,7 +51,7 @@ def test_derivatives_of_a_spot_s_image_agree_with_finite_differences(room, shape
     views = prepare_fit(room.frozen, room.views[:1], effects=effects)
     target = torch.ones(room.views[0].camera.pixel_count, 3)
     problem = LightProblem.create(views.prepared, target, views.effects).sharpest()
-    emitter = Emitter(PLACE, AXIS, shape, cone_free=True, softness=0.1)
+    emitter = emitter_at(PLACE, AXIS, shape, shape_free=True, softness=0.1)
     slopes = problem.evaluate(emitter)[:, :, 1:] * emitter.units(1.0).float()
     assert slopes.shape[2] == emitter.parameters
     step = 2e-4

@@ -3,33 +3,34 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import torch
 from torch import Tensor
 
-from rgspipe.fitting.model.spot_harmonics import BandLimit, fitted_share, legendre, zonal_coefficients
-from rgspipe.renderer.spot import SpotShape, spot_profile
-from rgspipe.renderer.spot_share import softened
+from emitters import emitter_at
+from rgspipe.fitting.model.harmonics import BandLimit, emitted_share, legendre, zonal_coefficients
+from rgspipe.scene.lights import SpotLight
 
 SHAPES = {
-    "gaussian": SpotShape("gaussian", 0.4, 0.15),
-    "smoothstep": SpotShape("smoothstep", 0.6, 0.5),
-    "linear": SpotShape("linear", 0.7, 0.3),
+    "gaussian": SpotLight.shaped("gaussian", 0.4, 0.15),
+    "smoothstep": SpotLight.shaped("smoothstep", 0.6, 0.5),
+    "linear": SpotLight.shaped("linear", 0.7, 0.3),
 }
-HARD = SpotShape("smoothstep", 0.7, 0.0)
+HARD = SpotLight.shaped("smoothstep", 0.7, 0.0)
 
 
-def expansion(shape: SpotShape, band: BandLimit, angle: Tensor) -> Tensor:
-    return legendre(torch.cos(angle), band.degree)[0] @ zonal_coefficients(shape, band)[:, 0]
+def expansion(shape: SpotLight, band: BandLimit, angle: Tensor) -> Tensor:
+    return legendre(torch.cos(angle), band.degree)[0] @ zonal_coefficients(shape, band)[0]
 
 
-def reference_share(points: Tensor, position: Tensor, axis: Tensor, shape: SpotShape, band: BandLimit) -> Tensor:
+def reference_share(points: Tensor, position: Tensor, axis: Tensor, shape: SpotLight, band: BandLimit) -> Tensor:
     """(N,) as it is defined, in float64: NumPy's series, differentiable by finite differences alone."""
     towards = points - position
     cosine = (towards @ (axis / axis.norm())) / towards.norm(dim=1)
-    series = np.polynomial.Legendre(zonal_coefficients(shape, band)[:, 0].numpy())
+    series = np.polynomial.Legendre(zonal_coefficients(shape, band)[0].numpy())
     return torch.from_numpy(series(cosine.numpy()))
 
 
@@ -54,14 +55,14 @@ def test_a_hard_cone_has_the_coefficients_of_its_closed_form() -> None:
     edge = torch.tensor([math.cos(HARD.cone_angle)], dtype=torch.float64)
     polynomials = legendre(edge, 17)[0][0]
     expected = torch.cat([0.5 * (1.0 - edge), 0.5 * (polynomials[:-2] - polynomials[2:])])
-    found = zonal_coefficients(HARD, BandLimit(16, mirrored=False))[:, 0]
+    found = zonal_coefficients(HARD, BandLimit(16, mirrored=False))[0]
     torch.testing.assert_close(found, expected, atol=1e-12, rtol=0)  # measured 3e-15
 
 
 def test_a_full_smoothstep_is_a_cubic_of_the_cosine_and_ends_there() -> None:
     """With blend 1 and a cone of π the share is y²(3 − 2y) of y = (1 + z)/2: powers of the cosine up to the third."""
-    shape = SpotShape("smoothstep", math.pi, 1.0)
-    found = zonal_coefficients(shape, BandLimit(6, mirrored=False))[:, 0]
+    shape = SpotLight.shaped("smoothstep", math.pi, 1.0)
+    found = zonal_coefficients(shape, BandLimit(6, mirrored=False))[0]
     y = np.polynomial.Polynomial([0.5, 0.5])
     expected = np.zeros(7)
     expected[:4] = (y**2 * (3 - 2 * y)).convert(kind=np.polynomial.Legendre).coef
@@ -72,7 +73,7 @@ def test_a_full_smoothstep_is_a_cubic_of_the_cosine_and_ends_there() -> None:
 @pytest.mark.parametrize("mirrored", [False, True])
 def test_the_expansion_converges_to_the_profile(name: str, mirrored: bool) -> None:
     angle = torch.linspace(0.0, 0.5 * math.pi, 400, dtype=torch.float64)
-    exact = SHAPES[name].share(angle)
+    exact = SHAPES[name].share_at(angle)
     errors = [
         float((expansion(SHAPES[name], BandLimit(degree, mirrored), angle) - exact).square().mean().sqrt())
         for degree in (2, 8, 32)
@@ -87,24 +88,20 @@ def test_one_sided_light_stays_in_front_and_mirrored_light_does_not() -> None:
     torch.testing.assert_close(mirrored, mirrored.flip(0), atol=1e-12, rtol=0)
     assert float(mirrored[-1]) == pytest.approx(1.0, abs=0.03)  # measured 1.010
     assert float(one_sided[91:].abs().max()) < 1e-3  # measured 8e-5
-    assert torch.equal(zonal_coefficients(SHAPES["gaussian"], BandLimit(9))[1::2], torch.zeros(5, 3).double())
+    coefficients, slopes = zonal_coefficients(SHAPES["gaussian"], BandLimit(9))
+    for column in (coefficients, *slopes.values()):
+        assert torch.equal(column[1::2], torch.zeros(5).double())
 
 
 def test_derivatives_of_the_coefficients_are_those_of_finite_differences() -> None:
     step, band = 1e-6, BandLimit(8)
     for name, shape in SHAPES.items():
-        found = zonal_coefficients(shape, band, softness=0.1)
-        for column, moved in ((1, (step, 0.0)), (2, (0.0, step))):
-            ends = [
-                zonal_coefficients(
-                    SpotShape(shape.profile, shape.cone_angle + sign * moved[0], shape.falloff + sign * moved[1]),
-                    band,
-                    softness=0.1,
-                )[:, 0]
-                for sign in (1.0, -1.0)
-            ]
+        _, slopes = zonal_coefficients(shape, band, softness=0.1)
+        for number, found in slopes.items():
+            moved = [replace(shape, **{number: getattr(shape, number) + sign * step}) for sign in (1.0, -1.0)]
+            ends = [zonal_coefficients(one, band, softness=0.1)[0] for one in moved]
             expected = (ends[0] - ends[1]) / (2.0 * step)
-            assert float((found[:, column] - expected).abs().max()) < 1e-8, name  # measured 8e-10
+            assert float((found - expected).abs().max()) < 1e-8, name  # measured 8e-10
 
 
 @pytest.mark.parametrize("name", SHAPES)
@@ -114,7 +111,7 @@ def test_the_share_is_the_series_and_its_slopes_those_of_finite_differences(name
     points = torch.randn((60, 3), generator=generator, dtype=torch.float64)
     position, axis = torch.tensor([0.1, -0.2, 0.3]).double(), torch.tensor([0.3, 0.5, -0.8]).double()
     axis, shape, band = axis / axis.norm(), SHAPES[name], BandLimit(12, mirrored)
-    found = fitted_share(points, position, axis, shape, 0.0, band)
+    found = emitted_share(emitter_at(position, axis, shape), points, band)
     expected = reference_share(points, position, axis, shape, band)
     torch.testing.assert_close(found.value.double(), expected, atol=3e-6, rtol=0)  # measured 6e-7
     step = 1e-6
@@ -122,7 +119,7 @@ def test_the_share_is_the_series_and_its_slopes_those_of_finite_differences(name
         move = step * torch.eye(3, dtype=torch.float64)[index]
         along = [reference_share(points, position + sign * move, axis, shape, band) for sign in (1.0, -1.0)]
         turned = [reference_share(points, position, axis + sign * move, shape, band) for sign in (1.0, -1.0)]
-        for slope, ends in ((found.by_position, along), (found.by_axis, turned)):
+        for slope, ends in ((found.by["position"], along), (found.by["direction"], turned)):
             difference = (ends[0] - ends[1]) / (2.0 * step)
             size = max(1.0, float(difference.abs().max()))
             assert float((slope[:, index].double() - difference).abs().max()) < 1e-5 * size  # measured 2e-6
@@ -132,10 +129,8 @@ def test_a_softer_rim_is_what_is_expanded() -> None:
     angle = torch.linspace(0.0, 1.5, 100, dtype=torch.float64)
     axis, origin = torch.tensor([0.0, 0.0, 1.0]).double(), torch.zeros(3).double()
     points = torch.stack([torch.sin(angle), torch.zeros_like(angle), torch.cos(angle)], dim=1)
-    found = fitted_share(points, origin, axis, HARD, 0.3, BandLimit(32))
-    cone, falloff = (torch.tensor(x).double() for x in (HARD.cone_angle, HARD.falloff))
-    profile, *rim = softened(HARD.profile, cone, falloff, 0.3)
-    exact, _ = spot_profile(profile, angle, *rim)
+    found = emitted_share(emitter_at(origin, axis, HARD, softness=0.3), points, BandLimit(32))
+    exact, _ = HARD.profile_at(angle, HARD.numbers(angle), 0.3)
     assert float((found.value - exact).abs().max()) < 3e-3  # measured 1.3e-3
 
 
@@ -143,8 +138,8 @@ def test_without_a_band_the_share_is_exact() -> None:
     points = torch.tensor([[0.0, 0.0, 1.0], [0.0, 0.4, 1.0], [0.0, 0.0, -1.0]]).double()
     axis, origin = torch.tensor([0.0, 0.0, 1.0]).double(), torch.zeros(3).double()
     angle = torch.tensor([0.0, math.atan(0.4), math.pi]).double()
-    found = fitted_share(points, origin, axis, SHAPES["smoothstep"], 0.0, None)
-    torch.testing.assert_close(found.value.double(), SHAPES["smoothstep"].share(angle), atol=1e-6, rtol=0)
+    found = emitted_share(emitter_at(origin, axis, SHAPES["smoothstep"]), points, None)
+    torch.testing.assert_close(found.value.double(), SHAPES["smoothstep"].share_at(angle), atol=1e-6, rtol=0)
 
 
 def test_a_negative_degree_is_refused() -> None:

@@ -1,4 +1,4 @@
-"""Coarse images of candidate spots: every candidate position, aimed everywhere."""
+"""Coarse images of candidates with an axis: every candidate position, aimed everywhere."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from rgspipe.renderer.clusters import cluster_patches
 from rgspipe.renderer.dictionary import LightDictionary
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.point_sets import fibonacci_directions
-from rgspipe.renderer.spot import SpotShape, angle_from_axis, spot_profile
-from rgspipe.renderer.spot_share import softened
+from rgspipe.scene.lights import AxialLight
+from rgspipe.scene.lights.angles import angle_from_axis
 
 #: Directions in which every candidate position is aimed.
 AXES = 60
@@ -36,12 +36,12 @@ GROUPS = 250
 LEAST_SEEN = 0.01
 
 
-def spot_candidates(
-    views: PreparedViews, dictionary: LightDictionary, shapes: Sequence[SpotShape], *, interreflection: bool = True
+def aimed_candidates(
+    views: PreparedViews, dictionary: LightDictionary, shapes: Sequence[AxialLight], *, interreflection: bool = True
 ) -> CoarseImages:
-    """Candidate spots of given profiles at the dictionary's positions, with their coarse images.
+    """Candidate lights of given shapes at the dictionary's positions, with their coarse images.
 
-    A spot's coarse image follows from that of a point light at its place: the share of light that the profile lets
+    A light's coarse image follows from that of a point light at its place: the share of light that the profile lets
     through is taken at the mean place of what each block sees, and of each group of patches.
     """
     side = max(6, round(math.sqrt(BLOCKS_IN_ALL / len(views.views))))
@@ -49,9 +49,9 @@ def spot_candidates(
     lit = _lit_by_points(views, dictionary, model)
     directions = fibonacci_directions(AXES).to(lit.places)
     images, positions, axes, kinds = [], [], [], []
-    for index in track(range(len(dictionary)), "candidate spots", unit="place"):
+    for index in track(range(len(dictionary)), "aimed candidates", unit="place"):
         angle = angle_from_axis(directions[:, None], lit.places - dictionary.positions[index].to(lit.places))
-        seen = torch.cat([_spots_seen(shape, angle, lit, index) for shape in shapes])
+        seen = torch.cat([_aimed_seen(shape, angle, lit, index) for shape in shapes])
         images.append(seen)
         positions.append(dictionary.positions[index].expand(len(seen), 3))
         axes.append(directions.repeat(len(shapes), 1))
@@ -60,12 +60,12 @@ def spot_candidates(
     brightness = joined[0].sum(dim=(1, 2))
     kept = brightness > LEAST_SEEN * brightness.amax()
     seen, origins, aims, which = (part[kept.to(part.device)] for part in joined)
-    return CoarseImages(model.average, model.counts, seen, origins, aims, tuple(shapes), which)
+    return CoarseImages(model.average, model.counts, seen, origins, tuple(shapes), aims, which)
 
 
 @dataclass(frozen=True)
 class _LitByPoints:
-    """What unit point lights at C places light, of which spots there let shares through.
+    """What unit point lights at C places light, of which lights with an axis there let shares through.
 
     Attributes:
         places: (B + K, 3) float32 mean place of what each block sees, and of each group of patches.
@@ -111,11 +111,9 @@ def _seen_places(frozen: FrozenScene, model: BlockModel) -> Tensor:
     return total / weight.reshape(-1, 1)
 
 
-def _spots_seen(shape: SpotShape, angle: Tensor, lit: _LitByPoints, index: int) -> Tensor:
-    """(A, B, 3) coarse images of spots at place `index`, from the angles (A, B + K) of what they light."""
-    rim = (torch.tensor(x, dtype=angle.dtype) for x in (shape.cone_angle, shape.falloff))
-    profile, cone, falloff = softened(shape.profile, *rim, SEARCH_SOFTNESS)
-    share, _ = spot_profile(profile, angle, cone, falloff)
+def _aimed_seen(shape: AxialLight, angle: Tensor, lit: _LitByPoints, index: int) -> Tensor:
+    """(A, B, 3) coarse images of lights at place `index`, from the angles (A, B + K) of what they light."""
+    share, _ = shape.profile_at(angle, shape.numbers(angle), SEARCH_SOFTNESS)
     count = lit.direct.shape[1]
     seen = share[:, :count, None] * lit.direct[index]
     for channel, bounced in enumerate(() if lit.bounced is None else lit.bounced):

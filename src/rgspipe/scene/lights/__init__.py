@@ -1,0 +1,25 @@
+"""Kinds of light, one file each, in scene units and W/sr."""
+
+from rgspipe.scene.lights.axial import AxialLight
+from rgspipe.scene.lights.led import LedLight
+from rgspipe.scene.lights.light import WATTS_PER_INTENSITY, Light, LightRig, ShapeNumber, Share, as_rig
+from rgspipe.scene.lights.point import PointLight
+from rgspipe.scene.lights.spot import SpotLight, SpotProfile
+
+#: Every kind by its name.
+KINDS: dict[str, type[Light]] = {kind.kind: kind for kind in (PointLight, SpotLight, LedLight)}
+
+__all__ = [
+    "KINDS",
+    "WATTS_PER_INTENSITY",
+    "AxialLight",
+    "LedLight",
+    "Light",
+    "LightRig",
+    "PointLight",
+    "ShapeNumber",
+    "Share",
+    "SpotLight",
+    "SpotProfile",
+    "as_rig",
+]

@@ -1,0 +1,181 @@
+"""How a fit moves what it may of a light: coordinates in which equal steps have about equal effects.
+
+A coordinate of d parameters belongs to a field of r numbers. Derivatives are taken towards the field in its own
+(natural) units; `units` are those of one unit of a parameter.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any, ClassVar, Literal
+
+import torch
+from torch import Tensor
+
+
+class Coordinate(ABC):
+    """One field of a light, as a fit moves it."""
+
+    #: How many parameters it has.
+    count: ClassVar[int]
+
+    #: How it goes on from frame to frame of a sequence: as a "place" or a "turn" in the world; None if it stays.
+    motion: ClassVar[Literal["place", "turn"] | None] = None
+
+    @abstractmethod
+    def units(self, value: Any, size: float) -> list[float]:
+        """(d,) natural change per unit of each parameter, in a scene of `size`."""
+
+    @abstractmethod
+    def moved(self, value: Any, step: Tensor, size: float) -> Any:
+        """The field after a step (d,)."""
+
+    @abstractmethod
+    def offset(self, value: Any, other: Any, size: float) -> Tensor:
+        """(d,) parameters of `other` over those of `value`, to first order."""
+
+    @abstractmethod
+    def distance(self, value: Any, other: Any, size: float) -> float:
+        """How far apart two values are: over the scene's size, or rad."""
+
+    def stretch(self, step: Tensor) -> tuple[float, float]:
+        """How far a step (d,) moves, over the scene's size, and turns or reshapes [rad, or a parameter]."""
+        return 0.0, float(step.abs().max())
+
+    def slopes(self, value: Any, by: Tensor) -> Tensor:
+        """(N, d) natural derivatives towards the parameters, from those towards the field (N, r) or (N,)."""
+        return by[:, None]
+
+    def spread(self, value: Any) -> Tensor:
+        """(r, d) natural change of the field per natural change of each parameter."""
+        return torch.eye(self.count, dtype=torch.float64)
+
+    def turned(self, value: Any, other: Any) -> Tensor:
+        """(d, d) from changes of the parameters at `value` to those at `other`."""
+        return torch.eye(self.count, dtype=torch.float64)
+
+
+class Place(Coordinate):
+    """A position, in units of the scene's size."""
+
+    count = 3
+    motion = "place"
+
+    def units(self, value: Tensor, size: float) -> list[float]:
+        return [size] * 3
+
+    def moved(self, value: Tensor, step: Tensor, size: float) -> Tensor:
+        return value + size * step
+
+    def offset(self, value: Tensor, other: Tensor, size: float) -> Tensor:
+        return (other - value) / size if size > 0.0 else 0.0 * value
+
+    def distance(self, value: Tensor, other: Tensor, size: float) -> float:
+        # A scene of one surfel has no size, and no room to move in.
+        return float((value - other).norm()) / size if size > 0.0 else 0.0
+
+    def stretch(self, step: Tensor) -> tuple[float, float]:
+        return float(step.norm()), 0.0
+
+    def slopes(self, value: Tensor, by: Tensor) -> Tensor:
+        return by
+
+
+class Axis(Coordinate):
+    """A unit vector, by two turns tangent to the sphere at where it points [rad]."""
+
+    count = 2
+    motion = "turn"
+
+    def units(self, value: Tensor, size: float) -> list[float]:
+        return [1.0, 1.0]
+
+    def moved(self, value: Tensor, step: Tensor, size: float) -> Tensor:
+        """Along the sphere (exponential map)."""
+        angle = float(step.norm())
+        if angle == 0.0:
+            return value
+        across = (step / angle) @ tangents(value)
+        return torch.nn.functional.normalize(math.cos(angle) * value + math.sin(angle) * across, dim=0)
+
+    def offset(self, value: Tensor, other: Tensor, size: float) -> Tensor:
+        return tangents(value) @ (other - value)
+
+    def distance(self, value: Tensor, other: Tensor, size: float) -> float:
+        return float((value - other).norm())
+
+    def slopes(self, value: Tensor, by: Tensor) -> Tensor:
+        return by @ tangents(value).T.to(by)
+
+    def spread(self, value: Tensor) -> Tensor:
+        return tangents(value).T
+
+    def turned(self, value: Tensor, other: Tensor) -> Tensor:
+        return tangents(other) @ tangents(value).T
+
+
+@dataclass(frozen=True)
+class Between(Coordinate):
+    """A number between two bounds, by its logit."""
+
+    low: float
+    high: float
+    count = 1
+
+    def units(self, value: float, size: float) -> list[float]:
+        inside = min(max(value, self.low), self.high)
+        return [max((inside - self.low) * (self.high - inside) / (self.high - self.low), 1e-4)]
+
+    def moved(self, value: float, step: Tensor, size: float) -> float:
+        span = self.high - self.low
+        share = min(max((value - self.low) / span, 1e-6), 1.0 - 1e-6)
+        logit = math.log(share / (1.0 - share)) + float(step[0])
+        return self.low + span / (1.0 + math.exp(-min(max(logit, -30.0), 30.0)))
+
+    def offset(self, value: float, other: float, size: float) -> Tensor:
+        return torch.tensor([other - value], dtype=torch.float64) / self.units(value, size)[0]
+
+    def distance(self, value: float, other: float, size: float) -> float:
+        return abs(value - other)
+
+
+@dataclass(frozen=True)
+class Positive(Coordinate):
+    """A number above zero, by its logarithm, within bounds."""
+
+    low: float
+    high: float
+    count = 1
+
+    def units(self, value: float, size: float) -> list[float]:
+        return [max(value, self.low)]
+
+    def moved(self, value: float, step: Tensor, size: float) -> float:
+        grown = max(value, self.low) * math.exp(min(max(float(step[0]), -3.0), 3.0))
+        return min(max(grown, self.low), self.high)
+
+    def offset(self, value: float, other: float, size: float) -> Tensor:
+        return torch.tensor([other - value], dtype=torch.float64) / self.units(value, size)[0]
+
+    def distance(self, value: float, other: float, size: float) -> float:
+        return abs(value - other)
+
+
+class Ratio(Positive):
+    """A `Positive` number of which only ratios tell how much it changes."""
+
+    def distance(self, value: float, other: float, size: float) -> float:
+        return abs(math.log(max(value, self.low) / max(other, self.low)))
+
+
+PLACE, AXIS = Place(), Axis()
+
+
+def tangents(axis: Tensor) -> Tensor:
+    """(2, 3) float64 unit vectors across an axis (3,) of unit length."""
+    helper = torch.zeros(3, dtype=torch.float64)
+    helper[int(axis.abs().argmin())] = 1.0
+    first = torch.nn.functional.normalize(torch.linalg.cross(axis, helper), dim=0)
+    return torch.stack([first, torch.linalg.cross(axis, first)])

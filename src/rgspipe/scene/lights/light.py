@@ -1,0 +1,245 @@
+"""What every kind of light answers to: a fit, a file or a drawing asks the light, and never its kind."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any, ClassVar, Protocol, Self
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from rgspipe.errors import InputError
+from rgspipe.scene.arrays import ArrayLike, as_tensor
+from rgspipe.scene.lights.coordinates import PLACE, Coordinate
+
+#: What tables call the components of an axis.
+AXIS_COLUMNS = ("ax", "ay", "az")
+
+#: Power [W] of a light that shines alike in all directions over its radiant intensity [W/sr].
+WATTS_PER_INTENSITY = 4.0 * math.pi
+
+
+@dataclass(frozen=True)
+class Share:
+    """Share of a light's intensity that goes towards N points, and its derivatives.
+
+    Attributes:
+        value: (N,) float32.
+        by: derivatives towards the light's own fields by name: (N, 3) towards its position [per scene unit] and its
+            direction (across it only), (N,) towards numbers of its shape, in their own units.
+    """
+
+    value: Tensor
+    by: Mapping[str, Tensor]
+
+
+@dataclass(frozen=True)
+class ShapeNumber:
+    """One number of a light's shape.
+
+    Attributes:
+        name: the light's field.
+        key: its name in light files, and for people.
+        unit: for people: "°" for angles, which fields hold in rad.
+        coordinate: how a fit moves it; None where it does not.
+        largest: what it can be at most, the others as they are.
+    """
+
+    name: str
+    key: str
+    unit: str = ""
+    coordinate: Coordinate | None = None
+    largest: float = math.inf
+
+    def shown(self, value: float) -> float:
+        """A value of the field in `unit`."""
+        return math.degrees(value) if self.unit == "°" else value
+
+    def natural(self, value: float) -> float:
+        """A value in `unit` as the field holds it."""
+        return math.radians(value) if self.unit == "°" else value
+
+
+class Reader(Protocol):
+    """A light's fields in a file; what is missing or impossible is refused by name."""
+
+    def vector(self, key: str) -> Tensor:
+        """(3,) float64."""
+        ...
+
+    def direction(self, key: str) -> Tensor:
+        """(3,) float64 of unit length."""
+        ...
+
+    def number(self, key: str) -> float: ...
+
+    def choice(self, key: str, names: Sequence[str]) -> str: ...
+
+
+@dataclass(frozen=True)
+class Light(ABC):
+    """A source of light. Lists and numpy arrays are taken for its tensors.
+
+    Attributes:
+        position: (3,) scene units.
+        intensity: (3,) RGB radiant intensity, W/sr, of a light with an axis along it; a single number is grey.
+
+    Raises:
+        InputError: what is given is no vector.
+    """
+
+    #: Its name in light files and settings.
+    kind: ClassVar[str]
+
+    position: Tensor
+    intensity: Tensor
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            if field.name in ("position", "direction"):
+                object.__setattr__(self, field.name, as_tensor(getattr(self, field.name), field.name, (3,)))
+        object.__setattr__(self, "intensity", _colour(self.intensity))
+
+    @property
+    def axis(self) -> Tensor | None:
+        """(3,) of unit length, along which it shines; None if it shines alike in all directions."""
+        return None
+
+    @property
+    def shape(self) -> tuple[ShapeNumber, ...]:
+        """The numbers of its shape."""
+        return ()
+
+    @property
+    def rim(self) -> float:
+        """Standard deviation [rad] of its edge of light; infinite if it has none, 0 for a hard one."""
+        return math.inf
+
+    @property
+    def plain(self) -> Light:
+        """The simpler light at its place that a fit tries instead; itself if there is none."""
+        return self
+
+    @abstractmethod
+    def power(self) -> Tensor:
+        """(3,) radiant power [W]: the intensity integrated over all directions."""
+
+    def share(self, points: Tensor, *, softness: float = 0.0, shape_free: bool = False) -> Share | None:
+        """What of its intensity goes towards `points` (N, 3); None if all of it does.
+
+        Args:
+            softness: widens the edge of light by so much [rad]: a narrow one says where it is only to lights that
+                almost hit the right place.
+            shape_free: whether derivatives towards its shape are wanted, which take half of the time.
+        """
+        return None
+
+    @property
+    def least_share(self) -> float:
+        """The smallest share of its intensity that it sends anywhere."""
+        return 1.0
+
+    def coordinates(self, shape_free: bool = False) -> dict[str, Coordinate]:
+        """By field how a fit moves it; fields that are not named are known."""
+        free = {number.name: number.coordinate for number in self.shape if shape_free and number.coordinate is not None}
+        return {"position": PLACE, **free}
+
+    def changed(self, name: str, value: Any) -> Self:
+        """The light with another value of one field, and of those that are tied to it."""
+        return replace(self, **{name: value})
+
+    def tied_slopes(self, by: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
+        """`Share.by` for moves by `changed`: through fields that are tied to another as well."""
+        return by
+
+    @classmethod
+    @abstractmethod
+    def shaped(cls, *numbers: Any) -> Self:
+        """A light of 1 W/sr at the origin, along −z, of a shape: what is known of lights whose places are not."""
+
+    def at(self, position: Tensor, direction: Tensor | None = None, intensity: Tensor | None = None) -> Self:
+        """The light at another place, with its axis along `direction` (3,) of unit length, if it has one."""
+        moved = replace(self, position=position, intensity=self.intensity if intensity is None else intensity)
+        return moved if direction is None or self.axis is None else replace(moved, direction=direction)
+
+    def variants(self) -> tuple[Self, ...]:
+        """Lights of this kind whose shapes differ enough for a search to try each."""
+        return (self,)
+
+    def to(self, *args: torch.dtype | torch.device | str) -> Self:
+        """A copy with every tensor moved by `Tensor.to`."""
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        return replace(self, **{name: value.to(*args) for name, value in values.items() if isinstance(value, Tensor)})
+
+    def detached(self) -> Self:
+        """A copy without gradients, in float64 on the CPU."""
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        tensors = {name: value.detach().double().cpu() for name, value in values.items() if isinstance(value, Tensor)}
+        return replace(self, **tensors)
+
+    def columns(self) -> dict[str, float]:
+        """Its numbers by name, for tables: x … b, of one with an axis ax, ay, az, and those of its shape."""
+        named = dict(zip("xyzrgb", [*self.position.tolist(), *self.intensity.tolist()], strict=True))
+        if self.axis is not None:
+            named |= dict(zip(AXIS_COLUMNS, self.axis.tolist(), strict=True))
+        return named | {number.name: float(getattr(self, number.name)) for number in self.shape}
+
+    def with_columns(self, values: Mapping[str, float]) -> Self | None:
+        """The light of this kind whose `columns` were `values`; None where one is missing or not finite."""
+        wanted = {name: values.get(name, math.nan) for name in self.columns()}
+        if not all(map(math.isfinite, wanted.values())):
+            return None
+        vectors = {"position": "xyz", "intensity": "rgb"} | ({} if self.axis is None else {"direction": AXIS_COLUMNS})
+        fields = {
+            name: torch.tensor([wanted[key] for key in keys], dtype=torch.float64) for name, keys in vectors.items()
+        }
+        return replace(self, **fields, **{number.name: wanted[number.name] for number in self.shape})
+
+    def file_fields(self) -> dict[str, object]:
+        """What a light file says of it beside kind, position and intensity."""
+        direction = {} if self.axis is None else {"direction": self.axis.double().tolist()}
+        return direction | {number.key: float(getattr(self, number.name)) for number in self.shape}
+
+    @classmethod
+    @abstractmethod
+    def from_fields(cls, position: Tensor, intensity: Tensor, reader: Reader) -> Self:
+        """The light that a file describes."""
+
+    def emission(self, maths: Any, cosine: Any) -> Any:
+        """`share` as an expression of the cosine of the angle from its axis, for other programs; None if it is 1.
+
+        Args:
+            maths: makes expressions of expressions and numbers; see `rgspipe.blender.lamp`.
+            cosine: an expression.
+        """
+        return None
+
+
+LightRig = tuple[Light, ...]
+
+
+def as_rig(lights: Light | Sequence[Light]) -> LightRig:
+    """A rig of several lights, or of one.
+
+    Raises:
+        InputError: something else.
+    """
+    rig = (lights,) if isinstance(lights, Light) else tuple(lights)
+    for index, light in enumerate(rig):
+        if not isinstance(light, Light):
+            found = type(light).__name__
+            raise InputError(
+                f"lights[{index}]", expected="a light", found=found, remedy="Pass one, such as PointLight."
+            )
+    return rig
+
+
+def _colour(value: ArrayLike) -> Tensor:
+    """(3,) RGB; one number stands for all three."""
+    if np.ndim(value) == 0:
+        return as_tensor(value, "intensity", ()).expand(3)
+    return as_tensor(value, "intensity", (3,))

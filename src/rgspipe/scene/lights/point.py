@@ -1,0 +1,30 @@
+"""Point lights, which shine alike in all directions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+import torch
+from torch import Tensor
+
+from rgspipe.scene.lights.light import WATTS_PER_INTENSITY, Light, Reader
+
+
+@dataclass(frozen=True)
+class PointLight(Light):
+    """An isotropic point light: radiant intensity `intensity` [W/sr] in every direction."""
+
+    kind: ClassVar[str] = "point"
+
+    @classmethod
+    def shaped(cls) -> Self:
+        """A point light of 1 W/sr at the origin."""
+        return cls(torch.zeros(3).double(), torch.ones(3).double())
+
+    def power(self) -> Tensor:
+        return WATTS_PER_INTENSITY * self.intensity
+
+    @classmethod
+    def from_fields(cls, position: Tensor, intensity: Tensor, reader: Reader) -> Self:
+        return cls(position, intensity)

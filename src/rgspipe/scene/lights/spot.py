@@ -1,0 +1,114 @@
+"""Spots: one-sided lights with a cone and a rim."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Literal, Self
+
+import torch
+from torch import Tensor
+
+from rgspipe.scene.lights.axial import AxialLight
+from rgspipe.scene.lights.coordinates import Between, Positive
+from rgspipe.scene.lights.light import Reader, ShapeNumber
+from rgspipe.scene.lights.spot_profiles import PROFILES, Profile, softened
+
+SpotProfile = Literal["gaussian", "smoothstep", "linear"]
+
+#: A free cone stays between these half-angles, and a free Gaussian falloff within its own limits, rad.
+CONE = Between(math.radians(1.0), math.radians(89.0))
+FALLOFF = Positive(math.radians(0.1), math.radians(60.0))
+
+#: Cone angles that a search tries where the cone is free, rad.
+CONES = tuple(math.radians(angle) for angle in (15.0, 25.0, 40.0))
+
+
+@dataclass(frozen=True)
+class SpotLight(AxialLight):
+    """A one-sided spot light.
+
+    Attributes:
+        profile: how intensity falls with the angle from the axis; see `spot_profiles`. `gaussian`: 1 inside
+            `cone_angle`, a Gaussian outside; `smoothstep`: Blender's; `linear`: Mitsuba's.
+        cone_angle: half-angle, rad.
+        falloff: of `gaussian` the standard deviation of the rim [rad], of `smoothstep` the blend in [0, 1], of
+            `linear` the beam angle [rad].
+
+    Raises:
+        ValueError: the profile has another name, or an angle is out of range.
+    """
+
+    kind: ClassVar[str] = "spot"
+
+    profile: SpotProfile
+    cone_angle: float
+    falloff: float
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.profile not in PROFILES:
+            raise ValueError(f"a spot's profile must be one of {', '.join(PROFILES)}, got {self.profile!r}")
+        if not 0.0 <= self.cone_angle <= math.pi or not self.falloff >= 0.0:
+            found = f"{self.cone_angle} and {self.falloff}"
+            raise ValueError(f"a spot needs 0 ≤ cone_angle ≤ π and falloff ≥ 0, got {found}")
+
+    @classmethod
+    def shaped(cls, profile: SpotProfile = "smoothstep", cone_angle: float = CONES[1], falloff: float = 0.15) -> Self:
+        down = torch.tensor([0.0, 0.0, -1.0], dtype=torch.float64)
+        return cls(torch.zeros(3).double(), torch.ones(3).double(), down, profile, cone_angle, falloff)
+
+    @property
+    def shape(self) -> tuple[ShapeNumber, ...]:
+        profile = self._profile
+        moves = FALLOFF if self.profile == "gaussian" else None
+        widest = profile.largest_falloff(self.cone_angle)
+        rim = ShapeNumber("falloff", profile.falloff_key, profile.falloff_unit, moves, widest)
+        return ShapeNumber("cone_angle", "cone_angle", "°", CONE), rim
+
+    @property
+    def rim(self) -> float:
+        cone, falloff = (torch.as_tensor(x, dtype=torch.float64) for x in (self.cone_angle, self.falloff))
+        return float(self._profile.half_and_width(cone, falloff)[1])
+
+    def profile_at(self, angle: Tensor, numbers: Mapping[str, Tensor], softness: float = 0.0) -> tuple[Tensor, Tensor]:
+        profile, *rim = softened(self._profile, numbers["cone_angle"], numbers["falloff"], softness)
+        return profile(angle, *rim)
+
+    def kinks(self, softness: float = 0.0) -> list[float]:
+        rim = (torch.as_tensor(x, dtype=torch.float64) for x in (self.cone_angle, self.falloff))
+        profile, cone, falloff = softened(self._profile, *rim, softness)
+        return [min(max(angle, 0.0), math.pi) for angle in profile.kinks(float(cone), float(falloff))]
+
+    def changed(self, name: str, value: Any) -> Self:
+        if name != "cone_angle":
+            return super().changed(name, value)
+        falloff = self._profile.falloff_with(self.cone_angle, self.falloff, value)
+        return replace(self, cone_angle=value, falloff=falloff)
+
+    def tied_slopes(self, by: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
+        # A falloff that follows the cone is proportional to it.
+        tied = self._profile.falloff_with(1.0, 1.0, 2.0) != 1.0 and self.cone_angle > 0.0
+        if not tied or "falloff" not in by:
+            return by
+        return {**by, "cone_angle": by["cone_angle"] + by["falloff"] * (self.falloff / self.cone_angle)}
+
+    def variants(self) -> tuple[Self, ...]:
+        return tuple(self.changed("cone_angle", cone) for cone in CONES)
+
+    def file_fields(self) -> dict[str, object]:
+        return {"profile": self.profile} | super().file_fields()
+
+    @classmethod
+    def from_fields(cls, position: Tensor, intensity: Tensor, reader: Reader) -> Self:
+        direction, profile = reader.direction("direction"), reader.choice("profile", tuple(PROFILES))
+        numbers = (reader.number(key) for key in ("cone_angle", PROFILES[profile].falloff_key))
+        return cls(position, intensity, direction, profile, *numbers)
+
+    def emission(self, maths: Any, cosine: Any) -> Any:
+        return self._profile.emission(maths, cosine, self.cone_angle, self.falloff)
+
+    @property
+    def _profile(self) -> Profile:
+        return PROFILES[self.profile]
