@@ -15,7 +15,8 @@ from rgspipe.cli.outcome import outcome
 from rgspipe.datasets.light_file import write_lights
 from rgspipe.evaluation.tables import summary_table, target_table
 from rgspipe.files import write_json
-from rgspipe.fitting.result import REASONS, FitStatus
+from rgspipe.fitting.findings import FitStatus
+from rgspipe.fitting.words import MEANINGS
 from rgspipe.scene import LightRig, PointLight, SpotLight
 
 
@@ -25,7 +26,7 @@ def _vector(*values: float) -> torch.Tensor:
 
 POINT = PointLight(_vector(0.1, 0.2, 0.3), _vector(1.0, 2.0, 3.0))
 SPOT = SpotLight(_vector(0.5, 0.5, 0.5), _vector(4.0, 4.0, 4.0), _vector(0.0, 0.0, -1.0), "gaussian", 0.5236, 0.1)
-AT_BOUND = REASONS[FitStatus.AT_BOUND]
+AT_BOUND = MEANINGS[FitStatus.AT_BOUND]
 
 
 def _fits(
@@ -35,7 +36,7 @@ def _fits(
         rows = []
         for index in range(count):
             name, status = f"rig_{index}", FitStatus.AT_BOUND if index else FitStatus.CONVERGED
-            told = {"result": str(status), "reason": REASONS[status], "seconds": 0.5 + index, "psnr": 36.04}
+            told = {"result": str(status), "reason": MEANINGS[status], "seconds": 0.5 + index, "psnr": 36.04}
             told["exposures"] = list(exposures)
             spread = [{"covariance": torch.diag(torch.full((6,), value)).tolist()} for value in (1e-4, 4e-4)]
             write_lights(folder / name / "lights.json", rig, told | {"lights": spread[: len(rig)]})

@@ -10,7 +10,8 @@ import torch
 
 from rgspipe.datasets.covariance_file import read_covariances
 from rgspipe.datasets.light_file import read_lights
-from rgspipe.fitting.result import REASONS, FitResult, FitStatus, dark_result
+from rgspipe.fitting.findings import Undetermined
+from rgspipe.fitting.result import FitResult, dark_result
 from rgspipe.fitting.result_text import light_line
 from rgspipe.scene import LightRig, PointLight
 
@@ -20,9 +21,12 @@ NEAR, FAR = PointLight([0.1, 0.2, 0.3], [1.0, 2.0, 3.0]), PointLight([0.5, 0.5, 
 SURE, UNSURE = [1e-4] * 3 + [4e-4] * 3, [1e-4, 1e-4, float("inf"), 1.0, 1.0, 1.0]
 
 
-def result(rig: LightRig = (NEAR, FAR), status: FitStatus = FitStatus.UNDETERMINED) -> FitResult:
+REASON = "These views do not tell all of the lights. Not determined by these views: z < 1"
+
+
+def result(rig: LightRig = (NEAR, FAR)) -> FitResult:
     spread = tuple(torch.diag(torch.tensor(row, dtype=torch.float64)) for row in (SURE, UNSURE))[: len(rig)]
-    return FitResult(rig, status, f"{REASONS[status]} Is z < 1?", 0.01, 7, 20, 2, 1.234, spread, ())
+    return FitResult(rig, (Undetermined(len(rig), len(rig), ("z < 1",)),), 0.01, 7, 20, 2, 1.234, spread, ())
 
 
 def test_a_result_reads_like_a_sentence_and_a_list() -> None:
@@ -33,7 +37,7 @@ def test_a_result_reads_like_a_sentence_and_a_list() -> None:
             "2 lights, undetermined in 1.2 s",
             "  point at (0.100, 0.200, 0.300) ± 0.0100, RGB (1.000, 2.000, 3.000) W/sr ± 0.020",
             "  point at (0.500, 0.500, 0.500) ± unknown, RGB (4.000, 4.000, 4.000) W/sr ± 1.000",
-            f"{REASONS[FitStatus.UNDETERMINED]} Is z < 1?",
+            f"{REASON} of light 2.",
         ]
     )
     assert str(dark_result(0.1)).startswith("no light, not enough light in 0.1 s")
@@ -43,7 +47,7 @@ def test_a_result_reads_like_a_sentence_and_a_list() -> None:
 def test_a_notebook_shows_the_same_as_a_list() -> None:
     page = result((NEAR,))._repr_html_()
     assert page.startswith("<b>1 light, undetermined in 1.2 s</b><ul><li>point at (0.100,")
-    assert page.endswith("Is z &lt; 1?")
+    assert page.endswith("z &lt; 1.")
 
 
 def test_a_saved_result_is_a_light_file_with_its_uncertainty(tmp_path: Path) -> None:

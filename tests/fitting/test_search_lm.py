@@ -12,13 +12,10 @@ from emitters import emitter_at
 from lit_room import HIDDEN, VISIBLE
 from rgspipe import fit_lights
 from rgspipe.errors import InputError
-from rgspipe.fitting import FitStatus, LightSpec, SearchOptions, prepare_fit
+from rgspipe.fitting import FitStatus, prepare_fit
 from rgspipe.fitting.model.problem import LightProblem
-from rgspipe.fitting.search.judge import MERGED, worth_keeping
 from rgspipe.fitting.search.moves import Region
-from rgspipe.fitting.search.refine import Refiner
-from rgspipe.fitting.search.weighting import ROBUST
-from rgspipe.fitting.search_lm import _Search, fit_from
+from rgspipe.fitting.search_lm import fit_from
 
 
 def _errors(result, light):
@@ -161,18 +158,3 @@ def test_programming_mistakes_are_value_errors(room):
         fit_lights(room.frozen, room.one, images, method="guess")
     with pytest.raises(ValueError, match="dictionary"):
         fit_lights(room.frozen, dataclasses.replace(room.one, coarse=()), images)
-
-
-def test_lights_that_meet_by_plain_squares_are_one(room, point_light):
-    """Where a worse rig of one light fewer was accepted, the next one holds two lights on their way to one place."""
-    problem = LightProblem.create(
-        room.two.prepared, room.two.prepared.stack_images(room.images(point_light(VISIBLE), 2))
-    )
-    refiner = Refiner.of(problem)
-    search = _Search(problem, refiner, [], SearchOptions(), LightSpec(count=None))
-    place = torch.tensor(VISIBLE, dtype=torch.float64)
-    apart = torch.tensor([0.6 * MERGED * problem.views.frozen.size, 0.0, 0.0], dtype=torch.float64)
-    twins = refiner.start([emitter_at(place - apart), emitter_at(place + apart)], ROBUST)
-    assert len(worth_keeping(twins, problem.views.frozen.size)) == 2
-    (found,) = search._without_twins(twins).emitters
-    assert float((found.position - place).norm()) < 1e-4  # measured 3e-8

@@ -15,8 +15,9 @@ from rgspipe.datasets.json_file import read_json
 from rgspipe.datasets.light_file import read_lights
 from rgspipe.evaluation.plots import LABELS
 from rgspipe.evaluation.tables import ALL, class_order
-from rgspipe.fitting.result import REASONS, FitStatus
+from rgspipe.fitting.findings import FitStatus
 from rgspipe.fitting.result_text import light_line
+from rgspipe.fitting.words import MEANINGS
 
 #: Exposures that differ by less from 1 are those that were known.
 KNOWN_EXPOSURE = 1e-9
@@ -48,7 +49,7 @@ def _fit(artifact: Artifact, row: Row) -> list[str]:
         head += f", PSNR {told['psnr']:.1f} dB"
     spread = dict(enumerate(spreads))
     lines = [f"  {light_line(light, spread.get(index))}" for index, light in enumerate(lights)]
-    lines += [] if told["reason"] == REASONS[FitStatus.CONVERGED] else [f"  {told['reason']}"]
+    lines += [] if told["reason"] == MEANINGS[FitStatus.CONVERGED] else [f"  {told['reason']}"]
     return [head, *lines, *_exposures(told["exposures"]), *_advice(artifact, str(row["target"]))]
 
 

@@ -18,6 +18,7 @@ from rgspipe.evaluation.images import progress_strip, save_png, stack
 from rgspipe.evaluation.metrics import psnr
 from rgspipe.fitting.fit import FitViews, render_rig
 from rgspipe.fitting.result import FitResult, Step
+from rgspipe.fitting.words import PYTHON, Spoken
 from rgspipe.scene import LightRig
 
 #: What the light file says beside the lights, and results.csv repeats.
@@ -34,18 +35,20 @@ def write_result(
     views: FitViews,
     targets: Sequence[Tensor],
     further: Mapping[str, bytes] | None = None,
+    spoken: Spoken = PYTHON,
 ) -> None:
     """Write lights.json, convergence.csv, fit.png and final.exr; `folder` appears when it is whole.
 
     fit.png has one row a view: target, start, midway, end, difference. final.exr is the first view's
-    final image; those of further views are final_1.exr and so on. `further` holds more files by name.
+    final image; those of further views are final_1.exr and so on. `further` holds more files by name; settings in the
+    reason are named as `spoken` has them.
     """
     partial = folder.with_name(f".{folder.name}.partial")
     shutil.rmtree(partial, ignore_errors=True)
     partial.mkdir(parents=True)
     shown = [render_rig(views, rig) for rig in _milestones(result)]
     final = shown[-1]
-    result.save(partial / "lights.json", psnr=_psnr(final, targets))
+    result.save(partial / "lights.json", spoken, psnr=_psnr(final, targets))
     _write_convergence(partial / "convergence.csv", result.trajectory)
     rows = [progress_strip(target, [images[k] for images in shown]) for k, target in enumerate(targets)]
     save_png(partial / "fit.png", stack(rows))

@@ -10,6 +10,7 @@ from torch import Tensor
 
 from rgspipe.fitting.baselines.paper_adam import AdamOptions, fit_paper_adam
 from rgspipe.fitting.baselines.paper_adam_start import LightPrior
+from rgspipe.fitting.findings import ExposureUnknown
 from rgspipe.fitting.model.blocks import BlockModel, block_model
 from rgspipe.fitting.model.capture import ImageCapture
 from rgspipe.fitting.model.gloss import bounced_light
@@ -28,9 +29,6 @@ from rgspipe.renderer.view_weights import ViewWeights
 from rgspipe.scene import Camera, Light, LightRig, PointLight
 
 METHODS = ("search_lm", "paper_adam", "finite_differences")
-
-#: What a fit with an unknown exposure says of a single view.
-ONE_EXPOSURE = "One view cannot tell its exposure from the lights' intensity: intensities are relative to the exposure."
 
 
 @dataclass(frozen=True)
@@ -150,7 +148,7 @@ def fit_lights(
     problem = replace(problem, differences=method == "finite_differences")
     result = fit_search_lm(problem, views.coarse, search or SearchOptions(), spec, views.blocks)
     if capture.exposure_free and len(views.prepared.views) == 1:
-        return replace(result, reason=f"{result.reason} {ONE_EXPOSURE}")
+        return replace(result, findings=(*result.findings, ExposureUnknown()))
     return result
 
 

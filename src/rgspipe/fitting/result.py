@@ -4,43 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from enum import StrEnum
 from pathlib import Path
 
 from torch import Tensor
 
 from rgspipe.datasets.covariance_file import covariance_fields
 from rgspipe.datasets.light_file import write_lights
+from rgspipe.fitting.findings import Dark, Finding, FitStatus, gravest
 from rgspipe.fitting.result_text import as_html, as_text
+from rgspipe.fitting.words import PYTHON, Spoken, explained
 from rgspipe.scene import LightRig
-
-
-class FitStatus(StrEnum):
-    """Why a fit ended."""
-
-    CONVERGED = "converged"
-    MAX_ITERATIONS = "max_iterations"
-    AT_BOUND = "at_bound"
-    AMBIGUOUS = "ambiguous"
-    UNDETERMINED = "undetermined"
-    UNEXPLAINED = "unexplained"
-    NOT_ENOUGH_LIGHT = "not_enough_light"
-
-
-#: For each status one sentence that says what it means and what to do.
-REASONS = {
-    FitStatus.CONVERGED: "The loss has a minimum here: a further step would not change the light.",
-    FitStatus.MAX_ITERATIONS: "All iterations were used while the loss was still falling: allow more of them.",
-    FitStatus.AT_BOUND: "The light was stopped at the edge of the region that is searched: the true light may be "
-    "outside, or these views do not tell its distance; give more views or a larger region.",
-    FitStatus.AMBIGUOUS: "Clearly different lights explain the target as well as these: give more views, or say more "
-    "of the lights (their number, their type).",
-    FitStatus.UNDETERMINED: "These views do not tell all of the lights.",
-    FitStatus.UNEXPLAINED: "These lights leave much of the target unexplained: their number or type may be another, or "
-    "the scene that was photographed is not the one that was frozen; say more of the lights, or search more starts.",
-    FitStatus.NOT_ENOUGH_LIGHT: "The target is black, or no light in the scene can explain it: check its exposure, "
-    "its mask and that it shows this scene.",
-}
 
 
 @dataclass(frozen=True)
@@ -74,8 +47,7 @@ class FitResult:
 
     Attributes:
         lights: the rig; empty if there was not enough light.
-        status: why the fit ended.
-        reason: the status in words, with what to do.
+        findings: what was found out about them.
         loss: the method's final loss.
         iterations: accepted steps, over all starts.
         evaluations: renderings of a light, over all starts.
@@ -84,17 +56,16 @@ class FitResult:
         covariance: per light a symmetric float64 matrix, of (x, y, z, r, g, b) for a point light; for a spot the axis
             as a vector follows the position, and where they were free the cone angle and (Gaussian) falloff [rad]:
             (x, y, z, ax, ay, az, [cone, [falloff]], r, g, b). Of noise and errors of the model together, calibrated;
-            see `certainty.uncertainty`. What the views do not determine has an infinite variance, and `reason` says so.
+            see `certainty.uncertainty`. What the views do not determine has an infinite variance; `findings` say so.
         trajectory: the steps from the start that won to the end, the start included.
-        costs: by number of lights that was tried, the robust cost of the best rig of so many; see `search.judge`.
+        costs: by number of lights that was tried, the robust cost of the best rig of so many; see `search.compare`.
         noise_covariance: the same with the residual as independent noise of the pixels, by plain Gauss-Newton. Errors
             of the model are shared by neighbouring pixels, so it is far too small for a scene that was trained.
         exposures: of each view over the first one's; all 1 where they were known.
     """
 
     lights: LightRig
-    status: FitStatus
-    reason: str
+    findings: tuple[Finding, ...]
     loss: float
     iterations: int
     evaluations: int
@@ -106,6 +77,16 @@ class FitResult:
     noise_covariance: tuple[Tensor, ...] = ()
     exposures: tuple[float, ...] = ()
 
+    @property
+    def status(self) -> FitStatus:
+        """What is to be thought of them: that of the gravest finding."""
+        return gravest(self.findings)
+
+    @property
+    def reason(self) -> str:
+        """All that was found, in sentences, with what to do."""
+        return explained(self.findings)
+
     def __repr__(self) -> str:
         return as_text(self)
 
@@ -113,10 +94,11 @@ class FitResult:
         """For notebooks."""
         return as_html(self)
 
-    def save(self, path: str | Path, **more: object) -> None:
+    def save(self, path: str | Path, spoken: Spoken = PYTHON, **more: object) -> None:
         """Write a light file with the covariances, and beside the lights how the fit went.
 
         Args:
+            spoken: how settings are named in `reason`.
             more: further fields of the file, such as JSON holds.
         """
         fit = {
@@ -127,7 +109,8 @@ class FitResult:
             "costs": {str(count): cost for count, cost in self.costs.items()},
             "seconds": round(self.seconds, 4),
             "result": str(self.status),
-            "reason": self.reason,
+            "reason": explained(self.findings, spoken),
+            "findings": [finding.data() for finding in self.findings],
             "exposures": list(self.exposures),
             "lights": covariance_fields(
                 len(self.lights), {"covariance": self.covariance, "noise_covariance": self.noise_covariance}
@@ -138,5 +121,4 @@ class FitResult:
 
 def dark_result(seconds: float) -> FitResult:
     """The result for a target that no light explains."""
-    status = FitStatus.NOT_ENOUGH_LIGHT
-    return FitResult((), status, REASONS[status], 0.0, 0, 0, 1, seconds, (), ())
+    return FitResult((), (Dark(),), 0.0, 0, 0, 1, seconds, (), ())

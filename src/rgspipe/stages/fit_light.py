@@ -42,6 +42,7 @@ from rgspipe.stages.fit_extras import Named, further_files, training_cameras
 from rgspipe.stages.light_shape import light_shape
 from rgspipe.stages.scene_effects import chosen_effects, frozen_scene, measured_effects
 from rgspipe.stages.sources import image_stage, require_images, target_stage
+from rgspipe.stages.spoken import COMMAND_LINE
 
 
 def run(context: StageContext) -> None:
@@ -121,7 +122,7 @@ class Fitter:
         # Pictures and their PSNR are those of the first view's exposure.
         exposures = result.exposures or [1.0] * len(views)
         images = [image / exposure for image, exposure in zip(taken, exposures, strict=True)]
-        write_result(folder / target.name, result, prepared, images, further)
+        write_result(folder / target.name, result, prepared, images, further, COMMAND_LINE)
 
     def _other_cameras(self, target: Target, used: Sequence[View]) -> list[Named]:
         """Cameras that could be added to a fit: the target's own others, and those of the training views."""

@@ -19,11 +19,13 @@ from rgspipe.fitting.fit import FitViews
 from rgspipe.fitting.model.capture import ImageCapture
 from rgspipe.fitting.tracking.frame import FrameStatus
 from rgspipe.fitting.tracking.track import TrackOptions, track_lights
+from rgspipe.fitting.words import explained
 from rgspipe.scene import LightRig
 from rgspipe.stages import fit_capture
 from rgspipe.stages.base import Need, Stage, StageContext
 from rgspipe.stages.fit_capture import captured_views
 from rgspipe.stages.fit_light import Fitter, light_spec, used_views
+from rgspipe.stages.spoken import COMMAND_LINE
 
 
 def run(context: StageContext) -> None:
@@ -49,7 +51,11 @@ def run(context: StageContext) -> None:
     table = track_table(track, names, truths, views.prepared.frozen.size)
     table.to_csv(context.folder / "track.csv", index=False)
     for name, frame in zip(names, track, strict=True):
-        told = {"status": str(frame.status), "result": str(frame.result.status), "reason": frame.result.reason}
+        told = {
+            "status": str(frame.status),
+            "result": str(frame.result.status),
+            "reason": explained(frame.result.findings, COMMAND_LINE),
+        }
         write_lights(context.folder / "frames" / f"{name}.json", frame.result.lights, told)
     origins = torch.stack([view.camera.origin for view in views.prepared.views])
     figure = track_figure(table, truths, surfels.centers, surfels.normals, origins)

@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rgspipe.fitting.certainty.doubts import ON_SURFACE, distance_to_surface, doubts
+from rgspipe.fitting.findings import OnSurface, Uncertain
 from rgspipe.scene import PointLight, Surfels
 from rgspipe.scene.rectangles import rectangle, surfels_on
 
@@ -28,18 +29,18 @@ def floor() -> Surfels:
 
 def test_positions_that_may_be_far_off_are_said_to_be(floor: Surfels) -> None:
     light = light_at(0.5, 0.5, 0.4)
-    assert doubts((light,), (SURE,), floor, 1.0) == "" and doubts((light,), (FAR,), floor, 100.0) == ""
-    assert "the position by 30 %" in doubts((light,), (FAR,), floor, 1.0)
-    assert "light 2 by 15 %" in doubts((light, light), (SURE, FAR), floor, 2.0)
+    assert doubts((light,), (SURE,), floor, 1.0) == [] == doubts((light,), (FAR,), floor, 100.0)
+    assert doubts((light,), (FAR,), floor, 1.0) == [Uncertain(1, 1, pytest.approx(0.3))]
+    assert doubts((light, light), (SURE, FAR), floor, 2.0) == [Uncertain(2, 2, pytest.approx(0.15))]
 
 
 def test_a_light_that_stands_on_a_surface_is_said_to(floor: Surfels) -> None:
     above, on, behind = (light_at(0.31, 0.52, height * ON_SURFACE) for height in (1.1, 0.9, -0.9))
-    assert doubts((above,), (SURE,), floor, 1.0) == ""
+    assert doubts((above,), (SURE,), floor, 1.0) == []
     for light in (on, behind):
-        assert doubts((light,), (SURE,), floor, 1.0).startswith("The light stands on a surface")
-    assert doubts((above, on), (SURE, SURE), floor, 1.0).startswith("Light 2 stands on a surface")
-    assert doubts((on, above, behind), 3 * (SURE,), floor, 1.0).startswith("Lights 1 and 3 stand on a surface")
+        assert doubts((light,), (SURE,), floor, 1.0) == [OnSurface(1, 1)]
+    assert doubts((above, on), (SURE, SURE), floor, 1.0) == [OnSurface(2, 2)]
+    assert doubts((on, above, behind), 3 * (SURE,), floor, 1.0) == [OnSurface(1, 3), OnSurface(3, 3)]
 
 
 @given(x=st.floats(0.05, 0.95), y=st.floats(0.05, 0.95), z=st.floats(-10.0, 10.0))

@@ -11,6 +11,7 @@ import torch
 from lit_room import HIDDEN, VISIBLE
 from rgspipe.fitting.certainty.doubts import doubts
 from rgspipe.fitting.certainty.uncertainty import inflated, light_covariances, sandwich, surface_cells, whitener
+from rgspipe.fitting.findings import Undetermined
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.moments import group_moments, information, scores
 from rgspipe.fitting.model.problem import LightProblem
@@ -120,8 +121,9 @@ def test_a_light_that_is_off_has_no_place(room, point_light):
     matrix = found[0]
     assert torch.isinf(matrix.diagonal()[:3]).all() and torch.isfinite(matrix.diagonal()[3:]).all()
     assert not torch.isnan(matrix).any() and float(matrix[:3, 3:].abs().max()) == 0.0
-    assert doubts((light,), found, room.frozen.surfels, 1.0) == "Not determined by these views: position."
-    assert doubts((light, light), (torch.eye(6), matrix), room.frozen.surfels, 100.0).endswith("position of light 2.")
+    assert doubts((light,), found, room.frozen.surfels, 1.0) == [Undetermined(1, 1, ("position",))]
+    second = doubts((light, light), (torch.eye(6), matrix), room.frozen.surfels, 100.0)[-1]
+    assert second == Undetermined(2, 2, ("position",))
 
 
 @pytest.mark.parametrize("where", [VISIBLE, HIDDEN])

@@ -9,7 +9,8 @@ from dataclasses import replace
 import torch
 
 from lit_room import VISIBLE
-from rgspipe.fitting import FitStatus, LightSpec, SearchOptions, fit_lights, prepare_fit
+from rgspipe.fitting import LightSpec, SearchOptions, fit_lights, prepare_fit
+from rgspipe.fitting.findings import OutOfSteps, Rival
 from rgspipe.fitting.result import dark_result
 from rgspipe.fitting.tracking.frame import FrameStatus, TrackedFrame, in_order
 from rgspipe.fitting.tracking.track import TrackOptions, search_order, track_lights
@@ -88,7 +89,7 @@ def _ambiguous(monkeypatch, wrong: LightRig) -> None:
     """Every search ends ambiguous, at `wrong`."""
     monkeypatch.setattr(
         "rgspipe.fitting.tracking.track.fit_lights",
-        lambda *a, **k: replace(fit_lights(*a, **k), lights=wrong, status=FitStatus.AMBIGUOUS),
+        lambda *a, **k: replace(fit_lights(*a, **k), lights=wrong, findings=(Rival(),)),
     )
 
 
@@ -104,13 +105,13 @@ def test_a_track_without_a_sure_frame_is_uncertain_throughout(monkeypatch, room,
 def test_an_answer_with_a_light_that_explains_nothing_is_not_sure(point_light) -> None:
     """Two headlights that one light explains almost as well: the other one of the answer may be anywhere."""
     strong, weak = point_light(VISIBLE), replace(point_light((0.3, 0.3, -0.3)), intensity=0.01 * torch.ones(3).double())
-    result = replace(dark_result(0.0), lights=(strong, strong), status=FitStatus.CONVERGED)
+    result = replace(dark_result(0.0), lights=(strong, strong), findings=())
     assert TrackedFrame(result, FrameStatus.TRACKED, 0.01).sure
     assert not TrackedFrame(replace(result, lights=(strong, weak)), FrameStatus.TRACKED, 0.01).sure
-    assert not TrackedFrame(replace(result, status=FitStatus.AMBIGUOUS), FrameStatus.TRACKED, 0.01).sure
+    assert not TrackedFrame(replace(result, findings=(Rival(),)), FrameStatus.TRACKED, 0.01).sure
     assert not TrackedFrame(result, FrameStatus.UNCERTAIN, 0.01).sure
     # A fit that ran out of steps does not say what its images leave open: the expected errors do.
-    steps = replace(result, status=FitStatus.MAX_ITERATIONS)
+    steps = replace(result, findings=(OutOfSteps(),))
     assert TrackedFrame(steps, FrameStatus.SEARCHED, 0.01, (0.01, 0.02)).sure
     assert not TrackedFrame(steps, FrameStatus.SEARCHED, 0.01, (0.01, 0.2)).sure
 

@@ -22,9 +22,10 @@ from rgspipe.fitting.baselines.paper_adam_start import (
 )
 from rgspipe.fitting.certainty.doubts import doubts
 from rgspipe.fitting.certainty.uncertainty import light_covariances
+from rgspipe.fitting.findings import AllStepsTaken, AtBound
 from rgspipe.fitting.meter import Meter
 from rgspipe.fitting.model.problem import LightProblem
-from rgspipe.fitting.result import REASONS, FitResult, FitStatus, Step, dark_result
+from rgspipe.fitting.result import FitResult, Step, dark_result
 from rgspipe.fitting.search.refine import State
 from rgspipe.fitting.spec import LightSpec
 from rgspipe.progress import track
@@ -88,8 +89,7 @@ def fit_paper_adam(
     if problem.black:
         return dark_result(meter.seconds)
     descent = _Descent.create(problem, target, options, prior, seed, spec, meter)
-    status = descent.run()
-    return _result(problem, descent, status)
+    return _result(problem, descent, descent.run())
 
 
 @dataclass
@@ -122,21 +122,21 @@ class _Descent:
         loss = AdamLoss(problem.views, target, options.ssim_weight, problem.effects)
         return cls(loss, options, ball, rig, meter, [])
 
-    def run(self) -> FitStatus:
-        """All steps; each one's loss is that of its own lights."""
+    def run(self) -> bool:
+        """All steps; each one's loss is that of its own lights. Whether the loss stalled before the last one."""
         options, optimiser = self.options, self._optimiser()
         for index in track(range(options.epochs * options.steps), "Adam", unit="step"):
             optimiser.zero_grad()
             loss = self.loss(self.rig)
             self._record(loss)
             if _stalled(self.steps, index, options):
-                return FitStatus.CONVERGED
+                return True
             loss.backward()
             optimiser.step()
             self._bound()
         with torch.no_grad():
             self._record(self.loss(self.rig))
-        return FitStatus.MAX_ITERATIONS
+        return False
 
     def _optimiser(self) -> torch.optim.Adam:
         options, rig = self.options, self.rig
@@ -157,18 +157,20 @@ class _Descent:
             rig.axes.copy_(torch.nn.functional.normalize(rig.axes, dim=1))
 
 
-def _result(problem: LightProblem, descent: _Descent, status: FitStatus) -> FitResult:
+def _result(problem: LightProblem, descent: _Descent, stalled: bool) -> FitResult:
     rig, last = descent.rig, descent.steps[-1]
-    status = FitStatus.AT_BOUND if descent.ball.at_bound(rig.positions.detach()) else status
     emitters = rig.emitters()
     intensities = torch.stack([light.intensity for light in last.lights])
     state = State(emitters, tuple(map(problem.evaluate, emitters)), intensities / problem.scale)
     spread = light_covariances(problem, state)
-    doubt = doubts(last.lights, spread.calibrated, problem.views.frozen.surfels, problem.views.frozen.size)
+    findings = [
+        *([AtBound()] if descent.ball.at_bound(rig.positions.detach()) else []),
+        *doubts(last.lights, spread.calibrated, problem.views.frozen.surfels, problem.views.frozen.size),
+        *([] if stalled else [_all_steps(descent)]),
+    ]
     return FitResult(
         lights=last.lights,
-        status=status,
-        reason=f"{_ended(descent) if status is FitStatus.MAX_ITERATIONS else REASONS[status]} {doubt}".rstrip(),
+        findings=tuple(findings),
         loss=last.loss,
         iterations=len(descent.steps) - 1,
         evaluations=len(emitters) * (len(descent.steps) + 1),
@@ -180,13 +182,11 @@ def _result(problem: LightProblem, descent: _Descent, status: FitStatus) -> FitR
     )
 
 
-def _ended(descent: _Descent) -> str:
+def _all_steps(descent: _Descent) -> AllStepsTaken:
     """What the last epoch brought: the method takes all of its steps, whether the loss still falls or not."""
     losses = [step.loss for step in descent.steps]
     before = losses[-min(len(losses), descent.options.steps + 1)]
-    change = 100.0 * (losses[-1] / before - 1.0) if before > 0.0 else 0.0
-    words = "hardly changed" if abs(change) < 1.0 else f"{'fell' if change < 0.0 else 'rose'} by {abs(change):.0f} %"
-    return f"All {len(losses) - 1} steps were taken; over the last epoch the loss {words}."
+    return AllStepsTaken(len(losses) - 1, losses[-1] / before - 1.0 if before > 0.0 else 0.0)
 
 
 def _stalled(steps: list[Step], index: int, options: AdamOptions) -> bool:

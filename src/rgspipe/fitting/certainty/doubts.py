@@ -1,4 +1,4 @@
-"""What a fit's covariances and places leave in doubt, in words."""
+"""What a fit's covariances and places leave in doubt."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor
 
+from rgspipe.fitting.findings import Finding, OnSurface, Uncertain, Undetermined
 from rgspipe.fitting.model.emitter import Emitter
-from rgspipe.scene import LightRig
+from rgspipe.scene import Light, LightRig
 from rgspipe.scene.surfels import Surfels
 
 #: A position whose error is expected to be larger than this part of the scene's size is said to be in doubt.
@@ -21,59 +22,32 @@ ON_SURFACE = 0.002
 #: A point lies over a surfel if it is within so many standard deviations of the middle, in the surfel's plane.
 OVER = 2.0
 
-#: What people call a light's fields.
-NAMES = {"direction": "axis"}
 
-
-def doubts(rig: LightRig, covariance: Sequence[Tensor], surfels: Surfels, scene_size: float) -> str:
-    """What the views do not determine, or hardly, in a sentence or two; empty if nothing is in doubt."""
-    said = _undetermined(rig, covariance), _uncertain(covariance, scene_size), _stopped(rig, surfels, scene_size)
-    return " ".join(filter(None, said))
-
-
-def _uncertain(covariance: Sequence[Tensor], scene_size: float) -> str:
-    """The positions that may be far off, with by how much."""
-    variances = [float(matrix.diagonal()[:3].sum()) for matrix in covariance]
-    errors = [math.sqrt(variance) / scene_size if scene_size > 0.0 else 0.0 for variance in variances]
-    parts = [
-        (f"light {index + 1}" if len(errors) > 1 else "the position") + f" by {100.0 * error:.0f} %"
-        for index, error in enumerate(errors)
-        if IN_DOUBT < error < math.inf
-    ]
-    if not parts:
-        return ""
-    return f"Uncertain, in parts of the scene's size: {', '.join(parts)}; give more views, or a sharper scene."
-
-
-def _undetermined(rig: LightRig, covariance: Sequence[Tensor]) -> str:
-    """What the views do not determine, as a sentence; empty if everything is."""
-    parts = []
-    for index, (light, matrix) in enumerate(zip(rig, covariance, strict=True)):
-        unknown = torch.isinf(matrix.diagonal())
-        dark = not bool((light.intensity > 0).any())
-        rows = Emitter.fitted(light, matrix).rows()
-        names = [
-            NAMES.get(name, name.replace("_", " "))
-            for name, chosen in rows.items()
-            if bool(unknown[chosen].any()) and not (name == "intensity" and dark)
-        ]
-        if names:
-            parts.append(" and ".join(names) + (f" of light {index + 1}" if len(rig) > 1 else ""))
-    return f"Not determined by these views: {'; '.join(parts)}." if parts else ""
-
-
-def _stopped(rig: LightRig, surfels: Surfels, scene_size: float) -> str:
-    """Which lights stand on a surface, as a sentence: their covariance is that of a place that they could not leave."""
+def doubts(rig: LightRig, covariance: Sequence[Tensor], surfels: Surfels, scene_size: float) -> list[Finding]:
+    """What the views do not determine, or hardly, and which lights stand on a surface."""
+    lights = list(enumerate(zip(rig, covariance, strict=True), start=1))
+    undetermined = [_undetermined(light, matrix, number, len(rig)) for number, (light, matrix) in lights]
+    uncertain = [_uncertain(matrix, scene_size, number, len(rig)) for number, (_, matrix) in lights]
+    # The covariance of a light that stands on a surface is that of a place that it could not leave.
     limit = ON_SURFACE * scene_size
-    standing = [index for index, light in enumerate(rig) if distance_to_surface(surfels, light.position) < limit]
-    if not standing:
-        return ""
-    if len(rig) == 1:
-        which = "The light stands"
-    else:
-        numbers = " and ".join(str(index + 1) for index in standing)
-        which = f"Light {numbers} stands" if len(standing) == 1 else f"Lights {numbers} stand"
-    return f"{which} on a surface, where lights that belong elsewhere are stopped: give more views."
+    standing = [number for number, (light, _) in lights if distance_to_surface(surfels, light.position) < limit]
+    on_surface = [OnSurface(number, len(rig)) for number in standing]
+    return [finding for finding in (*undetermined, *uncertain, *on_surface) if finding is not None]
+
+
+def _undetermined(light: Light, covariance: Tensor, number: int, count: int) -> Undetermined | None:
+    unknown = torch.isinf(covariance.diagonal())
+    rows = Emitter.fitted(light, covariance).rows()
+    if not bool((light.intensity > 0).any()):
+        # Of a light that is off nothing else is known, and it matters to nobody.
+        rows.pop("intensity")
+    names = tuple(name for name, chosen in rows.items() if bool(unknown[chosen].any()))
+    return Undetermined(number, count, names) if names else None
+
+
+def _uncertain(covariance: Tensor, scene_size: float, number: int, count: int) -> Uncertain | None:
+    error = math.sqrt(float(covariance.diagonal()[:3].sum())) / scene_size if scene_size > 0.0 else 0.0
+    return Uncertain(number, count, error) if IN_DOUBT < error < math.inf else None
 
 
 def distance_to_surface(surfels: Surfels, position: Tensor) -> float:

@@ -13,14 +13,27 @@ from rgspipe.fitting.model.nonnegative import nonnegative
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.search.coarse import CoarseImages
 
-#: Up to this many candidates all pairs are tried.
-ALL_PAIRS = 900
 
-#: Combinations that are kept while lights are added one by one.
-BEAM = 24
+@dataclass(frozen=True)
+class CombinationOptions:
+    """How candidates are put together to starts.
 
-#: Of the candidates that may join a combination, so many are tried with exact intensities.
-JOINING = 16
+    Attributes:
+        variety: so many times the wanted number of combinations are looked at, as neighbours of the best are much like
+            it.
+        separation, turned: starts stand so far apart, a part of the scene's size; lights at one place may differ by
+            `turned` in their axes (the cosine between them).
+        all_pairs: up to this many candidates all pairs are tried.
+        beam: combinations that are kept while lights are added one by one.
+        joining: of the candidates that may join a combination, so many are tried with exact intensities.
+    """
+
+    variety: int = 40
+    separation: float = 0.16
+    turned: float = 0.85
+    all_pairs: int = 900
+    beam: int = 24
+    joining: int = 16
 
 
 @dataclass(frozen=True)
@@ -103,7 +116,7 @@ def best_pairs(scored: Scored, count: int) -> list[tuple[int, int]]:
     return [(index // size, index % size) for index in order if index // size < index % size]
 
 
-def extensions(scored: Scored, fixed: Tensor, count: int = JOINING) -> list[tuple[int, float]]:
+def extensions(scored: Scored, fixed: Tensor, count: int) -> list[tuple[int, float]]:
     """Candidates that explain most of a target together with lights that are there, and the share of energy so.
 
     Candidates are ranked by what they add while the others' intensities answer without bounds, and the first `count`
@@ -158,48 +171,52 @@ def _explained(gram: Tensor, cross: Tensor, wanted: Tensor, scored: Scored, chos
     return 2.0 * (strength * product).sum(dim=1) - torch.einsum("ki,kij,kj->k", strength, joint, strength)
 
 
-def best_combinations(scored: Scored, positions: Tensor, lights: int, count: int) -> list[tuple[int, ...]]:
+def best_combinations(
+    scored: Scored, positions: Tensor, lights: int, count: int, options: CombinationOptions | None = None
+) -> list[tuple[int, ...]]:
     """Combinations of `lights` candidates that explain the target best, at most `count` of them, best first.
 
-    All pairs are tried of up to ALL_PAIRS candidates; of more, the best candidates of all places are extended by one.
+    All pairs are tried of up to `all_pairs` candidates; of more, the best candidates of all places are extended by one.
     So are pairs for more lights; in the end every light of the best ones may be another candidate.
 
     Args:
         positions: (C, 3) of the candidates.
     """
+    options = options or CombinationOptions()
     order = single_gains(scored).argsort(descending=True, stable=True).tolist()
     if lights == 1:
         return [(index,) for index in order[:count]]
-    exhaustive = len(order) <= ALL_PAIRS
-    beam: list[tuple[int, ...]] = [(index,) for index in _best_of_each_place(order, positions)]
+    exhaustive = len(order) <= options.all_pairs
+    beam: list[tuple[int, ...]] = [(index,) for index in _best_of_each_place(order, positions, options.beam)]
     if exhaustive:
-        beam = list(best_pairs(scored, count if lights == 2 else BEAM))
+        beam = list(best_pairs(scored, count if lights == 2 else options.beam))
     if lights == 2 and exhaustive:
         return beam
     while beam and len(beam[0]) < lights:
-        beam = _extended(scored, beam)
-    swapped = [combination[:k] + combination[k + 1 :] for combination in beam[: BEAM // 2] for k in range(lights)]
-    return _extended(scored, list(dict.fromkeys(swapped)))[:count]
+        beam = _extended(scored, beam, options)
+    best = beam[: options.beam // 2]
+    swapped = [combination[:k] + combination[k + 1 :] for combination in best for k in range(lights)]
+    return _extended(scored, list(dict.fromkeys(swapped)), options)[:count]
 
 
-def _best_of_each_place(order: Sequence[int], positions: Tensor) -> list[int]:
-    """The first BEAM of the candidates in `order` that stand at different places."""
+def _best_of_each_place(order: Sequence[int], positions: Tensor, most: int) -> list[int]:
+    """The first `most` of the candidates in `order` that stand at different places."""
     places: dict[tuple[float, ...], int] = {}
     everywhere = positions.tolist()
     for index in order:
         places.setdefault(tuple(everywhere[index]), index)
-        if len(places) == BEAM:
+        if len(places) == most:
             break
     return list(places.values())
 
 
-def _extended(scored: Scored, beam: Sequence[tuple[int, ...]]) -> list[tuple[int, ...]]:
+def _extended(scored: Scored, beam: Sequence[tuple[int, ...]], options: CombinationOptions) -> list[tuple[int, ...]]:
     found: dict[tuple[int, ...], float] = {}
     for combination in beam:
-        for index, gain in extensions(scored, scored.images[list(combination)]):
+        for index, gain in extensions(scored, scored.images[list(combination)], options.joining):
             if index not in combination:
                 found[tuple(sorted((*combination, index)))] = gain
-    return sorted(found, key=lambda combination: -found[combination])[:BEAM]
+    return sorted(found, key=lambda combination: -found[combination])[: options.beam]
 
 
 def candidate_costs(scored: Scored) -> Tensor:

@@ -9,12 +9,13 @@ from functools import cached_property
 import torch
 from torch import Tensor
 
+from rgspipe.fitting.findings import FitStatus
 from rgspipe.fitting.meter import Meter
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.exposure import ExposedMoments
 from rgspipe.fitting.model.moments import Moments
 from rgspipe.fitting.model.problem import LightProblem
-from rgspipe.fitting.result import FitStatus, Step
+from rgspipe.fitting.result import Step
 from rgspipe.fitting.search.moves import Region, StepLimits, moved_rig, rig_move
 from rgspipe.fitting.search.weighting import Weighting
 from rgspipe.optim.levenberg_marquardt import Ended, LevenbergMarquardt, NormalEquations, Problem, least_squares

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
 from itertools import zip_longest
 
 import torch
@@ -13,6 +13,7 @@ from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.search.coarse import CoarseImages
 from rgspipe.fitting.search.combinations import (
+    CombinationOptions,
     Scored,
     best_apart,
     best_combinations,
@@ -22,15 +23,8 @@ from rgspipe.fitting.search.combinations import (
     extensions,
     single_gains,
 )
-from rgspipe.fitting.search.judge import rig_distance
+from rgspipe.fitting.search.compare import rig_distance
 from rgspipe.fitting.search.refine import State
-
-#: So many times the wanted number of combinations are looked at, as neighbours of the best are much like it.
-VARIETY = 40
-
-#: Starts stand this far apart, as a part of the scene's size; spots at one place may differ by TURNED in their axes
-#: (the cosine between them).
-SEPARATION, TURNED = 0.16, 0.85
 
 Rig = tuple[Emitter, ...]
 
@@ -43,10 +37,22 @@ class Candidates:
     coarse: CoarseImages
     scored: Scored
     shape_free: bool
+    options: CombinationOptions = field(default_factory=CombinationOptions)
 
     @classmethod
-    def of(cls, problem: LightProblem, coarse: CoarseImages, shape_free: bool = False) -> Candidates:
-        return cls(problem, coarse, Scored.of(problem, coarse), shape_free)
+    def of(
+        cls,
+        problem: LightProblem,
+        coarse: CoarseImages,
+        shape_free: bool = False,
+        options: CombinationOptions | None = None,
+    ) -> Candidates:
+        return cls(problem, coarse, Scored.of(problem, coarse), shape_free, options or CombinationOptions())
+
+    @property
+    def aimed(self) -> bool:
+        """Whether they have an axis."""
+        return self.coarse.axes is not None
 
     @property
     def lit(self) -> bool:
@@ -62,26 +68,26 @@ class Candidates:
         Of single spots those that explain most of dim and bright parts alike take turns with those of plain squares,
         which a narrow cone's pool decides.
         """
-        if lights == 1 and self.coarse.axes is None:
+        if lights == 1 and not self.aimed:
             costs = candidate_costs(self.scored)
             costs = torch.where(costs < 1.0, costs, torch.inf)
             count = min(count, int(costs.isfinite().sum()))
-            return [
-                self.emitters([k]) for k in best_apart(costs, self.coarse.positions.cpu(), count, SEPARATION * size)
-            ]
-        combinations = best_combinations(self.scored, self.coarse.positions, lights, VARIETY * count)
-        rigs = different((self.emitters(combination) for combination in combinations), count, SEPARATION * size)
+            apart = self.options.separation * size
+            return [self.emitters([k]) for k in best_apart(costs, self.coarse.positions.cpu(), count, apart)]
+        looked_at = self.options.variety * count
+        combinations = best_combinations(self.scored, self.coarse.positions, lights, looked_at, self.options)
+        rigs = self._different((self.emitters(combination) for combination in combinations), count, size)
         if lights > 1:
             return rigs
-        bright = bright_gains(self.problem, self.coarse).topk(min(VARIETY * count, len(self.coarse))).indices
-        pools = different((self.emitters([index]) for index in bright.tolist()), count, SEPARATION * size)
+        bright = bright_gains(self.problem, self.coarse).topk(min(looked_at, len(self.coarse))).indices
+        pools = self._different((self.emitters([index]) for index in bright.tolist()), count, size)
         both = [rig for pair in zip_longest(rigs, pools) for rig in pair if rig is not None]
-        return different(both, count, SEPARATION * size)
+        return self._different(both, count, size)
 
     def extended(self, state: State, count: int, size: float) -> list[Rig]:
         """At most `count` rigs: the lights of a refined one and one candidate more."""
         fixed = torch.stack([self.scored.coarse_of(self.problem, self.coarse, emitter) for emitter in state.emitters])
-        return self._extended(state, extensions(self.scored, fixed), count, size)
+        return self._extended(state, extensions(self.scored, fixed, self.options.joining), count, size)
 
     def promised(self, state: State, searched: LightProblem, count: int, size: float) -> tuple[float, list[Rig]]:
         """By what share one candidate more lowers the blocks' squared relative error, and `extended`.
@@ -97,30 +103,28 @@ class Candidates:
             seen = [self.coarse.blocks @ self.problem.evaluate(one)[:, :, 0].contiguous() for one in state.emitters]
         fixed = torch.stack([self.scored.weighted(self.problem, self.coarse, image) for image in seen])
         left = 1.0 - explained(self.scored, fixed)
-        found = extensions(self.scored, fixed)
+        found = extensions(self.scored, fixed, self.options.joining)
         promise = (found[0][1] - (1.0 - left)) / left if left > 0.0 else 0.0
         return promise, self._extended(state, found, count, size)
 
     def _extended(self, state: State, found: Sequence[tuple[int, float]], count: int, size: float) -> list[Rig]:
         added = [self.emitters([index]) for index, _ in found]
-        return [(*state.emitters, *extra) for extra in different(added, count, SEPARATION * size)]
+        return [(*state.emitters, *extra) for extra in self._different(added, count, size)]
 
+    def _different(self, rigs: Iterable[Rig], count: int, size: float) -> list[Rig]:
+        """The first `count` of `rigs` that differ from each other."""
+        chosen: list[Rig] = []
+        for rig in rigs:
+            if all(self._apart(rig, other, size) for other in chosen):
+                chosen.append(rig)
+            if len(chosen) == count:
+                break
+        return chosen
 
-def different(rigs: Sequence[Rig], count: int, separation: float) -> list[Rig]:
-    """The first `count` of `rigs` that differ from each other."""
-    chosen: list[Rig] = []
-    for rig in rigs:
-        if all(_apart(rig, other, separation) for other in chosen):
-            chosen.append(rig)
-        if len(chosen) == count:
-            break
-    return chosen
-
-
-def _apart(one: Rig, other: Rig, separation: float) -> bool:
-    if rig_distance(one, other) > separation:
-        return True
-    return any(a.axis is not None and _turn(a, other) < TURNED for a in one)
+    def _apart(self, one: Rig, other: Rig, size: float) -> bool:
+        if rig_distance(one, other) > self.options.separation * size:
+            return True
+        return any(a.axis is not None and _turn(a, other) < self.options.turned for a in one)
 
 
 def _turn(emitter: Emitter, rig: Rig) -> float:

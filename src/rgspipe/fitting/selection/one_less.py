@@ -10,13 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rgspipe.fitting.model.emitter import Emitter
-from rgspipe.fitting.search.judge import FAINT_DROP, drop, light_energies, worth_one_more
+from rgspipe.fitting.search.compare import Bar, drop, light_energies
 from rgspipe.fitting.search.refine import Refiner, State
-from rgspipe.fitting.search.schedule import SHORT_ITERATIONS
 from rgspipe.fitting.search.weighting import ROBUST
-
-#: Steps of the others before it is clear that a light is there, and as many more where it is not.
-TURN = SHORT_ITERATIONS // 2
 
 
 @dataclass(frozen=True)
@@ -26,38 +22,45 @@ class OneLess:
     Attributes:
         rich, simple: the two rigs; of all rigs with one light less the first that is as good, else the last.
         index: which light was left out.
-        worth: whether that light is there, rather than an error of the model.
         gain: by what share it lowers the robust cost.
+        wanted: by what share it would have to.
     """
 
     rich: State
     simple: State
     index: int
-    worth: bool
     gain: float
+    wanted: float
+
+    @property
+    def worth(self) -> bool:
+        """Whether that light is there, rather than an error of the model."""
+        return self.gain >= self.wanted
 
 
-def one_light_less(refiner: Refiner, answer: State) -> OneLess:
+def one_light_less(refiner: Refiner, answer: State, bar: Bar | None = None, steps: int = 3) -> OneLess:
     """The answer beside its rigs with one light less.
 
     Args:
         refiner: on the problem that the answer was searched on.
         answer: of two lights or more.
+        bar: how much a light has to explain.
+        steps: of the others before it is clear that a light is there, and as many more where it is not.
     """
-    energies, rich, problem = light_energies(answer), answer, refiner.problem
+    bar, energies, rich, problem = bar or Bar(), light_energies(answer), answer, refiner.problem
     for index in sorted(range(len(energies)), key=energies.__getitem__):
-        simple = refiner.refined(refiner.start(_without(answer, index), ROBUST), ROBUST, TURN)
+        simple = refiner.refined(refiner.start(_without(answer, index), ROBUST), ROBUST, steps)
+        found = OneLess(rich, simple, index, drop(problem, simple, rich), bar.wanted(rich))
         # An answer of plain squares has a higher robust cost than it would have to have.
-        worth = drop(problem, simple, rich) >= FAINT_DROP
-        if worth:
+        if found.gain >= bar.least_faint:
             continue
         if rich is answer:
-            rich = refiner.refined(answer, ROBUST, SHORT_ITERATIONS)
-        simple = refiner.refined(simple, ROBUST, TURN)
-        worth = worth_one_more(problem, simple, rich)
-        if not worth:
+            rich = refiner.refined(answer, ROBUST, 2 * steps)
+        simple = refiner.refined(simple, ROBUST, steps)
+        found = OneLess(rich, simple, index, drop(problem, simple, rich), bar.wanted(rich))
+        if not found.worth:
             break
-    return OneLess(rich, simple, index, worth, drop(problem, simple, rich))
+    return found
 
 
 def _without(answer: State, index: int) -> list[Emitter]:

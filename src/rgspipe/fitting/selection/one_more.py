@@ -11,24 +11,30 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from rgspipe.fitting.search.judge import FAINT_DROP, best_state, light_energies
+from rgspipe.fitting.search.compare import Bar, best_state, drop, light_energies
 from rgspipe.fitting.search.refine import Refiner, State
-from rgspipe.fitting.search.schedule import SHORT_ITERATIONS, refine_starts
+from rgspipe.fitting.search.schedule import Schedule
 from rgspipe.fitting.search.starts import Candidates, Rig
 from rgspipe.fitting.search.weighting import ROBUST
 
-#: An answer that leaves less than this share of the blocks' energy unexplained is not doubted: that is rounding, or
-#: noise.
-NOTICEABLE = 1e-4
 
-#: The best candidate beside the answer must promise to lower the squared relative error by this share, …
-PROMISED = 0.23
+@dataclass(frozen=True)
+class OneMoreOptions:
+    """When a light more is looked for.
 
-#: … and a light that begins with less than this share of the image's energy, by as much as faint ones must.
-BEGINS_FAINT = 0.03
+    Attributes:
+        noticeable: an answer that leaves less than this share of the blocks' energy unexplained is not doubted: that is
+            rounding, or noise.
+        promised: the best candidate beside the answer must promise to lower the squared relative error by this share, …
+        begins_faint: … and a light that begins with less than this share of the image's energy, by as much as faint
+            ones must.
+        tries: so many rigs of each kind of candidate are refined.
+    """
 
-#: So many rigs of each kind of candidate are refined.
-TRIES = 2
+    noticeable: float = 1e-4
+    promised: float = 0.23
+    begins_faint: float = 0.03
+    tries: int = 2
 
 
 @dataclass(frozen=True)
@@ -37,34 +43,53 @@ class OneMore:
 
     Attributes:
         simple, rich: the two rigs.
+        gain: by what share the light lowers the robust cost.
+        wanted: by what share it would have to.
     """
 
     simple: State
     rich: State
+    gain: float
+    wanted: float
+
+    @property
+    def worth(self) -> bool:
+        """Whether that light is there, rather than an error of the model."""
+        return self.gain >= self.wanted
 
 
-def one_more_light(refiner: Refiner, candidates: Sequence[Candidates], answer: State) -> OneMore | None:
+def one_more_light(
+    refiner: Refiner,
+    candidates: Sequence[Candidates],
+    answer: State,
+    bar: Bar | None = None,
+    options: OneMoreOptions | None = None,
+    schedule: Schedule | None = None,
+) -> OneMore | None:
     """The answer beside the best rig with one light more; None where no candidate promises enough.
 
     Args:
         refiner: on the problem that the answer was searched on.
         candidates: of each kind of light.
+        bar: how much a light has to explain.
     """
-    if refiner.unexplained(answer) < NOTICEABLE:
+    bar, options, schedule = bar or Bar(), options or OneMoreOptions(), schedule or Schedule()
+    if refiner.unexplained(answer) < options.noticeable:
         return None
     rigs: list[Rig] = []
     for kind in candidates:
-        promise, extended = kind.promised(answer, refiner.problem, TRIES, refiner.region.size)
-        if promise >= PROMISED and (promise >= FAINT_DROP or _noticed(refiner, extended[0])):
+        promise, extended = kind.promised(answer, refiner.problem, options.tries, refiner.region.size)
+        sure = promise >= bar.least_faint
+        if promise >= options.promised and (sure or _last_share(refiner, extended[0]) >= options.begins_faint):
             rigs += extended
     if not rigs:
         return None
-    rich = best_state(refiner.problem, refine_starts(refiner, rigs, SHORT_ITERATIONS))
-    simple, rich = (refiner.refined(state, ROBUST, SHORT_ITERATIONS) for state in (answer, rich))
-    return OneMore(simple, rich)
+    rich = best_state(refiner.problem, schedule.refined(refiner, rigs, schedule.steps))
+    simple, rich = (refiner.refined(state, ROBUST, schedule.steps) for state in (answer, rich))
+    return OneMore(simple, rich, drop(refiner.problem, simple, rich), bar.wanted(rich))
 
 
-def _noticed(refiner: Refiner, rig: Rig) -> bool:
-    """Whether the last light of a rig sends enough of the energy to be no error of the model at first sight."""
+def _last_share(refiner: Refiner, rig: Rig) -> float:
+    """What the last light of a rig sends of all its energy, at first sight."""
     energies = light_energies(refiner.start(rig, ROBUST))
-    return energies[-1] >= BEGINS_FAINT * sum(energies)
+    return energies[-1] / sum(energies) if sum(energies) > 0.0 else 0.0

@@ -10,9 +10,10 @@ import torch
 from scipy.optimize import linear_sum_assignment
 
 from rgspipe.fitting.certainty.doubts import IN_DOUBT
+from rgspipe.fitting.findings import FitStatus
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.problem import LightProblem
-from rgspipe.fitting.result import FitResult, FitStatus
+from rgspipe.fitting.result import FitResult
 from rgspipe.fitting.search.schedule import soft
 from rgspipe.scene import LightRig
 

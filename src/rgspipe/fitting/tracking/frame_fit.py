@@ -16,14 +16,13 @@ from dataclasses import dataclass, replace
 
 import torch
 
-from rgspipe.fitting.certainty.doubts import doubts
 from rgspipe.fitting.certainty.uncertainty import Covariances, light_covariances
 from rgspipe.fitting.model.problem import LightProblem
-from rgspipe.fitting.result import REASONS, FitResult, FitStatus
+from rgspipe.fitting.result import FitResult
 from rgspipe.fitting.search.refine import Refiner, State
 from rgspipe.fitting.search.starts import Rig
 from rgspipe.fitting.search.weighting import PLAIN
-from rgspipe.fitting.selection.verdict import POORLY_EXPLAINED
+from rgspipe.fitting.selection.diagnosis import standing
 from rgspipe.fitting.tracking.motion import Motion, references
 from rgspipe.fitting.tracking.predicted_rig import Evidence, PredictedRig
 
@@ -87,20 +86,11 @@ def _refiner(problem: LightProblem, rig: Rig) -> Refiner:
 
 def _result(refiner: Refiner, state: State, motion: Motion, spread: Covariances) -> FitResult:
     """The fit of a frame; its status is that of the frame's images alone, its covariance that of all frames so far."""
-    problem, region, meter = refiner.problem, refiner.region, refiner.meter
+    problem, meter = refiner.problem, refiner.meter
     loss, lights = refiner.unexplained(state), state.lights(problem)
-    doubt = doubts(lights, spread.calibrated, problem.views.frozen.surfels, region.size)
-    status = state.status
-    if any(region.at_bound(emitter.position) for emitter in state.emitters):
-        status = FitStatus.AT_BOUND
-    elif loss > POORLY_EXPLAINED:
-        status = FitStatus.UNEXPLAINED
-    elif doubt:
-        status = FitStatus.UNDETERMINED
     return FitResult(
         lights=lights,
-        status=status,
-        reason=" ".join(filter(None, (REASONS[status], doubt))),
+        findings=tuple(standing(refiner, state, spread.calibrated)),
         loss=loss,
         iterations=meter.iterations,
         evaluations=meter.evaluations,

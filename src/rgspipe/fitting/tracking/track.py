@@ -10,11 +10,12 @@ import torch
 from torch import Tensor
 
 from rgspipe.fitting.certainty.doubts import IN_DOUBT
+from rgspipe.fitting.findings import FitStatus
 from rgspipe.fitting.fit import FitViews, fit_lights
 from rgspipe.fitting.model.capture import ImageCapture
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.problem import LightProblem
-from rgspipe.fitting.result import FitStatus, dark_result
+from rgspipe.fitting.result import dark_result
 from rgspipe.fitting.search.schedule import soft
 from rgspipe.fitting.search_lm import SearchOptions
 from rgspipe.fitting.spec import LightSpec

@@ -11,22 +11,19 @@ import torch
 from emitters import emitter_at
 from lit_room import HIDDEN, VISIBLE
 from rgspipe.fitting.model.problem import LightProblem
-from rgspipe.fitting.search.judge import (
-    FAINT,
-    FAINT_DROP,
-    LEAST_DROP,
-    MET,
+from rgspipe.fitting.search.compare import (
+    Bar,
+    Likeness,
     best_state,
-    distinct,
     drop,
-    equally_good,
     rig_distance,
-    worth_keeping,
-    worth_one_more,
 )
 from rgspipe.fitting.search.refine import Refiner, State
 from rgspipe.fitting.search.weighting import ROBUST
+from rgspipe.fitting.selection.rivals import equally_good
 from rgspipe.scene.lights import SpotLight
+
+BAR, ALIKE = Bar(), Likeness()
 
 
 @pytest.fixture(scope="module")
@@ -66,17 +63,17 @@ def lit_by_two(room, point_light, strength: float, noise: float) -> tuple[float,
     problem = LightProblem.create(room.one.prepared, stacked)
     one, two = state(problem, VISIBLE), state(problem, VISIBLE, HIDDEN)
     share = float(strength * second.mean() / image.mean())
-    return share, drop(problem, one, two), worth_one_more(problem, one, two)
+    return share, drop(problem, one, two), BAR.passed(problem, one, two)
 
 
 def test_a_faint_light_must_explain_more_than_a_bright_one(room, point_light) -> None:
     """One at 17 % of the energy is taken for what lowers the cost by 31 %, one at 4 % is not, but for 84 %."""
     share, gain, there = lit_by_two(room, point_light, strength=0.25, noise=0.1)
-    assert share > FAINT and LEAST_DROP < gain < FAINT_DROP and there  # measured 0.167, 0.309
+    assert share > BAR.faint and BAR.least < gain < BAR.least_faint and there  # measured 0.167, 0.309
     share, gain, there = lit_by_two(room, point_light, strength=0.05, noise=0.03)
-    assert share < FAINT and LEAST_DROP < gain < FAINT_DROP and not there  # measured 0.039, 0.258
+    assert share < BAR.faint and BAR.least < gain < BAR.least_faint and not there  # measured 0.039, 0.258
     share, gain, there = lit_by_two(room, point_light, strength=0.05, noise=0.003)
-    assert share < FAINT and gain > FAINT_DROP and there  # measured 0.039, 0.838
+    assert share < BAR.faint and gain > BAR.least_faint and there  # measured 0.039, 0.838
 
 
 def test_rigs_within_the_noise_are_equally_good(problem: LightProblem) -> None:
@@ -98,19 +95,19 @@ def test_twins_are_merged_and_faint_lights_dropped(problem: LightProblem) -> Non
     three = state(problem, VISIBLE, shifted(VISIBLE, 0.01), HIDDEN)
     for strengths, kept in (((0.5, 1.0, 1.0), [1, 2]), ((0.0, 1.0, 1e-3), [1])):
         intensity = torch.tensor(strengths, dtype=torch.float64)[:, None].expand(3, 3)
-        assert worth_keeping(replace(three, intensity=intensity), 1.0) == kept
+        assert ALIKE.worth_keeping(replace(three, intensity=intensity), 1.0) == kept
 
 
 def test_rigs_that_met_are_refined_once(problem: LightProblem) -> None:
     """Of rigs on their way to the same place the first is left, in whichever order their lights stand."""
     size = problem.views.frozen.size
-    near, far = shifted(VISIBLE, 0.9 * MET * size), shifted(VISIBLE, 1.1 * MET * size)
+    near, far = shifted(VISIBLE, 0.9 * ALIKE.met * size), shifted(VISIBLE, 1.1 * ALIKE.met * size)
     first, second, third = state(problem, VISIBLE), state(problem, near), state(problem, far)
-    kept = distinct([first, second, third], size)
+    kept = ALIKE.distinct([first, second, third], size)
     assert [one is other for one, other in zip(kept, [first, third], strict=True)] == [True, True]
     pair, swapped = state(problem, VISIBLE, HIDDEN), state(problem, HIDDEN, near)
-    assert distinct([pair, swapped], size) == [pair]
-    assert distinct([first, pair], size) == [first, pair], "another number of lights is another rig"
+    assert ALIKE.distinct([pair, swapped], size) == [pair]
+    assert ALIKE.distinct([first, pair], size) == [first, pair], "another number of lights is another rig"
 
 
 def test_spots_that_point_elsewhere_have_not_met(problem: LightProblem) -> None:
@@ -118,7 +115,7 @@ def test_spots_that_point_elsewhere_have_not_met(problem: LightProblem) -> None:
     place = torch.tensor(VISIBLE, dtype=torch.float64)
     turned = [torch.tensor([math.sin(angle), 0.0, -math.cos(angle)], dtype=torch.float64) for angle in (0, 0.005, 0.3)]
     spots = [Refiner.of(problem).start([emitter_at(place, axis, shape)], ROBUST) for axis in turned]
-    assert distinct(spots, 1.0) == [spots[0], spots[2]]
+    assert ALIKE.distinct(spots, 1.0) == [spots[0], spots[2]]
     wider = Refiner.of(problem).start([emitter_at(place, turned[0], SpotLight.shaped("smoothstep", 0.6, 0.3))], ROBUST)
-    assert distinct([spots[0], wider], 1.0) == [spots[0], wider]
-    assert distinct([state(problem, VISIBLE), spots[0]], 1.0)[1] is spots[0], "a point light is no spot"
+    assert ALIKE.distinct([spots[0], wider], 1.0) == [spots[0], wider]
+    assert ALIKE.distinct([state(problem, VISIBLE), spots[0]], 1.0)[1] is spots[0], "a point light is no spot"

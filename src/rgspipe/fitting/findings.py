@@ -1,0 +1,152 @@
+"""What a fit found out about its answer, as data; `words` makes sentences of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from enum import StrEnum
+from typing import ClassVar
+
+
+class FitStatus(StrEnum):
+    """What is to be thought of an answer, the gravest first."""
+
+    NOT_ENOUGH_LIGHT = "not_enough_light"
+    AT_BOUND = "at_bound"
+    UNEXPLAINED = "unexplained"
+    AMBIGUOUS = "ambiguous"
+    UNDETERMINED = "undetermined"
+    MAX_ITERATIONS = "max_iterations"
+    CONVERGED = "converged"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that holds of an answer."""
+
+    #: What an answer is of which nothing graver holds.
+    status: ClassVar[FitStatus]
+
+    def data(self) -> dict[str, object]:
+        """Its name and numbers, as JSON holds them."""
+        name = "".join(f"_{letter.lower()}" if letter.isupper() else letter for letter in type(self).__name__)
+        return {"finding": name.lstrip("_"), **asdict(self)}
+
+
+@dataclass(frozen=True)
+class Dark(Finding):
+    """The target is black, or no light can explain it."""
+
+    status = FitStatus.NOT_ENOUGH_LIGHT
+
+
+@dataclass(frozen=True)
+class AtBound(Finding):
+    """A light was stopped at the edge of the region that is searched."""
+
+    status = FitStatus.AT_BOUND
+
+
+@dataclass(frozen=True)
+class PoorlyExplained(Finding):
+    """`share` of the target's energy is left."""
+
+    share: float
+    status = FitStatus.UNEXPLAINED
+
+
+@dataclass(frozen=True)
+class LightMissing(Finding):
+    """One light more than the `count` that were asked for lowers the robust cost by the share `gain`: it is there."""
+
+    count: int
+    gain: float
+    status = FitStatus.UNEXPLAINED
+
+
+@dataclass(frozen=True)
+class Rival(Finding):
+    """Clearly different lights explain the target as well."""
+
+    status = FitStatus.AMBIGUOUS
+
+
+@dataclass(frozen=True)
+class LightSpare(Finding):
+    """Light `number` (from 1) of `count` may not be there.
+
+    It lowers the robust cost by the share `gain`; from `wanted` on it would count.
+    """
+
+    number: int
+    count: int
+    gain: float
+    wanted: float
+    status = FitStatus.AMBIGUOUS
+
+
+@dataclass(frozen=True)
+class Undetermined(Finding):
+    """The views do not tell some fields of light `number` (from 1) of `count`, by name ("intensity" among them)."""
+
+    number: int
+    count: int
+    fields: tuple[str, ...]
+    status = FitStatus.UNDETERMINED
+
+
+@dataclass(frozen=True)
+class Uncertain(Finding):
+    """Light `number` of `count` is expected to be off by `error`, a part of the scene's size."""
+
+    number: int
+    count: int
+    error: float
+    status = FitStatus.UNDETERMINED
+
+
+@dataclass(frozen=True)
+class OnSurface(Finding):
+    """Light `number` of `count` stands on a surface, where lights that belong elsewhere are stopped."""
+
+    number: int
+    count: int
+    status = FitStatus.UNDETERMINED
+
+
+@dataclass(frozen=True)
+class OutOfSteps(Finding):
+    """All steps were used while the loss was still falling."""
+
+    status = FitStatus.MAX_ITERATIONS
+
+
+@dataclass(frozen=True)
+class AllStepsTaken(Finding):
+    """A method that takes all of its `steps`; over the last epoch the loss changed by the share `change`."""
+
+    steps: int
+    change: float
+    status = FitStatus.MAX_ITERATIONS
+
+
+@dataclass(frozen=True)
+class MaybeOneMore(Finding):
+    """One light more would lower the robust cost by the share `gain`, which is too little to count (`wanted`)."""
+
+    gain: float
+    wanted: float
+    status = FitStatus.CONVERGED
+
+
+@dataclass(frozen=True)
+class ExposureUnknown(Finding):
+    """A single view cannot tell its exposure from the lights' intensity."""
+
+    status = FitStatus.CONVERGED
+
+
+def gravest(findings: Sequence[Finding]) -> FitStatus:
+    """The status of an answer."""
+    held = {finding.status for finding in findings}
+    return next((status for status in FitStatus if status in held), FitStatus.CONVERGED)

@@ -1,0 +1,57 @@
+"""What is to be said of lights that were fitted, whoever fitted them: where they stand and what they leave."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from torch import Tensor
+
+from rgspipe.fitting.certainty.doubts import doubts
+from rgspipe.fitting.findings import AtBound, Finding, FitStatus, MaybeOneMore, OutOfSteps, PoorlyExplained
+from rgspipe.fitting.search.compare import Bar, robust_losses
+from rgspipe.fitting.search.refine import Refiner, State
+
+#: An answer that leaves more than this share of the target's energy unexplained is none.
+POORLY_EXPLAINED = 0.05
+
+
+def standing(refiner: Refiner, state: State, covariance: Sequence[Tensor]) -> list[Finding]:
+    """What holds of lights by themselves, without a rival.
+
+    Args:
+        refiner: on the problem of all pixels that they were fitted to.
+        covariance: of each, see `FitResult.covariance`.
+    """
+    problem, region, loss = refiner.problem, refiner.region, refiner.unexplained(state)
+    at_bound = any(region.at_bound(emitter.position) for emitter in state.emitters)
+    return [
+        *([AtBound()] if at_bound else []),
+        *([PoorlyExplained(loss)] if loss > POORLY_EXPLAINED else []),
+        *doubts(state.lights(problem), covariance, problem.views.frozen.surfels, region.size),
+        *([OutOfSteps()] if state.status is FitStatus.MAX_ITERATIONS else []),
+    ]
+
+
+@dataclass(frozen=True)
+class Costs:
+    """Robust costs of rigs that were compared, at one scale.
+
+    Attributes:
+        by_count: by number of lights.
+    """
+
+    by_count: Mapping[int, float]
+
+    @classmethod
+    def of(cls, refiner: Refiner, compared: Mapping[int, State]) -> Costs:
+        losses = robust_losses(refiner.problem, [*compared.values()]) if compared else []
+        return cls({count: float(loss.mean()) for count, loss in zip(compared, losses, strict=True)})
+
+    def maybe_more(self, count: int, compared: Mapping[int, State], bar: Bar) -> list[Finding]:
+        """Whether one light more than `count` might be there, though it lowers the cost too little to count."""
+        costs = self.by_count
+        if count not in costs or count + 1 not in costs:
+            return []
+        gain = 1.0 - costs[count + 1] / costs[count]
+        return [MaybeOneMore(gain, bar.wanted(compared[count + 1]))] if gain > bar.doubtful else []

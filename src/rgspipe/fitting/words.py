@@ -1,0 +1,138 @@
+"""What a fit found out about its answer, in sentences: the gravest first, and no doubt left out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from rgspipe.fitting.findings import (
+    AllStepsTaken,
+    ExposureUnknown,
+    Finding,
+    FitStatus,
+    LightMissing,
+    LightSpare,
+    MaybeOneMore,
+    OnSurface,
+    Uncertain,
+    Undetermined,
+    gravest,
+)
+
+#: What a status means and what to do, where no finding says more.
+MEANINGS = {
+    FitStatus.CONVERGED: "The loss has a minimum here: a further step would not change the light.",
+    FitStatus.MAX_ITERATIONS: "All iterations were used while the loss was still falling: allow more of them.",
+    FitStatus.AT_BOUND: "The light was stopped at the edge of the region that is searched: the true light may be "
+    "outside, or these views do not tell its distance; give more views or a larger region.",
+    FitStatus.AMBIGUOUS: "Clearly different lights explain the target as well as these: give more views, or say more "
+    "of the lights (their number, their type).",
+    FitStatus.UNDETERMINED: "These views do not tell all of the lights.",
+    FitStatus.UNEXPLAINED: "These lights leave much of the target unexplained: their number or type may be another, or "
+    "the scene that was photographed is not the one that was frozen; say more of the lights, or search more starts.",
+    FitStatus.NOT_ENOUGH_LIGHT: "The target is black, or no light in the scene can explain it: check its exposure, "
+    "its mask and that it shows this scene.",
+}
+
+#: What people call the fields of a light.
+FIELDS = {"direction": "axis", "cone_angle": "cone"}
+
+
+@dataclass(frozen=True)
+class Spoken:
+    """How settings are named to whoever reads.
+
+    Attributes:
+        count: a given number of lights; takes the number.
+        uncounted: a number of lights that is to be found.
+    """
+
+    count: Callable[[int], str]
+    uncounted: str
+
+
+PYTHON = Spoken("LightSpec(count={})".format, "LightSpec(count=None)")
+
+
+def explained(findings: Sequence[Finding], spoken: Spoken = PYTHON) -> str:
+    """All that was found, in sentences."""
+    status = gravest(findings)
+    order = list(FitStatus)
+    told = sorted(findings, key=lambda finding: order.index(finding.status))
+    parts = [_sentence(finding, spoken) for finding in told]
+    if not told or told[0].status is FitStatus.CONVERGED or status is FitStatus.UNDETERMINED:
+        parts.insert(0, MEANINGS[status])
+    return " ".join(_joined(parts))
+
+
+def _joined(parts: Sequence[str]) -> list[str]:
+    """The sentences, each once."""
+    return list(dict.fromkeys(parts))
+
+
+def _sentence(finding: Finding, spoken: Spoken) -> str:
+    words = _WORDS.get(type(finding))
+    return MEANINGS[finding.status] if words is None else words(finding, spoken)
+
+
+def _missing(found: LightMissing, spoken: Spoken) -> str:
+    more = f"One more light would lower the cost by {percent(found.gain)}: fit with {spoken.count(found.count + 1)}"
+    return f"{more}, or {spoken.uncounted} to have them counted."
+
+
+def _spare(found: LightSpare, spoken: Spoken) -> str:
+    less = f"Light {found.number} lowers the cost by {percent(found.gain)} only and may not be there (it counts from "
+    less += f"{percent(found.wanted)} on): fit with {spoken.count(found.count - 1)}, or {spoken.uncounted} to have "
+    return f"{less}them counted."
+
+
+def _undetermined(found: Undetermined, spoken: Spoken) -> str:
+    names = " and ".join(FIELDS.get(name, name.replace("_", " ")) for name in found.fields)
+    return f"Not determined by these views: {names}{_of_light(found.number, found.count)}."
+
+
+def _uncertain(found: Uncertain, spoken: Spoken) -> str:
+    place = f"the position{_of_light(found.number, found.count)}"
+    return f"Uncertain: {place} by {percent(found.error)} of the scene's size; give more views, or a sharper scene."
+
+
+def _on_surface(found: OnSurface, spoken: Spoken) -> str:
+    which = f"Light {found.number}" if found.count > 1 else "The light"
+    return f"{which} stands on a surface, where lights that belong elsewhere are stopped: give more views."
+
+
+def _all_steps(found: AllStepsTaken, spoken: Spoken) -> str:
+    change = 100.0 * found.change
+    words = "hardly changed" if abs(change) < 1.0 else f"{'fell' if change < 0.0 else 'rose'} by {abs(change):.0f} %"
+    return f"All {found.steps} steps were taken; over the last epoch the loss {words}."
+
+
+def _maybe(found: MaybeOneMore, spoken: Spoken) -> str:
+    more = f"One more light would lower the cost by {percent(found.gain)}: there may be one"
+    return f"{more} (it counts from {percent(found.wanted)} on)."
+
+
+def _exposure(found: ExposureUnknown, spoken: Spoken) -> str:
+    return "One view cannot tell its exposure from the lights' intensity: intensities are relative to the exposure."
+
+
+#: Findings that say more than their status does.
+_WORDS: dict[type[Finding], Callable[..., str]] = {
+    LightMissing: _missing,
+    LightSpare: _spare,
+    Undetermined: _undetermined,
+    Uncertain: _uncertain,
+    OnSurface: _on_surface,
+    AllStepsTaken: _all_steps,
+    MaybeOneMore: _maybe,
+    ExposureUnknown: _exposure,
+}
+
+
+def percent(share: float) -> str:
+    """A share in words."""
+    return f"{100.0 * share:.0f} %"
+
+
+def _of_light(number: int, count: int) -> str:
+    return f" of light {number}" if count > 1 else ""

@@ -1,0 +1,100 @@
+"""What a search found out is told in full, the gravest first."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+
+import pytest
+
+from rgspipe.fitting.findings import (
+    AtBound,
+    Finding,
+    FitStatus,
+    LightMissing,
+    LightSpare,
+    MaybeOneMore,
+    OnSurface,
+    OutOfSteps,
+    PoorlyExplained,
+    Rival,
+    Uncertain,
+    Undetermined,
+    gravest,
+)
+from rgspipe.fitting.words import MEANINGS, Spoken, explained
+
+DOUBT = Undetermined(1, 1, ("intensity",))
+DOUBTED = "Not determined by these views: intensity."
+ELSEWHERE = Spoken("lamps:{}".format, "lamps:?")
+
+
+def test_without_a_finding_a_fit_has_converged() -> None:
+    assert gravest(()) is FitStatus.CONVERGED and explained(()) == MEANINGS[FitStatus.CONVERGED]
+
+
+def test_a_doubt_is_not_hidden_by_steps_that_ran_out() -> None:
+    found = (OutOfSteps(), DOUBT)
+    assert gravest(found) is FitStatus.UNDETERMINED and gravest(found[:1]) is FitStatus.MAX_ITERATIONS
+    assert DOUBTED in explained(found) and MEANINGS[FitStatus.MAX_ITERATIONS] in explained(found)
+
+
+@pytest.mark.parametrize(
+    ("found", "status"),
+    [
+        ((DOUBT, Rival(), PoorlyExplained(0.3), AtBound()), FitStatus.AT_BOUND),
+        ((DOUBT, PoorlyExplained(0.3), Rival()), FitStatus.UNEXPLAINED),
+        ((DOUBT, Rival()), FitStatus.AMBIGUOUS),
+        ((DOUBT,), FitStatus.UNDETERMINED),
+    ],
+)
+def test_the_gravest_finding_is_the_status_and_all_are_told(found: Sequence[Finding], status: FitStatus) -> None:
+    assert gravest(found) is status
+    words = explained(found)
+    assert words.startswith(MEANINGS[status]) and DOUBTED in words and MEANINGS[FitStatus.CONVERGED] not in words
+    assert (MEANINGS[FitStatus.AMBIGUOUS] in words) == (Rival() in found)
+
+
+def test_a_number_that_is_too_small_is_told_with_the_next_one() -> None:
+    words = explained([LightMissing(1, 0.62)], ELSEWHERE)
+    assert gravest([LightMissing(1, 0.62)]) is FitStatus.UNEXPLAINED
+    assert "62 %" in words and "lamps:2" in words and "lamps:?" in words and "LightSpec" not in words
+    assert "count=4" in explained([LightMissing(3, 0.62)]) and MEANINGS[FitStatus.UNEXPLAINED] not in words
+
+
+def test_what_is_left_unexplained_is_told_beside_a_light_that_is_missing() -> None:
+    words = explained([PoorlyExplained(0.1), LightMissing(1, 0.62)])
+    assert words.startswith(MEANINGS[FitStatus.UNEXPLAINED]) and "count=2" in words
+
+
+def test_a_number_that_is_too_large_is_told_with_the_light_that_may_not_be_there() -> None:
+    found = [LightSpare(3, 3, 0.04, 0.2)]
+    words = explained(found, ELSEWHERE)
+    assert gravest(found) is FitStatus.AMBIGUOUS and MEANINGS[FitStatus.AMBIGUOUS] not in words
+    assert words.startswith("Light 3 lowers the cost by 4 % only") and "from 20 % on" in words
+    assert "lamps:2" in words and "lamps:?" in words
+
+
+def test_other_lights_that_explain_as_much_are_told_beside_a_light_too_many() -> None:
+    words = explained([Rival(), LightSpare(2, 2, 0.04, 0.2), DOUBT])
+    assert words.startswith(MEANINGS[FitStatus.AMBIGUOUS]) and "Light 2" in words and DOUBTED in words
+
+
+def test_lights_are_numbered_where_there_are_several() -> None:
+    assert "the position by 30 %" in explained([Uncertain(1, 1, 0.3)])
+    assert "the position of light 2 by 15 %" in explained([Uncertain(2, 2, 0.15)])
+    assert "The light stands on a surface" in explained([OnSurface(1, 1)])
+    assert "Light 3 stands on a surface" in explained([OnSurface(1, 3), OnSurface(3, 3)])
+    assert "axis and cone of light 2" in explained([Undetermined(2, 2, ("direction", "cone_angle"))])
+
+
+def test_what_may_be_there_leaves_the_answer_as_it_is() -> None:
+    found = [MaybeOneMore(0.1, 0.2)]
+    assert gravest(found) is FitStatus.CONVERGED
+    assert explained(found).startswith(MEANINGS[FitStatus.CONVERGED]) and "may be one" in explained(found)
+
+
+def test_findings_are_data() -> None:
+    fields = json.loads(json.dumps([LightSpare(3, 3, 0.04, 0.2).data(), DOUBT.data()]))
+    assert fields[0] == {"finding": "light_spare", "number": 3, "count": 3, "gain": 0.04, "wanted": 0.2}
+    assert fields[1] == {"finding": "undetermined", "number": 1, "count": 1, "fields": ["intensity"]}
