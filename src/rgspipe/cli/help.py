@@ -15,6 +15,7 @@ from rgspipe.stages import NAMES, stage_summary
 SCENES = """\
   cornell    a Cornell box with two boxes, modelled and rendered with Blender; scene.cornell.* sets its measures
   cornell_glossy  the same with glossy boxes
+  tutorial   the same with few images, in a few minutes
   corner     a closed corridor around a corner; targets with the light in the other leg (occlusion=around_corner)
   hotdog     a hot dog on a plate: curved and textured, in empty space
   room       a closed room with furniture, textured
