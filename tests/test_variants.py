@@ -1,4 +1,4 @@
-"""`latest` is what the plain command makes; everything else is called by the settings that make it another one."""
+"""`latest` is what the plain command makes; what is made to compare is called by its settings."""
 
 from __future__ import annotations
 
@@ -9,39 +9,38 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import toys
-from rgspipe.artifacts import ArtifactStore, Key
-from rgspipe.cli.compose import compose_config, plain_config
+from rgspipe.artifacts import ArtifactStore
+from rgspipe.cli.compose import compose_config, usual_command
 from rgspipe.config import RgspipeConfig, with_changes
-from rgspipe.pipeline import resolve, run
+from rgspipe.pipeline import Usual, resolve, run
 from rgspipe.variants import LONGEST, variant_name
 
 
 @pytest.mark.parametrize(
-    ("overrides", "changes", "keys", "name"),
+    ("overrides", "swept", "changes", "keys", "name"),
     [
-        (["stage=freeze", "freeze.surfels=truth"], {}, ["freeze", "train"], "freeze.surfels=truth"),
-        (["fit=paper_adam", "views.count=3"], {}, ["fit.method", "views"], "fit=paper_adam,views.count=3"),
-        (["fit=paper_adam", "views.count=3"], {}, ["views.count"], "views.count=3"),
-        (["scene=corner", "scene.corner.width=0.3", "outputs=o"], {}, ["scene.corner"], ""),
-        (
-            ["experiment=smoke", "seed=3"],
-            {"freeze.surfels": "truth"},
-            ["freeze"],
-            "experiment=smoke,freeze.surfels=truth",
-        ),
-        (["freeze.surfels=trained"], {"freeze.surfels": "truth"}, ["freeze"], "freeze.surfels=truth"),
-        (["fit.target=/data/a b"], {}, ["fit.target"], "fit.target=_data_a_b"),
+        (["stage=freeze", "freeze.surfels=truth"], [], {}, ["freeze", "train"], "freeze.surfels=truth"),
+        (["dataset.resolution=64", "fit.limit=2"], [], {}, ["dataset", "fit.limit"], ""),
+        (["fit=paper_adam", "seed=3"], ["seed"], {}, ["fit.method", "seed"], "fit=paper_adam,seed=3"),
+        (["fit=paper_adam", "views.count=3"], ["views.count"], {}, ["views.count"], "views.count=3"),
+        (["fit=paper_adam", "views.count=3"], [], {}, ["freeze", "dataset"], ""),
+        (["views=multi"], ["views"], {}, ["views.count"], "views=multi"),
+        (["seed=3"], [], {"freeze.surfels": "truth"}, ["freeze"], "freeze.surfels=truth"),
+        (["freeze.surfels=trained"], [], {"freeze.surfels": "truth"}, ["freeze"], "freeze.surfels=truth"),
+        (["fit.target=/data/a b"], ["fit.target"], {}, ["fit.target"], "fit.target=_data_a_b"),
+        (["model_error.albedo=0.1"], [], {}, ["model_error"], "model_error.albedo=0.1"),
     ],
 )
-def test_a_variant_is_called_by_what_matters(
-    overrides: list[str], changes: dict[str, str], keys: list[str], name: str
+def test_a_variant_is_called_by_what_varies_and_matters(
+    overrides: list[str], swept: list[str], changes: dict[str, str], keys: list[str], name: str
 ) -> None:
-    assert variant_name(overrides, changes, keys) == name
+    assert variant_name(overrides, swept, changes, keys) == name
 
 
 @given(st.lists(st.text(min_size=1, max_size=60), max_size=6))
 def test_any_name_is_one_of_a_file(values: list[str]) -> None:
-    name = variant_name([f"a.k{index}={value}" for index, value in enumerate(values)], {}, ["a"])
+    overrides = [f"a.k{index}={value}" for index, value in enumerate(values)]
+    name = variant_name(overrides, [f"a.k{index}" for index in range(len(values))], {}, ["a"])
     assert "/" not in name and "\0" not in name and len(name) <= LONGEST
 
 
@@ -58,40 +57,40 @@ def fingerprint(config: RgspipeConfig) -> str:
     return resolve(config, toys.load).key.fingerprint
 
 
-def test_a_variant_leaves_latest_where_it_is(plain: RgspipeConfig, tmp_path: Path) -> None:
+def test_a_job_of_a_sweep_leaves_latest_where_it_is(plain: RgspipeConfig, tmp_path: Path) -> None:
+    usual = Usual(plain, frozenset({"views.count"}))
+    for count in (3, 1):
+        run(with_changes(plain, {"views.count": count}), toys.load, [f"views.count={count}"], usual)
     three = with_changes(plain, {"views.count": 3})
-    run(plain, toys.load, [], plain)
-    run(three, toys.load, ["views.count=3"], plain)
-    expected = {"latest": fingerprint(plain), "latest-views.count=3": fingerprint(three)}
-    assert links(tmp_path, "grow") == expected
+    assert links(tmp_path, "grow") == {"latest": fingerprint(plain), "latest-views.count=3": fingerprint(three)}
     assert list(links(tmp_path, "sow")) == ["latest"]
 
 
-def test_the_plain_command_takes_latest_back(plain: RgspipeConfig, tmp_path: Path) -> None:
+def test_a_plain_command_takes_latest(plain: RgspipeConfig, tmp_path: Path) -> None:
     changed = with_changes(plain, {"dataset.resolution": 5})
     for config in (plain, changed, plain):
-        run(config, toys.load, [], config)
+        run(config, toys.load, [], Usual(config))
         assert links(tmp_path, "grow") == {"latest": fingerprint(config)}
 
 
 def test_what_a_stage_asks_of_its_inputs_are_variants(plain: RgspipeConfig, tmp_path: Path) -> None:
     harvest = with_changes(plain, {"stage": "harvest", "report.views": [1, 2]})
-    run(harvest, toys.load, [], harvest)
+    run(harvest, toys.load, [], Usual(harvest))
     assert set(links(tmp_path, "grow")) == {"latest", "latest-views.count=2"}
     assert set(links(tmp_path, "harvest")) == {"latest"}
 
 
 def test_the_newest_is_what_was_asked_for_last(plain: RgspipeConfig, tmp_path: Path) -> None:
-    three = with_changes(plain, {"views.count": 3})
+    store, three = ArtifactStore(tmp_path), with_changes(plain, {"views.count": 3})
     for config in (plain, three, plain, three):
-        run(config, toys.load, ["views.count=3"], plain)
-        assert ArtifactStore(tmp_path).newest("cornell", "grow").fingerprint == fingerprint(config)
-    assert ArtifactStore(tmp_path).newest("cornell", "reap") is None
-    assert Key("cornell", "grow", fingerprint(plain)) == resolve(plain, toys.load).key
+        run(config, toys.load, ["views.count=3"], Usual(plain, frozenset({"views.count"})))
+        assert store.newest("cornell", "grow").fingerprint == fingerprint(config)
+    assert store.newest("cornell", "reap") is None
 
 
-def test_a_plain_command_keeps_its_scene() -> None:
-    overrides = ["stage=freeze", "scene=corner", "scene.corner.width=0.3", "freeze.surfels=truth", "experiment=smoke"]
-    plain, config = plain_config(overrides), compose_config(overrides)
-    assert plain.scene == config.scene and plain.stage == "freeze"
-    assert (plain.freeze.surfels, plain.dataset.resolution) == ("trained", 128)
+def test_the_usual_command_is_the_one_without_what_varies() -> None:
+    overrides = ["stage=freeze", "scene=corner", "freeze.surfels=truth", "experiment=smoke", "fit.limit=2"]
+    usual = usual_command([*overrides, "views.count=2,3", "fit=search_lm,paper_adam", "report.views=[1,3]"])
+    assert usual.swept == {"views.count", "fit"}
+    expected = compose_config([*overrides, "report.views=[1,3]"])
+    assert usual.config == with_changes(expected, {"freeze.surfels": "trained"})

@@ -1,4 +1,12 @@
-"""rgspipe: from images of a scene, find the lights."""
+"""rgspipe: from images of a scene, find the lights.
+
+import rgspipe as rg
+
+scene = rg.FrozenScene.load("outputs/cornell/freeze/latest")
+camera = rg.Camera.look_at([0, -1.5, 0], [0, 0, 0])
+image = scene.render(camera, [rg.PointLight([-0.3, 0.3, -0.1], 0.8)])
+print(rg.fit_lights(scene, [camera], [image]))
+"""
 
 from __future__ import annotations
 
@@ -8,30 +16,80 @@ from typing import TYPE_CHECKING, Any
 from rgspipe.threads import settle_threads
 
 if TYPE_CHECKING:
-    from rgspipe.fitting import fit_lights
+    from rgspipe.datasets.light_file import read_lights, write_lights
+    from rgspipe.datasets.location import load_views
+    from rgspipe.datasets.ply import PlyOptions, save_ply
+    from rgspipe.datasets.surfel_file import load_surfels, save_surfels
+    from rgspipe.datasets.views import View
+    from rgspipe.errors import InputError
+    from rgspipe.fitting import Effects, FitResult, FitStatus, FitViews, ImageCapture, LightSpec, fit_lights
     from rgspipe.renderer.frozen import FrozenScene
-    from rgspipe.scene import PointLight, SpotLight
+    from rgspipe.renderer.ply import load_ply
+    from rgspipe.scene import Camera, LedLight, Light, PointLight, SpotLight, Surfels
+    from rgspipe.scene.models import CornellBox, Corridor, exact_surfels
+    from rgspipe.training.trainer import Trained, TrainOptions, train
 
-__all__ = ["FrozenScene", "PointLight", "SpotLight", "__version__", "fit_lights"]
+#: Where the public names live; they are imported when first used, so that `import rgspipe` stays quick.
+_HOMES = {
+    "datasets.light_file": ("read_lights", "write_lights"),
+    "datasets.location": ("load_views",),
+    "datasets.ply": ("PlyOptions", "save_ply"),
+    "datasets.surfel_file": ("load_surfels", "save_surfels"),
+    "datasets.views": ("View",),
+    "errors": ("InputError",),
+    "fitting": ("Effects", "FitResult", "FitStatus", "FitViews", "ImageCapture", "LightSpec", "fit_lights"),
+    "renderer.frozen": ("FrozenScene",),
+    "renderer.ply": ("load_ply",),
+    "scene": ("Camera", "LedLight", "Light", "PointLight", "SpotLight", "Surfels"),
+    "scene.models": ("CornellBox", "Corridor", "exact_surfels"),
+    "training.trainer": ("TrainOptions", "Trained", "train"),
+}
+
+__all__ = [
+    "Camera",
+    "CornellBox",
+    "Corridor",
+    "Effects",
+    "FitResult",
+    "FitStatus",
+    "FitViews",
+    "FrozenScene",
+    "ImageCapture",
+    "InputError",
+    "LedLight",
+    "Light",
+    "LightSpec",
+    "PlyOptions",
+    "PointLight",
+    "SpotLight",
+    "Surfels",
+    "TrainOptions",
+    "Trained",
+    "View",
+    "__version__",
+    "exact_surfels",
+    "fit_lights",
+    "load_ply",
+    "load_surfels",
+    "load_views",
+    "read_lights",
+    "save_ply",
+    "save_surfels",
+    "train",
+    "write_lights",
+]
 
 settle_threads()
 
 __version__ = "0.1.0"
 
-#: Where the public names live; they are imported when first used, so that `import rgspipe` stays quick.
-_HOMES = {
-    "FrozenScene": "rgspipe.renderer.frozen",
-    "PointLight": "rgspipe.scene",
-    "SpotLight": "rgspipe.scene",
-    "fit_lights": "rgspipe.fitting",
-}
-
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(importlib.import_module(_HOMES[name]), name)
+    for home, names in _HOMES.items():
+        if name in names:
+            return getattr(importlib.import_module(f"{__name__}.{home}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:
-    return sorted([*globals(), *_HOMES])
+    return sorted({*globals(), *__all__})

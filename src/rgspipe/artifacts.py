@@ -1,8 +1,8 @@
 """The artifact store: what a stage made, published whole or not at all, and verified when it is read.
 
     <root>/<scene>/<stage>/<fingerprint>/              an artifact: its files and manifest.json
-    <root>/<scene>/<stage>/latest                      link to the newest one that the plain command makes
-    <root>/<scene>/<stage>/latest-<settings>           link to the newest one with other settings
+    <root>/<scene>/<stage>/latest                      link to the newest one
+    <root>/<scene>/<stage>/latest-<settings>           link to the newest one of a variant; see `variants`
     <root>/<scene>/<stage>/.partial-<fingerprint>/     an artifact in the making
     <root>/<scene>/<stage>/.lock-<fingerprint>         held while it is made
 

@@ -77,6 +77,19 @@ class Step:
     remarks: tuple[str, ...] = ()
 
 
+@dataclass(frozen=True)
+class Usual:
+    """What a command would make if nothing varied; see `variants`.
+
+    Attributes:
+        config: its configuration.
+        swept: keys and groups of which a sweep tries several values.
+    """
+
+    config: RgspipeConfig
+    swept: frozenset[str] = frozenset()
+
+
 @dataclass
 class _Resolver:
     """Builds the graph; every module and foreign file is read once."""
@@ -166,19 +179,15 @@ def describe_plan(steps: Sequence[Step]) -> str:
 
 
 def run(
-    config: RgspipeConfig,
-    load_stage: StageLoader,
-    overrides: Sequence[str] = (),
-    plain: RgspipeConfig | None = None,
+    config: RgspipeConfig, load_stage: StageLoader, overrides: Sequence[str] = (), usual: Usual | None = None
 ) -> Artifact:
     """Make `config.stage`, and before it what is missing of its inputs; reuse what is there.
 
     Args:
         config: the whole configuration, checked.
         load_stage: gives a stage by name.
-        overrides: the command line's overrides, for the commands that messages suggest, and names of variants.
-        plain: the configuration of the command without them, but for the scene: what that makes is called `latest`.
-            None calls everything so.
+        overrides: the command line's overrides, for the commands that messages suggest, and for names of variants.
+        usual: what is called `latest`; None calls everything so.
 
     Raises:
         InputError: an input cannot be used, or is missing under `upstream=require`.
@@ -190,7 +199,7 @@ def run(
     log.info(describe_plan(steps))
     if config.upstream == "require":
         _refuse_missing(steps, overrides)
-    names = {step.node.key: "" if plain is None else _variant(step.node, resolver, plain, overrides) for step in steps}
+    names = {step.node.key: _variant(step.node, resolver, overrides, usual) for step in steps}
     artifacts = {step.node.key: _take(step.node, store, names[step.node.key]) for step in steps if step.reused}
     for step in steps:
         if not step.reused:
@@ -198,16 +207,18 @@ def run(
     return artifacts[root.key]
 
 
-def _variant(node: Node, resolver: _Resolver, plain: RgspipeConfig, overrides: Sequence[str]) -> str:
-    """What tells a node from the one that the plain command makes; empty for that one."""
-    try:
-        usual = resolver.resolve(node.stage.name, plain, {})
-    except InputError:  # it cannot do without further settings, so all of them are as plain
+def _variant(node: Node, resolver: _Resolver, overrides: Sequence[str], usual: Usual | None) -> str:
+    """What tells a node from the one that is called `latest`; empty for that one."""
+    if usual is None:
         return ""
-    if usual.key == node.key:
+    try:
+        plain = resolver.resolve(node.stage.name, usual.config, {})
+    except InputError:  # what varies cannot be left away, so no variant is plainer than the others
+        return ""
+    if plain.key == node.key:
         return ""
     changes = {key: _as_override(value) for key, value in node.changes.items()}
-    return variant_name(overrides, changes, _keys(node)) or node.key.fingerprint
+    return variant_name(overrides, usual.swept, changes, _keys(node))
 
 
 def _keys(node: Node) -> set[str]:

@@ -1,40 +1,50 @@
-"""What an artifact is called that the plain command would not have made: the settings that make it another one."""
+"""What an artifact is called that is one of several to compare: the settings that tell it from the plain one.
+
+Settings vary in a sweep, where a stage needs an input with others than its own, and where the keys below are set: they
+ask what another scene than the one that is there would give.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 
-#: Groups of presets, which set keys of any stage.
-PRESETS = ("accuracy", "experiment")
+#: Keys and sections that are for comparisons: other surfels, other methods, errors put in.
+COMPARED = ("capture", "fit.method", "freeze.surfels", "model_error", "target_capture")
 
-#: Keys that say which scene is looked at, and where its results go: what is plain follows from them.
-GIVEN = ("outputs", "scene")
+#: The group of methods, whose members set `fit.method`.
+METHODS = "fit"
 
 #: A name that is longer ends in digits that tell it from others.
 LONGEST, DIGITS = 100, 6
 
 
-def plain_overrides(overrides: Sequence[str]) -> list[str]:
-    """Those of a command that are left where it is plain: which scene, and where its results go."""
-    return [text for text in overrides if _below(_key(text), GIVEN)]
+def plain_overrides(overrides: Sequence[str], swept: Collection[str]) -> list[str]:
+    """Those of a command that do not vary.
+
+    Args:
+        swept: keys and groups of which a sweep tries several values.
+    """
+    return [text for text in overrides if not _varies(_key(text), swept)]
 
 
-def variant_name(overrides: Sequence[str], changes: Mapping[str, str], keys: Iterable[str]) -> str:
-    """Such as "freeze.surfels=truth,views.count=3".
+def variant_name(
+    overrides: Sequence[str], swept: Collection[str], changes: Mapping[str, str], keys: Collection[str]
+) -> str:
+    """Such as "freeze.surfels=truth,views.count=3"; empty if nothing varies that matters.
 
     Args:
         overrides: of the command.
+        swept: keys and groups of which a sweep tries several values.
         changes: values by dotted key that a stage asks of its inputs; they stand over those of the command.
         keys: dotted keys and sections that the artifact and all behind it depend on.
     """
-    known = tuple(keys)
-    wanted = {_key(text): text.lstrip("+~").partition("=")[2] for text in overrides} | changes
+    given = {_key(text): text.partition("=")[2] for text in overrides if _varies(_key(text), swept)}
     texts = [
         f"{key}={value}"
-        for key, value in sorted(wanted.items())
-        if not _below(key, (*GIVEN, "stage")) and (key in PRESETS or _below(key, known) or _above(key, known))
+        for key, value in sorted((given | changes).items())
+        if _below(key, keys) or any(_below(other, (key,)) for other in keys)
     ]
     name = re.sub(r"[^\w.,=+-]+", "_", ",".join(texts), flags=re.ASCII)
     if len(name) <= LONGEST:
@@ -46,11 +56,10 @@ def _key(override: str) -> str:
     return override.split("=")[0].lstrip("+~")
 
 
+def _varies(key: str, swept: Collection[str]) -> bool:
+    return key in swept or key == METHODS or _below(key, COMPARED)
+
+
 def _below(key: str, sections: Iterable[str]) -> bool:
     """Whether a key is one of the sections, or in one."""
     return any(key == section or key.startswith(f"{section}.") for section in sections)
-
-
-def _above(key: str, others: Iterable[str]) -> bool:
-    """Whether one of the others is in the section, or group, that is called like the key."""
-    return any(other.startswith(f"{key}.") for other in others)

@@ -164,10 +164,9 @@ def test_a_job_that_is_queued_again_goes_on_where_it_was(cluster: dict[str, str]
     code, output, messages = ended(sweep)
     assert code == 0, messages
     assert "1 of 1 jobs done" in output
-    made = sown / "latest-dataset.resolution=16"
-    manifest = json.loads((made / "manifest.json").read_text())
+    manifest = json.loads((sown / "latest" / "manifest.json").read_text())
     assert manifest["resumed"] is True
-    assert (made / "row_00.txt").stat().st_mtime_ns == before
+    assert (sown / "latest" / "row_00.txt").stat().st_mtime_ns == before
 
 
 def test_ctrl_c_takes_the_jobs_out_of_the_queue(cluster: dict[str, str], tmp_path: Path) -> None:

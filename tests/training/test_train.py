@@ -49,7 +49,7 @@ def test_training_goes_on_from_a_checkpoint_as_if_never_interrupted(
         steps=6, relight_every=3, views_per_step=4, interior_pixels=100, subsamples=1, tilt_rate=0.01, height_rate=0.01
     )
     options = replace(OPTIONS, rounds=2, refine=refine_options, light_rounds=1, density=DensityOptions(growth=1.1))
-    whole = train(start, views, options)
+    whole = train(views, start, options)
 
     class Killed(Exception):
         pass
@@ -61,8 +61,8 @@ def test_training_goes_on_from_a_checkpoint_as_if_never_interrupted(
                 raise Killed
 
     with pytest.raises(Killed):
-        train(start, views, options, KillingCheckpoint(tmp_path / "state", every=2))
-    resumed = train(start, views, options, Checkpoint(tmp_path / "state", every=2))
+        train(views, start, options, checkpoint=KillingCheckpoint(tmp_path / "state", every=2))
+    resumed = train(views, start, options, checkpoint=Checkpoint(tmp_path / "state", every=2))
     assert len(whole.surfels) > len(start)
     for name, tensor in whole.surfels.tensors().items():
         assert torch.equal(tensor, resumed.surfels.tensors()[name]), name
@@ -89,7 +89,7 @@ def test_progress_says_how_training_goes_and_when_it_ends(
     refine_options = RefineOptions(
         steps=3, views_per_step=4, interior_pixels=100, subsamples=1, loss=LossOptions("l1", compression=10.0)
     )
-    trained = train(start, views, replace(OPTIONS, rounds=2, refine=refine_options))
+    trained = train(views, start, replace(OPTIONS, rounds=2, refine=refine_options))
     first, *steps, last = trained.records
     assert [record.phase for record in steps] == 3 * ["geometry"]
     # The mean over steps is of errors; the loss is another measure.

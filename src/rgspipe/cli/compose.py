@@ -18,6 +18,7 @@ from omegaconf.errors import OmegaConfBaseException
 
 from rgspipe.config import RgspipeConfig, check_values
 from rgspipe.errors import InputError
+from rgspipe.pipeline import Usual
 from rgspipe.resources import resource_folder
 from rgspipe.stages import NAMES, load_stage
 from rgspipe.variants import plain_overrides
@@ -87,10 +88,10 @@ def compose_config(overrides: Sequence[str]) -> RgspipeConfig:
         raise _composition_error(error, overrides) from None
 
 
-def plain_config(overrides: Sequence[str]) -> RgspipeConfig:
-    """The configuration of a command without its overrides, but for the stage and the scene."""
-    stage = [text for text in overrides if text.startswith("stage=")]
-    return compose_config([*stage, *plain_overrides(overrides)])
+def usual_command(overrides: Sequence[str]) -> Usual:
+    """What a command, or each job of a sweep, would make if nothing varied."""
+    swept = frozenset(str(override.key_or_group) for override in _parse(overrides) if override.is_sweep_override())
+    return Usual(compose_config(plain_overrides(overrides, swept)), swept)
 
 
 def check_sweep(overrides: Sequence[str]) -> RgspipeConfig:

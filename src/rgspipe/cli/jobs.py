@@ -22,14 +22,14 @@ from rgspipe.cli.compose import (
     config_folder,
     given_folder,
     leaves_machine,
-    plain_config,
     register_schema,
     typed,
+    usual_command,
 )
 from rgspipe.cli.messages import EXIT_FAILED, EXIT_INPUT, show_failure, show_input_error
 from rgspipe.cli.sweep_table import write_sweep_table
 from rgspipe.errors import InputError
-from rgspipe.pipeline import StageLoader, run
+from rgspipe.pipeline import StageLoader, Usual, run
 from rgspipe.stages import load_stage
 from rgspipe.status import RunStatus, read_status, read_statuses
 
@@ -57,19 +57,21 @@ def run_jobs(overrides: Sequence[str], stage_loader: StageLoader, multirun: bool
     )
     # Said again even where it was given: interpolations such as the time must not be resolved twice.
     chosen = f"hydra.{mode}.dir={quoted(folder)}"
-    code = run_hydra([*(["-m"] if multirun else []), *overrides, chosen], stage_loader)
+    # Worked out here: within a job Hydra composes nothing else.
+    usual = usual_command(overrides)
+    code = run_hydra([*(["-m"] if multirun else []), *overrides, chosen], stage_loader, usual)
     if multirun:
         return _sweep_summary(folder, code)
     status = read_status(folder)
     return max(code, EXIT_FAILED if status is None else int(status.get("exit_code", EXIT_FAILED)))
 
 
-def run_hydra(arguments: Sequence[str], stage_loader: StageLoader) -> int:
+def run_hydra(arguments: Sequence[str], stage_loader: StageLoader, usual: Usual) -> int:
     """Hand the arguments to Hydra as they are; its exit status."""
 
-    # A closure, so that worker processes get the stage loader with it.
+    # A closure, so that worker processes get the stage loader and what is usual with it.
     def job(values: DictConfig) -> int:
-        return _job(values, stage_loader)
+        return _job(values, stage_loader, usual)
 
     register_schema()
     application = hydra.main(version_base=HYDRA_VERSION_BASE, config_path=config_folder(), config_name=CONFIG_NAME)(job)
@@ -104,7 +106,7 @@ def quoted(path: Path) -> str:
     return f"'{text}'"
 
 
-def _job(values: DictConfig, stage_loader: StageLoader) -> int:
+def _job(values: DictConfig, stage_loader: StageLoader, usual: Usual) -> int:
     """One run, or one job of a sweep; its exit status."""
     settings = HydraConfig.get()
     overrides = list(settings.overrides.task)
@@ -112,7 +114,7 @@ def _job(values: DictConfig, stage_loader: StageLoader) -> int:
     wanted = bool(values.debug.traceback)
     try:
         config = typed(values)
-        artifact = run(config, stage_loader, overrides, plain_config(overrides))
+        artifact = run(config, stage_loader, overrides, usual)
     except InputError as error:
         status.failed(error, EXIT_INPUT)
         show_input_error(error, wanted)

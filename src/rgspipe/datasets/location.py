@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Literal
 
-from rgspipe.datasets.gs3 import load_dataset
+from rgspipe.datasets.gs3 import load_dataset, load_target
 from rgspipe.datasets.json_file import read_json, required
-from rgspipe.datasets.views import Dataset
+from rgspipe.datasets.views import Dataset, View
 from rgspipe.errors import InputError
 from rgspipe.files import write_json
 
 POINTER = "dataset.json"
+
+#: What a folder of a fit target has, and one of a dataset has not.
+TARGET = "transforms.json"
 
 
 def dataset_root(folder: str | Path) -> Path:
@@ -32,3 +36,19 @@ def point_at_dataset(folder: Path, root: Path) -> None:
 def open_dataset(folder: str | Path, *, train: bool = True, test: bool = True, targets: bool = True) -> Dataset:
     """`load_dataset` of the dataset that `folder` is, or points at."""
     return load_dataset(dataset_root(folder), train=train, test=test, targets=targets)
+
+
+def load_views(folder: str | Path, split: Literal["train", "test"] = "train") -> tuple[View, ...]:
+    """The views of a dataset that are trained on, or held out; or those of a fit target.
+
+    Args:
+        folder: of a dataset, of what the stage generate_dataset made, or of a fit target.
+        split: which of a dataset's views.
+
+    Raises:
+        InputError: any file is missing, broken or inconsistent.
+    """
+    if (Path(folder) / TARGET).is_file():
+        return load_target(folder).views
+    dataset = open_dataset(folder, train=split == "train", test=split == "test", targets=False)
+    return dataset.train if split == "train" else dataset.test

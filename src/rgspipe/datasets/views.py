@@ -14,7 +14,7 @@ from rgspipe.scene import Camera, PointLight
 Occlusion = Literal["visible", "out_of_frame", "occluded", "around_corner", "unknown"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class View:
     """One image and what is known of it.
 
@@ -38,6 +38,11 @@ class View:
     depth: Tensor | None = None
     normal: Tensor | None = None
     albedo: Tensor | None = None
+
+    def __repr__(self) -> str:
+        known = [name for name in ("light", "depth", "normal", "albedo") if getattr(self, name) is not None]
+        size = f"{self.camera.width} × {self.camera.height}"
+        return f"View({self.name!r}, {size}{''.join(f', {name}' for name in known)})"
 
 
 @dataclass(frozen=True)

@@ -52,7 +52,7 @@ class IndirectSolver(Protocol):
         ...
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class FrozenScene:
     """Surfels with their light transport.
 
@@ -126,6 +126,9 @@ class FrozenScene:
             gloss=self.gloss,
             candidates=self.__dict__.get("dictionary", self.candidates),
         )
+
+    def __repr__(self) -> str:
+        return f"FrozenScene({self.surfels!r}, {self.transport.average.shape[0]} patches, size {self.size:.3g})"
 
     @property
     def device(self) -> torch.device:

@@ -44,7 +44,7 @@ class Coverage:
             )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Surfels:
     """N Gaussian surfels as plain tensors; all of one dtype and device.
 
@@ -87,6 +87,10 @@ class Surfels:
 
     def __len__(self) -> int:
         return self.centers.shape[0]
+
+    def __repr__(self) -> str:
+        glossy = 0 if self.gloss is None else len(self.gloss.glossy)
+        return f"Surfels({len(self)}, {glossy or 'none'} of them glossy, {self.centers.dtype}, {self.centers.device})"
 
     @property
     def frames(self) -> Tensor:

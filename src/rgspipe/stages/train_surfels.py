@@ -46,7 +46,7 @@ def run(context: StageContext) -> None:
     checkpoint = Checkpoint(context.scratch / "checkpoint.safetensors", config.checkpoint_every)
     train_views = degraded(dataset.train, Capture.from_config(context.config.capture))
     known = prior_from_maps(train_views, config.albedo_prior_weight) if config.albedo_prior == "dataset" else None
-    trained = train(start, train_views, options, checkpoint, known)
+    trained = train(train_views, start, options, checkpoint=checkpoint, prior=known)
     save_surfels(context.folder / "surfels.safetensors", trained.surfels)
     _write_table(context.folder / "training.csv", trained)
 

@@ -22,7 +22,7 @@ from rgspipe.training.checkpoint import Checkpoint
 from rgspipe.training.density import DensityOptions, redistributed, surfel_errors
 from rgspipe.training.gloss import gloss_radiance
 from rgspipe.training.gloss_light import operators_from
-from rgspipe.training.initialise import Footprint
+from rgspipe.training.initialise import Footprint, initialise_surfels
 from rgspipe.training.light_refinement import refine_lights
 from rgspipe.training.lighting import total_irradiance, trace_lighting
 from rgspipe.training.materials import MaterialOptions, Materials, PriorOf, build_frozen, each_view, fit_materials
@@ -34,6 +34,9 @@ from rgspipe.training.regularise import find_neighbours
 from rgspipe.training.shading import surfel_lights
 
 logger = logging.getLogger(__name__)
+
+#: How many surfels a scene gets if nothing else is said.
+SURFELS = 10_000
 
 
 @dataclass(frozen=True)
@@ -55,7 +58,7 @@ class TrainOptions(MaterialOptions):
     unseen: bool = True
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Trained:
     """The trained surfels and how training went.
 
@@ -71,23 +74,35 @@ class Trained:
     views: tuple[View, ...]
     stored: Stored
 
+    def __repr__(self) -> str:
+        last = self.records[-1]
+        return f"Trained({self.surfels!r}, {last.psnr:.1f} dB on {len(self.views)} views, {last.seconds:.0f} s)"
+
 
 def train(
-    surfels: Surfels,
     views: Sequence[View],
-    options: TrainOptions,
+    surfels: Surfels | int = SURFELS,
+    options: TrainOptions | None = None,
+    *,
     checkpoint: Checkpoint | None = None,
     prior: PriorOf | None = None,
 ) -> Trained:
-    """Fit materials and geometry of `surfels` to `views` with known lights.
+    """Fit materials and geometry of surfels to views with known lights.
 
     Args:
-        surfels: where to start; their albedo is a guess.
         views: training views, each with its light.
+        surfels: where to start, albedo is a guess; or how many to make from the depth of the views.
+        options: how; the defaults if None.
         checkpoint: where to keep what is done; an interrupted training goes on from there and ends with
             the surfels of an uninterrupted one.
         prior: known albedo that materials are pulled to.
+
+    Raises:
+        InputError: the views have no depth to make surfels from.
     """
+    options = options or TrainOptions()
+    if isinstance(surfels, int):
+        surfels = initialise_surfels(views, surfels, seed=options.seed)
     log = _Log(checkpoint.records if checkpoint else [])
     surfels = surfels.to(torch.float32)
     spacing, given = surfel_spacing(surfels), [view.light for view in views]
