@@ -22,7 +22,7 @@ def tracked(monkeypatch: pytest.MonkeyPatch, items: range, seconds: float, **opt
     """Track items that take `seconds` each."""
     clock = Clock()
     monkeypatch.setattr("tqdm.std.time", clock)
-    bar = progress.track(items, "steps", unit="step", **options)
+    bar = progress.progress_bar(items, "steps", unit="step", **options)
     for _ in bar:
         clock.now += seconds
         bar.set_postfix_str("loss 0.1", refresh=False)
@@ -61,7 +61,7 @@ def test_what_was_done_before_tells_nothing_of_the_pace(
     """Work that is taken up at item 48 of 160, which is known only after 5 s; 12 s an item."""
     clock = Clock()
     monkeypatch.setattr("tqdm.std.time", clock)
-    with progress.track([], "frames", unit="frame") as bar:
+    with progress.progress_bar([], "frames", unit="frame") as bar:
         clock.now += 5.0
         bar.begin(total=160, done=48)
         for _ in range(3):

@@ -69,7 +69,7 @@ class _Lines(_Bar):
             self._decr_instances(self)
 
 
-def track(
+def progress_bar(
     items: Iterable[Item],
     description: str,
     total: int | None = None,

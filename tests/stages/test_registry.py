@@ -69,13 +69,11 @@ def test_a_change_of_any_code_behind_a_result_rebuilds_it(name: str, source_code
 
 
 def test_packages_do_nothing_on_the_way_to_their_modules() -> None:
-    # Only where its own name is imported does a package count, so it must not do more than hand on names.
-    harmless = ast.ImportFrom | ast.Expr
+    # A package counts where its own name is imported, so it must do no more than define names.
+    harmless = ast.Import | ast.ImportFrom | ast.Assign | ast.AnnAssign | ast.FunctionDef | ast.ClassDef
     for path in PACKAGE.rglob("__init__.py"):
-        if path.parent.relative_to(PACKAGE).as_posix() in (".", "cli", "stages"):
-            continue
-        body = [node for node in ast.parse(path.read_text()).body if not isinstance(node, harmless)]
-        assert all(ast.unparse(node).startswith("__all__ =") for node in body), path
+        statements = ast.parse(path.read_text()).body[1:]  # after the docstring
+        assert path.parent == PACKAGE or all(isinstance(statement, harmless) for statement in statements), path
 
 
 def test_no_stage_loads_blender_into_its_own_process() -> None:

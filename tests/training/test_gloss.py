@@ -11,6 +11,7 @@ import pytest
 import torch
 
 from rgspipe.datasets.views import View
+from rgspipe.evaluation.held_out_views import render_held_out
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.sparse import SparseOperator, in_places
@@ -24,7 +25,6 @@ from rgspipe.training.gloss_light import operators_from
 from rgspipe.training.gloss_model import GlossLight, GlossView, Reflection
 from rgspipe.training.lighting import trace_lighting
 from rgspipe.training.materials import MaterialOptions, build_frozen, fit_materials, trace_views
-from rgspipe.training.validate import render_held_out
 from rgspipe.training.view_model import build_view_models
 
 OPTIONS = MaterialOptions(rounds=4, gather_rays=32, patches=60, supersampling=1, gloss=True)

@@ -83,7 +83,7 @@ def test_progress_says_how_training_goes_and_when_it_ends(
         estimates.append(after)
         return Bar(items)
 
-    monkeypatch.setattr("rgspipe.training.refine.track", tracked)
+    monkeypatch.setattr("rgspipe.training.refine.progress_bar", tracked)
     caplog.set_level("INFO")
     start = replace(painted_box(), albedo=torch.full((864, 3), 0.5))
     refine_options = RefineOptions(

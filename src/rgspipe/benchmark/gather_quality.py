@@ -19,7 +19,7 @@ from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.model.views import prepare_views
 from rgspipe.fitting.search_lm import fit_from
-from rgspipe.progress import track
+from rgspipe.progress import progress_bar
 from rgspipe.renderer.areas import surfel_areas
 from rgspipe.renderer.clusters import cluster_patches
 from rgspipe.renderer.direct import unit_irradiance
@@ -133,7 +133,7 @@ def compare_gathers(
     exact = {name: reference @ source for name, source in sources.items()}
     targets = _targets(bench, bench.scene(reference))
     rows = []
-    for variant, count in track([(v, m) for v in variants for m in rays], "gather operators", unit="operator"):
+    for variant, count in progress_bar([(v, m) for v in variants for m in rays], "gather operators", unit="operator"):
         begin = time.process_time()
         gather = bench.gather(variant, count, seed + 2)
         seconds = time.process_time() - begin

@@ -11,7 +11,7 @@ from rgspipe.benchmark.rooms import Room
 from rgspipe.benchmark.settings import Model, Setting, Workshop
 from rgspipe.benchmark.step_cost import StepCost, step_cost
 from rgspipe.benchmark.truth import KINDS, Truth
-from rgspipe.progress import track
+from rgspipe.progress import progress_bar
 
 
 def image_errors(room: Room, truth: Truth, settings: list[Setting], repetitions: int) -> pd.DataFrame:
@@ -23,7 +23,7 @@ def image_errors(room: Room, truth: Truth, settings: list[Setting], repetitions:
     """
     workshop = Workshop(room)
     rows = []
-    for setting in track(settings, f"settings, {room.name}", unit="setting"):
+    for setting in progress_bar(settings, f"settings, {room.name}", unit="setting"):
         model = workshop.model(setting)
         cost = step_cost(model, room.lights[0], repetitions)
         rows.append({"room": room.name, "setting": setting.changed} | asdict(setting) | errors(model, room, truth))

@@ -12,7 +12,7 @@ import torch
 from rgspipe.benchmark.rooms import Room
 from rgspipe.evaluation.timing import measure
 from rgspipe.machine import peak_memory_now_mib, reset_peak_memory
-from rgspipe.progress import track
+from rgspipe.progress import progress_bar
 from rgspipe.renderer.clusters import cluster_patches
 from rgspipe.renderer.direct import unit_irradiance
 from rgspipe.renderer.gather import build_gather
@@ -33,7 +33,7 @@ GATHER_RAYS, PATCHES = 32, 500
 def scaling(room: Room, counts: tuple[int, ...] = COUNTS, repetitions: int = 5) -> pd.DataFrame:
     """One row per number of surfels and part: `surfels`, `part`, `ms`, `operators_mib`, `peak_mib`."""
     rows = []
-    for count in track(counts, f"scaling, {room.name}", unit="size"):
+    for count in progress_bar(counts, f"scaling, {room.name}", unit="size"):
         rows += _parts(room, count, repetitions)
     return pd.DataFrame(rows)
 

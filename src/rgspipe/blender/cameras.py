@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -80,11 +81,8 @@ class CornellLayout:
         raise no_room("a camera inside the room")
 
     def light(self, rng: np.random.Generator, clearance: float) -> np.ndarray:
-        for _ in range(MAX_DRAWS):
-            point = rng.uniform(clearance - 0.5 * self._size, 0.5 * self._size - clearance)
-            if self.space.has_room_for(point, clearance):
-                return point
-        raise no_room(f"a place {clearance:g} from any surface")
+        half = 0.5 * self._size
+        return free_place(self.space, clearance, lambda: rng.uniform(clearance - half, half - clearance))
 
     def hidden_light(self, rng: np.random.Generator, clearance: float) -> np.ndarray:
         return self.light(rng, clearance)
@@ -121,12 +119,12 @@ class RoomLayout:
         raise no_room(f"a camera with a view of {self.sight:g} or more")
 
     def light(self, rng: np.random.Generator, clearance: float) -> np.ndarray:
-        cell = self.space.cell
-        for _ in range(MAX_DRAWS):
-            point = self.space.interior[rng.integers(len(self.space.interior))] + rng.uniform(-0.5, 0.5, 3) * cell
-            if self.space.has_room_for(point, clearance):
-                return point
-        raise no_room(f"a place {clearance:g} from any surface")
+        interior, cell = self.space.interior, self.space.cell
+        return free_place(
+            self.space,
+            clearance,
+            lambda: interior[rng.integers(len(interior))] + rng.uniform(-0.5, 0.5, 3) * cell,
+        )
 
     def hidden_light(self, rng: np.random.Generator, clearance: float) -> np.ndarray:
         return self.light(rng, clearance)
@@ -205,13 +203,13 @@ class ObjectLayout:
 
     def _place(self, rng: np.random.Generator, clearance: float, inner: float, outer: float) -> np.ndarray:
         """A place between two radii, in radii of the object."""
-        for _ in range(MAX_DRAWS):
-            point = rng.uniform(-outer, outer, 3) * self._radius
+        radius = self._radius
+
+        def is_good(point: np.ndarray) -> bool:
             distance = np.linalg.norm(point)
-            is_in_shell = inner * self._radius <= distance < outer * self._radius
-            if is_in_shell and point[2] >= self.lowest_light * distance and self.space.has_room_for(point, clearance):
-                return point
-        raise no_room(f"a place {clearance:g} from any surface")
+            return inner * radius <= distance < outer * radius and point[2] >= self.lowest_light * distance
+
+        return free_place(self.space, clearance, lambda: rng.uniform(-outer, outer, 3) * radius, is_good)
 
     def target_cameras(self) -> list[Camera]:
         cameras = []
@@ -220,6 +218,24 @@ class ObjectLayout:
             origin = (self.distances[1] - 0.2) * self._radius * direction
             cameras.append(aimed(origin, np.zeros(3), 40.0, self.resolution))
         return cameras
+
+
+def free_place(
+    space: FreeSpace,
+    clearance: float,
+    draw: Callable[[], np.ndarray],
+    is_good: Callable[[np.ndarray], bool] = lambda _: True,
+) -> np.ndarray:
+    """The first of the points (3,) drawn that is good and has no surface within `clearance`.
+
+    Raises:
+        InputError: there is none in `MAX_DRAWS`.
+    """
+    for _ in range(MAX_DRAWS):
+        point = draw()
+        if is_good(point) and space.has_room_for(point, clearance):
+            return point
+    raise no_room(f"a place {clearance:g} from any surface")
 
 
 def aimed(origin: np.ndarray, focus: np.ndarray, degrees: float, resolution: int) -> Camera:

@@ -15,7 +15,7 @@ import rgspipe
 from rgspipe.datasets.json_file import read_json
 from rgspipe.errors import InputError
 from rgspipe.files import write_json
-from rgspipe.progress import track
+from rgspipe.progress import progress_bar
 
 #: Prefix of the lines on the child's stdout that are messages; the rest is Blender's own talk.
 MESSAGE_PREFIX = "@rgspipe "
@@ -104,7 +104,7 @@ def _follow(child: subprocess.Popen, scene: str) -> tuple[str, dict | None]:
     """Show the child's progress until it ends; returns the last lines of its output, and an input error."""
     tail: deque[str] = deque(maxlen=TAIL_LINES)
     input_error = None
-    with track([], f"rendering {scene}", unit="frame") as bar:
+    with progress_bar([], f"rendering {scene}", unit="frame") as bar:
         for line in child.stdout:
             if not line.startswith(MESSAGE_PREFIX):
                 tail.append(line.rstrip())

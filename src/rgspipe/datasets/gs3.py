@@ -19,7 +19,7 @@ from rgspipe.datasets.json_file import read_json, required
 from rgspipe.datasets.tensoir import is_tensoir, load_tensoir
 from rgspipe.datasets.views import Dataset, Target, View
 from rgspipe.errors import InputError
-from rgspipe.progress import track
+from rgspipe.progress import progress_bar
 from rgspipe.scene import PointLight
 
 OCCLUSIONS = ("visible", "out_of_frame", "occluded", "around_corner", "unknown")
@@ -50,7 +50,7 @@ def load_split(root: Path, split: str, info: DatasetInfo | None) -> tuple[View, 
     entries = read_entries(root / f"transforms_{split}.json", f"the cameras and lights of the {split} views")
     return tuple(
         _load_view(entry, root, info, with_light=True)
-        for entry in track(entries, f"reading {split} views", unit="view")
+        for entry in progress_bar(entries, f"reading {split} views", unit="view")
     )
 
 
@@ -78,7 +78,7 @@ def _load_targets(root: Path) -> tuple[Target, ...]:
         return ()
     listed = _listed_targets(folder)
     names: Iterable[str] = listed or sorted(path.name for path in folder.iterdir() if path.is_dir())
-    return tuple(load_target(folder / name) for name in track(list(names), "reading targets", unit="target"))
+    return tuple(load_target(folder / name) for name in progress_bar(list(names), "reading targets", unit="target"))
 
 
 def _listed_targets(folder: Path) -> dict[str, str]:

@@ -18,7 +18,7 @@ from rgspipe.datasets.images import check_size, read_colour, read_png
 from rgspipe.datasets.json_file import is_number, read_json, required
 from rgspipe.datasets.views import Dataset, View
 from rgspipe.errors import InputError
-from rgspipe.progress import track
+from rgspipe.progress import progress_bar
 from rgspipe.scene import Camera
 
 METADATA = "metadata.json"
@@ -40,7 +40,9 @@ def load_tensoir(root: Path, *, train: bool = True, test: bool = True) -> Datase
     """
     splits = {"train": train, "test": test}
     views = {
-        name: tuple(_view(folder) for folder in track(_folders(root, name), f"reading {name} views", unit="view"))
+        name: tuple(
+            _view(folder) for folder in progress_bar(_folders(root, name), f"reading {name} views", unit="view")
+        )
         if wanted
         else ()
         for name, wanted in splits.items()

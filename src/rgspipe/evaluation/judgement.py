@@ -17,7 +17,7 @@ from rgspipe.evaluation.held_out import QUALITY, albedo_of_views, held_out_summa
 from rgspipe.evaluation.images import Bytes, comparison_strip
 from rgspipe.fitting.fit import prepare_fit, render_light
 from rgspipe.fitting.model.problem import Effects
-from rgspipe.progress import track
+from rgspipe.progress import progress_bar
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.view_weights import ViewWeights
 from rgspipe.training.gloss import GlossScene, render_gloss
@@ -81,7 +81,7 @@ def render_views(frozen: FrozenScene, views: Sequence[View]) -> Renders:
         raise ValueError(f"held-out views must have lights, these have none: {dark[:5]}")
     images: dict[str, list] = {place: [] for place in PLACES}
     albedo = []
-    for view in track(views, "held-out views", unit="view"):
+    for view in progress_bar(views, "held-out views", unit="view"):
         weights = frozen.view(view.camera)
         albedo.append(weights.image(frozen.surfels.albedo.float()).numpy())
         for place, at_pixels in PLACES.items():

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rgspipe.progress import track
+from rgspipe.progress import progress_bar
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ def measure(step: str, run: Callable[[], object], repetitions: int) -> Timing:
     """Time `run` `repetitions` times after one run that is not counted."""
     run()
     seconds = []
-    for _ in track(range(repetitions), step, unit="run"):
+    for _ in progress_bar(range(repetitions), step, unit="run"):
         begin = time.perf_counter()
         run()
         seconds.append(time.perf_counter() - begin)

@@ -8,7 +8,7 @@ import scipy.spatial
 import torch
 from torch import Tensor
 
-from rgspipe.progress import track
+from rgspipe.progress import progress_bar
 from rgspipe.renderer.direct import unit_irradiance
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.surroundings import Surroundings
@@ -95,7 +95,7 @@ def build_dictionary(
         positions = torch.cat([positions, surroundings.shell_points()])
     rows = [
         unit_irradiance(bvh, positions[start : start + BATCH], shadows)[0]
-        for start in track(range(0, len(positions), BATCH), "light dictionary", unit="batch")
+        for start in progress_bar(range(0, len(positions), BATCH), "light dictionary", unit="batch")
     ]
     irradiance = torch.cat(rows) if rows else torch.zeros((0, len(bvh.surfels)), device=bvh.device)
     flux = irradiance @ areas.to(irradiance)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from rgspipe.progress import track
+from rgspipe.progress import progress_bar
 from rgspipe.renderer.kernels.irradiance import transmittance
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.scene.orientation import backs_towards, turned_over
@@ -33,7 +33,7 @@ def backs_towards_cameras(surfels: Surfels, viewpoints: Tensor) -> Tensor:
         share = torch.minimum(*(transmittance(side, viewpoint[None])[0][0] for side in sides))
         return share.clamp(min=HIDDEN_SHARE).to(surfels.centers)
 
-    chosen = track(spread_out(viewpoints, LOOKED_FROM), "which side is seen", unit="camera")
+    chosen = progress_bar(spread_out(viewpoints, LOOKED_FROM), "which side is seen", unit="camera")
     return backs_towards(surfels, chosen, seen)
 
 

@@ -17,12 +17,12 @@ from rgspipe.renderer.areas import surfel_areas
 from rgspipe.renderer.clusters import cluster_patches
 from rgspipe.renderer.dictionary import GRID, LightDictionary, build_dictionary
 from rgspipe.renderer.direct import unit_irradiance
-from rgspipe.renderer.exposure import exposure
 from rgspipe.renderer.frozen_file import load_parts, save_parts
 from rgspipe.renderer.gather import build_gather
 from rgspipe.renderer.glossy_transport import GlossyLight, GlossyTransport, build_glossy_transport
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.monte_carlo import MonteCarloSolver
+from rgspipe.renderer.mutual_visibility import mutual_visibility
 from rgspipe.renderer.openness import openness
 from rgspipe.renderer.radiosity import GatherSolver
 from rgspipe.renderer.rig import rig_irradiance, unit_response
@@ -269,7 +269,7 @@ class FrozenScene:
 
 def _gather(bvh: SurfelBvh, rays: int, areas: Tensor, seed: int) -> SparseOperator:
     """The gather operator; no ray is cast where no surfel can see another."""
-    if exposure(bvh.surfels).sight:
+    if mutual_visibility(bvh.surfels).sight:
         return build_gather(bvh, rays, seed=seed, areas=areas)
     nothing = scipy.sparse.csr_matrix((len(bvh.surfels), len(bvh.surfels)), dtype=np.float32)
     return SparseOperator.from_scipy(nothing, bvh.device)

@@ -7,7 +7,7 @@ import scipy.sparse
 import torch
 from torch import Tensor
 
-from rgspipe.progress import track
+from rgspipe.progress import progress_bar
 from rgspipe.renderer.kernels.composite import composite
 from rgspipe.renderer.kernels.reciprocity import Rows, reciprocal_rows
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
@@ -44,7 +44,7 @@ def build_gather(
     lifted = surfels.centers + LIFT * surfels.scales.prod(dim=1).sqrt()[:, None] * axes[:, 2]
     per_batch = max(1, RAYS_AT_ONCE // rays)
     blocks = [scipy.sparse.csr_matrix((0, count), dtype=np.float32)]
-    for start in track(range(0, count, per_batch), "gather operator", unit="batch"):
+    for start in progress_bar(range(0, count, per_batch), "gather operator", unit="batch"):
         frames = axes[start : start + per_batch].float()
         directions = cosine_directions(frames, rays, generator, points)
         origins = lifted[start : start + per_batch, None].expand_as(directions)

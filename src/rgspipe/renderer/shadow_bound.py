@@ -9,8 +9,8 @@ import torch
 from torch import Tensor
 from torch.nn.functional import normalize
 
-from rgspipe.renderer.exposure import exposure
 from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.renderer.mutual_visibility import mutual_visibility
 
 #: Radius of the ball in which lights may be, over half the diagonal of the bounding box.
 BALL_RADII = 2.0
@@ -43,8 +43,8 @@ class ShadowBound:
             radiance without shadows.
         spot: the largest part of its own light that any lit surfel loses: a cone may be aimed at just that surfel,
             which then is the brightest.
-        proved: no surfel can shade another (`exposure`), both are zero. Otherwise they are the largest of a sample,
-            which a shadow that few positions cast can exceed.
+        proved: no surfel can shade another (`mutual_visibility`), both are zero. Otherwise they are the largest of a
+            sample, which a shadow that few positions cast can exceed.
         lights: how many were tried; with CERTAIN reached there is no need to go on.
         uniform: how many of them were drawn from the whole domain: with 95 % confidence less than 3/uniform of it
             casts larger shadows.
@@ -59,7 +59,7 @@ class ShadowBound:
 
 def shadow_bound(frozen: FrozenScene, seed: int) -> ShadowBound:
     """Prove that there are no shadows, or else search for the worst one."""
-    if not exposure(frozen.surfels).shadow:
+    if not mutual_visibility(frozen.surfels).shadow:
         return ShadowBound(0.0, 0.0, True, 0, 0)
     generator = torch.Generator().manual_seed(seed)
     search = _Search(frozen)

@@ -21,7 +21,7 @@ from rgspipe.evaluation.metrics import longest_side
 from rgspipe.evaluation.plots import png_of
 from rgspipe.evaluation.tables import class_of
 from rgspipe.fitting import FitViews, render_rig
-from rgspipe.progress import track
+from rgspipe.progress import progress_bar
 from rgspipe.scene import LightRig
 from rgspipe.stages import fit_light
 from rgspipe.stages.base import Need, Stage, StageContext
@@ -44,7 +44,7 @@ def run(context: StageContext) -> None:
     results = pd.read_csv(fits[0].file("results.csv"), dtype={"target": str})
     (context.folder / PICTURES).mkdir(exist_ok=True)
     parts = []
-    for row in track(results.to_dict("records"), "comparing courses", unit="target"):
+    for row in progress_bar(results.to_dict("records"), "comparing courses", unit="target"):
         name, path = row["target"], truth_file(config, dataset, row["target"])
         truth = () if path is None else read_lights(path)
         views, prepared = _views(fitter, _target_folder(config, dataset, name), name)

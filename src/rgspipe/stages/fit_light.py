@@ -28,7 +28,7 @@ from rgspipe.fitting import (
 )
 from rgspipe.fitting.model.harmonics import BandLimit
 from rgspipe.fitting.spec import MOST_LIGHTS, shaped_kind
-from rgspipe.progress import track
+from rgspipe.progress import progress_bar
 from rgspipe.renderer.dictionary import LightDictionary
 from rgspipe.renderer.effect_bounds import NO_BOUND, EffectBounds
 from rgspipe.renderer.effects import Decision, EffectChoice, RigKind
@@ -50,7 +50,7 @@ def run(context: StageContext) -> None:
     fitter = Fitter.create(context)
     targets = select_targets(_targets(context), context.config)
     rows = []
-    for target in track(targets, "fitting lights", unit="target"):
+    for target in progress_bar(targets, "fitting lights", unit="target"):
         if not (context.folder / target.name).is_dir():
             fitter.fit(target, context.folder)
         rows.append(_row(context, target))

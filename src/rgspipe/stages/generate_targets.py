@@ -10,7 +10,7 @@ from rgspipe.blender.pool.compose import write_targets
 from rgspipe.blender.pool.pool_file import PooledLight, read_pool
 from rgspipe.blender.pool.rigs import RigPlan, RigRequest, check_request, draw_rigs, headlight_rigs
 from rgspipe.config import RgspipeConfig
-from rgspipe.progress import track
+from rgspipe.progress import progress_bar
 from rgspipe.stages.base import Need, Stage, StageContext
 from rgspipe.stages.render_olat import check_scene
 
@@ -41,7 +41,7 @@ def _rigs(config: RgspipeConfig, pool: list[PooledLight]) -> list[RigPlan]:
 
 def _brightness(pool: list[PooledLight]) -> np.ndarray:
     """(K, 3) mean radiance of each light's images, per W/sr."""
-    return np.array([pooled.brightness() for pooled in track(pool, "measuring lights", unit="light")])
+    return np.array([pooled.brightness() for pooled in progress_bar(pool, "measuring lights", unit="light")])
 
 
 def _request(config: RgspipeConfig) -> RigRequest:

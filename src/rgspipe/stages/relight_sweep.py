@@ -11,7 +11,7 @@ import torch
 from rgspipe.config import RelightConfig
 from rgspipe.errors import InputError
 from rgspipe.evaluation.images import save_png
-from rgspipe.progress import track
+from rgspipe.progress import progress_bar
 from rgspipe.relighting.pictures import developed, grid, video
 from rgspipe.relighting.sweeps import (
     SpotKind,
@@ -41,7 +41,7 @@ def write_sweep(relighter: Relighter, camera: Camera, folder: Path) -> list[floa
     wanted = relighter.config.relight
     spots = sweep_lights(wanted, _places(relighter, camera))
     images, seconds = [], []
-    for spot in track(spots, "sweeping", unit="frame"):
+    for spot in progress_bar(spots, "sweeping", unit="frame"):
         (image,), took = relighter.render([camera], (spot,))
         images.append(image.numpy())
         seconds.append(took)

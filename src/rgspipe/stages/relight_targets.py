@@ -18,7 +18,7 @@ from rgspipe.datasets.location import dataset_root
 from rgspipe.datasets.views import Target
 from rgspipe.errors import InputError
 from rgspipe.evaluation.plots import png_of
-from rgspipe.progress import track
+from rgspipe.progress import progress_bar
 from rgspipe.relighting.pictures import Relit, comparison_figure
 from rgspipe.relighting.sweeps import spread_frames
 from rgspipe.relighting.table import compared, relight_summary, typical_rows
@@ -37,7 +37,7 @@ def relight_targets(context: StageContext, relighter: Relighter) -> pd.DataFrame
         InputError: no target has a true rig.
     """
     rows, truths = [], {}
-    for target, rig in track(list(_targets(context)), "relighting targets", unit="target"):
+    for target, rig in progress_bar(list(_targets(context)), "relighting targets", unit="target"):
         indices = chosen_indices(context.config.relight.indices, len(target.views))
         views = [(index, target.views[index].camera) for index in indices]
         written, images = relighter.write(context.folder, target.name, rig, views)

@@ -18,6 +18,7 @@ from rgspipe.datasets.views import View
 from rgspipe.degradation.capture import Capture, degraded
 from rgspipe.errors import InputError
 from rgspipe.evaluation.held_out import held_out_picture
+from rgspipe.evaluation.held_out_views import render_held_out
 from rgspipe.evaluation.images import save_png
 from rgspipe.files import write_json
 from rgspipe.machine import PeakMemory
@@ -31,7 +32,6 @@ from rgspipe.training.photometric import PhotometricOptions
 from rgspipe.training.prior import prior_from_maps
 from rgspipe.training.refine import RefineOptions
 from rgspipe.training.trainer import Trained, TrainOptions, train
-from rgspipe.training.validate import render_held_out
 
 #: Settings that a training can be resumed with another value of: they do not change the surfels.
 NO_RESULT = ("memory_mib", "checkpoint_every")

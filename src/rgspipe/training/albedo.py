@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 from torch import Tensor
 
 from rgspipe.datasets.views import View
-from rgspipe.progress import track
+from rgspipe.progress import progress_bar
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.transport import PatchTransport, with_albedo
 from rgspipe.scene.surfels import Surfels
@@ -104,7 +104,7 @@ def solve_albedo(
     """
     albedo = surfels.albedo.float()
     indirect, mixing = None, Mixing(DAMPING if transport is not None else 1.0)
-    for index in track(range(rounds), "albedo", unit="round"):
+    for index in progress_bar(range(rounds), "albedo", unit="round"):
         if transport is not None:
             transport = with_albedo(transport, albedo)
             indirect = indirect_irradiance(lighting, albedo, transport)

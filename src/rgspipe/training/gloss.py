@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import torch
 from torch import Tensor
 
-from rgspipe.progress import track
+from rgspipe.progress import progress_bar
 from rgspipe.renderer.glossy import phong_lobe
 from rgspipe.renderer.transport import PatchTransport, with_albedo
 from rgspipe.scene.camera import Camera
@@ -161,7 +161,7 @@ def _solve(
 ) -> Reflection:
     flat, bounces, mixing = scene.highlights(problem.chosen), scene.bounces(problem.chosen), Mixing(DAMPING)
     known = bool((at.specular > 0.0).any())
-    for index in track(range(rounds), "gloss", unit="round"):
+    for index in progress_bar(range(rounds), "gloss", unit="round"):
         light = scene.light(bounces, flat, at)
         weights = pixel_weights
         if known or index > 1:

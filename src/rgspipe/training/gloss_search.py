@@ -10,7 +10,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from rgspipe.progress import track
+from rgspipe.progress import progress_bar
 from rgspipe.renderer.clusters import cluster_patches
 from rgspipe.scene.surfels import Surfels
 from rgspipe.training.albedo import nearest_surfels
@@ -67,7 +67,7 @@ def find_lobes(
     diffuse = Reflection(surfels.albedo.float(), torch.zeros(count, 3), torch.zeros(count))
     before = errors.of(own.step(held, diffuse, weights, specular=False, exponents=False))
     after = []
-    for exponent in track(EXPONENTS, "gloss", unit="exponent"):
+    for exponent in progress_bar(EXPONENTS, "gloss", unit="exponent"):
         start = replace(diffuse, log_exponents=torch.full((count,), math.log(exponent)))
         after.append(errors.of(own.step(held, start, weights, exponents=False)))
     gains = before - torch.stack(after)

@@ -21,7 +21,7 @@ from torch import Tensor
 
 from rgspipe.datasets.views import View
 from rgspipe.optim.levenberg_marquardt import NormalEquations, least_squares, within
-from rgspipe.progress import track
+from rgspipe.progress import progress_bar
 from rgspipe.renderer.direct import unit_irradiance
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.pixel_direct import PixelDirect, surfel_shares
@@ -54,7 +54,7 @@ def refine_lights(
         measured: V lights that corrections count from.
     """
     pairs = zip(views, weights, strict=True)
-    found = [_OneLight(bvh, weight, transport, view).refined() for view, weight in track(list(pairs), "lights")]
+    found = [_OneLight(bvh, weight, transport, view).refined() for view, weight in progress_bar(list(pairs), "lights")]
     return [replace(view, light=light) for view, light in zip(views, _in_gauge(found, measured), strict=True)]
 
 

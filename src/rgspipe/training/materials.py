@@ -10,7 +10,7 @@ from pathlib import Path
 from torch import Tensor
 
 from rgspipe.datasets.views import View
-from rgspipe.progress import track
+from rgspipe.progress import progress_bar
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.sparse import SparseOperator
@@ -182,5 +182,5 @@ def trace_views(
 def each_view(surfels: Surfels, views: Sequence[View], supersampling: int) -> Iterator[ViewWeights]:
     """View weights of one view after the other: for those who look at each once."""
     bvh = SurfelBvh(surfels)
-    for view in track(views, "views", unit="view"):
+    for view in progress_bar(views, "views", unit="view"):
         yield build_view_weights(bvh, view.camera, supersampling)

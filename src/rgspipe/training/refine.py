@@ -10,7 +10,7 @@ from statistics import fmean
 import torch
 from torch import Tensor
 
-from rgspipe.progress import track
+from rgspipe.progress import progress_bar
 from rgspipe.renderer.kernels.composite import composite
 from rgspipe.renderer.kernels.shade import shade_rays
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
@@ -168,7 +168,7 @@ def refine(
     pairs = find_neighbours(surfels, spacing)
     last = options.steps if until is None else min(until, options.steps)
     steps = range(state.step, last)
-    bar = track(steps, "geometry", options.steps, unit="step", done=state.step, after=after)
+    bar = progress_bar(steps, "geometry", options.steps, unit="step", done=state.step, after=after)
     for step in bar:
         moved = {name: value.clone().requires_grad_(rates[name] > 0.0) for name, value in state.parameters.items()}
         data, prior, error = _step_loss(build_surfels(surfels, moved), moved["thresholds"], views, pairs, options, step)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from rgspipe.progress import track
+from rgspipe.progress import progress_bar
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.pixel_direct import PixelDirect
 from rgspipe.renderer.sparse import SparseOperator, in_places
@@ -75,7 +75,7 @@ def build_view_models(
         store: where the operators of direct light are kept; in memory by default.
     """
     models, keep = [], (store or OperatorStore()).keep
-    for index, view in enumerate(track(weights, "direct light", unit="view")):
+    for index, view in enumerate(progress_bar(weights, "direct light", unit="view")):
         if at_pixels:
             direct = PixelDirect(bvh, view).operator(lighting.positions[index], lighting.shares[index])
         else:

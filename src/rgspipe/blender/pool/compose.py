@@ -13,7 +13,7 @@ from rgspipe.blender.pool.rigs import RigPlan
 from rgspipe.datasets.exr import write_image
 from rgspipe.datasets.gs3_write import write_target_list
 from rgspipe.datasets.light_file import write_lights
-from rgspipe.progress import track
+from rgspipe.progress import progress_bar
 
 
 def write_targets(pool_folder: Path, pool: Sequence[PooledLight], rigs: Sequence[RigPlan], folder: Path) -> None:
@@ -26,7 +26,7 @@ def write_targets(pool_folder: Path, pool: Sequence[PooledLight], rigs: Sequence
     """
     shutil.copyfile(pool_folder / INFO, folder / INFO)
     listed = []
-    for number, rig in enumerate(track(rigs, "adding lights", unit="target")):
+    for number, rig in enumerate(progress_bar(rigs, "adding lights", unit="target")):
         name, members = f"rig_{number:04d}", [pool[index] for index in rig.members]
         target = folder / "targets" / name
         for view in range(len(members[0].images)):

@@ -28,7 +28,7 @@ from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.result import FitResult, Step, dark_result
 from rgspipe.fitting.search.refine import State
 from rgspipe.fitting.spec import LightSpec
-from rgspipe.progress import track
+from rgspipe.progress import progress_bar
 
 
 @dataclass(frozen=True)
@@ -125,7 +125,7 @@ class _Descent:
     def run(self) -> bool:
         """All steps; each one's loss is that of its own lights. Whether the loss stalled before the last one."""
         options, optimiser = self.options, self._optimiser()
-        for index in track(range(options.epochs * options.steps), "Adam", unit="step"):
+        for index in progress_bar(range(options.epochs * options.steps), "Adam", unit="step"):
             optimiser.zero_grad()
             loss = self.loss(self.rig)
             self._record(loss)

@@ -30,7 +30,7 @@ from rgspipe.fitting.model.moments import group_moments, information, scores
 from rgspipe.fitting.model.problem import Effects, LightProblem
 from rgspipe.fitting.model.views import prepare_views
 from rgspipe.fitting.result import FitResult
-from rgspipe.progress import track
+from rgspipe.progress import progress_bar
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import Camera
 
@@ -231,7 +231,9 @@ def _evidence(
         clips: (V,) radiance from which on values tell nothing.
     """
     small = [camera.reduced(COARSE_PIXELS) for camera in cameras]
-    weights = [frozen.view(camera, supersampling=1) for camera in track(small, "looking through cameras", unit="view")]
+    weights = [
+        frozen.view(camera, supersampling=1) for camera in progress_bar(small, "looking through cameras", unit="view")
+    ]
     views = prepare_views(frozen, weights)
     black = torch.zeros((len(views.pixels), 3), device=views.operator.matrix.device)
     problem = LightProblem(views, black, 1.0, replace(effects, at_pixels=False))

@@ -13,7 +13,7 @@ from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.search.moves import Region
 from rgspipe.fitting.search.weighting import PLAIN
-from rgspipe.progress import track
+from rgspipe.progress import progress_bar
 
 #: The planes: pairs of axes.
 PLANES = ((0, 1), (0, 2), (1, 2))
@@ -68,7 +68,7 @@ def loss_slices(
 
     losses = torch.empty((len(PLANES), points, points), dtype=torch.float64)
     rows = list(itertools.product(range(len(PLANES)), range(points)))
-    for plane, row in track(rows, "loss around the answer", unit="row"):
+    for plane, row in progress_bar(rows, "loss around the answer", unit="row"):
         for column, along in enumerate(offsets):
             position = answer.clone()
             position[list(PLANES[plane])] += torch.stack([along, offsets[row]])

@@ -12,7 +12,7 @@ from torch import Tensor
 from rgspipe.fitting.model.blocks import BlockModel, block_model, patch_radiance
 from rgspipe.fitting.model.views import PreparedViews
 from rgspipe.fitting.search.coarse import CoarseImages
-from rgspipe.progress import track
+from rgspipe.progress import progress_bar
 from rgspipe.renderer.clusters import cluster_patches
 from rgspipe.renderer.dictionary import LightDictionary
 from rgspipe.renderer.frozen import FrozenScene
@@ -49,7 +49,7 @@ def aimed_candidates(
     lit = _lit_by_points(views, dictionary, model)
     directions = fibonacci_directions(AXES).to(lit.places)
     images, positions, axes, kinds = [], [], [], []
-    for index in track(range(len(dictionary)), "aimed candidates", unit="place"):
+    for index in progress_bar(range(len(dictionary)), "aimed candidates", unit="place"):
         angle = angle_from_axis(directions[:, None], lit.places - dictionary.positions[index].to(lit.places))
         seen = torch.cat([_aimed_seen(shape, angle, lit, index) for shape in shapes])
         images.append(seen)

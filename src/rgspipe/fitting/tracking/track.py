@@ -23,7 +23,7 @@ from rgspipe.fitting.tracking.frame import FrameStatus, TrackedFrame, frame_cost
 from rgspipe.fitting.tracking.frame_fit import Followed, follow, observed
 from rgspipe.fitting.tracking.motion import Motion
 from rgspipe.fitting.tracking.twins import split_lights
-from rgspipe.progress import track
+from rgspipe.progress import progress_bar
 from rgspipe.scene import LightRig
 
 #: Median residuals below this part of a pixel are as good as none.
@@ -111,7 +111,7 @@ class _Tracker:
         if start is not None:
             count = len(self.taken)
             ways = [*range(start + 1, count), *range(start - 1, -1, -1)]
-            for index in track(ways, "following lights", unit="frame"):
+            for index in progress_bar(ways, "following lights", unit="frame"):
                 self._follow(index, 1 if index > start else -1)
             for way in (-1, 1):
                 for index in range(count)[::way]:

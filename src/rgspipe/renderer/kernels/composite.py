@@ -13,9 +13,9 @@ import torch
 import warp as wp
 from torch import Tensor
 
-from rgspipe.renderer.kernels.coverage import LayerRule, sharpened
+from rgspipe.renderer.kernels.coverage import sharpened
 from rgspipe.renderer.kernels.launch import as_array, as_vec3, launch
-from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh, SurfelRecord, surfel_alpha
+from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh, SurfelTree, surfel_alpha
 
 # Adjoints are written by hand; generating them would double the compile time.
 wp.set_module_options({"enable_backward": False})
@@ -58,10 +58,8 @@ class Hits:
 def _composite(
     offset: int,
     slab: int,
-    bvh: wp.uint64,
-    surfels: wp.array(dtype=SurfelRecord),
+    tree: SurfelTree,
     order: wp.array(dtype=int),
-    rule: LayerRule,
     origins: wp.array(dtype=wp.vec3),
     directions: wp.array(dtype=wp.vec3),
     nearest: float,
@@ -74,10 +72,12 @@ def _composite(
     cut: wp.array(dtype=int),
 ):
     i = wp.tid() + offset
+    surfels = tree.records
+    rule = tree.rule
     width = indices.shape[1]
     o = origins[i]
     d = directions[i]
-    query = wp.bvh_query_ray(bvh, o, d)
+    query = wp.bvh_query_ray(tree.bvh, o, d)
     count = int(0)
     dropped = int(0)
     # Nothing is seen behind the layer of an opaque hit.
@@ -163,7 +163,7 @@ def _cast(bvh: SurfelBvh, rays: tuple[Tensor, Tensor], nearest: float, two_sided
     if len(bvh.surfels) == 0:
         return Hits(hits.indices.fill_(-1), *(row.zero_() for row in rows), hits.transmittance.fill_(1.0))
     cut = torch.empty(count, **integers)
-    inputs = [bvh.id, bvh.records, bvh.order, bvh.rule, *(as_vec3(x) for x in rays), nearest, int(two_sided)]
+    inputs = [bvh.tree, bvh.order, *(as_vec3(x) for x in rays), nearest, int(two_sided)]
     outputs = [hits.indices, hits.depths, hits.alphas, hits.weights, hits.transmittance, cut]
     launch(_composite, count, [*inputs, *(as_array(x) for x in outputs)], device)
     chosen = cut.nonzero()[:, 0]

@@ -6,10 +6,9 @@ import torch
 import warp as wp
 from torch import Tensor
 
-from rgspipe.renderer.kernels.coverage import LayerRule
 from rgspipe.renderer.kernels.launch import as_array, as_vec3, launch
 from rgspipe.renderer.kernels.shadow import light_transmittance
-from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh, SurfelRecord
+from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh, SurfelTree
 
 # Adjoints are written by hand; generating them would double the compile time.
 wp.set_module_options({"enable_backward": False})
@@ -23,10 +22,8 @@ SOFTENING = wp.constant(0.5)
 def _irradiance(
     offset: int,
     slab: int,
-    bvh: wp.uint64,
-    surfels: wp.array(dtype=SurfelRecord),
+    tree: SurfelTree,
     order: wp.array(dtype=int),
-    rule: LayerRule,
     lights: wp.array(dtype=wp.vec3),
     falloff: int,
     shadows: int,
@@ -34,6 +31,7 @@ def _irradiance(
     derivative: wp.array(dtype=wp.vec3),
 ):
     item = wp.tid() + offset
+    surfels = tree.records
     count = surfels.shape[0]
     light = lights[item / count]
     i = item % count
@@ -54,7 +52,7 @@ def _irradiance(
             value = projected * inverse_cube
             slope = inverse_cube * (n - (3.0 * projected * (square / softened) / softened) * d)
         if shadows == 1 and projected > 0.0 and square > 0.0:
-            share, share_slope = light_transmittance(bvh, surfels, rule, i, surfels[i].center, light, d)
+            share, share_slope = light_transmittance(tree, i, surfels[i].center, light, d)
             slope = share * slope + value * share_slope
             value *= share
     place = item - i + order[i]
@@ -83,8 +81,7 @@ def _launch(bvh: SurfelBvh, positions: Tensor, *, falloff: bool, shadows: bool) 
     value = torch.empty((lights, count), dtype=torch.float32, device=bvh.device)
     derivative = torch.empty((lights, count, 3), dtype=torch.float32, device=bvh.device)
     if count > 0:
-        hierarchy = bvh.id if shadows else 0
-        inputs = [hierarchy, bvh.records, bvh.order, bvh.rule, as_vec3(bvh.local(positions))]
+        inputs = [bvh.tree if shadows else bvh.leaves, bvh.order, as_vec3(bvh.local(positions))]
         outputs = [as_array(value.view(-1)), as_vec3(derivative.view(-1, 3))]
         launch(_irradiance, lights * count, [*inputs, int(falloff), int(shadows), *outputs], bvh.device)
     return value, derivative

@@ -9,6 +9,7 @@ import warp as wp
 from torch import Tensor
 
 from rgspipe.renderer.kernels.launch import as_array, as_vec3, launch, vector
+from rgspipe.renderer.kernels.pixel_rays import PixelRays, pixel_rays
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.scene.camera import Camera
 
@@ -26,6 +27,20 @@ NEAR = wp.constant(0.1)
 #: Gauss-Legendre nodes and weights on [−½, ½]: ±NODE and 0.
 NODE = wp.constant(0.5 * math.sqrt(0.6))
 SIDE_WEIGHT, MIDDLE_WEIGHT = wp.constant(5.0 / 18.0), wp.constant(8.0 / 18.0)
+
+
+@wp.struct
+class PixelView:
+    """What the pixels of a view see: the entries of its weights in compressed rows, and the surfels."""
+
+    rows: wp.array(dtype=int)
+    columns: wp.array(dtype=int)
+    weights: wp.array(dtype=float)
+    edges: wp.array(dtype=int)  # 1 where a pixel is on or beside an edge
+    centers: wp.array(dtype=wp.vec3)
+    normals: wp.array(dtype=wp.vec3)
+    scales: wp.array(dtype=float)
+    softening: wp.array(dtype=float)
 
 
 @wp.func
@@ -56,33 +71,28 @@ def light_at(x: wp.vec3, n: wp.vec3, light: wp.vec3, softening: float):
 
 
 @wp.func
-def light_on_pixel(
-    origin: wp.vec3,
-    d: wp.vec3,
-    right: wp.vec3,
-    up: wp.vec3,
-    c: wp.vec3,
-    n: wp.vec3,
-    reach: float,
-    light: wp.vec3,
-    softening: float,
-):
-    """`light_at` where a pixel looks on a surfel; its mean over the pixel's footprint beside the light."""
-    x = point_on_surfel(origin, d, c, n, reach)
+def light_on_pixel(view: PixelView, rays: PixelRays, p: int, j: int, light: wp.vec3):
+    """`light_at` where pixel p looks on surfel j; its mean over the pixel's footprint beside the light."""
+    d = rays.directions[p]
+    c = view.centers[j]
+    n = view.normals[j]
+    softening = view.softening[j]
+    reach = wp.where(view.edges[p] == 1, REACH * view.scales[j], 1.0e30)
+    x = point_on_surfel(rays.origin, d, c, n, reach)
     # Longest side of the pixel's footprint: pixels are nearly square, and leaning stretches them.
-    seen = x - origin
-    footprint = wp.length(right) * wp.dot(seen, seen) / wp.max(wp.abs(wp.dot(seen, n)), 1.0e-30)
+    seen = x - rays.origin
+    footprint = wp.length(rays.right) * wp.dot(seen, seen) / wp.max(wp.abs(wp.dot(seen, n)), 1.0e-30)
     lit = wp.vec4(0.0, 0.0, 0.0, 0.0)
     if footprint <= NEAR * wp.length(light - x):
         lit = light_at(x, n, light, softening)
     else:
         for a in range(3):
             for b in range(3):
-                shifted = d + (float(a) - 1.0) * NODE * right + (float(b) - 1.0) * NODE * up
+                shifted = d + (float(a) - 1.0) * NODE * rays.right + (float(b) - 1.0) * NODE * rays.up
                 weight = float(1.0)
                 weight *= wp.where(a == 1, MIDDLE_WEIGHT, SIDE_WEIGHT)
                 weight *= wp.where(b == 1, MIDDLE_WEIGHT, SIDE_WEIGHT)
-                lit += weight * light_at(point_on_surfel(origin, shifted, c, n, reach), n, light, softening)
+                lit += weight * light_at(point_on_surfel(rays.origin, shifted, c, n, reach), n, light, softening)
     return lit
 
 
@@ -90,18 +100,8 @@ def light_on_pixel(
 def _direct_image(
     offset: int,
     slab: int,
-    rows: wp.array(dtype=int),
-    columns: wp.array(dtype=int),
-    weights: wp.array(dtype=float),
-    edges: wp.array(dtype=int),
-    origin: wp.vec3,
-    directions: wp.array(dtype=wp.vec3),
-    right: wp.vec3,
-    up: wp.vec3,
-    centers: wp.array(dtype=wp.vec3),
-    normals: wp.array(dtype=wp.vec3),
-    scales: wp.array(dtype=float),
-    softening: wp.array(dtype=float),
+    view: PixelView,
+    rays: PixelRays,
     reflectance: wp.array(dtype=wp.vec3),
     light: wp.vec3,
     share: wp.array(dtype=float),
@@ -110,22 +110,20 @@ def _direct_image(
     image: wp.array(dtype=wp.vec4, ndim=2),
 ):
     p = wp.tid() + offset
-    d = directions[p]
     own = own_share[p]
     red = wp.vec4(0.0, 0.0, 0.0, 0.0)
     green = wp.vec4(0.0, 0.0, 0.0, 0.0)
     blue = wp.vec4(0.0, 0.0, 0.0, 0.0)
-    for e in range(rows[p], rows[p + 1]):
-        j = columns[e]
+    for e in range(view.rows[p], view.rows[p + 1]):
+        j = view.columns[e]
         passing = share[j]
         slope = share_slope[j]
         if own[0] >= 0.0:
             passing = own[0]
             slope = wp.vec3(own[1], own[2], own[3])
         if passing > 0.0 or wp.dot(slope, slope) > 0.0:
-            reach = wp.where(edges[p] == 1, REACH * scales[j], 1.0e30)
-            lit = light_on_pixel(origin, d, right, up, centers[j], normals[j], reach, light, softening[j])
-            lit = weights[e] * (passing * lit + wp.vec4(0.0, slope[0], slope[1], slope[2]) * lit[0])
+            lit = light_on_pixel(view, rays, p, j, light)
+            lit = view.weights[e] * (passing * lit + wp.vec4(0.0, slope[0], slope[1], slope[2]) * lit[0])
             r = reflectance[j]
             red += r[0] * lit
             green += r[1] * lit
@@ -139,33 +137,21 @@ def _direct_image(
 def _direct_entries(
     offset: int,
     slab: int,
-    rows: wp.array(dtype=int),
-    columns: wp.array(dtype=int),
-    weights: wp.array(dtype=float),
-    edges: wp.array(dtype=int),
-    origin: wp.vec3,
-    directions: wp.array(dtype=wp.vec3),
-    right: wp.vec3,
-    up: wp.vec3,
-    centers: wp.array(dtype=wp.vec3),
-    normals: wp.array(dtype=wp.vec3),
-    scales: wp.array(dtype=float),
-    softening: wp.array(dtype=float),
+    view: PixelView,
+    rays: PixelRays,
     light: wp.vec3,
     share: wp.array(dtype=float),
     own_share: wp.array(dtype=wp.vec4),
     entries: wp.array(dtype=float),
 ):
     p = wp.tid() + offset
-    d = directions[p]
-    for e in range(rows[p], rows[p + 1]):
-        j = columns[e]
+    for e in range(view.rows[p], view.rows[p + 1]):
+        j = view.columns[e]
         passing = wp.where(own_share[p][0] >= 0.0, own_share[p][0], share[j])
         entry = float(0.0)
         if passing > 0.0:
-            reach = wp.where(edges[p] == 1, REACH * scales[j], 1.0e30)
-            lit = light_on_pixel(origin, d, right, up, centers[j], normals[j], reach, light, softening[j])
-            entry = weights[e] * passing * lit[0]
+            lit = light_on_pixel(view, rays, p, j, light)
+            entry = view.weights[e] * passing * lit[0]
         entries[e] = entry
 
 
@@ -183,15 +169,13 @@ class PixelLight:
     def __init__(self, bvh: SurfelBvh, matrix: Tensor, edges: Tensor, camera: Camera, softening: Tensor) -> None:
         surfels = bvh.surfels
         self._bvh, self._pixels = bvh, matrix.shape[0]
-        _, directions, lengths = camera.rays()
-        axes = camera.camera_to_world[:3, :3].double()
-        self._inputs = [as_array(part) for part in (matrix.crow_indices(), matrix.col_indices(), matrix.values())]
-        planar = (directions * lengths[:, None]).to(bvh.device)
-        self._inputs += [as_array(edges.to(bvh.device).int()), vector(bvh.local(camera.origin)), as_vec3(planar)]
-        self._inputs += [vector(axes[:, 0] / camera.fx), vector(axes[:, 1] / camera.fy)]
-        self._inputs += [as_vec3(bvh.local(surfels.centers)), as_vec3(surfels.normals)]
+        view = self._view = PixelView()
+        view.rows, view.columns = as_array(matrix.crow_indices()), as_array(matrix.col_indices())
+        view.weights, view.edges = as_array(matrix.values()), as_array(edges.to(bvh.device).int())
+        view.centers, view.normals = as_vec3(bvh.local(surfels.centers)), as_vec3(surfels.normals)
         scales = surfels.scales.detach().prod(dim=1).sqrt()
-        self._inputs += [as_array(scales.float()), as_array(softening.float())]
+        view.scales, view.softening = as_array(scales.float()), as_array(softening.float())
+        self._rays = pixel_rays(bvh, camera)
         self._reflectance = as_vec3(surfels.albedo / math.pi)
 
     def image(self, light: Tensor, share: Tensor, share_slope: Tensor, own_share: Tensor) -> Tensor:
@@ -205,7 +189,7 @@ class PixelLight:
                 is negative where they are not.
         """
         image = torch.empty((self._pixels, 3, 4), dtype=torch.float32, device=self._bvh.device)
-        inputs = [*self._inputs, self._reflectance, vector(self._bvh.local(light))]
+        inputs = [self._view, self._rays, self._reflectance, vector(self._bvh.local(light))]
         inputs += [as_array(share.float()), as_vec3(share_slope)]
         inputs.append(wp.from_torch(own_share.contiguous(), dtype=wp.vec4))
         launch(_direct_image, self._pixels, [*inputs, wp.from_torch(image, dtype=wp.vec4)], self._bvh.device)
@@ -219,8 +203,8 @@ class PixelLight:
         Args:
             light, share, own_share: as for `image`.
         """
-        entries = torch.empty(self._inputs[1].shape[0], dtype=torch.float32, device=self._bvh.device)
-        inputs = [*self._inputs, vector(self._bvh.local(light)), as_array(share.float())]
+        entries = torch.empty(self._view.columns.shape[0], dtype=torch.float32, device=self._bvh.device)
+        inputs = [self._view, self._rays, vector(self._bvh.local(light)), as_array(share.float())]
         inputs += [wp.from_torch(own_share.contiguous(), dtype=wp.vec4), as_array(entries)]
         launch(_direct_entries, self._pixels, inputs, self._bvh.device)
         return entries

@@ -6,11 +6,11 @@ import torch
 import warp as wp
 from torch import Tensor
 
-from rgspipe.renderer.kernels.coverage import LayerRule
-from rgspipe.renderer.kernels.launch import as_array, as_vec3, launch, vector
+from rgspipe.renderer.kernels.launch import as_array, launch, vector
 from rgspipe.renderer.kernels.pixel_light import point_on_surfel
+from rgspipe.renderer.kernels.pixel_rays import PixelRays, pixel_rays
 from rgspipe.renderer.kernels.shadow import light_transmittance
-from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh, SurfelRecord
+from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh, SurfelTree
 from rgspipe.scene.camera import Camera
 
 # Adjoints are written by hand; generating them would double the compile time.
@@ -21,13 +21,8 @@ wp.set_module_options({"enable_backward": False})
 def _pixel_transmittance(
     offset: int,
     slab: int,
-    bvh: wp.uint64,
-    surfels: wp.array(dtype=SurfelRecord),
-    rule: LayerRule,
-    origin: wp.vec3,
-    directions: wp.array(dtype=wp.vec3),
-    right: wp.vec3,
-    up: wp.vec3,
+    tree: SurfelTree,
+    rays: PixelRays,
     places: wp.array(dtype=wp.vec2),
     pixels: wp.array(dtype=int),
     receivers: wp.array(dtype=int),
@@ -37,14 +32,14 @@ def _pixel_transmittance(
     item = wp.tid() + offset
     p = pixels[item]
     i = receivers[p]
-    n = surfels[i].normal
+    n = tree.records[i].normal
     total = wp.vec4(0.0, 0.0, 0.0, 0.0)
     for k in range(places.shape[0]):
-        d = directions[p] + (places[k][0] - 0.5) * right + (places[k][1] - 0.5) * up
-        at = point_on_surfel(origin, d, surfels[i].center, n, 1.0e30)
+        d = rays.directions[p] + (places[k][0] - 0.5) * rays.right + (places[k][1] - 0.5) * rays.up
+        at = point_on_surfel(rays.origin, d, tree.records[i].center, n, 1.0e30)
         path = light - at
         if wp.dot(path, n) > 0.0:
-            passing, slope = light_transmittance(bvh, surfels, rule, i, at, light, path)
+            passing, slope = light_transmittance(tree, i, at, light, path)
             total += wp.vec4(passing, slope[0], slope[1], slope[2])
     share[p] = total / float(places.shape[0])
 
@@ -63,13 +58,9 @@ def pixel_transmittance(
     share = torch.full((camera.pixel_count, 4), -1.0, dtype=torch.float32, device=bvh.device)
     if len(pixels) == 0:
         return share
-    _, directions, lengths = camera.rays()
-    axes = camera.camera_to_world[:3, :3].double()
-    rays = [vector(bvh.local(camera.origin)), as_vec3((directions * lengths[:, None]).to(bvh.device))]
-    rays += [vector(axes[:, 0] / camera.fx), vector(axes[:, 1] / camera.fy)]
-    rays.append(wp.from_torch(places.float().contiguous().to(bvh.device), dtype=wp.vec2))
+    lattice = wp.from_torch(places.float().contiguous().to(bvh.device), dtype=wp.vec2)
     records = wp.to_torch(bvh.rank)[receivers.to(bvh.device)].int()
     which = [as_array(pixels.to(bvh.device).int()), as_array(records), vector(bvh.local(light))]
-    inputs = [bvh.id, bvh.records, bvh.rule, *rays, *which, wp.from_torch(share, dtype=wp.vec4)]
+    inputs = [bvh.tree, pixel_rays(bvh, camera), lattice, *which, wp.from_torch(share, dtype=wp.vec4)]
     launch(_pixel_transmittance, len(pixels), inputs, bvh.device)
     return share

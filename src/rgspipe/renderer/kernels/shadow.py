@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import warp as wp
 
-from rgspipe.renderer.kernels.coverage import LayerRule, sharpened, sharpened_slope
-from rgspipe.renderer.kernels.surfel_bvh import SurfelRecord, clip_height, surfel_alpha
+from rgspipe.renderer.kernels.coverage import sharpened, sharpened_slope
+from rgspipe.renderer.kernels.surfel_bvh import SurfelRecord, SurfelTree, clip_height, surfel_alpha
 
 # Adjoints are written by hand; generating them would double the compile time.
 wp.set_module_options({"enable_backward": False})
@@ -129,15 +129,15 @@ def occluder_slope(
 
 @wp.func
 def light_transmittance(
-    bvh: wp.uint64,
-    surfels: wp.array(dtype=SurfelRecord),
-    rule: LayerRule,
+    tree: SurfelTree,
     receiver: int,
     at: wp.vec3,
     light: wp.vec3,
     path: wp.vec3,
 ):
     """Share of a light that reaches the point `at` of a receiver along the `path` to it, and d/d(light) of it."""
+    surfels = tree.records
+    rule = tree.rule
     passing = float(1.0)
     slope = wp.vec3(0.0, 0.0, 0.0)
     distance = wp.length(path)
@@ -159,7 +159,7 @@ def light_transmittance(
         more = int(0)
         count = int(0)
         reach = wp.min(1.0, last_depth + thickness) - skip
-        query = wp.bvh_query_ray(bvh, start, path)
+        query = wp.bvh_query_ray(tree.bvh, start, path)
         j = int(0)
         while wp.bvh_query_next(query, j, reach):
             alpha, depth = occluder(surfels, rule.minimum_alpha, receiver, at, j, light, path, distance)

@@ -9,7 +9,7 @@ import torch
 import warp as wp
 from torch import Tensor
 
-from rgspipe.renderer.kernels.coverage import layer_rule
+from rgspipe.renderer.kernels.coverage import LayerRule, layer_rule
 from rgspipe.renderer.kernels.launch import as_array, as_vec3, torch_stream
 from rgspipe.scene.surfels import Surfels
 
@@ -36,6 +36,15 @@ class SurfelRecord:
     opacity: float
     reach: float  # u² + v² beyond which the opacity is below the coverage's minimum
     scale: float  # geometric mean of the two scales
+
+
+@wp.struct
+class SurfelTree:
+    """What rays are cast at."""
+
+    bvh: wp.uint64
+    records: wp.array(dtype=SurfelRecord)
+    rule: LayerRule
 
 
 @wp.func
@@ -98,10 +107,20 @@ class SurfelBvh:
         with torch_stream(self.device):
             return wp.Bvh(lower, upper, leaf_size=LEAF_SIZE)
 
-    @property
-    def id(self) -> int:
-        """Warp's handle of the hierarchy, which the first ray cast builds. There must be surfels."""
-        return self._hierarchy.id
+    @cached_property
+    def tree(self) -> SurfelTree:
+        """What kernels cast rays at; the hierarchy is built when it is asked for. There must be surfels."""
+        return self._tree(self._hierarchy.id)
+
+    @cached_property
+    def leaves(self) -> SurfelTree:
+        """The same without a hierarchy, for kernels that cast no ray."""
+        return self._tree(0)
+
+    def _tree(self, bvh: int) -> SurfelTree:
+        tree = SurfelTree()
+        tree.bvh, tree.records, tree.rule = bvh, self.records, self.rule
+        return tree
 
     def local(self, points: Tensor) -> Tensor:
         """Points (…, 3) from the scene's middle, float32, contiguous, on the surfels' device."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from rgspipe.datasets.views import View
 from rgspipe.errors import InputError
-from rgspipe.progress import track
+from rgspipe.progress import progress_bar
 from rgspipe.training.initialise.depth_noise import relative_noise
 from rgspipe.training.initialise.normals import normals_from_depth
 from rgspipe.training.initialise.sightings import EXACT, Sightings, joined
@@ -51,7 +51,7 @@ def see_surfaces(
         listed = ", ".join(view.name for view in views[:3]) + (", …" if len(views) > 3 else "")
         found = f"no depth in any of its {len(views)} views ({listed})" if views else "no views"
         raise InputError(where, expected="training views with a depth map", found=found, remedy=DEPTH_HELP)
-    seen = joined([_see(view, normals, least_cosine, where) for view in track(with_depth, "depth", unit="view")])
+    seen = joined([_see(view, normals, least_cosine, where) for view in progress_bar(with_depth, "depth", unit="view")])
     if not len(seen):
         raise InputError(
             where,

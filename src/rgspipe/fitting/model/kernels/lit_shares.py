@@ -6,10 +6,9 @@ import torch
 import warp as wp
 from torch import Tensor
 
-from rgspipe.renderer.kernels.coverage import LayerRule
 from rgspipe.renderer.kernels.launch import as_array, launch, vector
 from rgspipe.renderer.kernels.shadow import light_transmittance
-from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh, SurfelRecord
+from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh, SurfelTree
 
 # Adjoints are written by hand; generating them would double the compile time.
 wp.set_module_options({"enable_backward": False})
@@ -22,20 +21,19 @@ LEAST_LIT = 1e-4
 def _lit_shares(
     offset: int,
     slab: int,
-    bvh: wp.uint64,
-    surfels: wp.array(dtype=SurfelRecord),
-    rule: LayerRule,
+    tree: SurfelTree,
     receivers: wp.array(dtype=int),
     light: wp.vec3,
     share: wp.array(dtype=wp.vec4),
 ):
     item = wp.tid() + offset
     i = receivers[item]
+    surfels = tree.records
     d = light - surfels[i].center
     passing = float(1.0)
     slope = wp.vec3(0.0, 0.0, 0.0)
     if wp.dot(d, surfels[i].normal) > 0.0 and wp.dot(d, d) > 0.0:
-        passing, slope = light_transmittance(bvh, surfels, rule, i, surfels[i].center, light, d)
+        passing, slope = light_transmittance(tree, i, surfels[i].center, light, d)
     share[item] = wp.vec4(passing, slope[0], slope[1], slope[2])
 
 
@@ -53,7 +51,7 @@ def lit_shares(bvh: SurfelBvh, position: Tensor, lit: Tensor) -> tuple[Tensor, T
     receivers = lit.to(bvh.device)[order].nonzero()[:, 0].int()
     found = torch.empty((len(receivers), 4), dtype=torch.float32, device=bvh.device)
     if len(receivers) > 0:
-        inputs = [bvh.id, bvh.records, bvh.rule, as_array(receivers), vector(bvh.local(position))]
+        inputs = [bvh.tree, as_array(receivers), vector(bvh.local(position))]
         launch(_lit_shares, len(receivers), [*inputs, wp.from_torch(found, dtype=wp.vec4)], bvh.device)
     share = torch.ones(len(order), device=bvh.device)
     slope = torch.zeros((len(order), 3), device=bvh.device)

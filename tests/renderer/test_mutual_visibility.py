@@ -7,9 +7,9 @@ import torch
 
 from rgspipe.benchmark.effect_scenes import ball
 from rgspipe.renderer.direct import unit_irradiance
-from rgspipe.renderer.exposure import Exposure, exposure
 from rgspipe.renderer.gather import build_gather
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
+from rgspipe.renderer.mutual_visibility import MutualVisibility, mutual_visibility
 from rgspipe.scene import Surfels
 from rgspipe.scene.rectangles import inside_of_box, rectangle, solid_box, surfels_on
 
@@ -30,7 +30,7 @@ def lights(count: int) -> torch.Tensor:
     ids=["ball", "floor", "few surfels"],
 )
 def test_where_nothing_is_exposed_no_ray_meets_anything(surfels: Surfels) -> None:
-    assert exposure(surfels) == Exposure(shadow=False, sight=False)
+    assert mutual_visibility(surfels) == MutualVisibility(shadow=False, sight=False)
     bvh = SurfelBvh(surfels.to(torch.float32))
     shaded, clear = (unit_irradiance(bvh, lights(64), shadows=on)[0] for on in (True, False))
     assert float(clear.max()) > 0.0 and torch.equal(shaded, clear)
@@ -40,7 +40,7 @@ def test_where_nothing_is_exposed_no_ray_meets_anything(surfels: Surfels) -> Non
 def test_what_blocks_light_from_behind_is_not_seen_but_shades() -> None:
     """A screen over a floor that faces the same way: its back is not met by gather rays, but stops light."""
     screen = rectangle([-0.1, -0.1, 0.3], [0.2, 0, 0], [0, 0.2, 0], [0.5] * 3)
-    assert exposure(surfels_on(FLOOR + screen, 400)) == Exposure(shadow=True, sight=False)
+    assert mutual_visibility(surfels_on(FLOOR + screen, 400)) == MutualVisibility(shadow=True, sight=False)
 
 
 @pytest.mark.parametrize("count", [300, 1500])
@@ -49,7 +49,7 @@ def test_scenes_that_face_themselves_are_exposed(count: int) -> None:
         inside_of_box([0, 0, 0], [1, 1, 1], [0.5] * 3),
         FLOOR + solid_box([0, 0, 0.2], [0.2] * 3, [0.5] * 3),
     ):
-        assert exposure(surfels_on(surfaces, count)) == Exposure(shadow=True, sight=True)
+        assert mutual_visibility(surfels_on(surfaces, count)) == MutualVisibility(shadow=True, sight=True)
 
 
 def test_one_small_thing_on_a_convex_object_is_not_missed() -> None:
@@ -57,18 +57,18 @@ def test_one_small_thing_on_a_convex_object_is_not_missed() -> None:
     antenna = rectangle([0.0, 0.0, 0.5], [0.05, 0, 0], [0, 0, 0.1], [0.5] * 3)
     one, many = surfels_on(antenna, 8), ball(2600, 0.5)
     parts = {name: torch.cat([many.tensors()[name], one.tensors()[name]]) for name in many.tensors()}
-    assert exposure(Surfels(**parts, coverage=many.coverage)) == Exposure(shadow=True, sight=True)
+    assert mutual_visibility(Surfels(**parts, coverage=many.coverage)) == MutualVisibility(shadow=True, sight=True)
 
 
 def test_no_surfel_and_one_surfel_are_exposed_to_nothing() -> None:
     surfels = ball(3000, 0.5)
     for count in (0, 1):
         few = Surfels(**{name: tensor[:count] for name, tensor in surfels.tensors().items()}, coverage=surfels.coverage)
-        assert exposure(few) == Exposure(shadow=False, sight=False)
+        assert mutual_visibility(few) == MutualVisibility(shadow=False, sight=False)
 
 
 @pytest.mark.parametrize(("scale", "offset"), [(1e-3, 0.0), (1e3, 0.0), (1.0, 1e4)])
 def test_the_proof_does_not_depend_on_size_or_place(scale: float, offset: float) -> None:
     one = ball(3000, 0.5)
     tensors = one.tensors() | {"centers": scale * one.centers + offset, "scales": scale * one.scales}
-    assert exposure(Surfels(**tensors, coverage=one.coverage)) == Exposure(shadow=False, sight=False)
+    assert mutual_visibility(Surfels(**tensors, coverage=one.coverage)) == MutualVisibility(shadow=False, sight=False)

@@ -34,7 +34,7 @@ LEAST_RISE = 1e-4
 
 
 @dataclass(frozen=True)
-class Exposure:
+class MutualVisibility:
     """What cannot be ruled out in a scene.
 
     Attributes:
@@ -128,7 +128,7 @@ class _Cylinders:
         return over + self.spread * torch.cdist(points, self.centers) + self.back
 
 
-def exposure(surfels: Surfels) -> Exposure:
+def mutual_visibility(surfels: Surfels) -> MutualVisibility:
     """What cannot be ruled out between N surfels; edges are ignored, so that footprints count as whole ellipses.
 
     Rules out both for convex objects whose footprints are small against their curvature: spheres from some 2500
@@ -137,7 +137,7 @@ def exposure(surfels: Surfels) -> Exposure:
     """
     shadow, sight = False, False
     if len(surfels) < 2:
-        return Exposure(shadow, sight)
+        return MutualVisibility(shadow, sight)
     footprints, looked_into = _Footprints.of(surfels), 0
     groups = footprints[_groups(footprints)]
     cylinders = _Cylinders.around(groups)
@@ -155,10 +155,10 @@ def exposure(surfels: Surfels) -> Exposure:
             pair_shadow, pair_sight = _possible(receivers, i, groups, g)
             shadow, sight = shadow or pair_shadow, sight or pair_sight
             if shadow and sight:
-                return Exposure(True, True)
+                return MutualVisibility(True, True)
         if looked_into > MOST_PAIRS * len(surfels):
-            return Exposure(True, True)
-    return Exposure(shadow, sight)
+            return MutualVisibility(True, True)
+    return MutualVisibility(shadow, sight)
 
 
 def _groups(footprints: _Footprints) -> Tensor:
