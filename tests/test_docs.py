@@ -7,6 +7,7 @@ import os
 import re
 import subprocess
 import sys
+from operator import attrgetter
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,7 @@ from markdown.extensions.toc import unique
 from pymdownx.slugs import slugify
 
 from rgspipe.evaluation import goals
+from rgspipe.fitting import SearchOptions
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -26,10 +28,12 @@ HEADING = re.compile(r"^#+ (.+)$", re.MULTILINE)
 TABLE = re.compile(r"(?:^\|.*\n)+", re.MULTILINE)
 #: Code between fences, or indented.
 CODE = re.compile(r"^```.*?^```$|^(?: {4}|\t).*$", re.MULTILINE | re.DOTALL)
-#: `fitting/search/judge.py`, or a name in it: `fitting/search/judge.py:FAINT`.
-SOURCE = re.compile(r"`((?!outputs/)[a-z_0-9/]+/(?:[a-z_0-9]+\.py)?)(?::([A-Z_]+))?`")
+#: `fitting/certainty/doubts.py`, or a name in it: `fitting/certainty/doubts.py:IN_DOUBT`.
+SOURCE = re.compile(r"`((?!outputs/|site/)[a-z_0-9/]+/(?:[a-z_0-9]+\.py)?)(?::([A-Z_]+))?`")
 #: A constant with its value, as cells of a table.
 VALUE = re.compile(r"\| `([a-z_/]+\.py):([A-Z_]+)` \| ([^|]+) \|")
+#: A field of the search's options with its default, as cells of a table.
+FIELD = re.compile(r"\| `SearchOptions\.([a-z_.]+)` \| ([^|]+) \|")
 #: Words of a page that is read in one sitting; the laboratory may be longer.
 LONGEST = 1500
 
@@ -74,8 +78,12 @@ def test_code_that_is_named_exists(page: Path) -> None:
 
 
 def test_values_of_constants_are_those_of_the_code() -> None:
-    told = VALUE.findall((DOCS / "guides" / "doubtful_answers.md").read_text())
-    assert len(told) >= 10
+    page = (DOCS / "guides" / "doubtful_answers.md").read_text()
+    told, fields = VALUE.findall(page), FIELD.findall(page)
+    assert len(told) >= 3 and len(fields) >= 7
+    assert {name: float(value) for name, value in fields} == {
+        name: attrgetter(name)(SearchOptions()) for name, _ in fields
+    }
     assert {name: float(value) for _, name, value in told} == {
         name: _constants(ROOT / "src" / "rgspipe" / path)[name] for path, name, _ in told
     }
