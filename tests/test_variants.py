@@ -47,7 +47,7 @@ def test_any_name_is_one_of_a_file(values: list[str]) -> None:
 
 @pytest.fixture
 def plain(tmp_path: Path) -> RgspipeConfig:
-    return with_changes(RgspipeConfig(stage="grow", outputs=str(tmp_path)), {"dataset.resolution": 4})
+    return with_changes(RgspipeConfig(stage="grow", outputs=str(tmp_path)), {"dataset.resolution": 8})
 
 
 def links(tmp_path: Path, stage: str) -> dict[str, str]:
@@ -68,7 +68,7 @@ def test_a_variant_leaves_latest_where_it_is(plain: RgspipeConfig, tmp_path: Pat
 
 
 def test_the_plain_command_takes_latest_back(plain: RgspipeConfig, tmp_path: Path) -> None:
-    changed = with_changes(plain, {"dataset.resolution": 5})
+    changed = with_changes(plain, {"dataset.resolution": 9})
     for config in (plain, changed, plain):
         run(config, toys.load, [], config)
         assert links(tmp_path, "grow") == {"latest": fingerprint(config)}

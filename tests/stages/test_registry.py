@@ -72,7 +72,7 @@ def test_packages_do_nothing_on_the_way_to_their_modules() -> None:
     # Only where its own name is imported does a package count, so it must not do more than hand on names.
     harmless = ast.ImportFrom | ast.Expr
     for path in PACKAGE.rglob("__init__.py"):
-        if path.parent.relative_to(PACKAGE).as_posix() in (".", "cli", "stages"):
+        if path.parent.relative_to(PACKAGE).as_posix() in (".", "cli", "fitting", "stages"):
             continue
         body = [node for node in ast.parse(path.read_text()).body if not isinstance(node, harmless)]
         assert all(ast.unparse(node).startswith("__all__ =") for node in body), path

@@ -13,7 +13,7 @@ from lit_room import VISIBLE, room_cameras, room_surfels
 from rgspipe.datasets.views import View
 from rgspipe.scene import PointLight, Surfels
 from rgspipe.training.materials import build_frozen
-from rgspipe.training.trainer import TrainOptions
+from rgspipe.training.options import TrainOptions
 from rgspipe.training.validate import HeldOut, render_held_out
 
 OPTIONS = TrainOptions(gather_rays=64, patches=100)

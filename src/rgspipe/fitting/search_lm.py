@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import zip_longest
 
 from rgspipe.fitting.certainty.doubts import doubts
@@ -14,6 +14,7 @@ from rgspipe.fitting.model.blocks import BlockModel, view_of_blocks
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.exposure import rough_exposures
 from rgspipe.fitting.model.problem import LightProblem
+from rgspipe.fitting.options import MOST_LIGHTS, SearchOptions
 from rgspipe.fitting.result import FitResult, dark_result
 from rgspipe.fitting.search.coarse import CoarseImages
 from rgspipe.fitting.search.judge import (
@@ -37,7 +38,7 @@ from rgspipe.fitting.search.weighting import PLAIN, ROBUST
 from rgspipe.fitting.selection.one_less import one_light_less
 from rgspipe.fitting.selection.one_more import one_more_light
 from rgspipe.fitting.selection.verdict import Findings, SpareLight, counted_from, percent
-from rgspipe.fitting.spec import MOST_LIGHTS, LightSpec
+from rgspipe.fitting.spec import LightSpec
 
 #: Starts for each wanted one, where candidates have an axis.
 AIMED_STARTS = 3
@@ -54,19 +55,6 @@ FAR_RIVAL = 0.5
 
 #: A rival leaves at most so many times the energy unexplained that the best rig does.
 RIVAL_ENERGY = 1.5
-
-
-@dataclass(frozen=True)
-class SearchOptions:
-    """How `search_lm` searches.
-
-    Attributes:
-        starts: best candidates that are refined.
-        iterations: most Levenberg-Marquardt steps of the final refinement.
-    """
-
-    starts: int = 4
-    iterations: int = 30
 
 
 def fit_search_lm(
@@ -106,7 +94,7 @@ def fit_from(problem: LightProblem, start: Sequence[Emitter], iterations: int = 
         return dark_result(0.0)
     problem = problem.sharpest()
     refiner = Refiner.of(problem)
-    search = _Search(problem, refiner, [], SearchOptions(0, iterations), LightSpec())
+    search = _Search(problem, refiner, [], SearchOptions(iterations=iterations), LightSpec())
     return search.result(refiner.refined(refiner.start(start, PLAIN), PLAIN, iterations), Findings())
 
 
