@@ -5,11 +5,13 @@ from __future__ import annotations
 import difflib
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
 from hydra import compose, initialize_config_dir
 from hydra.core.config_store import ConfigStore
+from hydra.core.global_hydra import GlobalHydra
 from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.core.override_parser.types import Override
 from hydra.errors import HydraException, MissingConfigException, OverrideParseException
@@ -134,7 +136,10 @@ def leaves_machine(overrides: Sequence[str]) -> bool:
 
 def _compose(overrides: Sequence[str], hydra: bool = False) -> DictConfig:
     register_schema()
-    with initialize_config_dir(version_base=HYDRA_VERSION_BASE, config_dir=config_folder(), job_name="rgspipe"):
+    # Within a job Hydra is at work already, with the same folder.
+    running = GlobalHydra.instance().is_initialized()
+    folder = {"version_base": HYDRA_VERSION_BASE, "config_dir": config_folder(), "job_name": "rgspipe"}
+    with nullcontext() if running else initialize_config_dir(**folder):
         return compose(CONFIG_NAME, overrides=list(overrides), return_hydra_config=hydra)
 
 
