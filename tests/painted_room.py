@@ -12,14 +12,11 @@ from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.scene import Camera, PointLight, Surfels, look_at
 from rgspipe.training.lighting import total_irradiance, trace_lighting
 from rgspipe.training.materials import build_frozen, trace_views
-from rgspipe.training.refine import RefineOptions
-from rgspipe.training.trainer import TrainOptions
+from rgspipe.training.options import TrainOptions
 from rooms import closed_box
 
 #: How the light bounces in the photographs.
-LIGHT = TrainOptions(
-    rounds=5, refine=RefineOptions(steps=0), gather_rays=64, patches=100, supersampling=1, at_pixels=False
-)
+LIGHT = TrainOptions(rounds=5, steps=0, gather_rays=64, patches=100, supersampling=1, at_pixels=False)
 
 
 def painted_box() -> Surfels:

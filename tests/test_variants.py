@@ -46,7 +46,7 @@ def test_any_name_is_one_of_a_file(values: list[str]) -> None:
 
 @pytest.fixture
 def plain(tmp_path: Path) -> RgspipeConfig:
-    return with_changes(RgspipeConfig(stage="grow", outputs=str(tmp_path)), {"dataset.resolution": 4})
+    return with_changes(RgspipeConfig(stage="grow", outputs=str(tmp_path)), {"dataset.resolution": 8})
 
 
 def links(tmp_path: Path, stage: str) -> dict[str, str]:
@@ -66,8 +66,8 @@ def test_a_job_of_a_sweep_leaves_latest_where_it_is(plain: RgspipeConfig, tmp_pa
     assert list(links(tmp_path, "sow")) == ["latest"]
 
 
-def test_a_plain_command_takes_latest(plain: RgspipeConfig, tmp_path: Path) -> None:
-    changed = with_changes(plain, {"dataset.resolution": 5})
+def test_the_plain_command_takes_latest_back(plain: RgspipeConfig, tmp_path: Path) -> None:
+    changed = with_changes(plain, {"dataset.resolution": 9})
     for config in (plain, changed, plain):
         run(config, toys.load, [], Usual(config))
         assert links(tmp_path, "grow") == {"latest": fingerprint(config)}

@@ -22,3 +22,8 @@ class InputError(Exception):
     def __init__(self, where: str | Path, *, expected: str, found: str, remedy: str) -> None:
         self.where, self.expected, self.found, self.remedy = str(where), expected, found, remedy
         super().__init__(f"{where}: expected {expected}, found {found}. {remedy}")
+
+    def within(self, section: str) -> InputError:
+        """The same error where what is wrong is part of something larger: `section` and a dot before its name."""
+        where = f"{section}.{self.where}" if section else self.where
+        return InputError(where, expected=self.expected, found=self.found, remedy=self.remedy)

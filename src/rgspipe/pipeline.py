@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from rgspipe.artifacts import Artifact, ArtifactStore, Key
-from rgspipe.config import RgspipeConfig, get_value, scene_name, with_changes
+from rgspipe.config import RgspipeConfig, get_value, with_changes
 from rgspipe.errors import InputError
 from rgspipe.files import tree_digest
 from rgspipe.fingerprints import differences, fingerprint
@@ -32,6 +32,7 @@ NO_RESULT = (
     "rgspipe.errors",
     "rgspipe.files",
     "rgspipe.machine",
+    "rgspipe.options",
     "rgspipe.pipeline",
     "rgspipe.progress",
     "rgspipe.stages.base",
@@ -110,7 +111,7 @@ class _Resolver:
             "foreign": {str(path): self._file(path) for path in stage.files(config)},
             "code": self.code.fingerprints(stage.run.__module__),
         }
-        key = Key(scene_name(config), stage.name, fingerprint({"stage": stage.name, **recipe}))
+        key = Key(config.scene.folder, stage.name, fingerprint({"stage": stage.name, **recipe}))
         return Node(stage, config, changes, key, recipe, inputs)
 
     def _file(self, path: Path) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import pytest
 import torch
@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from raycast import room_views
-from rgspipe.config import CaptureConfig
 from rgspipe.datasets.views import View
-from rgspipe.degradation.capture import Capture, degraded
+from rgspipe.degradation.capture import degraded
+from rgspipe.degradation.options import Capture
 from rgspipe.scene import PointLight
 
 
@@ -98,16 +98,3 @@ def test_passes_can_be_dropped(views: list[View]) -> None:
     (view,) = degraded(views[:1], Capture(normals=False, albedo=False))
     assert view.normal is None and view.albedo is None
     assert view.depth is views[0].depth
-
-
-@pytest.mark.parametrize(
-    "wrong", [{"depth_noise": -1.0}, {"depth_missing": 1.0}, {"views": 0}, {"image_noise": float("nan")}]
-)
-def test_impossible_captures_are_refused(views: list[View], wrong: dict) -> None:
-    with pytest.raises(ValueError, match=next(iter(wrong))):
-        degraded(views, Capture(**wrong))
-
-
-def test_the_configuration_has_the_same_options_and_defaults() -> None:
-    assert {f.name for f in fields(CaptureConfig)} == {f.name for f in fields(Capture)}
-    assert Capture.from_config(CaptureConfig()) == Capture()

@@ -8,7 +8,8 @@ import pytest
 import torch
 
 from lit_room import room_surfels
-from rgspipe.degradation.model_error import ModelError, smooth_field, with_error
+from rgspipe.degradation.model_error import smooth_field, with_error
+from rgspipe.degradation.options import ModelError
 from rgspipe.errors import InputError
 from rgspipe.scene import Gloss, Surfels
 

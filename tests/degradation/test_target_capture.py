@@ -10,7 +10,8 @@ import torch
 
 from lit_room import room_cameras
 from rgspipe.datasets.views import View
-from rgspipe.degradation.target_capture import TargetCapture, captured
+from rgspipe.degradation.options import TargetCapture
+from rgspipe.degradation.target_capture import captured
 from rgspipe.scene import srgb
 
 

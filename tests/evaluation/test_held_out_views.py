@@ -14,7 +14,7 @@ from rgspipe.datasets.views import View
 from rgspipe.evaluation.held_out_views import HeldOut, render_held_out
 from rgspipe.scene import PointLight, Surfels
 from rgspipe.training.materials import build_frozen
-from rgspipe.training.trainer import TrainOptions
+from rgspipe.training.options import TrainOptions
 
 OPTIONS = TrainOptions(gather_rays=64, patches=100)
 

@@ -22,7 +22,7 @@ from rgspipe.renderer.ply import load_ply
 from rgspipe.scene import Camera, look_at
 from rgspipe.scene.surfels import quaternion_to_axes
 
-KEPT = PlyOptions(fronts="kept")
+KEPT = PlyOptions(fronts="kept", gloss=True)
 
 
 def lost(conversion, words: str):

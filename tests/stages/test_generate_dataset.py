@@ -11,7 +11,8 @@ import pytest
 import torch
 
 from rgspipe.blender.models.parameters import kind_of
-from rgspipe.config import MODELLED, RgspipeConfig
+from rgspipe.config import RgspipeConfig, with_changes
+from rgspipe.config.scene import MODELLED
 from rgspipe.datasets.exr import write_image
 from rgspipe.datasets.gs3_write import frame_entry, write_transforms
 from rgspipe.datasets.location import open_dataset
@@ -23,10 +24,7 @@ from rgspipe.stages.generate_dataset import STAGE, dataset_job
 
 
 def _config(**scene: object) -> RgspipeConfig:
-    config = RgspipeConfig()
-    for key, value in scene.items():
-        setattr(config.scene, key, value)
-    return config
+    return with_changes(RgspipeConfig(), {f"scene.{key}": value for key, value in scene.items()})
 
 
 def _run(config: RgspipeConfig, folder: Path) -> StageContext:
@@ -73,10 +71,9 @@ def test_a_path_that_leads_nowhere_is_named(kind: str, path: str | None, message
 
 
 def test_boxes_stand_on_the_floor_of_a_centred_room() -> None:
-    config = _config(kind="cornell")
-    room = config.scene.cornell
-    room.room, room.tall_size, room.tall_center, room.tall_angle = [1.0, 0.8, 0.6], [0.1, 0.2, 0.4], [0.5, 0.4], 90.0
-    cornell = dataset_job(config).model
+    tall = {"tall_size": [0.1, 0.2, 0.4], "tall_center": [0.5, 0.4], "tall_angle": 90.0}
+    room = {"room": [1.0, 0.8, 0.6]} | tall
+    cornell = dataset_job(_config(kind="cornell", **{f"cornell.{key}": value for key, value in room.items()})).model
     tall = cornell.boxes[0]
     assert cornell.room == (1.0, 0.8, 0.6)
     assert tall.center == pytest.approx((0.0, 0.0, -0.1))  # its foot is at −0.3, the floor
@@ -95,10 +92,10 @@ def test_the_configured_corridor_is_the_model_s_default() -> None:
 
 def test_gloss_that_makes_light_is_refused() -> None:
     config = _config(kind="cornell")
-    config.scene.cornell.gloss = 0.28
+    config = with_changes(config, {"scene.cornell.gloss": 0.28})
     with pytest.raises(InputError, match=r"scene\.cornell\.gloss.*1\.01"):
         dataset_job(config)
-    config.scene.cornell.gloss = 0.25
+    config = with_changes(config, {"scene.cornell.gloss": 0.25})
     assert dataset_job(config).model.gloss == 0.25
 
 

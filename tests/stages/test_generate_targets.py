@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -142,8 +143,8 @@ def test_a_pool_is_like_the_dataset_s_targets_unless_told_otherwise() -> None:
 def test_angles_are_given_in_degrees_and_blends_as_they_are() -> None:
     spot = _config(targets__spot__cone_angle=[20.0, 30.0], targets__spot__falloff=[0.1, 0.3]).targets.spot
     assert render_olat.spot_range(spot) == SpotRange("smoothstep", (math.radians(20), math.radians(30)), (0.1, 0.3))
-    spot.profile, spot.falloff = "gaussian", [2.0, 5.0]
-    assert render_olat.spot_range(spot).falloff == pytest.approx((math.radians(2), math.radians(5)))
+    gaussian = replace(spot, profile="gaussian", falloff=[2.0, 5.0])
+    assert render_olat.spot_range(gaussian).falloff == pytest.approx((math.radians(2), math.radians(5)))
 
 
 @pytest.mark.parametrize(
@@ -175,6 +176,6 @@ def test_what_can_not_be_made_is_refused_before_anything_is_made(values: dict, w
     ],
 )
 def test_spots_that_are_none_are_refused(values: dict, words: str) -> None:
-    config = _config(targets__kind="spots", **{f"targets__spot__{key}": value for key, value in values.items()})
     with pytest.raises(InputError, match=words):
-        render_olat.pool_job(config)
+        spot = {f"targets__spot__{key}": value for key, value in values.items()}
+        render_olat.pool_job(_config(targets__kind="spots", **spot))

@@ -10,7 +10,8 @@ import pytest
 import torch
 
 from raycast import room_views, surface_distance
-from rgspipe.config import InitConfig, RgspipeConfig
+from rgspipe.config import RgspipeConfig
+from rgspipe.config.init import InitConfig
 from rgspipe.datasets.exr import write_channels, write_image
 from rgspipe.datasets.gs3_write import frame_entry, write_info, write_transforms
 from rgspipe.datasets.surfel_file import load_surfels

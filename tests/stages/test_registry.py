@@ -73,6 +73,7 @@ def test_packages_do_nothing_on_the_way_to_their_modules() -> None:
     harmless = ast.Import | ast.ImportFrom | ast.Assign | ast.AnnAssign | ast.FunctionDef | ast.ClassDef
     for path in PACKAGE.rglob("__init__.py"):
         statements = ast.parse(path.read_text()).body[1:]  # after the docstring
+        statements = [node for node in statements if ast.unparse(node).partition("\n")[0] != "if TYPE_CHECKING:"]
         assert path.parent == PACKAGE or all(isinstance(statement, harmless) for statement in statements), path
 
 

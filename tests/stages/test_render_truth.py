@@ -5,12 +5,14 @@ from __future__ import annotations
 import importlib.util
 import json
 from pathlib import Path
+from typing import get_args
 
 import pytest
 
+from rgspipe.benchmark.names import RoomName
 from rgspipe.benchmark.rooms import ROOMS
 from rgspipe.benchmark.truth import load_truth
-from rgspipe.config import ROOM_NAMES, RgspipeConfig, with_changes
+from rgspipe.config import RgspipeConfig, with_changes
 from rgspipe.errors import InputError
 from rgspipe.stages.base import StageContext
 from rgspipe.stages.render_truth import STAGE
@@ -22,7 +24,7 @@ def _context(folder: Path, **benchmark: object) -> StageContext:
 
 
 def test_the_configuration_knows_every_room() -> None:
-    assert tuple(ROOMS) == ROOM_NAMES
+    assert tuple(ROOMS) == get_args(RoomName)
 
 
 @pytest.mark.slow

@@ -30,7 +30,7 @@ def test_a_value_means_the_artifact_that_it_means_on_the_command_line() -> None:
     [
         ("target_capture.nose=0.1", "target_capture.noise"),
         ("target_capture=0.1", "no key target_capture"),
-        ("target_capture.noise=much", "right type"),
+        ("target_capture.noise=much", "a number, found much"),
         ("target_capture.noise=-1", "target_capture.noise.*from 0 to 10"),
         ("model_error.missing=[0,1]", "6 values"),
         ("outputs=elsewhere", "how the study is run"),

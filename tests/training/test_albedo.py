@@ -13,7 +13,8 @@ from rgspipe.scene import Camera, PointLight, Surfels, look_at
 from rgspipe.scene.rectangles import inside_of_box, solid_box, surfels_on
 from rgspipe.training.albedo import AlbedoPrior, AlbedoProblem, Mixing
 from rgspipe.training.lighting import indirect_irradiance, trace_lighting
-from rgspipe.training.materials import MaterialOptions, build_frozen, fit_materials, trace_views
+from rgspipe.training.materials import build_frozen, fit_materials, trace_views
+from rgspipe.training.options import MaterialOptions
 from rgspipe.training.view_model import ViewModel, build_view_models
 
 OPTIONS = MaterialOptions(rounds=5, gather_rays=32, patches=60, supersampling=1)

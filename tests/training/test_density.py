@@ -11,7 +11,7 @@ import torch
 from painted_room import painted_box, painted_views
 from rgspipe.datasets.views import View
 from rgspipe.scene import NO_CLIP
-from rgspipe.training.density import DensityOptions, redistributed, surfel_errors
+from rgspipe.training.density import redistributed, surfel_errors
 from rgspipe.training.materials import trace_views
 
 
@@ -23,12 +23,11 @@ def views() -> list[View]:
 def test_surfels_with_the_largest_errors_split_up_to_the_bound() -> None:
     box = painted_box()
     errors = torch.arange(864).float()
-    options = DensityOptions(split_share=0.02)
-    split, parent = redistributed(box, errors, int(1.05 * 864), options)
+    split, parent = redistributed(box, errors, int(1.05 * 864), 0.02)
     assert len(split) == 864 + 17
     assert sorted(parent.bincount(minlength=864).nonzero()[:, 0].tolist()) == list(range(864))
     assert sorted((parent.bincount() == 2).nonzero()[:, 0].tolist()) == list(range(847, 864))
-    again, _ = redistributed(split, torch.ones(len(split)), int(1.05 * 864), replace(options, split_share=1.0))
+    again, _ = redistributed(split, torch.ones(len(split)), int(1.05 * 864), 1.0)
     assert len(again) == int(1.05 * 864)
 
 
@@ -36,7 +35,7 @@ def test_halves_of_a_surfel_stand_on_its_plane_around_its_centre() -> None:
     box = painted_box()
     errors = torch.zeros(864)
     errors[100] = 1.0
-    split, parent = redistributed(box, errors, 2 * 864, DensityOptions())
+    split, parent = redistributed(box, errors, 2 * 864)
     halves = (parent == 100).nonzero()[:, 0]
     assert len(halves) == 2
     torch.testing.assert_close(split.centers[halves].mean(dim=0), box.centers[100])
@@ -48,14 +47,14 @@ def test_faint_surfels_vanish_and_unseen_ones_stay() -> None:
     box = painted_box()
     opacities = box.opacities.clone()
     opacities[5] = 0.01
-    kept, parent = redistributed(replace(box, opacities=opacities), torch.zeros(864), 2 * 864, DensityOptions())
+    kept, parent = redistributed(replace(box, opacities=opacities), torch.zeros(864), 2 * 864)
     assert len(kept) == 863
     assert 5 not in parent.tolist()
 
 
 def test_splitting_leaves_the_picture_nearly_as_it_was(views: list[View]) -> None:
     box = painted_box()
-    split, _ = redistributed(box, torch.ones(864), 2 * 864, DensityOptions(split_share=1.0))
+    split, _ = redistributed(box, torch.ones(864), 2 * 864, 1.0)
     for before, after in zip(trace_views(box, views, 1), trace_views(split, views, 1), strict=True):
         change = (after.image(split.albedo) - before.image(box.albedo)).abs()
         # Measured: 1.6e-4 to 4.6e-4, where two colours meet, and coverage to 1e-7.
@@ -68,7 +67,7 @@ def test_edges_stay_where_they_are_when_surfels_split() -> None:
     offsets = box.clip_offsets.clone()
     offsets[:, 0] = 0.01
     clipped = replace(box, clip_offsets=offsets, clip_angles=torch.full((864, 2), 0.4))
-    split, parent = redistributed(clipped, torch.ones(864), 2 * 864, DensityOptions(split_share=1.0))
+    split, parent = redistributed(clipped, torch.ones(864), 2 * 864, 1.0)
     local = torch.tensor([[0.4, 0.4 - math.pi / 2]]).cos().expand(len(split), 2)
     direction = torch.einsum("na,nac->nc", local, split.frames[:, :2])
     edge = split.centers + split.clip_offsets[:, :1] * direction

@@ -19,15 +19,16 @@ from rgspipe.scene import Camera, PointLight, Surfels, look_at
 from rgspipe.scene.gloss import Gloss
 from rgspipe.scene.rectangles import inside_of_box, solid_box, surfels_on
 from rgspipe.training.checkpoint import Checkpoint
-from rgspipe.training.density import DensityOptions, redistributed
+from rgspipe.training.density import redistributed
 from rgspipe.training.gloss import GlossScene, reflection_of, render_gloss
 from rgspipe.training.gloss_light import operators_from
 from rgspipe.training.gloss_model import GlossLight, GlossView, Reflection
 from rgspipe.training.lighting import trace_lighting
-from rgspipe.training.materials import MaterialOptions, build_frozen, fit_materials, trace_views
+from rgspipe.training.materials import build_frozen, fit_materials, trace_views
+from rgspipe.training.options import MaterialOptions
 from rgspipe.training.view_model import build_view_models
 
-OPTIONS = MaterialOptions(rounds=4, gather_rays=32, patches=60, supersampling=1, gloss=True)
+OPTIONS = MaterialOptions(rounds=4, gather_rays=32, patches=60, supersampling=1, gloss="auto")
 SPECULAR, EXPONENT = 0.3, 20.0
 
 
@@ -171,7 +172,7 @@ def test_gloss_explains_views_that_it_was_not_fitted_to(
     room: Surfels, photographs: list[View], fitted: Surfels
 ) -> None:
     fresh = photographed(room, unlit_views(28)[24:])
-    diffuse = fit_materials(replace(fitted, gloss=None), photographs, replace(OPTIONS, gloss=False)).surfels
+    diffuse = fit_materials(replace(fitted, gloss=None), photographs, replace(OPTIONS, gloss="none")).surfels
     psnr = []
     for surfels in (fitted, diffuse):
         frozen = build_frozen(surfels, OPTIONS)
@@ -202,7 +203,7 @@ def test_gloss_without_bounces_is_refused_in_held_out_views(room: Surfels) -> No
 
 def test_halves_and_checkpoints_keep_the_gloss(room: Surfels, tmp_path: Path) -> None:
     errors = torch.arange(len(room)).float()
-    grown, parent = redistributed(room, errors, len(room) + 20, DensityOptions(growth=1.1))
+    grown, parent = redistributed(room, errors, len(room) + 20)
     assert torch.equal(grown.gloss.exponents, room.gloss.exponents[parent]) and len(grown) > len(room)
     checkpoint = Checkpoint(tmp_path / "checkpoint.safetensors")
     lights = [view.light for view in unlit_views(2)]

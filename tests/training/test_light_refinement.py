@@ -15,7 +15,8 @@ from rgspipe.scene import Camera, PointLight, Surfels, look_at
 from rgspipe.scene.rectangles import inside_of_box, solid_box, surfels_on
 from rgspipe.training.light_refinement import refine_lights
 from rgspipe.training.lighting import indirect_irradiance, trace_lighting
-from rgspipe.training.materials import MaterialOptions, build_frozen, trace_views
+from rgspipe.training.materials import build_frozen, trace_views
+from rgspipe.training.options import MaterialOptions
 from rgspipe.training.view_model import build_view_models
 
 COUNT, RESOLUTION = 8, 32

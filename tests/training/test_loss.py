@@ -8,7 +8,8 @@ import pytest
 import torch
 
 from rgspipe.scene import Camera, look_at
-from rgspipe.training.loss import LossOptions, compressed, image_loss
+from rgspipe.training.loss import compressed, image_loss
+from rgspipe.training.options import LossOptions
 from rgspipe.training.sampling import draw_pixels, draw_window, pixel_means, views_of_step
 
 IMAGE = torch.rand(16, 16, 3, generator=torch.Generator().manual_seed(0), dtype=torch.float64)

@@ -15,7 +15,8 @@ from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.view_weights import ViewWeights, build_view_weights
 from rgspipe.scene import Camera, PointLight, look_at
 from rgspipe.training.lighting import total_irradiance, trace_lighting
-from rgspipe.training.materials import MaterialOptions, build_frozen, fit_materials
+from rgspipe.training.materials import build_frozen, fit_materials
+from rgspipe.training.options import MaterialOptions
 from rgspipe.training.prior import albedo_prior, prior_from_maps, rescaled
 
 VIEWS = 12

@@ -12,11 +12,8 @@ import torch
 from painted_room import LIGHT, painted_box, painted_views
 from rgspipe.datasets.views import View
 from rgspipe.training.checkpoint import Checkpoint
-from rgspipe.training.density import DensityOptions
-from rgspipe.training.loss import LossOptions
 from rgspipe.training.materials import fit_materials
 from rgspipe.training.record import Record, materials_seconds
-from rgspipe.training.refine import RefineOptions
 from rgspipe.training.trainer import train
 
 OPTIONS = LIGHT
@@ -45,10 +42,9 @@ def test_training_goes_on_from_a_checkpoint_as_if_never_interrupted(
 ) -> None:
     """Killed between two rounds, within one, and after the last step; some surfels split on the way."""
     start = replace(painted_box(), albedo=torch.full((864, 3), 0.5))
-    refine_options = RefineOptions(
-        steps=6, relight_every=3, views_per_step=4, interior_pixels=100, subsamples=1, tilt_rate=0.01, height_rate=0.01
-    )
-    options = replace(OPTIONS, rounds=2, refine=refine_options, light_rounds=1, density=DensityOptions(growth=1.1))
+    steps = {"steps": 6, "relight_every": 3, "growth": 1.1, "tilt_rate": 0.01, "height_rate": 0.01}
+    pixels = {"views_per_step": 4, "interior_pixels": 100, "subsamples": 1}
+    options = replace(OPTIONS, rounds=2, light_rounds=1, **steps, **pixels)
     whole = train(views, start, options)
 
     class Killed(Exception):
@@ -86,10 +82,8 @@ def test_progress_says_how_training_goes_and_when_it_ends(
     monkeypatch.setattr("rgspipe.training.refine.progress_bar", tracked)
     caplog.set_level("INFO")
     start = replace(painted_box(), albedo=torch.full((864, 3), 0.5))
-    refine_options = RefineOptions(
-        steps=3, views_per_step=4, interior_pixels=100, subsamples=1, loss=LossOptions("l1", compression=10.0)
-    )
-    trained = train(views, start, replace(OPTIONS, rounds=2, refine=refine_options))
+    steps = {"steps": 3, "views_per_step": 4, "interior_pixels": 100, "subsamples": 1}
+    trained = train(views, start, replace(OPTIONS, rounds=2, loss="l1", compression=10.0, **steps))
     first, *steps, last = trained.records
     assert [record.phase for record in steps] == 3 * ["geometry"]
     # The mean over steps is of errors; the loss is another measure.

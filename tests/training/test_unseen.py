@@ -11,7 +11,6 @@ from half_seen_room import BACK, cameras_in_front, true_room, without_back
 from painted_room import LIGHT, photographed
 from rgspipe.datasets.views import View
 from rgspipe.scene import PointLight, Surfels
-from rgspipe.training.refine import RefineOptions
 from rgspipe.training.trainer import train
 
 
@@ -34,8 +33,7 @@ def test_a_room_is_closed_before_the_last_fit_of_materials_and_its_albedo_comes_
 ) -> None:
     seen = without_back(room)
     start = replace(seen, albedo=torch.full_like(seen.albedo, 0.5))
-    refine = RefineOptions(steps=steps, views_per_step=4, interior_pixels=100, subsamples=1)
-    options = replace(LIGHT, rounds=2, refine=refine)
+    options = replace(LIGHT, rounds=2, steps=steps, views_per_step=4, interior_pixels=100, subsamples=1)
     closed, left = (train(views, start, replace(options, unseen=unseen)).surfels for unseen in (True, False))
     added = closed.centers[len(seen) :]
     assert len(left) == len(seen) and 5 <= len(added) <= 25  # measured 6 and 7; 25 are missing

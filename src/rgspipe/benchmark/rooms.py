@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from rgspipe.benchmark.names import RoomName
 from rgspipe.scene import Camera, PointLight, look_at
 from rgspipe.scene.models import CornellBox, FloorPlan
 from rgspipe.scene.rectangles import Rectangles, inside_of_box, solid_box
@@ -102,4 +103,4 @@ def _clutter() -> Room:
 
 
 #: How each room is made.
-ROOMS: dict[str, Callable[[], Room]] = {"cornell": _cornell, "corridor": _corridor, "clutter": _clutter}
+ROOMS: dict[RoomName, Callable[[], Room]] = {"cornell": _cornell, "corridor": _corridor, "clutter": _clutter}

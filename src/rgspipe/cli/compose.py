@@ -5,18 +5,21 @@ from __future__ import annotations
 import difflib
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
 from hydra import compose, initialize_config_dir
 from hydra.core.config_store import ConfigStore
+from hydra.core.global_hydra import GlobalHydra
 from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.core.override_parser.types import Override
-from hydra.errors import ConfigCompositionException, HydraException, MissingConfigException, OverrideParseException
+from hydra.errors import HydraException, MissingConfigException, OverrideParseException
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
-from rgspipe.config import RgspipeConfig, check_values
+from rgspipe.config import RgspipeConfig
+from rgspipe.config.core import build, plain, unknown_key
 from rgspipe.errors import InputError
 from rgspipe.pipeline import Usual
 from rgspipe.resources import resource_folder
@@ -47,8 +50,8 @@ CHECKED_VALUES = 50
 
 
 def register_schema() -> None:
-    """Let the files under conf/ extend the typed schema."""
-    ConfigStore.instance().store(name="schema", node=RgspipeConfig, provider="rgspipe")
+    """Let the files under conf/ extend the defaults. Hydra composes plain values; `typed` knows what they may be."""
+    ConfigStore.instance().store(name="schema", node=plain(RgspipeConfig()), provider="rgspipe")
 
 
 def config_folder() -> str:
@@ -67,11 +70,12 @@ def typed(values: DictConfig) -> RgspipeConfig:
             "stage", expected=f"one of {', '.join(NAMES)}", found="nothing", remedy="Say which: stage=NAME."
         )
     try:
-        config = OmegaConf.to_object(values)
+        content = OmegaConf.to_container(values, resolve=True)
     except OmegaConfBaseException as error:
-        raise _value_error(error, "") from None
-    assert isinstance(config, RgspipeConfig)
-    check_values(config)
+        raise _composition_error(error, ()) from None
+    assert isinstance(content, dict)
+    config = build(RgspipeConfig, content)
+    config.scene.check_path()
     return config
 
 
@@ -81,7 +85,9 @@ def compose_config(overrides: Sequence[str]) -> RgspipeConfig:
     Raises:
         InputError: an override is misspelt, of the wrong type or out of range.
     """
-    _check_keys(_parse(overrides))
+    parsed = _parse(overrides)
+    _check_keys(parsed)
+    _check_single(parsed)
     try:
         return typed(_compose(overrides))
     except (HydraException, OmegaConfBaseException) as error:
@@ -131,7 +137,10 @@ def leaves_machine(overrides: Sequence[str]) -> bool:
 
 def _compose(overrides: Sequence[str], hydra: bool = False) -> DictConfig:
     register_schema()
-    with initialize_config_dir(version_base=HYDRA_VERSION_BASE, config_dir=config_folder(), job_name="rgspipe"):
+    # Within a job Hydra is at work already, with the same folder.
+    running = GlobalHydra.instance().is_initialized()
+    folder = {"version_base": HYDRA_VERSION_BASE, "config_dir": config_folder(), "job_name": "rgspipe"}
+    with nullcontext() if running else initialize_config_dir(**folder):
         return compose(CONFIG_NAME, overrides=list(overrides), return_hydra_config=hydra)
 
 
@@ -180,7 +189,7 @@ def _check_keys(overrides: Sequence[Override]) -> None:
                 f"~{key}", expected="key=value", found="a deletion", remedy=f"Set {key} instead: no key can go."
             )
         if (override.is_add() or override.is_force_add()) and not key.startswith(FREE_SECTIONS) and key not in known:
-            raise _unknown_key(key, known)
+            raise unknown_key(key, known)
 
 
 def _known_keys(overrides: Sequence[Override]) -> list[str]:
@@ -204,48 +213,28 @@ def _flat(values: Mapping[Any, Any], prefix: str = "") -> Iterator[str]:
             yield from _flat(value, f"{prefix}{key}.")
 
 
+def _check_single(overrides: Sequence[Override]) -> None:
+    """Refuse values that only a sweep may have."""
+    for override in overrides:
+        if override.is_sweep_override():
+            key, _, found = (override.input_line or "").partition("=")
+            remedy = "Add -m to run one job for each value, or write a list as [a,b]."
+            raise InputError(key, expected="one value", found=found, remedy=remedy)
+
+
 def _composition_error(error: Exception, overrides: Sequence[str]) -> InputError:
     if isinstance(error, MissingConfigException):
         return _unknown_choice(error)
     known = _known_keys(_parse(overrides))
     for override in _parse(overrides):
         if override.key_or_group not in known and not override.key_or_group.startswith(FREE_SECTIONS):
-            return _unknown_key(override.key_or_group, known)
-    if isinstance(error, ConfigCompositionException) and isinstance(error.__cause__, OmegaConfBaseException):
-        return _value_error(error.__cause__, str(error).rpartition(" ")[2])
-    ambiguous = next((text for text in overrides if f"'{text}'" in str(error)), None)
-    if ambiguous is not None and "multirun" in str(error):
-        return InputError(
-            ambiguous.partition("=")[0],
-            expected="one value",
-            found=ambiguous.partition("=")[2],
-            remedy="Add -m to run one job for each value, or write a list as [a,b].",
-        )
+            return unknown_key(override.key_or_group, known)
     return InputError(
         "the command line",
         expected="overrides that fit the configuration",
         found=" ".join(str(error).split()),
         remedy="See python -m rgspipe --help.",
     )
-
-
-def _unknown_key(key: str, known: Sequence[str]) -> InputError:
-    return InputError(
-        key, expected="a key of the configuration", found="no such key", remedy=f"{_suggestion(key, known)}"
-    )
-
-
-def _suggestion(key: str, known: Sequence[str]) -> str:
-    near = difflib.get_close_matches(key, known, n=3, cutoff=0.7)
-    # The right name in the wrong section, such as resolution= for dataset.resolution=.
-    last = key.rpartition(".")[2]
-    near += [name for name in known if name.rpartition(".")[2] == last and name not in near][:3]
-    if near:
-        return f"Did you mean {' or '.join(near)}?"
-    section = key.partition(".")[0]
-    if section in known and section != key:
-        return f"python -m rgspipe --help {section} lists the keys of {section}."
-    return "python -m rgspipe --help lists the keys."
 
 
 def _unknown_choice(error: MissingConfigException) -> InputError:
@@ -255,24 +244,6 @@ def _unknown_choice(error: MissingConfigException) -> InputError:
     near = difflib.get_close_matches(found, options, n=1)
     remedy = f"Did you mean {group}={near[0]}?" if near else f"Choose one of them: {group}=NAME."
     return InputError(group, expected=f"one of {', '.join(options)}", found=repr(found), remedy=remedy)
-
-
-def _value_error(error: OmegaConfBaseException, override: str) -> InputError:
-    key = str(error.full_key or override.partition("=")[0] or "the configuration")
-    text = (error.msg or str(error)).splitlines()[0]
-    for ending, meaning, example in (
-        ("could not be converted to Integer", "a whole number", "8"),
-        ("could not be converted to Float", "a number", "0.5"),
-        ("is not a valid bool", "true or false", "true"),
-    ):
-        if ending in text:
-            found = text.removeprefix("Value ").partition(" of type ")[0].partition(" is not ")[0]
-            return InputError(key, expected=meaning, found=found, remedy=f"Write {key}={example}, for instance.")
-    if "is not Optional" in text:
-        return InputError(key, expected="a value", found="null", remedy=f"Leave {key} away for its default.")
-    return InputError(
-        key, expected="a value of the right type", found=text, remedy="See python -m rgspipe --help for the keys."
-    )
 
 
 def check_stage(name: str) -> None:

@@ -7,8 +7,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from rgspipe.config import RgspipeConfig, describe
+from rgspipe.config import RgspipeConfig
+from rgspipe.config.core import describe
 from rgspipe.errors import InputError
+from rgspipe.options import shown
 from rgspipe.resources import resource_folder
 from rgspipe.stages import NAMES, stage_summary
 
@@ -42,9 +44,9 @@ class Setting(NamedTuple):
 def sections() -> dict[str, list[Setting]]:
     """Every setting by section; those outside of one are under ""."""
     found: dict[str, list[Setting]] = {}
-    for key, meaning, default in describe(RgspipeConfig):
+    for key, meaning, default in describe(RgspipeConfig()):
         section, _, name = key.partition(".")
-        found.setdefault(section if name else "", []).append(Setting(key, meaning, _shown(default)))
+        found.setdefault(section if name else "", []).append(Setting(key, meaning, shown(default)))
     return found
 
 
@@ -134,9 +136,3 @@ def _topic(topic: str) -> str:
     width = max((len(setting.key) for setting in rows), default=0)
     lines += [f"  {setting.key:<{width}}  {setting.meaning}; default {setting.default}" for setting in rows]
     return "\n".join(lines)
-
-
-def _shown(default: object) -> str:
-    if default is None:
-        return "null"
-    return str(default).lower() if isinstance(default, bool) else str(default)

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import torch
 
+from rgspipe.datasets.classes import OCCLUSIONS
 from rgspipe.datasets.frames import FrameEntry, read_entries
 from rgspipe.datasets.images import read_colour, read_depth, read_mask, read_vectors
 from rgspipe.datasets.info import DatasetInfo, read_info
@@ -21,8 +22,6 @@ from rgspipe.datasets.views import Dataset, Target, View
 from rgspipe.errors import InputError
 from rgspipe.progress import progress_bar
 from rgspipe.scene import PointLight
-
-OCCLUSIONS = ("visible", "out_of_frame", "occluded", "around_corner", "unknown")
 
 
 def load_dataset(root: str | Path, *, train: bool = True, test: bool = True, targets: bool = True) -> Dataset:

@@ -78,7 +78,7 @@ def _check_count(path: Path, kept: np.ndarray, options: PlyOptions) -> None:
             found=f"{count} of {len(kept)} in the box and above an opacity of {options.minimum_alpha}",
             remedy="Correct scene.ply.crop, or lower scene.ply.minimum_alpha.",
         )
-    if options.max_surfels is not None and count > options.max_surfels:
+    if count > options.max_surfels:
         raise InputError(
             path,
             expected=f"at most {options.max_surfels} surfels (scene.ply.max_surfels)",

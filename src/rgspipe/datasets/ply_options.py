@@ -6,36 +6,44 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from rgspipe.errors import InputError
+from rgspipe.options import Options, option
+
 #: Which side of a surfel is its front; see PlyOptions.
 Fronts = Literal["auto", "kept", "inwards", "outwards", "cameras"]
 
 
 @dataclass(frozen=True)
-class PlyOptions:
-    """How files from elsewhere are read; files of this program say all of it themselves.
-
-    Attributes:
-        fronts: `kept` as the rotations say; `inwards` towards the middle of the scene, for rooms; `outwards` away from
-            it, for objects in empty space; `cameras` towards the cameras that took the images; `auto` as kept in a file
-            of this program, and else towards the cameras that a 3DGS folder names.
-        cameras: a 3DGS cameras.json or a transforms file; by default cameras.json beside the file or in its model's
-            folder.
-        srgb: the colours of Gaussians are display values; False takes them as linear.
-        low, high: thresholds of the coverage; None for those that suit the layout.
-        layer: thickness of a layer in median scales.
-        minimum_alpha: opacity below which a surfel is not there.
-        gloss: take over the gloss of RadiosityGS, too; without it only the diffuse part is.
-        crop: (x, y, z, x, y, z) lower and upper corner of the box that is kept; None for all.
-        max_surfels: files of which more are kept are refused; None for no limit.
-    """
+class PlyOptions(Options):
+    """How PLY files from elsewhere are read; those of this program say all of it themselves."""
 
     fronts: Fronts = "auto"
+    """side of the surfels that light falls on: as the rotations say, towards the middle (rooms), away from it
+    (objects), or towards the cameras of the images; auto: the latter where a 3DGS folder names them, else as kept"""
     cameras: Path | None = None
+    """cameras.json of a 3DGS model, or a transforms file; by default the model's own"""
     srgb: bool = True
-    low: float | None = None
-    high: float | None = None
-    layer: float = 1.0
-    minimum_alpha: float = 0.01
-    gloss: bool = True
-    crop: tuple[float, ...] | None = None
-    max_surfels: int | None = None
+    """colours of Gaussians are display values, not linear ones"""
+    low: float | None = option(None, low=0, high=1)
+    """raw coverage that counts as none; by default what suits the file"""
+    high: float | None = option(None, low=0, high=1)
+    """raw coverage that is opaque; by default what suits the file"""
+    layer: float = option(1.0, low=0.01, high=100)
+    """thickness of a layer in the median scale of the surfels"""
+    minimum_alpha: float = option(0.01, low=1e-4, high=0.5)
+    """opacity below which a surfel is not there"""
+    gloss: bool = False
+    """take over the gloss of RadiosityGS; fits pass over it, and it takes memory"""
+    crop: tuple[float, float, float, float, float, float] | None = option(None, low=-1e6, high=1e6)
+    """box that is kept: lower and upper x, y, z in [x,y,z,x,y,z]"""
+    max_surfels: int = option(100_000, low=2, high=100_000_000)
+    """files with more are refused: operators grow with them"""
+
+    def check(self) -> None:
+        """Refuse thresholds and corners in the wrong order."""
+        if self.low is not None and self.high is not None and self.low >= self.high:
+            found = f"{self.low} and {self.high}"
+            raise InputError("low", expected="less than high", found=found, remedy="Put them in order.")
+        if self.crop is not None and any(a >= b for a, b in zip(self.crop[:3], self.crop[3:], strict=True)):
+            expected, found = "a lower and then an upper corner", str(list(self.crop))
+            raise InputError("crop", expected=expected, found=found, remedy="Put them in order.")

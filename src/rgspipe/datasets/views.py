@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 from torch import Tensor
 
+from rgspipe.datasets.classes import Occlusion
 from rgspipe.scene import Camera, PointLight
-
-#: Where a target's hidden light is, as the target's cameras see it.
-Occlusion = Literal["visible", "out_of_frame", "occluded", "around_corner", "unknown"]
 
 
 @dataclass(frozen=True, repr=False)

@@ -7,7 +7,7 @@ only in what their options say, however many views they keep.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import replace
 
 import numpy as np
 import torch
@@ -15,6 +15,7 @@ from scipy.ndimage import gaussian_filter
 from torch import Tensor
 
 from rgspipe.datasets.views import View
+from rgspipe.degradation.options import Capture
 from rgspipe.scene import PointLight
 
 #: Read noise of an image, as a share of its relative noise and of the image's brightest values.
@@ -25,61 +26,15 @@ BRIGHT = 0.995
 BLOB_SHARE, BLOB_SIZE = 0.5, 1.0 / 30.0
 
 
-@dataclass(frozen=True)
-class Capture:
-    """How far training views are from perfect; the default changes nothing.
-
-    Attributes:
-        depth_noise: standard deviation of a depth over the depth, independent in every pixel.
-        depth_missing: share of the pixels of a depth map that are unknown (NaN), half of them in blobs.
-        image_noise: standard deviation of a value over the value; a tenth of it, relative to the image's
-            brightest values, is there in the dark, too (read noise).
-        light_position_noise: standard deviation of every coordinate of every light, scene units.
-        light_intensity_noise: standard deviation of the logarithm of every light's intensity, all channels alike.
-        views: how many views are kept, spread evenly over the list; None keeps all.
-        normals, albedo: whether the views keep their passes.
-        seed: of all draws.
-    """
-
-    depth_noise: float = 0.0
-    depth_missing: float = 0.0
-    image_noise: float = 0.0
-    light_position_noise: float = 0.0
-    light_intensity_noise: float = 0.0
-    views: int | None = None
-    normals: bool = True
-    albedo: bool = True
-    seed: int = 0
-
-    @classmethod
-    def from_config(cls, config: object) -> Capture:
-        """The options in any object with the same fields."""
-        return cls(**{item.name: getattr(config, item.name) for item in fields(cls)})
-
-
 def degraded(views: Sequence[View], capture: Capture) -> tuple[View, ...]:
     """The views as such a capture would have taken them; where nothing is asked for, the very same tensors.
 
     Missing depth is NaN: not known, as opposed to +inf, where there is no surface.
-
-    Raises:
-        ValueError: a share is outside of [0, 1), a noise is negative, or `views` is not positive.
     """
-    _check(capture)
     kept = range(len(views))
     if capture.views is not None and capture.views < len(views):
         kept = [round(place) for place in np.linspace(0, len(views) - 1, capture.views)]
     return tuple(_degrade(views[index], capture, index) for index in kept)
-
-
-def _check(capture: Capture) -> None:
-    for name in ("depth_noise", "image_noise", "light_position_noise", "light_intensity_noise"):
-        if not getattr(capture, name) >= 0.0:
-            raise ValueError(f"{name} must not be negative, got {getattr(capture, name)}")
-    if not 0.0 <= capture.depth_missing < 1.0:
-        raise ValueError(f"depth_missing must be in [0, 1), got {capture.depth_missing}")
-    if capture.views is not None and capture.views < 1:
-        raise ValueError(f"views must be at least 1, got {capture.views}")
 
 
 def _degrade(view: View, capture: Capture, index: int) -> View:

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import replace
 
 import torch
 from torch import Tensor
 
+from rgspipe.degradation.options import ModelError
 from rgspipe.errors import InputError
 from rgspipe.scene.surfels import Surfels
 
@@ -23,38 +24,6 @@ ALBEDO_LENGTH = 0.15
 
 #: No surface reflects more than this, diffusely and in its lobe together.
 LARGEST_REFLECTANCE = 0.99
-
-
-@dataclass(frozen=True)
-class ModelError:
-    """How far a scene model is from the truth; the default changes nothing.
-
-    Attributes:
-        albedo: standard deviation of the logarithm of the albedo's error, which varies smoothly over the scene (over
-            ALBEDO_LENGTH of its size) and differs between channels.
-        albedo_factor: factor on all albedo.
-        position: standard deviation of every surfel's shift along its normal, in parts of the scene's size.
-        tilt: standard deviation of every normal's turn about each of two axes across it, degrees.
-        missing: (x, y, z, x, y, z) lower and upper corner of a box in which the model has no surfels, scene units.
-        seed: of all draws.
-    """
-
-    albedo: float = 0.0
-    albedo_factor: float = 1.0
-    position: float = 0.0
-    tilt: float = 0.0
-    missing: Sequence[float] | None = None
-    seed: int = 0
-
-    @classmethod
-    def from_config(cls, config: object) -> ModelError:
-        """The options in any object with the same fields."""
-        return cls(**{item.name: getattr(config, item.name) for item in fields(cls)})
-
-    @property
-    def none(self) -> bool:
-        """Whether nothing is changed."""
-        return replace(self, seed=0) == ModelError()
 
 
 def with_error(surfels: Surfels, error: ModelError) -> Surfels:

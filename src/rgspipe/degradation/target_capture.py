@@ -8,38 +8,16 @@ from __future__ import annotations
 import math
 import zlib
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import replace
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from rgspipe.datasets.views import View
-from rgspipe.degradation.capture import Capture, degraded
+from rgspipe.degradation.capture import degraded
+from rgspipe.degradation.options import Capture, TargetCapture
 from rgspipe.scene import srgb
-
-
-@dataclass(frozen=True)
-class TargetCapture:
-    """How far the images of a target are from perfect; the default changes nothing.
-
-    Attributes:
-        noise: standard deviation of a value over the value, see `capture.Capture.image_noise`.
-        exposure: standard deviation of the exposure of every view but the first, in stops (factors of two).
-        white: quantile of all values of the target that 8-bit images can just hold; what is brighter is clipped, and
-            the rest rounded to the levels of sRGB. None keeps floating point.
-        seed: of all draws.
-    """
-
-    noise: float = 0.0
-    exposure: float = 0.0
-    white: float | None = None
-    seed: int = 0
-
-    @classmethod
-    def from_config(cls, config: object) -> TargetCapture:
-        """The options in any object with the same fields."""
-        return cls(**{item.name: getattr(config, item.name) for item in fields(cls)})
 
 
 def captured(views: Sequence[View], name: str, capture: TargetCapture) -> tuple[list[View], float | None]:

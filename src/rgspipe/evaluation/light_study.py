@@ -43,7 +43,9 @@ KEYS = ["scene", "case", "method", "views", "occlusion"]
 TWO_SIDED_95 = 1.959964
 
 
-def case_rows(scene: str, case: str, targets: pd.DataFrame, seed: int, resamples: int) -> pd.DataFrame:
+def case_rows(
+    scene: str, case: str, targets: pd.DataFrame, seed: int, resamples: int = metrics.RESAMPLES
+) -> pd.DataFrame:
     """What became of the targets of one case: a row for each class, and one for all of them.
 
     Args:

@@ -14,6 +14,8 @@ from rgspipe.evaluation.arrays import ArrayLike, to_array, to_mask
 PEAK_PERCENTILE = 99.5
 #: A light counts as found when its position error is at most this fraction of the scene's longest side.
 SUCCESS_LIMIT = 0.01
+#: Resamples behind the interval of a median.
+RESAMPLES = 2000
 
 
 def peak(target: ArrayLike) -> float:
@@ -123,7 +125,7 @@ def success(error: float, limit: float = SUCCESS_LIMIT) -> bool:
 
 
 def bootstrap_median(
-    values: ArrayLike, generator: np.random.Generator, resamples: int = 4000, confidence: float = 0.95
+    values: ArrayLike, generator: np.random.Generator, resamples: int = RESAMPLES, confidence: float = 0.95
 ) -> tuple[float, float]:
     """Percentile bootstrap interval of the median.
 

@@ -11,12 +11,13 @@ import numpy.typing as npt
 import pandas as pd
 from scipy.optimize import linear_sum_assignment
 
+from rgspipe.datasets.classes import LIGHT_CLASSES
 from rgspipe.evaluation import calibration, metrics
 from rgspipe.evaluation.arrays import ArrayLike, to_array
 from rgspipe.scene import Light, LightRig
 
 #: Occlusion classes in the order in which every table and figure shows them.
-CLASSES = ("visible", "out_of_frame", "occluded", "around_corner", "mixed", "unknown")
+CLASSES = (*LIGHT_CLASSES, "mixed", "unknown")
 #: The row that holds all targets of a method and view count.
 ALL = "all"
 
@@ -219,7 +220,7 @@ def target_table(
     )
 
 
-def summary_table(targets: pd.DataFrame, seed: int, resamples: int = 4000) -> pd.DataFrame:
+def summary_table(targets: pd.DataFrame, seed: int, resamples: int = metrics.RESAMPLES) -> pd.DataFrame:
     """One row per method, view count and occlusion class, and one for all classes together.
 
     Methods and view counts stand in the order in which they first occur.

@@ -1,13 +1,21 @@
-"""From images of a frozen scene to the lights that made them."""
+"""From images of a frozen scene to the lights that made them.
 
-from rgspipe.fitting.baselines.paper_adam import AdamOptions
-from rgspipe.fitting.findings import FitStatus
-from rgspipe.fitting.fit import FitViews, fit_lights, prepare_fit, render_light, render_rig
-from rgspipe.fitting.model.capture import ImageCapture
-from rgspipe.fitting.model.problem import Effects
-from rgspipe.fitting.result import FitResult, Step
-from rgspipe.fitting.search_lm import SearchOptions
-from rgspipe.fitting.spec import LightSpec
+Names are imported when they are first used, so that what only asks for options need not load torch.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rgspipe.fitting.findings import FitStatus
+    from rgspipe.fitting.fit import FitViews, fit_lights, prepare_fit, render_light, render_rig
+    from rgspipe.fitting.model.capture import ImageCapture
+    from rgspipe.fitting.model.problem import Effects
+    from rgspipe.fitting.options import AdamOptions, SearchOptions
+    from rgspipe.fitting.result import FitResult, Step
+    from rgspipe.fitting.spec import LightSpec
 
 __all__ = [
     "AdamOptions",
@@ -24,3 +32,19 @@ __all__ = [
     "render_light",
     "render_rig",
 ]
+
+_HOMES = {
+    "rgspipe.fitting.fit": ("FitViews", "fit_lights", "prepare_fit", "render_light", "render_rig"),
+    "rgspipe.fitting.model.capture": ("ImageCapture",),
+    "rgspipe.fitting.model.problem": ("Effects",),
+    "rgspipe.fitting.options": ("AdamOptions", "SearchOptions"),
+    "rgspipe.fitting.result": ("FitResult", "FitStatus", "Step"),
+    "rgspipe.fitting.spec": ("LightSpec",),
+}
+
+
+def __getattr__(name: str) -> Any:
+    for home, names in _HOMES.items():
+        if name in names:
+            return getattr(importlib.import_module(home), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import get_args
 
 import torch
 from torch import Tensor
 
-from rgspipe.fitting.baselines.paper_adam import AdamOptions, fit_paper_adam
+from rgspipe.fitting.baselines.paper_adam import fit_paper_adam
 from rgspipe.fitting.baselines.paper_adam_start import LightPrior
 from rgspipe.fitting.findings import ExposureUnknown
 from rgspipe.fitting.model.blocks import BlockModel, block_model
@@ -16,10 +17,11 @@ from rgspipe.fitting.model.capture import ImageCapture
 from rgspipe.fitting.model.gloss import bounced_light
 from rgspipe.fitting.model.problem import Effects, LightProblem
 from rgspipe.fitting.model.views import PreparedViews, prepare_views
+from rgspipe.fitting.options import AdamOptions, Method, SearchOptions
 from rgspipe.fitting.result import FitResult
 from rgspipe.fitting.search.aimed_candidates import aimed_candidates
 from rgspipe.fitting.search.coarse import CoarseImages, coarse_images
-from rgspipe.fitting.search_lm import SearchOptions, fit_search_lm
+from rgspipe.fitting.search_lm import fit_search_lm
 from rgspipe.fitting.spec import LightSpec
 from rgspipe.renderer.dictionary import LightDictionary
 from rgspipe.renderer.frozen import FrozenScene
@@ -27,8 +29,6 @@ from rgspipe.renderer.pixel_direct import surfel_shares
 from rgspipe.renderer.rig import unit_response
 from rgspipe.renderer.view_weights import ViewWeights
 from rgspipe.scene import Camera, Light, LightRig, PointLight
-
-METHODS = ("search_lm", "paper_adam", "finite_differences")
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ def fit_lights(
     views: FitViews | Sequence[ViewWeights | Camera],
     images: Sequence[Tensor],
     *,
-    method: str = "search_lm",
+    method: Method = "search_lm",
     masks: Sequence[Tensor] | None = None,
     mask_edges: bool = True,
     dictionary: LightDictionary | None = None,
@@ -126,8 +126,8 @@ def fit_lights(
         ValueError: an unknown method; with `paper_adam` free exposures, clipped images, or lights whose type, number
             or cone is not known.
     """
-    if method not in METHODS:
-        raise ValueError(f"method must be one of {METHODS}, got {method!r}")
+    if method not in get_args(Method):
+        raise ValueError(f"method must be one of {get_args(Method)}, got {method!r}")
     if not isinstance(views, FitViews):
         if method != "paper_adam" and dictionary is None:
             shaded = (effects or Effects()).shadows

@@ -7,7 +7,7 @@ A target is searched on blocks of pixels (`search`), the number and rivals of th
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 from rgspipe.fitting.certainty.uncertainty import light_covariances
 from rgspipe.fitting.findings import Finding, LightMissing, Rival
@@ -16,54 +16,17 @@ from rgspipe.fitting.model.blocks import BlockModel, view_of_blocks
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.exposure import rough_exposures
 from rgspipe.fitting.model.problem import LightProblem
+from rgspipe.fitting.options import SearchOptions
 from rgspipe.fitting.result import FitResult, dark_result
 from rgspipe.fitting.search.coarse import CoarseImages
-from rgspipe.fitting.search.combinations import CombinationOptions
-from rgspipe.fitting.search.compare import Bar
-from rgspipe.fitting.search.moves import StepLimits
 from rgspipe.fitting.search.refine import Refiner, State
-from rgspipe.fitting.search.rig_search import RigSearch, StartOptions
-from rgspipe.fitting.search.schedule import Schedule
+from rgspipe.fitting.search.rig_search import RigSearch
 from rgspipe.fitting.search.starts import Candidates
 from rgspipe.fitting.search.weighting import PLAIN
 from rgspipe.fitting.selection.diagnosis import Costs, standing
 from rgspipe.fitting.selection.number import Doubted, doubted_number
-from rgspipe.fitting.selection.one_more import OneMoreOptions
-from rgspipe.fitting.selection.rivals import RivalOptions, has_rival
+from rgspipe.fitting.selection.rivals import has_rival
 from rgspipe.fitting.spec import LightSpec
-from rgspipe.optim.levenberg_marquardt import LevenbergMarquardt
-
-
-@dataclass(frozen=True)
-class SearchOptions:
-    """How `search_lm` searches.
-
-    Attributes:
-        starts: best candidates that are refined.
-        iterations: most Levenberg-Marquardt steps of the final refinement.
-        combinations: how candidates are put together to starts.
-        choice: which starts are tried.
-        schedule: how starts are refined.
-        bar: how much a light has to explain.
-        one_more: when a light more than were asked for is looked for.
-        rivals: what counts as another answer.
-        solver, limits: how steps are taken, and how long they may be.
-    """
-
-    starts: int = 4
-    iterations: int = 30
-    combinations: CombinationOptions = field(default_factory=CombinationOptions)
-    choice: StartOptions = field(default_factory=StartOptions)
-    schedule: Schedule = field(default_factory=Schedule)
-    bar: Bar = field(default_factory=Bar)
-    one_more: OneMoreOptions = field(default_factory=OneMoreOptions)
-    rivals: RivalOptions = field(default_factory=RivalOptions)
-    solver: LevenbergMarquardt = field(default_factory=LevenbergMarquardt)
-    limits: StepLimits = field(default_factory=StepLimits)
-
-    def refiner(self, problem: LightProblem, meter: Meter | None = None) -> Refiner:
-        """A refiner on a problem, of a fit that begins now or that of `meter`."""
-        return replace(Refiner.of(problem, meter), solver=self.solver, limits=self.limits)
 
 
 def fit_search_lm(
@@ -88,7 +51,7 @@ def fit_search_lm(
     candidates = [one for one in candidates if one.lit]
     if not candidates:
         return dark_result(meter.seconds)
-    refiner = options.refiner(problem.coarsest(blocks), meter)
+    refiner = Refiner.of(problem.coarsest(blocks), meter, options.limits)
     found = _search(refiner, candidates, options, spec)
     polished, best = _polished(refiner.on(problem.sharpest()), found.best, options.iterations)
     if not bool((best.intensity > 0).any()):
@@ -116,14 +79,12 @@ class _Searched:
 
 def _search(refiner: Refiner, candidates: Sequence[Candidates], options: SearchOptions, spec: LightSpec) -> _Searched:
     """Search, then doubt what was found."""
-    parts = options.starts, options.iterations, options.choice, options.schedule, options.bar
-    search = RigSearch(refiner, candidates, *parts, kinds_open=len(spec.kinds) > 1)
+    search = RigSearch(refiner, candidates, options, kinds_open=len(spec.kinds) > 1)
     found = search.unknown() if spec.count is None else search.known(spec.count)
     rival = [Rival()] if has_rival(refiner, found.best, found.others, options.rivals) else []
     doubted = Doubted()
     if spec.count is not None:
-        parts = options.bar, options.one_more, options.schedule
-        doubted = doubted_number(refiner, candidates, found.best, spec.count, *parts)
+        doubted = doubted_number(refiner, candidates, found.best, spec.count, options)
     compared = {**found.compared, **doubted.compared}
     findings = (*rival, *doubted.findings)
     if not any(isinstance(finding, LightMissing) for finding in findings):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from rgspipe.fitting.options import MOST_LIGHTS
 from rgspipe.scene.lights import KINDS, Light
 
 #: Each light may be a point or a spot: it is a spot where that is worth it.
@@ -13,9 +14,6 @@ AUTO = "auto"
 AUTO_KINDS = ("point", "spot")
 
 TYPES = (*KINDS, AUTO)
-
-#: Where the number of lights is not known, at most so many are tried.
-MOST_LIGHTS = 8
 
 
 @dataclass(frozen=True)

@@ -49,7 +49,7 @@ def run(context: StageContext) -> None:
 
     covariances = {name: _covariances(fit, name) for name in estimates}
     targets = tables.target_table(results, estimates, truth.rigs, size, config.evaluate.success, covariances)
-    summary = tables.summary_table(targets, config.seed, config.evaluate.bootstrap)
+    summary = tables.summary_table(targets, config.seed)
     targets.to_csv(context.folder / "metrics.csv", index=False)
     summary.to_csv(context.folder / "summary.csv", index=False)
     _curves(fit, targets, truth.rigs, size).to_csv(context.folder / "convergence.csv", index=False)

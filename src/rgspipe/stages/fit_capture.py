@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from rgspipe.config import RgspipeConfig
 from rgspipe.datasets.views import View
-from rgspipe.degradation.target_capture import TargetCapture, captured
+from rgspipe.degradation.target_capture import captured
 from rgspipe.errors import InputError
 from rgspipe.fitting.model.capture import ImageCapture, stored_in_eight_bits
 
@@ -23,7 +23,7 @@ def captured_views(views: Sequence[View], target: str, config: RgspipeConfig) ->
         InputError: the paper's method is asked for unknown exposures.
     """
     free = config.fit.exposure == "free"
-    taken, white = captured(views, target, TargetCapture.from_config(config.target_capture))
+    taken, white = captured(views, target, config.target_capture)
     if config.fit.method == "paper_adam":
         if free:
             raise InputError(

@@ -11,7 +11,7 @@ import pandas as pd
 import torch
 from torch import Tensor
 
-from rgspipe.config import FitConfig
+from rgspipe.config.fit import FitConfig
 from rgspipe.datasets.advice_file import ADVICE, ALONE, IN_ORDER, PLAN, SUGGESTED
 from rgspipe.datasets.frames import FrameEntry, read_entries
 from rgspipe.datasets.json_file import numbers

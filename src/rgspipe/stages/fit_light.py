@@ -18,16 +18,15 @@ from rgspipe.datasets.views import Target, View
 from rgspipe.errors import InputError
 from rgspipe.evaluation.fit_folder import read_result, write_result
 from rgspipe.fitting import (
-    AdamOptions,
     Effects,
     FitViews,
     LightSpec,
-    SearchOptions,
     fit_lights,
     prepare_fit,
 )
 from rgspipe.fitting.model.harmonics import BandLimit
-from rgspipe.fitting.spec import MOST_LIGHTS, shaped_kind
+from rgspipe.fitting.options import MOST_LIGHTS
+from rgspipe.fitting.spec import shaped_kind
 from rgspipe.progress import progress_bar
 from rgspipe.renderer.dictionary import LightDictionary
 from rgspipe.renderer.effect_bounds import NO_BOUND, EffectBounds
@@ -43,6 +42,9 @@ from rgspipe.stages.light_shape import light_shape
 from rgspipe.stages.scene_effects import chosen_effects, frozen_scene, measured_effects
 from rgspipe.stages.sources import image_stage, require_images, target_stage
 from rgspipe.stages.spoken import COMMAND_LINE
+
+#: Number of the random stream of fits; part of the seed, so never renumber it.
+STREAM = 0
 
 
 def run(context: StageContext) -> None:
@@ -101,18 +103,8 @@ class Fitter:
             prepared,
             taken,
             method=config.method,
-            search=SearchOptions(config.search.starts, config.search.iterations),
-            adam=AdamOptions(
-                epochs=config.adam.epochs,
-                steps=config.adam.steps,
-                position_rate=config.adam.position_rate,
-                intensity_rate=config.adam.intensity_rate,
-                ssim_weight=config.adam.ssim_weight,
-                init=config.adam.init,
-                random_intensity=config.adam.random_intensity,
-                axis_rate=config.adam.axis_rate,
-                aim=config.adam.aim,
-            ),
+            search=config.search,
+            adam=config.adam,
             training_lights=self.training_lights,
             seed=target_seed(target, self.config),
             spec=light_spec(self.config),
@@ -202,8 +194,7 @@ def light_spec(config: RgspipeConfig) -> LightSpec:
     """What the configuration says of the lights that are looked for.
 
     Raises:
-        InputError: the paper's method is asked for lights of unknown type, number or cone, or a rim does not fit its
-            cone.
+        InputError: the paper's method is asked for lights of unknown type, number or cone.
     """
     if config.fit.method == "paper_adam":
         _refuse_unknowns(config)
@@ -285,7 +276,7 @@ def used_views(target: Target, config: RgspipeConfig) -> list[View]:
 
 def target_seed(target: Target, config: RgspipeConfig) -> int:
     """A seed of the target's own, so that a start does not depend on which other targets are fitted."""
-    return zlib.crc32(f"{config.seed}/{config.fit.adam.seed}/{target.name}".encode())
+    return zlib.crc32(f"{config.seed}/{STREAM}/{target.name}".encode())
 
 
 def _targets(context: StageContext) -> Sequence[Target]:

@@ -6,7 +6,7 @@ import time
 from dataclasses import asdict
 
 from rgspipe.datasets.surfel_file import load_surfels
-from rgspipe.degradation.model_error import ModelError, with_error
+from rgspipe.degradation.model_error import with_error
 from rgspipe.files import write_json
 from rgspipe.renderer.effect_bounds import measure_costs, measure_effects
 from rgspipe.renderer.frozen import FrozenScene
@@ -20,7 +20,7 @@ def run(context: StageContext) -> None:
     """Write the folder of a frozen scene, and effects.json."""
     options = context.config.freeze
     surfels = load_surfels(context.inputs[surfel_stage(context.config)].file(SURFELS))
-    surfels = with_error(surfels, ModelError.from_config(context.config.model_error))
+    surfels = with_error(surfels, context.config.model_error)
     begin = time.perf_counter()
     frozen = FrozenScene.freeze(surfels, gather_rays=options.gather_rays, patches=options.patches, seed=options.seed)
     built = time.perf_counter()

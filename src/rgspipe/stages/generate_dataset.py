@@ -7,7 +7,8 @@ from pathlib import Path
 
 from rgspipe.blender.job import DatasetJob
 from rgspipe.blender.render_dataset import render_dataset
-from rgspipe.config import MODELLED, RgspipeConfig, scene_name
+from rgspipe.config import RgspipeConfig
+from rgspipe.config.scene import MODELLED
 from rgspipe.datasets.gs3 import load_dataset
 from rgspipe.datasets.location import point_at_dataset
 from rgspipe.errors import InputError
@@ -29,29 +30,12 @@ def dataset_job(config: RgspipeConfig) -> DatasetJob:
     """What the configuration asks Blender for.
 
     Raises:
-        InputError: `scene.path` names no file, or more views of a target are wanted than there are cameras, or
-            a material makes light.
+        InputError: `scene.path` names no file, or a material makes light.
     """
-    if config.dataset.target_views > 3:
-        found = str(config.dataset.target_views)
-        raise InputError("dataset.target_views", expected="1, 2 or 3", found=found, remedy="Use up to 3 views.")
-    wanted, scene = config.dataset, config.scene
+    scene = config.scene
     if scene.kind == "blend":
         scene = replace(scene, path=str(_existing_path(config, "a .blend file")))
-    return DatasetJob(
-        scene=scene_name(config),
-        model=scene_model(scene),
-        train_views=wanted.train_views,
-        test_views=wanted.test_views,
-        targets_per_class=wanted.targets_per_class,
-        target_views=wanted.target_views,
-        resolution=wanted.resolution,
-        samples=wanted.samples,
-        test_samples=wanted.test_samples,
-        denoise=wanted.denoise,
-        max_bounces=wanted.max_bounces,
-        seed=wanted.seed,
-    )
+    return DatasetJob(scene=config.scene.folder, model=scene_model(scene), **vars(config.dataset))
 
 
 def _take_external(context: StageContext) -> None:

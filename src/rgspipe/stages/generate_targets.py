@@ -46,10 +46,9 @@ def _brightness(pool: list[PooledLight]) -> np.ndarray:
 
 def _request(config: RgspipeConfig) -> RigRequest:
     wanted = config.targets
-    fewest, most = wanted.count
     return RigRequest(
         number=wanted.number,
-        count=(fewest, most),
+        count=wanted.count,
         mixed=wanted.kind == "mixed",
         weakest=wanted.weakest,
         separation=wanted.separation,

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 from rgspipe.config import RgspipeConfig
-from rgspipe.datasets.ply import PlyOptions
 from rgspipe.datasets.ply_cameras import find_cameras
 from rgspipe.datasets.ply_radiosity import find_config
 from rgspipe.datasets.surfel_file import save_surfels
@@ -17,39 +16,11 @@ from rgspipe.stages.base import Stage, StageContext
 def run(context: StageContext) -> None:
     """Write surfels.safetensors and conversion.json."""
     scene = context.config.scene
-    surfels, conversion = load_ply(_path(context.config), ply_options(context.config))
+    surfels, conversion = load_ply(_path(context.config), scene.ply)
     save_surfels(context.folder / "surfels.safetensors", surfels)
     conversion.save(context.folder / "conversion.json")
     print("\n".join(conversion.lines()))
     context.note(surfels=len(surfels), layout=conversion.layout, file=str(scene.path))
-
-
-def ply_options(config: RgspipeConfig) -> PlyOptions:
-    """The library's options for a configuration.
-
-    Raises:
-        InputError: thresholds or corners in the wrong order.
-    """
-    wanted = config.scene.ply
-    if wanted.low is not None and wanted.high is not None and wanted.low >= wanted.high:
-        found = f"{wanted.low} and {wanted.high}"
-        raise InputError("scene.ply.low", expected="less than scene.ply.high", found=found, remedy="Correct them.")
-    if wanted.crop is not None and any(a >= b for a, b in zip(wanted.crop[:3], wanted.crop[3:], strict=True)):
-        raise InputError(
-            "scene.ply.crop", expected="a lower and then an upper corner", found=str(wanted.crop), remedy="Correct it."
-        )
-    return PlyOptions(
-        fronts=wanted.fronts,
-        cameras=None if wanted.cameras is None else Path(wanted.cameras),
-        srgb=wanted.srgb,
-        low=wanted.low,
-        high=wanted.high,
-        layer=wanted.layer,
-        minimum_alpha=wanted.minimum_alpha,
-        gloss=wanted.gloss,
-        crop=None if wanted.crop is None else tuple(wanted.crop),
-        max_surfels=wanted.max_surfels,
-    )
 
 
 def _path(config: RgspipeConfig) -> Path:
@@ -64,7 +35,7 @@ def _files(config: RgspipeConfig) -> list[Path]:
     if config.scene.path is None:
         return []
     path, cameras = Path(config.scene.path), config.scene.ply.cameras
-    others = [find_cameras(path) if cameras is None else Path(cameras), find_config(path)]
+    others = [cameras or find_cameras(path), find_config(path)]
     return [path.resolve(), *(other for other in others if other is not None)]
 
 

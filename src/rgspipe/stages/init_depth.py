@@ -8,7 +8,7 @@ from rgspipe.datasets.gs3 import load_dataset
 from rgspipe.datasets.location import dataset_root
 from rgspipe.datasets.surfel_file import save_surfels
 from rgspipe.datasets.tensoir import require_lights
-from rgspipe.degradation.capture import Capture, degraded
+from rgspipe.degradation.capture import degraded
 from rgspipe.scene import NO_CLIP
 from rgspipe.stages.base import Stage, StageContext
 from rgspipe.stages.detail import surfel_count
@@ -19,7 +19,7 @@ def run(context: StageContext) -> None:
     """Write surfels.safetensors."""
     init = context.config.init
     root = dataset_root(context.inputs["generate_dataset"].folder())
-    views = degraded(load_dataset(root, test=False, targets=False).train, Capture.from_config(context.config.capture))
+    views = degraded(load_dataset(root, test=False, targets=False).train, context.config.capture)
     require_lights(views, root)
     start = time.perf_counter()
     surfels = initialise_surfels(

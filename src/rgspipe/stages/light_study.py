@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import pandas as pd
 
 from rgspipe.artifacts import Artifact
-from rgspipe.config import LightStudyConfig, RgspipeConfig, scene_name
+from rgspipe.config import RgspipeConfig
+from rgspipe.config.studies import LightStudyConfig
 from rgspipe.datasets.advice_file import SUGGESTED, own_views_in_order
 from rgspipe.evaluation.light_study import case_rows, predicted_errors
 from rgspipe.evaluation.light_study_plots import light_study_figure
@@ -46,7 +47,7 @@ def run(context: StageContext) -> None:
     parts, predictions = [], []
     for cell, evaluated in zip(cells, context.input_lists["evaluate"], strict=True):
         targets = pd.read_csv(evaluated.file("metrics.csv"), dtype=TYPES)
-        rows = case_rows(cell.scene, cell.case, targets, config.seed, config.evaluate.bootstrap)
+        rows = case_rows(cell.scene, cell.case, targets, config.seed)
         parts.append(rows)
         if cell.foretells:
             found = predicted_errors(targets, _advice(next(fits), targets))
@@ -81,7 +82,7 @@ def _each_cell(config: RgspipeConfig) -> Iterator[Cell]:
                 for views in _numbers_of_views(wanted, method):
                     foretells = wanted.kind == "views" and method == "search_lm" and views == min(wanted.views)
                     changes = scene | _fit_changes(chosen, method, views, foretells) | case.changes
-                    yield Cell(scene_name(chosen), case.name, changes, foretells)
+                    yield Cell(chosen.scene.folder, case.name, changes, foretells)
 
 
 def _numbers_of_views(wanted: LightStudyConfig, method: str) -> list[int]:
@@ -109,5 +110,5 @@ STAGE = Stage(
     help="recovered lights over numbers of views, errors of images and model, or classes: a table and a figure",
     run=run,
     inputs=_inputs,
-    config_keys=("light_study", "seed", "evaluate.bootstrap"),
+    config_keys=("light_study", "seed"),
 )

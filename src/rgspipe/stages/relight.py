@@ -7,7 +7,8 @@ from statistics import median
 
 import pandas as pd
 
-from rgspipe.config import RelightConfig, RgspipeConfig
+from rgspipe.config import RgspipeConfig
+from rgspipe.config.relight import RelightConfig
 from rgspipe.datasets.light_file import read_lights
 from rgspipe.errors import InputError
 from rgspipe.evaluation.images import save_png

@@ -8,7 +8,7 @@ from pathlib import Path
 import pandas as pd
 import torch
 
-from rgspipe.config import RelightConfig
+from rgspipe.config.relight import RelightConfig
 from rgspipe.errors import InputError
 from rgspipe.evaluation.images import save_png
 from rgspipe.progress import progress_bar

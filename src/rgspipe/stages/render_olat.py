@@ -9,7 +9,9 @@ from rgspipe.blender.fixed_view import FixedView
 from rgspipe.blender.pool.job import PoolJob, SpotRange
 from rgspipe.blender.pool.pool_file import read_pool
 from rgspipe.blender.pool.render_pool import render_pool
-from rgspipe.config import MODELLED, RgspipeConfig, TargetsConfig, TargetSpotConfig
+from rgspipe.config import RgspipeConfig
+from rgspipe.config.scene import MODELLED
+from rgspipe.config.targets import TargetsConfig, TargetSpotConfig
 from rgspipe.errors import InputError
 from rgspipe.scene import SpotLight
 from rgspipe.scene.lights.spot_profiles import PROFILES
@@ -53,7 +55,7 @@ def pool_job(config: RgspipeConfig) -> PoolJob:
         ),
         wanted.kind,
         wanted.frames if wanted.kind == "track" else wanted.pool,
-        tuple(wanted.classes),
+        wanted.classes,
         spot_range(wanted.spot) if wanted.kind != "points" else SpotRange(),
         wanted.views,
         fixed_views(wanted),
@@ -94,17 +96,8 @@ def spot_range(spot: TargetSpotConfig) -> SpotRange:
     """The spots of the configuration in radians.
 
     Raises:
-        InputError: a range ends before it begins, or a rim does not fit its cone.
+        InputError: a rim does not fit its cone.
     """
-    for name in ("cone_angle", "falloff"):
-        low, high = getattr(spot, name)
-        if low > high:
-            raise InputError(
-                f"targets.spot.{name}",
-                expected="the least value, then the largest",
-                found=f"[{low:g},{high:g}]",
-                remedy="Put them in order.",
-            )
     profile, degree = PROFILES[spot.profile], math.radians(1.0)
     rim = degree if profile.falloff_unit else 1.0
     largest = profile.largest_falloff(degree * spot.cone_angle[0]) / rim
@@ -126,7 +119,7 @@ def fixed_views(targets: TargetsConfig) -> tuple[FixedView, ...]:
     Raises:
         InputError: they are no cameras, or fewer than there are views.
     """
-    numbers = targets.cameras or []
+    numbers = targets.cameras or ()
     rows = [numbers[first : first + CAMERA_NUMBERS] for first in range(0, len(numbers), CAMERA_NUMBERS)]
     if len(numbers) % CAMERA_NUMBERS or (rows and len(rows) < targets.views):
         raise InputError(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -10,7 +9,8 @@ from typing import Any
 import pandas as pd
 
 from rgspipe.artifacts import Artifact
-from rgspipe.config import RgspipeConfig, scene_name
+from rgspipe.config import RgspipeConfig
+from rgspipe.config.core import plain
 from rgspipe.datasets.json_file import read_json
 from rgspipe.datasets.surfel_file import load_surfels
 from rgspipe.evaluation.plots import CameraMark
@@ -61,7 +61,7 @@ def _contents(context: StageContext) -> report.ReportContents:
     targets = _table(evaluations, "metrics.csv", verdicts | {"result": str, "reason": str})
     study, remark = found_study(config, judged)
     return report.ReportContents(
-        scene=scene_name(config),
+        scene=config.scene.folder,
         summary=_table(evaluations, "summary.csv"),
         targets=targets,
         curves=_table(evaluations, "convergence.csv"),
@@ -148,7 +148,7 @@ def _optional_bytes(artifact: Artifact | None, name: str) -> bytes | None:
 
 
 def _configuration(config: RgspipeConfig) -> str:
-    shown = {key: value for key, value in dataclasses.asdict(config).items() if key not in _OPERATION}
+    shown = {key: value for key, value in plain(config).items() if key not in _OPERATION}
     return json.dumps(shown, indent=2)
 
 
@@ -201,7 +201,7 @@ def _judgements(config: RgspipeConfig) -> list[Need | str]:
 
 def _keys(config: RgspipeConfig) -> list[str]:
     """Everything that the report prints."""
-    return [field.name for field in dataclasses.fields(config) if field.name not in _OPERATION]
+    return [key for key in plain(config) if key not in _OPERATION]
 
 
 STAGE = Stage(

@@ -7,7 +7,7 @@ from pathlib import Path
 import pandas as pd
 
 from rgspipe.artifacts import Artifact, ArtifactStore, Key
-from rgspipe.config import RgspipeConfig, scene_name
+from rgspipe.config import RgspipeConfig
 from rgspipe.errors import InputError
 from rgspipe.evaluation.light_study import KINDS
 from rgspipe.pages.light_studies import LightStudy
@@ -28,7 +28,7 @@ def found_light_studies(config: RgspipeConfig, freeze: Artifact | None) -> list[
     """
     found = _newest(config)
     return [
-        LightStudy(kind, _rows(study, scene_name(config)), _remark(config, study, freeze))
+        LightStudy(kind, _rows(study, config.scene.folder), _remark(config, study, freeze))
         for kind in KINDS
         for (its_kind, _), study in sorted(found.items(), key=lambda item: len(item[0][1]))
         if its_kind == kind
@@ -37,7 +37,7 @@ def found_light_studies(config: RgspipeConfig, freeze: Artifact | None) -> list[
 
 def _newest(config: RgspipeConfig) -> dict[tuple[str, tuple[str, ...]], Artifact]:
     """By kind and methods; all folders are looked at, as a study over several scenes lies in one scene's."""
-    root, scene = Path(config.outputs), scene_name(config)
+    root, scene = Path(config.outputs), config.scene.folder
     store, newest = ArtifactStore(root), {}
     for path in sorted(root.glob(f"*/{STAGE_NAME}/*/{TABLE}")):
         if path.parent.is_symlink() or path.parent.name.startswith("."):
@@ -70,7 +70,7 @@ def _rows(study: Artifact, scene: str) -> pd.DataFrame:
 
 def _remark(config: RgspipeConfig, study: Artifact, freeze: Artifact | None) -> str:
     """Whether no fit of the study is one of the frozen scene of the report."""
-    store, scene = ArtifactStore(Path(config.outputs)), scene_name(config)
+    store, scene = ArtifactStore(Path(config.outputs)), config.scene.folder
     fits = [_readable(store, Key(scene, "evaluate", name)) for name in study.manifest["inputs"].get("evaluate", ())]
     frozen = {name for fit in fits if fit is not None for name in fit.manifest["inputs"].get("freeze", ())}
     if freeze is not None and freeze.fingerprint in frozen:

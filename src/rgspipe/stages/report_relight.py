@@ -7,7 +7,7 @@ from pathlib import Path
 import pandas as pd
 
 from rgspipe.artifacts import MANIFEST, Artifact, ArtifactStore, Key
-from rgspipe.config import RgspipeConfig, scene_name
+from rgspipe.config import RgspipeConfig
 from rgspipe.datasets.light_file import read_lights
 from rgspipe.errors import InputError
 from rgspipe.pages.gallery import light_words
@@ -60,12 +60,12 @@ def _words(made: Artifact) -> str:
 def _newest(config: RgspipeConfig) -> dict[str, Artifact]:
     """By kind, of those with a picture."""
     store, newest = ArtifactStore(Path(config.outputs)), {}
-    folder = Path(config.outputs) / scene_name(config) / STAGE_NAME
+    folder = Path(config.outputs) / config.scene.folder / STAGE_NAME
     for path in sorted(folder.glob(f"[!.]*/{MANIFEST}")):
         if path.parent.is_symlink():
             continue
         try:
-            found = store.find(Key(scene_name(config), STAGE_NAME, path.parent.name))
+            found = store.find(Key(config.scene.folder, STAGE_NAME, path.parent.name))
         except InputError:
             continue
         if found is None or not any(name in found.manifest["files"] for name in PICTURES):

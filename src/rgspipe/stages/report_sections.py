@@ -10,7 +10,7 @@ import pandas as pd
 import torch
 
 from rgspipe.artifacts import MANIFEST, Artifact, ArtifactStore, Key
-from rgspipe.config import RgspipeConfig, scene_name
+from rgspipe.config import RgspipeConfig
 from rgspipe.datasets.light_file import read_lights
 from rgspipe.datasets.location import open_dataset
 from rgspipe.errors import InputError
@@ -180,11 +180,11 @@ def _newest(
 ) -> dict[str, Artifact]:
     """The newest artifact of a stage, of each group."""
     store, newest = ArtifactStore(Path(config.outputs)), {}
-    for path in sorted((Path(config.outputs) / scene_name(config) / stage).glob(f"[!.]*/{MANIFEST}")):
+    for path in sorted((Path(config.outputs) / config.scene.folder / stage).glob(f"[!.]*/{MANIFEST}")):
         if path.parent.is_symlink():
             continue
         try:
-            found = store.find(Key(scene_name(config), stage, path.parent.name))
+            found = store.find(Key(config.scene.folder, stage, path.parent.name))
         except InputError:
             continue
         if found is not None and (group(found) not in newest or _made(found) > _made(newest[group(found)])):

@@ -8,7 +8,7 @@ from pathlib import Path
 import pandas as pd
 
 from rgspipe.artifacts import Artifact, ArtifactStore
-from rgspipe.config import RgspipeConfig, scene_name
+from rgspipe.config import RgspipeConfig
 
 STUDY = "study.csv"
 
@@ -33,12 +33,12 @@ def found_study(config: RgspipeConfig, judged: Sequence[Artifact]) -> tuple[pd.D
     remark = (
         "" if same else f"This study, of {day}, was made with other settings, data or code than the rest of this page."
     )
-    return _rows(found, scene_name(config)), remark
+    return _rows(found, config.scene.folder), remark
 
 
 def _newest(config: RgspipeConfig) -> Artifact | None:
     """A study over several scenes lies in the folder of the one that was configured, so all folders are looked at."""
-    root, scene = Path(config.outputs), scene_name(config)
+    root, scene = Path(config.outputs), config.scene.folder
     store = ArtifactStore(root)
     folders = sorted(path.parent.name for path in root.glob("*/study"))
     studies = [found for name in folders if (found := store.newest(name, "study")) is not None]

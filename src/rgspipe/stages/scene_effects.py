@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from rgspipe.artifacts import Artifact
-from rgspipe.config import EffectsConfig, RgspipeConfig
+from rgspipe.config import RgspipeConfig
+from rgspipe.config.effects import EffectsConfig
 from rgspipe.datasets.json_file import read_json
 from rgspipe.renderer.effect_bounds import EffectBounds
 from rgspipe.renderer.effects import EffectChoice, RigKind, choose_effects

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
-from rgspipe.blender.models.parameters import BlendFile, HotdogParameters, Model, RoomParameters
-from rgspipe.config import CornellConfig, CornerConfig, SceneConfig
+from rgspipe.blender.models.parameters import BlendFile, Model
+from rgspipe.config.scene import CornellConfig, CornerConfig, SceneConfig
 from rgspipe.errors import InputError
-from rgspipe.scene.models import Box, CornellBox, Corridor
+from rgspipe.scene.models import Box, CornellBox, Corridor, Vector
 
 
 def scene_model(scene: SceneConfig) -> Model:
@@ -21,9 +21,9 @@ def scene_model(scene: SceneConfig) -> Model:
     if scene.kind == "corner":
         return _corridor(scene.corner)
     if scene.kind == "hotdog":
-        return HotdogParameters(scene.hotdog.textured, scene.hotdog.segments)
+        return scene.hotdog
     if scene.kind == "room":
-        return RoomParameters(scene.room.textured, scene.room.segments)
+        return scene.room
     return BlendFile(scene.path)
 
 
@@ -46,28 +46,28 @@ def _cornell_box(wanted: CornellConfig) -> CornellBox:
         _standing_box(wanted, wanted.short_size, wanted.short_center, wanted.short_angle),
     )
     return CornellBox(
-        room=tuple(wanted.room),
-        white=tuple(wanted.wall_color),
-        left=tuple(wanted.left_color),
-        right=tuple(wanted.right_color),
+        room=wanted.room,
+        white=wanted.wall_color,
+        left=wanted.left_color,
+        right=wanted.right_color,
         boxes=boxes,
         gloss=wanted.gloss,
         shininess=wanted.shininess,
     )
 
 
-def _standing_box(wanted: CornellConfig, size: list[float], foot: list[float], degrees: float) -> Box:
+def _standing_box(wanted: CornellConfig, size: Vector, foot: tuple[float, float], degrees: float) -> Box:
     width, depth, height = wanted.room
     center = (foot[0] - 0.5 * width, foot[1] - 0.5 * depth, 0.5 * (size[2] - height))
-    return Box(center, tuple(size), math.radians(degrees), tuple(wanted.box_color))
+    return Box(center, size, math.radians(degrees), wanted.box_color)
 
 
 def _corridor(wanted: CornerConfig) -> Corridor:
     return Corridor(
         width=wanted.width,
         height=wanted.height,
-        wall=tuple(wanted.wall_color),
-        floor=tuple(wanted.floor_color),
-        near_end=tuple(wanted.near_end_color),
-        far_end=tuple(wanted.far_end_color),
+        wall=wanted.wall_color,
+        floor=wanted.floor_color,
+        near_end=wanted.near_end_color,
+        far_end=wanted.far_end_color,
     )

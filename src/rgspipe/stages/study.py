@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import pandas as pd
 
 from rgspipe.benchmark.markdown import markdown_table
-from rgspipe.config import RgspipeConfig, scene_name
+from rgspipe.config import RgspipeConfig
 from rgspipe.evaluation.plots import png_of
 from rgspipe.evaluation.quality_plots import study_figure
 from rgspipe.evaluation.study import TRUTH, study_row, with_factors
@@ -52,9 +52,9 @@ def _cases(config: RgspipeConfig) -> Iterator[tuple[str, str, dict[str, object]]
     """(scene, case, configuration changes) of every row; the last of a scene has true surfels where they are known."""
     for scene, chosen in chosen_scenes(config, config.study.scenes):
         for case in checked_cases(chosen, "study.cases", config.study.cases, SECTION):
-            yield scene_name(chosen), case.name, scene | case.changes
+            yield chosen.scene.folder, case.name, scene | case.changes
         if has_truth(chosen):
-            yield scene_name(chosen), TRUTH, scene | {"freeze.surfels": "truth"}
+            yield chosen.scene.folder, TRUTH, scene | {"freeze.surfels": "truth"}
 
 
 def _inputs(config: RgspipeConfig) -> list[Need]:

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterator, Sequence
-from typing import Any
 
-from omegaconf import OmegaConf
-from omegaconf.errors import OmegaConfBaseException
-
-from rgspipe.config import RgspipeConfig, check_values, describe, with_changes
+from rgspipe.config import RgspipeConfig, get_value, with_changes
+from rgspipe.config.core import describe
 from rgspipe.errors import InputError
 from rgspipe.evaluation.study_cases import Case, parse_case
 
@@ -49,45 +46,25 @@ def checked_cases(config: RgspipeConfig, listed: str, texts: Sequence[str], sect
 
 
 def _checked(config: RgspipeConfig, listed: str, text: str, case: Case) -> Case:
-    changes = {key: _typed(key, value, listed, text) for key, value in case.changes.items()}
+    known = [key for key, _, _ in describe(config)]
+    for key in case.changes:
+        if key not in known:
+            raise _unknown(listed, text, key, known)
+        if key.partition(".")[0] in OPERATION:
+            raise InputError(
+                listed,
+                expected="settings of what is studied",
+                found=f"{text!r}: {key} says how the study is run",
+                remedy="Give it beside the study, not in a case.",
+            )
     try:
-        check_values(with_changes(config, changes))
+        changed = with_changes(config, case.changes)
+        changed.scene.check_path()
     except InputError as error:
         raise InputError(
             f"{listed}: {text!r}: {error.where}", expected=error.expected, found=error.found, remedy=error.remedy
         ) from None
-    return Case(case.name, changes)
-
-
-def _typed(key: str, value: Any, listed: str, text: str) -> Any:
-    """`value` in the type of the key."""
-    known = [name for name, _, _ in describe(RgspipeConfig)]
-    if key not in known:
-        raise _unknown(listed, text, key, known)
-    if key.partition(".")[0] in OPERATION:
-        raise InputError(
-            listed,
-            expected="settings of what is studied",
-            found=f"{text!r}: {key} says how the study is run",
-            remedy="Give it beside the study, not in a case.",
-        )
-    values = OmegaConf.structured(RgspipeConfig)
-    try:
-        OmegaConf.update(values, key, value)
-    except OmegaConfBaseException as error:
-        raise _wrong_type(listed, text, error) from None
-    typed = OmegaConf.select(values, key)
-    return OmegaConf.to_container(typed) if OmegaConf.is_config(typed) else typed
-
-
-def _wrong_type(listed: str, text: str, error: OmegaConfBaseException) -> InputError:
-    found = (error.msg or str(error)).splitlines()[0]
-    return InputError(
-        listed,
-        expected="values of the right type",
-        found=f"{text!r}: {found}",
-        remedy="python -m rgspipe --help SECTION shows what each key of a section may be.",
-    )
+    return Case(case.name, {key: get_value(changed, key) for key in case.changes})
 
 
 def _unknown(listed: str, text: str, key: str, known: Sequence[str]) -> InputError:

@@ -14,11 +14,10 @@ from rgspipe.datasets.views import Target
 from rgspipe.errors import InputError
 from rgspipe.evaluation.plots import png_of
 from rgspipe.evaluation.track_table import track_figure, track_table
-from rgspipe.fitting import SearchOptions
 from rgspipe.fitting.fit import FitViews
 from rgspipe.fitting.model.capture import ImageCapture
 from rgspipe.fitting.tracking.frame import FrameStatus
-from rgspipe.fitting.tracking.track import TrackOptions, track_lights
+from rgspipe.fitting.tracking.track import track_lights
 from rgspipe.fitting.words import explained
 from rgspipe.scene import LightRig
 from rgspipe.stages import fit_capture
@@ -42,8 +41,8 @@ def run(context: StageContext) -> None:
         views,
         frames,
         light_spec(config),
-        search=SearchOptions(config.fit.search.starts, config.fit.search.iterations),
-        options=TrackOptions(config.track.lost, config.track.iterations, config.track.searches, config.track.together),
+        search=config.fit.search,
+        options=config.track,
         capture=captures,
     )
     names = [target.name for target in targets]

@@ -4,47 +4,45 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, fields, replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import torch
 
-from rgspipe.config import TrainConfig
+from rgspipe.config.train import TrainConfig
 from rgspipe.datasets.location import open_dataset
 from rgspipe.datasets.surfel_file import load_surfels, save_surfels
 from rgspipe.datasets.views import View
-from rgspipe.degradation.capture import Capture, degraded
-from rgspipe.errors import InputError
+from rgspipe.degradation.capture import degraded
 from rgspipe.evaluation.held_out import held_out_picture
 from rgspipe.evaluation.held_out_views import render_held_out
 from rgspipe.evaluation.images import save_png
 from rgspipe.files import write_json
 from rgspipe.machine import PeakMemory
+from rgspipe.options import settings
 from rgspipe.scene.gloss import Gloss
 from rgspipe.stages.base import Stage, StageContext
 from rgspipe.training.checkpoint import Checkpoint
-from rgspipe.training.density import DensityOptions
-from rgspipe.training.loss import LossOptions
 from rgspipe.training.materials import build_frozen, fit_materials
-from rgspipe.training.photometric import PhotometricOptions
+from rgspipe.training.operator_store import OperatorStore
+from rgspipe.training.options import TrainOptions
 from rgspipe.training.prior import prior_from_maps
-from rgspipe.training.refine import RefineOptions
-from rgspipe.training.trainer import Trained, TrainOptions, train
+from rgspipe.training.trainer import Trained, train
 
 #: Settings that a training can be resumed with another value of: they do not change the surfels.
-NO_RESULT = ("memory_mib", "checkpoint_every")
+NO_RESULT = ("memory_mib", "scratch", "checkpoint_every")
 
 
 def run(context: StageContext) -> None:
     """Write surfels.safetensors, training.csv, metrics.json and comparison.png."""
     memory, config = PeakMemory(), context.config.train
-    options = replace(train_options(config), scratch=context.scratch)
+    options = replace(config, scratch=config.scratch or context.scratch)
     dataset = open_dataset(context.inputs["generate_dataset"].folder(), targets=False)
     start = load_surfels(context.inputs["init_depth"].file("surfels.safetensors"))
     checkpoint = Checkpoint(context.scratch / "checkpoint.safetensors", config.checkpoint_every)
-    train_views = degraded(dataset.train, Capture.from_config(context.config.capture))
+    train_views = degraded(dataset.train, context.config.capture)
     known = prior_from_maps(train_views, config.albedo_prior_weight) if config.albedo_prior == "dataset" else None
     trained = train(train_views, start, options, checkpoint=checkpoint, prior=known)
     save_surfels(context.folder / "surfels.safetensors", trained.surfels)
@@ -58,7 +56,7 @@ def run(context: StageContext) -> None:
         frozen.transport,
         options.supersampling,
         options.at_pixels,
-        options.operator_store(),
+        OperatorStore.of(options),
         frozen.gather,
     )
     seconds = {"training": trained.records[-1].seconds, "held_out": time.perf_counter() - began}
@@ -81,60 +79,13 @@ def run(context: StageContext) -> None:
     )
 
 
-def train_options(config: TrainConfig) -> TrainOptions:
-    """The library's options for a configuration.
-
-    Raises:
-        InputError: settings that do not go together.
-    """
-    if config.loss == "l1_ssim" and config.window == 0:
-        raise InputError(
-            "train.window",
-            expected="the side of a window of pixels, as train.loss=l1_ssim compares windows",
-            found="0: single pixels",
-            remedy="Set train.window=48, or another loss.",
-        )
-    refine = RefineOptions(
-        steps=config.steps,
-        views_per_step=config.views_per_step,
-        edge_pixels=config.edge_pixels,
-        interior_pixels=config.interior_pixels,
-        subsamples=config.subsamples,
-        relight_every=config.relight_every,
-        window=config.window,
-        loss=LossOptions(config.loss, config.ssim_weight, config.compression),
-        tilt_rate=config.tilt_rate,
-        height_rate=config.height_rate,
-        continuity_weight=config.continuity_weight,
-        smoothness_weight=config.smoothness_weight,
-        distortion_weight=config.distortion_weight,
-        alpha_weight=config.alpha_weight,
-        seed=config.seed,
-    )
-    return TrainOptions(
-        rounds=config.rounds,
-        refine=refine,
-        photometric=PhotometricOptions(rounds=config.photometric_rounds),
-        density=DensityOptions(growth=config.growth),
-        gather_rays=config.gather_rays,
-        patches=config.patches,
-        supersampling=config.supersampling,
-        at_pixels=config.at_pixels,
-        light_rounds=config.light_rounds,
-        unseen=config.unseen,
-        seed=config.seed,
-        memory_mib=config.memory_mib,
-        gloss=config.gloss == "auto",
-    )
-
-
 def _direct_only(
     trained: Trained, train_views: tuple[View, ...], test_views: tuple[View, ...], options: TrainOptions
 ) -> float:
     """Mean held-out PSNR of the same geometry when light does not bounce, its albedo fitted accordingly."""
     surfels = fit_materials(trained.surfels, train_views, options, bounces=False).surfels
     held_out = render_held_out(
-        surfels, test_views, None, options.supersampling, options.at_pixels, options.operator_store()
+        surfels, test_views, None, options.supersampling, options.at_pixels, OperatorStore.of(options)
     )
     return float(np.mean(held_out.psnr))
 
@@ -171,5 +122,5 @@ STAGE = Stage(
     help="fits materials and geometry of the surfels to the training images",
     run=run,
     inputs=lambda config: ["init_depth", "generate_dataset"],
-    config_keys=(*(f"train.{key.name}" for key in fields(TrainConfig) if key.name not in NO_RESULT), "capture"),
+    config_keys=(*(f"train.{key.name}" for key in settings(TrainConfig) if key.name not in NO_RESULT), "capture"),
 )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import torch
 from torch import Tensor
@@ -16,19 +16,8 @@ from rgspipe.scene.surfels import NO_CLIP, Surfels
 APART, SHORTER = 0.6, 0.8
 
 
-@dataclass(frozen=True)
-class DensityOptions:
-    """How surfels split and vanish between rounds of the geometry.
-
-    Attributes:
-        growth: most surfels at the end, as a multiple of those at the start; 1 for no splits.
-        split_share: part of the surfels that splits in a round at most.
-        faintest: opacity below which a surfel is taken away.
-    """
-
-    growth: float = 1.0
-    split_share: float = 0.03
-    faintest: float = 0.03
+#: Part of the surfels that splits in a round at most, and the opacity below which a surfel is taken away.
+SPLIT_SHARE, FAINTEST = 0.03, 0.03
 
 
 def surfel_errors(weights: Iterable[ViewWeights], radiance: Tensor, images: Sequence[Tensor]) -> Tensor:
@@ -46,7 +35,9 @@ def surfel_errors(weights: Iterable[ViewWeights], radiance: Tensor, images: Sequ
     return total
 
 
-def redistributed(surfels: Surfels, errors: Tensor, most: int, options: DensityOptions) -> tuple[Surfels, Tensor]:
+def redistributed(
+    surfels: Surfels, errors: Tensor, most: int, split_share: float = SPLIT_SHARE
+) -> tuple[Surfels, Tensor]:
     """Surfels (M) without the faint ones and with those of the largest errors halved, and whose part each is (M,).
 
     Surfels that no view sees stay: they cast shadows and send light on.
@@ -54,9 +45,10 @@ def redistributed(surfels: Surfels, errors: Tensor, most: int, options: DensityO
     Args:
         errors: (N,) of `surfel_errors`.
         most: surfels at the end.
+        split_share: part of the surfels that splits at most.
     """
-    kept = (surfels.opacities >= options.faintest).nonzero()[:, 0]
-    count = max(0, min(most - len(kept), int(options.split_share * len(kept))))
+    kept = (surfels.opacities >= FAINTEST).nonzero()[:, 0]
+    count = max(0, min(most - len(kept), int(split_share * len(kept))))
     # Stable, so that equal errors do not depend on the machine.
     order = errors[kept].argsort(descending=True, stable=True)[:count]
     split = kept[order[errors[kept][order] > 0.0]]

@@ -3,30 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Literal
 
 import torch
 from torch import Tensor
 
 from rgspipe.optim.ssim import ssim_map
-
-LossKind = Literal["l2", "l1", "l1_ssim"]
-
-
-@dataclass(frozen=True)
-class LossOptions:
-    """What is minimised.
-
-    Attributes:
-        kind: `l2`, mean squared error; `l1`; `l1_ssim`, (1 − λ)·L1 + λ·(1 − SSIM), which needs windows.
-        ssim_weight: λ.
-        compression: µ of the compression log(1 + µx)/log(1 + µ) of radiance in units of the peak; 0 for none.
-    """
-
-    kind: LossKind = "l2"
-    ssim_weight: float = 0.2
-    compression: float = 0.0
+from rgspipe.training.options import LossOptions
 
 
 def compressed(values: Tensor, strength: float) -> Tensor:
@@ -46,10 +28,10 @@ def image_loss(rendered: Tensor, photographed: Tensor, peak: float, options: Los
         ValueError: SSIM of pixels that stand alone.
     """
     x, y = (compressed(values / peak, options.compression) for values in (rendered, photographed))
-    if options.kind == "l2":
+    if options.loss == "l2":
         return (x - y).square().mean()
     absolute = (x - y).abs().mean()
-    if options.kind == "l1":
+    if options.loss == "l1":
         return absolute
     if not window:
         raise ValueError("the loss `l1_ssim` compares windows of images, got pixels that stand alone")

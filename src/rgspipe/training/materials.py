@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 from torch import Tensor
 
@@ -22,6 +20,7 @@ from rgspipe.training.gloss import GlossScene, fit_gloss
 from rgspipe.training.gloss_light import operators_from
 from rgspipe.training.lighting import trace_lighting
 from rgspipe.training.operator_store import OperatorStore, Stored
+from rgspipe.training.options import MaterialOptions
 from rgspipe.training.view_model import build_view_models
 
 #: Rounds of the solve when light does not bounce: only the pixels' weights change.
@@ -29,36 +28,6 @@ DIRECT_ROUNDS = 3
 
 #: The prior of surfels as they stand.
 PriorOf = Callable[[Surfels], AlbedoPrior]
-
-
-@dataclass(frozen=True)
-class MaterialOptions:
-    """How materials are fitted.
-
-    Attributes:
-        rounds: of the albedo solve.
-        gather_rays, patches: of the indirect light.
-        supersampling: of edge pixels in the view weights.
-        at_pixels: whether direct light is taken where pixels look; otherwise at surfels' centres.
-        seed: of rays and patches.
-        gloss: whether surfels get lobes where those pay.
-        memory_mib: budget of the views' operators; those beyond it lie in a file, at the same results.
-        scratch: folder of that file; by default the system's for temporary files.
-    """
-
-    rounds: int = 5
-    gather_rays: int = 128
-    patches: int = 500
-    supersampling: int = 4
-    at_pixels: bool = True
-    seed: int = 0
-    memory_mib: float = math.inf
-    scratch: Path | None = None
-    gloss: bool = False
-
-    def operator_store(self) -> OperatorStore:
-        """Where the operators of a fit go."""
-        return OperatorStore(self.memory_mib, self.scratch)
 
 
 @dataclass(frozen=True)
@@ -124,7 +93,7 @@ def fit_materials(
     rounds = options.rounds if bounces else min(DIRECT_ROUNDS, options.rounds)
     stored = prepared.store.stored + store.stored
     glossy = None
-    if options.gloss and transport is not None:
+    if options.gloss == "auto" and transport is not None:
         glossy = GlossScene(
             surfels,
             models,
@@ -156,7 +125,7 @@ def fit_materials(
 
 def prepare(surfels: Surfels, views: Sequence[View], options: MaterialOptions, bounces: bool = True) -> Prepared:
     """Trace the cameras and, if light bounces, the surfels' view of each other."""
-    store = options.operator_store()
+    store = OperatorStore.of(options)
     weights = trace_views(surfels, views, options.supersampling, store)
     frozen = build_frozen(surfels, options) if bounces else None
     light = (None, None) if frozen is None else (frozen.transport, frozen.gather)

@@ -14,6 +14,7 @@ from torch import Tensor
 
 from rgspipe.errors import InputError
 from rgspipe.renderer.sparse import SparseOperator, in_places
+from rgspipe.training.options import MaterialOptions
 
 MIB = 2**20
 
@@ -53,6 +54,11 @@ class OperatorStore:
         self._budget, self._folder = budget_mib * MIB, folder
         self._file: _PageFile | None = None
         self.stored = Stored()
+
+    @classmethod
+    def of(cls, options: MaterialOptions) -> OperatorStore:
+        """Where the operators of a fit go."""
+        return cls(options.memory_mib, options.scratch)
 
     def keep(self, operator: SparseOperator) -> SparseOperator:
         """The operator, from now on in its place.

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import scipy.sparse
@@ -40,25 +40,15 @@ LARGEST_TURN = 0.1
 CG_STEPS, CG_TOLERANCE = 200, 1e-4
 
 
-@dataclass(frozen=True)
-class PhotometricOptions:
-    """How normals and heights are solved for.
+#: Angle [rad] below which surfels are smoother than shading could make them: on a clean Cornell box, whose normals are
+#: right, the solve turns them by 0.3° (10k surfels, 100 views of 128²) to 1.5° (3k surfels, 30 views of 64²).
+LEAST_ROUGHNESS = 0.01
 
-    Attributes:
-        rounds: solves, each with materials of its own; 0 for none.
-        least_roughness: angle [rad] below which surfels are smoother than shading could make them: on a clean Cornell
-            box, whose normals are right, the solve turns them by 0.3° (10k surfels, 100 views of 128²) to 1.5° (3k
-            surfels, 30 views of 64²).
-        smoothness: weight of neighbours' likeness, relative to what images say of a typical surfel.
-        pull: weight of the normals as they are, likewise.
-        height_pull: weight of heights as they are, relative to one neighbour's continuity.
-    """
+#: Weights of neighbours' likeness and of normals as they are, relative to what images say of a typical surfel.
+SMOOTHNESS, PULL = 1000.0, 0.02
 
-    rounds: int = 1
-    least_roughness: float = 0.01
-    smoothness: float = 1000.0
-    pull: float = 0.02
-    height_pull: float = 1.0
+#: Weight of heights as they are, relative to one neighbour's continuity.
+HEIGHT_PULL = 1.0
 
 
 def roughness(surfels: Surfels, pairs: Neighbours) -> float:
@@ -77,7 +67,6 @@ def fit_normals(
     images: Sequence[Tensor],
     lights: Sequence[SurfelLight],
     pairs: Neighbours,
-    options: PhotometricOptions,
 ) -> Surfels:
     """`surfels` (N) with normals that explain the shading of V views best: one Gauss-Newton step.
 
@@ -99,15 +88,15 @@ def fit_normals(
     typical = _typical(matrix.diagonal()[: 2 * count])
     smooth, smooth_right = _smoothness(surfels, pairs)
     blank = scipy.sparse.csr_matrix((count, count))
-    matrix = matrix + options.smoothness * typical * scipy.sparse.block_diag([smooth, blank])
-    matrix = matrix + options.pull * typical * scipy.sparse.identity(3 * count)
-    right[: 2 * count] += options.smoothness * typical * smooth_right
+    matrix = matrix + SMOOTHNESS * typical * scipy.sparse.block_diag([smooth, blank])
+    matrix = matrix + PULL * typical * scipy.sparse.identity(3 * count)
+    right[: 2 * count] += SMOOTHNESS * typical * smooth_right
     turns = torch.from_numpy(_solve(matrix, right)[: 2 * count].reshape(2, count).T).to(surfels.rotations)
     size = turns.norm(dim=1, keepdim=True).clamp(min=1e-12)
     return replace(surfels, rotations=tilted(surfels.rotations, turns * (LARGEST_TURN / size).clamp(max=1.0)))
 
 
-def fit_heights(surfels: Surfels, measured: Tensor, pairs: Neighbours, options: PhotometricOptions) -> Surfels:
+def fit_heights(surfels: Surfels, measured: Tensor, pairs: Neighbours) -> Surfels:
     """`surfels` moved along their normals until neighbours lie in each other's planes: `regularise.continuity` at its
     least, with a pull to where they were measured.
 
@@ -125,9 +114,9 @@ def fit_heights(surfels: Surfels, measured: Tensor, pairs: Neighbours, options: 
     difference = scipy.sparse.csr_matrix((values, (np.tile(rows, 2), columns)), shape=(len(rows), count))
     weight = pairs.weight.double().numpy()
     weighted = difference.multiply(weight[:, None]).tocsr()
-    matrix = weighted.T @ difference + options.height_pull * scipy.sparse.identity(count)
+    matrix = weighted.T @ difference + HEIGHT_PULL * scipy.sparse.identity(count)
     above = ((measured.double() - centers) * normals).sum(dim=1).numpy()
-    right = options.height_pull * above - weighted.T @ gap
+    right = HEIGHT_PULL * above - weighted.T @ gap
     heights = torch.from_numpy(_solve(matrix, right)).clamp(-pairs.spacing, pairs.spacing)
     return replace(surfels, centers=surfels.centers + (heights[:, None] * normals).to(surfels.centers))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from statistics import fmean
 
@@ -17,7 +17,8 @@ from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.scene.camera import Camera
 from rgspipe.scene.surfels import Surfels
 from rgspipe.training.adam import adam_direction
-from rgspipe.training.loss import LossOptions, image_loss
+from rgspipe.training.loss import image_loss
+from rgspipe.training.options import RefineOptions
 from rgspipe.training.parameters import build_surfels, limit, start_parameters
 from rgspipe.training.regularise import Neighbours, continuity, distortion, find_neighbours, normal_smoothness
 from rgspipe.training.sampling import PixelDraw, draw_pixels, draw_window, pixel_means, views_of_step
@@ -30,49 +31,18 @@ SHOWN_STEPS = 20
 DISTORTION_STRIDE = 16
 
 
-@dataclass(frozen=True)
-class RefineOptions:
-    """How geometry is refined.
-
-    Attributes:
-        steps: Adam steps.
-        relight_every: steps between which shadows and indirect light lag; 0 keeps those of the start.
-        views_per_step: images that a step looks at.
-        edge_pixels, interior_pixels: most pixels of an image, on edges and elsewhere; the latter close pinholes.
-        window: side of a window of pixels that is looked at instead of single pixels; 0 for single ones.
-        subsamples: rays per pixel, squared; in windows, of pixels on edges.
-        position_rate, height_rate, clip_rate: steps in the plane, along the normal and of clips, in surfel spacings.
-        tilt_rate, angle_rate, log_scale_rate, opacity_rate, clip_angle_rate, albedo_rate, threshold_rate: of
-            the others.
-        loss: what is minimised.
-        alpha_weight: of the difference between coverage and the views' alpha.
-        continuity_weight, smoothness_weight, distortion_weight: of the terms in `regularise`.
-        seed: of views and pixels.
-    """
-
-    steps: int = 140
-    relight_every: int = 0
-    views_per_step: int = 5
-    edge_pixels: int = 2000
-    interior_pixels: int = 1000
-    window: int = 0
-    subsamples: int = 3
-    position_rate: float = 0.003
-    height_rate: float = 0.0
-    clip_rate: float = 0.001
-    tilt_rate: float = 0.0
-    angle_rate: float = 0.02
-    log_scale_rate: float = 0.03
-    opacity_rate: float = 0.05
-    clip_angle_rate: float = 0.001
-    albedo_rate: float = 0.0
-    threshold_rate: float = 0.002
-    loss: LossOptions = field(default_factory=LossOptions)
-    alpha_weight: float = 0.0
-    continuity_weight: float = 0.0
-    smoothness_weight: float = 0.0
-    distortion_weight: float = 0.0
-    seed: int = 0
+#: Gradient steps of the parameters by their names in `parameters`; those of IN_SPACINGS are parts of a surfel spacing.
+RATES = {
+    "offset": 0.003,
+    "angle": 0.02,
+    "log_scales": 0.03,
+    "logit": 0.05,
+    "clip_offsets": 0.001,
+    "clip_angles": 0.001,
+    "albedo": 0.0,
+    "thresholds": 0.002,
+}
+IN_SPACINGS = ("offset", "height", "clip_offsets")
 
 
 @dataclass(frozen=True)
@@ -150,6 +120,7 @@ def refine(
     checkpoint: Callable[[RefineState], None] | None = None,
     until: int | None = None,
     after: float = 0.0,
+    rates: Mapping[str, float] | None = None,
 ) -> tuple[Surfels, RefineState]:
     """Surfels that render the views better, and the state at the end.
 
@@ -162,9 +133,10 @@ def refine(
         checkpoint: called with the state after every step.
         until: the step to stop before; all of `options.steps` if None.
         after: seconds of training besides these steps that are left, for the estimate that is shown.
+        rates: instead of those in RATES.
     """
     state = state or RefineState.start(surfels)
-    rates = _rates(options, spacing)
+    rates = _steps(rates or {}, options, spacing)
     pairs = find_neighbours(surfels, spacing)
     last = options.steps if until is None else min(until, options.steps)
     steps = range(state.step, last)
@@ -256,7 +228,7 @@ def _image_term(
         pair = (rendered, view.image[draw.pixels])
         if draw.shape is not None:
             pair = tuple(x.reshape(*draw.shape, 3) for x in pair)
-        terms.append(image_loss(*pair, view.peak, options.loss, window=draw.shape is not None))
+        terms.append(image_loss(*pair, view.peak, options, window=draw.shape is not None))
     return torch.stack(terms).mean()
 
 
@@ -277,16 +249,7 @@ def _alpha_term(views: Sequence[RefineView], draws: Sequence[PixelDraw], covered
     return torch.stack(terms).mean()
 
 
-def _rates(options: RefineOptions, spacing: float) -> dict[str, float]:
-    return {
-        "offset": options.position_rate * spacing,
-        "height": options.height_rate * spacing,
-        "tilt": options.tilt_rate,
-        "angle": options.angle_rate,
-        "log_scales": options.log_scale_rate,
-        "logit": options.opacity_rate,
-        "clip_offsets": options.clip_rate * spacing,
-        "clip_angles": options.clip_angle_rate,
-        "albedo": options.albedo_rate,
-        "thresholds": options.threshold_rate,
-    }
+def _steps(rates: Mapping[str, float], options: RefineOptions, spacing: float) -> dict[str, float]:
+    """The gradient step of each parameter, in its own unit."""
+    wanted = {**RATES, "height": options.height_rate, "tilt": options.tilt_rate, **rates}
+    return {name: rate * (spacing if name in IN_SPACINGS else 1.0) for name, rate in wanted.items()}

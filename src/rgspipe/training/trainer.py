@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -19,17 +19,18 @@ from rgspipe.renderer.view_weights import build_view_weights
 from rgspipe.scene.lights import PointLight
 from rgspipe.scene.surfels import Surfels
 from rgspipe.training.checkpoint import Checkpoint
-from rgspipe.training.density import DensityOptions, redistributed, surfel_errors
+from rgspipe.training.density import redistributed, surfel_errors
 from rgspipe.training.gloss import gloss_radiance
 from rgspipe.training.gloss_light import operators_from
 from rgspipe.training.initialise import Footprint, initialise_surfels
 from rgspipe.training.light_refinement import refine_lights
 from rgspipe.training.lighting import total_irradiance, trace_lighting
-from rgspipe.training.materials import MaterialOptions, Materials, PriorOf, build_frozen, each_view, fit_materials
+from rgspipe.training.materials import Materials, PriorOf, build_frozen, each_view, fit_materials
 from rgspipe.training.operator_store import Stored
-from rgspipe.training.photometric import PhotometricOptions, fit_heights, fit_normals, roughness
+from rgspipe.training.options import TrainOptions
+from rgspipe.training.photometric import LEAST_ROUGHNESS, fit_heights, fit_normals, roughness
 from rgspipe.training.record import Record, materials_seconds
-from rgspipe.training.refine import RefineOptions, RefineState, RefineView, refine
+from rgspipe.training.refine import RefineState, RefineView, refine
 from rgspipe.training.regularise import find_neighbours
 from rgspipe.training.shading import surfel_lights
 
@@ -37,25 +38,6 @@ logger = logging.getLogger(__name__)
 
 #: How many surfels a scene gets if nothing else is said.
 SURFELS = 10_000
-
-
-@dataclass(frozen=True)
-class TrainOptions(MaterialOptions):
-    """How surfels are trained: their materials, before and after the geometry, and the geometry.
-
-    Attributes:
-        refine: of the geometry; its `steps` may be 0.
-        photometric: of normals from shading, where depth was too noisy to tell them.
-        density: of surfels that split and vanish whenever light is made again.
-        light_rounds: how often lights that were measured with errors are refined, before the geometry and after it.
-        unseen: whether rooms get surfels where no view saw what is there, after the geometry.
-    """
-
-    refine: RefineOptions = field(default_factory=RefineOptions)
-    photometric: PhotometricOptions = field(default_factory=PhotometricOptions)
-    density: DensityOptions = field(default_factory=DensityOptions)
-    light_rounds: int = 0
-    unseen: bool = True
 
 
 @dataclass(frozen=True, repr=False)
@@ -106,21 +88,21 @@ def train(
     log = _Log(checkpoint.records if checkpoint else [])
     surfels = surfels.to(torch.float32)
     spacing, given = surfel_spacing(surfels), [view.light for view in views]
-    most = int(options.density.growth * len(surfels))
+    most = int(options.growth * len(surfels))
     if checkpoint is not None and (found := checkpoint.load(surfels)) is not None:
         surfels, radiance, state, lights = found
         views = [replace(view, light=light) for view, light in zip(views, lights, strict=True)]
     else:
-        if options.refine.steps == 0:
+        if options.steps == 0:
             surfels = _closed(surfels, views, options)
         surfels, radiance, views = _fit_materials(surfels, views, given, options, log, "materials", prior)
         centers, state = surfels.centers, None
-        for _ in range(options.photometric.rounds):
-            turned = _turned_by_shading(surfels, centers, views, radiance, spacing, options)
+        for _ in range(options.photometric_rounds):
+            turned = _turned_by_shading(surfels, centers, views, radiance, spacing)
             if turned is None:
                 break
             surfels, radiance, views = _fit_materials(turned, views, given, options, log, "materials", prior)
-    if options.refine.steps > 0:
+    if options.steps > 0:
         if checkpoint is not None and state is None:
             checkpoint.save(surfels, radiance, None, log.records, [view.light for view in views])
         surfels = _refine_geometry(surfels, radiance, state, views, spacing, options, log, checkpoint, most)
@@ -162,17 +144,17 @@ def _fit_materials(
 
 
 def _turned_by_shading(
-    surfels: Surfels, measured: Tensor, views: Sequence[View], radiance: Tensor, spacing: float, options: TrainOptions
+    surfels: Surfels, measured: Tensor, views: Sequence[View], radiance: Tensor, spacing: float
 ) -> Surfels | None:
     """Rough surfels with normals and heights as the shading says; None if depth knows better."""
-    pairs, photometric = find_neighbours(surfels, spacing), options.photometric
-    if roughness(surfels, pairs) < photometric.least_roughness:
+    pairs = find_neighbours(surfels, spacing)
+    if roughness(surfels, pairs) < LEAST_ROUGHNESS:
         return None
     lights = surfel_lights(surfels, [view.light for view in views], radiance / surfels.albedo.clamp(min=1e-6))
     weights = each_view(surfels, views, supersampling=1)
     images = [view.image.reshape(-1, 3).float() for view in views]
-    turned = fit_normals(surfels, weights, images, lights, pairs, photometric)
-    return fit_heights(turned, measured, find_neighbours(turned, spacing), photometric)
+    turned = fit_normals(surfels, weights, images, lights, pairs)
+    return fit_heights(turned, measured, find_neighbours(turned, spacing))
 
 
 def _refine_geometry(
@@ -192,7 +174,7 @@ def _refine_geometry(
         most: surfels at the end.
     """
     state = state or RefineState.start(surfels)
-    steps, every = options.refine.steps, options.refine.relight_every or options.refine.steps
+    steps, every = options.steps, options.relight_every or options.steps
     lights, relighting = [view.light for view in views], 0.0
 
     def keep(progress: RefineState) -> None:
@@ -208,13 +190,13 @@ def _refine_geometry(
         # Rounds that make light again, and the materials at the end.
         rounds = (steps - 1) // every - state.step // every
         after = rounds * relighting + materials_seconds(log.records)
-        surfels_after, state = refine(surfels, refined, spacing, options.refine, state, keep, until, after)
+        surfels_after, state = refine(surfels, refined, spacing, options, state, keep, until, after)
         if state.step >= steps:
             return surfels_after
         began = time.monotonic()
         surfels, radiance = surfels_after, _relit(surfels_after, views, options)
-        if options.density.growth > 1.0:
-            surfels, parent = _redistributed(surfels, views, radiance, most, options.density)
+        if options.growth > 1.0:
+            surfels, parent = _redistributed(surfels, views, radiance, most)
             radiance, state = _relit(surfels, views, options), state.of_parts(parent)
         state = state.rebased(surfels)
         if checkpoint is not None:
@@ -222,12 +204,10 @@ def _refine_geometry(
         relighting = time.monotonic() - began
 
 
-def _redistributed(
-    surfels: Surfels, views: Sequence[View], radiance: Tensor, most: int, options: DensityOptions
-) -> tuple[Surfels, Tensor]:
+def _redistributed(surfels: Surfels, views: Sequence[View], radiance: Tensor, most: int) -> tuple[Surfels, Tensor]:
     weights = each_view(surfels, views, supersampling=1)
     errors = surfel_errors(weights, radiance, [view.image.reshape(-1, 3).float() for view in views])
-    return redistributed(surfels, errors, most, options)
+    return redistributed(surfels, errors, most)
 
 
 def _relit(surfels: Surfels, views: Sequence[View], options: TrainOptions) -> Tensor:

@@ -11,19 +11,21 @@ import torch
 from emitters import emitter_at
 from lit_room import HIDDEN, VISIBLE
 from rgspipe.fitting.model.problem import LightProblem
+from rgspipe.fitting.options import RivalOptions, SearchOptions
 from rgspipe.fitting.search.compare import (
-    Bar,
-    Likeness,
     best_state,
+    distinct,
     drop,
+    passed,
     rig_distance,
+    worth_keeping,
 )
 from rgspipe.fitting.search.refine import Refiner, State
 from rgspipe.fitting.search.weighting import ROBUST
 from rgspipe.fitting.selection.rivals import equally_good
 from rgspipe.scene.lights import SpotLight
 
-BAR, ALIKE = Bar(), Likeness()
+BAR, MET = SearchOptions().bar, SearchOptions().schedule.met
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +48,7 @@ def shifted(place: tuple[float, float, float], by: float) -> tuple[float, float,
 def test_the_true_light_is_better_than_another(problem: LightProblem) -> None:
     true, other = state(problem, VISIBLE), state(problem, HIDDEN)
     assert best_state(problem, [other, true]) is true
-    assert drop(problem, other, true) > 0.5 and not equally_good(problem, true, other)
+    assert drop(problem, other, true) > 0.5 and not equally_good(problem, true, other, RivalOptions())
 
 
 def test_a_light_more_than_there_are_gains_next_to_nothing(problem: LightProblem) -> None:
@@ -63,7 +65,7 @@ def lit_by_two(room, point_light, strength: float, noise: float) -> tuple[float,
     problem = LightProblem.create(room.one.prepared, stacked)
     one, two = state(problem, VISIBLE), state(problem, VISIBLE, HIDDEN)
     share = float(strength * second.mean() / image.mean())
-    return share, drop(problem, one, two), BAR.passed(problem, one, two)
+    return share, drop(problem, one, two), passed(problem, one, two, BAR)
 
 
 def test_a_faint_light_must_explain_more_than_a_bright_one(room, point_light) -> None:
@@ -79,8 +81,8 @@ def test_a_faint_light_must_explain_more_than_a_bright_one(room, point_light) ->
 def test_rigs_within_the_noise_are_equally_good(problem: LightProblem) -> None:
     """A shift of 1e-4 is far below what the noise allows to tell."""
     true = state(problem, VISIBLE)
-    assert equally_good(problem, true, state(problem, shifted(VISIBLE, 1e-4)))
-    assert not equally_good(problem, true, state(problem, shifted(VISIBLE, 0.1)))
+    assert equally_good(problem, true, state(problem, shifted(VISIBLE, 1e-4)), RivalOptions())
+    assert not equally_good(problem, true, state(problem, shifted(VISIBLE, 0.1)), RivalOptions())
 
 
 def test_distance_of_rigs_is_that_of_the_best_matching() -> None:
@@ -95,19 +97,19 @@ def test_twins_are_merged_and_faint_lights_dropped(problem: LightProblem) -> Non
     three = state(problem, VISIBLE, shifted(VISIBLE, 0.01), HIDDEN)
     for strengths, kept in (((0.5, 1.0, 1.0), [1, 2]), ((0.0, 1.0, 1e-3), [1])):
         intensity = torch.tensor(strengths, dtype=torch.float64)[:, None].expand(3, 3)
-        assert ALIKE.worth_keeping(replace(three, intensity=intensity), 1.0) == kept
+        assert worth_keeping(replace(three, intensity=intensity), BAR, 1.0) == kept
 
 
 def test_rigs_that_met_are_refined_once(problem: LightProblem) -> None:
     """Of rigs on their way to the same place the first is left, in whichever order their lights stand."""
     size = problem.views.frozen.size
-    near, far = shifted(VISIBLE, 0.9 * ALIKE.met * size), shifted(VISIBLE, 1.1 * ALIKE.met * size)
+    near, far = shifted(VISIBLE, 0.9 * MET * size), shifted(VISIBLE, 1.1 * MET * size)
     first, second, third = state(problem, VISIBLE), state(problem, near), state(problem, far)
-    kept = ALIKE.distinct([first, second, third], size)
+    kept = distinct([first, second, third], MET, size)
     assert [one is other for one, other in zip(kept, [first, third], strict=True)] == [True, True]
     pair, swapped = state(problem, VISIBLE, HIDDEN), state(problem, HIDDEN, near)
-    assert ALIKE.distinct([pair, swapped], size) == [pair]
-    assert ALIKE.distinct([first, pair], size) == [first, pair], "another number of lights is another rig"
+    assert distinct([pair, swapped], MET, size) == [pair]
+    assert distinct([first, pair], MET, size) == [first, pair], "another number of lights is another rig"
 
 
 def test_spots_that_point_elsewhere_have_not_met(problem: LightProblem) -> None:
@@ -115,7 +117,7 @@ def test_spots_that_point_elsewhere_have_not_met(problem: LightProblem) -> None:
     place = torch.tensor(VISIBLE, dtype=torch.float64)
     turned = [torch.tensor([math.sin(angle), 0.0, -math.cos(angle)], dtype=torch.float64) for angle in (0, 0.005, 0.3)]
     spots = [Refiner.of(problem).start([emitter_at(place, axis, shape)], ROBUST) for axis in turned]
-    assert ALIKE.distinct(spots, 1.0) == [spots[0], spots[2]]
+    assert distinct(spots, MET, 1.0) == [spots[0], spots[2]]
     wider = Refiner.of(problem).start([emitter_at(place, turned[0], SpotLight.shaped("smoothstep", 0.6, 0.3))], ROBUST)
-    assert ALIKE.distinct([spots[0], wider], 1.0) == [spots[0], wider]
-    assert ALIKE.distinct([state(problem, VISIBLE), spots[0]], 1.0)[1] is spots[0], "a point light is no spot"
+    assert distinct([spots[0], wider], MET, 1.0) == [spots[0], wider]
+    assert distinct([state(problem, VISIBLE), spots[0]], MET, 1.0)[1] is spots[0], "a point light is no spot"

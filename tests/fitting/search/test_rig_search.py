@@ -7,6 +7,7 @@ import torch
 from emitters import emitter_at
 from lit_room import VISIBLE
 from rgspipe.fitting.model.problem import LightProblem
+from rgspipe.fitting.search.compare import worth_keeping
 from rgspipe.fitting.search.refine import Refiner
 from rgspipe.fitting.search.rig_search import RigSearch
 from rgspipe.fitting.search.weighting import ROBUST
@@ -20,8 +21,8 @@ def test_lights_that_meet_by_plain_squares_are_one(room, point_light):
     refiner = Refiner.of(problem)
     search = RigSearch(refiner, [])
     place = torch.tensor(VISIBLE, dtype=torch.float64)
-    apart = torch.tensor([0.6 * search.alike.merged * problem.views.frozen.size, 0.0, 0.0], dtype=torch.float64)
+    apart = torch.tensor([0.6 * search.options.bar.merged * problem.views.frozen.size, 0.0, 0.0], dtype=torch.float64)
     twins = refiner.start([emitter_at(place - apart), emitter_at(place + apart)], ROBUST)
-    assert len(search.alike.worth_keeping(twins, problem.views.frozen.size)) == 2
+    assert len(worth_keeping(twins, search.options.bar, problem.views.frozen.size)) == 2
     (found,) = search.without_twins(twins).emitters
     assert float((found.position - place).norm()) < 1e-4  # measured 3e-8

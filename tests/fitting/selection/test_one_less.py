@@ -11,7 +11,7 @@ from noisy_fits import SHAPE, THIRD, noisy_fit, noisy_images
 from rgspipe.fitting import FitResult, FitStatus, LightSpec, prepare_fit
 from rgspipe.fitting.findings import LightSpare
 from rgspipe.fitting.model.problem import LightProblem
-from rgspipe.fitting.search.compare import Bar
+from rgspipe.fitting.options import BarOptions
 from rgspipe.fitting.search.refine import Refiner
 from rgspipe.fitting.search.weighting import ROBUST
 from rgspipe.fitting.selection.one_less import one_light_less
@@ -46,7 +46,7 @@ def test_a_right_number_is_not_doubted(room, point_light, places):
     count = len(places)
     result = noisy_fit(room, tuple(point_light(place) for place in places), LightSpec(count=count))
     assert result.status is FitStatus.CONVERGED and set(result.costs) == {count - 1, count}
-    assert 1.0 - result.costs[count] / result.costs[count - 1] > 2.0 * Bar().least  # measured at least 0.919
+    assert 1.0 - result.costs[count] / result.costs[count - 1] > 2.0 * BarOptions().least  # measured at least 0.919
 
 
 def test_the_light_that_is_spare_is_named_and_the_others_take_its_part(room, point_light):
@@ -58,7 +58,7 @@ def test_the_light_that_is_spare_is_named_and_the_others_take_its_part(room, poi
     places = [HIDDEN, VISIBLE, beside]
     emitters = [emitter_at(torch.tensor(place, dtype=torch.float64)) for place in places]
     refiner = Refiner.of(problem)
-    found = one_light_less(refiner, refiner.start(emitters, ROBUST))
+    found = one_light_less(refiner, refiner.start(emitters, ROBUST), BarOptions())
     assert not found.worth and found.index in (1, 2) and found.gain < 0.1  # measured 0.001
     assert [len(state.emitters) for state in (found.rich, found.simple)] == [3, 2]
     nearest = min(float((one.position - emitters[1].position).norm()) for one in found.simple.emitters)

@@ -11,9 +11,10 @@ import torch
 from lit_room import VISIBLE
 from rgspipe.fitting import LightSpec, SearchOptions, fit_lights, prepare_fit
 from rgspipe.fitting.findings import OutOfSteps, Rival
+from rgspipe.fitting.options import TrackOptions
 from rgspipe.fitting.result import dark_result
 from rgspipe.fitting.tracking.frame import FrameStatus, TrackedFrame, in_order
-from rgspipe.fitting.tracking.track import TrackOptions, search_order, track_lights
+from rgspipe.fitting.tracking.track import search_order, track_lights
 from rgspipe.scene import LightRig, SpotLight
 
 SHAPE = SpotLight.shaped("gaussian", math.radians(30.0), math.radians(12.0))

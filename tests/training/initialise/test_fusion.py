@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from curved import torus_distance, torus_normals, torus_views
 from raycast import BLOCK, ROOM, room_views, surface_distance
 from rgspipe.datasets.views import View
-from rgspipe.degradation.capture import Capture, degraded
+from rgspipe.degradation.capture import degraded
+from rgspipe.degradation.options import Capture
 from rgspipe.errors import InputError
 from rgspipe.scene import Camera
 from rgspipe.training.initialise import cloud_from_views, initialise_surfels, see_surfaces

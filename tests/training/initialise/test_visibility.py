@@ -9,7 +9,8 @@ import pytest
 import torch
 
 from raycast import room_views
-from rgspipe.degradation.capture import Capture, degraded
+from rgspipe.degradation.capture import degraded
+from rgspipe.degradation.options import Capture
 from rgspipe.training.initialise.facets import Facets
 from rgspipe.training.initialise.visibility import confirmed
 

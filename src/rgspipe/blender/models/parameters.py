@@ -4,33 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from rgspipe.blender.options import HotdogParameters, RoomParameters
 from rgspipe.scene.models import Box, CornellBox, Corridor
-
-
-@dataclass(frozen=True)
-class HotdogParameters:
-    """A hot dog on a plate, in empty space.
-
-    Attributes:
-        textured: procedural textures on bun, sausage and plate; without them every part has one colour.
-        segments: faces around a plate or a bun. Normals of smooth surfaces turn by half of 360°/segments in a face.
-    """
-
-    textured: bool = True
-    segments: int = 192
-
-
-@dataclass(frozen=True)
-class RoomParameters:
-    """A closed, furnished room.
-
-    Attributes:
-        textured: procedural textures on floor, walls and furniture; without them every part has one colour.
-        segments: faces around whatever is round.
-    """
-
-    textured: bool = True
-    segments: int = 192
 
 
 @dataclass(frozen=True)

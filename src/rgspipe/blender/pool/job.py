@@ -10,6 +10,7 @@ import numpy as np
 
 from rgspipe.blender.fixed_view import FixedView
 from rgspipe.blender.job import DatasetJob
+from rgspipe.datasets.classes import LIGHT_CLASSES, LightClass
 from rgspipe.scene.lights import SpotLight, SpotProfile
 from rgspipe.scene.lights.spot_profiles import PROFILES
 
@@ -73,7 +74,7 @@ class PoolJob:
     dataset: DatasetJob
     kind: Kind
     number: int
-    classes: tuple[str, ...] = ("visible", "out_of_frame", "occluded", "around_corner")
+    classes: tuple[LightClass, ...] = LIGHT_CLASSES
     spot: SpotRange = SpotRange()
     views: int = 3
     cameras: tuple[FixedView, ...] = ()

@@ -16,7 +16,6 @@ from rgspipe.fitting.baselines.paper_adam_start import (
     LOG_INTENSITY_LIMIT,
     Ball,
     LightPrior,
-    StartOptions,
     draw_start,
     light_ball,
 )
@@ -25,41 +24,11 @@ from rgspipe.fitting.certainty.uncertainty import light_covariances
 from rgspipe.fitting.findings import AllStepsTaken, AtBound
 from rgspipe.fitting.meter import Meter
 from rgspipe.fitting.model.problem import LightProblem
+from rgspipe.fitting.options import AdamOptions
 from rgspipe.fitting.result import FitResult, Step, dark_result
 from rgspipe.fitting.search.refine import State
 from rgspipe.fitting.spec import LightSpec
 from rgspipe.progress import progress_bar
-
-
-@dataclass(frozen=True)
-class AdamOptions:
-    """The published method's settings.
-
-    Attributes:
-        epochs, steps: epochs of so many steps each.
-        position_rate: learning rate of the positions.
-        intensity_rate: learning rate of the log-intensities.
-        ssim_weight: λ, the share of structural similarity in the loss.
-        init, random_intensity: see `StartOptions`.
-        patience: stop after so many epochs without a lower loss; None never stops early.
-        axis_rate: learning rate of spots' axes.
-        aim: see `StartOptions`.
-    """
-
-    epochs: int = 25
-    steps: int = 50
-    position_rate: float = 0.01
-    intensity_rate: float = 0.05
-    ssim_weight: float = 0.2
-    init: str = "dataset"
-    random_intensity: bool = False
-    patience: int | None = None
-    axis_rate: float = 0.005
-    aim: str = "center"
-
-    @property
-    def start(self) -> StartOptions:
-        return StartOptions(self.init, self.random_intensity, self.aim)
 
 
 def fit_paper_adam(
@@ -115,7 +84,7 @@ class _Descent:
         meter: Meter,
     ) -> _Descent:
         ball, scene_radius = light_ball(problem.views.frozen, prior)
-        start = draw_start(ball, scene_radius, prior, options.start, seed, spec.count)
+        start = draw_start(ball, scene_radius, prior, options, seed, spec.count)
         axes = start.axes.clone().requires_grad_() if spec.aimed else None
         leaves = (leaf.clone().requires_grad_() for leaf in (start.positions, start.log_intensities))
         rig = MovingRig(*leaves, spec.kinds[0], axes)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from rgspipe.fitting.options import StartOptions
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import PointLight
 
@@ -23,8 +24,6 @@ SCENE_REACH = 4.0
 
 #: Radius of the sphere of `init=sphere`, in radii of the scene.
 SPHERE_RADII = 2.0
-
-INITS, AIMS = ("dataset", "sphere"), ("center", "random")
 
 
 @dataclass(frozen=True)
@@ -74,30 +73,6 @@ def light_ball(frozen: FrozenScene, prior: LightPrior | None) -> tuple[Ball, flo
     scene_radius = float((centers - middle).norm(dim=1).amax())
     farthest = float((prior.positions - middle).norm(dim=1).amax()) if prior is not None else 0.0
     return Ball(middle, max(LIGHT_REACH * farthest, SCENE_REACH * scene_radius)), scene_radius
-
-
-@dataclass(frozen=True)
-class StartOptions:
-    """How a start is drawn.
-
-    Attributes:
-        init: "dataset" draws positions from the training lights' mean and spread, "sphere" from a sphere; without
-            training lights always the sphere.
-        random_intensity: whether the first intensity is drawn, too: e^u times its mean, u uniform in ±1.
-        aim: where spots point at first: "center" to the middle of the scene, "random" anywhere.
-
-    Raises:
-        ValueError: another init or aim.
-    """
-
-    init: str = "dataset"
-    random_intensity: bool = False
-    aim: str = "center"
-
-    def __post_init__(self) -> None:
-        for name, value, known in (("init", self.init, INITS), ("aim", self.aim, AIMS)):
-            if value not in known:
-                raise ValueError(f"{name} must be one of {known}, got {value!r}")
 
 
 @dataclass(frozen=True)

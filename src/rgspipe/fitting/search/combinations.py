@@ -11,29 +11,8 @@ from torch import Tensor
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.nonnegative import nonnegative
 from rgspipe.fitting.model.problem import LightProblem
+from rgspipe.fitting.options import CombinationOptions
 from rgspipe.fitting.search.coarse import CoarseImages
-
-
-@dataclass(frozen=True)
-class CombinationOptions:
-    """How candidates are put together to starts.
-
-    Attributes:
-        variety: so many times the wanted number of combinations are looked at, as neighbours of the best are much like
-            it.
-        separation, turned: starts stand so far apart, a part of the scene's size; lights at one place may differ by
-            `turned` in their axes (the cosine between them).
-        all_pairs: up to this many candidates all pairs are tried.
-        beam: combinations that are kept while lights are added one by one.
-        joining: of the candidates that may join a combination, so many are tried with exact intensities.
-    """
-
-    variety: int = 40
-    separation: float = 0.16
-    turned: float = 0.85
-    all_pairs: int = 900
-    beam: int = 24
-    joining: int = 16
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import torch
@@ -13,82 +12,54 @@ from torch import Tensor
 
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.problem import LightProblem
+from rgspipe.fitting.options import BarOptions
 from rgspipe.fitting.search.refine import State
 from rgspipe.fitting.search.weighting import ROBUST, cauchy_scale
 
 
-@dataclass(frozen=True)
-class Bar:
-    """How much a light has to lower the robust cost of the blocks to be there, rather than an error of the model.
-
-    Attributes:
-        least: one light more, or a spot in the place of a point light, lowers it by this share …
-        doubtful: … and one that lowers it by more than this share may be there, which the answer says.
-        faint, least_faint: where a light of the richer rig sends less than `faint` of the image's energy, it is
-            `least_faint`: a light too many, which explains what the model gets wrong, is a faint one. Chosen on other
-            scenes than it is judged on, see docs/laboratory/number_of_lights.md.
-    """
-
-    least: float = 0.2
-    doubtful: float = 0.07
-    faint: float = 0.12
-    least_faint: float = 0.5
-
-    def wanted(self, rich: State) -> float:
-        """The share by which `rich` has to lower the cost."""
-        energies = light_energies(rich)
-        return self.least_faint if min(energies) < self.faint * sum(energies) else self.least
-
-    def passed(self, problem: LightProblem, simple: State, rich: State) -> bool:
-        """Whether the light that `rich` has and `simple` has not is there."""
-        return drop(problem, simple, rich) >= self.wanted(rich)
+def wanted(rich: State, bar: BarOptions) -> float:
+    """The share by which `rich` has to lower the robust cost for its lights to be there."""
+    energies = light_energies(rich)
+    return bar.least_faint if min(energies) < bar.faint * sum(energies) else bar.least
 
 
-@dataclass(frozen=True)
-class Likeness:
-    """When rigs, and lights of one rig, are the same. Lengths are parts of the scene's size.
+def passed(problem: LightProblem, simple: State, rich: State, bar: BarOptions) -> bool:
+    """Whether the light that `rich` has and `simple` has not is there."""
+    return drop(problem, simple, rich) >= wanted(rich, bar)
 
-    Attributes:
-        met: rigs whose lights are within this of each other, and their axes and shapes within as many radians, are on
-            their way to the same place.
-        merged, least_energy: lights of one kind that end closer than `merged` are one, and a light with less than
-            `least_energy` of the image's energy is none; where the number of lights is not known.
-    """
 
-    met: float = 0.01
-    merged: float = 0.03
-    least_energy: float = 0.01
+def distinct(states: Sequence[State], met: float, size: float) -> list[State]:
+    """The rigs without those that met one before them; see `ScheduleOptions.met`."""
+    kept: list[State] = []
+    for state in states:
+        if not any(_met(state.emitters, other.emitters, met, size) for other in kept):
+            kept.append(state)
+    return kept
 
-    def distinct(self, states: Sequence[State], size: float) -> list[State]:
-        """The rigs without those that met one before them."""
-        kept: list[State] = []
-        for state in states:
-            if not any(self._met(state.emitters, other.emitters, size) for other in kept):
-                kept.append(state)
-        return kept
 
-    def worth_keeping(self, state: State, size: float) -> list[int]:
-        """Indices of the lights that send enough of the image's energy and do not coincide with a brighter one."""
-        energies = light_energies(state)
-        kept: list[int] = []
-        for index in sorted(range(len(energies)), key=lambda k: -energies[k]):
-            emitter = state.emitters[index]
-            twins = [
-                other
-                for other in kept
-                if state.emitters[other].light.kind == emitter.light.kind
-                and float((state.emitters[other].position - emitter.position).norm()) < self.merged * size
-            ]
-            if not twins and energies[index] >= self.least_energy * sum(energies):
-                kept.append(index)
-        return sorted(kept)
+def _met(one: Sequence[Emitter], other: Sequence[Emitter], met: float, size: float) -> bool:
+    """Whether each light of a rig is where its counterpart is."""
+    if len(one) != len(other):
+        return False
+    pairs = _counterparts(one, other)
+    return all(a.light.kind == b.light.kind and a.distance(b, size) < met for a, b in pairs)
 
-    def _met(self, one: Sequence[Emitter], other: Sequence[Emitter], size: float) -> bool:
-        """Whether each light of a rig is where its counterpart is."""
-        if len(one) != len(other):
-            return False
-        pairs = _counterparts(one, other)
-        return all(a.light.kind == b.light.kind and a.distance(b, size) < self.met for a, b in pairs)
+
+def worth_keeping(state: State, bar: BarOptions, size: float) -> list[int]:
+    """Indices of the lights that send enough of the image's energy and do not coincide with a brighter one."""
+    energies = light_energies(state)
+    kept: list[int] = []
+    for index in sorted(range(len(energies)), key=lambda k: -energies[k]):
+        emitter = state.emitters[index]
+        twins = [
+            other
+            for other in kept
+            if state.emitters[other].light.kind == emitter.light.kind
+            and float((state.emitters[other].position - emitter.position).norm()) < bar.merged * size
+        ]
+        if not twins and energies[index] >= bar.least_energy * sum(energies):
+            kept.append(index)
+    return sorted(kept)
 
 
 def robust_losses(problem: LightProblem, states: Sequence[State]) -> list[Tensor]:

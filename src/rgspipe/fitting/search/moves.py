@@ -9,6 +9,7 @@ import torch
 from torch import Tensor
 
 from rgspipe.fitting.model.emitter import Emitter
+from rgspipe.fitting.options import StepLimits
 from rgspipe.optim.levenberg_marquardt import within
 from rgspipe.renderer.frozen import FrozenScene
 
@@ -39,25 +40,10 @@ class Region:
         return bool(((position - self.lower < near) | (self.upper - position < near)).any())
 
 
-@dataclass(frozen=True)
-class StepLimits:
-    """The longest step: as far as derivatives at its start may be trusted.
-
-    Attributes:
-        move: of a position, a part of the scene's size.
-        turn: of an axis [rad], and of the parameters of a shape.
-    """
-
-    move: float = 0.12
-    turn: float = 0.3
-
-    def allowed(self, rig: Sequence[Emitter], step: Tensor) -> float:
-        """By which part a step (D,) of the parameters of all lights has to be shortened."""
-        return min(self._allowed(emitter, part) for emitter, part in _parts(rig, step))
-
-    def _allowed(self, emitter: Emitter, step: Tensor) -> float:
-        moved, turned = emitter.stretch(step)
-        return min(within(moved, self.move), within(turned, self.turn))
+def allowed_share(rig: Sequence[Emitter], step: Tensor, limits: StepLimits) -> float:
+    """By which part a step (D,) of the parameters of all lights has to be shortened."""
+    stretches = [emitter.stretch(part) for emitter, part in _parts(rig, step)]
+    return min(min(within(moved, limits.move), within(turned, limits.turn)) for moved, turned in stretches)
 
 
 def moved_rig(rig: Sequence[Emitter], step: Tensor, region: Region) -> tuple[Emitter, ...]:

@@ -15,8 +15,9 @@ from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.exposure import ExposedMoments
 from rgspipe.fitting.model.moments import Moments
 from rgspipe.fitting.model.problem import LightProblem
+from rgspipe.fitting.options import StepLimits
 from rgspipe.fitting.result import Step
-from rgspipe.fitting.search.moves import Region, StepLimits, moved_rig, rig_move
+from rgspipe.fitting.search.moves import Region, allowed_share, moved_rig, rig_move
 from rgspipe.fitting.search.weighting import Weighting
 from rgspipe.optim.levenberg_marquardt import Ended, LevenbergMarquardt, NormalEquations, Problem, least_squares
 from rgspipe.scene import LightRig
@@ -71,9 +72,9 @@ class Refiner:
     limits: StepLimits = field(default_factory=StepLimits)
 
     @classmethod
-    def of(cls, problem: LightProblem, meter: Meter | None = None) -> Refiner:
+    def of(cls, problem: LightProblem, meter: Meter | None = None, limits: StepLimits | None = None) -> Refiner:
         """For a fit of its own, which begins now, or that of `meter`."""
-        return cls(problem, Region.of(problem.views.frozen), meter or Meter())
+        return cls(problem, Region.of(problem.views.frozen), meter or Meter(), limits=limits or StepLimits())
 
     def on(self, problem: LightProblem) -> Refiner:
         """The same fit's refiner on another problem: of other pixels, say."""
@@ -155,7 +156,7 @@ class _AroundRig:
         return NormalEquations(matrix * units[:, None] * units[None, :], direction * units, self.moments.cost)
 
     def allowed(self, step: Tensor) -> float:
-        return self.refiner.limits.allowed(self.state.emitters, step)
+        return allowed_share(self.state.emitters, step, self.refiner.limits)
 
     def moved(self, step: Tensor) -> tuple[Emitter, ...]:
         return moved_rig(self.state.emitters, step, self.refiner.region)

@@ -10,30 +10,12 @@ from dataclasses import dataclass, field
 from itertools import zip_longest
 
 from rgspipe.fitting.model.emitter import Emitter
-from rgspipe.fitting.search.compare import Bar, Likeness, best_state, drop, ranked
+from rgspipe.fitting.options import MOST_LIGHTS, SearchOptions
+from rgspipe.fitting.search.compare import best_state, distinct, drop, passed, ranked, worth_keeping
 from rgspipe.fitting.search.refine import Refiner, State
-from rgspipe.fitting.search.schedule import Schedule
+from rgspipe.fitting.search.schedule import refined_starts
 from rgspipe.fitting.search.starts import Candidates, Rig
 from rgspipe.fitting.search.weighting import PLAIN, ROBUST
-from rgspipe.fitting.spec import MOST_LIGHTS
-
-
-@dataclass(frozen=True)
-class StartOptions:
-    """Which starts are tried.
-
-    Attributes:
-        aimed: starts for each wanted one, where candidates have an axis.
-        batches, well_explained: a number of lights that is known is searched from up to so many times the wanted
-            starts, until the best one leaves less than this share of the blocks' energy unexplained.
-        settled: so many of the starts with the least robust losses, and of those that explain most, are refined with
-            plain squares.
-    """
-
-    aimed: int = 3
-    batches: int = 4
-    well_explained: float = 0.02
-    settled: int = 2
 
 
 @dataclass(frozen=True)
@@ -57,23 +39,15 @@ class RigSearch:
 
     Attributes:
         refiner: on that problem.
-        candidates: of each kind of light, the plainest first; those of several kinds stand against each other.
-        starts: best candidates that are refined.
-        iterations: most steps of a refinement at a time.
+        candidates: of each kind of light, the plainest first.
+        options: how it searches.
+        kinds_open: whether lights of several kinds stand against each other.
     """
 
     refiner: Refiner
     candidates: Sequence[Candidates]
-    starts: int = 4
-    iterations: int = 30
-    options: StartOptions = field(default_factory=StartOptions)
-    schedule: Schedule = field(default_factory=Schedule)
-    bar: Bar = field(default_factory=Bar)
+    options: SearchOptions = field(default_factory=SearchOptions)
     kinds_open: bool = False
-
-    @property
-    def alike(self) -> Likeness:
-        return self.schedule.alike
 
     def known(self, lights: int) -> Found:
         """The best rig of a given number of lights; fewer where there are too few candidates."""
@@ -89,16 +63,16 @@ class RigSearch:
 
     def unknown(self) -> Found:
         """The best rig of the least number of lights to which one more adds too little."""
-        best, compared = None, {}
+        best, compared, bar = None, {}, self.options.bar
         for lights in range(1, MOST_LIGHTS + 1):
             found = self._of(lights, best and best.best, patient=False)
             if found is None:
                 break
             # More steps rarely gain as much again, so a rig that is far from worth it needs none.
-            hopeless = best is not None and drop(self.refiner.problem, best.best, found.best) < 0.5 * self.bar.least
+            hopeless = best is not None and drop(self.refiner.problem, best.best, found.best) < 0.5 * bar.least
             found = found if hopeless else self._further(found)
             compared[lights] = found.best
-            if hopeless or (best is not None and not self.bar.passed(self.refiner.problem, best.best, found.best)):
+            if hopeless or (best is not None and not passed(self.refiner.problem, best.best, found.best, bar)):
                 break
             best = found
         answer = self.without_twins(best.best)
@@ -115,10 +89,10 @@ class RigSearch:
         The polish takes plain squares: a rig that only a forgiving loss likes, for which the brightest pixels are
         outliers, would walk far in it. So the best by plain squares are among those that are tried.
         """
-        most = self.options.settled
+        most = self.options.trials.settled
         chosen = [*ranked(self.refiner.problem, states)[:most], *sorted(states, key=self.refiner.unexplained)[:most]]
-        steps = min(self.schedule.steps, self.iterations)
-        tried = self.alike.distinct(chosen, self.refiner.region.size)
+        steps = min(self.options.schedule.steps, self.options.iterations)
+        tried = distinct(chosen, self.options.schedule.met, self.refiner.region.size)
         return min((self.refiner.refined(state, PLAIN, steps) for state in tried), key=self.refiner.unexplained)
 
     def without_twins(self, best: State) -> State:
@@ -134,21 +108,21 @@ class RigSearch:
             previous: a refined rig of one light fewer, to grow from.
             patient: whether further starts follow while all explain little.
         """
-        batches = self.options.batches if patient else 1
+        batches = self.options.trials.batches if patient else 1
         starts = [self._starts(kind, lights, previous, batches) for kind in self.candidates]
         found = [self._refined(rigs, batches) for rigs in starts if rigs]
         if not found:
             return None
         best = found[0].best
         for richer in found[1:]:
-            if drop(self.refiner.problem, best, richer.best) >= self.bar.least:
+            if drop(self.refiner.problem, best, richer.best) >= self.options.bar.least:
                 best = richer.best
         best = self._with_plain_lights(best) if self.kinds_open else best
         return Found(best, tuple(state for one in found for state in one.others))
 
     def _starts(self, candidates: Candidates, lights: int, previous: State | None, batches: int) -> list[Rig]:
         size = self.refiner.region.size
-        count = self.starts * (self.options.aimed if candidates.aimed else 1) * batches
+        count = self.options.starts * (self.options.trials.aimed if candidates.aimed else 1) * batches
         if previous is None or len(previous.emitters) != lights - 1:
             return candidates.rigs(lights, count, size)
         half = max(1, count // 2)
@@ -164,15 +138,15 @@ class RigSearch:
         refined, size = [], math.ceil(len(rigs) / batches)
         for first in range(0, len(rigs), size):
             part = rigs[first : first + size]
-            refined += self.schedule.refined(self.refiner, part, self.iterations, thorough=first > 0)
+            refined += refined_starts(self.refiner, part, self.options.iterations, self.options.schedule, first > 0)
             best = best_state(self.refiner.problem, refined) if compared else self.settled(refined)
-            if self.refiner.unexplained(best) < self.options.well_explained:
+            if self.refiner.unexplained(best) < self.options.trials.well_explained:
                 break
         return Found(best, tuple(refined))
 
     def _further(self, found: Found) -> Found:
         """The same with more steps of the best rig."""
-        further = self.refiner.refined(found.best, ROBUST, 2 * self.schedule.steps)
+        further = self.refiner.refined(found.best, ROBUST, 2 * self.options.schedule.steps)
         return Found(further, tuple(further if state is found.best else state for state in found.others))
 
     def _with_plain_lights(self, state: State) -> State:
@@ -181,14 +155,14 @@ class RigSearch:
             if emitter.axis is not None:
                 plain = [*state.emitters]
                 plain[index] = Emitter(emitter.light.plain)
-                other = self.refiner.refined(self.refiner.start(plain, ROBUST), ROBUST, self.schedule.steps)
-                state = state if drop(self.refiner.problem, other, state) >= self.bar.least else other
+                other = self.refiner.refined(self.refiner.start(plain, ROBUST), ROBUST, self.options.schedule.steps)
+                state = state if drop(self.refiner.problem, other, state) >= self.options.bar.least else other
         return state
 
     def _pruned(self, state: State) -> State:
         """The rig without lights that add next to nothing or coincide with another."""
-        kept = self.alike.worth_keeping(state, self.refiner.region.size)
+        kept = worth_keeping(state, self.options.bar, self.refiner.region.size)
         if len(kept) == len(state.emitters) or not kept:
             return state
         fewer = self.refiner.start([state.emitters[index] for index in kept], ROBUST)
-        return self.refiner.refined(fewer, ROBUST, 2 * self.schedule.steps)
+        return self.refiner.refined(fewer, ROBUST, 2 * self.options.schedule.steps)

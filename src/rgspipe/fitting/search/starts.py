@@ -11,9 +11,9 @@ from torch import Tensor
 
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.problem import LightProblem
+from rgspipe.fitting.options import CombinationOptions
 from rgspipe.fitting.search.coarse import CoarseImages
 from rgspipe.fitting.search.combinations import (
-    CombinationOptions,
     Scored,
     best_apart,
     best_combinations,

@@ -9,7 +9,8 @@ from torch import Tensor
 
 from rgspipe.fitting.certainty.doubts import doubts
 from rgspipe.fitting.findings import AtBound, Finding, FitStatus, MaybeOneMore, OutOfSteps, PoorlyExplained
-from rgspipe.fitting.search.compare import Bar, robust_losses
+from rgspipe.fitting.options import BarOptions
+from rgspipe.fitting.search.compare import robust_losses, wanted
 from rgspipe.fitting.search.refine import Refiner, State
 
 #: An answer that leaves more than this share of the target's energy unexplained is none.
@@ -48,10 +49,10 @@ class Costs:
         losses = robust_losses(refiner.problem, [*compared.values()]) if compared else []
         return cls({count: float(loss.mean()) for count, loss in zip(compared, losses, strict=True)})
 
-    def maybe_more(self, count: int, compared: Mapping[int, State], bar: Bar) -> list[Finding]:
+    def maybe_more(self, count: int, compared: Mapping[int, State], bar: BarOptions) -> list[Finding]:
         """Whether one light more than `count` might be there, though it lowers the cost too little to count."""
         costs = self.by_count
         if count not in costs or count + 1 not in costs:
             return []
         gain = 1.0 - costs[count + 1] / costs[count]
-        return [MaybeOneMore(gain, bar.wanted(compared[count + 1]))] if gain > bar.doubtful else []
+        return [MaybeOneMore(gain, wanted(compared[count + 1], bar))] if gain > bar.doubtful else []

@@ -6,13 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from rgspipe.fitting.findings import Finding, LightMissing, LightSpare
-from rgspipe.fitting.search.compare import Bar
+from rgspipe.fitting.options import MOST_LIGHTS, SearchOptions
 from rgspipe.fitting.search.refine import Refiner, State
-from rgspipe.fitting.search.schedule import Schedule
 from rgspipe.fitting.search.starts import Candidates
 from rgspipe.fitting.selection.one_less import one_light_less
-from rgspipe.fitting.selection.one_more import OneMoreOptions, one_more_light
-from rgspipe.fitting.spec import MOST_LIGHTS
+from rgspipe.fitting.selection.one_more import one_more_light
 
 
 @dataclass(frozen=True)
@@ -29,26 +27,18 @@ class Doubted:
 
 
 def doubted_number(
-    refiner: Refiner,
-    candidates: Sequence[Candidates],
-    best: State,
-    wanted: int,
-    bar: Bar,
-    options: OneMoreOptions,
-    schedule: Schedule,
+    refiner: Refiner, candidates: Sequence[Candidates], best: State, wanted: int, options: SearchOptions
 ) -> Doubted:
     """What is wrong with the number `wanted`, of which `best` is the answer."""
     count = len(best.emitters)
     findings: list[Finding] = []
     compared: dict[int, State] = {}
-    more = None
-    if count == wanted < MOST_LIGHTS:
-        more = one_more_light(refiner, candidates, best, bar, options, schedule)
+    more = one_more_light(refiner, candidates, best, options) if count == wanted < MOST_LIGHTS else None
     if more is not None:
         compared |= {count: more.simple, count + 1: more.rich}
         findings += [LightMissing(count, more.gain)] if more.worth else []
     if count > 1:
-        less = one_light_less(refiner, best, bar, schedule.steps // 2)
+        less = one_light_less(refiner, best, options.bar, options.schedule.steps // 2)
         compared |= {count - 1: less.simple, count: less.rich}
         findings += [] if less.worth else [LightSpare(less.index + 1, count, less.gain, less.wanted)]
     return Doubted(tuple(findings), compared)

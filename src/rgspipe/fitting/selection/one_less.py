@@ -10,7 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rgspipe.fitting.model.emitter import Emitter
-from rgspipe.fitting.search.compare import Bar, drop, light_energies
+from rgspipe.fitting.options import BarOptions
+from rgspipe.fitting.search.compare import drop, light_energies, wanted
 from rgspipe.fitting.search.refine import Refiner, State
 from rgspipe.fitting.search.weighting import ROBUST
 
@@ -38,7 +39,7 @@ class OneLess:
         return self.gain >= self.wanted
 
 
-def one_light_less(refiner: Refiner, answer: State, bar: Bar | None = None, steps: int = 3) -> OneLess:
+def one_light_less(refiner: Refiner, answer: State, bar: BarOptions, steps: int = 3) -> OneLess:
     """The answer beside its rigs with one light less.
 
     Args:
@@ -47,17 +48,17 @@ def one_light_less(refiner: Refiner, answer: State, bar: Bar | None = None, step
         bar: how much a light has to explain.
         steps: of the others before it is clear that a light is there, and as many more where it is not.
     """
-    bar, energies, rich, problem = bar or Bar(), light_energies(answer), answer, refiner.problem
+    energies, rich, problem = light_energies(answer), answer, refiner.problem
     for index in sorted(range(len(energies)), key=energies.__getitem__):
         simple = refiner.refined(refiner.start(_without(answer, index), ROBUST), ROBUST, steps)
-        found = OneLess(rich, simple, index, drop(problem, simple, rich), bar.wanted(rich))
+        found = OneLess(rich, simple, index, drop(problem, simple, rich), wanted(rich, bar))
         # An answer of plain squares has a higher robust cost than it would have to have.
         if found.gain >= bar.least_faint:
             continue
         if rich is answer:
             rich = refiner.refined(answer, ROBUST, 2 * steps)
         simple = refiner.refined(simple, ROBUST, steps)
-        found = OneLess(rich, simple, index, drop(problem, simple, rich), bar.wanted(rich))
+        found = OneLess(rich, simple, index, drop(problem, simple, rich), wanted(rich, bar))
         if not found.worth:
             break
     return found

@@ -11,30 +11,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from rgspipe.fitting.search.compare import Bar, best_state, drop, light_energies
+from rgspipe.fitting.options import SearchOptions
+from rgspipe.fitting.search.compare import best_state, drop, light_energies, wanted
 from rgspipe.fitting.search.refine import Refiner, State
-from rgspipe.fitting.search.schedule import Schedule
+from rgspipe.fitting.search.schedule import refined_starts
 from rgspipe.fitting.search.starts import Candidates, Rig
 from rgspipe.fitting.search.weighting import ROBUST
-
-
-@dataclass(frozen=True)
-class OneMoreOptions:
-    """When a light more is looked for.
-
-    Attributes:
-        noticeable: an answer that leaves less than this share of the blocks' energy unexplained is not doubted: that is
-            rounding, or noise.
-        promised: the best candidate beside the answer must promise to lower the squared relative error by this share, …
-        begins_faint: … and a light that begins with less than this share of the image's energy, by as much as faint
-            ones must.
-        tries: so many rigs of each kind of candidate are refined.
-    """
-
-    noticeable: float = 1e-4
-    promised: float = 0.23
-    begins_faint: float = 0.03
-    tries: int = 2
 
 
 @dataclass(frozen=True)
@@ -62,31 +44,28 @@ def one_more_light(
     refiner: Refiner,
     candidates: Sequence[Candidates],
     answer: State,
-    bar: Bar | None = None,
-    options: OneMoreOptions | None = None,
-    schedule: Schedule | None = None,
+    options: SearchOptions,
 ) -> OneMore | None:
     """The answer beside the best rig with one light more; None where no candidate promises enough.
 
     Args:
         refiner: on the problem that the answer was searched on.
         candidates: of each kind of light.
-        bar: how much a light has to explain.
     """
-    bar, options, schedule = bar or Bar(), options or OneMoreOptions(), schedule or Schedule()
-    if refiner.unexplained(answer) < options.noticeable:
+    more, bar, steps = options.one_more, options.bar, options.schedule.steps
+    if refiner.unexplained(answer) < more.noticeable:
         return None
     rigs: list[Rig] = []
     for kind in candidates:
-        promise, extended = kind.promised(answer, refiner.problem, options.tries, refiner.region.size)
+        promise, extended = kind.promised(answer, refiner.problem, more.tries, refiner.region.size)
         sure = promise >= bar.least_faint
-        if promise >= options.promised and (sure or _last_share(refiner, extended[0]) >= options.begins_faint):
+        if promise >= more.promised and (sure or _last_share(refiner, extended[0]) >= more.begins_faint):
             rigs += extended
     if not rigs:
         return None
-    rich = best_state(refiner.problem, schedule.refined(refiner, rigs, schedule.steps))
-    simple, rich = (refiner.refined(state, ROBUST, schedule.steps) for state in (answer, rich))
-    return OneMore(simple, rich, drop(refiner.problem, simple, rich), bar.wanted(rich))
+    rich = best_state(refiner.problem, refined_starts(refiner, rigs, steps, options.schedule))
+    simple, rich = (refiner.refined(state, ROBUST, steps) for state in (answer, rich))
+    return OneMore(simple, rich, drop(refiner.problem, simple, rich), wanted(rich, bar))
 
 
 def _last_share(refiner: Refiner, rig: Rig) -> float:

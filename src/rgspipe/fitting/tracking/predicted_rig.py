@@ -10,7 +10,7 @@ from torch import Tensor
 
 from rgspipe.fitting.model.moments import Moments, scores
 from rgspipe.fitting.model.problem import LightProblem
-from rgspipe.fitting.search.moves import moved_rig, rig_move
+from rgspipe.fitting.search.moves import allowed_share, moved_rig, rig_move
 from rgspipe.fitting.search.refine import Refiner, State
 from rgspipe.fitting.search.starts import Rig
 from rgspipe.fitting.search.weighting import PLAIN
@@ -103,7 +103,7 @@ class _AroundRig:
         return NormalEquations(matrix, direction, self._cost(evidence.moments, state.emitters, state.intensity))
 
     def allowed(self, step: Tensor) -> float:
-        return self.whole.refiner.limits.allowed(self.state.emitters, step[: self._parameters])
+        return allowed_share(self.state.emitters, step[: self._parameters], self.whole.refiner.limits)
 
     def moved(self, step: Tensor) -> tuple[Rig, Tensor]:
         refiner, count = self.whole.refiner, self._parameters

@@ -15,9 +15,9 @@ from rgspipe.fitting.fit import FitViews, fit_lights
 from rgspipe.fitting.model.capture import ImageCapture
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.problem import LightProblem
+from rgspipe.fitting.options import SearchOptions, TrackOptions
 from rgspipe.fitting.result import dark_result
 from rgspipe.fitting.search.schedule import soft
-from rgspipe.fitting.search_lm import SearchOptions
 from rgspipe.fitting.spec import LightSpec
 from rgspipe.fitting.tracking.frame import FrameStatus, TrackedFrame, frame_cost, in_order
 from rgspipe.fitting.tracking.frame_fit import Followed, follow, observed
@@ -31,23 +31,6 @@ SMALL_COST = 1e-3
 
 #: The cost of a frame is judged by the median of so many frames before it.
 REMEMBERED = 5
-
-
-@dataclass(frozen=True)
-class TrackOptions:
-    """How a sequence is followed.
-
-    Attributes:
-        lost: a frame whose cost rises beyond so many times that of the frames next to it is lost, and searched.
-        iterations: most Levenberg-Marquardt steps of a followed frame.
-        searches: most frames that are searched from nothing, those of the beginning and lost ones together.
-        together: whether one thing carries all lights, so that they move and turn together.
-    """
-
-    lost: float = 2.0
-    iterations: int = 15
-    searches: int = 6
-    together: bool = False
 
 
 def track_lights(

@@ -7,7 +7,8 @@ import itertools
 import pytest
 
 from rgspipe.cli.compose import check_sweep, compose_config, leaves_machine
-from rgspipe.config import RgspipeConfig, describe, get_value, scene_name, with_changes
+from rgspipe.config import RgspipeConfig, get_value, with_changes
+from rgspipe.config.core import build, describe, plain
 from rgspipe.errors import InputError
 from rgspipe.resources import resource_folder
 
@@ -34,12 +35,12 @@ def test_presets_combine() -> None:
 
 
 def test_scene_kinds_need_their_path(tmp_path) -> None:
-    assert scene_name(composed("scene=cornell")) == "cornell"
-    assert scene_name(composed("scene=external", f"scene.path={tmp_path}")) == tmp_path.name
+    assert composed("scene=cornell").scene.folder == "cornell"
+    assert composed("scene=external", f"scene.path={tmp_path}").scene.folder == tmp_path.name
     blend = tmp_path / "room.blend"
     blend.touch()
-    assert scene_name(composed("scene=blend", f"scene.path={blend}")) == "room"
-    assert scene_name(composed("scene=blend", f"scene.path={blend}", "scene.name=hall")) == "hall"
+    assert composed("scene=blend", f"scene.path={blend}").scene.folder == "room"
+    assert composed("scene=blend", f"scene.path={blend}", "scene.name=hall").scene.folder == "hall"
 
 
 def test_choosing_a_method_by_group_or_by_key_means_the_same() -> None:
@@ -69,7 +70,7 @@ def test_choosing_a_method_by_group_or_by_key_means_the_same() -> None:
         ("dataset.denoise=maybe", ["dataset.denoise", "true or false"]),
         ("dataset.resolution=null", ["dataset.resolution", "null"]),
         ("views.indices=[a]", ["views.indices", "whole number"]),
-        ("dataset=3", ["dataset"]),
+        ("dataset=3", ["dataset:", "dataset.resolution", "3"]),
         ("dataset.resolution=4", ["dataset.resolution", "8 to 8192", "4"]),
         ("views.count=0", ["views.count"]),
         ("views.indices=[]", ["views.indices"]),
@@ -77,6 +78,8 @@ def test_choosing_a_method_by_group_or_by_key_means_the_same() -> None:
         ("fit.method=adam", ["fit.method", "paper_adam"]),
         ("fit.adam.ssim_weight=nan", ["fit.adam.ssim_weight"]),
         ("scene.cornell.room=[1,1]", ["scene.cornell.room", "3 values"]),
+        ("train.loss=l1_ssim", ["train.window", "windows"]),
+        ("scene.ply.crop=[0,0,0,1,-1,1]", ["scene.ply.crop", "upper corner"]),
         ("scene.name=runs", ["scene.name"]),
         ("scene.name=a/b", ["scene.name"]),
         ("scene=external", ["scene.path", "folder"]),
@@ -144,6 +147,20 @@ def test_values_are_read_and_changed_by_dotted_key() -> None:
             call()
 
 
+def test_changes_are_made_all_at_once_and_what_does_not_go_together_is_refused_with_the_whole_key() -> None:
+    assert with_changes(composed(), {"train.loss": "l1_ssim", "train.window": 48}).train.window == 48
+    with pytest.raises(InputError, match=r"^train\.window: .*single pixels"):
+        with_changes(composed(), {"train.loss": "l1_ssim"})
+
+
+def test_plain_values_are_built_into_the_same_configuration() -> None:
+    config = composed("views.indices=[0,2]", "scene.ply.cameras=a/cameras.json", "light.count=null")
+    assert build(RgspipeConfig, plain(config)) == config
+    assert plain(config)["scene"]["ply"]["cameras"] == "a/cameras.json"
+    with pytest.raises(InputError, match=r"^fit\.search\.start: .*Did you mean fit\.search\.starts"):
+        build(RgspipeConfig, {"fit": {"search": {"start": 3}}})
+
+
 def test_every_key_says_what_it_is() -> None:
-    for key, help, _ in describe(RgspipeConfig):
+    for key, help, _ in describe(RgspipeConfig()):
         assert len(help) > 3, key

@@ -1,0 +1,53 @@
+"""What images are made of. Nothing here loads torch or Blender, so that the command line can show it at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rgspipe.options import Options, option
+
+
+@dataclass(frozen=True)
+class DatasetOptions(Options):
+    """How images are made (unused by scene=external)."""
+
+    resolution: int = option(128, low=8, high=8192)
+    """image width and height, pixels"""
+    train_views: int = option(100, low=1, high=100000)
+    """training views, each with one light of its own"""
+    test_views: int = option(24, low=1, high=100000)
+    """held-out views: new cameras and new lights"""
+    targets_per_class: int = option(20, low=0, high=10000)
+    """fit targets of each occlusion class that suits the scene"""
+    target_views: int = option(3, low=1, high=3)
+    """fixed cameras that see each fit target"""
+    samples: int = option(48, low=1, high=1000000)
+    """paths per pixel of training views and targets"""
+    test_samples: int = option(192, low=1, high=1000000)
+    """paths per pixel of held-out views: with 48 their noise hides 2 dB"""
+    denoise: bool = True
+    """denoise the colour images"""
+    max_bounces: int = option(12, low=0, high=1024)
+    """bounces of a path; fewer than 8 lose light"""
+    seed: int = option(0, low=0, high=2**31 - 1)
+    """draws of cameras and lights; each frame draws from its own stream, and does not depend on how many there are"""
+
+
+@dataclass(frozen=True)
+class HotdogParameters(Options):
+    """A hot dog on a plate, in empty space."""
+
+    textured: bool = True
+    """textures on bun and sausage; without them every part has one colour"""
+    segments: int = option(192, low=48, high=2000)
+    """faces around plate and bun; normals of smooth surfaces turn by half of 360°/segments in a face"""
+
+
+@dataclass(frozen=True)
+class RoomParameters(Options):
+    """A closed room with a table, a bookcase, an armchair and ten other things."""
+
+    textured: bool = True
+    """textures on floor, walls and furniture; without them every part has one colour"""
+    segments: int = option(192, low=48, high=2000)
+    """faces around whatever is round"""

@@ -1,0 +1,25 @@
+"""What is timed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+from rgspipe.benchmark.names import RoomName
+from rgspipe.options import Options, option
+
+
+@dataclass(frozen=True)
+class BenchmarkConfig(Options):
+    """What is measured."""
+
+    kind: Literal["renderer", "fit"] = "renderer"
+    """the renderer on rooms with path-traced truth, or the steps of a fit on the trained scene"""
+    repetitions: int = option(20, low=1, high=100000)
+    """runs of each measured step"""
+    rooms: tuple[RoomName, ...] = get_args(RoomName)
+    """rooms that are path-traced and measured on"""
+    truth_resolution: int = option(128, low=8, high=8192)
+    """width and height of the path-traced images, pixels"""
+    truth_samples: int = option(1024, low=8, high=1000000)
+    """paths per pixel of the path-traced images with all bounces; a multiple of 8"""

@@ -1,0 +1,57 @@
+"""What is looked for, and how much of it is seen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from rgspipe.errors import InputError
+from rgspipe.fitting.options import MOST_LIGHTS
+from rgspipe.options import Options, option
+
+#: How intensity falls with the angle from the axis.
+Profile = Literal["smoothstep", "gaussian", "linear"]
+
+
+@dataclass(frozen=True)
+class SpotConfig(Options):
+    """The profile of unknown spots; with fit.cone=free its kind, and a rim to begin with."""
+
+    profile: Profile = "smoothstep"
+    """how intensity falls with the angle from the axis: Blender's smoothstep, gaussian, or Mitsuba's linear"""
+    cone_angle: float = option(25.0, low=1, high=89)
+    """half-angle of the cone, degrees"""
+    falloff: float = option(0.15, low=0, high=89)
+    """width of the rim: of smoothstep Blender's blend (0 to 1); of gaussian the standard deviation, of linear the
+    half-angle of the inner cone, degrees"""
+
+
+@dataclass(frozen=True)
+class LightConfig(Options):
+    """What is looked for."""
+
+    type: Literal["point", "spot", "auto"] = "point"
+    """type of the unknown lights"""
+    count: int | None = option(1, low=1, high=MOST_LIGHTS)
+    """how many unknown lights; null finds out"""
+    spot: SpotConfig = SpotConfig()
+
+
+@dataclass(frozen=True)
+class ViewsConfig(Options):
+    """How much of a fit target is seen."""
+
+    count: int = option(1, low=1, high=1000)
+    """the first `count` cameras of the target"""
+    indices: tuple[int, ...] | None = option(None, low=0, high=100000)
+    """these cameras instead of the first ones"""
+
+    def check(self) -> None:
+        """Refuse a list without cameras."""
+        if self.indices == ():
+            raise InputError(
+                "indices",
+                expected="at least one camera's index",
+                found="an empty list",
+                remedy="Give indices such as [0,2], or leave it away and set views.count.",
+            )

@@ -1,0 +1,203 @@
+"""What steers the fits. Nothing here loads torch, so that the command line can show it at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from rgspipe.errors import InputError
+from rgspipe.options import Options, option
+
+#: Ways from images to lights; `finite_differences` is search_lm with derivatives by central differences.
+Method = Literal["search_lm", "paper_adam", "finite_differences"]
+
+#: Where the number of lights is not known, at most so many are tried.
+MOST_LIGHTS = 8
+
+
+@dataclass(frozen=True)
+class CombinationOptions(Options):
+    """How candidates are put together to starts."""
+
+    variety: int = option(40, low=1, high=10000)
+    """so many times the wanted number of combinations are looked at, as neighbours of the best are much like it"""
+    separation: float = option(0.16, low=0, high=10)
+    """starts stand so far apart, a part of the scene's size …"""
+    turned: float = option(0.85, low=-1, high=1)
+    """… or their axes differ by this cosine"""
+    all_pairs: int = option(900, low=0, high=100000)
+    """up to this many candidates all pairs are tried"""
+    beam: int = option(24, low=1, high=10000)
+    """combinations that are kept while lights are added one by one"""
+    joining: int = option(16, low=1, high=10000)
+    """of the candidates that may join a combination, so many are tried with exact intensities"""
+
+
+@dataclass(frozen=True)
+class TrialOptions(Options):
+    """How many starts are tried."""
+
+    aimed: int = option(3, low=1, high=1000)
+    """starts for each wanted one, where candidates have an axis"""
+    batches: int = option(4, low=1, high=1000)
+    """a number of lights that is known is searched from up to so many times the wanted starts …"""
+    well_explained: float = option(0.02, low=0, high=1)
+    """… until the best one leaves less than this share of the blocks' energy unexplained"""
+    settled: int = option(2, low=1, high=1000)
+    """so many of the starts that look best, by either loss, are refined with plain squares"""
+
+
+@dataclass(frozen=True)
+class ScheduleOptions(Options):
+    """Turns of a refinement, and which starts go on from one to the next."""
+
+    steps: int = option(6, low=2, high=10000)
+    """steps of a start to the end, in its last turn"""
+    first: int = option(3, low=1, high=10000)
+    """steps of a rig of points before the better ones go on"""
+    softness: tuple[float, ...] = option((0.3, 0.15, 0.05), low=0, high=3)
+    """of rigs with an axis: by how much edges are wider in the turns before the last one, rad"""
+    softly: tuple[int, ...] = option((3, 4, 4), low=1, high=10000)
+    """steps of each of these turns"""
+    going_on: float = option(0.4, low=0, high=1)
+    """share of the starts, at least two of them, that take a turn after the one before: the best go on"""
+    thoroughly: float = option(0.5, low=0, high=1)
+    """the same, where the best starts of all failed"""
+    promising: float = option(0.67, low=0, high=1)
+    """share of starts with an axis that take the first turn, by how they look before it"""
+    met: float = option(0.01, low=0, high=10)
+    """rigs whose lights are within this part of the scene's size, and as many rad, are on their way to one place"""
+
+    def check(self) -> None:
+        if len(self.softness) != len(self.softly):
+            found = f"{len(self.softly)} numbers of steps"
+            expected = f"{len(self.softness)} of them, one for each softness"
+            raise InputError("softly", expected=expected, found=found, remedy="Give as many of both.")
+        if self.first >= self.steps:
+            raise InputError("first", expected="less than steps", found=str(self.first), remedy="Give fewer.")
+
+
+@dataclass(frozen=True)
+class BarOptions(Options):
+    """How much a light has to lower the robust cost of the blocks to be there, rather than an error of the model.
+
+    Chosen on other scenes than it is judged on, see docs/laboratory/number_of_lights.md.
+    """
+
+    least: float = option(0.2, low=0, high=1)
+    """one more light, or a spot in the place of a point light, lowers it by this share …"""
+    doubtful: float = option(0.07, low=0, high=1)
+    """… and one that lowers it by more than this share may be there, which the answer says"""
+    faint: float = option(0.12, low=0, high=1)
+    """a light that sends less than this share of the image's energy is faint …"""
+    least_faint: float = option(0.5, low=0, high=1)
+    """… and has to lower the cost by this share: what explains an error of the model is faint"""
+    merged: float = option(0.03, low=0, high=10)
+    """lights of one kind that end closer than this part of the scene's size are one, where their number is open"""
+    least_energy: float = option(0.01, low=0, high=1)
+    """a light with less than this share of the image's energy is none, where the number is open"""
+
+
+@dataclass(frozen=True)
+class OneMoreOptions(Options):
+    """When a light more than were asked for is looked for."""
+
+    noticeable: float = option(1e-4, low=0, high=1)
+    """an answer that leaves less than this share of the blocks' energy is not doubted: that is rounding, or noise"""
+    promised: float = option(0.23, low=0, high=1)
+    """the best candidate beside the answer must promise to lower the squared relative error by this share …"""
+    begins_faint: float = option(0.03, low=0, high=1)
+    """… and a light that begins with less than this share of the energy, by as much as faint ones must"""
+    tries: int = option(2, low=1, high=1000)
+    """so many rigs of each kind of candidate are refined"""
+
+
+@dataclass(frozen=True)
+class RivalOptions(Options):
+    """What counts as another answer."""
+
+    apart: float = option(0.05, low=0, high=10)
+    """rigs are different where a light is farther from its counterpart than this part of the scene's size"""
+    far: float = option(0.5, low=0, high=1)
+    """a rival is refined unless the best rig's robust cost is lower by this share"""
+    deviations: float = option(2.0, low=0, high=1000)
+    """standard deviations between losses within which two rigs are equally good"""
+    pixels_per_error: float = option(25.0, low=1, high=1e6)
+    """errors of about so many neighbouring pixels are one: what the model gets wrong is smooth"""
+    energy: float = option(1.5, low=1, high=1000)
+    """a rival leaves at most so many times the energy unexplained that the best rig does"""
+    steps: int = option(12, low=2, high=10000)
+    """steps of either rig under the robust loss, and half as many of the rival by plain squares"""
+
+
+@dataclass(frozen=True)
+class StepLimits(Options):
+    """The longest step: as far as derivatives at its start may be trusted."""
+
+    move: float = option(0.12, low=1e-6, high=10)
+    """of a position, a part of the scene's size"""
+    turn: float = option(0.3, low=1e-6, high=10)
+    """of an axis, rad, and of the parameters of a shape"""
+
+
+@dataclass(frozen=True)
+class SearchOptions(Options):
+    """How `search_lm` searches: a dictionary with closed-form intensity, then Levenberg-Marquardt."""
+
+    starts: int = option(4, low=1, high=4096)
+    """best candidates that are refined"""
+    iterations: int = option(30, low=1, high=10000)
+    """most Levenberg-Marquardt steps of the final refinement"""
+    combinations: CombinationOptions = CombinationOptions()
+    trials: TrialOptions = TrialOptions()
+    schedule: ScheduleOptions = ScheduleOptions()
+    bar: BarOptions = BarOptions()
+    one_more: OneMoreOptions = OneMoreOptions()
+    rivals: RivalOptions = RivalOptions()
+    limits: StepLimits = StepLimits()
+
+
+@dataclass(frozen=True)
+class StartOptions(Options):
+    """Where the published method starts; without training lights always on a sphere."""
+
+    init: Literal["dataset", "sphere"] = "dataset"
+    """where positions are drawn from: the training lights' mean and spread, or a sphere"""
+    random_intensity: bool = False
+    """draw the first intensity too: e^u times its mean, u uniform in ±1"""
+    aim: Literal["center", "random"] = "center"
+    """where spots point at first: to the scene's middle, or anywhere"""
+
+
+@dataclass(frozen=True)
+class AdamOptions(StartOptions):
+    """The published method, with its defaults."""
+
+    epochs: int = option(25, low=1, high=100000)
+    """epochs"""
+    steps: int = option(50, low=1, high=100000)
+    """steps of an epoch"""
+    position_rate: float = option(0.01, low=0, high=100)
+    """learning rate of the positions"""
+    intensity_rate: float = option(0.05, low=0, high=100)
+    """learning rate of the log-intensities"""
+    axis_rate: float = option(0.005, low=0, high=100)
+    """learning rate of spots' axes"""
+    ssim_weight: float = option(0.2, low=0, high=1)
+    """λ, the share of structural similarity in the loss"""
+    patience: int | None = option(None, low=1, high=100000)
+    """stop after so many epochs without a lower loss; by default never"""
+
+
+@dataclass(frozen=True)
+class TrackOptions(Options):
+    """How moving lights are followed from frame to frame."""
+
+    lost: float = option(2.0, low=1, high=1000)
+    """a frame that is so many times worse explained than those next to it is searched anew"""
+    iterations: int = option(15, low=1, high=10000)
+    """most Levenberg-Marquardt steps of a frame"""
+    searches: int = option(6, low=1, high=10000)
+    """most frames that are searched from nothing, those of the beginning and lost ones together"""
+    together: bool = False
+    """the lights are carried by one thing, such as a car: they move and turn together"""
