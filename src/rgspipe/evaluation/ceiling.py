@@ -62,9 +62,9 @@ def project_albedo(surfels: Surfels, views: Sequence[View]) -> Tensor:
 
 def transmittance_image(bvh: SurfelBvh, weights: ViewWeights, position: Tensor) -> np.ndarray:
     """(H, W) share of a light at `position` (3,) that reaches what each pixel sees; NaN where it sees too little."""
-    share = transmittance(bvh, position[None])[0][0]
-    coverage = weights.coverage.to(share.device)
-    seen = (weights.operator @ share[:, None])[:, 0] / coverage.clamp(min=LEAST_COVERAGE)
+    passing = transmittance(bvh, position[None])[0][0]
+    coverage = weights.coverage.to(passing.device)
+    seen = (weights.operator @ passing[:, None])[:, 0] / coverage.clamp(min=LEAST_COVERAGE)
     image = torch.where(coverage < LEAST_COVERAGE, torch.full_like(seen, torch.nan), seen)
     return to_array(image.reshape(weights.camera.height, weights.camera.width))
 

@@ -61,10 +61,10 @@ def pixel_kinds(view: View, transmittance: ArrayLike, scene_size: float) -> npt.
     """
     if view.light is None or view.depth is None or view.normal is None:
         raise ValueError(f"splitting errors needs a light, depth and normals; {view.name} lacks one of them")
-    shares = to_array(transmittance)
-    if shares.shape != tuple(view.depth.shape):
-        raise ValueError(f"the transmittance must have shape {tuple(view.depth.shape)}, got {shares.shape}")
-    shadow = _range_around(shares) > SHADOW_STEP
+    reaching = to_array(transmittance)
+    if reaching.shape != tuple(view.depth.shape):
+        raise ValueError(f"the transmittance must have shape {tuple(view.depth.shape)}, got {reaching.shape}")
+    shadow = _range_around(reaching) > SHADOW_STEP
     near = _light_distance(view) < NEAR_LIGHT * scene_size
     edges = edge_mask(view.depth, view.normal)
     rest = KINDS.index("rest")

@@ -30,8 +30,8 @@ def backs_towards_cameras(surfels: Surfels, viewpoints: Tensor) -> Tensor:
     sides = SurfelBvh(surfels), SurfelBvh(turned_over(surfels, everywhere))
 
     def seen(viewpoint: Tensor) -> Tensor:
-        share = torch.minimum(*(transmittance(side, viewpoint[None])[0][0] for side in sides))
-        return share.clamp(min=HIDDEN_SHARE).to(surfels.centers)
+        reaching = torch.minimum(*(transmittance(side, viewpoint[None])[0][0] for side in sides))
+        return reaching.clamp(min=HIDDEN_SHARE).to(surfels.centers)
 
     chosen = progress_bar(spread_out(viewpoints, LOOKED_FROM), "which side is seen", unit="camera")
     return backs_towards(surfels, chosen, seen)

@@ -156,9 +156,9 @@ def _over_receivers(
     keys, group = np.unique(slots[incident.rows] * wide + incident.patches, return_inverse=True)
     pairs = len(group)
     member = scipy.sparse.csr_matrix((area, (group, np.arange(pairs))), shape=(len(keys), pairs))
-    shares = member @ incident.shares
-    seen = scipy.sparse.diags(1.0 / shares) @ member @ scipy.sparse.diags(incident.shares) @ between
-    coarse = PairSums(keys // wide, keys % wide, shares, member @ incident.harmonics)
+    form_factors = member @ incident.form_factors
+    seen = scipy.sparse.diags(1.0 / form_factors) @ member @ scipy.sparse.diags(incident.form_factors) @ between
+    coarse = PairSums(keys // wide, keys % wide, form_factors, member @ incident.harmonics)
     return coarse, seen.tocsr()
 
 
@@ -174,14 +174,14 @@ def _only_columns(matrix: scipy.sparse.csr_matrix, columns: np.ndarray) -> scipy
 def _between(
     leaving: PairSums, incident: PairSums, chosen: np.ndarray, patches: np.ndarray, width: int
 ) -> scipy.sparse.csr_matrix:
-    """V: the sums of light that leaves for glossy receivers, each over the share of its pair."""
+    """V: the sums of light that leaves for glossy receivers, each over the form factors of its pair."""
     wide = max(int(incident.patches.max(initial=0)), int(patches.max())) + 1
     at_gloss = np.isin(leaving.rows, chosen)
     rows, slots = np.searchsorted(chosen, leaving.rows[at_gloss]), leaving.patches[at_gloss]
     # Where F_ij is an entry, its pair is one of the incident ones.
     place = np.searchsorted(incident.rows * wide + incident.patches, rows * wide + patches[slots])
     return spread_columns(
-        leaving.harmonics[at_gloss] / incident.shares[place][:, None], place, slots, (len(incident.rows), width)
+        leaving.harmonics[at_gloss] / incident.form_factors[place][:, None], place, slots, (len(incident.rows), width)
     )
 
 
@@ -199,13 +199,13 @@ class PairSums:
 
     Attributes:
         rows, patches: (pairs,) i and patch of each pair, in this order.
-        shares: (pairs,) Σ_j F_ij.
+        form_factors: (pairs,) Σ_j F_ij.
         harmonics: (pairs, K) Σ_j F_ij Y(direction of i and j).
     """
 
     rows: np.ndarray
     patches: np.ndarray
-    shares: np.ndarray
+    form_factors: np.ndarray
     harmonics: np.ndarray
 
 

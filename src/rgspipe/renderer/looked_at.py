@@ -17,5 +17,5 @@ def on_planes(origin: Tensor, directions: Tensor, centers: Tensor, normals: Tens
     grazing = across.abs() <= 1e-6
     along = ((centers - origin) * normals).sum(-1, keepdim=True) / where(grazing, 1.0, across)
     beside = origin + along * directions - centers
-    share = (reach[:, None] / beside.norm(dim=-1, keepdim=True).clamp(min=1e-30)).clamp(max=1.0)
-    return where(grazing, centers, centers + beside * share)
+    factor = (reach[:, None] / beside.norm(dim=-1, keepdim=True).clamp(min=1e-30)).clamp(max=1.0)
+    return where(grazing, centers, centers + beside * factor)

@@ -77,8 +77,8 @@ def shadow_losses(frozen: FrozenScene, positions: Tensor) -> tuple[Tensor, Tenso
     lit, shadowed = (frozen.unit_irradiance(positions, shadows=on)[0] * albedo for on in (False, True))
     peak = lit.amax(dim=1)
     point = torch.where(peak > 0.0, (lit - shadowed).amax(dim=1) / peak.clamp(min=1e-30), torch.zeros_like(peak))
-    share = torch.where(lit > 0.0, 1.0 - shadowed / lit.clamp(min=1e-30), torch.zeros_like(lit))
-    return point, share.amax(dim=1)
+    loss = torch.where(lit > 0.0, 1.0 - shadowed / lit.clamp(min=1e-30), torch.zeros_like(lit))
+    return point, loss.amax(dim=1)
 
 
 def sample_lights(frozen: FrozenScene, count: int, generator: torch.Generator) -> Tensor:

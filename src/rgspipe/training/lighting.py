@@ -28,20 +28,20 @@ class Lighting:
 
     Attributes:
         irradiance: (V, N) per unit intensity, at the surfels' centres.
-        shares: (V, N) part of the light that no surfel stops.
+        transmittance: (V, N) part of the light that no surfel stops.
         positions: (V, 3) of the lights, float64.
         intensity: (V, 3) W/sr.
     """
 
     irradiance: Tensor
-    shares: Tensor
+    transmittance: Tensor
     positions: Tensor
     intensity: Tensor
 
     def of_views(self, views: Sequence[int]) -> Lighting:
         """The light of some of the views."""
         index = torch.tensor(views, dtype=torch.int64)
-        return Lighting(self.irradiance[index], self.shares[index], self.positions[index], self.intensity[index])
+        return Lighting(self.irradiance[index], self.transmittance[index], self.positions[index], self.intensity[index])
 
     def direct(self) -> Tensor:
         """(V, N, 3) direct irradiance over π: the radiance that a white surfel would reflect."""
@@ -60,9 +60,9 @@ def trace_lighting(bvh: SurfelBvh, views: Sequence[View]) -> Lighting:
     positions = torch.stack([view.light.position for view in views])
     intensity = torch.stack([view.light.intensity for view in views]).float()
     blocks = positions.split(LIGHTS_AT_ONCE)
-    shares = torch.cat([transmittance(bvh, block)[0] for block in blocks])
+    passing = torch.cat([transmittance(bvh, block)[0] for block in blocks])
     falloff = torch.cat([unit_irradiance(bvh, block, shadows=False)[0] for block in blocks])
-    return Lighting(shares * falloff, shares, positions, intensity.to(bvh.device))
+    return Lighting(passing * falloff, passing, positions, intensity.to(bvh.device))
 
 
 def indirect_irradiance(lighting: Lighting, albedo: Tensor, transport: PatchTransport) -> Tensor:

@@ -77,7 +77,7 @@ def build_view_models(
     models, keep = [], (store or OperatorStore()).keep
     for index, view in enumerate(progress_bar(weights, "direct light", unit="view")):
         if at_pixels:
-            direct = PixelDirect(bvh, view).operator(lighting.positions[index], lighting.shares[index])
+            direct = PixelDirect(bvh, view).operator(lighting.positions[index], lighting.transmittance[index])
         else:
             direct = _at_centers(view.operator, lighting.irradiance[index])
         models.append(ViewModel(view, keep(direct), lighting.intensity[index] / torch.pi))

@@ -95,9 +95,9 @@ def _bun(segments: int) -> tuple[np.ndarray, np.ndarray]:
 def _tapered(section: np.ndarray, length: float, count: int, power: float) -> np.ndarray:
     """Rings of a section (S, 2) in y and z along x that shrink to a point at both ends as a superellipse does."""
     angle = np.linspace(-0.5 * math.pi, 0.5 * math.pi, count)
-    share = np.sin(angle)
-    scale = (1.0 - np.abs(share) ** power) ** 0.5
-    along = np.broadcast_to(length * share[:, None, None], (count, len(section), 1))
+    sine = np.sin(angle)
+    scale = (1.0 - np.abs(sine) ** power) ** 0.5
+    along = np.broadcast_to(length * sine[:, None, None], (count, len(section), 1))
     return np.concatenate([along, scale[:, None, None] * section], axis=-1)
 
 

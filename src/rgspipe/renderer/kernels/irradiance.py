@@ -52,9 +52,9 @@ def _irradiance(
             value = projected * inverse_cube
             slope = inverse_cube * (n - (3.0 * projected * (square / softened) / softened) * d)
         if shadows == 1 and projected > 0.0 and square > 0.0:
-            share, share_slope = light_transmittance(tree, i, surfels[i].center, light, d)
-            slope = share * slope + value * share_slope
-            value *= share
+            passing, passing_slope = light_transmittance(tree, i, surfels[i].center, light, d)
+            slope = passing * slope + value * passing_slope
+            value *= passing
     place = item - i + order[i]
     irradiance[place] = value
     derivative[place] = slope

@@ -27,7 +27,7 @@ def _pixel_transmittance(
     pixels: wp.array(dtype=int),
     receivers: wp.array(dtype=int),
     light: wp.vec3,
-    share: wp.array(dtype=wp.vec4),
+    transmittance: wp.array(dtype=wp.vec4),
 ):
     item = wp.tid() + offset
     p = pixels[item]
@@ -41,7 +41,7 @@ def _pixel_transmittance(
         if wp.dot(path, n) > 0.0:
             passing, slope = light_transmittance(tree, i, at, light, path)
             total += wp.vec4(passing, slope[0], slope[1], slope[2])
-    share[p] = total / float(places.shape[0])
+    transmittance[p] = total / float(places.shape[0])
 
 
 def pixel_transmittance(
@@ -51,16 +51,16 @@ def pixel_transmittance(
 
     Args:
         receivers: (P,) int64 surfel that stands for the surface in each pixel.
-        pixels: (K,) int64 those that are computed; the share of the others is −1.
+        pixels: (K,) int64 those that are computed; that of the others is −1.
         light: (3,) position.
         places: (K, 2) of a pixel's shadow rays in the unit square.
     """
-    share = torch.full((camera.pixel_count, 4), -1.0, dtype=torch.float32, device=bvh.device)
+    transmittance = torch.full((camera.pixel_count, 4), -1.0, dtype=torch.float32, device=bvh.device)
     if len(pixels) == 0:
-        return share
+        return transmittance
     lattice = wp.from_torch(places.float().contiguous().to(bvh.device), dtype=wp.vec2)
     records = wp.to_torch(bvh.rank)[receivers.to(bvh.device)].int()
     which = [as_array(pixels.to(bvh.device).int()), as_array(records), vector(bvh.local(light))]
-    inputs = [bvh.tree, pixel_rays(bvh, camera), lattice, *which, wp.from_torch(share, dtype=wp.vec4)]
+    inputs = [bvh.tree, pixel_rays(bvh, camera), lattice, *which, wp.from_torch(transmittance, dtype=wp.vec4)]
     launch(_pixel_transmittance, len(pixels), inputs, bvh.device)
-    return share
+    return transmittance

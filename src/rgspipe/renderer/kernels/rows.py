@@ -72,7 +72,7 @@ def _add_hits(
     row = wp.tid() + offset
     start = starts[row]
     capacity = starts[row + 1] - start
-    share = 1.0 / float(rays)
+    each = 1.0 / float(rays)
     count = int(0)
     for ray in range(row * rays, row * rays + rays):
         k = int(0)
@@ -80,7 +80,7 @@ def _add_hits(
             column = indices[ray, k]
             if column < 0:
                 break
-            count += place_in_table(start, capacity, column, share * weights[ray, k], keys, sums)
+            count += place_in_table(start, capacity, column, each * weights[ray, k], keys, sums)
             k += 1
     found[row] = count
 

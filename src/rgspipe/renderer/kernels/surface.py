@@ -32,10 +32,10 @@ def _mean_surface(
         j = indices[ray, k]
         if j < 0:
             break
-        share = weights[ray, k]
-        direction += share * normals[j]
-        far += share * depths[ray, k]
-        total += share
+        weight = weights[ray, k]
+        direction += weight * normals[j]
+        far += weight * depths[ray, k]
+        total += weight
         k += 1
     total = wp.max(total, 1.0e-6)
     normal[ray] = direction / total

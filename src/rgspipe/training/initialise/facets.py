@@ -113,16 +113,16 @@ def _fit_chunk(
     u, v = _dot(away, along), _dot(away, across)
     # Offset and slopes explain the measured offsets: the last column is what the first three are to give.
     system = np.stack([np.ones_like(u), u, v, _dot(measured[index] - here[:, None], normal)], axis=-1)
-    share = np.where(alike & np.isfinite(distance), weights[index], 0.0)
-    best, steps, supported = _widest_plane(system, share, distance, radii)
+    nearby = np.where(alike & np.isfinite(distance), weights[index], 0.0)
+    best, steps, supported = _widest_plane(system, nearby, distance, radii)
     forms = np.zeros((len(here), 3))
     bent = np.flatnonzero(supported & (steps < len(radii) - 1))
     if len(bent):
         curves = np.stack([0.5 * u[bent] ** 2, u[bent] * v[bent], 0.5 * v[bent] ** 2], axis=-1)
         radius = radii[steps[bent] + 1]
         bowl = np.concatenate([system[bent][..., :3], curves, system[bent][..., 3:]], axis=-1)
-        weight = share[bent] * np.maximum(1.0 - (distance[bent] / radius[:, None]) ** 2, 0.0)
-        found, _ = _robust(bowl, share[bent], weight, radius)
+        weight = nearby[bent] * np.maximum(1.0 - (distance[bent] / radius[:, None]) ** 2, 0.0)
+        found, _ = _robust(bowl, nearby[bent], weight, radius)
         best[bent], forms[bent] = found[:, :3], found[:, 3:]
     tilted = normal - best[:, 1:2] * along - best[:, 2:] * across
     frame = np.stack([along, across], axis=1)
@@ -132,7 +132,7 @@ def _fit_chunk(
 
 
 def _widest_plane(
-    system: np.ndarray, share: np.ndarray, distance: np.ndarray, radii: np.ndarray
+    system: np.ndarray, nearby: np.ndarray, distance: np.ndarray, radii: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Offset and slopes (C, 3) of the widest fit that agrees with all narrower ones, its radius (C,), if any (C,)."""
     count = len(system)
@@ -140,8 +140,8 @@ def _widest_plane(
     low, high = np.full((count, 3), -np.inf), np.full((count, 3), np.inf)
     growing, supported = np.ones(count, dtype=bool), np.zeros(count, dtype=bool)
     for step, radius in enumerate(radii):
-        weight = share * np.maximum(1.0 - (distance / radius) ** 2, 0.0)
-        found, variance = _robust(system, share, weight, np.full(count, radius))
+        weight = nearby * np.maximum(1.0 - (distance / radius) ** 2, 0.0)
+        found, variance = _robust(system, nearby, weight, np.full(count, radius))
         enough = (weight > 0).sum(axis=1) >= LEAST_NEIGHBOURS
         margin = CONFIDENCE * np.sqrt(variance)
         new_low, new_high = np.maximum(low, found - margin), np.minimum(high, found + margin)
@@ -153,11 +153,11 @@ def _widest_plane(
 
 
 def _robust(
-    system: np.ndarray, share: np.ndarray, weight: np.ndarray, radius: np.ndarray
+    system: np.ndarray, nearby: np.ndarray, weight: np.ndarray, radius: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """`_solve`, twice: what is far off the first solution counts little in the second."""
     found, _ = _solve(system, weight, radius)
-    off = np.sqrt(share) * (system[..., -1] - _dot(system[..., :-1], found))
+    off = np.sqrt(nearby) * (system[..., -1] - _dot(system[..., :-1], found))
     return _solve(system, weight / (1.0 + (off / OUTLIER) ** 2) ** 2, radius)
 
 
