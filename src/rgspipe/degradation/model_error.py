@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import torch
+from scipy.spatial.transform import Rotation
 from torch import Tensor
 
 from rgspipe.degradation.options import ModelError
@@ -73,17 +74,9 @@ def _wrong_albedo(surfels: Surfels, error: ModelError, size: float, generator: t
 
 def _tilted(rotations: Tensor, turn: Tensor) -> Tensor:
     """(N, 4) quaternions after a turn (N, 2) [rad] about each surfel's own u and v axes."""
-    w, x, y, z = torch.nn.functional.normalize(rotations.double().cpu(), dim=1).unbind(1)
-    angle = turn.norm(dim=1).clamp(min=1e-300)
-    cosine, sine = (0.5 * angle).cos(), (0.5 * angle).sin() / angle
-    a, b = sine * turn[:, 0], sine * turn[:, 1]
-    product = [
-        w * cosine - x * a - y * b,
-        x * cosine + w * a - z * b,
-        y * cosine + w * b + z * a,
-        z * cosine + x * b - y * a,
-    ]
-    return torch.stack(product, dim=1).to(rotations)
+    own = Rotation.from_quat(rotations.double().cpu().numpy(), scalar_first=True)
+    about = Rotation.from_rotvec(torch.nn.functional.pad(turn, (0, 1)).numpy())
+    return torch.from_numpy((own * about).as_quat(scalar_first=True)).to(rotations)
 
 
 def _without(surfels: Surfels, box: Sequence[float]) -> Surfels:
