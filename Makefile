@@ -57,8 +57,8 @@ docs: setup  ## the documentation as a site in site/, which is read without a se
 	$(MKDOCS) build --strict --quiet
 
 lint: setup  ## style and mistakes
-	$(VENV)/bin/ruff check src tests tools
-	$(VENV)/bin/ruff format --check src tests tools
+	$(VENV)/bin/ruff check src tests examples tools
+	$(VENV)/bin/ruff format --check src tests examples tools
 
 house: setup  ## the measures of the code: rooms, functions, imports, what stands twice (ARGS="--since REV --list")
 	$(VENV)/bin/python tools/house.py $(ARGS)

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from rgspipe.datasets.surfel_file import load_surfels, save_surfels
     from rgspipe.datasets.views import View
     from rgspipe.errors import InputError
+    from rgspipe.evaluation.images import save_png, tone_map
     from rgspipe.fitting import Effects, FitResult, FitStatus, FitViews, ImageCapture, LightSpec, fit_lights
     from rgspipe.renderer.frozen import FrozenScene
     from rgspipe.renderer.ply import load_ply
@@ -37,6 +38,7 @@ _HOMES = {
     "datasets.surfel_file": ("load_surfels", "save_surfels"),
     "datasets.views": ("View",),
     "errors": ("InputError",),
+    "evaluation.images": ("save_png", "tone_map"),
     "fitting": ("Effects", "FitResult", "FitStatus", "FitViews", "ImageCapture", "LightSpec", "fit_lights"),
     "renderer.frozen": ("FrozenScene",),
     "renderer.ply": ("load_ply",),
@@ -74,7 +76,9 @@ __all__ = [
     "load_views",
     "read_lights",
     "save_ply",
+    "save_png",
     "save_surfels",
+    "tone_map",
     "train",
     "write_lights",
 ]

@@ -12,7 +12,7 @@ from rgspipe.evaluation import images
 def test_exposure_brings_the_percentile_to_white_and_black_stays_black():
     image = np.full((10, 10, 3), 4.0)
     assert images.exposure(image) == pytest.approx(0.25)
-    assert (images.tone_map(image, images.exposure(image)) == 255).all()
+    assert (images.tone_map(image) == 255).all()
     black = np.zeros((4, 4, 3))
     assert images.exposure(black) == 1.0 and (images.tone_map(black, 1.0) == 0).all()
 

@@ -9,6 +9,7 @@ from torch import Tensor
 
 from rgspipe.datasets.classes import Occlusion
 from rgspipe.scene import Camera, PointLight
+from rgspipe.scene.shapes import Float
 
 
 @dataclass(frozen=True, repr=False)
@@ -29,12 +30,12 @@ class View:
 
     name: str
     camera: Camera
-    image: Tensor
-    alpha: Tensor
+    image: Float[Tensor, "H W 3"]
+    alpha: Float[Tensor, "H W"]
     light: PointLight | None = None
-    depth: Tensor | None = None
-    normal: Tensor | None = None
-    albedo: Tensor | None = None
+    depth: Float[Tensor, "H W"] | None = None
+    normal: Float[Tensor, "H W 3"] | None = None
+    albedo: Float[Tensor, "H W 3"] | None = None
 
     def __repr__(self) -> str:
         known = [name for name in ("light", "depth", "normal", "albedo") if getattr(self, name) is not None]

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 from torch import Tensor
 
-ArrayLike = npt.ArrayLike | Tensor
+from rgspipe.scene.arrays import ArrayLike
 
 
 def to_array(values: ArrayLike) -> npt.NDArray[np.float64]:

@@ -34,9 +34,9 @@ def exposure(target: ArrayLike) -> float:
     return 1.0 / white if white > 0.0 else 1.0
 
 
-def tone_map(image: ArrayLike, factor: float) -> Bytes:
-    """(H, W, 3) uint8 sRGB of a linear image (H, W, 3) times `factor`; NaN becomes magenta."""
-    linear = _image(image) * factor
+def tone_map(image: ArrayLike, factor: float | None = None) -> Bytes:
+    """(H, W, 3) uint8 sRGB of a linear image (H, W, 3) times `factor` (None: its `exposure`); NaN becomes magenta."""
+    linear = _image(image) * (exposure(image) if factor is None else factor)
     broken = np.isnan(linear).any(axis=-1)
     linear = np.clip(np.nan_to_num(linear, nan=0.0, posinf=1.0, neginf=0.0), 0.0, 1.0)
     result = np.round(255.0 * srgb.encode(linear)).astype(np.uint8)

@@ -9,6 +9,7 @@ import torch
 from torch import Tensor
 
 from rgspipe.scene.arrays import ArrayLike, as_tensor
+from rgspipe.scene.shapes import Float, Given
 
 
 @dataclass(frozen=True)
@@ -24,7 +25,7 @@ class Camera:
         width, height: image size in pixels.
     """
 
-    camera_to_world: Tensor
+    camera_to_world: Given
     fx: float
     fy: float
     cx: float
@@ -66,7 +67,7 @@ class Camera:
         return cls(camera_to_world, focal, focal, 0.5 * width, 0.5 * height, width, height)
 
     @property
-    def origin(self) -> Tensor:
+    def origin(self) -> Float[Tensor, " 3"]:
         """(3,) float64, the centre of projection."""
         return self.camera_to_world[:3, 3]
 
@@ -95,7 +96,7 @@ class Camera:
 
     def rays(
         self, pixels: Tensor | None = None, subsamples: int = 1, places: Tensor | None = None
-    ) -> tuple[Tensor, Tensor, Tensor]:
+    ) -> tuple[Float[Tensor, "R 3"], Float[Tensor, "R 3"], Float[Tensor, " R"]]:
         """Rays through a regular `subsamples × subsamples` grid in each pixel, or through given places in it.
 
         Args:
@@ -124,7 +125,7 @@ class Camera:
         directions = directions / lengths[:, None]
         return self.origin.expand_as(directions), directions, lengths
 
-    def project(self, points: Tensor) -> tuple[Tensor, Tensor]:
+    def project(self, points: Float[Tensor, "*B 3"]) -> tuple[Float[Tensor, "*B 2"], Float[Tensor, "*B"]]:
         """Pixel coordinates (…, 2) and planar depth (…,) of world points (…, 3); depth ≤ 0 is behind."""
         rotation = self.camera_to_world[:3, :3]
         local = (points.double() - self.origin) @ rotation
@@ -135,7 +136,7 @@ class Camera:
         return torch.stack([x, y], dim=-1), depth
 
 
-def look_at(origin: ArrayLike, target: ArrayLike, up: ArrayLike | None = None) -> Tensor:
+def look_at(origin: ArrayLike, target: ArrayLike, up: ArrayLike | None = None) -> Float[Tensor, "4 4"]:
     """(4, 4) float64 camera-to-world matrix of a camera at `origin` that looks at `target`.
 
     `up` defaults to +z; when the view is along it, +y takes its place.

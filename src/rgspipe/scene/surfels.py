@@ -8,6 +8,7 @@ import torch
 from torch import Tensor
 
 from rgspipe.scene.gloss import Gloss
+from rgspipe.scene.shapes import Float
 
 #: A clip offset that never clips (in units of the softness it is far beyond any surfel's footprint).
 NO_CLIP = 1e3
@@ -93,12 +94,12 @@ class Surfels:
         return f"Surfels({len(self)}, {glossy or 'none'} of them glossy, {self.centers.dtype}, {self.centers.device})"
 
     @property
-    def frames(self) -> Tensor:
+    def frames(self) -> Float[Tensor, "N 3 3"]:
         """(N, 3, 3) orthonormal axes; [:, 0] is u, [:, 1] is v, [:, 2] the normal."""
         return quaternion_to_axes(self.rotations)
 
     @property
-    def normals(self) -> Tensor:
+    def normals(self) -> Float[Tensor, "N 3"]:
         """(N, 3) unit normals."""
         return self.frames[:, 2]
 
@@ -117,7 +118,7 @@ def tensor_names() -> list[str]:
     return [field.name for field in fields(Surfels) if field.name not in ("coverage", "gloss")]
 
 
-def quaternion_to_axes(quaternions: Tensor) -> Tensor:
+def quaternion_to_axes(quaternions: Float[Tensor, "N 4"]) -> Float[Tensor, "N 3 3"]:
     """(N, 3, 3) rows u, v, normal of the rotations (N, 4) (w, x, y, z); quaternions are normalised first."""
     w, x, y, z = torch.nn.functional.normalize(quaternions, dim=-1).unbind(-1)
     u = torch.stack([1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)], dim=-1)
@@ -126,7 +127,7 @@ def quaternion_to_axes(quaternions: Tensor) -> Tensor:
     return torch.stack([u, v, n], dim=-2)
 
 
-def quaternion_from_normal(normals: Tensor) -> Tensor:
+def quaternion_from_normal(normals: Float[Tensor, "N 3"]) -> Float[Tensor, "N 4"]:
     """(N, 4) shortest rotations from +z to the unit normals (N, 3); −z turns about x."""
     x, y, z = normals.unbind(-1)
     across = x * x + y * y
@@ -139,7 +140,7 @@ def quaternion_from_normal(normals: Tensor) -> Tensor:
     return torch.nn.functional.normalize(quaternion, dim=-1)
 
 
-def turn_in_plane(quaternions: Tensor, angles: Tensor) -> Tensor:
+def turn_in_plane(quaternions: Float[Tensor, "N 4"], angles: Float[Tensor, " N"]) -> Float[Tensor, "N 4"]:
     """Rotations (N, 4) turned by `angles` (N,) [rad] about their own normals."""
     w, x, y, z = quaternions.unbind(-1)
     c, s = torch.cos(0.5 * angles), torch.sin(0.5 * angles)

@@ -16,6 +16,7 @@ from rgspipe.scene.lights.angles import angle_from_axis, angle_slopes
 from rgspipe.scene.lights.coordinates import AXIS, PLACE, Coordinate
 from rgspipe.scene.lights.light import Light, Share
 from rgspipe.scene.lights.point import PointLight
+from rgspipe.scene.shapes import Float, Given
 
 
 @dataclass(frozen=True)
@@ -26,7 +27,7 @@ class AxialLight(Light):
         direction: (3,) unit vector along the axis, away from the light.
     """
 
-    direction: Tensor
+    direction: Given
 
     @abstractmethod
     def profile_at(self, angle: Tensor, numbers: Mapping[str, Tensor], softness: float = 0.0) -> tuple[Tensor, Tensor]:
@@ -42,7 +43,7 @@ class AxialLight(Light):
         """Angles in [0, π] between which the profile is smooth."""
 
     @property
-    def axis(self) -> Tensor:
+    def axis(self) -> Float[Tensor, " 3"]:
         return self.direction
 
     @property
@@ -59,12 +60,12 @@ class AxialLight(Light):
         """Share of the axial intensity at `angle` [rad] from the axis."""
         return self.profile_at(angle, self.numbers(angle))[0]
 
-    def share_towards(self, points: Tensor) -> Tensor:
+    def share_towards(self, points: Float[Tensor, "N 3"]) -> Float[Tensor, " N"]:
         """(N,) share of the axial intensity that goes towards `points` (N, 3), differentiable by autograd."""
         towards = points - self.position.to(points)
         return self.share_at(angle_from_axis(self.direction.to(points), towards))
 
-    def share(self, points: Tensor, *, softness: float = 0.0, shape_free: bool = False) -> Share:
+    def share(self, points: Float[Tensor, "N 3"], *, softness: float = 0.0, shape_free: bool = False) -> Share:
         # The difference is taken in float64: far from the origin float32 knows neither of the two well enough.
         towards = (points.double() - self.position.detach().to(points.device, torch.float64)).float()
         axis = self.direction.detach().to(towards)
@@ -85,7 +86,7 @@ class AxialLight(Light):
         """No profile rises with the angle, so no share is smaller than that straight backwards."""
         return float(self.share_at(torch.tensor([math.pi], dtype=torch.float64)))
 
-    def power(self) -> Tensor:
+    def power(self) -> Float[Tensor, " 3"]:
         """2π I ∫ p(θ) sin θ dθ."""
         nodes, weights = np.polynomial.legendre.leggauss(64)
         total = 0.0

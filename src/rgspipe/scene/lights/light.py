@@ -15,6 +15,7 @@ from torch import Tensor
 from rgspipe.errors import InputError
 from rgspipe.scene.arrays import ArrayLike, as_tensor
 from rgspipe.scene.lights.coordinates import PLACE, Coordinate
+from rgspipe.scene.shapes import Float, Given
 
 #: What tables call the components of an axis.
 AXIS_COLUMNS = ("ax", "ay", "az")
@@ -33,7 +34,7 @@ class Share:
             direction (across it only), (N,) towards numbers of its shape, in their own units.
     """
 
-    value: Tensor
+    value: Float[Tensor, " N"]
     by: Mapping[str, Tensor]
 
 
@@ -95,8 +96,8 @@ class Light(ABC):
     #: Its name in light files and settings.
     kind: ClassVar[str]
 
-    position: Tensor
-    intensity: Tensor
+    position: Given
+    intensity: Given
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -105,7 +106,7 @@ class Light(ABC):
         object.__setattr__(self, "intensity", _colour(self.intensity))
 
     @property
-    def axis(self) -> Tensor | None:
+    def axis(self) -> Float[Tensor, " 3"] | None:
         """(3,) of unit length, along which it shines; None if it shines alike in all directions."""
         return None
 
@@ -125,10 +126,10 @@ class Light(ABC):
         return self
 
     @abstractmethod
-    def power(self) -> Tensor:
+    def power(self) -> Float[Tensor, " 3"]:
         """(3,) radiant power [W]: the intensity integrated over all directions."""
 
-    def share(self, points: Tensor, *, softness: float = 0.0, shape_free: bool = False) -> Share | None:
+    def share(self, points: Float[Tensor, "N 3"], *, softness: float = 0.0, shape_free: bool = False) -> Share | None:
         """What of its intensity goes towards `points` (N, 3); None if all of it does.
 
         Args:

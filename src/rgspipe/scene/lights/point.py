@@ -9,6 +9,7 @@ import torch
 from torch import Tensor
 
 from rgspipe.scene.lights.light import WATTS_PER_INTENSITY, Light, Reader
+from rgspipe.scene.shapes import Float
 
 
 @dataclass(frozen=True)
@@ -22,7 +23,7 @@ class PointLight(Light):
         """A point light of 1 W/sr at the origin."""
         return cls(torch.zeros(3).double(), torch.ones(3).double())
 
-    def power(self) -> Tensor:
+    def power(self) -> Float[Tensor, " 3"]:
         return WATTS_PER_INTENSITY * self.intensity
 
     @classmethod

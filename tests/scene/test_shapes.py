@@ -1,0 +1,40 @@
+"""Shapes in annotations are checked under pytest, and cost nothing elsewhere."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from dataclasses import replace
+
+import jaxtyping
+import pytest
+import torch
+
+from rgspipe.datasets.views import View
+from rgspipe.scene import Camera, PointLight
+from rgspipe.scene.surfels import turn_in_plane
+
+
+def test_arguments_of_other_shapes_are_refused() -> None:
+    camera = Camera.look_at([0.0, -2.0, 0.0], [0.0, 0.0, 0.0], width=8, height=6)
+    with pytest.raises(jaxtyping.TypeCheckError):
+        camera.project(torch.zeros(4, 2))
+    with pytest.raises(jaxtyping.TypeCheckError):
+        turn_in_plane(torch.zeros(5, 4), torch.zeros(6))
+    with pytest.raises(jaxtyping.TypeCheckError):
+        PointLight([0.0, 0.0, 0.0], 1.0).share(torch.zeros(3))
+
+
+def test_the_maps_of_a_view_have_one_size() -> None:
+    camera = Camera.look_at([0.0, -2.0, 0.0], [0.0, 0.0, 0.0], width=8, height=6)
+    view = View("one", camera, torch.zeros(6, 8, 3), torch.ones(6, 8))
+    with pytest.raises(jaxtyping.TypeCheckError):
+        replace(view, depth=torch.ones(8, 6))
+
+
+def test_the_library_does_without_jaxtyping(child_environment: dict[str, str]) -> None:
+    script = (
+        "import sys, rgspipe as rg; rg.FrozenScene, rg.fit_lights, rg.load_views; print('jaxtyping' in sys.modules)"
+    )
+    run = subprocess.run([sys.executable, "-c", script], env=child_environment, capture_output=True, text=True)
+    assert run.stdout == "False\n", run.stderr
