@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from rgspipe.benchmark.figures import front_figure, scaling_figure
 from rgspipe.benchmark.front import mark_front, non_dominated, over_rooms
-from rgspipe.benchmark.markdown import markdown_table
 from rgspipe.evaluation.plots import svg_bytes
 
 NUMBERS = st.lists(st.tuples(st.integers(0, 9), st.integers(0, 9)), min_size=1, max_size=20)
@@ -66,11 +65,3 @@ def test_the_figures_are_drawn_with_and_without_peers() -> None:
         }
     )
     assert len(svg_bytes(scaling_figure(growth))) > 10_000
-
-
-def test_a_markdown_table_shows_what_is_there() -> None:
-    table = pd.DataFrame({"name": ["a", "b"], "value": [1.234, float("nan")], "flag": [True, False]})
-    text = markdown_table(
-        table, {"name": ("what", ""), "value": ("how much", ".1f"), "missing": ("no", ""), "flag": ("on", "")}
-    )
-    assert text == "| what | how much | on |\n| --- | --- | --- |\n| a | 1.2 | yes |\n| b | – | no |\n"

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 import pandas as pd
 
-from rgspipe.benchmark.markdown import markdown_table
 from rgspipe.benchmark.settings import Setting
+from rgspipe.evaluation.markdown import markdown_table
 
 ERRORS = {
     "direct_db": ("direct (dB)", ".1f"),

@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
+from scipy.stats import binomtest
 
 from rgspipe.evaluation import metrics
 from rgspipe.evaluation.tables import ALL, class_order
@@ -38,9 +39,6 @@ SHARES = {
 
 #: What names a row.
 KEYS = ["scene", "case", "method", "views", "occlusion"]
-
-#: Quantile of the normal distribution that a two-sided 95 % interval reaches to.
-TWO_SIDED_95 = 1.959964
 
 
 def case_rows(
@@ -103,10 +101,8 @@ def wilson_interval(successes: int, count: int) -> tuple[float, float]:
     """
     if count == 0:
         return math.nan, math.nan
-    share, z = successes / count, TWO_SIDED_95
-    middle = (share + z * z / (2 * count)) / (1 + z * z / count)
-    half = z / (1 + z * z / count) * math.sqrt(share * (1 - share) / count + z * z / (4 * count * count))
-    return max(0.0, middle - half), min(1.0, middle + half)
+    interval = binomtest(successes, count).proportion_ci(0.95, method="wilson")
+    return float(interval.low), float(interval.high)
 
 
 def _figures(group: pd.DataFrame, seed: int, resamples: int) -> dict[str, float]:

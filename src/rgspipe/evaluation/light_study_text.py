@@ -10,6 +10,7 @@ import pandas as pd
 
 from rgspipe.evaluation.goals import percent
 from rgspipe.evaluation.light_study import STATUSES, several, without_repeats
+from rgspipe.evaluation.markdown import markdown_lines
 from rgspipe.evaluation.plots import LABELS
 from rgspipe.evaluation.tables import ALL
 
@@ -62,9 +63,7 @@ def shown_rows(table: pd.DataFrame, kind: str) -> tuple[list[str], list[Row]]:
 def markdown(table: pd.DataFrame, kind: str) -> str:
     """The same as a Markdown table."""
     headings, rows = shown_rows(table, kind)
-    lines = ["| " + " | ".join(headings) + " |", "| " + "--- | " * len(headings)]
-    lines += ["| " + " | ".join(row.values()) + " |" for row in rows]
-    return "\n".join(line.rstrip() for line in lines) + "\n"
+    return markdown_lines(headings, [list(row.values()) for row in rows])
 
 
 def _columns(rows: pd.DataFrame, kind: str) -> dict[str, Callable[[Row], str]]:

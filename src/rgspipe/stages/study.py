@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import pandas as pd
 
-from rgspipe.benchmark.markdown import markdown_table
 from rgspipe.config import RgspipeConfig
+from rgspipe.evaluation.markdown import markdown_table
 from rgspipe.evaluation.plots import png_of
 from rgspipe.evaluation.quality_plots import study_figure
 from rgspipe.evaluation.study import TRUTH, study_row, with_factors

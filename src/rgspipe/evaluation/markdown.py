@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 import pandas as pd
 
@@ -15,10 +15,15 @@ def markdown_table(table: pd.DataFrame, columns: Mapping[str, tuple[str, str]]) 
         columns: for each column that is shown its heading and format, such as ("PSNR (dB)", ".1f").
     """
     shown = {name: style for name, style in columns.items() if name in table.columns}
-    lines = ["| " + " | ".join(heading for heading, _ in shown.values()) + " |", "| " + "--- | " * len(shown)]
-    for row in table.to_dict("records"):
-        lines.append("| " + " | ".join(_cell(row[name], form) for name, (_, form) in shown.items()) + " |")
-    return "\n".join(line.rstrip() for line in lines) + "\n"
+    rows = table.to_dict("records")
+    cells = [[_cell(row[name], form) for name, (_, form) in shown.items()] for row in rows]
+    return markdown_lines([heading for heading, _ in shown.values()], cells)
+
+
+def markdown_lines(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A Markdown table of texts."""
+    lines = [headings, ["---"] * len(headings), *rows]
+    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
 
 def _cell(value: object, form: str) -> str:
