@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from rgspipe.fitting.certainty.uncertainty import light_covariances
-from rgspipe.fitting.findings import Finding, LightMissing, Rival
+from rgspipe.fitting.findings import Finding, LightMissing, LightSpare, Rival
 from rgspipe.fitting.meter import Meter
 from rgspipe.fitting.model.blocks import BlockModel, view_of_blocks
 from rgspipe.fitting.model.emitter import Emitter
@@ -27,9 +27,9 @@ from rgspipe.fitting.search.schedule import Schedule
 from rgspipe.fitting.search.starts import Candidates
 from rgspipe.fitting.search.weighting import PLAIN
 from rgspipe.fitting.selection.diagnosis import Costs, standing
-from rgspipe.fitting.selection.number import Doubted, doubted_number
+from rgspipe.fitting.selection.number import Doubted, doubted_number, faded_light
 from rgspipe.fitting.selection.one_more import OneMoreOptions
-from rgspipe.fitting.selection.rivals import RivalOptions, has_rival
+from rgspipe.fitting.selection.rivals import RivalOptions, has_rival, stands_anywhere
 from rgspipe.fitting.spec import LightSpec
 from rgspipe.optim.levenberg_marquardt import LevenbergMarquardt
 
@@ -93,7 +93,10 @@ def fit_search_lm(
     polished, best = _polished(refiner.on(problem.sharpest()), found.best, options.iterations)
     if not bool((best.intensity > 0).any()):
         return dark_result(meter.seconds)
-    return _result(polished, best, found.findings, Costs.of(refiner, found.compared))
+    findings = found.findings
+    if spec.count is not None and not any(isinstance(finding, LightSpare) for finding in findings):
+        findings = (*findings, *faded_light(refiner, best, options.bar, options.schedule))
+    return _result(polished, best, findings, Costs.of(refiner, found.compared), options.rivals)
 
 
 def fit_from(problem: LightProblem, start: Sequence[Emitter], iterations: int = 30) -> FitResult:
@@ -102,7 +105,7 @@ def fit_from(problem: LightProblem, start: Sequence[Emitter], iterations: int = 
         return dark_result(0.0)
     refiner = Refiner.of(problem.sharpest())
     best = refiner.refined(refiner.start(start, PLAIN), PLAIN, iterations)
-    return _result(refiner, best, (), Costs({}))
+    return _result(refiner, best, (), Costs({}), RivalOptions())
 
 
 @dataclass(frozen=True)
@@ -157,9 +160,13 @@ def _polished(refiner: Refiner, best: State, iterations: int) -> tuple[Refiner, 
     return refiner.on(problem), best
 
 
-def _result(refiner: Refiner, best: State, findings: Sequence[Finding], costs: Costs) -> FitResult:
+def _result(
+    refiner: Refiner, best: State, findings: Sequence[Finding], costs: Costs, rivals: RivalOptions
+) -> FitResult:
     problem, meter, last = refiner.problem, refiner.meter, refiner.step(best)
     spread = light_covariances(problem, best)
+    if Rival() not in findings and stands_anywhere(refiner, best, spread.calibrated, rivals):
+        findings = (Rival(), *findings)
     return FitResult(
         lights=last.lights,
         findings=(*standing(refiner, best, spread.calibrated), *findings),

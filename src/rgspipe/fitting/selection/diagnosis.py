@@ -9,7 +9,7 @@ from torch import Tensor
 
 from rgspipe.fitting.certainty.doubts import doubts
 from rgspipe.fitting.findings import AtBound, Finding, FitStatus, MaybeOneMore, OutOfSteps, PoorlyExplained
-from rgspipe.fitting.search.compare import Bar, robust_losses
+from rgspipe.fitting.search.compare import Bar, robust_costs
 from rgspipe.fitting.search.refine import Refiner, State
 
 #: An answer that leaves more than this share of the target's energy unexplained is none.
@@ -45,8 +45,8 @@ class Costs:
 
     @classmethod
     def of(cls, refiner: Refiner, compared: Mapping[int, State]) -> Costs:
-        losses = robust_losses(refiner.problem, [*compared.values()]) if compared else []
-        return cls({count: float(loss.mean()) for count, loss in zip(compared, losses, strict=True)})
+        costs = robust_costs(refiner.problem, [*compared.values()]) if compared else []
+        return cls(dict(zip(compared, costs, strict=True)))
 
     def maybe_more(self, count: int, compared: Mapping[int, State], bar: Bar) -> list[Finding]:
         """Whether one light more than `count` might be there, though it lowers the cost too little to count."""

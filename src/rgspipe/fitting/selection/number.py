@@ -6,10 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from rgspipe.fitting.findings import Finding, LightMissing, LightSpare
-from rgspipe.fitting.search.compare import Bar
+from rgspipe.fitting.search.compare import Bar, energy_shares
 from rgspipe.fitting.search.refine import Refiner, State
 from rgspipe.fitting.search.schedule import Schedule
 from rgspipe.fitting.search.starts import Candidates
+from rgspipe.fitting.search.weighting import PLAIN
 from rgspipe.fitting.selection.one_less import one_light_less
 from rgspipe.fitting.selection.one_more import OneMoreOptions, one_more_light
 from rgspipe.fitting.spec import MOST_LIGHTS
@@ -50,5 +51,12 @@ def doubted_number(
     if count > 1:
         less = one_light_less(refiner, best, bar, schedule.steps // 2)
         compared |= {count - 1: less.simple, count: less.rich}
-        findings += [] if less.worth else [LightSpare(less.index + 1, count, less.gain, less.wanted)]
+        findings += less.findings
     return Doubted(tuple(findings), compared)
+
+
+def faded_light(refiner: Refiner, polished: State, bar: Bar, schedule: Schedule) -> list[LightSpare]:
+    """What `doubted_number` says of the number being too large, where the polish has left a light next to nothing."""
+    if min(energy_shares(polished)) >= schedule.alike.least_energy:
+        return []
+    return one_light_less(refiner, refiner.start(polished.emitters, PLAIN), bar, schedule.steps // 2).findings

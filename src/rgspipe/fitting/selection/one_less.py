@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from rgspipe.fitting.findings import LightSpare
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.search.compare import Bar, drop, light_energies
 from rgspipe.fitting.search.refine import Refiner, State
@@ -36,6 +37,11 @@ class OneLess:
     def worth(self) -> bool:
         """Whether that light is there, rather than an error of the model."""
         return self.gain >= self.wanted
+
+    @property
+    def findings(self) -> list[LightSpare]:
+        """What there is to be said of the number."""
+        return [] if self.worth else [LightSpare(self.index + 1, len(self.rich.emitters), self.gain, self.wanted)]
 
 
 def one_light_less(refiner: Refiner, answer: State, bar: Bar | None = None, steps: int = 3) -> OneLess:
