@@ -126,6 +126,10 @@ class RivalOptions(Options):
     """errors of about so many neighbouring pixels are one: what the model gets wrong is smooth"""
     energy: float = option(1.5, low=1, high=1000)
     """a rival leaves at most so many times the energy unexplained that the best rig does"""
+    stride: float = option(1.2, low=1, high=100)
+    """where the place of a light is not determined, others are tried so many times `apart` away …"""
+    least_energy: float = option(0.01, low=0, high=1)
+    """… if it sends this share of the image's energy"""
     steps: int = option(12, low=2, high=10000)
     """steps of either rig under the robust loss, and half as many of the rival by plain squares"""
 

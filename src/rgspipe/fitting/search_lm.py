@@ -10,13 +10,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from rgspipe.fitting.certainty.uncertainty import light_covariances
-from rgspipe.fitting.findings import Finding, LightMissing, Rival
+from rgspipe.fitting.findings import Finding, LightMissing, LightSpare, Rival
 from rgspipe.fitting.meter import Meter
 from rgspipe.fitting.model.blocks import BlockModel, view_of_blocks
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.exposure import rough_exposures
 from rgspipe.fitting.model.problem import LightProblem
-from rgspipe.fitting.options import SearchOptions
+from rgspipe.fitting.options import RivalOptions, SearchOptions
 from rgspipe.fitting.result import FitResult, dark_result
 from rgspipe.fitting.search.coarse import CoarseImages
 from rgspipe.fitting.search.refine import Refiner, State
@@ -24,8 +24,8 @@ from rgspipe.fitting.search.rig_search import RigSearch
 from rgspipe.fitting.search.starts import Candidates
 from rgspipe.fitting.search.weighting import PLAIN
 from rgspipe.fitting.selection.diagnosis import Costs, standing
-from rgspipe.fitting.selection.number import Doubted, doubted_number
-from rgspipe.fitting.selection.rivals import has_rival
+from rgspipe.fitting.selection.number import Doubted, doubted_number, faded_light
+from rgspipe.fitting.selection.rivals import has_rival, stands_anywhere
 from rgspipe.fitting.spec import LightSpec
 
 
@@ -56,7 +56,10 @@ def fit_search_lm(
     polished, best = _polished(refiner.on(problem.sharpest()), found.best, options.iterations)
     if not bool((best.intensity > 0).any()):
         return dark_result(meter.seconds)
-    return _result(polished, best, found.findings, Costs.of(refiner, found.compared))
+    findings = found.findings
+    if spec.count is not None and not any(isinstance(finding, LightSpare) for finding in findings):
+        findings = (*findings, *faded_light(refiner, best, options))
+    return _result(polished, best, findings, Costs.of(refiner, found.compared), options.rivals)
 
 
 def fit_from(problem: LightProblem, start: Sequence[Emitter], iterations: int = 30) -> FitResult:
@@ -65,7 +68,7 @@ def fit_from(problem: LightProblem, start: Sequence[Emitter], iterations: int = 
         return dark_result(0.0)
     refiner = Refiner.of(problem.sharpest())
     best = refiner.refined(refiner.start(start, PLAIN), PLAIN, iterations)
-    return _result(refiner, best, (), Costs({}))
+    return _result(refiner, best, (), Costs({}), RivalOptions())
 
 
 @dataclass(frozen=True)
@@ -118,9 +121,13 @@ def _polished(refiner: Refiner, best: State, iterations: int) -> tuple[Refiner, 
     return refiner.on(problem), best
 
 
-def _result(refiner: Refiner, best: State, findings: Sequence[Finding], costs: Costs) -> FitResult:
+def _result(
+    refiner: Refiner, best: State, findings: Sequence[Finding], costs: Costs, rivals: RivalOptions
+) -> FitResult:
     problem, meter, last = refiner.problem, refiner.meter, refiner.step(best)
     spread = light_covariances(problem, best)
+    if Rival() not in findings and stands_anywhere(refiner, best, spread.calibrated, rivals):
+        findings = (Rival(), *findings)
     return FitResult(
         lights=last.lights,
         findings=(*standing(refiner, best, spread.calibrated), *findings),

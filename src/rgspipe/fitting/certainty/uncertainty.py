@@ -21,7 +21,7 @@ import torch
 from torch import Tensor
 
 from rgspipe.fitting.model.moments import group_moments, information, scores
-from rgspipe.fitting.model.problem import LightProblem
+from rgspipe.fitting.model.problem import ROUNDING, LightProblem
 from rgspipe.fitting.model.views import PreparedViews
 from rgspipe.fitting.search.refine import State
 from rgspipe.fitting.search.weighting import PLAIN
@@ -36,8 +36,9 @@ INFLATION = 3.5
 #: No cell's share of the evidence counts as more than this: one that tells everything cannot be left out.
 LARGEST_SHARE = 0.95
 
-#: Directions with less information than this part of the largest are not determined.
-RANK = 1e-11
+#: Directions with less information than this part of the largest are not determined: information goes with the square
+#: of the image, and that of ten unknowns that do nothing is rounding up to this.
+RANK = 10.0 * ROUNDING**2
 
 
 @dataclass(frozen=True)

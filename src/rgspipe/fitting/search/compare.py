@@ -11,7 +11,7 @@ from scipy.optimize import linear_sum_assignment
 from torch import Tensor
 
 from rgspipe.fitting.model.emitter import Emitter
-from rgspipe.fitting.model.problem import LightProblem
+from rgspipe.fitting.model.problem import ROUNDING, LightProblem
 from rgspipe.fitting.options import BarOptions
 from rgspipe.fitting.search.refine import State
 from rgspipe.fitting.search.weighting import ROBUST, cauchy_scale
@@ -64,10 +64,21 @@ def worth_keeping(state: State, bar: BarOptions, size: float) -> list[int]:
 
 def robust_losses(problem: LightProblem, states: Sequence[State]) -> list[Tensor]:
     """(P,) Cauchy loss of each pixel for each rig, relative to brightness, at the scale of the rig that fits best."""
+    return _losses_and_scale(problem, states)[0]
+
+
+def robust_costs(problem: LightProblem, states: Sequence[State]) -> list[float]:
+    """The mean of `robust_losses` of each rig, no less than that of rounding, below which no rig is the better one."""
+    losses, scale = _losses_and_scale(problem, states)
+    rounding = math.log1p((ROUNDING / scale) ** 2)
+    return [max(float(loss.mean()), rounding) for loss in losses]
+
+
+def _losses_and_scale(problem: LightProblem, states: Sequence[State]) -> tuple[list[Tensor], float]:
     base = ROBUST.base(problem)
     residuals = [base * problem.residual(state.columns, state.intensity) for state in states]
     scale = min(cauchy_scale(residual) for residual in residuals)
-    return [(residual.double() / scale).square().log1p().mean(dim=1) for residual in residuals]
+    return [(residual.double() / scale).square().log1p().mean(dim=1) for residual in residuals], scale
 
 
 def ranked(problem: LightProblem, states: Sequence[State]) -> list[State]:
@@ -83,8 +94,8 @@ def best_state(problem: LightProblem, states: Sequence[State]) -> State:
 
 def drop(problem: LightProblem, simple: State, rich: State) -> float:
     """By what share the robust cost of `rich` is below that of `simple`."""
-    costs = [float(loss.mean()) for loss in robust_losses(problem, [simple, rich])]
-    return 1.0 - costs[1] / costs[0] if costs[0] > 0.0 else 0.0
+    before, after = robust_costs(problem, [simple, rich])
+    return 1.0 - after / before
 
 
 def rig_distance(one: Sequence[Emitter], other: Sequence[Emitter]) -> float:
@@ -101,6 +112,12 @@ def _counterparts(one: Sequence[Emitter], other: Sequence[Emitter]) -> list[tupl
     first, second = (torch.stack([emitter.position for emitter in rig]).numpy() for rig in (one, other))
     rows, columns = linear_sum_assignment(np.linalg.norm(first[:, None] - second[None], axis=-1))
     return [(one[row], other[column]) for row, column in zip(rows, columns, strict=True)]
+
+
+def energy_shares(state: State) -> list[float]:
+    """`light_energies` over their sum."""
+    energies = light_energies(state)
+    return [energy / max(sum(energies), 1e-300) for energy in energies]
 
 
 def light_energies(state: State) -> list[float]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from rgspipe.fitting.model.problem import LightProblem
+from rgspipe.fitting.model.problem import ROUNDING, LightProblem
 
 #: Residuals beyond this many medians lose their weight (Cauchy loss).
 CAUCHY_MEDIANS = 3.0
@@ -54,4 +54,4 @@ ROBUST, PLAIN = Weighting(relative=True, robust=True), Weighting(relative=False,
 
 def cauchy_scale(weighted: Tensor) -> float:
     """The residual at which the Cauchy loss lets go: three medians, above rounding."""
-    return CAUCHY_MEDIANS * float(weighted.abs().median()) + 1e-6 if weighted.numel() else 1.0
+    return CAUCHY_MEDIANS * float(weighted.abs().median()) + ROUNDING if weighted.numel() else 1.0

@@ -10,7 +10,7 @@ from torch import Tensor
 from rgspipe.fitting.certainty.doubts import doubts
 from rgspipe.fitting.findings import AtBound, Finding, FitStatus, MaybeOneMore, OutOfSteps, PoorlyExplained
 from rgspipe.fitting.options import BarOptions
-from rgspipe.fitting.search.compare import robust_losses, wanted
+from rgspipe.fitting.search.compare import robust_costs, wanted
 from rgspipe.fitting.search.refine import Refiner, State
 
 #: An answer that leaves more than this share of the target's energy unexplained is none.
@@ -46,8 +46,8 @@ class Costs:
 
     @classmethod
     def of(cls, refiner: Refiner, compared: Mapping[int, State]) -> Costs:
-        losses = robust_losses(refiner.problem, [*compared.values()]) if compared else []
-        return cls({count: float(loss.mean()) for count, loss in zip(compared, losses, strict=True)})
+        costs = robust_costs(refiner.problem, [*compared.values()]) if compared else []
+        return cls(dict(zip(compared, costs, strict=True)))
 
     def maybe_more(self, count: int, compared: Mapping[int, State], bar: BarOptions) -> list[Finding]:
         """Whether one light more than `count` might be there, though it lowers the cost too little to count."""

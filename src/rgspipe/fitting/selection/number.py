@@ -7,8 +7,10 @@ from dataclasses import dataclass, field
 
 from rgspipe.fitting.findings import Finding, LightMissing, LightSpare
 from rgspipe.fitting.options import MOST_LIGHTS, SearchOptions
+from rgspipe.fitting.search.compare import energy_shares
 from rgspipe.fitting.search.refine import Refiner, State
 from rgspipe.fitting.search.starts import Candidates
+from rgspipe.fitting.search.weighting import PLAIN
 from rgspipe.fitting.selection.one_less import one_light_less
 from rgspipe.fitting.selection.one_more import one_more_light
 
@@ -40,5 +42,14 @@ def doubted_number(
     if count > 1:
         less = one_light_less(refiner, best, options.bar, options.schedule.steps // 2)
         compared |= {count - 1: less.simple, count: less.rich}
-        findings += [] if less.worth else [LightSpare(less.index + 1, count, less.gain, less.wanted)]
+        findings += less.findings
     return Doubted(tuple(findings), compared)
+
+
+def faded_light(refiner: Refiner, polished: State, options: SearchOptions) -> list[LightSpare]:
+    """What `doubted_number` says of the number being too large, where the polish has left a light next to nothing."""
+    if min(energy_shares(polished)) >= options.bar.least_energy:
+        return []
+    return one_light_less(
+        refiner, refiner.start(polished.emitters, PLAIN), options.bar, options.schedule.steps // 2
+    ).findings

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from rgspipe.fitting.findings import LightSpare
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.options import BarOptions
 from rgspipe.fitting.search.compare import drop, light_energies, wanted
@@ -37,6 +38,11 @@ class OneLess:
     def worth(self) -> bool:
         """Whether that light is there, rather than an error of the model."""
         return self.gain >= self.wanted
+
+    @property
+    def findings(self) -> list[LightSpare]:
+        """What there is to be said of the number."""
+        return [] if self.worth else [LightSpare(self.index + 1, len(self.rich.emitters), self.gain, self.wanted)]
 
 
 def one_light_less(refiner: Refiner, answer: State, bar: BarOptions, steps: int = 3) -> OneLess:

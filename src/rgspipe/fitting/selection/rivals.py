@@ -3,11 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
-from rgspipe.fitting.model.problem import LightProblem
+import torch
+from torch import Tensor
+
+from rgspipe.fitting.model.problem import ROUNDING, LightProblem
 from rgspipe.fitting.options import RivalOptions
-from rgspipe.fitting.search.compare import best_state, drop, rig_distance, robust_losses
+from rgspipe.fitting.search.compare import (
+    best_state,
+    drop,
+    energy_shares,
+    rig_distance,
+    robust_costs,
+    robust_losses,
+)
 from rgspipe.fitting.search.refine import Refiner, State
 from rgspipe.fitting.search.weighting import PLAIN, ROBUST
 
@@ -27,12 +37,45 @@ def has_rival(refiner: Refiner, best: State, others: Sequence[State], options: R
     # The answer is one of plain squares, so a rival has to be one, too.
     other = refiner.refined(other, PLAIN, options.steps // 2)
     clear = rig_distance(best.emitters, other.emitters) > apart
-    return clear and refiner.unexplained(other) <= options.energy * refiner.unexplained(best)
+    return clear and _leaves_as_little(refiner, best, other, options)
+
+
+def stands_anywhere(refiner: Refiner, best: State, covariance: Sequence[Tensor], options: RivalOptions) -> bool:
+    """Whether a light whose place is not determined explains as much from a clearly different one.
+
+    A search meets such rivals only by chance: where its starts end in a valley without a floor is up to the last bits.
+
+    Args:
+        refiner: on the problem that the answer was polished on.
+        covariance: of each light, see `FitResult.covariance`; infinite where nothing is determined.
+    """
+    return any(
+        equally_good(refiner.problem, best, other, options) and _leaves_as_little(refiner, best, other, options)
+        for other in _moved(refiner, best, covariance, options)
+    )
+
+
+def _moved(refiner: Refiner, best: State, covariance: Sequence[Tensor], options: RivalOptions) -> Iterator[State]:
+    """The rig with one light moved along an axis, of those that are there and whose place is not determined."""
+    apart = options.apart * refiner.region.size
+    steps = options.stride * apart * torch.cat([torch.eye(3), -torch.eye(3)]).double()
+    for index, share in enumerate(energy_shares(best)):
+        if share >= options.least_energy and bool(torch.isinf(covariance[index].diagonal()[:3]).any()):
+            for place in refiner.region.clip(best.emitters[index].position + steps):
+                rig = [*best.emitters]
+                rig[index] = rig[index].placed(place)
+                if rig_distance(rig, best.emitters) > apart:
+                    yield refiner.start(rig, PLAIN)
+
+
+def _leaves_as_little(refiner: Refiner, best: State, other: State, options: RivalOptions) -> bool:
+    """Whether `other` leaves about as little of the energy unexplained as `best`, or nothing but rounding."""
+    return refiner.unexplained(other) <= options.energy * max(refiner.unexplained(best), ROUNDING**2)
 
 
 def equally_good(problem: LightProblem, best: State, other: State, options: RivalOptions) -> bool:
     """Whether `other` explains the target as well as `best`, within the spread of what both leave unexplained."""
     one, two = robust_losses(problem, [best, other])
-    difference = two - one
+    least, cost = robust_costs(problem, [best, other])
     errors = max(1.0, float((problem.pixels_each / options.pixels_per_error).clamp(max=1.0).sum()))
-    return float(difference.mean()) <= options.deviations * float(difference.std()) / math.sqrt(errors)
+    return cost - least <= options.deviations * float((two - one).std()) / math.sqrt(errors)

@@ -1,0 +1,45 @@
+"""Whether other lights explain as much: not by rounding, and not because a covariance says so."""
+
+from __future__ import annotations
+
+import torch
+
+from emitters import emitter_at
+from lit_room import VISIBLE
+from rgspipe.fitting.model.problem import LightProblem
+from rgspipe.fitting.options import RivalOptions
+from rgspipe.fitting.search.compare import drop
+from rgspipe.fitting.search.refine import Refiner, State
+from rgspipe.fitting.search.weighting import ROBUST
+from rgspipe.fitting.selection.rivals import equally_good, stands_anywhere
+
+
+def refiner_of(room, point_light) -> Refiner:
+    images = room.images(point_light(VISIBLE))
+    return Refiner.of(LightProblem.create(room.one.prepared, room.one.prepared.stack_images(images)))
+
+
+def placed(refiner: Refiner, by: float) -> State:
+    return refiner.start([emitter_at(torch.tensor(VISIBLE, dtype=torch.float64) + by)], ROBUST)
+
+
+def test_rigs_that_leave_only_rounding_are_equally_good(room, point_light) -> None:
+    refiner = refiner_of(room, point_light)
+    true, near, far = (placed(refiner, by) for by in (0.0, 1e-7, 1e-4))
+    # Measured: they leave 1e-15, 8e-14 and 7e-8 of the energy.
+    assert refiner.unexplained(near) < 1e-12 < refiner.unexplained(far)
+    assert drop(refiner.problem, near, true) == drop(refiner.problem, true, near) == 0.0
+    assert equally_good(refiner.problem, true, near, RivalOptions()) and equally_good(refiner.problem, near, true)
+    assert drop(refiner.problem, far, true) > 0.5 and not equally_good(refiner.problem, true, far, RivalOptions())
+
+
+def test_a_place_that_is_not_determined_is_looked_at(room, point_light) -> None:
+    """Six others are tried, and as the images tell them apart after all, there is no rival."""
+    refiner = refiner_of(room, point_light)
+    known = torch.eye(6, dtype=torch.float64)
+    unknown = torch.diag(torch.tensor([torch.inf, 1.0, 1.0, 1.0, 1.0, 1.0], dtype=torch.float64))
+    for covariance, tried in ((known, 0), (unknown, 6)):
+        true = placed(refiner, 0.0)
+        before = refiner.meter.evaluations
+        assert not stands_anywhere(refiner, true, [covariance])
+        assert refiner.meter.evaluations - before == tried
