@@ -1,4 +1,4 @@
-"""A diffuse plane under a point light or a spot, seen from above, and its image in closed form."""
+"""A diffuse plane under lights of every kind, seen from above, and its image in closed form."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ import math
 import numpy as np
 import torch
 
-from rgspipe.scene import Camera, Light, PointLight, SpotLight, look_at
+from rgspipe.scene import Camera, Light, SpotLight, look_at
+from rgspipe.scene.lights import KINDS
 
 POSITION, INTENSITY = [0.1, -0.2, 0.9], [0.5, 1.0, 2.0]
 ALBEDO = (0.2, 0.5, 0.8)
@@ -20,15 +21,13 @@ def plane_camera() -> Camera:
 
 
 def plane_lights() -> dict[str, Light]:
-    """A point light, and in its place a spot of each profile, aimed aslant."""
-    point = PointLight(torch.tensor(POSITION).double(), torch.tensor(INTENSITY).double())
-    axis = torch.tensor([0.3, 0.2, -1.0], dtype=torch.float64)
+    """A light of each kind, by its name, and of spots each profile by its own, in one place and aimed aslant."""
+    axis = torch.nn.functional.normalize(torch.tensor([0.3, 0.2, -1.0], dtype=torch.float64), dim=0)
+    narrow = {name: kind.shaped().variants()[-1] for name, kind in KINDS.items() if name != "spot"}
     profiles = {"smoothstep": (0.45, 0.4), "gaussian": (0.25, 0.15), "linear": (0.45, 0.2)}
-    spots = {
-        name: SpotLight(point.position, point.intensity, axis / axis.norm(), name, *angles)
-        for name, angles in profiles.items()
-    }
-    return {"point": point} | spots
+    spots = {name: SpotLight.shaped(name, *angles) for name, angles in profiles.items()}
+    place, intensity = (torch.tensor(values, dtype=torch.float64) for values in (POSITION, INTENSITY))
+    return {name: shape.at(place, axis, intensity) for name, shape in (narrow | spots).items()}
 
 
 def plane_image(light: Light, subsamples: int = 16) -> np.ndarray:

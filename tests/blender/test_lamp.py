@@ -29,7 +29,7 @@ def rendered(tmp_path_factory: pytest.TempPathFactory, child_environment: dict[s
     return folder
 
 
-@pytest.mark.parametrize("name", ["point", "smoothstep", "gaussian", "linear"])
+@pytest.mark.parametrize("name", plane_lights())
 def test_cycles_renders_the_closed_form_of_every_profile(rendered: Path, name: str) -> None:
     image, expected = read_image(rendered / f"{name}.exr")[0], plane_image(plane_lights()[name])
     # 1024 samples inside a pixel against 256 subpixels, over the brightest pixel: 1.5e-4 for the point light, 1.0e-3

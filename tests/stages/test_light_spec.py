@@ -7,8 +7,12 @@ import math
 import pytest
 
 from rgspipe.config import RgspipeConfig, with_changes
+from rgspipe.config.light import LightConfig
 from rgspipe.errors import InputError
 from rgspipe.fitting.model.harmonics import BandLimit
+from rgspipe.fitting.spec import TYPES
+from rgspipe.options import settings
+from rgspipe.scene.lights import KINDS
 from rgspipe.stages.fit_light import STAGE, band_limit, light_spec
 
 
@@ -17,10 +21,20 @@ def test_one_point_light_is_looked_for_by_default() -> None:
     assert (spec.type, spec.count, spec.aimed, spec.shape_free) == ("point", 1, False, False)
 
 
+def test_every_kind_can_be_looked_for() -> None:
+    """By its name, in the shape that it usually has."""
+    assert {setting.name: setting for setting in settings(LightConfig)}["type"].choices == TYPES
+    for name, kind in KINDS.items():
+        spec = light_spec(with_changes(RgspipeConfig(stage="fit_light"), {"light.type": name}))
+        (found,), usual = spec.kinds, kind.shaped()
+        assert type(found) is kind and found.columns() == pytest.approx(usual.columns())
+        assert (spec.shape is None) == (not usual.shape), "numbers of a shape are settings"
+
+
 def test_angles_become_radians_and_a_blend_stays_a_share() -> None:
     config = with_changes(
         RgspipeConfig(stage="fit_light"),
-        {"light.type": "spot", "light.count": None, "light.spot.cone_angle": 30.0, "fit.cone": "free"},
+        {"light.type": "spot", "light.count": None, "light.spot.cone_angle": 30.0, "fit.shape": "free"},
     )
     spec = light_spec(config)
     assert spec.count is None and spec.shape_free and len(spec.kinds[0].variants()) == 3
@@ -39,7 +53,7 @@ def test_angles_become_radians_and_a_blend_stays_a_share() -> None:
         ({"light.type": "auto", "light.spot.profile": "linear", "light.spot.falloff": 40.0}, "at most 25"),
         ({"fit.method": "paper_adam", "light.count": None}, "light.count: .* 1 to 8"),
         ({"fit.method": "paper_adam", "light.type": "auto"}, "light.type: .* point or spot"),
-        ({"fit.method": "paper_adam", "light.type": "spot", "fit.cone": "free"}, "fit.cone: .* known"),
+        ({"fit.method": "paper_adam", "light.type": "spot", "fit.shape": "free"}, "fit.shape: .* known"),
     ],
 )
 def test_what_does_not_fit_together_is_refused(changes: dict, message: str) -> None:

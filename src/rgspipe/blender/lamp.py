@@ -78,7 +78,7 @@ class _Maths:
         self._nodes = nodes
 
     def __getattr__(self, operation: str) -> Callable[..., bpy.types.NodeSocket]:
-        """Blender's own scalar operations: add, subtract, multiply, divide, power, minimum, maximum …"""
+        """Blender's own scalar operations: add, subtract, multiply, divide, power, minimum, maximum, greater_than …"""
         return partial(self._nodes.math, operation.upper())
 
     def exponential(self, value: Value) -> bpy.types.NodeSocket:

@@ -31,8 +31,8 @@ class FitConfig(Options):
     """at most this many targets of each class"""
     search: SearchConfig = SearchConfig()
     adam: AdamOptions = AdamOptions()
-    cone: Literal["known", "free"] = "known"
-    """whether spots' cones are those of light.spot, or recovered, too"""
+    shape: Literal["known", "free"] = "known"
+    """whether shapes such as cones are those that light.* says, or recovered, too"""
     suggest_view: bool = False
     """say which further camera would help most, and how many views are needed"""
     wanted_accuracy: float = option(0.003, low=0, high=1)

@@ -15,7 +15,7 @@ Profile = Literal["smoothstep", "gaussian", "linear"]
 
 @dataclass(frozen=True)
 class SpotConfig(Options):
-    """The profile of unknown spots; with fit.cone=free its kind, and a rim to begin with."""
+    """The profile of unknown spots; with fit.shape=free its kind, and a rim to begin with."""
 
     profile: Profile = "smoothstep"
     """how intensity falls with the angle from the axis: Blender's smoothstep, gaussian, or Mitsuba's linear"""
@@ -27,14 +27,23 @@ class SpotConfig(Options):
 
 
 @dataclass(frozen=True)
+class LedConfig(Options):
+    """The shape of unknown LEDs, whose intensity falls with a power of the cosine of the angle from their axis."""
+
+    exponent: float = option(1.0, low=0, high=1000)
+    """the power: ln ½ / ln cos of the half-angle; with fit.shape=free where to begin"""
+
+
+@dataclass(frozen=True)
 class LightConfig(Options):
     """What is looked for."""
 
-    type: Literal["point", "spot", "auto"] = "point"
+    type: Literal["point", "spot", "led", "auto"] = "point"
     """type of the unknown lights"""
     count: int | None = option(1, low=1, high=MOST_LIGHTS)
     """how many unknown lights; null finds out"""
     spot: SpotConfig = SpotConfig()
+    led: LedConfig = LedConfig()
 
 
 @dataclass(frozen=True)

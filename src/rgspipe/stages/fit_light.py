@@ -26,7 +26,7 @@ from rgspipe.fitting import (
 )
 from rgspipe.fitting.model.harmonics import BandLimit
 from rgspipe.fitting.options import MOST_LIGHTS
-from rgspipe.fitting.spec import shaped_kind
+from rgspipe.fitting.spec import AUTO, shaped_kind
 from rgspipe.progress import progress_bar
 from rgspipe.renderer.dictionary import LightDictionary
 from rgspipe.renderer.effect_bounds import NO_BOUND, EffectBounds
@@ -34,6 +34,7 @@ from rgspipe.renderer.effects import Decision, EffectChoice, RigKind
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.monte_carlo import MonteCarloSolver
 from rgspipe.scene import PointLight
+from rgspipe.scene.lights import KINDS
 from rgspipe.stages import fit_capture
 from rgspipe.stages.base import Stage, StageContext
 from rgspipe.stages.fit_capture import captured_views
@@ -201,7 +202,7 @@ def light_spec(config: RgspipeConfig) -> LightSpec:
     light, kind = config.light, shaped_kind(config.light.type)
     section = getattr(light, kind, None)
     shape = None if section is None else light_shape(kind, section, f"light.{kind}")
-    return LightSpec(light.type, light.count, shape, config.fit.cone == "free")
+    return LightSpec(light.type, light.count, shape, config.fit.shape == "free")
 
 
 def _refuse_unknowns(config: RgspipeConfig) -> None:
@@ -211,9 +212,9 @@ def _refuse_unknowns(config: RgspipeConfig) -> None:
         InputError: it is asked for others.
     """
     asked = [
-        ("light.type", "point or spot", config.light.type, config.light.type == "auto"),
+        ("light.type", " or ".join(KINDS), config.light.type, config.light.type == AUTO),
         ("light.count", "a number from 1 to 8", "null", config.light.count is None),
-        ("fit.cone", "known", config.fit.cone, config.fit.cone == "free"),
+        ("fit.shape", "known", config.fit.shape, config.fit.shape == "free"),
     ]
     for key, expected, found, unknown in asked:
         if unknown:
@@ -330,7 +331,7 @@ def _keys(config: RgspipeConfig) -> list[str]:
     ]
     keys += ["fit.suggest_view", "fit.landscape"]
     keys += ["fit.wanted_accuracy"] if config.fit.suggest_view else []
-    keys += ["fit.adam"] if config.fit.method == "paper_adam" else ["fit.search", "fit.cone"]
+    keys += ["fit.adam"] if config.fit.method == "paper_adam" else ["fit.search", "fit.shape"]
     keys += ["fit.sh_degree", "fit.sh_mirrored"] if config.fit.spot_basis == "sh" else []
     return keys if config.fit.target is not None else [*keys, "occlusion", "fit.limit"]
 

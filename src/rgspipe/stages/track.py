@@ -126,7 +126,7 @@ STAGE = Stage(
         "effects",
         "light",
         "fit.search",
-        "fit.cone",
+        "fit.shape",
         "fit.spot_basis",
         "fit.sh_degree",
         "fit.sh_mirrored",

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 import torch
 
 from emitters import emitter_at
 from rgspipe.fitting import prepare_fit
+from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.problem import Effects, LightProblem
-from rgspipe.scene.lights import SpotLight
+from rgspipe.scene.lights import KINDS, Light, SpotLight
 from rgspipe.scene.lights.coordinates import tangents
 from rgspipe.scene.lights.spot import CONE
 
@@ -21,6 +23,13 @@ SHAPES = [
     SpotLight.shaped("smoothstep", 0.7, 0.8),
     SpotLight.shaped("linear", 0.8, 0.3),
 ]
+
+#: Every kind, in every shape that a search tries.
+ANY = [shape for kind in KINDS.values() for shape in kind.shaped().variants()]
+
+
+def name_of(light: Light) -> str:
+    return " ".join([light.kind, *(f"{getattr(light, number.name):.3g}" for number in light.shape)])
 
 
 def test_steps_keep_axes_on_the_sphere_and_cones_in_range() -> None:
@@ -62,3 +71,38 @@ def test_derivatives_of_a_spot_s_image_agree_with_finite_differences(room, shape
         error = (slopes[:, :, k] - expected).abs().median() / expected.abs().median()
         # Measured at most 0.0008, float32 differences over a short step.
         assert float(error) < 0.005
+
+
+@pytest.mark.parametrize("shape", [*ANY, *SHAPES], ids=name_of)
+def test_derivatives_of_a_share_are_those_of_steps(shape: Light) -> None:
+    """Through what is tied to another field, and in the units of steps; of every kind."""
+    emitter = emitter_at(PLACE, AXIS, shape, shape_free=True)
+    generator = torch.Generator().manual_seed(0)
+    points = PLACE + torch.nn.functional.normalize(torch.randn(3000, 3, generator=generator, dtype=torch.float64))
+    share = shape.at(PLACE, AXIS).share(points, shape_free=True)
+    if share is None:
+        assert emitter.parameters == 3
+        return
+    slopes = emitter.slopes(share) * emitter.units(2.0).float()
+    for k in range(emitter.parameters):
+        step = 1e-5 * torch.eye(emitter.parameters, dtype=torch.float64)[k]
+        ends = [emitter.moved(sign * step, 2.0).light.share_towards(points) for sign in (1, -1)]
+        expected = (ends[0] - ends[1]) / 2e-5
+        # Measured at most 2.1e-5, of a cone of 15°.
+        assert float((slopes[:, k] - expected).abs().max()) < 1e-4 * float(expected.abs().max())
+
+
+@pytest.mark.parametrize("shape", ANY, ids=name_of)
+def test_an_emitter_leads_to_another_and_back(shape: Light) -> None:
+    emitter = emitter_at(PLACE, AXIS, shape, shape_free=True)
+    step = 1e-4 * torch.linspace(-1.0, 1.0, emitter.parameters, dtype=torch.float64)
+    other = emitter.moved(step, 2.0)
+    # Second order; measured 5e-9.
+    torch.testing.assert_close(emitter.offset(other, 2.0), step, rtol=0, atol=3e-8)
+    assert emitter.distance(other, 2.0) == other.distance(emitter, 2.0) > 0.0
+    rows = emitter.rows()
+    assert list(rows) == [*emitter.coordinates, "intensity"]
+    assert rows["intensity"].stop == len(emitter.spread()) + 3
+    for known in (emitter, replace(emitter, shape_free=False)):
+        count = known.rows()["intensity"].stop
+        assert Emitter.fitted(other.light, torch.zeros(count, count)).parameters == known.parameters

@@ -82,4 +82,6 @@ class LedLight(AxialLight):
         return cls(position, intensity, reader.direction("direction"), reader.number("exponent"))
 
     def emission(self, maths: Any, cosine: Any) -> Any:
-        return maths.power(maths.maximum(cosine, 0.0), self.exponent)
+        # 0 to the power of 0 is 1, and behind an LED it is dark whatever its exponent.
+        share = maths.power(maths.maximum(cosine, 0.0), self.exponent)
+        return maths.multiply(share, maths.greater_than(cosine, 0.0))
