@@ -29,7 +29,7 @@ def test_rigs_that_leave_only_rounding_are_equally_good(room, point_light) -> No
     # Measured: they leave 1e-15, 8e-14 and 7e-8 of the energy.
     assert refiner.unexplained(near) < 1e-12 < refiner.unexplained(far)
     assert drop(refiner.problem, near, true) == drop(refiner.problem, true, near) == 0.0
-    assert equally_good(refiner.problem, true, near, RivalOptions()) and equally_good(refiner.problem, near, true)
+    assert all(equally_good(refiner.problem, *pair, RivalOptions()) for pair in ((true, near), (near, true)))
     assert drop(refiner.problem, far, true) > 0.5 and not equally_good(refiner.problem, true, far, RivalOptions())
 
 
@@ -41,5 +41,5 @@ def test_a_place_that_is_not_determined_is_looked_at(room, point_light) -> None:
     for covariance, tried in ((known, 0), (unknown, 6)):
         true = placed(refiner, 0.0)
         before = refiner.meter.evaluations
-        assert not stands_anywhere(refiner, true, [covariance])
+        assert not stands_anywhere(refiner, true, [covariance], RivalOptions())
         assert refiner.meter.evaluations - before == tried

@@ -50,6 +50,5 @@ def faded_light(refiner: Refiner, polished: State, options: SearchOptions) -> li
     """What `doubted_number` says of the number being too large, where the polish has left a light next to nothing."""
     if min(energy_shares(polished)) >= options.bar.least_energy:
         return []
-    return one_light_less(
-        refiner, refiner.start(polished.emitters, PLAIN), options.bar, options.schedule.steps // 2
-    ).findings
+    answer = refiner.start(polished.emitters, PLAIN)
+    return one_light_less(refiner, answer, options.bar, options.schedule.steps // 2).findings
