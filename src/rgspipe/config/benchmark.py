@@ -13,8 +13,11 @@ from rgspipe.options import Options, option
 class BenchmarkConfig(Options):
     """What is measured."""
 
-    kind: Literal["renderer", "fit"] = "renderer"
-    """the renderer on rooms with path-traced truth, or the steps of a fit on the trained scene"""
+    kind: Literal["renderer", "fit", "search"] = "renderer"
+    """the renderer on rooms with path-traced truth, the steps of a fit on the trained scene, or what each number that
+    steers a search is worth: fits with it halved and doubled"""
+    targets: int = option(4, low=1, high=1000)
+    """with kind=search: single lights of each class, and half as many pairs of unknown number"""
     repetitions: int = option(20, low=1, high=100000)
     """runs of each measured step"""
     rooms: tuple[RoomName, ...] = get_args(RoomName)

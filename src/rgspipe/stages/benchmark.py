@@ -1,4 +1,5 @@
-"""Measure accuracy and time on this machine: the renderer against path-traced truth, or the steps of a fit."""
+"""Measure accuracy and time on this machine: the renderer against path-traced truth, the steps of a fit, or what the
+numbers that steer a search are worth."""
 
 from __future__ import annotations
 
@@ -11,20 +12,29 @@ import pandas as pd
 import torch
 from omegaconf import OmegaConf
 
+from rgspipe.artifacts import Artifact
 from rgspipe.benchmark.fit_steps import fit_steps
 from rgspipe.benchmark.renderer_report import REPORT, Bench, run_bench
 from rgspipe.benchmark.rooms import ROOMS
+from rgspipe.benchmark.search_settings import KnownTarget, search_markdown, search_table
 from rgspipe.benchmark.settings import Setting
 from rgspipe.benchmark.truth import load_truth
 from rgspipe.config import RgspipeConfig, get_value
+from rgspipe.datasets.light_file import read_lights
+from rgspipe.datasets.location import open_dataset
+from rgspipe.datasets.views import Target, View
 from rgspipe.errors import InputError
+from rgspipe.evaluation.metrics import longest_side
 from rgspipe.evaluation.timing import load_average
 from rgspipe.files import write_json
+from rgspipe.fitting import Effects, FitViews, LightSpec, prepare_fit
 from rgspipe.machine import machine
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.resources import resource_folder
-from rgspipe.scene import Camera, look_at
+from rgspipe.scene import Camera, LightRig, look_at
 from rgspipe.stages.base import Need, Stage, StageContext
+from rgspipe.stages.sources import require_images
+from rgspipe.stages.true_lights import scene_bounds, truth_file
 
 #: The choices of `accuracy`.
 PRESETS = ("draft", "standard", "reference")
@@ -36,10 +46,7 @@ def run(context: StageContext) -> None:
     context.note(machine=machine(), load_average=load, threads=torch.get_num_threads())
     if load > 0.5:
         print(f"The load average is {load:.2f}: other programs run, and the times will be too long.")
-    if context.config.benchmark.kind == "renderer":
-        _renderer(context)
-    else:
-        _fit(context)
+    {"renderer": _renderer, "fit": _fit, "search": _search}[context.config.benchmark.kind](context)
 
 
 def _renderer(context: StageContext) -> None:
@@ -86,6 +93,44 @@ def _fit(context: StageContext) -> None:
     print(table.to_string(index=False, float_format="%.2f"))
 
 
+def _search(context: StageContext) -> None:
+    """Write search.csv and search.md."""
+    frozen = FrozenScene.load(context.inputs["freeze"].folder())
+    dataset = context.inputs["generate_dataset"]
+    bounds, _ = scene_bounds(dataset, context.inputs["freeze"])
+    targets = _known_targets(context, frozen, dataset)
+    table = search_table(frozen, targets, longest_side(bounds))
+    table.to_csv(context.folder / "search.csv", index=False)
+    text = search_markdown(table)
+    (context.folder / "search.md").write_text(text, encoding="utf-8")
+    context.note(targets=len(targets))
+    print(text)
+
+
+def _known_targets(context: StageContext, frozen: FrozenScene, dataset: Artifact) -> list[KnownTarget]:
+    """Single lights in one view, and pairs of them, added up, in all views and of unknown number."""
+    config, wanted = context.config, context.config.benchmark.targets
+    every = open_dataset(dataset.folder(), train=False, test=False).targets
+    classes = {name: [one for one in every if one.occlusion == name][:wanted] for name in {t.occlusion for t in every}}
+    singles = [target for name in sorted(classes) for target in classes[name]]
+    effects = Effects(at_pixels=config.effects.at_pixels)
+
+    def prepared(views: Sequence[View], spec: LightSpec) -> FitViews:
+        cameras, masks = [view.camera for view in views], [view.alpha for view in views]
+        return prepare_fit(frozen, cameras, masks=masks, dictionary=frozen.dictionary, effects=effects, spec=spec)
+
+    def truth(target: Target) -> LightRig:
+        return read_lights(truth_file(config, dataset, target.name))
+
+    one, open_number = LightSpec(), LightSpec(count=None)
+    first, together = prepared(singles[0].views[:1], one), prepared(singles[0].views, open_number)
+    known = [KnownTarget([target.views[0].image], truth(target), first, one) for target in singles]
+    for a, b in zip(singles[: wanted // 2], reversed(singles), strict=False):
+        images = [x.image + y.image for x, y in zip(a.views, b.views, strict=True)]
+        known.append(KnownTarget(images, (*truth(a), *truth(b)), together, open_number))
+    return known
+
+
 def _camera(frozen: FrozenScene, resolution: int) -> Camera:
     """In front of the scene's open side (−y), as far as its whole width needs."""
     middle = 0.5 * (frozen.bounds[0] + frozen.bounds[1])
@@ -96,6 +141,9 @@ def _camera(frozen: FrozenScene, resolution: int) -> Camera:
 def _inputs(config: RgspipeConfig) -> list[Need | str]:
     if config.benchmark.kind == "fit":
         return ["freeze"]
+    if config.benchmark.kind == "search":
+        require_images(config, "targets of its own, whose lights are known")
+        return ["freeze", "generate_dataset"]
     if config.scene.kind == "ply":
         raise InputError(
             "stage=benchmark",
@@ -109,6 +157,8 @@ def _inputs(config: RgspipeConfig) -> list[Need | str]:
 def _keys(config: RgspipeConfig) -> tuple[str, ...]:
     if config.benchmark.kind == "fit":
         return ("benchmark.kind", "benchmark.repetitions")
+    if config.benchmark.kind == "search":
+        return ("benchmark.kind", "benchmark.targets", "effects.at_pixels")
     return ("benchmark",)
 
 

@@ -1,0 +1,131 @@
+"""What each number that steers a search is worth: fits with it halved and doubled, on targets of known lights."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from torch import Tensor
+
+from rgspipe.errors import InputError
+from rgspipe.evaluation import metrics
+from rgspipe.evaluation.markdown import markdown_table
+from rgspipe.evaluation.tables import rig_errors
+from rgspipe.fitting import FitStatus, FitViews, LightSpec, SearchOptions, fit_lights
+from rgspipe.options import Options, settings
+from rgspipe.progress import progress_bar
+from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.scene import LightRig
+
+FACTORS = (0.5, 2.0)
+
+COLUMNS = {
+    "setting": ("setting", "s"),
+    "value": ("value", "s"),
+    "solved": ("solved", ".0f"),
+    "error": ("median error (%)", ".3f"),
+    "silent": ("wrong without a word", ".0f"),
+    "evaluations": ("renderings a fit", ".0f"),
+    "seconds": ("s a fit", ".2f"),
+}
+
+
+@dataclass(frozen=True)
+class KnownTarget:
+    """Images whose lights are known.
+
+    Attributes:
+        images: (H, W, 3) of each view.
+        truth: the lights.
+        views: made ready for `spec`.
+        spec: what the fit is told of the lights.
+    """
+
+    images: Sequence[Tensor]
+    truth: LightRig
+    views: FitViews
+    spec: LightSpec
+
+
+def search_table(frozen: FrozenScene, targets: Sequence[KnownTarget], size: float) -> pd.DataFrame:
+    """One row for the settings as they are, and one for each number halved and doubled.
+
+    Args:
+        size: the scene's, for errors as shares of it.
+    """
+    usual = SearchOptions()
+    tried = [("as it is", "", usual), *varied(usual)]
+    rows = [
+        {"setting": name, "value": value, **_outcome(frozen, targets, options, size)}
+        for name, value, options in progress_bar(tried, "settings of the search", unit="setting")
+    ]
+    return pd.DataFrame(rows)
+
+
+def varied(options: SearchOptions) -> Iterator[tuple[str, str, SearchOptions]]:
+    """Each number of the options, nested ones by dotted names, halved and doubled where its range allows that."""
+    for name in _numbers(type(options)):
+        value = _get(options, name)
+        for factor in FACTORS:
+            changed = _scaled(value, factor)
+            try:
+                other = _with(options, name.split("."), changed)
+            except InputError:
+                continue
+            if changed != value:
+                yield name, str(changed), other
+
+
+def search_markdown(table: pd.DataFrame) -> str:
+    """The table as it stands in docs/."""
+    return markdown_table(table, COLUMNS)
+
+
+def _outcome(
+    frozen: FrozenScene, targets: Sequence[KnownTarget], options: SearchOptions, size: float
+) -> dict[str, float]:
+    """How often and how well targets are solved, and what that takes."""
+    results = [fit_lights(frozen, one.views, one.images, spec=one.spec, search=options) for one in targets]
+    errors = [
+        rig_errors(found.lights, one.truth, size).position if len(found.lights) == len(one.truth) else np.inf
+        for found, one in zip(results, targets, strict=True)
+    ]
+    solved = [error <= metrics.SUCCESS_LIMIT for error in errors]
+    silent = [not right and found.status is FitStatus.CONVERGED for right, found in zip(solved, results, strict=True)]
+    return {
+        "solved": sum(solved),
+        "error": 100.0 * float(np.median(errors)),
+        "silent": sum(silent),
+        "evaluations": float(np.mean([found.evaluations for found in results])),
+        "seconds": float(np.mean([found.seconds for found in results])),
+    }
+
+
+def _numbers(options: type[Options], prefix: str = "") -> Iterator[str]:
+    for setting in settings(options):
+        if setting.section is not None:
+            yield from _numbers(setting.section, f"{prefix}{setting.name}.")
+        elif setting.type in (int, float):
+            yield f"{prefix}{setting.name}"
+
+
+def _get(options: Options, name: str) -> Any:
+    for part in name.split("."):
+        options = getattr(options, part)
+    return options
+
+
+def _scaled(value: Any, factor: float) -> Any:
+    if isinstance(value, tuple):
+        return tuple(_scaled(one, factor) for one in value)
+    return max(1, round(factor * value)) if isinstance(value, int) else factor * value
+
+
+def _with(options: Any, path: Sequence[str], value: Any) -> Any:
+    """The options with one number changed; frozen and checked as ever."""
+    first, *rest = path
+    changed = value if not rest else _with(getattr(options, first), rest, value)
+    return replace(options, **{first: changed})
