@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 import torch
 
@@ -47,6 +48,17 @@ def test_place_axis_and_exponent_are_found(room, exponent: float, free: bool) ->
     assert errors.cone < 5e-6 * exponent if free else found.exponent == exponent
     assert result.covariance[0].shape == ((10, 10) if free else (9, 9))
     assert torch.isfinite(result.covariance[0]).all()
+
+
+@pytest.mark.parametrize("seed", [0, 8])
+def test_random_leds_are_found(room, seed: int) -> None:
+    draw = np.random.default_rng(seed)
+    truth = led(2.7, tuple(draw.uniform(-0.35, 0.35, 3)), tuple(draw.normal(size=3)))
+    result = fit(room, (truth,), LightSpec("led", shape_free=True))
+    errors = rig_errors(result.lights, (truth,), 1.0)
+    # Measured at most 1e-7 and 4e-7. Of the first ten seeds nine are found, to 6e-7 and 5e-6; number 6, of which the
+    # views see nothing but what bounces off, says undetermined.
+    assert result.status is FitStatus.CONVERGED and errors.position < 2e-6 and errors.cone < 2e-5
 
 
 def test_deviations_are_those_of_noise(room) -> None:

@@ -23,7 +23,7 @@ from rgspipe.datasets.surfel_file import save_surfels
 from rgspipe.errors import InputError
 from rgspipe.fitting.fit import prepare_fit, render_light
 from rgspipe.fitting.model.problem import Effects
-from rgspipe.scene import PointLight
+from rgspipe.scene import LedLight, PointLight
 from rgspipe.stages import fit_extras, fit_light, freeze
 from rgspipe.stages.base import StageContext
 
@@ -160,6 +160,25 @@ def test_fits_a_rig_of_spots_in_harmonics_by_the_paper_s_method(inputs, tmp_path
     harmonics = _fit(inputs, tmp_path / "sh", **changes, **rig, fit__spot_basis="sh", fit__sh_degree=4)
     assert len(read_lights(tmp_path / "sh/visible_001/lights.json")) == 2
     assert float(exact["loss"].iloc[0]) != float(harmonics["loss"].iloc[0])
+
+
+@pytest.mark.parametrize("shape", [{"fit__shape": "free"}, {"light__led__exponent": 4.0}], ids=["free", "known"])
+def test_fits_a_folder_with_an_led_in_it(inputs, tmp_path, shape):
+    axis = torch.nn.functional.normalize(torch.tensor([-0.3, 0.5, -0.6], dtype=torch.float64), dim=0)
+    truth = LedLight(torch.tensor(VISIBLE).double(), torch.tensor([1.0, 2.0, 0.5]).double(), axis, 4.0)
+    cameras, folder = room_cameras(32), tmp_path / "led"
+    for index, image in enumerate(render_light(prepare_fit(frozen_room(), cameras, effects=Effects()), truth)):
+        write_image(folder / f"view_{index}.exr", image.numpy())
+    entries = [frame_entry(f"./view_{index}", camera) for index, camera in enumerate(cameras)]
+    write_transforms(folder / "transforms.json", entries)
+    settings = {"fit__target": str(folder), "light__type": "led", "views__count": 2, "effects__at_pixels": False}
+    assert _fit(inputs, tmp_path / "out", **settings, **shape)["result"].tolist() == ["converged"]
+    (found,) = read_lights(tmp_path / "out/led/lights.json")
+    # Measured at most 5e-8, 8e-8 and 2e-7.
+    assert isinstance(found, LedLight) and float((found.position - truth.position).norm()) < 1e-6
+    assert float((found.direction - axis).norm()) < 2e-6 and found.exponent == pytest.approx(4.0, abs=5e-6)
+    curve = pd.read_csv(tmp_path / "out/led/convergence.csv")
+    assert curve["exponent"].iloc[-1] == pytest.approx(found.exponent)
 
 
 def test_generated_targets_come_from_their_own_stage(inputs, tmp_path):

@@ -31,8 +31,8 @@ def course_of(curve: pd.DataFrame, found: LightRig, most: int = MOST_STEPS) -> l
     """The steps of a fit that are looked at, the first and the last among them.
 
     Args:
-        curve: convergence.csv of a fit: a row a step with step, seconds, loss, and the lights as x … b, of spots ax …
-            and cone_angle; names of the second light's columns end in _1, and so on.
+        curve: convergence.csv of a fit: a row a step with step, seconds, loss, and the lights' `columns`; names of the
+            second light's columns end in _1, and so on.
         found: the lights at the end, for what the table leaves out. Steps with other lights than these, in number or
             type, are passed over.
         most: of all steps.

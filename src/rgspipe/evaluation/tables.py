@@ -89,9 +89,9 @@ class RigErrors:
     Attributes:
         position: the largest position error of the matched lights, fraction of the scene size.
         intensity: the mean intensity error of the matched lights, a fraction.
-        axis: the largest angle between the axes of the true spots and their matches, degrees; infinite where a match
-            is no spot, NaN without true spots.
-        cone: the largest error of their cone angles, degrees, likewise.
+        axis: the largest angle between the axes of the true lights that have one and their matches, degrees; infinite
+            where a match is of another kind, NaN where no light has an axis.
+        cone: the largest error of the first numbers of their shapes (cone angles, degrees; exponents), likewise.
         pairs: (estimate, truth) indices of the matched lights, in the order of the truth.
     """
 
@@ -155,7 +155,7 @@ def _shape_errors(pairs: Sequence[tuple[Light, Light]]) -> tuple[float, float]:
     if not all(found.kind == wanted.kind for found, wanted in aimed):
         return math.inf, math.inf
     axes = [metrics.angle_between(found.axis, wanted.axis) for found, wanted in aimed]
-    return max(axes), max((_first_number(found, wanted) for found, wanted in aimed), default=math.nan)
+    return max(axes), max((_first_number(found, wanted) for found, wanted in aimed if wanted.shape), default=math.nan)
 
 
 def _first_number(found: Light, wanted: Light) -> float:
@@ -186,7 +186,7 @@ def target_table(
     Returns:
         A table with `TARGET_COLUMNS`. `success` is True, False or missing; a rig with lights too many
         or too few is never a success, and has no right types: `types_right` is whether every true light is matched
-        by one of its own type, point or spot, and none is left over. Positions and intensities are those of the true
+        by one of its own kind, and none is left over. Positions and intensities are those of the true
         rig's first light and of the estimate matched to it. `position_sd` is the error that the fit expects of itself
         (`calibration.position_sd`), `inside_95` whether the true positions lie inside its 95 % regions; missing
         where that cannot be told or the number of lights is wrong.

@@ -37,9 +37,9 @@ def track_table(
 ) -> pd.DataFrame:
     """One row a light and frame (one without a light where none was found).
 
-    Columns: frame, target, status, result, cost, seconds, evaluations, light, type, x, y, z, r, g, b, and of spots ax,
-    ay, az, cone_angle [rad]; position_sd, the position error that is to be expected (parts of the scene's size); where
-    the truth is known position_error (the same), intensity_error and, of spots, axis_error [degrees].
+    Columns: frame, target, status, result, cost, seconds, evaluations, light, type, and `Light.columns`; position_sd,
+    the position error that is to be expected (parts of the scene's size); where the truth is known position_error (the
+    same), intensity_error and, of lights with an axis, axis_error [degrees].
     """
     rows = []
     for index, (frame, name) in enumerate(zip(frames, names, strict=True)):

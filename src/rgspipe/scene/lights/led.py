@@ -46,8 +46,7 @@ class LedLight(AxialLight):
 
     @classmethod
     def shaped(cls, exponent: float = 1.0) -> Self:
-        down = torch.tensor([0.0, 0.0, -1.0], dtype=torch.float64)
-        return cls(torch.zeros(3).double(), torch.ones(3).double(), down, exponent)
+        return cls([0.0, 0.0, 0.0], 1.0, [0.0, 0.0, -1.0], exponent)
 
     @property
     def shape(self) -> tuple[ShapeNumber, ...]:

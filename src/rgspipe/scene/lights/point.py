@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar, Self
 
-import torch
 from torch import Tensor
 
 from rgspipe.scene.lights.light import WATTS_PER_INTENSITY, Light, Reader
@@ -21,7 +20,7 @@ class PointLight(Light):
     @classmethod
     def shaped(cls) -> Self:
         """A point light of 1 W/sr at the origin."""
-        return cls(torch.zeros(3).double(), torch.ones(3).double())
+        return cls([0.0, 0.0, 0.0], 1.0)
 
     def power(self) -> Float[Tensor, " 3"]:
         return WATTS_PER_INTENSITY * self.intensity

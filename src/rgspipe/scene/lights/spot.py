@@ -56,8 +56,7 @@ class SpotLight(AxialLight):
 
     @classmethod
     def shaped(cls, profile: SpotProfile = "smoothstep", cone_angle: float = CONES[1], falloff: float = 0.15) -> Self:
-        down = torch.tensor([0.0, 0.0, -1.0], dtype=torch.float64)
-        return cls(torch.zeros(3).double(), torch.ones(3).double(), down, profile, cone_angle, falloff)
+        return cls([0.0, 0.0, 0.0], 1.0, [0.0, 0.0, -1.0], profile, cone_angle, falloff)
 
     @property
     def shape(self) -> tuple[ShapeNumber, ...]:
