@@ -6,7 +6,7 @@ import math
 
 import torch
 
-from rgspipe.fitting import FitResult, FitViews, LightSpec, fit_lights, prepare_fit, render_rig
+from rgspipe.fitting import FitResult, FitViews, LightSpec
 from rgspipe.scene import LightRig
 from rgspipe.scene.lights import SpotLight
 
@@ -19,10 +19,10 @@ SHAPE = SpotLight.shaped("smoothstep", math.radians(30.0), 0.3)
 def noisy_images(views: FitViews, rig: LightRig) -> list[torch.Tensor]:
     """The rig's images of the model itself with noise of 2 %."""
     draw = torch.Generator().manual_seed(0)
-    return [image + 0.02 * image.mean() * torch.randn(image.shape, generator=draw) for image in render_rig(views, rig)]
+    return [image + 0.02 * image.mean() * torch.randn(image.shape, generator=draw) for image in views.render(rig)]
 
 
 def noisy_fit(room, rig: LightRig, spec: LightSpec) -> FitResult:
     """A search for the lights of `noisy_images` in the lit room."""
-    views = prepare_fit(room.frozen, room.views, dictionary=room.dictionary, spec=spec)
-    return fit_lights(room.frozen, views, noisy_images(views, rig), spec=spec)
+    views = FitViews.prepare(room.frozen, room.views, lights=spec)
+    return views.fit(noisy_images(views, rig))

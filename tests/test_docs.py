@@ -15,7 +15,7 @@ from markdown.extensions.toc import unique
 from pymdownx.slugs import slugify
 
 from rgspipe.evaluation import goals
-from rgspipe.fitting import SearchOptions
+from rgspipe.fitting import Search
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -33,7 +33,7 @@ SOURCE = re.compile(r"`((?!outputs/|site/)[a-z_0-9/]+/(?:[a-z_0-9]+\.py)?)(?::([
 #: A constant with its value, as cells of a table.
 VALUE = re.compile(r"\| `([a-z_/]+\.py):([A-Z_]+)` \| ([^|]+) \|")
 #: A field of the search's options with its default, as cells of a table.
-FIELD = re.compile(r"\| `SearchOptions\.([a-z_.]+)` \| ([^|]+) \|")
+FIELD = re.compile(r"\| `Search\.([a-z_.]+)` \| ([^|]+) \|")
 #: Words of a page that is read in one sitting; the laboratory may be longer.
 LONGEST = 1500
 
@@ -82,7 +82,7 @@ def test_values_of_constants_are_those_of_the_code() -> None:
     told, fields = VALUE.findall(page), FIELD.findall(page)
     assert len(told) >= 3 and len(fields) >= 7
     assert {name: float(value) for name, value in fields} == {
-        name: attrgetter(name)(SearchOptions()) for name, _ in fields
+        name: attrgetter(name)(Search()) for name, _ in fields
     }
     assert {name: float(value) for _, name, value in told} == {
         name: _constants(ROOT / "src" / "rgspipe" / path)[name] for path, name, _ in told

@@ -23,7 +23,19 @@ if TYPE_CHECKING:
     from rgspipe.datasets.views import View
     from rgspipe.errors import InputError
     from rgspipe.evaluation.images import save_png, tone_map
-    from rgspipe.fitting import Effects, FitResult, FitStatus, FitViews, ImageCapture, LightSpec, fit_lights
+    from rgspipe.fitting import (
+        Effects,
+        FitResult,
+        FitStatus,
+        FitViews,
+        ImageCapture,
+        LightSpec,
+        PaperAdam,
+        Search,
+        TrackOptions,
+        fit_lights,
+        track_lights,
+    )
     from rgspipe.renderer.frozen import FrozenScene
     from rgspipe.renderer.ply import load_ply
     from rgspipe.scene import Camera, LedLight, Light, PointLight, SpotLight, Surfels
@@ -39,7 +51,10 @@ _HOMES = {
     "datasets.views": ("View",),
     "errors": ("InputError",),
     "evaluation.images": ("save_png", "tone_map"),
-    "fitting": ("Effects", "FitResult", "FitStatus", "FitViews", "ImageCapture", "LightSpec", "fit_lights"),
+    "fitting": (
+        *("Effects", "FitResult", "FitStatus", "FitViews", "ImageCapture", "LightSpec", "PaperAdam", "Search"),
+        *("TrackOptions", "fit_lights", "track_lights"),
+    ),
     "renderer.frozen": ("FrozenScene",),
     "renderer.ply": ("load_ply",),
     "scene": ("Camera", "LedLight", "Light", "PointLight", "SpotLight", "Surfels"),
@@ -61,10 +76,13 @@ __all__ = [
     "LedLight",
     "Light",
     "LightSpec",
+    "PaperAdam",
     "PlyOptions",
     "PointLight",
+    "Search",
     "SpotLight",
     "Surfels",
+    "TrackOptions",
     "TrainOptions",
     "Trained",
     "View",
@@ -79,6 +97,7 @@ __all__ = [
     "save_png",
     "save_surfels",
     "tone_map",
+    "track_lights",
     "train",
     "write_lights",
 ]

@@ -9,7 +9,7 @@ import pytest
 import torch
 
 from lit_room import frozen_room, room_cameras
-from rgspipe.fitting import FitViews, prepare_fit
+from rgspipe.fitting import FitViews
 from rgspipe.renderer.dictionary import LightDictionary
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.view_weights import ViewWeights
@@ -32,11 +32,10 @@ class Room:
 
 @pytest.fixture(scope="session")
 def room() -> Room:
-    frozen = frozen_room()
+    frozen = frozen_room().with_dictionary(6)
     views = [frozen.view(camera) for camera in room_cameras(48)]
-    dictionary = frozen.with_dictionary(6).dictionary
-    one, two = (prepare_fit(frozen, views[:count], dictionary=dictionary) for count in (1, 2))
-    return Room(frozen, views, dictionary, one, two)
+    one, two = (FitViews.prepare(frozen, views[:count]) for count in (1, 2))
+    return Room(frozen, views, frozen.dictionary, one, two)
 
 
 @pytest.fixture(scope="session")

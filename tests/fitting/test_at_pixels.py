@@ -7,9 +7,8 @@ import torch
 
 from emitters import emitter_at
 from rgspipe.benchmark.rooms import ROOMS
-from rgspipe.fitting.fit import fit_lights, prepare_fit, render_light
+from rgspipe.fitting import FitViews
 from rgspipe.fitting.model.problem import Effects, LightProblem
-from rgspipe.renderer.dictionary import LightDictionary
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.pixel_direct import PixelDirect, surfel_shares
 from rgspipe.scene import PointLight
@@ -21,25 +20,18 @@ LIGHT = PointLight(torch.tensor([0.2, 0.42, 0.15], dtype=torch.float64), torch.t
 
 @pytest.fixture(scope="module")
 def frozen() -> FrozenScene:
-    return FrozenScene.freeze(surfels_on(ROOMS["cornell"]().surfaces, 1500), gather_rays=32, patches=80, seed=0)
+    surfels = surfels_on(ROOMS["cornell"]().surfaces, 1500)
+    return FrozenScene.freeze(surfels, gather_rays=32, patches=80, seed=0).with_dictionary(5)
 
 
-@pytest.fixture(scope="module")
-def dictionary(frozen: FrozenScene) -> LightDictionary:
-    return frozen.with_dictionary(5).dictionary
-
-
-def test_a_fit_at_pixels_finds_a_light_near_a_wall_that_centres_misplace(
-    frozen: FrozenScene, dictionary: LightDictionary
-) -> None:
+def test_a_fit_at_pixels_finds_a_light_near_a_wall_that_centres_misplace(frozen: FrozenScene) -> None:
     cameras = ROOMS["cornell"]().cameras(32)[:1]
     sharp, plain = (
-        prepare_fit(frozen, cameras, dictionary=dictionary, effects=Effects(at_pixels=at_pixels))
-        for at_pixels in (True, False)
+        FitViews.prepare(frozen, cameras, effects=Effects(at_pixels=at_pixels)) for at_pixels in (True, False)
     )
-    images = render_light(sharp, LIGHT)
-    found = fit_lights(frozen, sharp, images).lights[0]
-    coarse = fit_lights(frozen, plain, images).lights[0]
+    images = sharp.render(LIGHT)
+    found = sharp.fit(images).lights[0]
+    coarse = plain.fit(images).lights[0]
     errors = [float((light.position - LIGHT.position).norm()) for light in (found, coarse)]
     # Measured 2e-8 and 0.018; the intensity is off by 3e-7.
     assert errors[0] < 1e-4
@@ -49,10 +41,8 @@ def test_a_fit_at_pixels_finds_a_light_near_a_wall_that_centres_misplace(
 
 def test_without_bounces_the_image_is_the_direct_light_of_the_pixels(frozen: FrozenScene) -> None:
     cameras = ROOMS["cornell"]().cameras(16)
-    views = prepare_fit(frozen, cameras, effects=Effects(interreflection=False, at_pixels=True))
-    problem = LightProblem.create(
-        views.prepared, views.prepared.stack_images(render_light(views, LIGHT)), views.effects
-    )
+    views = FitViews.prepare(frozen, cameras, effects=Effects(interreflection=False, at_pixels=True))
+    problem = LightProblem.create(views.prepared, views.prepared.stack_images(views.render(LIGHT)), views.effects)
     expected = [
         PixelDirect(frozen.bvh, view).image(LIGHT.position, *surfel_shares(frozen.bvh, LIGHT.position))
         for view in views.prepared.views
@@ -64,8 +54,8 @@ def test_without_bounces_the_image_is_the_direct_light_of_the_pixels(frozen: Fro
 
 def test_derivatives_agree_with_finite_differences(frozen: FrozenScene) -> None:
     """Bounces included, in the part of the image that is smooth: the median over the pixels."""
-    views = prepare_fit(frozen, ROOMS["cornell"]().cameras(16), effects=Effects(at_pixels=True))
-    problem = LightProblem.create(views.prepared, views.prepared.stack_images(render_light(views, LIGHT))).sharpest()
+    views = FitViews.prepare(frozen, ROOMS["cornell"]().cameras(16), effects=Effects(at_pixels=True))
+    problem = LightProblem.create(views.prepared, views.prepared.stack_images(views.render(LIGHT))).sharpest()
     position, step = torch.tensor([0.05, -0.1, 0.2], dtype=torch.float64), 1e-3
     columns = problem.evaluate(emitter_at(position))
     for axis in range(3):

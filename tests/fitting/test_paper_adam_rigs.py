@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 import torch
@@ -14,8 +15,7 @@ from emitters import emitter_at
 from hard_cases import camera
 from hard_cases import room as small_room
 from lit_room import VISIBLE
-from rgspipe import fit_lights
-from rgspipe.fitting import AdamOptions, Effects, LightSpec
+from rgspipe.fitting import Effects, LightSpec, PaperAdam
 from rgspipe.fitting.baselines.paper_adam_loss import AdamLoss, MovingRig, rig_image
 from rgspipe.fitting.model.harmonics import BandLimit, legendre, zonal_coefficients
 from rgspipe.fitting.model.problem import LightProblem
@@ -94,17 +94,8 @@ def test_adam_finds_two_points(room, point_light) -> None:
     rig = (point_light(VISIBLE), point_light((-0.25, 0.3, 0.2), (2.0, 0.5, 1.0)))
     images = [room.frozen.render(view, rig) for view in room.views]
     starts = [point_light(VISIBLE, (1.0, 1.0, 1.0)), point_light((-0.25, 0.3, 0.2), (1.0, 1.0, 1.0))]
-    options = AdamOptions(epochs=1, steps=80, intensity_rate=0.1)
-    result = fit_lights(
-        room.frozen,
-        room.two,
-        images,
-        method="paper_adam",
-        adam=options,
-        training_lights=starts,
-        seed=1,
-        spec=LightSpec(count=2),
-    )
+    solver = PaperAdam(epochs=1, steps=80, intensity_rate=0.1, training_lights=starts, seed=1)
+    result = replace(room.two, lights=LightSpec(count=2)).fit(images, solver=solver)
     distances = [min(float((found.position - true.position).norm()) for found in result.lights) for true in rig]
     # Measured 0.018 and 0.006.
     assert result.loss < 0.1 * result.trajectory[0].loss and max(distances) < 0.03
@@ -117,10 +108,8 @@ def test_adam_finds_a_spot_and_its_axis(room, point_light) -> None:
     truth = SHAPE.at(light.position, axis, light.intensity)
     images = [room.frozen.render(view, (truth,)) for view in room.views]
     start = point_light((0.05, -0.2, 0.2), (1.0, 1.0, 1.0))
-    options = AdamOptions(epochs=1, steps=60, intensity_rate=0.1, axis_rate=0.02)
-    result = fit_lights(
-        room.frozen, room.two, images, method="paper_adam", adam=options, training_lights=[start], spec=SPOTS
-    )
+    solver = PaperAdam(epochs=1, steps=60, intensity_rate=0.1, axis_rate=0.02, training_lights=[start])
+    result = replace(room.two, lights=SPOTS).fit(images, solver=solver)
     (found,), (first,) = result.lights, result.trajectory[0].lights
     # Measured 0.010 and 0.026.
     assert float((found.direction - axis).norm()) < 0.1 * float((first.direction - axis).norm())
@@ -129,13 +118,10 @@ def test_adam_finds_a_spot_and_its_axis(room, point_light) -> None:
 
 
 def test_the_same_seed_gives_the_same_rig_and_axes_stay_of_unit_length(room, point_light) -> None:
-    wild = AdamOptions(epochs=1, steps=6, axis_rate=3.0, position_rate=3.0, init="sphere", aim="random")
-    spec = LightSpec("spot", 2, SHAPE)
+    wild = PaperAdam(epochs=1, steps=6, axis_rate=3.0, position_rate=3.0, init="sphere", aim="random")
+    views = replace(room.one, lights=LightSpec("spot", 2, SHAPE))
     image = room.images(point_light(VISIBLE))
-    one, same, other = (
-        fit_lights(room.frozen, room.one, image, method="paper_adam", adam=wild, seed=seed, spec=spec)
-        for seed in (5, 5, 6)
-    )
+    one, same, other = (views.fit(image, solver=replace(wild, seed=seed)) for seed in (5, 5, 6))
     for index in range(2):
         assert torch.equal(one.lights[index].position, same.lights[index].position)
         assert torch.equal(one.lights[index].direction, same.lights[index].direction)
@@ -151,7 +137,7 @@ def test_the_same_seed_gives_the_same_rig_and_axes_stay_of_unit_length(room, poi
 )
 def test_what_is_not_known_is_refused(room, point_light, spec: LightSpec) -> None:
     with pytest.raises(ValueError, match="known"):
-        fit_lights(room.frozen, room.one, room.images(point_light(VISIBLE)), method="paper_adam", spec=spec)
+        replace(room.one, lights=spec).fit(room.images(point_light(VISIBLE)), solver=PaperAdam())
 
 
 def test_a_hard_edge_has_a_gradient(room, point_light) -> None:

@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from lit_room import HIDDEN, VISIBLE
-from rgspipe.fitting import Effects, FitResult, FitStatus, LightSpec, fit_lights, prepare_fit, render_rig
+from rgspipe.fitting import Effects, FitResult, FitStatus, FitViews, LightSpec
 from rgspipe.scene import LightRig, SpotLight
 
 THIRD = (-0.3, 0.3, 0.1)
@@ -24,12 +24,12 @@ def spot(position=VISIBLE, axis=(-0.3, 0.5, -0.6), shape: SpotLight = SHAPE) -> 
 
 
 def fit(room, rig: LightRig, spec: LightSpec, noise: float = 0.0, effects: Effects | None = None) -> FitResult:
-    views = prepare_fit(room.frozen, room.views, dictionary=room.dictionary, spec=spec, effects=effects)
+    views = FitViews.prepare(room.frozen, room.views, lights=spec, effects=effects)
     generator = torch.Generator().manual_seed(0)
     images = [
-        image + noise * image.mean() * torch.randn(image.shape, generator=generator) for image in render_rig(views, rig)
+        image + noise * image.mean() * torch.randn(image.shape, generator=generator) for image in views.render(rig)
     ]
-    return fit_lights(room.frozen, views, images, spec=spec)
+    return views.fit(images)
 
 
 def errors(result: FitResult, rig: LightRig) -> tuple[float, float]:
@@ -125,8 +125,8 @@ def _ill_images(room, kind: str) -> list[Tensor]:
 @pytest.mark.parametrize("kind", ["black", "saturated", "one hot pixel"])
 def test_images_that_no_rig_explains_stay_finite(room, kind):
     spec = LightSpec(count=2)
-    views = prepare_fit(room.frozen, room.views, dictionary=room.dictionary, spec=spec)
-    result = fit_lights(room.frozen, views, _ill_images(room, kind), spec=spec)
+    views = FitViews.prepare(room.frozen, room.views, lights=spec)
+    result = views.fit(_ill_images(room, kind))
     assert result.lights or result.status is FitStatus.NOT_ENOUGH_LIGHT
     assert bool(result.lights) or kind != "saturated"
     assert np.isfinite(result.loss) and result.reason

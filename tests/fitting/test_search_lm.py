@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 import pytest
 import torch
@@ -12,7 +10,7 @@ from emitters import emitter_at
 from lit_room import HIDDEN, VISIBLE
 from rgspipe import fit_lights
 from rgspipe.errors import InputError
-from rgspipe.fitting import FitStatus, prepare_fit
+from rgspipe.fitting import FitStatus, FitViews
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.search.moves import Region
 from rgspipe.fitting.search_lm import fit_from
@@ -28,7 +26,7 @@ def _errors(result, light):
 def test_recovers_visible_and_hidden_lights(room, point_light, where, views):
     light = point_light(where)
     prepared = room.one if views == 1 else room.two
-    result = fit_lights(room.frozen, prepared, room.images(light, views))
+    result = prepared.fit(room.images(light, views))
     position, intensity = _errors(result, light)
     assert position < 1e-5 and intensity < 1e-5  # measured 6e-8 and 2e-8
     assert result.status is FitStatus.CONVERGED and result.loss < 1e-8
@@ -38,7 +36,7 @@ def test_recovers_visible_and_hidden_lights(room, point_light, where, views):
 
 def test_trajectory_leads_from_a_candidate_to_the_light(room, point_light):
     light = point_light(VISIBLE)
-    result = fit_lights(room.frozen, room.one, room.images(light))
+    result = room.one.fit(room.images(light))
     first, last = result.trajectory[0], result.trajectory[-1]
     assert float((room.dictionary.positions.double() - first.position).norm(dim=1).min()) == 0.0
     assert last.loss < 1e-6 < first.loss
@@ -48,7 +46,7 @@ def test_trajectory_leads_from_a_candidate_to_the_light(room, point_light):
 
 def test_the_same_images_give_the_same_light(room, point_light):
     images = room.images(point_light(HIDDEN))
-    one, two = (fit_lights(room.frozen, room.one, images) for _ in range(2))
+    one, two = (room.one.fit(images) for _ in range(2))
     assert torch.equal(one.lights[0].position, two.lights[0].position)
     assert torch.equal(one.lights[0].intensity, two.lights[0].intensity)
     assert [step.loss for step in one.trajectory] == [step.loss for step in two.trajectory]
@@ -58,13 +56,13 @@ def test_the_same_images_give_the_same_light(room, point_light):
 def test_brightness_does_not_matter(room, point_light, scale):
     """Very dim and very bright images, too, are fitted in the middle of float32's range."""
     light = point_light(VISIBLE, (scale, 2 * scale, 0.5 * scale))
-    position, intensity = _errors(fit_lights(room.frozen, room.one, room.images(light)), light)
+    position, intensity = _errors(room.one.fit(room.images(light)), light)
     assert position < 1e-5 and intensity < 1e-5
 
 
 def test_a_red_light_has_no_green_and_blue(room, point_light):
     light = point_light(VISIBLE, (2.0, 0.0, 0.0))
-    found = fit_lights(room.frozen, room.one, room.images(light))
+    found = room.one.fit(room.images(light))
     assert torch.equal(found.lights[0].intensity[1:], torch.zeros(2, dtype=torch.float64))
     assert float((found.lights[0].position - light.position).norm()) < 1e-5
     assert torch.isfinite(found.covariance[0]).all()
@@ -78,7 +76,7 @@ def test_noise_leaves_an_error_of_the_size_of_the_covariance(room, point_light):
     scores = []
     for _ in range(6):
         noisy = clean + 0.02 * clean.mean() * torch.randn(clean.shape, generator=generator)
-        result = fit_lights(room.frozen, room.one, [noisy])
+        result = room.one.fit([noisy])
         deviation = torch.cat(
             [result.lights[0].position - light.position, result.lights[0].intensity - light.intensity]
         )
@@ -89,7 +87,7 @@ def test_noise_leaves_an_error_of_the_size_of_the_covariance(room, point_light):
 @pytest.mark.parametrize("value", [0.0, -1.0])
 def test_a_black_target_is_not_enough_light(room, value):
     height, width = room.views[0].camera.height, room.views[0].camera.width
-    result = fit_lights(room.frozen, room.one, [torch.full((height, width, 3), value)])
+    result = room.one.fit([torch.full((height, width, 3), value)])
     assert result.status is FitStatus.NOT_ENOUGH_LIGHT and result.lights == ()
     assert np.isfinite(result.loss) and "exposure" in result.reason
 
@@ -98,7 +96,7 @@ def test_a_light_that_no_candidate_explains_stays_finite(room):
     """One hot pixel in the dark: whatever comes out, it is finite."""
     image = torch.zeros((48, 48, 3))
     image.view(-1, 3)[room.one.prepared.pixels[7]] = 1e4
-    result = fit_lights(room.frozen, room.one, [image])
+    result = room.one.fit([image])
     assert np.isfinite(result.loss)
     for light in result.lights:
         assert torch.isfinite(light.position).all() and torch.isfinite(light.intensity).all()
@@ -115,7 +113,7 @@ def test_too_few_iterations_are_said_so(room, point_light):
 def test_lights_stay_in_the_region(room, point_light):
     """A wall's mean colour everywhere pulls a light away from everything; it ends inside the region."""
     flat = [torch.ones(48, 48, 3)]
-    result = fit_lights(room.frozen, room.one, flat)
+    result = room.one.fit(flat)
     region = Region.of(room.frozen)
     position = result.lights[0].position
     assert bool((position >= region.lower).all() and (position <= region.upper).all())
@@ -124,7 +122,7 @@ def test_lights_stay_in_the_region(room, point_light):
 
 def test_a_mask_that_leaves_nothing_is_refused(room):
     with pytest.raises(InputError, match="pixels"):
-        prepare_fit(room.frozen, room.views[:1], masks=[torch.zeros(48, 48)])
+        FitViews.prepare(room.frozen, room.views[:1], masks=[torch.zeros(48, 48)])
 
 
 def test_masked_pixels_do_not_count(room, point_light):
@@ -134,8 +132,8 @@ def test_masked_pixels_do_not_count(room, point_light):
     mask[:, :16] = 0.0
     spoiled = image.clone()
     spoiled[:, :16] = 100.0
-    prepared = prepare_fit(room.frozen, room.views[:1], masks=[mask], dictionary=room.dictionary)
-    position, _ = _errors(fit_lights(room.frozen, prepared, [spoiled]), light)
+    prepared = FitViews.prepare(room.frozen, room.views[:1], masks=[mask])
+    position, _ = _errors(prepared.fit([spoiled]), light)
     assert position < 1e-5
 
 
@@ -143,18 +141,24 @@ def test_masked_pixels_do_not_count(room, point_light):
     ("images", "message"),
     [
         ([], "one for each"),
-        ([torch.ones(47, 48, 3)], "shape"),
+        ([torch.ones(47, 48, 3)], r"images\[0\]: expected numbers of shape \(48, 48, 3\), found shape \(47, 48, 3\)"),
+        (np.ones((2, 48, 48, 3)), "found 2"),
+        (np.ones((1, 48, 48, 3), np.uint8), "linear radiance"),
         ([torch.full((48, 48, 3), torch.nan)], "finite"),
     ],
 )
 def test_images_that_do_not_fit_are_refused(room, images, message):
     with pytest.raises(InputError, match=message):
-        fit_lights(room.frozen, room.one, images)
+        room.one.fit(images)
 
 
-def test_programming_mistakes_are_value_errors(room):
-    images = [torch.ones(48, 48, 3)]
-    with pytest.raises(ValueError, match="method"):
-        fit_lights(room.frozen, room.one, images, method="guess")
-    with pytest.raises(ValueError, match="dictionary"):
-        fit_lights(room.frozen, dataclasses.replace(room.one, coarse=()), images)
+def test_lights_of_no_known_kind_are_refused(room):
+    with pytest.raises(ValueError, match="type must be one of"):
+        fit_lights(room.frozen, room.views[0], torch.ones(48, 48, 3), lights="lantern")
+
+
+def test_images_are_taken_in_any_form_and_alone(room, point_light):
+    (image,) = room.images(point_light(VISIBLE))
+    expected = room.one.fit([image]).lights[0].position
+    for given in (image, image.numpy(), image[None], [image.double().tolist()]):
+        assert torch.equal(room.one.fit(given).lights[0].position, expected)

@@ -10,7 +10,7 @@ from lit_room import frozen_room, room_cameras, room_surfels
 from rgspipe.datasets.exr import write_image
 from rgspipe.datasets.gs3_write import frame_entry, write_transforms
 from rgspipe.datasets.ply import save_ply
-from rgspipe.fitting.fit import prepare_fit, render_light
+from rgspipe.fitting import FitViews
 from rgspipe.fitting.model.problem import Effects
 from rgspipe.scene import PointLight
 
@@ -27,13 +27,13 @@ def write_room(folder: Path) -> None:
     """Write room.ply and a folder of two views for each light."""
     save_ply(folder / "room.ply", room_surfels().to(torch.float32))
     cameras = room_cameras(32)
-    views = prepare_fit(frozen_room(), cameras, effects=Effects(at_pixels=True))
+    views = FitViews.prepare(frozen_room(), cameras, effects=Effects(at_pixels=True))
     intensity = torch.tensor([1.0, 2.0, 0.5], dtype=torch.float64)
     for name, position in LIGHTS.items():
         target = folder / name
         target.mkdir()
         light = PointLight(torch.tensor(position, dtype=torch.float64), intensity)
-        for index, image in enumerate(render_light(views, light)):
+        for index, image in enumerate(views.render(light)):
             write_image(target / f"view_{index}.exr", image.numpy())
         write_transforms(
             target / "transforms.json", [frame_entry(f"./view_{k}", camera) for k, camera in enumerate(cameras)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 import torch
@@ -10,7 +11,7 @@ from torch import Tensor
 
 from hard_cases import DEEP, INSIDE, LIGHTS, SCENES, HardScene, camera, scene_of_light
 from rgspipe.errors import InputError
-from rgspipe.fitting import AdamOptions, FitResult, FitStatus, SearchOptions, fit_lights, prepare_fit
+from rgspipe.fitting import FitResult, FitStatus, PaperAdam, Search
 from rgspipe.fitting.fit import FitViews
 from rgspipe.renderer.dictionary import LightDictionary
 from rgspipe.renderer.frozen import FrozenScene
@@ -41,8 +42,8 @@ def light_at(scene: HardScene, place: Tensor, exponent: float = 0.0) -> PointLig
     return PointLight(scene.at(place), torch.full((3,), scene.size**2 * math.exp(exponent), dtype=torch.float64))
 
 
-def prepare(kept: Kept, scene: HardScene, start: PointLight) -> tuple[FrozenScene, FitViews, Tensor]:
-    """The scene, one view with the start as the only candidate, and the target's image."""
+def prepare(kept: Kept, scene: HardScene, start: PointLight) -> tuple[FitViews, Tensor]:
+    """One view with the start as the only candidate, and the target's image."""
     if id(scene) not in kept:
         frozen = FrozenScene.freeze(scene.build(), gather_rays=4, patches=20, seed=0)
         view = frozen.view(camera("plain", scene))
@@ -50,19 +51,19 @@ def prepare(kept: Kept, scene: HardScene, start: PointLight) -> tuple[FrozenScen
     frozen, view, image = kept[id(scene)]
     irradiance, _ = frozen.unit_irradiance(start.position[None])
     candidate = LightDictionary(start.position[None].float(), irradiance)
-    return frozen, prepare_fit(frozen, [view], mask_edges=False, dictionary=candidate), image
+    return FitViews.prepare(replace(frozen, candidates=candidate), view, mask_edges=False), image
 
 
 def adam(kept: Kept, scene: HardScene, start: PointLight, steps: int) -> FitResult:
     """Adam from `start` exactly: the only training light is where the mean is and has no spread."""
-    frozen, views, image = prepare(kept, scene, start)
-    options = AdamOptions(epochs=1, steps=steps, position_rate=0.01 * scene.size)
-    return fit_lights(frozen, views, [image], method="paper_adam", adam=options, training_lights=[start])
+    views, image = prepare(kept, scene, start)
+    solver = PaperAdam(epochs=1, steps=steps, position_rate=0.01 * scene.size, training_lights=[start])
+    return views.fit([image], solver=solver)
 
 
 def levenberg(kept: Kept, scene: HardScene, start: PointLight, steps: int) -> FitResult:
-    frozen, views, image = prepare(kept, scene, start)
-    return fit_lights(frozen, views, [image], search=SearchOptions(starts=1, iterations=steps))
+    views, image = prepare(kept, scene, start)
+    return views.fit([image], solver=Search(starts=1, iterations=steps))
 
 
 def assert_goes_on(one: FitResult, more: FitResult, gain: float) -> None:
@@ -130,8 +131,8 @@ def test_both_from_the_ends_of_the_intensity_range(kept: Kept, exponent: float) 
 @pytest.mark.parametrize("scale", [1e-13, 1e13])
 def test_a_search_finds_a_light_of_any_brightness(kept: Kept, scale: float) -> None:
     scene = SCENES["plain"]
-    frozen, views, image = prepare(kept, scene, light_at(scene, INSIDE))
-    fit = fit_lights(frozen, views, [scale * image], search=SearchOptions(starts=1))
+    views, image = prepare(kept, scene, light_at(scene, INSIDE))
+    fit = views.fit([scale * image], solver=Search(starts=1))
     # Measured below 1e-5.
     assert float((fit.lights[0].position - TRUTH).norm()) < 1e-3
     torch.testing.assert_close(fit.lights[0].intensity / scale, torch.ones(3, dtype=torch.float64), rtol=1e-3, atol=0)

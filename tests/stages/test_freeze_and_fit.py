@@ -21,7 +21,7 @@ from rgspipe.datasets.landscape_file import read_landscape
 from rgspipe.datasets.light_file import read_lights
 from rgspipe.datasets.surfel_file import save_surfels
 from rgspipe.errors import InputError
-from rgspipe.fitting.fit import prepare_fit, render_light
+from rgspipe.fitting import FitViews
 from rgspipe.fitting.model.problem import Effects
 from rgspipe.scene import LedLight, PointLight
 from rgspipe.stages import fit_extras, fit_light, freeze
@@ -50,11 +50,11 @@ def _build(root: Path, stage: str, make) -> Artifact:
 def _write_dataset(folder: Path) -> None:
     frozen, cameras = frozen_room(), room_cameras(32)
     # The model's own images, with direct light where pixels look, as it is by default.
-    views = prepare_fit(frozen, cameras, effects=Effects(at_pixels=True))
+    views = FitViews.prepare(frozen, cameras, effects=Effects(at_pixels=True))
     for (name, _), (position, intensity) in LIGHTS.items():
         target = folder / "targets" / name
         target.mkdir(parents=True)
-        for index, image in enumerate(render_light(views, _light(position, intensity))):
+        for index, image in enumerate(views.render(_light(position, intensity))):
             write_image(target / f"view_{index}.exr", image.numpy())
         entries = [frame_entry(f"./view_{index}", camera) for index, camera in enumerate(cameras)]
         write_transforms(target / "transforms.json", entries)

@@ -20,7 +20,7 @@ from rgspipe.config import RgspipeConfig, with_changes
 from rgspipe.datasets.exr import read_image
 from rgspipe.datasets.light_file import read_lights, write_lights
 from rgspipe.errors import InputError
-from rgspipe.fitting.fit import prepare_fit, render_rig
+from rgspipe.fitting import FitViews
 from rgspipe.fitting.model.problem import Effects
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import LightRig, PointLight, SpotLight
@@ -42,8 +42,8 @@ def inputs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Artifact]:
     """The frozen room, and targets whose images the library's own renderer made."""
     root = tmp_path_factory.mktemp("store")
     freeze = frozen_artifact(root)
-    views = prepare_fit(FrozenScene.load(freeze.folder()), room_cameras(32), effects=Effects(at_pixels=True))
-    images = {name: render_rig(views, rig) for name, rig in RIGS.items()}
+    views = FitViews.prepare(FrozenScene.load(freeze.folder()), room_cameras(32), effects=Effects(at_pixels=True))
+    images = {name: views.render(rig) for name, rig in RIGS.items()}
     return {
         "freeze": freeze,
         "generate_dataset": artifact(root, "generate_dataset", lambda folder: write_targets(folder, images, RIGS)),

@@ -16,7 +16,7 @@ from rgspipe.datasets.json_file import read_json
 from rgspipe.datasets.light_file import read_lights
 from rgspipe.evaluation.images import progress_strip, save_png, stack
 from rgspipe.evaluation.metrics import psnr
-from rgspipe.fitting.fit import FitViews, render_rig
+from rgspipe.fitting.fit import FitViews
 from rgspipe.fitting.result import FitResult, Step
 from rgspipe.fitting.words import PYTHON, Spoken
 from rgspipe.scene import LightRig
@@ -46,7 +46,7 @@ def write_result(
     partial = folder.with_name(f".{folder.name}.partial")
     shutil.rmtree(partial, ignore_errors=True)
     partial.mkdir(parents=True)
-    shown = [render_rig(views, rig) for rig in _milestones(result)]
+    shown = [views.render(rig) for rig in _milestones(result)]
     final = shown[-1]
     result.save(partial / "lights.json", spoken, psnr=_psnr(final, targets))
     _write_convergence(partial / "convergence.csv", result.trajectory)

@@ -10,36 +10,41 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rgspipe.fitting.findings import FitStatus
-    from rgspipe.fitting.fit import FitViews, fit_lights, prepare_fit, render_light, render_rig
+    from rgspipe.fitting.fit import FitViews, fit_lights
     from rgspipe.fitting.model.capture import ImageCapture
     from rgspipe.fitting.model.problem import Effects
-    from rgspipe.fitting.options import AdamOptions, SearchOptions
+    from rgspipe.fitting.options import TrackOptions
     from rgspipe.fitting.result import FitResult, Step
+    from rgspipe.fitting.solvers import PaperAdam, Search, Solver
     from rgspipe.fitting.spec import LightSpec
+    from rgspipe.fitting.tracking.track import track_lights
 
 __all__ = [
-    "AdamOptions",
     "Effects",
     "FitResult",
     "FitStatus",
     "FitViews",
     "ImageCapture",
     "LightSpec",
-    "SearchOptions",
+    "PaperAdam",
+    "Search",
+    "Solver",
     "Step",
+    "TrackOptions",
     "fit_lights",
-    "prepare_fit",
-    "render_light",
-    "render_rig",
+    "track_lights",
 ]
 
 _HOMES = {
-    "rgspipe.fitting.fit": ("FitViews", "fit_lights", "prepare_fit", "render_light", "render_rig"),
+    "rgspipe.fitting.findings": ("FitStatus",),
+    "rgspipe.fitting.fit": ("FitViews", "fit_lights"),
     "rgspipe.fitting.model.capture": ("ImageCapture",),
     "rgspipe.fitting.model.problem": ("Effects",),
-    "rgspipe.fitting.options": ("AdamOptions", "SearchOptions"),
-    "rgspipe.fitting.result": ("FitResult", "FitStatus", "Step"),
+    "rgspipe.fitting.options": ("TrackOptions",),
+    "rgspipe.fitting.result": ("FitResult", "Step"),
+    "rgspipe.fitting.solvers": ("PaperAdam", "Search", "Solver"),
     "rgspipe.fitting.spec": ("LightSpec",),
+    "rgspipe.fitting.tracking.track": ("track_lights",),
 }
 
 

@@ -3,162 +3,151 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import get_args
+from dataclasses import dataclass
+from functools import cached_property
 
 import torch
 from torch import Tensor
 
-from rgspipe.fitting.baselines.paper_adam import fit_paper_adam
-from rgspipe.fitting.baselines.paper_adam_start import LightPrior
-from rgspipe.fitting.findings import ExposureUnknown
 from rgspipe.fitting.model.blocks import BlockModel, block_model
 from rgspipe.fitting.model.capture import ImageCapture
 from rgspipe.fitting.model.gloss import bounced_light
-from rgspipe.fitting.model.problem import Effects, LightProblem
+from rgspipe.fitting.model.problem import Effects
 from rgspipe.fitting.model.views import PreparedViews, prepare_views
-from rgspipe.fitting.options import AdamOptions, Method, SearchOptions
 from rgspipe.fitting.result import FitResult
 from rgspipe.fitting.search.aimed_candidates import aimed_candidates
 from rgspipe.fitting.search.coarse import CoarseImages, coarse_images
-from rgspipe.fitting.search_lm import fit_search_lm
+from rgspipe.fitting.solvers import Search, Solver
 from rgspipe.fitting.spec import LightSpec
 from rgspipe.renderer.dictionary import LightDictionary
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.pixel_direct import surfel_shares
 from rgspipe.renderer.rig import unit_response
 from rgspipe.renderer.view_weights import ViewWeights
-from rgspipe.scene import Camera, Light, LightRig, PointLight
+from rgspipe.scene import Camera, Light, LightRig
+from rgspipe.scene.arrays import ArrayLike, as_list
+from rgspipe.scene.lights import as_rig
+
+Cameras = Camera | ViewWeights | Sequence[Camera | ViewWeights]
 
 
 @dataclass(frozen=True)
 class FitViews:
-    """Views made ready for any number of targets that the same cameras see.
+    """Views made ready for any number of targets that the same cameras see, and of whose lights the same is known.
 
     Attributes:
-        prepared: the pixels and their weights.
-        coarse: images of the dictionary's candidates, per kind of light; none where only `paper_adam` is used.
+        prepared: the pixels that a fit trusts, and their weights.
+        lights: what is known of the lights.
         effects: parts of light transport.
-        blocks: the views as blocks of pixels, which searches look at; None where `coarse` is empty.
     """
 
     prepared: PreparedViews
-    coarse: tuple[CoarseImages, ...]
+    lights: LightSpec
     effects: Effects
-    blocks: BlockModel | None = None
 
+    @classmethod
+    def prepare(
+        cls,
+        scene: FrozenScene,
+        cameras: Cameras,
+        *,
+        lights: str | LightSpec = "point",
+        masks: Sequence[ArrayLike] | ArrayLike | None = None,
+        effects: Effects | None = None,
+        mask_edges: bool = True,
+    ) -> FitViews:
+        """What all targets of one set of cameras share; see `fit_lights` for the arguments.
 
-def prepare_fit(
-    frozen: FrozenScene,
-    views: Sequence[ViewWeights | Camera],
-    *,
-    masks: Sequence[Tensor] | None = None,
-    mask_edges: bool = True,
-    dictionary: LightDictionary | None = None,
-    effects: Effects | None = None,
-    spec: LightSpec | None = None,
-) -> FitViews:
-    """What all targets of one set of cameras share; see `fit_lights` for the arguments."""
-    effects = effects or Effects()
-    weights = [frozen.view(view) if isinstance(view, Camera) else view for view in views]
-    prepared = prepare_views(frozen, weights, masks=masks, mask_edges=mask_edges, at_pixels=effects.at_pixels)
-    if dictionary is None:
-        return FitViews(prepared, (), effects)
-    blocks = block_model(prepared, interreflection=effects.interreflection)
-    return FitViews(prepared, _candidates(prepared, blocks, dictionary, effects, spec or LightSpec()), effects, blocks)
+        Raises:
+            InputError: masks do not fit the cameras, or leave no pixel.
+        """
+        effects = effects or Effects()
+        views = [cameras] if isinstance(cameras, Camera | ViewWeights) else cameras
+        weights = [scene.view(view) if isinstance(view, Camera) else view for view in views]
+        masks = None if masks is None else as_list(masks, axes=2)
+        prepared = prepare_views(scene, weights, masks=masks, mask_edges=mask_edges, at_pixels=effects.at_pixels)
+        return cls(prepared, LightSpec(lights) if isinstance(lights, str) else lights, effects)
 
+    @property
+    def dictionary(self) -> LightDictionary:
+        """The candidates that a search begins with: the scene's own."""
+        return self.prepared.frozen.candidates_with(self.effects.shadows)
 
-def _candidates(
-    prepared: PreparedViews, blocks: BlockModel, dictionary: LightDictionary, effects: Effects, spec: LightSpec
-) -> tuple[CoarseImages, ...]:
-    """Candidates of each kind of light that is looked for, the plainest first."""
+    @cached_property
+    def blocks(self) -> BlockModel:
+        """The views as blocks of pixels, which searches look at."""
+        return block_model(self.prepared, interreflection=self.effects.interreflection)
 
-    def of(kind: Light) -> CoarseImages:
+    @cached_property
+    def coarse(self) -> tuple[CoarseImages, ...]:
+        """Images of the candidates of each kind of light that is looked for, the plainest first."""
+        return tuple(map(self._coarse, self.lights.kinds))
+
+    def _coarse(self, kind: Light) -> CoarseImages:
         if kind.axis is None:
-            return coarse_images(prepared.frozen, blocks, dictionary)
-        shapes = kind.variants() if spec.shape_free else (kind,)
-        return aimed_candidates(prepared, dictionary, shapes, interreflection=effects.interreflection)
+            return coarse_images(self.prepared.frozen, self.blocks, self.dictionary)
+        shapes = kind.variants() if self.lights.shape_free else (kind,)
+        bounces = self.effects.interreflection
+        return aimed_candidates(self.prepared, self.dictionary, shapes, interreflection=bounces)
 
-    return tuple(map(of, spec.kinds))
+    def fit(
+        self,
+        images: Sequence[ArrayLike] | ArrayLike,
+        *,
+        solver: Solver | None = None,
+        capture: ImageCapture | None = None,
+    ) -> FitResult:
+        """The lights of one image a view; see `fit_lights`."""
+        stacked = self.prepared.stack_images(as_list(images, axes=3))
+        return (solver or Search()).fit(self, stacked, capture or ImageCapture())
+
+    def render(self, lights: Light | Sequence[Light]) -> list[Tensor]:
+        """(H, W, 3) image per view of the scene under lights, with the fit's effects; black without any."""
+        return _render(self, as_rig(lights))
 
 
 def fit_lights(
-    frozen: FrozenScene,
-    views: FitViews | Sequence[ViewWeights | Camera],
-    images: Sequence[Tensor],
+    scene: FrozenScene,
+    cameras: Cameras,
+    images: Sequence[ArrayLike] | ArrayLike,
     *,
-    method: Method = "search_lm",
-    masks: Sequence[Tensor] | None = None,
-    mask_edges: bool = True,
-    dictionary: LightDictionary | None = None,
-    effects: Effects | None = None,
-    search: SearchOptions | None = None,
-    adam: AdamOptions | None = None,
-    training_lights: Sequence[PointLight] = (),
-    seed: int = 0,
-    spec: LightSpec | None = None,
+    lights: str | LightSpec = "point",
+    solver: Solver | None = None,
+    masks: Sequence[ArrayLike] | ArrayLike | None = None,
     capture: ImageCapture | None = None,
+    effects: Effects | None = None,
+    mask_edges: bool = True,
 ) -> FitResult:
     """Recover the lights of images of a frozen scene.
 
+    `FitViews.prepare(scene, cameras, …).fit(images, …)` does the same, and is quicker for several targets of the same
+    cameras.
+
     Args:
-        frozen: the scene.
-        views: the images' cameras, or their weights; or what `prepare_fit` made of them for the same `spec`, and then
-            `masks`, `mask_edges`, `dictionary` and `effects` are those that it was given.
-        images: (H, W, 3) linear radiance per view, premultiplied by alpha.
-        method: "search_lm", "paper_adam", or "finite_differences": search_lm with derivatives by central differences.
-        masks: (H, W) per view, the scene's share of each pixel (the image's alpha); 1 if None.
-        mask_edges: whether `search_lm` leaves out pixels on silhouettes, creases and depth jumps.
-        dictionary: candidates for `search_lm`; the scene's own if None.
-        effects: parts of light transport; all if None.
-        search, adam: settings of the methods.
-        training_lights: lights of known images, where `paper_adam` starts from.
-        seed: of every draw; the same seed gives the same result.
-        spec: what is known of the lights: type, number, spots' profile; one point light if None.
+        scene: the scene.
+        cameras: of the images, or their weights; one stands for a list of it, as of images and masks.
+        images: (H, W, 3) linear radiance per camera, premultiplied by alpha.
+        lights: what is known of the lights: the name of a kind, of which there is one, or "auto" for a point or a
+            spot; or all that there is to know.
+        solver: how, such as `Search(starts=8)` or `PaperAdam(seed=1)`; `Search()` if None.
+        masks: (H, W) per camera, the scene's share of each pixel (the image's alpha); 1 if None.
         capture: what is known of how the images were taken; as radiance, with known exposures, if None.
+        effects: parts of light transport; those of `Effects()` if None.
+        mask_edges: whether a search leaves out pixels on silhouettes, creases and depth jumps.
 
     Returns:
         The lights, why the fit stopped, and how it got there. A target that is black gives a result without
         lights, not an error.
 
     Raises:
-        InputError: images or masks do not fit the views, are not finite, or leave no pixel.
-        ValueError: an unknown method; with `paper_adam` free exposures, clipped images, or lights whose type, number
-            or cone is not known.
+        InputError: images or masks do not fit the cameras, are not finite, or leave no pixel.
+        ValueError: a kind of light that is not known, or the solver cannot do without what is not known.
     """
-    if method not in get_args(Method):
-        raise ValueError(f"method must be one of {get_args(Method)}, got {method!r}")
-    if not isinstance(views, FitViews):
-        if method != "paper_adam" and dictionary is None:
-            shaded = (effects or Effects()).shadows
-            dictionary = (frozen if shaded else frozen.with_dictionary(shadows=False)).dictionary
-        views = prepare_fit(
-            frozen, views, masks=masks, mask_edges=mask_edges, dictionary=dictionary, effects=effects, spec=spec
-        )
-    stacked = views.prepared.stack_images(images)
-    capture = capture or ImageCapture()
-    problem = LightProblem.create(views.prepared, stacked, views.effects, capture)
-    if method == "paper_adam":
-        if capture != ImageCapture():
-            raise ValueError("paper_adam takes images as radiance with known exposures: use search_lm")
-        prior = LightPrior.of(training_lights)
-        return fit_paper_adam(problem, stacked, adam or AdamOptions(), prior, seed, spec)
-    if not views.coarse:
-        raise ValueError(f"{method} needs a dictionary: pass one to prepare_fit")
-    problem = replace(problem, differences=method == "finite_differences")
-    result = fit_search_lm(problem, views.coarse, search or SearchOptions(), spec, views.blocks)
-    if capture.exposure_free and len(views.prepared.views) == 1:
-        return replace(result, findings=(*result.findings, ExposureUnknown()))
-    return result
+    views = FitViews.prepare(scene, cameras, lights=lights, masks=masks, effects=effects, mask_edges=mask_edges)
+    return views.fit(images, solver=solver, capture=capture)
 
 
-def render_light(views: FitViews, light: Light | None) -> list[Tensor]:
-    """`render_rig` of one light, or of none."""
-    return render_rig(views, () if light is None else (light,))
-
-
-def render_rig(views: FitViews, rig: LightRig) -> list[Tensor]:
-    """(H, W, 3) image per view of the scene under `rig`, with the fit's effects; black without lights."""
+def _render(views: FitViews, rig: LightRig) -> list[Tensor]:
     prepared, effects = views.prepared, views.effects
     if rig and prepared.frozen.gloss is not None:
         return _render_with_gloss(views, rig)
@@ -177,7 +166,7 @@ def render_rig(views: FitViews, rig: LightRig) -> list[Tensor]:
 
 
 def _render_with_gloss(views: FitViews, rig: LightRig) -> list[Tensor]:
-    """`render_rig` of a scene with gloss."""
+    """`_render` of a scene with gloss."""
     prepared, effects = views.prepared, views.effects
     frozen = prepared.frozen
     if not prepared.pixel_direct:

@@ -184,6 +184,11 @@ class FrozenScene:
         """Unit lights all over the scene, where searches begin; made when first asked for, which takes seconds."""
         return self.with_dictionary().candidates if self.candidates is None else self.candidates
 
+    def candidates_with(self, shadows: bool) -> LightDictionary:
+        """The dictionary, or one like it for lights that nothing stands in the way of."""
+        found = self.dictionary
+        return found if shadows else self.with_dictionary(found.grid, seed=found.seed, shadows=False).dictionary
+
     def with_dictionary(self, grid: int = GRID, *, seed: int = 0, shadows: bool = True) -> FrozenScene:
         """The same scene with a dictionary of its own; see `build_dictionary`."""
         made = build_dictionary(self.bvh, self.areas, self.surroundings, grid, seed=seed, shadows=shadows)

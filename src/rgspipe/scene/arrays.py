@@ -43,6 +43,11 @@ def as_tensor(value: ArrayLike, name: str, shape: Sequence[Axis], dtype: torch.d
     return tensor if dtype is None else tensor.to(dtype)
 
 
+def as_list(value: Sequence[ArrayLike] | ArrayLike, axes: int) -> list[ArrayLike]:
+    """Several arrays of `axes` axes each; one of them stands for a list of it."""
+    return [value] if getattr(value, "ndim", None) == axes else list(value)
+
+
 def _from_numbers(value: object, name: str, shape: Sequence[Axis]) -> Tensor:
     if isinstance(value, list | tuple) and any(isinstance(part, Tensor) for part in value):
         return torch.stack([torch.as_tensor(part).double() for part in value])

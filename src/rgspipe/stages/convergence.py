@@ -20,7 +20,7 @@ from rgspipe.evaluation.courses import CourseStep, course_of, course_summary, co
 from rgspipe.evaluation.metrics import longest_side
 from rgspipe.evaluation.plots import png_of
 from rgspipe.evaluation.tables import class_of
-from rgspipe.fitting import FitViews, render_rig
+from rgspipe.fitting import FitViews
 from rgspipe.progress import progress_bar
 from rgspipe.scene import LightRig
 from rgspipe.stages import fit_light
@@ -101,7 +101,7 @@ def _courses(
 
 def _image_error(prepared: FitViews, step: CourseStep, images: list[torch.Tensor]) -> float:
     """Σ (C − C*)² / Σ C*² over all pixels of all views: the same measure for every method."""
-    pairs = list(zip(render_rig(prepared, step.rig), images, strict=True))
+    pairs = list(zip(prepared.render(step.rig), images, strict=True))
     squared = sum(float((image.cpu() - target.to(image.dtype)).double().square().sum()) for image, target in pairs)
     return squared / sum(float(target.double().square().sum()) for _, target in pairs)
 

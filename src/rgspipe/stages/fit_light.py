@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 
 import pandas as pd
@@ -17,18 +17,12 @@ from rgspipe.datasets.location import dataset_root, open_dataset
 from rgspipe.datasets.views import Target, View
 from rgspipe.errors import InputError
 from rgspipe.evaluation.fit_folder import read_result, write_result
-from rgspipe.fitting import (
-    Effects,
-    FitViews,
-    LightSpec,
-    fit_lights,
-    prepare_fit,
-)
+from rgspipe.fitting import Effects, FitViews, LightSpec, PaperAdam, Search, Solver
 from rgspipe.fitting.model.harmonics import BandLimit
-from rgspipe.fitting.options import MOST_LIGHTS
+from rgspipe.fitting.options import MOST_LIGHTS, AdamOptions, SearchOptions
 from rgspipe.fitting.spec import AUTO, shaped_kind
+from rgspipe.options import Options
 from rgspipe.progress import progress_bar
-from rgspipe.renderer.dictionary import LightDictionary
 from rgspipe.renderer.effect_bounds import NO_BOUND, EffectBounds
 from rgspipe.renderer.effects import Decision, EffectChoice, RigKind
 from rgspipe.renderer.frozen import FrozenScene
@@ -40,7 +34,7 @@ from rgspipe.stages.base import Stage, StageContext
 from rgspipe.stages.fit_capture import captured_views
 from rgspipe.stages.fit_extras import Named, further_files, training_cameras
 from rgspipe.stages.light_shape import light_shape
-from rgspipe.stages.scene_effects import chosen_effects, frozen_scene, measured_effects
+from rgspipe.stages.scene_effects import chosen_effects, frozen_scene
 from rgspipe.stages.sources import image_stage, require_images, target_stage
 from rgspipe.stages.spoken import COMMAND_LINE
 
@@ -67,7 +61,6 @@ class Fitter:
 
     config: RgspipeConfig
     frozen: FrozenScene
-    dictionary: LightDictionary | None
     training_lights: Sequence[PointLight]
     effects: Effects
     dataset: Path | None = None
@@ -76,18 +69,12 @@ class Fitter:
     @classmethod
     def create(cls, context: StageContext) -> Fitter:
         config, artifact = context.config, context.inputs["freeze"]
-        frozen = frozen_scene(config, artifact)
-        effects = _effects(context)
+        frozen, effects = frozen_scene(config, artifact), _effects(context)
         if frozen.gloss is not None and config.effects.auto and not _choice(config, artifact)[1].specular:
             frozen = replace(frozen, gloss=None)
         dataset = context.inputs["generate_dataset"].path if "generate_dataset" in context.inputs else None
-        if config.fit.method == "paper_adam":
-            return cls(config, frozen, None, _training_lights(context), effects, dataset)
-        if not effects.shadows and not measured_effects(artifact)[0].shadows.proved:
-            # The stored candidates have shadows.
-            options = config.freeze
-            frozen = frozen.with_dictionary(options.dictionary_grid, seed=options.seed, shadows=False)
-        return cls(config, frozen, frozen.dictionary, (), effects, dataset)
+        lights = _training_lights(context) if config.fit.method == "paper_adam" else ()
+        return cls(config, frozen, lights, effects, dataset)
 
     def fit(self, target: Target, folder: Path) -> None:
         """Fit one target and write its folder, whole or not at all."""
@@ -95,27 +82,26 @@ class Fitter:
         views, capture = captured_views(chosen, target.name, self.config)
         prepared = self.prepare(views)
         taken = [view.image for view in views]
-        config = self.config.fit
+        seed = target_seed(target, self.config)
         if isinstance(self.frozen.solver, MonteCarloSolver):
             # Every target draws its own rays, whichever targets an earlier attempt has finished.
-            self.frozen.solver.generator.manual_seed(target_seed(target, self.config))
-        result = fit_lights(
-            self.frozen,
-            prepared,
-            taken,
-            method=config.method,
-            search=config.search,
-            adam=config.adam,
-            training_lights=self.training_lights,
-            seed=target_seed(target, self.config),
-            spec=light_spec(self.config),
-            capture=capture,
-        )
+            self.frozen.solver.generator.manual_seed(seed)
+        result = prepared.fit(taken, solver=self.solver(seed), capture=capture)
+        config = self.config.fit
         further = further_files(config, prepared, taken, result, self._other_cameras(target, chosen), capture)
         # Pictures and their PSNR are those of the first view's exposure.
         exposures = result.exposures or [1.0] * len(views)
         images = [image / exposure for image, exposure in zip(taken, exposures, strict=True)]
         write_result(folder / target.name, result, prepared, images, further, COMMAND_LINE)
+
+    def solver(self, seed: int = 0) -> Solver:
+        """The method that is configured; `seed` is that of a target."""
+        config = self.config.fit
+        if config.method == "paper_adam":
+            return PaperAdam(**_given(config.adam, AdamOptions), training_lights=self.training_lights, seed=seed)
+        differences = config.method == "finite_differences"
+        options = _given(config.search, SearchOptions)
+        return Search(**options, derivatives="differences" if differences else "analytic")
 
     def _other_cameras(self, target: Target, used: Sequence[View]) -> list[Named]:
         """Cameras that could be added to a fit: the target's own others, and those of the training views."""
@@ -132,16 +118,20 @@ class Fitter:
         """What fits of these cameras and masks share; made once."""
         key = b"".join(_identity(view) for view in views)
         if key not in self.prepared:
-            self.prepared[key] = prepare_fit(
+            self.prepared[key] = FitViews.prepare(
                 self.frozen,
                 [view.camera for view in views],
+                lights=light_spec(self.config),
                 masks=[view.alpha for view in views],
-                mask_edges=self.config.fit.search.mask_edges,
-                dictionary=self.dictionary,
                 effects=self.effects,
-                spec=light_spec(self.config),
+                mask_edges=self.config.fit.search.mask_edges,
             )
         return self.prepared[key]
+
+
+def _given(options: Options, kind: type[Options]) -> dict[str, object]:
+    """The values of those options that `kind` has."""
+    return {item.name: getattr(options, item.name) for item in fields(kind)}
 
 
 def _effects(context: StageContext) -> Effects:

@@ -19,9 +19,10 @@ from rgspipe.datasets.light_file import write_lights
 from rgspipe.datasets.location import dataset_root, open_dataset
 from rgspipe.datasets.views import View
 from rgspipe.errors import InputError
-from rgspipe.fitting.fit import FitViews, render_rig
+from rgspipe.fitting.fit import FitViews
 from rgspipe.fitting.model.problem import Effects
 from rgspipe.fitting.model.views import PreparedViews, prepare_views
+from rgspipe.fitting.spec import LightSpec
 from rgspipe.renderer.effects import RigKind
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.view_weights import ViewWeights
@@ -58,13 +59,13 @@ class Relighter:
         """(H, W, 3) image of every camera under `rig`, and the seconds that all of them took once they are prepared."""
         effects, spots, lobes = self._effects(rig)
         prepared, lights = self._prepare(cameras, lobes), rig if spots else tuple(light.plain for light in rig)
-        views = FitViews(prepared, (), effects)
+        views = FitViews(prepared, LightSpec(), effects)
         if prepared is not self._rendered:
             # The first image of a camera works out what the others share.
-            render_rig(views, lights)
+            views.render(lights)
             self._rendered = prepared
         began = time.perf_counter()
-        images = render_rig(views, lights)
+        images = views.render(lights)
         return [image.cpu() for image in images], time.perf_counter() - began
 
     def write(

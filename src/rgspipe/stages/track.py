@@ -23,7 +23,7 @@ from rgspipe.scene import LightRig
 from rgspipe.stages import fit_capture
 from rgspipe.stages.base import Need, Stage, StageContext
 from rgspipe.stages.fit_capture import captured_views
-from rgspipe.stages.fit_light import Fitter, light_spec, used_views
+from rgspipe.stages.fit_light import Fitter, used_views
 from rgspipe.stages.spoken import COMMAND_LINE
 
 
@@ -36,15 +36,9 @@ def run(context: StageContext) -> None:
         raise InputError(
             folder, expected="targets/ with the frames", found="none", remedy="Give a folder with targets/<frame>/."
         )
-    views, frames, captures = _frames(Fitter.create(context), targets, config)
-    track = track_lights(
-        views,
-        frames,
-        light_spec(config),
-        search=config.fit.search,
-        options=config.track,
-        capture=captures,
-    )
+    fitter = Fitter.create(context)
+    views, frames, captures = _frames(fitter, targets, config)
+    track = track_lights(views, frames, options=config.track, search=fitter.solver(), capture=captures)
     names = [target.name for target in targets]
     truths, surfels = _truths(dataset_root(folder), names), views.prepared.frozen.surfels
     table = track_table(track, names, truths, views.prepared.frozen.size)

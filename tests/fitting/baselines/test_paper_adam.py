@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import skimage.metrics
 import torch
 
 from lit_room import VISIBLE
-from rgspipe import fit_lights
-from rgspipe.fitting import AdamOptions, Effects, FitStatus
+from rgspipe.fitting import Effects, FitStatus, PaperAdam
 from rgspipe.fitting.baselines.paper_adam_loss import AdamLoss, MovingRig
 from rgspipe.fitting.baselines.paper_adam_start import Ball, LightPrior, draw_start, light_ball
 from rgspipe.fitting.findings import AllStepsTaken
@@ -17,7 +18,7 @@ from rgspipe.fitting.options import StartOptions
 from rgspipe.optim.ssim import WINDOW, ssim, ssim_map
 from rgspipe.scene import PointLight
 
-SHORT = AdamOptions(epochs=2, steps=15)
+SHORT = PaperAdam(epochs=2, steps=15)
 
 
 def test_ssim_is_skimage_s():
@@ -90,16 +91,7 @@ def test_adam_goes_downhill_and_is_deterministic(room, point_light):
     light = point_light(VISIBLE)
     lights = [point_light((-0.2, -0.2, 0.2)), point_light((0.2, 0.2, 0.3))]
     one, two = (
-        fit_lights(
-            room.frozen,
-            room.one,
-            room.images(light),
-            method="paper_adam",
-            adam=SHORT,
-            training_lights=lights,
-            seed=3,
-        )
-        for _ in range(2)
+        room.one.fit(room.images(light), solver=replace(SHORT, training_lights=lights, seed=3)) for _ in range(2)
     )
     assert one.loss < 0.5 * one.trajectory[0].loss
     assert len(one.trajectory) == 31 and one.iterations == 30 and one.status is FitStatus.MAX_ITERATIONS
@@ -113,8 +105,8 @@ def test_positions_stay_in_the_ball(room, point_light):
     """With a huge learning rate the light leaves at once, and is brought back each time."""
     ball, radius = light_ball(room.frozen, None)
     assert ball.radius == pytest.approx(4 * radius)
-    wild = AdamOptions(epochs=1, steps=8, position_rate=3.0, intensity_rate=20.0, init="sphere")
-    result = fit_lights(room.frozen, room.one, room.images(point_light(VISIBLE)), method="paper_adam", adam=wild)
+    wild = PaperAdam(epochs=1, steps=8, position_rate=3.0, intensity_rate=20.0, init="sphere")
+    result = room.one.fit(room.images(point_light(VISIBLE)), solver=wild)
     for step in result.trajectory:
         assert float((step.position - ball.center).norm()) <= ball.radius * (1 + 1e-12)
         assert torch.isfinite(step.intensity).all() and float(step.intensity.log().abs().max()) <= 30 + 1e-9
@@ -163,16 +155,16 @@ def test_the_intensity_is_split_over_the_lights_and_axes_point_inwards_or_anywhe
 
 def test_patience_stops_early(room, point_light):
     light = point_light(VISIBLE)
-    still = AdamOptions(epochs=10, steps=3, position_rate=0.0, intensity_rate=0.0, patience=2)
-    result = fit_lights(room.frozen, room.one, room.images(light), method="paper_adam", adam=still)
+    still = PaperAdam(epochs=10, steps=3, position_rate=0.0, intensity_rate=0.0, patience=2)
+    result = room.one.fit(room.images(light), solver=still)
     assert not any(isinstance(finding, AllStepsTaken) for finding in result.findings) and result.iterations < 10
 
 
 def test_black_target_and_dark_start_stay_finite(room, point_light):
     black = [torch.zeros(48, 48, 3)]
-    assert fit_lights(room.frozen, room.one, black, method="paper_adam").status is FitStatus.NOT_ENOUGH_LIGHT
+    assert room.one.fit(black, solver=PaperAdam()).status is FitStatus.NOT_ENOUGH_LIGHT
     # Outside a closed room the light reaches nothing and has no gradient.
-    dark = AdamOptions(epochs=1, steps=3, init="sphere")
-    result = fit_lights(room.frozen, room.one, room.images(point_light(VISIBLE)), method="paper_adam", adam=dark)
+    dark = PaperAdam(epochs=1, steps=3, init="sphere")
+    result = room.one.fit(room.images(point_light(VISIBLE)), solver=dark)
     assert np.isfinite(result.loss) and torch.isfinite(result.lights[0].position).all()
     assert torch.isfinite(result.covariance[0]).all()

@@ -9,7 +9,6 @@ import pytest
 import torch
 
 from lit_room import HIDDEN, room_cameras
-from rgspipe import fit_lights
 from rgspipe.fitting import Effects, ImageCapture
 from rgspipe.fitting.certainty.advice import COMMON, MOST_VIEWS, suggest_views
 from rgspipe.scene import Camera, PointLight, look_at
@@ -29,7 +28,7 @@ def fitted(room):
     light = torch.tensor(HIDDEN, dtype=torch.float64)
     (image,) = room.images(PointLight(light, torch.ones(3, dtype=torch.float64)))
     stripes = 1.0 + 0.02 * torch.sign(torch.sin(torch.arange(48) * 0.5))[None, :, None]
-    return fit_lights(room.frozen, room.one, [image * stripes])
+    return room.one.fit([image * stripes])
 
 
 def test_the_camera_that_sees_the_bright_spot_helps_most(room, fitted):
@@ -67,8 +66,8 @@ def test_noise_is_predicted_as_a_fit_of_both_views_finds_it(room, point_light):
     images = [
         image + 0.02 * image.mean() * torch.randn(image.shape, generator=generator) for image in room.images(light, 2)
     ]
-    one = fit_lights(room.frozen, room.one, images[:1])
-    two = fit_lights(room.frozen, room.two, images)
+    one = room.one.fit(images[:1])
+    two = room.two.fit(images)
     one = replace(one, covariance=one.noise_covariance)
     first, second = room_cameras(48)
     advice = suggest_views(room.frozen, one, [first], [second], wanted=0.0)

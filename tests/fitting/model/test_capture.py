@@ -8,7 +8,7 @@ import torch
 from emitters import emitter_at
 from lit_room import VISIBLE
 from rgspipe.degradation.target_capture import eight_bit
-from rgspipe.fitting import ImageCapture, fit_lights
+from rgspipe.fitting import ImageCapture
 from rgspipe.fitting.model.capture import rounding_noise, stored_in_eight_bits
 from rgspipe.fitting.model.problem import LightProblem
 
@@ -55,7 +55,7 @@ def test_a_light_is_recovered_exactly_from_clipped_images_and_not_without_knowin
     images, white = _clipped(room, light, 0.15)
     errors = []
     for capture in (ImageCapture(clip=white), None):
-        found = fit_lights(room.frozen, room.two, images, capture=capture).lights[0]
+        found = room.two.fit(images, capture=capture).lights[0]
         errors.append(
             (
                 float((found.position - light.position).norm()),
@@ -71,13 +71,13 @@ def test_eight_bits_cost_little(room, point_light) -> None:
     images = room.images(light, 2)
     white = float(torch.cat([image.reshape(-1) for image in images]).quantile(0.95))
     taken = [eight_bit(image, white) for image in images]
-    found = fit_lights(room.frozen, room.two, taken, capture=ImageCapture(clip=white)).lights[0]
+    found = room.two.fit(taken, capture=ImageCapture(clip=white)).lights[0]
     assert float((found.position - light.position).norm()) < 2e-3
 
 
 def test_images_that_are_white_all_over_do_not_break_a_fit(room) -> None:
     images = [torch.ones(48, 48, 3) for _ in range(2)]
-    result = fit_lights(room.frozen, room.two, images, capture=ImageCapture(clip=1.0))
+    result = room.two.fit(images, capture=ImageCapture(clip=1.0))
     assert all(
         torch.isfinite(light.position).all() and torch.isfinite(light.intensity).all() for light in result.lights
     )

@@ -10,7 +10,7 @@ import torch
 
 from emitters import emitter_at
 from lit_room import VISIBLE
-from rgspipe.fitting import fit_lights
+from rgspipe.fitting import Search
 from rgspipe.fitting.model.differences import central_differences
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.problem import LightProblem
@@ -42,9 +42,7 @@ def test_differences_are_those_of_an_analytic_function() -> None:
 def test_both_methods_find_the_same_light_and_differences_render_more(room, point_light) -> None:
     light = point_light(VISIBLE)
     images = room.images(light, 2)
-    ours, baseline = (
-        fit_lights(room.frozen, room.two, images, method=method) for method in ("search_lm", "finite_differences")
-    )
+    ours, baseline = (room.two.fit(images, solver=Search(derivatives=kind)) for kind in ("analytic", "differences"))
     for result in (ours, baseline):
         assert float((result.lights[0].position - light.position).norm()) < 1e-3  # measured 1e-7 and 2e-6
     # Seven images an evaluation.

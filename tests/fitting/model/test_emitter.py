@@ -9,7 +9,7 @@ import pytest
 import torch
 
 from emitters import emitter_at
-from rgspipe.fitting import prepare_fit
+from rgspipe.fitting import FitViews
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.problem import Effects, LightProblem
 from rgspipe.scene.lights import KINDS, Light, SpotLight
@@ -57,7 +57,7 @@ def test_derivatives_of_a_spot_s_image_agree_with_finite_differences(room, shape
     Without shadows, which are the same as a point light's and jump where hits part into layers.
     """
     effects = Effects(shadows=False, at_pixels=at_pixels)
-    views = prepare_fit(room.frozen, room.views[:1], effects=effects)
+    views = FitViews.prepare(room.frozen, room.views[:1], effects=effects)
     target = torch.ones(room.views[0].camera.pixel_count, 3)
     problem = LightProblem.create(views.prepared, target, views.effects).sharpest()
     emitter = emitter_at(PLACE, AXIS, shape, shape_free=True, softness=0.1)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import pytest
 import torch
 
 from lit_room import HIDDEN, VISIBLE
-from rgspipe.fitting import ImageCapture, LightSpec, fit_lights
+from rgspipe.fitting import ImageCapture, LightSpec, PaperAdam
 from rgspipe.fitting.model.exposure import ExposedMoments, moments_by_view, rough_exposures
 from rgspipe.fitting.model.moments import moments
 
@@ -75,29 +76,29 @@ def test_rough_exposures_come_from_the_candidate_that_fits_every_view() -> None:
 def test_a_light_is_recovered_exactly_from_views_of_unknown_exposure(room, point_light, where) -> None:
     light = point_light(where)
     images = [image * factor for image, factor in zip(room.images(light, 2), (1.0, 3.7), strict=True)]
-    result = fit_lights(room.frozen, room.two, images, capture=FREE)
+    result = room.two.fit(images, capture=FREE)
     error = float((result.lights[0].position - light.position).norm())
     assert error < 1e-4, error
     assert result.exposures[1] == pytest.approx(3.7, rel=1e-3)
     torch.testing.assert_close(result.lights[0].intensity, light.intensity, rtol=1e-3, atol=0.0)
-    wrong = fit_lights(room.frozen, room.two, images)
+    wrong = room.two.fit(images)
     assert float((wrong.lights[0].position - light.position).norm()) > 10.0 * error
 
 
 def test_two_lights_are_recovered_from_views_of_unknown_exposure(room, point_light) -> None:
     rig = (point_light(VISIBLE), point_light((-0.3, 0.3, 0.2), (0.5, 0.5, 1.5)))
     images = [room.frozen.render(view, rig) * factor for view, factor in zip(room.views, (1.0, 0.4), strict=True)]
-    result = fit_lights(room.frozen, room.two, images, spec=LightSpec(count=2), capture=FREE)
+    result = replace(room.two, lights=LightSpec(count=2)).fit(images, capture=FREE)
     errors = [min(float((found.position - light.position).norm()) for found in result.lights) for light in rig]
     assert max(errors) < 1e-3, errors
     assert result.exposures[1] == pytest.approx(0.4, rel=1e-2)
 
 
 def test_one_view_of_unknown_exposure_says_that_intensities_are_relative(room, point_light) -> None:
-    result = fit_lights(room.frozen, room.one, room.images(point_light(VISIBLE)), capture=FREE)
+    result = room.one.fit(room.images(point_light(VISIBLE)), capture=FREE)
     assert "relative to the exposure" in result.reason and result.exposures == (1.0,)
 
 
 def test_the_published_method_refuses_unknown_exposures(room, point_light) -> None:
-    with pytest.raises(ValueError, match="search_lm"):
-        fit_lights(room.frozen, room.one, room.images(point_light(VISIBLE)), method="paper_adam", capture=FREE)
+    with pytest.raises(ValueError, match="use Search"):
+        room.one.fit(room.images(point_light(VISIBLE)), solver=PaperAdam(), capture=FREE)

@@ -9,7 +9,7 @@ import torch
 
 from emitters import emitter_at
 from lit_room import VISIBLE, room_cameras, room_surfels
-from rgspipe.fitting import Effects, FitViews, fit_lights, prepare_fit, render_rig
+from rgspipe.fitting import Effects, FitViews
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.renderer.frozen import FrozenScene
@@ -36,11 +36,11 @@ def frozen() -> FrozenScene:
 
 
 def _views(frozen: FrozenScene, **effects: bool) -> FitViews:
-    return prepare_fit(frozen, room_cameras(24), effects=Effects(**effects))
+    return FitViews.prepare(frozen, room_cameras(24), effects=Effects(**effects))
 
 
 def _problem(views: FitViews) -> LightProblem:
-    stacked = views.prepared.stack_images(render_rig(views, (LIGHT,)))
+    stacked = views.prepared.stack_images(views.render((LIGHT,)))
     return LightProblem.create(views.prepared, stacked, views.effects)
 
 
@@ -68,20 +68,20 @@ def test_at_centres_the_image_is_the_renderer_s(frozen: FrozenScene) -> None:
 
 
 @pytest.mark.parametrize("interreflection", [True, False])
-def test_at_pixels_the_image_is_that_of_render_rig(frozen: FrozenScene, interreflection: bool) -> None:
+def test_at_pixels_the_image_is_that_of_a_rendering(frozen: FrozenScene, interreflection: bool) -> None:
     views = _views(frozen, at_pixels=True, interreflection=interreflection)
     problem = _problem(views).sharpest()
     for light, emitter in ((LIGHT, emitter_at(LIGHT.position)), (SPOT.shining(LIGHT.intensity), SPOT)):
         image = problem.evaluate(emitter)[:, :, 0] * light.intensity.float()
-        expected = torch.cat([image.reshape(-1, 3) for image in render_rig(views, (light,))])
+        expected = torch.cat([image.reshape(-1, 3) for image in views.render((light,))])
         torch.testing.assert_close(image, expected[views.prepared.pixels], rtol=1e-4, atol=1e-5)
 
 
 def test_highlights_at_pixels_are_those_of_centres_where_surfels_are_small(frozen: FrozenScene) -> None:
     """They differ by what a lobe changes within a surfel; without lobes both images lose the same light."""
-    sharp, plain = (render_rig(_views(frozen, at_pixels=at_pixels), (LIGHT,)) for at_pixels in (True, False))
+    sharp, plain = (_views(frozen, at_pixels=at_pixels).render((LIGHT,)) for at_pixels in (True, False))
     diffuse = replace(frozen, gloss=None)
-    without = [render_rig(_views(diffuse, at_pixels=at_pixels), (LIGHT,)) for at_pixels in (True, False)]
+    without = [_views(diffuse, at_pixels=at_pixels).render((LIGHT,)) for at_pixels in (True, False)]
     pairs = ((sharp, without[0]), (plain, without[1]))
     lobes = [sum(float((a - b).sum()) for a, b in zip(*pair, strict=True)) for pair in pairs]
     assert lobes[0] == pytest.approx(lobes[1], rel=0.03)
@@ -96,12 +96,11 @@ def test_derivatives_match_finite_differences(frozen: FrozenScene, at_pixels: bo
 
 
 def test_a_fit_finds_the_light_that_made_a_glossy_image_and_without_lobes_misplaces_it(frozen: FrozenScene) -> None:
-    images = render_rig(_views(frozen, at_pixels=True), (LIGHT,))
+    images = _views(frozen, at_pixels=True).render((LIGHT,))
     errors = []
     for scene in (frozen, replace(frozen, gloss=None)):
-        dictionary = scene.with_dictionary(5).dictionary
-        views = prepare_fit(scene, room_cameras(24), dictionary=dictionary, effects=Effects(at_pixels=True))
-        light = fit_lights(scene, views, images).lights[0]
+        views = FitViews.prepare(scene.with_dictionary(5), room_cameras(24), effects=Effects(at_pixels=True))
+        light = views.fit(images).lights[0]
         errors.append(float((light.position - LIGHT.position).norm()))
     assert errors[0] < 1e-4, errors
     assert errors[1] > 10.0 * errors[0], errors

@@ -9,7 +9,7 @@ from dataclasses import replace
 import torch
 
 from lit_room import VISIBLE
-from rgspipe.fitting import LightSpec, SearchOptions, fit_lights, prepare_fit
+from rgspipe.fitting import FitViews, LightSpec, Search
 from rgspipe.fitting.findings import OutOfSteps, Rival
 from rgspipe.fitting.options import TrackOptions
 from rgspipe.fitting.result import dark_result
@@ -91,10 +91,8 @@ def test_a_frame_that_is_searched_in_vain_is_followed_by_one_some_way_off() -> N
 
 def _ambiguous(monkeypatch, wrong: LightRig) -> None:
     """Every search ends ambiguous, at `wrong`."""
-    monkeypatch.setattr(
-        "rgspipe.fitting.tracking.track.fit_lights",
-        lambda *a, **k: replace(fit_lights(*a, **k), lights=wrong, findings=(Rival(),)),
-    )
+    fit = FitViews.fit
+    monkeypatch.setattr(FitViews, "fit", lambda *a, **k: replace(fit(*a, **k), lights=wrong, findings=(Rival(),)))
 
 
 def test_a_track_without_a_sure_frame_is_uncertain_throughout(monkeypatch, room, point_light) -> None:
@@ -123,7 +121,7 @@ def test_an_answer_with_a_light_that_explains_nothing_is_not_sure(point_light) -
 def test_two_spots_that_move_and_turn_keep_their_order(room) -> None:
     """The headlights of a car: one axis, which turns by 4° a frame."""
     spec = LightSpec("spot", 2, SHAPE)
-    views = prepare_fit(room.frozen, room.views, dictionary=room.dictionary, spec=spec)
+    views = FitViews.prepare(room.frozen, room.views, lights=spec)
     frames, truth = [], []
     for k in range(4):
         turn = math.radians(4.0 * k)
@@ -132,7 +130,7 @@ def test_two_spots_that_move_and_turn_keep_their_order(room) -> None:
         rig = tuple(SHAPE.at(p, axis, (1.0 + j) * torch.ones(3).double()) for j, p in enumerate(places))
         truth.append(rig)
         frames.append([room.frozen.render(view, rig) for view in room.views])
-    track = track_lights(views, frames, spec, search=SearchOptions(starts=3))
+    track = track_lights(views, frames, search=Search(starts=3))
     assert [frame.status for frame in track].count(FrameStatus.SEARCHED) == 1
     assert {frame.status for frame in track} <= {FrameStatus.SEARCHED, FrameStatus.TRACKED, FrameStatus.TRACED_BACK}
     first = [float((light.position - truth[0][0].position).norm()) for light in track[0].result.lights]

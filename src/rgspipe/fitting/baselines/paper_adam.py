@@ -54,7 +54,7 @@ def fit_paper_adam(
     meter = Meter()
     spec = spec or LightSpec()
     if spec.type == "auto" or spec.count is None or spec.shape_free:
-        raise ValueError("paper_adam needs lights of known type, number and cone: use search_lm")
+        raise ValueError("PaperAdam needs lights of known kind, number and shape: use Search")
     if problem.black:
         return dark_result(meter.seconds)
     descent = _Descent.create(problem, target, options, prior, seed, spec, meter)

@@ -18,6 +18,7 @@ from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.pixel_direct import PixelDirect
 from rgspipe.renderer.sparse import SparseOperator, stack
 from rgspipe.renderer.view_weights import ViewWeights
+from rgspipe.scene.arrays import ArrayLike, as_tensor
 
 #: Pixels that surfels cover less than this show something the scene does not have.
 LEAST_COVERAGE = 0.9
@@ -90,22 +91,14 @@ class PreparedViews:
         """(P, 3) float64 place that each trusted pixel looks at; for views with `pixel_direct`."""
         return self.all_points[self.pixels]
 
-    def stack_images(self, images: Sequence[Tensor]) -> Tensor:
+    def stack_images(self, images: Sequence[ArrayLike]) -> Tensor:
         """(all pixels, 3) float32 of one image (H, W, 3) per view.
 
         Raises:
-            InputError: a wrong number of images, a wrong size, or pixels that are not finite.
+            InputError: a wrong number of images, a wrong size, display values, or pixels that are not finite.
         """
-        if len(images) != len(self.views):
-            raise InputError(
-                "target images",
-                expected=f"one for each of the {len(self.views)} views",
-                found=f"{len(images)}",
-                remedy="Pass as many images as views.",
-            )
-        for index, (view, image) in enumerate(zip(self.views, images, strict=True)):
-            _check_image(f"target image {index}", view, image)
-        return torch.cat([image.reshape(-1, 3).float() for image in images]).to(self.operator.matrix.device)
+        checked = _one_each("images", images, self.views, (3,))
+        return torch.cat([image.reshape(-1, 3).float() for image in checked]).to(self.operator.matrix.device)
 
     def split_images(self, stacked: Tensor) -> list[Tensor]:
         """(H, W, 3) per view of stacked pixels (all pixels, 3)."""
@@ -118,7 +111,7 @@ def prepare_views(
     frozen: FrozenScene,
     views: Sequence[ViewWeights],
     *,
-    masks: Sequence[Tensor] | None = None,
+    masks: Sequence[ArrayLike] | None = None,
     mask_edges: bool = True,
     at_pixels: bool = False,
 ) -> PreparedViews:
@@ -137,8 +130,8 @@ def prepare_views(
     """
     if not views:
         raise InputError("views", expected="at least one", found="none", remedy="Choose views of the target.")
-    masks = masks if masks is not None else [torch.ones(v.camera.height, v.camera.width) for v in views]
-    _check_masks(views, masks)
+    masks = [torch.ones(v.camera.height, v.camera.width) for v in views] if masks is None else masks
+    masks = _one_each("masks", masks, views, ())
     trusted = [_trusted(view, mask, mask_edges) for view, mask in zip(views, masks, strict=True)]
     pixels = torch.cat(trusted).nonzero()[:, 0]
     if len(pixels) < LEAST_PIXELS:
@@ -161,22 +154,29 @@ def _trusted(view: ViewWeights, mask: Tensor, mask_edges: bool) -> Tensor:
     return chosen & ~view.edges.cpu() if mask_edges else chosen
 
 
-def _check_masks(views: Sequence[ViewWeights], masks: Sequence[Tensor]) -> None:
-    sizes = [(v.camera.height, v.camera.width) for v in views]
-    found = [tuple(mask.shape) for mask in masks]
-    if sizes != found:
-        raise InputError(
-            "target masks", expected=f"the sizes {sizes} of the views", found=str(found), remedy="Correct the masks."
-        )
-    if not all(bool(torch.isfinite(mask).all()) for mask in masks):
-        raise InputError("target masks", expected="finite values", found="NaN or infinity", remedy="Correct the masks.")
+def _one_each(
+    name: str, values: Sequence[ArrayLike], views: Sequence[ViewWeights], channels: tuple[int, ...]
+) -> list[Tensor]:
+    """One tensor (H, W, …) a view, finite.
 
-
-def _check_image(where: str, view: ViewWeights, image: Tensor) -> None:
-    expected = (view.camera.height, view.camera.width, 3)
-    if tuple(image.shape) != expected:
-        raise InputError(
-            where, expected=f"shape {expected}", found=str(tuple(image.shape)), remedy="Pass the camera's own image."
-        )
-    if not bool(torch.isfinite(image).all()):
-        raise InputError(where, expected="finite pixels", found="NaN or infinity", remedy="Render this image again.")
+    Raises:
+        InputError: they are fewer or more, of another size, or not finite; or they are images of display values.
+    """
+    if len(values) != len(views):
+        expected = f"one for each of the {len(views)} views"
+        raise InputError(name, expected=expected, found=str(len(values)), remedy=f"Pass as many {name} as cameras.")
+    checked = []
+    for index, (view, value) in enumerate(zip(views, values, strict=True)):
+        where = f"{name}[{index}]"
+        if channels and "uint8" in str(getattr(value, "dtype", "")):
+            raise InputError(
+                where,
+                expected="linear radiance, as floats",
+                found="levels from 0 to 255",
+                remedy="rg.load_views reads files as radiance, and rgspipe.scene.srgb.decode makes it of levels / 255.",
+            )
+        tensor = as_tensor(value, where, (view.camera.height, view.camera.width, *channels))
+        if not bool(torch.isfinite(tensor).all()):
+            raise InputError(where, expected="finite values", found="NaN or infinity", remedy="Make it again.")
+        checked.append(tensor)
+    return checked

@@ -11,20 +11,21 @@ from torch import Tensor
 
 from rgspipe.fitting.certainty.doubts import IN_DOUBT
 from rgspipe.fitting.findings import FitStatus
-from rgspipe.fitting.fit import FitViews, fit_lights
+from rgspipe.fitting.fit import FitViews
 from rgspipe.fitting.model.capture import ImageCapture
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.problem import LightProblem
-from rgspipe.fitting.options import SearchOptions, TrackOptions
+from rgspipe.fitting.options import TrackOptions
 from rgspipe.fitting.result import dark_result
 from rgspipe.fitting.search.schedule import soft
-from rgspipe.fitting.spec import LightSpec
+from rgspipe.fitting.solvers import Search
 from rgspipe.fitting.tracking.frame import FrameStatus, TrackedFrame, frame_cost, in_order
 from rgspipe.fitting.tracking.frame_fit import Followed, follow, observed
 from rgspipe.fitting.tracking.motion import Motion
 from rgspipe.fitting.tracking.twins import split_lights
 from rgspipe.progress import progress_bar
 from rgspipe.scene import LightRig
+from rgspipe.scene.arrays import ArrayLike, as_list
 
 #: Median residuals below this part of a pixel are as good as none.
 SMALL_COST = 1e-3
@@ -35,11 +36,10 @@ REMEMBERED = 5
 
 def track_lights(
     views: FitViews,
-    frames: Sequence[Sequence[Tensor]],
-    spec: LightSpec | None = None,
+    frames: Sequence[Sequence[ArrayLike] | ArrayLike],
     *,
-    search: SearchOptions | None = None,
     options: TrackOptions | None = None,
+    search: Search | None = None,
     capture: ImageCapture | Sequence[ImageCapture] | None = None,
 ) -> list[TrackedFrame]:
     """Follow the lights of a sequence.
@@ -52,15 +52,16 @@ def track_lights(
     from its other neighbour.
 
     Args:
-        views: made by `prepare_fit` with a dictionary, for the same `spec`.
+        views: of all frames.
         frames: per frame one image (H, W, 3) a view.
+        options: how.
+        search: how frames are searched from nothing.
         capture: of all frames, or one for each.
     """
     same = capture is None or isinstance(capture, ImageCapture)
     captures = [capture or ImageCapture()] * len(frames) if same else capture
-    taken = list(zip(frames, captures, strict=True))
-    tracker = _Tracker(views, spec or LightSpec(), search or SearchOptions(), options or TrackOptions(), taken)
-    return tracker.run()
+    taken = list(zip((as_list(images, axes=3) for images in frames), captures, strict=True))
+    return _Tracker(views, search or Search(), options or TrackOptions(), taken).run()
 
 
 @dataclass(frozen=True)
@@ -79,12 +80,11 @@ class _Tracker:
     def __init__(
         self,
         views: FitViews,
-        spec: LightSpec,
-        search: SearchOptions,
+        search: Search,
         options: TrackOptions,
-        taken: Sequence[tuple[Sequence[Tensor], ImageCapture]],
+        taken: Sequence[tuple[Sequence[ArrayLike], ImageCapture]],
     ) -> None:
-        self.views, self.spec, self.search, self.options, self.taken = views, spec, search, options, taken
+        self.views, self.search, self.options, self.taken = views, search, options, taken
         self.found: dict[int, _Known] = {}
         self.left = options.searches
 
@@ -170,9 +170,7 @@ class _Tracker:
     def _searched(self, index: int, status: FrameStatus, before: _Known | None) -> _Known | None:
         """A frame searched from nothing, in the order of the lights before; None where no light is found."""
         images, capture = self.taken[index]
-        result = fit_lights(
-            self.views.prepared.frozen, self.views, images, search=self.search, spec=self.spec, capture=capture
-        )
+        result = self.views.fit(images, solver=self.search, capture=capture)
         problem = self._problem(index)
         result = split_lights(problem, result, self.views.blocks, self.search.iterations)
         if not result.lights:
@@ -207,7 +205,7 @@ class _Tracker:
         return self.options.lost * max(SMALL_COST, float(np.median(costs))) if costs else 1.0
 
     def _emitters(self, rig: LightRig) -> tuple[Emitter, ...]:
-        return soft(tuple(Emitter.of(light, self.spec.shape_free) for light in rig), 0.0)
+        return soft(tuple(Emitter.of(light, self.views.lights.shape_free) for light in rig), 0.0)
 
 
 def frame_energy(images: Sequence[Tensor]) -> float:

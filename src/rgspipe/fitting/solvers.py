@@ -1,0 +1,68 @@
+"""Ways from images to lights: each an object of its options, which fits any number of targets."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal, Protocol
+
+from torch import Tensor
+
+from rgspipe.fitting.baselines.paper_adam import fit_paper_adam
+from rgspipe.fitting.baselines.paper_adam_start import LightPrior
+from rgspipe.fitting.findings import ExposureUnknown
+from rgspipe.fitting.model.capture import ImageCapture
+from rgspipe.fitting.model.problem import LightProblem
+from rgspipe.fitting.options import AdamOptions, SearchOptions
+from rgspipe.fitting.result import FitResult
+from rgspipe.fitting.search_lm import fit_search_lm
+from rgspipe.scene import PointLight
+
+if TYPE_CHECKING:
+    from rgspipe.fitting.fit import FitViews
+
+
+class Solver(Protocol):
+    """A way from images to lights."""
+
+    def fit(self, views: FitViews, images: Tensor, capture: ImageCapture) -> FitResult:
+        """The lights of images (all pixels of all views, 3)."""
+        ...
+
+
+@dataclass(frozen=True)
+class Search(SearchOptions):
+    """Candidates in closed form, then Levenberg-Marquardt on all lights, intensities in closed form."""
+
+    derivatives: Literal["analytic", "differences"] = "analytic"
+    """of images towards the lights, or central differences in their place, for comparison"""
+
+    def fit(self, views: FitViews, images: Tensor, capture: ImageCapture) -> FitResult:
+        """The lights of images (all pixels of all views, 3)."""
+        problem = LightProblem.create(views.prepared, images, views.effects, capture)
+        problem = replace(problem, differences=self.derivatives == "differences")
+        result = fit_search_lm(problem, views.coarse, self, views.lights, views.blocks)
+        if capture.exposure_free and len(views.prepared.views) == 1:
+            return replace(result, findings=(*result.findings, ExposureUnknown()))
+        return result
+
+
+@dataclass(frozen=True)
+class PaperAdam(AdamOptions):
+    """The published method: Adam from one start, for lights of known kind, number and shape."""
+
+    training_lights: Sequence[PointLight] = ()
+    """lights of known images, near which a start is drawn; without them it is drawn on a sphere"""
+    seed: int = 0
+    """of the start"""
+
+    def fit(self, views: FitViews, images: Tensor, capture: ImageCapture) -> FitResult:
+        """The lights of images (all pixels of all views, 3).
+
+        Raises:
+            ValueError: exposures are free, images are clipped, or kind, number or shape of the lights are not known.
+        """
+        if capture != ImageCapture():
+            raise ValueError("PaperAdam takes images as radiance with known exposures: use Search")
+        problem = LightProblem.create(views.prepared, images, views.effects)
+        return fit_paper_adam(problem, images, self, LightPrior.of(self.training_lights), self.seed, views.lights)
