@@ -81,9 +81,7 @@ def test_values_of_constants_are_those_of_the_code() -> None:
     page = (DOCS / "guides" / "doubtful_answers.md").read_text()
     told, fields = VALUE.findall(page), FIELD.findall(page)
     assert len(told) >= 3 and len(fields) >= 7
-    assert {name: float(value) for name, value in fields} == {
-        name: attrgetter(name)(Search()) for name, _ in fields
-    }
+    assert {name: float(value) for name, value in fields} == {name: attrgetter(name)(Search()) for name, _ in fields}
     assert {name: float(value) for _, name, value in told} == {
         name: _constants(ROOT / "src" / "rgspipe" / path)[name] for path, name, _ in told
     }
