@@ -38,7 +38,8 @@ if TYPE_CHECKING:
     )
     from rgspipe.renderer.frozen import FrozenScene
     from rgspipe.renderer.ply import load_ply
-    from rgspipe.scene import Camera, LedLight, Light, PointLight, SpotLight, Surfels
+    from rgspipe.scene import Camera, Surfels
+    from rgspipe.scene.lights import LedLight, Light, PointLight, SpotLight
     from rgspipe.scene.models import CornellBox, Corridor, exact_surfels
     from rgspipe.training.trainer import Trained, TrainOptions, train
 
@@ -57,7 +58,8 @@ _HOMES = {
     ),
     "renderer.frozen": ("FrozenScene",),
     "renderer.ply": ("load_ply",),
-    "scene": ("Camera", "LedLight", "Light", "PointLight", "SpotLight", "Surfels"),
+    "scene": ("Camera", "Surfels"),
+    "scene.lights": ("LedLight", "Light", "PointLight", "SpotLight"),
     "scene.models": ("CornellBox", "Corridor", "exact_surfels"),
     "training.trainer": ("TrainOptions", "Trained", "train"),
 }

@@ -23,7 +23,8 @@ from rgspipe.datasets.surfel_file import save_surfels
 from rgspipe.errors import InputError
 from rgspipe.fitting import FitViews
 from rgspipe.fitting.model.problem import Effects
-from rgspipe.scene import LedLight, PointLight
+from rgspipe.scene import PointLight
+from rgspipe.scene.lights import LedLight
 from rgspipe.stages import fit_extras, fit_light, freeze
 from rgspipe.stages.base import StageContext
 

@@ -2,7 +2,7 @@
 
 from rgspipe.scene.camera import Camera, look_at
 from rgspipe.scene.gloss import Gloss
-from rgspipe.scene.lights import LedLight, Light, LightRig, PointLight, SpotLight
+from rgspipe.scene.lights import Light, LightRig, PointLight, SpotLight
 from rgspipe.scene.surfels import NO_CLIP, Coverage, Surfels
 
 __all__ = [
@@ -10,7 +10,6 @@ __all__ = [
     "Camera",
     "Coverage",
     "Gloss",
-    "LedLight",
     "Light",
     "LightRig",
     "PointLight",
