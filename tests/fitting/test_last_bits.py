@@ -10,8 +10,7 @@ import torch
 
 from last_bits import round_otherwise
 from lit_room import VISIBLE, frozen_cube
-from rgspipe.fitting import FitResult, FitStatus, FitViews, LightSpec, fit_lights, prepare_fit, render_rig
-from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.fitting import FitResult, FitStatus, FitViews, LightSpec
 from rgspipe.scene import Camera, LightRig, PointLight, SpotLight, look_at
 
 #: Ways in which sums round. Of five, all find the same. While differences below rounding counted, three found that
@@ -58,30 +57,27 @@ CASES = {
 }
 
 
-def rounded_in_ways(
-    monkeypatch: pytest.MonkeyPatch, frozen: FrozenScene, views: FitViews, rig: LightRig, spec: LightSpec
-) -> list[FitResult]:
+def rounded_in_ways(monkeypatch: pytest.MonkeyPatch, views: FitViews, rig: LightRig) -> list[FitResult]:
     """Fits of the same images, whose sums round in different ways."""
-    images, results = render_rig(views, rig), []
+    images, results = views.render(rig), []
     for seed in range(WAYS):
         with monkeypatch.context() as patch:
             round_otherwise(patch, seed)
-            results.append(fit_lights(frozen, views, images, spec=spec))
+            results.append(views.fit(images))
     return results
 
 
 @pytest.mark.parametrize("name", CASES)
 def test_the_same_is_said_however_sums_round(room, monkeypatch, name: str) -> None:
-    case, views = CASES[name], room.two
-    if case.spec.type != "point":
-        views = prepare_fit(room.frozen, room.views, dictionary=room.dictionary, spec=case.spec)
-    for result in rounded_in_ways(monkeypatch, room.frozen, views, case.rig, case.spec):
+    case = CASES[name]
+    views = FitViews.prepare(room.frozen, room.views, lights=case.spec)
+    for result in rounded_in_ways(monkeypatch, views, case.rig):
         assert {finding.status for finding in result.findings} == case.held
 
 
 def test_a_light_that_is_too_far_stays_at_the_bound(monkeypatch) -> None:
-    cube = frozen_cube()
+    cube = frozen_cube().with_dictionary(3)
     camera = Camera.from_field_of_view(look_at(torch.tensor([0.9, -0.7, 0.8]), torch.zeros(3)), 0.7, 24, 24)
-    views = prepare_fit(cube, [camera], dictionary=cube.with_dictionary(3).dictionary)
-    for result in rounded_in_ways(monkeypatch, cube, views, (point(26.0, -28.0, 21.0),), LightSpec()):
+    views = FitViews.prepare(cube, camera)
+    for result in rounded_in_ways(monkeypatch, views, (point(26.0, -28.0, 21.0),)):
         assert result.status is FitStatus.AT_BOUND

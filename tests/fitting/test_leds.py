@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ import torch
 from lit_room import HIDDEN, VISIBLE
 from rgspipe.datasets.light_file import read_lights
 from rgspipe.evaluation.tables import rig_errors
-from rgspipe.fitting import AdamOptions, FitResult, FitStatus, LightSpec, fit_lights, prepare_fit, render_rig
+from rgspipe.fitting import FitResult, FitStatus, FitViews, LightSpec, PaperAdam
 from rgspipe.fitting.tracking.frame import FrameStatus
 from rgspipe.fitting.tracking.track import track_lights
 from rgspipe.scene import LightRig
@@ -27,11 +28,11 @@ def led(exponent: float, place=VISIBLE, axis=AXIS) -> LedLight:
 
 
 def fit(room, rig: LightRig, spec: LightSpec, noise: float = 0.0) -> FitResult:
-    views = prepare_fit(room.frozen, room.views, dictionary=room.dictionary, spec=spec)
+    views = FitViews.prepare(room.frozen, room.views, lights=spec)
     generator = torch.Generator().manual_seed(0)
-    images = render_rig(views, rig)
+    images = views.render(rig)
     images = [image + noise * image.mean() * torch.randn(image.shape, generator=generator) for image in images]
-    return fit_lights(room.frozen, views, images, spec=spec)
+    return views.fit(images)
 
 
 @pytest.mark.parametrize("exponent", [1.0, 4.0, 16.0])
@@ -82,15 +83,10 @@ def test_two_leds_are_counted(room) -> None:
 def test_adam_finds_an_led_and_its_axis(room, point_light) -> None:
     truth = led(4.0)
     images = [room.frozen.render(view, (truth,)) for view in room.views]
-    result = fit_lights(
-        room.frozen,
-        room.two,
-        images,
-        method="paper_adam",
-        adam=AdamOptions(epochs=1, steps=60, intensity_rate=0.1, axis_rate=0.02),
-        training_lights=[point_light((0.05, -0.2, 0.2), (1.0, 1.0, 1.0))],
-        spec=LightSpec("led", shape=LedLight.shaped(4.0)),
-    )
+    start = point_light((0.05, -0.2, 0.2), (1.0, 1.0, 1.0))
+    solver = PaperAdam(epochs=1, steps=60, intensity_rate=0.1, axis_rate=0.02, training_lights=[start])
+    views = replace(room.two, lights=LightSpec("led", shape=LedLight.shaped(4.0)))
+    result = views.fit(images, solver=solver)
     (found,), (first,) = result.lights, result.trajectory[0].lights
     for name in ("direction", "position"):
         away, before = (float((getattr(one, name) - getattr(truth, name)).norm()) for one in (found, first))
@@ -100,10 +96,10 @@ def test_adam_finds_an_led_and_its_axis(room, point_light) -> None:
 
 def test_an_led_that_moves_and_turns_is_followed(room) -> None:
     spec = LightSpec("led", shape_free=True)
-    views = prepare_fit(room.frozen, room.views, dictionary=room.dictionary, spec=spec)
+    views = FitViews.prepare(room.frozen, room.views, lights=spec)
     truth = [(led(4.0, (0.1 - 0.04 * k, -0.25, 0.3), (-0.3, 0.5 + 0.05 * k, -0.6)),) for k in range(3)]
     frames = [[room.frozen.render(view, rig) for view in room.views] for rig in truth]
-    track = track_lights(views, frames, spec)
+    track = track_lights(views, frames)
     assert [frame.status for frame in track].count(FrameStatus.SEARCHED) == 1
     for frame, rig in zip(track, truth, strict=True):
         errors = rig_errors(frame.result.lights, rig, 1.0)
