@@ -6,15 +6,15 @@ import torch
 
 from lit_room import VISIBLE, frozen_room, room_cameras
 from rgspipe.benchmark.search_settings import KnownTarget, search_markdown, search_table, varied
-from rgspipe.fitting import LightSpec, SearchOptions, prepare_fit, render_rig
+from rgspipe.fitting import FitViews, Search
 from rgspipe.scene import PointLight
 
 
 def test_every_number_is_halved_and_doubled_alone() -> None:
-    usual, found = SearchOptions(), {}
+    usual, found = Search(), {}
     for name, value, options in varied(usual):
         found.setdefault(name, []).append(value)
-        assert options != usual and type(options) is SearchOptions
+        assert options != usual and type(options) is Search
     assert found["starts"] == ["2", "8"] and found["bar.least"] == ["0.1", "0.4"]
     assert found["schedule.softly"] == ["(2, 2, 2)", "(6, 8, 8)"]
     # A number of steps that is not less than all of them is out of range.
@@ -23,11 +23,11 @@ def test_every_number_is_halved_and_doubled_alone() -> None:
 
 def test_the_table_has_a_row_for_each_and_the_usual_first(monkeypatch) -> None:
     monkeypatch.setattr("rgspipe.benchmark.search_settings.varied", lambda usual: [*varied(usual)][:2])
-    frozen, spec = frozen_room(), LightSpec()
-    views = prepare_fit(frozen, room_cameras(24)[:1], dictionary=frozen.with_dictionary(4).dictionary, spec=spec)
+    frozen = frozen_room().with_dictionary(4)
+    views = FitViews.prepare(frozen, room_cameras(24)[:1])
     light = PointLight(torch.tensor(VISIBLE, dtype=torch.float64), 1.0)
-    targets = [KnownTarget(render_rig(views, (light,)), (light,), views, spec)]
-    table = search_table(frozen, targets, frozen.size)
+    targets = [KnownTarget(views.render(light), (light,), views)]
+    table = search_table(targets, frozen.size)
     assert list(table["setting"]) == ["as it is", "starts", "starts"] and list(table["solved"]) == [1, 1, 1]
     assert float(table["error"].max()) < 0.01 and int(table["silent"].sum()) == 0  # measured 1e-5 %
     assert search_markdown(table).count("\n") == 5

@@ -14,10 +14,9 @@ from rgspipe.errors import InputError
 from rgspipe.evaluation import metrics
 from rgspipe.evaluation.markdown import markdown_table
 from rgspipe.evaluation.tables import rig_errors
-from rgspipe.fitting import FitStatus, FitViews, LightSpec, SearchOptions, fit_lights
+from rgspipe.fitting import FitStatus, FitViews, Search
 from rgspipe.options import Options, settings
 from rgspipe.progress import progress_bar
-from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import LightRig
 
 FACTORS = (0.5, 2.0)
@@ -40,32 +39,30 @@ class KnownTarget:
     Attributes:
         images: (H, W, 3) of each view.
         truth: the lights.
-        views: made ready for `spec`.
-        spec: what the fit is told of the lights.
+        views: made ready for what the fit is told of the lights.
     """
 
     images: Sequence[Tensor]
     truth: LightRig
     views: FitViews
-    spec: LightSpec
 
 
-def search_table(frozen: FrozenScene, targets: Sequence[KnownTarget], size: float) -> pd.DataFrame:
+def search_table(targets: Sequence[KnownTarget], size: float) -> pd.DataFrame:
     """One row for the settings as they are, and one for each number halved and doubled.
 
     Args:
         size: the scene's, for errors as shares of it.
     """
-    usual = SearchOptions()
+    usual = Search()
     tried = [("as it is", "", usual), *varied(usual)]
     rows = [
-        {"setting": name, "value": value, **_outcome(frozen, targets, options, size)}
+        {"setting": name, "value": value, **_outcome(targets, options, size)}
         for name, value, options in progress_bar(tried, "settings of the search", unit="setting")
     ]
     return pd.DataFrame(rows)
 
 
-def varied(options: SearchOptions) -> Iterator[tuple[str, str, SearchOptions]]:
+def varied(options: Search) -> Iterator[tuple[str, str, Search]]:
     """Each number of the options, nested ones by dotted names, halved and doubled where its range allows that."""
     for name in _numbers(type(options)):
         value = _get(options, name)
@@ -84,11 +81,9 @@ def search_markdown(table: pd.DataFrame) -> str:
     return markdown_table(table, COLUMNS)
 
 
-def _outcome(
-    frozen: FrozenScene, targets: Sequence[KnownTarget], options: SearchOptions, size: float
-) -> dict[str, float]:
+def _outcome(targets: Sequence[KnownTarget], options: Search, size: float) -> dict[str, float]:
     """How often and how well targets are solved, and what that takes."""
-    results = [fit_lights(frozen, one.views, one.images, spec=one.spec, search=options) for one in targets]
+    results = [one.views.fit(one.images, solver=options) for one in targets]
     errors = [
         rig_errors(found.lights, one.truth, size).position if len(found.lights) == len(one.truth) else np.inf
         for found, one in zip(results, targets, strict=True)

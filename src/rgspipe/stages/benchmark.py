@@ -27,7 +27,7 @@ from rgspipe.errors import InputError
 from rgspipe.evaluation.metrics import longest_side
 from rgspipe.evaluation.timing import load_average
 from rgspipe.files import write_json
-from rgspipe.fitting import Effects, FitViews, LightSpec, prepare_fit
+from rgspipe.fitting import Effects, FitViews, LightSpec
 from rgspipe.machine import machine
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.resources import resource_folder
@@ -99,7 +99,7 @@ def _search(context: StageContext) -> None:
     dataset = context.inputs["generate_dataset"]
     bounds, _ = scene_bounds(dataset, context.inputs["freeze"])
     targets = _known_targets(context, frozen, dataset)
-    table = search_table(frozen, targets, longest_side(bounds))
+    table = search_table(targets, longest_side(bounds))
     table.to_csv(context.folder / "search.csv", index=False)
     text = search_markdown(table)
     (context.folder / "search.md").write_text(text, encoding="utf-8")
@@ -117,17 +117,16 @@ def _known_targets(context: StageContext, frozen: FrozenScene, dataset: Artifact
 
     def prepared(views: Sequence[View], spec: LightSpec) -> FitViews:
         cameras, masks = [view.camera for view in views], [view.alpha for view in views]
-        return prepare_fit(frozen, cameras, masks=masks, dictionary=frozen.dictionary, effects=effects, spec=spec)
+        return FitViews.prepare(frozen, cameras, lights=spec, masks=masks, effects=effects)
 
     def truth(target: Target) -> LightRig:
         return read_lights(truth_file(config, dataset, target.name))
 
-    one, open_number = LightSpec(), LightSpec(count=None)
-    first, together = prepared(singles[0].views[:1], one), prepared(singles[0].views, open_number)
-    known = [KnownTarget([target.views[0].image], truth(target), first, one) for target in singles]
+    first, together = prepared(singles[0].views[:1], LightSpec()), prepared(singles[0].views, LightSpec(count=None))
+    known = [KnownTarget([target.views[0].image], truth(target), first) for target in singles]
     for a, b in zip(singles[: wanted // 2], reversed(singles), strict=False):
         images = [x.image + y.image for x, y in zip(a.views, b.views, strict=True)]
-        known.append(KnownTarget(images, (*truth(a), *truth(b)), together, open_number))
+        known.append(KnownTarget(images, (*truth(a), *truth(b)), together))
     return known
 
 
