@@ -12,7 +12,7 @@ from lit_room import frozen_room, room_cameras
 from rgspipe.datasets.json_file import read_json
 from rgspipe.datasets.light_file import read_lights
 from rgspipe.evaluation.fit_folder import read_result, write_result
-from rgspipe.fitting import FitResult, FitStatus, FitViews, Step
+from rgspipe.fitting import FitResult, FitViews, Step
 from rgspipe.scene import PointLight, SpotLight
 
 
@@ -23,7 +23,7 @@ def test_a_rig_with_a_spot_is_written_whole(tmp_path: Path) -> None:
     rig = (PointLight(place, ones), SpotLight(-place, 2.0 * ones, axis, "gaussian", 0.4, 0.1))
     steps = (Step(0.5, rig, 0.0), Step(0.1, rig, 0.25))
     matrices = (torch.eye(6).double(), torch.eye(9).double())
-    result = FitResult(rig, FitStatus.CONVERGED, "done", 0.1, 1, 4, 3, 0.3, matrices, steps, {1: 0.9, 2: 0.2, 3: 0.19})
+    result = FitResult(rig, (), 0.1, 1, 4, 3, 0.3, matrices, steps, {1: 0.9, 2: 0.2, 3: 0.19})
     write_result(tmp_path / "target", result, views, views.render(rig))
 
     content = read_json(tmp_path / "target" / "lights.json", "a light file")

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from rgspipe.fitting.result import FitResult, Step
     from rgspipe.fitting.solvers import PaperAdam, Search, Solver
     from rgspipe.fitting.spec import LightSpec
-    from rgspipe.fitting.tracking.track import track_lights
 
 __all__ = [
     "Effects",
@@ -32,7 +31,6 @@ __all__ = [
     "Step",
     "TrackOptions",
     "fit_lights",
-    "track_lights",
 ]
 
 _HOMES = {
@@ -44,7 +42,6 @@ _HOMES = {
     "rgspipe.fitting.result": ("FitResult", "Step"),
     "rgspipe.fitting.solvers": ("PaperAdam", "Search", "Solver"),
     "rgspipe.fitting.spec": ("LightSpec",),
-    "rgspipe.fitting.tracking.track": ("track_lights",),
 }
 
 
