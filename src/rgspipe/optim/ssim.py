@@ -7,6 +7,8 @@ from functools import lru_cache
 import torch
 from torch import Tensor
 
+from rgspipe.sums import average
+
 #: Gaussian window: width in pixels and standard deviation.
 WINDOW, SIGMA = 11, 1.5
 
@@ -42,7 +44,7 @@ def ssim_map(image: Tensor, target: Tensor) -> Tensor:
 
 def ssim(image: Tensor, target: Tensor) -> Tensor:
     """Mean structural similarity of two images (H, W, C), a scalar; 1 for equal ones."""
-    return ssim_map(image, target).mean()
+    return average(ssim_map(image, target))
 
 
 def blur(images: Tensor) -> Tensor:

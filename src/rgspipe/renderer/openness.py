@@ -8,6 +8,7 @@ from rgspipe.renderer.kernels.composite import composite
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.point_sets import cosine_directions
 from rgspipe.scene.surfels import Surfels
+from rgspipe.sums import average
 
 #: Surfels that look around, and rays of each: the share is known to a few percent, in milliseconds.
 LOOKING, RAYS = 256, 32
@@ -27,4 +28,4 @@ def openness(bvh: SurfelBvh, surfels: Surfels) -> float:
     directions = cosine_directions(surfels.frames[chosen], RAYS, torch.Generator().manual_seed(0))
     directions = directions.reshape(-1, 3)
     origins = surfels.centers[chosen].repeat_interleave(RAYS, dim=0)
-    return float(composite(bvh, origins, directions).transmittance.mean())
+    return float(average(composite(bvh, origins, directions).transmittance))

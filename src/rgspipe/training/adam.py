@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from torch import Tensor
 
+from rgspipe.sums import average
+
 #: Decay of the first and the second moment.
 FAST, SLOW = 0.9, 0.98
 
@@ -22,5 +24,5 @@ def adam_direction(first: Tensor, second: Tensor, gradient: Tensor, step: int) -
     second.mul_(SLOW).addcmul_(gradient, gradient, value=1.0 - SLOW)
     mean = first / (1.0 - FAST**step)
     spread = (second / (1.0 - SLOW**step)).sqrt()
-    floor = 1e-3 * spread.square().mean().sqrt() + 1e-20
+    floor = 1e-3 * average(spread.square()).sqrt() + 1e-20
     return mean / (spread + floor)

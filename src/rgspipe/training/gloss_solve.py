@@ -11,6 +11,7 @@ import torch
 from torch import Tensor
 
 from rgspipe.scene.surfels import Surfels
+from rgspipe.sums import average
 from rgspipe.training.albedo import (
     ALBEDO_RANGE,
     SMOOTHNESS,
@@ -159,7 +160,7 @@ class _Penalty:
         gloss = graph_laplacian(problem.gloss_graph, None, at.albedo[problem.chosen])
         weight, target = pull(problem.prior, at.albedo)
         typical = _median(diagonal.albedo)
-        specular, logs = (max(1e-20, float(part.mean())) for part in (diagonal.specular, diagonal.log_exponents))
+        specular, logs = (max(1e-20, float(average(part))) for part in (diagonal.specular, diagonal.log_exponents))
         weights = (SMOOTHNESS * typical, SPECULAR_SMOOTHNESS * specular, EXPONENT_SMOOTHNESS * logs)
         return cls(albedo, gloss, weights, (STEP_WEIGHT * specular, STEP_WEIGHT * logs), typical * weight, target)
 

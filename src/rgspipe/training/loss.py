@@ -8,6 +8,7 @@ import torch
 from torch import Tensor
 
 from rgspipe.optim.ssim import ssim_map
+from rgspipe.sums import average
 from rgspipe.training.options import LossOptions
 
 
@@ -29,10 +30,10 @@ def image_loss(rendered: Tensor, photographed: Tensor, peak: float, options: Los
     """
     x, y = (compressed(values / peak, options.compression) for values in (rendered, photographed))
     if options.loss == "l2":
-        return (x - y).square().mean()
-    absolute = (x - y).abs().mean()
+        return average((x - y).square())
+    absolute = average((x - y).abs())
     if options.loss == "l1":
         return absolute
     if not window:
         raise ValueError("the loss `l1_ssim` compares windows of images, got pixels that stand alone")
-    return (1.0 - options.ssim_weight) * absolute + options.ssim_weight * (1.0 - ssim_map(x, y).mean())
+    return (1.0 - options.ssim_weight) * absolute + options.ssim_weight * (1.0 - average(ssim_map(x, y)))

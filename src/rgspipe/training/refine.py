@@ -16,6 +16,7 @@ from rgspipe.renderer.kernels.shade import shade_rays
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.scene.camera import Camera
 from rgspipe.scene.surfels import Surfels
+from rgspipe.sums import average
 from rgspipe.training.adam import adam_direction
 from rgspipe.training.loss import image_loss
 from rgspipe.training.options import RefineOptions
@@ -235,7 +236,7 @@ def _image_term(
 def _squared_error(views: Sequence[RefineView], draws: Sequence[PixelDraw], images: Sequence[Tensor]) -> float:
     triples = zip(views, draws, images, strict=True)
     return fmean(
-        float(((rendered.detach() - view.image[draw.pixels]) / view.peak).square().mean())
+        float(average(((rendered.detach() - view.image[draw.pixels]) / view.peak).square()))
         for view, draw, rendered in triples
     )
 
@@ -244,7 +245,7 @@ def _alpha_term(views: Sequence[RefineView], draws: Sequence[PixelDraw], covered
     """Mean |coverage − alpha|."""
     triples = zip(views, draws, _split(draws, covered), strict=True)
     terms = [
-        (pixel_means(draw, seen[:, :1])[:, 0] - view.alpha[draw.pixels]).abs().mean() for view, draw, seen in triples
+        average((pixel_means(draw, seen[:, :1])[:, 0] - view.alpha[draw.pixels]).abs()) for view, draw, seen in triples
     ]
     return torch.stack(terms).mean()
 

@@ -10,6 +10,7 @@ from torch import Tensor
 
 from rgspipe.renderer.kernels.composite import Hits
 from rgspipe.scene.surfels import Surfels
+from rgspipe.sums import average
 
 #: Neighbours of a surfel.
 NEIGHBOURS = 8
@@ -57,13 +58,13 @@ def continuity(surfels: Surfels, pairs: Neighbours) -> Tensor:
     with those of the rendered depth: the same tie, in image space.)
     """
     offset = _mean_plane_offset(surfels.centers, surfels.normals, pairs.first, pairs.second)
-    return (pairs.weight * (offset / pairs.spacing).square()).mean()
+    return average(pairs.weight * (offset / pairs.spacing).square())
 
 
 def normal_smoothness(surfels: Surfels, pairs: Neighbours) -> Tensor:
     """Mean of w |n_i − n_j|²."""
     normals = surfels.normals
-    return (pairs.weight * (normals[pairs.first] - normals[pairs.second]).square().sum(dim=1)).mean()
+    return average(pairs.weight * (normals[pairs.first] - normals[pairs.second]).square().sum(dim=1))
 
 
 def _mean_plane_offset(centers: Tensor, normals: Tensor, first: Tensor, second: Tensor) -> Tensor:
@@ -89,4 +90,4 @@ def distortion(surfels: Surfels, hits: Hits, origins: Tensor, directions: Tensor
     thickness = surfels.coverage.layer_thickness
     weight = weight * ((depth.detach() - mean).abs() < thickness)
     mean = (weight * depth).sum(dim=1, keepdim=True) / weight.sum(dim=1, keepdim=True).clamp(min=1e-6)
-    return (weight * ((depth - mean) / thickness).square()).sum(dim=1).mean()
+    return average((weight * ((depth - mean) / thickness).square()).sum(dim=1))

@@ -18,6 +18,7 @@ from rgspipe.renderer.transport import with_albedo
 from rgspipe.renderer.view_weights import build_view_weights
 from rgspipe.scene.lights import PointLight
 from rgspipe.scene.surfels import Surfels
+from rgspipe.sums import average
 from rgspipe.training.checkpoint import Checkpoint
 from rgspipe.training.density import redistributed, surfel_errors
 from rgspipe.training.gloss import gloss_radiance
@@ -247,7 +248,7 @@ class _Log:
         for view, render in zip(views, fitted.renders, strict=True):
             image = view.image.reshape(-1, 3)
             peak = torch.quantile(image, 0.995).clamp(min=1e-12)
-            errors.append(float(((render - image) / peak).square().mean()))
+            errors.append(float(average(((render - image) / peak).square())))
         self._add(phase, 0, float(np.mean(errors)), float(np.mean([_decibels(error) for error in errors])))
         self.stored = max(self.stored, fitted.stored, key=lambda stored: stored.memory + stored.file)
         last = self.records[-1]

@@ -16,6 +16,7 @@ from rgspipe.fitting.search.schedule import soft
 from rgspipe.optim.ssim_reference import SsimReference
 from rgspipe.renderer.direct import differentiable_irradiance
 from rgspipe.scene import Light, LightRig
+from rgspipe.sums import average
 
 
 @dataclass(frozen=True)
@@ -94,6 +95,6 @@ class AdamLoss:
         losses = []
         for image, mask, (wanted, reference) in zip(images, self._covered, self._wanted, strict=True):
             image = mask * image
-            absolute = (image - wanted).abs().mean()
+            absolute = average((image - wanted).abs())
             losses.append((1.0 - self._weight) * absolute + self._weight * (1.0 - reference.similarity(image)))
         return torch.stack(losses).mean()

@@ -23,6 +23,7 @@ from rgspipe.renderer.direct import unit_irradiance
 from rgspipe.renderer.pixel_direct import surfel_shares
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.scene.lights import Share
+from rgspipe.sums import average, total
 
 #: In relative weights 1/(y + floor·mean y): pixels darker than this share of the mean count no more than it does.
 RELATIVE_FLOOR = 0.05
@@ -92,7 +93,7 @@ class LightProblem:
         """The problem for images stacked by `PreparedViews.stack_images`, (all pixels, 3)."""
         capture = capture or ImageCapture()
         target = stacked[views.pixels].double()
-        scale = max(0.0, float(target.mean()))
+        scale = max(0.0, float(average(target)))
         normalised = target / scale if scale > 0.0 else target
         if not bool(torch.isfinite(normalised).all()):
             scale, normalised = 0.0, torch.zeros_like(target)
@@ -240,7 +241,7 @@ class LightProblem:
             return 1.0 / size
         # A block counts as much as its pixels do together.
         counts = self.blocks.counts.to(size)
-        return (counts / counts.mean()).sqrt()[:, None] / size
+        return (counts / average(counts)).sqrt()[:, None] / size
 
     def block_weights(self, target: Tensor, counts: Tensor, blocks: SparseOperator) -> Tensor:
         """(B, 3) squared relative weights of block averages (B, 3) over `counts` (B,) pixels each.
@@ -257,8 +258,8 @@ class LightProblem:
 
     def unexplained(self, columns: Sequence[Tensor], intensity: Tensor) -> float:
         """Σ (target − image)² / Σ target², the loss that is reported: 0 is a perfect fit, 1 a black image."""
-        energy = float(self.target.double().square().sum())
-        return float(self.residual(columns, intensity).double().square().sum()) / energy if energy > 0.0 else 0.0
+        energy = float(total(self.target.double().square()))
+        return float(total(self.residual(columns, intensity).double().square())) / energy if energy > 0.0 else 0.0
 
 
 def _seen(operator: SparseOperator, radiance: Tensor) -> Tensor:

@@ -13,6 +13,7 @@ from rgspipe.fitting.model.nonnegative import nonnegative
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.options import CombinationOptions
 from rgspipe.fitting.search.coarse import CoarseImages
+from rgspipe.sums import total
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,7 @@ class Scored:
         wanted = weighted.to(images)
         square = torch.stack([images[:, c].square().sum(dim=1) for c in range(3)], dim=1).double()
         product = torch.stack([images[:, c] @ wanted[c] for c in range(3)], dim=1).double()
-        return cls(images, wanted, square, product, float(weighted.square().sum()))
+        return cls(images, wanted, square, product, float(total(weighted.square())))
 
     def coarse_of(self, problem: LightProblem, coarse: CoarseImages, emitter: Emitter) -> Tensor:
         """(3, B) weighted coarse image of a light that is no candidate."""
@@ -70,7 +71,7 @@ def bright_gains(problem: LightProblem, coarse: CoarseImages) -> Tensor:
     product = torch.einsum("kbc,bc->kc", coarse.images, counts[:, None] * target).double().clamp(min=0.0)
     reached = coarse.square > 0
     explained = torch.where(reached, product.square() / torch.where(reached, coarse.square, 1.0), 0.0)
-    return explained.sum(dim=1) / float((counts[:, None] * target.square()).sum())
+    return explained.sum(dim=1) / float(total(counts[:, None] * target.square()))
 
 
 def best_pairs(scored: Scored, count: int) -> list[tuple[int, int]]:

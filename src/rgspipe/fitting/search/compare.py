@@ -15,6 +15,7 @@ from rgspipe.fitting.model.problem import ROUNDING, LightProblem
 from rgspipe.fitting.options import BarOptions
 from rgspipe.fitting.search.refine import State
 from rgspipe.fitting.search.weighting import ROBUST, cauchy_scale
+from rgspipe.sums import average, total
 
 
 def wanted(rich: State, bar: BarOptions) -> float:
@@ -71,7 +72,7 @@ def robust_costs(problem: LightProblem, states: Sequence[State]) -> list[float]:
     """The mean of `robust_losses` of each rig, no less than that of rounding, below which no rig is the better one."""
     losses, scale = _losses_and_scale(problem, states)
     rounding = math.log1p((ROUNDING / scale) ** 2)
-    return [max(float(loss.mean()), rounding) for loss in losses]
+    return [max(float(average(loss)), rounding) for loss in losses]
 
 
 def _losses_and_scale(problem: LightProblem, states: Sequence[State]) -> tuple[list[Tensor], float]:
@@ -83,7 +84,7 @@ def _losses_and_scale(problem: LightProblem, states: Sequence[State]) -> tuple[l
 
 def ranked(problem: LightProblem, states: Sequence[State]) -> list[State]:
     """The rigs by their robust losses, best first."""
-    losses = [float(loss.mean()) for loss in robust_losses(problem, states)]
+    losses = [float(average(loss)) for loss in robust_losses(problem, states)]
     return [states[index] for index in sorted(range(len(states)), key=losses.__getitem__)]
 
 
@@ -123,6 +124,6 @@ def energy_shares(state: State) -> list[float]:
 def light_energies(state: State) -> list[float]:
     """What each light sends into the image, summed over its pixels and colours."""
     return [
-        float((column[:, :, 0] * strength.to(column)).double().sum())
+        float(total((column[:, :, 0] * strength.to(column)).double()))
         for column, strength in zip(state.columns, state.intensity, strict=True)
     ]

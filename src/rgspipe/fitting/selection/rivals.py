@@ -20,6 +20,7 @@ from rgspipe.fitting.search.compare import (
 )
 from rgspipe.fitting.search.refine import Refiner, State
 from rgspipe.fitting.search.weighting import PLAIN, ROBUST
+from rgspipe.sums import average, total
 
 
 def has_rival(refiner: Refiner, best: State, others: Sequence[State], options: RivalOptions) -> bool:
@@ -77,5 +78,10 @@ def equally_good(problem: LightProblem, best: State, other: State, options: Riva
     """Whether `other` explains the target as well as `best`, within the spread of what both leave unexplained."""
     one, two = robust_losses(problem, [best, other])
     least, cost = robust_costs(problem, [best, other])
-    errors = max(1.0, float((problem.pixels_each / options.pixels_per_error).clamp(max=1.0).sum()))
-    return cost - least <= options.deviations * float((two - one).std()) / math.sqrt(errors)
+    errors = max(1.0, float(total((problem.pixels_each / options.pixels_per_error).clamp(max=1.0))))
+    return cost - least <= options.deviations * _deviation(two - one) / math.sqrt(errors)
+
+
+def _deviation(values: Tensor) -> float:
+    """Standard deviation of (P,) values."""
+    return math.sqrt(float(total((values - average(values)).square())) / max(1, len(values) - 1))

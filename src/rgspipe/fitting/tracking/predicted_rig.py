@@ -16,6 +16,7 @@ from rgspipe.fitting.search.starts import Rig
 from rgspipe.fitting.search.weighting import PLAIN
 from rgspipe.fitting.tracking.motion import Motion, offset, turns
 from rgspipe.optim.levenberg_marquardt import NormalEquations
+from rgspipe.sums import total
 
 #: Residuals below this part of the mean radiance are rounding.
 LEAST_NOISE = 1e-6
@@ -43,7 +44,7 @@ class Evidence:
         """At `state`, intensities over `reference` (L,) [W/sr]."""
         weights = PLAIN.at(problem, state.columns, state.intensity)
         moments = problem.moments(state.columns, weights)
-        counted = max(1.0, float(weights.double().expand(problem.target.shape).sum()))
+        counted = max(1.0, float(total(weights.double().expand(problem.target.shape))))
         size = problem.views.frozen.size
         colours = (reference / problem.scale).repeat_interleave(3)
         units = torch.cat([*(emitter.units(size) for emitter in state.emitters), colours])

@@ -25,6 +25,7 @@ from rgspipe.fitting.tracking.twins import split_lights
 from rgspipe.progress import progress_bar
 from rgspipe.scene import LightRig
 from rgspipe.scene.arrays import ArrayLike, as_list
+from rgspipe.sums import total
 
 #: Median residuals below this part of a pixel are as good as none.
 SMALL_COST = 1e-3
@@ -211,7 +212,7 @@ class _Tracker:
 
 def frame_energy(images: Sequence[Tensor]) -> float:
     """Σ y² over the images of a frame."""
-    return sum(float(torch.nan_to_num(image).double().square().sum()) for image in images)
+    return sum(float(total(torch.nan_to_num(image).double().square())) for image in images)
 
 
 def search_order(energies: Sequence[float], searches: int) -> list[int]:

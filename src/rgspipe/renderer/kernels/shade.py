@@ -10,7 +10,7 @@ from torch import Tensor
 
 from rgspipe.renderer.kernels.composite import Hits, composite
 from rgspipe.renderer.kernels.coverage import LayerRule, sharpened, sharpened_slope
-from rgspipe.renderer.kernels.launch import as_array, as_vec3, launch, thread_count
+from rgspipe.renderer.kernels.launch import as_array, as_vec3, launch
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh, SurfelRecord, clip_height
 from rgspipe.scene.surfels import Surfels
 
@@ -19,6 +19,10 @@ wp.set_module_options({"enable_backward": False})
 
 #: Columns of a surfel's gradient: centre 3, rotation vector 3, log-scales 2, opacity, clip offsets 2, clip angles 2.
 GRADIENT_COLUMNS = 13
+
+#: Private gradients that are added up at the end, of a fixed part of the rays each: their number is part of the result,
+#: so it is none of the machine's. More cores than this would wait; each takes 52 bytes a surfel.
+SLABS = 8
 
 
 @wp.kernel
@@ -223,7 +227,7 @@ def _surfel_gradient(
     """(N, GRADIENT_COLUMNS) and (2,) gradients of Σ colour_gradient · colour."""
     origins, directions, ray_view = rays
     count, device = origins.shape[0], bvh.device
-    slabs = thread_count() if device.type == "cpu" else 1
+    slabs = SLABS if device.type == "cpu" else 1
     packed = torch.zeros((slabs, len(bvh.surfels), GRADIENT_COLUMNS), dtype=torch.float32, device=device)
     thresholds = torch.zeros((slabs, 2), dtype=torch.float32, device=device)
     scratch = [torch.empty_like(hits.weights), torch.empty_like(hits.weights), torch.empty_like(hits.indices)]
