@@ -33,6 +33,10 @@ def few_surfels(**changes: object) -> rg.Surfels:
     return replace(rg.exact_surfels(rg.CornellBox(), 60), **changes)
 
 
+def no_surfels() -> rg.Surfels:
+    return few_surfels(**{name: tensor[:0] for name, tensor in few_surfels().tensors().items()})
+
+
 def freeze(surfels: Any, **options: int) -> rg.FrozenScene:
     return rg.FrozenScene.freeze(surfels, **{"gather_rays": 8, "patches": 8} | options)
 
@@ -45,6 +49,12 @@ def test_one_light_is_a_list_of_it(scene, image, given) -> None:
 def test_without_lights_it_is_black(scene) -> None:
     black = scene.render(CAMERA, [])
     assert black.shape == (HEIGHT, WIDTH, 3) and not black.any()
+
+
+def test_an_empty_scene_is_black_and_says_so() -> None:
+    empty = freeze(no_surfels())
+    assert repr(empty) == "FrozenScene(Surfels(0, none of them glossy, torch.float32, cpu), 0 patches, size 0)"
+    assert not empty.render(CAMERA, LIGHT).any()
 
 
 @pytest.mark.parametrize("vector", [tuple, np.array, np.float32, torch.tensor, lambda x: torch.tensor(x).double()])
@@ -198,12 +208,7 @@ REFUSED: dict[str, tuple[Callable[[rg.FrozenScene, Tensor], object], str, str, s
     "no starts": (lambda s, i: rg.Search(starts=0), "starts", "0", "range"),
     "a model that is no scene": (lambda s, i: freeze(rg.CornellBox()), "surfels", "CornellBox", "exact_surfels"),
     "no surfels": (lambda s, i: rg.exact_surfels(rg.CornellBox(), 0), "count", "0", "2000"),
-    "an empty scene": (
-        lambda s, i: freeze(few_surfels(**{name: x[:0] for name, x in few_surfels().tensors().items()})),
-        "surfels",
-        "none",
-        "surface",
-    ),
+    "an empty scene": (lambda s, i: fit(freeze(no_surfels()), i), "target", "0 of 1920", "cameras"),
     "no rays": (lambda s, i: freeze(few_surfels(), gather_rays=0), "gather_rays", "0", "default"),
     "an albedo of 5": (
         lambda s, i: freeze(few_surfels(albedo=np.full((93, 3), 5.0))),

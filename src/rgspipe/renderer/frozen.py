@@ -92,7 +92,7 @@ class FrozenScene:
             seed: of the rays.
 
         Raises:
-            InputError: they are no surfels, none, or have impossible numbers; see `Surfels.check`.
+            InputError: they are no surfels, or have impossible numbers; see `Surfels.check`.
         """
         if not isinstance(surfels, Surfels):
             found, remedy = type(surfels).__name__, "rg.exact_surfels makes them of a model, rg.train of views."
@@ -177,7 +177,9 @@ class FrozenScene:
 
     @property
     def size(self) -> float:
-        """Longest side of the bounding box, scene units."""
+        """Longest side of the bounding box, scene units; 0 of an empty scene."""
+        if not len(self.surfels):
+            return 0.0
         lower, upper = self.bounds
         return float((upper - lower).amax())
 

@@ -30,7 +30,7 @@ ENTRIES = {
 }
 
 #: What is possible where not every number is: the least and the most, with the rounding of float32.
-RANGES = {"scales": (1e-12, math.inf), "opacities": (-1e-5, 1.0 + 1e-5), "albedo": (-1e-5, 1.0 + 1e-5)}
+RANGES = {"scales": (0.0, math.inf), "opacities": (-1e-5, 1.0 + 1e-5), "albedo": (-1e-5, 1.0 + 1e-5)}
 
 #: A clip offset that never clips (in units of the softness it is far beyond any surfel's footprint).
 NO_CLIP = 1e3
@@ -111,20 +111,17 @@ class Surfels:
             raise ValueError(f"surfels.gloss must be of {count} surfels, got {len(self.gloss)}")
 
     def check(self) -> None:
-        """Refuse what no scene is made of.
+        """Refuse what no scene is made of; without surfels it is empty, and black.
 
         Raises:
-            InputError: there are no surfels, or a number is not finite or impossible, such as an albedo above 1.
+            InputError: a number is not finite or impossible, such as an albedo above 1.
         """
-        if not len(self):
-            raise InputError("surfels", expected="at least one", found="none", remedy="Give the scene a surface.")
         for name, tensor in self.tensors().items():
             check_finite(tensor, f"surfels.{name}", "Look where they were made.")
             low, high = RANGES.get(name, (-math.inf, math.inf))
-            least, most = float(tensor.min()), float(tensor.max())
-            if least < low or most > high:
-                expected = "lengths above 0" if high == math.inf else "values from 0 to 1"
-                found = f"{least:.4g} to {most:.4g}"
+            if bool(((tensor < low) | (tensor > high)).any()):
+                expected = "lengths, 0 or more" if high == math.inf else "values from 0 to 1"
+                found = f"{float(tensor.min()):.4g} to {float(tensor.max()):.4g}"
                 raise InputError(f"surfels.{name}", expected=expected, found=found, remedy="Correct or clamp them.")
 
     def __len__(self) -> int:
