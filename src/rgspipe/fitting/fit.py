@@ -28,6 +28,7 @@ from rgspipe.renderer.view_weights import ViewWeights
 from rgspipe.scene import Camera, Light, LightRig
 from rgspipe.scene.arrays import ArrayLike, as_list
 from rgspipe.scene.lights import as_rig
+from rgspipe.scene.shapes import Float
 
 Cameras = Camera | ViewWeights | Sequence[Camera | ViewWeights]
 
@@ -109,7 +110,7 @@ class FitViews:
             )
         return solver.fit(self, stacked, capture or ImageCapture())
 
-    def render(self, lights: Light | Sequence[Light]) -> list[Tensor]:
+    def render(self, lights: Light | Sequence[Light]) -> list[Float[Tensor, "H W 3"]]:
         """(H, W, 3) image per view of the scene under lights, with the fit's effects; black without any."""
         return _render(self, as_rig(lights))
 

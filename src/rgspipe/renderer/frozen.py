@@ -74,12 +74,12 @@ class FrozenScene:
     """
 
     surfels: Surfels
-    areas: Tensor
+    areas: Float[Tensor, " N"]
     gather: SparseOperator | None
     transport: PatchTransport
     solver: IndirectSolver | None = None
     gloss: GlossyTransport | None = None
-    centers: Tensor | None = None
+    centers: Float[Tensor, "N 3"] | None = None
     candidates: LightDictionary | None = None
 
     @classmethod
@@ -171,7 +171,7 @@ class FrozenScene:
         return SurfelBvh(placed)
 
     @cached_property
-    def bounds(self) -> tuple[Tensor, Tensor]:
+    def bounds(self) -> tuple[Float[Tensor, " 3"], Float[Tensor, " 3"]]:
         """(3,) lower and upper corner of the surfels' centres."""
         return self.surfels.centers.amin(dim=0), self.surfels.centers.amax(dim=0)
 
@@ -265,16 +265,16 @@ class FrozenScene:
             return MonteCarloSolver(self.bvh, samples, bounces, torch.Generator().manual_seed(seed))
         raise ValueError(f"solver must be patches, gather or monte_carlo, got {solver!r}")
 
-    def indirect(self, direct: Tensor) -> Tensor:
+    def indirect(self, direct: Float[Tensor, "N 3 K"]) -> Float[Tensor, "N 3 K"]:
         """(N, 3, K) indirect part of the radiosity for K lightings with direct radiosity (N, 3, K)."""
         return (self.solver or self.transport).indirect(direct)
 
-    def radiance(self, irradiance: Tensor, indirect: bool = True) -> Tensor:
+    def radiance(self, irradiance: Float[Tensor, "N K"], indirect: bool = True) -> Float[Tensor, "N 3 K"]:
         """Outgoing radiance (N, 3, K) for K direct irradiances (N, K), grey; linear and differentiable."""
         direct = self.surfels.albedo[:, :, None] * (irradiance / math.pi)[:, None, :]
         return direct + self.indirect(direct) if indirect else direct
 
-    def radiance_of(self, rig: LightRig, indirect: bool = True, shadows: bool = True) -> Tensor:
+    def radiance_of(self, rig: LightRig, indirect: bool = True, shadows: bool = True) -> Float[Tensor, "N 3"]:
         """Outgoing radiance (N, 3) under a rig, differentiable towards the tensors of its lights.
 
         The lights are added up before their light bounces, so a rig costs as many bounces as one light. Of a glossy
