@@ -123,8 +123,8 @@ def test_results_are_saved_where_nothing_is_yet(scene, image, tmp_path) -> None:
 REFUSED: dict[str, tuple[Callable[[rg.FrozenScene, Tensor], object], str, str, str]] = {
     "a name for a light": (lambda s, i: s.render(CAMERA, "point"), "lights", "str", "PointLight"),
     "a place for a light": (lambda s, i: s.render(CAMERA, [[0, 0, 0]]), "lights[0]", "list", "PointLight"),
-    "several cameras": (lambda s, i: s.render([CAMERA], LIGHT), "view", "list", "one after the other"),
-    "arguments swapped": (lambda s, i: s.render(LIGHT, CAMERA), "view", "PointLight", "Camera.look_at"),
+    "several cameras": (lambda s, i: s.render([CAMERA], LIGHT), "camera", "list", "one after the other"),
+    "arguments swapped": (lambda s, i: s.render(LIGHT, CAMERA), "camera", "PointLight", "Camera.look_at"),
     "a light nowhere": (
         lambda s, i: s.render(CAMERA, rg.PointLight([0, 0, math.nan], 1)),
         "lights[0].position",

@@ -220,7 +220,7 @@ class FrozenScene:
         if isinstance(view, ViewWeights):
             return view
         found, remedy = type(view).__name__, "Camera.look_at makes one; of several, render one after the other."
-        raise InputError("view", expected="a Camera", found=found, remedy=remedy)
+        raise InputError("camera", expected="a Camera", found=found, remedy=remedy)
 
     def unit_irradiance(
         self, positions: ArrayLike, shadows: bool = True
@@ -287,7 +287,7 @@ class FrozenScene:
 
     def render(
         self,
-        view: Camera | ViewWeights,
+        camera: Camera | ViewWeights,
         lights: Light | Sequence[Light],
         indirect: bool = True,
         shadows: bool = True,
@@ -297,7 +297,7 @@ class FrozenScene:
         Differentiable towards the tensors of the lights.
 
         Args:
-            view: a camera, or its weights (`view`), which save time where it is rendered again and again.
+            camera: or its weights (`view`), which save time where it is rendered again and again.
             lights: one or several.
             indirect: whether light bounces.
             shadows: whether surfaces stand in its way.
@@ -305,7 +305,7 @@ class FrozenScene:
         Raises:
             InputError: no camera or no lights, but something else, or a light's numbers are not finite.
         """
-        view, rig = self._weights(view), as_rig(lights)
+        view, rig = self._weights(camera), as_rig(lights)
         check_numbers(rig)
         if self.gloss is not None:
             return view.image(self.glossy_light(rig, indirect, shadows).seen_from(view.camera.origin))
