@@ -42,7 +42,7 @@ class Search(SearchOptions):
         """The lights of images (all pixels of all views, 3)."""
         problem = LightProblem.create(views.prepared, images, views.effects, capture)
         problem = replace(problem, differences=self.derivatives == "differences")
-        result = fit_search_lm(problem, views.coarse, self, views.lights, views.blocks)
+        result = fit_search_lm(problem, views.coarse(self.aimed), self, views.lights, views.blocks)
         if capture.exposure_free and len(views.prepared.views) == 1:
             return replace(result, findings=(*result.findings, ExposureUnknown()))
         return result
