@@ -1,8 +1,9 @@
-"""The Python that README.md, the tutorial and the package's first lines show runs as it is written."""
+"""The Python of README.md, of the tutorial, of the guide to doubts and of the package's first lines runs as written."""
 
 from __future__ import annotations
 
 import re
+from operator import attrgetter
 from pathlib import Path
 
 import numpy as np
@@ -36,9 +37,8 @@ def folder(scene: rg.FrozenScene, tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     return tmp_path
 
 
-def run(code: list[str], page: str) -> dict[str, object]:
-    """Pieces of code, one after the other as in a session; the names that they leave."""
-    names: dict[str, object] = {}
+def run(code: list[str], page: str, **names: object) -> dict[str, object]:
+    """Pieces of code, one after the other as in a session that has `names`; the names that they leave."""
     for number, piece in enumerate(code, start=1):
         exec(compile(piece, f"{page}, block {number}", "exec"), names)
     return names
@@ -78,6 +78,17 @@ def test_readme_runs(folder: Path, capsys) -> None:
     run(code, "README.md")
     assert capsys.readouterr().out.startswith("1 light, ")
     assert len(rg.read_lights(folder / "lights.json")) == 1
+
+
+def test_thresholds_are_changed_as_the_guide_says(scene: rg.FrozenScene) -> None:
+    page = "docs/guides/doubtful_answers.md"
+    camera = rg.Camera.look_at([0, -1.5, 0.05], [0, 0, 0], width=32, height=32)
+    image = scene.render(camera, rg.PointLight([-0.3, 0.28, -0.1], 0.8))
+    names = run(blocks(page), page, rg=rg, scene=scene, camera=camera, image=image)
+    assert names["search"].rivals.apart == names["search"].certainty.doubtful == 0.1
+    assert len(names["result"].lights) == 1
+    settings = re.findall(r"fit\.search\.(\S+)=0\.1", (ROOT / page).read_text())
+    assert [attrgetter(name)(names["search"]) for name in settings] == [0.1, 0.1]
 
 
 @pytest.mark.slow
