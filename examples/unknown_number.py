@@ -15,8 +15,7 @@ image = room.scene.render(room.camera, truth)
 
 result = rg.fit_lights(room.scene, room.camera, image, lights=rg.LightSpec("point", count=None))
 print(result)
-for count, cost in result.costs.items():
-    print(f"  {count} lights cost {cost:.3g}")
+print("What each number of lights leaves:", {count: round(cost, 2) for count, cost in result.costs.items()})
 
 # A wrong number is noticed: one too few leaves light unexplained, one too many explains nothing more.
 for count in (1, 3):

@@ -81,7 +81,7 @@ def _missing(found: LightMissing, spoken: Spoken) -> str:
 
 
 def _spare(found: LightSpare, spoken: Spoken) -> str:
-    little = f"lowers the cost by {percent(found.gain)} only" if found.gain > 0.0 else "does not lower the cost"
+    little = f"lowers the cost by {percent(found.gain)} only" if found.gain >= 0.005 else "does not lower the cost"
     less = f"Light {found.number} {little} and may not be there (it counts from {percent(found.wanted)} on): "
     return f"{less}fit with {spoken.count(found.count - 1)}, or {spoken.uncounted} to have them counted."
 
