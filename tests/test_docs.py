@@ -14,12 +14,13 @@ import pytest
 from markdown.extensions.toc import unique
 from pymdownx.slugs import slugify
 
+import rgspipe
 from rgspipe.evaluation import goals
 from rgspipe.fitting import Search
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
-PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted(DOCS.rglob("*.md"))]
+PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", ROOT / "examples" / "README.md", *sorted(DOCS.rglob("*.md"))]
 
 #: [text](page.md#anchor), ![text](picture.png); not what is on the web.
 LINK = re.compile(r"\]\((?!https?://)([^)\s]+)\)")
@@ -114,7 +115,10 @@ def test_the_site_builds_strictly_and_needs_nothing_from_the_web(tmp_path: Path)
     pages = {path.relative_to(tmp_path).as_posix(): path.read_text() for path in tmp_path.rglob("*.html")}
     assert {name for name, text in pages.items() if fetched.search(text)} == set()
     assert "fit.search.starts" in pages["reference/settings.html"]
-    assert "fit_lights" in pages["reference/api.html"]
+    shown = re.findall(r'id="rgspipe\.([\w.]+)"', pages["reference/api.html"])
+    assert {name for name in rgspipe.__all__ if not name.startswith("__")} <= set(shown)
+    assert {"Surfels.from_ply", "FitResult.save", "Search.starts", "fitting.options.RivalOptions.apart"} <= set(shown)
+    assert "Search.rivals" in pages["reference/api.html"]
 
 
 def _anchors(page: Path) -> set[str]:

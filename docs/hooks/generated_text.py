@@ -10,6 +10,8 @@ import yaml
 
 import rgspipe
 from rgspipe.cli.help import Setting, groups, help_text, sections
+from rgspipe.options import Options
+from rgspipe.options import settings as option_fields
 
 #: A value of more characters is not shown.
 LONGEST = 60
@@ -39,9 +41,20 @@ def help_page() -> str:
 
 
 def api() -> str:
-    """A directive of mkdocstrings for each public name of the package."""
+    """A directive of mkdocstrings for each public name of the package; options with those of their sections."""
     names = [name for name in rgspipe.__all__ if not name.startswith("__")]
-    return "\n\n".join(f"::: rgspipe.{name}" for name in names)
+    return "\n\n".join(_directives(name, getattr(rgspipe, name)) for name in names)
+
+
+def _directives(name: str, value: object) -> str:
+    if not (isinstance(value, type) and issubclass(value, Options)):
+        return f"::: rgspipe.{name}"
+    nested = (
+        f"`{name}.{item.name}` is\n\n::: {section.__module__}.{section.__name__}\n    options: {{heading_level: 3}}"
+        for item in option_fields(value)
+        if (section := item.section) is not None
+    )
+    return "\n\n".join([f"::: rgspipe.{name}\n    options: {{inherited_members: true}}", *nested])
 
 
 #: What a page says where a text goes.

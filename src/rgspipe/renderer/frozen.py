@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -13,6 +14,7 @@ import scipy.sparse
 import torch
 from torch import Tensor
 
+from rgspipe.errors import InputError
 from rgspipe.renderer.areas import surfel_areas
 from rgspipe.renderer.clusters import cluster_patches
 from rgspipe.renderer.dictionary import GRID, LightDictionary, build_dictionary
@@ -30,8 +32,10 @@ from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.surroundings import OPEN, Surroundings
 from rgspipe.renderer.transport import PatchTransport, build_patch_transport, with_bounces
 from rgspipe.renderer.view_weights import ViewWeights, build_view_weights
+from rgspipe.scene.arrays import ArrayLike, as_tensor
 from rgspipe.scene.camera import Camera
-from rgspipe.scene.lights import LightRig
+from rgspipe.scene.lights import Light, LightRig, as_rig, check_numbers
+from rgspipe.scene.shapes import Float
 from rgspipe.scene.surfels import Surfels
 
 Solver = Literal["patches", "gather", "monte_carlo"]
@@ -70,12 +74,12 @@ class FrozenScene:
     """
 
     surfels: Surfels
-    areas: Tensor
+    areas: Float[Tensor, " N"]
     gather: SparseOperator | None
     transport: PatchTransport
     solver: IndirectSolver | None = None
     gloss: GlossyTransport | None = None
-    centers: Tensor | None = None
+    centers: Float[Tensor, "N 3"] | None = None
     candidates: LightDictionary | None = None
 
     @classmethod
@@ -86,7 +90,17 @@ class FrozenScene:
             gather_rays: hemisphere rays of a surfel.
             patches: of the indirect light.
             seed: of the rays.
+
+        Raises:
+            InputError: they are no surfels, or have impossible numbers; see `Surfels.check`.
         """
+        if not isinstance(surfels, Surfels):
+            found, remedy = type(surfels).__name__, "rg.exact_surfels makes them of a model, rg.train of views."
+            raise InputError("surfels", expected="Surfels", found=found, remedy=remedy)
+        surfels.check()
+        for name, count in (("gather_rays", gather_rays), ("patches", patches)):
+            if count < 1:
+                raise InputError(name, expected="1 or more", found=str(count), remedy="Leave the default.")
         centers, surfels = surfels.centers.double(), surfels.to(torch.float32)
         bvh = SurfelBvh(replace(surfels, centers=centers))
         areas = surfel_areas(bvh, seed=seed)
@@ -157,13 +171,15 @@ class FrozenScene:
         return SurfelBvh(placed)
 
     @cached_property
-    def bounds(self) -> tuple[Tensor, Tensor]:
+    def bounds(self) -> tuple[Float[Tensor, " 3"], Float[Tensor, " 3"]]:
         """(3,) lower and upper corner of the surfels' centres."""
         return self.surfels.centers.amin(dim=0), self.surfels.centers.amax(dim=0)
 
     @property
     def size(self) -> float:
-        """Longest side of the bounding box, scene units."""
+        """Longest side of the bounding box, scene units; 0 of an empty scene."""
+        if not len(self.surfels):
+            return 0.0
         lower, upper = self.bounds
         return float((upper - lower).amax())
 
@@ -198,9 +214,23 @@ class FrozenScene:
         """The camera's image as a linear function of the radiance."""
         return build_view_weights(self.bvh, camera, supersampling)
 
-    def unit_irradiance(self, positions: Tensor, shadows: bool = True) -> tuple[Tensor, Tensor]:
-        """Irradiance (L, N) of unit point lights at (L, 3) and its derivative (L, N, 3)."""
-        return unit_irradiance(self.bvh, positions, shadows)
+    def _weights(self, view: Camera | ViewWeights) -> ViewWeights:
+        if isinstance(view, Camera):
+            return self.view(view)
+        if isinstance(view, ViewWeights):
+            return view
+        found, remedy = type(view).__name__, "Camera.look_at makes one; of several, render one after the other."
+        raise InputError("camera", expected="a Camera", found=found, remedy=remedy)
+
+    def unit_irradiance(
+        self, positions: ArrayLike, shadows: bool = True
+    ) -> tuple[Float[Tensor, "L N"], Float[Tensor, "L N 3"]]:
+        """Irradiance (L, N) of unit point lights at (L, 3) and its derivative (L, N, 3).
+
+        Raises:
+            InputError: positions have another shape.
+        """
+        return unit_irradiance(self.bvh, as_tensor(positions, "positions", ("L", 3)), shadows)
 
     def with_solver(
         self, solver: Solver, *, bounces: int | None = None, samples: int = 64, seed: int = 0
@@ -235,16 +265,16 @@ class FrozenScene:
             return MonteCarloSolver(self.bvh, samples, bounces, torch.Generator().manual_seed(seed))
         raise ValueError(f"solver must be patches, gather or monte_carlo, got {solver!r}")
 
-    def indirect(self, direct: Tensor) -> Tensor:
+    def indirect(self, direct: Float[Tensor, "N 3 K"]) -> Float[Tensor, "N 3 K"]:
         """(N, 3, K) indirect part of the radiosity for K lightings with direct radiosity (N, 3, K)."""
         return (self.solver or self.transport).indirect(direct)
 
-    def radiance(self, irradiance: Tensor, indirect: bool = True) -> Tensor:
+    def radiance(self, irradiance: Float[Tensor, "N K"], indirect: bool = True) -> Float[Tensor, "N 3 K"]:
         """Outgoing radiance (N, 3, K) for K direct irradiances (N, K), grey; linear and differentiable."""
         direct = self.surfels.albedo[:, :, None] * (irradiance / math.pi)[:, None, :]
         return direct + self.indirect(direct) if indirect else direct
 
-    def radiance_of(self, rig: LightRig, indirect: bool = True, shadows: bool = True) -> Tensor:
+    def radiance_of(self, rig: LightRig, indirect: bool = True, shadows: bool = True) -> Float[Tensor, "N 3"]:
         """Outgoing radiance (N, 3) under a rig, differentiable towards the tensors of its lights.
 
         The lights are added up before their light bounces, so a rig costs as many bounces as one light. Of a glossy
@@ -255,8 +285,28 @@ class FrozenScene:
         direct = self.surfels.albedo * (rig_irradiance(self.bvh, rig, shadows) / math.pi)
         return direct + self.indirect(direct[:, :, None])[:, :, 0] if indirect else direct
 
-    def render(self, view: ViewWeights, rig: LightRig, indirect: bool = True, shadows: bool = True) -> Tensor:
-        """(height, width, 3) image of the scene under `rig`."""
+    def render(
+        self,
+        camera: Camera | ViewWeights,
+        lights: Light | Sequence[Light],
+        indirect: bool = True,
+        shadows: bool = True,
+    ) -> Float[Tensor, "H W 3"]:
+        """(height, width, 3) image of the scene in linear radiance, black without lights.
+
+        Differentiable towards the tensors of the lights.
+
+        Args:
+            camera: or its weights (`view`), which save time where it is rendered again and again.
+            lights: one or several.
+            indirect: whether light bounces.
+            shadows: whether surfaces stand in its way.
+
+        Raises:
+            InputError: no camera or no lights, but something else, or a light's numbers are not finite.
+        """
+        view, rig = self._weights(camera), as_rig(lights)
+        check_numbers(rig)
         if self.gloss is not None:
             return view.image(self.glossy_light(rig, indirect, shadows).seen_from(view.camera.origin))
         return view.image(self.radiance_of(rig, indirect, shadows))
