@@ -14,9 +14,9 @@ from rgspipe.errors import InputError
 from rgspipe.fitting import FitViews
 from rgspipe.fitting.baselines.paper_adam_loss import AdamLoss, MovingRig
 from rgspipe.fitting.baselines.paper_adam_start import Ball, light_ball
-from rgspipe.fitting.model.problem import Effects
 from rgspipe.fitting.model.views import PreparedViews, prepare_views
 from rgspipe.optim.ssim import ssim
+from rgspipe.renderer.effects import Effects
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import PointLight
 

@@ -22,7 +22,7 @@ from rgspipe.datasets.light_file import read_lights
 from rgspipe.datasets.surfel_file import save_surfels
 from rgspipe.errors import InputError
 from rgspipe.fitting import FitViews
-from rgspipe.fitting.model.problem import Effects
+from rgspipe.renderer.effects import Effects
 from rgspipe.scene import PointLight
 from rgspipe.scene.lights import LedLight
 from rgspipe.stages import fit_extras, fit_light, freeze
@@ -51,7 +51,7 @@ def _build(root: Path, stage: str, make) -> Artifact:
 def _write_dataset(folder: Path) -> None:
     frozen, cameras = frozen_room(), room_cameras(32)
     # The model's own images, with direct light where pixels look, as it is by default.
-    views = FitViews.prepare(frozen, cameras, effects=Effects(at_pixels=True))
+    views = FitViews.prepare(frozen, cameras, sharp=True)
     for (name, _), (position, intensity) in LIGHTS.items():
         target = folder / "targets" / name
         target.mkdir(parents=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -17,21 +18,25 @@ from rgspipe.renderer.areas import surfel_areas
 from rgspipe.renderer.clusters import cluster_patches
 from rgspipe.renderer.dictionary import GRID, LightDictionary, build_dictionary
 from rgspipe.renderer.direct import unit_irradiance
+from rgspipe.renderer.effects import ALL_EFFECTS, Effects
 from rgspipe.renderer.frozen_file import load_parts, save_parts
 from rgspipe.renderer.gather import build_gather
 from rgspipe.renderer.glossy_transport import GlossyLight, GlossyTransport, build_glossy_transport
+from rgspipe.renderer.image_model import SurfelModel
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.monte_carlo import MonteCarloSolver
 from rgspipe.renderer.mutual_visibility import mutual_visibility
 from rgspipe.renderer.openness import openness
+from rgspipe.renderer.pixel_model import PixelModel
 from rgspipe.renderer.radiosity import GatherSolver
 from rgspipe.renderer.rig import rig_irradiance, unit_response
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.surroundings import OPEN, Surroundings
 from rgspipe.renderer.transport import PatchTransport, build_patch_transport, with_bounces
 from rgspipe.renderer.view_weights import ViewWeights, build_view_weights
+from rgspipe.renderer.viewed_pixels import ViewedPixels
 from rgspipe.scene.camera import Camera
-from rgspipe.scene.lights import LightRig
+from rgspipe.scene.lights import Light, LightRig, as_rig
 from rgspipe.scene.surfels import Surfels
 
 Solver = Literal["patches", "gather", "monte_carlo"]
@@ -244,24 +249,40 @@ class FrozenScene:
         direct = self.surfels.albedo[:, :, None] * (irradiance / math.pi)[:, None, :]
         return direct + self.indirect(direct) if indirect else direct
 
-    def radiance_of(self, rig: LightRig, indirect: bool = True, shadows: bool = True) -> Tensor:
+    def radiance_of(self, rig: LightRig, effects: Effects = ALL_EFFECTS) -> Tensor:
         """Outgoing radiance (N, 3) under a rig, differentiable towards the tensors of its lights.
 
         The lights are added up before their light bounces, so a rig costs as many bounces as one light. Of a glossy
         scene this is the diffuse part, which is the same in all directions; `glossy_light` has all of it.
         """
-        if self.gloss is not None:
-            return self.glossy_light(rig, indirect, shadows).radiance
-        direct = self.surfels.albedo * (rig_irradiance(self.bvh, rig, shadows) / math.pi)
-        return direct + self.indirect(direct[:, :, None])[:, :, 0] if indirect else direct
+        if self.gloss is not None and effects.lobes:
+            return self.glossy_light(rig, effects).radiance
+        direct = self.surfels.albedo * (rig_irradiance(self.bvh, rig, effects) / math.pi)
+        return direct + self.indirect(direct[:, :, None])[:, :, 0] if effects.interreflection else direct
 
-    def render(self, view: ViewWeights, rig: LightRig, indirect: bool = True, shadows: bool = True) -> Tensor:
-        """(height, width, 3) image of the scene under `rig`."""
-        if self.gloss is not None:
-            return view.image(self.glossy_light(rig, indirect, shadows).seen_from(view.camera.origin))
-        return view.image(self.radiance_of(rig, indirect, shadows))
+    def render(
+        self,
+        camera: Camera | ViewWeights,
+        lights: Light | Sequence[Light],
+        effects: Effects = ALL_EFFECTS,
+        *,
+        sharp: bool = False,
+    ) -> Tensor:
+        """(height, width, 3) radiance that a camera sees under one light or several.
 
-    def glossy_light(self, rig: LightRig, indirect: bool = True, shadows: bool = True) -> GlossyLight:
+        Differentiable, once, towards every tensor of the lights that requires gradients, by analytic derivatives.
+
+        Args:
+            camera: or the weights of its `view`, which are quicker where it sees several images.
+            effects: parts of light transport.
+            sharp: whether direct light is taken where pixels look, shadows' edges included; else at surfels' centres.
+        """
+        view = self.view(camera) if isinstance(camera, Camera) else camera
+        pixels = ViewedPixels.every(self, [view])
+        model = PixelModel.of(pixels, effects) if sharp else SurfelModel(pixels, effects)
+        return pixels.split(model.image(as_rig(lights)))[0]
+
+    def glossy_light(self, rig: LightRig, effects: Effects = ALL_EFFECTS) -> GlossyLight:
         """The light of a scene with gloss under `rig`, to be seen from anywhere; differentiable like `radiance_of`.
 
         Raises:
@@ -269,7 +290,8 @@ class FrozenScene:
         """
         if self.gloss is None:
             raise ValueError("a diffuse scene has no glossy light: use radiance_of")
-        return self.gloss.light(self.solver or self.transport, unit_response(self.bvh, rig, shadows), indirect)
+        response = unit_response(self.bvh, rig, effects)
+        return self.gloss.light(self.solver or self.transport, response, effects.interreflection)
 
 
 def _gather(bvh: SurfelBvh, rays: int, areas: Tensor, seed: int) -> SparseOperator:

@@ -9,7 +9,7 @@ from rgspipe.config import RgspipeConfig
 from rgspipe.config.effects import EffectsConfig
 from rgspipe.datasets.json_file import read_json
 from rgspipe.renderer.effect_bounds import EffectBounds
-from rgspipe.renderer.effects import EffectChoice, RigKind, choose_effects
+from rgspipe.renderer.effect_choice import EffectChoice, RigKind, choose_effects
 from rgspipe.renderer.frozen import FrozenScene
 
 #: What each effect can change in a frozen scene, and its cost, beside the scene's own files.

@@ -9,8 +9,9 @@ import pytest
 import torch
 
 from lit_room import HIDDEN, room_cameras
-from rgspipe.fitting import Effects, ImageCapture
+from rgspipe.fitting import ImageCapture
 from rgspipe.fitting.certainty.advice import COMMON, MOST_VIEWS, suggest_views
+from rgspipe.renderer.effects import Effects
 from rgspipe.scene import Camera, PointLight, look_at
 
 

@@ -9,12 +9,13 @@ import torch
 from torch import Tensor
 
 from rgspipe.fitting.model.emitter import Emitter
-from rgspipe.fitting.model.harmonics import BandLimit, emitted_share
-from rgspipe.fitting.model.problem import Effects
 from rgspipe.fitting.model.views import PreparedViews
 from rgspipe.fitting.search.schedule import soft
 from rgspipe.optim.ssim_reference import SsimReference
 from rgspipe.renderer.direct import differentiable_irradiance
+from rgspipe.renderer.effects import Effects
+from rgspipe.renderer.unit_light import emitted_share
+from rgspipe.renderer.zonal_harmonics import BandLimit
 from rgspipe.scene import Light, LightRig
 
 
@@ -72,7 +73,7 @@ def rig_image(views: PreparedViews, rig: MovingRig, effects: Effects) -> Tensor:
     radiance = frozen.surfels.albedo * (irradiance / math.pi)
     if effects.interreflection:
         radiance = radiance + frozen.indirect(radiance[:, :, None])[:, :, 0]
-    return views.all_pixels @ radiance
+    return views.every_pixel.operator @ radiance
 
 
 class AdamLoss:
@@ -86,11 +87,11 @@ class AdamLoss:
     def __init__(self, views: PreparedViews, target: Tensor, ssim_weight: float, effects: Effects) -> None:
         self._views, self._weight, self._effects = views, ssim_weight, effects
         self._covered = [mask.to(target)[:, :, None] for mask in views.masks]
-        wanted = [mask * image for mask, image in zip(self._covered, views.split_images(target), strict=True)]
+        wanted = [mask * image for mask, image in zip(self._covered, views.split(target), strict=True)]
         self._wanted = [(image, SsimReference.of(image)) for image in wanted]
 
     def __call__(self, rig: MovingRig) -> Tensor:
-        images = self._views.split_images(rig_image(self._views, rig, self._effects))
+        images = self._views.split(rig_image(self._views, rig, self._effects))
         losses = []
         for image, mask, (wanted, reference) in zip(images, self._covered, self._wanted, strict=True):
             image = mask * image

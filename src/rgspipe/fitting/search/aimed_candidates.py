@@ -9,12 +9,13 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from rgspipe.fitting.model.blocks import BlockModel, block_model, patch_radiance
 from rgspipe.fitting.model.views import PreparedViews
 from rgspipe.fitting.search.coarse import CoarseImages
 from rgspipe.progress import progress_bar
+from rgspipe.renderer.block_model import BlockModel, block_model, patch_radiance
 from rgspipe.renderer.clusters import cluster_patches
 from rgspipe.renderer.dictionary import LightDictionary
+from rgspipe.renderer.effects import ALL_EFFECTS, Effects
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.point_sets import fibonacci_directions
 from rgspipe.scene.lights import AxialLight
@@ -37,7 +38,7 @@ LEAST_SEEN = 0.01
 
 
 def aimed_candidates(
-    views: PreparedViews, dictionary: LightDictionary, shapes: Sequence[AxialLight], *, interreflection: bool = True
+    views: PreparedViews, dictionary: LightDictionary, shapes: Sequence[AxialLight], effects: Effects = ALL_EFFECTS
 ) -> CoarseImages:
     """Candidate lights of given shapes at the dictionary's positions, with their coarse images.
 
@@ -45,7 +46,7 @@ def aimed_candidates(
     through is taken at the mean place of what each block sees, and of each group of patches.
     """
     side = max(6, round(math.sqrt(BLOCKS_IN_ALL / len(views.views))))
-    model = block_model(views, side, interreflection=interreflection)
+    model = block_model(views, side, effects)
     lit = _lit_by_points(views, dictionary, model)
     directions = fibonacci_directions(AXES).to(lit.places)
     images, positions, axes, kinds = [], [], [], []

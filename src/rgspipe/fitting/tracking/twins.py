@@ -12,7 +12,6 @@ from dataclasses import replace
 
 import torch
 
-from rgspipe.fitting.model.blocks import BlockModel
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.result import FitResult
@@ -21,6 +20,7 @@ from rgspipe.fitting.search.schedule import soft
 from rgspipe.fitting.search.starts import Rig
 from rgspipe.fitting.search.weighting import PLAIN
 from rgspipe.fitting.search_lm import fit_from
+from rgspipe.renderer.image_model import ImageModel
 from rgspipe.scene.lights.coordinates import tangents
 
 #: How far apart the halves of a light are put, parts of the scene's size.
@@ -37,7 +37,7 @@ BETTER = 0.8
 
 
 def split_lights(
-    problem: LightProblem, result: FitResult, blocks: BlockModel | None, iterations: int = 30
+    problem: LightProblem, result: FitResult, blocks: ImageModel | None, iterations: int = 30
 ) -> FitResult:
     """The result, or one with a light split in two in the place of its faintest if that explains clearly more.
 
