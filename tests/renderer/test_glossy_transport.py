@@ -147,7 +147,7 @@ def test_gloss_without_reflectance_is_exactly_the_diffuse_scene(room: FrozenScen
     diffuse = replace(room.surfels, gloss=None)
     black = replace(room.surfels, gloss=Gloss(torch.zeros(len(diffuse), 3), torch.full((len(diffuse),), 20.0)))
     scenes = [frozen(surfels, rays=16) for surfels in (diffuse, black)]
-    images = [scene.render(view_of(scene), (lamp(),)) for scene in scenes]
+    images = [scene.render(view_of(scene), (lamp(),), sharp=False) for scene in scenes]
     assert scenes[0].gloss is None
     assert scenes[1].gloss is None
     assert torch.equal(*images)
@@ -163,7 +163,7 @@ def test_a_diffuse_scene_touches_nothing_of_gloss(monkeypatch: pytest.MonkeyPatc
         monkeypatch.setattr(GlossyTransport, name, never)
     monkeypatch.setattr("rgspipe.renderer.glossy_transport.build_glossy_operators", never)
     scene = frozen(closed_box(1 / 4), rays=16, patches=20)
-    assert torch.isfinite(scene.render(view_of(scene), (lamp(),))).all()
+    assert torch.isfinite(scene.render(view_of(scene), (lamp(),), sharp=False)).all()
     with pytest.raises(ValueError, match="use radiance_of"):
         scene.glossy_light((lamp(),))
 
@@ -268,7 +268,7 @@ def test_derivative_of_the_whole_image_is_that_of_finite_differences(room: Froze
     weights = torch.rand(16, 16, 3, generator=torch.Generator().manual_seed(0))
 
     def loss(position: Tensor) -> Tensor:
-        return (room.render(view, (PointLight(position, torch.ones(3)),)) * weights).double().sum()
+        return (room.render(view, (PointLight(position, torch.ones(3)),), sharp=False) * weights).double().sum()
 
     position = torch.tensor(LIGHT, requires_grad=True)
     loss(position).backward()

@@ -68,7 +68,7 @@ def _row(
     generator = torch.Generator().manual_seed(seed + 1)
     rigs = [random_rig(scene, frozen, generator) for _ in range(lights)]
     differences = [
-        float((frozen.render(view, rig) - frozen.render(view, rig, effects)).abs().max())
+        float((frozen.render(view, rig, sharp=False) - frozen.render(view, rig, effects, sharp=False)).abs().max())
         / brightest_direct(frozen, rig)
         for rig in rigs
     ]
@@ -81,8 +81,8 @@ def _row(
         "difference": max(differences) / tolerance,
         "missed": _missed(frozen, bounds, lights, generator),
         "measurement_ms": measured,
-        "all_ms": median_ms(lambda: frozen.render(view, rigs[0]), RUNS),
-        "chosen_ms": median_ms(lambda: frozen.render(view, rigs[0], effects), RUNS),
+        "all_ms": median_ms(lambda: frozen.render(view, rigs[0], sharp=False), RUNS),
+        "chosen_ms": median_ms(lambda: frozen.render(view, rigs[0], effects, sharp=False), RUNS),
     }
 
 

@@ -44,7 +44,7 @@ class FitViews:
     prepared: PreparedViews
     lights: LightSpec
     effects: Effects
-    sharp: bool = False
+    sharp: bool = True
 
     @classmethod
     def prepare(
@@ -55,7 +55,7 @@ class FitViews:
         lights: str | LightSpec = "point",
         masks: Sequence[ArrayLike] | ArrayLike | None = None,
         effects: Effects = ALL_EFFECTS,
-        sharp: bool = False,
+        sharp: bool = True,
         mask_edges: bool = True,
     ) -> FitViews:
         """What all targets of one set of cameras share; see `fit_lights` for the arguments.
@@ -131,7 +131,7 @@ def fit_lights(
     masks: Sequence[ArrayLike] | ArrayLike | None = None,
     capture: ImageCapture | None = None,
     effects: Effects = ALL_EFFECTS,
-    sharp: bool = False,
+    sharp: bool = True,
     mask_edges: bool = True,
 ) -> FitResult:
     """Recover the lights of images of a frozen scene.
@@ -149,7 +149,8 @@ def fit_lights(
         masks: (H, W) per camera, the scene's share of each pixel (the image's alpha); 1 if None.
         capture: what is known of how the images were taken; as radiance, with known exposures, if None.
         effects: parts of light transport.
-        sharp: whether the last steps take direct light where pixels look.
+        sharp: whether the last steps take direct light where pixels look, shadows' edges included; else at surfels'
+            centres, which is quicker and less accurate.
         mask_edges: whether a search leaves out pixels on silhouettes, creases and depth jumps.
 
     Returns:

@@ -13,6 +13,7 @@ from rgspipe.fitting.baselines.paper_adam_start import LightPrior
 from rgspipe.fitting.findings import ExposureUnknown
 from rgspipe.fitting.model.capture import ImageCapture
 from rgspipe.fitting.model.differences import DifferenceModel, by_differences
+from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.options import AdamOptions, SearchOptions
 from rgspipe.fitting.result import FitResult
 from rgspipe.fitting.search_lm import fit_search_lm
@@ -65,6 +66,5 @@ class PaperAdam(AdamOptions):
         """
         if capture != ImageCapture():
             raise ValueError("PaperAdam takes images as radiance with known exposures: use Search")
-        return fit_paper_adam(
-            views.problem(images), images, self, LightPrior.of(self.training_lights), self.seed, views.lights
-        )
+        problem, prior = LightProblem.create(views.prepared, images, views.effects), LightPrior.of(self.training_lights)
+        return fit_paper_adam(problem, images, self, prior, self.seed, views.lights)

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Literal, Protocol
 
 import numpy as np
 import scipy.sparse
@@ -23,38 +22,21 @@ from rgspipe.renderer.frozen_file import load_parts, save_parts
 from rgspipe.renderer.gather import build_gather
 from rgspipe.renderer.glossy_transport import GlossyLight, GlossyTransport, build_glossy_transport
 from rgspipe.renderer.image_model import SurfelModel
+from rgspipe.renderer.indirect import IndirectSolver, Solver, indirect_solver
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
-from rgspipe.renderer.monte_carlo import MonteCarloSolver
 from rgspipe.renderer.mutual_visibility import mutual_visibility
 from rgspipe.renderer.openness import openness
 from rgspipe.renderer.pixel_model import PixelModel
-from rgspipe.renderer.radiosity import GatherSolver
+from rgspipe.renderer.recent_views import RecentViews
 from rgspipe.renderer.rig import rig_irradiance, unit_response
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.surroundings import OPEN, Surroundings
-from rgspipe.renderer.transport import PatchTransport, build_patch_transport, with_bounces
+from rgspipe.renderer.transport import PatchTransport, build_patch_transport
 from rgspipe.renderer.view_weights import ViewWeights, build_view_weights
 from rgspipe.renderer.viewed_pixels import ViewedPixels
 from rgspipe.scene.camera import Camera
 from rgspipe.scene.lights import Light, LightRig, as_rig
 from rgspipe.scene.surfels import Surfels
-
-Solver = Literal["patches", "gather", "monte_carlo"]
-
-#: Bounces of Monte Carlo where no number is given: what is left after four is 6 % of the light at albedo 0.5.
-MONTE_CARLO_BOUNCES = 4
-
-
-class IndirectSolver(Protocol):
-    """A way from direct light to the light that bounces."""
-
-    def indirect(self, direct: Tensor) -> Tensor:
-        """(N, 3, K) indirect part of the radiosity for K lightings with direct radiosity (N, 3, K)."""
-        ...
-
-    def to(self, device: torch.device | str) -> IndirectSolver:
-        """The same on another device."""
-        ...
 
 
 @dataclass(frozen=True, repr=False)
@@ -162,6 +144,10 @@ class FrozenScene:
         return SurfelBvh(placed)
 
     @cached_property
+    def _recent(self) -> RecentViews:
+        return RecentViews(self.bvh)
+
+    @cached_property
     def bounds(self) -> tuple[Tensor, Tensor]:
         """(3,) lower and upper corner of the surfels' centres."""
         return self.surfels.centers.amin(dim=0), self.surfels.centers.amax(dim=0)
@@ -223,22 +209,7 @@ class FrozenScene:
             ValueError: the solver has another name, needs the gather operator and the scene was loaded without it, or
                 the scene is glossy: light goes over gloss from patch to patch.
         """
-        return replace(self, solver=self._solver(solver, bounces, samples, seed))
-
-    def _solver(self, solver: Solver, bounces: int | None, samples: int, seed: int) -> IndirectSolver:
-        if solver == "patches":
-            same = bounces == self.transport.bounces
-            return self.transport if same else with_bounces(self.transport, bounces)
-        if self.gloss is not None and solver in ("gather", "monte_carlo"):
-            raise ValueError(f"solver {solver} is for diffuse scenes: this one has gloss, which needs patches")
-        if solver == "gather":
-            if self.gather is None:
-                raise ValueError("solver gather needs the gather operator: load the scene with gather=True")
-            return GatherSolver(self.gather, self.surfels.albedo, bounces)
-        if solver == "monte_carlo":
-            bounces = MONTE_CARLO_BOUNCES if bounces is None else bounces
-            return MonteCarloSolver(self.bvh, samples, bounces, torch.Generator().manual_seed(seed))
-        raise ValueError(f"solver must be patches, gather or monte_carlo, got {solver!r}")
+        return replace(self, solver=indirect_solver(self, solver, bounces, samples, seed))
 
     def indirect(self, direct: Tensor) -> Tensor:
         """(N, 3, K) indirect part of the radiosity for K lightings with direct radiosity (N, 3, K)."""
@@ -249,6 +220,11 @@ class FrozenScene:
         direct = self.surfels.albedo[:, :, None] * (irradiance / math.pi)[:, None, :]
         return direct + self.indirect(direct) if indirect else direct
 
+    def coloured_radiance(self, irradiance: Tensor, indirect: bool = True) -> Tensor:
+        """Outgoing radiance (N, 3) for a coloured direct irradiance (N, 3); linear and differentiable."""
+        direct = self.surfels.albedo * (irradiance / math.pi)
+        return direct + self.indirect(direct[:, :, None])[:, :, 0] if indirect else direct
+
     def radiance_of(self, rig: LightRig, effects: Effects = ALL_EFFECTS) -> Tensor:
         """Outgoing radiance (N, 3) under a rig, differentiable towards the tensors of its lights.
 
@@ -257,8 +233,7 @@ class FrozenScene:
         """
         if self.gloss is not None and effects.lobes:
             return self.glossy_light(rig, effects).radiance
-        direct = self.surfels.albedo * (rig_irradiance(self.bvh, rig, effects) / math.pi)
-        return direct + self.indirect(direct[:, :, None])[:, :, 0] if effects.interreflection else direct
+        return self.coloured_radiance(rig_irradiance(self.bvh, rig, effects), effects.interreflection)
 
     def render(
         self,
@@ -266,21 +241,25 @@ class FrozenScene:
         lights: Light | Sequence[Light],
         effects: Effects = ALL_EFFECTS,
         *,
-        sharp: bool = False,
+        sharp: bool = True,
     ) -> Tensor:
         """(height, width, 3) radiance that a camera sees under one light or several.
 
         Differentiable, once, towards every tensor of the lights that requires gradients, by analytic derivatives.
 
         Args:
-            camera: or the weights of its `view`, which are quicker where it sees several images.
+            camera: or the weights of its `view`. The first image of a camera takes longer than the next ones.
             effects: parts of light transport.
-            sharp: whether direct light is taken where pixels look, shadows' edges included; else at surfels' centres.
+            sharp: whether direct light is taken where pixels look, shadows' edges included; else at surfels' centres,
+                which is quicker and less accurate.
         """
-        view = self.view(camera) if isinstance(camera, Camera) else camera
+        view = self._recent.weights(camera) if isinstance(camera, Camera) else camera
         pixels = ViewedPixels.every(self, [view])
-        model = PixelModel.of(pixels, effects) if sharp else SurfelModel(pixels, effects)
-        return pixels.split(model.image(as_rig(lights)))[0]
+        if sharp:
+            image = PixelModel.of(pixels, effects, (self._recent.direct(view),)).image(as_rig(lights))
+        else:
+            image = SurfelModel(pixels, effects).image(as_rig(lights))
+        return pixels.split(image)[0]
 
     def glossy_light(self, rig: LightRig, effects: Effects = ALL_EFFECTS) -> GlossyLight:
         """The light of a scene with gloss under `rig`, to be seen from anywhere; differentiable like `radiance_of`.

@@ -31,11 +31,13 @@ class LitSurfels:
     columns: Tensor
 
 
-def lit_surfels(bvh: SurfelBvh, light: UnitLight, effects: Effects, least: float = 0.0) -> LitSurfels:
+def lit_surfels(bvh: SurfelBvh, light: UnitLight, effects: Effects, least: float | None = None) -> LitSurfels:
     """The surfels under a light: E = p(θ) T max(0, n·d)/|d|³, see `direct.unit_irradiance`.
 
     Args:
-        least: surfels to which the light sends no more than this share p of its intensity are left without shadows.
+        least: surfels to whose centres the light sends no more than this share p of its intensity are left without
+            shadows, which changes nothing there if it is 0; None if they all have theirs, for pixels that look beside
+            the centre.
     """
     position = light.light.position
     sent = emitted_share(light, bvh.surfels.centers, effects.spots)
@@ -45,8 +47,10 @@ def lit_surfels(bvh: SurfelBvh, light: UnitLight, effects: Effects, least: float
     return LitSurfels(share, slope, shared(torch.cat([(factor * share)[:, None], moved], dim=1), sent, light))
 
 
-def _shares(bvh: SurfelBvh, position: Tensor, sent: Share | None, shadows: bool, least: float) -> tuple[Tensor, Tensor]:
+def _shares(
+    bvh: SurfelBvh, position: Tensor, sent: Share | None, shadows: bool, least: float | None
+) -> tuple[Tensor, Tensor]:
     """`LitSurfels.share` and `LitSurfels.slope`."""
-    if sent is None or not shadows:
+    if sent is None or least is None or not shadows:
         return surfel_shares(bvh, position, shadows)
     return lit_shares(bvh, position, sent.value.abs() > least)

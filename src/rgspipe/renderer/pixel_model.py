@@ -35,9 +35,15 @@ class PixelModel(ViewModel):
     highlights: tuple[PixelHighlights, ...]
 
     @classmethod
-    def of(cls, views: ViewedPixels, effects: Effects) -> PixelModel:
+    def of(cls, views: ViewedPixels, effects: Effects, direct: tuple[PixelDirect, ...] | None = None) -> PixelModel:
+        """The model of some pixels.
+
+        Args:
+            direct: per view its direct light, where it is known already.
+        """
         frozen = views.frozen
-        direct = tuple(PixelDirect(frozen.bvh, view) for view in views.views)
+        if direct is None:
+            direct = tuple(PixelDirect(frozen.bvh, view) for view in views.views)
         pairs = zip(views.views, direct, strict=True) if frozen.gloss is not None and effects.lobes else ()
         return cls(views, effects, direct, tuple(PixelHighlights(frozen.gloss, *pair) for pair in pairs))
 

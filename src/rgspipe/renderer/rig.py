@@ -61,7 +61,7 @@ class RigResponse:
 def unit_response(bvh: SurfelBvh, rig: LightRig, effects: Effects = ALL_EFFECTS) -> RigResponse:
     """Irradiance of every light at unit intensity, with derivatives."""
     lights = effects.lights(tuple(rig))
-    return RigResponse.of(bvh, lights, [lit_surfels(bvh, OwnLight(light), effects) for light in lights])
+    return RigResponse.of(bvh, lights, [lit_surfels(bvh, OwnLight(light), effects, 0.0) for light in lights])
 
 
 def rig_irradiance(bvh: SurfelBvh, rig: LightRig, effects: Effects = ALL_EFFECTS) -> Tensor:

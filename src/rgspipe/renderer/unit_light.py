@@ -73,19 +73,16 @@ class OwnLight:
 
     Attributes:
         given: the light; its tensors may require gradients, be of any float type and on any device.
+        softness: by how much its edge of light is widened [rad].
     """
 
     given: Light
+    softness: float = 0.0
 
     @cached_property
     def light(self) -> Light:
         """It, in float64 on the CPU."""
         return self.given.detached()
-
-    @property
-    def softness(self) -> float:
-        """Its edges are as they are."""
-        return 0.0
 
     @property
     def shape_free(self) -> bool:

@@ -45,7 +45,7 @@ def test_candidates_are_seen_as_block_means_of_full_images(room, point_light, in
     coarse = coarse_images(model, room.dictionary)
     for index in (0, 30, 60):
         light = point_light(tuple(room.dictionary.positions[index].tolist()), (1.0, 1.0, 1.0))
-        images = [room.frozen.render(view, light, model.effects) for view in room.views]
+        images = [room.frozen.render(view, light, model.effects, sharp=False) for view in room.views]
         expected = blocks @ prepared.stack_images(images)[prepared.pixels]
         torch.testing.assert_close(coarse.images[index], expected, rtol=1e-4, atol=1e-5)
 
