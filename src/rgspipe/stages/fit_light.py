@@ -35,7 +35,7 @@ from rgspipe.stages.base import Stage, StageContext
 from rgspipe.stages.fit_capture import captured_views
 from rgspipe.stages.fit_extras import Named, further_files, training_cameras
 from rgspipe.stages.light_shape import light_shape
-from rgspipe.stages.scene_effects import chosen_effects, frozen_scene
+from rgspipe.stages.scene_effects import chosen_effects, frozen_scene, wanted_effects
 from rgspipe.stages.sources import image_stage, require_images, target_stage
 from rgspipe.stages.spoken import COMMAND_LINE
 
@@ -138,7 +138,7 @@ def _effects(context: StageContext) -> Effects:
     """The effects of the configuration; with effects.auto less those that the frozen scene does not call for."""
     wanted, band = context.config.effects, band_limit(context.config)
     if not wanted.auto:
-        return Effects(wanted.shadows, wanted.interreflection, spots=band)
+        return replace(wanted_effects(wanted), spots=band)
     bounds, choice = _choice(context.config, context.inputs["freeze"])
     print("effects: " + "; ".join(choice.reasons))
     context.note(effects={"choice": asdict(choice), "bounds": asdict(bounds), "tolerance": wanted.tolerance})

@@ -28,7 +28,7 @@ from rgspipe.renderer.view_weights import ViewWeights
 from rgspipe.renderer.viewed_pixels import ViewedPixels
 from rgspipe.scene import Camera, LightRig
 from rgspipe.scene.lights import KINDS
-from rgspipe.stages.scene_effects import chosen_effects, frozen_scene
+from rgspipe.stages.scene_effects import chosen_effects, frozen_scene, wanted_effects
 
 
 @dataclass
@@ -87,7 +87,7 @@ class Relighter:
         """The effects of a rig."""
         wanted, kind = self.config.effects, RigKind.of(rig)
         if not wanted.auto:
-            return Effects(wanted.shadows, wanted.interreflection)
+            return wanted_effects(wanted)
         if kind not in self._kinds:
             choice = chosen_effects(wanted, self.freeze, kind)[1]
             self.reasons[_words(rig)] = choice.reasons
