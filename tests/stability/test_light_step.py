@@ -16,7 +16,7 @@ from rgspipe.fitting.baselines.paper_adam_loss import AdamLoss, MovingRig
 from rgspipe.fitting.model.views import PreparedViews
 from rgspipe.renderer.effects import Effects
 from rgspipe.renderer.frozen import FrozenScene
-from rgspipe.renderer.image_model import SurfelModel
+from rgspipe.renderer.images.model import SurfelModel
 from rgspipe.scene import PointLight
 
 #: The light whose image is the target.

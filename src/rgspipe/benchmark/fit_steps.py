@@ -12,8 +12,8 @@ from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.views import prepare_views
 from rgspipe.renderer.effects import ALL_EFFECTS
 from rgspipe.renderer.frozen import FrozenScene
-from rgspipe.renderer.image_model import SurfelModel
-from rgspipe.renderer.pixel_model import PixelModel
+from rgspipe.renderer.images.model import SurfelModel
+from rgspipe.renderer.images.pixels import PixelModel
 from rgspipe.renderer.radiosity import solve_radiosity
 from rgspipe.renderer.sparse import stack
 from rgspipe.renderer.view_weights import ViewWeights

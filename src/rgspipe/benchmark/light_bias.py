@@ -14,7 +14,7 @@ from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.model.views import prepare_views
 from rgspipe.fitting.search_lm import fit_from
 from rgspipe.renderer.effects import ALL_EFFECTS
-from rgspipe.renderer.pixel_model import PixelModel
+from rgspipe.renderer.images.pixels import PixelModel
 from rgspipe.scene import PointLight
 
 #: Lights at least this far from any surface [scene units] count as in the open.

@@ -17,13 +17,13 @@ from rgspipe.renderer.clusters import cluster_patches
 from rgspipe.renderer.effects import Effects
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.gather import build_gather
-from rgspipe.renderer.image_model import SurfelModel, ViewModel
+from rgspipe.renderer.images.model import SurfelModel, ViewModel
+from rgspipe.renderer.images.pixels import PixelModel
+from rgspipe.renderer.images.viewed_pixels import ViewedPixels
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
-from rgspipe.renderer.pixel_model import PixelModel
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.transport import build_patch_transport
 from rgspipe.renderer.view_weights import ViewWeights
-from rgspipe.renderer.viewed_pixels import ViewedPixels
 from rgspipe.scene import LightRig
 from rgspipe.scene.rectangles import surfels_on
 

@@ -16,12 +16,12 @@ from rgspipe.fitting.search.aimed_candidates import aimed_candidates
 from rgspipe.fitting.search.coarse import CoarseImages, coarse_images
 from rgspipe.fitting.solvers import Search, Solver
 from rgspipe.fitting.spec import LightSpec
-from rgspipe.renderer.block_model import BlockModel, block_model
 from rgspipe.renderer.dictionary import LightDictionary
 from rgspipe.renderer.effects import ALL_EFFECTS, Effects
 from rgspipe.renderer.frozen import FrozenScene
-from rgspipe.renderer.image_model import SurfelModel, ViewModel
-from rgspipe.renderer.pixel_model import PixelModel
+from rgspipe.renderer.images.blocks import BlockModel, block_model
+from rgspipe.renderer.images.model import SurfelModel, ViewModel
+from rgspipe.renderer.images.pixels import PixelModel
 from rgspipe.renderer.view_weights import ViewWeights
 from rgspipe.scene import Camera, Light
 from rgspipe.scene.arrays import ArrayLike, as_list

@@ -26,8 +26,8 @@ from rgspipe.fitting.selection.diagnosis import Costs, standing
 from rgspipe.fitting.selection.number import Doubted, doubted_number, faded_light
 from rgspipe.fitting.selection.rivals import has_rival, stands_anywhere
 from rgspipe.fitting.spec import LightSpec
-from rgspipe.renderer.block_model import view_of_blocks
-from rgspipe.renderer.image_model import ImageModel
+from rgspipe.renderer.images.blocks import view_of_blocks
+from rgspipe.renderer.images.model import ImageModel
 
 
 def fit_search_lm(

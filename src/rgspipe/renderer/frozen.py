@@ -21,19 +21,19 @@ from rgspipe.renderer.effects import ALL_EFFECTS, Effects
 from rgspipe.renderer.frozen_file import load_parts, save_parts
 from rgspipe.renderer.gather import build_gather
 from rgspipe.renderer.glossy_transport import GlossyLight, GlossyTransport, build_glossy_transport
-from rgspipe.renderer.image_model import SurfelModel
+from rgspipe.renderer.images.model import SurfelModel
+from rgspipe.renderer.images.pixels import PixelModel
+from rgspipe.renderer.images.recent_views import RecentViews
+from rgspipe.renderer.images.viewed_pixels import ViewedPixels
 from rgspipe.renderer.indirect import IndirectSolver, Solver, indirect_solver
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.mutual_visibility import mutual_visibility
 from rgspipe.renderer.openness import openness
-from rgspipe.renderer.pixel_model import PixelModel
-from rgspipe.renderer.recent_views import RecentViews
 from rgspipe.renderer.rig import rig_irradiance, unit_response
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.surroundings import OPEN, Surroundings
 from rgspipe.renderer.transport import PatchTransport, build_patch_transport
 from rgspipe.renderer.view_weights import ViewWeights, build_view_weights
-from rgspipe.renderer.viewed_pixels import ViewedPixels
 from rgspipe.scene.camera import Camera
 from rgspipe.scene.lights import Light, LightRig, as_rig
 from rgspipe.scene.surfels import Surfels

@@ -22,10 +22,10 @@ from rgspipe.errors import InputError
 from rgspipe.renderer.effect_choice import RigKind
 from rgspipe.renderer.effects import Effects
 from rgspipe.renderer.frozen import FrozenScene
-from rgspipe.renderer.image_model import SurfelModel, ViewModel
-from rgspipe.renderer.pixel_model import PixelModel
+from rgspipe.renderer.images.model import SurfelModel, ViewModel
+from rgspipe.renderer.images.pixels import PixelModel
+from rgspipe.renderer.images.viewed_pixels import ViewedPixels
 from rgspipe.renderer.view_weights import ViewWeights
-from rgspipe.renderer.viewed_pixels import ViewedPixels
 from rgspipe.scene import Camera, LightRig
 from rgspipe.scene.lights import KINDS
 from rgspipe.stages.scene_effects import chosen_effects, frozen_scene, wanted_effects

@@ -12,8 +12,8 @@ from rgspipe.fitting.model.capture import ImageCapture
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.model.views import prepare_views
 from rgspipe.fitting.search.coarse import coarse_images
-from rgspipe.renderer.block_model import block_average, block_model
 from rgspipe.renderer.effects import Effects
+from rgspipe.renderer.images.blocks import block_average, block_model
 from rgspipe.scene.lights import SpotLight
 
 PLACE = torch.tensor([0.1, -0.2, 0.15], dtype=torch.float64)

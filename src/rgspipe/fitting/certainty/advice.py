@@ -33,7 +33,7 @@ from rgspipe.fitting.result import FitResult
 from rgspipe.progress import progress_bar
 from rgspipe.renderer.effects import ALL_EFFECTS, Effects
 from rgspipe.renderer.frozen import FrozenScene
-from rgspipe.renderer.image_model import SurfelModel
+from rgspipe.renderer.images.model import SurfelModel
 from rgspipe.scene import Camera
 
 #: Images that are only predicted need no more pixels than this along their longer side.

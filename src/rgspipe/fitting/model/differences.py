@@ -11,7 +11,7 @@ from torch import Tensor
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.renderer.effects import Effects
-from rgspipe.renderer.image_model import ImageModel
+from rgspipe.renderer.images.model import ImageModel
 from rgspipe.renderer.sparse import SparseOperator
 
 #: Step of a parameter: of the scene's size for positions, rad for axes; see `Emitter`.

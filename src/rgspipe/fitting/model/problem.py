@@ -15,7 +15,7 @@ from rgspipe.fitting.model.exposure import ExposedMoments, best_factors, moments
 from rgspipe.fitting.model.moments import Moments, moments
 from rgspipe.fitting.model.views import PreparedViews
 from rgspipe.renderer.effects import ALL_EFFECTS, Effects
-from rgspipe.renderer.image_model import ImageModel, SurfelModel
+from rgspipe.renderer.images.model import ImageModel, SurfelModel
 from rgspipe.renderer.sparse import SparseOperator
 
 #: In relative weights 1/(y + floor·mean y): pixels darker than this share of the mean count no more than it does.

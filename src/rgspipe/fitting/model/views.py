@@ -12,9 +12,9 @@ from torch import Tensor
 
 from rgspipe.errors import InputError
 from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.renderer.images.viewed_pixels import ViewedPixels
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.view_weights import ViewWeights
-from rgspipe.renderer.viewed_pixels import ViewedPixels
 from rgspipe.scene.arrays import ArrayLike, as_tensor
 
 #: Pixels that surfels cover less than this show something the scene does not have.

@@ -12,11 +12,11 @@ from torch import Tensor
 from rgspipe.fitting.model.views import PreparedViews
 from rgspipe.fitting.search.coarse import CoarseImages
 from rgspipe.progress import progress_bar
-from rgspipe.renderer.block_model import BlockModel, block_model, patch_radiance
 from rgspipe.renderer.clusters import cluster_patches
 from rgspipe.renderer.dictionary import LightDictionary
 from rgspipe.renderer.effects import ALL_EFFECTS, Effects
 from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.renderer.images.blocks import BlockModel, block_model, patch_radiance
 from rgspipe.renderer.point_sets import fibonacci_directions
 from rgspipe.scene.lights import AxialLight
 from rgspipe.scene.lights.angles import angle_from_axis

@@ -9,8 +9,8 @@ import torch
 from torch import Tensor
 
 from rgspipe.fitting.model.emitter import Emitter
-from rgspipe.renderer.block_model import BlockModel
 from rgspipe.renderer.dictionary import LightDictionary
+from rgspipe.renderer.images.blocks import BlockModel
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.scene.lights import Light, PointLight
 

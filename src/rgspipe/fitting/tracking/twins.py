@@ -20,7 +20,7 @@ from rgspipe.fitting.search.schedule import soft
 from rgspipe.fitting.search.starts import Rig
 from rgspipe.fitting.search.weighting import PLAIN
 from rgspipe.fitting.search_lm import fit_from
-from rgspipe.renderer.image_model import ImageModel
+from rgspipe.renderer.images.model import ImageModel
 from rgspipe.scene.lights.coordinates import tangents
 
 #: How far apart the halves of a light are put, parts of the scene's size.

@@ -10,15 +10,15 @@ import torch
 from torch import Tensor
 
 from rgspipe.renderer.effects import Effects
-from rgspipe.renderer.glossy_images import bounced_light, seen_light, seen_with_gloss
-from rgspipe.renderer.image_model import ViewModel
+from rgspipe.renderer.images.glossy import bounced_light, seen_light, seen_with_gloss
+from rgspipe.renderer.images.highlights import PixelHighlights
+from rgspipe.renderer.images.model import ViewModel
+from rgspipe.renderer.images.viewed_pixels import ViewedPixels
 from rgspipe.renderer.kernels.lit_shares import LEAST_LIT
 from rgspipe.renderer.lit_surfels import LitSurfels, lit_surfels
 from rgspipe.renderer.pixel_direct import PixelDirect
-from rgspipe.renderer.pixel_highlights import PixelHighlights
 from rgspipe.renderer.rig import RigResponse
 from rgspipe.renderer.unit_light import OwnLight, UnitLight, emitted_share, shared
-from rgspipe.renderer.viewed_pixels import ViewedPixels
 from rgspipe.scene.lights import LightRig
 
 

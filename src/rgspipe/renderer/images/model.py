@@ -1,9 +1,4 @@
-"""The image of a light: what pixels of a frozen scene, or blocks of them, see of one of unit intensity.
-
-Three models have one interface, unit lights in, unit images with derivatives out: `SurfelModel` (soft: direct light at
-surfels' centres), `PixelModel` (sharp: direct light where pixels look, in pixel_model.py) and `BlockModel` (averages
-over blocks of pixels, in block_model.py).
-"""
+"""What all models of an image have in common, and the soft one."""
 
 from __future__ import annotations
 
@@ -15,13 +10,13 @@ import torch
 from torch import Tensor
 
 from rgspipe.renderer.effects import Effects
-from rgspipe.renderer.glossy_images import seen_light, seen_with_gloss
 from rgspipe.renderer.glossy_transport import GlossyTransport
+from rgspipe.renderer.images.glossy import seen_light, seen_with_gloss
+from rgspipe.renderer.images.viewed_pixels import ViewedPixels
 from rgspipe.renderer.kernels.lit_shares import LEAST_LIT
 from rgspipe.renderer.lit_surfels import lit_surfels
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.unit_light import UnitLight
-from rgspipe.renderer.viewed_pixels import ViewedPixels
 from rgspipe.scene.lights import LightRig
 
 

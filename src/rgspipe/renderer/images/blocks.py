@@ -12,13 +12,13 @@ import torch
 from torch import Tensor
 
 from rgspipe.renderer.effects import ALL_EFFECTS, Effects
-from rgspipe.renderer.image_model import ImageModel
+from rgspipe.renderer.images.model import ImageModel
+from rgspipe.renderer.images.viewed_pixels import ViewedPixels
 from rgspipe.renderer.kernels.lit_shares import LEAST_LIT
 from rgspipe.renderer.lit_surfels import lit_surfels
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.transport import PatchTransport
 from rgspipe.renderer.unit_light import UnitLight
-from rgspipe.renderer.viewed_pixels import ViewedPixels
 
 if TYPE_CHECKING:
     from rgspipe.renderer.frozen import FrozenScene

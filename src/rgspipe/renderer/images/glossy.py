@@ -11,8 +11,8 @@ from torch import Tensor
 
 from rgspipe.renderer.glossy_columns import GlossyColumns, unit_light_columns
 from rgspipe.renderer.glossy_transport import GlossyLight
+from rgspipe.renderer.images.viewed_pixels import ViewedPixels
 from rgspipe.renderer.rig import RigResponse
-from rgspipe.renderer.viewed_pixels import ViewedPixels
 
 if TYPE_CHECKING:
     from rgspipe.renderer.frozen import FrozenScene

@@ -13,13 +13,13 @@ from double_precision import DoubleTransport
 from rgspipe.renderer import reference
 from rgspipe.renderer.effects import Effects
 from rgspipe.renderer.frozen import FrozenScene
-from rgspipe.renderer.image_model import SurfelModel
+from rgspipe.renderer.images.model import SurfelModel
+from rgspipe.renderer.images.pixels import PixelModel
+from rgspipe.renderer.images.recent_views import KEPT
+from rgspipe.renderer.images.viewed_pixels import ViewedPixels
 from rgspipe.renderer.pixel_direct import LIT_OR_NOT, SHADOW_RAYS, PixelDirect
-from rgspipe.renderer.pixel_model import PixelModel
-from rgspipe.renderer.recent_views import KEPT
 from rgspipe.renderer.unit_light import OwnLight
 from rgspipe.renderer.view_weights import build_view_weights, even_places
-from rgspipe.renderer.viewed_pixels import ViewedPixels
 from rgspipe.scene import Camera, Gloss, PointLight, SpotLight, Surfels
 from rgspipe.scene.lights import LedLight, Light
 from rooms import closed_box, rectangle, surfels_on
@@ -206,7 +206,7 @@ def test_a_camera_in_a_loop_is_traced_once(frozen: FrozenScene, monkeypatch: pyt
         traced.append(camera)
         return build_view_weights(bvh, camera)
 
-    monkeypatch.setattr("rgspipe.renderer.recent_views.build_view_weights", counted)
+    monkeypatch.setattr("rgspipe.renderer.images.recent_views.build_view_weights", counted)
     scene = replace(frozen)
     cameras = [Camera.look_at([0.3, -0.4, 0.1 * k], [0, 0, 0], width=4, height=4) for k in range(KEPT + 1)]
     images = [scene.render(cameras[0], LIGHTS["point"]) for _ in range(3)]
