@@ -83,6 +83,17 @@ class Module:
                     names = target.elts if isinstance(target, ast.Tuple) else [target]
                     yield from (name.id for name in names if isinstance(name, ast.Name) and name.id.isupper())
 
+    def settings(self) -> Iterator[str]:
+        """Fields of classes whose defaults are numbers, or tuples of numbers, bare or in a call of `option`."""
+        for owner in self.tree.body:
+            for node in owner.body if isinstance(owner, ast.ClassDef) else ():
+                if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name) and node.value:
+                    value = node.value
+                    if isinstance(value, ast.Call) and getattr(value.func, "id", "") == "option" and value.args:
+                        value = value.args[0]
+                    if _is_number(value):
+                        yield f"{owner.name}.{node.target.id}"
+
     def bare(self) -> Iterator[str]:
         """Public functions, classes and methods without a docstring; what overrides an interface has that one's."""
         yield from (
@@ -215,6 +226,7 @@ def _reached(after: dict[str, set[str]], start: str) -> set[str]:
 def measures(house: House) -> dict[str, object]:
     """What the house is like, by what is measured."""
     modules = house.modules.values()
+    fits = [module for module in modules if module.room == "fitting"]
     lengths = sorted(
         (node.end_lineno - node.lineno + 1, f"{m.name}.{node.name}") for m in modules for node in m.functions()
     )
@@ -230,7 +242,8 @@ def measures(house: House) -> dict[str, object]:
         "function, 90 % lines": counts[int(0.9 * len(counts))],
         "function, largest": f"{lengths[-1][0]} ({lengths[-1][1]})",
         f"files over {LONG_FILE} lines": sum(module.lines > LONG_FILE for module in modules),
-        "constants that steer fits": sum(len(list(m.constants())) for m in modules if m.room == "fitting"),
+        "constants in fitting/": sum(len(list(m.constants())) for m in fits),
+        "numbers among the options of fits": sum(len(list(m.settings())) for m in fits if m.name.endswith("options")),
         "constants in all": sum(len(list(m.constants())) for m in modules),
         "public names without docstring": sum(len(list(m.bare())) for m in modules),
         "circles of imports": len(house.circles()),

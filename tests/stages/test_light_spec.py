@@ -13,7 +13,8 @@ from rgspipe.fitting.spec import TYPES
 from rgspipe.options import settings
 from rgspipe.renderer.zonal_harmonics import BandLimit
 from rgspipe.scene.lights import KINDS
-from rgspipe.stages.fit_light import STAGE, band_limit, light_spec
+from rgspipe.stages.fit_light import STAGE, band_limit
+from rgspipe.stages.light_spec import light_spec
 
 
 def test_one_point_light_is_looked_for_by_default() -> None:

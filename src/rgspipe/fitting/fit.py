@@ -11,6 +11,7 @@ from torch import Tensor
 from rgspipe.fitting.model.capture import ImageCapture
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.model.views import PreparedViews, prepare_views
+from rgspipe.fitting.options import AimedOptions
 from rgspipe.fitting.result import FitResult
 from rgspipe.fitting.search.aimed_candidates import aimed_candidates
 from rgspipe.fitting.search.coarse import CoarseImages, coarse_images
@@ -79,16 +80,21 @@ class FitViews:
         """The views as blocks of pixels, which searches look at."""
         return block_model(self.prepared, effects=self.effects)
 
-    @cached_property
-    def coarse(self) -> tuple[CoarseImages, ...]:
-        """Images of the candidates of each kind of light that is looked for, the plainest first."""
-        return tuple(map(self._coarse, self.lights.kinds))
+    def coarse(self, options: AimedOptions) -> tuple[CoarseImages, ...]:
+        """Images of the candidates of each kind of light that is looked for, the plainest first; made once."""
+        if options not in self._coarse_made:
+            self._coarse_made[options] = tuple(self._coarse(kind, options) for kind in self.lights.kinds)
+        return self._coarse_made[options]
 
-    def _coarse(self, kind: Light) -> CoarseImages:
+    @cached_property
+    def _coarse_made(self) -> dict[AimedOptions, tuple[CoarseImages, ...]]:
+        return {}
+
+    def _coarse(self, kind: Light, options: AimedOptions) -> CoarseImages:
         if kind.axis is None:
             return coarse_images(self.blocks, self.dictionary)
         shapes = kind.variants() if self.lights.shape_free else (kind,)
-        return aimed_candidates(self.prepared, self.dictionary, shapes, self.effects)
+        return aimed_candidates(self.prepared, self.dictionary, shapes, options, self.effects)
 
     @cached_property
     def pixels(self) -> PixelModel:

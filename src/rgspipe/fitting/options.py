@@ -16,6 +16,22 @@ MOST_LIGHTS = 8
 
 
 @dataclass(frozen=True)
+class AimedOptions(Options):
+    """Candidates with an axis: every candidate position, aimed everywhere."""
+
+    axes: int = option(60, low=4, high=10000)
+    """directions in which each position is aimed"""
+    softness: float = option(0.15, low=0, high=3)
+    """candidates' rims are so much wider than they are, rad, as directions are so far apart"""
+    blocks: int = option(256, low=16, high=100000)
+    """all views together have about so many blocks: there are many candidates"""
+    groups: int = option(250, low=1, high=100000)
+    """what bounces is followed from about so many groups of patches: a wide rim needs no more"""
+    least_seen: float = option(0.01, low=0, high=1)
+    """candidates that send less than this share of the brightest one's light to the views are left out"""
+
+
+@dataclass(frozen=True)
 class CombinationOptions(Options):
     """How candidates are put together to starts."""
 
@@ -145,6 +161,23 @@ class StepLimits(Options):
 
 
 @dataclass(frozen=True)
+class CertaintyOptions(Options):
+    """How sure a fit says that it is; the search itself does not ask."""
+
+    cell: float = option(0.2, low=1e-3, high=10)
+    """errors of the model are shared within cells of this part of the scene's size"""
+    inflation: float = option(3.5, low=0, high=1000)
+    """κ: by what factor, in standard deviations, errors of the model are larger than the residual shows. The 95 %
+    quantile of what it takes to hold the truth, over half of the targets of one trained scene; judged on others"""
+    doubtful: float = option(0.05, low=0, high=10)
+    """a position whose error is expected to be larger than this part of the scene's size is said to be in doubt"""
+    on_surface: float = option(0.002, low=0, high=1)
+    """a light nearer to a surface than this part of the scene's size stands on it: 6 mm in a room of 3 m"""
+    poorly: float = option(0.05, low=0, high=1)
+    """an answer that leaves more than this share of the target's energy unexplained is none"""
+
+
+@dataclass(frozen=True)
 class SearchOptions(Options):
     """How `search_lm` searches: a dictionary with closed-form intensity, then Levenberg-Marquardt."""
 
@@ -152,6 +185,7 @@ class SearchOptions(Options):
     """best candidates that are refined"""
     iterations: int = option(30, low=1, high=10000)
     """most Levenberg-Marquardt steps of the final refinement"""
+    aimed: AimedOptions = AimedOptions()
     combinations: CombinationOptions = CombinationOptions()
     trials: TrialOptions = TrialOptions()
     schedule: ScheduleOptions = ScheduleOptions()
@@ -159,6 +193,7 @@ class SearchOptions(Options):
     one_more: OneMoreOptions = OneMoreOptions()
     rivals: RivalOptions = RivalOptions()
     limits: StepLimits = StepLimits()
+    certainty: CertaintyOptions = CertaintyOptions()
 
 
 @dataclass(frozen=True)
@@ -194,6 +229,46 @@ class AdamOptions(StartOptions):
 
 
 @dataclass(frozen=True)
+class SplitOptions(Options):
+    """How two lights that a search took for one are found: a strong one is split in the place of the faintest."""
+
+    apart: float = option(0.06, low=1e-4, high=1)
+    """the halves of a light are put so far apart, a part of the scene's size"""
+    softness: tuple[float, ...] = option((0.15, 0.05, 0.0), low=0, high=3)
+    """by how much edges are wider in each round of refinement, rad"""
+    steps: tuple[int, ...] = option((4, 4, 8), low=1, high=10000)
+    """steps of each round"""
+    kept: int = option(5, low=1, high=1000)
+    """so many of the split rigs take the next round …"""
+    polished: int = option(2, low=1, high=1000)
+    """… and so many are polished on all pixels"""
+    better: float = option(0.8, low=0, high=1)
+    """a split rig is the answer where it leaves less than this part of the error unexplained"""
+
+    def check(self) -> None:
+        if len(self.softness) != len(self.steps):
+            expected = f"{len(self.softness)} of them, one for each softness"
+            found = f"{len(self.steps)} numbers of steps"
+            raise InputError("steps", expected=expected, found=found, remedy="Give as many of both.")
+
+
+@dataclass(frozen=True)
+class MotionOptions(Options):
+    """How lights may move: standard deviations of what is known of them, and of what changes from frame to frame."""
+
+    rate: tuple[float, float] = option((0.1, 0.3), low=1e-9, high=1000)
+    """of a first rate, of a position over the scene's size and of an axis in rad …"""
+    rate_change: tuple[float, float] = option((0.01, 0.05), low=0, high=1000)
+    """… and of its change from one frame to the next"""
+    alike: float = option(0.95, low=0, high=1)
+    """correlation of these changes where one thing carries the lights: the rest is what a turn does to them"""
+    intensity_change: float = option(0.02, low=0, high=1000)
+    """of the relative change of an intensity from one frame to the next"""
+    shape_change: float = option(0.02, low=0, high=1000)
+    """of the change of a shape's numbers"""
+
+
+@dataclass(frozen=True)
 class TrackOptions(Options):
     """How moving lights are followed from frame to frame."""
 
@@ -205,3 +280,9 @@ class TrackOptions(Options):
     """most frames that are searched from nothing, those of the beginning and lost ones together"""
     together: bool = False
     """the lights are carried by one thing, such as a car: they move and turn together"""
+    faint: float = option(0.02, low=0, high=1)
+    """a frame is not sure where a light has less than this part of the strongest one's intensity"""
+    remembered: int = option(5, low=1, high=10000)
+    """frames before, whose median residual tells whether a frame is lost"""
+    split: SplitOptions = SplitOptions()
+    motion: MotionOptions = MotionOptions()

@@ -15,7 +15,7 @@ from rgspipe.fitting.meter import Meter
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.exposure import rough_exposures
 from rgspipe.fitting.model.problem import LightProblem
-from rgspipe.fitting.options import RivalOptions, SearchOptions
+from rgspipe.fitting.options import SearchOptions
 from rgspipe.fitting.result import FitResult, dark_result
 from rgspipe.fitting.search.coarse import CoarseImages
 from rgspipe.fitting.search.refine import Refiner, State
@@ -60,16 +60,18 @@ def fit_search_lm(
     findings = found.findings
     if spec.count is not None and not any(isinstance(finding, LightSpare) for finding in findings):
         findings = (*findings, *faded_light(refiner, best, options))
-    return _result(polished, best, findings, Costs.of(refiner, found.compared), options.rivals)
+    return _result(polished, best, findings, Costs.of(refiner, found.compared), options)
 
 
-def fit_from(problem: LightProblem, start: Sequence[Emitter], iterations: int = 30) -> FitResult:
+def fit_from(
+    problem: LightProblem, start: Sequence[Emitter], iterations: int = 30, options: SearchOptions | None = None
+) -> FitResult:
     """Lights from known starts, by plain least squares: no search, no robust loss."""
     if problem.black:
         return dark_result(0.0)
     refiner = Refiner.of(problem.sharpest())
     best = refiner.refined(refiner.start(start, PLAIN), PLAIN, iterations)
-    return _result(refiner, best, (), Costs({}), RivalOptions())
+    return _result(refiner, best, (), Costs({}), options or SearchOptions())
 
 
 @dataclass(frozen=True)
@@ -123,15 +125,15 @@ def _polished(refiner: Refiner, best: State, iterations: int) -> tuple[Refiner, 
 
 
 def _result(
-    refiner: Refiner, best: State, findings: Sequence[Finding], costs: Costs, rivals: RivalOptions
+    refiner: Refiner, best: State, findings: Sequence[Finding], costs: Costs, options: SearchOptions
 ) -> FitResult:
     problem, meter, last = refiner.problem, refiner.meter, refiner.step(best)
-    spread = light_covariances(problem, best)
-    if Rival() not in findings and stands_anywhere(refiner, best, spread.calibrated, rivals):
+    spread = light_covariances(problem, best, options.certainty)
+    if Rival() not in findings and stands_anywhere(refiner, best, spread.calibrated, options.rivals):
         findings = (Rival(), *findings)
     return FitResult(
         lights=last.lights,
-        findings=(*standing(refiner, best, spread.calibrated), *findings),
+        findings=(*standing(refiner, best, spread.calibrated, options.certainty), *findings),
         loss=last.loss,
         iterations=meter.iterations,
         evaluations=meter.evaluations,

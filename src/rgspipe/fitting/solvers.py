@@ -43,7 +43,7 @@ class Search(SearchOptions):
         problem, blocks = views.problem(images, capture), views.blocks
         if self.derivatives == "differences":
             problem, blocks = by_differences(problem), DifferenceModel(blocks, views.prepared.frozen.size)
-        result = fit_search_lm(problem, views.coarse, self, views.lights, blocks)
+        result = fit_search_lm(problem, views.coarse(self.aimed), self, views.lights, blocks)
         if capture.exposure_free and len(views.prepared.views) == 1:
             return replace(result, findings=(*result.findings, ExposureUnknown()))
         return result

@@ -26,7 +26,8 @@ from rgspipe.scene import LightRig
 from rgspipe.stages import fit_light
 from rgspipe.stages.base import Need, Stage, StageContext
 from rgspipe.stages.fit_capture import captured_views
-from rgspipe.stages.fit_light import Fitter, used_views
+from rgspipe.stages.fit_light import Fitter
+from rgspipe.stages.fit_targets import used_views
 from rgspipe.stages.sources import target_stage
 from rgspipe.stages.true_lights import scene_bounds, truth_file
 

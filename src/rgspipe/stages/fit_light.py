@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
@@ -13,13 +12,11 @@ from rgspipe.artifacts import Artifact
 from rgspipe.config import RgspipeConfig
 from rgspipe.datasets.frames import read_entries
 from rgspipe.datasets.gs3 import load_target
-from rgspipe.datasets.location import dataset_root, open_dataset
+from rgspipe.datasets.location import dataset_root
 from rgspipe.datasets.views import Target, View
-from rgspipe.errors import InputError
 from rgspipe.evaluation.fit_folder import read_result, write_result
-from rgspipe.fitting import FitViews, LightSpec, PaperAdam, Search, Solver
+from rgspipe.fitting import FitViews, PaperAdam, Search, Solver
 from rgspipe.fitting.options import MOST_LIGHTS, AdamOptions, SearchOptions
-from rgspipe.fitting.spec import AUTO, shaped_kind
 from rgspipe.options import Options
 from rgspipe.progress import progress_bar
 from rgspipe.renderer.effect_bounds import NO_BOUND, EffectBounds
@@ -29,24 +26,21 @@ from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.monte_carlo import MonteCarloSolver
 from rgspipe.renderer.zonal_harmonics import BandLimit
 from rgspipe.scene import PointLight
-from rgspipe.scene.lights import KINDS
 from rgspipe.stages import fit_capture
 from rgspipe.stages.base import Stage, StageContext
 from rgspipe.stages.fit_capture import captured_views
 from rgspipe.stages.fit_extras import Named, further_files, training_cameras
-from rgspipe.stages.light_shape import light_shape
+from rgspipe.stages.fit_targets import all_targets, select_targets, target_seed, used_views
+from rgspipe.stages.light_spec import light_spec
 from rgspipe.stages.scene_effects import chosen_effects, frozen_scene, wanted_effects
 from rgspipe.stages.sources import image_stage, require_images, target_stage
 from rgspipe.stages.spoken import COMMAND_LINE
-
-#: Number of the random stream of fits; part of the seed, so never renumber it.
-STREAM = 0
 
 
 def run(context: StageContext) -> None:
     """Write results.csv and a folder per target; targets that an earlier attempt finished are kept."""
     fitter = Fitter.create(context)
-    targets = select_targets(_targets(context), context.config)
+    targets = select_targets(all_targets(context), context.config)
     rows = []
     for target in progress_bar(targets, "fitting lights", unit="target"):
         if not (context.folder / target.name).is_dir():
@@ -182,100 +176,10 @@ def remarks(config: RgspipeConfig, made: Mapping[str, Artifact]) -> Sequence[str
     return _choice(config, made["freeze"])[1].reasons
 
 
-def light_spec(config: RgspipeConfig) -> LightSpec:
-    """What the configuration says of the lights that are looked for.
-
-    Raises:
-        InputError: the paper's method is asked for lights of unknown type, number or cone.
-    """
-    if config.fit.method == "paper_adam":
-        _refuse_unknowns(config)
-    light, kind = config.light, shaped_kind(config.light.type)
-    section = getattr(light, kind, None)
-    shape = None if section is None else light_shape(kind, section, f"light.{kind}")
-    return LightSpec(light.type, light.count, shape, config.fit.shape == "free")
-
-
-def _refuse_unknowns(config: RgspipeConfig) -> None:
-    """The paper's method moves a given number of lights of one type, with given cones.
-
-    Raises:
-        InputError: it is asked for others.
-    """
-    asked = [
-        ("light.type", " or ".join(KINDS), config.light.type, config.light.type == AUTO),
-        ("light.count", "a number from 1 to 8", "null", config.light.count is None),
-        ("fit.shape", "known", config.fit.shape, config.fit.shape == "free"),
-    ]
-    for key, expected, found, unknown in asked:
-        if unknown:
-            raise InputError(
-                key,
-                expected=f"{expected} with fit=paper_adam",
-                found=found,
-                remedy="Say what is known, or use fit=search_lm, which finds it out.",
-            )
-
-
 def band_limit(config: RgspipeConfig) -> BandLimit | None:
     """How the model of a fit encodes spots; None for exact profiles."""
     fit = config.fit
     return BandLimit(fit.sh_degree, fit.sh_mirrored) if fit.spot_basis == "sh" else None
-
-
-def select_targets(targets: Sequence[Target], config: RgspipeConfig) -> list[Target]:
-    """The targets of the wanted class, at most `fit.limit` of each.
-
-    Raises:
-        InputError: there is none.
-    """
-    if config.fit.target is not None:
-        return list(targets)
-    chosen: list[Target] = []
-    for target in targets:
-        before = sum(other.occlusion == target.occlusion for other in chosen)
-        wanted = config.occlusion in ("all", target.occlusion)
-        if wanted and (config.fit.limit is None or before < config.fit.limit):
-            chosen.append(target)
-    if not chosen:
-        classes = sorted({target.occlusion for target in targets})
-        raise InputError(
-            "occlusion",
-            expected=f"a class that the dataset has targets of: {', '.join(classes) or 'it has no targets at all'}",
-            found=config.occlusion,
-            remedy="Choose another class, or fit a folder of your own with fit.target=DIR.",
-        )
-    return chosen
-
-
-def used_views(target: Target, config: RgspipeConfig) -> list[View]:
-    """The views of a target that the configuration asks for.
-
-    Raises:
-        InputError: the target has fewer.
-    """
-    indices = config.views.indices if config.views.indices is not None else list(range(config.views.count))
-    if max(indices) >= len(target.views) or len(set(indices)) < len(indices):
-        key = "views.count" if config.views.indices is None else "views.indices"
-        raise InputError(
-            key,
-            expected=f"different cameras of the {len(target.views)} that target {target.name} has",
-            found=str(config.views.count if config.views.indices is None else indices),
-            remedy="Ask for fewer views, or add images to the target.",
-        )
-    return [target.views[index] for index in indices]
-
-
-def target_seed(target: Target, config: RgspipeConfig) -> int:
-    """A seed of the target's own, so that a start does not depend on which other targets are fitted."""
-    return zlib.crc32(f"{config.seed}/{STREAM}/{target.name}".encode())
-
-
-def _targets(context: StageContext) -> Sequence[Target]:
-    if context.config.fit.target is not None:
-        return [load_target(context.config.fit.target)]
-    [stage] = target_stage(context.config)
-    return open_dataset(context.inputs[stage].folder(), train=False, test=False).targets
 
 
 def _training_lights(context: StageContext) -> list[PointLight]:

@@ -23,7 +23,8 @@ from rgspipe.scene import LightRig
 from rgspipe.stages import fit_capture
 from rgspipe.stages.base import Need, Stage, StageContext
 from rgspipe.stages.fit_capture import captured_views
-from rgspipe.stages.fit_light import Fitter, used_views
+from rgspipe.stages.fit_light import Fitter
+from rgspipe.stages.fit_targets import used_views
 from rgspipe.stages.spoken import COMMAND_LINE
 
 

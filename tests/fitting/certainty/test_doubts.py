@@ -9,8 +9,9 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rgspipe.fitting.certainty.doubts import ON_SURFACE, distance_to_surface, doubts
+from rgspipe.fitting.certainty.doubts import distance_to_surface, doubts
 from rgspipe.fitting.findings import OnSurface, Uncertain
+from rgspipe.fitting.options import CertaintyOptions
 from rgspipe.scene import PointLight, Surfels
 from rgspipe.scene.rectangles import rectangle, surfels_on
 
@@ -35,7 +36,7 @@ def test_positions_that_may_be_far_off_are_said_to_be(floor: Surfels) -> None:
 
 
 def test_a_light_that_stands_on_a_surface_is_said_to(floor: Surfels) -> None:
-    above, on, behind = (light_at(0.31, 0.52, height * ON_SURFACE) for height in (1.1, 0.9, -0.9))
+    above, on, behind = (light_at(0.31, 0.52, height * CertaintyOptions().on_surface) for height in (1.1, 0.9, -0.9))
     assert doubts((above,), (SURE,), floor, 1.0) == []
     for light in (on, behind):
         assert doubts((light,), (SURE,), floor, 1.0) == [OnSurface(1, 1)]

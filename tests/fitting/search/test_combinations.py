@@ -12,7 +12,8 @@ import torch
 
 from lit_room import HIDDEN, VISIBLE
 from rgspipe.fitting.model.problem import LightProblem
-from rgspipe.fitting.search.aimed_candidates import AXES, aimed_candidates
+from rgspipe.fitting.options import AimedOptions
+from rgspipe.fitting.search.aimed_candidates import aimed_candidates
 from rgspipe.fitting.search.combinations import (
     Scored,
     best_apart,
@@ -68,8 +69,8 @@ def test_three_lights_are_found_among_the_candidates() -> None:
 
 
 def test_directions_are_spread_evenly() -> None:
-    directions = fibonacci_directions(AXES)
-    cosine = directions @ directions.T - 2.0 * torch.eye(AXES)
+    directions = fibonacci_directions(AimedOptions().axes)
+    cosine = directions @ directions.T - 2.0 * torch.eye(AimedOptions().axes)
     nearest = torch.rad2deg(torch.acos(cosine.amax(dim=1)))
     assert float(nearest.min()) > 15.0 and float(nearest.max()) < 30.0  # measured 22.6 to 24.2 degrees
 
@@ -126,7 +127,7 @@ def test_a_narrow_pool_decides_by_plain_squares(room) -> None:
 def test_the_nearest_candidates_of_a_hidden_light_are_among_the_best(room, point_light):
     light = point_light(HIDDEN)
     problem = LightProblem.create(room.one.prepared, room.one.prepared.stack_images(room.images(light)))
-    (coarse,) = room.one.coarse
+    (coarse,) = room.one.coarse(AimedOptions())
     costs = candidate_costs(Scored.of(problem, coarse))
     chosen = best_apart(costs, coarse.positions, 4, 0.16)
     distance = (coarse.positions[chosen] - light.position).norm(dim=1)

@@ -9,7 +9,7 @@ from lit_room import HIDDEN, VISIBLE
 from noisy_fits import SHAPE, THIRD, noisy_fit
 from rgspipe.fitting import FitResult, FitStatus, LightSpec
 from rgspipe.fitting.findings import LightMissing
-from rgspipe.fitting.selection.diagnosis import POORLY_EXPLAINED
+from rgspipe.fitting.options import CertaintyOptions
 from rgspipe.scene import SpotLight
 
 
@@ -23,7 +23,7 @@ def told_missing(result: FitResult, count: int) -> bool:
 def test_one_light_that_explains_nearly_all_of_two_says_so(room, point_light, place, strength):
     rig = (point_light(VISIBLE), point_light(place, (0.5 * strength, strength, 2.0 * strength)))
     result = noisy_fit(room, rig, LightSpec(count=1))
-    assert len(result.lights) == 1 and result.loss < POORLY_EXPLAINED
+    assert len(result.lights) == 1 and result.loss < CertaintyOptions().poorly
     assert result.status is FitStatus.UNEXPLAINED and told_missing(result, 1)
     assert result.costs[2] < 0.3 * result.costs[1] and result.lights_tried == 2
 
@@ -32,7 +32,7 @@ def test_two_lights_for_three_say_so(room, point_light):
     rig = (point_light(VISIBLE), point_light(HIDDEN), point_light(THIRD, (0.15, 0.3, 0.45)))
     result = noisy_fit(room, rig, LightSpec(count=2))
     # Measured: 0.7 % of the energy is left, and a third light takes off 89 % of the cost.
-    assert result.loss < POORLY_EXPLAINED
+    assert result.loss < CertaintyOptions().poorly
     assert result.status is FitStatus.UNEXPLAINED and told_missing(result, 2)
     assert result.costs[3] < 0.3 * result.costs[2]
 
@@ -53,5 +53,5 @@ def test_one_spot_for_two_says_so(room):
     rig = (spot(VISIBLE, (-0.3, 0.5, -0.6), 1.0), spot(THIRD, (0.2, -0.4, -0.7), 0.15))
     result = noisy_fit(room, rig, LightSpec("spot", 1, SHAPE))
     # Measured: 2.8 % of the energy is left, and another spot takes off 77 % of the cost.
-    assert result.loss < POORLY_EXPLAINED
+    assert result.loss < CertaintyOptions().poorly
     assert result.status is FitStatus.UNEXPLAINED and told_missing(result, 1)

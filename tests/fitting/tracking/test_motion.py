@@ -10,7 +10,8 @@ import torch
 
 from emitters import emitter_at
 from rgspipe.fitting.model.emitter import Emitter
-from rgspipe.fitting.tracking.motion import RATE_CHANGE, Motion, offset, turns
+from rgspipe.fitting.options import MotionOptions
+from rgspipe.fitting.tracking.motion import Motion, offset, turns
 from rgspipe.scene.lights import SpotLight
 
 SHAPE = SpotLight.shaped("gaussian", math.radians(30.0), math.radians(12.0))
@@ -73,7 +74,7 @@ def test_lights_of_one_carrier_change_their_rates_together() -> None:
         spread = float(apart @ ahead @ apart) ** 0.5
         assert (spread < 0.4 * 0.1 * math.sqrt(2.0)) == together
         assert float(torch.linalg.eigvalsh(ahead).min()) > 0.0
-    assert RATE_CHANGE[0] < 0.1
+    assert MotionOptions().rate_change[0] < 0.1
 
 
 def test_an_offset_is_the_step_that_leads_there() -> None:

@@ -11,7 +11,7 @@ import torch
 from lit_room import VISIBLE
 from rgspipe.fitting import FitViews, LightSpec, Search
 from rgspipe.fitting.findings import OutOfSteps, Rival
-from rgspipe.fitting.options import TrackOptions
+from rgspipe.fitting.options import CertaintyOptions, TrackOptions
 from rgspipe.fitting.result import dark_result
 from rgspipe.fitting.tracking.frame import FrameStatus, TrackedFrame, in_order
 from rgspipe.fitting.tracking.track import search_order, track_lights
@@ -64,6 +64,10 @@ def test_a_light_that_jumps_is_found_again_and_a_dark_frame_does_not_end_the_tra
             assert _error(frame, place) < 1e-3
 
 
+def _sure(frame: TrackedFrame) -> bool:
+    return frame.sure(CertaintyOptions().doubtful, TrackOptions().faint)
+
+
 def test_searches_are_counted(room, point_light) -> None:
     """A jump in a sequence of which only one frame may be searched: one side of it stays lost, and says so.
 
@@ -73,7 +77,7 @@ def test_searches_are_counted(room, point_light) -> None:
     track = track_lights(room.two, frames, options=TrackOptions(searches=1, iterations=2))
     assert sorted(frame.status for frame in track) == [FrameStatus.LOST, FrameStatus.SEARCHED]
     lost = next(frame for frame in track if frame.status == FrameStatus.LOST)
-    assert not lost.sure and lost.cost > 0.1
+    assert not _sure(lost) and lost.cost > 0.1
 
 
 def test_a_sequence_without_light_is_lost(room) -> None:
@@ -101,21 +105,21 @@ def test_a_track_without_a_sure_frame_is_uncertain_throughout(monkeypatch, room,
     _ambiguous(monkeypatch, (point_light((0.1, -0.2, 0.28)),))
     track = track_lights(room.two, frames)
     assert {frame.status for frame in track} == {FrameStatus.UNCERTAIN}
-    assert not any(frame.sure for frame in track)
+    assert not any(map(_sure, track))
 
 
 def test_an_answer_with_a_light_that_explains_nothing_is_not_sure(point_light) -> None:
     """Two headlights that one light explains almost as well: the other one of the answer may be anywhere."""
     strong, weak = point_light(VISIBLE), replace(point_light((0.3, 0.3, -0.3)), intensity=0.01 * torch.ones(3).double())
     result = replace(dark_result(0.0), lights=(strong, strong), findings=())
-    assert TrackedFrame(result, FrameStatus.TRACKED, 0.01).sure
-    assert not TrackedFrame(replace(result, lights=(strong, weak)), FrameStatus.TRACKED, 0.01).sure
-    assert not TrackedFrame(replace(result, findings=(Rival(),)), FrameStatus.TRACKED, 0.01).sure
-    assert not TrackedFrame(result, FrameStatus.UNCERTAIN, 0.01).sure
+    assert _sure(TrackedFrame(result, FrameStatus.TRACKED, 0.01))
+    assert not _sure(TrackedFrame(replace(result, lights=(strong, weak)), FrameStatus.TRACKED, 0.01))
+    assert not _sure(TrackedFrame(replace(result, findings=(Rival(),)), FrameStatus.TRACKED, 0.01))
+    assert not _sure(TrackedFrame(result, FrameStatus.UNCERTAIN, 0.01))
     # A fit that ran out of steps does not say what its images leave open: the expected errors do.
     steps = replace(result, findings=(OutOfSteps(),))
-    assert TrackedFrame(steps, FrameStatus.SEARCHED, 0.01, (0.01, 0.02)).sure
-    assert not TrackedFrame(steps, FrameStatus.SEARCHED, 0.01, (0.01, 0.2)).sure
+    assert _sure(TrackedFrame(steps, FrameStatus.SEARCHED, 0.01, (0.01, 0.02)))
+    assert not _sure(TrackedFrame(steps, FrameStatus.SEARCHED, 0.01, (0.01, 0.2)))
 
 
 def test_two_spots_that_move_and_turn_keep_their_order(room) -> None:

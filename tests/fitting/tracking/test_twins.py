@@ -10,7 +10,7 @@ from rgspipe.fitting import FitStatus
 from rgspipe.fitting.findings import Rival
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.result import dark_result
-from rgspipe.fitting.tracking.twins import APART, split_lights, split_rigs
+from rgspipe.fitting.tracking.twins import split_lights, split_rigs
 from rgspipe.scene import LightRig
 
 
@@ -42,9 +42,9 @@ def test_halves_stand_on_both_sides_and_the_faintest_light_gives_way(point_light
     bright, middle = point_light((0.0, 0.0, 0.0), (4.0, 4.0, 4.0)), point_light((0.5, 0.0, 0.0))
     faint = point_light((0.2, 0.2, 0.2), (0.1, 0.1, 0.1))
     result = replace(dark_result(0.0), lights=(bright, faint, middle))
-    rigs = split_rigs(result, 2.0)
+    rigs = split_rigs(result, 0.1)
     # Two lights that may be split, along three directions each.
     assert len(rigs) == 6 and all(len(rig) == 3 for rig in rigs)
     first, second, third = rigs[0]
-    torch.testing.assert_close(first.position - second.position, torch.tensor([2.0 * APART, 0.0, 0.0]).double())
+    torch.testing.assert_close(first.position - second.position, torch.tensor([0.1, 0.0, 0.0]).double())
     torch.testing.assert_close(third.position, middle.position)

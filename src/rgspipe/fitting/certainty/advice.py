@@ -29,6 +29,7 @@ from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.moments import group_moments, information, scores
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.model.views import prepare_views
+from rgspipe.fitting.options import CertaintyOptions
 from rgspipe.fitting.result import FitResult
 from rgspipe.progress import progress_bar
 from rgspipe.renderer.effects import ALL_EFFECTS, Effects
@@ -244,7 +245,7 @@ def _evidence(
     intensity = torch.stack([light.intensity.double().cpu() for light in result.lights])
     columns = [problem.evaluate(emitter) for emitter in emitters]
     image = -problem.residual(columns, intensity)
-    cells, count = surface_cells(views)
+    cells, count = surface_cells(views, CertaintyOptions().cell)
     ends = torch.tensor([camera.pixel_count for camera in small]).cumsum(0)
     view = torch.searchsorted(ends, views.pixels.cpu(), right=True)
     # A small pixel stands for as many as it covers of the camera's own.

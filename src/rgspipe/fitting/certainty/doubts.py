@@ -10,26 +10,28 @@ from torch import Tensor
 
 from rgspipe.fitting.findings import Finding, OnSurface, Uncertain, Undetermined
 from rgspipe.fitting.model.emitter import Emitter
+from rgspipe.fitting.options import CertaintyOptions
 from rgspipe.scene import Light, LightRig
 from rgspipe.scene.surfels import Surfels
-
-#: A position whose error is expected to be larger than this part of the scene's size is said to be in doubt.
-IN_DOUBT = 0.05
-
-#: A light nearer to a surface than this part of the scene's size stands on it: 6 mm in a room of 3 m.
-ON_SURFACE = 0.002
 
 #: A point lies over a surfel if it is within so many standard deviations of the middle, in the surfel's plane.
 OVER = 2.0
 
 
-def doubts(rig: LightRig, covariance: Sequence[Tensor], surfels: Surfels, scene_size: float) -> list[Finding]:
+def doubts(
+    rig: LightRig,
+    covariance: Sequence[Tensor],
+    surfels: Surfels,
+    scene_size: float,
+    options: CertaintyOptions | None = None,
+) -> list[Finding]:
     """What the views do not determine, or hardly, and which lights stand on a surface."""
+    options = options or CertaintyOptions()
     lights = list(enumerate(zip(rig, covariance, strict=True), start=1))
     undetermined = [_undetermined(light, matrix, number, len(rig)) for number, (light, matrix) in lights]
-    uncertain = [_uncertain(matrix, scene_size, number, len(rig)) for number, (_, matrix) in lights]
+    uncertain = [_uncertain(matrix, scene_size, number, len(rig), options.doubtful) for number, (_, matrix) in lights]
     # The covariance of a light that stands on a surface is that of a place that it could not leave.
-    limit = ON_SURFACE * scene_size
+    limit = options.on_surface * scene_size
     standing = [number for number, (light, _) in lights if distance_to_surface(surfels, light.position) < limit]
     on_surface = [OnSurface(number, len(rig)) for number in standing]
     return [finding for finding in (*undetermined, *uncertain, *on_surface) if finding is not None]
@@ -45,9 +47,9 @@ def _undetermined(light: Light, covariance: Tensor, number: int, count: int) -> 
     return Undetermined(number, count, names) if names else None
 
 
-def _uncertain(covariance: Tensor, scene_size: float, number: int, count: int) -> Uncertain | None:
+def _uncertain(covariance: Tensor, scene_size: float, number: int, count: int, limit: float) -> Uncertain | None:
     error = math.sqrt(float(covariance.diagonal()[:3].sum())) / scene_size if scene_size > 0.0 else 0.0
-    return Uncertain(number, count, error) if IN_DOUBT < error < math.inf else None
+    return Uncertain(number, count, error) if limit < error < math.inf else None
 
 
 def distance_to_surface(surfels: Surfels, position: Tensor) -> float:

@@ -23,15 +23,9 @@ from torch import Tensor
 from rgspipe.fitting.model.moments import group_moments, information, scores
 from rgspipe.fitting.model.problem import ROUNDING, LightProblem
 from rgspipe.fitting.model.views import PreparedViews
+from rgspipe.fitting.options import CertaintyOptions
 from rgspipe.fitting.search.refine import State
 from rgspipe.fitting.search.weighting import PLAIN
-
-#: Errors of the model are shared within cells of this part of the scene's size.
-CELL = 0.2
-
-#: κ: by what factor, in standard deviations, errors of the model are larger than the residual shows. The 95 % quantile
-#: of what it takes to hold the truth, over half of the targets of one trained scene; judged on others.
-INFLATION = 3.5
 
 #: No cell's share of the evidence counts as more than this: one that tells everything cannot be left out.
 LARGEST_SHARE = 0.95
@@ -54,7 +48,7 @@ class Covariances:
     noise: tuple[Tensor, ...] = ()
 
 
-def light_covariances(problem: LightProblem, state: State) -> Covariances:
+def light_covariances(problem: LightProblem, state: State, options: CertaintyOptions | None = None) -> Covariances:
     """The covariances of a fit's lights.
 
     All lights are uncertain together: each matrix is a block of the joint covariance. What the views do not determine
@@ -62,7 +56,7 @@ def light_covariances(problem: LightProblem, state: State) -> Covariances:
     """
     owners = torch.cat([torch.full((emitter.parameters,), index) for index, emitter in enumerate(state.emitters)])
     blocks = []
-    for joint, unknown in _joint(problem, state):
+    for joint, unknown in _joint(problem, state, options or CertaintyOptions()):
         per_light = []
         for index, emitter in enumerate(state.emitters):
             colours = len(owners) + 3 * index + torch.arange(3)
@@ -74,7 +68,7 @@ def light_covariances(problem: LightProblem, state: State) -> Covariances:
     return Covariances(*blocks)
 
 
-def surface_cells(views: PreparedViews, cell: float = CELL) -> tuple[Tensor, int]:
+def surface_cells(views: PreparedViews, cell: float) -> tuple[Tensor, int]:
     """(P,) int64 cell of the surface that each trusted pixel looks at, and how many there are.
 
     A pixel looks at the mean place of its surfels; cells are cubes of side `cell` times the scene's size, the same for
@@ -95,11 +89,13 @@ def surface_cells(views: PreparedViews, cell: float = CELL) -> tuple[Tensor, int
     return labels, len(found)
 
 
-def _joint(problem: LightProblem, state: State) -> tuple[tuple[Tensor, Tensor], tuple[Tensor, Tensor]]:
+def _joint(
+    problem: LightProblem, state: State, options: CertaintyOptions
+) -> tuple[tuple[Tensor, Tensor], tuple[Tensor, Tensor]]:
     """Calibrated and noise-only covariance (n, n) of all unknowns, each with what is not determined (n,)."""
     residual = problem.residual(state.columns, state.intensity)
     weights = PLAIN.at(problem, state.columns, state.intensity)
-    labels, count = surface_cells(problem.views)
+    labels, count = surface_cells(problem.views, options.cell)
     labels = labels.to(residual.device)
     values, owners = group_moments(state.columns, residual, weights, labels, count)
     cells = information(values, owners, state.intensity)
@@ -107,7 +103,7 @@ def _joint(problem: LightProblem, state: State) -> tuple[tuple[Tensor, Tensor], 
     noise = float(values[..., -1, -1].sum()) / max(1, residual.numel() - cells.shape[-1])
     root, unknown = whitener(cells.sum(dim=0))
     model = sandwich(root, cells, cell_scores)
-    return (root @ inflated(model, noise) @ root.T, unknown), (noise * root @ root.T, unknown)
+    return (root @ inflated(model, noise, options.inflation) @ root.T, unknown), (noise * root @ root.T, unknown)
 
 
 def whitener(matrix: Tensor) -> tuple[Tensor, Tensor]:
@@ -139,7 +135,7 @@ def sandwich(root: Tensor, cells: Tensor, cell_scores: Tensor) -> Tensor:
     return moves.T @ moves
 
 
-def inflated(model: Tensor, noise: float, inflation: float = INFLATION) -> Tensor:
+def inflated(model: Tensor, noise: float, inflation: float) -> Tensor:
     """(m, m) σ²I + κ²(V − σ²I)₊ for V = `model` and σ² = `noise`."""
     values, vectors = torch.linalg.eigh(model)
     total = noise + inflation**2 * (values - noise).clamp(min=0.0)

@@ -10,6 +10,7 @@ import torch
 from torch import Tensor
 
 from rgspipe.fitting.model.views import PreparedViews
+from rgspipe.fitting.options import AimedOptions
 from rgspipe.fitting.search.coarse import CoarseImages
 from rgspipe.progress import progress_bar
 from rgspipe.renderer.clusters import cluster_patches
@@ -21,45 +22,35 @@ from rgspipe.renderer.point_sets import fibonacci_directions
 from rgspipe.scene.lights import AxialLight
 from rgspipe.scene.lights.angles import angle_from_axis
 
-#: Directions in which every candidate position is aimed.
-AXES = 60
-
-#: Candidates' rims are this much wider than they are [rad], as directions are so far apart.
-SEARCH_SOFTNESS = 0.15
-
-#: All views together have about this many blocks: there are many candidates.
-BLOCKS_IN_ALL = 256
-
-#: What bounces is followed from about this many groups of patches: a wide rim needs no more.
-GROUPS = 250
-
-#: Candidates that send less than this share of the brightest one's light to the views are left out.
-LEAST_SEEN = 0.01
-
 
 def aimed_candidates(
-    views: PreparedViews, dictionary: LightDictionary, shapes: Sequence[AxialLight], effects: Effects = ALL_EFFECTS
+    views: PreparedViews,
+    dictionary: LightDictionary,
+    shapes: Sequence[AxialLight],
+    options: AimedOptions | None = None,
+    effects: Effects = ALL_EFFECTS,
 ) -> CoarseImages:
     """Candidate lights of given shapes at the dictionary's positions, with their coarse images.
 
     A light's coarse image follows from that of a point light at its place: the share of light that the profile lets
     through is taken at the mean place of what each block sees, and of each group of patches.
     """
-    side = max(6, round(math.sqrt(BLOCKS_IN_ALL / len(views.views))))
+    options = options or AimedOptions()
+    side = max(6, round(math.sqrt(options.blocks / len(views.views))))
     model = block_model(views, side, effects)
-    lit = _lit_by_points(views, dictionary, model)
-    directions = fibonacci_directions(AXES).to(lit.places)
+    lit = _lit_by_points(views, dictionary, model, options.groups)
+    directions = fibonacci_directions(options.axes).to(lit.places)
     images, positions, axes, kinds = [], [], [], []
     for index in progress_bar(range(len(dictionary)), "aimed candidates", unit="place"):
         angle = angle_from_axis(directions[:, None], lit.places - dictionary.positions[index].to(lit.places))
-        seen = torch.cat([_aimed_seen(shape, angle, lit, index) for shape in shapes])
+        seen = torch.cat([_aimed_seen(shape, angle, lit, index, options.softness) for shape in shapes])
         images.append(seen)
         positions.append(dictionary.positions[index].expand(len(seen), 3))
         axes.append(directions.repeat(len(shapes), 1))
-        kinds.append(torch.arange(len(shapes)).repeat_interleave(AXES))
+        kinds.append(torch.arange(len(shapes)).repeat_interleave(options.axes))
     joined = [torch.cat(parts) for parts in (images, positions, axes, kinds)]
     brightness = joined[0].sum(dim=(1, 2))
-    kept = brightness > LEAST_SEEN * brightness.amax()
+    kept = brightness > options.least_seen * brightness.amax()
     seen, origins, aims, which = (part[kept.to(part.device)] for part in joined)
     return CoarseImages(model.average, model.counts, seen, origins, tuple(shapes), aims, which)
 
@@ -81,25 +72,25 @@ class _LitByPoints:
     bounced: Tensor | None
 
 
-def _lit_by_points(views: PreparedViews, dictionary: LightDictionary, model: BlockModel) -> _LitByPoints:
+def _lit_by_points(views: PreparedViews, dictionary: LightDictionary, model: BlockModel, groups: int) -> _LitByPoints:
     lights = dictionary.irradiance.T
     direct = model.direct(lights).permute(2, 0, 1)
     patches = patch_radiance(views.frozen, lights).permute(2, 1, 0)
-    groups, places = _groups(views.frozen)
+    members, places = _groups(views.frozen, groups)
     bounced = model.bounced
     if bounced is not None:
         # Within a group each patch counts as much as it does on the average over all lights.
         usual = patches.mean(dim=0).T.clamp(min=1e-12)
-        bounced = ((bounced * usual[:, None]) @ groups.T) / (usual @ groups.T)[:, None]
+        bounced = ((bounced * usual[:, None]) @ members.T) / (usual @ members.T)[:, None]
     seen = torch.cat([_seen_places(views.frozen, model), places])
-    return _LitByPoints(seen, direct, torch.einsum("kp,lpc->lkc", groups, patches), bounced)
+    return _LitByPoints(seen, direct, torch.einsum("kp,lpc->lkc", members, patches), bounced)
 
 
-def _groups(frozen: FrozenScene) -> tuple[Tensor, Tensor]:
+def _groups(frozen: FrozenScene, count: int) -> tuple[Tensor, Tensor]:
     """Compact groups of the frozen scene's patches: which they hold, 1 or 0, (K, patches), and mean places (K, 3)."""
     average, surfels = frozen.transport.average, frozen.surfels
     centers, normals = average @ surfels.centers.float(), average @ surfels.normals.float()
-    labels = torch.from_numpy(cluster_patches(centers, normals, GROUPS, seed=0)).long()
+    labels = torch.from_numpy(cluster_patches(centers, normals, count, seed=0)).long()
     groups = torch.nn.functional.one_hot(labels).T.to(centers)
     return groups, (groups @ centers) / groups.sum(dim=1, keepdim=True)
 
@@ -112,9 +103,9 @@ def _seen_places(frozen: FrozenScene, model: BlockModel) -> Tensor:
     return total / weight.reshape(-1, 1)
 
 
-def _aimed_seen(shape: AxialLight, angle: Tensor, lit: _LitByPoints, index: int) -> Tensor:
+def _aimed_seen(shape: AxialLight, angle: Tensor, lit: _LitByPoints, index: int, softness: float) -> Tensor:
     """(A, B, 3) coarse images of lights at place `index`, from the angles (A, B + K) of what they light."""
-    share, _ = shape.profile_at(angle, shape.numbers(angle), SEARCH_SOFTNESS)
+    share, _ = shape.profile_at(angle, shape.numbers(angle), softness)
     count = lit.direct.shape[1]
     seen = share[:, :count, None] * lit.direct[index]
     for channel, bounced in enumerate(() if lit.bounced is None else lit.bounced):

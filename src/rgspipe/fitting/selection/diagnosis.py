@@ -9,27 +9,27 @@ from torch import Tensor
 
 from rgspipe.fitting.certainty.doubts import doubts
 from rgspipe.fitting.findings import AtBound, Finding, FitStatus, MaybeOneMore, OutOfSteps, PoorlyExplained
-from rgspipe.fitting.options import BarOptions
+from rgspipe.fitting.options import BarOptions, CertaintyOptions
 from rgspipe.fitting.search.compare import robust_costs, wanted
 from rgspipe.fitting.search.refine import Refiner, State
 
-#: An answer that leaves more than this share of the target's energy unexplained is none.
-POORLY_EXPLAINED = 0.05
 
-
-def standing(refiner: Refiner, state: State, covariance: Sequence[Tensor]) -> list[Finding]:
+def standing(
+    refiner: Refiner, state: State, covariance: Sequence[Tensor], options: CertaintyOptions | None = None
+) -> list[Finding]:
     """What holds of lights by themselves, without a rival.
 
     Args:
         refiner: on the problem of all pixels that they were fitted to.
         covariance: of each, see `FitResult.covariance`.
     """
+    options = options or CertaintyOptions()
     problem, region, loss = refiner.problem, refiner.region, refiner.unexplained(state)
     at_bound = any(region.at_bound(emitter.position) for emitter in state.emitters)
     return [
         *([AtBound()] if at_bound else []),
-        *([PoorlyExplained(loss)] if loss > POORLY_EXPLAINED else []),
-        *doubts(state.lights(problem), covariance, problem.views.frozen.surfels, region.size),
+        *([PoorlyExplained(loss)] if loss > options.poorly else []),
+        *doubts(state.lights(problem), covariance, problem.views.frozen.surfels, region.size, options),
         *([OutOfSteps()] if state.status is FitStatus.MAX_ITERATIONS else []),
     ]
 

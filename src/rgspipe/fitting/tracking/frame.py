@@ -9,7 +9,6 @@ import numpy as np
 import torch
 from scipy.optimize import linear_sum_assignment
 
-from rgspipe.fitting.certainty.doubts import IN_DOUBT
 from rgspipe.fitting.findings import FitStatus
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.problem import LightProblem
@@ -19,9 +18,6 @@ from rgspipe.scene import LightRig
 
 #: Results with one answer.
 SURE = (FitStatus.CONVERGED, FitStatus.MAX_ITERATIONS)
-
-#: A light with less than this part of the strongest one's intensity explains nothing: it may be anywhere.
-FAINT = 0.02
 
 #: What a result tells of every light.
 PER_LIGHT = ("lights", "covariance", "noise_covariance")
@@ -45,8 +41,8 @@ class TrackedFrame:
     Attributes:
         result: the fit; its lights have the same order in all frames. Its status is that of the frame's own images, its
             covariance that of these and of the frames from which it was followed.
-        status: how they were found. UNCERTAIN where neither the frame's images nor the motion tell the positions to
-            5 % of the scene, or where the track has no sure frame; LOST where nothing explains the frame.
+        status: how they were found. UNCERTAIN where neither the frame's images nor the motion tell the positions, or
+            where the track has no sure frame; LOST where nothing explains the frame.
         cost: median of the pixels' residuals over their brightness, 1 without lights.
         position_errors: per light the error that is to be expected, root mean square over the scene's size.
     """
@@ -56,18 +52,22 @@ class TrackedFrame:
     cost: float
     position_errors: tuple[float, ...] = ()
 
-    @property
-    def sure(self) -> bool:
-        """Whether the frame's own images tell all of its lights."""
+    def sure(self, doubtful: float, faint: float) -> bool:
+        """Whether the frame's own images tell all of its lights.
+
+        Args:
+            doubtful: errors of positions above this part of the scene's size are in doubt.
+            faint: a light with less than this part of the strongest one's intensity explains nothing.
+        """
         known = self.status not in (FrameStatus.LOST, FrameStatus.UNCERTAIN)
-        told = self.result.status in SURE and max(self.position_errors, default=0.0) <= IN_DOUBT
-        return known and told and not has_faint_light(self.result.lights)
+        told = self.result.status in SURE and max(self.position_errors, default=0.0) <= doubtful
+        return known and told and not has_faint_light(self.result.lights, faint)
 
 
-def has_faint_light(rig: LightRig) -> bool:
+def has_faint_light(rig: LightRig, faint: float) -> bool:
     """Whether a light is so weak beside the strongest that it explains nothing."""
     strengths = [float(light.intensity.mean()) for light in rig]
-    return bool(strengths) and min(strengths) < FAINT * max(strengths)
+    return bool(strengths) and min(strengths) < faint * max(strengths)
 
 
 def frame_cost(problem: LightProblem, rig: LightRig) -> float:

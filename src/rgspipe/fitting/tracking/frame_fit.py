@@ -18,6 +18,7 @@ import torch
 
 from rgspipe.fitting.certainty.uncertainty import Covariances, light_covariances
 from rgspipe.fitting.model.problem import LightProblem
+from rgspipe.fitting.options import CertaintyOptions, TrackOptions
 from rgspipe.fitting.result import FitResult
 from rgspipe.fitting.search.refine import Refiner, State
 from rgspipe.fitting.search.starts import Rig
@@ -39,20 +40,30 @@ class Followed:
     inflation: float
 
 
-def observed(problem: LightProblem, rig: Rig, together: bool = False) -> Followed:
+def observed(
+    problem: LightProblem, rig: Rig, options: TrackOptions | None = None, certainty: CertaintyOptions | None = None
+) -> Followed:
     """A frame whose lights are known already, by a search: with what its images alone tell of them."""
+    options = options or TrackOptions()
     refiner = _refiner(problem, rig)
     problem, state = refiner.problem, refiner.start(rig, PLAIN)
-    spread = light_covariances(problem, state)
+    spread = light_covariances(problem, state, certainty)
     inflation = inflation_of(spread)
     intensity = problem.scale * state.intensity
     evidence = Evidence.of(problem, state, references(intensity))
     information = evidence.information() / (evidence.variance * inflation**2)
-    motion = Motion.starting(state.emitters, intensity, information, problem.views.frozen.size, together)
-    return Followed(_result(refiner, state, motion, spread), motion, inflation)
+    size, together = problem.views.frozen.size, options.together
+    motion = Motion.starting(state.emitters, intensity, information, size, together, options.motion)
+    return Followed(_result(refiner, state, motion, spread, certainty), motion, inflation)
 
 
-def follow(problem: LightProblem, predicted: Motion, inflation: float, iterations: int) -> Followed:
+def follow(
+    problem: LightProblem,
+    predicted: Motion,
+    inflation: float,
+    iterations: int,
+    certainty: CertaintyOptions | None = None,
+) -> Followed:
     """The frame's lights, started from where they are predicted, by at most `iterations` steps."""
     refiner = _refiner(problem, predicted.rig)
     problem, start = refiner.problem, refiner.start(predicted.rig, PLAIN)
@@ -61,8 +72,8 @@ def follow(problem: LightProblem, predicted: Motion, inflation: float, iteration
     evidence = Evidence.of(problem, state, predicted.reference)
     information = evidence.information() / (evidence.variance * inflation**2)
     motion = predicted.updated(state.emitters, problem.scale * state.intensity, information)
-    spread = light_covariances(problem, state)
-    return Followed(_result(refiner, state, motion, spread), motion, inflation_of(spread))
+    spread = light_covariances(problem, state, certainty)
+    return Followed(_result(refiner, state, motion, spread, certainty), motion, inflation_of(spread))
 
 
 def inflation_of(spread: Covariances) -> float:
@@ -84,13 +95,15 @@ def _refiner(problem: LightProblem, rig: Rig) -> Refiner:
     return refiner.on(replace(problem.with_exposures(exposures), exposure_free=False))
 
 
-def _result(refiner: Refiner, state: State, motion: Motion, spread: Covariances) -> FitResult:
+def _result(
+    refiner: Refiner, state: State, motion: Motion, spread: Covariances, certainty: CertaintyOptions | None
+) -> FitResult:
     """The fit of a frame; its status is that of the frame's images alone, its covariance that of all frames so far."""
     problem, meter = refiner.problem, refiner.meter
     loss, lights = refiner.unexplained(state), state.lights(problem)
     return FitResult(
         lights=lights,
-        findings=tuple(standing(refiner, state, spread.calibrated)),
+        findings=tuple(standing(refiner, state, spread.calibrated, certainty)),
         loss=loss,
         iterations=meter.iterations,
         evaluations=meter.evaluations,

@@ -7,24 +7,14 @@ cones hardly change (white-noise acceleration; Bar-Shalom, Li and Kirubarajan 20
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import torch
 from torch import Tensor
 
 from rgspipe.fitting.model.emitter import Emitter
+from rgspipe.fitting.options import MotionOptions
 from rgspipe.fitting.search.starts import Rig
-
-#: Standard deviations of a rate at first, and of its change from one frame to the next: of positions over the scene's
-#: size, and of axes [rad].
-FIRST_RATE, RATE_CHANGE = (0.1, 0.3), (0.01, 0.05)
-
-#: Correlation of the random changes of different lights' rates where the lights are carried by one thing: the rest is
-#: what a turn does to lights some way apart.
-TOGETHER = 0.95
-
-#: Standard deviation of the relative change of an intensity from one frame to the next, and of a cone's parameter.
-INTENSITY_CHANGE, CONE_CHANGE = 0.02, 0.02
 
 #: Standard deviations of what views do not tell at all: a place anywhere in the scene, any axis, any intensity.
 NOTHING_KNOWN = 1.0
@@ -45,6 +35,7 @@ class Motion:
         covariance: (D + 3L + M,) * 2 float64.
         size: the scene's, scene units.
         together: whether one thing carries the lights, so that they move and turn together.
+        options: how lights may move.
     """
 
     rig: Rig
@@ -54,14 +45,25 @@ class Motion:
     covariance: Tensor
     size: float
     together: bool = False
+    options: MotionOptions = field(default_factory=MotionOptions)
 
     @classmethod
-    def starting(cls, rig: Rig, intensity: Tensor, information: Tensor, size: float, together: bool = False) -> Motion:
+    def starting(
+        cls,
+        rig: Rig,
+        intensity: Tensor,
+        information: Tensor,
+        size: float,
+        together: bool = False,
+        options: MotionOptions | None = None,
+    ) -> Motion:
         """At rest, with the information (D + 3L,) * 2 that a first frame gives."""
         known = torch.linalg.inv(information + torch.eye(len(information)).double() / NOTHING_KNOWN**2)
-        rates = _rate_covariance(rig, FIRST_RATE, together)
+        options = options or MotionOptions()
+        rates = _rate_covariance(rig, options.rate, options.alike if together else 0.0)
         still = torch.zeros(len(rates), dtype=torch.float64)
-        return cls(rig, intensity, references(intensity), still, torch.block_diag(known, rates), size, together)
+        covariance = torch.block_diag(known, rates)
+        return cls(rig, intensity, references(intensity), still, covariance, size, together, options)
 
     @property
     def unknowns(self) -> int:
@@ -80,10 +82,11 @@ class Motion:
         forward[moving, count + torch.arange(len(moving))] = 1.0
         basis = torch.block_diag(turned, torch.eye(count - len(turned)).double(), turned[moving][:, moving])
         forward = basis @ forward
-        drift = torch.full((count,), INTENSITY_CHANGE, dtype=torch.float64)
-        drift[: len(turned)] = CONE_CHANGE
+        drift = torch.full((count,), self.options.intensity_change, dtype=torch.float64)
+        drift[: len(turned)] = self.options.shape_change
         drift[moving] = 0.0
-        noise = torch.block_diag(torch.diag(drift.square()), _rate_covariance(self.rig, RATE_CHANGE, self.together))
+        rates = _rate_covariance(self.rig, self.options.rate_change, self.options.alike if self.together else 0.0)
+        noise = torch.block_diag(torch.diag(drift.square()), rates)
         covariance = forward @ (self.covariance + noise) @ forward.T
         return replace(self, rig=rig, rates=turned[moving][:, moving] @ self.rates, covariance=covariance)
 
@@ -158,11 +161,11 @@ def _parameters(rig: Sequence[Emitter]) -> int:
     return sum(emitter.parameters for emitter in rig)
 
 
-def _rate_covariance(rig: Rig, scales: tuple[float, float], together: bool) -> Tensor:
-    """(M, M) of random rates with standard deviations `scales` of positions and axes."""
+def _rate_covariance(rig: Rig, scales: tuple[float, float], alike: float) -> Tensor:
+    """(M, M) of random rates with standard deviations `scales` of positions and axes, and a correlation of lights."""
     rows = [emitter.carried(*scales) for emitter in rig]
     alone = torch.block_diag(*(row @ row.T for row in rows))
-    if not together:
+    if alike == 0.0:
         return alone
     common = torch.cat(rows)
-    return TOGETHER * common @ common.T + (1.0 - TOGETHER) * alone
+    return alike * common @ common.T + (1.0 - alike) * alone

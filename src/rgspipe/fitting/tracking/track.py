@@ -9,7 +9,6 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from rgspipe.fitting.certainty.doubts import IN_DOUBT
 from rgspipe.fitting.findings import FitStatus
 from rgspipe.fitting.fit import FitViews
 from rgspipe.fitting.model.capture import ImageCapture
@@ -29,9 +28,6 @@ from rgspipe.scene.arrays import ArrayLike, as_list
 
 #: Median residuals below this part of a pixel are as good as none.
 SMALL_COST = 1e-3
-
-#: The cost of a frame is judged by the median of so many frames before it.
-REMEMBERED = 5
 
 
 def track_lights(
@@ -110,12 +106,12 @@ class _Tracker:
             known = self._searched(index, FrameStatus.SEARCHED, None)
             if known is not None:
                 tried[index] = known
-            if known is not None and known.frame.sure:
+            if known is not None and self._sure(known):
                 break
         if not tried:
             return None
-        best = min(tried, key=lambda index: (not tried[index].frame.sure, tried[index].frame.cost))
-        self.found[best] = self._judged(tried[best], anchored=tried[best].frame.sure)
+        best = min(tried, key=lambda index: (not self._sure(tried[index]), tried[index].frame.cost))
+        self.found[best] = self._judged(tried[best], anchored=self._sure(tried[best]))
         return best
 
     def _follow(self, index: int, way: int) -> None:
@@ -142,7 +138,7 @@ class _Tracker:
             if other is not None and other.frame.cost < followed.frame.cost:
                 lost = other.frame.cost > limit
                 status = FrameStatus.LOST if lost else other.frame.status
-                return self._judged(replace(other, frame=replace(other.frame, status=status)), other.frame.sure)
+                return self._judged(replace(other, frame=replace(other.frame, status=status)), self._sure(other))
         lost = replace(followed.frame, status=FrameStatus.LOST)
         return replace(before, frame=lost, motion=before.motion.predicted())
 
@@ -159,9 +155,14 @@ class _Tracker:
             self.found[index] = known
 
     def _followed(self, problem: LightProblem, before: _Known, way: int) -> _Known:
-        made = follow(problem, before.motion.predicted(), before.inflation, self.options.iterations)
+        made = follow(
+            problem, before.motion.predicted(), before.inflation, self.options.iterations, self.search.certainty
+        )
         status = FrameStatus.TRACKED if way > 0 else FrameStatus.TRACED_BACK
         return self._judged(self._known(problem, made, status), before.anchored)
+
+    def _sure(self, known: _Known) -> bool:
+        return known.frame.sure(self.search.certainty.doubtful, self.options.faint)
 
     @staticmethod
     def _is_lost(known: _Known, limit: float) -> bool:
@@ -172,12 +173,12 @@ class _Tracker:
         images, capture = self.taken[index]
         result = self.views.fit(images, solver=self.search, capture=capture)
         problem = self._problem(index)
-        result = split_lights(problem, result, self.views.blocks, self.search.iterations)
+        result = split_lights(problem, result, self.views.blocks, self.search, self.options.split)
         if not result.lights:
             return None
         if before is not None:
             result = in_order(result, tuple(light for light in before.frame.result.lights))
-        made = observed(problem, self._emitters(result.lights), self.options.together)
+        made = observed(problem, self._emitters(result.lights), self.options, self.search.certainty)
         return self._known(problem, replace(made, result=result), status)
 
     def _known(self, problem: LightProblem, made: Followed, status: FrameStatus) -> _Known:
@@ -188,7 +189,7 @@ class _Tracker:
     def _judged(self, known: _Known, anchored: bool) -> _Known:
         """The frame as part of a track that had a sure frame, or had none."""
         frame = known.frame
-        doubtful = not anchored or max(frame.position_errors, default=1.0) > IN_DOUBT
+        doubtful = not anchored or max(frame.position_errors, default=1.0) > self.search.certainty.doubtful
         if doubtful and frame.status != FrameStatus.LOST:
             frame = replace(frame, status=FrameStatus.UNCERTAIN)
         return replace(known, frame=frame, anchored=anchored)
@@ -200,7 +201,7 @@ class _Tracker:
 
     def _limit(self, index: int, way: int) -> float:
         """The cost from which on a frame is lost, by the frames next to it on the side that it is followed from."""
-        near = [self.found.get(index - way * back) for back in range(1, REMEMBERED + 1)]
+        near = [self.found.get(index - way * back) for back in range(1, self.options.remembered + 1)]
         costs = [known.frame.cost for known in near if known is not None and known.frame.status != FrameStatus.LOST]
         return self.options.lost * max(SMALL_COST, float(np.median(costs))) if costs else 1.0
 

@@ -14,6 +14,7 @@ import torch
 
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.problem import LightProblem
+from rgspipe.fitting.options import SearchOptions, SplitOptions
 from rgspipe.fitting.result import FitResult
 from rgspipe.fitting.search.refine import Refiner
 from rgspipe.fitting.search.schedule import soft
@@ -23,39 +24,34 @@ from rgspipe.fitting.search_lm import fit_from
 from rgspipe.renderer.images.model import ImageModel
 from rgspipe.scene.lights.coordinates import tangents
 
-#: How far apart the halves of a light are put, parts of the scene's size.
-APART = 0.06
-
-#: Steps of each split rig, with rims that are wider by so much [rad], and of the best ones as they are.
-ROUNDS = ((0.15, 4), (0.05, 4), (0.0, 8))
-
-#: So many split rigs take the last round, and the better ones of these are polished.
-KEPT, POLISHED = 5, 2
-
-#: A split rig takes the place of the rig it comes from where it leaves less than this part of its error unexplained.
-BETTER = 0.8
-
 
 def split_lights(
-    problem: LightProblem, result: FitResult, blocks: ImageModel | None, iterations: int = 30
+    problem: LightProblem,
+    result: FitResult,
+    blocks: ImageModel | None,
+    search: SearchOptions | None = None,
+    options: SplitOptions | None = None,
 ) -> FitResult:
     """The result, or one with a light split in two in the place of its faintest if that explains clearly more.
 
     Args:
         problem: of all pixels.
         blocks: the views as blocks of pixels, on which split rigs are refined.
+        search: how split rigs are polished.
+        options: how lights are split.
     """
+    search, options = search or SearchOptions(), options or SplitOptions()
     if len(result.lights) < 2:
         return result
     coarse = Refiner.of(problem.coarsest(blocks))
-    states = [coarse.start(rig, PLAIN) for rig in split_rigs(result, coarse.region.size)]
-    for softness, steps in ROUNDS:
+    states = [coarse.start(rig, PLAIN) for rig in split_rigs(result, options.apart * coarse.region.size)]
+    for softness, steps in zip(options.softness, options.steps, strict=True):
         states = [coarse.at(state, soft(state.emitters, softness)) for state in states]
         states = [coarse.refined(state, PLAIN, steps) for state in states]
-        states = sorted(states, key=coarse.unexplained)[:KEPT]
-    polished = [fit_from(problem, state.emitters, iterations) for state in states[:POLISHED]]
+        states = sorted(states, key=coarse.unexplained)[: options.kept]
+    polished = [fit_from(problem, state.emitters, search.iterations, search) for state in states[: options.polished]]
     best = min(polished, key=lambda other: other.loss)
-    chosen = best if best.loss < BETTER * result.loss else result
+    chosen = best if best.loss < options.better * result.loss else result
     return replace(
         chosen,
         seconds=result.seconds + coarse.meter.seconds,
@@ -64,8 +60,8 @@ def split_lights(
     )
 
 
-def split_rigs(result: FitResult, size: float) -> list[Rig]:
-    """The rig with one light after the other split in the place of the faintest, along three directions each."""
+def split_rigs(result: FitResult, apart: float) -> list[Rig]:
+    """The rig with one light after the other split in the place of the faintest, three ways, `apart` scene units."""
     emitters = [Emitter.of(light) for light in result.lights]
     strengths = [float(light.intensity.mean()) for light in result.lights]
     faint = min(range(len(strengths)), key=strengths.__getitem__)
@@ -74,8 +70,8 @@ def split_rigs(result: FitResult, size: float) -> list[Rig]:
         if index == faint:
             continue
         for direction in _directions(emitter):
-            apart = 0.5 * APART * size * direction
-            halves = [emitter.placed(emitter.position + sign * apart) for sign in (1.0, -1.0)]
+            half = 0.5 * apart * direction
+            halves = [emitter.placed(emitter.position + sign * half) for sign in (1.0, -1.0)]
             others = [one for k, one in enumerate(emitters) if k not in (index, faint)]
             rigs.append((*halves, *others))
     return rigs

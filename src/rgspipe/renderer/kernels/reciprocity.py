@@ -16,6 +16,7 @@ PAST_THE_END = wp.constant(2147483647)
 
 @wp.func
 def column_at(columns: wp.array(dtype=int), k: int, end: int):
+    """The column of entry k, or PAST_THE_END from `end` on."""
     found = PAST_THE_END
     if k < end:
         found = columns[k]
