@@ -24,5 +24,5 @@ def noisy_images(views: FitViews, rig: LightRig) -> list[torch.Tensor]:
 
 def noisy_fit(room, rig: LightRig, spec: LightSpec) -> FitResult:
     """A search for the lights of `noisy_images` in the lit room."""
-    views = FitViews.prepare(room.frozen, room.views, lights=spec)
+    views = FitViews.prepare(room.frozen, room.views, lights=spec, sharp=False)
     return views.fit(noisy_images(views, rig))

@@ -23,10 +23,11 @@ if TYPE_CHECKING:
     from rgspipe.datasets.views import View
     from rgspipe.errors import InputError
     from rgspipe.evaluation.images import save_png, tone_map
-    from rgspipe.fitting import Effects, FitResult, FitStatus, FitViews, ImageCapture, LightSpec, fit_lights
+    from rgspipe.fitting import FitResult, FitStatus, FitViews, ImageCapture, LightSpec, fit_lights
     from rgspipe.fitting.options import TrackOptions
     from rgspipe.fitting.solvers import PaperAdam, Search
     from rgspipe.fitting.tracking.track import track_lights
+    from rgspipe.renderer.effects import Effects
     from rgspipe.renderer.frozen import FrozenScene
     from rgspipe.renderer.ply import load_ply
     from rgspipe.scene import Camera, Surfels
@@ -43,10 +44,11 @@ _HOMES = {
     "datasets.views": ("View",),
     "errors": ("InputError",),
     "evaluation.images": ("save_png", "tone_map"),
-    "fitting": ("Effects", "FitResult", "FitStatus", "FitViews", "ImageCapture", "LightSpec", "fit_lights"),
+    "fitting": ("FitResult", "FitStatus", "FitViews", "ImageCapture", "LightSpec", "fit_lights"),
     "fitting.options": ("TrackOptions",),
     "fitting.solvers": ("PaperAdam", "Search"),
     "fitting.tracking.track": ("track_lights",),
+    "renderer.effects": ("Effects",),
     "renderer.frozen": ("FrozenScene",),
     "renderer.ply": ("load_ply",),
     "scene": ("Camera", "Surfels"),

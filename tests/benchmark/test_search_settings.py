@@ -24,7 +24,7 @@ def test_every_number_is_halved_and_doubled_alone() -> None:
 def test_the_table_has_a_row_for_each_and_the_usual_first(monkeypatch) -> None:
     monkeypatch.setattr("rgspipe.benchmark.search_settings.varied", lambda usual: [*varied(usual)][:2])
     frozen = frozen_room().with_dictionary(4)
-    views = FitViews.prepare(frozen, room_cameras(24)[:1])
+    views = FitViews.prepare(frozen, room_cameras(24)[:1], sharp=False)
     light = PointLight(torch.tensor(VISIBLE, dtype=torch.float64), 1.0)
     targets = [KnownTarget(views.render(light), (light,), views)]
     table = search_table(targets, frozen.size)

@@ -27,6 +27,7 @@ from half_seen_room import (
 )
 from rgspipe.completion import with_unseen_surfaces
 from rgspipe.completion.unseen import MOST_UNSEEN
+from rgspipe.renderer.effects import Effects
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import PointLight, Surfels
 from rgspipe.scene.gloss import Gloss
@@ -164,4 +165,4 @@ def bounced_light(surfels: Surfels, lamp: PointLight) -> torch.Tensor:
     """(N, 3) radiance of the light that bounces."""
     frozen = FrozenScene.freeze(surfels, gather_rays=64, patches=100, seed=0)
     rig = (lamp,)
-    return frozen.radiance_of(rig) - frozen.radiance_of(rig, indirect=False)
+    return frozen.radiance_of(rig) - frozen.radiance_of(rig, Effects(interreflection=False))

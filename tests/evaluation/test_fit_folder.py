@@ -17,7 +17,7 @@ from rgspipe.scene import PointLight, SpotLight
 
 
 def test_a_rig_with_a_spot_is_written_whole(tmp_path: Path) -> None:
-    views = FitViews.prepare(frozen_room(), room_cameras(8)[:1], mask_edges=False)
+    views = FitViews.prepare(frozen_room(), room_cameras(8)[:1], mask_edges=False, sharp=False)
     place, ones = torch.tensor([0.1, 0.2, 0.3], dtype=torch.float64), torch.ones(3, dtype=torch.float64)
     axis = torch.tensor([0.0, 0.6, -0.8], dtype=torch.float64)
     rig = (PointLight(place, ones), SpotLight(-place, 2.0 * ones, axis, "gaussian", 0.4, 0.1))

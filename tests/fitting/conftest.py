@@ -27,14 +27,14 @@ class Room:
     two: FitViews
 
     def images(self, light: PointLight, count: int = 1) -> list[torch.Tensor]:
-        return [self.frozen.render(view, (light,)) for view in self.views[:count]]
+        return [self.frozen.render(view, (light,), sharp=False) for view in self.views[:count]]
 
 
 @pytest.fixture(scope="session")
 def room() -> Room:
     frozen = frozen_room().with_dictionary(6)
     views = [frozen.view(camera) for camera in room_cameras(48)]
-    one, two = (FitViews.prepare(frozen, views[:count]) for count in (1, 2))
+    one, two = (FitViews.prepare(frozen, views[:count], sharp=False) for count in (1, 2))
     return Room(frozen, views, frozen.dictionary, one, two)
 
 

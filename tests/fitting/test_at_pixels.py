@@ -8,7 +8,7 @@ import torch
 from emitters import emitter_at
 from rgspipe.benchmark.rooms import ROOMS
 from rgspipe.fitting import FitViews
-from rgspipe.fitting.model.problem import Effects, LightProblem
+from rgspipe.renderer.effects import Effects
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.pixel_direct import PixelDirect, surfel_shares
 from rgspipe.scene import PointLight
@@ -26,9 +26,7 @@ def frozen() -> FrozenScene:
 
 def test_a_fit_at_pixels_finds_a_light_near_a_wall_that_centres_misplace(frozen: FrozenScene) -> None:
     cameras = ROOMS["cornell"]().cameras(32)[:1]
-    sharp, plain = (
-        FitViews.prepare(frozen, cameras, effects=Effects(at_pixels=at_pixels)) for at_pixels in (True, False)
-    )
+    sharp, plain = (FitViews.prepare(frozen, cameras, sharp=at_pixels) for at_pixels in (True, False))
     images = sharp.render(LIGHT)
     found = sharp.fit(images).lights[0]
     coarse = plain.fit(images).lights[0]
@@ -41,8 +39,8 @@ def test_a_fit_at_pixels_finds_a_light_near_a_wall_that_centres_misplace(frozen:
 
 def test_without_bounces_the_image_is_the_direct_light_of_the_pixels(frozen: FrozenScene) -> None:
     cameras = ROOMS["cornell"]().cameras(16)
-    views = FitViews.prepare(frozen, cameras, effects=Effects(interreflection=False, at_pixels=True))
-    problem = LightProblem.create(views.prepared, views.prepared.stack_images(views.render(LIGHT)), views.effects)
+    views = FitViews.prepare(frozen, cameras, effects=Effects(interreflection=False), sharp=True)
+    problem = views.problem(views.prepared.stack_images(views.render(LIGHT)))
     expected = [
         PixelDirect(frozen.bvh, view).image(LIGHT.position, *surfel_shares(frozen.bvh, LIGHT.position))
         for view in views.prepared.views
@@ -54,8 +52,8 @@ def test_without_bounces_the_image_is_the_direct_light_of_the_pixels(frozen: Fro
 
 def test_derivatives_agree_with_finite_differences(frozen: FrozenScene) -> None:
     """Bounces included, in the part of the image that is smooth: the median over the pixels."""
-    views = FitViews.prepare(frozen, ROOMS["cornell"]().cameras(16), effects=Effects(at_pixels=True))
-    problem = LightProblem.create(views.prepared, views.prepared.stack_images(views.render(LIGHT))).sharpest()
+    views = FitViews.prepare(frozen, ROOMS["cornell"]().cameras(16), sharp=True)
+    problem = views.problem(views.prepared.stack_images(views.render(LIGHT))).sharpest()
     position, step = torch.tensor([0.05, -0.1, 0.2], dtype=torch.float64), 1e-3
     columns = problem.evaluate(emitter_at(position))
     for axis in range(3):

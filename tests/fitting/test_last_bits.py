@@ -71,7 +71,7 @@ def rounded_in_ways(monkeypatch: pytest.MonkeyPatch, views: FitViews, rig: Light
 def test_the_same_is_said_however_sums_round(room, monkeypatch, name: str) -> None:
     case, views = CASES[name], room.two
     if case.spec != LightSpec():
-        views = FitViews.prepare(room.frozen, room.views, lights=case.spec)
+        views = FitViews.prepare(room.frozen, room.views, lights=case.spec, sharp=False)
     for result in rounded_in_ways(monkeypatch, views, case.rig):
         assert {finding.status for finding in result.findings} == case.held
 
@@ -79,6 +79,6 @@ def test_the_same_is_said_however_sums_round(room, monkeypatch, name: str) -> No
 def test_a_light_that_is_too_far_stays_at_the_bound(monkeypatch) -> None:
     cube = frozen_cube()
     camera = Camera.from_field_of_view(look_at(torch.tensor([0.9, -0.7, 0.8]), torch.zeros(3)), 0.7, 24, 24)
-    views = FitViews.prepare(cube.with_dictionary(3), [camera])
+    views = FitViews.prepare(cube.with_dictionary(3), [camera], sharp=False)
     for result in rounded_in_ways(monkeypatch, views, (point(26.0, -28.0, 21.0),)):
         assert result.status is FitStatus.AT_BOUND

@@ -27,7 +27,7 @@ def led(exponent: float, place=VISIBLE, axis=AXIS) -> LedLight:
 
 
 def fit(room, rig: LightRig, spec: LightSpec, noise: float = 0.0) -> FitResult:
-    views = FitViews.prepare(room.frozen, room.views, lights=spec)
+    views = FitViews.prepare(room.frozen, room.views, lights=spec, sharp=False)
     generator = torch.Generator().manual_seed(0)
     images = views.render(rig)
     images = [image + noise * image.mean() * torch.randn(image.shape, generator=generator) for image in images]
@@ -81,7 +81,7 @@ def test_two_leds_are_counted(room) -> None:
 
 def test_adam_finds_an_led_and_its_axis(room, point_light) -> None:
     truth = led(4.0)
-    images = [room.frozen.render(view, (truth,)) for view in room.views]
+    images = [room.frozen.render(view, (truth,), sharp=False) for view in room.views]
     result = fit_lights(
         room.frozen,
         room.views,
@@ -94,6 +94,7 @@ def test_adam_finds_an_led_and_its_axis(room, point_light) -> None:
             axis_rate=0.02,
             training_lights=[point_light((0.05, -0.2, 0.2), (1.0, 1.0, 1.0))],
         ),
+        sharp=False,
     )
     (found,), (first,) = result.lights, result.trajectory[0].lights
     for name in ("direction", "position"):
@@ -104,9 +105,9 @@ def test_adam_finds_an_led_and_its_axis(room, point_light) -> None:
 
 def test_an_led_that_moves_and_turns_is_followed(room) -> None:
     spec = LightSpec("led", shape_free=True)
-    views = FitViews.prepare(room.frozen, room.views, lights=spec)
+    views = FitViews.prepare(room.frozen, room.views, lights=spec, sharp=False)
     truth = [(led(4.0, (0.1 - 0.04 * k, -0.25, 0.3), (-0.3, 0.5 + 0.05 * k, -0.6)),) for k in range(3)]
-    frames = [[room.frozen.render(view, rig) for view in room.views] for rig in truth]
+    frames = [[room.frozen.render(view, rig, sharp=False) for view in room.views] for rig in truth]
     track = track_lights(views, frames)
     assert [frame.status for frame in track].count(FrameStatus.SEARCHED) == 1
     for frame, rig in zip(track, truth, strict=True):

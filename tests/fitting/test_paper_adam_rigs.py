@@ -15,13 +15,14 @@ from emitters import emitter_at
 from hard_cases import camera
 from hard_cases import room as small_room
 from lit_room import VISIBLE
-from rgspipe.fitting import Effects, LightSpec, PaperAdam
+from rgspipe.fitting import LightSpec, PaperAdam
 from rgspipe.fitting.baselines.paper_adam_loss import AdamLoss, MovingRig, rig_image
-from rgspipe.fitting.model.harmonics import BandLimit, legendre, zonal_coefficients
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.model.views import prepare_views
 from rgspipe.fitting.search_lm import fit_from
+from rgspipe.renderer.effects import Effects
 from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.renderer.zonal_harmonics import BandLimit, legendre, zonal_coefficients
 from rgspipe.scene import SpotLight
 from rgspipe.scene.lights.angles import angle_from_axis
 
@@ -53,9 +54,9 @@ def test_loss_and_gradients_of_two_spots_are_those_of_float64(band: BandLimit | 
     surfels = small_room()
     frozen = FrozenScene.freeze(surfels, gather_rays=16, patches=20, seed=0)
     views = prepare_views(frozen, [frozen.view(camera())], mask_edges=False)
-    target = torch.full((views.all_pixels.shape[0], 3), 0.2)
+    target = torch.full((views.every_pixel.operator.shape[0], 3), 0.2)
     shape = (views.views[0].camera.height, views.views[0].camera.width)
-    transport, operator = DoubleTransport.of(frozen), views.all_pixels.matrix.to_dense().double()
+    transport, operator = DoubleTransport.of(frozen), views.every_pixel.operator.matrix.to_dense().double()
     double = double_precision.in_double(surfels)
     results = []
     for exact in (False, True):
@@ -86,13 +87,13 @@ def test_the_image_of_a_rig_is_the_scene_s(room, point_light) -> None:
     positions, strengths, axes = (leaf.detach() for leaf in two_spots())
     rig = MovingRig(positions, strengths, SHAPE, axes)
     found = rig_image(room.one.prepared, rig, Effects())
-    expected = room.frozen.render(room.views[0], rig.lights()).reshape(-1, 3)
+    expected = room.frozen.render(room.views[0], rig.lights(), sharp=False).reshape(-1, 3)
     torch.testing.assert_close(found, expected, atol=1e-6, rtol=1e-5)  # measured 0
 
 
 def test_adam_finds_two_points(room, point_light) -> None:
     rig = (point_light(VISIBLE), point_light((-0.25, 0.3, 0.2), (2.0, 0.5, 1.0)))
-    images = [room.frozen.render(view, rig) for view in room.views]
+    images = [room.frozen.render(view, rig, sharp=False) for view in room.views]
     starts = [point_light(VISIBLE, (1.0, 1.0, 1.0)), point_light((-0.25, 0.3, 0.2), (1.0, 1.0, 1.0))]
     solver = PaperAdam(epochs=1, steps=80, intensity_rate=0.1, training_lights=starts, seed=1)
     result = replace(room.two, lights=LightSpec(count=2)).fit(images, solver=solver)
@@ -106,7 +107,7 @@ def test_adam_finds_a_spot_and_its_axis(room, point_light) -> None:
     axis = unit(-0.3, 0.5, -0.6)
     light = point_light(VISIBLE)
     truth = SHAPE.at(light.position, axis, light.intensity)
-    images = [room.frozen.render(view, (truth,)) for view in room.views]
+    images = [room.frozen.render(view, (truth,), sharp=False) for view in room.views]
     start = point_light((0.05, -0.2, 0.2), (1.0, 1.0, 1.0))
     solver = PaperAdam(epochs=1, steps=60, intensity_rate=0.1, axis_rate=0.02, training_lights=[start])
     result = replace(room.two, lights=SPOTS).fit(images, solver=solver)
@@ -144,7 +145,7 @@ def test_a_hard_edge_has_a_gradient(room, point_light) -> None:
     """It is taken with the least rim of fits; a derivative of zero would never turn the axis."""
     hard = SpotLight.shaped("smoothstep", math.radians(30.0), 0.0)
     positions, strengths, axes = (leaf[:1].detach().requires_grad_() for leaf in two_spots())
-    target = torch.zeros((room.one.prepared.all_pixels.shape[0], 3))
+    target = torch.zeros((room.one.prepared.every_pixel.operator.shape[0], 3))
     AdamLoss(room.one.prepared, target, 0.2, Effects())(MovingRig(positions, strengths, hard, axes)).backward()
     assert float(axes.grad.norm()) > 0.0 and torch.isfinite(axes.grad).all()
 

@@ -11,7 +11,7 @@ from torch import Tensor
 
 from lit_room import HIDDEN, VISIBLE
 from rgspipe.errors import InputError
-from rgspipe.fitting import Effects, FitResult, FitStatus, FitViews, LightSpec
+from rgspipe.fitting import FitResult, FitStatus, FitViews, LightSpec
 from rgspipe.scene import LightRig, SpotLight
 
 THIRD = (-0.3, 0.3, 0.1)
@@ -24,8 +24,8 @@ def spot(position=VISIBLE, axis=(-0.3, 0.5, -0.6), shape: SpotLight = SHAPE) -> 
     return shape.at(place, direction, intensity)
 
 
-def fit(room, rig: LightRig, spec: LightSpec, noise: float = 0.0, effects: Effects | None = None) -> FitResult:
-    views = FitViews.prepare(room.frozen, room.views, lights=spec, effects=effects)
+def fit(room, rig: LightRig, spec: LightSpec, noise: float = 0.0, sharp: bool = False) -> FitResult:
+    views = FitViews.prepare(room.frozen, room.views, lights=spec, sharp=sharp)
     generator = torch.Generator().manual_seed(0)
     images = [
         image + noise * image.mean() * torch.randn(image.shape, generator=generator) for image in views.render(rig)
@@ -61,7 +61,7 @@ def test_two_point_lights_one_of_them_hidden(room, point_light):
 
 
 def test_a_spot_with_known_cone_where_pixels_look(room):
-    result = fit(room, (spot(),), LightSpec("spot", shape=SHAPE), effects=Effects(at_pixels=True))
+    result = fit(room, (spot(),), LightSpec("spot", shape=SHAPE), sharp=True)
     (found,) = result.lights
     # Measured 7e-8 and 1e-7.
     assert max(errors(result, (spot(),))) < 1e-5 and isinstance(found, SpotLight)
@@ -126,7 +126,7 @@ def _ill_images(room, kind: str) -> list[Tensor]:
 @pytest.mark.parametrize("kind", ["black", "saturated", "one hot pixel"])
 def test_images_that_no_rig_explains_stay_finite(room, kind):
     spec = LightSpec(count=2)
-    views = FitViews.prepare(room.frozen, room.views, lights=spec)
+    views = FitViews.prepare(room.frozen, room.views, lights=spec, sharp=False)
     result = views.fit(_ill_images(room, kind))
     assert result.lights or result.status is FitStatus.NOT_ENOUGH_LIGHT
     assert bool(result.lights) or kind != "saturated"

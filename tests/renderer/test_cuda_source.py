@@ -13,7 +13,6 @@ import warp as wp
 from rgspipe.renderer import kernels
 
 NAMES = [f"{kernels.__name__}.{module.name}" for module in pkgutil.iter_modules(kernels.__path__)]
-NAMES.append("rgspipe.fitting.model.kernels.lit_shares")
 
 
 @pytest.mark.skipif(sys.platform == "darwin", reason="Warp for macOS holds no CUDA compiler")

@@ -6,10 +6,11 @@ import pytest
 import torch
 from torch import Tensor
 
-from rgspipe.renderer.direct import differentiable_irradiance, unit_irradiance
+from rgspipe.renderer.direct import unit_irradiance
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.kernels.irradiance import SOFTENING
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
+from rgspipe.renderer.rig import rig_irradiance
 from rgspipe.scene import PointLight, Surfels
 from rooms import closed_box, rectangle, surfels_on
 
@@ -52,7 +53,7 @@ def test_derivative_matches_finite_differences_of_the_closed_form(light: list[fl
 def test_autograd_is_the_derivative(box: FrozenScene) -> None:
     light = torch.tensor([[0.1, 0.2, 0.1]], requires_grad=True)
     weights = torch.rand(len(box.surfels), generator=torch.Generator().manual_seed(0))
-    (differentiable_irradiance(box.bvh, light)[0] * weights).sum().backward()
+    (rig_irradiance(box.bvh, (PointLight(light[0], 1.0),))[:, 0] * weights).sum().backward()
     _, slope = box.unit_irradiance(light.detach())
     expected = (slope[0] * weights[:, None]).sum(dim=0)
     # Measured 1e-6: float32 sums of terms that cancel, in two orders.

@@ -7,7 +7,9 @@ import math
 import pytest
 import torch
 
-from rgspipe.renderer.frozen import FrozenScene, Solver
+from rgspipe.renderer.effects import Effects
+from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.renderer.indirect import Solver
 from rgspipe.renderer.radiosity import GatherSolver, solve_radiosity_directly
 from rgspipe.renderer.transport import with_albedo
 from rgspipe.scene import PointLight
@@ -48,7 +50,7 @@ def test_closed_box_with_uniform_emission(box: FrozenScene, solver: str, albedo:
 def test_pbrt_s_furnace(globe: FrozenScene, solver: Solver) -> None:
     """A unit sphere of albedo 0.5 around a point light of intensity π: radiance 1, and 0.5 of it directly."""
     light = (PointLight(torch.zeros(3), torch.full((3,), math.pi)),)
-    direct = globe.radiance_of(light, indirect=False)
+    direct = globe.radiance_of(light, Effects(interreflection=False))
     total = globe.with_solver(solver).radiance_of(light)
     # Measured 4e-6 (direct, and total by patches) and 3.5e-5 (total by gather, whose bounces end there).
     torch.testing.assert_close(direct, torch.full_like(direct, 0.5), rtol=2e-5, atol=0)

@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 import torch
 
+from rgspipe.renderer.effects import Effects
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.glossy_columns import unit_light_columns
 from rgspipe.scene import Gloss, PointLight
@@ -31,7 +32,7 @@ def test_columns_are_radiance_and_its_derivatives(room: FrozenScene, indirect: b
     found = columns.seen_from(EYE)
 
     def radiance(place: torch.Tensor) -> torch.Tensor:
-        return room.glossy_light((PointLight(place, torch.ones(3)),), indirect).seen_from(EYE)
+        return room.glossy_light((PointLight(place, torch.ones(3)),), Effects(interreflection=indirect)).seen_from(EYE)
 
     weights = torch.rand(5, len(room.surfels), 3, generator=torch.Generator().manual_seed(0))
     slopes = torch.autograd.functional.jacobian(lambda p: (weights * radiance(p)).sum(dim=(1, 2)), position)

@@ -11,6 +11,7 @@ import torch
 from torch import Tensor
 
 from phong_room import PhongRoom
+from rgspipe.renderer.effects import ALL_EFFECTS, Effects
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.gather import cosine_directions
 from rgspipe.renderer.glossy import mirrored, phong_lobe
@@ -20,6 +21,9 @@ from rgspipe.renderer.spherical_harmonics import real_harmonics
 from rgspipe.renderer.transport import build_patch_transport, with_bounces
 from rgspipe.scene import Camera, Gloss, LightRig, PointLight, SpotLight, Surfels, look_at
 from rooms import closed_box, sphere, surfels_on
+
+#: Light that meets one surface.
+DIRECT = Effects(interreflection=False)
 
 LIGHT, EYE = (0.1, -0.2, 0.1), (-0.3, 0.25, 0.2)
 
@@ -75,7 +79,7 @@ def test_radiance_of_a_glossy_room_is_that_of_an_exact_path_tracer(
 
 def test_the_highlight_of_a_light_is_the_exact_lobe(room: FrozenScene) -> None:
     """Direct light alone: no harmonic is in it, so it has no band limit."""
-    found = room.glossy_light((lamp(),), indirect=False).seen_from(torch.tensor(EYE)).double()
+    found = room.glossy_light((lamp(),), DIRECT).seen_from(torch.tensor(EYE)).double()
     truth = PhongRoom(0.5, 0.4, 20.0, np.array(LIGHT))
     expected, _ = truth.radiance(room.surfels.centers.double().numpy(), np.array(EYE), paths=1, bounces=0)
     # Measured 2e-5, next to the light's own softening.
@@ -119,7 +123,7 @@ def test_one_bounce_converges_to_the_exact_lobe_with_the_degree(degree: int, tol
     light, eye = (torch.tensor(x, dtype=torch.float64) for x in (LIGHT, EYE))
     expected = exact_bounce(surfels, torch.from_numpy(scene.gather.to_scipy().toarray()).double(), light, eye)
     exact = unshadowed(surfels, (lamp(),))
-    response = RigResponse(exact.lights, exact.irradiance.float(), ({"position": exact.slopes[0]["position"].float()},))
+    response = RigResponse(exact.lights, exact.irradiance.float(), (exact.slopes[0].float(),))
     found = gloss.light(transport, response).seen_from(eye)[:, 0].double()
     # Measured 2.0e-3, 1.8e-4 and 5.1e-5.
     assert float((found - expected).norm() / expected.norm()) < tolerance
@@ -132,7 +136,7 @@ def unshadowed(surfels: Surfels, lights: LightRig) -> RigResponse:
     slope = surfels.normals * inverse.pow(3)[..., None] - 3.0 * d * (facing * inverse.pow(5))[..., None]
     lit = facing > 0.0
     slopes = torch.where(lit[..., None], slope, 0.0)
-    return RigResponse(lights, facing.clamp(min=0.0) * inverse.pow(3), tuple({"position": by} for by in slopes))
+    return RigResponse(lights, facing.clamp(min=0.0) * inverse.pow(3), tuple(slopes))
 
 
 def point_lights(positions: Tensor, intensities: Tensor) -> LightRig:
@@ -143,7 +147,7 @@ def test_gloss_without_reflectance_is_exactly_the_diffuse_scene(room: FrozenScen
     diffuse = replace(room.surfels, gloss=None)
     black = replace(room.surfels, gloss=Gloss(torch.zeros(len(diffuse), 3), torch.full((len(diffuse),), 20.0)))
     scenes = [frozen(surfels, rays=16) for surfels in (diffuse, black)]
-    images = [scene.render(view_of(scene), (lamp(),)) for scene in scenes]
+    images = [scene.render(view_of(scene), (lamp(),), sharp=False) for scene in scenes]
     assert scenes[0].gloss is None
     assert scenes[1].gloss is None
     assert torch.equal(*images)
@@ -159,7 +163,7 @@ def test_a_diffuse_scene_touches_nothing_of_gloss(monkeypatch: pytest.MonkeyPatc
         monkeypatch.setattr(GlossyTransport, name, never)
     monkeypatch.setattr("rgspipe.renderer.glossy_transport.build_glossy_operators", never)
     scene = frozen(closed_box(1 / 4), rays=16, patches=20)
-    assert torch.isfinite(scene.render(view_of(scene), (lamp(),))).all()
+    assert torch.isfinite(scene.render(view_of(scene), (lamp(),), sharp=False)).all()
     with pytest.raises(ValueError, match="use radiance_of"):
         scene.glossy_light((lamp(),))
 
@@ -223,7 +227,7 @@ def test_counted_bounces_lead_to_all_of_them(room: FrozenScene) -> None:
     eye, rig = torch.tensor(EYE), (lamp(),)
     everything = room.glossy_light(rig).seen_from(eye)
     counted = [room.with_solver("patches", bounces=b).glossy_light(rig).seen_from(eye) for b in (0, 2, 16)]
-    assert torch.equal(counted[0], room.glossy_light(rig, indirect=False).seen_from(eye))
+    assert torch.equal(counted[0], room.glossy_light(rig, DIRECT).seen_from(eye))
     errors = [float((image - everything).norm() / everything.norm()) for image in counted]
     # Measured 0.51, 0.15 and 1.1e-4.
     assert errors[0] > errors[1] > 1e-2 > 1e-3 > errors[2]
@@ -264,7 +268,7 @@ def test_derivative_of_the_whole_image_is_that_of_finite_differences(room: Froze
     weights = torch.rand(16, 16, 3, generator=torch.Generator().manual_seed(0))
 
     def loss(position: Tensor) -> Tensor:
-        return (room.render(view, (PointLight(position, torch.ones(3)),)) * weights).double().sum()
+        return (room.render(view, (PointLight(position, torch.ones(3)),), sharp=False) * weights).double().sum()
 
     position = torch.tensor(LIGHT, requires_grad=True)
     loss(position).backward()
@@ -307,6 +311,6 @@ def test_a_glossy_object_that_sees_nothing_has_highlights_alone() -> None:
     scene = frozen(replace(outside, gloss=gloss), rays=16, patches=20)
     assert scene.gather.entries == 0
     light, eye = lamp((3.0, 1.0, 2.0)), torch.tensor([2.5, -2.0, 1.0])
-    everything, direct = (scene.glossy_light((light,), indirect=x).seen_from(eye) for x in (True, False))
+    everything, direct = (scene.glossy_light((light,), effects).seen_from(eye) for effects in (ALL_EFFECTS, DIRECT))
     assert torch.equal(everything, direct)
     assert float(everything.amax()) > 3.0 * float(scene.radiance_of((light,)).amax())

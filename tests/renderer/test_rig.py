@@ -9,6 +9,7 @@ import torch
 from torch import Tensor
 
 from rgspipe.renderer import reference
+from rgspipe.renderer.effects import Effects
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.kernels.irradiance import SOFTENING
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
@@ -89,7 +90,8 @@ def frozen(surfels: Surfels) -> FrozenScene:
 def test_irradiance_of_a_mixed_rig_matches_the_references(surfels: Surfels, bvh: SurfelBvh) -> None:
     values = parameters()
     expected, found = expected_irradiance(surfels, **values), rig_irradiance(bvh, rig(**values)).double()
-    partly = unit_response(bvh, rig(**values)).irradiance / unit_response(bvh, rig(**values), shadows=False).irradiance
+    shaded, lit = (unit_response(bvh, rig(**values), Effects(shadows=on)).irradiance for on in (True, False))
+    partly = shaded / lit
     assert float(((partly > 0.01) & (partly < 0.99)).float().mean()) > 0.02, "penumbrae prove the shadows"
     # Measured 2.3e-7.
     assert float((found - expected).abs().amax() / expected.amax()) < 5e-6
@@ -133,7 +135,7 @@ def test_a_rig_without_spots_pays_for_no_profile(bvh: SurfelBvh, monkeypatch: py
 
     monkeypatch.setattr("rgspipe.scene.lights.axial.angle_slopes", refuse)
     lamps = tuple(PointLight(p, torch.ones(3).double()) for p in parameters()["positions"])
-    assert all({*slopes} == {"position"} for slopes in unit_response(bvh, lamps).slopes)
+    assert all(slopes.shape[1] == 3 for slopes in unit_response(bvh, lamps).slopes)
     assert rig_irradiance(bvh, lamps).shape == (len(bvh.surfels), 3)
 
 
@@ -141,7 +143,7 @@ def test_only_a_shape_that_moves_pays_for_its_derivatives(bvh: SurfelBvh) -> Non
     spot = SHAPES[1]
     moving = replace(spot, cone_angle=torch.tensor(spot.cone_angle, requires_grad=True))
     known, free = unit_response(bvh, (spot, moving)).slopes
-    assert {*free} - {*known} == {"cone_angle", "falloff"}
+    assert (known.shape[1], free.shape[1]) == (3, 4)
 
 
 def test_eight_mixed_lights_are_the_sum_of_each(frozen: FrozenScene) -> None:

@@ -11,7 +11,6 @@ from rgspipe.datasets.exr import write_image
 from rgspipe.datasets.gs3_write import frame_entry, write_transforms
 from rgspipe.datasets.ply import save_ply
 from rgspipe.fitting import FitViews
-from rgspipe.fitting.model.problem import Effects
 from rgspipe.scene import PointLight
 
 #: Where the light of each target is.
@@ -27,7 +26,7 @@ def write_room(folder: Path) -> None:
     """Write room.ply and a folder of two views for each light."""
     save_ply(folder / "room.ply", room_surfels().to(torch.float32))
     cameras = room_cameras(32)
-    views = FitViews.prepare(frozen_room(), cameras, effects=Effects(at_pixels=True))
+    views = FitViews.prepare(frozen_room(), cameras, sharp=True)
     intensity = torch.tensor([1.0, 2.0, 0.5], dtype=torch.float64)
     for name, position in LIGHTS.items():
         target = folder / name

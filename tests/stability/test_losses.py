@@ -14,9 +14,9 @@ from rgspipe.errors import InputError
 from rgspipe.fitting import FitViews
 from rgspipe.fitting.baselines.paper_adam_loss import AdamLoss, MovingRig
 from rgspipe.fitting.baselines.paper_adam_start import Ball, light_ball
-from rgspipe.fitting.model.problem import Effects
 from rgspipe.fitting.model.views import PreparedViews, prepare_views
 from rgspipe.optim.ssim import ssim
+from rgspipe.renderer.effects import Effects
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import PointLight
 
@@ -70,7 +70,7 @@ def loss_and_gradients(views: PreparedViews, target: Tensor) -> list[Tensor]:
 
 
 def test_masks_all_zero_make_a_loss_of_nothing(frozen: FrozenScene, views: PreparedViews) -> None:
-    target = torch.cat([frozen.render(view, (LIGHT,)).reshape(-1, 3) for view in views.views])
+    target = torch.cat([frozen.render(view, (LIGHT,), sharp=False).reshape(-1, 3) for view in views.views])
     nowhere = replace(views, masks=tuple(torch.zeros_like(mask) for mask in views.masks))
     for value in loss_and_gradients(nowhere, target):
         # 1 − SSIM of two black images: measured 0.
@@ -78,7 +78,7 @@ def test_masks_all_zero_make_a_loss_of_nothing(frozen: FrozenScene, views: Prepa
 
 
 def test_a_view_whose_mask_is_zero_leaves_the_others_to_decide(frozen: FrozenScene, views: PreparedViews) -> None:
-    target = torch.cat([frozen.render(view, (LIGHT,)).reshape(-1, 3) for view in views.views])
+    target = torch.cat([frozen.render(view, (LIGHT,), sharp=False).reshape(-1, 3) for view in views.views])
     one = replace(views, masks=(views.masks[0], torch.zeros_like(views.masks[1])))
     alone = prepare_views(frozen, [views.views[0]])
     half = [0.5 * value for value in loss_and_gradients(alone, target[: views.views[0].camera.pixel_count])]
@@ -89,13 +89,13 @@ def test_a_view_whose_mask_is_zero_leaves_the_others_to_decide(frozen: FrozenSce
 def test_a_fit_with_masks_all_zero_says_so(frozen: FrozenScene, views: PreparedViews) -> None:
     masks = [torch.zeros(16, 16) for _ in views.views]
     with pytest.raises(InputError, match="0 of 512"):
-        FitViews.prepare(frozen, views.views, masks=masks)
+        FitViews.prepare(frozen, views.views, masks=masks, sharp=False)
 
 
 def test_a_search_with_one_mask_zero_finds_the_light(frozen: FrozenScene, views: PreparedViews) -> None:
-    images = [frozen.render(view, (LIGHT,)) for view in views.views]
+    images = [frozen.render(view, (LIGHT,), sharp=False) for view in views.views]
     masks = [torch.ones(16, 16), torch.zeros(16, 16)]
-    prepared = FitViews.prepare(frozen.with_dictionary(5), views.views, masks=masks)
+    prepared = FitViews.prepare(frozen.with_dictionary(5), views.views, masks=masks, sharp=False)
     fit = prepared.fit([images[0], torch.full_like(images[1], 1e9)])
     # Measured 2e-8.
     assert float((fit.lights[0].position - INSIDE).norm()) < 1e-3

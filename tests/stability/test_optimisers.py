@@ -47,11 +47,11 @@ def prepare(kept: Kept, scene: HardScene, start: PointLight) -> tuple[FitViews, 
     if id(scene) not in kept:
         frozen = FrozenScene.freeze(scene.build(), gather_rays=4, patches=20, seed=0)
         view = frozen.view(camera("plain", scene))
-        kept[id(scene)] = frozen, view, frozen.render(view, (light_at(scene, TRUTH),))
+        kept[id(scene)] = frozen, view, frozen.render(view, (light_at(scene, TRUTH),), sharp=False)
     frozen, view, image = kept[id(scene)]
     irradiance, _ = frozen.unit_irradiance(start.position[None])
     candidate = LightDictionary(start.position[None].float(), irradiance)
-    return FitViews.prepare(replace(frozen, candidates=candidate), view, mask_edges=False), image
+    return FitViews.prepare(replace(frozen, candidates=candidate), view, mask_edges=False, sharp=False), image
 
 
 def adam(kept: Kept, scene: HardScene, start: PointLight, steps: int) -> FitResult:

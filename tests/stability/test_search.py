@@ -19,6 +19,7 @@ from torch import Tensor
 from double_precision import in_double, irradiance_and_slope
 from rgspipe.renderer import reference
 from rgspipe.renderer.direct import unit_irradiance
+from rgspipe.renderer.effects import Effects
 from rgspipe.renderer.kernels.shade import shade_rays
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.rig import unit_response
@@ -215,10 +216,11 @@ def test_any_spot_on_any_soup(
     if float(direction.norm()) < 1e-3:
         direction = tensor([0.0, 0.0, 1.0])
     where = tensor(position)
-    light = SpotLight(where, tensor([1.0, 1.0, 1.0]), length * direction, profile, cone, falloff)
+    light = SpotLight(where, tensor([1.0, 1.0, 1.0]), (length * direction).requires_grad_(), profile, cone, falloff)
     bvh = SurfelBvh(surfels)
-    response = unit_response(bvh, (light,), shadows=False)
-    for value in (response.irradiance, *response.slopes[0].values()):
+    response = unit_response(bvh, (light,), Effects(shadows=False))
+    assert response.slopes[0].shape[1] == 6
+    for value in (response.irradiance, *response.slopes):
         assert torch.isfinite(value).all()
     point, _ = unit_irradiance(bvh, where[None], shadows=False)
     unit = replace(light, direction=torch.nn.functional.normalize(direction, dim=0))

@@ -9,8 +9,10 @@ import torch
 
 from double_precision import in_double, irradiance_and_slope
 from hard_cases import DEEP, GEOMETRIES, INSIDE, LIGHTS, SCENES, HardScene, join, scene_of_light
-from rgspipe.renderer.direct import differentiable_irradiance, unit_irradiance
+from rgspipe.renderer.direct import unit_irradiance
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
+from rgspipe.renderer.rig import rig_irradiance
+from rgspipe.scene import PointLight
 from rooms import surfels_on
 
 
@@ -55,7 +57,7 @@ def test_a_thousand_layers_pass_the_product_of_what_each_passes() -> None:
 def test_every_light_in_every_scene_is_finite_with_its_gradient(name: str, light: str) -> None:
     scene = SCENES[name]
     position = scene.at(LIGHTS[light]).clone().requires_grad_()
-    irradiance = differentiable_irradiance(SurfelBvh(scene.build()), position[None])
+    irradiance = rig_irradiance(SurfelBvh(scene.build()), (PointLight(position, 1.0),))
     irradiance.square().sum().backward()
     assert torch.isfinite(irradiance).all() and torch.isfinite(position.grad).all()
     assert position.grad.dtype == torch.float64

@@ -16,7 +16,7 @@ from rgspipe.datasets.gs3 import load_target
 from rgspipe.datasets.light_file import read_lights
 from rgspipe.datasets.views import View
 from rgspipe.errors import InputError
-from rgspipe.fitting import Effects, FitViews
+from rgspipe.fitting import FitViews
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import PointLight
 from rgspipe.stages import fit_light
@@ -34,9 +34,7 @@ def freeze(tmp_path_factory: pytest.TempPathFactory) -> Artifact:
 @pytest.fixture(scope="module")
 def images(freeze: Artifact) -> list[torch.Tensor]:
     """Two views of LIGHT, of which 5 % of the values are above 1."""
-    views = FitViews.prepare(
-        FrozenScene.load(freeze.folder()), room_cameras(RESOLUTION), effects=Effects(at_pixels=True)
-    )
+    views = FitViews.prepare(FrozenScene.load(freeze.folder()), room_cameras(RESOLUTION), sharp=True)
     images = views.render(LIGHT)
     white = float(torch.cat([image.reshape(-1) for image in images]).quantile(0.95))
     return [image / white for image in images]

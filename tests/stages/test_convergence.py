@@ -15,7 +15,7 @@ from frozen_store import RESOLUTION, artifact, frozen_artifact, write_targets
 from lit_room import room_cameras
 from rgspipe.config import RgspipeConfig, with_changes
 from rgspipe.datasets.light_file import write_lights
-from rgspipe.fitting import Effects, FitViews
+from rgspipe.fitting import FitViews
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import PointLight
 from rgspipe.stages import convergence
@@ -40,9 +40,7 @@ def _write_fit(folder: Path, steps: int) -> None:
 
 def test_methods_are_compared_by_the_same_measures(tmp_path: Path) -> None:
     freeze = frozen_artifact(tmp_path / "store")
-    views = FitViews.prepare(
-        FrozenScene.load(freeze.folder()), room_cameras(RESOLUTION), effects=Effects(at_pixels=True)
-    )
+    views = FitViews.prepare(FrozenScene.load(freeze.folder()), room_cameras(RESOLUTION), sharp=True)
     images = {"rig_0000": views.render(_light(PLACE))}
     truths = {"rig_0000": (_light(PLACE),)}
     targets = artifact(tmp_path / "store", "generate_dataset", lambda folder: write_targets(folder, images, truths))

@@ -52,7 +52,7 @@ def write_target(folder: Path, scene: FrozenScene) -> None:
     """One image of the scene from the outside."""
     camera = EFFECT_SCENES["dark ball"].camera(24)
     folder.mkdir()
-    write_image(folder / "view_0.exr", scene.render(scene.view(camera), (LIGHT,)).numpy())
+    write_image(folder / "view_0.exr", scene.render(scene.view(camera), (LIGHT,), sharp=False).numpy())
     write_transforms(folder / "transforms.json", [frame_entry("./view_0", camera)])
 
 

@@ -22,7 +22,6 @@ from rgspipe.datasets.light_file import read_lights
 from rgspipe.datasets.surfel_file import save_surfels
 from rgspipe.errors import InputError
 from rgspipe.fitting import FitViews
-from rgspipe.fitting.model.problem import Effects
 from rgspipe.scene import PointLight
 from rgspipe.scene.lights import LedLight
 from rgspipe.stages import fit_extras, fit_light, freeze
@@ -51,7 +50,7 @@ def _build(root: Path, stage: str, make) -> Artifact:
 def _write_dataset(folder: Path) -> None:
     frozen, cameras = frozen_room(), room_cameras(32)
     # The model's own images, with direct light where pixels look, as it is by default.
-    views = FitViews.prepare(frozen, cameras, effects=Effects(at_pixels=True))
+    views = FitViews.prepare(frozen, cameras, sharp=True)
     for (name, _), (position, intensity) in LIGHTS.items():
         target = folder / "targets" / name
         target.mkdir(parents=True)
@@ -168,7 +167,7 @@ def test_fits_a_folder_with_an_led_in_it(inputs, tmp_path, shape):
     axis = torch.nn.functional.normalize(torch.tensor([-0.3, 0.5, -0.6], dtype=torch.float64), dim=0)
     truth = LedLight(torch.tensor(VISIBLE).double(), torch.tensor([1.0, 2.0, 0.5]).double(), axis, 4.0)
     cameras, folder = room_cameras(32), tmp_path / "led"
-    for index, image in enumerate(FitViews.prepare(frozen_room(), cameras, effects=Effects()).render(truth)):
+    for index, image in enumerate(FitViews.prepare(frozen_room(), cameras, sharp=False).render(truth)):
         write_image(folder / f"view_{index}.exr", image.numpy())
     entries = [frame_entry(f"./view_{index}", camera) for index, camera in enumerate(cameras)]
     write_transforms(folder / "transforms.json", entries)

@@ -9,9 +9,9 @@ import pytest
 from rgspipe.config import RgspipeConfig, with_changes
 from rgspipe.config.light import LightConfig
 from rgspipe.errors import InputError
-from rgspipe.fitting.model.harmonics import BandLimit
 from rgspipe.fitting.spec import TYPES
 from rgspipe.options import settings
+from rgspipe.renderer.zonal_harmonics import BandLimit
 from rgspipe.scene.lights import KINDS
 from rgspipe.stages.fit_light import STAGE, band_limit
 from rgspipe.stages.light_spec import light_spec

@@ -23,7 +23,6 @@ from rgspipe.datasets.ply import save_ply
 from rgspipe.datasets.surfel_file import load_surfels
 from rgspipe.errors import InputError
 from rgspipe.fitting import FitViews
-from rgspipe.fitting.model.problem import Effects
 from rgspipe.pipeline import resolve, run
 from rgspipe.renderer.ply import load_ply
 from rgspipe.scene import PointLight
@@ -52,7 +51,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     root = tmp_path_factory.mktemp("ply_scene")
     save_ply(root / "room.ply", room_surfels().to(torch.float32))
     cameras = room_cameras(32)[:1]
-    views = FitViews.prepare(frozen_room(), cameras, effects=Effects(at_pixels=True))
+    views = FitViews.prepare(frozen_room(), cameras, sharp=True)
     (root / "target").mkdir()
     write_image(root / "target" / "view_0.exr", views.render(LIGHT)[0].numpy())
     write_transforms(root / "target" / "transforms.json", [frame_entry("./view_0", cameras[0])])

@@ -21,7 +21,6 @@ from rgspipe.datasets.exr import read_image
 from rgspipe.datasets.light_file import read_lights, write_lights
 from rgspipe.errors import InputError
 from rgspipe.fitting import FitViews
-from rgspipe.fitting.model.problem import Effects
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import LightRig, PointLight, SpotLight
 from rgspipe.stages import relight
@@ -42,7 +41,7 @@ def inputs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Artifact]:
     """The frozen room, and targets whose images the library's own renderer made."""
     root = tmp_path_factory.mktemp("store")
     freeze = frozen_artifact(root)
-    views = FitViews.prepare(FrozenScene.load(freeze.folder()), room_cameras(32), effects=Effects(at_pixels=True))
+    views = FitViews.prepare(FrozenScene.load(freeze.folder()), room_cameras(32), sharp=True)
     images = {name: views.render(rig) for name, rig in RIGS.items()}
     return {
         "freeze": freeze,

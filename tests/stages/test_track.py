@@ -15,7 +15,7 @@ from lit_room import room_cameras
 from rgspipe.config import RgspipeConfig, with_changes
 from rgspipe.datasets.light_file import read_lights
 from rgspipe.errors import InputError
-from rgspipe.fitting import Effects, FitViews
+from rgspipe.fitting import FitViews
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import PointLight
 from rgspipe.stages import track
@@ -26,9 +26,7 @@ def test_a_track_is_written_and_compared_with_the_truth(tmp_path: Path) -> None:
     freeze = frozen_artifact(tmp_path / "store")
     places = [(0.1 - 0.06 * k, -0.25 + 0.05 * k, 0.3) for k in range(3)]
     lights = [PointLight(torch.tensor(place, dtype=torch.float64), torch.ones(3).double()) for place in places]
-    views = FitViews.prepare(
-        FrozenScene.load(freeze.folder()), room_cameras(RESOLUTION), effects=Effects(at_pixels=True)
-    )
+    views = FitViews.prepare(FrozenScene.load(freeze.folder()), room_cameras(RESOLUTION), sharp=True)
     names = [f"rig_{k:04d}" for k in range(3)]
     images = {name: views.render(light) for name, light in zip(names, lights, strict=True)}
     truths = {name: (light,) for name, light in zip(names, lights, strict=True)}

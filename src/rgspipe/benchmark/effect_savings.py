@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterable
-from dataclasses import replace
 
 import pandas as pd
 import torch
@@ -13,7 +12,8 @@ import torch
 from rgspipe.benchmark.effect_scenes import EffectScene
 from rgspipe.evaluation.timing import median_ms
 from rgspipe.renderer.effect_bounds import EffectBounds, measure_effects
-from rgspipe.renderer.effects import ChosenScene, RigKind, choose_effects
+from rgspipe.renderer.effect_choice import RigKind, choose_effects
+from rgspipe.renderer.effects import Effects
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.shadow_bound import sample_lights, shadow_losses
 from rgspipe.scene import LightRig, PointLight
@@ -64,11 +64,12 @@ def _row(
     bounds = measure_effects(frozen, seed=seed)
     measured = 1e3 * (time.perf_counter() - begin)
     choice = choose_effects(bounds, tolerance, RigKind(scene.points, tuple(spot.least_share for spot in scene.spots)))
-    chosen, view = ChosenScene.of(frozen, choice), frozen.view(scene.camera(resolution))
+    effects, view = choice.effects, frozen.view(scene.camera(resolution))
     generator = torch.Generator().manual_seed(seed + 1)
     rigs = [random_rig(scene, frozen, generator) for _ in range(lights)]
     differences = [
-        float((frozen.render(view, rig) - chosen.render(view, rig)).abs().max()) / brightest_direct(frozen, rig)
+        float((frozen.render(view, rig, sharp=False) - frozen.render(view, rig, effects, sharp=False)).abs().max())
+        / brightest_direct(frozen, rig)
         for rig in rigs
     ]
     row: dict[str, object] = {"scene": scene.name, "surfels": len(frozen.surfels)}
@@ -80,8 +81,8 @@ def _row(
         "difference": max(differences) / tolerance,
         "missed": _missed(frozen, bounds, lights, generator),
         "measurement_ms": measured,
-        "all_ms": median_ms(lambda: frozen.render(view, rigs[0]), RUNS),
-        "chosen_ms": median_ms(lambda: chosen.render(view, rigs[0]), RUNS),
+        "all_ms": median_ms(lambda: frozen.render(view, rigs[0], sharp=False), RUNS),
+        "chosen_ms": median_ms(lambda: frozen.render(view, rigs[0], effects, sharp=False), RUNS),
     }
 
 
@@ -99,8 +100,8 @@ def random_rig(scene: EffectScene, frozen: FrozenScene, generator: torch.Generat
 
 def brightest_direct(frozen: FrozenScene, rig: LightRig) -> float:
     """The largest diffuse radiance of a surfel under a rig, without shadows and bounces; infinite if all is dark."""
-    diffuse = replace(frozen, gloss=None)
-    return float(diffuse.radiance_of(rig, indirect=False, shadows=False).max()) or math.inf
+    dark = Effects(shadows=False, interreflection=False, lobes=False)
+    return float(frozen.radiance_of(rig, dark).max()) or math.inf
 
 
 def _missed(frozen: FrozenScene, bounds: EffectBounds, lights: int, generator: torch.Generator) -> float:

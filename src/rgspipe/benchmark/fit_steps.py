@@ -9,9 +9,11 @@ from torch import Tensor
 
 from rgspipe.evaluation.timing import Timing, measure
 from rgspipe.fitting.model.emitter import Emitter
-from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.model.views import prepare_views
+from rgspipe.renderer.effects import ALL_EFFECTS
 from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.renderer.images.model import SurfelModel
+from rgspipe.renderer.images.pixels import PixelModel
 from rgspipe.renderer.radiosity import solve_radiosity
 from rgspipe.renderer.sparse import stack
 from rgspipe.renderer.view_weights import ViewWeights
@@ -38,16 +40,15 @@ def fit_steps(frozen: FrozenScene, small: Camera, large: Camera, position: Tenso
     radiance = frozen.radiance(lightings).reshape(len(frozen.surfels), -1)
     albedo = frozen.surfels.albedo.contiguous()
     direct = albedo * irradiance[0, :, None]
-    image = view.operator @ frozen.radiance(irradiance.T)[:, :, 0]
-    problem = LightProblem.create(prepare_views(frozen, [view]), image)
-    sharp = LightProblem.create(prepare_views(frozen, [view], at_pixels=True), image).sharpest()
+    pixels = prepare_views(frozen, [view])
+    soft, sharp = SurfelModel.of(pixels, ALL_EFFECTS), PixelModel.of(pixels, ALL_EFFECTS)
     many = stack([wide.operator] * MANY)
     steps: dict[str, Callable[[], object]] = {
         "irradiance and derivative": lambda: frozen.unit_irradiance(position[None]),
         "patch transport of four lightings": lambda: frozen.radiance(lightings),
         "view product": lambda: view.operator @ radiance,
-        "image and analytic derivative": lambda: problem.evaluate(Emitter(PointLight(position, 1.0))),
-        "… with direct light at pixels": lambda: sharp.evaluate(Emitter(PointLight(position, 1.0))),
+        "image and analytic derivative": lambda: soft.columns(Emitter(PointLight(position, 1.0))),
+        "… with direct light at pixels": lambda: sharp.columns(Emitter(PointLight(position, 1.0))),
         "forward and backward, one 128² view": lambda: forward_and_backward(frozen, [view], position),
         f"forward and backward, {MANY} 256² views": lambda: _many_views(frozen, many, position),
         "image by central differences": lambda: _central_differences(frozen, view, position),

@@ -168,7 +168,7 @@ def _lights_near(surfels: Surfels, distance: float, seed: int) -> Tensor:
 def _targets(bench: _Bench, scene: FrozenScene) -> list[list[Tensor]]:
     """The reference's images of each of the room's lights."""
     rigs = [bench.room.rig(light) for light in range(len(bench.room.lights))]
-    return [[scene.render(view, rig) for view in bench.views] for rig in rigs]
+    return [[scene.render(view, rig, sharp=False) for view in bench.views] for rig in rigs]
 
 
 def _biases(bench: _Bench, gather: SparseOperator, targets: list[list[Tensor]]) -> dict[str, float]:

@@ -13,6 +13,8 @@ from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.model.views import prepare_views
 from rgspipe.fitting.search_lm import fit_from
+from rgspipe.renderer.effects import ALL_EFFECTS
+from rgspipe.renderer.images.pixels import PixelModel
 from rgspipe.scene import PointLight
 
 #: Lights at least this far from any surface [scene units] count as in the open.
@@ -31,10 +33,11 @@ def light_biases(room: Room, truth: Truth, model: Model) -> pd.DataFrame:
     small = truth.pooled(model.setting.resolution)
     for chosen in sets:
         views = [model.views[camera] for camera in chosen]
-        prepared = prepare_views(model.frozen, views, at_pixels=bool(model.at_pixels))
+        prepared = prepare_views(model.frozen, views)
+        sharp = PixelModel.of(prepared, ALL_EFFECTS) if model.at_pixels else None
         for light in range(len(room.lights)):
             images = [small.image(camera, light, "global") for camera in chosen]
-            problem = LightProblem.create(prepared, prepared.stack_images(images))
+            problem = LightProblem.create(prepared, prepared.stack_images(images), sharp=sharp)
             result = fit_from(problem, [Emitter(PointLight(room.lights[light].double(), 1.0))])
             found = result.lights[0]
             error = float((found.position.cpu() - room.lights[light].double()).norm()) / model.frozen.size

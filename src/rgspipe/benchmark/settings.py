@@ -14,10 +14,13 @@ from torch import Tensor
 from rgspipe.benchmark.rooms import Room
 from rgspipe.renderer.areas import surfel_areas
 from rgspipe.renderer.clusters import cluster_patches
+from rgspipe.renderer.effects import Effects
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.gather import build_gather
+from rgspipe.renderer.images.model import SurfelModel, ViewModel
+from rgspipe.renderer.images.pixels import PixelModel
+from rgspipe.renderer.images.viewed_pixels import ViewedPixels
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
-from rgspipe.renderer.pixel_direct import PixelDirect, surfel_shares
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.transport import build_patch_transport
 from rgspipe.renderer.view_weights import ViewWeights
@@ -82,35 +85,30 @@ class Cost:
 
 @dataclass(frozen=True)
 class Model:
-    """A room made with a setting: the frozen scene, its views, and their direct light at pixels if that is wanted."""
+    """A room made with a setting: the frozen scene, its views, and how each of these sees lights."""
 
     setting: Setting
     frozen: FrozenScene
     views: tuple[ViewWeights, ...]
-    at_pixels: tuple[PixelDirect, ...]
+    seen: tuple[ViewModel, ...]
     cost: Cost
 
     @property
-    def shadows(self) -> bool:
-        return self.setting.shadows != "none"
+    def at_pixels(self) -> bool:
+        return self.setting.shadows == "pixels"
 
     def image(self, camera: int, rig: LightRig, indirect: bool = True) -> Tensor:
-        """(H, W, 3) image of one camera under one point light; differentiable unless direct light is at pixels."""
-        view = self.views[camera]
+        """(H, W, 3) image of one camera, differentiable towards the tensors of the lights."""
         if self.setting.precision == "float64":
-            return precise_image(self.frozen, view, rig, indirect)
-        image = self.frozen.render(view, rig, indirect, self.shadows)
-        if not self.at_pixels:
-            return image
-        (light,) = rig
-        shares = surfel_shares(self.frozen.bvh, light.position)
-        sharp = self.at_pixels[camera].image(light.position, *shares)[:, :, 0].reshape(image.shape)
-        return image - self.frozen.render(view, rig, False) + sharp * light.intensity
+            return precise_image(self.frozen, self.views[camera], rig, indirect)
+        model = self.seen[camera]
+        model = replace(model, effects=replace(model.effects, interreflection=indirect))
+        return model.views.split(model.image(rig))[0]
 
 
 def precise_image(frozen: FrozenScene, view: ViewWeights, rig: LightRig, indirect: bool) -> Tensor:
     """(H, W, 3) float32 of an image whose products and solve are done in float64; ray casts stay as they are."""
-    direct = frozen.radiance_of(rig, indirect=False).double().numpy()
+    direct = frozen.radiance_of(rig, Effects(interreflection=False)).double().numpy()
     weights, transport = view.operator.to_scipy().astype(np.float64), frozen.transport
     radiance = direct.copy()
     if indirect:
@@ -142,11 +140,12 @@ class Workshop:
         middle = time.perf_counter()
         cameras = self.room.cameras(setting.resolution)
         views = tuple(frozen.view(camera, setting.supersampling) for camera in cameras)
-        sharp = tuple(PixelDirect(frozen.bvh, view) for view in views) if setting.shadows == "pixels" else ()
+        effects, kind = Effects(setting.shadows != "none"), PixelModel if setting.shadows == "pixels" else SurfelModel
+        seen = tuple(kind.of(ViewedPixels.every(frozen, [view]), effects) for view in views)
         views_s = (time.perf_counter() - middle) / len(cameras)
         parts = [gather, transport.average, transport.gather, *(view.operator for view in views)]
         size = 8 * sum(part.entries for part in parts) + 4 * transport.inverse.numel()
-        return Model(setting, frozen, views, sharp, Cost(areas_s, gather_s, middle - begin, views_s, size / 2**20))
+        return Model(setting, frozen, views, seen, Cost(areas_s, gather_s, middle - begin, views_s, size / 2**20))
 
     def _gather(self, setting: Setting) -> tuple[SurfelBvh, SparseOperator, Tensor, float, float]:
         key = setting.surfels, setting.gather_rays

@@ -11,8 +11,6 @@ from torch import Tensor
 from rgspipe.benchmark.settings import Model
 from rgspipe.evaluation.timing import median_ms
 from rgspipe.fitting.model.emitter import Emitter
-from rgspipe.fitting.model.problem import Effects, LightProblem
-from rgspipe.fitting.model.views import prepare_views
 from rgspipe.machine import peak_memory_now_mib, reset_peak_memory
 from rgspipe.scene import PointLight
 
@@ -39,7 +37,7 @@ class StepCost:
 
 def step_cost(model: Model, position: Tensor, repetitions: int) -> StepCost:
     """The cost of a step with the model's first view."""
-    step = _step_at_pixels(model) if model.at_pixels else _step_by_autograd(model)
+    step = _step_by_columns(model) if model.at_pixels else _step_by_autograd(model)
     reset_peak_memory()
     forward = median_ms(lambda: model.image(0, (PointLight(position.float(), torch.ones(3)),)), repetitions)
     both = median_ms(lambda: step(position), repetitions)
@@ -49,20 +47,16 @@ def step_cost(model: Model, position: Tensor, repetitions: int) -> StepCost:
 def _step_by_autograd(model: Model) -> Callable[[Tensor], Tensor]:
     def step(position: Tensor) -> Tensor:
         leaf = position.float().clone().requires_grad_()
-        image = model.frozen.render(model.views[0], (PointLight(leaf, torch.ones(3)),), shadows=model.shadows)
+        image = model.image(0, (PointLight(leaf, torch.ones(3)),))
         image.square().mean().backward()
         return leaf.grad
 
     return step
 
 
-def _step_at_pixels(model: Model) -> Callable[[Tensor], Tensor]:
-    prepared = prepare_views(model.frozen, model.views[:1], mask_edges=False, at_pixels=True)
-    white = torch.ones(model.views[0].camera.pixel_count, 3)
-    problem = LightProblem.create(prepared, white, Effects(shadows=model.shadows)).sharpest()
-
+def _step_by_columns(model: Model) -> Callable[[Tensor], Tensor]:
     def step(position: Tensor) -> Tensor:
-        columns = problem.evaluate(Emitter(PointLight(position, 1.0)))
+        columns = model.seen[0].columns(Emitter(PointLight(position, 1.0)))
         return torch.einsum("pc,pcx->x", columns[:, :, 0], columns[:, :, 1:]) * (2.0 / columns[:, :, 0].numel())
 
     return step

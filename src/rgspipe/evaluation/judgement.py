@@ -15,8 +15,6 @@ from rgspipe.evaluation.ceiling import transmittance_image
 from rgspipe.evaluation.error_split import pixel_kinds, split_error
 from rgspipe.evaluation.held_out import QUALITY, albedo_of_views, held_out_summary, quality_row, view_table
 from rgspipe.evaluation.images import Bytes, comparison_strip
-from rgspipe.fitting.fit import FitViews
-from rgspipe.fitting.model.problem import Effects
 from rgspipe.progress import progress_bar
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.view_weights import ViewWeights
@@ -92,8 +90,7 @@ def render_views(frozen: FrozenScene, views: Sequence[View]) -> Renders:
 def _render(frozen: FrozenScene, weights: ViewWeights, view: View, at_pixels: bool) -> Tensor:
     """(H, W, 3) under the view's own light."""
     if frozen.gloss is None:
-        views = FitViews.prepare(frozen, weights, mask_edges=False, effects=Effects(at_pixels=at_pixels))
-        return views.render(view.light)[0]
+        return frozen.render(weights, view.light, sharp=at_pixels)
     operators, lighting = frozen.gloss.operators, trace_lighting(frozen.bvh, [view])
     models = build_view_models(frozen.bvh, [weights], lighting, at_pixels)
     surfels = frozen.gloss.surfels

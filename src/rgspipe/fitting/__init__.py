@@ -12,14 +12,12 @@ if TYPE_CHECKING:
     from rgspipe.fitting.findings import FitStatus
     from rgspipe.fitting.fit import FitViews, fit_lights
     from rgspipe.fitting.model.capture import ImageCapture
-    from rgspipe.fitting.model.problem import Effects
     from rgspipe.fitting.options import TrackOptions
     from rgspipe.fitting.result import FitResult, Step
     from rgspipe.fitting.solvers import PaperAdam, Search, Solver
     from rgspipe.fitting.spec import LightSpec
 
 __all__ = [
-    "Effects",
     "FitResult",
     "FitStatus",
     "FitViews",
@@ -37,7 +35,6 @@ _HOMES = {
     "rgspipe.fitting.findings": ("FitStatus",),
     "rgspipe.fitting.fit": ("FitViews", "fit_lights"),
     "rgspipe.fitting.model.capture": ("ImageCapture",),
-    "rgspipe.fitting.model.problem": ("Effects",),
     "rgspipe.fitting.options": ("TrackOptions",),
     "rgspipe.fitting.result": ("FitResult", "Step"),
     "rgspipe.fitting.solvers": ("PaperAdam", "Search", "Solver"),

@@ -6,14 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-import torch
 from torch import Tensor
 
 from rgspipe.errors import InputError
-from rgspipe.fitting.model.blocks import BlockModel, block_model
 from rgspipe.fitting.model.capture import ImageCapture
-from rgspipe.fitting.model.gloss import bounced_light
-from rgspipe.fitting.model.problem import Effects
+from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.model.views import PreparedViews, prepare_views
 from rgspipe.fitting.options import AimedOptions
 from rgspipe.fitting.result import FitResult
@@ -22,11 +19,13 @@ from rgspipe.fitting.search.coarse import CoarseImages, coarse_images
 from rgspipe.fitting.solvers import Search, Solver
 from rgspipe.fitting.spec import LightSpec, as_spec
 from rgspipe.renderer.dictionary import LightDictionary
+from rgspipe.renderer.effects import ALL_EFFECTS, Effects
 from rgspipe.renderer.frozen import FrozenScene
-from rgspipe.renderer.pixel_direct import surfel_shares
-from rgspipe.renderer.rig import unit_response
+from rgspipe.renderer.images.blocks import BlockModel, block_model
+from rgspipe.renderer.images.model import SurfelModel, ViewModel
+from rgspipe.renderer.images.pixels import PixelModel
 from rgspipe.renderer.view_weights import ViewWeights
-from rgspipe.scene import Camera, Light, LightRig
+from rgspipe.scene import Camera, Light
 from rgspipe.scene.arrays import ArrayLike, as_list
 from rgspipe.scene.lights import as_rig
 from rgspipe.scene.shapes import Float
@@ -42,11 +41,13 @@ class FitViews:
         prepared: the pixels that a fit trusts, and their weights.
         lights: what is known of the lights.
         effects: parts of light transport.
+        sharp: whether the last steps of a fit, and the images of its lights, take direct light where pixels look.
     """
 
     prepared: PreparedViews
     lights: LightSpec
     effects: Effects
+    sharp: bool = True
 
     @classmethod
     def prepare(
@@ -56,7 +57,8 @@ class FitViews:
         *,
         lights: str | LightSpec = "point",
         masks: Sequence[ArrayLike] | ArrayLike | None = None,
-        effects: Effects | None = None,
+        effects: Effects = ALL_EFFECTS,
+        sharp: bool = True,
         mask_edges: bool = True,
     ) -> FitViews:
         """What all targets of one set of cameras share; see `fit_lights` for the arguments.
@@ -64,11 +66,10 @@ class FitViews:
         Raises:
             InputError: masks do not fit the cameras, or leave no pixel; or a kind of light that is not known.
         """
-        effects = effects or Effects()
         weights = _weights(scene, cameras)
         masks = None if masks is None else as_list(masks, axes=2)
-        prepared = prepare_views(scene, weights, masks=masks, mask_edges=mask_edges, at_pixels=effects.at_pixels)
-        return cls(prepared, as_spec(lights), effects)
+        prepared = prepare_views(scene, weights, masks=masks, mask_edges=mask_edges)
+        return cls(prepared, as_spec(lights), effects, sharp)
 
     @property
     def dictionary(self) -> LightDictionary:
@@ -78,7 +79,7 @@ class FitViews:
     @cached_property
     def blocks(self) -> BlockModel:
         """The views as blocks of pixels, which searches look at."""
-        return block_model(self.prepared, interreflection=self.effects.interreflection)
+        return block_model(self.prepared, effects=self.effects)
 
     def coarse(self, options: AimedOptions) -> tuple[CoarseImages, ...]:
         """Images of the candidates of each kind of light that is looked for, the plainest first; made once."""
@@ -92,10 +93,24 @@ class FitViews:
 
     def _coarse(self, kind: Light, options: AimedOptions) -> CoarseImages:
         if kind.axis is None:
-            return coarse_images(self.prepared.frozen, self.blocks, self.dictionary)
+            return coarse_images(self.blocks, self.dictionary)
         shapes = kind.variants() if self.lights.shape_free else (kind,)
-        bounces = self.effects.interreflection
-        return aimed_candidates(self.prepared, self.dictionary, shapes, options, interreflection=bounces)
+        return aimed_candidates(self.prepared, self.dictionary, shapes, options, self.effects)
+
+    @cached_property
+    def pixels(self) -> PixelModel:
+        """How the trusted pixels see lights where they look."""
+        return PixelModel.of(self.prepared, self.effects)
+
+    @cached_property
+    def images(self) -> ViewModel:
+        """How all pixels see lights."""
+        model = self.pixels if self.sharp else SurfelModel(self.prepared, self.effects)
+        return model.on(self.prepared.every_pixel)
+
+    def problem(self, stacked: Tensor, capture: ImageCapture | None = None) -> LightProblem:
+        """The problem that images stacked by `PreparedViews.stack_images`, (all pixels, 3), pose."""
+        return LightProblem.create(self.prepared, stacked, self.effects, capture, self.pixels if self.sharp else None)
 
     def fit(
         self,
@@ -118,7 +133,7 @@ class FitViews:
 
     def render(self, lights: Light | Sequence[Light]) -> list[Float[Tensor, "H W 3"]]:
         """(H, W, 3) image per view of the scene under lights, with the fit's effects; black without any."""
-        return _render(self, as_rig(lights))
+        return self.prepared.split(self.images.image(as_rig(lights)))
 
 
 def fit_lights(
@@ -130,7 +145,8 @@ def fit_lights(
     solver: Solver | None = None,
     masks: Sequence[ArrayLike] | ArrayLike | None = None,
     capture: ImageCapture | None = None,
-    effects: Effects | None = None,
+    effects: Effects = ALL_EFFECTS,
+    sharp: bool = True,
     mask_edges: bool = True,
 ) -> FitResult:
     """Recover the lights of images of a frozen scene.
@@ -147,7 +163,9 @@ def fit_lights(
         solver: how, such as `Search(starts=8)` or `PaperAdam(seed=1)`; `Search()` if None.
         masks: (H, W) per camera, the scene's share of each pixel (the image's alpha); 1 if None.
         capture: what is known of how the images were taken; as radiance, with known exposures, if None.
-        effects: parts of light transport; those of `Effects()` if None.
+        effects: parts of light transport.
+        sharp: whether the last steps take direct light where pixels look, shadows' edges included; else at surfels'
+            centres, which is quicker and less accurate.
         mask_edges: whether a search leaves out pixels on silhouettes, creases and depth jumps.
 
     Returns:
@@ -159,7 +177,9 @@ def fit_lights(
             is not known.
         ValueError: the solver cannot do without what is not known of the lights.
     """
-    views = FitViews.prepare(scene, cameras, lights=lights, masks=masks, effects=effects, mask_edges=mask_edges)
+    views = FitViews.prepare(
+        scene, cameras, lights=lights, masks=masks, effects=effects, sharp=sharp, mask_edges=mask_edges
+    )
     return views.fit(images, solver=solver, capture=capture)
 
 
@@ -171,46 +191,3 @@ def _weights(scene: FrozenScene, cameras: Cameras) -> list[ViewWeights]:
             where, found = f"cameras[{index}]", type(view).__name__
             raise InputError(where, expected="a Camera", found=found, remedy="Camera.look_at makes one.")
     return [scene.view(view) if isinstance(view, Camera) else view for view in views]
-
-
-def _render(views: FitViews, rig: LightRig) -> list[Tensor]:
-    prepared, effects = views.prepared, views.effects
-    if rig and prepared.frozen.gloss is not None:
-        return _render_with_gloss(views, rig)
-    operator, frozen = prepared.all_pixels, prepared.frozen
-    stacked = torch.zeros((operator.shape[0], 3), device=operator.matrix.device)
-    if rig:
-        indirect = effects.interreflection
-        irradiance = unit_response(frozen.bvh, rig, effects.shadows).irradiance.T
-        strength = torch.stack([light.intensity for light in rig]).to(irradiance)
-        radiance = frozen.radiance(irradiance, indirect)
-        if prepared.pixel_direct:
-            radiance = radiance - frozen.radiance(irradiance, indirect=False)
-            stacked = sum(_direct_at_pixels(views, light) * light.intensity.to(stacked) for light in rig)
-        stacked = stacked + operator @ torch.einsum("ncl,lc->nc", radiance, strength)
-    return prepared.split_images(stacked)
-
-
-def _render_with_gloss(views: FitViews, rig: LightRig) -> list[Tensor]:
-    """`_render` of a scene with gloss."""
-    prepared, effects = views.prepared, views.effects
-    frozen = prepared.frozen
-    if not prepared.pixel_direct:
-        return [frozen.render(view, rig, effects.interreflection, effects.shadows) for view in prepared.views]
-    images = prepared.split_images(sum(_direct_at_pixels(views, light) * light.intensity.float() for light in rig))
-    if effects.interreflection:
-        light = bounced_light(frozen, rig, effects.shadows)
-        bounced = [view.image(light.seen_from(view.camera.origin)) for view in prepared.views]
-        images = [direct + others for direct, others in zip(images, bounced, strict=True)]
-    return images
-
-
-def _direct_at_pixels(views: FitViews, light: Light) -> Tensor:
-    """(all pixels, 3) direct image of a light of unit intensity, where pixels look."""
-    prepared, position = views.prepared, light.position
-    shares = surfel_shares(prepared.frozen.bvh, position, views.effects.shadows)
-    image = torch.cat([one.image(position, *shares)[:, :, 0] for one in prepared.pixel_direct])
-    if prepared.highlights:
-        image = image + torch.cat([one.image(position, *shares)[:, :, 0] for one in prepared.highlights])
-    share = light.share(prepared.all_points)
-    return image if share is None else image * share.value[:, None]

@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from rgspipe.fitting.certainty.uncertainty import light_covariances
 from rgspipe.fitting.findings import Finding, LightMissing, LightSpare, Rival
 from rgspipe.fitting.meter import Meter
-from rgspipe.fitting.model.blocks import BlockModel, view_of_blocks
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.exposure import rough_exposures
 from rgspipe.fitting.model.problem import LightProblem
@@ -27,6 +26,8 @@ from rgspipe.fitting.selection.diagnosis import Costs, standing
 from rgspipe.fitting.selection.number import Doubted, doubted_number, faded_light
 from rgspipe.fitting.selection.rivals import has_rival, stands_anywhere
 from rgspipe.fitting.spec import LightSpec
+from rgspipe.renderer.images.blocks import view_of_blocks
+from rgspipe.renderer.images.model import ImageModel
 
 
 def fit_search_lm(
@@ -34,7 +35,7 @@ def fit_search_lm(
     coarse: Sequence[CoarseImages],
     options: SearchOptions,
     spec: LightSpec | None = None,
-    blocks: BlockModel | None = None,
+    blocks: ImageModel | None = None,
 ) -> FitResult:
     """The lights that explain a target: refine the candidates that look most like it, polish the best.
 

@@ -12,6 +12,7 @@ from rgspipe.fitting.baselines.paper_adam import fit_paper_adam
 from rgspipe.fitting.baselines.paper_adam_start import LightPrior
 from rgspipe.fitting.findings import ExposureUnknown
 from rgspipe.fitting.model.capture import ImageCapture
+from rgspipe.fitting.model.differences import DifferenceModel, by_differences
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.options import AdamOptions, SearchOptions
 from rgspipe.fitting.result import FitResult
@@ -40,9 +41,10 @@ class Search(SearchOptions):
 
     def fit(self, views: FitViews, images: Tensor, capture: ImageCapture) -> FitResult:
         """The lights of images (all pixels of all views, 3)."""
-        problem = LightProblem.create(views.prepared, images, views.effects, capture)
-        problem = replace(problem, differences=self.derivatives == "differences")
-        result = fit_search_lm(problem, views.coarse(self.aimed), self, views.lights, views.blocks)
+        problem, blocks = views.problem(images, capture), views.blocks
+        if self.derivatives == "differences":
+            problem, blocks = by_differences(problem), DifferenceModel(blocks, views.prepared.frozen.size)
+        result = fit_search_lm(problem, views.coarse(self.aimed), self, views.lights, blocks)
         if capture.exposure_free and len(views.prepared.views) == 1:
             return replace(result, findings=(*result.findings, ExposureUnknown()))
         return result
@@ -65,5 +67,5 @@ class PaperAdam(AdamOptions):
         """
         if capture != ImageCapture():
             raise ValueError("PaperAdam takes images as radiance with known exposures: use Search")
-        problem = LightProblem.create(views.prepared, images, views.effects)
-        return fit_paper_adam(problem, images, self, LightPrior.of(self.training_lights), self.seed, views.lights)
+        problem, prior = LightProblem.create(views.prepared, images, views.effects), LightPrior.of(self.training_lights)
+        return fit_paper_adam(problem, images, self, prior, self.seed, views.lights)

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-import torch
 from torch import Tensor
 
 from rgspipe.renderer.kernels.irradiance import point_irradiance
@@ -26,23 +23,3 @@ def unit_irradiance(bvh: SurfelBvh, positions: Tensor, shadows: bool = True) -> 
         E (L, N) and dE/dposition (L, N, 3), float32, per W/sr.
     """
     return point_irradiance(bvh, positions, shadows)
-
-
-class _UnitIrradiance(torch.autograd.Function):
-    @staticmethod
-    def forward(ctx: Any, positions: Tensor, bvh: SurfelBvh, shadows: bool) -> Tensor:
-        irradiance, slope = unit_irradiance(bvh, positions.detach(), shadows)
-        ctx.save_for_backward(slope)
-        ctx.like = positions.dtype, positions.device
-        return irradiance
-
-    @staticmethod
-    def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor, None, None]:
-        (slope,) = ctx.saved_tensors
-        dtype, device = ctx.like
-        return torch.einsum("ln,lnc->lc", gradient, slope).to(device, dtype), None, None
-
-
-def differentiable_irradiance(bvh: SurfelBvh, positions: Tensor, shadows: bool = True) -> Tensor:
-    """`unit_irradiance` without the derivative, differentiable by autograd towards the positions."""
-    return _UnitIrradiance.apply(positions, bvh, shadows)

@@ -10,6 +10,7 @@ from typing import Any
 
 import torch
 
+from rgspipe.renderer.effects import Effects
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.glossy import largest_lobe
 from rgspipe.renderer.shadow_bound import ShadowBound, shadow_bound
@@ -101,14 +102,14 @@ def measure_costs(frozen: FrozenScene) -> dict[str, float]:
     spot = (SpotLight(position.cpu(), ones, axis, "gaussian", 0.5, 0.2),)
     point = (PointLight(position.cpu(), ones),)
     lightings = torch.ones(len(frozen.surfels), 4, device=frozen.surfels.centers.device)
-    diffuse = replace(frozen, gloss=None)
+    dark = Effects(shadows=False, interreflection=False, lobes=False)
     pairs = {
         "shadows": (lambda on: frozen.unit_irradiance(position[None], shadows=on)),
-        "interreflection": (lambda on: diffuse.radiance(lightings, indirect=on)),
-        "spot cones": (lambda on: diffuse.radiance_of(spot if on else point, indirect=False, shadows=False)),
+        "interreflection": (lambda on: frozen.radiance(lightings, indirect=on)),
+        "spot cones": (lambda on: frozen.radiance_of(spot, replace(dark, cones=on))),
     }
     if frozen.gloss is not None:
-        pairs["specular lobes"] = lambda on: (frozen if on else diffuse).radiance_of(point, shadows=False)
+        pairs["specular lobes"] = lambda on: frozen.radiance_of(point, Effects(shadows=False, lobes=on))
     return {name: max(0.0, _milliseconds(run, True) - _milliseconds(run, False)) for name, run in pairs.items()}
 
 

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Literal, Protocol
 
 import numpy as np
 import scipy.sparse
@@ -19,41 +18,28 @@ from rgspipe.renderer.areas import surfel_areas
 from rgspipe.renderer.clusters import cluster_patches
 from rgspipe.renderer.dictionary import GRID, LightDictionary, build_dictionary
 from rgspipe.renderer.direct import unit_irradiance
+from rgspipe.renderer.effects import ALL_EFFECTS, Effects
 from rgspipe.renderer.frozen_file import load_parts, save_parts
 from rgspipe.renderer.gather import build_gather
 from rgspipe.renderer.glossy_transport import GlossyLight, GlossyTransport, build_glossy_transport
+from rgspipe.renderer.images.model import SurfelModel
+from rgspipe.renderer.images.pixels import PixelModel
+from rgspipe.renderer.images.recent_views import RecentViews
+from rgspipe.renderer.images.viewed_pixels import ViewedPixels
+from rgspipe.renderer.indirect import IndirectSolver, Solver, indirect_solver
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
-from rgspipe.renderer.monte_carlo import MonteCarloSolver
 from rgspipe.renderer.mutual_visibility import mutual_visibility
 from rgspipe.renderer.openness import openness
-from rgspipe.renderer.radiosity import GatherSolver
 from rgspipe.renderer.rig import rig_irradiance, unit_response
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.surroundings import OPEN, Surroundings
-from rgspipe.renderer.transport import PatchTransport, build_patch_transport, with_bounces
+from rgspipe.renderer.transport import PatchTransport, build_patch_transport
 from rgspipe.renderer.view_weights import ViewWeights, build_view_weights
 from rgspipe.scene.arrays import ArrayLike, as_tensor
 from rgspipe.scene.camera import Camera
 from rgspipe.scene.lights import Light, LightRig, as_rig, check_numbers
 from rgspipe.scene.shapes import Float
 from rgspipe.scene.surfels import Surfels
-
-Solver = Literal["patches", "gather", "monte_carlo"]
-
-#: Bounces of Monte Carlo where no number is given: what is left after four is 6 % of the light at albedo 0.5.
-MONTE_CARLO_BOUNCES = 4
-
-
-class IndirectSolver(Protocol):
-    """A way from direct light to the light that bounces."""
-
-    def indirect(self, direct: Tensor) -> Tensor:
-        """(N, 3, K) indirect part of the radiosity for K lightings with direct radiosity (N, 3, K)."""
-        ...
-
-    def to(self, device: torch.device | str) -> IndirectSolver:
-        """The same on another device."""
-        ...
 
 
 @dataclass(frozen=True, repr=False)
@@ -171,6 +157,10 @@ class FrozenScene:
         return SurfelBvh(placed)
 
     @cached_property
+    def _recent(self) -> RecentViews:
+        return RecentViews(self.bvh)
+
+    @cached_property
     def bounds(self) -> tuple[Float[Tensor, " 3"], Float[Tensor, " 3"]]:
         """(3,) lower and upper corner of the surfels' centres."""
         return self.surfels.centers.amin(dim=0), self.surfels.centers.amax(dim=0)
@@ -216,7 +206,7 @@ class FrozenScene:
 
     def _weights(self, view: Camera | ViewWeights) -> ViewWeights:
         if isinstance(view, Camera):
-            return self.view(view)
+            return self._recent.weights(view)
         if isinstance(view, ViewWeights):
             return view
         found, remedy = type(view).__name__, "Camera.look_at makes one; of several, render one after the other."
@@ -248,22 +238,7 @@ class FrozenScene:
             ValueError: the solver has another name, needs the gather operator and the scene was loaded without it, or
                 the scene is glossy: light goes over gloss from patch to patch.
         """
-        return replace(self, solver=self._solver(solver, bounces, samples, seed))
-
-    def _solver(self, solver: Solver, bounces: int | None, samples: int, seed: int) -> IndirectSolver:
-        if solver == "patches":
-            same = bounces == self.transport.bounces
-            return self.transport if same else with_bounces(self.transport, bounces)
-        if self.gloss is not None and solver in ("gather", "monte_carlo"):
-            raise ValueError(f"solver {solver} is for diffuse scenes: this one has gloss, which needs patches")
-        if solver == "gather":
-            if self.gather is None:
-                raise ValueError("solver gather needs the gather operator: load the scene with gather=True")
-            return GatherSolver(self.gather, self.surfels.albedo, bounces)
-        if solver == "monte_carlo":
-            bounces = MONTE_CARLO_BOUNCES if bounces is None else bounces
-            return MonteCarloSolver(self.bvh, samples, bounces, torch.Generator().manual_seed(seed))
-        raise ValueError(f"solver must be patches, gather or monte_carlo, got {solver!r}")
+        return replace(self, solver=indirect_solver(self, solver, bounces, samples, seed))
 
     def indirect(self, direct: Float[Tensor, "N 3 K"]) -> Float[Tensor, "N 3 K"]:
         """(N, 3, K) indirect part of the radiosity for K lightings with direct radiosity (N, 3, K)."""
@@ -274,44 +249,52 @@ class FrozenScene:
         direct = self.surfels.albedo[:, :, None] * (irradiance / math.pi)[:, None, :]
         return direct + self.indirect(direct) if indirect else direct
 
-    def radiance_of(self, rig: LightRig, indirect: bool = True, shadows: bool = True) -> Float[Tensor, "N 3"]:
+    def coloured_radiance(self, irradiance: Float[Tensor, "N 3"], indirect: bool = True) -> Float[Tensor, "N 3"]:
+        """Outgoing radiance (N, 3) for a coloured direct irradiance (N, 3); linear and differentiable."""
+        direct = self.surfels.albedo * (irradiance / math.pi)
+        return direct + self.indirect(direct[:, :, None])[:, :, 0] if indirect else direct
+
+    def radiance_of(self, rig: LightRig, effects: Effects = ALL_EFFECTS) -> Float[Tensor, "N 3"]:
         """Outgoing radiance (N, 3) under a rig, differentiable towards the tensors of its lights.
 
         The lights are added up before their light bounces, so a rig costs as many bounces as one light. Of a glossy
         scene this is the diffuse part, which is the same in all directions; `glossy_light` has all of it.
         """
-        if self.gloss is not None:
-            return self.glossy_light(rig, indirect, shadows).radiance
-        direct = self.surfels.albedo * (rig_irradiance(self.bvh, rig, shadows) / math.pi)
-        return direct + self.indirect(direct[:, :, None])[:, :, 0] if indirect else direct
+        if self.gloss is not None and effects.lobes:
+            return self.glossy_light(rig, effects).radiance
+        return self.coloured_radiance(rig_irradiance(self.bvh, rig, effects), effects.interreflection)
 
     def render(
         self,
         camera: Camera | ViewWeights,
         lights: Light | Sequence[Light],
-        indirect: bool = True,
-        shadows: bool = True,
+        effects: Effects = ALL_EFFECTS,
+        *,
+        sharp: bool = True,
     ) -> Float[Tensor, "H W 3"]:
-        """(height, width, 3) image of the scene in linear radiance, black without lights.
+        """(height, width, 3) linear radiance that a camera sees under one light or several; black without any.
 
-        Differentiable towards the tensors of the lights.
+        Differentiable, once, towards every tensor of the lights that requires gradients, by analytic derivatives.
 
         Args:
-            camera: or its weights (`view`), which save time where it is rendered again and again.
-            lights: one or several.
-            indirect: whether light bounces.
-            shadows: whether surfaces stand in its way.
+            camera: or the weights of its `view`. The first image of a camera takes longer than the next ones.
+            effects: parts of light transport.
+            sharp: whether direct light is taken where pixels look, shadows' edges included; else at surfels' centres,
+                which is quicker and less accurate.
 
         Raises:
             InputError: no camera or no lights, but something else, or a light's numbers are not finite.
         """
         view, rig = self._weights(camera), as_rig(lights)
         check_numbers(rig)
-        if self.gloss is not None:
-            return view.image(self.glossy_light(rig, indirect, shadows).seen_from(view.camera.origin))
-        return view.image(self.radiance_of(rig, indirect, shadows))
+        pixels = ViewedPixels.every(self, [view])
+        if sharp:
+            image = PixelModel.of(pixels, effects, (self._recent.direct(view),)).image(rig)
+        else:
+            image = SurfelModel(pixels, effects).image(rig)
+        return pixels.split(image)[0]
 
-    def glossy_light(self, rig: LightRig, indirect: bool = True, shadows: bool = True) -> GlossyLight:
+    def glossy_light(self, rig: LightRig, effects: Effects = ALL_EFFECTS) -> GlossyLight:
         """The light of a scene with gloss under `rig`, to be seen from anywhere; differentiable like `radiance_of`.
 
         Raises:
@@ -319,7 +302,8 @@ class FrozenScene:
         """
         if self.gloss is None:
             raise ValueError("a diffuse scene has no glossy light: use radiance_of")
-        return self.gloss.light(self.solver or self.transport, unit_response(self.bvh, rig, shadows), indirect)
+        response = unit_response(self.bvh, rig, effects)
+        return self.gloss.light(self.solver or self.transport, response, effects.interreflection)
 
 
 def _gather(bvh: SurfelBvh, rays: int, areas: Tensor, seed: int) -> SparseOperator:

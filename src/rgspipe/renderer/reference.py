@@ -109,7 +109,7 @@ def geometry_factor(positions: Tensor, centers: Tensor, normals: Tensor, scales:
 
 
 def unit_irradiance(surfels: Surfels, positions: Tensor, shadows: bool = True) -> Tensor:
-    """(L, N) irradiance of unit point lights (L, 3): `direct.differentiable_irradiance`."""
+    """(L, N) irradiance of unit point lights (L, 3): `direct.unit_irradiance`."""
     scales = surfels.scales.prod(dim=1).sqrt()
     factor, _ = geometry_factor(positions, surfels.centers, surfels.normals, scales)
     return factor * transmittance(surfels, positions) if shadows else factor

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import torch
 from torch import Tensor
 
-from rgspipe.renderer.direct import unit_irradiance
+from rgspipe.renderer.effects import ALL_EFFECTS, Effects
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
-from rgspipe.scene.lights import Light, LightRig, Share
+from rgspipe.renderer.lit_surfels import LitSurfels, lit_surfels
+from rgspipe.renderer.unit_light import OwnLight
+from rgspipe.scene.lights import LightRig
 
 
 @dataclass(frozen=True)
@@ -20,13 +22,20 @@ class RigResponse:
     Attributes:
         lights: L lights.
         irradiance: (L, N) float32, per W/sr.
-        slopes: per light its derivatives by field: (N, 3) towards the position, through distance, cosine, shadow and
-            profile, and towards the axis; (N,) towards numbers of the shape that require gradients.
+        slopes: per light (N, D) its derivatives towards the tensors of `OwnLight`, through distance, cosine, shadow and
+            profile.
     """
 
     lights: LightRig
     irradiance: Tensor
-    slopes: tuple[Mapping[str, Tensor], ...]
+    slopes: tuple[Tensor, ...]
+
+    @classmethod
+    def of(cls, bvh: SurfelBvh, lights: LightRig, lit: Sequence[LitSurfels]) -> RigResponse:
+        """The response to lights of which each is `lit` as an `OwnLight`."""
+        rows = [one.columns[:, 0] for one in lit]
+        irradiance = torch.stack(rows) if rows else torch.zeros(0, len(bvh.surfels), device=bvh.device)
+        return cls(lights, irradiance, tuple(one.columns[:, 1:] for one in lit))
 
     @property
     def positions(self) -> Tensor:
@@ -39,62 +48,28 @@ class RigResponse:
         return stacked(self.lights, "intensity").to(self.irradiance)
 
     def attached(self) -> Tensor:
-        """(L, N) the irradiance, which autograd knows how to differentiate towards the lights' tensors.
-
-        What is added is zero, and its derivative is the response's: exact to first order. A second derivative is not
-        there.
-        """
-        rows = []
-        for row, light, slopes in zip(self.irradiance, self.lights, self.slopes, strict=True):
-            for name, slope in slopes.items():
-                value = getattr(light, name)
-                if isinstance(value, Tensor) and value.requires_grad:
-                    change = (value - value.detach()).to(slope)
-                    row = row + (slope @ change if change.ndim else slope * change)
-            rows.append(row)
+        """(L, N) the irradiance, which autograd knows how to differentiate towards the lights' tensors, once."""
+        parts = zip(self.lights, self.irradiance, self.slopes, strict=True)
+        rows = [OwnLight(light).attached(row, slopes) for light, row, slopes in parts]
         return torch.stack(rows) if rows else self.irradiance
 
-
-def unit_response(bvh: SurfelBvh, lights: LightRig, shadows: bool = True) -> RigResponse:
-    """Irradiance of every light at unit intensity, with derivatives: E_l = p(θ_l) · E_point,l.
-
-    Args:
-        shadows: whether surfels stand in the lights' way.
-    """
-    irradiance, by_position = unit_irradiance(bvh, stacked(lights, "position").detach(), shadows)
-    rows = [
-        _with_share(light.share(bvh.surfels.centers, shape_free=_shape_moves(light)), *of_point)
-        for light, *of_point in zip(lights, irradiance, by_position, strict=True)
-    ]
-    irradiance = torch.stack([row for row, _ in rows]) if rows else irradiance
-    return RigResponse(tuple(lights), irradiance, tuple(slopes for _, slopes in rows))
+    def summed(self) -> Tensor:
+        """(N, 3) irradiance of the whole rig, differentiable like `attached`."""
+        return self.attached().T @ self.intensities
 
 
-def _with_share(share: Share | None, row: Tensor, by_position: Tensor) -> tuple[Tensor, dict[str, Tensor]]:
-    """A point light's irradiance (N,) and derivative (N, 3) times the share of the light that goes there."""
-    if share is None:
-        return row, {"position": by_position}
-    slopes = {name: (row[:, None] if by.ndim > 1 else row) * by for name, by in share.by.items()}
-    slopes["position"] = share.value[:, None] * by_position + slopes["position"]
-    return share.value * row, slopes
+def unit_response(bvh: SurfelBvh, rig: LightRig, effects: Effects = ALL_EFFECTS) -> RigResponse:
+    """Irradiance of every light at unit intensity, with derivatives."""
+    lights = effects.lights(tuple(rig))
+    return RigResponse.of(bvh, lights, [lit_surfels(bvh, OwnLight(light), effects, 0.0) for light in lights])
 
 
-def _shape_moves(light: Light) -> bool:
-    """Whether gradients towards a number of the light's shape are wanted."""
-    values = (getattr(light, number.name) for number in light.shape)
-    return any(isinstance(value, Tensor) and value.requires_grad for value in values)
-
-
-def rig_irradiance(bvh: SurfelBvh, lights: LightRig, shadows: bool = True) -> Tensor:
+def rig_irradiance(bvh: SurfelBvh, rig: LightRig, effects: Effects = ALL_EFFECTS) -> Tensor:
     """(N, 3) float32 irradiance of a whole rig, differentiable towards the tensors of its lights.
 
     Derivatives are analytic, through the transmittance and the spots' rims as well.
-
-    Args:
-        shadows: whether surfels stand in the lights' way.
     """
-    response = unit_response(bvh, lights, shadows)
-    return response.attached().T @ response.intensities
+    return unit_response(bvh, rig, effects).summed()
 
 
 def stacked(lights: LightRig, field: str) -> Tensor:

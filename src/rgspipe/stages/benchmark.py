@@ -27,7 +27,7 @@ from rgspipe.errors import InputError
 from rgspipe.evaluation.metrics import longest_side
 from rgspipe.evaluation.timing import load_average
 from rgspipe.files import write_json
-from rgspipe.fitting import Effects, FitViews, LightSpec
+from rgspipe.fitting import FitViews, LightSpec
 from rgspipe.machine import machine
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.resources import resource_folder
@@ -113,11 +113,11 @@ def _known_targets(context: StageContext, frozen: FrozenScene, dataset: Artifact
     every = open_dataset(dataset.folder(), train=False, test=False).targets
     classes = {name: [one for one in every if one.occlusion == name][:wanted] for name in {t.occlusion for t in every}}
     singles = [target for name in sorted(classes) for target in classes[name]]
-    effects = Effects(at_pixels=config.effects.at_pixels)
+    sharp = config.effects.at_pixels
 
     def prepared(views: Sequence[View], spec: LightSpec) -> FitViews:
         cameras, masks = [view.camera for view in views], [view.alpha for view in views]
-        return FitViews.prepare(frozen, cameras, lights=spec, masks=masks, effects=effects)
+        return FitViews.prepare(frozen, cameras, lights=spec, masks=masks, sharp=sharp)
 
     def truth(target: Target) -> LightRig:
         return read_lights(truth_file(config, dataset, target.name))

@@ -22,7 +22,6 @@ from rgspipe.fitting.certainty.advice import ViewAdvice, suggest_views
 from rgspipe.fitting.certainty.landscape import loss_slices
 from rgspipe.fitting.model.capture import ImageCapture
 from rgspipe.fitting.model.emitter import Emitter
-from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.scene import Camera
 
 #: A camera and its name.
@@ -110,7 +109,7 @@ def _advice_words(advice: ViewAdvice, names: Sequence[str]) -> bytes:
 def _landscape(views: FitViews, images: Sequence[Tensor], result: FitResult, capture: ImageCapture) -> bytes:
     """The loss around the first light, with the exposures that were found."""
     known = replace(capture, exposure_free=False)
-    problem = LightProblem.create(views.prepared, views.prepared.stack_images(images), views.effects, known)
+    problem = views.problem(views.prepared.stack_images(images), known)
     if result.exposures:
         problem = problem.with_exposures(torch.tensor(result.exposures, dtype=torch.float64))
     pairs = zip(result.lights, result.covariance, strict=True)

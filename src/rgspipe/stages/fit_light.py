@@ -15,15 +15,16 @@ from rgspipe.datasets.gs3 import load_target
 from rgspipe.datasets.location import dataset_root
 from rgspipe.datasets.views import Target, View
 from rgspipe.evaluation.fit_folder import read_result, write_result
-from rgspipe.fitting import Effects, FitViews, PaperAdam, Search, Solver
-from rgspipe.fitting.model.harmonics import BandLimit
+from rgspipe.fitting import FitViews, PaperAdam, Search, Solver
 from rgspipe.fitting.options import MOST_LIGHTS, AdamOptions, SearchOptions
 from rgspipe.options import Options
 from rgspipe.progress import progress_bar
 from rgspipe.renderer.effect_bounds import NO_BOUND, EffectBounds
-from rgspipe.renderer.effects import Decision, EffectChoice, RigKind
+from rgspipe.renderer.effect_choice import Decision, EffectChoice, RigKind
+from rgspipe.renderer.effects import Effects
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.monte_carlo import MonteCarloSolver
+from rgspipe.renderer.zonal_harmonics import BandLimit
 from rgspipe.scene import PointLight
 from rgspipe.stages import fit_capture
 from rgspipe.stages.base import Stage, StageContext
@@ -31,7 +32,7 @@ from rgspipe.stages.fit_capture import captured_views
 from rgspipe.stages.fit_extras import Named, further_files, training_cameras
 from rgspipe.stages.fit_targets import all_targets, select_targets, target_seed, used_views
 from rgspipe.stages.light_spec import light_spec
-from rgspipe.stages.scene_effects import chosen_effects, frozen_scene
+from rgspipe.stages.scene_effects import chosen_effects, frozen_scene, wanted_effects
 from rgspipe.stages.sources import image_stage, require_images, target_stage
 from rgspipe.stages.spoken import COMMAND_LINE
 
@@ -64,8 +65,6 @@ class Fitter:
     def create(cls, context: StageContext) -> Fitter:
         config, artifact = context.config, context.inputs["freeze"]
         frozen, effects = frozen_scene(config, artifact), _effects(context)
-        if frozen.gloss is not None and config.effects.auto and not _choice(config, artifact)[1].specular:
-            frozen = replace(frozen, gloss=None)
         dataset = context.inputs["generate_dataset"].path if "generate_dataset" in context.inputs else None
         lights = _training_lights(context) if config.fit.method == "paper_adam" else ()
         return cls(config, frozen, lights, effects, dataset)
@@ -118,6 +117,7 @@ class Fitter:
                 lights=light_spec(self.config),
                 masks=[view.alpha for view in views],
                 effects=self.effects,
+                sharp=self.config.effects.at_pixels,
                 mask_edges=self.config.fit.search.mask_edges,
             )
         return self.prepared[key]
@@ -132,11 +132,12 @@ def _effects(context: StageContext) -> Effects:
     """The effects of the configuration; with effects.auto less those that the frozen scene does not call for."""
     wanted, band = context.config.effects, band_limit(context.config)
     if not wanted.auto:
-        return Effects(wanted.shadows, wanted.interreflection, wanted.at_pixels, band)
+        return replace(wanted_effects(wanted), spots=band)
     bounds, choice = _choice(context.config, context.inputs["freeze"])
     print("effects: " + "; ".join(choice.reasons))
     context.note(effects={"choice": asdict(choice), "bounds": asdict(bounds), "tolerance": wanted.tolerance})
-    return Effects(choice.shadows, choice.interreflection, wanted.at_pixels, band)
+    # What is looked for has its cone, even where known rigs would be rendered without.
+    return replace(choice.effects, cones=True, spots=band)
 
 
 def _choice(config: RgspipeConfig, freeze: Artifact) -> tuple[EffectBounds, EffectChoice]:

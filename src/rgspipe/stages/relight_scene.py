@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -19,16 +19,16 @@ from rgspipe.datasets.light_file import write_lights
 from rgspipe.datasets.location import dataset_root, open_dataset
 from rgspipe.datasets.views import View
 from rgspipe.errors import InputError
-from rgspipe.fitting.fit import FitViews
-from rgspipe.fitting.model.problem import Effects
-from rgspipe.fitting.model.views import PreparedViews, prepare_views
-from rgspipe.fitting.spec import LightSpec
-from rgspipe.renderer.effects import RigKind
+from rgspipe.renderer.effect_choice import RigKind
+from rgspipe.renderer.effects import Effects
 from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.renderer.images.model import SurfelModel, ViewModel
+from rgspipe.renderer.images.pixels import PixelModel
+from rgspipe.renderer.images.viewed_pixels import ViewedPixels
 from rgspipe.renderer.view_weights import ViewWeights
 from rgspipe.scene import Camera, LightRig
 from rgspipe.scene.lights import KINDS
-from rgspipe.stages.scene_effects import chosen_effects, frozen_scene
+from rgspipe.stages.scene_effects import chosen_effects, frozen_scene, wanted_effects
 
 
 @dataclass
@@ -47,9 +47,9 @@ class Relighter:
     frozen: FrozenScene
     reasons: dict[str, tuple[str, ...]] = field(default_factory=dict)
     _weights: dict[bytes, ViewWeights] = field(default_factory=dict)
-    _prepared: dict[tuple[bytes, bool], PreparedViews] = field(default_factory=dict)
-    _rendered: PreparedViews | None = None
-    _kinds: dict[RigKind, tuple[Effects, bool, bool]] = field(default_factory=dict)
+    _models: dict[tuple[bytes, Effects], ViewModel] = field(default_factory=dict)
+    _rendered: ViewModel | None = None
+    _kinds: dict[RigKind, Effects] = field(default_factory=dict)
 
     @classmethod
     def of(cls, config: RgspipeConfig, freeze: Artifact) -> Relighter:
@@ -57,15 +57,13 @@ class Relighter:
 
     def render(self, cameras: Sequence[Camera], rig: LightRig) -> tuple[list[Tensor], float]:
         """(H, W, 3) image of every camera under `rig`, and the seconds that all of them took once they are prepared."""
-        effects, spots, lobes = self._effects(rig)
-        prepared, lights = self._prepare(cameras, lobes), rig if spots else tuple(light.plain for light in rig)
-        views = FitViews(prepared, LightSpec(), effects)
-        if prepared is not self._rendered:
+        model = self._model(cameras, self._effects(rig))
+        if model is not self._rendered:
             # The first image of a camera works out what the others share.
-            views.render(lights)
-            self._rendered = prepared
+            model.image(rig)
+            self._rendered = model
         began = time.perf_counter()
-        images = views.render(lights)
+        images = model.views.split(model.image(rig))
         return [image.cpu() for image in images], time.perf_counter() - began
 
     def write(
@@ -85,32 +83,29 @@ class Relighter:
         rows = [known | {"view": index, "milliseconds": 1e3 * seconds / len(views)} for index, _ in views]
         return rows, arrays
 
-    def _effects(self, rig: LightRig) -> tuple[Effects, bool, bool]:
-        """The effects of a rig; whether its spots have cones; whether the scene has lobes."""
+    def _effects(self, rig: LightRig) -> Effects:
+        """The effects of a rig."""
         wanted, kind = self.config.effects, RigKind.of(rig)
         if not wanted.auto:
-            return Effects(wanted.shadows, wanted.interreflection, wanted.at_pixels), True, True
+            return wanted_effects(wanted)
         if kind not in self._kinds:
             choice = chosen_effects(wanted, self.freeze, kind)[1]
             self.reasons[_words(rig)] = choice.reasons
-            effects = Effects(choice.shadows, choice.interreflection, wanted.at_pixels)
-            self._kinds[kind] = effects, choice.spots, choice.specular
+            self._kinds[kind] = choice.effects
         return self._kinds[kind]
 
-    def _prepare(self, cameras: Sequence[Camera], lobes: bool) -> PreparedViews:
-        key = b"".join(map(_identity, cameras)), lobes
-        if key not in self._prepared:
-            frozen = self.frozen if lobes else replace(self.frozen, gloss=None)
-            weights = [self._view(camera) for camera in cameras]
-            at_pixels = self.config.effects.at_pixels
-            self._prepared[key] = prepare_views(frozen, weights, mask_edges=False, at_pixels=at_pixels)
-        return self._prepared[key]
+    def _model(self, cameras: Sequence[Camera], effects: Effects) -> ViewModel:
+        key = b"".join(camera.key for camera in cameras), effects
+        if key not in self._models:
+            views = ViewedPixels.every(self.frozen, [self._view(camera) for camera in cameras])
+            sharp = self.config.effects.at_pixels
+            self._models[key] = PixelModel.of(views, effects) if sharp else SurfelModel(views, effects)
+        return self._models[key]
 
     def _view(self, camera: Camera) -> ViewWeights:
-        key = _identity(camera)
-        if key not in self._weights:
-            self._weights[key] = self.frozen.view(camera)
-        return self._weights[key]
+        if camera.key not in self._weights:
+            self._weights[camera.key] = self.frozen.view(camera)
+        return self._weights[camera.key]
 
 
 def image_path(folder: Path, rig: str, view: int) -> Path:
@@ -122,11 +117,6 @@ def _words(rig: LightRig) -> str:
     """A rig in words: "2 points, 1 spot"."""
     counted = Counter(light.kind for light in rig)
     return ", ".join(f"{counted[name]} {name}{'s' if counted[name] != 1 else ''}" for name in KINDS if counted[name])
-
-
-def _identity(camera: Camera) -> bytes:
-    numbers = (camera.fx, camera.fy, camera.cx, camera.cy, camera.width, camera.height)
-    return camera.camera_to_world.numpy().tobytes() + repr(numbers).encode()
 
 
 def configured_cameras(config: RgspipeConfig, folder: Path | None) -> list[Camera]:

@@ -9,7 +9,8 @@ from rgspipe.config import RgspipeConfig
 from rgspipe.config.effects import EffectsConfig
 from rgspipe.datasets.json_file import read_json
 from rgspipe.renderer.effect_bounds import EffectBounds
-from rgspipe.renderer.effects import EffectChoice, RigKind, choose_effects
+from rgspipe.renderer.effect_choice import EffectChoice, RigKind, choose_effects
+from rgspipe.renderer.effects import Effects
 from rgspipe.renderer.frozen import FrozenScene
 
 #: What each effect can change in a frozen scene, and its cost, beside the scene's own files.
@@ -29,6 +30,11 @@ def measured_effects(freeze: Artifact) -> tuple[EffectBounds, Mapping[str, float
     """What effects can change in the frozen scene, and the milliseconds that they cost."""
     content = read_json(freeze.file(EFFECTS), "the effects of a frozen scene")
     return EffectBounds.from_json(content["bounds"]), content["milliseconds"]
+
+
+def wanted_effects(wanted: EffectsConfig) -> Effects:
+    """What is simulated where nothing is left out on its own."""
+    return Effects(wanted.shadows, wanted.interreflection)
 
 
 def chosen_effects(wanted: EffectsConfig, freeze: Artifact, kind: RigKind) -> tuple[EffectBounds, EffectChoice]:

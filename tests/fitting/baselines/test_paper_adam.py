@@ -10,12 +10,13 @@ import skimage.metrics
 import torch
 
 from lit_room import VISIBLE
-from rgspipe.fitting import Effects, FitStatus, PaperAdam
+from rgspipe.fitting import FitStatus, PaperAdam
 from rgspipe.fitting.baselines.paper_adam_loss import AdamLoss, MovingRig
 from rgspipe.fitting.baselines.paper_adam_start import Ball, LightPrior, draw_start, light_ball
 from rgspipe.fitting.findings import AllStepsTaken
 from rgspipe.fitting.options import StartOptions
 from rgspipe.optim.ssim import WINDOW, ssim, ssim_map
+from rgspipe.renderer.effects import Effects
 from rgspipe.scene import PointLight
 
 SHORT = PaperAdam(epochs=2, steps=15)

@@ -9,8 +9,9 @@ import pytest
 import torch
 
 from lit_room import HIDDEN, room_cameras
-from rgspipe.fitting import Effects, ImageCapture
+from rgspipe.fitting import ImageCapture
 from rgspipe.fitting.certainty.advice import COMMON, MOST_VIEWS, suggest_views
+from rgspipe.renderer.effects import Effects
 from rgspipe.scene import Camera, PointLight, look_at
 
 
@@ -100,7 +101,7 @@ def test_a_fit_without_lights_has_no_advice(room, fitted):
 
 def test_a_camera_whose_image_would_be_saturated_helps_no_more(room, fitted):
     """TOWARDS sees the bright spot, but not with a clip far below it; one that nothing reaches changes nothing."""
-    image = room.frozen.render(room.frozen.view(TOWARDS), fitted.lights)
+    image = room.frozen.render(room.frozen.view(TOWARDS), fitted.lights, sharp=False)
     (present,) = room_cameras(48)[:1]
 
     def left(clip: float | None) -> float:
@@ -110,7 +111,7 @@ def test_a_camera_whose_image_would_be_saturated_helps_no_more(room, fitted):
 
     free = left(None)
     assert left(10.0 * float(image.max())) == pytest.approx(free, rel=1e-9)
-    seen = room.frozen.render(room.frozen.view(present), fitted.lights)
+    seen = room.frozen.render(room.frozen.view(present), fitted.lights, sharp=False)
     assert float(image.quantile(0.5)) > float(seen.quantile(0.1))
     assert left(float(image.quantile(0.5))) > free + 0.1
 
@@ -118,8 +119,8 @@ def test_a_camera_whose_image_would_be_saturated_helps_no_more(room, fitted):
 def test_the_clip_of_a_view_is_that_of_its_exposure(room, fitted):
     """A view of twice the exposure is saturated from half the radiance on; one that is all saturated tells nothing."""
     (present,) = room_cameras(48)[:1]
-    brightest = float(room.frozen.render(room.frozen.view(TOWARDS), fitted.lights).max())
-    bright = float(room.frozen.render(room.frozen.view(present), fitted.lights).max())
+    brightest = float(room.frozen.render(room.frozen.view(TOWARDS), fitted.lights, sharp=False).max())
+    bright = float(room.frozen.render(room.frozen.view(present), fitted.lights, sharp=False).max())
     capture = ImageCapture(clip=2.0 * max(bright, brightest))
 
     def left(exposure: float) -> float:

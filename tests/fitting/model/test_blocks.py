@@ -8,11 +8,12 @@ import pytest
 import torch
 
 from emitters import emitter_at
-from rgspipe.fitting.model.blocks import block_average, block_model
 from rgspipe.fitting.model.capture import ImageCapture
-from rgspipe.fitting.model.problem import Effects, LightProblem
+from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.model.views import prepare_views
 from rgspipe.fitting.search.coarse import coarse_images
+from rgspipe.renderer.effects import Effects
+from rgspipe.renderer.images.blocks import block_average, block_model
 from rgspipe.scene.lights import SpotLight
 
 PLACE = torch.tensor([0.1, -0.2, 0.15], dtype=torch.float64)
@@ -40,11 +41,11 @@ def test_blocks_are_in_the_order_of_views_and_reach_over_none(room):
 def test_candidates_are_seen_as_block_means_of_full_images(room, point_light, interreflection):
     prepared = room.two.prepared
     blocks, _ = block_average(prepared)
-    model = block_model(prepared, interreflection=interreflection)
-    coarse = coarse_images(room.frozen, model, room.dictionary)
+    model = block_model(prepared, effects=Effects(interreflection=interreflection))
+    coarse = coarse_images(model, room.dictionary)
     for index in (0, 30, 60):
         light = point_light(tuple(room.dictionary.positions[index].tolist()), (1.0, 1.0, 1.0))
-        images = [room.frozen.render(view, (light,), indirect=interreflection) for view in room.views]
+        images = [room.frozen.render(view, light, model.effects, sharp=False) for view in room.views]
         expected = blocks @ prepared.stack_images(images)[prepared.pixels]
         torch.testing.assert_close(coarse.images[index], expected, rtol=1e-4, atol=1e-5)
 
@@ -55,9 +56,9 @@ def test_candidates_are_seen_as_block_means_of_full_images(room, point_light, in
 )
 def test_lights_and_their_derivatives_are_block_means(room, emitter, interreflection):
     full = _problem(room, interreflection)
-    coarse = full.coarsest(block_model(full.views, interreflection=interreflection))
+    coarse = full.coarsest(block_model(full.views, effects=Effects(interreflection=interreflection)))
     columns = full.evaluate(emitter)
-    expected = (coarse.blocks.average @ columns.reshape(len(columns), -1)).reshape(-1, *columns.shape[1:])
+    expected = (coarse.model.average @ columns.reshape(len(columns), -1)).reshape(-1, *columns.shape[1:])
     # Sums in another order: 3e-6 of the largest derivative, measured.
     torch.testing.assert_close(coarse.evaluate(emitter), expected, rtol=1e-4, atol=2e-5 * float(expected.abs().max()))
 
@@ -68,7 +69,7 @@ def test_a_block_weighs_as_much_as_its_pixels(room):
     even = dataclasses.replace(coarse, target=torch.ones_like(coarse.target))
     weights = even.relative_weights()[:, 0].double().square()
     torch.testing.assert_close(
-        weights / weights.sum(), coarse.blocks.counts / coarse.blocks.counts.sum(), rtol=1e-6, atol=0
+        weights / weights.sum(), coarse.model.counts / coarse.model.counts.sum(), rtol=1e-6, atol=0
     )
 
 
@@ -96,7 +97,7 @@ def test_blocks_follow_as_many_bounces_as_the_scene(room):
     full = LightProblem.create(views, image)
     coarse = full.coarsest(block_model(views))
     seen, expected = (problem.evaluate(emitter_at(PLACE))[:, :, 0] for problem in (coarse, full))
-    torch.testing.assert_close(seen, coarse.blocks.average @ expected.contiguous(), rtol=1e-4, atol=1e-5)
+    torch.testing.assert_close(seen, coarse.model.average @ expected.contiguous(), rtol=1e-4, atol=1e-5)
     every = LightProblem.create(room.two.prepared, image).coarsest(block_model(room.two.prepared))
     # All bounces make the blocks brighter; measured 15 %.
     assert float((every.evaluate(emitter_at(PLACE))[:, :, 0] / seen).median()) > 1.01

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import pytest
 import torch
@@ -11,7 +10,7 @@ import torch
 from emitters import emitter_at
 from lit_room import VISIBLE
 from rgspipe.fitting import Search
-from rgspipe.fitting.model.differences import central_differences
+from rgspipe.fitting.model.differences import by_differences, central_differences
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.scene.lights import SpotLight
@@ -53,8 +52,9 @@ def test_derivatives_of_both_kinds_agree_in_smooth_pixels(room, point_light) -> 
     prepared = room.one.prepared
     problem = LightProblem.create(prepared, prepared.stack_images(room.images(point_light(VISIBLE))))
     emitter = emitter_at(torch.tensor(VISIBLE, dtype=torch.float64) + 0.003)
-    ours, theirs = (replace(problem, differences=on).evaluate(emitter) for on in (False, True))
+    exact, differences = problem, by_differences(problem)
+    ours, theirs = (one.evaluate(emitter) for one in (exact, differences))
     apart = (ours - theirs)[:, :, 1:].abs().median() / theirs[:, :, 1:].abs().median()
     assert float(apart) < 0.01 and problem.renderings([emitter]) == 1
-    assert replace(problem, differences=True).renderings([emitter]) == 7
+    assert differences.renderings([emitter]) == 7
     assert float((ours - theirs)[:, :, 0].abs().max()) == pytest.approx(0.0)

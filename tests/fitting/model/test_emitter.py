@@ -11,7 +11,7 @@ import torch
 from emitters import emitter_at
 from rgspipe.fitting import FitViews
 from rgspipe.fitting.model.emitter import Emitter
-from rgspipe.fitting.model.problem import Effects, LightProblem
+from rgspipe.renderer.effects import Effects
 from rgspipe.scene.lights import KINDS, Light, SpotLight
 from rgspipe.scene.lights.coordinates import tangents
 from rgspipe.scene.lights.spot import CONE
@@ -56,10 +56,9 @@ def test_derivatives_of_a_spot_s_image_agree_with_finite_differences(room, shape
 
     Without shadows, which are the same as a point light's and jump where hits part into layers.
     """
-    effects = Effects(shadows=False, at_pixels=at_pixels)
-    views = FitViews.prepare(room.frozen, room.views[:1], effects=effects)
+    views = FitViews.prepare(room.frozen, room.views[:1], effects=Effects(shadows=False), sharp=at_pixels)
     target = torch.ones(room.views[0].camera.pixel_count, 3)
-    problem = LightProblem.create(views.prepared, target, views.effects).sharpest()
+    problem = views.problem(target).sharpest()
     emitter = emitter_at(PLACE, AXIS, shape, shape_free=True, softness=0.1)
     slopes = problem.evaluate(emitter)[:, :, 1:] * emitter.units(1.0).float()
     assert slopes.shape[2] == emitter.parameters

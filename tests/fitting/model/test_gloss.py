@@ -9,9 +9,10 @@ import torch
 
 from emitters import emitter_at
 from lit_room import VISIBLE, room_cameras, room_surfels
-from rgspipe.fitting import Effects, FitViews
+from rgspipe.fitting import FitViews
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.problem import LightProblem
+from rgspipe.renderer.effects import Effects
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import Gloss, PointLight
 from rgspipe.scene.lights import SpotLight
@@ -35,13 +36,12 @@ def frozen() -> FrozenScene:
     return FrozenScene.freeze(replace(surfels, gloss=gloss), gather_rays=64, patches=100, seed=0)
 
 
-def _views(frozen: FrozenScene, **effects: bool) -> FitViews:
-    return FitViews.prepare(frozen, room_cameras(24), effects=Effects(**effects))
+def _views(frozen: FrozenScene, sharp: bool = False, **effects: bool) -> FitViews:
+    return FitViews.prepare(frozen, room_cameras(24), effects=Effects(**effects), sharp=sharp)
 
 
 def _problem(views: FitViews) -> LightProblem:
-    stacked = views.prepared.stack_images(views.render((LIGHT,)))
-    return LightProblem.create(views.prepared, stacked, views.effects)
+    return views.problem(views.prepared.stack_images(views.render((LIGHT,))))
 
 
 def _largest_error(problem: LightProblem, emitter: Emitter, share: float = 1.0) -> list[float]:
@@ -63,13 +63,13 @@ def _largest_error(problem: LightProblem, emitter: Emitter, share: float = 1.0) 
 def test_at_centres_the_image_is_the_renderer_s(frozen: FrozenScene) -> None:
     views = _views(frozen)
     image = _problem(views).evaluate(emitter_at(LIGHT.position))[:, :, 0] * LIGHT.intensity.float()
-    expected = torch.cat([frozen.render(view, (LIGHT,)).reshape(-1, 3) for view in views.prepared.views])
+    expected = torch.cat([frozen.render(view, (LIGHT,), sharp=False).reshape(-1, 3) for view in views.prepared.views])
     torch.testing.assert_close(image, expected[views.prepared.pixels], rtol=1e-4, atol=1e-6)
 
 
 @pytest.mark.parametrize("interreflection", [True, False])
 def test_at_pixels_the_image_is_that_of_a_rendering(frozen: FrozenScene, interreflection: bool) -> None:
-    views = _views(frozen, at_pixels=True, interreflection=interreflection)
+    views = _views(frozen, sharp=True, interreflection=interreflection)
     problem = _problem(views).sharpest()
     for light, emitter in ((LIGHT, emitter_at(LIGHT.position)), (SPOT.shining(LIGHT.intensity), SPOT)):
         image = problem.evaluate(emitter)[:, :, 0] * light.intensity.float()
@@ -79,9 +79,9 @@ def test_at_pixels_the_image_is_that_of_a_rendering(frozen: FrozenScene, interre
 
 def test_highlights_at_pixels_are_those_of_centres_where_surfels_are_small(frozen: FrozenScene) -> None:
     """They differ by what a lobe changes within a surfel; without lobes both images lose the same light."""
-    sharp, plain = (_views(frozen, at_pixels=at_pixels).render((LIGHT,)) for at_pixels in (True, False))
+    sharp, plain = (_views(frozen, at_pixels).render((LIGHT,)) for at_pixels in (True, False))
     diffuse = replace(frozen, gloss=None)
-    without = [_views(diffuse, at_pixels=at_pixels).render((LIGHT,)) for at_pixels in (True, False)]
+    without = [_views(diffuse, at_pixels).render((LIGHT,)) for at_pixels in (True, False)]
     pairs = ((sharp, without[0]), (plain, without[1]))
     lobes = [sum(float((a - b).sum()) for a, b in zip(*pair, strict=True)) for pair in pairs]
     assert lobes[0] == pytest.approx(lobes[1], rel=0.03)
@@ -90,16 +90,16 @@ def test_highlights_at_pixels_are_those_of_centres_where_surfels_are_small(froze
 @pytest.mark.parametrize("at_pixels", [False, True])
 @pytest.mark.parametrize("emitter", [emitter_at(LIGHT.position + 0.003), SPOT], ids=["point", "spot"])
 def test_derivatives_match_finite_differences(frozen: FrozenScene, at_pixels: bool, emitter: Emitter) -> None:
-    problem = _problem(_views(frozen, at_pixels=at_pixels)).sharpest()
+    problem = _problem(_views(frozen, at_pixels)).sharpest()
     errors = _largest_error(problem, emitter, 0.95)
     assert max(errors) < 0.02, errors
 
 
 def test_a_fit_finds_the_light_that_made_a_glossy_image_and_without_lobes_misplaces_it(frozen: FrozenScene) -> None:
-    images = _views(frozen, at_pixels=True).render((LIGHT,))
+    images = _views(frozen, sharp=True).render((LIGHT,))
     errors = []
     for scene in (frozen, replace(frozen, gloss=None)):
-        views = FitViews.prepare(scene.with_dictionary(5), room_cameras(24), effects=Effects(at_pixels=True))
+        views = FitViews.prepare(scene.with_dictionary(5), room_cameras(24), sharp=True)
         light = views.fit(images).lights[0]
         errors.append(float((light.position - LIGHT.position).norm()))
     assert errors[0] < 1e-4, errors

@@ -8,8 +8,9 @@ import torch
 from emitters import emitter_at
 from lit_room import HIDDEN, VISIBLE
 from rgspipe.fitting.model.moments import moments
-from rgspipe.fitting.model.problem import Effects, LightProblem
+from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.renderer.direct import unit_irradiance
+from rgspipe.renderer.effects import Effects
 from rgspipe.renderer.kernels.irradiance import SOFTENING
 
 

@@ -51,7 +51,7 @@ def test_a_right_number_is_not_doubted(room, point_light, places):
 
 def test_the_light_that_is_spare_is_named_and_the_others_take_its_part(room, point_light):
     """Of a light that is split in two one half is left out, though each is far from faint."""
-    views = FitViews.prepare(room.frozen, room.views)
+    views = FitViews.prepare(room.frozen, room.views, sharp=False)
     images = noisy_images(views, (point_light(VISIBLE), point_light(HIDDEN)))
     problem = LightProblem.create(views.prepared, views.prepared.stack_images(images))
     beside = (VISIBLE[0] + 0.05, *VISIBLE[1:])

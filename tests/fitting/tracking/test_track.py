@@ -125,7 +125,7 @@ def test_an_answer_with_a_light_that_explains_nothing_is_not_sure(point_light) -
 def test_two_spots_that_move_and_turn_keep_their_order(room) -> None:
     """The headlights of a car: one axis, which turns by 4° a frame."""
     spec = LightSpec("spot", 2, SHAPE)
-    views = FitViews.prepare(room.frozen, room.views, lights=spec)
+    views = FitViews.prepare(room.frozen, room.views, lights=spec, sharp=False)
     frames, truth = [], []
     for k in range(4):
         turn = math.radians(4.0 * k)
@@ -133,7 +133,7 @@ def test_two_spots_that_move_and_turn_keep_their_order(room) -> None:
         places = torch.tensor([[-0.35 + 0.04 * k, -0.3, 0.1], [-0.35 + 0.04 * k, 0.2, 0.1]], dtype=torch.float64)
         rig = tuple(SHAPE.at(p, axis, (1.0 + j) * torch.ones(3).double()) for j, p in enumerate(places))
         truth.append(rig)
-        frames.append([room.frozen.render(view, rig) for view in room.views])
+        frames.append([room.frozen.render(view, rig, sharp=False) for view in room.views])
     track = track_lights(views, frames, search=Search(starts=3))
     assert [frame.status for frame in track].count(FrameStatus.SEARCHED) == 1
     assert {frame.status for frame in track} <= {FrameStatus.SEARCHED, FrameStatus.TRACKED, FrameStatus.TRACED_BACK}

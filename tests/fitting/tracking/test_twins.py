@@ -15,7 +15,7 @@ from rgspipe.scene import LightRig
 
 
 def _problem(room, rig: LightRig) -> LightProblem:
-    stacked = room.two.prepared.stack_images([room.frozen.render(view, rig) for view in room.views])
+    stacked = room.two.prepared.stack_images([room.frozen.render(view, rig, sharp=False) for view in room.views])
     return LightProblem.create(room.two.prepared, stacked, room.two.effects)
 
 

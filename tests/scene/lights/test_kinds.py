@@ -16,6 +16,7 @@ from torch import Tensor
 from double_precision import irradiance
 from rgspipe.datasets.light_file import read_lights, write_lights
 from rgspipe.errors import InputError
+from rgspipe.renderer.effects import Effects
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.rig import rig_irradiance
 from rgspipe.scene import Light
@@ -215,7 +216,7 @@ def test_light_on_surfels_knows_how_it_changes_with_every_tensor(light: Light) -
         return float((lit[:, None] * one.intensity * weights).sum())
 
     leaves = {name: value.clone().requires_grad_() for name, value in values.items()}
-    (rig_irradiance(bvh, (replace(light, **leaves),), shadows=False) * weights).sum().backward()
+    (rig_irradiance(bvh, (replace(light, **leaves),), Effects(shadows=False)) * weights).sum().backward()
     for name, value in values.items():
         steps = 1e-6 * torch.eye(value.numel(), dtype=torch.float64).reshape(-1, *value.shape)
         expected = (

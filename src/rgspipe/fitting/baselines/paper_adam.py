@@ -88,7 +88,7 @@ class _Descent:
         axes = start.axes.clone().requires_grad_() if spec.aimed else None
         leaves = (leaf.clone().requires_grad_() for leaf in (start.positions, start.log_intensities))
         rig = MovingRig(*leaves, spec.kinds[0], axes)
-        loss = AdamLoss(problem.views, target, options.ssim_weight, problem.effects)
+        loss = AdamLoss(problem.views, target, options.ssim_weight, problem.model.effects)
         return cls(loss, options, ball, rig, meter, [])
 
     def run(self) -> bool:

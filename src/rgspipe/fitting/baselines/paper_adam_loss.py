@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import torch
 from torch import Tensor
 
 from rgspipe.fitting.model.emitter import Emitter
-from rgspipe.fitting.model.harmonics import BandLimit, emitted_share
-from rgspipe.fitting.model.problem import Effects
 from rgspipe.fitting.model.views import PreparedViews
 from rgspipe.fitting.search.schedule import soft
 from rgspipe.optim.ssim_reference import SsimReference
-from rgspipe.renderer.direct import differentiable_irradiance
+from rgspipe.renderer.effects import Effects
+from rgspipe.renderer.lit_surfels import lit_surfels
+from rgspipe.renderer.rig import RigResponse
+from rgspipe.renderer.unit_light import OwnLight
 from rgspipe.scene import Light, LightRig
 from rgspipe.sums import average
 
@@ -42,20 +42,16 @@ class MovingRig:
         lights = (self.shape.at(*both) for both in zip(positions, axes, strict=True))
         return soft(tuple(map(Emitter.of, lights)), 0.0)
 
+    def moving(self) -> tuple[OwnLight, ...]:
+        """The lights with their gradients, and with the rims of `emitters`."""
+        axes = [None] * len(self.positions) if self.axes is None else self.axes
+        parts = zip(self.positions, axes, self.log_intensities.exp(), self.emitters(), strict=True)
+        return tuple(OwnLight(self.shape.at(*tensors), emitter.softness) for *tensors, emitter in parts)
+
     def lights(self) -> LightRig:
         """The lights, without gradients."""
         intensities = self.log_intensities.detach().exp()
         return tuple(one.shining(intensity) for one, intensity in zip(self.emitters(), intensities, strict=True))
-
-
-def _share(position: Tensor, axis: Tensor, points: Tensor, emitter: Emitter, band: BandLimit | None) -> Tensor:
-    """(N,) the share of a light towards points, differentiable towards its position and axis.
-
-    What is added is zero, and its derivative that of the share.
-    """
-    share = emitted_share(emitter, points, band)
-    moves = ((share.by["position"], position), (share.by["direction"], axis))
-    return share.value + sum(slope @ (leaf - leaf.detach()).to(slope) for slope, leaf in moves)
 
 
 def rig_image(views: PreparedViews, rig: MovingRig, effects: Effects) -> Tensor:
@@ -63,17 +59,10 @@ def rig_image(views: PreparedViews, rig: MovingRig, effects: Effects) -> Tensor:
 
     The lights are added up before their light bounces, so a rig costs as many bounces as one light.
     """
-    frozen = views.frozen
-    lit = differentiable_irradiance(frozen.bvh, rig.positions, effects.shadows)
-    if rig.axes is not None:
-        points = frozen.bvh.surfels.centers
-        spots = zip(rig.positions, rig.axes, rig.emitters(), strict=True)
-        lit = lit * torch.stack([_share(*spot[:2], points, spot[2], effects.spots) for spot in spots])
-    irradiance = lit.T @ rig.log_intensities.exp().to(lit)
-    radiance = frozen.surfels.albedo * (irradiance / math.pi)
-    if effects.interreflection:
-        radiance = radiance + frozen.indirect(radiance[:, :, None])[:, :, 0]
-    return views.all_pixels @ radiance
+    frozen, moving = views.frozen, rig.moving()
+    lit = [lit_surfels(frozen.bvh, light, effects, 0.0) for light in moving]
+    response = RigResponse.of(frozen.bvh, tuple(light.given for light in moving), lit)
+    return views.every_pixel.operator @ frozen.coloured_radiance(response.summed(), effects.interreflection)
 
 
 class AdamLoss:
@@ -87,11 +76,11 @@ class AdamLoss:
     def __init__(self, views: PreparedViews, target: Tensor, ssim_weight: float, effects: Effects) -> None:
         self._views, self._weight, self._effects = views, ssim_weight, effects
         self._covered = [mask.to(target)[:, :, None] for mask in views.masks]
-        wanted = [mask * image for mask, image in zip(self._covered, views.split_images(target), strict=True)]
+        wanted = [mask * image for mask, image in zip(self._covered, views.split(target), strict=True)]
         self._wanted = [(image, SsimReference.of(image)) for image in wanted]
 
     def __call__(self, rig: MovingRig) -> Tensor:
-        images = self._views.split_images(rig_image(self._views, rig, self._effects))
+        images = self._views.split(rig_image(self._views, rig, self._effects))
         losses = []
         for image, mask, (wanted, reference) in zip(images, self._covered, self._wanted, strict=True):
             image = mask * image

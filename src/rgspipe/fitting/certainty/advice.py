@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import torch
 from torch import Tensor
@@ -27,12 +27,14 @@ from rgspipe.fitting.certainty.uncertainty import surface_cells, whitener
 from rgspipe.fitting.model.capture import SATURATED, ImageCapture
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.moments import group_moments, information, scores
-from rgspipe.fitting.model.problem import Effects, LightProblem
+from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.model.views import prepare_views
 from rgspipe.fitting.options import CertaintyOptions
 from rgspipe.fitting.result import FitResult
 from rgspipe.progress import progress_bar
+from rgspipe.renderer.effects import ALL_EFFECTS, Effects
 from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.renderer.images.model import SurfelModel
 from rgspipe.scene import Camera
 
 #: Images that are only predicted need no more pixels than this along their longer side.
@@ -104,7 +106,7 @@ def suggest_views(
     candidates: Sequence[Camera],
     *,
     wanted: float,
-    effects: Effects | None = None,
+    effects: Effects = ALL_EFFECTS,
     capture: ImageCapture | None = None,
 ) -> ViewAdvice:
     """Rank further cameras for a fit by what they would leave uncertain.
@@ -125,7 +127,7 @@ def suggest_views(
         raise ValueError("views can be suggested only for a fit with lights and cameras")
     cameras = [*present, *candidates]
     clips = _clips(result, capture or ImageCapture(), len(present), len(cameras))
-    evidence = _evidence(frozen, result, cameras, effects or Effects(), clips)
+    evidence = _evidence(frozen, result, cameras, effects, clips)
     first = list(range(len(present)))
     forecast = _Forecast.fitted_to(result, evidence, first, frozen.size)
     others = range(len(present), len(present) + len(candidates))
@@ -237,7 +239,7 @@ def _evidence(
     ]
     views = prepare_views(frozen, weights)
     black = torch.zeros((len(views.pixels), 3), device=views.operator.matrix.device)
-    problem = LightProblem(views, black, 1.0, replace(effects, at_pixels=False))
+    problem = LightProblem(views, SurfelModel(views, effects), black, 1.0)
     pairs = zip(result.lights, result.covariance, strict=True)
     emitters = [Emitter.fitted(light, matrix) for light, matrix in pairs]
     intensity = torch.stack([light.intensity.double().cpu() for light in result.lights])

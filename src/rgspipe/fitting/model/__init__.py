@@ -1,4 +1,5 @@
 """The image of unknown lights, and what it leaves unexplained: views and a target in, residuals and moments out.
 
-Views as pixels, as blocks of pixels, or with direct light where pixels look; exposures, clipping and gloss.
+How views see lights is one of the models of `renderer.images.model`; here are what a fit may move of a light, which
+pixels it trusts, exposures and clipping.
 """

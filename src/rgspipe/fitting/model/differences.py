@@ -3,14 +3,65 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import torch
 from torch import Tensor
 
 from rgspipe.fitting.model.emitter import Emitter
+from rgspipe.fitting.model.problem import LightProblem
+from rgspipe.renderer.effects import Effects
+from rgspipe.renderer.images.model import ImageModel
+from rgspipe.renderer.sparse import SparseOperator
 
 #: Step of a parameter: of the scene's size for positions, rad for axes; see `Emitter`.
 STEP = 1e-3
+
+
+@dataclass(frozen=True)
+class DifferenceModel(ImageModel):
+    """A model of images with derivatives by central differences in the place of its own.
+
+    Attributes:
+        exact: the model.
+        size: of the scene, scene units.
+    """
+
+    exact: ImageModel
+    size: float
+
+    @property
+    def effects(self) -> Effects:
+        return self.exact.effects
+
+    @property
+    def view_of(self) -> Tensor:
+        return self.exact.view_of
+
+    @property
+    def bounds(self) -> list[int]:
+        return self.exact.bounds
+
+    @property
+    def counts(self) -> Tensor:
+        return self.exact.counts
+
+    @property
+    def average(self) -> SparseOperator | None:
+        return self.exact.average
+
+    def columns(self, light: Emitter) -> Tensor:
+        return central_differences(lambda other: self.exact.columns(other)[:, :, 0], light, self.size)
+
+    def renderings(self, light: Emitter) -> int:
+        return 1 + 2 * light.parameters
+
+
+def by_differences(problem: LightProblem) -> LightProblem:
+    """The same problem with derivatives by central differences."""
+    size = problem.views.frozen.size
+    sharp = None if problem.sharp is None else DifferenceModel(problem.sharp, size)
+    return replace(problem, model=DifferenceModel(problem.model, size), sharp=sharp)
 
 
 def central_differences(image: Callable[[Emitter], Tensor], emitter: Emitter, size: float) -> Tensor:

@@ -146,20 +146,3 @@ class Emitter:
         counts = [coordinate.count for coordinate in self.coordinates.values()]
         for (name, coordinate), part in zip(self.coordinates.items(), step.split(counts), strict=True):
             yield name, coordinate, part
-
-
-def shared(columns: Tensor, share: Share | None, emitter: Emitter) -> Tensor:
-    """What a point light's `columns` (N, …, 4) are of `emitter`, which sends a share of its light there.
-
-    Returns:
-        (N, …, 1 + D): the value, then its natural derivatives.
-    """
-    if share is None:
-        return columns
-    between = [1] * (columns.ndim - 2)
-    value, slopes = share.value.reshape(-1, *between, 1), emitter.slopes(share)
-    slopes = slopes.reshape(len(slopes), *between, -1)
-    unit = columns[..., :1]
-    products = slopes * unit
-    products = torch.cat([products[..., :3] + value * columns[..., 1:], products[..., 3:]], dim=-1)
-    return torch.cat([value * unit, products], dim=-1)

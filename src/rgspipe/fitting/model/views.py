@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-import numpy as np
 import scipy.sparse
 import torch
 from torch import Tensor
 
 from rgspipe.errors import InputError
-from rgspipe.fitting.model.pixel_highlights import PixelHighlights
 from rgspipe.renderer.frozen import FrozenScene
-from rgspipe.renderer.pixel_direct import PixelDirect
-from rgspipe.renderer.sparse import SparseOperator, stack
+from rgspipe.renderer.images.viewed_pixels import ViewedPixels
+from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.view_weights import ViewWeights
 from rgspipe.scene.arrays import ArrayLike, as_tensor, check_finite
 
@@ -34,65 +31,19 @@ LEAST_PIXELS = 8
 
 
 @dataclass(frozen=True)
-class PreparedViews:
-    """One or several views, stacked.
+class PreparedViews(ViewedPixels):
+    """One or several views, and the pixels of them that a fit trusts.
 
     Attributes:
-        frozen: the scene that they show.
-        views: their weights, V of them.
         masks: (H, W) in [0, 1] per view, the scene's share of each pixel.
-        pixels: (P,) int64 pixels that a fit trusts, in the order of all views' pixels stacked.
-        operator: (P, N) weights of those pixels.
-        pixel_direct: per view its direct light where pixels look; empty where surfels' centres stand for them.
     """
 
-    frozen: FrozenScene
-    views: tuple[ViewWeights, ...]
     masks: tuple[Tensor, ...]
-    pixels: Tensor
-    operator: SparseOperator
-    pixel_direct: tuple[PixelDirect, ...] = ()
 
     @cached_property
-    def all_pixels(self) -> SparseOperator:
-        """(all pixels of all views, N) weights, edges included."""
-        return stack([view.operator for view in self.views])
-
-    @cached_property
-    def bounds(self) -> list[int]:
-        """V + 1 places: view v has the trusted pixels from bounds[v] to bounds[v + 1]."""
-        ends = np.cumsum([0, *(view.camera.pixel_count for view in self.views)])
-        return np.searchsorted(self.pixels.cpu().numpy(), ends).tolist()
-
-    @cached_property
-    def view_of(self) -> Tensor:
-        """(P,) int64 view of each trusted pixel."""
-        counts = torch.tensor(self.bounds).diff()
-        return torch.repeat_interleave(torch.arange(len(counts)), counts).to(self.pixels.device)
-
-    @cached_property
-    def rows(self) -> tuple[SparseOperator, ...]:
-        """Per view the rows of `operator` that are its own."""
-        matrix, device = self.operator.to_scipy(), self.operator.matrix.device
-        pairs = itertools.pairwise(self.bounds)
-        return tuple(SparseOperator.from_scipy(matrix[first:last], device) for first, last in pairs)
-
-    @cached_property
-    def highlights(self) -> tuple[PixelHighlights, ...]:
-        """Of a scene with gloss, per view its highlights where pixels look; empty where `pixel_direct` is."""
-        pairs = zip(self.views, self.pixel_direct, strict=True) if self.pixel_direct else ()
-        gloss = self.frozen.gloss
-        return () if gloss is None else tuple(PixelHighlights(gloss, view, direct) for view, direct in pairs)
-
-    @cached_property
-    def all_points(self) -> Tensor:
-        """(all pixels of all views, 3) float64 place that each pixel looks at; for views with `pixel_direct`."""
-        return torch.cat([direct.points for direct in self.pixel_direct])
-
-    @cached_property
-    def points(self) -> Tensor:
-        """(P, 3) float64 place that each trusted pixel looks at; for views with `pixel_direct`."""
-        return self.all_points[self.pixels]
+    def every_pixel(self) -> ViewedPixels:
+        """All pixels of all views, edges included."""
+        return ViewedPixels.every(self.frozen, self.views)
 
     def stack_images(self, images: Sequence[ArrayLike]) -> Tensor:
         """(all pixels, 3) float32 of one image (H, W, 3) per view.
@@ -103,12 +54,6 @@ class PreparedViews:
         checked = _one_each("images", images, self.views, (3,))
         return torch.cat([image.detach().reshape(-1, 3).float() for image in checked]).to(self.operator.matrix.device)
 
-    def split_images(self, stacked: Tensor) -> list[Tensor]:
-        """(H, W, 3) per view of stacked pixels (all pixels, 3)."""
-        cameras = [view.camera for view in self.views]
-        parts = stacked.split([camera.pixel_count for camera in cameras])
-        return [part.reshape(camera.height, camera.width, 3) for part, camera in zip(parts, cameras, strict=True)]
-
 
 def prepare_views(
     frozen: FrozenScene,
@@ -116,7 +61,6 @@ def prepare_views(
     *,
     masks: Sequence[ArrayLike] | None = None,
     mask_edges: bool = True,
-    at_pixels: bool = False,
 ) -> PreparedViews:
     """Choose the pixels that a fit trusts and stack their weights.
 
@@ -126,7 +70,6 @@ def prepare_views(
     Args:
         masks: (H, W) per view, the scene's share of each pixel (the images' alpha); 1 if None.
         mask_edges: whether pixels on silhouettes, creases and depth jumps are left out.
-        at_pixels: whether the last steps of a fit take direct light where pixels look.
 
     Raises:
         InputError: a mask of the wrong size or with impossible values, or too few pixels left.
@@ -149,8 +92,7 @@ def prepare_views(
         view.operator.to_scipy()[chosen.cpu().numpy().nonzero()[0]] for view, chosen in zip(views, trusted, strict=True)
     ]
     operator = SparseOperator.from_scipy(scipy.sparse.vstack(rows, format="csr"), frozen.surfels.centers.device)
-    direct = tuple(PixelDirect(frozen.bvh, view) for view in views) if at_pixels else ()
-    return PreparedViews(frozen, tuple(views), tuple(masks), pixels, operator, direct)
+    return PreparedViews(frozen, tuple(views), pixels, operator, tuple(masks))
 
 
 def _trusted(view: ViewWeights, mask: Tensor, mask_edges: bool) -> Tensor:

@@ -9,14 +9,15 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from rgspipe.fitting.model.blocks import BlockModel, block_model, patch_radiance
 from rgspipe.fitting.model.views import PreparedViews
 from rgspipe.fitting.options import AimedOptions
 from rgspipe.fitting.search.coarse import CoarseImages
 from rgspipe.progress import progress_bar
 from rgspipe.renderer.clusters import cluster_patches
 from rgspipe.renderer.dictionary import LightDictionary
+from rgspipe.renderer.effects import ALL_EFFECTS, Effects
 from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.renderer.images.blocks import BlockModel, block_model, patch_radiance
 from rgspipe.renderer.point_sets import fibonacci_directions
 from rgspipe.scene.lights import AxialLight
 from rgspipe.scene.lights.angles import angle_from_axis
@@ -27,8 +28,7 @@ def aimed_candidates(
     dictionary: LightDictionary,
     shapes: Sequence[AxialLight],
     options: AimedOptions | None = None,
-    *,
-    interreflection: bool = True,
+    effects: Effects = ALL_EFFECTS,
 ) -> CoarseImages:
     """Candidate lights of given shapes at the dictionary's positions, with their coarse images.
 
@@ -37,7 +37,7 @@ def aimed_candidates(
     """
     options = options or AimedOptions()
     side = max(6, round(math.sqrt(options.blocks / len(views.views))))
-    model = block_model(views, side, interreflection=interreflection)
+    model = block_model(views, side, effects)
     lit = _lit_by_points(views, dictionary, model, options.groups)
     directions = fibonacci_directions(options.axes).to(lit.places)
     images, positions, axes, kinds = [], [], [], []

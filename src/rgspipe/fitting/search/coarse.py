@@ -8,10 +8,9 @@ from functools import cached_property
 import torch
 from torch import Tensor
 
-from rgspipe.fitting.model.blocks import BlockModel
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.renderer.dictionary import LightDictionary
-from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.renderer.images.blocks import BlockModel
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.scene.lights import Light, PointLight
 
@@ -54,7 +53,7 @@ class CoarseImages:
         return Emitter.of(shape.at(self.positions[index], axis), shape_free)
 
 
-def coarse_images(frozen: FrozenScene, model: BlockModel, dictionary: LightDictionary) -> CoarseImages:
+def coarse_images(model: BlockModel, dictionary: LightDictionary) -> CoarseImages:
     """Coarse images of all candidates by products of small matrices, instead of one rendering each."""
-    images = model.seen(frozen, dictionary.irradiance.T).permute(2, 0, 1).contiguous()
+    images = model.seen(dictionary.irradiance.T).permute(2, 0, 1).contiguous()
     return CoarseImages(model.average, model.counts, images, dictionary.positions, (PointLight.shaped(),))

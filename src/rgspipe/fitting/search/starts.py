@@ -95,9 +95,9 @@ class Candidates:
         Args:
             searched: what `state` was refined on; only where its blocks are not the candidates' something is rendered.
         """
-        if searched.blocks is None:
+        if searched.model.average is None:
             seen = [self.coarse.blocks @ column[:, :, 0].contiguous() for column in state.columns]
-        elif searched.blocks.average is self.coarse.blocks:
+        elif searched.model.average is self.coarse.blocks:
             seen = [column[:, :, 0] for column in state.columns]
         else:
             seen = [self.coarse.blocks @ self.problem.evaluate(one)[:, :, 0].contiguous() for one in state.emitters]

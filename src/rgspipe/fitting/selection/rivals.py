@@ -78,7 +78,7 @@ def equally_good(problem: LightProblem, best: State, other: State, options: Riva
     """Whether `other` explains the target as well as `best`, within the spread of what both leave unexplained."""
     one, two = robust_losses(problem, [best, other])
     least, cost = robust_costs(problem, [best, other])
-    errors = max(1.0, float(total((problem.pixels_each / options.pixels_per_error).clamp(max=1.0))))
+    errors = max(1.0, float(total((problem.model.counts.cpu() / options.pixels_per_error).clamp(max=1.0))))
     return cost - least <= options.deviations * _deviation(two - one) / math.sqrt(errors)
 
 

@@ -12,7 +12,6 @@ from dataclasses import replace
 
 import torch
 
-from rgspipe.fitting.model.blocks import BlockModel
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.options import SearchOptions, SplitOptions
@@ -22,13 +21,14 @@ from rgspipe.fitting.search.schedule import soft
 from rgspipe.fitting.search.starts import Rig
 from rgspipe.fitting.search.weighting import PLAIN
 from rgspipe.fitting.search_lm import fit_from
+from rgspipe.renderer.images.model import ImageModel
 from rgspipe.scene.lights.coordinates import tangents
 
 
 def split_lights(
     problem: LightProblem,
     result: FitResult,
-    blocks: BlockModel | None,
+    blocks: ImageModel | None,
     search: SearchOptions | None = None,
     options: SplitOptions | None = None,
 ) -> FitResult:

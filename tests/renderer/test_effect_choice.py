@@ -20,7 +20,7 @@ from rgspipe.renderer.effect_bounds import (
     measure_effects,
     void_share,
 )
-from rgspipe.renderer.effects import EFFECTS, RigKind, choose_effects, cone_bound, rig_bounds
+from rgspipe.renderer.effect_choice import EFFECTS, RigKind, choose_effects, cone_bound, rig_bounds
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.shadow_bound import ShadowBound, sample_lights, shadow_losses
 from rgspipe.scene import Camera, PointLight, look_at
@@ -120,8 +120,8 @@ def test_the_choice_is_taken_again_for_another_kind_of_rig() -> None:
         kind: choose_effects(bounds, 1e-3, kind)
         for kind in (RigKind.of((light,)), RigKind.of((light,) * 6), RigKind.of((cone,)))
     }
-    assert [choice.shadows for choice in decided.values()] == [False, True, True]
-    assert [choice.spots for choice in decided.values()] == [False, False, True]
+    assert [choice.effects.shadows for choice in decided.values()] == [False, True, True]
+    assert [choice.effects.cones for choice in decided.values()] == [False, False, True]
 
 
 @settings(max_examples=60, deadline=None)
@@ -148,8 +148,9 @@ def test_effects_left_out_together_stay_within_the_tolerance() -> None:
     choice = choose_effects(bounds, 1.1e-3, ONE_POINT)
     left_out = [decision for decision in choice.decisions if not decision.simulated]
     assert sum(decision.bound for decision in left_out) <= 1.1e-3
-    assert not choice.shadows and not choice.specular and choice.interreflection
-    assert choose_effects(bounds, 1.0, ONE_POINT).interreflection is False
+    effects = choice.effects
+    assert not effects.shadows and not effects.lobes and effects.interreflection
+    assert choose_effects(bounds, 1.0, ONE_POINT).effects.interreflection is False
     assert choose_effects(DARK, 0.0, ONE_POINT).decisions == choose_effects(DARK, 1.0, ONE_POINT).decisions
 
 
@@ -162,7 +163,7 @@ def test_reasons_say_what_why_and_how_much() -> None:
     assert "simulated: can change 2 times the brightest" in reasons[1] and "costs 3.0 ms" in reasons[1]
     assert reasons[2] == "spot cones left out: the rig has no spots"
     off = choose_effects(bounds, 1e-3, ONE_POINT, off=["interreflection"])
-    assert not off.interreflection and off.reasons[1] == "interreflection left out: as configured"
+    assert not off.effects.interreflection and off.reasons[1] == "interreflection left out: as configured"
 
 
 def test_bounds_survive_being_written() -> None:
@@ -175,7 +176,8 @@ def test_a_gloss_too_faint_to_see_is_left_out() -> None:
         measure_effects(frozen(EFFECT_SCENES[name].build(900)), seed=0) for name in ("faint gloss", "glossy box")
     )
     assert 0.0 < faint.specular < 1e-3 < visible.specular
-    assert not choose_effects(faint, 1e-3, ONE_POINT).specular and choose_effects(visible, 1e-3, ONE_POINT).specular
+    left_out, kept = (choose_effects(bounds, 1e-3, ONE_POINT).effects for bounds in (faint, visible))
+    assert kept.lobes and not left_out.lobes
 
 
 def test_costs_name_effects() -> None:

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import pytest
 import torch
 
-from lit_room import HIDDEN, VISIBLE
-from rgspipe.fitting.model.kernels.lit_shares import lit_shares
+from lit_room import HIDDEN, VISIBLE, frozen_room
+from rgspipe.renderer.kernels.lit_shares import lit_shares
+from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.pixel_direct import surfel_shares
 
 
-def test_lit_surfels_have_their_shadows_and_the_others_none(room) -> None:
-    bvh = room.frozen.bvh
+@pytest.fixture(scope="module")
+def bvh() -> SurfelBvh:
+    return frozen_room().bvh
+
+
+def test_lit_surfels_have_their_shadows_and_the_others_none(bvh: SurfelBvh) -> None:
     for place in (VISIBLE, HIDDEN):
         position = torch.tensor(place, dtype=torch.float64)
         lit = torch.rand(len(bvh.surfels), generator=torch.Generator().manual_seed(0)) < 0.3
@@ -22,7 +28,7 @@ def test_lit_surfels_have_their_shadows_and_the_others_none(room) -> None:
         assert bool((share[~lit] == 1.0).all()) and bool((slope[~lit] == 0.0).all())
 
 
-def test_no_surfel_needs_to_be_lit(room) -> None:
-    nothing = torch.zeros(len(room.frozen.bvh.surfels), dtype=torch.bool)
-    share, slope = lit_shares(room.frozen.bvh, torch.zeros(3), nothing)
+def test_no_surfel_needs_to_be_lit(bvh: SurfelBvh) -> None:
+    nothing = torch.zeros(len(bvh.surfels), dtype=torch.bool)
+    share, slope = lit_shares(bvh, torch.zeros(3), nothing)
     assert bool((share == 1.0).all()) and not bool(slope.any())

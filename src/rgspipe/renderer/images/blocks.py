@@ -4,30 +4,40 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse
 import torch
 from torch import Tensor
 
-from rgspipe.fitting.model.views import PreparedViews
-from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.renderer.effects import ALL_EFFECTS, Effects
+from rgspipe.renderer.images.model import ImageModel
+from rgspipe.renderer.images.viewed_pixels import ViewedPixels
+from rgspipe.renderer.kernels.lit_shares import LEAST_LIT
+from rgspipe.renderer.lit_surfels import lit_surfels
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.transport import PatchTransport
+from rgspipe.renderer.unit_light import UnitLight
+
+if TYPE_CHECKING:
+    from rgspipe.renderer.frozen import FrozenScene
 
 #: A view has at most this many blocks along each side.
 BLOCKS = 16
 
 
 @dataclass(frozen=True)
-class BlockModel:
+class BlockModel(ImageModel):
     """How blocks of pixels see diffuse light.
 
     With W_c the block averages of the view weights, and in the notation of `PatchTransport`, the image of channel c is
     W_c ρ/π E + (W_c ρ F_p H) · (R ρ/π E): the first bracket is (B, patches) and made once.
 
     Attributes:
-        average: (B, P) averages the used pixels of a `PreparedViews` over blocks.
+        frozen: the scene.
+        effects: parts of light transport.
+        average: (B, P) averages the used pixels over blocks.
         counts: (B,) float64 used pixels of each block.
         view_of: (B,) int64 view of each block; blocks are in the order of views, and none reaches over two.
         weights: (B, N) block averages of the view weights.
@@ -36,6 +46,8 @@ class BlockModel:
             without interreflection.
     """
 
+    frozen: FrozenScene
+    effects: Effects
     average: SparseOperator
     counts: Tensor
     view_of: Tensor
@@ -57,13 +69,16 @@ class BlockModel:
         seen = self.shaded @ (irradiance / math.pi)
         return seen.reshape(3, len(self), -1).transpose(0, 1)
 
-    def seen(self, frozen: FrozenScene, irradiance: Tensor) -> Tensor:
+    def columns(self, light: UnitLight) -> Tensor:
+        return self.seen(lit_surfels(self.frozen.bvh, light, self.effects, LEAST_LIT).columns)
+
+    def seen(self, irradiance: Tensor) -> Tensor:
         """(B, 3, K) radiance under K direct irradiances (N, K), with all that bounces."""
         image = self.direct(irradiance)
         if self.bounced is None:
             return image
         # The other way round, for which a product with so few columns takes four times as long: (X B)ᵀ = Bᵀ Xᵀ.
-        bounced = patch_radiance(frozen, irradiance).transpose(1, 2) @ self.bounced.transpose(1, 2)
+        bounced = patch_radiance(self.frozen, irradiance).transpose(1, 2) @ self.bounced.transpose(1, 2)
         return image + bounced.permute(2, 0, 1)
 
 
@@ -73,8 +88,8 @@ def patch_radiance(frozen: FrozenScene, irradiance: Tensor) -> Tensor:
     return torch.stack([frozen.transport.average @ (albedo[:, channel, None] * irradiance) for channel in range(3)])
 
 
-def block_model(views: PreparedViews, blocks: int = BLOCKS, *, interreflection: bool = True) -> BlockModel:
-    """The blocks of some views.
+def block_model(views: ViewedPixels, blocks: int = BLOCKS, effects: Effects = ALL_EFFECTS) -> BlockModel:
+    """The blocks of some views' pixels.
 
     Args:
         blocks: at most so many along each side of a view.
@@ -88,11 +103,13 @@ def block_model(views: PreparedViews, blocks: int = BLOCKS, *, interreflection: 
     albedo = frozen.surfels.albedo.float().cpu().numpy()
     shaded = [(weights @ scipy.sparse.diags(albedo[:, channel])).tocsr() for channel in range(3)]
     bounced = None
-    if interreflection:
+    if effects.interreflection:
         gathered = transport.gather.to_scipy()
         seen = [torch.from_numpy((matrix @ gathered).toarray()).to(transport.inverse) for matrix in shaded]
         bounced = torch.stack([part @ inverse for part, inverse in zip(seen, transport.inverse, strict=True)])
     return BlockModel(
+        frozen,
+        effects,
         average,
         counts,
         view_of_blocks(average, views),
@@ -102,13 +119,13 @@ def block_model(views: PreparedViews, blocks: int = BLOCKS, *, interreflection: 
     )
 
 
-def view_of_blocks(average: SparseOperator, views: PreparedViews) -> Tensor:
+def view_of_blocks(average: SparseOperator, views: ViewedPixels) -> Tensor:
     """(B,) int64 view of each block of `average` (B, P): blocks reach over no two, so their first pixel says it."""
     matrix = average.matrix
     return views.view_of[matrix.col_indices()[matrix.crow_indices()[:-1].long()].long()]
 
 
-def block_average(views: PreparedViews, blocks: int = BLOCKS) -> tuple[SparseOperator, Tensor]:
+def block_average(views: ViewedPixels, blocks: int = BLOCKS) -> tuple[SparseOperator, Tensor]:
     """The operator from used pixels (P) to blocks that hold any (B), and how many each holds (B,).
 
     Args:

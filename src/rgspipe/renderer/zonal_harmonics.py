@@ -19,7 +19,6 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.scene.lights import AxialLight, Share
 from rgspipe.scene.lights.angles import angle_slopes
 
@@ -47,23 +46,16 @@ class BandLimit:
             raise ValueError(f"a band limit must have a degree of at least 0, got {self.degree}")
 
 
-def emitted_share(emitter: Emitter, points: Tensor, band: BandLimit | None) -> Share | None:
-    """What a fit takes for the share of a light towards `points` (N, 3) float64: exact, or band-limited.
-
-    Args:
-        band: None for the exact profile.
-    """
-    light = emitter.light
-    if band is None or light.axis is None:
-        return light.share(points, softness=emitter.softness, shape_free=emitter.shape_free)
+def band_limited_share(light: AxialLight, points: Tensor, band: BandLimit, softness: float = 0.0) -> Share:
+    """`AxialLight.share` towards `points` (N, 3) float64 of a profile in spherical harmonics, with all derivatives."""
     towards = (points.double() - light.position.to(points.device, torch.float64)).float()
     unit = torch.nn.functional.normalize(light.axis.to(towards), dim=0)[None]
     angle, by_towards, by_axis = angle_slopes(unit, towards)
-    coefficients, by_shape = zonal_coefficients(light, band, emitter.softness)
+    coefficients, by_shape = zonal_coefficients(light, band, softness)
     polynomials, rises = legendre(torch.cos(angle), band.degree)
     value, *by_numbers = (polynomials @ torch.stack([coefficients, *by_shape.values()], dim=1).to(angle)).unbind(dim=1)
     slope = -(torch.sin(angle) * (rises @ coefficients.to(angle)))[:, None]
-    by = {"position": -slope * by_towards, "direction": slope * by_axis}
+    by = {"position": -slope * by_towards, "direction": slope * by_axis / float(light.axis.norm())}
     return Share(value, by | dict(zip(by_shape, by_numbers, strict=True)))
 
 

@@ -11,7 +11,8 @@ import torch
 from torch import Tensor
 
 from emitters import emitter_at
-from rgspipe.fitting.model.harmonics import BandLimit, emitted_share, legendre, zonal_coefficients
+from rgspipe.renderer.unit_light import emitted_share
+from rgspipe.renderer.zonal_harmonics import BandLimit, legendre, zonal_coefficients
 from rgspipe.scene.lights import SpotLight
 
 SHAPES = {

@@ -1,27 +1,30 @@
-"""What views see of a unit light in a scene with gloss, and its derivatives: every view sees a radiance of its own."""
+"""What views see of lights in a scene with gloss: every view sees a radiance of its own."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import torch
 from torch import Tensor
 
-from rgspipe.fitting.model.views import PreparedViews
-from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.glossy_columns import GlossyColumns, unit_light_columns
 from rgspipe.renderer.glossy_transport import GlossyLight
-from rgspipe.scene import LightRig
+from rgspipe.renderer.images.viewed_pixels import ViewedPixels
+from rgspipe.renderer.rig import RigResponse
+
+if TYPE_CHECKING:
+    from rgspipe.renderer.frozen import FrozenScene
 
 #: Columns of `GlossyColumns`: the value and its derivatives towards x, y and z.
 COLUMNS = 4
 
 
 def seen_with_gloss(
-    views: PreparedViews, position: Tensor, lit: Tensor, interreflection: bool, *, bounced_only: bool = False
+    views: ViewedPixels, position: Tensor, lit: Tensor, interreflection: bool, *, bounced_only: bool = False
 ) -> Tensor:
-    """(P, 3, 1 + d) images at the trusted pixels of a unit white light in a glossy scene.
+    """(P, 3, 1 + d) images of a unit white light in a glossy scene.
 
     Args:
         position: (3,) of the light.
@@ -41,9 +44,16 @@ def seen_with_gloss(
     return torch.cat(images)
 
 
-def bounced_light(frozen: FrozenScene, rig: LightRig, shadows: bool) -> GlossyLight:
+def seen_light(views: ViewedPixels, light: GlossyLight) -> Tensor:
+    """(P, 3) images of the light of a glossy scene."""
+    pairs = zip(views.views, views.rows, strict=True)
+    return torch.cat([rows @ light.seen_from(view.camera.origin) for view, rows in pairs])
+
+
+def bounced_light(frozen: FrozenScene, response: RigResponse) -> GlossyLight:
     """The light of a glossy scene that was reflected more than once."""
-    light, direct = (frozen.glossy_light(rig, indirect, shadows) for indirect in (True, False))
+    transport = frozen.solver or frozen.transport
+    light, direct = (frozen.gloss.light(transport, response, indirect) for indirect in (True, False))
     return replace(light, radiance=light.radiance - direct.radiance, irradiance=torch.zeros_like(light.irradiance))
 
 

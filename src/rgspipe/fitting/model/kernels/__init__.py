@@ -1,1 +1,0 @@
-"""Kernels of fits: what only they compute. Those that rendering shares are in `renderer.kernels`."""

@@ -1,0 +1,89 @@
+"""Sharp images: direct light where pixels look, and from surfels' centres what bounces."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import torch
+from torch import Tensor
+
+from rgspipe.renderer.effects import Effects
+from rgspipe.renderer.images.glossy import bounced_light, seen_light, seen_with_gloss
+from rgspipe.renderer.images.highlights import PixelHighlights
+from rgspipe.renderer.images.model import ViewModel
+from rgspipe.renderer.images.viewed_pixels import ViewedPixels
+from rgspipe.renderer.kernels.lit_shares import LEAST_LIT
+from rgspipe.renderer.lit_surfels import LitSurfels, lit_surfels
+from rgspipe.renderer.pixel_direct import PixelDirect
+from rgspipe.renderer.rig import RigResponse
+from rgspipe.renderer.unit_light import OwnLight, UnitLight, emitted_share, shared
+from rgspipe.scene.lights import LightRig
+
+
+@dataclass(frozen=True)
+class PixelModel(ViewModel):
+    """How pixels see lights where they look.
+
+    Attributes:
+        direct: per view its direct light.
+        highlights: of a scene with gloss, per view its highlights.
+    """
+
+    direct: tuple[PixelDirect, ...]
+    highlights: tuple[PixelHighlights, ...]
+
+    @classmethod
+    def of(cls, views: ViewedPixels, effects: Effects, direct: tuple[PixelDirect, ...] | None = None) -> PixelModel:
+        """The model of some pixels.
+
+        Args:
+            direct: per view its direct light, where it is known already.
+        """
+        frozen = views.frozen
+        if direct is None:
+            direct = tuple(PixelDirect(frozen.bvh, view) for view in views.views)
+        pairs = zip(views.views, direct, strict=True) if frozen.gloss is not None and effects.lobes else ()
+        return cls(views, effects, direct, tuple(PixelHighlights(frozen.gloss, *pair) for pair in pairs))
+
+    @cached_property
+    def points(self) -> Tensor:
+        """(P, 3) float64 place that each pixel looks at."""
+        return torch.cat([direct.points for direct in self.direct])[self.views.pixels]
+
+    def columns(self, light: UnitLight) -> Tensor:
+        frozen = self.views.frozen
+        lit = lit_surfels(frozen.bvh, light, self.effects, LEAST_LIT)
+        columns = self._direct(light, lit)
+        if not self.effects.interreflection:
+            return columns
+        if self.gloss is not None:
+            return columns + seen_with_gloss(self.views, light.light.position, lit.columns, True, bounced_only=True)
+        return columns + self.views.seen(frozen.radiance(lit.columns) - frozen.radiance(lit.columns, indirect=False))
+
+    def image(self, rig: LightRig) -> Tensor:
+        frozen, own = self.views.frozen, [OwnLight(light) for light in self.effects.lights(rig)]
+        lit = [lit_surfels(frozen.bvh, light, self.effects) for light in own]
+        response = RigResponse.of(frozen.bvh, tuple(light.given for light in own), lit)
+        image = torch.zeros((len(self.views.pixels), 3), device=frozen.device)
+        for light, one, intensity in zip(own, lit, response.intensities, strict=True):
+            columns = self._direct(light, one)
+            image = image + light.attached(columns[:, :, 0], columns[:, :, 1:]) * intensity
+        if not own or not self.effects.interreflection:
+            return image
+        if self.gloss is not None:
+            return image + seen_light(self.views, bounced_light(frozen, response))
+        reflected = frozen.surfels.albedo * (response.summed() / math.pi)
+        return image + self.views.seen(frozen.indirect(reflected[:, :, None]))[:, :, 0]
+
+    def _direct(self, light: UnitLight, lit: LitSurfels) -> Tensor:
+        """(P, 3, 1 + D) direct light of a unit light."""
+        position = light.light.position
+        images = [direct.image(position, lit.share, lit.slope) for direct in self.direct]
+        for index, highlights in enumerate(self.highlights):
+            images[index] = images[index] + highlights.image(position, lit.share, lit.slope)
+        columns = torch.cat(images)[self.views.pixels]
+        if light.light.axis is None:
+            return columns
+        return shared(columns, emitted_share(light, self.points, self.effects.spots), light)

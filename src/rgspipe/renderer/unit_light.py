@@ -1,0 +1,119 @@
+"""What an image model asks of a light: what it sends where, and what its image is differentiated towards."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import torch
+from torch import Tensor
+
+from rgspipe.renderer.zonal_harmonics import BandLimit, band_limited_share
+from rgspipe.scene.lights import Light, Share
+
+
+class UnitLight(Protocol):
+    """A light of unit intensity, and the D numbers that its image is differentiated towards.
+
+    The first three of them are its position; those of a light that shines alike in all directions are no others.
+    """
+
+    @property
+    def light(self) -> Light:
+        """It, in float64 on the CPU; its intensity is not looked at."""
+        ...
+
+    @property
+    def softness(self) -> float:
+        """By how much its edge of light is widened [rad]; see `Light.share`."""
+        ...
+
+    @property
+    def shape_free(self) -> bool:
+        """Whether its shape is among the numbers."""
+        ...
+
+    def slopes(self, share: Share) -> Tensor:
+        """(N, D) derivatives of its share towards the numbers."""
+        ...
+
+
+def emitted_share(light: UnitLight, points: Tensor, band: BandLimit | None) -> Share | None:
+    """The share of a light towards `points` (N, 3) float64, exact or band-limited; None if all of it goes there.
+
+    Args:
+        band: None for the exact profile.
+    """
+    if band is None or light.light.axis is None:
+        return light.light.share(points, softness=light.softness, shape_free=light.shape_free)
+    return band_limited_share(light.light, points, band, light.softness)
+
+
+def shared(columns: Tensor, share: Share | None, light: UnitLight) -> Tensor:
+    """What a point light's `columns` (N, …, 4) are of `light`, which sends a share of its light there.
+
+    Returns:
+        (N, …, 1 + D): the value, then its derivatives.
+    """
+    if share is None:
+        return columns
+    between = [1] * (columns.ndim - 2)
+    value, slopes = share.value.reshape(-1, *between, 1), light.slopes(share)
+    slopes = slopes.reshape(len(slopes), *between, -1)
+    unit = columns[..., :1]
+    products = slopes * unit
+    products = torch.cat([products[..., :3] + value * columns[..., 1:], products[..., 3:]], dim=-1)
+    return torch.cat([value * unit, products], dim=-1)
+
+
+@dataclass(frozen=True)
+class OwnLight:
+    """A light as it is given, differentiated towards its own tensors: the position, and others that require gradients.
+
+    Attributes:
+        given: the light; its tensors may require gradients, be of any float type and on any device.
+        softness: by how much its edge of light is widened [rad].
+    """
+
+    given: Light
+    softness: float = 0.0
+
+    @cached_property
+    def light(self) -> Light:
+        """It, in float64 on the CPU."""
+        return self.given.detached()
+
+    @property
+    def shape_free(self) -> bool:
+        """Whether gradients towards a number of its shape are wanted."""
+        return any(_wanted(getattr(self.given, number.name)) for number in self.given.shape)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """The fields that are differentiated towards."""
+        others = ["direction"] if self.given.axis is not None else []
+        others += [number.name for number in self.given.shape]
+        return ("position", *(name for name in others if _wanted(getattr(self.given, name))))
+
+    def slopes(self, share: Share) -> Tensor:
+        """(N, D) derivatives of its share towards its tensors, one after the other."""
+        return torch.cat([share.by[name].reshape(len(share.value), -1) for name in self.names], dim=1)
+
+    def attached(self, value: Tensor, slopes: Tensor) -> Tensor:
+        """What of the light is `value` (N, …), as autograd knows how to differentiate it towards the light's tensors.
+
+        What is added is zero, and its derivative is what is known: exact to first order. A second one is not there.
+
+        Args:
+            slopes: (N, …, D) its derivatives.
+        """
+        tensors = [getattr(self.given, name) for name in self.names]
+        if not any(map(_wanted, tensors)):
+            return value
+        now = torch.cat([tensor.reshape(-1).double().cpu() for tensor in tensors])
+        return value + slopes @ (now - now.detach()).to(slopes)
+
+
+def _wanted(value: object) -> bool:
+    return isinstance(value, Tensor) and value.requires_grad
