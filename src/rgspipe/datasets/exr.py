@@ -84,8 +84,10 @@ def _corners(window: tuple[np.ndarray, np.ndarray]) -> str:
 
 
 def _joined(path: Path, parts: list[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
-    """The channels of all parts, which must agree on the image's size and have no name twice."""
+    """The channels of all parts, none of them twice; parts share the display window, so their sizes agree."""
     names = [name for part in parts for name in part]
+    if not names:  # a part of which nothing can be read is left out without raising
+        raise _broken(path, "its pixels are cut off or damaged")
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise InputError(
@@ -94,10 +96,7 @@ def _joined(path: Path, parts: list[dict[str, np.ndarray]]) -> dict[str, np.ndar
             found=f"{', '.join(twice)} in several of its {len(parts)} parts",
             remedy="Export the part that is meant into a file of its own.",
         )
-    joined = {name: values for part in parts for name, values in part.items()}
-    if len({values.shape for values in joined.values()}) != 1:
-        raise _broken(path, "its parts have different sizes")
-    return joined
+    return {name: values for part in parts for name, values in part.items()}
 
 
 def _broken(path: Path, why: str) -> InputError:
