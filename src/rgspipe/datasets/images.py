@@ -18,7 +18,7 @@ NO_SURFACE = 1e9
 
 
 def read_colour(path: Path) -> tuple[Tensor, Tensor]:
-    """Linear, premultiplied colour (H, W, 3) and alpha (H, W) of an EXR, PNG or JPEG image (the latter sRGB, straight alpha).
+    """Linear, premultiplied colour (H, W, 3) and alpha (H, W) of an EXR image, or a PNG or JPEG (sRGB, straight alpha).
 
     Raises:
         InputError: missing or broken file, other channels, NaN or infinite pixels, alpha outside of [0, 1].

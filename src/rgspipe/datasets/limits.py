@@ -1,0 +1,13 @@
+"""What no scene has: numbers beyond which float32 loses its squares, so that answers would be silently wrong."""
+
+from __future__ import annotations
+
+#: The largest coordinate, or size of a surfel, scene units: even a place on Earth, in millimetres from its centre,
+#: is nearer.
+FARTHEST = 1e10
+
+#: The largest intensity of a light, W/sr or W.
+STRONGEST = 1e20
+
+#: Albedo may exceed 1, and a mask its range, by this: the rounding of files.
+ROUNDING = 1e-3
