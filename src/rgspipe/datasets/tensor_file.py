@@ -12,6 +12,7 @@ import safetensors.torch
 from torch import Tensor
 
 from rgspipe.datasets.input_file import input_file
+from rgspipe.datasets.limits import LARGEST
 from rgspipe.errors import InputError
 
 MAKE_AGAIN = "Remove it and run the stage that makes it again."
@@ -33,14 +34,19 @@ def load_tensors(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
     """The tensors and the note of `save_tensors`.
 
     Raises:
-        InputError: the file is missing or no safetensors file, or holds NaN or infinity.
+        InputError: the file is missing or no safetensors file, or holds NaN, infinity or numbers beyond `LARGEST`.
     """
     input_file(path, "a safetensors file")
     tensors, note = _read(path)
     for name, tensor in tensors.items():
-        if tensor.is_floating_point() and not bool(tensor.isfinite().all()):
-            raise InputError(path, expected=f"finite {name}", found="values that are not finite", remedy=MAKE_AGAIN)
+        if tensor.is_floating_point() and not bool((tensor.abs() <= LARGEST).all()):
+            found = "values that are not finite" if not bool(tensor.isfinite().all()) else f"{_largest(tensor):g}"
+            raise InputError(path, expected=f"finite {name} up to {LARGEST:g}", found=found, remedy=MAKE_AGAIN)
     return tensors, note
+
+
+def _largest(tensor: Tensor) -> float:
+    return float(tensor.double().abs().max())
 
 
 def _read(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:

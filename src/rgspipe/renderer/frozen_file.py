@@ -180,6 +180,8 @@ def _require(path: Path, name: str, found: Sequence[int], expected: tuple[int, .
 def _require_range(path: Path, tensors: dict[str, Tensor], low: float = -math.inf) -> None:
     """Refuse values that are not finite, or below `low`."""
     for name, tensor in tensors.items():
+        if not tensor.is_floating_point():
+            raise InputError(path, expected=f"floats as {name}", found=str(tensor.dtype), remedy=MAKE_AGAIN)
         good = tensor.isfinite() & (tensor >= low)
         if not bool(good.all()):
             expected = f"finite {name}" if low == -math.inf else f"finite {name} of at least {low:g}"
