@@ -13,7 +13,6 @@ with. The lock belongs to the operating system, so it ends with its holder howev
 from __future__ import annotations
 
 import datetime
-import json
 import logging
 import shutil
 import time
@@ -27,6 +26,7 @@ from filelock import FileLock, Timeout
 from rgspipe.errors import InputError
 from rgspipe.files import point_at, sha256, sync, sync_tree, write_json
 from rgspipe.machine import PeakMemory, library_versions, machine
+from rgspipe.strict_json import parse_json
 
 SCHEMA_VERSION = 1
 MANIFEST = "manifest.json"
@@ -236,10 +236,10 @@ def _read_manifest(folder: Path, key: Key) -> Mapping[str, Any]:
     remedy = f"Remove the folder {folder} and run again: the stage will make it anew."
     expected = f"the manifest of {key.stage} {key.fingerprint} (schema {SCHEMA_VERSION})"
     try:
-        manifest = json.loads(path.read_text(encoding="utf-8"))
+        manifest = parse_json(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise InputError(path, expected=expected, found="no file", remedy=remedy) from None
-    except ValueError as error:
+    except (OSError, ValueError) as error:
         raise InputError(path, expected=expected, found=f"damaged JSON ({error})", remedy=remedy) from None
     if not isinstance(manifest, dict) or manifest.get("schema") != SCHEMA_VERSION:
         raise InputError(path, expected=expected, found="another schema", remedy=remedy)

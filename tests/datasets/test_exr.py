@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import numpy as np
+import OpenEXR
 import pytest
 
 from rgspipe.datasets.exr import read_array, read_channels, read_image, write_channels, write_image
@@ -80,3 +82,55 @@ def test_other_channels_are_listed(tmp_path: Path) -> None:
         read_image(tmp_path / "grey.exr")
     with pytest.raises(InputError, match="1 channel Z"):
         read_array(tmp_path / "grey.exr", ("Z",))
+
+
+def _write_windows(path: Path, values: np.ndarray, data: tuple, display: tuple, names: str = "RGB") -> None:
+    """An EXR file with windows of its own: ((left, top), (right, bottom)) each."""
+    corners = {"dataWindow": data, "displayWindow": display}
+    header = {name: tuple(np.array(corner, np.int32) for corner in pair) for name, pair in corners.items()}
+    channels = {name: np.ascontiguousarray(values) for name in names}
+    OpenEXR.File({"type": OpenEXR.scanlineimage, **header}, channels).write(str(path))
+
+
+def test_a_cropped_data_window_is_placed_in_the_display_window(tmp_path: Path) -> None:
+    values = _noise(3, 4)
+    _write_windows(tmp_path / "cropped.exr", values, ((12, 21), (15, 23)), ((10, 20), (19, 27)))
+    image, _ = read_image(tmp_path / "cropped.exr")
+    expected = np.zeros((8, 10), np.float32)
+    expected[1:4, 2:6] = values
+    np.testing.assert_array_equal(image, np.repeat(expected[..., None], 3, axis=2))
+
+
+@pytest.mark.parametrize("data", [((-1, 0), (8, 7)), ((1, 0), (10, 7)), ((0, 1), (9, 8))])
+def test_pixels_outside_of_the_display_window_are_refused(tmp_path: Path, data: tuple) -> None:
+    _write_windows(tmp_path / "over.exr", _noise(8, 10), data, ((0, 0), (9, 7)))
+    with pytest.raises(InputError, match=r"over\.exr.*display window.*data window"):
+        read_image(tmp_path / "over.exr")
+
+
+def test_parts_with_the_same_channels_are_refused_and_others_joined(tmp_path: Path) -> None:
+    def write(name: str, *parts: dict[str, np.ndarray]) -> Path:
+        header = {"type": OpenEXR.scanlineimage}
+        made = [OpenEXR.Part(header | {"name": str(index)}, part) for index, part in enumerate(parts)]
+        OpenEXR.File(made).write(str(tmp_path / name))
+        return tmp_path / name
+
+    colour = {name: _noise(4, 6) for name in "RGB"}
+    with pytest.raises(InputError, match=r"stereo\.exr.*each channel once.*B, G, R in several of its 2 parts"):
+        read_channels(write("stereo.exr", colour, {name: 2 * values for name, values in colour.items()}))
+    joined = read_channels(write("joined.exr", colour, {"Z": _noise(4, 6)}))
+    assert set(joined) == set("RGBZ")
+
+
+def test_a_size_that_no_image_has_is_refused_by_the_header(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write_image(tmp_path / "large.exr", _noise(8, 8, 3))
+    monkeypatch.setattr("rgspipe.datasets.input_file.MOST_PIXELS", 63)
+    with pytest.raises(InputError, match=r"large\.exr.*1 to 63 pixels.*8 × 8"):
+        read_channels(tmp_path / "large.exr")
+
+
+def test_pipes_folders_and_endless_names_are_refused(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.exr")
+    for name, words in (("pipe.exr", "pipe or a device"), ("", "folder"), ("n" * 5000, "too long"), ("\0", "null")):
+        with pytest.raises(InputError, match=words):
+            read_channels(tmp_path / name)

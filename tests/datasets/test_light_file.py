@@ -62,6 +62,14 @@ def test_further_fields_cannot_replace_the_format_s_own(tmp_path: Path) -> None:
         ({"intensity": ...}, '"intensity"'),
         ({"intensity": [1, -1, 1]}, r"lights\[0\]\.intensity"),
         ({"type": "spot", "direction": [0, 0, 0]}, "direction.*longer than 0"),
+        ({"type": "led", "direction": [0, 0, 1e300], "exponent": 1}, "direction.*longer than 0"),
+        ({"type": "led", "direction": [0, 0, 1], "exponent": -1}, r"lights\[0\].*exponent ≥ 0"),
+        (
+            {"type": "spot", "direction": [0, 0, 1], "profile": "gaussian", "cone_angle": 3.5, "falloff": 0.1},
+            r"lights\[0\].*cone_angle ≤ π",
+        ),
+        ({"position": [0, 0, 1e308]}, r"lights\[0\]\.position.*within"),
+        ({"intensity": [1, 1e308, 1]}, r"lights\[0\]\.intensity.*up to|from 0 to"),
         ({"type": "spot", "direction": [0, 0, 1], "profile": "cosine"}, "profile.*gaussian or smoothstep or linear"),
         ({"type": "spot", "direction": [0, 0, 1], "profile": "gaussian", "cone_angle": 1}, '"falloff"'),
     ],
@@ -91,3 +99,8 @@ def test_what_is_wrong_with_the_file_is_named(tmp_path: Path, text: str, message
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"gone\.json.*no such file"):
         read_lights(tmp_path / "gone.json")
+
+
+def test_a_tiny_direction_keeps_its_way(tmp_path: Path) -> None:
+    (light,) = read_lights(_write(tmp_path / "lights.json", type="led", direction=[0, 3e-300, 4e-300], exponent=1))
+    torch.testing.assert_close(light.direction, _vector(0.0, 0.6, 0.8), rtol=0, atol=1e-15)  # measured: 1.1e-16

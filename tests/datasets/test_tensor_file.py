@@ -31,3 +31,10 @@ def test_tensors_and_note_come_back(tmp_path: Path) -> None:
     assert all(torch.equal(found[name], tensors[name]) and found[name].dtype == tensors[name].dtype for name in tensors)
     with pytest.raises(InputError, match=r"b\.safetensors"):
         load_tensors(tmp_path / "b.safetensors")
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), 1e30])
+def test_numbers_that_no_scene_has_are_refused(tmp_path: Path, value: float) -> None:
+    save_tensors(tmp_path / "a.safetensors", {"x": torch.tensor([1.0, value]), "y": torch.ones(1)})
+    with pytest.raises(InputError, match=r"a\.safetensors.*finite x"):
+        load_tensors(tmp_path / "a.safetensors")

@@ -158,6 +158,10 @@ def test_operators_of_another_scene_are_refused(folder, name, tensor):
         (TRANSPORT, "inverse", float("inf"), "finite inverse"),
         (DICTIONARY, "irradiance", -0.5, "irradiance of at least 0"),
         (DICTIONARY, "positions", float("nan"), "finite positions"),
+        (DICTIONARY, "irradiance", float("inf"), "finite irradiance"),
+        (TRANSPORT, "inverse", 1e30, "finite inverse up to"),
+        (TRANSPORT, "gather.columns", 2**31 - 1, "column"),
+        (TRANSPORT, "average.rows", -1, "row indices"),
     ],
 )
 def test_values_that_no_scene_has_are_refused(folder, name, tensor, value, found):
@@ -182,3 +186,24 @@ def test_a_missing_tensor_and_another_dictionary_are_refused(folder):
 def test_a_folder_that_is_none_is_refused(tmp_path):
     with pytest.raises(InputError, match="no such folder"):
         FrozenScene.load(tmp_path / "nowhere")
+
+
+@pytest.mark.parametrize("part", ["rows", "columns", "values"])
+@pytest.mark.parametrize("damage", ["shorter", "longer", "type"])
+def test_lists_that_do_not_fit_each_other_are_refused(folder, part, damage):
+    tensors, note = load_tensors(folder / TRANSPORT)
+    name = f"gather.{part}"
+    whole = tensors[name]
+    other = torch.int32 if whole.is_floating_point() else torch.float32
+    changed = {"shorter": whole[:-1], "longer": torch.cat([whole, whole[-1:]]), "type": whole.to(other)}[damage]
+    save_tensors(folder / TRANSPORT, tensors | {name: changed.clone()}, note)
+    with pytest.raises(InputError, match=f"{TRANSPORT}.*a sparse matrix gather"):
+        FrozenScene.load(folder)
+
+
+@pytest.mark.parametrize("stated", [torch.tensor([4]), torch.tensor([4.0, 4.0]), torch.tensor([[4, 4]])])
+def test_a_shape_is_two_integers(folder, stated):
+    tensors, note = load_tensors(folder / TRANSPORT)
+    save_tensors(folder / TRANSPORT, tensors | {"gather.shape": stated}, note)
+    with pytest.raises(InputError, match=r"two integers as gather\.shape"):
+        FrozenScene.load(folder)

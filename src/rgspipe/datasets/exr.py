@@ -8,29 +8,95 @@ from pathlib import Path
 import numpy as np
 import OpenEXR
 
+from rgspipe.datasets.input_file import check_pixel_count, input_file
 from rgspipe.errors import InputError
 
 RENDER_AGAIN = "Export or render this image again."
 
 
 def read_channels(path: str | Path) -> dict[str, np.ndarray]:
-    """All channels of all parts of an EXR file: {name: (H, W) float32}.
+    """All channels of an EXR file over its display window: {name: (H, W) float32}, 0 outside of its data window.
 
     Raises:
-        InputError: no such file, not an EXR file, truncated, or a channel that is not a plain image.
+        InputError: no such file, not an EXR file, truncated, a channel that is not a plain image or that two parts
+            have, or pixels outside of the display window.
     """
-    path = Path(path)
-    if not path.is_file():
-        raise InputError(path, expected="an OpenEXR image", found="no such file", remedy="Check the path.")
+    path = input_file(path, "an OpenEXR image")
+    _check_pixels(path)
     try:
         with OpenEXR.File(str(path), separate_channels=True) as file:
-            pixels = {name: channel.pixels for part in file.parts for name, channel in part.channels.items()}
+            parts = [_placed(path, part) for part in file.parts]
+    except InputError:
+        raise
     except Exception as error:  # the binding raises bare RuntimeError, ValueError or MemoryError for bad files
         raise _broken(path, str(error)) from error
+    return _joined(path, parts)
+
+
+def _check_pixels(path: Path) -> None:
+    """Refuse sizes that no image has, by the header alone: decoding would take all memory first."""
+    try:
+        with OpenEXR.File(str(path), separate_channels=True, header_only=True) as file:
+            for part in file.parts:
+                for window in ("displayWindow", "dataWindow"):
+                    _, size = _window(part.header[window])
+                    check_pixel_count(path, *size)
+    except InputError:
+        raise
+    except Exception as error:  # as in `read_channels`
+        raise _broken(path, str(error)) from error
+
+
+def _window(corners: tuple[np.ndarray, np.ndarray]) -> tuple[tuple[int, int], tuple[int, int]]:
+    """The first column and row of a window, and its width and height."""
+    (left, top), (right, bottom) = ([int(value) for value in corner] for corner in corners)
+    return (left, top), (right - left + 1, bottom - top + 1)
+
+
+def _placed(path: Path, part: OpenEXR.Part) -> dict[str, np.ndarray]:
+    """The channels of a part in its display window, which is what the camera saw."""
+    pixels = {name: channel.pixels for name, channel in part.channels.items()}
+    data, display = part.header["dataWindow"], part.header["displayWindow"]
+    (left, top), (width, height) = _window(data)
     # Pixels that it cannot read, it leaves out without raising.
-    if not pixels or any(values is None or values.ndim != 2 or values.size == 0 for values in pixels.values()):
+    if not pixels or any(values is None or values.shape != (height, width) for values in pixels.values()):
+        raise _broken(path, "its pixels are cut off or damaged, or channels have sizes of their own")
+    (first, upper), (columns, rows) = _window(display)
+    if left < first or top < upper or left + width > first + columns or top + height > upper + rows:
+        raise InputError(
+            path,
+            expected=f"pixels within the display window, {_corners(display)}",
+            found=f"a data window {_corners(data)}",
+            remedy="Crop the image to its display window, which is what the camera sees.",
+        )
+    stored = {name: np.asarray(values, dtype=np.float32) for name, values in pixels.items()}
+    if (width, height) == (columns, rows):
+        return stored
+    place = np.s_[top - upper : top - upper + height, left - first : left - first + width]
+    whole = {name: np.zeros((rows, columns), np.float32) for name in stored}
+    for name, values in stored.items():
+        whole[name][place] = values
+    return whole
+
+
+def _corners(window: tuple[np.ndarray, np.ndarray]) -> str:
+    return " to ".join(f"({int(corner[0])}, {int(corner[1])})" for corner in window)
+
+
+def _joined(path: Path, parts: list[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
+    """The channels of all parts, none of them twice; parts share the display window, so their sizes agree."""
+    names = [name for part in parts for name in part]
+    if not names:  # a part of which nothing can be read is left out without raising
         raise _broken(path, "its pixels are cut off or damaged")
-    return {name: np.asarray(values, dtype=np.float32) for name, values in pixels.items()}
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise InputError(
+            path,
+            expected="each channel once",
+            found=f"{', '.join(twice)} in several of its {len(parts)} parts",
+            remedy="Export the part that is meant into a file of its own.",
+        )
+    return {name: values for part in parts for name, values in part.items()}
 
 
 def _broken(path: Path, why: str) -> InputError:

@@ -8,7 +8,8 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
-from rgspipe.datasets.json_file import is_number, numbers, read_json, required
+from rgspipe.datasets.json_file import is_number, numbers, read_json, required, shown
+from rgspipe.datasets.limits import FARTHEST, STRONGEST
 from rgspipe.errors import InputError
 from rgspipe.scene import Camera
 from rgspipe.scene.lights import WATTS_PER_INTENSITY
@@ -98,10 +99,10 @@ class FrameEntry:
         position = numbers(required(self.fields, "pl_pos", self.where), 3, self.where, "pl_pos")
         watts = required(self.fields, "pl_intensity", self.where)
         watts = numbers([watts] * 3 if is_number(watts) else watts, 3, self.where, "pl_intensity")
-        if min(watts) < 0 or max(watts) <= 0:
-            raise InputError(
-                f"{self.where}.pl_intensity", expected="watts above 0", found=repr(watts), remedy="Correct it."
-            )
+        if min(watts) < 0 or not 0 < max(watts) <= STRONGEST:
+            expected = f"watts above 0, up to {STRONGEST:g}"
+            raise InputError(f"{self.where}.pl_intensity", expected=expected, found=repr(watts), remedy="Correct it.")
+        check_place(position, f"{self.where}.pl_pos")
         power = torch.tensor(watts, dtype=torch.float64)
         return torch.tensor(position, dtype=torch.float64), power / WATTS_PER_INTENSITY
 
@@ -156,16 +157,17 @@ def rigid_pose(value: object, place: str) -> Tensor:
     """
     rows = value if isinstance(value, list) else []
     if len(rows) != 4 or not all(isinstance(row, list) and len(row) == 4 for row in rows):
-        raise InputError(place, expected="a 4 × 4 matrix", found=repr(value)[:120], remedy="Correct it.")
+        raise InputError(place, expected="a 4 × 4 matrix", found=shown(value), remedy="Correct it.")
     flat = [item for row in rows for item in row]
     if not all(map(is_number, flat)):
-        raise InputError(place, expected="finite numbers", found=repr(value)[:120], remedy="Correct it.")
+        raise InputError(place, expected="finite numbers", found=shown(value), remedy="Correct it.")
     pose = torch.tensor(flat, dtype=torch.float64).reshape(4, 4)
     rotation = pose[:3, :3]
     error = float((rotation.T @ rotation - torch.eye(3, dtype=torch.float64)).abs().max())
     determinant = float(torch.linalg.det(rotation))
     bottom = torch.tensor([0.0, 0.0, 0.0, 1.0], dtype=torch.float64)
-    if error > ROTATION_TOLERANCE or determinant < 0 or not torch.allclose(pose[3], bottom):
+    check_place(pose[:3, 3].tolist(), place)
+    if not error <= ROTATION_TOLERANCE or determinant < 0 or not torch.allclose(pose[3], bottom):
         raise InputError(
             place,
             expected="a rigid camera-to-world transform (orthonormal rotation, determinant +1, last row 0 0 0 1)",
@@ -173,6 +175,17 @@ def rigid_pose(value: object, place: str) -> Tensor:
             remedy="Remove scale, shear or mirroring from the camera.",
         )
     return pose
+
+
+def check_place(position: list[float], place: str) -> None:
+    """Refuse coordinates that are too large to be of a scene; `place` names them in errors.
+
+    Raises:
+        InputError: one of them is beyond `FARTHEST`.
+    """
+    if max(map(abs, position)) > FARTHEST:
+        expected = f"a place within ±{FARTHEST:g}"
+        raise InputError(place, expected=expected, found=shown(position), remedy="Correct it.")
 
 
 def read_entries(path: Path, what: str) -> list[FrameEntry]:

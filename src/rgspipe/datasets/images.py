@@ -8,6 +8,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from rgspipe.datasets.display_image import read_display, read_display_colour
 from rgspipe.datasets.exr import read_array, read_channels, read_image
 from rgspipe.errors import InputError
 from rgspipe.scene import Camera, srgb
@@ -17,12 +18,12 @@ NO_SURFACE = 1e9
 
 
 def read_colour(path: Path) -> tuple[Tensor, Tensor]:
-    """Linear, premultiplied colour (H, W, 3) and alpha (H, W) of an EXR image or a PNG (sRGB, straight alpha).
+    """Linear, premultiplied colour (H, W, 3) and alpha (H, W) of an EXR image, or a PNG or JPEG (sRGB, straight alpha).
 
     Raises:
         InputError: missing or broken file, other channels, NaN or infinite pixels, alpha outside of [0, 1].
     """
-    image, alpha = read_image(path) if path.suffix.lower() == ".exr" else _read_display_png(path)
+    image, alpha = read_image(path) if path.suffix.lower() == ".exr" else _read_display_image(path)
     if alpha.min() < 0 or alpha.max() > 1 + 1e-3:
         found = f"{alpha.min():g} to {alpha.max():g}"
         raise InputError(path, expected="alpha from 0 to 1", found=found, remedy="Export the image again.")
@@ -70,10 +71,10 @@ def read_vectors(path: Path, names: tuple[str, ...], camera: Camera) -> Tensor:
 
 
 def read_mask(path: Path, camera: Camera) -> Tensor:
-    """A mask (H, W) float32 in [0, 1]: 8-bit grey (or RGB, of which the first channel counts), or EXR with one channel.
+    """A mask (H, W) float32 in [0, 1]: a grey PNG or JPEG, the alpha of one that has any, or EXR with one channel.
 
     Raises:
-        InputError: missing or broken file, other channels, another size than the image, values outside of [0, 1].
+        InputError: missing or broken file, colours, another size than the image, values outside of [0, 1].
     """
     if path.suffix.lower() == ".exr":
         channels = read_channels(path)
@@ -82,8 +83,7 @@ def read_mask(path: Path, camera: Camera) -> Tensor:
             raise InputError(path, expected="one channel, the mask", found=found, remedy="Export only the mask.")
         (stored,) = channels.values()
     else:
-        stored = _read_levels(path)
-        stored = stored if stored.ndim == 2 else stored[..., 0]
+        stored = _mask_levels(path)
     check_size(path, stored, camera)
     if not (stored.min() >= 0 and stored.max() <= 1):
         found = f"{stored.min():g} to {stored.max():g}"
@@ -107,44 +107,20 @@ def check_size(path: Path, stored: np.ndarray | Tensor, camera: Camera) -> None:
         )
 
 
-def _read_display_png(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """An 8-bit PNG, linearised with the sRGB curve and premultiplied."""
-    values = read_png(path)
+def _read_display_image(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """A PNG or JPEG, linearised with the sRGB curve and premultiplied."""
+    values = read_display_colour(path)
     alpha = values[..., 3] if values.shape[2] == 4 else np.ones(values.shape[:2], np.float32)
     linear = srgb.decode(values[..., :3])
     return (linear * alpha[..., None]).astype(np.float32), np.ascontiguousarray(alpha)
 
 
-def read_png(path: Path) -> np.ndarray:
-    """(H, W, 3 or 4) float32 values in [0, 1] of an 8-bit PNG, as they are stored.
-
-    Raises:
-        InputError: missing or broken file, or other than 8-bit RGB or RGBA.
-    """
-    values = _read_levels(path)
-    if values.ndim != 3 or values.shape[2] not in (3, 4):
-        found = f"shape {values.shape}"
-        raise InputError(path, expected="8-bit RGB or RGBA", found=found, remedy="Export it so, or as OpenEXR.")
-    return values
-
-
-def _read_levels(path: Path) -> np.ndarray:
-    """(H, W) or (H, W, C) float32 values in [0, 1] of an 8-bit image."""
-    from PIL import Image, UnidentifiedImageError
-
-    if not path.is_file():
-        raise InputError(path, expected="an image", found="no such file", remedy="Check file_path and file_ext.")
-    try:
-        with Image.open(path) as file:
-            stored = np.asarray(file)
-    except (UnidentifiedImageError, OSError, SyntaxError) as error:
-        raise InputError(
-            path,
-            expected="a whole PNG or OpenEXR image",
-            found=f"an unreadable file ({error})",
-            remedy="Export it again.",
-        ) from error
-    if stored.dtype != np.uint8:
-        found = f"{stored.dtype} with shape {stored.shape}"
-        raise InputError(path, expected="8-bit RGB or RGBA", found=found, remedy="Export it so, or as OpenEXR.")
-    return stored.astype(np.float32) / 255.0
+def _mask_levels(path: Path) -> np.ndarray:
+    """(H, W) of a mask that an image program wrote: its alpha where that says anything, or else its grey levels."""
+    values, alpha = read_display(path)
+    if alpha is not None and alpha.min() < 1.0:
+        return alpha
+    if not (values == values[..., :1]).all():
+        found = "colours, all of them opaque"
+        raise InputError(path, expected="grey levels, or an alpha channel", found=found, remedy="Export it in grey.")
+    return values[..., 0]

@@ -2,31 +2,45 @@
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 
+from rgspipe.datasets.input_file import input_file
 from rgspipe.errors import InputError
+from rgspipe.strict_json import parse_json
+
+#: Bytes of the largest file that is read: cameras of 100 000 views take a tenth of it.
+MOST_BYTES = 2**28
+
+#: Characters of a value that errors show.
+LONGEST_SHOWN = 120
 
 
 def read_json(path: str | Path, what: str) -> dict:
     """The object in a JSON file; `what` names its role in errors ("the cameras of the training views").
 
     Raises:
-        InputError: missing, not JSON, or not an object at the top level.
+        InputError: as `read_json_value`, or not an object at the top level.
     """
-    path = Path(path)
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        raise InputError(path, expected=what, found="no such file", remedy="Check the path.") from error
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(path, expected=what, found=f"an unreadable file ({error})", remedy="Check it.") from error
-    except json.JSONDecodeError as error:
-        raise InputError(path, expected=what, found=f"invalid JSON ({error})", remedy="Repair the file.") from error
+    content = read_json_value(path, what)
     if not isinstance(content, dict):
         raise InputError(path, expected=f"{what} as a JSON object", found=type(content).__name__, remedy="Repair it.")
     return content
+
+
+def read_json_value(path: str | Path, what: str) -> object:
+    """What is in a JSON file, strictly: no key twice, no integer that a double cannot hold.
+
+    Raises:
+        InputError: missing, no regular file, too large or not JSON.
+    """
+    path = input_file(path, what, most_bytes=MOST_BYTES)
+    try:
+        return parse_json(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(path, expected=what, found=f"an unreadable file ({error})", remedy="Check it.") from error
+    except ValueError as error:
+        raise InputError(path, expected=what, found=f"invalid JSON ({error})", remedy="Repair the file.") from error
 
 
 def required(content: dict, key: str, where: str | Path) -> object:
@@ -42,11 +56,22 @@ def numbers(value: object, count: int, where: str | Path, key: str) -> list[floa
     good = isinstance(value, list) and len(value) == count and all(is_number(item) for item in value)
     if not good:
         raise InputError(
-            where, expected=f'{count} finite numbers under "{key}"', found=repr(value)[:120], remedy=f'Correct "{key}".'
+            where, expected=f'{count} finite numbers under "{key}"', found=shown(value), remedy=f'Correct "{key}".'
         )
     return [float(item) for item in value]
 
 
 def is_number(value: object) -> bool:
     """Whether `value` is a finite JSON number."""
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    try:
+        return math.isfinite(value)
+    except OverflowError:  # an integer that no double can hold
+        return False
+
+
+def shown(value: object) -> str:
+    """A value as errors show it, which may be long."""
+    text = repr(value)
+    return text if len(text) <= LONGEST_SHOWN else f"{text[:LONGEST_SHOWN]}…"

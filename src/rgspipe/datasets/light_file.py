@@ -9,11 +9,15 @@ from pathlib import Path
 import torch
 
 from rgspipe.datasets.json_file import is_number, numbers, read_json, required
+from rgspipe.datasets.limits import FARTHEST, STRONGEST
 from rgspipe.errors import InputError
 from rgspipe.files import write_json
 from rgspipe.scene.lights import KINDS, Light, LightRig
 
 VERSION = 1
+
+#: Vectors shorter than this are enlarged before they are squared.
+TINY = 1e-100
 
 
 def read_lights(path: str | Path) -> LightRig:
@@ -67,9 +71,15 @@ def _read_light(fields: dict, path: str | Path, where: str) -> Light:
     reader = _Fields(fields, f"{path}: {where}")
     kind = KINDS[reader.choice("type", tuple(KINDS))]
     position, intensity = reader.vector("position"), reader.vector("intensity")
-    if (intensity < 0).any():
-        raise reader.refusal("intensity", "W/sr ≥ 0", str(intensity.tolist()))
-    return kind.from_fields(position, intensity, reader)
+    if (position.abs() > FARTHEST).any():
+        raise reader.refusal("position", f"coordinates within ±{FARTHEST:g}", str(position.tolist()))
+    if (intensity < 0).any() or (intensity > STRONGEST).any():
+        raise reader.refusal("intensity", f"W/sr from 0 to {STRONGEST:g}", str(intensity.tolist()))
+    try:
+        return kind.from_fields(position, intensity, reader)
+    except ValueError as error:
+        where = f"{path}: {where}"
+        raise InputError(where, expected=f"a {kind.kind} light", found=str(error), remedy="Correct it.") from error
 
 
 @dataclass(frozen=True)
@@ -84,8 +94,10 @@ class _Fields:
 
     def direction(self, key: str) -> torch.Tensor:
         vector = self.vector(key)
-        if vector.norm() == 0:
-            raise self.refusal(key, "a vector longer than 0", "zero")
+        if not 0.0 < vector.abs().max() <= FARTHEST:
+            raise self.refusal(key, f"a vector longer than 0, of numbers within ±{FARTHEST:g}", str(vector.tolist()))
+        # Squares of tiny numbers would be 0.
+        vector = vector / vector.abs().max() if vector.norm() < TINY else vector
         return vector / vector.norm()
 
     def number(self, key: str) -> float:

@@ -15,6 +15,7 @@ from rgspipe.datasets.ply_options import PlyOptions
 from rgspipe.datasets.ply_own import is_own, read_own, save_ply
 from rgspipe.datasets.ply_radiosity import is_radiosity, read_radiosity
 from rgspipe.datasets.ply_table import read_vertices
+from rgspipe.datasets.surfel_range import check_surfels
 from rgspipe.errors import InputError
 from rgspipe.scene.gloss import Gloss
 from rgspipe.scene.spacing import inferred_coverage
@@ -65,6 +66,7 @@ def read_ply(path: Path, options: PlyOptions) -> PlySurfels:
         rule = surfels.coverage
         notes = [*discs.notes, f"Coverage is inferred: thresholds {rule.low:g} and {rule.high:g}, layers of "
                  f"{rule.layer_thickness:.3g}."]  # fmt: skip
+    check_surfels(path, surfels, "Correct them, leave them out with scene.ply.crop=[x,y,z,x,y,z], or export it again.")
     left = loss("left out: outside of the box, or too faint to be there", 1.0 * ~kept, 0.0, "each")
     return PlySurfels(surfels, own, Conversion.of(path, layout, len(surfels), [*losses, left], notes))
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import torch
 from torch import Tensor
 
 from rgspipe.datasets.frames import read_entries
-from rgspipe.datasets.json_file import numbers, required
+from rgspipe.datasets.json_file import numbers, read_json_value, required
 from rgspipe.errors import InputError
 
 #: 3DGS writes it into the model's folder, the scene into point_cloud/iteration_<n>/ below.
@@ -28,7 +27,7 @@ def read_viewpoints(path: Path) -> Tensor:
     Raises:
         InputError: neither of the two, or no cameras in it.
     """
-    content = _content(path)
+    content = read_json_value(path, "cameras")
     if isinstance(content, dict):
         entries = read_entries(path, "cameras")
         return torch.stack([entry.pose()[:3, 3] for entry in entries])
@@ -44,12 +43,3 @@ def read_viewpoints(path: Path) -> Tensor:
         where = f"{path}[{index}]"
         positions.append(numbers(required(item, "position", where), 3, where, "position"))
     return torch.tensor(positions, dtype=torch.float64)
-
-
-def _content(path: Path) -> object:
-    try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        raise InputError(path, expected="cameras", found="no such file", remedy="Check the path.") from error
-    except (OSError, ValueError) as error:
-        raise InputError(path, expected="cameras as JSON", found=str(error), remedy="Repair the file.") from error

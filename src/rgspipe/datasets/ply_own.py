@@ -27,6 +27,7 @@ from rgspipe.scene import srgb
 from rgspipe.scene.gloss import Gloss
 from rgspipe.scene.spacing import inferred_coverage
 from rgspipe.scene.surfels import NO_CLIP, Coverage, Surfels, quaternion_to_axes
+from rgspipe.strict_json import parse_json
 
 #: The comment that marks our files, followed by JSON.
 MARK = "rgspipe-surfels"
@@ -191,7 +192,7 @@ def _mark(table: VertexTable) -> str | None:
 def _note(table: VertexTable) -> Mapping[str, Any]:
     where = f"{table.path}: comment {MARK}"
     try:
-        note = json.loads((_mark(table) or "").partition(" ")[2])
+        note = parse_json((_mark(table) or "").partition(" ")[2])
     except ValueError:
         note = None
     values = note.get("coverage") if isinstance(note, dict) and note.get("version") == VERSION else None

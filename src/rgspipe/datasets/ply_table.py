@@ -10,6 +10,8 @@ from pathlib import Path
 import numpy as np
 from plyfile import PlyData, PlyElement, PlyListProperty, PlyParseError
 
+from rgspipe.datasets.input_file import input_file
+from rgspipe.datasets.ply_header import check_header
 from rgspipe.errors import InputError
 
 ELEMENT = "vertex"
@@ -108,9 +110,8 @@ def read_vertices(path: str | Path) -> VertexTable:
     Raises:
         InputError: no such file, no PLY file, cut off, or without vertices.
     """
-    path = Path(path)
-    if not path.is_file():
-        raise InputError(path, expected="a PLY file", found="no such file", remedy="Check the path.")
+    path = input_file(path, "a PLY file")
+    check_header(path)
     try:
         content = PlyData.read(str(path), mmap="r")
     # The library lets errors of numpy and of decoding through.

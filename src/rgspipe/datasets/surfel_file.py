@@ -9,6 +9,7 @@ from typing import Any
 from torch import Tensor
 
 from rgspipe.datasets.json_file import is_number
+from rgspipe.datasets.surfel_range import check_surfels
 from rgspipe.datasets.tensor_file import load_tensors, save_tensors
 from rgspipe.errors import InputError
 from rgspipe.scene.gloss import Gloss
@@ -52,6 +53,7 @@ def load_surfels(path: str | Path) -> Surfels:
             surfels.gloss.check(surfels.albedo)
     except ValueError as error:  # a wrong shape, or gloss out of range
         raise InputError(path, expected="surfels", found=str(error), remedy=MAKE_AGAIN) from error
+    check_surfels(path, surfels, MAKE_AGAIN)
     return surfels
 
 

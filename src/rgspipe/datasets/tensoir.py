@@ -13,8 +13,9 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
+from rgspipe.datasets.display_image import read_display_colour
 from rgspipe.datasets.frames import rigid_pose
-from rgspipe.datasets.images import check_size, read_colour, read_png
+from rgspipe.datasets.images import check_size, read_colour
 from rgspipe.datasets.json_file import is_number, read_json, required
 from rgspipe.datasets.views import Dataset, View
 from rgspipe.errors import InputError
@@ -126,7 +127,7 @@ def _albedo(path: Path, camera: Camera) -> Tensor:
 
 def _normals(path: Path, camera: Camera) -> Tensor:
     """(H, W, 3) unit normals in world axes, stored as (n + 1)/2; 0 where there is no surface."""
-    stored = torch.from_numpy(read_png(path))
+    stored = torch.from_numpy(read_display_colour(path))
     check_size(path, stored, camera)
     normals = 2.0 * stored[..., :3] - 1.0
     length = normals.norm(dim=-1, keepdim=True)

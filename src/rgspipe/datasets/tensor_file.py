@@ -11,7 +11,11 @@ import safetensors
 import safetensors.torch
 from torch import Tensor
 
+from rgspipe.datasets.input_file import input_file
+from rgspipe.datasets.limits import LARGEST
 from rgspipe.errors import InputError
+
+MAKE_AGAIN = "Remove it and run the stage that makes it again."
 
 
 def save_tensors(path: Path, tensors: dict[str, Tensor], note: dict[str, Any] | None = None) -> None:
@@ -30,16 +34,30 @@ def load_tensors(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
     """The tensors and the note of `save_tensors`.
 
     Raises:
-        InputError: the file is missing or no safetensors file.
+        InputError: the file is missing or no safetensors file, or holds NaN, infinity or numbers beyond `LARGEST`.
     """
+    input_file(path, "a safetensors file")
+    tensors, note = _read(path)
+    for name, tensor in tensors.items():
+        if tensor.is_floating_point() and not bool((tensor.abs() <= LARGEST).all()):
+            found = "values that are not finite" if not bool(tensor.isfinite().all()) else f"{_largest(tensor):g}"
+            raise InputError(path, expected=f"finite {name} up to {LARGEST:g}", found=found, remedy=MAKE_AGAIN)
+    return tensors, note
+
+
+def _largest(tensor: Tensor) -> float:
+    return float(tensor.double().abs().max())
+
+
+def _read(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
     try:
         with safetensors.safe_open(path, framework="pt") as file:
             note = (file.metadata() or {}).get("note", "{}")
             return {name: file.get_tensor(name) for name in file.keys()}, json.loads(note)  # noqa: SIM118
-    except (OSError, safetensors.SafetensorError, ValueError) as error:
+    except (OSError, safetensors.SafetensorError, ValueError, RecursionError) as error:
         raise InputError(
             path,
             expected="a safetensors file",
             found=str(error).splitlines()[0] if str(error) else type(error).__name__,
-            remedy="Remove it and run the stage that makes it again.",
+            remedy=MAKE_AGAIN,
         ) from error

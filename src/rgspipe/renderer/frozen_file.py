@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import torch
 from torch import Tensor
 
 from rgspipe.datasets.surfel_file import load_surfels, save_surfels
@@ -104,11 +105,14 @@ def _load_gloss(path: Path, surfels: Surfels, transport: PatchTransport) -> Glos
     tensors, _ = _load(path, set(PAIR_NAMES), OPERATOR_NAMES)
     glossy, patches = surfels.gloss.glossy, transport.average.shape[0]
     for name in PAIR_NAMES:
+        if tensors[name].dim() != 1 or tensors[name].dtype not in (torch.int32, torch.int64):
+            found = f"{tensors[name].dtype} {tuple(tensors[name].shape)}"
+            raise InputError(path, expected=f"a list of integers as {name}", found=found, remedy=MAKE_AGAIN)
         beyond = (tensors[name] < 0) | (tensors[name] >= patches)
         if bool(beyond.any()):
             found = str(int(tensors[name][beyond][0]))
             raise InputError(path, expected=f"{name} below {patches}", found=found, remedy=MAKE_AGAIN)
-    groups, sent = int(tensors["average.shape"][0]), int(tensors["leaving.shape"][1])
+    groups, sent = _listed_shape(path, tensors, "average")[0], _listed_shape(path, tensors, "leaving")[1]
     harmonics, pairs = sent // max(1, groups), [len(tensors[name]) for name in PAIR_NAMES]
     shapes = (
         (groups, len(glossy)),
@@ -151,11 +155,21 @@ def _load(path: Path, names: set[str], operators: tuple[str, ...]) -> tuple[dict
 
 def _operator(path: Path, tensors: dict[str, Tensor], name: str, shape: tuple[int, int]) -> SparseOperator:
     """The sparse operator of this name, of this shape."""
-    _require(path, name, tensors[f"{name}.shape"].tolist(), shape)
+    _require(path, name, _listed_shape(path, tensors, name), shape)
     try:
         return SparseOperator.from_tensors(tensors, name)
     except ValueError as error:
         raise InputError(path, expected=f"a sparse matrix {name}", found=str(error), remedy=MAKE_AGAIN) from error
+
+
+def _listed_shape(path: Path, tensors: dict[str, Tensor], name: str) -> tuple[int, int]:
+    """Rows and columns that a file states of a sparse operator."""
+    stated = tensors[f"{name}.shape"]
+    if stated.shape != (2,) or stated.is_floating_point() or stated.is_complex():
+        found = f"{stated.dtype} {tuple(stated.shape)}"
+        raise InputError(path, expected=f"two integers as {name}.shape", found=found, remedy=MAKE_AGAIN)
+    rows, columns = (int(size) for size in stated)
+    return rows, columns
 
 
 def _require(path: Path, name: str, found: Sequence[int], expected: tuple[int, ...]) -> None:
@@ -166,6 +180,8 @@ def _require(path: Path, name: str, found: Sequence[int], expected: tuple[int, .
 def _require_range(path: Path, tensors: dict[str, Tensor], low: float = -math.inf) -> None:
     """Refuse values that are not finite, or below `low`."""
     for name, tensor in tensors.items():
+        if not tensor.is_floating_point():
+            raise InputError(path, expected=f"floats as {name}", found=str(tensor.dtype), remedy=MAKE_AGAIN)
         good = tensor.isfinite() & (tensor >= low)
         if not bool(good.all()):
             expected = f"finite {name}" if low == -math.inf else f"finite {name} of at least {low:g}"

@@ -94,15 +94,31 @@ class SparseOperator:
         Raises:
             ValueError: rows or columns that lie outside of the matrix, or values that are not finite.
         """
-        names = ("values", "columns", "rows")
-        parts = tuple(tensors[f"{prefix}.{name}"].numpy() for name in names)
+        rows, columns, values = (tensors[f"{prefix}.{name}"] for name in ("rows", "columns", "values"))
         shape = tuple(tensors[f"{prefix}.shape"].tolist())
-        matrix = scipy.sparse.csr_matrix(parts, shape=shape)
-        # Products read and write where the indices say, unchecked.
-        matrix.check_format(full_check=True)
-        if not np.isfinite(matrix.data).all():
-            raise ValueError("values that are not finite")
-        return cls.from_scipy(matrix, device)
+        _check_compressed(rows, columns, values, shape)
+        parts = tuple(part.numpy() for part in (values, columns, rows))
+        return cls.from_scipy(scipy.sparse.csr_matrix(parts, shape=shape), device)
+
+
+def _check_compressed(rows: Tensor, columns: Tensor, values: Tensor, shape: tuple[int, ...]) -> None:
+    """Refuse what is no matrix in compressed rows: products read and write where the indices say, unchecked.
+
+    Raises:
+        ValueError: parts of wrong types or lengths, indices outside of the matrix, or values that are not finite.
+    """
+    if len(shape) != 2 or not all(0 <= size < 2**31 for size in shape):
+        raise ValueError(f"no matrix is of shape {shape}")
+    if any(part.dim() != 1 for part in (rows, columns, values)) or len(columns) != len(values):
+        raise ValueError("rows, columns and values are no lists, or of different lengths")
+    if any(part.dtype not in (torch.int32, torch.int64) for part in (rows, columns)) or not values.is_floating_point():
+        raise ValueError("indices that are no integers, or values that are no floats")
+    if len(rows) != shape[0] + 1 or int(rows[0]) != 0 or int(rows[-1]) != len(values) or bool((rows.diff() < 0).any()):
+        raise ValueError(f"row indices that do not rise from 0 to its {len(values)} entries in {shape[0]} rows")
+    if len(columns) and not (int(columns.min()) >= 0 and int(columns.max()) < shape[1]):
+        raise ValueError(f"column indices from {int(columns.min())} to {int(columns.max())} of {shape[1]} columns")
+    if not bool(values.isfinite().all()):
+        raise ValueError("values that are not finite")
 
 
 def in_places(matrix: Tensor, values: Tensor) -> Tensor:

@@ -1,0 +1,101 @@
+"""PNG and JPEG images, as the levels that they hold; nothing is decoded that is not one of the two."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+
+import numpy as np
+from PIL import Image, UnidentifiedImageError
+
+from rgspipe.datasets.input_file import check_pixel_count, input_file
+from rgspipe.errors import InputError
+
+#: What a file may be, by its suffix. Pillow would start Ghostscript for an EPS image by another name.
+FORMATS = {".png": "PNG", ".jpg": "JPEG", ".jpeg": "JPEG"}
+
+#: What the pixels of each of Pillow's modes become: grey or colour, with alpha or without.
+MODES = {"1": "L", "L": "L", "LA": "LA", "RGB": "RGB", "RGBA": "RGBA", "P": "RGB", "PA": "RGBA"}
+
+#: Depth and colour type in a PNG's header; the type of pixels with three or four channels.
+DEPTH, COLOUR_TYPE, COLOURED = 24, 25, (2, 4, 6)
+
+LARGEST_LEVEL = {np.dtype(np.uint8): 255.0, np.dtype(np.uint16): 65535.0}
+
+
+def read_display(path: Path) -> tuple[np.ndarray, np.ndarray | None]:
+    """Values (H, W, 1 or 3) float32 in [0, 1] as they are stored, palettes resolved, and alpha (H, W), if there is any.
+
+    Raises:
+        InputError: missing or broken file, too many pixels, another format than the suffix says, CMYK, or 16-bit
+            colour, which no library at hand reads whole.
+    """
+    input_file(path, "an image")
+    stored = _levels(path, _format(path))
+    values = stored.astype(np.float32) / np.float32(LARGEST_LEVEL[stored.dtype])
+    values = values[..., None] if values.ndim == 2 else values
+    channels = values.shape[2]
+    has_alpha = channels in (2, 4)
+    return values[..., : channels - has_alpha], np.ascontiguousarray(values[..., -1]) if has_alpha else None
+
+
+def read_display_colour(path: Path) -> np.ndarray:
+    """(H, W, 3 or 4) float32 values in [0, 1] of RGB or RGBA, as they are stored.
+
+    Raises:
+        InputError: as `read_display`; also for images in grey.
+    """
+    values, alpha = read_display(path)
+    if values.shape[2] != 3:
+        raise _refusal(path, "8-bit RGB or RGBA", "grey levels")
+    return values if alpha is None else np.concatenate([values, alpha[..., None]], axis=2)
+
+
+def _format(path: Path) -> str:
+    kind = FORMATS.get(path.suffix.lower())
+    if kind is None:
+        raise _refusal(path, f"an image ending in .exr, {', '.join(FORMATS)}", path.suffix or "no suffix")
+    return kind
+
+
+def _levels(path: Path, kind: str) -> np.ndarray:
+    """(H, W) or (H, W, C) uint8, or uint16 of a grey image."""
+    try:
+        with warnings.catch_warnings():
+            # Pillow only warns of sizes from half of those on that it refuses; the limit here is our own.
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+            with Image.open(path, formats=[kind]) as file:
+                check_pixel_count(path, *file.size)
+                _check_depth(path, kind)
+                return _unpacked(path, file)
+    except UnidentifiedImageError as error:
+        raise _refusal(
+            path, f"a {kind} image, as its name says", "an unreadable file: another format, or damaged"
+        ) from error
+    except Image.DecompressionBombError as error:
+        raise _refusal(path, "an image of a size that can be decoded", str(error)) from error
+    except (OSError, SyntaxError, ValueError, MemoryError) as error:  # what Pillow raises for damaged files
+        raise _refusal(path, "a whole PNG or OpenEXR image", f"an unreadable file ({error})") from error
+
+
+def _check_depth(path: Path, kind: str) -> None:
+    """Refuse 16-bit colours, of which Pillow drops the lower byte without a word."""
+    with path.open("rb") as stream:
+        header = stream.read(COLOUR_TYPE + 1)
+    if kind == "PNG" and header[DEPTH] == 16 and header[COLOUR_TYPE] in COLOURED:
+        raise _refusal(path, "8 bits a channel", "16, of which half would be lost")
+
+
+def _unpacked(path: Path, file: Image.Image) -> np.ndarray:
+    if file.mode.startswith("I;16"):
+        return np.asarray(file).astype(np.uint16)
+    mode = MODES.get(file.mode)
+    if mode is None:
+        raise _refusal(path, "grey, RGB or RGBA", f"{file.mode} pixels")
+    if "transparency" in file.info:  # of a palette, or one colour that is
+        mode = "LA" if mode == "L" else "RGBA"
+    return np.asarray(file if mode == file.mode else file.convert(mode))
+
+
+def _refusal(path: Path, expected: str, found: str) -> InputError:
+    return InputError(path, expected=expected, found=found, remedy="Export it as 8-bit PNG, or as OpenEXR.")

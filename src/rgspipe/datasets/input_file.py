@@ -1,0 +1,71 @@
+"""The door of every reader: what is opened is a regular file of a size that can be meant."""
+
+from __future__ import annotations
+
+import stat
+from pathlib import Path
+
+from rgspipe.errors import InputError
+
+#: Pixels of the largest image that is read; decoded, it takes 1.2 GB.
+MOST_PIXELS = 100_000_000
+
+#: The longest name that file systems take, bytes.
+LONGEST_NAME = 255
+
+
+def input_file(path: str | Path, expected: str, *, most_bytes: int | None = None) -> Path:
+    """`path`, found to be a regular file; a pipe or a device would never end.
+
+    Args:
+        path: what is to be read.
+        expected: what it should be, for errors.
+        most_bytes: the size from which on no such file is meant.
+
+    Raises:
+        InputError: no such file, something else than a regular file, a name that cannot be, or too large.
+    """
+    try:
+        status = Path(path).stat()
+    except FileNotFoundError:
+        raise InputError(path, expected=expected, found="no such file", remedy="Check the path.") from None
+    except (OSError, ValueError) as error:  # a name too long, a loop of links, no permission; a null in the name
+        raise InputError(_short(path), expected=expected, found=_why(error), remedy="Check the path.") from None
+    if not stat.S_ISREG(status.st_mode):
+        found = "a folder" if stat.S_ISDIR(status.st_mode) else "no regular file but a pipe or a device"
+        raise InputError(path, expected=expected, found=found, remedy="Check the path.")
+    if most_bytes is not None and status.st_size > most_bytes:
+        wanted = f"{expected} of at most {most_bytes} bytes"
+        raise InputError(path, expected=wanted, found=f"{status.st_size} bytes", remedy="Check the file.")
+    return Path(path)
+
+
+def check_pixel_count(path: Path, width: int, height: int) -> None:
+    """Refuse an image that has no pixels, or too many to be decoded.
+
+    Raises:
+        InputError: naming the file and its size.
+    """
+    if not (width >= 1 and height >= 1 and width * height <= MOST_PIXELS):
+        raise InputError(
+            path,
+            expected=f"an image of 1 to {MOST_PIXELS} pixels",
+            found=f"{width} × {height}",
+            remedy="Export the image at a smaller size.",
+        )
+
+
+def is_plain_name(name: object) -> bool:
+    """Whether `name` can be a visible file or folder of its own in a folder."""
+    if not isinstance(name, str) or not name or name.startswith(".") or "/" in name or "\0" in name:
+        return False
+    return name.isprintable() and len(name.encode()) <= LONGEST_NAME
+
+
+def _short(path: str | Path) -> str:
+    text = str(path).encode(errors="replace").decode().replace("\0", "\\0")
+    return text if len(text) <= 2 * LONGEST_NAME else f"{text[:LONGEST_NAME]}…"
+
+
+def _why(error: OSError | ValueError) -> str:
+    return f"no readable file ({error.strerror if isinstance(error, OSError) else error})"

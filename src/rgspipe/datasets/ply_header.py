@@ -1,0 +1,72 @@
+"""The header of a PLY file against the size of the file: reading one believes it, whatever it claims."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from rgspipe.errors import InputError
+
+#: Bytes of the longest header.
+LONGEST = 2**20
+
+#: Names of numbers, as PLY and as numpy have them.
+KINDS = {
+    "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "float": "f4",
+    "double": "f8",
+    "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4", "float32": "f4",
+    "float64": "f8",
+}  # fmt: skip
+
+
+@dataclass
+class _Element:
+    name: str
+    count: int
+    kinds: list[str] = field(default_factory=list)
+
+
+def check_header(path: Path) -> None:
+    """Refuse what claims more rows than the file has bytes for, and rows of lists, whose lengths nothing bounds.
+
+    What is no header at all is left to the reader.
+
+    Raises:
+        InputError: naming the element and the property.
+    """
+    with path.open("rb") as stream:
+        head, end, _ = stream.read(LONGEST).partition(b"end_header")
+    if not end:
+        return
+    lines = [line.split() for line in head.decode("ascii", errors="replace").splitlines()]
+    text = ["format", "ascii", "1.0"] in lines
+    size = path.stat().st_size - len(head)
+    for element in _elements(path, lines):
+        # In text each number takes a digit and a separator.
+        row = sum(2 if text else np.dtype(KINDS.get(kind, "u1")).itemsize for kind in element.kinds)
+        if element.count * max(row, 1) > size:
+            raise InputError(
+                f"{path}: element {element.name}",
+                expected=f"a whole PLY file with {element.count} rows of at least {max(row, 1)} bytes",
+                found=f"{size} bytes",
+                remedy="Export it again.",
+            )
+
+
+def _elements(path: Path, lines: list[list[str]]) -> list[_Element]:
+    elements: list[_Element] = []
+    for words in lines:
+        if words[:1] == ["element"] and len(words) == 3 and words[2].isdecimal() and len(words[2]) < 20:
+            elements.append(_Element(words[1], int(words[2])))
+        elif words[:1] == ["property"] and elements and len(words) > 2:
+            if words[1] == "list" and elements[-1].count:
+                raise InputError(
+                    f"{path}: element {elements[-1].name}, property {words[-1]}",
+                    expected="one number for each vertex",
+                    found="a list",
+                    remedy="Export the file again, without faces.",
+                )
+            elements[-1].kinds.append(words[1])
+    return elements

@@ -1,0 +1,139 @@
+"""PNG and JPEG: each layout of pixels is read as what it shows, and what cannot be read whole is refused."""
+
+from __future__ import annotations
+
+import struct
+import subprocess
+import zlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from rgspipe.datasets.display_image import read_display, read_display_colour
+from rgspipe.datasets.images import read_colour, read_mask
+from rgspipe.errors import InputError
+from rgspipe.scene import Camera, look_at
+
+#: The left half of 6 × 4 pixels counts.
+MASK = np.repeat([[255, 255, 255, 0, 0, 0]], 4, axis=0).astype(np.uint8)
+
+COLOUR = np.random.default_rng(0).integers(0, 256, (4, 6, 3), dtype=np.uint8)
+
+
+def _camera() -> Camera:
+    return Camera(look_at([0.0, -2.0, 0.0], [0.0, 0.0, 0.0]), 5.0, 5.0, 3.0, 2.0, 6, 4)
+
+
+def _png(path: Path, depth: int, kind: int, rows: list[bytes], width: int) -> Path:
+    """A PNG as no library at hand writes it."""
+
+    def chunk(name: bytes, content: bytes) -> bytes:
+        return struct.pack(">I", len(content)) + name + content + struct.pack(">I", zlib.crc32(name + content))
+
+    header = struct.pack(">IIBBBBB", width, len(rows), depth, kind, 0, 0, 0)
+    pixels = zlib.compress(b"".join(b"\0" + row for row in rows))
+    parts = chunk(b"IHDR", header) + chunk(b"IDAT", pixels) + chunk(b"IEND", b"")
+    path.write_bytes(b"\x89PNG\r\n\x1a\n" + parts)
+    return path
+
+
+def _palette() -> Image.Image:
+    image = Image.fromarray(MASK // 255, mode="P")
+    image.putpalette([0, 0, 0, 255, 255, 255])
+    return image
+
+
+@pytest.mark.parametrize(
+    "image",
+    [
+        Image.fromarray(MASK),
+        Image.fromarray(np.repeat(MASK[..., None], 3, axis=2)),
+        _palette(),
+        Image.fromarray(MASK > 0),
+        Image.fromarray(257 * MASK.astype(np.uint16)),
+        Image.fromarray(np.dstack([MASK, np.full_like(MASK, 255)])),
+        Image.fromarray(np.dstack([np.full_like(MASK, 255), MASK])),
+        Image.fromarray(np.dstack([COLOUR, MASK])),
+    ],
+    ids=["grey", "RGB", "palette", "1 bit", "16 bit", "grey, opaque", "white, alpha", "cut out"],
+)
+def test_a_mask_is_what_it_shows(tmp_path: Path, image: Image.Image) -> None:
+    image.save(tmp_path / "mask.png")
+    np.testing.assert_array_equal(read_mask(tmp_path / "mask.png", _camera()), MASK / np.float32(255))
+
+
+def test_a_mask_in_colours_is_refused(tmp_path: Path) -> None:
+    Image.fromarray(COLOUR).save(tmp_path / "mask.png")
+    with pytest.raises(InputError, match=r"mask\.png.*grey levels, or an alpha channel"):
+        read_mask(tmp_path / "mask.png", _camera())
+
+
+def test_a_palette_is_read_as_its_colours(tmp_path: Path) -> None:
+    image = Image.fromarray(COLOUR).quantize(8)
+    image.save(tmp_path / "a.png")
+    np.testing.assert_array_equal(
+        read_display_colour(tmp_path / "a.png"), np.asarray(image.convert("RGB")) / np.float32(255)
+    )
+
+
+def test_8_bit_colours_are_their_levels_bit_for_bit(tmp_path: Path) -> None:
+    Image.fromarray(np.dstack([COLOUR, MASK])).save(tmp_path / "a.png")
+    values, alpha = read_display(tmp_path / "a.png")
+    np.testing.assert_array_equal(values, COLOUR.astype(np.float32) / 255.0)
+    np.testing.assert_array_equal(alpha, MASK.astype(np.float32) / 255.0)
+
+
+@pytest.mark.parametrize(("kind", "channels"), [(2, 3), (4, 2), (6, 4)])
+def test_16_bit_colours_are_refused_as_half_would_be_lost(tmp_path: Path, kind: int, channels: int) -> None:
+    path = _png(tmp_path / "deep.png", 16, kind, [bytes(range(2 * channels))], 1)
+    with pytest.raises(InputError, match=r"deep\.png.*8 bits a channel.*found 16.*OpenEXR"):
+        read_display(path)
+
+
+def test_16_bit_grey_keeps_its_levels(tmp_path: Path) -> None:
+    path = _png(tmp_path / "deep.png", 16, 0, [struct.pack(">3H", 0, 258, 65535)], 3)
+    expected = np.array([[[0.0], [258 / 65535], [1.0]]], np.float32)
+    np.testing.assert_array_equal(read_display(path)[0], expected)
+
+
+def test_cmyk_is_not_taken_for_rgba(tmp_path: Path) -> None:
+    Image.fromarray(COLOUR).convert("CMYK").save(tmp_path / "print.jpg")
+    with pytest.raises(InputError, match=r"print\.jpg.*RGB or RGBA.*CMYK"):
+        read_colour(tmp_path / "print.jpg")
+
+
+@pytest.mark.parametrize("kind", ["BMP", "JPEG", "GIF", "TIFF"])
+def test_another_format_under_the_name_of_png_is_refused(tmp_path: Path, kind: str) -> None:
+    Image.fromarray(COLOUR).save(tmp_path / "a.png", format=kind)
+    with pytest.raises(InputError, match=r"a\.png.*a PNG image, as its name says"):
+        read_display(tmp_path / "a.png")
+
+
+def test_another_suffix_is_refused(tmp_path: Path) -> None:
+    Image.fromarray(COLOUR).save(tmp_path / "a.bmp")
+    with pytest.raises(InputError, match=r"a\.bmp.*ending in \.exr, \.png, \.jpg"):
+        read_display(tmp_path / "a.bmp")
+
+
+def test_an_eps_by_another_name_starts_no_program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def started(*_: object, **__: object) -> None:
+        raise AssertionError("a program was started")
+
+    monkeypatch.setattr(subprocess, "check_call", started)
+    monkeypatch.setattr(subprocess, "Popen", started)
+    (tmp_path / "a.png").write_text("%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 8 8\n%%EndComments\nshowpage\n%%EOF\n")
+    with pytest.raises(InputError, match="another format"):
+        read_display(tmp_path / "a.png")
+
+
+@pytest.mark.parametrize("side", [13_000, 60_000])
+def test_a_small_file_of_a_huge_image_is_refused_before_it_is_decoded(tmp_path: Path, side: int) -> None:
+    path = _png(tmp_path / "bomb.png", 8, 2, [b""], side)
+    content = bytearray(path.read_bytes())
+    content[20:24] = struct.pack(">I", side)
+    content[29:33] = struct.pack(">I", zlib.crc32(content[12:29]))
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=r"bomb\.png"):
+        read_display(path)
