@@ -32,8 +32,8 @@ ENTRIES = {
 #: What is possible where not every number is: the least and the most, with the rounding of float32.
 RANGES = {"scales": (0.0, math.inf), "opacities": (-1e-5, 1.0 + 1e-5), "albedo": (-1e-5, 1.0 + 1e-5)}
 
-#: A clip offset that never clips: beyond the footprint of any surfel, whatever the scene's unit. A power of two, so that
-#: it is the same in float32 and float64.
+#: A clip offset that never clips: beyond the footprint of any surfel, whatever the scene's unit. A power of two, so
+#: that it is the same in float32 and float64.
 NO_CLIP = 2.0**40
 
 
