@@ -19,7 +19,7 @@ from rgspipe.fitting import Search
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
-PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted(DOCS.rglob("*.md"))]
+PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", ROOT / "examples" / "README.md", *sorted(DOCS.rglob("*.md"))]
 
 #: [text](page.md#anchor), ![text](picture.png); not what is on the web.
 LINK = re.compile(r"\]\((?!https?://)([^)\s]+)\)")

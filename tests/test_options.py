@@ -69,7 +69,9 @@ def test_values_take_the_types_of_their_fields() -> None:
         ({"place": 1.0}, "^place: expected a list, found 1.0"),
         ({"place": [0, 0, 2]}, "^place: expected a value from -1 to 1"),
         ({"kinds": ["a", "c"]}, "^kinds: expected one of a, b, found c"),
-        ({"inner": "point"}, "^inner: expected Inner"),
+        ({"inner": "point"}, "^inner: expected values for some of kind, angle, found point"),
+        ({"inner": {"kind": "led"}}, r"^inner\.kind: expected one of point, spot, found led"),
+        ({"inner": {"kinds": "spot"}}, "^inner: expected values for some of kind, angle"),
         ({"count": 5}, "^count: expected no 5"),
     ],
 )
@@ -78,6 +80,10 @@ def test_what_is_none_is_refused_with_the_field(values: dict, words: str) -> Non
         Outer(**values)
     with pytest.raises(InputError, match=words):
         replace(Outer(), **values)
+
+
+def test_nested_options_are_given_by_name() -> None:
+    assert Outer(inner={"angle": 1}).inner == Inner(angle=1.0) and Outer(inner={}) == Outer()
 
 
 def test_settings_are_read_from_the_class() -> None:

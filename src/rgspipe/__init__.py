@@ -4,8 +4,8 @@ import rgspipe as rg
 
 scene = rg.FrozenScene.load("outputs/cornell/freeze/latest")
 camera = rg.Camera.look_at([0, -1.5, 0], [0, 0, 0])
-image = scene.render(camera, [rg.PointLight([-0.3, 0.3, -0.1], 0.8)])
-print(rg.fit_lights(scene, [camera], [image]))
+image = scene.render(camera, rg.PointLight([-0.3, 0.3, -0.1], 0.8))
+print(rg.fit_lights(scene, camera, image))
 """
 
 from __future__ import annotations

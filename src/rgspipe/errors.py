@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 
-class InputError(Exception):
+class InputError(ValueError):
     """Input that cannot be used: a file, a folder, a configuration key or an argument.
 
     The message is one paragraph that names the place, what was expected, what was found and what to

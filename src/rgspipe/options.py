@@ -19,7 +19,7 @@ import math
 import sys
 import types
 import typing
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
@@ -109,6 +109,20 @@ class Setting:
             return ""
         return f"{_short(self.low)} to {_short(self.high)}"
 
+    def _nested(self, section: type[Options], value: Any) -> Options:
+        """Options of this class, also of those by name that are not as they are by default."""
+        if isinstance(value, section):
+            return value
+        names = [item.name for item in settings(section)]
+        if not isinstance(value, Mapping) or not set(value) <= set(names):
+            example = f"{self.name}={{{names[0]!r}: …}}"
+            expected = f"values for some of {', '.join(names)}"
+            raise self._refusal(expected, value, f"Give them as a dictionary, such as {example}.")
+        try:
+            return section(**value)
+        except InputError as error:
+            raise error.within(self.name) from None
+
     def checked(self, value: Any) -> Any:
         """The value in the field's own type.
 
@@ -118,9 +132,7 @@ class Setting:
         if value is None and self.optional:
             return None
         if self.section is not None:
-            if not isinstance(value, self.section):
-                raise self._refusal(f"{self.section.__name__}", value, "Give the options as an object of this class.")
-            return value
+            return self._nested(self.section, value)
         if self.length == 0:
             return self._one(value)
         if isinstance(value, str) or not isinstance(value, Sequence):

@@ -84,7 +84,7 @@ def test_missing_and_truncated_files_are_named(tmp_path, surfels):
     ("change", "message"),
     [
         (lambda tensors: tensors.pop("scales"), "the tensors"),
-        (lambda tensors: tensors.update(scales=torch.ones(3, 2)), r"scales must have shape \(7, 2\)"),
+        (lambda tensors: tensors.update(scales=torch.ones(3, 2)), r"scales: expected numbers of shape \(7, 2\)"),
         (lambda tensors: tensors.update(scales=torch.full((7, 2), torch.nan)), "finite scales"),
         (lambda tensors: tensors.update(scales=torch.ones(7, 2, dtype=torch.int64)), "one type"),
     ],

@@ -10,6 +10,7 @@ import torch
 from torch import Tensor
 
 from lit_room import HIDDEN, VISIBLE
+from rgspipe.errors import InputError
 from rgspipe.fitting import FitResult, FitStatus, FitViews, LightSpec
 from rgspipe.scene import LightRig, SpotLight
 
@@ -135,7 +136,7 @@ def test_images_that_no_rig_explains_stay_finite(room, kind):
 
 
 def test_impossible_wishes_are_refused():
-    with pytest.raises(ValueError, match="type"):
+    with pytest.raises(InputError, match=r"LightSpec\.type"):
         LightSpec("lamp")
-    with pytest.raises(ValueError, match="count"):
+    with pytest.raises(InputError, match=r"LightSpec\.count"):
         LightSpec(count=9)

@@ -9,6 +9,7 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rgspipe.errors import InputError
 from rgspipe.scene import Camera, Gloss, Surfels, look_at
 from rgspipe.scene.surfels import quaternion_from_normal, quaternion_to_axes
 from rooms import closed_box
@@ -88,7 +89,7 @@ def test_a_rotation_from_a_normal_has_that_normal(x: float, y: float, z: float) 
 def test_surfels_of_a_wrong_shape_are_refused() -> None:
     tensors = closed_box(0.5).tensors()
     coverage = closed_box(0.5).coverage
-    with pytest.raises(ValueError, match=r"surfels.scales must have shape \(24, 2\), got \(24, 3\)"):
+    with pytest.raises(InputError, match=r"surfels.scales: expected numbers of shape \(24, 2\), found shape \(24, 3\)"):
         Surfels(**(tensors | {"scales": torch.ones(24, 3)}), coverage=coverage)
 
 

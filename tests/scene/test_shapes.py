@@ -11,7 +11,10 @@ import pytest
 import torch
 
 from rgspipe.datasets.views import View
+from rgspipe.fitting.result import dark_result
+from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import Camera, PointLight
+from rgspipe.scene.models import CornellBox, exact_surfels
 from rgspipe.scene.surfels import turn_in_plane
 
 
@@ -30,6 +33,21 @@ def test_the_maps_of_a_view_have_one_size() -> None:
     view = View("one", camera, torch.zeros(6, 8, 3), torch.ones(6, 8))
     with pytest.raises(jaxtyping.TypeCheckError):
         replace(view, depth=torch.ones(8, 6))
+
+
+def test_light_of_a_frozen_scene_has_a_row_for_each_surfel() -> None:
+    scene = FrozenScene.freeze(exact_surfels(CornellBox(), 60), gather_rays=8, patches=8)
+    irradiance = torch.ones(len(scene.surfels), 2)
+    assert scene.radiance(irradiance).shape == (len(scene.surfels), 3, 2)
+    with pytest.raises(jaxtyping.TypeCheckError):
+        scene.radiance(irradiance[:, 0])
+    with pytest.raises(jaxtyping.TypeCheckError):
+        replace(scene, areas=scene.areas[:-1], centers=scene.centers)
+
+
+def test_covariances_are_matrices() -> None:
+    with pytest.raises(jaxtyping.TypeCheckError):
+        replace(dark_result(0.0), covariance=(torch.ones(6),))
 
 
 def test_the_library_does_without_jaxtyping(child_environment: dict[str, str]) -> None:

@@ -264,7 +264,7 @@ def test_impossible_depth_names_view_and_pixel(views, value):
 
 
 def test_too_few_points_say_how_many_there_are(views):
-    with pytest.raises(InputError, match=r"init.surfels=100000.*found \d+ in 2 views.*at most \d+"):
+    with pytest.raises(InputError, match=r"at least 100000.*found \d+ in 2 views.*at most \d+ surfels .init\.surfels."):
         initialise_surfels(views[:2], 100_000, seed=0)
     with pytest.raises(ValueError, match="at least 1"):
         initialise_surfels(views[:2], 0, seed=0)

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image
 
+from rgspipe.errors import InputError
 from rgspipe.evaluation.arrays import ArrayLike, to_array
 from rgspipe.scene import srgb
 
@@ -97,16 +98,26 @@ def stack(rows: Sequence[Bytes], gap: int = GAP) -> Bytes:
 
 
 def png_bytes(pixels: Bytes) -> bytes:
-    """A PNG file of (H, W, 3) uint8 pixels, without metadata: equal pixels give equal bytes."""
+    """A PNG file of (H, W, 3) uint8 pixels, without metadata: equal pixels give equal bytes.
+
+    Raises:
+        InputError: they are something else, such as radiance.
+    """
     if pixels.ndim != 3 or pixels.shape[2] != 3 or pixels.dtype != np.uint8:
-        raise ValueError(f"pixels must be (H, W, 3) uint8, got {pixels.shape} {pixels.dtype}")
+        found = f"shape {tuple(pixels.shape)} of {pixels.dtype}"
+        remedy = "rg.tone_map makes them of radiance."
+        raise InputError("pixels", expected="levels of 8 bits of shape (H, W, 3)", found=found, remedy=remedy)
     buffer = io.BytesIO()
     Image.fromarray(pixels).save(buffer, format="PNG", optimize=True)
     return buffer.getvalue()
 
 
 def save_png(path: str | Path, pixels: Bytes) -> None:
-    """Write (H, W, 3) uint8 pixels; the file appears under its name only when it is whole."""
+    """Write (H, W, 3) uint8 pixels; the file appears under its name only when it is whole.
+
+    Raises:
+        InputError: the pixels are something else, such as radiance, of which `tone_map` makes them.
+    """
     path = Path(path)
     partial = path.with_name(path.name + ".partial")
     partial.write_bytes(png_bytes(pixels))

@@ -8,6 +8,7 @@ from functools import cached_property
 
 from torch import Tensor
 
+from rgspipe.errors import InputError
 from rgspipe.fitting.model.capture import ImageCapture
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.model.views import PreparedViews, prepare_views
@@ -16,7 +17,7 @@ from rgspipe.fitting.result import FitResult
 from rgspipe.fitting.search.aimed_candidates import aimed_candidates
 from rgspipe.fitting.search.coarse import CoarseImages, coarse_images
 from rgspipe.fitting.solvers import Search, Solver
-from rgspipe.fitting.spec import LightSpec
+from rgspipe.fitting.spec import LightSpec, as_spec
 from rgspipe.renderer.dictionary import LightDictionary
 from rgspipe.renderer.effects import ALL_EFFECTS, Effects
 from rgspipe.renderer.frozen import FrozenScene
@@ -27,6 +28,7 @@ from rgspipe.renderer.view_weights import ViewWeights
 from rgspipe.scene import Camera, Light
 from rgspipe.scene.arrays import ArrayLike, as_list
 from rgspipe.scene.lights import as_rig
+from rgspipe.scene.shapes import Float
 
 Cameras = Camera | ViewWeights | Sequence[Camera | ViewWeights]
 
@@ -62,13 +64,12 @@ class FitViews:
         """What all targets of one set of cameras share; see `fit_lights` for the arguments.
 
         Raises:
-            InputError: masks do not fit the cameras, or leave no pixel.
+            InputError: masks do not fit the cameras, or leave no pixel; or a kind of light that is not known.
         """
-        views = [cameras] if isinstance(cameras, Camera | ViewWeights) else cameras
-        weights = [scene.view(view) if isinstance(view, Camera) else view for view in views]
+        weights = _weights(scene, cameras)
         masks = None if masks is None else as_list(masks, axes=2)
         prepared = prepare_views(scene, weights, masks=masks, mask_edges=mask_edges)
-        return cls(prepared, LightSpec(lights) if isinstance(lights, str) else lights, effects, sharp)
+        return cls(prepared, as_spec(lights), effects, sharp)
 
     @property
     def dictionary(self) -> LightDictionary:
@@ -120,9 +121,17 @@ class FitViews:
     ) -> FitResult:
         """The lights of one image a view; see `fit_lights`."""
         stacked = self.prepared.stack_images(as_list(images, axes=3))
-        return (solver or Search()).fit(self, stacked, capture or ImageCapture())
+        solver = Search() if solver is None else solver
+        if isinstance(solver, type) or not isinstance(solver, Solver):
+            raise InputError(
+                "solver",
+                expected="a way of fitting with its options, such as rg.Search(starts=8) or rg.PaperAdam()",
+                found=f"{solver!r}",
+                remedy="Pass such an object.",
+            )
+        return solver.fit(self, stacked, capture or ImageCapture())
 
-    def render(self, lights: Light | Sequence[Light]) -> list[Tensor]:
+    def render(self, lights: Light | Sequence[Light]) -> list[Float[Tensor, "H W 3"]]:
         """(H, W, 3) image per view of the scene under lights, with the fit's effects; black without any."""
         return self.prepared.split(self.images.image(as_rig(lights)))
 
@@ -164,10 +173,21 @@ def fit_lights(
         lights, not an error.
 
     Raises:
-        InputError: images or masks do not fit the cameras, are not finite, or leave no pixel.
-        ValueError: a kind of light that is not known, or the solver cannot do without what is not known.
+        InputError: images or masks do not fit the cameras, are not finite, or leave no pixel; or a kind of light that
+            is not known.
+        ValueError: the solver cannot do without what is not known of the lights.
     """
     views = FitViews.prepare(
         scene, cameras, lights=lights, masks=masks, effects=effects, sharp=sharp, mask_edges=mask_edges
     )
     return views.fit(images, solver=solver, capture=capture)
+
+
+def _weights(scene: FrozenScene, cameras: Cameras) -> list[ViewWeights]:
+    """Of each camera."""
+    views = [cameras] if isinstance(cameras, Camera | ViewWeights) else list(cameras)
+    for index, view in enumerate(views):
+        if not isinstance(view, Camera | ViewWeights):
+            where, found = f"cameras[{index}]", type(view).__name__
+            raise InputError(where, expected="a Camera", found=found, remedy="Camera.look_at makes one.")
+    return [scene.view(view) if isinstance(view, Camera) else view for view in views]

@@ -14,6 +14,7 @@ from rgspipe.fitting.findings import Dark, Finding, FitStatus, gravest
 from rgspipe.fitting.result_text import as_html, as_text
 from rgspipe.fitting.words import PYTHON, Spoken, explained
 from rgspipe.scene import LightRig
+from rgspipe.scene.shapes import Float
 
 
 @dataclass(frozen=True)
@@ -31,12 +32,12 @@ class Step:
     seconds: float
 
     @property
-    def position(self) -> Tensor:
+    def position(self) -> Float[Tensor, " 3"]:
         """(3,) of the first light, scene units."""
         return self.lights[0].position
 
     @property
-    def intensity(self) -> Tensor:
+    def intensity(self) -> Float[Tensor, " 3"]:
         """(3,) of the first light, W/sr."""
         return self.lights[0].intensity
 
@@ -71,10 +72,10 @@ class FitResult:
     evaluations: int
     lights_tried: int
     seconds: float
-    covariance: tuple[Tensor, ...]
+    covariance: tuple[Float[Tensor, "_ _"], ...]
     trajectory: tuple[Step, ...]
     costs: Mapping[int, float] = field(default_factory=dict)
-    noise_covariance: tuple[Tensor, ...] = ()
+    noise_covariance: tuple[Float[Tensor, "_ _"], ...] = ()
     exposures: tuple[float, ...] = ()
 
     @property

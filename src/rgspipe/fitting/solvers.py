@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal, Protocol
+from typing import TYPE_CHECKING, Literal, Protocol, runtime_checkable
 
 from torch import Tensor
 
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from rgspipe.fitting.fit import FitViews
 
 
+@runtime_checkable
 class Solver(Protocol):
     """A way from images to lights."""
 

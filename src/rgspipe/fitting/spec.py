@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NoReturn
 
+from rgspipe.errors import InputError
 from rgspipe.fitting.options import MOST_LIGHTS
 from rgspipe.scene.lights import KINDS, Light
 
@@ -29,7 +31,7 @@ class LightSpec:
             them is then only where to begin.
 
     Raises:
-        ValueError: an unknown type, a count out of range, or a shape of another kind.
+        InputError: an unknown type, a count out of range, or a shape of another kind.
     """
 
     type: str = "point"
@@ -39,12 +41,12 @@ class LightSpec:
 
     def __post_init__(self) -> None:
         if self.type not in TYPES:
-            raise ValueError(f"type must be one of {TYPES}, got {self.type!r}")
+            _refuse("type", f"one of {', '.join(TYPES)}", self.type, "Correct the name.")
         if self.count is not None and not 1 <= self.count <= MOST_LIGHTS:
-            raise ValueError(f"count must be None or 1 to {MOST_LIGHTS}, got {self.count}")
+            _refuse("count", f"None or 1 to {MOST_LIGHTS}", self.count, "None has them counted.")
         kind = shaped_kind(self.type)
         if self.shape is not None and self.shape.kind != kind:
-            raise ValueError(f"the shape of lights of type {self.type!r} must be a {kind}, got {self.shape}")
+            _refuse("shape", f"a {kind}, as the type is {self.type}", self.shape, "Let type and shape agree.")
 
     @property
     def kinds(self) -> tuple[Light, ...]:
@@ -56,6 +58,26 @@ class LightSpec:
     def aimed(self) -> bool:
         """Whether lights with an axis may be among them."""
         return any(light.axis is not None for light in self.kinds)
+
+
+def as_spec(lights: str | LightSpec) -> LightSpec:
+    """What is known of the lights, of which a name may say all.
+
+    Raises:
+        InputError: something else, or an unknown name.
+    """
+    if isinstance(lights, str):
+        return LightSpec(lights)
+    if not isinstance(lights, LightSpec):
+        remedy = 'LightSpec("point", count=2) are two point lights; a light whose shape is known goes into its shape.'
+        raise InputError(
+            "lights", expected="a kind of light by name, or a LightSpec", found=type(lights).__name__, remedy=remedy
+        )
+    return lights
+
+
+def _refuse(field: str, expected: str, found: object, remedy: str) -> NoReturn:
+    raise InputError(f"LightSpec.{field}", expected=expected, found=f"{found!r}", remedy=remedy)
 
 
 def shaped_kind(type: str) -> str:

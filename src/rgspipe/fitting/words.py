@@ -81,9 +81,9 @@ def _missing(found: LightMissing, spoken: Spoken) -> str:
 
 
 def _spare(found: LightSpare, spoken: Spoken) -> str:
-    less = f"Light {found.number} lowers the cost by {percent(found.gain)} only and may not be there (it counts from "
-    less += f"{percent(found.wanted)} on): fit with {spoken.count(found.count - 1)}, or {spoken.uncounted} to have "
-    return f"{less}them counted."
+    little = f"lowers the cost by {percent(found.gain)} only" if found.gain > 0.0 else "does not lower the cost"
+    less = f"Light {found.number} {little} and may not be there (it counts from {percent(found.wanted)} on): "
+    return f"{less}fit with {spoken.count(found.count - 1)}, or {spoken.uncounted} to have them counted."
 
 
 def _undetermined(found: Undetermined, spoken: Spoken) -> str:

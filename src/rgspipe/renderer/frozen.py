@@ -8,18 +8,16 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
-import numpy as np
-import scipy.sparse
 import torch
 from torch import Tensor
 
+from rgspipe.errors import InputError
 from rgspipe.renderer.areas import surfel_areas
 from rgspipe.renderer.clusters import cluster_patches
 from rgspipe.renderer.dictionary import GRID, LightDictionary, build_dictionary
 from rgspipe.renderer.direct import unit_irradiance
 from rgspipe.renderer.effects import ALL_EFFECTS, Effects
 from rgspipe.renderer.frozen_file import load_parts, save_parts
-from rgspipe.renderer.gather import build_gather
 from rgspipe.renderer.glossy_transport import GlossyLight, GlossyTransport, build_glossy_transport
 from rgspipe.renderer.images.model import SurfelModel
 from rgspipe.renderer.images.pixels import PixelModel
@@ -27,15 +25,17 @@ from rgspipe.renderer.images.recent_views import RecentViews
 from rgspipe.renderer.images.viewed_pixels import ViewedPixels
 from rgspipe.renderer.indirect import IndirectSolver, Solver, indirect_solver
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
-from rgspipe.renderer.mutual_visibility import mutual_visibility
+from rgspipe.renderer.mutual_visibility import build_needed_gather
 from rgspipe.renderer.openness import openness
 from rgspipe.renderer.rig import rig_irradiance, unit_response
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.surroundings import OPEN, Surroundings
 from rgspipe.renderer.transport import PatchTransport, build_patch_transport
 from rgspipe.renderer.view_weights import ViewWeights, build_view_weights
+from rgspipe.scene.arrays import ArrayLike, as_tensor
 from rgspipe.scene.camera import Camera
-from rgspipe.scene.lights import Light, LightRig, as_rig
+from rgspipe.scene.lights import Light, LightRig, as_rig, check_numbers
+from rgspipe.scene.shapes import Float
 from rgspipe.scene.surfels import Surfels
 
 
@@ -57,12 +57,12 @@ class FrozenScene:
     """
 
     surfels: Surfels
-    areas: Tensor
+    areas: Float[Tensor, " N"]
     gather: SparseOperator | None
     transport: PatchTransport
     solver: IndirectSolver | None = None
     gloss: GlossyTransport | None = None
-    centers: Tensor | None = None
+    centers: Float[Tensor, "N 3"] | None = None
     candidates: LightDictionary | None = None
 
     @classmethod
@@ -73,11 +73,21 @@ class FrozenScene:
             gather_rays: hemisphere rays of a surfel.
             patches: of the indirect light.
             seed: of the rays.
+
+        Raises:
+            InputError: they are no surfels, or have impossible numbers; see `Surfels.check`.
         """
+        if not isinstance(surfels, Surfels):
+            found, remedy = type(surfels).__name__, "rg.exact_surfels makes them of a model, rg.train of views."
+            raise InputError("surfels", expected="Surfels", found=found, remedy=remedy)
+        surfels.check()
+        for name, count in (("gather_rays", gather_rays), ("patches", patches)):
+            if count < 1:
+                raise InputError(name, expected="1 or more", found=str(count), remedy="Leave the default.")
         centers, surfels = surfels.centers.double(), surfels.to(torch.float32)
         bvh = SurfelBvh(replace(surfels, centers=centers))
         areas = surfel_areas(bvh, seed=seed)
-        gather = _gather(bvh, gather_rays, areas, seed)
+        gather = build_needed_gather(bvh, gather_rays, seed=seed, areas=areas)
         labels = cluster_patches(centers, surfels.normals, patches if gather.entries else 1, seed=seed)
         transport = build_patch_transport(gather, labels, areas, surfels.albedo)
         gloss = build_glossy_transport(replace(surfels, centers=centers), gather, transport)
@@ -148,13 +158,15 @@ class FrozenScene:
         return RecentViews(self.bvh)
 
     @cached_property
-    def bounds(self) -> tuple[Tensor, Tensor]:
+    def bounds(self) -> tuple[Float[Tensor, " 3"], Float[Tensor, " 3"]]:
         """(3,) lower and upper corner of the surfels' centres."""
         return self.surfels.centers.amin(dim=0), self.surfels.centers.amax(dim=0)
 
     @property
     def size(self) -> float:
-        """Longest side of the bounding box, scene units."""
+        """Longest side of the bounding box, scene units; 0 of an empty scene."""
+        if not len(self.surfels):
+            return 0.0
         lower, upper = self.bounds
         return float((upper - lower).amax())
 
@@ -189,9 +201,15 @@ class FrozenScene:
         """The camera's image as a linear function of the radiance."""
         return build_view_weights(self.bvh, camera, supersampling)
 
-    def unit_irradiance(self, positions: Tensor, shadows: bool = True) -> tuple[Tensor, Tensor]:
-        """Irradiance (L, N) of unit point lights at (L, 3) and its derivative (L, N, 3)."""
-        return unit_irradiance(self.bvh, positions, shadows)
+    def unit_irradiance(
+        self, positions: ArrayLike, shadows: bool = True
+    ) -> tuple[Float[Tensor, "L N"], Float[Tensor, "L N 3"]]:
+        """Irradiance (L, N) of unit point lights at (L, 3) and its derivative (L, N, 3).
+
+        Raises:
+            InputError: positions have another shape.
+        """
+        return unit_irradiance(self.bvh, as_tensor(positions, "positions", ("L", 3)), shadows)
 
     def with_solver(
         self, solver: Solver, *, bounces: int | None = None, samples: int = 64, seed: int = 0
@@ -211,21 +229,21 @@ class FrozenScene:
         """
         return replace(self, solver=indirect_solver(self, solver, bounces, samples, seed))
 
-    def indirect(self, direct: Tensor) -> Tensor:
+    def indirect(self, direct: Float[Tensor, "N 3 K"]) -> Float[Tensor, "N 3 K"]:
         """(N, 3, K) indirect part of the radiosity for K lightings with direct radiosity (N, 3, K)."""
         return (self.solver or self.transport).indirect(direct)
 
-    def radiance(self, irradiance: Tensor, indirect: bool = True) -> Tensor:
+    def radiance(self, irradiance: Float[Tensor, "N K"], indirect: bool = True) -> Float[Tensor, "N 3 K"]:
         """Outgoing radiance (N, 3, K) for K direct irradiances (N, K), grey; linear and differentiable."""
         direct = self.surfels.albedo[:, :, None] * (irradiance / math.pi)[:, None, :]
         return direct + self.indirect(direct) if indirect else direct
 
-    def coloured_radiance(self, irradiance: Tensor, indirect: bool = True) -> Tensor:
+    def coloured_radiance(self, irradiance: Float[Tensor, "N 3"], indirect: bool = True) -> Float[Tensor, "N 3"]:
         """Outgoing radiance (N, 3) for a coloured direct irradiance (N, 3); linear and differentiable."""
         direct = self.surfels.albedo * (irradiance / math.pi)
         return direct + self.indirect(direct[:, :, None])[:, :, 0] if indirect else direct
 
-    def radiance_of(self, rig: LightRig, effects: Effects = ALL_EFFECTS) -> Tensor:
+    def radiance_of(self, rig: LightRig, effects: Effects = ALL_EFFECTS) -> Float[Tensor, "N 3"]:
         """Outgoing radiance (N, 3) under a rig, differentiable towards the tensors of its lights.
 
         The lights are added up before their light bounces, so a rig costs as many bounces as one light. Of a glossy
@@ -242,8 +260,8 @@ class FrozenScene:
         effects: Effects = ALL_EFFECTS,
         *,
         sharp: bool = True,
-    ) -> Tensor:
-        """(height, width, 3) radiance that a camera sees under one light or several.
+    ) -> Float[Tensor, "H W 3"]:
+        """(height, width, 3) linear radiance that a camera sees under one light or several, black without any.
 
         Differentiable, once, towards every tensor of the lights that requires gradients, by analytic derivatives.
 
@@ -252,13 +270,17 @@ class FrozenScene:
             effects: parts of light transport.
             sharp: whether direct light is taken where pixels look, shadows' edges included; else at surfels' centres,
                 which is quicker and less accurate.
+
+        Raises:
+            InputError: no camera or no lights, but something else, or a light's numbers are not finite.
         """
-        view = self._recent.weights(camera) if isinstance(camera, Camera) else camera
+        view, rig = self._recent.weights(camera), as_rig(lights)
+        check_numbers(rig)
         pixels = ViewedPixels.every(self, [view])
         if sharp:
-            image = PixelModel.of(pixels, effects, (self._recent.direct(view),)).image(as_rig(lights))
+            image = PixelModel.of(pixels, effects, (self._recent.direct(view),)).image(rig)
         else:
-            image = SurfelModel(pixels, effects).image(as_rig(lights))
+            image = SurfelModel(pixels, effects).image(rig)
         return pixels.split(image)[0]
 
     def glossy_light(self, rig: LightRig, effects: Effects = ALL_EFFECTS) -> GlossyLight:
@@ -271,11 +293,3 @@ class FrozenScene:
             raise ValueError("a diffuse scene has no glossy light: use radiance_of")
         response = unit_response(self.bvh, rig, effects)
         return self.gloss.light(self.solver or self.transport, response, effects.interreflection)
-
-
-def _gather(bvh: SurfelBvh, rays: int, areas: Tensor, seed: int) -> SparseOperator:
-    """The gather operator; no ray is cast where no surfel can see another."""
-    if mutual_visibility(bvh.surfels).sight:
-        return build_gather(bvh, rays, seed=seed, areas=areas)
-    nothing = scipy.sparse.csr_matrix((len(bvh.surfels), len(bvh.surfels)), dtype=np.float32)
-    return SparseOperator.from_scipy(nothing, bvh.device)

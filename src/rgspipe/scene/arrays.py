@@ -44,8 +44,27 @@ def as_tensor(value: ArrayLike, name: str, shape: Sequence[Axis], dtype: torch.d
 
 
 def as_list(value: Sequence[ArrayLike] | ArrayLike, axes: int) -> list[ArrayLike]:
-    """Several arrays of `axes` axes each; one of them stands for a list of it."""
-    return [value] if getattr(value, "ndim", None) == axes else list(value)
+    """Several arrays of `axes` axes each; one of them, also one with too few axes, stands for a list of it."""
+    none = isinstance(value, list | tuple) and not value
+    return [value] if _axes(value) <= axes and not none else list(value)
+
+
+def check_finite(tensor: Tensor, name: str, remedy: str) -> None:
+    """Refuse NaN and infinity.
+
+    Raises:
+        InputError: there is some.
+    """
+    if not bool(torch.isfinite(tensor).all()):
+        raise InputError(name, expected="finite numbers", found="NaN or infinity", remedy=remedy)
+
+
+def _axes(value: object) -> int:
+    """How many axes an array has, or lists of lists, by their first entries."""
+    depth = 0
+    while isinstance(value, list | tuple) and value:
+        value, depth = value[0], depth + 1
+    return depth + getattr(value, "ndim", 0)
 
 
 def _from_numbers(value: object, name: str, shape: Sequence[Axis]) -> Tensor:

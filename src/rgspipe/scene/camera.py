@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import torch
 from torch import Tensor
 
-from rgspipe.scene.arrays import ArrayLike, as_tensor
+from rgspipe.errors import InputError
+from rgspipe.scene.arrays import ArrayLike, as_tensor, check_finite
 from rgspipe.scene.shapes import Float, Given
 
 
@@ -35,7 +36,10 @@ class Camera:
 
     def __post_init__(self) -> None:
         pose = as_tensor(self.camera_to_world, "camera_to_world", (4, 4), torch.float64)
+        check_finite(pose, "camera_to_world", "Check where the camera stands and where it looks.")
         object.__setattr__(self, "camera_to_world", pose)
+        for name in ("width", "height"):
+            object.__setattr__(self, name, _pixels(name, getattr(self, name)))
 
     @classmethod
     def look_at(
@@ -56,8 +60,12 @@ class Camera:
             up: (3,) what is up in the image; +z if None, or +y for a view along z.
 
         Raises:
-            InputError: a point that is not three numbers.
+            InputError: a point is not three numbers, both are one, or the field of view or a size is out of range.
         """
+        if not 0.0 < fov_degrees < 180.0:
+            raise InputError(
+                "fov_degrees", expected="an angle between 0 and 180", found=f"{fov_degrees}", remedy="40 is usual."
+            )
         return cls.from_field_of_view(look_at(eye, target, up), math.radians(fov_degrees), width, height)
 
     @classmethod
@@ -142,13 +150,30 @@ class Camera:
         return torch.stack([x, y], dim=-1), depth
 
 
+def _pixels(name: str, count: float) -> int:
+    """A number of pixels.
+
+    Raises:
+        InputError: it is not whole, or not positive.
+    """
+    if count < 1 or count != int(count):
+        raise InputError(name, expected="a whole number of pixels, at least 1", found=f"{count}", remedy="Round it up.")
+    return int(count)
+
+
 def look_at(origin: ArrayLike, target: ArrayLike, up: ArrayLike | None = None) -> Float[Tensor, "4 4"]:
     """(4, 4) float64 camera-to-world matrix of a camera at `origin` that looks at `target`.
 
     `up` defaults to +z; when the view is along it, +y takes its place.
+
+    Raises:
+        InputError: both are the same point, or a point is not three numbers.
     """
     origin, target = (as_tensor(x, name, (3,), torch.float64) for x, name in ((origin, "eye"), (target, "target")))
     up = as_tensor([0.0, 0.0, 1.0] if up is None else up, "up", (3,), torch.float64)
+    if torch.equal(origin, target):
+        found = f"{tuple(origin.tolist())}, where the camera stands"
+        raise InputError("target", expected="a point in front of the camera", found=found, remedy="Move either.")
     backward = torch.nn.functional.normalize(origin - target, dim=0)
     if torch.linalg.cross(up, backward).norm() < 1e-6:
         up = torch.tensor([0.0, 1.0, 0.0], dtype=torch.float64)

@@ -2,13 +2,35 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import torch
 from torch import Tensor
 
+from rgspipe.errors import InputError
+from rgspipe.scene.arrays import as_tensor, check_finite
 from rgspipe.scene.gloss import Gloss
-from rgspipe.scene.shapes import Float
+from rgspipe.scene.shapes import Float, Given
+
+if TYPE_CHECKING:
+    from rgspipe.datasets.ply import PlyOptions
+
+#: Entries of each surfel in its tensors.
+ENTRIES = {
+    "centers": (3,),
+    "rotations": (4,),
+    "scales": (2,),
+    "opacities": (),
+    "albedo": (3,),
+    "clip_offsets": (2,),
+    "clip_angles": (2,),
+}
+
+#: What is possible where not every number is: the least and the most, with the rounding of float32.
+RANGES = {"scales": (0.0, math.inf), "opacities": (-1e-5, 1.0 + 1e-5), "albedo": (-1e-5, 1.0 + 1e-5)}
 
 #: A clip offset that never clips (in units of the softness it is far beyond any surfel's footprint).
 NO_CLIP = 1e3
@@ -47,7 +69,7 @@ class Coverage:
 
 @dataclass(frozen=True, repr=False)
 class Surfels:
-    """N Gaussian surfels as plain tensors; all of one dtype and device.
+    """N Gaussian surfels as plain tensors, all of one dtype and device; lists and numpy arrays are taken for them.
 
     The opacity of surfel i at a point x of its plane, with local coordinates u, v along its axes:
 
@@ -63,28 +85,44 @@ class Surfels:
         clip_angles: (N, 2) direction φ of the edges' outward normals in the (u, v) plane, rad.
         coverage: how surfels compose to surfaces; belongs to the scene, as it was trained with it.
         gloss: what they reflect besides, or None if all of them are diffuse.
+
+    Raises:
+        InputError: a tensor has another shape.
+        ValueError: the gloss is that of another number of surfels.
     """
 
-    centers: Tensor
-    rotations: Tensor
-    scales: Tensor
-    opacities: Tensor
-    albedo: Tensor
-    clip_offsets: Tensor
-    clip_angles: Tensor
+    centers: Given
+    rotations: Given
+    scales: Given
+    opacities: Given
+    albedo: Given
+    clip_offsets: Given
+    clip_angles: Given
     coverage: Coverage
     gloss: Gloss | None = None
 
     def __post_init__(self) -> None:
-        count = self.centers.shape[0]
-        shapes = {"centers": (count, 3), "rotations": (count, 4), "scales": (count, 2), "opacities": (count,)}
-        shapes |= {"albedo": (count, 3), "clip_offsets": (count, 2), "clip_angles": (count, 2)}
-        for name, shape in shapes.items():
-            found = tuple(getattr(self, name).shape)
-            if found != shape:
-                raise ValueError(f"surfels.{name} must have shape {shape}, got {found}")
+        count: int | str = "N"
+        for name, entries in ENTRIES.items():
+            tensor = as_tensor(getattr(self, name), f"surfels.{name}", (count, *entries))
+            object.__setattr__(self, name, tensor)
+            count = len(tensor)
         if self.gloss is not None and len(self.gloss) != count:
             raise ValueError(f"surfels.gloss must be of {count} surfels, got {len(self.gloss)}")
+
+    def check(self) -> None:
+        """Refuse what no scene is made of; without surfels it is empty, and black.
+
+        Raises:
+            InputError: a number is not finite or impossible, such as an albedo above 1.
+        """
+        for name, tensor in self.tensors().items():
+            check_finite(tensor, f"surfels.{name}", "Look where they were made.")
+            low, high = RANGES.get(name, (-math.inf, math.inf))
+            if bool(((tensor < low) | (tensor > high)).any()):
+                expected = "lengths, 0 or more" if high == math.inf else "values from 0 to 1"
+                found = f"{float(tensor.min()):.4g} to {float(tensor.max()):.4g}"
+                raise InputError(f"surfels.{name}", expected=expected, found=found, remedy="Correct or clamp them.")
 
     def __len__(self) -> int:
         return self.centers.shape[0]
@@ -92,6 +130,24 @@ class Surfels:
     def __repr__(self) -> str:
         glossy = 0 if self.gloss is None else len(self.gloss.glossy)
         return f"Surfels({len(self)}, {glossy or 'none'} of them glossy, {self.centers.dtype}, {self.centers.device})"
+
+    @classmethod
+    def from_ply(cls, path: str | Path, options: PlyOptions | None = None) -> Surfels:
+        """The surfels in a PLY file of this program, or of 3DGS, 2DGS or RadiosityGS; float32 on the CPU.
+
+        `load_ply` does the same, and tells what of a file could not be taken over.
+
+        Args:
+            options: what files from elsewhere do not say of themselves, such as which side of a surfel is its front.
+
+        Raises:
+            InputError: no PLY file, a property is missing or has impossible values, or nothing says which side of the
+                surfels is their front.
+        """
+        # Files are for those above; this is the door to them that people look for here.
+        from rgspipe import load_ply
+
+        return load_ply(path, options)[0]
 
     @property
     def frames(self) -> Float[Tensor, "N 3 3"]:

@@ -29,8 +29,8 @@ def _is_exact(config: RgspipeConfig) -> bool:
 
 def _from_passes(context: StageContext) -> Surfels:
     config = context.config
+    views = open_dataset(context.inputs["generate_dataset"].folder(), test=False, targets=False).train
     try:
-        views = open_dataset(context.inputs["generate_dataset"].folder(), test=False, targets=False).train
         return surfels_from_passes(views, surfel_count(config), seed=config.init.seed)
     except ValueError as error:
         raise InputError(

@@ -10,6 +10,7 @@ import torch
 from torch import Tensor
 
 from rgspipe.datasets.views import View
+from rgspipe.errors import InputError
 from rgspipe.renderer.direct import unit_irradiance
 from rgspipe.renderer.kernels.irradiance import transmittance
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
@@ -52,11 +53,13 @@ def trace_lighting(bvh: SurfelBvh, views: Sequence[View]) -> Lighting:
     """Cast the shadows of every view's light.
 
     Raises:
-        ValueError: a view has no light.
+        InputError: a view has no light.
     """
     missing = [view.name for view in views if view.light is None]
     if missing:
-        raise ValueError(f"views must have lights, these have none: {missing[:5]}")
+        found = f"none in {len(missing)} of {len(views)} views ({', '.join(missing[:5])})"
+        remedy = "Views of a fit target have none: train on those of a dataset."
+        raise InputError("the training views", expected="the light of each", found=found, remedy=remedy)
     positions = torch.stack([view.light.position for view in views])
     intensity = torch.stack([view.light.intensity for view in views]).float()
     blocks = positions.split(LIGHTS_AT_ONCE)

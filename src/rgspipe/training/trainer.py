@@ -80,7 +80,7 @@ def train(
         prior: known albedo that materials are pulled to.
 
     Raises:
-        InputError: the views have no depth to make surfels from.
+        InputError: the views have no lights, or no depth to make surfels from.
     """
     options = options or TrainOptions()
     if isinstance(surfels, int):

@@ -15,13 +15,16 @@ from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.images.viewed_pixels import ViewedPixels
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.view_weights import ViewWeights
-from rgspipe.scene.arrays import ArrayLike, as_tensor
+from rgspipe.scene.arrays import ArrayLike, as_tensor, check_finite
 
 #: Pixels that surfels cover less than this show something the scene does not have.
 LEAST_COVERAGE = 0.9
 
 #: Pixels with a mask below this are not the scene's.
 LEAST_MASK = 0.9
+
+#: So much a mask may be out of range: it may have been resampled.
+ROUNDING = 1e-3
 
 #: A light has six unknowns, and each pixel tells three numbers; fewer pixels than this tell nothing reliable.
 LEAST_PIXELS = 8
@@ -49,7 +52,7 @@ class PreparedViews(ViewedPixels):
             InputError: a wrong number of images, a wrong size, display values, or pixels that are not finite.
         """
         checked = _one_each("images", images, self.views, (3,))
-        return torch.cat([image.reshape(-1, 3).float() for image in checked]).to(self.operator.matrix.device)
+        return torch.cat([image.detach().reshape(-1, 3).float() for image in checked]).to(self.operator.matrix.device)
 
 
 def prepare_views(
@@ -69,12 +72,13 @@ def prepare_views(
         mask_edges: whether pixels on silhouettes, creases and depth jumps are left out.
 
     Raises:
-        InputError: a mask of the wrong size, or too few pixels left.
+        InputError: a mask of the wrong size or with impossible values, or too few pixels left.
     """
     if not views:
         raise InputError("views", expected="at least one", found="none", remedy="Choose views of the target.")
     masks = [torch.ones(v.camera.height, v.camera.width) for v in views] if masks is None else masks
     masks = _one_each("masks", masks, views, ())
+    _check_masks(masks)
     trusted = [_trusted(view, mask, mask_edges) for view, mask in zip(views, masks, strict=True)]
     pixels = torch.cat(trusted).nonzero()[:, 0]
     if len(pixels) < LEAST_PIXELS:
@@ -82,7 +86,7 @@ def prepare_views(
             "target",
             expected=f"at least {LEAST_PIXELS} pixels that show the scene away from edges",
             found=f"{len(pixels)} of {sum(v.camera.pixel_count for v in views)}",
-            remedy="Check the masks and cameras; keep edge pixels with fit.search.mask_edges=false.",
+            remedy="Check the masks and cameras; with mask_edges off, pixels on edges count, too.",
         )
     rows = [
         view.operator.to_scipy()[chosen.cpu().numpy().nonzero()[0]] for view, chosen in zip(views, trusted, strict=True)
@@ -105,8 +109,8 @@ def _one_each(
         InputError: they are fewer or more, of another size, or not finite; or they are images of display values.
     """
     if len(values) != len(views):
-        expected = f"one for each of the {len(views)} views"
-        raise InputError(name, expected=expected, found=str(len(values)), remedy=f"Pass as many {name} as cameras.")
+        expected, found = f"one for each of the {len(views)} views", f"{len(values)} of them"
+        raise InputError(name, expected=expected, found=found, remedy=f"Pass as many {name} as cameras.")
     checked = []
     for index, (view, value) in enumerate(zip(views, values, strict=True)):
         where = f"{name}[{index}]"
@@ -118,7 +122,23 @@ def _one_each(
                 remedy="rg.load_views reads files as radiance, and rgspipe.scene.srgb.decode makes it of levels / 255.",
             )
         tensor = as_tensor(value, where, (view.camera.height, view.camera.width, *channels))
-        if not bool(torch.isfinite(tensor).all()):
-            raise InputError(where, expected="finite values", found="NaN or infinity", remedy="Make it again.")
+        check_finite(tensor, where, "Make it again.")
         checked.append(tensor)
     return checked
+
+
+def _check_masks(masks: Sequence[Tensor]) -> None:
+    """Refuse masks that are no shares of pixels, such as levels of 8 bits.
+
+    Raises:
+        InputError: a value is below 0 or above 1.
+    """
+    for index, mask in enumerate(masks):
+        least, most = float(mask.min()), float(mask.max())
+        if least < -ROUNDING or most > 1.0 + ROUNDING:
+            raise InputError(
+                f"masks[{index}]",
+                expected="the scene's share of each pixel, 0 to 1",
+                found=f"values from {least:.4g} to {most:.4g}",
+                remedy="Divide levels of 8 bits by 255, and clamp what is left.",
+            )

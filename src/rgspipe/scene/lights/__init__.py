@@ -2,7 +2,7 @@
 
 from rgspipe.scene.lights.axial import AxialLight
 from rgspipe.scene.lights.led import LedLight
-from rgspipe.scene.lights.light import WATTS_PER_INTENSITY, Light, LightRig, ShapeNumber, Share, as_rig
+from rgspipe.scene.lights.light import WATTS_PER_INTENSITY, Light, LightRig, ShapeNumber, Share, as_rig, check_numbers
 from rgspipe.scene.lights.point import PointLight
 from rgspipe.scene.lights.spot import SpotLight, SpotProfile
 
@@ -22,4 +22,5 @@ __all__ = [
     "SpotLight",
     "SpotProfile",
     "as_rig",
+    "check_numbers",
 ]

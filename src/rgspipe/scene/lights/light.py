@@ -6,14 +6,14 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any, ClassVar, Protocol, Self
+from typing import Any, ClassVar, NoReturn, Protocol, Self
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from rgspipe.errors import InputError
-from rgspipe.scene.arrays import ArrayLike, as_tensor
+from rgspipe.scene.arrays import ArrayLike, as_tensor, check_finite
 from rgspipe.scene.lights.coordinates import PLACE, Coordinate
 from rgspipe.scene.shapes import Float, Given
 
@@ -229,14 +229,35 @@ def as_rig(lights: Light | Sequence[Light]) -> LightRig:
     Raises:
         InputError: something else.
     """
-    rig = (lights,) if isinstance(lights, Light) else tuple(lights)
-    for index, light in enumerate(rig):
+    if isinstance(lights, Light):
+        return (lights,)
+    if not isinstance(lights, Sequence) or isinstance(lights, str):
+        _refuse("lights", "a light or a list of them", lights)
+    for index, light in enumerate(lights):
         if not isinstance(light, Light):
-            found = type(light).__name__
-            raise InputError(
-                f"lights[{index}]", expected="a light", found=found, remedy="Pass one, such as PointLight."
-            )
-    return rig
+            _refuse(f"lights[{index}]", "a light", light)
+    return tuple(lights)
+
+
+def check_numbers(rig: LightRig) -> None:
+    """Refuse lights that are nowhere or aim nowhere.
+
+    Raises:
+        InputError: a number is not finite, or an axis has no length.
+    """
+    remedy = "Where steps moved it there, take shorter ones."
+    for index, light in enumerate(rig):
+        for field in fields(light):
+            if isinstance(value := getattr(light, field.name), Tensor):
+                check_finite(value, f"lights[{index}].{field.name}", remedy)
+        if light.axis is not None and not bool(light.axis.any()):
+            where = f"lights[{index}].direction"
+            raise InputError(where, expected="a direction", found="(0, 0, 0)", remedy="Say where the light aims.")
+
+
+def _refuse(where: str, expected: str, found: object) -> NoReturn:
+    remedy = "Pass one, such as PointLight([0, 0, 0.3], 1.0)."
+    raise InputError(where, expected=expected, found=type(found).__name__, remedy=remedy)
 
 
 def _colour(value: ArrayLike) -> Tensor:

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import torch
 
+from rgspipe.errors import InputError
 from rgspipe.scene.gloss import Gloss
 from rgspipe.scene.models.cornell import CornellBox
 from rgspipe.scene.models.corridor import Corridor
@@ -14,7 +15,13 @@ from rgspipe.scene.surfels import Surfels
 
 
 def exact_surfels(model: CornellBox | Corridor, count: int) -> Surfels:
-    """About `count` float32 surfels on the rectangles of a model; those on glossy boxes have their lobe."""
+    """About `count` float32 surfels on the rectangles of a model; those on glossy boxes have their lobe.
+
+    Raises:
+        InputError: the count is below 1.
+    """
+    if count < 1:
+        raise InputError("count", expected="1 or more", found=str(count), remedy="2000 are enough for a first look.")
     surfels = surfels_on(model.rectangles(), count)
     if isinstance(model, CornellBox) and model.gloss > 0.0:
         surfels = replace(surfels, gloss=_gloss(model, count))

@@ -84,9 +84,10 @@ def initialise_surfels(
     if len(cloud) < count:
         raise InputError(
             where,
-            expected=f"at least {count} depth pixels on surfaces, one for each of init.surfels={count}",
+            expected=f"at least {count} depth pixels on surfaces, one for each surfel",
             found=f"{len(cloud)} in {sum(view.depth is not None for view in views)} views",
-            remedy=f"Set init.surfels to at most {max(len(cloud) // 4, 1)}, or give more views or a higher resolution.",
+            remedy=f"Ask for at most {max(len(cloud) // 4, 1)} surfels (init.surfels), or give more views or a higher "
+            "resolution.",
         )
     spacing = estimate_spacing(cloud, count)
     thinned = thin_for(cloud, count, spacing)

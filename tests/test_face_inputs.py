@@ -1,0 +1,260 @@
+"""What newcomers hand to the library works, or an error says where, what was expected, what was found, and a remedy."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from torch import Tensor
+
+import rgspipe as rg
+
+WIDTH, HEIGHT = 48, 40
+CAMERA = rg.Camera.look_at([0, -1.5, 0.05], [0, 0, 0], width=WIDTH, height=HEIGHT)
+LIGHT = rg.PointLight([-0.3, 0.28, -0.1], [0.6, 0.8, 0.8])
+
+
+@pytest.fixture(scope="module")
+def scene() -> rg.FrozenScene:
+    return rg.FrozenScene.freeze(rg.exact_surfels(rg.CornellBox(), 600), gather_rays=32, patches=40)
+
+
+@pytest.fixture(scope="module")
+def image(scene: rg.FrozenScene) -> Tensor:
+    return scene.render(CAMERA, LIGHT)
+
+
+def few_surfels(**changes: object) -> rg.Surfels:
+    return replace(rg.exact_surfels(rg.CornellBox(), 60), **changes)
+
+
+def no_surfels() -> rg.Surfels:
+    return few_surfels(**{name: tensor[:0] for name, tensor in few_surfels().tensors().items()})
+
+
+def freeze(surfels: Any, **options: int) -> rg.FrozenScene:
+    return rg.FrozenScene.freeze(surfels, **{"gather_rays": 8, "patches": 8} | options)
+
+
+@pytest.mark.parametrize("given", [lambda light: [light], lambda light: (light,)], ids=["list", "tuple"])
+def test_one_light_is_a_list_of_it(scene, image, given) -> None:
+    assert torch.equal(scene.render(CAMERA, given(LIGHT)), image)
+
+
+def test_without_lights_it_is_black(scene) -> None:
+    black = scene.render(CAMERA, [])
+    assert black.shape == (HEIGHT, WIDTH, 3) and not black.any()
+
+
+def test_an_empty_scene_is_black_and_says_so() -> None:
+    empty = freeze(no_surfels())
+    assert repr(empty) == "FrozenScene(Surfels(0, none of them glossy, torch.float32, cpu), 0 patches, size 0)"
+    assert not empty.render(CAMERA, LIGHT).any()
+
+
+@pytest.mark.parametrize("vector", [tuple, np.array, np.float32, torch.tensor, lambda x: torch.tensor(x).double()])
+def test_lights_are_made_of_whatever_holds_numbers(scene, image, vector: Callable) -> None:
+    light = rg.PointLight(vector([-0.3, 0.28, -0.1]), vector([0.6, 0.8, 0.8]))
+    # Measured 0; float32 rounds the position by 1e-8.
+    torch.testing.assert_close(scene.render(CAMERA, light), image, rtol=1e-5, atol=1e-5 * float(image.max()))
+
+
+def test_an_image_is_differentiated_towards_its_light(scene, image) -> None:
+    position = torch.tensor([-0.3, 0.2, -0.1], requires_grad=True)
+    (scene.render(CAMERA, rg.PointLight(position, 0.8)) - image).square().mean().backward()
+    assert torch.isfinite(position.grad).all() and position.grad.any()
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        lambda x: x,
+        lambda x: [x],
+        lambda x: x[None],
+        lambda x: x.numpy(),
+        lambda x: x.tolist(),
+        lambda x: [x.tolist()],
+        lambda x: x.double(),
+        lambda x: x.clone().requires_grad_(),
+    ],
+    ids=["one", "list", "stack", "numpy", "numbers", "lists of numbers", "float64", "with gradients"],
+)
+def test_images_are_whatever_holds_numbers(scene, image, given) -> None:
+    result, same = rg.fit_lights(scene, CAMERA, given(image)), rg.fit_lights(scene, [CAMERA], [image])
+    assert torch.equal(result.lights[0].position, same.lights[0].position)
+
+
+@pytest.mark.parametrize("dtype", [torch.bool, torch.float64])
+def test_masks_are_shares_or_truths(scene, image, dtype) -> None:
+    masks = torch.ones(HEIGHT, WIDTH, dtype=dtype)
+    masks[:, : WIDTH // 4] = 0
+    result = rg.fit_lights(scene, CAMERA, image, masks=masks.numpy())
+    same = rg.fit_lights(scene, [CAMERA], [image], masks=[masks.float()])
+    assert torch.equal(result.lights[0].position, same.lights[0].position)
+
+
+def test_surfels_are_made_of_arrays() -> None:
+    surfels = few_surfels()
+    arrays = {name: tensor.numpy() for name, tensor in surfels.tensors().items()}
+    made = rg.Surfels(**arrays, coverage=surfels.coverage)
+    assert torch.equal(made.albedo.float(), surfels.albedo) and freeze(made).surfels.albedo.dtype == torch.float32
+
+
+def test_surfels_come_from_ply(tmp_path) -> None:
+    surfels = few_surfels()
+    rg.save_ply(tmp_path / "surfels.ply", surfels)
+    made = rg.Surfels.from_ply(tmp_path / "surfels.ply")
+    assert len(made) == len(surfels) and torch.equal(made.centers, surfels.centers)
+
+
+def test_results_are_saved_where_nothing_is_yet(scene, image, tmp_path) -> None:
+    result = rg.fit_lights(scene, CAMERA, image)
+    result.save(tmp_path / "new" / "lights.json")
+    (light,) = rg.read_lights(tmp_path / "new" / "lights.json")
+    assert torch.equal(light.position, result.lights[0].position)
+
+
+#: What is done, where the error says it was, what was found, and a word of the remedy.
+REFUSED: dict[str, tuple[Callable[[rg.FrozenScene, Tensor], object], str, str, str]] = {
+    "a name for a light": (lambda s, i: s.render(CAMERA, "point"), "lights", "str", "PointLight"),
+    "a place for a light": (lambda s, i: s.render(CAMERA, [[0, 0, 0]]), "lights[0]", "list", "PointLight"),
+    "several cameras": (lambda s, i: s.render([CAMERA], LIGHT), "camera", "list", "one after the other"),
+    "arguments swapped": (lambda s, i: s.render(LIGHT, CAMERA), "camera", "PointLight", "Camera.look_at"),
+    "a light nowhere": (
+        lambda s, i: s.render(CAMERA, rg.PointLight([0, 0, math.nan], 1)),
+        "lights[0].position",
+        "NaN",
+        "steps",
+    ),
+    "a spot that aims nowhere": (
+        lambda s, i: s.render(CAMERA, rg.SpotLight([0, 0, 0], 1, [0, 0, 0], "smoothstep", 0.4, 0.1)),
+        "lights[0].direction",
+        "(0, 0, 0)",
+        "aims",
+    ),
+    "two coordinates": (lambda s, i: rg.PointLight([0, 0], 1), "position", "shape (2,)", "Pass"),
+    "two colours": (lambda s, i: rg.PointLight([0, 0, 0], [1, 2]), "intensity", "shape (2,)", "Pass"),
+    "a camera in its target": (lambda s, i: rg.Camera.look_at([0, 0, 1], [0, 0, 1]), "target", "0.0, 1.0", "Move"),
+    "a camera without pixels": (
+        lambda s, i: rg.Camera.look_at([0, -1, 0], [0, 0, 0], width=0),
+        "width",
+        "0",
+        "Round",
+    ),
+    "a camera that sees all": (
+        lambda s, i: rg.Camera.look_at([0, -1, 0], [0, 0, 0], fov_degrees=200),
+        "fov_degrees",
+        "200",
+        "usual",
+    ),
+    "a pose without its last row": (
+        lambda s, i: rg.Camera(np.zeros((3, 4)), 1, 1, 1, 1, 2, 2),
+        "camera_to_world",
+        "shape (3, 4)",
+        "Pass",
+    ),
+    "one place alone": (lambda s, i: s.unit_irradiance([0, 0, 0]), "positions", "shape (3,)", "Pass"),
+    "an image that is too low": (lambda s, i: fit(s, i[:10]), "images[0]", "shape (10, 48, 3)", "Pass"),
+    "a grey image": (lambda s, i: fit(s, i[:, :, 0]), "images[0]", "shape (40, 48)", "Pass"),
+    "alpha in the image": (
+        lambda s, i: fit(s, torch.cat([i, i[:, :, :1]], dim=2)),
+        "images[0]",
+        "shape (40, 48, 4)",
+        "Pass",
+    ),
+    "channels first": (lambda s, i: fit(s, i.permute(2, 0, 1)), "images[0]", "shape (3, 40, 48)", "Pass"),
+    "levels of a PNG": (lambda s, i: fit(s, rg.tone_map(i)), "images[0]", "0 to 255", "srgb.decode"),
+    "an image of NaN": (lambda s, i: fit(s, i * math.nan), "images[0]", "NaN", "again"),
+    "an image too few": (
+        lambda s, i: rg.fit_lights(s, [CAMERA, CAMERA], [i]),
+        "images",
+        "1 of them",
+        "as many images as cameras",
+    ),
+    "no camera at all": (lambda s, i: rg.fit_lights(s, [], []), "views", "none", "Choose"),
+    "a view for a camera": (lambda s, i: rg.fit_lights(s, ["view"], [i]), "cameras[0]", "str", "Camera.look_at"),
+    "a mask of 2": (
+        lambda s, i: fit(s, i, masks=torch.full((HEIGHT, WIDTH), 2.0)),
+        "masks[0]",
+        "from 2 to 2",
+        "clamp",
+    ),
+    "a mask of levels": (
+        lambda s, i: fit(s, i, masks=np.full((HEIGHT, WIDTH), 255, np.uint8)),
+        "masks[0]",
+        "255",
+        "Divide",
+    ),
+    "a mask of nothing": (lambda s, i: fit(s, i, masks=np.zeros((HEIGHT, WIDTH))), "target", "0 of 1920", "masks"),
+    "a mask with channels": (
+        lambda s, i: fit(s, i, masks=np.ones((HEIGHT, WIDTH, 1))),
+        "masks",
+        "40 of them",
+        "as many masks",
+    ),
+    "a misspelt kind": (lambda s, i: fit(s, i, lights="pointt"), "LightSpec.type", "'pointt'", "Correct"),
+    "a light for its kind": (lambda s, i: fit(s, i, lights=LIGHT), "lights", "PointLight", "LightSpec"),
+    "a number of lights": (lambda s, i: fit(s, i, lights=2), "lights", "int", "count=2"),
+    "no lights": (lambda s, i: rg.LightSpec(count=0), "LightSpec.count", "0", "counted"),
+    "a solver's name": (lambda s, i: fit(s, i, solver="paper_adam"), "solver", "'paper_adam'", "Pass such"),
+    "a solver's class": (lambda s, i: fit(s, i, solver=rg.Search), "solver", "Search", "Pass such"),
+    "a threshold out of range": (lambda s, i: rg.Search(rivals={"apart": 99}), "rivals.apart", "99", "range"),
+    "a misspelt threshold": (lambda s, i: rg.Search(rivals={"aprt": 0.1}), "rivals", "aprt", "rivals={'apart': …}"),
+    "no starts": (lambda s, i: rg.Search(starts=0), "starts", "0", "range"),
+    "a model that is no scene": (lambda s, i: freeze(rg.CornellBox()), "surfels", "CornellBox", "exact_surfels"),
+    "no surfels": (lambda s, i: rg.exact_surfels(rg.CornellBox(), 0), "count", "0", "2000"),
+    "an empty scene": (lambda s, i: fit(freeze(no_surfels()), i), "target", "0 of 1920", "cameras"),
+    "no rays": (lambda s, i: freeze(few_surfels(), gather_rays=0), "gather_rays", "0", "default"),
+    "an albedo of 5": (
+        lambda s, i: freeze(few_surfels(albedo=np.full((93, 3), 5.0))),
+        "surfels.albedo",
+        "5 to 5",
+        "clamp",
+    ),
+    "an albedo of NaN": (
+        lambda s, i: freeze(few_surfels(albedo=np.full((93, 3), np.nan))),
+        "surfels.albedo",
+        "NaN",
+        "made",
+    ),
+    "a grey albedo": (
+        lambda s, i: few_surfels(albedo=np.zeros(93)),
+        "surfels.albedo",
+        "shape (93,)",
+        "Pass",
+    ),
+    "surfels inside out": (
+        lambda s, i: freeze(few_surfels(scales=-few_surfels().scales)),
+        "surfels.scales",
+        "-0.",
+        "Correct",
+    ),
+    "a folder that is not there": (lambda s, i: rg.FrozenScene.load("nowhere"), "nowhere", "no such folder", "Freeze"),
+    "a file that is not there": (lambda s, i: rg.Surfels.from_ply("no.ply"), "no.ply", "no such file", "path"),
+    "radiance for a picture": (lambda s, i: rg.save_png("x.png", i), "pixels", "float32", "tone_map"),
+    "views without lights": (
+        lambda s, i: rg.train([rg.View("a", CAMERA, i, torch.ones(HEIGHT, WIDTH))], few_surfels()),
+        "the training views",
+        "none in 1 of 1 views (a)",
+        "dataset",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_cannot_be_meant_is_refused_in_words(scene, image, case: str) -> None:
+    act, where, found, remedy = REFUSED[case]
+    with pytest.raises(rg.InputError) as caught:
+        act(scene, image)
+    error = caught.value
+    assert error.where == where and found in error.found and remedy in error.remedy, error
+    assert error.expected and str(error).startswith(f"{where}: expected ")
+
+
+def fit(scene: rg.FrozenScene, image: Any, **options: Any) -> rg.FitResult:
+    return rg.fit_lights(scene, [CAMERA], image, **options)
