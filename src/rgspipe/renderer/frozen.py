@@ -8,8 +8,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
-import numpy as np
-import scipy.sparse
 import torch
 from torch import Tensor
 
@@ -20,7 +18,6 @@ from rgspipe.renderer.dictionary import GRID, LightDictionary, build_dictionary
 from rgspipe.renderer.direct import unit_irradiance
 from rgspipe.renderer.effects import ALL_EFFECTS, Effects
 from rgspipe.renderer.frozen_file import load_parts, save_parts
-from rgspipe.renderer.gather import build_gather
 from rgspipe.renderer.glossy_transport import GlossyLight, GlossyTransport, build_glossy_transport
 from rgspipe.renderer.images.model import SurfelModel
 from rgspipe.renderer.images.pixels import PixelModel
@@ -28,7 +25,7 @@ from rgspipe.renderer.images.recent_views import RecentViews
 from rgspipe.renderer.images.viewed_pixels import ViewedPixels
 from rgspipe.renderer.indirect import IndirectSolver, Solver, indirect_solver
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
-from rgspipe.renderer.mutual_visibility import mutual_visibility
+from rgspipe.renderer.mutual_visibility import build_needed_gather
 from rgspipe.renderer.openness import openness
 from rgspipe.renderer.rig import rig_irradiance, unit_response
 from rgspipe.renderer.sparse import SparseOperator
@@ -90,7 +87,7 @@ class FrozenScene:
         centers, surfels = surfels.centers.double(), surfels.to(torch.float32)
         bvh = SurfelBvh(replace(surfels, centers=centers))
         areas = surfel_areas(bvh, seed=seed)
-        gather = _gather(bvh, gather_rays, areas, seed)
+        gather = build_needed_gather(bvh, gather_rays, seed=seed, areas=areas)
         labels = cluster_patches(centers, surfels.normals, patches if gather.entries else 1, seed=seed)
         transport = build_patch_transport(gather, labels, areas, surfels.albedo)
         gloss = build_glossy_transport(replace(surfels, centers=centers), gather, transport)
@@ -204,14 +201,6 @@ class FrozenScene:
         """The camera's image as a linear function of the radiance."""
         return build_view_weights(self.bvh, camera, supersampling)
 
-    def _weights(self, view: Camera | ViewWeights) -> ViewWeights:
-        if isinstance(view, Camera):
-            return self._recent.weights(view)
-        if isinstance(view, ViewWeights):
-            return view
-        found, remedy = type(view).__name__, "Camera.look_at makes one; of several, render one after the other."
-        raise InputError("camera", expected="a Camera", found=found, remedy=remedy)
-
     def unit_irradiance(
         self, positions: ArrayLike, shadows: bool = True
     ) -> tuple[Float[Tensor, "L N"], Float[Tensor, "L N 3"]]:
@@ -272,7 +261,7 @@ class FrozenScene:
         *,
         sharp: bool = True,
     ) -> Float[Tensor, "H W 3"]:
-        """(height, width, 3) linear radiance that a camera sees under one light or several; black without any.
+        """(height, width, 3) linear radiance that a camera sees under one light or several, black without any.
 
         Differentiable, once, towards every tensor of the lights that requires gradients, by analytic derivatives.
 
@@ -285,7 +274,7 @@ class FrozenScene:
         Raises:
             InputError: no camera or no lights, but something else, or a light's numbers are not finite.
         """
-        view, rig = self._weights(camera), as_rig(lights)
+        view, rig = self._recent.weights(camera), as_rig(lights)
         check_numbers(rig)
         pixels = ViewedPixels.every(self, [view])
         if sharp:
@@ -304,11 +293,3 @@ class FrozenScene:
             raise ValueError("a diffuse scene has no glossy light: use radiance_of")
         response = unit_response(self.bvh, rig, effects)
         return self.gloss.light(self.solver or self.transport, response, effects.interreflection)
-
-
-def _gather(bvh: SurfelBvh, rays: int, areas: Tensor, seed: int) -> SparseOperator:
-    """The gather operator; no ray is cast where no surfel can see another."""
-    if mutual_visibility(bvh.surfels).sight:
-        return build_gather(bvh, rays, seed=seed, areas=areas)
-    nothing = scipy.sparse.csr_matrix((len(bvh.surfels), len(bvh.surfels)), dtype=np.float32)
-    return SparseOperator.from_scipy(nothing, bvh.device)

@@ -10,12 +10,14 @@ import math
 from dataclasses import dataclass, fields
 
 import numpy as np
+import scipy.sparse
 import torch
 from torch import Tensor
 
-from rgspipe.renderer.gather import LIFT
+from rgspipe.renderer.gather import LIFT, build_gather
 from rgspipe.renderer.kernels.shadow import COPLANAR_COSINE, COPLANAR_OFFSET
-from rgspipe.renderer.kernels.surfel_bvh import usable_scales
+from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh, usable_scales
+from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.scene.surfels import Surfels
 
 #: Surfels are tested in groups, by a cylinder around their footprints, before they are tested one by one: so many in a
@@ -126,6 +128,14 @@ class _Cylinders:
         """(R, G) at least the height of each point (R, 3) over the plane of any member of a group."""
         over = points @ self.axes.T - (self.axes * self.centers).sum(dim=1)
         return over + self.spread * torch.cdist(points, self.centers) + self.back
+
+
+def build_needed_gather(bvh: SurfelBvh, rays: int, *, seed: int, areas: Tensor) -> SparseOperator:
+    """`build_gather`, but no ray is cast where no surfel can see another."""
+    if mutual_visibility(bvh.surfels).sight:
+        return build_gather(bvh, rays, seed=seed, areas=areas)
+    nothing = scipy.sparse.csr_matrix((len(bvh.surfels), len(bvh.surfels)), dtype=np.float32)
+    return SparseOperator.from_scipy(nothing, bvh.device)
 
 
 def mutual_visibility(surfels: Surfels) -> MutualVisibility:

@@ -48,10 +48,12 @@ class PixelDirect:
         """(P, 3) float64 place on the surface that each pixel's centre looks at, where spots are evaluated.
 
         It lies in the plane of the surfel with the largest weight; on edges, where that plane may be missed, within
-        two and a half scales of its centre.
+        two and a half scales of its centre. In an empty scene it is the camera's.
         """
         surfels, receivers = self._bvh.surfels, self._receivers.to(self._bvh.device)
         origins, directions, _ = (part.to(self._bvh.device) for part in self._view.camera.rays())
+        if not len(surfels):
+            return origins.expand_as(directions)
         centers, normals = surfels.centers.double()[receivers], surfels.normals.double()[receivers]
         reach = float(REACH) * surfels.scales.detach().double().prod(dim=1).sqrt()[receivers]
         reach = torch.where(self._view.edges.to(reach.device), reach, torch.full_like(reach, torch.inf))

@@ -60,7 +60,7 @@ def shared(columns: Tensor, share: Share | None, light: UnitLight) -> Tensor:
         return columns
     between = [1] * (columns.ndim - 2)
     value, slopes = share.value.reshape(-1, *between, 1), light.slopes(share)
-    slopes = slopes.reshape(len(slopes), *between, -1)
+    slopes = slopes.reshape(len(slopes), *between, slopes.shape[1])
     unit = columns[..., :1]
     products = slopes * unit
     products = torch.cat([products[..., :3] + value * columns[..., 1:], products[..., 3:]], dim=-1)
@@ -98,7 +98,8 @@ class OwnLight:
 
     def slopes(self, share: Share) -> Tensor:
         """(N, D) derivatives of its share towards its tensors, one after the other."""
-        return torch.cat([share.by[name].reshape(len(share.value), -1) for name in self.names], dim=1)
+        slopes = [share.by[name] for name in self.names]
+        return torch.cat([slope if slope.ndim > 1 else slope[:, None] for slope in slopes], dim=1)
 
     def attached(self, value: Tensor, slopes: Tensor) -> Tensor:
         """What of the light is `value` (N, …), as autograd knows how to differentiate it towards the light's tensors.

@@ -222,3 +222,13 @@ def test_the_dark_is_black(frozen: FrozenScene, glossy: FrozenScene) -> None:
     for scene in (frozen, glossy):
         for sharp in (True, False):
             assert not bool(scene.render(CAMERA, [], sharp=sharp).any())
+
+
+def test_nothing_to_see_is_black_under_every_light(surfels: Surfels) -> None:
+    nothing = {name: tensor[:0] for name, tensor in surfels.tensors().items()}
+    empty = FrozenScene.freeze(replace(surfels, **nothing), gather_rays=4, patches=4)
+    for light in LIGHTS.values():
+        moving, leaves = with_leaves(light)
+        image = empty.render(CAMERA, moving)
+        image.sum().backward()
+        assert not bool(image.detach().any()) and not bool(leaves["position"].grad.any())

@@ -6,6 +6,7 @@ from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from typing import TypeVar
 
+from rgspipe.errors import InputError
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.pixel_direct import PixelDirect
 from rgspipe.renderer.view_weights import ViewWeights, build_view_weights
@@ -29,8 +30,17 @@ class RecentViews:
         self._weights: OrderedDict[Hashable, ViewWeights] = OrderedDict()
         self._direct: OrderedDict[Hashable, tuple[ViewWeights, PixelDirect]] = OrderedDict()
 
-    def weights(self, camera: Camera) -> ViewWeights:
-        """The camera's image as a linear function of the radiance."""
+    def weights(self, camera: Camera | ViewWeights) -> ViewWeights:
+        """The camera's image as a linear function of the radiance.
+
+        Raises:
+            InputError: it is no camera.
+        """
+        if isinstance(camera, ViewWeights):
+            return camera
+        if not isinstance(camera, Camera):
+            found, remedy = type(camera).__name__, "Camera.look_at makes one; of several, render one after the other."
+            raise InputError("camera", expected="a Camera", found=found, remedy=remedy)
         return _kept(self._weights, camera.key, lambda: build_view_weights(self._bvh, camera))
 
     def direct(self, view: ViewWeights) -> PixelDirect:
