@@ -67,6 +67,12 @@ class FrameEntry:
         """The image of which pixels count, if there is one."""
         return self._optional_path("mask_path")
 
+    @property
+    def files(self) -> list[Path]:
+        """All images of the frame."""
+        maps = (self.depth_path, self.normal_path, self.albedo_path, self.mask_path)
+        return [self.image_path, *(path for path in maps if path is not None)]
+
     def camera(self, width: int, height: int) -> Camera:
         """The camera for an image of this size.
 

@@ -10,8 +10,8 @@ from torch import Tensor
 from rgspipe.scene.gloss import Gloss
 from rgspipe.scene.shapes import Float
 
-#: A clip offset that never clips: beyond the footprint of any surfel, whatever the scene's unit. A power of two, so that
-#: it is the same in float32 and float64.
+#: A clip offset that never clips: beyond the footprint of any surfel, whatever the scene's unit. A power of two, which
+#: is the same in float32 and float64.
 NO_CLIP = 2.0**40
 
 

@@ -14,6 +14,7 @@ from rgspipe.config import RgspipeConfig
 from rgspipe.datasets.frames import read_entries
 from rgspipe.datasets.gs3 import load_target
 from rgspipe.datasets.location import dataset_root, open_dataset
+from rgspipe.datasets.read_files import files_read
 from rgspipe.datasets.views import Target, View
 from rgspipe.errors import InputError
 from rgspipe.evaluation.fit_folder import read_result, write_result
@@ -331,7 +332,7 @@ def _files(config: RgspipeConfig) -> list[Path]:
     if config.fit.target is None:
         return []
     load_target(config.fit.target)
-    return [Path(config.fit.target)]
+    return files_read(config.fit.target)
 
 
 STAGE = Stage(

@@ -11,6 +11,7 @@ from rgspipe.config import RgspipeConfig
 from rgspipe.config.scene import MODELLED
 from rgspipe.datasets.gs3 import load_dataset
 from rgspipe.datasets.location import point_at_dataset
+from rgspipe.datasets.read_files import files_read
 from rgspipe.errors import InputError
 from rgspipe.stages.base import Stage, StageContext
 from rgspipe.stages.scene_model import scene_model
@@ -70,7 +71,8 @@ def _config_keys(config: RgspipeConfig) -> tuple[str, ...]:
 def _files(config: RgspipeConfig) -> tuple[Path, ...]:
     if config.scene.kind in MODELLED or config.scene.path is None or not Path(config.scene.path).exists():
         return ()
-    return (Path(config.scene.path).resolve(),)
+    path = Path(config.scene.path).resolve()
+    return tuple(files_read(path)) if config.scene.kind == "external" else (path,)
 
 
 STAGE = Stage(
