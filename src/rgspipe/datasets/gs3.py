@@ -75,7 +75,15 @@ def load_target(folder: str | Path) -> Target:
     _check_name(place.name, folder)
     occlusion = _listed_targets(place.parent).get(place.name, "unknown")
     entries = read_entries(folder / "transforms.json", "the cameras of a fit target")
-    return Target(place.name, occlusion, tuple(_load_view(entry, folder, None, with_light=False) for entry in entries))
+    entries[0].refuse_other_world()
+    info = _target_info(folder, place)
+    return Target(place.name, occlusion, tuple(_load_view(entry, folder, info, with_light=False) for entry in entries))
+
+
+def _target_info(folder: Path, place: Path) -> DatasetInfo | None:
+    """What the target's images mean: as it says itself, or else the dataset that it is a target of."""
+    own = read_info(folder)
+    return read_info(place.parent.parent) if own is None and place.parent.name == "targets" else own
 
 
 def _load_targets(root: Path) -> tuple[Target, ...]:

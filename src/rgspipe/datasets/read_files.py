@@ -10,7 +10,7 @@ from rgspipe.datasets.frames import read_entries
 TRANSFORMS = ("transforms_train.json", "transforms_test.json", "transforms.json", "targets/*/transforms.json")
 
 #: What is read beside the folder of a target.
-BESIDE = ("targets.json", "dataset_info.json", "../dataset_info.json")
+BESIDE = ("targets.json", "../dataset_info.json")
 
 
 def files_read(folder: str | Path) -> list[Path]:

@@ -26,6 +26,9 @@ LEAST_COVERAGE = 0.9
 #: Pixels with a mask below this are not the scene's.
 LEAST_MASK = 0.9
 
+#: A mask may exceed 1 by this: rounding.
+MASK_ROUNDING = 1e-3
+
 #: A light has six unknowns, and each pixel tells three numbers; fewer pixels than this tell nothing reliable.
 LEAST_PIXELS = 8
 
@@ -98,6 +101,10 @@ class PreparedViews:
             InputError: a wrong number of images, a wrong size, display values, or pixels that are not finite.
         """
         checked = _one_each("images", images, self.views, (3,))
+        for index, image in enumerate(checked):
+            if float(image.double().sum()) < 0.0:
+                found = f"pixels down to {float(image.min()):g}, which outweigh the positive ones"
+                raise InputError(f"images[{index}]", expected="radiance ≥ 0", found=found, remedy="Make it again.")
         return torch.cat([image.reshape(-1, 3).float() for image in checked]).to(self.operator.matrix.device)
 
     def split_images(self, stacked: Tensor) -> list[Tensor]:
@@ -126,12 +133,17 @@ def prepare_views(
         at_pixels: whether the last steps of a fit take direct light where pixels look.
 
     Raises:
-        InputError: a mask of the wrong size, or too few pixels left.
+        InputError: a mask of the wrong size or with values outside of [0, 1], or too few pixels left.
     """
     if not views:
         raise InputError("views", expected="at least one", found="none", remedy="Choose views of the target.")
     masks = [torch.ones(v.camera.height, v.camera.width) for v in views] if masks is None else masks
     masks = _one_each("masks", masks, views, ())
+    for index, mask in enumerate(masks):
+        if not (float(mask.min()) >= 0.0 and float(mask.max()) <= 1.0 + MASK_ROUNDING):
+            found = f"{float(mask.min()):g} to {float(mask.max()):g}"
+            remedy = "Divide levels by the largest one."
+            raise InputError(f"masks[{index}]", expected="values from 0 to 1", found=found, remedy=remedy)
     trusted = [_trusted(view, mask, mask_edges) for view, mask in zip(views, masks, strict=True)]
     pixels = torch.cat(trusted).nonzero()[:, 0]
     if len(pixels) < LEAST_PIXELS:
