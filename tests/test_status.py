@@ -9,6 +9,8 @@ import sys
 import time
 from pathlib import Path
 
+import pytest
+
 from rgspipe.status import RunStatus, process_start, read_status, read_statuses
 
 
@@ -67,3 +69,17 @@ def test_a_run_on_another_machine_is_believed(tmp_path: Path) -> None:
     status.values |= {"host": "node7", "process_start": "another boot:1"}
     status._write()
     assert read_status(tmp_path)["state"] == "running"
+
+
+@pytest.mark.parametrize("content", ["", "{", "[1]", '{"state": "done"}', "[" * 100_000])
+def test_a_damaged_status_file_does_not_hide_the_others(tmp_path: Path, content: str) -> None:
+    for name in ("1", "2"):
+        RunStatus.start(tmp_path / name, "freeze", []).done(Path("outputs/x"))
+    (tmp_path / "1/status.json").write_text(content)
+    assert [status["state"] for _, status in read_statuses(tmp_path)] == ["damaged", "done"]
+
+
+def test_a_run_that_its_user_stopped_has_not_failed(tmp_path: Path) -> None:
+    RunStatus.start(tmp_path, "freeze", []).stopped(130)
+    values = read_status(tmp_path)
+    assert (values["state"], values["exit_code"]) == ("stopped", 130) and "traceback" not in values

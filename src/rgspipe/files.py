@@ -6,6 +6,7 @@ import contextlib
 import hashlib
 import json
 import os
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -62,10 +63,17 @@ def sha256(path: Path) -> str:
 
 
 def tree_digest(root: Path) -> str:
-    """One digest of a file, or of the names and contents of all files below a folder."""
+    """One digest of a file, or of the names and contents of all files below a folder, links to folders followed."""
     if root.is_file():
         return sha256(root)
-    lines = [
-        f"{path.relative_to(root).as_posix()} {sha256(path)}" for path in sorted(root.rglob("*")) if path.is_file()
-    ]
+    lines = [f"{path.relative_to(root).as_posix()} {sha256(path)}" for path in sorted(_files_below(root))]
     return hashlib.sha256("\n".join(lines).encode()).hexdigest()
+
+
+def _files_below(root: Path) -> Iterator[Path]:
+    """All files, also those behind links to folders; a link to a folder that it lies in is not followed."""
+    for place, folders, names in os.walk(root, followlinks=True):
+        folder = Path(place)
+        above = {folder.resolve(), *folder.resolve().parents}
+        folders[:] = [name for name in folders if (folder / name).resolve() not in above]
+        yield from (folder / name for name in names if (folder / name).is_file())

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import datetime
-import json
 import os
 import socket
 import time
@@ -14,8 +13,12 @@ from pathlib import Path
 from typing import Any
 
 from rgspipe.files import write_json
+from rgspipe.strict_json import parse_json
 
 STATUS = "status.json"
+
+#: What every status file says.
+NEEDED = {"state", "stage", "overrides"}
 
 
 def _now() -> str:
@@ -84,6 +87,10 @@ class RunStatus:
         lines = traceback.format_exception(error)
         self._end("failed", {"error": str(error), "traceback": "".join(lines), "exit_code": exit_code})
 
+    def stopped(self, exit_code: int) -> None:
+        """Say that the user has stopped the run."""
+        self._end("stopped", {"error": "stopped by the user", "exit_code": exit_code})
+
     def _end(self, state: str, more: Mapping[str, Any]) -> None:
         seconds = round(time.perf_counter() - self._clock, 3)
         self.values |= {"state": state, "ended": _now(), "seconds": seconds, **more}
@@ -96,13 +103,19 @@ class RunStatus:
 def read_status(folder: Path) -> dict[str, Any] | None:
     """The status of the run in `folder`, or None if none was started there.
 
+    A file that cannot be read has the state "damaged".
     A run that says it is running, but whose process is gone, has the state "killed". Processes of another machine
     cannot be seen: its runs are believed.
     """
     path = folder / STATUS
     if not path.is_file():
         return None
-    values = json.loads(path.read_text(encoding="utf-8"))
+    try:
+        values = parse_json(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        values = None
+    if not isinstance(values, dict) or not values.keys() >= NEEDED:
+        return {"state": "damaged", "stage": "", "overrides": [], "command": "", "error": f"{path} cannot be read"}
     here = values.get("host", socket.gethostname()) == socket.gethostname()
     if values["state"] == "running" and here and process_start(values["pid"]) != values["process_start"]:
         values["state"] = "killed"

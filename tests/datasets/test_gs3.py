@@ -272,3 +272,51 @@ def test_a_broken_png_is_named(dataset: Path, change: Change) -> None:
 def test_images_of_colour_only_are_opaque(dataset: Path) -> None:
     write_image(dataset / "train/r_0000.exr", np.ones((4, 6, 3)))
     assert (load_dataset(dataset).train[0].alpha == 1).all()
+
+
+def test_a_name_with_its_suffix_needs_no_file_ext(dataset: Path, change: Change) -> None:
+    Image.fromarray(np.full((4, 6, 3), 128, np.uint8)).save(dataset / "train/a.png")
+    change(TRAIN, _frame(file_path="train/a.png", file_ext=...))
+    assert load_dataset(dataset).train[0].name == "train/a"
+
+
+def test_maps_need_no_suffix_either(dataset: Path, change: Change) -> None:
+    change(TRAIN, _frame(depth_path="train/r_0000_depth"))
+    assert load_dataset(dataset).train[0].depth is not None
+
+
+@pytest.mark.parametrize("place", ["", "targets/one"])
+def test_a_target_s_depth_is_read_as_the_dataset_says(dataset: Path, change: Change, place: str) -> None:
+    shutil.copy(dataset / "train/r_0000_depth.exr", dataset / "targets/one/depth.exr")
+    change("targets/one/transforms.json", _frame(depth_path="depth.exr"))
+    if place:
+        shutil.move(dataset / "dataset_info.json", dataset / place / "dataset_info.json")
+    depth = load_target(dataset / "targets/one").views[0].depth
+    assert depth is not None and depth[1, 1] == 2.0
+
+
+@pytest.mark.parametrize("key", ["k1", "k4", "p2"])
+def test_distorted_images_are_refused(dataset: Path, change: Change, key: str) -> None:
+    change(TRAIN, _frame(**{key: 0}))
+    load_dataset(dataset)
+    change(TRAIN, _frame(**{key: -0.05}))
+    with pytest.raises(InputError, match=rf"frames\[0\]: {key}.*without distortion"):
+        load_dataset(dataset)
+
+
+def test_a_target_in_other_axes_is_refused(dataset: Path, change: Change) -> None:
+    turned = [[0, 1, 0, 0], [1, 0, 0, 0], [0, 0, -1, 0]]
+    change("targets/one/transforms.json", lambda content: content.update(applied_transform=turned))
+    with pytest.raises(InputError, match=r"applied_transform.*axes of the scene"):
+        load_target(dataset / "targets/one")
+
+
+def test_a_negative_pixel_is_no_radiance(dataset: Path) -> None:
+    image = np.full((4, 6, 3), 0.25, np.float32)
+    image[1, 2] = -0.002  # as filters leave it
+    write_image(dataset / "train/r_0000.exr", image)
+    load_dataset(dataset)
+    image[1, 2] = -10.0
+    write_image(dataset / "train/r_0000.exr", image)
+    with pytest.raises(InputError, match=r"r_0000\.exr.*radiance ≥ 0.*1 negative pixels, the lowest -10"):
+        load_dataset(dataset)

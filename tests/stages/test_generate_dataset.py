@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from PIL import Image
 
 from rgspipe.blender.models.parameters import kind_of
 from rgspipe.config import RgspipeConfig, with_changes
@@ -103,3 +104,18 @@ def test_only_what_matters_is_in_the_fingerprint() -> None:
     assert STAGE.keys(_config(kind="external")) == ("scene.kind",)
     assert "scene.cornell" not in STAGE.keys(_config(kind="blend"))
     assert {"scene.cornell", "dataset"} <= set(STAGE.keys(_config(kind="cornell")))
+
+
+def test_saturated_8_bit_training_images_are_told(
+    foreign: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    levels = np.full((4, 4, 3), 128, np.uint8)
+    levels[0, 0], levels[3, 3, 1] = 255, 255
+    Image.fromarray(levels).save(foreign / "train/r_0000.png")
+    content = json.loads((foreign / "transforms_train.json").read_text())
+    content["frames"][0] |= {"file_path": "train/r_0000.png"}
+    content["frames"][0].pop("file_ext", None)
+    (foreign / "transforms_train.json").write_text(json.dumps(content))
+    context = _run(_config(kind="external", path=str(foreign)), tmp_path / "out")
+    assert context.facts["saturated"] == 2 / 16
+    assert "12.5 % of the pixels of 8-bit training images are saturated" in capsys.readouterr().out

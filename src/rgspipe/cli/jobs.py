@@ -26,7 +26,7 @@ from rgspipe.cli.compose import (
     typed,
     usual_command,
 )
-from rgspipe.cli.messages import EXIT_FAILED, EXIT_INPUT, show_failure, show_input_error
+from rgspipe.cli.messages import EXIT_FAILED, EXIT_INPUT, EXIT_INTERRUPTED, show_failure, show_input_error
 from rgspipe.cli.sweep_table import write_sweep_table
 from rgspipe.errors import InputError
 from rgspipe.pipeline import StageLoader, Usual, run
@@ -123,6 +123,9 @@ def _job(values: DictConfig, stage_loader: StageLoader, usual: Usual) -> int:
         status.failed(error, EXIT_FAILED)
         show_failure(error, status.path, wanted)
         return EXIT_FAILED
+    except KeyboardInterrupt:
+        status.stopped(EXIT_INTERRUPTED)
+        raise
     except BaseException as error:
         status.failed(error, EXIT_FAILED)
         raise

@@ -17,6 +17,12 @@ from rgspipe.scene.lights import WATTS_PER_INTENSITY
 #: Largest entry of RᵀR − 1 that a rotation may have; files written in float32 reach 1e-6.
 ROTATION_TOLERANCE = 1e-4
 
+#: Suffixes of images; names without one of them are completed.
+SUFFIXES = (".exr", ".png", ".jpg", ".jpeg")
+
+#: Coefficients of lens distortion, as COLMAP and nerfstudio name them.
+DISTORTION = ("k1", "k2", "k3", "k4", "p1", "p2")
+
 
 @dataclass(frozen=True)
 class FrameEntry:
@@ -41,8 +47,10 @@ class FrameEntry:
 
     @property
     def image_path(self) -> Path:
-        """The image; `file_ext` (default .exr) is added unless `file_path` has that suffix already."""
-        name, extension = self._text("file_path"), self.fields.get("file_ext", self.shared.get("file_ext", ".exr"))
+        """The image; `file_ext` is added unless `file_path` has it already, or .exr where neither says anything."""
+        name, extension = self._text("file_path"), self.fields.get("file_ext", self.shared.get("file_ext"))
+        if extension is None:
+            return self._image(name)
         if not isinstance(extension, str):
             raise InputError(f"{self.where}.file_ext", expected="a suffix", found=repr(extension), remedy="Correct it.")
         return self._path(name if name.endswith(extension) else name + extension)
@@ -67,6 +75,12 @@ class FrameEntry:
         """The image of which pixels count, if there is one."""
         return self._optional_path("mask_path")
 
+    @property
+    def files(self) -> list[Path]:
+        """All images of the frame."""
+        maps = (self.depth_path, self.normal_path, self.albedo_path, self.mask_path)
+        return [self.image_path, *(path for path in maps if path is not None)]
+
     def camera(self, width: int, height: int) -> Camera:
         """The camera for an image of this size.
 
@@ -74,6 +88,7 @@ class FrameEntry:
             InputError: no rigid transform, no intrinsics, or intrinsics of an image of another size.
         """
         pose = self.pose()
+        self._refuse_distortion()
         holder = self.fields if self.fields.keys() & {"camera_intrinsics", "camera_angle_x"} else self.shared
         if "camera_intrinsics" in holder:
             return self._camera_from_intrinsics(pose, holder["camera_intrinsics"], width, height)
@@ -89,6 +104,34 @@ class FrameEntry:
             place = f"{self.where}: camera_angle_x"
             raise InputError(place, expected="radians between 0 and π", found=repr(angle), remedy="Correct it.")
         return Camera.from_field_of_view(pose, float(angle), width, height)
+
+    def _refuse_distortion(self) -> None:
+        """Images of lenses that bend straight lines are not of the cameras that are known here."""
+        for key in DISTORTION:
+            value = self.fields.get(key, self.shared.get(key, 0))
+            if not (is_number(value) and value == 0):
+                raise InputError(
+                    f"{self.where}: {key}",
+                    expected="0: images without distortion",
+                    found=shown(value),
+                    remedy="Undistort the images (colmap image_undistorter), and leave the key away.",
+                )
+
+    def refuse_other_world(self) -> None:
+        """Refuse a target whose poses are in other axes than those of the scene.
+
+        Raises:
+            InputError: there is an `applied_transform` other than 1.
+        """
+        value = self.shared.get("applied_transform")
+        rows = [[float(row == column) for column in range(4)] for row in range(4)]
+        if value not in (None, rows, rows[:3]):
+            raise InputError(
+                f"{self.transforms_path}: applied_transform",
+                expected="poses in the axes of the scene",
+                found=shown(value),
+                remedy="Write the poses as those of the training views are, and leave the key away.",
+            )
 
     def light(self) -> tuple[Tensor, Tensor]:
         """Position (3,) and intensity (3,) [W/sr] of the frame's light, float64; the file holds watts.
@@ -137,7 +180,11 @@ class FrameEntry:
         return rigid_pose(value, f"{self.where}.transform_matrix")
 
     def _optional_path(self, key: str) -> Path | None:
-        return self._path(self._text(key)) if key in self.fields else None
+        return self._image(self._text(key)) if key in self.fields else None
+
+    def _image(self, name: str) -> Path:
+        """An image by a name that may lack its suffix."""
+        return self._path(name if name.lower().endswith(SUFFIXES) else name + ".exr")
 
     def _text(self, key: str) -> str:
         value = required(self.fields, key, self.where)

@@ -16,12 +16,16 @@ from rgspipe.datasets.classes import OCCLUSIONS
 from rgspipe.datasets.frames import FrameEntry, read_entries
 from rgspipe.datasets.images import read_colour, read_depth, read_mask, read_vectors
 from rgspipe.datasets.info import DatasetInfo, read_info
-from rgspipe.datasets.json_file import read_json, required
+from rgspipe.datasets.input_file import is_plain_name
+from rgspipe.datasets.json_file import read_json, required, shown
 from rgspipe.datasets.tensoir import is_tensoir, load_tensoir
 from rgspipe.datasets.views import Dataset, Target, View
 from rgspipe.errors import InputError
 from rgspipe.progress import progress_bar
 from rgspipe.scene import PointLight
+
+#: Files of a result, beside the folders of targets.
+TAKEN = ("results.csv", "manifest.json")
 
 
 def load_dataset(root: str | Path, *, train: bool = True, test: bool = True, targets: bool = True) -> Dataset:
@@ -66,9 +70,20 @@ def load_target(folder: str | Path) -> Target:
         raise InputError(
             folder, expected="the folder of a fit target", found="no such folder", remedy="Check the path."
         )
-    occlusion = _listed_targets(folder.parent).get(folder.name, "unknown")
+    # "." and "DIR/sub/.." have names, too.
+    place = folder.resolve() if folder.name in ("", "..") else folder
+    _check_name(place.name, folder)
+    occlusion = _listed_targets(place.parent).get(place.name, "unknown")
     entries = read_entries(folder / "transforms.json", "the cameras of a fit target")
-    return Target(folder.name, occlusion, tuple(_load_view(entry, folder, None, with_light=False) for entry in entries))
+    entries[0].refuse_other_world()
+    info = _target_info(folder, place)
+    return Target(place.name, occlusion, tuple(_load_view(entry, folder, info, with_light=False) for entry in entries))
+
+
+def _target_info(folder: Path, place: Path) -> DatasetInfo | None:
+    """What the target's images mean: as it says itself, or else the dataset that it is a target of."""
+    own = read_info(folder)
+    return read_info(place.parent.parent) if own is None and place.parent.name == "targets" else own
 
 
 def _load_targets(root: Path) -> tuple[Target, ...]:
@@ -76,7 +91,8 @@ def _load_targets(root: Path) -> tuple[Target, ...]:
     if not folder.is_dir():
         return ()
     listed = _listed_targets(folder)
-    names: Iterable[str] = listed or sorted(path.name for path in folder.iterdir() if path.is_dir())
+    there = (path.name for path in folder.iterdir() if path.is_dir() and not path.name.startswith("."))
+    names: Iterable[str] = listed or sorted(there)
     return tuple(load_target(folder / name) for name in progress_bar(list(names), "reading targets", unit="target"))
 
 
@@ -92,13 +108,19 @@ def _listed_targets(folder: Path) -> dict[str, str]:
         if not isinstance(item, dict):
             raise InputError(place, expected='{"name": …, "occlusion": …}', found=repr(item)[:80], remedy="Correct it.")
         name, occlusion = required(item, "name", place), item.get("occlusion", "unknown")
-        if not isinstance(name, str) or not name or Path(name).name != name or name in (".", ".."):
-            raise InputError(f"{place}.name", expected="the name of a folder", found=repr(name), remedy="Correct it.")
+        _check_name(name, f"{place}.name")
         if occlusion not in OCCLUSIONS:
             expected = ", ".join(OCCLUSIONS)
             raise InputError(f"{place}.occlusion", expected=expected, found=repr(occlusion), remedy="Correct it.")
         classes[name] = occlusion
     return classes
+
+
+def _check_name(name: object, where: str | Path) -> None:
+    """Refuse names that the folder of a result cannot have: hidden ones are not published."""
+    if not is_plain_name(name) or name in TAKEN:
+        expected = f"the name of a folder that is not hidden, nor {' or '.join(TAKEN)}"
+        raise InputError(where, expected=expected, found=shown(name), remedy="Rename the folder of the target.")
 
 
 @dataclass(frozen=True)

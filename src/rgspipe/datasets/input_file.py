@@ -10,8 +10,8 @@ from rgspipe.errors import InputError
 #: Pixels of the largest image that is read; decoded, it takes 1.2 GB.
 MOST_PIXELS = 100_000_000
 
-#: The longest name that file systems take, bytes.
-LONGEST_NAME = 255
+#: The longest name of a target, bytes: file systems take 255, and a name in the making is longer.
+LONGEST_NAME = 200
 
 
 def input_file(path: str | Path, expected: str, *, most_bytes: int | None = None) -> Path:

@@ -14,6 +14,7 @@ from rgspipe.datasets.gs3 import load_target
 from rgspipe.datasets.json_file import read_json
 from rgspipe.datasets.light_file import read_lights
 from rgspipe.datasets.location import dataset_root
+from rgspipe.datasets.read_files import files_read
 from rgspipe.datasets.views import View
 from rgspipe.evaluation.course_figure import course_figure
 from rgspipe.evaluation.courses import CourseStep, course_of, course_summary, course_table
@@ -119,7 +120,8 @@ def _keys(config: RgspipeConfig) -> list[str]:
 
 def _files(config: RgspipeConfig) -> list[Path]:
     """The user's own target and its truth."""
-    return [Path(given) for given in (config.fit.target, config.fit.truth) if given is not None]
+    target = [] if config.fit.target is None else files_read(config.fit.target)
+    return target if config.fit.truth is None else [*target, Path(config.fit.truth)]
 
 
 STAGE = Stage(

@@ -13,6 +13,7 @@ from rgspipe.config import RgspipeConfig
 from rgspipe.datasets.frames import read_entries
 from rgspipe.datasets.gs3 import load_target
 from rgspipe.datasets.location import dataset_root
+from rgspipe.datasets.read_files import files_read
 from rgspipe.datasets.views import Target, View
 from rgspipe.evaluation.fit_folder import read_result, write_result
 from rgspipe.fitting import FitViews, PaperAdam, Search, Solver
@@ -236,7 +237,7 @@ def _files(config: RgspipeConfig) -> list[Path]:
     if config.fit.target is None:
         return []
     load_target(config.fit.target)
-    return [Path(config.fit.target)]
+    return files_read(config.fit.target)
 
 
 STAGE = Stage(

@@ -9,12 +9,19 @@ from rgspipe.blender.job import DatasetJob
 from rgspipe.blender.render_dataset import render_dataset
 from rgspipe.config import RgspipeConfig
 from rgspipe.config.scene import MODELLED
+from rgspipe.datasets.frames import read_entries
 from rgspipe.datasets.gs3 import load_dataset
 from rgspipe.datasets.location import point_at_dataset
+from rgspipe.datasets.read_files import files_read
+from rgspipe.datasets.views import Dataset
 from rgspipe.errors import InputError
+from rgspipe.fitting.model.capture import SATURATED
 from rgspipe.stages.base import Stage, StageContext
 from rgspipe.stages.scene_model import scene_model
 from rgspipe.stages.sources import require_images
+
+#: From this share of saturated pixels on, people are told.
+NOTICEABLE = 0.01
 
 
 def run(context: StageContext) -> None:
@@ -44,6 +51,30 @@ def _take_external(context: StageContext) -> None:
     dataset = load_dataset(root)
     point_at_dataset(context.folder, root)
     context.note(train=len(dataset.train), test=len(dataset.test), targets=len(dataset.targets))
+    _tell_saturated(root, dataset, context)
+
+
+def _tell_saturated(root: Path, dataset: Dataset, context: StageContext) -> None:
+    """Say which share of the pixels of 8-bit training images has a channel at the brightest level."""
+    path = root / "transforms_train.json"
+    if not path.is_file():  # a folder of TensoIR, which is not trained on
+        return
+    entries = read_entries(path, "the training views")
+    images = [
+        view.image
+        for entry, view in zip(entries, dataset.train, strict=True)
+        if entry.image_path.suffix.lower() != ".exr"
+    ]
+    if not images:
+        return
+    bright = sum(int((image >= SATURATED).any(dim=-1).sum()) for image in images)
+    share = bright / sum(image.shape[0] * image.shape[1] for image in images)
+    context.note(saturated=round(share, 4))
+    if share > NOTICEABLE:
+        print(
+            f"warning: {100 * share:.1f} % of the pixels of 8-bit training images are saturated, and count as if they "
+            "were no brighter than that: expose less, or use linear EXR"
+        )
 
 
 def _existing_path(config: RgspipeConfig, what: str) -> Path:
@@ -70,7 +101,8 @@ def _config_keys(config: RgspipeConfig) -> tuple[str, ...]:
 def _files(config: RgspipeConfig) -> tuple[Path, ...]:
     if config.scene.kind in MODELLED or config.scene.path is None or not Path(config.scene.path).exists():
         return ()
-    return (Path(config.scene.path).resolve(),)
+    path = Path(config.scene.path).resolve()
+    return tuple(files_read(path)) if config.scene.kind == "external" else (path,)
 
 
 STAGE = Stage(

@@ -10,6 +10,7 @@ import pandas as pd
 from rgspipe.config import RgspipeConfig
 from rgspipe.config.relight import RelightConfig
 from rgspipe.datasets.light_file import read_lights
+from rgspipe.datasets.read_files import files_read
 from rgspipe.errors import InputError
 from rgspipe.evaluation.images import save_png
 from rgspipe.relighting.pictures import contact_sheet
@@ -142,7 +143,7 @@ def _files(config: RgspipeConfig) -> list[Path]:
             raise InputError(wanted.lights, expected="at least one light", found="none", remedy="Add a light.")
         files.append(Path(wanted.lights))
     if config.fit.target is not None and wanted.views == "targets":
-        files.append(Path(config.fit.target))
+        files += files_read(config.fit.target)
     return files
 
 
