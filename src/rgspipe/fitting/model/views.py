@@ -54,7 +54,7 @@ class PreparedViews(ViewedPixels):
         """
         checked = _one_each("images", images, self.views, (3,))
         for index, image in enumerate(checked):
-            if float(total(image.double())) < 0.0:
+            if float(total(image.detach().double())) < 0.0:
                 found = f"pixels down to {float(image.min()):g}, which outweigh the positive ones"
                 raise InputError(f"images[{index}]", expected="radiance ≥ 0", found=found, remedy="Make it again.")
         return torch.cat([image.detach().reshape(-1, 3).float() for image in checked]).to(self.operator.matrix.device)
