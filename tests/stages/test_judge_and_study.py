@@ -14,10 +14,10 @@ from rgspipe.config import RgspipeConfig, with_changes
 from rgspipe.datasets.surfel_file import load_surfels
 from rgspipe.errors import InputError
 from rgspipe.evaluation.held_out import QUALITY
-from rgspipe.evaluation.study import TRUTH
 from rgspipe.stages import judge, study, true_surfels
 from rgspipe.stages.base import Need, StageContext
 from rgspipe.stages.sources import has_truth, surfel_stage
+from rgspipe.studies.captures import TRUTH
 
 
 def _config(**changes: object) -> RgspipeConfig:

@@ -15,8 +15,6 @@ from rgspipe.datasets.json_file import read_json
 from rgspipe.datasets.light_file import read_lights
 from rgspipe.datasets.location import dataset_root
 from rgspipe.datasets.views import View
-from rgspipe.evaluation.course_figure import course_figure
-from rgspipe.evaluation.courses import CourseStep, course_of, course_summary, course_table
 from rgspipe.evaluation.metrics import longest_side
 from rgspipe.evaluation.plots import png_of
 from rgspipe.evaluation.tables import class_of
@@ -29,6 +27,8 @@ from rgspipe.stages.fit_capture import captured_views
 from rgspipe.stages.fit_light import Fitter, used_views
 from rgspipe.stages.sources import target_stage
 from rgspipe.stages.true_lights import scene_bounds, truth_file
+from rgspipe.studies.course_figure import course_figure
+from rgspipe.studies.courses import CourseStep, course_of, course_summary, course_table
 
 #: A row a step, a row a fit, and a picture a target.
 COURSES, SUMMARY, PICTURES = "courses.csv", "convergence.csv", "pictures"

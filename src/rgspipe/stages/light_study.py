@@ -11,12 +11,12 @@ from rgspipe.artifacts import Artifact
 from rgspipe.config import RgspipeConfig
 from rgspipe.config.studies import LightStudyConfig
 from rgspipe.datasets.advice_file import SUGGESTED, own_views_in_order
-from rgspipe.evaluation.light_study import case_rows, predicted_errors
-from rgspipe.evaluation.light_study_plots import light_study_figure
-from rgspipe.evaluation.light_study_text import markdown
 from rgspipe.evaluation.plots import png_of
 from rgspipe.stages.base import Need, Stage, StageContext
 from rgspipe.stages.study_cases import checked_cases, chosen_scenes
+from rgspipe.studies.light_figure import light_study_figure
+from rgspipe.studies.light_table import markdown
+from rgspipe.studies.lights import case_rows, predicted_errors
 
 TABLE, TEXT, FIGURE = "study.csv", "study.md", "study.png"
 

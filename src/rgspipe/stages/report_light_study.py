@@ -9,8 +9,8 @@ import pandas as pd
 from rgspipe.artifacts import Artifact, ArtifactStore, Key
 from rgspipe.config import RgspipeConfig
 from rgspipe.errors import InputError
-from rgspipe.evaluation.light_study import KINDS
 from rgspipe.pages.light_studies import LightStudy
+from rgspipe.studies.lights import KINDS
 
 STAGE_NAME, TABLE = "light_study", "study.csv"
 

@@ -9,11 +9,11 @@ import pandas as pd
 from rgspipe.config import RgspipeConfig
 from rgspipe.evaluation.markdown import markdown_table
 from rgspipe.evaluation.plots import png_of
-from rgspipe.evaluation.quality_plots import study_figure
-from rgspipe.evaluation.study import TRUTH, study_row, with_factors
 from rgspipe.stages.base import Need, Stage, StageContext
 from rgspipe.stages.sources import has_truth
 from rgspipe.stages.study_cases import checked_cases, chosen_scenes
+from rgspipe.studies.capture_figure import capture_figure
+from rgspipe.studies.captures import TRUTH, study_row, with_factors
 
 #: Where keys of a case belong that name no section.
 SECTION = "capture"
@@ -44,7 +44,7 @@ def run(context: StageContext) -> None:
     table = with_factors(pd.DataFrame(rows))
     table.to_csv(context.folder / "study.csv", index=False)
     (context.folder / "study.md").write_text(markdown_table(table, SHOWN), encoding="utf-8")
-    (context.folder / "study.png").write_bytes(png_of(study_figure(table)))
+    (context.folder / "study.png").write_bytes(png_of(capture_figure(table)))
     context.note(cases=len(table))
 
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from rgspipe.config import RgspipeConfig, get_value, with_changes
 from rgspipe.config.core import describe
 from rgspipe.errors import InputError
-from rgspipe.evaluation.study_cases import Case, parse_case
+from rgspipe.studies.cases import Case, parse_case
 
 #: What a case cannot change: how the study itself is run.
 OPERATION = ("stage", "upstream", "outputs", "study", "light_study", "report", "overview", "debug")

@@ -3,7 +3,7 @@
 import pytest
 
 from rgspipe.errors import InputError
-from rgspipe.evaluation.study_cases import parse_case
+from rgspipe.studies.cases import parse_case
 
 
 @pytest.mark.parametrize(
