@@ -15,8 +15,8 @@ from rgspipe.stages.study_cases import checked_cases, chosen_scenes
 from rgspipe.studies.capture_figure import capture_figure
 from rgspipe.studies.captures import TRUTH, study_row, with_factors
 
-#: Where keys of a case belong that name no section.
-SECTION = "capture"
+#: What tables leave out of the names of cases: captures are what is studied.
+SECTION = "capture."
 
 #: What study.md shows of study.csv: headings and formats.
 SHOWN = {
@@ -51,8 +51,8 @@ def run(context: StageContext) -> None:
 def _cases(config: RgspipeConfig) -> Iterator[tuple[str, str, dict[str, object]]]:
     """(scene, case, configuration changes) of every row; the last of a scene has true surfels where they are known."""
     for scene, chosen in chosen_scenes(config, config.study.scenes):
-        for case in checked_cases(chosen, "study.cases", config.study.cases, SECTION):
-            yield chosen.scene.folder, case.name, scene | case.changes
+        for case in checked_cases(chosen, "study.cases", config.study.cases):
+            yield chosen.scene.folder, case.name.replace(SECTION, ""), scene | case.changes
         if has_truth(chosen):
             yield chosen.scene.folder, TRUTH, scene | {"freeze.surfels": "truth"}
 

@@ -11,8 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from rgspipe.evaluation.plots import INK, STYLE
-from rgspipe.studies.captures import TRUTH
-from rgspipe.studies.cases import CLEAN
+from rgspipe.studies.captures import CLEAN, TRUTH
 
 #: Panels of the study: column, title, factor that makes it what the title says, and whether the axis is logarithmic.
 PANELS = (
