@@ -12,8 +12,9 @@ from rgspipe.config import RgspipeConfig
 from rgspipe.errors import InputError
 from rgspipe.pages.light_studies import LightStudy
 from rgspipe.studies.lights import KINDS
+from rgspipe.studies.written import TABLE
 
-CAPTURES, LIGHTS, TABLE = "study", "light_study", "study.csv"
+CAPTURES, LIGHTS = "study", "light_study"
 
 
 def study_files(config: RgspipeConfig) -> list[Path]:

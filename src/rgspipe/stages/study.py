@@ -8,12 +8,12 @@ import pandas as pd
 
 from rgspipe.config import RgspipeConfig
 from rgspipe.evaluation.markdown import markdown_table
-from rgspipe.evaluation.plots import png_of
 from rgspipe.stages.base import Need, Stage, StageContext
 from rgspipe.stages.sources import has_truth
 from rgspipe.stages.study_cases import checked_cases, chosen_scenes
 from rgspipe.studies.capture_figure import capture_figure
 from rgspipe.studies.captures import TRUTH, study_row, with_factors
+from rgspipe.studies.written import write_study
 
 #: What tables leave out of the names of cases: captures are what is studied.
 SECTION = "capture."
@@ -42,9 +42,7 @@ def run(context: StageContext) -> None:
         tables = pd.read_csv(quality.file("quality.csv")), pd.read_csv(lights.file("summary.csv"))
         rows.append(study_row(scene, case, *tables))
     table = with_factors(pd.DataFrame(rows))
-    table.to_csv(context.folder / "study.csv", index=False)
-    (context.folder / "study.md").write_text(markdown_table(table, SHOWN), encoding="utf-8")
-    (context.folder / "study.png").write_bytes(png_of(capture_figure(table)))
+    write_study(context.folder, table, markdown_table(table, SHOWN), capture_figure(table))
     context.note(cases=len(table))
 
 
