@@ -9,10 +9,10 @@ import pytest
 
 from fitted_lights import make_fitted
 from html_page import Page
-from rgspipe.evaluation.light_study import KINDS, case_rows
-from rgspipe.evaluation.light_study_text import NOTES, TOGETHER
 from rgspipe.pages import report
 from rgspipe.pages.light_studies import ALT, TITLES, LightStudy, light_studies
+from rgspipe.studies.light_table import NOTES, TOGETHER
+from rgspipe.studies.lights import KINDS, case_rows
 
 
 @pytest.fixture

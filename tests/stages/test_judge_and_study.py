@@ -14,10 +14,10 @@ from rgspipe.config import RgspipeConfig, with_changes
 from rgspipe.datasets.surfel_file import load_surfels
 from rgspipe.errors import InputError
 from rgspipe.evaluation.held_out import QUALITY
-from rgspipe.evaluation.study import TRUTH
 from rgspipe.stages import judge, study, true_surfels
 from rgspipe.stages.base import Need, StageContext
 from rgspipe.stages.sources import has_truth, surfel_stage
+from rgspipe.studies.captures import TRUTH
 
 
 def _config(**changes: object) -> RgspipeConfig:
@@ -90,7 +90,9 @@ def test_surfels_without_images_cannot_be_judged(tmp_path: Path) -> None:
 
 
 def test_a_study_needs_every_case_of_every_scene_and_the_truth() -> None:
-    config = _config(study__cases=["clean", "depth_noise=0.01"], study__scenes=["cornell", "room"], study__limit=2)
+    config = _config(
+        study__cases=["clean", "capture.depth_noise=0.01"], study__scenes=["cornell", "room"], study__limit=2
+    )
     needs = study.STAGE.needs(config)
     judged = [need.changes for need in needs if need.stage == "judge"]
     assert len(judged) == 6 and len(needs) == 12
@@ -102,7 +104,7 @@ def test_a_study_needs_every_case_of_every_scene_and_the_truth() -> None:
         with_changes(config, need.changes)
 
 
-@pytest.mark.parametrize("case", ["depth_nose=0.1", "depth_noise"])
+@pytest.mark.parametrize("case", ["capture.depth_nose=0.1", "depth_noise=0.1", "capture.depth_noise"])
 def test_a_case_that_is_none_is_refused(case: str) -> None:
     with pytest.raises(InputError, match=r"study\.cases"):
         study.STAGE.needs(_config(study__cases=[case]))
@@ -126,7 +128,7 @@ def test_a_study_is_one_table_a_figure_and_text(tmp_path: Path) -> None:
             lists[stage].append(made)
     folder = tmp_path / "study"
     folder.mkdir()
-    config = _config(study__cases=["clean", "views=25"])
+    config = _config(study__cases=["clean", "capture.views=25"])
     context = StageContext(config, {name: found[0] for name, found in lists.items()}, lists, folder)
     study.run(context)
     table = pd.read_csv(folder / "study.csv")

@@ -16,10 +16,10 @@ from rgspipe.config import RgspipeConfig, with_changes
 from rgspipe.config.studies import LightStudy
 from rgspipe.datasets.advice_file import own_views_in_order
 from rgspipe.errors import InputError
-from rgspipe.evaluation.light_study import KINDS
 from rgspipe.evaluation.tables import TARGET_COLUMNS
 from rgspipe.stages import light_study
 from rgspipe.stages.base import StageContext
+from rgspipe.studies.lights import KINDS
 
 ADVICE = "added,views,camera,position_sd\nalone,2,view_1,0.004\nplan,2,train/r_0,0.001\n"
 ADVICE += "in_order,2,view_1,0.004\nin_order,3,view_2,0.003\nin_order,4,train/r_0,0.002\nin_order,5,view_3,0.001\n"

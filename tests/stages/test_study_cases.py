@@ -7,7 +7,7 @@ import pytest
 from rgspipe.cli.compose import compose_config
 from rgspipe.config import RgspipeConfig, with_changes
 from rgspipe.errors import InputError
-from rgspipe.stages.study_cases import checked_cases, chosen_scenes
+from rgspipe.stages.study_cases import checked_cases, chosen_scenes, parse_case
 
 LISTED = "light_study.cases"
 
@@ -53,3 +53,46 @@ def test_scenes_are_those_that_are_named_or_the_one_that_is_configured() -> None
     assert [(changes, one.scene.name) for changes, one in chosen_scenes(config, [])] == [({}, "mine")]
     found = [(one.scene.kind, one.scene.name) for _, one in chosen_scenes(config, ["corner", "room"])]
     assert found == [("corner", None), ("room", None)]
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "changes"),
+    [
+        ("clean", "clean", {}),
+        (" clean ", "clean", {}),
+        ("as it is: clean", "as it is", {}),
+        ("capture.depth_noise=0.01", None, {"capture.depth_noise": 0.01}),
+        ("capture.views=25  capture.normals=false", None, {"capture.views": 25, "capture.normals": False}),
+        ("capture.views=null", None, {"capture.views": None}),
+        ("box gone: model_error.missing=[0,0,-0.5,1,1,0]", "box gone", {"model_error.missing": [0, 0, -0.5, 1, 1, 0]}),
+        ("fit.truth=a:b.json", None, {"fit.truth": "a:b.json"}),
+        ("noise=3 %: target_capture.noise=3e-2", "noise=3 %", {"target_capture.noise": 0.03}),
+        ("model_error.missing=[0, 0, -0.5] seed=3", None, {"model_error.missing": [0, 0, -0.5], "seed": 3}),
+        ("scene.name='my room' seed=3", None, {"scene.name": "my room", "seed": 3}),
+    ],
+)
+def test_a_case_is_what_it_says(text: str, name: str | None, changes: dict) -> None:
+    found = parse_case(text, "study.cases")
+    assert found.name == (name or " ".join(text.split())) and found.changes == changes
+    assert [type(value) for value in found.changes.values()] == [type(value) for value in changes.values()]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "noise",
+        "depth_noise=",
+        "=3",
+        "clean capture.depth_noise=0.1",
+        "named:",
+        ": capture.views=3",
+        "model_error.missing=[0,1",
+        "seed=1,2",
+        "+seed=1",
+        "~seed",
+    ],
+)
+def test_a_case_that_says_nothing_is_refused(text: str) -> None:
+    with pytest.raises(InputError, match=r"study\.cases"):
+        parse_case(text, "study.cases")

@@ -26,8 +26,8 @@ class StudyConfig(Options):
     """What becomes of a trained scene when its capture gets worse."""
 
     cases: tuple[str, ...] = ("clean",)
-    """captures: `clean`, keys of capture.* such as depth_noise=0.01, or any others such as train.steps=0; several
-    joined by spaces, and `NAME: ` before them where wanted"""
+    """captures: `clean`, or overrides such as capture.depth_noise=0.01, several joined by spaces, and `NAME: ` before
+    them where wanted"""
     scenes: tuple[Modelled, ...] = ()
     """scenes that are compared; by default the one that is configured"""
     limit: int | None = option(6, low=1, high=100000)
@@ -42,7 +42,7 @@ class LightStudyConfig(Options):
     """the figure: errors against the number of views; cases of errors in images and model; classes of lights; kinds of
     lights; how often 95 % regions hold the truth; or the paper's method beside ours"""
     cases: tuple[str, ...] = ("clean",)
-    """what is compared: `clean`, or keys such as target_capture.noise=0.03, several joined by spaces, and `NAME: `
+    """what is compared: `clean`, or overrides such as target_capture.noise=0.03, several joined by spaces, and `NAME: `
     before them where wanted"""
     scenes: tuple[Modelled, ...] = ()
     """scenes that are compared; by default the one that is configured"""

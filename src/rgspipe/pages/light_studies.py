@@ -8,9 +8,9 @@ from typing import Any
 
 import pandas as pd
 
-from rgspipe.evaluation.light_study_plots import light_study_figure
-from rgspipe.evaluation.light_study_text import NOTES, shown_rows
 from rgspipe.pages.html import figure_address
+from rgspipe.studies.light_figure import light_study_figure
+from rgspipe.studies.light_table import NOTES, shown_rows
 
 #: What each kind is called, and asks.
 TITLES = {

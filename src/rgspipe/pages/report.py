@@ -9,8 +9,7 @@ from typing import Any
 import pandas as pd
 
 from rgspipe.evaluation import goals, metrics, plots
-from rgspipe.evaluation.quality_plots import split_figure, study_figure
-from rgspipe.evaluation.study import TRUTH
+from rgspipe.evaluation.quality_plots import split_figure
 from rgspipe.evaluation.tables import ALL
 from rgspipe.pages.gallery import Gallery, Shot
 from rgspipe.pages.highlights import highlights, tiles
@@ -20,6 +19,8 @@ from rgspipe.pages.provenance import StageRecord
 from rgspipe.pages.quality import compared_lights, quality_columns, quality_rows
 from rgspipe.pages.relit import Relighting, relightings
 from rgspipe.pages.section import Section, shown_sections
+from rgspipe.studies.capture_figure import capture_figure
+from rgspipe.studies.captures import TRUTH
 
 #: Pictures of fits and held-out views together, before they are encoded as text (which adds a third).
 PICTURE_BYTES = 4_500_000
@@ -239,7 +240,7 @@ def _figures(contents: ReportContents) -> dict[str, Any]:
         "split": figure_address(lambda: split_figure(contents.split))
         if contents.split is not None
         else {"source": None, "reason": "nothing judged the scene"},
-        "study": None if contents.study is None else figure_address(lambda: study_figure(contents.study)),
+        "study": None if contents.study is None else figure_address(lambda: capture_figure(contents.study)),
         "lights": _light_figures(contents),
     }
 

@@ -16,8 +16,6 @@ from rgspipe.datasets.light_file import read_lights
 from rgspipe.datasets.location import dataset_root
 from rgspipe.datasets.read_files import files_read
 from rgspipe.datasets.views import View
-from rgspipe.evaluation.course_figure import course_figure
-from rgspipe.evaluation.courses import CourseStep, course_of, course_summary, course_table
 from rgspipe.evaluation.metrics import longest_side
 from rgspipe.evaluation.plots import png_of
 from rgspipe.evaluation.tables import class_of
@@ -31,6 +29,8 @@ from rgspipe.stages.fit_light import Fitter
 from rgspipe.stages.fit_targets import used_views
 from rgspipe.stages.sources import target_stage
 from rgspipe.stages.true_lights import scene_bounds, truth_file
+from rgspipe.studies.course_figure import course_figure
+from rgspipe.studies.courses import CourseStep, course_of, course_summary, course_table
 
 #: A row a step, a row a fit, and a picture a target.
 COURSES, SUMMARY, PICTURES = "courses.csv", "convergence.csv", "pictures"

@@ -11,14 +11,12 @@ from rgspipe.artifacts import Artifact
 from rgspipe.config import RgspipeConfig
 from rgspipe.config.studies import LightStudyConfig
 from rgspipe.datasets.advice_file import SUGGESTED, own_views_in_order
-from rgspipe.evaluation.light_study import case_rows, predicted_errors
-from rgspipe.evaluation.light_study_plots import light_study_figure
-from rgspipe.evaluation.light_study_text import markdown
-from rgspipe.evaluation.plots import png_of
 from rgspipe.stages.base import Need, Stage, StageContext
 from rgspipe.stages.study_cases import checked_cases, chosen_scenes
-
-TABLE, TEXT, FIGURE = "study.csv", "study.md", "study.png"
+from rgspipe.studies.light_figure import light_study_figure
+from rgspipe.studies.light_table import markdown
+from rgspipe.studies.lights import case_rows, predicted_errors
+from rgspipe.studies.written import write_study
 
 #: What an evaluation says of each target: columns that are not numbers.
 TYPES = {"target": str, "result": str, "reason": str, "success": "boolean", "inside_95": "boolean"}
@@ -58,9 +56,7 @@ def run(context: StageContext) -> None:
         table = table.merge(pd.concat(predictions), how="left")
     kind = config.light_study.kind
     table.insert(0, "kind", kind)
-    table.to_csv(context.folder / TABLE, index=False)
-    (context.folder / TEXT).write_text(markdown(table, kind), encoding="utf-8")
-    (context.folder / FIGURE).write_bytes(png_of(light_study_figure(table, kind)))
+    write_study(context.folder, table, markdown(table, kind), light_study_figure(table, kind))
     context.note(kind=kind, rows=len(table))
 
 

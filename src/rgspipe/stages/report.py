@@ -20,10 +20,9 @@ from rgspipe.pages.overview import scene_summary
 from rgspipe.pages.provenance import StageRecord, stage_record
 from rgspipe.stages.base import Need, Stage, StageContext
 from rgspipe.stages.report_gallery import dataset_gallery
-from rgspipe.stages.report_light_study import found_light_studies, light_study_files
 from rgspipe.stages.report_relight import found_relightings, relight_files
 from rgspipe.stages.report_sections import found_galleries, found_sections, section_files
-from rgspipe.stages.report_study import found_study, study_file
+from rgspipe.stages.report_studies import found_captures, found_light_studies, study_files
 from rgspipe.stages.sources import has_truth
 
 REPORT = "report.html"
@@ -59,7 +58,7 @@ def _contents(context: StageContext) -> report.ReportContents:
     trained = context.inputs.get("train_surfels")
     verdicts = {"success": "boolean", "inside_95": "boolean", "count_right": "boolean", "types_right": "boolean"}
     targets = _table(evaluations, "metrics.csv", verdicts | {"result": str, "reason": str})
-    study, remark = found_study(config, judged)
+    study, remark = found_captures(config, judged)
     return report.ReportContents(
         scene=config.scene.folder,
         summary=_table(evaluations, "summary.csv"),
@@ -210,8 +209,7 @@ STAGE = Stage(
     inputs=_inputs,
     config_keys=_keys,
     files=lambda config: [
-        *study_file(config),
-        *light_study_files(config),
+        *study_files(config),
         *relight_files(config),
         *section_files(config),
     ],

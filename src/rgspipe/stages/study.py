@@ -8,15 +8,15 @@ import pandas as pd
 
 from rgspipe.config import RgspipeConfig
 from rgspipe.evaluation.markdown import markdown_table
-from rgspipe.evaluation.plots import png_of
-from rgspipe.evaluation.quality_plots import study_figure
-from rgspipe.evaluation.study import TRUTH, study_row, with_factors
 from rgspipe.stages.base import Need, Stage, StageContext
 from rgspipe.stages.sources import has_truth
 from rgspipe.stages.study_cases import checked_cases, chosen_scenes
+from rgspipe.studies.capture_figure import capture_figure
+from rgspipe.studies.captures import TRUTH, study_row, with_factors
+from rgspipe.studies.written import write_study
 
-#: Where keys of a case belong that name no section.
-SECTION = "capture"
+#: What tables leave out of the names of cases: captures are what is studied.
+SECTION = "capture."
 
 #: What study.md shows of study.csv: headings and formats.
 SHOWN = {
@@ -42,17 +42,15 @@ def run(context: StageContext) -> None:
         tables = pd.read_csv(quality.file("quality.csv")), pd.read_csv(lights.file("summary.csv"))
         rows.append(study_row(scene, case, *tables))
     table = with_factors(pd.DataFrame(rows))
-    table.to_csv(context.folder / "study.csv", index=False)
-    (context.folder / "study.md").write_text(markdown_table(table, SHOWN), encoding="utf-8")
-    (context.folder / "study.png").write_bytes(png_of(study_figure(table)))
+    write_study(context.folder, table, markdown_table(table, SHOWN), capture_figure(table))
     context.note(cases=len(table))
 
 
 def _cases(config: RgspipeConfig) -> Iterator[tuple[str, str, dict[str, object]]]:
     """(scene, case, configuration changes) of every row; the last of a scene has true surfels where they are known."""
     for scene, chosen in chosen_scenes(config, config.study.scenes):
-        for case in checked_cases(chosen, "study.cases", config.study.cases, SECTION):
-            yield chosen.scene.folder, case.name, scene | case.changes
+        for case in checked_cases(chosen, "study.cases", config.study.cases):
+            yield chosen.scene.folder, case.name.replace(SECTION, ""), scene | case.changes
         if has_truth(chosen):
             yield chosen.scene.folder, TRUTH, scene | {"freeze.surfels": "truth"}
 

@@ -3,15 +3,38 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from hydra.core.override_parser.overrides_parser import OverridesParser
+from hydra.core.override_parser.types import Override, OverrideType
+from hydra.errors import HydraException
 
 from rgspipe.config import RgspipeConfig, get_value, with_changes
 from rgspipe.config.core import describe
 from rgspipe.errors import InputError
-from rgspipe.evaluation.study_cases import Case, parse_case
+from rgspipe.studies.captures import CLEAN
 
 #: What a case cannot change: how the study itself is run.
 OPERATION = ("stage", "upstream", "outputs", "study", "light_study", "report", "overview", "debug")
+
+#: One override: what stands in brackets or quotes may have spaces in it.
+OVERRIDE = re.compile(r"""(?:\[[^\]]*\]|'[^']*'|"[^"]*"|\S)+""")
+
+
+@dataclass(frozen=True)
+class Case:
+    """One row of a study.
+
+    Attributes:
+        name: what tables and figures call it.
+        changes: values by dotted configuration key.
+    """
+
+    name: str
+    changes: dict[str, Any]
 
 
 def chosen_scenes(config: RgspipeConfig, kinds: Sequence[str]) -> Iterator[tuple[dict[str, object], RgspipeConfig]]:
@@ -24,18 +47,15 @@ def chosen_scenes(config: RgspipeConfig, kinds: Sequence[str]) -> Iterator[tuple
         yield changes, with_changes(config, changes)
 
 
-def checked_cases(config: RgspipeConfig, listed: str, texts: Sequence[str], section: str = "") -> list[Case]:
+def checked_cases(config: RgspipeConfig, listed: str, texts: Sequence[str]) -> list[Case]:
     """The cases that the key `listed` lists, their values in the types of the configuration.
 
     A value means the same artifact as on the command line: 1 for a number with a fraction becomes 1.0.
 
-    Args:
-        section: where keys without a dot belong, see `parse_case`.
-
     Raises:
         InputError: a case is unclear, two have one name, or a key or value is none of the configuration.
     """
-    cases = [_checked(config, listed, text, parse_case(text, listed, section)) for text in texts]
+    cases = [_checked(config, listed, text, parse_case(text, listed)) for text in texts]
     names = [case.name for case in cases]
     for name in names:
         if names.count(name) > 1:
@@ -43,6 +63,49 @@ def checked_cases(config: RgspipeConfig, listed: str, texts: Sequence[str], sect
                 listed, expected="a name of its own for each case", found=f"{name!r} twice", remedy="Name them apart."
             )
     return cases
+
+
+def parse_case(text: str, listed: str) -> Case:
+    """A case: overrides as on the command line, with a name in front if wanted, or `CLEAN`.
+
+    "train.steps=0 capture.views=50", "few views: capture.views=25", "as it is: clean".
+
+    Args:
+        text: the case.
+        listed: the configuration key that lists it, for messages.
+
+    Raises:
+        InputError: it is neither `CLEAN` nor overrides of single values.
+    """
+    name, colon, settings = text.partition(": ")
+    if not colon:
+        name, settings = text, text
+    if not name.strip() or not settings.strip():
+        raise _unclear(text, listed)
+    overrides = [] if settings.strip() == CLEAN else OVERRIDE.findall(settings)
+    return Case(" ".join(name.split()), dict(_change(override, text, listed) for override in overrides))
+
+
+def _change(override: str, text: str, listed: str) -> tuple[str, Any]:
+    """Key and value of an override, as Hydra reads it."""
+    try:
+        parsed: Override = OverridesParser.create().parse_override(override)
+    except HydraException:
+        raise _unclear(text, listed) from None
+    plain = parsed.type == OverrideType.CHANGE and not parsed.is_sweep_override()
+    if not plain or not parsed.key_or_group or parsed.value() == "":
+        raise _unclear(text, listed)
+    return parsed.key_or_group, parsed.value()
+
+
+def _unclear(text: str, listed: str) -> InputError:
+    return InputError(
+        listed,
+        expected=f"{CLEAN}, or key=value as on the command line, several joined by spaces, with a name in front where "
+        "wanted",
+        found=repr(text),
+        remedy='Write it like "target_capture.noise=0.03" or "noise 3 %: target_capture.noise=0.03".',
+    )
 
 
 def _checked(config: RgspipeConfig, listed: str, text: str, case: Case) -> Case:

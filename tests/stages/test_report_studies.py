@@ -1,4 +1,4 @@
-"""Which studies of recovered lights a report takes."""
+"""Which studies a report takes."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import pytest
 
 from rgspipe.artifacts import Artifact, ArtifactStore, Key
 from rgspipe.config import RgspipeConfig, with_changes
-from rgspipe.stages import report_light_study
-from rgspipe.stages.report_light_study import found_light_studies, light_study_files
+from rgspipe.stages import report_studies
+from rgspipe.stages.report_studies import found_captures, found_light_studies, study_files
 
 
 def _config(root: Path, scene: str = "cornell") -> RgspipeConfig:
@@ -42,7 +42,7 @@ def _study(
 @pytest.fixture
 def days(monkeypatch: pytest.MonkeyPatch) -> None:
     """Artifacts that are made one after the other within a second are a day apart, in the order of their names."""
-    monkeypatch.setattr(report_light_study, "_made", lambda found: found.fingerprint)
+    monkeypatch.setattr(report_studies, "_made", lambda found: found.fingerprint)
 
 
 def test_of_each_kind_the_newest_study_that_has_the_scene_is_taken(tmp_path: Path, days: None) -> None:
@@ -57,8 +57,8 @@ def test_of_each_kind_the_newest_study_that_has_the_scene_is_taken(tmp_path: Pat
         ("views", [2]),
         ("classes", [3, 3]),
     ]
-    assert sorted(path.parent.name for path in light_study_files(_config(tmp_path))) == ["02", "03"]
-    assert found_light_studies(_config(tmp_path, "room"), None) == light_study_files(_config(tmp_path, "room")) == []
+    assert sorted(path.parent.name for path in study_files(_config(tmp_path))) == ["02", "03"]
+    assert found_light_studies(_config(tmp_path, "room"), None) == study_files(_config(tmp_path, "room")) == []
 
 
 def test_a_study_of_other_methods_does_not_hide_one_of_its_kind(tmp_path: Path, days: None) -> None:
@@ -78,3 +78,27 @@ def test_a_study_of_another_frozen_scene_is_marked(tmp_path: Path) -> None:
     assert same.remark == ""
     (other,) = found_light_studies(_config(tmp_path), _build(tmp_path, Key("cornell", "freeze", "f2"), {}))
     assert "not of the frozen scene" in other.remark
+
+
+def _captures(root: Path, folder: str, fingerprint: str, scenes: tuple[str, ...], judged: str) -> Artifact:
+    return _build(root, Key(folder, "study", fingerprint), {"judge": [judged]}, scenes=scenes)
+
+
+def test_the_newest_study_of_captures_counts_wherever_it_lies(tmp_path: Path, days: None) -> None:
+    _captures(tmp_path, "room", "01", ("room",), "j1")
+    newest = _captures(tmp_path, "cornell", "02", ("cornell", "room", "room"), "j2")
+    _captures(tmp_path, "corner", "03", ("corner",), "j3")
+    config = _config(tmp_path, "room")
+    assert study_files(config) == [newest.path / "study.csv"]
+    table, _ = found_captures(config, ())
+    assert table is not None and table["made"].tolist() == [2, 2]
+    hotdog = _config(tmp_path, "hotdog")
+    assert study_files(hotdog) == [] and found_captures(hotdog, ()) == (None, "")
+
+
+def test_a_study_of_captures_of_another_training_is_marked(tmp_path: Path, days: None) -> None:
+    judged = _build(tmp_path, Key("room", "judge", "j1"), {})
+    _captures(tmp_path, "room", "01", ("room",), "j1")
+    assert found_captures(_config(tmp_path, "room"), [judged])[1] == ""
+    _captures(tmp_path, "room", "02", ("room",), "j2")
+    assert "other settings" in found_captures(_config(tmp_path, "room"), [judged])[1]

@@ -10,9 +10,9 @@ import pandas as pd
 import pytest
 import torch
 
-from rgspipe.evaluation.course_figure import COLOURS, course_figure
-from rgspipe.evaluation.courses import MOST_STEPS, course_of, course_summary, course_table
 from rgspipe.scene import PointLight, SpotLight
+from rgspipe.studies.course_figure import COLOURS, course_figure
+from rgspipe.studies.courses import MOST_STEPS, course_of, course_summary, course_table
 
 TRUTH = (PointLight(torch.tensor([0.5, 0.5, 1.0], dtype=torch.float64), torch.full((3,), 2.0, dtype=torch.float64)),)
 

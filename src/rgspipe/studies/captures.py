@@ -10,6 +10,8 @@ import pandas as pd
 from rgspipe.evaluation.held_out import QUALITY
 from rgspipe.evaluation.tables import ALL, class_order
 
+#: The case in which nothing differs.
+CLEAN = "clean"
 #: The row of surfels made from the truth.
 TRUTH = "true surfels"
 

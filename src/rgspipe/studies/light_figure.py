@@ -14,10 +14,10 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from rgspipe.evaluation import metrics
-from rgspipe.evaluation.light_study import several, without_repeats
-from rgspipe.evaluation.light_study_text import TOGETHER
 from rgspipe.evaluation.plots import INK, LABELS, STYLE
 from rgspipe.evaluation.tables import ALL, class_order
+from rgspipe.studies.light_table import TOGETHER
+from rgspipe.studies.lights import several, without_repeats
 
 #: Column, title, factor, whether logarithmic.
 Panel = tuple[str, str, float, bool]

@@ -7,9 +7,9 @@ import math
 import pandas as pd
 import pytest
 
-from rgspipe.evaluation.light_study import STATUSES, case_rows, predicted_errors, several, wilson_interval
-from rgspipe.evaluation.light_study_text import markdown, shown_rows
 from rgspipe.fitting.result import FitStatus
+from rgspipe.studies.light_table import markdown, shown_rows
+from rgspipe.studies.lights import STATUSES, case_rows, predicted_errors, several, wilson_interval
 
 
 def _targets(views: int = 1) -> pd.DataFrame:

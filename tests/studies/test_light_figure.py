@@ -7,9 +7,9 @@ import math
 import pandas as pd
 import pytest
 
-from rgspipe.evaluation.light_study import KINDS
-from rgspipe.evaluation.light_study_plots import light_study_figure
 from rgspipe.evaluation.plots import png_of
+from rgspipe.studies.light_figure import light_study_figure
+from rgspipe.studies.lights import KINDS
 
 
 def _row(**named: object) -> dict:

@@ -6,7 +6,7 @@ import pandas as pd
 import pytest
 
 from rgspipe.evaluation.held_out import QUALITY
-from rgspipe.evaluation.study import TRUTH, study_row, with_factors
+from rgspipe.studies.captures import TRUTH, study_row, with_factors
 
 
 def _quality(psnr: float) -> pd.DataFrame:
