@@ -11,6 +11,9 @@ import OpenEXR
 from rgspipe.datasets.input_file import check_pixel_count, input_file
 from rgspipe.errors import InputError
 
+#: Pixels of the largest image of which only a part is stored, 8K: a file of a few bytes could claim any size.
+MOST_CROPPED = 2**25
+
 RENDER_AGAIN = "Export or render this image again."
 
 
@@ -72,6 +75,7 @@ def _placed(path: Path, part: OpenEXR.Part) -> dict[str, np.ndarray]:
     stored = {name: np.asarray(values, dtype=np.float32) for name, values in pixels.items()}
     if (width, height) == (columns, rows):
         return stored
+    check_pixel_count(path, columns, rows, MOST_CROPPED)
     place = np.s_[top - upper : top - upper + height, left - first : left - first + width]
     whole = {name: np.zeros((rows, columns), np.float32) for name in stored}
     for name, values in stored.items():

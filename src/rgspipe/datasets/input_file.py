@@ -40,16 +40,17 @@ def input_file(path: str | Path, expected: str, *, most_bytes: int | None = None
     return Path(path)
 
 
-def check_pixel_count(path: Path, width: int, height: int) -> None:
-    """Refuse an image that has no pixels, or too many to be decoded.
+def check_pixel_count(path: Path, width: int, height: int, most: int | None = None) -> None:
+    """Refuse an image that has no pixels, or more than `most` (by default `MOST_PIXELS`).
 
     Raises:
         InputError: naming the file and its size.
     """
-    if not (width >= 1 and height >= 1 and width * height <= MOST_PIXELS):
+    most = MOST_PIXELS if most is None else most
+    if not (width >= 1 and height >= 1 and width * height <= most):
         raise InputError(
             path,
-            expected=f"an image of 1 to {MOST_PIXELS} pixels",
+            expected=f"an image of 1 to {most} pixels",
             found=f"{width} × {height}",
             remedy="Export the image at a smaller size.",
         )
