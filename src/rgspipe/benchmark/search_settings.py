@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+import torch
 from torch import Tensor
 
 from rgspipe.errors import InputError
@@ -17,9 +18,12 @@ from rgspipe.evaluation.tables import rig_errors
 from rgspipe.fitting import FitStatus, FitViews, Search
 from rgspipe.options import Options, settings
 from rgspipe.progress import progress_bar
-from rgspipe.scene import LightRig
+from rgspipe.scene import Light, LightRig
 
 FACTORS = (0.5, 2.0)
+
+#: Standard deviation of the noise in images that the scene renders itself, a part of their mean.
+NOISE = 0.02
 
 COLUMNS = {
     "setting": ("setting", "s"),
@@ -74,6 +78,25 @@ def varied(options: Search) -> Iterator[tuple[str, str, Search]]:
                 continue
             if changed != value:
                 yield name, str(changed), other
+
+
+def rendered_spots(views: FitViews, places: Sequence[Light], seed: int = 0) -> list[KnownTarget]:
+    """Spots at the places of lights, aimed at random, as the scene itself shows them, with noise of NOISE of the mean.
+
+    Args:
+        views: made ready for one spot.
+    """
+    generator, [kind] = torch.Generator().manual_seed(seed), views.lights.kinds
+    known = []
+    for place in places:
+        axis = torch.randn(3, generator=generator, dtype=torch.float64)
+        light = kind.at(place.position.double(), axis / axis.norm(), place.intensity.double())
+        images = views.render(light)
+        mean = float(torch.stack([image.mean() for image in images]).mean())
+        noise = [torch.randn(image.shape, generator=generator) for image in images]
+        pairs = zip(images, noise, strict=True)
+        known.append(KnownTarget([image + NOISE * mean * one.to(image) for image, one in pairs], (light,), views))
+    return known
 
 
 def search_markdown(table: pd.DataFrame) -> str:

@@ -17,7 +17,7 @@ class BenchmarkConfig(Options):
     """the renderer on rooms with path-traced truth, the steps of a fit on the trained scene, or what each number that
     steers a search is worth: fits with it halved and doubled"""
     targets: int = option(4, low=1, high=1000)
-    """with kind=search: single lights of each class, and half as many pairs of unknown number"""
+    """with kind=search: single lights of each class; as many pairs and threes of unknown number; and a spot a light"""
     repetitions: int = option(20, low=1, high=100000)
     """runs of each measured step"""
     rooms: tuple[RoomName, ...] = get_args(RoomName)

@@ -16,7 +16,7 @@ from rgspipe.artifacts import Artifact
 from rgspipe.benchmark.fit_steps import fit_steps
 from rgspipe.benchmark.renderer_report import REPORT, Bench, run_bench
 from rgspipe.benchmark.rooms import ROOMS
-from rgspipe.benchmark.search_settings import KnownTarget, search_markdown, search_table
+from rgspipe.benchmark.search_settings import KnownTarget, rendered_spots, search_markdown, search_table
 from rgspipe.benchmark.settings import Setting
 from rgspipe.benchmark.truth import load_truth
 from rgspipe.config import RgspipeConfig, get_value
@@ -108,7 +108,7 @@ def _search(context: StageContext) -> None:
 
 
 def _known_targets(context: StageContext, frozen: FrozenScene, dataset: Artifact) -> list[KnownTarget]:
-    """Single lights in one view, and pairs of them, added up, in all views and of unknown number."""
+    """Single lights in one view; two and three of them, added up, in all views and of unknown number; and spots."""
     config, wanted = context.config, context.config.benchmark.targets
     every = open_dataset(dataset.folder(), train=False, test=False).targets
     classes = {name: [one for one in every if one.occlusion == name][:wanted] for name in {t.occlusion for t in every}}
@@ -122,13 +122,16 @@ def _known_targets(context: StageContext, frozen: FrozenScene, dataset: Artifact
     def truth(target: Target) -> LightRig:
         return read_lights(truth_file(config, dataset, target.name))
 
-    first = prepared(singles[0].views[:1], LightSpec())
-    together = prepared(singles[0].views, LightSpec(count=None))
+    views = singles[0].views
+    first, together = prepared(views[:1], LightSpec()), prepared(views, LightSpec(count=None))
     known = [KnownTarget([target.views[0].image], truth(target), first) for target in singles]
-    for a, b in zip(singles[: wanted // 2], reversed(singles), strict=False):
-        images = [x.image + y.image for x, y in zip(a.views, b.views, strict=True)]
-        known.append(KnownTarget(images, (*truth(a), *truth(b)), together))
-    return known
+    for number in (2, 3):
+        for start in range(wanted):
+            # Every so many of the list: lights of different classes.
+            parts = [singles[(start + step * len(singles) // number) % len(singles)] for step in range(number)]
+            images = [sum(part.views[index].image for part in parts) for index in range(len(views))]
+            known.append(KnownTarget(images, tuple(light for part in parts for light in truth(part)), together))
+    return [*known, *rendered_spots(prepared(views, LightSpec("spot")), [truth(one)[0] for one in singles])]
 
 
 def _camera(frozen: FrozenScene, resolution: int) -> Camera:
