@@ -18,7 +18,7 @@ from rgspipe.config import RgspipeConfig, with_changes
 from rgspipe.datasets.exr import write_image
 from rgspipe.datasets.gs3_write import frame_entry, write_transforms
 from rgspipe.datasets.surfel_file import save_surfels
-from rgspipe.renderer import direct, frozen, transport
+from rgspipe.renderer import direct, mutual_visibility, transport
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import PointLight, Surfels
 from rgspipe.stages import fit_light, freeze
@@ -84,7 +84,7 @@ def allow_nothing_but_direct_light(monkeypatch: pytest.MonkeyPatch) -> None:
         raise AssertionError("light bounced, or would have to")
 
     monkeypatch.setattr(direct, "point_irradiance", unshadowed)
-    monkeypatch.setattr(frozen, "build_gather", refuse)
+    monkeypatch.setattr(mutual_visibility, "build_gather", refuse)
     monkeypatch.setattr(transport.PatchTransport, "gathered", refuse)
     # The cost of what is left out cannot be known without doing it.
     monkeypatch.setattr(freeze, "measure_costs", lambda scene: {})

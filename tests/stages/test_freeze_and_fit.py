@@ -222,7 +222,8 @@ def test_result_depends_on_what_it_uses(dataset):
     assert "fit.search" in stage.keys(config) and "fit.adam" not in stage.keys(config)
     target = dataset / "targets" / "one"
     own = replace(config, fit=replace(config.fit, target=str(target)))
-    assert stage.files(own) == [target] and "fit.limit" not in stage.keys(own)
+    beside = [dataset / "targets" / "targets.json", dataset / "targets" / "../dataset_info.json"]
+    assert stage.files(own) == [target, *beside] and "fit.limit" not in stage.keys(own)
 
 
 def test_light_may_bounce_through_the_full_operator(inputs, tmp_path):

@@ -12,24 +12,20 @@ from rgspipe.datasets.display_image import read_display, read_display_colour
 from rgspipe.datasets.exr import read_array, read_channels, read_image
 from rgspipe.errors import InputError
 from rgspipe.scene import Camera, srgb
+from rgspipe.scene.arrays import check_radiance
 
 #: Depths from here on (Blender writes 1e10) say that there is no surface.
 NO_SURFACE = 1e9
-
-#: Pixels may be negative by this share of the brightest one, as filters of renderers and compositors leave them.
-NEGATIVE = 0.01
 
 
 def read_colour(path: Path) -> tuple[Tensor, Tensor]:
     """Linear, premultiplied colour (H, W, 3) and alpha (H, W) of an EXR image, or a PNG or JPEG (sRGB, straight alpha).
 
     Raises:
-        InputError: missing or broken file, other channels, negative pixels, NaN or infinity, alpha outside of [0, 1].
+        InputError: missing or broken file, other channels, negative radiance, NaN or infinity, alpha outside of [0, 1].
     """
     image, alpha = read_image(path) if path.suffix.lower() == ".exr" else _read_display_image(path)
-    if image.min() < -NEGATIVE * image.max() or image.max() < 0:
-        found = f"{int((image < 0).any(axis=-1).sum())} negative pixels, the lowest {image.min():g}"
-        raise InputError(path, expected="radiance ≥ 0", found=found, remedy="Export the image again.")
+    check_radiance(path, float(image.min()), float(image.max()))
     if alpha.min() < 0 or alpha.max() > 1 + 1e-3:
         found = f"{alpha.min():g} to {alpha.max():g}"
         raise InputError(path, expected="alpha from 0 to 1", found=found, remedy="Export the image again.")

@@ -18,6 +18,9 @@ ArrayLike: TypeAlias = "Tensor | npt.ArrayLike"
 #: Kinds of numpy's types that are numbers: booleans, integers, floats.
 NUMBERS = "biuf"
 
+#: Noise reaches about as far below zero as above it; what reaches so many times as far is a broken pixel.
+NOISE = 2.0
+
 #: How many entries an axis has; a name for any number of them.
 Axis = int | str
 
@@ -65,6 +68,21 @@ def _axes(value: object) -> int:
     while isinstance(value, list | tuple) and value:
         value, depth = value[0], depth + 1
     return depth + getattr(value, "ndim", 0)
+
+
+def check_radiance(where: object, least: float, most: float) -> None:
+    """Refuse an image whose lowest value is no noise: that is about as far above zero as below.
+
+    Args:
+        where: what is refused.
+        least, most: its lowest and highest value.
+
+    Raises:
+        InputError: the lowest value is negative by more than NOISE times the highest.
+    """
+    if least < -NOISE * max(most, 0.0):
+        found = f"values down to {least:g}, and none above {most:g}"
+        raise InputError(where, expected="radiance, which is not negative", found=found, remedy="Export it again.")
 
 
 def _from_numbers(value: object, name: str, shape: Sequence[Axis]) -> Tensor:

@@ -20,7 +20,7 @@ def test_negative_light_is_not_taken_for_black(scene) -> None:
     image = torch.full((8, 8, 3), 0.1)
     image[4, 4] = -10.0
     views = FitViews.prepare(scene, camera, mask_edges=False)
-    with pytest.raises(InputError, match=r"images\[0\].*radiance ≥ 0.*down to -10"):
+    with pytest.raises(InputError, match=r"images\[0\].*radiance, which is not negative.*down to -10"):
         views.prepared.stack_images([image])
 
 
@@ -28,5 +28,5 @@ def test_negative_light_is_not_taken_for_black(scene) -> None:
 def test_masks_are_shares(scene, value: float) -> None:
     mask = torch.ones(8, 8)
     mask[0, 0] = value
-    with pytest.raises(InputError, match=r"masks\[0\].*from 0 to 1"):
+    with pytest.raises(InputError, match=r"masks\[0\].*0 to 1"):
         FitViews.prepare(scene, room_cameras(8)[0], masks=mask, mask_edges=False)

@@ -15,8 +15,7 @@ from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.images.viewed_pixels import ViewedPixels
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.view_weights import ViewWeights
-from rgspipe.scene.arrays import ArrayLike, as_tensor, check_finite
-from rgspipe.sums import total
+from rgspipe.scene.arrays import ArrayLike, as_tensor, check_finite, check_radiance
 
 #: Pixels that surfels cover less than this show something the scene does not have.
 LEAST_COVERAGE = 0.9
@@ -54,9 +53,7 @@ class PreparedViews(ViewedPixels):
         """
         checked = _one_each("images", images, self.views, (3,))
         for index, image in enumerate(checked):
-            if float(total(image.detach().double())) < 0.0:
-                found = f"pixels down to {float(image.min()):g}, which outweigh the positive ones"
-                raise InputError(f"images[{index}]", expected="radiance ≥ 0", found=found, remedy="Make it again.")
+            check_radiance(f"images[{index}]", float(image.detach().min()), float(image.detach().max()))
         return torch.cat([image.detach().reshape(-1, 3).float() for image in checked]).to(self.operator.matrix.device)
 
 
