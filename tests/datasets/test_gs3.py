@@ -318,7 +318,5 @@ def test_a_negative_pixel_is_no_radiance(dataset: Path) -> None:
     load_dataset(dataset)
     image[1, 2] = -10.0
     write_image(dataset / "train/r_0000.exr", image)
-    with pytest.raises(
-        InputError, match=r"r_0000\.exr.*which is not negative.*down to -10, and none above 0.25"
-    ):
+    with pytest.raises(InputError, match=r"r_0000\.exr.*which is not negative.*down to -10, and none above 0.25"):
         load_dataset(dataset)

@@ -15,7 +15,7 @@ def _summary(**medians: float) -> pd.DataFrame:
     for key, median in medians.items():
         occlusion, views = key.rsplit("_", 1)
         row = dict.fromkeys(tables.SUMMARY_COLUMNS, math.nan) | {"method": METHOD, "views": int(views)}
-        row |= {"occlusion": occlusion, "count": 20, "judged": 20, "median_position_error": median}
+        row |= {"occlusion": occlusion, "count": 20, "with_truth": 20, "median_position_error": median}
         row |= {"median_low": median - 0.0002, "median_high": median + 0.0002}
         rows.append(row | {"median_seconds": 1.0, "worst_seconds": 6.0})
     return pd.DataFrame(rows, columns=list(tables.SUMMARY_COLUMNS))
@@ -47,13 +47,13 @@ def test_a_scene_that_was_never_measured_has_no_goals():
 
 def test_few_targets_neither_meet_a_goal_nor_miss_it():
     summary = _summary(visible_1=0.001, occluded_1=0.5, all_1=0.01, all_3=0.02)
-    summary["judged"] = 19
+    summary["with_truth"] = 19
     found = goals.goals("cornell", summary, None, METHOD)
     assert {goal.met for goal in found if "median position" in goal.name} == {None}
 
 
 def test_a_study_of_kinds_of_lights_has_goals_of_its_own():
-    row = {"case": "two lights, 3 views", "method": METHOD, "occlusion": tables.ALL, "judged": 40}
+    row = {"case": "two lights, 3 views", "method": METHOD, "occlusion": tables.ALL, "with_truth": 40}
     row |= {"position": 0.0033, "position_low": 0.0024, "position_high": 0.0043}
     other = row | {"case": "two lights, 3 views, true scene", "position_low": 0.9}
     found = goals.goals("void", _summary(), None, METHOD, pd.DataFrame([row, other]))

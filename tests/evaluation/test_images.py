@@ -1,4 +1,4 @@
-"""Pictures: exposure, colours of differences, sizes and files."""
+"""Pictures: gain, colours of differences, sizes and files."""
 
 import io
 
@@ -9,12 +9,12 @@ from PIL import Image
 from rgspipe.evaluation import images
 
 
-def test_exposure_brings_the_percentile_to_white_and_black_stays_black():
+def test_the_gain_brings_the_percentile_to_white_and_black_stays_black():
     image = np.full((10, 10, 3), 4.0)
-    assert images.exposure(image) == pytest.approx(0.25)
+    assert images.display_gain(image) == pytest.approx(0.25)
     assert (images.tone_map(image) == 255).all()
     black = np.zeros((4, 4, 3))
-    assert images.exposure(black) == 1.0 and (images.tone_map(black, 1.0) == 0).all()
+    assert images.display_gain(black) == 1.0 and (images.tone_map(black, 1.0) == 0).all()
 
 
 def test_tone_mapping_is_the_srgb_curve_and_shows_broken_pixels():

@@ -48,14 +48,14 @@ def test_spots_are_judged_by_their_axes_and_cones_too():
     truth = (_spot(0.0, (0, 0, 1), 0.5), _light(1, 0, 0))
     found = (_light(1, 0, 0), _spot(0.1, (0, 1, 1), 0.4))
     errors = tables.rig_errors(found, truth, 1.0)
-    assert errors.axis == pytest.approx(45.0) and errors.cone == pytest.approx(math.degrees(0.1), abs=1e-6)
+    assert errors.axis == pytest.approx(45.0) and errors.shape == pytest.approx(math.degrees(0.1), abs=1e-6)
     # A point light in the place of a spot has no axis; among point lights there is none to judge.
     assert tables.rig_errors((_light(0, 0, 0), _light(1, 0, 0)), truth, 1.0).axis == math.inf
     assert math.isnan(tables.rig_errors((_light(1, 0, 0),), (_light(1, 0, 0),), 1.0).axis)
-    assert tables.rig_errors((), truth, 1.0).cone == math.inf
+    assert tables.rig_errors((), truth, 1.0).shape == math.inf
 
 
-def test_the_number_of_lights_is_judged():
+def test_the_number_of_lights_is_targets():
     truths = {name: (_light(0, 0, 0),) for name in "ab"}
     estimates = {"a": (_light(0, 0, 0),), "b": (_light(0, 0, 0), _light(1, 1, 1))}
     table = tables.target_table(_results([("a", "visible"), ("b", "visible")]), estimates, truths, 1.0)
@@ -107,7 +107,7 @@ def test_results_without_a_needed_column_are_refused():
         tables.target_table(_results([("a", "visible")]).drop(columns="seconds"), {}, {}, 1.0)
 
 
-def _judged() -> pd.DataFrame:
+def _targets() -> pd.DataFrame:
     names = [(f"v{i}", "visible") for i in range(5)] + [(f"o{i}", "occluded") for i in range(3)]
     errors = [0.001, 0.002, 0.003, 0.004, 0.5, 0.02, math.inf, math.nan]
     truths = {name: (_light(0, 0, 0),) for (name, _), error in zip(names, errors, strict=True) if not math.isnan(error)}
@@ -118,7 +118,7 @@ def _judged() -> pd.DataFrame:
 
 
 def test_summary_has_medians_worst_and_rates_per_class_and_over_all():
-    summary = tables.summary_table(_judged(), seed=3)
+    summary = tables.summary_table(_targets(), seed=3)
     assert list(summary.columns) == list(tables.SUMMARY_COLUMNS)
     assert summary["occlusion"].tolist() == ["visible", "occluded", "all"]
     rows = summary.set_index("occlusion")
@@ -126,23 +126,23 @@ def test_summary_has_medians_worst_and_rates_per_class_and_over_all():
     assert rows.loc["visible", "worst_position_error"] == pytest.approx(0.5)
     assert rows.loc["visible", "success_rate"] == pytest.approx(0.8)
     assert rows.loc["visible", "median_low"] <= 0.003 <= rows.loc["visible", "median_high"]
-    assert rows.loc["occluded", ["count", "judged"]].tolist() == [3, 2]
+    assert rows.loc["occluded", ["count", "with_truth"]].tolist() == [3, 2]
     assert rows.loc["occluded", "median_position_error"] == math.inf  # one of two fits failed
-    assert rows.loc["all", ["count", "judged"]].tolist() == [8, 7]
+    assert rows.loc["all", ["count", "with_truth"]].tolist() == [8, 7]
     assert rows.loc["all", "median_seconds"] == 2.0
-    pd.testing.assert_frame_equal(summary, tables.summary_table(_judged(), seed=3))
+    pd.testing.assert_frame_equal(summary, tables.summary_table(_targets(), seed=3))
 
 
 def test_summary_without_truth_or_without_targets():
     unknown = tables.summary_table(tables.target_table(_results([("a", "unknown")]), {}, {}, 1.0), seed=0)
-    assert unknown["judged"].tolist() == [0, 0] and unknown["success_rate"].isna().all()
+    assert unknown["with_truth"].tolist() == [0, 0] and unknown["success_rate"].isna().all()
     assert unknown["median_psnr"].tolist() == [30.0, 30.0]
     empty = tables.target_table(_results([("a", "visible")]).iloc[:0], {}, {}, 1.0)
     assert tables.summary_table(empty, seed=0).empty and tables.exemplars(empty) == {}
 
 
 def test_exemplars_are_the_median_and_the_worst_of_each_class():
-    chosen = tables.exemplars(_judged())
+    chosen = tables.exemplars(_targets())
     assert chosen == {"visible": {"median": "v2", "worst": "v4"}, "occluded": {"median": "o0", "worst": "o1"}}
 
 

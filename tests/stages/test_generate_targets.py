@@ -79,7 +79,7 @@ def test_lights_that_are_alone_are_not_measured(tmp_path: Path, monkeypatch: pyt
 
 
 def test_a_track_pairs_its_lights(tmp_path: Path) -> None:
-    config = _config(targets__kind="track", scene__kind="corner")
+    config = _config(targets__kind="drive", scene__kind="corner")
     context = _made(config, tmp_path, _pool(tmp_path / "t", "spots", 6))
     assert context.facts["targets"] == 3
     lights = read_lights(context.folder / "truth/rig_0001.json")
@@ -152,7 +152,7 @@ def test_angles_are_given_in_degrees_and_blends_as_they_are() -> None:
     [
         ({"scene__kind": "external"}, r"scene: .*Blender.*scene=external.*fit\.target=DIR"),
         ({"scene__kind": "ply"}, r"scene: .*scene=ply"),
-        ({"targets__kind": "track"}, r"targets\.kind.*scene=corner.*scene=cornell"),
+        ({"targets__kind": "drive"}, r"targets\.kind.*scene=corner.*scene=cornell"),
         ({"targets__count": [3, 2]}, r"targets\.count.*3 to 2"),
         ({"targets__count": [1, 4], "targets__pool": 3}, r"targets\.count.*at most the 3 lights"),
         ({"targets__count": [4, 4], "targets__weakest": 0.3}, r"targets\.weakest.*below 0\.25"),

@@ -109,7 +109,7 @@ def test_lights_of_large_rigs_are_counted_instead_of_listed(tmp_path: Path) -> N
 
 
 def test_generated_targets_are_in_the_order_of_kinds_and_numbers_of_lights(tmp_path: Path) -> None:
-    for fingerprint, kind, count in (("01", "track", 2), ("02", "spots", 1), ("03", "points", 2), ("04", "points", 1)):
+    for fingerprint, kind, count in (("01", "drive", 2), ("02", "spots", 1), ("03", "points", 2), ("04", "points", 1)):
         make = partial(_targets, count=1, rig=RIG[:1] * count)
         build(tmp_path, "generate_targets", fingerprint, make, count=[count, count], kind=kind)
     titles = [section.title for section in found_galleries(config(tmp_path), room_surfels())]

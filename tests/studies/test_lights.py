@@ -26,7 +26,7 @@ def _targets(views: int = 1) -> pd.DataFrame:
             "position_sd": [0.002, 0.02, 0.001, math.nan],
             "result": ["converged", "converged", "converged", "ambiguous"],
             "axis_error": [math.nan, 0.5, 1.5, math.nan],
-            "cone_error": math.nan,
+            "shape_error": math.nan,
             "count_right": pd.array([True, True, True, False], dtype="boolean"),
             "types_right": pd.array([True, False, True, False], dtype="boolean"),
         }
@@ -42,7 +42,7 @@ def test_a_case_has_a_row_for_each_class_and_one_for_all() -> None:
     rows = case_rows("cornell", "clean", _targets(), seed=0, resamples=500)
     assert rows["occlusion"].tolist() == ["visible", "occluded", "all"]
     whole = rows.iloc[2]
-    assert whole["count"] == whole["judged"] == 4 and whole["position"] == pytest.approx(0.025)
+    assert whole["count"] == whole["with_truth"] == 4 and whole["position"] == pytest.approx(0.025)
     assert whole["position_low"] == 0.002 and whole["position_high"] == math.inf
     assert (whole["success"], whole["inside_95"]) == (0.25, pytest.approx(2 / 3))
     assert whole["stated"] == 0.002 and whole["converged"] == 0.75 and whole["ambiguous"] == 0.25
@@ -61,7 +61,7 @@ def test_a_row_does_not_depend_on_the_others() -> None:
 def test_without_truth_there_are_no_errors_and_nothing_is_silent() -> None:
     unknown = _targets().assign(position_error=math.nan, intensity_error=math.nan, success=pd.NA, inside_95=pd.NA)
     whole = case_rows("s", "c", unknown, seed=0, resamples=100).iloc[-1]
-    assert whole["judged"] == 0 and whole[["position", "position_low", "success", "silent"]].isna().all()
+    assert whole["with_truth"] == 0 and whole[["position", "position_low", "success", "silent"]].isna().all()
     assert whole["seconds"] == 2.5
 
 

@@ -15,7 +15,7 @@ LightStudy = Literal["views", "robustness", "classes", "kinds", "regions", "adam
 
 @dataclass(frozen=True)
 class EvaluateConfig(Options):
-    """How estimates are judged."""
+    """How estimates are compared with the truth."""
 
     success: float = option(0.01, low=0, high=1)
     """largest position error of a success, fraction of the scene's size"""

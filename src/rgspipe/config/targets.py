@@ -36,11 +36,11 @@ class TargetSpotConfig(Options):
 class TargetsConfig(Options):
     """Generated fit targets: sums of single lights, each of which is rendered once."""
 
-    kind: Literal["points", "spots", "mixed", "track"] = "points"
+    kind: Literal["points", "spots", "mixed", "drive"] = "points"
     """lights of a target: points, spots, of each at least one, or the headlights of a car that drives around the bend
     of scene=corner"""
     number: int = option(40, low=1, high=100000)
-    """targets; a track has `frames`"""
+    """targets; a drive has `frames`"""
     count: tuple[int, int] = option((1, 1), low=1, high=MOST_LIGHTS)
     """fewest and most lights of a target"""
     classes: tuple[LightClass, ...] = LIGHT_CLASSES
@@ -56,7 +56,7 @@ class TargetsConfig(Options):
     pool_seed: int = option(0, low=0, high=2**31 - 1)
     """draws of the lights' places, axes and cones"""
     frames: int = option(24, low=1, high=100000)
-    """targets of a track, equally far apart on the way"""
+    """targets of a drive, equally far apart on the way"""
     views: int = option(3, low=1, high=8)
     """fixed cameras that see each target"""
     cameras: tuple[float, ...] | None = option(None, low=-1e6, high=1e6)

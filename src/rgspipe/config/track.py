@@ -12,4 +12,4 @@ class TrackConfig(TrackOptions):
     """Lights that move from frame to frame."""
 
     folder: str | None = None
-    """a folder whose targets/ are the frames, in order; by default those of generate_targets, kind=track"""
+    """a folder whose targets/ are the frames, in order; by default those of generate_targets, kind=drive"""

@@ -145,7 +145,7 @@ def _at_most(name: str, value: float | None, limit: float) -> Goal:
 
 def _row(summary: pd.DataFrame, method: str, views: int, occlusion: str) -> pd.Series | None:
     chosen = summary[(summary["method"] == method) & (summary["views"] == views) & (summary["occlusion"] == occlusion)]
-    return None if chosen.empty or int(chosen["judged"].iloc[0]) == 0 else chosen.iloc[0]
+    return None if chosen.empty or int(chosen["with_truth"].iloc[0]) == 0 else chosen.iloc[0]
 
 
 def _median_goal(summary: pd.DataFrame, method: str, occlusion: str, views: int, limit: float) -> Goal:
@@ -154,7 +154,7 @@ def _median_goal(summary: pd.DataFrame, method: str, occlusion: str, views: int,
     if row is None:
         return _no_worse(name, None, limit)
     middle, low, high = (float(row[key]) for key in ("median_position_error", "median_low", "median_high"))
-    return _no_worse(name, (middle, low, high, int(row["judged"])), limit)
+    return _no_worse(name, (middle, low, high, int(row["with_truth"])), limit)
 
 
 def _kinds(table: pd.DataFrame, method: str) -> list[Goal]:
@@ -163,8 +163,8 @@ def _kinds(table: pd.DataFrame, method: str) -> list[Goal]:
     for case, limit in KINDS.items():
         rows = table[(table["case"] == case) & (table["method"] == method) & (table["occlusion"] == ALL)]
         if len(rows):
-            middle, low, high, judged = rows.iloc[0][["position", "position_low", "position_high", "judged"]]
-            median = float(middle), float(low), float(high), int(judged)
+            middle, low, high, compared = rows.iloc[0][["position", "position_low", "position_high", "with_truth"]]
+            median = float(middle), float(low), float(high), int(compared)
             found.append(_no_worse(f"Kinds of lights, {case}: median position error", median, limit))
     return found
 
@@ -186,7 +186,7 @@ def _more_views(summary: pd.DataFrame, method: str) -> Goal:
     if rows[0] is None or rows[1] is None:
         return Goal(name, wanted, MISSING, None)
     one, three = (row["median_position_error"] for row in rows)
-    told = min(row["judged"] for row in rows) >= CLASS_SIZE
+    told = min(row["with_truth"] for row in rows) >= CLASS_SIZE
     return Goal(name, wanted, f"{percent(three)} against {percent(one)}", bool(three < one) if told else None)
 
 

@@ -17,7 +17,7 @@ from rgspipe.scene import srgb
 Bytes = npt.NDArray[np.uint8]
 
 #: The percentile of a target that is exposed to white.
-EXPOSURE_PERCENTILE = 97.0
+WHITE_PERCENTILE = 97.0
 #: A signed difference this large, relative to exposed white, has the strongest colour.
 DIFFERENCE_SPAN = 0.2
 #: Width of the white gap between panels, pixels.
@@ -27,17 +27,17 @@ GAP = 4
 _TOO_DARK, _EQUAL, _TOO_BRIGHT = (33, 102, 172), (247, 247, 247), (178, 24, 43)
 
 
-def exposure(target: ArrayLike) -> float:
+def display_gain(target: ArrayLike) -> float:
     """The factor that brings the 97th percentile of `target` to white; 1 for a black image."""
     finite = to_array(target)
     finite = finite[np.isfinite(finite)]
-    white = float(np.percentile(finite, EXPOSURE_PERCENTILE)) if finite.size else 0.0
+    white = float(np.percentile(finite, WHITE_PERCENTILE)) if finite.size else 0.0
     return 1.0 / white if white > 0.0 else 1.0
 
 
 def tone_map(image: ArrayLike, factor: float | None = None) -> Bytes:
-    """(H, W, 3) uint8 sRGB of a linear image (H, W, 3) times `factor` (None: its `exposure`); NaN becomes magenta."""
-    linear = _image(image) * (exposure(image) if factor is None else factor)
+    """(H, W, 3) uint8 sRGB of a linear image times `factor` (None: its `display_gain`); NaN becomes magenta."""
+    linear = _image(image) * (display_gain(image) if factor is None else factor)
     broken = np.isnan(linear).any(axis=-1)
     linear = np.clip(np.nan_to_num(linear, nan=0.0, posinf=1.0, neginf=0.0), 0.0, 1.0)
     result = np.round(255.0 * srgb.encode(linear)).astype(np.uint8)
@@ -72,7 +72,7 @@ def progress_strip(target: ArrayLike, renders: Sequence[ArrayLike]) -> Bytes:
     """(H, …, 3) uint8: target | each render in turn | signed difference of the last, exposed for the target."""
     if not renders:
         raise ValueError("a strip needs at least one render")
-    factor = exposure(target)
+    factor = display_gain(target)
     panels = [tone_map(target, factor), *(tone_map(render, factor) for render in renders)]
     return beside([*panels, signed_difference(target, renders[-1], factor)])
 

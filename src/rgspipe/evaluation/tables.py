@@ -32,7 +32,7 @@ TARGET_COLUMNS = (
     "position_error",
     "intensity_error",
     "axis_error",
-    "cone_error",
+    "shape_error",
     "psnr",
     "seconds",
     "success",
@@ -63,7 +63,7 @@ SUMMARY_COLUMNS = (
     "views",
     "occlusion",
     "count",
-    "judged",
+    "with_truth",
     "median_position_error",
     "median_low",
     "median_high",
@@ -74,7 +74,7 @@ SUMMARY_COLUMNS = (
     "median_seconds",
     "worst_seconds",
     "median_axis_error",
-    "median_cone_error",
+    "median_shape_error",
     "count_rate",
     "types_rate",
     "median_position_sd",
@@ -91,14 +91,14 @@ class RigErrors:
         intensity: the mean intensity error of the matched lights, a fraction.
         axis: the largest angle between the axes of the true lights that have one and their matches, degrees; infinite
             where a match is of another kind, NaN where no light has an axis.
-        cone: the largest error of the first numbers of their shapes (cone angles, degrees; exponents), likewise.
+        shape: the largest error of the first numbers of their shapes (cone angles, degrees; exponents), likewise.
         pairs: (estimate, truth) indices of the matched lights, in the order of the truth.
     """
 
     position: float
     intensity: float
     axis: float
-    cone: float
+    shape: float
     pairs: tuple[tuple[int, int], ...]
 
 
@@ -225,7 +225,7 @@ def summary_table(targets: pd.DataFrame, seed: int, resamples: int = metrics.RES
 
     Methods and view counts stand in the order in which they first occur.
 
-    `count` is the number of targets, `judged` that of targets with a known truth: errors and success
+    `count` is the number of targets, `with_truth` that of targets with a known truth: errors and success
     rate are over those. Position errors of failed fits are inf and count in the median. The interval
     `median_low`…`median_high` is a 95 % bootstrap interval; each row draws from a generator of its
     own, so a row's figures do not depend on which other rows the table has. `resamples=0` leaves the
@@ -251,10 +251,10 @@ def exemplars(targets: pd.DataFrame) -> dict[str, dict[str, str]]:
         group = targets[targets["occlusion"] == name]
         key = group["position_error"] if group["position_error"].notna().any() else -group["psnr"].astype(float)
         ordered = group.loc[key.sort_values(kind="stable", na_position="first").index, "target"].tolist()
-        judged = ordered[int(key.isna().sum()) :] or ordered
-        chosen[name] = {"median": judged[(len(judged) - 1) // 2]}
-        if len(judged) > 1:
-            chosen[name]["worst"] = judged[-1]
+        compared = ordered[int(key.isna().sum()) :] or ordered
+        chosen[name] = {"median": compared[(len(compared) - 1) // 2]}
+        if len(compared) > 1:
+            chosen[name]["worst"] = compared[-1]
     return chosen
 
 
@@ -277,12 +277,12 @@ def _target_row(
     limit: float,
     covariances: Sequence[ArrayLike],
 ) -> dict:
-    position, intensity, axis, cone, solved = math.nan, math.nan, math.nan, math.nan, None
+    position, intensity, axis, shape, solved = math.nan, math.nan, math.nan, math.nan, None
     pairs: tuple[tuple[int, int], ...] = ()
     if truth:
         known_size = math.isfinite(scene_size)
         errors = rig_errors(estimate, truth, scene_size if known_size else 1.0)
-        pairs, intensity, axis, cone = errors.pairs, errors.intensity, errors.axis, errors.cone
+        pairs, intensity, axis, shape = errors.pairs, errors.intensity, errors.axis, errors.shape
         if known_size:
             position = errors.position
             solved = metrics.success(position, limit) and len(estimate) == len(truth)
@@ -293,7 +293,7 @@ def _target_row(
     return (
         {name: row[name] for name in ("target", "occlusion", "method", "views", "seconds")}
         | {"occlusion": class_of(row["occlusion"], len(truth))}
-        | {"position_error": position, "intensity_error": intensity, "axis_error": axis, "cone_error": cone}
+        | {"position_error": position, "intensity_error": intensity, "axis_error": axis, "shape_error": shape}
         | {"success": solved, "count_right": len(estimate) == len(truth) if truth else None}
         | {"types_right": _types_right(estimate, truth, pairs)}
         | {"psnr": _number(row.get("psnr")), "result": row.get("result", ""), "reason": row.get("reason", "")}
@@ -346,7 +346,7 @@ def _summary(group: pd.DataFrame, seed: int, resamples: int) -> dict[str, float]
         low, high = metrics.bootstrap_median(errors, np.random.default_rng(seed), resamples)
     return {
         "count": len(group),
-        "judged": int(group["position_error"].notna().sum()),
+        "with_truth": int(group["position_error"].notna().sum()),
         "median_position_error": _median(group["position_error"]),
         "median_low": low,
         "median_high": high,
@@ -357,7 +357,7 @@ def _summary(group: pd.DataFrame, seed: int, resamples: int) -> dict[str, float]
         "median_seconds": _median(group["seconds"]),
         "worst_seconds": float(group["seconds"].max()),
         "median_axis_error": _median(group["axis_error"]),
-        "median_cone_error": _median(group["cone_error"]),
+        "median_shape_error": _median(group["shape_error"]),
         "count_rate": _rate(group["count_right"]),
         "types_rate": _rate(group["types_right"]),
         "median_position_sd": _median(group["position_sd"]),

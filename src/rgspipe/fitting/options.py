@@ -97,7 +97,7 @@ class ScheduleOptions(Options):
 class BarOptions(Options):
     """How much a light has to lower the robust cost of the blocks to be there, rather than an error of the model.
 
-    Chosen on other scenes than it is judged on, see docs/laboratory/number_of_lights.md.
+    Chosen on other scenes than it is measured on, see docs/laboratory/number_of_lights.md.
     """
 
     least: float = option(0.2, low=0, high=1)
@@ -168,7 +168,7 @@ class CertaintyOptions(Options):
     """errors of the model are shared within cells of this part of the scene's size"""
     inflation: float = option(3.5, low=0, high=1000)
     """κ: by what factor, in standard deviations, errors of the model are larger than the residual shows. The 95 %
-    quantile of what it takes to hold the truth, over half of the targets of one trained scene; judged on others"""
+    quantile of what it takes to hold the truth, over half of the targets of one trained scene; measured on others"""
     doubtful: float = option(0.05, low=0, high=10)
     """a position whose error is expected to be larger than this part of the scene's size is said to be in doubt"""
     on_surface: float = option(0.002, low=0, high=1)

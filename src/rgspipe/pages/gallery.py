@@ -89,7 +89,7 @@ def make_gallery(
 
 def picture(view: View) -> bytes:
     """A view as PNG, exposed for itself."""
-    return images.png_bytes(images.tone_map(view.image, images.exposure(view.image)))
+    return images.png_bytes(images.tone_map(view.image, images.display_gain(view.image)))
 
 
 def light_words(rig: LightRig) -> str:

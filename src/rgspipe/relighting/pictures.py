@@ -12,7 +12,7 @@ import numpy.typing as npt
 from matplotlib.figure import Figure
 from PIL import Image
 
-from rgspipe.evaluation.images import Bytes, beside, exposure, signed_difference, stack, tone_map
+from rgspipe.evaluation.images import Bytes, beside, display_gain, signed_difference, stack, tone_map
 from rgspipe.evaluation.plots import STYLE
 
 #: Most pictures of a contact sheet side by side.
@@ -38,9 +38,9 @@ class Relit:
     psnr: float
 
 
-def shared_exposure(renders: Sequence[Radiance]) -> float:
-    """The exposure of several pictures that are to be compared: that of all their pixels together."""
-    return exposure(np.concatenate([render.reshape(-1, 3) for render in renders]))
+def common_gain(renders: Sequence[Radiance]) -> float:
+    """The gain of several pictures that are to be compared: that of all their pixels together."""
+    return display_gain(np.concatenate([render.reshape(-1, 3) for render in renders]))
 
 
 def contact_sheet(renders: Sequence[Radiance]) -> Bytes:
@@ -50,7 +50,7 @@ def contact_sheet(renders: Sequence[Radiance]) -> Bytes:
 
 def developed(renders: Sequence[Radiance]) -> list[Bytes]:
     """Linear radiance (H, W, 3) as uint8 sRGB, all exposed alike."""
-    factor = shared_exposure(renders)
+    factor = common_gain(renders)
     return [tone_map(render, factor) for render in renders]
 
 
@@ -102,7 +102,7 @@ def comparison_figure(columns: Sequence[Relit]) -> Figure:
         figure = Figure(figsize=size, layout="constrained")
         axes = figure.subplots(3, len(columns), squeeze=False)
         for column, relit in enumerate(columns):
-            factor = exposure(relit.truth)
+            factor = display_gain(relit.truth)
             difference = signed_difference(relit.truth, relit.render, factor)
             panels = (tone_map(relit.truth, factor), tone_map(relit.render, factor), difference)
             for axis, panel, name in zip(axes[:, column], panels, rows, strict=True):

@@ -68,7 +68,7 @@ def run(context: StageContext) -> None:
         "notes": truth.notes,
     }
     write_json(context.folder / "metrics.json", _plain(content))
-    context.note(targets=len(targets), judged=int(targets["position_error"].notna().sum()))
+    context.note(targets=len(targets), with_truth=int(targets["position_error"].notna().sum()))
 
 
 def _estimate(fit: Artifact, row: Mapping[str, Any]) -> LightRig:

@@ -31,7 +31,7 @@ def _in_turn(pools: list[list[PooledLight]]) -> list[PooledLight]:
 
 def _rigs(config: RgspipeConfig, pool: list[PooledLight]) -> list[RigPlan]:
     lights = [pooled.light for pooled in pool]
-    if config.targets.kind == "track":
+    if config.targets.kind == "drive":
         return headlight_rigs(lights, _brightness(pool))
     request = _request(config)
     # A light that is alone has all of the energy, however bright it is; measuring reads every image of the pool.
@@ -60,13 +60,13 @@ def _inputs(config: RgspipeConfig) -> list[Need]:
     """The pools; what can not be made of them shows now, and not after they are rendered."""
     check_scene(config)
     kinds = ("points", "spots") if config.targets.kind == "mixed" else (config.targets.kind,)
-    if config.targets.kind != "track":
+    if config.targets.kind != "drive":
         check_request(len(kinds) * config.targets.pool, _request(config))
     return [Need("render_olat", {"targets.kind": kind}) for kind in kinds]
 
 
 def _keys(config: RgspipeConfig) -> list[str]:
-    if config.targets.kind == "track":
+    if config.targets.kind == "drive":
         return ["targets.kind"]
     return [f"targets.{name}" for name in ("kind", "number", "count", "weakest", "separation", "seed")]
 

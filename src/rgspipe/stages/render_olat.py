@@ -54,7 +54,7 @@ def pool_job(config: RgspipeConfig) -> PoolJob:
             seed=wanted.pool_seed,
         ),
         wanted.kind,
-        wanted.frames if wanted.kind == "track" else wanted.pool,
+        wanted.frames if wanted.kind == "drive" else wanted.pool,
         wanted.classes,
         spot_range(wanted.spot) if wanted.kind != "points" else SpotRange(),
         wanted.views,
@@ -63,7 +63,7 @@ def pool_job(config: RgspipeConfig) -> PoolJob:
 
 
 def check_scene(config: RgspipeConfig) -> None:
-    """Refuse scenes that Blender does not render, a track without a bend, and a pool of two types in one.
+    """Refuse scenes that Blender does not render, a drive without a bend, and a pool of two types in one.
 
     Raises:
         InputError: says what would do.
@@ -76,17 +76,17 @@ def check_scene(config: RgspipeConfig) -> None:
             found=f"scene={kind}",
             remedy="Fit its own targets (fit.targets=dataset), or a folder of yours (fit.target=DIR).",
         )
-    if wanted.kind == "track" and kind != "corner":
+    if wanted.kind == "drive" and kind != "corner":
         raise InputError(
             "targets.kind",
-            expected="track with scene=corner alone: the car drives around its bend",
+            expected="drive with scene=corner alone: the car drives around its bend",
             found=f"scene={kind}",
             remedy="Use scene=corner, or targets.kind=spots.",
         )
     if wanted.kind == "mixed" and config.stage == "render_olat":
         raise InputError(
             "targets.kind",
-            expected="points, spots or track: mixed targets take one pool of points and one of spots",
+            expected="points, spots or drive: mixed targets take one pool of points and one of spots",
             found="mixed",
             remedy="Use stage=generate_targets, which renders both.",
         )
@@ -150,7 +150,7 @@ def _keys(config: RgspipeConfig) -> list[str]:
     scene = [key for key in DATASET.keys(config) if key.startswith("scene")]
     quality = [f"dataset.{name}" for name in ("resolution", "samples", "denoise", "max_bounces")]
     wanted = ["kind", "views", "resolution", "samples", "pool_seed"]
-    wanted += ["frames"] if config.targets.kind == "track" else ["pool", "classes"]
+    wanted += ["frames"] if config.targets.kind == "drive" else ["pool", "classes"]
     wanted += [] if config.targets.kind == "points" else ["spot"]
     # Named only where they are set: else they say nothing that the scene and the dataset's keys do not.
     wanted += [name for name in ("cameras", "max_bounces") if getattr(config.targets, name) is not None]

@@ -33,7 +33,7 @@ KINDS = {
     "points": "Point lights",
     "spots": "Spots",
     "mixed": "Points and spots",
-    "track": "Headlights of a car that drives around the bend",
+    "drive": "Headlights of a car that drives around the bend",
 }
 
 

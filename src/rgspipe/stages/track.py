@@ -102,7 +102,7 @@ def _inputs(config: RgspipeConfig) -> list[Need | str]:
             found=config.fit.method,
             remedy="Follow lights with fit=search_lm.",
         )
-    sequence = [] if config.track.folder is not None else [Need("generate_targets", {"targets.kind": "track"})]
+    sequence = [] if config.track.folder is not None else [Need("generate_targets", {"targets.kind": "drive"})]
     return ["freeze", *sequence]
 
 

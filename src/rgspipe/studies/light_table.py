@@ -81,7 +81,7 @@ def _columns(rows: pd.DataFrame, kind: str) -> dict[str, Callable[[Row], str]]:
         columns["axis"] = lambda row: _degrees(row, "axis")
         columns["cone"] = lambda row: _degrees(row, "cone")
         columns["right number"] = lambda row: _interval(row, "right_number", 0)
-        # Studies that were made before types were judged do not have it.
+        # Studies that were made before types were compared do not have it.
         if "right_types" in rows:
             columns["right types"] = lambda row: _interval(row, "right_types", 0)
     columns["solved"] = lambda row: _interval(row, "success", 0)

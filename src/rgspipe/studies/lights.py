@@ -27,7 +27,7 @@ MEDIANS = {
     "intensity": "intensity_error",
     "seconds": "seconds",
     "axis": "axis_error",
-    "cone": "cone_error",
+    "cone": "shape_error",
 }
 #: Shares of the targets, likewise.
 SHARES = {
@@ -52,15 +52,15 @@ def case_rows(
         resamples: behind the intervals of medians; 0 leaves them out.
 
     Returns:
-        `KEYS`, `count` and `judged` (targets, and those with a known truth), and
+        `KEYS`, `count` and `with_truth` (targets, and those with a known truth), and
         - `position` (fraction of the scene), `intensity` (fraction), `seconds`, of spots `axis` and `cone` (degrees):
           medians, each with `_low` and `_high`;
         - `success` (within the limit, with the right number of lights), `inside_95` (the truth lies inside the region
           that the fit states for 95 %), `right_number` (of lights) and `right_types` (their number is right, and each
           is a point or a spot where it should be): shares of those where it is known, with `_low` and `_high`;
         - `stated`: the median of the position errors that fits expect of themselves;
-        - `silent`, likewise: the share of judged targets whose fit says that it converged, misses the limit, and states
-          no region that holds the truth: wrong without a word;
+        - `silent`, likewise: the share of targets with a truth whose fit says that it converged, misses the limit, and
+          states no region that holds the truth: wrong without a word;
         - the share of each of `STATUSES`.
     """
     rows = []
@@ -106,15 +106,15 @@ def wilson_interval(successes: int, count: int) -> tuple[float, float]:
 
 
 def _figures(group: pd.DataFrame, seed: int, resamples: int) -> dict[str, float]:
-    judged = group["position_error"].notna()
-    found: dict[str, float] = {"count": len(group), "judged": int(judged.sum())}
+    known = group["position_error"].notna()
+    found: dict[str, float] = {"count": len(group), "with_truth": int(known.sum())}
     for name, column in MEDIANS.items():
         found |= _median(name, group[column].astype(float), seed, resamples)
     for name, column in SHARES.items():
         found |= _share(name, group[column])
     found["stated"] = float(group["position_sd"].median()) if group["position_sd"].notna().any() else math.nan
     missed = ~_true(group["success"]) & ~_true(group["inside_95"]) & (group["result"] == "converged")
-    found |= _share("silent", missed[judged])
+    found |= _share("silent", missed[known])
     return found | {status: float((group["result"] == status).mean()) for status in STATUSES}
 
 

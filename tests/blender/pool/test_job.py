@@ -16,7 +16,7 @@ from rgspipe.scene.models import Corridor
 def test_a_job_survives_json() -> None:
     dataset = DatasetJob(scene="mine", model=Corridor(width=0.3), train_views=0, seed=4)
     cameras = (FixedView((0.1, 0.2, 0.3), (0.5, 0.2, 0.3), 60.0), FixedView((0.0, 0.0, 1.0), (0.0, 0.3, 0.0), 90.0))
-    job = PoolJob(dataset, "track", 7, ("visible",), SpotRange("linear", (0.3, 0.5), (0.1, 0.2)), 2, cameras)
+    job = PoolJob(dataset, "drive", 7, ("visible",), SpotRange("linear", (0.3, 0.5), (0.1, 0.2)), 2, cameras)
     assert PoolJob.from_json(json.loads(json.dumps(job.to_json()))) == job
 
 

@@ -15,7 +15,7 @@ from rgspipe.scene.lights import SpotLight, SpotProfile
 from rgspipe.scene.lights.spot_profiles import PROFILES
 
 #: What a pool holds: point lights, spots, or the headlights of a car on its way.
-Kind = Literal["points", "spots", "track"]
+Kind = Literal["points", "spots", "drive"]
 
 #: Lights of a car.
 HEADLIGHTS = 2
@@ -64,9 +64,9 @@ class PoolJob:
     Attributes:
         dataset: the scene and the quality; of its seed every draw depends.
         kind: of lights.
-        number: lights; of a track, moments of `HEADLIGHTS` lights each.
+        number: lights; of a drive, moments of `HEADLIGHTS` lights each.
         classes: where points and spots are, in turn; those that the scene has none of are left out.
-        spot: the profile of spots and headlights; a track takes the least of its ranges.
+        spot: the profile of spots and headlights; a drive takes the least of its ranges.
         views: cameras that see every light.
         cameras: where they are; by default the scene's own (`pool_cameras`).
     """

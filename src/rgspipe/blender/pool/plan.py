@@ -14,8 +14,8 @@ from rgspipe.blender.models.parameters import BlendFile
 from rgspipe.blender.plan import Frame
 from rgspipe.blender.pool.aim import aim_at_relay, aim_at_seen, seen_points
 from rgspipe.blender.pool.cameras import pool_cameras
+from rgspipe.blender.pool.drive import headlights
 from rgspipe.blender.pool.job import PoolJob
-from rgspipe.blender.pool.track import headlights
 from rgspipe.blender.targets import classify, is_around_corner, is_of_class
 from rgspipe.scene import Camera, Light, PointLight, SpotLight
 from rgspipe.scene.models import Corridor
@@ -23,7 +23,7 @@ from rgspipe.scene.models import Corridor
 log = logging.getLogger(__name__)
 
 #: Numbers of the random streams; part of the seed, so never renumber them.
-STREAMS = {"points": 10, "spots": 11, "track": 12}
+STREAMS = {"points": 10, "spots": 11, "drive": 12}
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ def make_plan(job: PoolJob, layout: Layout, geometry: Geometry) -> list[LightPla
     """
     cameras = pool_cameras(layout, job.views, job.cameras)
     place = _Place(job, layout, geometry, cameras, seen_points(cameras[0], geometry))
-    lights = _track(place) if job.kind == "track" else _drawn(place)
+    lights = _drive(place) if job.kind == "drive" else _drawn(place)
     return [_plan(job, cameras, index, *light) for index, light in lights]
 
 
@@ -76,10 +76,10 @@ def _plan(job: PoolJob, cameras: list[Camera], index: int, occlusion: str, light
     return LightPlan(name, occlusion, light, frames)
 
 
-def _track(place: _Place) -> list[tuple[int, tuple[str, Light]]]:
+def _drive(place: _Place) -> list[tuple[int, tuple[str, Light]]]:
     corridor = place.job.dataset.model
     if not isinstance(corridor, Corridor):
-        raise ValueError("a track leads around the corner of a corridor")
+        raise ValueError("a drive leads around the corner of a corridor")
     shape = place.job.spot.least
     pairs = headlights(corridor, place.job.number, shape)
     lights = [light for pair in pairs for light in pair]

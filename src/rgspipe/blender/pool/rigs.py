@@ -79,7 +79,7 @@ def draw_rigs(pool: Sequence[Light], brightness: np.ndarray, request: RigRequest
 
 
 def headlight_rigs(pool: Sequence[Light], brightness: np.ndarray) -> list[RigPlan]:
-    """The rigs of a track: its lights, pair by pair, all of the same intensity."""
+    """The rigs of a drive: its lights, pair by pair, all of the same intensity."""
     known, colour = _Pool.of(pool, brightness), np.array(HEADLIGHT_COLOUR)
     pairs = [tuple(range(first, first + HEADLIGHTS)) for first in range(0, len(pool), HEADLIGHTS)]
     return [known.rig(pair, [colour * known.units[index] for index in pair]) for pair in pairs]

@@ -109,7 +109,7 @@ def _joint(
 def whitener(matrix: Tensor) -> tuple[Tensor, Tensor]:
     """Columns R (n, m) with RᵀHR = I that span what H (n, n) determines, and which unknowns it does not (n,).
 
-    Unknowns have different units, so H is scaled to a unit diagonal before its rank is judged.
+    Unknowns have different units, so H is scaled to a unit diagonal before its rank is taken.
     """
     scale = matrix.diagonal().clamp(min=0.0).sqrt()
     inverse = torch.where(scale > 0, 1.0 / scale.clamp(min=1e-300), 0.0)

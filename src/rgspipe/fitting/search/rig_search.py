@@ -14,7 +14,7 @@ from rgspipe.fitting.options import MOST_LIGHTS, SearchOptions
 from rgspipe.fitting.search.compare import best_state, distinct, drop, passed, ranked, worth_keeping
 from rgspipe.fitting.search.refine import Refiner, State
 from rgspipe.fitting.search.schedule import refined_starts
-from rgspipe.fitting.search.starts import Candidates, Rig
+from rgspipe.fitting.search.starts import Candidates, EmitterRig
 from rgspipe.fitting.search.weighting import PLAIN, ROBUST
 
 
@@ -120,7 +120,7 @@ class RigSearch:
         best = self._with_plain_lights(best) if self.kinds_open else best
         return Found(best, tuple(state for one in found for state in one.others))
 
-    def _starts(self, candidates: Candidates, lights: int, previous: State | None, batches: int) -> list[Rig]:
+    def _starts(self, candidates: Candidates, lights: int, previous: State | None, batches: int) -> list[EmitterRig]:
         size = self.refiner.region.size
         count = self.options.starts * (self.options.trials.aimed if candidates.aimed else 1) * batches
         if previous is None or len(previous.emitters) != lights - 1:
@@ -129,7 +129,7 @@ class RigSearch:
         pairs = zip_longest(candidates.extended(previous, half, size), candidates.rigs(lights, half, size))
         return [rig for pair in pairs for rig in pair if rig is not None]
 
-    def _refined(self, rigs: Sequence[Rig], batches: int) -> Found:
+    def _refined(self, rigs: Sequence[EmitterRig], batches: int) -> Found:
         """The best of several starts after a few steps each; of `batches` parts the next ones only if need be.
 
         Rigs that are to be compared with others have the least robust loss; else they are settled.

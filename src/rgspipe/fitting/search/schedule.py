@@ -9,7 +9,7 @@ from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.options import ScheduleOptions
 from rgspipe.fitting.search.compare import distinct, ranked
 from rgspipe.fitting.search.refine import Refiner, State
-from rgspipe.fitting.search.starts import Rig
+from rgspipe.fitting.search.starts import EmitterRig
 from rgspipe.fitting.search.weighting import PLAIN, ROBUST, Weighting
 
 #: A rim that is narrower by nature is fitted with this width [rad]: a hard edge has no derivative.
@@ -17,7 +17,7 @@ HARD_RIM = 0.01
 
 
 def refined_starts(
-    refiner: Refiner, rigs: Sequence[Rig], iterations: int, options: ScheduleOptions, thorough: bool = False
+    refiner: Refiner, rigs: Sequence[EmitterRig], iterations: int, options: ScheduleOptions, thorough: bool = False
 ) -> list[State]:
     """Those of the starts that are refined to the end, by at most `iterations` steps at a time.
 
@@ -48,7 +48,7 @@ def _turns(options: ScheduleOptions, aimed: bool) -> list[tuple[float, int]]:
     return [*zip(options.softness, options.softly, strict=True), (0.0, options.steps)]
 
 
-def soft(rig: Rig, softness: float) -> Rig:
+def soft(rig: EmitterRig, softness: float) -> EmitterRig:
     """The rig with rims that are `softness` wider, but none narrower than HARD_RIM."""
     return tuple(emitter.softened(max(softness, HARD_RIM if emitter.light.rim < HARD_RIM else 0.0)) for emitter in rig)
 

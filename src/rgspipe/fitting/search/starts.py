@@ -26,7 +26,7 @@ from rgspipe.fitting.search.combinations import (
 from rgspipe.fitting.search.compare import rig_distance
 from rgspipe.fitting.search.refine import State
 
-Rig = tuple[Emitter, ...]
+EmitterRig = tuple[Emitter, ...]
 
 
 @dataclass(frozen=True)
@@ -59,10 +59,10 @@ class Candidates:
         """Whether any candidate explains anything."""
         return bool((single_gains(self.scored) > 0).any())
 
-    def emitters(self, combination: Sequence[int]) -> Rig:
+    def emitters(self, combination: Sequence[int]) -> EmitterRig:
         return tuple(self.coarse.emitter(index, self.shape_free) for index in combination)
 
-    def rigs(self, lights: int, count: int, size: float) -> list[Rig]:
+    def rigs(self, lights: int, count: int, size: float) -> list[EmitterRig]:
         """At most `count` rigs of `lights` candidates each that explain most, clearly different ones, best first.
 
         Of single spots those that explain most of dim and bright parts alike take turns with those of plain squares,
@@ -84,12 +84,12 @@ class Candidates:
         both = [rig for pair in zip_longest(rigs, pools) for rig in pair if rig is not None]
         return self._different(both, count, size)
 
-    def extended(self, state: State, count: int, size: float) -> list[Rig]:
+    def extended(self, state: State, count: int, size: float) -> list[EmitterRig]:
         """At most `count` rigs: the lights of a refined one and one candidate more."""
         fixed = torch.stack([self.scored.coarse_of(self.problem, self.coarse, emitter) for emitter in state.emitters])
         return self._extended(state, extensions(self.scored, fixed, self.options.joining), count, size)
 
-    def promised(self, state: State, searched: LightProblem, count: int, size: float) -> tuple[float, list[Rig]]:
+    def promised(self, state: State, searched: LightProblem, count: int, size: float) -> tuple[float, list[EmitterRig]]:
         """By what share one candidate more lowers the blocks' squared relative error, and `extended`.
 
         Args:
@@ -107,13 +107,13 @@ class Candidates:
         promise = (found[0][1] - (1.0 - left)) / left if left > 0.0 else 0.0
         return promise, self._extended(state, found, count, size)
 
-    def _extended(self, state: State, found: Sequence[tuple[int, float]], count: int, size: float) -> list[Rig]:
+    def _extended(self, state: State, found: Sequence[tuple[int, float]], count: int, size: float) -> list[EmitterRig]:
         added = [self.emitters([index]) for index, _ in found]
         return [(*state.emitters, *extra) for extra in self._different(added, count, size)]
 
-    def _different(self, rigs: Iterable[Rig], count: int, size: float) -> list[Rig]:
+    def _different(self, rigs: Iterable[EmitterRig], count: int, size: float) -> list[EmitterRig]:
         """The first `count` of `rigs` that differ from each other."""
-        chosen: list[Rig] = []
+        chosen: list[EmitterRig] = []
         for rig in rigs:
             if all(self._apart(rig, other, size) for other in chosen):
                 chosen.append(rig)
@@ -121,13 +121,13 @@ class Candidates:
                 break
         return chosen
 
-    def _apart(self, one: Rig, other: Rig, size: float) -> bool:
+    def _apart(self, one: EmitterRig, other: EmitterRig, size: float) -> bool:
         if rig_distance(one, other) > self.options.separation * size:
             return True
         return any(a.axis is not None and _turn(a, other) < self.options.turned for a in one)
 
 
-def _turn(emitter: Emitter, rig: Rig) -> float:
+def _turn(emitter: Emitter, rig: EmitterRig) -> float:
     """The largest cosine between a light's axis and those of another rig."""
     axes: list[Tensor] = [other.axis for other in rig if other.axis is not None]
     return max((float(emitter.axis @ axis) for axis in axes), default=-1.0)

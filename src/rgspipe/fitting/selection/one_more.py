@@ -2,8 +2,8 @@
 
 What a wrong number leaves unexplained may be little: one light explains more than 95 % of the energy of two that stand
 close together, or of which one is weak. So a search with a known number asks the candidates in closed form whether one
-of them beside the answer promises enough, and only then refines a few rigs of one light more, to be judged as those of
-unknown numbers are.
+of them beside the answer promises enough, and only then refines a few rigs of one light more, to be compared as those
+of unknown numbers are.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from rgspipe.fitting.options import SearchOptions
 from rgspipe.fitting.search.compare import best_state, drop, light_energies, wanted
 from rgspipe.fitting.search.refine import Refiner, State
 from rgspipe.fitting.search.schedule import refined_starts
-from rgspipe.fitting.search.starts import Candidates, Rig
+from rgspipe.fitting.search.starts import Candidates, EmitterRig
 from rgspipe.fitting.search.weighting import ROBUST
 
 
@@ -55,7 +55,7 @@ def one_more_light(
     more, bar, steps = options.one_more, options.bar, options.schedule.steps
     if refiner.unexplained(answer) < more.noticeable:
         return None
-    rigs: list[Rig] = []
+    rigs: list[EmitterRig] = []
     for kind in candidates:
         promise, extended = kind.promised(answer, refiner.problem, more.tries, refiner.region.size)
         sure = promise >= bar.least_faint
@@ -68,7 +68,7 @@ def one_more_light(
     return OneMore(simple, rich, drop(refiner.problem, simple, rich), wanted(rich, bar))
 
 
-def _last_share(refiner: Refiner, rig: Rig) -> float:
+def _last_share(refiner: Refiner, rig: EmitterRig) -> float:
     """What the last light of a rig sends of all its energy, at first sight."""
     energies = light_energies(refiner.start(rig, ROBUST))
     return energies[-1] / sum(energies) if sum(energies) > 0.0 else 0.0

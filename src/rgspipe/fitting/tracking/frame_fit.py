@@ -21,7 +21,7 @@ from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.options import CertaintyOptions, TrackOptions
 from rgspipe.fitting.result import FitResult
 from rgspipe.fitting.search.refine import Refiner, State
-from rgspipe.fitting.search.starts import Rig
+from rgspipe.fitting.search.starts import EmitterRig
 from rgspipe.fitting.search.weighting import PLAIN
 from rgspipe.fitting.selection.diagnosis import standing
 from rgspipe.fitting.tracking.motion import Motion, references
@@ -41,7 +41,10 @@ class Followed:
 
 
 def observed(
-    problem: LightProblem, rig: Rig, options: TrackOptions | None = None, certainty: CertaintyOptions | None = None
+    problem: LightProblem,
+    rig: EmitterRig,
+    options: TrackOptions | None = None,
+    certainty: CertaintyOptions | None = None,
 ) -> Followed:
     """A frame whose lights are known already, by a search: with what its images alone tell of them."""
     options = options or TrackOptions()
@@ -85,7 +88,7 @@ def inflation_of(spread: Covariances) -> float:
     return min(max(factor, INFLATIONS[0]), INFLATIONS[1])
 
 
-def _refiner(problem: LightProblem, rig: Rig) -> Refiner:
+def _refiner(problem: LightProblem, rig: EmitterRig) -> Refiner:
     """For the problem with those exposures that explain the images best with the lights of `rig`."""
     refiner = Refiner.of(problem)
     if not problem.exposure_free:

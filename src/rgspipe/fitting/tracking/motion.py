@@ -14,7 +14,7 @@ from torch import Tensor
 
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.options import MotionOptions
-from rgspipe.fitting.search.starts import Rig
+from rgspipe.fitting.search.starts import EmitterRig
 
 #: Standard deviations of what views do not tell at all: a place anywhere in the scene, any axis, any intensity.
 NOTHING_KNOWN = 1.0
@@ -38,7 +38,7 @@ class Motion:
         options: how lights may move.
     """
 
-    rig: Rig
+    rig: EmitterRig
     intensity: Tensor
     reference: Tensor
     rates: Tensor
@@ -50,7 +50,7 @@ class Motion:
     @classmethod
     def starting(
         cls,
-        rig: Rig,
+        rig: EmitterRig,
         intensity: Tensor,
         information: Tensor,
         size: float,
@@ -94,7 +94,7 @@ class Motion:
         """The same lights, which may have moved, turned and changed in any way: they are only where to start from."""
         return replace(self, covariance=self.covariance + NOTHING_KNOWN**2 * torch.eye(len(self.covariance)).double())
 
-    def updated(self, rig: Rig, intensity: Tensor, information: Tensor) -> Motion:
+    def updated(self, rig: EmitterRig, intensity: Tensor, information: Tensor) -> Motion:
         """After a frame whose images, with what was predicted here, led to `rig` and `intensity`.
 
         Args:
@@ -142,17 +142,17 @@ def references(intensity: Tensor) -> Tensor:
     return means.clamp(min=max(1e-3 * float(means.max()), 1e-300))
 
 
-def moving_parameters(rig: Rig) -> Tensor:
+def moving_parameters(rig: EmitterRig) -> Tensor:
     """(M,) int64 which of the D parameters are positions and axes."""
     return torch.cat([emitter.moving() for emitter in rig]).nonzero()[:, 0]
 
 
-def offset(start: Rig, end: Rig, size: float) -> Tensor:
+def offset(start: EmitterRig, end: EmitterRig, size: float) -> Tensor:
     """(D,) parameters of `end` over those of `start`, axes in the tangents at `start`."""
     return torch.cat([one.offset(other, size) for one, other in zip(start, end, strict=True)])
 
 
-def turns(start: Rig, end: Rig) -> Tensor:
+def turns(start: EmitterRig, end: EmitterRig) -> Tensor:
     """(D, D) from changes of the parameters at `start` to those at `end`: axes have other tangents there."""
     return torch.block_diag(*(one.turned(other) for one, other in zip(start, end, strict=True)))
 
@@ -161,7 +161,7 @@ def _parameters(rig: Sequence[Emitter]) -> int:
     return sum(emitter.parameters for emitter in rig)
 
 
-def _rate_covariance(rig: Rig, scales: tuple[float, float], alike: float) -> Tensor:
+def _rate_covariance(rig: EmitterRig, scales: tuple[float, float], alike: float) -> Tensor:
     """(M, M) of random rates with standard deviations `scales` of positions and axes, and a correlation of lights."""
     rows = [emitter.carried(*scales) for emitter in rig]
     alone = torch.block_diag(*(row @ row.T for row in rows))

@@ -12,7 +12,7 @@ from rgspipe.fitting.model.moments import Moments, scores
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.search.moves import allowed_share, moved_rig, rig_move
 from rgspipe.fitting.search.refine import Refiner, State
-from rgspipe.fitting.search.starts import Rig
+from rgspipe.fitting.search.starts import EmitterRig
 from rgspipe.fitting.search.weighting import PLAIN
 from rgspipe.fitting.tracking.motion import Motion, offset, turns
 from rgspipe.optim.levenberg_marquardt import NormalEquations
@@ -78,7 +78,7 @@ class PredictedRig:
         count = self.predicted.unknowns
         return torch.linalg.inv(self.predicted.covariance[:count, :count])
 
-    def away(self, rig: Rig, intensity: Tensor) -> Tensor:
+    def away(self, rig: EmitterRig, intensity: Tensor) -> Tensor:
         """(D + 3L,) d, from the prediction."""
         before = self.predicted
         change = (self.refiner.problem.scale * intensity - before.intensity) / before.reference[:, None]
@@ -106,25 +106,25 @@ class _AroundRig:
     def allowed(self, step: Tensor) -> float:
         return allowed_share(self.state.emitters, step[: self._parameters], self.whole.refiner.limits)
 
-    def moved(self, step: Tensor) -> tuple[Rig, Tensor]:
+    def moved(self, step: Tensor) -> tuple[EmitterRig, Tensor]:
         refiner, count = self.whole.refiner, self._parameters
         colours = step[count:].reshape(-1, 3) * self.whole.predicted.reference[:, None] / refiner.problem.scale
         rig = moved_rig(self.state.emitters, step[:count], refiner.region)
         return rig, (self.state.intensity + colours).clamp(min=0.0)
 
-    def distance(self, place: tuple[Rig, Tensor]) -> float:
+    def distance(self, place: tuple[EmitterRig, Tensor]) -> float:
         refiner, (rig, intensity) = self.whole.refiner, place
         change = refiner.problem.scale * (intensity - self.state.intensity) / self.whole.predicted.reference[:, None]
         return max(rig_move(self.state.emitters, rig, refiner.region.size), float(change.abs().max()))
 
-    def evaluated(self, place: tuple[Rig, Tensor]) -> tuple[float, State]:
+    def evaluated(self, place: tuple[EmitterRig, Tensor]) -> tuple[float, State]:
         refiner, (rig, intensity) = self.whole.refiner, place
         columns = refiner.columns(rig, self.state)
         moments = refiner.problem.moments(columns, self.evidence.weights)
         state = replace(self.state, emitters=rig, columns=columns, intensity=intensity)
         return self._cost(moments, rig, intensity), state
 
-    def _cost(self, moments: Moments, rig: Rig, intensity: Tensor) -> float:
+    def _cost(self, moments: Moments, rig: EmitterRig, intensity: Tensor) -> float:
         away = self.whole.away(rig, intensity)
         return self._certainty * float(moments.cost_at(intensity)) + float(away @ self.whole.precision @ away)
 

@@ -112,7 +112,7 @@ class _Tracker:
         if not tried:
             return None
         best = min(tried, key=lambda index: (not self._sure(tried[index]), tried[index].frame.cost))
-        self.found[best] = self._judged(tried[best], anchored=self._sure(tried[best]))
+        self.found[best] = self._doubted(tried[best], anchored=self._sure(tried[best]))
         return best
 
     def _follow(self, index: int, way: int) -> None:
@@ -139,7 +139,7 @@ class _Tracker:
             if other is not None and other.frame.cost < followed.frame.cost:
                 lost = other.frame.cost > limit
                 status = FrameStatus.LOST if lost else other.frame.status
-                return self._judged(replace(other, frame=replace(other.frame, status=status)), self._sure(other))
+                return self._doubted(replace(other, frame=replace(other.frame, status=status)), self._sure(other))
         lost = replace(followed.frame, status=FrameStatus.LOST)
         return replace(before, frame=lost, motion=before.motion.predicted())
 
@@ -160,7 +160,7 @@ class _Tracker:
             problem, before.motion.predicted(), before.inflation, self.options.iterations, self.search.certainty
         )
         status = FrameStatus.TRACKED if way > 0 else FrameStatus.TRACED_BACK
-        return self._judged(self._known(problem, made, status), before.anchored)
+        return self._doubted(self._known(problem, made, status), before.anchored)
 
     def _sure(self, known: _Known) -> bool:
         return known.frame.sure(self.search.certainty.doubtful, self.options.faint)
@@ -187,7 +187,7 @@ class _Tracker:
         frame = TrackedFrame(made.result, status, frame_cost(problem, made.result.lights), errors)
         return _Known(frame, made.motion, made.inflation, True)
 
-    def _judged(self, known: _Known, anchored: bool) -> _Known:
+    def _doubted(self, known: _Known, anchored: bool) -> _Known:
         """The frame as part of a track that had a sure frame, or had none."""
         frame = known.frame
         doubtful = not anchored or max(frame.position_errors, default=1.0) > self.search.certainty.doubtful

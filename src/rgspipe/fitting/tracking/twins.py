@@ -18,7 +18,7 @@ from rgspipe.fitting.options import SearchOptions, SplitOptions
 from rgspipe.fitting.result import FitResult
 from rgspipe.fitting.search.refine import Refiner
 from rgspipe.fitting.search.schedule import soft
-from rgspipe.fitting.search.starts import Rig
+from rgspipe.fitting.search.starts import EmitterRig
 from rgspipe.fitting.search.weighting import PLAIN
 from rgspipe.fitting.search_lm import fit_from
 from rgspipe.renderer.images.model import ImageModel
@@ -60,7 +60,7 @@ def split_lights(
     )
 
 
-def split_rigs(result: FitResult, apart: float) -> list[Rig]:
+def split_rigs(result: FitResult, apart: float) -> list[EmitterRig]:
     """The rig with one light after the other split in the place of the faintest, three ways, `apart` scene units."""
     emitters = [Emitter.of(light) for light in result.lights]
     strengths = [float(light.intensity.mean()) for light in result.lights]

@@ -33,8 +33,8 @@ def confirmed(facets: Facets, views: Sequence[View], noise: Sequence[float]) -> 
     offs = np.full((len(views), len(facets)), np.nan, dtype=np.float32)
     for row, (view, deviation) in enumerate(zip(views, noise, strict=True)):
         offs[row] = _deviations(facets, view, deviation)
-    judged = np.isfinite(offs)
-    seen = judged & (offs > -HIDDEN)
+    compared = np.isfinite(offs)
+    seen = compared & (offs > -HIDDEN)
     count = seen.sum(axis=0)
     # Sorted with the unseen last: the (lower) median of the seen.
     ordered = np.sort(np.where(seen, offs, np.inf), axis=0)
@@ -57,15 +57,15 @@ def _deviations(facets: Facets, view: View, noise: float) -> np.ndarray:
     row = np.floor(camera.cy - camera.fy * local[:, 1] * scale)
     inside = before & (column >= 0) & (column < camera.width) & (row >= 0) & (row < camera.height)
     cosine = -np.einsum("nd,nd->n", local, normals) / np.maximum(np.linalg.norm(local, axis=1), 1e-300)
-    judged = np.flatnonzero(inside & (cosine > LEAST_COSINE))
-    column, row, normals, local = column[judged], row[judged], normals[judged], local[judged]
+    compared = np.flatnonzero(inside & (cosine > LEAST_COSINE))
+    column, row, normals, local = column[compared], row[compared], normals[compared], local[compared]
     ray = np.stack(
-        [(column + 0.5 - camera.cx) / camera.fx, -(row + 0.5 - camera.cy) / camera.fy, -np.ones(len(judged))], axis=1
+        [(column + 0.5 - camera.cx) / camera.fx, -(row + 0.5 - camera.cy) / camera.fy, -np.ones(len(compared))], axis=1
     )
     along = np.einsum("nd,nd->n", normals, ray)
     expected = np.einsum("nd,nd->n", normals, local) / np.where(along < -1e-6, along, -math.inf)
     measured = depth[row.astype(np.int64), column.astype(np.int64)]
     found = np.full(len(facets), np.nan)
     with np.errstate(invalid="ignore"):
-        found[judged] = np.where(expected > 0, (measured / np.maximum(expected, 1e-300) - 1.0) / noise, np.nan)
+        found[compared] = np.where(expected > 0, (measured / np.maximum(expected, 1e-300) - 1.0) / noise, np.nan)
     return found

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rgspipe.blender.pool.track import DIP, GAUGE, headlights, path, path_length
+from rgspipe.blender.pool.drive import DIP, GAUGE, headlights, path, path_length
 from rgspipe.scene.lights import SpotLight
 from rgspipe.scene.models import Corridor
 
