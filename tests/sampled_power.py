@@ -21,6 +21,6 @@ def sampled_power(light: AxialLight, limit: float) -> torch.Tensor:
         2.0
         * math.pi
         * (1.0 - math.cos(limit))
-        * light.share_towards(light.position + directions).mean()
+        * light.relative_intensity_towards(light.position + directions).mean()
         * light.intensity
     )

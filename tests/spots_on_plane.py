@@ -37,6 +37,6 @@ def plane_image(light: Light, subsamples: int = 16) -> np.ndarray:
     to_light = light.position - points
     irradiance = to_light[:, 2] / to_light.norm(dim=1) ** 3
     if light.axis is not None:
-        irradiance = irradiance * light.share_towards(points)
+        irradiance = irradiance * light.relative_intensity_towards(points)
     radiance = torch.tensor(ALBEDO) / math.pi * light.intensity * irradiance[:, None]
     return radiance.reshape(SIZE, SIZE, subsamples**2, 3).mean(dim=2).numpy()

@@ -10,7 +10,7 @@ from rgspipe.benchmark.rooms import ROOMS
 from rgspipe.fitting import FitViews
 from rgspipe.renderer.effects import Effects
 from rgspipe.renderer.frozen import FrozenScene
-from rgspipe.renderer.pixel_direct import PixelDirect, surfel_shares
+from rgspipe.renderer.pixel_direct import PixelDirect, surfel_transmittance
 from rgspipe.scene import PointLight
 from rgspipe.scene.rectangles import surfels_on
 
@@ -42,7 +42,7 @@ def test_without_bounces_the_image_is_the_direct_light_of_the_pixels(frozen: Fro
     views = FitViews.prepare(frozen, cameras, effects=Effects(interreflection=False), sharp=True)
     problem = views.problem(views.prepared.stack_images(views.render(LIGHT)))
     expected = [
-        PixelDirect(frozen.bvh, view).image(LIGHT.position, *surfel_shares(frozen.bvh, LIGHT.position))
+        PixelDirect(frozen.bvh, view).image(LIGHT.position, *surfel_transmittance(frozen.bvh, LIGHT.position))
         for view in views.prepared.views
     ]
     torch.testing.assert_close(

@@ -42,10 +42,10 @@ def two_spots() -> tuple[Tensor, Tensor, Tensor]:
     return tuple(leaf.requires_grad_() for leaf in (positions, strengths, axes))
 
 
-def share_in_double(points: Tensor, position: Tensor, axis: Tensor, band: BandLimit | None) -> Tensor:
+def intensity_in_double(points: Tensor, position: Tensor, axis: Tensor, band: BandLimit | None) -> Tensor:
     angle = angle_from_axis(axis, points - position)
     if band is None:
-        return SHAPE.share_at(angle)
+        return SHAPE.relative_intensity_at(angle)
     return legendre(torch.cos(angle), band.degree)[0] @ zonal_coefficients(SHAPE, band)[0]
 
 
@@ -64,8 +64,8 @@ def test_loss_and_gradients_of_two_spots_are_those_of_float64(band: BandLimit | 
         if exact:
             image = 0.0
             for position, strength, axis in zip(*leaves, strict=True):
-                share = share_in_double(double.centers, position, axis, band)
-                lit = share * double_precision.irradiance(double, position)
+                relative = intensity_in_double(double.centers, position, axis, band)
+                lit = relative * double_precision.irradiance(double, position)
                 image = image + (operator @ transport.radiance(lit[:, None])[:, :, 0]) * strength.exp()
             loss = double_precision.adam_loss(image, target.double(), [shape], list(views.masks), 0.2)
         else:

@@ -135,11 +135,14 @@ def test_no_direction_of_a_spot_differs_from_a_point_light_by_more_than_the_boun
     profile, cone, falloff, angle
 ) -> None:
     shape = SpotLight.shaped(profile, cone, falloff)
-    share, smallest = float(shape.share_at(torch.tensor(angle, dtype=torch.float64))), shape.least_share
-    assert smallest <= share + 1e-12
+    relative, smallest = (
+        float(shape.relative_intensity_at(torch.tensor(angle, dtype=torch.float64))),
+        shape.least_relative_intensity,
+    )
+    assert smallest <= relative + 1e-12
     if cone_bound(smallest) < NO_BOUND:
-        # Of the brightest, which has at least the smallest share.
-        assert (1.0 - share) / smallest <= cone_bound(smallest) * (1.0 + 1e-9)
+        # Of the brightest, which has at least the smallest part.
+        assert (1.0 - relative) / smallest <= cone_bound(smallest) * (1.0 + 1e-9)
 
 
 def test_effects_left_out_together_stay_within_the_tolerance() -> None:

@@ -16,7 +16,7 @@ from rgspipe.renderer.kernels.irradiance import SOFTENING
 from rgspipe.renderer.kernels.pixel_light import PixelLight
 from rgspipe.renderer.kernels.pixel_shadow import pixel_transmittance
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
-from rgspipe.renderer.pixel_direct import PixelDirect, surfel_shares
+from rgspipe.renderer.pixel_direct import PixelDirect, surfel_transmittance
 from rgspipe.renderer.view_weights import build_view_weights, even_places
 from rgspipe.scene import Camera, Surfels, look_at
 from rgspipe.scene.rectangles import inside_of_box, solid_box, surfels_on
@@ -36,19 +36,19 @@ def test_light_at_pixels_matches_the_reference(distance: float, device: str) -> 
     bvh = SurfelBvh(surfels.to(torch.float32).to(device))
     view = build_view_weights(bvh, seen, supersampling=2)
     generator = torch.Generator().manual_seed(1)
-    share = torch.rand(60, generator=generator, dtype=torch.float64)
+    passing = torch.rand(60, generator=generator, dtype=torch.float64)
     own = torch.where(torch.rand(144, generator=generator) < 0.3, torch.rand(144, generator=generator), -1.0).double()
     light = surfels.centers[7] + distance * surfels.normals[7]
     softening = float(SOFTENING) * surfels.scales.prod(dim=1).sqrt()
     prepared = PixelLight(bvh, view.operator.matrix, view.edges, seen, softening.to(device))
     own4 = torch.cat([own[:, None], torch.zeros(144, 3)], dim=1).float().to(device)
     slope = torch.zeros(60, 3, device=device)
-    found = prepared.image(light, share.to(device), slope, own4).double().cpu()
+    found = prepared.image(light, passing.to(device), slope, own4).double().cpu()
 
     weights = torch.from_numpy(view.operator.to_scipy().toarray()).double()
 
     def image(position: Tensor) -> Tensor:
-        return reference.direct_image(surfels, weights, view.edges.cpu(), seen, position, share, own)
+        return reference.direct_image(surfels, weights, view.edges.cpu(), seen, position, passing, own)
 
     expected = image(light)
     exact = torch.func.jacfwd(image)(light)
@@ -67,7 +67,7 @@ def test_shadows_of_pixels_match_the_reference(device: str) -> None:
     _, directions, lengths = seen.rays()
     axes = seen.camera_to_world[:3, :3].double()
 
-    def shares(light: Tensor) -> Tensor:
+    def passing_at(light: Tensor) -> Tensor:
         total = torch.zeros(len(pixels), dtype=torch.float64)
         for x, y in (places - 0.5).tolist():
             rays = (directions * lengths[:, None])[pixels] + x * axes[:, 0] / seen.fx + y * axes[:, 1] / seen.fy
@@ -77,8 +77,8 @@ def test_shadows_of_pixels_match_the_reference(device: str) -> None:
             total = total + torch.where(lit, reference.transmittance_at(surfels, light, which, points), 0.0)
         return total / len(places)
 
-    expected = shares(LIGHT)
-    exact = torch.func.jacfwd(shares)(LIGHT)
+    expected = passing_at(LIGHT)
+    exact = torch.func.jacfwd(passing_at)(LIGHT)
     assert float(((expected > 0.01) & (expected < 0.99)).double().mean()) > 0.1, "there must be penumbrae"
     assert bool((found[torch.arange(144) % 3 > 0, 0] == -1.0).all()), "the other pixels are left to the surfels"
     # Measured 1e-6, and 2e-6 of the largest derivative.
@@ -117,7 +117,7 @@ def test_a_shadow_is_as_sharp_as_the_image() -> None:
     view = build_view_weights(bvh, seen)
     exact = exact_floor(seen, light)
     plain = ~exact.isnan() & ~view.edges
-    sharp = PixelDirect(bvh, view).image(light, *surfel_shares(bvh, light))[:, 0, 0].double()
+    sharp = PixelDirect(bvh, view).image(light, *surfel_transmittance(bvh, light))[:, 0, 0].double()
     irradiance, _ = unit_irradiance(bvh, light[None])
     blurred = (view.operator @ (surfels.albedo * irradiance[0, :, None] / math.pi))[:, 0].double()
     white = float(exact[plain].max())
@@ -133,7 +133,7 @@ def test_without_shadows_no_shadow_ray_is_cast(monkeypatch: pytest.MonkeyPatch) 
     direct = PixelDirect(bvh, build_view_weights(bvh, seen))
     monkeypatch.setattr("rgspipe.renderer.pixel_direct.transmittance", None)
     monkeypatch.setattr("rgspipe.renderer.kernels.pixel_shadow.light_transmittance", None)
-    assert bool(direct.image(LIGHT, *surfel_shares(bvh, LIGHT, shadows=False)).isfinite().all())
+    assert bool(direct.image(LIGHT, *surfel_transmittance(bvh, LIGHT, shadows=False)).isfinite().all())
 
 
 def test_far_from_the_origin_nothing_changes() -> None:
@@ -144,7 +144,7 @@ def test_far_from_the_origin_nothing_changes() -> None:
         pose[:3, 3] += offset
         bvh = SurfelBvh(surfels)
         view = build_view_weights(bvh, Camera.from_field_of_view(pose, 0.8, 16, 16))
-        images.append(PixelDirect(bvh, view).image(LIGHT + offset, *surfel_shares(bvh, LIGHT + offset)))
+        images.append(PixelDirect(bvh, view).image(LIGHT + offset, *surfel_transmittance(bvh, LIGHT + offset)))
     # Measured 1e-6 of the largest: what float64 at 1e4 leaves of the places.
     assert float((images[0] - images[1])[:, :, 0].abs().max()) < 1e-4 * float(images[0][:, :, 0].abs().max())
 
@@ -155,9 +155,9 @@ def test_the_operator_gives_the_image_of_any_albedo() -> None:
     bvh = SurfelBvh(surfels)
     view = build_view_weights(bvh, seen)
     painted = replace(surfels, albedo=torch.rand(len(surfels), 3, generator=torch.Generator().manual_seed(5)))
-    share, slope = surfel_shares(bvh, light)
-    operator = PixelDirect(bvh, view).operator(light, share)
-    expected = PixelDirect(SurfelBvh(painted), view).image(light, share, slope)[:, :, 0]
+    passing, slope = surfel_transmittance(bvh, light)
+    operator = PixelDirect(bvh, view).operator(light, passing)
+    expected = PixelDirect(SurfelBvh(painted), view).image(light, passing, slope)[:, :, 0]
     # Measured 2e-7 of the largest.
     difference = (operator @ (painted.albedo / math.pi) - expected).abs()
     assert float(difference.max()) < 2e-6 * float(expected.max())

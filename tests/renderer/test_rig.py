@@ -65,11 +65,11 @@ def expected_irradiance(
     softening = (float(SOFTENING) * surfels.scales.prod(dim=1).sqrt()).pow(4)
     geometry = cosine / (towards.square().sum(dim=-1).square() + softening).pow(0.75)
     point = geometry * reference.transmittance(surfels, positions)
-    shares = [
-        torch.ones_like(row) if shape.axis is None else shape.share_at(angle_from_axis(axis, v))
+    relative = [
+        torch.ones_like(row) if shape.axis is None else shape.relative_intensity_at(angle_from_axis(axis, v))
         for shape, axis, v, row in zip(shapes, axes, towards, point, strict=True)
     ]
-    return (torch.stack(shares) * point).T @ log_intensities.exp()
+    return (torch.stack(relative) * point).T @ log_intensities.exp()
 
 
 @pytest.fixture(scope="module")

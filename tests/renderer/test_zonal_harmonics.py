@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 
 from emitters import emitter_at
-from rgspipe.renderer.unit_light import emitted_share
+from rgspipe.renderer.unit_light import emitted_intensity
 from rgspipe.renderer.zonal_harmonics import BandLimit, legendre, zonal_coefficients
 from rgspipe.scene.lights import SpotLight
 
@@ -27,7 +27,7 @@ def expansion(shape: SpotLight, band: BandLimit, angle: Tensor) -> Tensor:
     return legendre(torch.cos(angle), band.degree)[0] @ zonal_coefficients(shape, band)[0]
 
 
-def reference_share(points: Tensor, position: Tensor, axis: Tensor, shape: SpotLight, band: BandLimit) -> Tensor:
+def reference_intensity(points: Tensor, position: Tensor, axis: Tensor, shape: SpotLight, band: BandLimit) -> Tensor:
     """(N,) as it is defined, in float64: NumPy's series, differentiable by finite differences alone."""
     towards = points - position
     cosine = (towards @ (axis / axis.norm())) / towards.norm(dim=1)
@@ -74,7 +74,7 @@ def test_a_full_smoothstep_is_a_cubic_of_the_cosine_and_ends_there() -> None:
 @pytest.mark.parametrize("mirrored", [False, True])
 def test_the_expansion_converges_to_the_profile(name: str, mirrored: bool) -> None:
     angle = torch.linspace(0.0, 0.5 * math.pi, 400, dtype=torch.float64)
-    exact = SHAPES[name].share_at(angle)
+    exact = SHAPES[name].relative_intensity_at(angle)
     errors = [
         float((expansion(SHAPES[name], BandLimit(degree, mirrored), angle) - exact).square().mean().sqrt())
         for degree in (2, 8, 32)
@@ -107,19 +107,21 @@ def test_derivatives_of_the_coefficients_are_those_of_finite_differences() -> No
 
 @pytest.mark.parametrize("name", SHAPES)
 @pytest.mark.parametrize("mirrored", [False, True])
-def test_the_share_is_the_series_and_its_slopes_those_of_finite_differences(name: str, mirrored: bool) -> None:
+def test_the_relative_intensity_is_the_series_and_its_slopes_those_of_finite_differences(
+    name: str, mirrored: bool
+) -> None:
     generator = torch.Generator().manual_seed(0)
     points = torch.randn((60, 3), generator=generator, dtype=torch.float64)
     position, axis = torch.tensor([0.1, -0.2, 0.3]).double(), torch.tensor([0.3, 0.5, -0.8]).double()
     axis, shape, band = axis / axis.norm(), SHAPES[name], BandLimit(12, mirrored)
-    found = emitted_share(emitter_at(position, axis, shape), points, band)
-    expected = reference_share(points, position, axis, shape, band)
+    found = emitted_intensity(emitter_at(position, axis, shape), points, band)
+    expected = reference_intensity(points, position, axis, shape, band)
     torch.testing.assert_close(found.value.double(), expected, atol=3e-6, rtol=0)  # measured 6e-7
     step = 1e-6
     for index in range(3):
         move = step * torch.eye(3, dtype=torch.float64)[index]
-        along = [reference_share(points, position + sign * move, axis, shape, band) for sign in (1.0, -1.0)]
-        turned = [reference_share(points, position, axis + sign * move, shape, band) for sign in (1.0, -1.0)]
+        along = [reference_intensity(points, position + sign * move, axis, shape, band) for sign in (1.0, -1.0)]
+        turned = [reference_intensity(points, position, axis + sign * move, shape, band) for sign in (1.0, -1.0)]
         for slope, ends in ((found.by["position"], along), (found.by["direction"], turned)):
             difference = (ends[0] - ends[1]) / (2.0 * step)
             size = max(1.0, float(difference.abs().max()))
@@ -130,17 +132,19 @@ def test_a_softer_rim_is_what_is_expanded() -> None:
     angle = torch.linspace(0.0, 1.5, 100, dtype=torch.float64)
     axis, origin = torch.tensor([0.0, 0.0, 1.0]).double(), torch.zeros(3).double()
     points = torch.stack([torch.sin(angle), torch.zeros_like(angle), torch.cos(angle)], dim=1)
-    found = emitted_share(emitter_at(origin, axis, HARD, softness=0.3), points, BandLimit(32))
+    found = emitted_intensity(emitter_at(origin, axis, HARD, softness=0.3), points, BandLimit(32))
     exact, _ = HARD.profile_at(angle, HARD.numbers(angle), 0.3)
     assert float((found.value - exact).abs().max()) < 3e-3  # measured 1.3e-3
 
 
-def test_without_a_band_the_share_is_exact() -> None:
+def test_without_a_band_the_relative_intensity_is_exact() -> None:
     points = torch.tensor([[0.0, 0.0, 1.0], [0.0, 0.4, 1.0], [0.0, 0.0, -1.0]]).double()
     axis, origin = torch.tensor([0.0, 0.0, 1.0]).double(), torch.zeros(3).double()
     angle = torch.tensor([0.0, math.atan(0.4), math.pi]).double()
-    found = emitted_share(emitter_at(origin, axis, SHAPES["smoothstep"]), points, None)
-    torch.testing.assert_close(found.value.double(), SHAPES["smoothstep"].share_at(angle), atol=1e-6, rtol=0)
+    found = emitted_intensity(emitter_at(origin, axis, SHAPES["smoothstep"]), points, None)
+    torch.testing.assert_close(
+        found.value.double(), SHAPES["smoothstep"].relative_intensity_at(angle), atol=1e-6, rtol=0
+    )
 
 
 def test_a_negative_degree_is_refused() -> None:

@@ -25,7 +25,7 @@ def test_arguments_of_other_shapes_are_refused() -> None:
     with pytest.raises(jaxtyping.TypeCheckError):
         turn_in_plane(torch.zeros(5, 4), torch.zeros(6))
     with pytest.raises(jaxtyping.TypeCheckError):
-        PointLight([0.0, 0.0, 0.0], 1.0).share(torch.zeros(3))
+        PointLight([0.0, 0.0, 0.0], 1.0).relative_intensity(torch.zeros(3))
 
 
 def test_the_maps_of_a_view_have_one_size() -> None:

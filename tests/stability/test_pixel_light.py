@@ -11,25 +11,25 @@ from rgspipe.renderer import reference
 from rgspipe.renderer.kernels.irradiance import SOFTENING
 from rgspipe.renderer.kernels.pixel_light import PixelLight
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
-from rgspipe.renderer.pixel_direct import PixelDirect, surfel_shares
+from rgspipe.renderer.pixel_direct import PixelDirect, surfel_transmittance
 from rgspipe.renderer.view_weights import build_view_weights
 
 
 def compare(scene: HardScene, light: torch.Tensor, within, camera_name: str = "plain", smooth: bool = True) -> None:
-    """The image in units of 1/size² and its derivative in units of 1/size³, at given shares of the light."""
+    """The image in units of 1/size² and its derivative in units of 1/size³, at given parts of the light."""
     surfels, seen, position = scene.build(), camera(camera_name, scene), scene.at(light)
     exact, bvh = in_double(surfels), SurfelBvh(surfels)
     view = build_view_weights(bvh, seen, supersampling=2)
-    share = torch.rand(len(surfels), generator=torch.Generator().manual_seed(0), dtype=torch.float64)
+    passing = torch.rand(len(surfels), generator=torch.Generator().manual_seed(0), dtype=torch.float64)
     unknown = torch.full((seen.pixel_count,), -1.0, dtype=torch.float64)
     softening = float(SOFTENING) * exact.scales.prod(dim=1).sqrt()
     prepared = PixelLight(bvh, view.operator.matrix, view.edges, seen, softening)
     own = torch.cat([unknown[:, None], torch.zeros(len(unknown), 3)], dim=1).float()
-    found = prepared.image(position, share, torch.zeros(len(surfels), 3), own)
+    found = prepared.image(position, passing, torch.zeros(len(surfels), 3), own)
     weights = torch.from_numpy(view.operator.to_scipy().toarray()).double()
 
     def image(place: torch.Tensor) -> torch.Tensor:
-        return reference.direct_image(exact, weights, view.edges, seen, place, share, unknown)
+        return reference.direct_image(exact, weights, view.edges, seen, place, passing, unknown)
 
     expected = image(position.double())
     slope = torch.autograd.functional.jacobian(image, position.double(), vectorize=True, strategy="forward-mode")
@@ -63,4 +63,4 @@ def test_every_light_in_every_scene_is_finite_with_shadows_of_pixels(name: str, 
     scene = SCENES[name]
     bvh, position = SurfelBvh(scene.build()), scene.at(LIGHTS[light])
     direct = PixelDirect(bvh, build_view_weights(bvh, camera("plain", scene), supersampling=2))
-    assert torch.isfinite(direct.image(position, *surfel_shares(bvh, position))).all()
+    assert torch.isfinite(direct.image(position, *surfel_transmittance(bvh, position))).all()

@@ -211,7 +211,7 @@ def test_light_on_any_soup_agrees_with_float64(surfels: Surfels, light: tuple[li
 def test_any_spot_on_any_soup(
     profile: str, cone: float, falloff: float, axis: list[float], length: float, position: list[float], surfels: Surfels
 ) -> None:
-    """Response and derivatives of a spot are finite, and its share agrees with float64 where that stands still."""
+    """Response and derivatives of a spot are finite, and its profile agrees with float64 where that stands still."""
     direction = tensor(axis)
     if float(direction.norm()) < 1e-3:
         direction = tensor([0.0, 0.0, 1.0])
@@ -224,8 +224,8 @@ def test_any_spot_on_any_soup(
         assert torch.isfinite(value).all()
     point, _ = unit_irradiance(bvh, where[None], shadows=False)
     unit = replace(light, direction=torch.nn.functional.normalize(direction, dim=0))
-    expected = unit.share_towards(surfels.centers)
-    others = [unit.share_towards(moved.centers) for moved in shaken(surfels)]
+    expected = unit.relative_intensity_towards(surfels.centers)
+    others = [unit.relative_intensity_towards(moved.centers) for moved in shaken(surfels)]
     lit = point[0] > 0
-    share = torch.where(lit, response.irradiance[0] / torch.where(lit, point[0], 1.0), expected.float())
-    assert_agrees(share, expected, others, 1e-5)
+    relative = torch.where(lit, response.irradiance[0] / torch.where(lit, point[0], 1.0), expected.float())
+    assert_agrees(relative, expected, others, 1e-5)

@@ -1,4 +1,4 @@
-"""Spots in hard poses: share, radiance and gradients through the whole step, in float32 against float64."""
+"""Spots in hard poses: profile, radiance and gradients through the whole step, in float32 against float64."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ def with_leaves(light: SpotLight, leaves: dict[str, Tensor]) -> SpotLight:
 
 def radiance_in_double(double: DoubleTransport, light: SpotLight, leaves: dict[str, Tensor]) -> Tensor:
     surfels = in_double(room())
-    share = with_leaves(light, leaves).share_towards(surfels.centers)
-    lit = irradiance(surfels, leaves["position"]) * share
+    relative = with_leaves(light, leaves).relative_intensity_towards(surfels.centers)
+    lit = irradiance(surfels, leaves["position"]) * relative
     return double.radiance(lit[:, None])[:, :, 0] * leaves["log_intensity"].exp()
 
 
@@ -65,15 +65,15 @@ def compare(frozen: FrozenScene, double: DoubleTransport, light: SpotLight, with
 
 @pytest.mark.parametrize("axis", AXES, ids=str)
 @pytest.mark.parametrize("name", SPOTS)
-def test_share_and_derivative(name: str, axis: list[float], within) -> None:
+def test_relative_intensity_and_derivative(name: str, axis: list[float], within) -> None:
     """Surfels lie exactly along, against and across every axis."""
     light, centers, results = spot(name, axis), room().centers, []
     for dtype in (torch.float32, torch.float64):
         leaves = leaves_of(light, dtype)
-        share = with_leaves(light, leaves).share_towards(centers.to(dtype))
-        weighted(share).backward()
-        results.append((share, leaves["position"].grad, leaves["axis"].grad))
-    for what, found, expected in zip(("share", "position", "axis"), *results, strict=True):
+        relative = with_leaves(light, leaves).relative_intensity_towards(centers.to(dtype))
+        weighted(relative).backward()
+        results.append((relative, leaves["position"].grad, leaves["axis"].grad))
+    for what, found, expected in zip(("relative", "position", "axis"), *results, strict=True):
         within(what, found, expected, 1e-4)  # measured 4e-7, 2e-7 and 1.7e-5
 
 

@@ -63,7 +63,9 @@ def _row(
     begin = time.perf_counter()
     bounds = measure_effects(frozen, seed=seed)
     measured = 1e3 * (time.perf_counter() - begin)
-    choice = choose_effects(bounds, tolerance, RigKind(scene.points, tuple(spot.least_share for spot in scene.spots)))
+    choice = choose_effects(
+        bounds, tolerance, RigKind(scene.points, tuple(spot.least_relative_intensity for spot in scene.spots))
+    )
     effects, view = choice.effects, frozen.view(scene.camera(resolution))
     generator = torch.Generator().manual_seed(seed + 1)
     rigs = [random_rig(scene, frozen, generator) for _ in range(lights)]

@@ -24,8 +24,8 @@ def shape_lamp(lamp: bpy.types.Light, light: Light) -> None:
     emission, output = nodes.add("ShaderNodeEmission"), nodes.add("ShaderNodeOutputLight")
     nodes.tree.links.new(emission.outputs["Emission"], output.inputs["Surface"])
     if light.axis is not None:
-        share = light.emission(_Maths(nodes), nodes.cosine(light.axis.tolist()))
-        nodes.tree.links.new(share, emission.inputs["Strength"])
+        relative = light.emission(_Maths(nodes), nodes.cosine(light.axis.tolist()))
+        nodes.tree.links.new(relative, emission.inputs["Strength"])
 
 
 class _Nodes:

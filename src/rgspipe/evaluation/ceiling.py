@@ -61,7 +61,7 @@ def project_albedo(surfels: Surfels, views: Sequence[View]) -> Tensor:
 
 
 def transmittance_image(bvh: SurfelBvh, weights: ViewWeights, position: Tensor) -> np.ndarray:
-    """(H, W) share of a light at `position` (3,) that reaches what each pixel sees; NaN where it sees too little."""
+    """(H, W) part of a light at `position` (3,) that reaches what each pixel sees; NaN where it sees too little."""
     passing = transmittance(bvh, position[None])[0][0]
     coverage = weights.coverage.to(passing.device)
     seen = (weights.operator @ passing[:, None])[:, 0] / coverage.clamp(min=LEAST_COVERAGE)

@@ -52,7 +52,7 @@ def pixel_kinds(view: View, transmittance: ArrayLike, scene_size: float) -> npt.
     true scene alone, so renders of different models are split alike.
 
     Args:
-        transmittance: (H, W) share of the light that reaches what each pixel sees, of the true scene; NaN where there
+        transmittance: (H, W) part of the light that reaches what each pixel sees, of the true scene; NaN where there
             is nothing.
         scene_size: longest side of the scene, scene units.
 

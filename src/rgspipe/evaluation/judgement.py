@@ -104,6 +104,6 @@ def kinds_of_views(truth: FrozenScene, views: Sequence[View]) -> list[npt.NDArra
         return None
     found = []
     for view in views:
-        shares = transmittance_image(truth.bvh, truth.view(view.camera, supersampling=1), view.light.position)
-        found.append(pixel_kinds(view, shares, truth.size))
+        passing = transmittance_image(truth.bvh, truth.view(view.camera, supersampling=1), view.light.position)
+        found.append(pixel_kinds(view, passing, truth.size))
     return found

@@ -22,7 +22,7 @@ class RigKind:
 
     Attributes:
         points: number of lights that shine alike in all directions.
-        spots: of every other light the smallest share of its intensity that it sends anywhere.
+        spots: of every other light the smallest relative intensity in any direction.
     """
 
     points: int
@@ -30,7 +30,7 @@ class RigKind:
 
     @classmethod
     def of(cls, rig: LightRig) -> RigKind:
-        spots = tuple(light.least_share for light in rig if light.axis is not None)
+        spots = tuple(light.least_relative_intensity for light in rig if light.axis is not None)
         return cls(len(rig) - len(spots), spots)
 
 
@@ -126,9 +126,9 @@ def rig_bounds(bounds: EffectBounds, rig: RigKind) -> dict[str, float]:
 
 
 def cone_bound(smallest: float) -> float:
-    """What a profile with smallest share p can change against a point light, (1 − p)/p, wherever it is aimed.
+    """What a profile that falls to p can change against a point light, (1 − p)/p, wherever it is aimed.
 
-    The brightest surfel has at least this share of what it has under a point light.
+    The brightest surfel has at least this part of what it has under a point light.
     """
     return min(NO_BOUND, (1.0 - smallest) / smallest) if smallest > 0.0 else NO_BOUND
 

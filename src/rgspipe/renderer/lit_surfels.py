@@ -9,11 +9,11 @@ from torch import Tensor
 
 from rgspipe.renderer.direct import unit_irradiance
 from rgspipe.renderer.effects import Effects
-from rgspipe.renderer.kernels.lit_shares import lit_shares
+from rgspipe.renderer.kernels.lit_transmittance import lit_transmittance
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
-from rgspipe.renderer.pixel_direct import surfel_shares
-from rgspipe.renderer.unit_light import UnitLight, emitted_share, shared
-from rgspipe.scene.lights import Share
+from rgspipe.renderer.pixel_direct import surfel_transmittance
+from rgspipe.renderer.unit_light import UnitLight, attenuated, emitted_intensity
+from rgspipe.scene.lights import RelativeIntensity
 
 
 @dataclass(frozen=True)
@@ -21,12 +21,12 @@ class LitSurfels:
     """What a light of unit intensity sends to N surfels, and how that changes when it moves.
 
     Attributes:
-        share: (N,) part of the light that passes all surfels on its way.
+        passing: (N,) transmittance of the way to each.
         slope: (N, 3) its derivative towards the light's position.
         columns: (N, 1 + D) irradiance per W/sr and its derivatives towards the light's own numbers.
     """
 
-    share: Tensor
+    passing: Tensor
     slope: Tensor
     columns: Tensor
 
@@ -35,22 +35,22 @@ def lit_surfels(bvh: SurfelBvh, light: UnitLight, effects: Effects, least: float
     """The surfels under a light: E = p(θ) T max(0, n·d)/|d|³, see `direct.unit_irradiance`.
 
     Args:
-        least: surfels to whose centres the light sends no more than this share p of its intensity are left without
+        least: surfels to whose centres the light sends no more than this part p of its intensity are left without
             shadows, which changes nothing there if it is 0; None if they all have theirs, for pixels that look beside
             the centre.
     """
     position = light.light.position
-    sent = emitted_share(light, bvh.surfels.centers, effects.spots)
-    share, slope = _shares(bvh, position, sent, effects.shadows, least)
+    sent = emitted_intensity(light, bvh.surfels.centers, effects.spots)
+    passing, slope = _transmittance(bvh, position, sent, effects.shadows, least)
     factor, factor_slope = (part[0] for part in unit_irradiance(bvh, position[None], shadows=False))
-    moved = factor_slope * share[:, None] + factor[:, None] * slope
-    return LitSurfels(share, slope, shared(torch.cat([(factor * share)[:, None], moved], dim=1), sent, light))
+    moved = factor_slope * passing[:, None] + factor[:, None] * slope
+    return LitSurfels(passing, slope, attenuated(torch.cat([(factor * passing)[:, None], moved], dim=1), sent, light))
 
 
-def _shares(
-    bvh: SurfelBvh, position: Tensor, sent: Share | None, shadows: bool, least: float | None
+def _transmittance(
+    bvh: SurfelBvh, position: Tensor, sent: RelativeIntensity | None, shadows: bool, least: float | None
 ) -> tuple[Tensor, Tensor]:
-    """`LitSurfels.share` and `LitSurfels.slope`."""
+    """`LitSurfels.passing` and `LitSurfels.slope`."""
     if sent is None or least is None or not shadows:
-        return surfel_shares(bvh, position, shadows)
-    return lit_shares(bvh, position, sent.value.abs() > least)
+        return surfel_transmittance(bvh, position, shadows)
+    return lit_transmittance(bvh, position, sent.value.abs() > least)

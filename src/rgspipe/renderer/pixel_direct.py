@@ -59,39 +59,39 @@ class PixelDirect:
         reach = torch.where(self._view.edges.to(reach.device), reach, torch.full_like(reach, torch.inf))
         return on_planes(origins, directions, centers, normals, reach)
 
-    def image(self, position: Tensor, share: Tensor, slope: Tensor) -> Tensor:
+    def image(self, position: Tensor, passing: Tensor, slope: Tensor) -> Tensor:
         """(P, 3, 4) radiance under a light of 1 W/sr in RGB at `position` (3,), and its derivative towards x, y, z.
 
         Args:
-            share, slope: `surfel_shares` of the light.
+            passing, slope: `surfel_transmittance` of the light.
         """
-        return self._light.image(position, share, slope, self._own_shares(position, share))
+        return self._light.image(position, passing, slope, self._own_passing(position, passing))
 
-    def operator(self, position: Tensor, share: Tensor) -> SparseOperator:
+    def operator(self, position: Tensor, passing: Tensor) -> SparseOperator:
         """(P, N) irradiance per W/sr where each pixel looks on each surfel, times the view's weight of it.
 
         Times albedo over π this is `image` of surfels of any albedo.
 
         Args:
-            share: `surfel_shares` of the light.
+            passing: `surfel_transmittance` of the light.
         """
-        entries = self._light.entries(position, share, self._own_shares(position, share))
+        entries = self._light.entries(position, passing, self._own_passing(position, passing))
         return self._view.operator.with_values(entries)
 
-    def _own_shares(self, position: Tensor, share: Tensor) -> Tensor:
-        """(P, 4) `own_share` of `PixelLight.image`: of pixels on a shadow's edge."""
-        lit = (self._view.operator @ share[:, None])[:, 0] / self._view.coverage.to(self._bvh.device).clamp(min=1e-6)
+    def _own_passing(self, position: Tensor, passing: Tensor) -> Tensor:
+        """(P, 4) `own_passing` of `PixelLight.image`: of pixels on a shadow's edge."""
+        lit = (self._view.operator @ passing[:, None])[:, 0] / self._view.coverage.to(self._bvh.device).clamp(min=1e-6)
         pixels = (self._plain & (lit > LIT_OR_NOT) & (lit < 1.0 - LIT_OR_NOT)).nonzero()[:, 0]
         return pixel_transmittance(self._bvh, self._view.camera, self._receivers, pixels, position, self._places)
 
 
-def surfel_shares(bvh: SurfelBvh, position: Tensor, shadows: bool = True) -> tuple[Tensor, Tensor]:
-    """Share (N,) of a light at `position` (3,) that reaches each surfel, and its derivative (N, 3)."""
+def surfel_transmittance(bvh: SurfelBvh, position: Tensor, shadows: bool = True) -> tuple[Tensor, Tensor]:
+    """Transmittance (N,) of the way from a light at `position` (3,) to each surfel, and its derivative (N, 3)."""
     if not shadows:
         count = len(bvh.surfels)
         return torch.ones(count, device=bvh.device), torch.zeros(count, 3, device=bvh.device)
-    share, slope = transmittance(bvh, position[None])
-    return share[0], slope[0]
+    passing, slope = transmittance(bvh, position[None])
+    return passing[0], slope[0]
 
 
 def _heaviest(view: ViewWeights) -> Tensor:

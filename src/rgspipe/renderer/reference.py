@@ -116,13 +116,13 @@ def unit_irradiance(surfels: Surfels, positions: Tensor, shadows: bool = True) -
 
 
 def transmittance(surfels: Surfels, positions: Tensor) -> Tensor:
-    """(L, N) shares of the lights (L, 3) that reach the surfels: `kernels.irradiance.transmittance`."""
+    """(L, N) parts of the lights (L, 3) that reach the surfels: `kernels.irradiance.transmittance`."""
     everyone = torch.arange(len(surfels))
     return torch.stack([transmittance_at(surfels, light, everyone, surfels.centers) for light in positions])
 
 
 def transmittance_at(surfels: Surfels, light: Tensor, receivers: Tensor, points: Tensor) -> Tensor:
-    """(R,) share of a light (3,) that reaches points (R, 3) on the planes of the surfels `receivers` (R,)."""
+    """(R,) part of a light (3,) that reaches points (R, 3) on the planes of the surfels `receivers` (R,)."""
     coverage, normals, centers = surfels.coverage, surfels.normals, surfels.centers
     scale, own = surfels.scales.prod(dim=1).sqrt()[receivers], normals[receivers]
     between = centers[None] - points[:, None]
@@ -138,8 +138,8 @@ def transmittance_at(surfels: Surfels, light: Tensor, receivers: Tensor, points:
     fade = ((depth / scale[:, None] - RECEIVER_SKIP) / RECEIVER_FADE).clamp(0.0, 1.0)
     alpha = alpha_at(surfels, depth[..., None] * rays[:, None] - between)
     met = met & (fade > 0.0) & (alpha > coverage.minimum_alpha)
-    share = _layers_from_afar(torch.where(met, alpha * fade, torch.zeros_like(alpha)), depth, coverage)
-    return torch.where(lit, share, torch.ones_like(share))
+    passing = _layers_from_afar(torch.where(met, alpha * fade, torch.zeros_like(alpha)), depth, coverage)
+    return torch.where(lit, passing, torch.ones_like(passing))
 
 
 def _layers_from_afar(alpha: Tensor, depth: Tensor, coverage: Coverage) -> Tensor:
@@ -168,14 +168,20 @@ def points_on_surfels(surfels: Surfels, origin: Tensor, rays: Tensor, indices: T
 
 
 def direct_image(
-    surfels: Surfels, weights: Tensor, edges: Tensor, camera: Camera, light: Tensor, share: Tensor, own_share: Tensor
+    surfels: Surfels,
+    weights: Tensor,
+    edges: Tensor,
+    camera: Camera,
+    light: Tensor,
+    passing: Tensor,
+    own_passing: Tensor,
 ) -> Tensor:
     """(P, 3) direct radiance of a light (3,) of 1 W/sr: `kernels.pixel_light.PixelLight.image`, its value.
 
     Args:
         weights: (P, N) dense view weights.
         edges: (P,) bool.
-        share: (N,) part of the light that reaches each surfel; own_share: (P,) of each pixel, negative where unknown.
+        passing: (N,) transmittance of the way to each surfel; own_passing: (P,) of each pixel, negative where unknown.
     """
     _, directions, lengths = camera.rays()
     rays, axes = directions * lengths[:, None], camera.camera_to_world[:3, :3].double()
@@ -198,7 +204,7 @@ def direct_image(
     near = footprint > NEAR * (light - seen).norm(dim=1)
     nodes = ((-float(NODE), float(SIDE_WEIGHT)), (0.0, float(MIDDLE_WEIGHT)), (float(NODE), float(SIDE_WEIGHT)))
     mean = sum(wx * wy * lit(x, y)[1] for x, wx in nodes for y, wy in nodes)
-    passing = torch.where(own_share[pixels] >= 0.0, own_share[pixels], share[indices])
-    contribution = weights[pixels, indices] * passing * torch.where(near, mean, value)
+    part = torch.where(own_passing[pixels] >= 0.0, own_passing[pixels], passing[indices])
+    contribution = weights[pixels, indices] * part * torch.where(near, mean, value)
     image = torch.zeros(len(weights), 3, dtype=weights.dtype)
     return image.index_add(0, pixels, contribution[:, None] * surfels.albedo[indices] / math.pi)

@@ -9,8 +9,8 @@ from typing import Protocol
 import torch
 from torch import Tensor
 
-from rgspipe.renderer.zonal_harmonics import BandLimit, band_limited_share
-from rgspipe.scene.lights import Light, Share
+from rgspipe.renderer.zonal_harmonics import BandLimit, band_limited_intensity
+from rgspipe.scene.lights import Light, RelativeIntensity
 
 
 class UnitLight(Protocol):
@@ -26,7 +26,7 @@ class UnitLight(Protocol):
 
     @property
     def softness(self) -> float:
-        """By how much its edge of light is widened [rad]; see `Light.share`."""
+        """By how much its edge of light is widened [rad]; see `Light.relative_intensity`."""
         ...
 
     @property
@@ -34,32 +34,32 @@ class UnitLight(Protocol):
         """Whether its shape is among the numbers."""
         ...
 
-    def slopes(self, share: Share) -> Tensor:
-        """(N, D) derivatives of its share towards the numbers."""
+    def slopes(self, sent: RelativeIntensity) -> Tensor:
+        """(N, D) derivatives of its relative intensity towards the numbers."""
         ...
 
 
-def emitted_share(light: UnitLight, points: Tensor, band: BandLimit | None) -> Share | None:
-    """The share of a light towards `points` (N, 3) float64, exact or band-limited; None if all of it goes there.
+def emitted_intensity(light: UnitLight, points: Tensor, band: BandLimit | None) -> RelativeIntensity | None:
+    """What a light sends towards `points` (N, 3) float64, exact or band-limited; None if all of it goes there.
 
     Args:
         band: None for the exact profile.
     """
     if band is None or light.light.axis is None:
-        return light.light.share(points, softness=light.softness, shape_free=light.shape_free)
-    return band_limited_share(light.light, points, band, light.softness)
+        return light.light.relative_intensity(points, softness=light.softness, shape_free=light.shape_free)
+    return band_limited_intensity(light.light, points, band, light.softness)
 
 
-def shared(columns: Tensor, share: Share | None, light: UnitLight) -> Tensor:
-    """What a point light's `columns` (N, …, 4) are of `light`, which sends a share of its light there.
+def attenuated(columns: Tensor, sent: RelativeIntensity | None, light: UnitLight) -> Tensor:
+    """What a point light's `columns` (N, …, 4) are of `light`, which sends that much of its intensity there.
 
     Returns:
         (N, …, 1 + D): the value, then its derivatives.
     """
-    if share is None:
+    if sent is None:
         return columns
     between = [1] * (columns.ndim - 2)
-    value, slopes = share.value.reshape(-1, *between, 1), light.slopes(share)
+    value, slopes = sent.value.reshape(-1, *between, 1), light.slopes(sent)
     slopes = slopes.reshape(len(slopes), *between, slopes.shape[1])
     unit = columns[..., :1]
     products = slopes * unit
@@ -96,9 +96,9 @@ class OwnLight:
         others += [number.name for number in self.given.shape]
         return ("position", *(name for name in others if _wanted(getattr(self.given, name))))
 
-    def slopes(self, share: Share) -> Tensor:
-        """(N, D) derivatives of its share towards its tensors, one after the other."""
-        slopes = [share.by[name] for name in self.names]
+    def slopes(self, sent: RelativeIntensity) -> Tensor:
+        """(N, D) derivatives of its relative intensity towards its tensors, one after the other."""
+        slopes = [sent.by[name] for name in self.names]
         return torch.cat([slope if slope.ndim > 1 else slope[:, None] for slope in slopes], dim=1)
 
     def attached(self, value: Tensor, slopes: Tensor) -> Tensor:

@@ -19,7 +19,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from rgspipe.scene.lights import AxialLight, Share
+from rgspipe.scene.lights import AxialLight, RelativeIntensity
 from rgspipe.scene.lights.angles import angle_slopes
 
 #: Nodes of each panel of the quadrature, and further ones for each degree, whose waves they have to follow.
@@ -46,8 +46,10 @@ class BandLimit:
             raise ValueError(f"a band limit must have a degree of at least 0, got {self.degree}")
 
 
-def band_limited_share(light: AxialLight, points: Tensor, band: BandLimit, softness: float = 0.0) -> Share:
-    """`AxialLight.share` towards `points` (N, 3) float64 of a profile in spherical harmonics, with all derivatives."""
+def band_limited_intensity(
+    light: AxialLight, points: Tensor, band: BandLimit, softness: float = 0.0
+) -> RelativeIntensity:
+    """`AxialLight.relative_intensity` towards `points` (N, 3) float64 in spherical harmonics, with all derivatives."""
     towards = (points.double() - light.position.to(points.device, torch.float64)).float()
     unit = torch.nn.functional.normalize(light.axis.to(towards), dim=0)[None]
     angle, by_towards, by_axis = angle_slopes(unit, towards)
@@ -56,7 +58,7 @@ def band_limited_share(light: AxialLight, points: Tensor, band: BandLimit, softn
     value, *by_numbers = (polynomials @ torch.stack([coefficients, *by_shape.values()], dim=1).to(angle)).unbind(dim=1)
     slope = -(torch.sin(angle) * (rises @ coefficients.to(angle)))[:, None]
     by = {"position": -slope * by_towards, "direction": slope * by_axis / float(light.axis.norm())}
-    return Share(value, by | dict(zip(by_shape, by_numbers, strict=True)))
+    return RelativeIntensity(value, by | dict(zip(by_shape, by_numbers, strict=True)))
 
 
 def zonal_coefficients(light: AxialLight, band: BandLimit, softness: float = 0.0) -> tuple[Tensor, dict[str, Tensor]]:
@@ -69,10 +71,10 @@ def zonal_coefficients(light: AxialLight, band: BandLimit, softness: float = 0.0
     numbers = light.numbers(angles, tuple(angles.shape))
     numbers = {name: value.detach().clone().requires_grad_() for name, value in numbers.items()}
     with torch.enable_grad():
-        share, _ = light.profile_at(angles, numbers, softness)
-        slopes = torch.autograd.grad(share.sum(), tuple(numbers.values()), allow_unused=True)
+        relative, _ = light.profile_at(angles, numbers, softness)
+        slopes = torch.autograd.grad(relative.sum(), tuple(numbers.values()), allow_unused=True)
     unmoved = torch.zeros_like(angles)
-    columns = torch.stack([share.detach(), *(unmoved if slope is None else slope for slope in slopes)], dim=1)
+    columns = torch.stack([relative.detach(), *(unmoved if slope is None else slope for slope in slopes)], dim=1)
     degrees = torch.arange(band.degree + 1, dtype=torch.float64)
     factors = degrees + 0.5
     if band.mirrored:

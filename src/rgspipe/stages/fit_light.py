@@ -150,7 +150,7 @@ def _choice(config: RgspipeConfig, freeze: Artifact) -> tuple[EffectBounds, Effe
     count = spec.count or MOST_LIGHTS
     # In harmonics a spot's light leaves its cone.
     in_cones = spec.aimed and band is None
-    kind = RigKind(0, (spec.kinds[-1].least_share,) * count) if in_cones else RigKind(count)
+    kind = RigKind(0, (spec.kinds[-1].least_relative_intensity,) * count) if in_cones else RigKind(count)
     bounds, choice = chosen_effects(config.effects, freeze, kind)
     return bounds, choice if band is None or not spec.aimed else _in_harmonics(choice, band)
 

@@ -24,7 +24,7 @@ from rgspipe.optim.levenberg_marquardt import NormalEquations, least_squares, wi
 from rgspipe.progress import progress_bar
 from rgspipe.renderer.direct import unit_irradiance
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
-from rgspipe.renderer.pixel_direct import PixelDirect, surfel_shares
+from rgspipe.renderer.pixel_direct import PixelDirect, surfel_transmittance
 from rgspipe.renderer.transport import PatchTransport
 from rgspipe.renderer.view_weights import ViewWeights
 from rgspipe.scene.lights import PointLight
@@ -114,8 +114,8 @@ class _OneLight:
 
     def _unit_image(self, position: Tensor) -> Tensor:
         """(P, 3, 4) image of a light of 1 W/sr with all bounces, and its derivative towards x, y and z."""
-        share, slope = surfel_shares(self._bvh, position)
-        image = self._direct.image(position, share, slope)
+        passing, slope = surfel_transmittance(self._bvh, position)
+        image = self._direct.image(position, passing, slope)
         irradiance, gradient = unit_irradiance(self._bvh, position[None])
         columns = torch.cat([irradiance[0, :, None], gradient[0]], dim=1) / math.pi
         albedo = self._transport.albedo

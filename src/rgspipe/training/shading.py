@@ -25,7 +25,7 @@ class SurfelLight:
     Attributes:
         position: (3,) scene units.
         intensity: (3,) W/sr.
-        transmittance: (N,) share that shadows let through; it lags behind the geometry.
+        transmittance: (N,) part that shadows let through; it lags behind the geometry.
         indirect: (N, 3) irradiance from other surfels over π; it lags too.
     """
 
@@ -46,11 +46,11 @@ def surfel_lights(surfels: Surfels, lights: Sequence[PointLight], total: Tensor)
     for start in range(0, len(lights), LIGHTS_AT_ONCE):
         block = lights[start : start + LIGHTS_AT_ONCE]
         positions = torch.stack([light.position for light in block])
-        shares, _ = transmittance(bvh, positions)
+        passing, _ = transmittance(bvh, positions)
         for k, light in enumerate(block):
             position, intensity = light.position.to(surfels.centers), light.intensity.to(surfels.centers)
-            direct = direct_irradiance(surfels, position, intensity, shares[k])
-            found.append(SurfelLight(position, intensity, shares[k], total[start + k] - direct))
+            direct = direct_irradiance(surfels, position, intensity, passing[k])
+            found.append(SurfelLight(position, intensity, passing[k], total[start + k] - direct))
     return found
 
 

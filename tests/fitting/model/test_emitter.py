@@ -73,19 +73,19 @@ def test_derivatives_of_a_spot_s_image_agree_with_finite_differences(room, shape
 
 
 @pytest.mark.parametrize("shape", [*ANY, *SHAPES], ids=name_of)
-def test_derivatives_of_a_share_are_those_of_steps(shape: Light) -> None:
+def test_derivatives_of_a_relative_intensity_are_those_of_steps(shape: Light) -> None:
     """Through what is tied to another field, and in the units of steps; of every kind."""
     emitter = emitter_at(PLACE, AXIS, shape, shape_free=True)
     generator = torch.Generator().manual_seed(0)
     points = PLACE + torch.nn.functional.normalize(torch.randn(3000, 3, generator=generator, dtype=torch.float64))
-    share = shape.at(PLACE, AXIS).share(points, shape_free=True)
-    if share is None:
+    relative = shape.at(PLACE, AXIS).relative_intensity(points, shape_free=True)
+    if relative is None:
         assert emitter.parameters == 3
         return
-    slopes = emitter.slopes(share) * emitter.units(2.0).float()
+    slopes = emitter.slopes(relative) * emitter.units(2.0).float()
     for k in range(emitter.parameters):
         step = 1e-5 * torch.eye(emitter.parameters, dtype=torch.float64)[k]
-        ends = [emitter.moved(sign * step, 2.0).light.share_towards(points) for sign in (1, -1)]
+        ends = [emitter.moved(sign * step, 2.0).light.relative_intensity_towards(points) for sign in (1, -1)]
         expected = (ends[0] - ends[1]) / 2e-5
         # Measured at most 2.1e-5, of a cone of 15°.
         assert float((slopes[:, k] - expected).abs().max()) < 1e-4 * float(expected.abs().max())

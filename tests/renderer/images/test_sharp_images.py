@@ -79,7 +79,7 @@ def exact_image(surfels: Surfels, frozen: FrozenScene, at: Light) -> Callable[[L
     _, directions, lengths = CAMERA.rays()
     axes, which = CAMERA.camera_to_world[:3, :3], receivers[pixels]
 
-    def own_shares(position: Tensor) -> Tensor:
+    def own_passing(position: Tensor) -> Tensor:
         total = torch.zeros(len(pixels), dtype=torch.float64)
         for x, y in (even_places(SHADOW_RAYS) - 0.5).tolist():
             rays = (directions * lengths[:, None])[pixels] + x * axes[:, 0] / CAMERA.fx + y * axes[:, 1] / CAMERA.fy
@@ -90,12 +90,12 @@ def exact_image(surfels: Surfels, frozen: FrozenScene, at: Light) -> Callable[[L
 
     def image(light: Light) -> Tensor:
         position = light.position
-        share = reference.transmittance(surfels, position[None])[0]
-        direct = reference.direct_image(surfels, weights, edges, CAMERA, position, share, own_shares(position))
+        passing = reference.transmittance(surfels, position[None])[0]
+        direct = reference.direct_image(surfels, weights, edges, CAMERA, position, passing, own_passing(position))
         irradiance = reference.unit_irradiance(surfels, position[None])[0]
         if light.axis is not None:
-            direct = direct * light.share_towards(points)[:, None]
-            irradiance = irradiance * light.share_towards(surfels.centers)
+            direct = direct * light.relative_intensity_towards(points)[:, None]
+            irradiance = irradiance * light.relative_intensity_towards(surfels.centers)
         radiance = transport.radiance(irradiance[:, None]) - transport.radiance(irradiance[:, None], indirect=False)
         return (direct + weights @ radiance[:, :, 0]) * light.intensity
 

@@ -125,34 +125,36 @@ def test_it_moves_between_precisions_and_leaves_its_graph(light: Light) -> None:
 
 
 @every_light
-def test_no_share_is_above_one_or_below_the_least(light: Light) -> None:
-    share = light.share(points())
-    if share is None:
-        assert light.least_share == 1.0 and light.axis is None
+def test_no_relative_intensity_is_above_one_or_below_the_least(light: Light) -> None:
+    relative = light.relative_intensity(points())
+    if relative is None:
+        assert light.least_relative_intensity == 1.0 and light.axis is None
         torch.testing.assert_close(light.power(), 4.0 * math.pi * COLOUR)
     else:
-        assert light.least_share - 1e-6 <= float(share.value.min()) and float(share.value.max()) <= 1.0
+        assert (
+            light.least_relative_intensity - 1e-6 <= float(relative.value.min()) and float(relative.value.max()) <= 1.0
+        )
         assert bool((light.power() < 4.0 * math.pi * COLOUR).all())
 
 
 @every_light
 @pytest.mark.parametrize("softness", [0.0, 0.15])
-def test_derivatives_of_its_share_are_those_of_finite_differences(light: Light, softness: float) -> None:
-    share = light.share(points(), softness=softness, shape_free=True)
-    if share is None:
+def test_derivatives_of_its_relative_intensity_are_those_of_finite_differences(light: Light, softness: float) -> None:
+    relative = light.relative_intensity(points(), softness=softness, shape_free=True)
+    if relative is None:
         return
-    assert {*share.by} == {"position", "direction", *(number.name for number in light.shape)}
+    assert {*relative.by} == {"position", "direction", *(number.name for number in light.shape)}
     # Measured 2.9e-6.
-    torch.testing.assert_close(share.value.double(), exact_share(light, softness), rtol=0.0, atol=1e-5)
-    for name, slopes in share.by.items():
+    torch.testing.assert_close(relative.value.double(), exact_intensity(light, softness), rtol=0.0, atol=1e-5)
+    for name, slopes in relative.by.items():
         for slope, way in ways(light, name, slopes):
             ends = [replace(light, **{name: getattr(light, name) + sign * 1e-6 * way}) for sign in (1.0, -1.0)]
-            expected = (exact_share(ends[0], softness) - exact_share(ends[1], softness)) / 2e-6
+            expected = (exact_intensity(ends[0], softness) - exact_intensity(ends[1], softness)) / 2e-6
             # Measured at most 1.9e-5, of a cone of 15°.
             assert float((slope - expected).abs().max()) < 1e-4 * float(expected.abs().max()), name
 
 
-def exact_share(light: Light, softness: float = 0.0) -> Tensor:
+def exact_intensity(light: Light, softness: float = 0.0) -> Tensor:
     """In float64."""
     angle = angle_from_axis(light.axis, points() - light.position)
     return light.profile_at(angle, light.numbers(angle), softness)[0]
@@ -190,14 +192,14 @@ class Arithmetic:
 
 
 @every_light
-def test_other_programs_are_told_its_share(light: Light) -> None:
+def test_other_programs_are_told_its_profile(light: Light) -> None:
     towards = torch.nn.functional.normalize(points() - PLACE, dim=1)
     told = light.emission(Arithmetic, (towards @ AXIS).numpy())
     if light.axis is None:
         assert told is None
     else:
         # Measured 2e-15.
-        np.testing.assert_allclose(told, light.share_towards(points()), rtol=0.0, atol=1e-12)
+        np.testing.assert_allclose(told, light.relative_intensity_towards(points()), rtol=0.0, atol=1e-12)
 
 
 @every_light
@@ -211,8 +213,8 @@ def test_light_on_surfels_knows_how_it_changes_with_every_tensor(light: Light) -
 
     def exact(**changed: Tensor) -> float:
         one = replace(light, **changed)
-        share = 1.0 if one.axis is None else one.share_towards(surfels.centers)
-        lit = irradiance(surfels, one.position, shadows=False) * share
+        relative = 1.0 if one.axis is None else one.relative_intensity_towards(surfels.centers)
+        lit = irradiance(surfels, one.position, shadows=False) * relative
         return float((lit[:, None] * one.intensity * weights).sum())
 
     leaves = {name: value.clone().requires_grad_() for name, value in values.items()}

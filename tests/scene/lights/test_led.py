@@ -42,8 +42,8 @@ def test_intensity_falls_to_one_half_at_the_half_angle(degrees: float, exponent:
     half = math.radians(degrees)
     assert exponent == pytest.approx(math.log(0.5) / math.log(math.cos(half)), rel=1e-3)
     exponent = math.log(0.5) / math.log(math.cos(half))
-    share, _ = profile(exponent, torch.tensor([0.0, half, math.pi - half], dtype=torch.float64))
-    torch.testing.assert_close(share, torch.tensor([1.0, 0.5, 0.0]).double(), rtol=0.0, atol=1e-12)
+    relative, _ = profile(exponent, torch.tensor([0.0, half, math.pi - half], dtype=torch.float64))
+    torch.testing.assert_close(relative, torch.tensor([1.0, 0.5, 0.0]).double(), rtol=0.0, atol=1e-12)
 
 
 @pytest.mark.parametrize("exponent", [0.5, 1.0, 2.5, 20.0, 1000.0])
@@ -75,12 +75,12 @@ def test_values_and_gradients_are_finite_everywhere(exponent: float, dtype: torc
     free = torch.tensor(exponent, dtype=dtype, requires_grad=True)
     light = LedLight(place, COLOUR, axis, free)
     points = place.detach() + torch.tensor(towards, dtype=dtype)
-    share = light.share_towards(points)
-    share.sum().backward()
-    for value in (share, place.grad, axis.grad, free.grad):
+    relative = light.relative_intensity_towards(points)
+    relative.sum().backward()
+    for value in (relative, place.grad, axis.grad, free.grad):
         assert torch.isfinite(value).all()
-    assert float(share.detach().min()) >= 0.0 and float(share.detach().max()) <= 1.0
-    analytic = light.share(points, softness=softness, shape_free=True)
+    assert float(relative.detach().min()) >= 0.0 and float(relative.detach().max()) <= 1.0
+    analytic = light.relative_intensity(points, softness=softness, shape_free=True)
     for value in (analytic.value, *analytic.by.values()):
         assert torch.isfinite(value).all()
 
@@ -88,14 +88,18 @@ def test_values_and_gradients_are_finite_everywhere(exponent: float, dtype: torc
 def test_behind_an_led_it_is_dark_whatever_the_exponent() -> None:
     behind = PLACE - torch.rand(50, 1, generator=torch.Generator().manual_seed(0)) * AXIS
     for exponent in (0.0, 0.5, 1.0, 1000.0):
-        assert float(led(exponent).share_towards(behind).max()) == led(exponent).least_share == 0.0
+        assert (
+            float(led(exponent).relative_intensity_towards(behind).max())
+            == led(exponent).least_relative_intensity
+            == 0.0
+        )
 
 
 def test_a_lambertian_led_is_a_small_square_that_glows() -> None:
-    """The share of an exponent of 1 is the cosine, that of 0 is 1 in front."""
+    """The relative intensity of an exponent of 1 is the cosine, that of 0 is 1 in front."""
     angle = torch.linspace(0.0, 1.5, 50, dtype=torch.float64)
-    torch.testing.assert_close(led(1.0).share_at(angle), torch.cos(angle))
-    assert torch.equal(led(0.0).share_at(angle), torch.ones_like(angle))
+    torch.testing.assert_close(led(1.0).relative_intensity_at(angle), torch.cos(angle))
+    assert torch.equal(led(0.0).relative_intensity_at(angle), torch.ones_like(angle))
 
 
 def test_a_softer_beam_is_wider_by_as_much_as_a_gaussian_s() -> None:
@@ -103,11 +107,11 @@ def test_a_softer_beam_is_wider_by_as_much_as_a_gaussian_s() -> None:
     narrow, wide = led(100.0), 1.0 / (1.0 / 100.0 + 0.15**2)
     angle = torch.linspace(0.0, 1.0, 50, dtype=torch.float64)
     softened, _ = narrow.profile_at(angle, narrow.numbers(angle), 0.15)
-    torch.testing.assert_close(softened, led(wide).share_at(angle))
+    torch.testing.assert_close(softened, led(wide).relative_intensity_at(angle))
     assert narrow.rim == pytest.approx(0.1)
     # As wide as the Gaussian of that standard deviation; measured 0.2 % of the axial intensity.
     gaussian = torch.exp(-0.5 * (angle / narrow.rim) ** 2)
-    assert float((narrow.share_at(angle) - gaussian).abs().max()) < 0.01
+    assert float((narrow.relative_intensity_at(angle) - gaussian).abs().max()) < 0.01
 
 
 @pytest.mark.parametrize("exponent", [-0.1, math.nan])

@@ -54,11 +54,11 @@ def test_values_and_derivatives_are_finite_everywhere(profile: str, cone: float,
     axis = light.direction.to(dtype).clone().requires_grad_()
     position = light.position.to(dtype).clone().requires_grad_()
     offsets = torch.tensor([[0, 0, 1], [0, 0, -1], [1, 0, 0], [0, 0, 0], [1e-12, 0, 1], [1, 1, 1]], dtype=dtype)
-    share = replace(light, position=position, direction=axis).share_towards(position.detach() + offsets)
-    share.sum().backward()
-    for value in (share, axis.grad, position.grad):
+    relative = replace(light, position=position, direction=axis).relative_intensity_towards(position.detach() + offsets)
+    relative.sum().backward()
+    for value in (relative, axis.grad, position.grad):
         assert torch.isfinite(value).all()
-    assert float(share.detach().min()) >= 0.0 and float(share.detach().max()) <= 1.0
+    assert float(relative.detach().min()) >= 0.0 and float(relative.detach().max()) <= 1.0
 
 
 @pytest.mark.parametrize(("profile", "falloff"), [("gaussian", 0.2), ("smoothstep", 0.5), ("linear", 0.3)])
@@ -67,10 +67,10 @@ def test_derivatives_match_finite_differences(profile: str, falloff: float) -> N
     points = torch.randn(20, 3, generator=torch.Generator().manual_seed(0), dtype=torch.float64)
     position, axis = light.position.clone().requires_grad_(), light.direction.clone().requires_grad_()
 
-    def share(position: torch.Tensor, axis: torch.Tensor) -> torch.Tensor:
-        return replace(light, position=position, direction=axis).share_towards(points)
+    def relative(position: torch.Tensor, axis: torch.Tensor) -> torch.Tensor:
+        return replace(light, position=position, direction=axis).relative_intensity_towards(points)
 
-    assert torch.autograd.gradcheck(share, (position, axis), atol=1e-6)
+    assert torch.autograd.gradcheck(relative, (position, axis), atol=1e-6)
 
 
 @pytest.mark.parametrize("profile", ["gaussian", "smoothstep", "linear"])

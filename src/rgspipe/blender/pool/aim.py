@@ -49,7 +49,7 @@ def aim_at_seen(
     towards = torch.from_numpy(lit - position)
     for _ in range(MAX_AXES if len(lit) else 0):
         axis = towards[rng.integers(len(lit))]
-        if int((shape.share_at(angle_from_axis(axis, towards)) >= 0.5).sum()) >= least:
+        if int((shape.relative_intensity_at(angle_from_axis(axis, towards)) >= 0.5).sum()) >= least:
             return _unit(axis.numpy())
     return None
 

@@ -10,7 +10,7 @@ from itertools import accumulate
 import torch
 from torch import Tensor
 
-from rgspipe.scene.lights import Light, Share
+from rgspipe.scene.lights import Light, RelativeIntensity
 from rgspipe.scene.lights.coordinates import Coordinate
 
 #: R, G and B.
@@ -28,7 +28,7 @@ class Emitter:
     Attributes:
         light: float64 on the CPU; its intensity is not looked at.
         shape_free: whether its shape moves.
-        softness: by how much its edge of light is widened for now [rad]; see `Light.share`.
+        softness: by how much its edge of light is widened for now [rad]; see `Light.relative_intensity`.
     """
 
     light: Light
@@ -134,9 +134,9 @@ class Emitter:
         moving = [(one.spread(self._value(name)).T, one.motion) for name, one in self.coordinates.items() if one.motion]
         return torch.cat([torch.cat([scale * spread for scale in scales[how]], dim=1) for spread, how in moving])
 
-    def slopes(self, share: Share) -> Tensor:
-        """(N, D) natural derivatives of its share towards its parameters: scene units and rad."""
-        by = self.light.tied_slopes(share.by)
+    def slopes(self, sent: RelativeIntensity) -> Tensor:
+        """(N, D) natural derivatives of its relative intensity towards its parameters: scene units and rad."""
+        by = self.light.tied_slopes(sent.by)
         return torch.cat([one.slopes(self._value(name), by[name]) for name, one in self.coordinates.items()], dim=1)
 
     def _value(self, name: str) -> Tensor | float:

@@ -32,7 +32,7 @@ def aimed_candidates(
 ) -> CoarseImages:
     """Candidate lights of given shapes at the dictionary's positions, with their coarse images.
 
-    A light's coarse image follows from that of a point light at its place: the share of light that the profile lets
+    A light's coarse image follows from that of a point light at its place: the part of light that the profile lets
     through is taken at the mean place of what each block sees, and of each group of patches.
     """
     options = options or AimedOptions()
@@ -57,7 +57,7 @@ def aimed_candidates(
 
 @dataclass(frozen=True)
 class _LitByPoints:
-    """What unit point lights at C places light, of which lights with an axis there let shares through.
+    """What unit point lights at C places light, of which lights with an axis there let parts through.
 
     Attributes:
         places: (B + K, 3) float32 mean place of what each block sees, and of each group of patches.
@@ -105,9 +105,9 @@ def _seen_places(frozen: FrozenScene, model: BlockModel) -> Tensor:
 
 def _aimed_seen(shape: AxialLight, angle: Tensor, lit: _LitByPoints, index: int, softness: float) -> Tensor:
     """(A, B, 3) coarse images of lights at place `index`, from the angles (A, B + K) of what they light."""
-    share, _ = shape.profile_at(angle, shape.numbers(angle), softness)
+    relative, _ = shape.profile_at(angle, shape.numbers(angle), softness)
     count = lit.direct.shape[1]
-    seen = share[:, :count, None] * lit.direct[index]
+    seen = relative[:, :count, None] * lit.direct[index]
     for channel, bounced in enumerate(() if lit.bounced is None else lit.bounced):
-        seen[:, :, channel] += (share[:, count:] * lit.grouped[index, :, channel]) @ bounced.T
+        seen[:, :, channel] += (relative[:, count:] * lit.grouped[index, :, channel]) @ bounced.T
     return seen

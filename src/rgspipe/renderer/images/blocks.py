@@ -14,7 +14,7 @@ from torch import Tensor
 from rgspipe.renderer.effects import ALL_EFFECTS, Effects
 from rgspipe.renderer.images.model import ImageModel
 from rgspipe.renderer.images.viewed_pixels import ViewedPixels
-from rgspipe.renderer.kernels.lit_shares import LEAST_LIT
+from rgspipe.renderer.kernels.lit_transmittance import LEAST_LIT
 from rgspipe.renderer.lit_surfels import lit_surfels
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.transport import PatchTransport

@@ -12,7 +12,7 @@ from rgspipe.renderer.pixel_lobe import only_columns
 from rgspipe.renderer.view_weights import ViewWeights
 
 #: A surfel that less of the light reaches has no relative slope of its shadow.
-LEAST_SHARE = 1e-3
+LEAST_PASSING = 1e-3
 
 
 class PixelHighlights:
@@ -43,14 +43,14 @@ class PixelHighlights:
         self._normals = gloss.geometry[1].float()[self._columns]
         self._mirrors = mirrored(eyes.float()[self._rows], self._normals)
 
-    def image(self, position: Tensor, share: Tensor, slope: Tensor) -> Tensor:
+    def image(self, position: Tensor, passing: Tensor, slope: Tensor) -> Tensor:
         """(P, 3, 4) radiance of the highlights of a light of 1 W/sr in RGB at `position` (3,), and its derivatives.
 
         Args:
-            share, slope: `pixel_direct.surfel_shares` of the light.
+            passing, slope: `pixel_direct.surfel_transmittance` of the light.
         """
         reflectance, exponents = self._gloss.material
-        direct = self._direct.operator(position, share).matrix.values()[self._kept]
+        direct = self._direct.operator(position, passing).matrix.values()[self._kept]
         path = (position.to(self._direct.points) - self._direct.points).float()
         distance = path.norm(dim=1, keepdim=True).clamp(min=1e-20)
         towards, inverse = (path / distance)[self._rows], (1.0 / distance)[self._rows]
@@ -60,7 +60,7 @@ class PixelHighlights:
         across = (towards * self._normals).sum(dim=1, keepdim=True).clamp(min=1e-4)
         relative = (self._normals / across - 3.0 * towards) * inverse
         surfels = self._gloss.glossy
-        shaded = (slope[surfels] / share[surfels].clamp(min=LEAST_SHARE)[:, None])[self._columns]
+        shaded = (slope[surfels] / passing[surfels].clamp(min=LEAST_PASSING)[:, None])[self._columns]
         slopes = turned * (self._mirrors - cosines[:, None] * towards) * inverse + highlight * (relative + shaded)
         entries = torch.cat([highlight, slopes], dim=1)
         return torch.stack([self._summed(column, reflectance) for column in entries.unbind(1)], dim=2)

@@ -13,7 +13,7 @@ from rgspipe.renderer.effects import Effects
 from rgspipe.renderer.glossy_transport import GlossyTransport
 from rgspipe.renderer.images.glossy import seen_light, seen_with_gloss
 from rgspipe.renderer.images.viewed_pixels import ViewedPixels
-from rgspipe.renderer.kernels.lit_shares import LEAST_LIT
+from rgspipe.renderer.kernels.lit_transmittance import LEAST_LIT
 from rgspipe.renderer.lit_surfels import lit_surfels
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.unit_light import UnitLight

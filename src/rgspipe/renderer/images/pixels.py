@@ -14,11 +14,11 @@ from rgspipe.renderer.images.glossy import bounced_light, seen_light, seen_with_
 from rgspipe.renderer.images.highlights import PixelHighlights
 from rgspipe.renderer.images.model import ViewModel
 from rgspipe.renderer.images.viewed_pixels import ViewedPixels
-from rgspipe.renderer.kernels.lit_shares import LEAST_LIT
+from rgspipe.renderer.kernels.lit_transmittance import LEAST_LIT
 from rgspipe.renderer.lit_surfels import LitSurfels, lit_surfels
 from rgspipe.renderer.pixel_direct import PixelDirect
 from rgspipe.renderer.rig import RigResponse
-from rgspipe.renderer.unit_light import OwnLight, UnitLight, emitted_share, shared
+from rgspipe.renderer.unit_light import OwnLight, UnitLight, attenuated, emitted_intensity
 from rgspipe.scene.lights import LightRig
 
 
@@ -80,10 +80,10 @@ class PixelModel(ViewModel):
     def _direct(self, light: UnitLight, lit: LitSurfels) -> Tensor:
         """(P, 3, 1 + D) direct light of a unit light."""
         position = light.light.position
-        images = [direct.image(position, lit.share, lit.slope) for direct in self.direct]
+        images = [direct.image(position, lit.passing, lit.slope) for direct in self.direct]
         for index, highlights in enumerate(self.highlights):
-            images[index] = images[index] + highlights.image(position, lit.share, lit.slope)
+            images[index] = images[index] + highlights.image(position, lit.passing, lit.slope)
         columns = torch.cat(images)[self.views.pixels]
         if light.light.axis is None:
             return columns
-        return shared(columns, emitted_share(light, self.points, self.effects.spots), light)
+        return attenuated(columns, emitted_intensity(light, self.points, self.effects.spots), light)

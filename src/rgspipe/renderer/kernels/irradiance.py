@@ -69,7 +69,7 @@ def point_irradiance(bvh: SurfelBvh, positions: Tensor, shadows: bool) -> tuple[
 
 
 def transmittance(bvh: SurfelBvh, positions: Tensor) -> tuple[Tensor, Tensor]:
-    """Share (L, N) of lights at (L, 3) that reaches each surfel, and its derivative (L, N, 3) towards their positions.
+    """Transmittance (L, N) from lights at (L, 3) to each surfel, and its derivative (L, N, 3) towards their positions.
 
     Occluders are two-sided. Surfels that face away from the light get 1: their irradiance is zero by the cosine.
     """

@@ -104,26 +104,26 @@ def _direct_image(
     rays: PixelRays,
     reflectance: wp.array(dtype=wp.vec3),
     light: wp.vec3,
-    share: wp.array(dtype=float),
-    share_slope: wp.array(dtype=wp.vec3),
-    own_share: wp.array(dtype=wp.vec4),
+    passing: wp.array(dtype=float),
+    passing_slope: wp.array(dtype=wp.vec3),
+    own_passing: wp.array(dtype=wp.vec4),
     image: wp.array(dtype=wp.vec4, ndim=2),
 ):
     p = wp.tid() + offset
-    own = own_share[p]
+    own = own_passing[p]
     red = wp.vec4(0.0, 0.0, 0.0, 0.0)
     green = wp.vec4(0.0, 0.0, 0.0, 0.0)
     blue = wp.vec4(0.0, 0.0, 0.0, 0.0)
     for e in range(view.rows[p], view.rows[p + 1]):
         j = view.columns[e]
-        passing = share[j]
-        slope = share_slope[j]
+        part = passing[j]
+        slope = passing_slope[j]
         if own[0] >= 0.0:
-            passing = own[0]
+            part = own[0]
             slope = wp.vec3(own[1], own[2], own[3])
-        if passing > 0.0 or wp.dot(slope, slope) > 0.0:
+        if part > 0.0 or wp.dot(slope, slope) > 0.0:
             lit = light_on_pixel(view, rays, p, j, light)
-            lit = view.weights[e] * (passing * lit + wp.vec4(0.0, slope[0], slope[1], slope[2]) * lit[0])
+            lit = view.weights[e] * (part * lit + wp.vec4(0.0, slope[0], slope[1], slope[2]) * lit[0])
             r = reflectance[j]
             red += r[0] * lit
             green += r[1] * lit
@@ -140,18 +140,18 @@ def _direct_entries(
     view: PixelView,
     rays: PixelRays,
     light: wp.vec3,
-    share: wp.array(dtype=float),
-    own_share: wp.array(dtype=wp.vec4),
+    passing: wp.array(dtype=float),
+    own_passing: wp.array(dtype=wp.vec4),
     entries: wp.array(dtype=float),
 ):
     p = wp.tid() + offset
     for e in range(view.rows[p], view.rows[p + 1]):
         j = view.columns[e]
-        passing = wp.where(own_share[p][0] >= 0.0, own_share[p][0], share[j])
+        part = wp.where(own_passing[p][0] >= 0.0, own_passing[p][0], passing[j])
         entry = float(0.0)
-        if passing > 0.0:
+        if part > 0.0:
             lit = light_on_pixel(view, rays, p, j, light)
-            entry = view.weights[e] * passing * lit[0]
+            entry = view.weights[e] * part * lit[0]
         entries[e] = entry
 
 
@@ -178,33 +178,33 @@ class PixelLight:
         self._rays = pixel_rays(bvh, camera)
         self._reflectance = as_vec3(surfels.albedo / math.pi)
 
-    def image(self, light: Tensor, share: Tensor, share_slope: Tensor, own_share: Tensor) -> Tensor:
+    def image(self, light: Tensor, passing: Tensor, passing_slope: Tensor, own_passing: Tensor) -> Tensor:
         """(P, 3, 4) radiance under a light of 1 W/sr in RGB: its value, and its derivative towards x, y and z.
 
         Args:
             light: (3,) position.
-            share: (N,) part of the light that reaches each surfel, by shadows and a spot's profile.
-            share_slope: (N, 3) its derivative towards the position.
-            own_share: (P, 4) the same two of a pixel, where they are known better than from its surfels; the share
-                is negative where they are not.
+            passing: (N,) transmittance of the way to each surfel.
+            passing_slope: (N, 3) its derivative towards the position.
+            own_passing: (P, 4) the same two of a pixel, where they are known better than from its surfels; the
+                transmittance is negative where they are not.
         """
         image = torch.empty((self._pixels, 3, 4), dtype=torch.float32, device=self._bvh.device)
         inputs = [self._view, self._rays, self._reflectance, vector(self._bvh.local(light))]
-        inputs += [as_array(share.float()), as_vec3(share_slope)]
-        inputs.append(wp.from_torch(own_share.contiguous(), dtype=wp.vec4))
+        inputs += [as_array(passing.float()), as_vec3(passing_slope)]
+        inputs.append(wp.from_torch(own_passing.contiguous(), dtype=wp.vec4))
         launch(_direct_image, self._pixels, [*inputs, wp.from_torch(image, dtype=wp.vec4)], self._bvh.device)
         return image
 
-    def entries(self, light: Tensor, share: Tensor, own_share: Tensor) -> Tensor:
+    def entries(self, light: Tensor, passing: Tensor, own_passing: Tensor) -> Tensor:
         """(entries,) irradiance per W/sr in place of each of the view's weights, times that weight.
 
         The image of the light is these in the weights' places, times the surfels' albedo over π.
 
         Args:
-            light, share, own_share: as for `image`.
+            light, passing, own_passing: as for `image`.
         """
         entries = torch.empty(self._view.columns.shape[0], dtype=torch.float32, device=self._bvh.device)
-        inputs = [self._view, self._rays, vector(self._bvh.local(light)), as_array(share.float())]
-        inputs += [wp.from_torch(own_share.contiguous(), dtype=wp.vec4), as_array(entries)]
+        inputs = [self._view, self._rays, vector(self._bvh.local(light)), as_array(passing.float())]
+        inputs += [wp.from_torch(own_passing.contiguous(), dtype=wp.vec4), as_array(entries)]
         launch(_direct_entries, self._pixels, inputs, self._bvh.device)
         return entries

@@ -47,7 +47,7 @@ def _pixel_transmittance(
 def pixel_transmittance(
     bvh: SurfelBvh, camera: Camera, receivers: Tensor, pixels: Tensor, light: Tensor, places: Tensor
 ) -> Tensor:
-    """(P, 4) share of a light that reaches each pixel's surface, its mean over the pixel, and d/d(light) of it.
+    """(P, 4) part of a light that reaches each pixel's surface, its mean over the pixel, and d/d(light) of it.
 
     Args:
         receivers: (P,) int64 surfel that stands for the surface in each pixel.

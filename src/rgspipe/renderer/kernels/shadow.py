@@ -135,7 +135,7 @@ def light_transmittance(
     light: wp.vec3,
     path: wp.vec3,
 ):
-    """Share of a light that reaches the point `at` of a receiver along the `path` to it, and d/d(light) of it."""
+    """Part of a light that reaches the point `at` of a receiver along the `path` to it, and d/d(light) of it."""
     surfels = tree.records
     rule = tree.rule
     passing = float(1.0)

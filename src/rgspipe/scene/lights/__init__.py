@@ -2,7 +2,15 @@
 
 from rgspipe.scene.lights.axial import AxialLight
 from rgspipe.scene.lights.led import LedLight
-from rgspipe.scene.lights.light import WATTS_PER_INTENSITY, Light, LightRig, ShapeNumber, Share, as_rig, check_numbers
+from rgspipe.scene.lights.light import (
+    WATTS_PER_INTENSITY,
+    Light,
+    LightRig,
+    RelativeIntensity,
+    ShapeNumber,
+    as_rig,
+    check_numbers,
+)
 from rgspipe.scene.lights.point import PointLight
 from rgspipe.scene.lights.spot import SpotLight, SpotProfile
 
@@ -17,8 +25,8 @@ __all__ = [
     "Light",
     "LightRig",
     "PointLight",
+    "RelativeIntensity",
     "ShapeNumber",
-    "Share",
     "SpotLight",
     "SpotProfile",
     "as_rig",

@@ -14,7 +14,7 @@ from torch import Tensor
 
 from rgspipe.scene.lights.angles import angle_from_axis, angle_slopes
 from rgspipe.scene.lights.coordinates import AXIS, PLACE, Coordinate
-from rgspipe.scene.lights.light import Light, Share
+from rgspipe.scene.lights.light import Light, RelativeIntensity
 from rgspipe.scene.lights.point import PointLight
 from rgspipe.scene.shapes import Float, Given
 
@@ -31,11 +31,11 @@ class AxialLight(Light):
 
     @abstractmethod
     def profile_at(self, angle: Tensor, numbers: Mapping[str, Tensor], softness: float = 0.0) -> tuple[Tensor, Tensor]:
-        """Share of the axial intensity at `angle` [rad] from the axis, in [0, 1], and its derivative towards the angle.
+        """Part of the axial intensity at `angle` [rad] from the axis, in [0, 1], and its derivative towards the angle.
 
         Args:
             numbers: the shape's fields by name, which broadcast against `angle`; differentiable by autograd.
-            softness: as in `Light.share`.
+            softness: as in `Light.relative_intensity`.
         """
 
     @abstractmethod
@@ -56,16 +56,18 @@ class AxialLight(Light):
         to = {"dtype": like.dtype, "device": like.device}
         return {name: torch.as_tensor(value, **to).expand(extent) for name, value in values.items()}
 
-    def share_at(self, angle: Tensor) -> Tensor:
-        """Share of the axial intensity at `angle` [rad] from the axis."""
+    def relative_intensity_at(self, angle: Tensor) -> Tensor:
+        """Part of the axial intensity at `angle` [rad] from the axis."""
         return self.profile_at(angle, self.numbers(angle))[0]
 
-    def share_towards(self, points: Float[Tensor, "N 3"]) -> Float[Tensor, " N"]:
-        """(N,) share of the axial intensity that goes towards `points` (N, 3), differentiable by autograd."""
+    def relative_intensity_towards(self, points: Float[Tensor, "N 3"]) -> Float[Tensor, " N"]:
+        """(N,) part of the axial intensity that goes towards `points` (N, 3), differentiable by autograd."""
         towards = points - self.position.to(points)
-        return self.share_at(angle_from_axis(self.direction.to(points), towards))
+        return self.relative_intensity_at(angle_from_axis(self.direction.to(points), towards))
 
-    def share(self, points: Float[Tensor, "N 3"], *, softness: float = 0.0, shape_free: bool = False) -> Share:
+    def relative_intensity(
+        self, points: Float[Tensor, "N 3"], *, softness: float = 0.0, shape_free: bool = False
+    ) -> RelativeIntensity:
         # The difference is taken in float64: far from the origin float32 knows neither of the two well enough.
         towards = (points.double() - self.position.detach().to(points.device, torch.float64)).float()
         axis = self.direction.detach().to(towards)
@@ -79,12 +81,12 @@ class AxialLight(Light):
         value, slope = value.detach(), slope.detach()[:, None]
         # The angle does not depend on the axis' length, so the derivative towards the axis falls with it.
         by_axis = slope * by_axis / axis.norm()
-        return Share(value, {"position": -slope * by_towards, "direction": by_axis, **by_shape})
+        return RelativeIntensity(value, {"position": -slope * by_towards, "direction": by_axis, **by_shape})
 
     @property
-    def least_share(self) -> float:
-        """No profile rises with the angle, so no share is smaller than that straight backwards."""
-        return float(self.share_at(torch.tensor([math.pi], dtype=torch.float64)))
+    def least_relative_intensity(self) -> float:
+        """No profile rises with the angle, so no relative intensity is smaller than that straight backwards."""
+        return float(self.relative_intensity_at(torch.tensor([math.pi], dtype=torch.float64)))
 
     def power(self) -> Float[Tensor, " 3"]:
         """2π I ∫ p(θ) sin θ dθ."""
@@ -92,7 +94,7 @@ class AxialLight(Light):
         total = 0.0
         for low, high in pairwise(sorted({0.0, *self.kinks(), math.pi})):
             angle = torch.from_numpy(0.5 * (high - low) * nodes + 0.5 * (high + low))
-            values = self.share_at(angle) * torch.sin(angle)
+            values = self.relative_intensity_at(angle) * torch.sin(angle)
             total += 0.5 * (high - low) * float((torch.from_numpy(weights) * values).sum())
         return 2.0 * math.pi * total * self.intensity
 
@@ -101,7 +103,7 @@ class AxialLight(Light):
 
 
 def _towards_numbers(value: Tensor, numbers: Mapping[str, Tensor]) -> dict[str, Tensor]:
-    """Derivatives (N,) of shares (N,) towards their own numbers (N,)."""
+    """Derivatives (N,) of relative intensities (N,) towards their own numbers (N,)."""
     slopes = torch.autograd.grad(value.sum(), tuple(numbers.values()), allow_unused=True)
     filled = (torch.zeros_like(value) if slope is None else slope for slope in slopes)
     return dict(zip(numbers, filled, strict=True))

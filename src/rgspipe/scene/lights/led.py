@@ -82,5 +82,5 @@ class LedLight(AxialLight):
 
     def emission(self, maths: Any, cosine: Any) -> Any:
         # 0 to the power of 0 is 1, and behind an LED it is dark whatever its exponent.
-        share = maths.power(maths.maximum(cosine, 0.0), self.exponent)
-        return maths.multiply(share, maths.greater_than(cosine, 0.0))
+        front = maths.power(maths.maximum(cosine, 0.0), self.exponent)
+        return maths.multiply(front, maths.greater_than(cosine, 0.0))

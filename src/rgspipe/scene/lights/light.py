@@ -25,8 +25,8 @@ WATTS_PER_INTENSITY = 4.0 * math.pi
 
 
 @dataclass(frozen=True)
-class Share:
-    """Share of a light's intensity that goes towards N points, and its derivatives.
+class RelativeIntensity:
+    """What goes towards N points over a light's intensity (along its axis, if it has one), and its derivatives.
 
     Attributes:
         value: (N,) float32.
@@ -129,7 +129,9 @@ class Light(ABC):
     def power(self) -> Float[Tensor, " 3"]:
         """(3,) radiant power [W]: the intensity integrated over all directions."""
 
-    def share(self, points: Float[Tensor, "N 3"], *, softness: float = 0.0, shape_free: bool = False) -> Share | None:
+    def relative_intensity(
+        self, points: Float[Tensor, "N 3"], *, softness: float = 0.0, shape_free: bool = False
+    ) -> RelativeIntensity | None:
         """What of its intensity goes towards `points` (N, 3); None if all of it does.
 
         Args:
@@ -140,8 +142,8 @@ class Light(ABC):
         return None
 
     @property
-    def least_share(self) -> float:
-        """The smallest share of its intensity that it sends anywhere."""
+    def least_relative_intensity(self) -> float:
+        """The smallest relative intensity in any direction."""
         return 1.0
 
     def coordinates(self, shape_free: bool = False) -> dict[str, Coordinate]:
@@ -154,7 +156,7 @@ class Light(ABC):
         return replace(self, **{name: value})
 
     def tied_slopes(self, by: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """`Share.by` for moves by `changed`: through fields that are tied to another as well."""
+        """`RelativeIntensity.by` for moves by `changed`: through fields that are tied to another as well."""
         return by
 
     @classmethod
@@ -211,7 +213,7 @@ class Light(ABC):
         """The light that a file describes."""
 
     def emission(self, maths: Any, cosine: Any) -> Any:
-        """`share` as an expression of the cosine of the angle from its axis, for other programs; None if it is 1.
+        """Relative intensity as an expression of the angle's cosine, for other programs; None if it is 1.
 
         Args:
             maths: makes expressions of expressions and numbers; see `rgspipe.blender.lamp`.

@@ -37,7 +37,7 @@ class Profile(ABC):
 
     @abstractmethod
     def __call__(self, angle: Tensor, cone: Tensor, falloff: Tensor) -> tuple[Tensor, Tensor]:
-        """Share at `angle`, in [0, 1], and its derivative dp/dθ."""
+        """Relative intensity at `angle`, in [0, 1], and its derivative dp/dθ."""
 
     @abstractmethod
     def half_and_width(self, cone: Tensor, falloff: Tensor) -> tuple[Tensor, Tensor]:
@@ -103,8 +103,8 @@ class Smoothstep(Profile):
         return torch.where(soft, value, (angle <= cone).to(angle)), torch.where(soft, slope, 0.0)
 
     def half_and_width(self, cone: Tensor, falloff: Tensor) -> tuple[Tensor, Tensor]:
-        share = falloff.clamp(0.0, 1.0) * (1.0 - torch.cos(cone))
-        full, half = (torch.acos((torch.cos(cone) + part * share).clamp(-1.0, 1.0 - 1e-7)) for part in (1.0, 0.5))
+        width = falloff.clamp(0.0, 1.0) * (1.0 - torch.cos(cone))
+        full, half = (torch.acos((torch.cos(cone) + part * width).clamp(-1.0, 1.0 - 1e-7)) for part in (1.0, 0.5))
         return half, (half - full).clamp(min=0.0) / HALF_WIDTHS
 
     def kinks(self, cone: float, falloff: float) -> list[float]:

@@ -18,13 +18,13 @@ LEAST_LIT = 1e-4
 
 
 @wp.kernel
-def _lit_shares(
+def _lit_transmittance(
     offset: int,
     slab: int,
     tree: SurfelTree,
     receivers: wp.array(dtype=int),
     light: wp.vec3,
-    share: wp.array(dtype=wp.vec4),
+    found: wp.array(dtype=wp.vec4),
 ):
     item = wp.tid() + offset
     i = receivers[item]
@@ -34,27 +34,27 @@ def _lit_shares(
     slope = wp.vec3(0.0, 0.0, 0.0)
     if wp.dot(d, surfels[i].normal) > 0.0 and wp.dot(d, d) > 0.0:
         passing, slope = light_transmittance(tree, i, surfels[i].center, light, d)
-    share[item] = wp.vec4(passing, slope[0], slope[1], slope[2])
+    found[item] = wp.vec4(passing, slope[0], slope[1], slope[2])
 
 
-def lit_shares(bvh: SurfelBvh, position: Tensor, lit: Tensor) -> tuple[Tensor, Tensor]:
-    """`renderer.pixel_direct.surfel_shares` of the surfels that are `lit`; the others get 1, and do not change.
+def lit_transmittance(bvh: SurfelBvh, position: Tensor, lit: Tensor) -> tuple[Tensor, Tensor]:
+    """`renderer.pixel_direct.surfel_transmittance` of the surfels that are `lit`; the others get 1, and do not change.
 
     Args:
         position: (3,) of the light.
         lit: (N,) bool.
 
     Returns:
-        The share (N,) of the light that reaches each surfel, and its derivative (N, 3) towards the position, float32.
+        The transmittance (N,) of the way to each surfel, and its derivative (N, 3) towards the position, float32.
     """
     order = wp.to_torch(bvh.order).long()
     receivers = lit.to(bvh.device)[order].nonzero()[:, 0].int()
     found = torch.empty((len(receivers), 4), dtype=torch.float32, device=bvh.device)
     if len(receivers) > 0:
         inputs = [bvh.tree, as_array(receivers), vector(bvh.local(position))]
-        launch(_lit_shares, len(receivers), [*inputs, wp.from_torch(found, dtype=wp.vec4)], bvh.device)
-    share = torch.ones(len(order), device=bvh.device)
+        launch(_lit_transmittance, len(receivers), [*inputs, wp.from_torch(found, dtype=wp.vec4)], bvh.device)
+    passing = torch.ones(len(order), device=bvh.device)
     slope = torch.zeros((len(order), 3), device=bvh.device)
     surfels = order[receivers.long()]
-    share[surfels], slope[surfels] = found[:, 0], found[:, 1:]
-    return share, slope
+    passing[surfels], slope[surfels] = found[:, 0], found[:, 1:]
+    return passing, slope
