@@ -71,7 +71,10 @@ def test_values_take_the_types_of_their_fields() -> None:
         ({"kinds": ["a", "c"]}, "^kinds: expected one of a, b, found c"),
         ({"inner": "point"}, "^inner: expected values for some of kind, angle, found point"),
         ({"inner": {"kind": "led"}}, r"^inner\.kind: expected one of point, spot, found led"),
-        ({"inner": {"kinds": "spot"}}, "^inner: expected values for some of kind, angle"),
+        ({"inner": {"kinds": "spot"}}, r"^inner\.kinds: expected the name of an option, .* Did you mean kind\?"),
+        ({"inner": {1: "spot"}}, "^inner: expected values for some of kind, angle"),
+        ({"cuont": 3}, r"^cuont: expected the name of an option, found no such option\. Did you mean count\?"),
+        ({"xyz": 3}, r"^xyz: .* There are rate, count, name, folder, place, kinds, on, inner, foreign\."),
         ({"count": 5}, "^count: expected no 5"),
     ],
 )

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import ast
 import dataclasses
+import difflib
 import inspect
 import math
 import sys
@@ -24,7 +25,7 @@ from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 from rgspipe.errors import InputError
 
@@ -48,8 +49,16 @@ class Options:
     """The base of all options.
 
     Raises:
-        InputError: a value has another type than its field, or is out of its range; `where` is the field's name.
+        InputError: a value has another type than its field, is out of its range, or is of no field; `where` is the
+            field's name.
     """
+
+    def __new__(cls, *args: Any, **values: Any) -> Self:
+        names = [item.name for item in dataclasses.fields(cls)]
+        for name in values:
+            if name not in names:
+                raise _unknown(name, names)
+        return super().__new__(cls)
 
     def __post_init__(self) -> None:
         for item in settings(type(self)):
@@ -114,7 +123,7 @@ class Setting:
         if isinstance(value, section):
             return value
         names = [item.name for item in settings(section)]
-        if not isinstance(value, Mapping) or not set(value) <= set(names):
+        if not isinstance(value, Mapping) or not all(isinstance(name, str) for name in value):
             example = f"{self.name}={{{names[0]!r}: …}}"
             expected = f"values for some of {', '.join(names)}"
             raise self._refusal(expected, value, f"Give them as a dictionary, such as {example}.")
@@ -203,6 +212,12 @@ def _setting(owner: type, item: dataclasses.Field, hint: Any) -> Setting | None:
     if not inspect.isclass(hint) or not (hint in MEANINGS or issubclass(hint, Options)):
         return None
     return Setting(item.name, hint, optional, length, rule.get("low"), rule.get("high"), tuple(choices), owner)
+
+
+def _unknown(name: str, names: Sequence[str]) -> InputError:
+    near = difflib.get_close_matches(name, names, n=3)
+    remedy = f"Did you mean {' or '.join(near)}?" if near else f"There are {', '.join(names)}."
+    return InputError(name, expected="the name of an option", found="no such option", remedy=remedy)
 
 
 def shown(value: Any) -> str:

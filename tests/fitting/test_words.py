@@ -42,9 +42,9 @@ def test_a_doubt_is_not_hidden_by_steps_that_ran_out() -> None:
 @pytest.mark.parametrize(
     ("found", "status"),
     [
-        ((DOUBT, Rival(), PoorlyExplained(0.3), AtBound()), FitStatus.AT_BOUND),
-        ((DOUBT, PoorlyExplained(0.3), Rival()), FitStatus.UNEXPLAINED),
-        ((DOUBT, Rival()), FitStatus.AMBIGUOUS),
+        ((DOUBT, Rival(0.2), PoorlyExplained(0.3), AtBound()), FitStatus.AT_BOUND),
+        ((DOUBT, PoorlyExplained(0.3), Rival(0.2)), FitStatus.UNEXPLAINED),
+        ((DOUBT, Rival(0.2)), FitStatus.AMBIGUOUS),
         ((DOUBT,), FitStatus.UNDETERMINED),
     ],
 )
@@ -52,7 +52,7 @@ def test_the_gravest_finding_is_the_status_and_all_are_told(found: Sequence[Find
     assert gravest(found) is status
     words = explained(found)
     assert words.startswith(MEANINGS[status]) and DOUBTED in words and MEANINGS[FitStatus.CONVERGED] not in words
-    assert (MEANINGS[FitStatus.AMBIGUOUS] in words) == (Rival() in found)
+    assert (MEANINGS[FitStatus.AMBIGUOUS] in words) == (Rival(0.2) in found)
 
 
 def test_a_number_that_is_too_small_is_told_with_the_next_one() -> None:
@@ -76,8 +76,14 @@ def test_a_number_that_is_too_large_is_told_with_the_light_that_may_not_be_there
 
 
 def test_other_lights_that_explain_as_much_are_told_beside_a_light_too_many() -> None:
-    words = explained([Rival(), LightSpare(2, 2, 0.04, 0.2), DOUBT])
+    words = explained([Rival(0.2), LightSpare(2, 2, 0.04, 0.2), DOUBT])
     assert words.startswith(MEANINGS[FitStatus.AMBIGUOUS]) and "Light 2" in words and DOUBTED in words
+
+
+def test_a_rival_is_told_with_how_far_it_is() -> None:
+    assert "A light is 20 % of the scene's size away" in explained([Rival(0.2)])
+    assert "not as many" in explained([Rival(None)]) and "nan" not in json.dumps(Rival(None).data())
+    assert Rival(0.25).data() == {"finding": "rival", "distance": 0.25}
 
 
 def test_lights_are_numbered_where_there_are_several() -> None:

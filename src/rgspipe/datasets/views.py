@@ -12,7 +12,7 @@ from rgspipe.scene import Camera, PointLight
 from rgspipe.scene.shapes import Float
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class View:
     """One image and what is known of it.
 

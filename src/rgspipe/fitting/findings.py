@@ -66,8 +66,12 @@ class LightMissing(Finding):
 
 @dataclass(frozen=True)
 class Rival(Finding):
-    """Clearly different lights explain the target as well."""
+    """Clearly different lights explain the target as well.
 
+    A light is `distance`, a part of the scene's size, away from its counterpart; None where they are not as many.
+    """
+
+    distance: float | None
     status = FitStatus.AMBIGUOUS
 
 

@@ -4,113 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
-
-from torch import Tensor
 
 from rgspipe.errors import InputError
 from rgspipe.fitting.model.capture import ImageCapture
-from rgspipe.fitting.model.problem import LightProblem
-from rgspipe.fitting.model.views import PreparedViews, prepare_views
-from rgspipe.fitting.options import AimedOptions
 from rgspipe.fitting.result import FitResult
-from rgspipe.fitting.search.aimed_candidates import aimed_candidates
-from rgspipe.fitting.search.coarse import CoarseImages, coarse_images
 from rgspipe.fitting.solvers import Search, Solver
-from rgspipe.fitting.spec import LightSpec, as_spec
-from rgspipe.renderer.dictionary import LightDictionary
+from rgspipe.fitting.spec import LightSpec
+from rgspipe.fitting.target_views import Cameras, TargetViews
 from rgspipe.renderer.effects import ALL_EFFECTS, Effects
 from rgspipe.renderer.frozen import FrozenScene
-from rgspipe.renderer.images.blocks import BlockModel, block_model
-from rgspipe.renderer.images.model import SurfelModel, ViewModel
-from rgspipe.renderer.images.pixels import PixelModel
-from rgspipe.renderer.view_weights import ViewWeights
-from rgspipe.scene import Camera, Light
 from rgspipe.scene.arrays import ArrayLike, as_list
-from rgspipe.scene.lights import as_rig
-from rgspipe.scene.shapes import Float
-
-Cameras = Camera | ViewWeights | Sequence[Camera | ViewWeights]
 
 
 @dataclass(frozen=True)
-class FitViews:
-    """Views made ready for any number of targets that the same cameras see, and of whose lights the same is known.
-
-    Attributes:
-        prepared: the pixels that a fit trusts, and their weights.
-        lights: what is known of the lights.
-        effects: parts of light transport.
-        sharp: whether the last steps of a fit, and the images of its lights, take direct light where pixels look.
+class FitViews(TargetViews):
+    """Views made ready for any number of fits, of targets that the same cameras see and of whose lights the same is
+    known.
     """
-
-    prepared: PreparedViews
-    lights: LightSpec
-    effects: Effects
-    sharp: bool = True
-
-    @classmethod
-    def prepare(
-        cls,
-        scene: FrozenScene,
-        cameras: Cameras,
-        *,
-        lights: str | LightSpec = "point",
-        masks: Sequence[ArrayLike] | ArrayLike | None = None,
-        effects: Effects = ALL_EFFECTS,
-        sharp: bool = True,
-        mask_edges: bool = True,
-    ) -> FitViews:
-        """What all targets of one set of cameras share; see `fit_lights` for the arguments.
-
-        Raises:
-            InputError: masks do not fit the cameras, or leave no pixel; or a kind of light that is not known.
-        """
-        weights = _weights(scene, cameras)
-        masks = None if masks is None else as_list(masks, axes=2)
-        prepared = prepare_views(scene, weights, masks=masks, mask_edges=mask_edges)
-        return cls(prepared, as_spec(lights), effects, sharp)
-
-    @property
-    def dictionary(self) -> LightDictionary:
-        """The candidates that a search begins with: the scene's own."""
-        return self.prepared.frozen.candidates_with(self.effects.shadows)
-
-    @cached_property
-    def blocks(self) -> BlockModel:
-        """The views as blocks of pixels, which searches look at."""
-        return block_model(self.prepared, effects=self.effects)
-
-    def coarse(self, options: AimedOptions) -> tuple[CoarseImages, ...]:
-        """Images of the candidates of each kind of light that is looked for, the plainest first; made once."""
-        if options not in self._coarse_made:
-            self._coarse_made[options] = tuple(self._coarse(kind, options) for kind in self.lights.kinds)
-        return self._coarse_made[options]
-
-    @cached_property
-    def _coarse_made(self) -> dict[AimedOptions, tuple[CoarseImages, ...]]:
-        return {}
-
-    def _coarse(self, kind: Light, options: AimedOptions) -> CoarseImages:
-        if kind.axis is None:
-            return coarse_images(self.blocks, self.dictionary)
-        shapes = kind.variants() if self.lights.shape_free else (kind,)
-        return aimed_candidates(self.prepared, self.dictionary, shapes, options, self.effects)
-
-    @cached_property
-    def pixels(self) -> PixelModel:
-        """How the trusted pixels see lights where they look."""
-        return PixelModel.of(self.prepared, self.effects)
-
-    @cached_property
-    def images(self) -> ViewModel:
-        """How all pixels see lights."""
-        model = self.pixels if self.sharp else SurfelModel(self.prepared, self.effects)
-        return model.on(self.prepared.every_pixel)
-
-    def problem(self, stacked: Tensor, capture: ImageCapture | None = None) -> LightProblem:
-        """The problem that images stacked by `PreparedViews.stack_images`, (all pixels, 3), pose."""
-        return LightProblem.create(self.prepared, stacked, self.effects, capture, self.pixels if self.sharp else None)
 
     def fit(
         self,
@@ -130,10 +40,6 @@ class FitViews:
                 remedy="Pass such an object.",
             )
         return solver.fit(self, stacked, capture or ImageCapture())
-
-    def render(self, lights: Light | Sequence[Light]) -> list[Float[Tensor, "H W 3"]]:
-        """(H, W, 3) image per view of the scene under lights, with the fit's effects; black without any."""
-        return self.prepared.split(self.images.image(as_rig(lights)))
 
 
 def fit_lights(
@@ -181,13 +87,3 @@ def fit_lights(
         scene, cameras, lights=lights, masks=masks, effects=effects, sharp=sharp, mask_edges=mask_edges
     )
     return views.fit(images, solver=solver, capture=capture)
-
-
-def _weights(scene: FrozenScene, cameras: Cameras) -> list[ViewWeights]:
-    """Of each camera."""
-    views = [cameras] if isinstance(cameras, Camera | ViewWeights) else list(cameras)
-    for index, view in enumerate(views):
-        if not isinstance(view, Camera | ViewWeights):
-            where, found = f"cameras[{index}]", type(view).__name__
-            raise InputError(where, expected="a Camera", found=found, remedy="Camera.look_at makes one.")
-    return [scene.view(view) if isinstance(view, Camera) else view for view in views]

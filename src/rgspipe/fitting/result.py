@@ -11,7 +11,7 @@ from torch import Tensor
 from rgspipe.datasets.covariance_file import covariance_fields
 from rgspipe.datasets.light_file import write_lights
 from rgspipe.fitting.findings import Dark, Finding, FitStatus, gravest
-from rgspipe.fitting.result_text import as_html, as_text
+from rgspipe.fitting.result_text import as_html, as_text, headline, light_lines
 from rgspipe.fitting.words import PYTHON, Spoken, explained
 from rgspipe.scene import LightRig
 from rgspipe.scene.shapes import Float
@@ -42,7 +42,7 @@ class Step:
         return self.lights[0].intensity
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class FitResult:
     """Recovered lights. Printed, it says what was found, how sure that is, and why the fit ended.
 
@@ -89,11 +89,15 @@ class FitResult:
         return explained(self.findings)
 
     def __repr__(self) -> str:
-        return as_text(self)
+        return as_text(*self._told())
 
     def _repr_html_(self) -> str:
         """For notebooks."""
-        return as_html(self)
+        return as_html(*self._told())
+
+    def _told(self) -> tuple[str, list[str], str]:
+        first = headline(len(self.lights), self.status, self.seconds)
+        return first, light_lines(self.lights, self.covariance), self.reason
 
     def save(self, path: str | Path, spoken: Spoken = PYTHON, **more: object) -> None:
         """Write a light file with the covariances, and beside the lights how the fit went.

@@ -5,35 +5,34 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from html import escape
-from typing import TYPE_CHECKING
 
-from rgspipe.scene import Light
+from torch import Tensor
 
-if TYPE_CHECKING:
-    from rgspipe.fitting.result import FitResult
+from rgspipe.fitting.findings import FitStatus
+from rgspipe.scene import Light, LightRig
 
 
-def as_text(result: FitResult) -> str:
+def as_text(headline: str, lines: Sequence[str], reason: str) -> str:
     """Status, a line for each light with how sure it is, and why the fit ended."""
-    return "\n".join([headline(result), *(f"  {line}" for line in _light_lines(result)), result.reason])
+    return "\n".join([headline, *(f"  {line}" for line in lines), reason])
 
 
-def as_html(result: FitResult) -> str:
+def as_html(headline: str, lines: Sequence[str], reason: str) -> str:
     """`as_text` as a piece of HTML."""
-    items = "".join(f"<li>{escape(line)}</li>" for line in _light_lines(result))
-    return f"<b>{escape(headline(result))}</b><ul>{items}</ul>{escape(result.reason)}"
+    items = "".join(f"<li>{escape(line)}</li>" for line in lines)
+    return f"<b>{escape(headline)}</b><ul>{items}</ul>{escape(reason)}"
 
 
-def headline(result: FitResult) -> str:
+def headline(count: int, status: FitStatus, seconds: float) -> str:
     """How many lights, how the fit ended, and what it took: "2 lights, converged in 1.4 s"."""
-    count = len(result.lights)
     found = "no light" if count == 0 else f"{count} light{'s' if count > 1 else ''}"
-    return f"{found}, {result.status.replace('_', ' ')} in {result.seconds:.2g} s"
+    return f"{found}, {status.replace('_', ' ')} in {seconds:.2g} s"
 
 
-def _light_lines(result: FitResult) -> list[str]:
-    spreads = dict(enumerate(result.covariance))
-    return [light_line(light, spreads.get(index)) for index, light in enumerate(result.lights)]
+def light_lines(lights: LightRig, covariance: Sequence[Tensor]) -> list[str]:
+    """`light_line` of each light; `covariance` may be empty."""
+    spreads = dict(enumerate(covariance))
+    return [light_line(light, spreads.get(index)) for index, light in enumerate(lights)]
 
 
 def light_line(light: Light, covariance: Sequence[Sequence[float]] | None = None) -> str:

@@ -24,7 +24,7 @@ from rgspipe.fitting.search.starts import Candidates
 from rgspipe.fitting.search.weighting import PLAIN
 from rgspipe.fitting.selection.diagnosis import Costs, standing
 from rgspipe.fitting.selection.number import Doubted, doubted_number, faded_light
-from rgspipe.fitting.selection.rivals import has_rival, stands_anywhere
+from rgspipe.fitting.selection.rivals import rival_among, rival_elsewhere
 from rgspipe.fitting.spec import LightSpec
 from rgspipe.renderer.images.blocks import view_of_blocks
 from rgspipe.renderer.images.model import ImageModel
@@ -87,12 +87,12 @@ def _search(refiner: Refiner, candidates: Sequence[Candidates], options: SearchO
     """Search, then doubt what was found."""
     search = RigSearch(refiner, candidates, options, kinds_open=len(spec.kinds) > 1)
     found = search.unknown() if spec.count is None else search.known(spec.count)
-    rival = [Rival()] if has_rival(refiner, found.best, found.others, options.rivals) else []
+    rival = rival_among(refiner, found.best, found.others, options.rivals)
     doubted = Doubted()
     if spec.count is not None:
         doubted = doubted_number(refiner, candidates, found.best, spec.count, options)
     compared = {**found.compared, **doubted.compared}
-    findings = (*rival, *doubted.findings)
+    findings = (*([] if rival is None else [rival]), *doubted.findings)
     if not any(isinstance(finding, LightMissing) for finding in findings):
         costs = Costs.of(refiner, compared)
         findings = (*findings, *costs.maybe_more(len(found.best.emitters), compared, options.bar))
@@ -129,8 +129,9 @@ def _result(
 ) -> FitResult:
     problem, meter, last = refiner.problem, refiner.meter, refiner.step(best)
     spread = light_covariances(problem, best, options.certainty)
-    if Rival() not in findings and stands_anywhere(refiner, best, spread.calibrated, options.rivals):
-        findings = (Rival(), *findings)
+    if not any(isinstance(finding, Rival) for finding in findings):
+        rival = rival_elsewhere(refiner, best, spread.calibrated, options.rivals)
+        findings = findings if rival is None else (rival, *findings)
     return FitResult(
         lights=last.lights,
         findings=(*standing(refiner, best, spread.calibrated, options.certainty), *findings),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal, Protocol, runtime_checkable
+from typing import Literal, Protocol, runtime_checkable
 
 from torch import Tensor
 
@@ -17,17 +17,15 @@ from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.options import AdamOptions, SearchOptions
 from rgspipe.fitting.result import FitResult
 from rgspipe.fitting.search_lm import fit_search_lm
+from rgspipe.fitting.target_views import TargetViews
 from rgspipe.scene import PointLight
-
-if TYPE_CHECKING:
-    from rgspipe.fitting.fit import FitViews
 
 
 @runtime_checkable
 class Solver(Protocol):
     """A way from images to lights."""
 
-    def fit(self, views: FitViews, images: Tensor, capture: ImageCapture) -> FitResult:
+    def fit(self, views: TargetViews, images: Tensor, capture: ImageCapture) -> FitResult:
         """The lights of images (all pixels of all views, 3)."""
         ...
 
@@ -39,7 +37,7 @@ class Search(SearchOptions):
     derivatives: Literal["analytic", "differences"] = "analytic"
     """of images towards the lights, or central differences in their place, for comparison"""
 
-    def fit(self, views: FitViews, images: Tensor, capture: ImageCapture) -> FitResult:
+    def fit(self, views: TargetViews, images: Tensor, capture: ImageCapture) -> FitResult:
         """The lights of images (all pixels of all views, 3)."""
         problem, blocks = views.problem(images, capture), views.blocks
         if self.derivatives == "differences":
@@ -59,7 +57,7 @@ class PaperAdam(AdamOptions):
     seed: int = 0
     """of the start"""
 
-    def fit(self, views: FitViews, images: Tensor, capture: ImageCapture) -> FitResult:
+    def fit(self, views: TargetViews, images: Tensor, capture: ImageCapture) -> FitResult:
         """The lights of images (all pixels of all views, 3).
 
         Raises:

@@ -14,6 +14,7 @@ from rgspipe.fitting.findings import (
     LightSpare,
     MaybeOneMore,
     OnSurface,
+    Rival,
     Uncertain,
     Undetermined,
     gravest,
@@ -80,6 +81,13 @@ def _missing(found: LightMissing, spoken: Spoken) -> str:
     return f"{more}, or {spoken.uncounted} to have them counted."
 
 
+def _rival(found: Rival, spoken: Spoken) -> str:
+    others = "They are not as many"
+    if found.distance is not None:
+        others = f"A light is {percent(found.distance)} of the scene's size away from where it is here"
+    return f"{MEANINGS[found.status]} {others}."
+
+
 def _spare(found: LightSpare, spoken: Spoken) -> str:
     little = f"lowers the cost by {percent(found.gain)} only" if found.gain >= 0.005 else "does not lower the cost"
     less = f"Light {found.number} {little} and may not be there (it counts from {percent(found.wanted)} on): "
@@ -119,6 +127,7 @@ def _exposure(found: ExposureUnknown, spoken: Spoken) -> str:
 #: Findings that say more than their status does.
 _WORDS: dict[type[Finding], Callable[..., str]] = {
     LightMissing: _missing,
+    Rival: _rival,
     LightSpare: _spare,
     Undetermined: _undetermined,
     Uncertain: _uncertain,

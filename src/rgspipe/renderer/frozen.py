@@ -39,7 +39,7 @@ from rgspipe.scene.shapes import Float
 from rgspipe.scene.surfels import Surfels
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class FrozenScene:
     """Surfels with their light transport.
 

@@ -10,11 +10,12 @@ from torch import Tensor
 
 from rgspipe.errors import InputError
 from rgspipe.scene.arrays import ArrayLike, as_tensor, check_finite
+from rgspipe.scene.by_value import ByValue
 from rgspipe.scene.shapes import Float, Given
 
 
 @dataclass(frozen=True)
-class Camera:
+class Camera(ByValue):
     """A pinhole camera with OpenGL axes: it looks along its −z, +y is up, +x is right.
 
     Pixel (column x, row y) has its centre at (x + 0.5, y + 0.5); row 0 is the top of the image.

@@ -68,7 +68,7 @@ class Coverage:
             )
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Surfels:
     """N Gaussian surfels as plain tensors, all of one dtype and device; lists and numpy arrays are taken for them.
 

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import pytest
 import torch
 
 from emitters import emitter_at
 from lit_room import VISIBLE
+from rgspipe.fitting.findings import Rival
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.options import RivalOptions
 from rgspipe.fitting.search.compare import drop
 from rgspipe.fitting.search.refine import Refiner, State
 from rgspipe.fitting.search.weighting import ROBUST
-from rgspipe.fitting.selection.rivals import equally_good, stands_anywhere
+from rgspipe.fitting.selection.rivals import equally_good, rival_among, rival_elsewhere
 
 
 def refiner_of(room, point_light) -> Refiner:
@@ -41,5 +43,25 @@ def test_a_place_that_is_not_determined_is_looked_at(room, point_light) -> None:
     for covariance, tried in ((known, 0), (unknown, 6)):
         true = placed(refiner, 0.0)
         before = refiner.meter.evaluations
-        assert not stands_anywhere(refiner, true, [covariance], RivalOptions())
+        assert rival_elsewhere(refiner, true, [covariance], RivalOptions()) is None
         assert refiner.meter.evaluations - before == tried
+
+
+#: Nearly everything is as good as the answer.
+LENIENT = RivalOptions(deviations=1000.0, energy=1000.0, far=1.0, steps=2)
+
+
+def test_a_rival_says_how_far_it_is(room, point_light) -> None:
+    refiner = refiner_of(room, point_light)
+    off, unknown = placed(refiner, 0.02), torch.diag(torch.tensor([torch.inf] * 3 + [1.0] * 3, dtype=torch.float64))
+    found = rival_elsewhere(refiner, off, [unknown], LENIENT)
+    # A light is moved so far, unless the edge of the room stops it.
+    assert found is not None and found.distance == pytest.approx(LENIENT.stride * LENIENT.apart, rel=1e-9)
+
+
+def test_rivals_of_another_number_have_no_distance(room, point_light) -> None:
+    refiner = refiner_of(room, point_light)
+    one = placed(refiner, 0.02)
+    two = refiner.start([emitter_at(torch.tensor(VISIBLE, dtype=torch.float64) + by) for by in (0.02, 0.1)], ROBUST)
+    assert rival_among(refiner, one, [one], LENIENT) is None
+    assert rival_among(refiner, one, [one, two], LENIENT) == Rival(None)

@@ -96,7 +96,7 @@ def test_a_frame_that_is_searched_in_vain_is_followed_by_one_some_way_off() -> N
 def _ambiguous(monkeypatch, wrong: LightRig) -> None:
     """Every search ends ambiguous, at `wrong`."""
     fit = FitViews.fit
-    monkeypatch.setattr(FitViews, "fit", lambda *a, **k: replace(fit(*a, **k), lights=wrong, findings=(Rival(),)))
+    monkeypatch.setattr(FitViews, "fit", lambda *a, **k: replace(fit(*a, **k), lights=wrong, findings=(Rival(0.2),)))
 
 
 def test_a_track_without_a_sure_frame_is_uncertain_throughout(monkeypatch, room, point_light) -> None:
@@ -114,7 +114,7 @@ def test_an_answer_with_a_light_that_explains_nothing_is_not_sure(point_light) -
     result = replace(dark_result(0.0), lights=(strong, strong), findings=())
     assert _sure(TrackedFrame(result, FrameStatus.TRACKED, 0.01))
     assert not _sure(TrackedFrame(replace(result, lights=(strong, weak)), FrameStatus.TRACKED, 0.01))
-    assert not _sure(TrackedFrame(replace(result, findings=(Rival(),)), FrameStatus.TRACKED, 0.01))
+    assert not _sure(TrackedFrame(replace(result, findings=(Rival(0.2),)), FrameStatus.TRACKED, 0.01))
     assert not _sure(TrackedFrame(result, FrameStatus.UNCERTAIN, 0.01))
     # A fit that ran out of steps does not say what its images leave open: the expected errors do.
     steps = replace(result, findings=(OutOfSteps(),))

@@ -23,7 +23,7 @@ def test_two_lights_that_were_taken_for_one_and_a_faint_one_are_found_by_splitti
     truth = (point_light((0.07, -0.25, 0.3)), point_light((0.15, -0.25, 0.3)))
     taken = (point_light((0.11, -0.25, 0.3), (2.0, 4.0, 1.0)), point_light((0.3, 0.3, -0.3), (0.01, 0.02, 0.005)))
     problem = _problem(room, truth)
-    wrong = replace(dark_result(0.0), lights=taken, findings=(Rival(),), loss=0.02)
+    wrong = replace(dark_result(0.0), lights=taken, findings=(Rival(0.2),), loss=0.02)
     result = split_lights(problem, wrong, room.two.blocks)
     assert result.loss < 1e-6
     found = sorted(float(light.position[0]) for light in result.lights)

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 import torch
 from torch import Tensor
 
+from rgspipe.fitting.findings import Rival
 from rgspipe.fitting.model.problem import ROUNDING, LightProblem
 from rgspipe.fitting.options import RivalOptions
 from rgspipe.fitting.search.compare import (
@@ -23,26 +24,26 @@ from rgspipe.fitting.search.weighting import PLAIN, ROBUST
 from rgspipe.sums import average, total
 
 
-def has_rival(refiner: Refiner, best: State, others: Sequence[State], options: RivalOptions) -> bool:
-    """Whether one of the `others` is another answer; those that come near are refined first."""
+def rival_among(refiner: Refiner, best: State, others: Sequence[State], options: RivalOptions) -> Rival | None:
+    """One of the `others` that is another answer, if there is one; those that come near are refined first."""
     problem, apart = refiner.problem, options.apart * refiner.region.size
     rivals = [state for state in others if rig_distance(state.emitters, best.emitters) > apart]
     if not rivals:
-        return False
+        return None
     rival = best_state(problem, rivals)
     if drop(problem, rival, best) > options.far:
-        return False
+        return None
     one, other = (refiner.refined(state, ROBUST, options.steps) for state in (best, rival))
     if rig_distance(one.emitters, other.emitters) <= apart or not equally_good(problem, one, other, options):
-        return False
+        return None
     # The answer is one of plain squares, so a rival has to be one, too.
     other = refiner.refined(other, PLAIN, options.steps // 2)
     clear = rig_distance(best.emitters, other.emitters) > apart
-    return clear and _leaves_as_little(refiner, best, other, options)
+    return _rival(refiner, best, other) if clear and _leaves_as_little(refiner, best, other, options) else None
 
 
-def stands_anywhere(refiner: Refiner, best: State, covariance: Sequence[Tensor], options: RivalOptions) -> bool:
-    """Whether a light whose place is not determined explains as much from a clearly different one.
+def rival_elsewhere(refiner: Refiner, best: State, covariance: Sequence[Tensor], options: RivalOptions) -> Rival | None:
+    """The rig with a light whose place is not determined, if it explains as much from a clearly different one.
 
     A search meets such rivals only by chance: where its starts end in a valley without a floor is up to the last bits.
 
@@ -50,10 +51,15 @@ def stands_anywhere(refiner: Refiner, best: State, covariance: Sequence[Tensor],
         refiner: on the problem that the answer was polished on.
         covariance: of each light, see `FitResult.covariance`; infinite where nothing is determined.
     """
-    return any(
-        equally_good(refiner.problem, best, other, options) and _leaves_as_little(refiner, best, other, options)
-        for other in _moved(refiner, best, covariance, options)
-    )
+    for other in _moved(refiner, best, covariance, options):
+        if equally_good(refiner.problem, best, other, options) and _leaves_as_little(refiner, best, other, options):
+            return _rival(refiner, best, other)
+    return None
+
+
+def _rival(refiner: Refiner, best: State, other: State) -> Rival:
+    distance = rig_distance(best.emitters, other.emitters) / refiner.region.size
+    return Rival(distance if math.isfinite(distance) else None)
 
 
 def _moved(refiner: Refiner, best: State, covariance: Sequence[Tensor], options: RivalOptions) -> Iterator[State]:

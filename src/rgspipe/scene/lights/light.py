@@ -14,6 +14,7 @@ from torch import Tensor
 
 from rgspipe.errors import InputError
 from rgspipe.scene.arrays import ArrayLike, as_tensor, check_finite
+from rgspipe.scene.by_value import ByValue
 from rgspipe.scene.lights.coordinates import PLACE, Coordinate
 from rgspipe.scene.shapes import Float, Given
 
@@ -82,8 +83,8 @@ class Reader(Protocol):
 
 
 @dataclass(frozen=True)
-class Light(ABC):
-    """A source of light. Lists and numpy arrays are taken for its tensors.
+class Light(ByValue, ABC):
+    """A source of light. Lists and numpy arrays are taken for its tensors; lights of the same numbers are equal.
 
     Attributes:
         position: (3,) scene units.
