@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import torch
@@ -28,6 +29,13 @@ def plane_lights() -> dict[str, Light]:
     spots = {name: SpotLight.shaped(name, *angles) for name, angles in profiles.items()}
     place, intensity = (torch.tensor(values, dtype=torch.float64) for values in (POSITION, INTENSITY))
     return {name: shape.at(place, axis, intensity) for name, shape in (narrow | spots).items()}
+
+
+def hard_spots() -> dict[str, SpotLight]:
+    """The spots among them with hard edges."""
+    spots = {name: light for name, light in plane_lights().items() if isinstance(light, SpotLight)}
+    hard = {name: light.cone_angle if name == "linear" else 0.0 for name, light in spots.items()}
+    return {f"hard_{name}": replace(light, falloff=hard[name]) for name, light in spots.items()}
 
 
 def plane_image(light: Light, subsamples: int = 16) -> np.ndarray:

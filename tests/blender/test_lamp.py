@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from rgspipe.datasets.exr import read_image
-from spots_on_plane import plane_image, plane_lights
+from spots_on_plane import hard_spots, plane_image, plane_lights
 
 pytestmark = [
     pytest.mark.slow,
@@ -36,6 +36,15 @@ def test_cycles_renders_the_closed_form_of_every_profile(rendered: Path, name: s
     # where the smoothstep's rim crosses a pixel; means differ by 8e-5 at most.
     np.testing.assert_allclose(image, expected, atol=2e-3 * expected.max())
     assert abs(image.mean() / expected.mean() - 1.0) < 2e-4
+
+
+@pytest.mark.parametrize("name", hard_spots())
+def test_cycles_renders_hard_edges(rendered: Path, name: str) -> None:
+    image, expected = read_image(rendered / f"{name}.exr")[0], plane_image(hard_spots()[name])
+    assert float((expected == 0.0).mean()) > 0.3
+    # Only pixels that the edge crosses differ: measured at most 0.012 of the brightest pixel, and 8e-4 of the mean.
+    np.testing.assert_allclose(image, expected, atol=2e-2 * expected.max())
+    assert abs(image.mean() / expected.mean() - 1.0) < 2e-3
 
 
 def test_our_smoothstep_is_blender_s_spot(rendered: Path) -> None:

@@ -10,9 +10,9 @@ import torch
 
 from rgspipe.datasets.covariance_file import read_covariances
 from rgspipe.datasets.light_file import read_lights
-from rgspipe.fitting.findings import Undetermined
+from rgspipe.fitting.findings import FitStatus, Undetermined
 from rgspipe.fitting.result import FitResult, dark_result
-from rgspipe.fitting.result_text import light_line
+from rgspipe.fitting.result_text import headline, light_line
 from rgspipe.scene import LightRig, PointLight
 
 NEAR, FAR = PointLight([0.1, 0.2, 0.3], [1.0, 2.0, 3.0]), PointLight([0.5, 0.5, 0.5], 4.0)
@@ -34,19 +34,19 @@ def test_a_result_reads_like_a_sentence_and_a_list() -> None:
         str(result()).splitlines()
         == repr(result()).splitlines()
         == [
-            "2 lights, undetermined in 1.2 s",
+            "2 lights, undetermined after 1.2 s",
             "  point at (0.100, 0.200, 0.300) ± 0.0100, RGB (1.000, 2.000, 3.000) W/sr ± 0.020",
             "  point at (0.500, 0.500, 0.500) ± unknown, RGB (4.000, 4.000, 4.000) W/sr ± 1.000",
             f"{REASON} of light 2.",
         ]
     )
-    assert str(dark_result(0.1)).startswith("no light, not enough light in 0.1 s")
+    assert str(dark_result(0.1)).startswith("no light, not enough light after 0.1 s")
     assert "±" not in light_line(NEAR)
 
 
 def test_a_notebook_shows_the_same_as_a_list() -> None:
     page = result((NEAR,))._repr_html_()
-    assert page.startswith("<b>1 light, undetermined in 1.2 s</b><ul><li>point at (0.100,")
+    assert page.startswith("<b>1 light, undetermined after 1.2 s</b><ul><li>point at (0.100,")
     assert page.endswith("z &lt; 1.")
 
 
@@ -61,3 +61,19 @@ def test_a_saved_result_is_a_light_file_with_its_uncertainty(tmp_path: Path) -> 
     assert (told["version"], told["result"], told["psnr"]) == (1, "undetermined", 41.5)
     with pytest.raises(ValueError, match="version"):
         found.save(tmp_path / "other.json", version=2)
+
+
+@pytest.mark.parametrize(
+    ("status", "words"),
+    [
+        (FitStatus.CONVERGED, "converged in 1.4 s"),
+        (FitStatus.MAX_ITERATIONS, "out of steps after 1.4 s"),
+        (FitStatus.UNDETERMINED, "undetermined after 1.4 s"),
+        (FitStatus.AMBIGUOUS, "ambiguous after 1.4 s"),
+        (FitStatus.UNEXPLAINED, "unexplained after 1.4 s"),
+        (FitStatus.AT_BOUND, "stopped at the edge after 1.4 s"),
+        (FitStatus.NOT_ENOUGH_LIGHT, "not enough light after 1.4 s"),
+    ],
+)
+def test_every_end_of_a_fit_is_a_phrase(status: FitStatus, words: str) -> None:
+    assert headline(1, status, 1.42) == f"1 light, {words}"

@@ -81,8 +81,8 @@ def test_other_lights_that_explain_as_much_are_told_beside_a_light_too_many() ->
 
 
 def test_a_rival_is_told_with_how_far_it_is() -> None:
-    assert "A light is 20 % of the scene's size away" in explained([Rival(0.2)])
-    assert "not as many" in explained([Rival(None)]) and "nan" not in json.dumps(Rival(None).data())
+    assert "stands 20 % of the scene's size away" in explained([Rival(0.2)])
+    assert "more, or fewer" in explained([Rival(None)]) and "nan" not in json.dumps(Rival(None).data())
     assert Rival(0.25).data() == {"finding": "rival", "distance": 0.25}
 
 

@@ -23,10 +23,15 @@ def as_html(headline: str, lines: Sequence[str], reason: str) -> str:
     return f"<b>{escape(headline)}</b><ul>{items}</ul>{escape(reason)}"
 
 
+#: How fits that did not converge ended, where the name of the status is no phrase.
+ENDS = {FitStatus.MAX_ITERATIONS: "out of steps", FitStatus.AT_BOUND: "stopped at the edge"}
+
+
 def headline(count: int, status: FitStatus, seconds: float) -> str:
     """How many lights, how the fit ended, and what it took: "2 lights, converged in 1.4 s"."""
     found = "no light" if count == 0 else f"{count} light{'s' if count > 1 else ''}"
-    return f"{found}, {status.replace('_', ' ')} in {seconds:.2g} s"
+    end, after = ENDS.get(status, status.replace("_", " ")), "in" if status is FitStatus.CONVERGED else "after"
+    return f"{found}, {end} {after} {seconds:.2g} s"
 
 
 def light_lines(lights: LightRig, covariance: Sequence[Tensor]) -> list[str]:

@@ -22,10 +22,10 @@ from rgspipe.fitting.findings import (
 
 #: What a status means and what to do, where no finding says more.
 MEANINGS = {
-    FitStatus.CONVERGED: "The loss has a minimum here: a further step would not change the light.",
+    FitStatus.CONVERGED: "The loss has a minimum here: a further step would change nothing.",
     FitStatus.MAX_ITERATIONS: "All iterations were used while the loss was still falling: allow more of them.",
-    FitStatus.AT_BOUND: "The light was stopped at the edge of the region that is searched: the true light may be "
-    "outside, or these views do not tell its distance; give more views or a larger region.",
+    FitStatus.AT_BOUND: "A light was stopped at the edge of the region that is searched: it may truly be outside, or "
+    "these views do not tell its distance; give more views or a larger region.",
     FitStatus.AMBIGUOUS: "Clearly different lights explain the target as well as these: give more views, or say more "
     "of the lights (their number, their type).",
     FitStatus.UNDETERMINED: "These views do not tell all of the lights.",
@@ -82,9 +82,9 @@ def _missing(found: LightMissing, spoken: Spoken) -> str:
 
 
 def _rival(found: Rival, spoken: Spoken) -> str:
-    others = "They are not as many"
+    others = "The others are more, or fewer"
     if found.distance is not None:
-        others = f"A light is {percent(found.distance)} of the scene's size away from where it is here"
+        others = f"One of those stands {percent(found.distance)} of the scene's size away from where it stands here"
     return f"{MEANINGS[found.status]} {others}."
 
 

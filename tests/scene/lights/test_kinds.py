@@ -20,7 +20,7 @@ from rgspipe.renderer.effects import Effects
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.rig import rig_irradiance
 from rgspipe.scene import Light
-from rgspipe.scene.lights import KINDS
+from rgspipe.scene.lights import KINDS, SpotLight
 from rgspipe.scene.lights.angles import angle_from_axis
 from rooms import closed_box
 
@@ -200,6 +200,21 @@ def test_other_programs_are_told_its_profile(light: Light) -> None:
     else:
         # Measured 2e-15.
         np.testing.assert_allclose(told, light.relative_intensity_towards(points()), rtol=0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("falloff", [0.0, 1e-12])
+@pytest.mark.parametrize("profile", ["gaussian", "smoothstep", "linear"])
+def test_other_programs_divide_by_no_hard_edge(profile: str, falloff: float) -> None:
+    """Blender's nodes give 0 for a division by 0: a Gaussian shone everywhere, the others nowhere."""
+    cone = math.radians(40.0)
+    # A linear profile has a hard edge where its two angles are one.
+    light = SpotLight(PLACE, 1.0, AXIS, profile, cone, cone - falloff if profile == "linear" else falloff)
+    towards = torch.nn.functional.normalize(points() - PLACE, dim=1)
+    with np.errstate(all="raise", under="ignore"):
+        told = light.emission(Arithmetic, (towards @ AXIS).numpy())
+    expected = light.relative_intensity_towards(points())
+    assert 0.0 < float(expected.mean()) < 1.0
+    np.testing.assert_array_equal(told, expected)
 
 
 @every_light

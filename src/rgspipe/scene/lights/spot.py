@@ -106,6 +106,9 @@ class SpotLight(AxialLight):
         return cls(position, intensity, direction, profile, *numbers)
 
     def emission(self, maths: Any, cosine: Any) -> Any:
+        if self.rim == 0.0:
+            # Profiles divide by the width of their rim.
+            return maths.subtract(1.0, maths.greater_than(maths.arccosine(cosine), self.cone_angle))
         return self._profile.emission(maths, cosine, self.cone_angle, self.falloff)
 
     @property
