@@ -45,7 +45,7 @@ def test_place_axis_and_exponent_are_found(room, exponent: float, free: bool) ->
     errors = rig_errors(result.lights, (truth,), 1.0)
     # Measured at most 1e-7, 2e-7, 6e-6 degrees and 2e-7 of the exponent.
     assert errors.position < 2e-6 and errors.intensity < 5e-6 and errors.axis < 1e-4
-    assert errors.cone < 5e-6 * exponent if free else found.exponent == exponent
+    assert errors.shape < 5e-6 * exponent if free else found.exponent == exponent
     assert result.covariance[0].shape == ((10, 10) if free else (9, 9))
     assert torch.isfinite(result.covariance[0]).all()
 
@@ -58,7 +58,7 @@ def test_random_leds_are_found(room, seed: int) -> None:
     errors = rig_errors(result.lights, (truth,), 1.0)
     # Measured at most 1e-7 and 4e-7. Of the first ten seeds nine are found, to 6e-7 and 5e-6; number 6, of which the
     # views see nothing but what bounces off, says undetermined.
-    assert result.status is FitStatus.CONVERGED and errors.position < 2e-6 and errors.cone < 2e-5
+    assert result.status is FitStatus.CONVERGED and errors.position < 2e-6 and errors.shape < 2e-5
 
 
 def test_deviations_are_those_of_noise(room) -> None:
@@ -113,7 +113,7 @@ def test_an_led_that_moves_and_turns_is_followed(room) -> None:
     for frame, rig in zip(track, truth, strict=True):
         errors = rig_errors(frame.result.lights, rig, 1.0)
         # Measured 4e-8, 6e-6 degrees and 3e-7 of the exponent.
-        assert errors.position < 1e-6 and errors.axis < 1e-4 and errors.cone < 1e-5
+        assert errors.position < 1e-6 and errors.axis < 1e-4 and errors.shape < 1e-5
 
 
 def test_the_answer_is_printed_written_and_read(room, tmp_path: Path) -> None:

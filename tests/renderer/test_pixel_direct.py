@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
+import scipy.sparse
 import torch
 from torch import Tensor
 
@@ -16,7 +18,8 @@ from rgspipe.renderer.kernels.irradiance import SOFTENING
 from rgspipe.renderer.kernels.pixel_light import PixelLight
 from rgspipe.renderer.kernels.pixel_shadow import pixel_transmittance
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
-from rgspipe.renderer.pixel_direct import PixelDirect, surfel_transmittance
+from rgspipe.renderer.pixel_direct import PixelDirect, _heaviest, surfel_transmittance
+from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.view_weights import build_view_weights, even_places
 from rgspipe.scene import Camera, Surfels, look_at
 from rgspipe.scene.rectangles import inside_of_box, solid_box, surfels_on
@@ -161,3 +164,20 @@ def test_the_operator_gives_the_image_of_any_albedo() -> None:
     # Measured 2e-7 of the largest.
     difference = (operator @ (painted.albedo / math.pi) - expected).abs()
     assert float(difference.max()) < 2e-6 * float(expected.max())
+
+
+@pytest.mark.parametrize("levels", [1, 3, 1000])
+@pytest.mark.parametrize("filled", [0.0, 0.6, 1.0])
+def test_the_heaviest_surfel_of_a_pixel_is_the_last_of_the_largest(filled: float, levels: int) -> None:
+    """As a stable sort of each row has it, also where rows are empty and weights are equal."""
+    rng = np.random.default_rng(levels)
+    for _ in range(100):
+        counts = rng.integers(0, 8, rng.integers(1, 40))
+        counts[rng.random(len(counts)) >= filled] = 0
+        rows, entries = np.repeat(np.arange(len(counts)), counts), int(counts.sum())
+        weights = (rng.integers(0, levels, entries) / levels).astype(np.float32)
+        columns, starts = rng.integers(0, 50, entries), np.concatenate([[0], np.cumsum(counts)])
+        operator = SparseOperator.from_scipy(scipy.sparse.csr_matrix((weights, columns, starts), (len(counts), 50)))
+        order = np.lexsort((weights, rows))
+        expected = dict(zip(rows[order].tolist(), columns[order].tolist(), strict=True))
+        assert _heaviest(operator).tolist() == [expected.get(row, 0) for row in range(len(counts))]

@@ -39,7 +39,7 @@ class PixelDirect:
         self._bvh, self._view = bvh, view
         scales = bvh.surfels.scales.detach().prod(dim=1).sqrt()
         self._light = PixelLight(bvh, view.operator.matrix, view.edges, view.camera, float(SOFTENING) * scales)
-        self._receivers = _heaviest(view)
+        self._receivers = _heaviest(view.operator)
         self._places = even_places(SHADOW_RAYS)
         self._plain = ~view.edges.to(bvh.device) & (view.coverage.to(bvh.device) > 0.5)
 
@@ -94,12 +94,14 @@ def surfel_transmittance(bvh: SurfelBvh, position: Tensor, shadows: bool = True)
     return passing[0], slope[0]
 
 
-def _heaviest(view: ViewWeights) -> Tensor:
-    """(P,) int64 surfel with the largest weight in each pixel; 0 in empty ones."""
-    matrix = view.operator.to_scipy()
-    rows = np.repeat(np.arange(matrix.shape[0]), np.diff(matrix.indptr))
-    order = np.lexsort((matrix.data, rows))
-    heaviest = np.zeros(matrix.shape[0], np.int64)
-    # The last entry of a row is its largest.
-    heaviest[rows[order]] = matrix.indices[order]
+def _heaviest(operator: SparseOperator) -> Tensor:
+    """(P,) int64 surfel with the largest weight in each pixel (row), the last one of several; 0 in empty ones."""
+    matrix = operator.to_scipy()
+    heaviest, counts = np.zeros(matrix.shape[0], np.int64), np.diff(matrix.indptr)
+    rows = np.flatnonzero(counts)
+    if len(rows):
+        most = np.maximum.reduceat(matrix.data, matrix.indptr[rows])
+        places = np.flatnonzero(matrix.data == np.repeat(most, counts[rows]))
+        # Of places in one row, the last is written last.
+        heaviest[np.searchsorted(matrix.indptr, places, side="right") - 1] = matrix.indices[places]
     return torch.from_numpy(heaviest)
