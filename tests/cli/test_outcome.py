@@ -53,7 +53,7 @@ def test_few_targets_show_their_lights_with_deviations_and_what_is_wrong(tmp_pat
     assert lines[0] == "rig_0 (occluded): converged in 0.50 s, PSNR 36.0 dB"
     assert lines[1] == "  point at (0.100, 0.200, 0.300) ± 0.0100, RGB (1.000, 2.000, 3.000) W/sr ± 0.010"
     assert "spot at (0.500, 0.500, 0.500) ± 0.0200, axis (0.000, 0.000, -1.000), cone angle 30.0°" in lines[2]
-    assert "at bound" in lines[3] and f"  {AT_BOUND}" in lines
+    assert "stopped at the bound after 1.50 s" in lines[3] and f"  {AT_BOUND}" in lines
     assert lines.count(f"  {AT_BOUND}") == 1 and "lights.json" in lines[-1]
 
 

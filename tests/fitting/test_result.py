@@ -67,11 +67,11 @@ def test_a_saved_result_is_a_light_file_with_its_uncertainty(tmp_path: Path) -> 
     ("status", "words"),
     [
         (FitStatus.CONVERGED, "converged in 1.4 s"),
-        (FitStatus.MAX_ITERATIONS, "out of steps after 1.4 s"),
+        (FitStatus.MAX_ITERATIONS, "out of iterations after 1.4 s"),
         (FitStatus.UNDETERMINED, "undetermined after 1.4 s"),
         (FitStatus.AMBIGUOUS, "ambiguous after 1.4 s"),
         (FitStatus.UNEXPLAINED, "unexplained after 1.4 s"),
-        (FitStatus.AT_BOUND, "stopped at the edge after 1.4 s"),
+        (FitStatus.AT_BOUND, "stopped at the bound after 1.4 s"),
         (FitStatus.NOT_ENOUGH_LIGHT, "not enough light after 1.4 s"),
     ],
 )

@@ -16,7 +16,7 @@ from rgspipe.datasets.light_file import read_lights
 from rgspipe.evaluation.plots import LABELS
 from rgspipe.evaluation.tables import ALL, class_order
 from rgspipe.fitting.findings import FitStatus
-from rgspipe.fitting.result_text import light_line
+from rgspipe.fitting.result_text import ending, light_line
 from rgspipe.fitting.words import MEANINGS
 
 #: Exposures that differ by less from 1 are those that were known.
@@ -44,7 +44,8 @@ def _fits(artifact: Artifact) -> list[str]:
 def _fit(artifact: Artifact, row: Row) -> list[str]:
     path = artifact.file(f"{row['target']}/lights.json")
     lights, spreads, told = read_lights(path), read_covariances(path), read_json(path, "a fit's light file")
-    head = f"{row['target']} ({_class(row['occlusion'])}): {words(told['result'])} in {seconds(told['seconds'])}"
+    end = ending(FitStatus(told["result"]), seconds(told["seconds"]))
+    head = f"{row['target']} ({_class(row['occlusion'])}): {end}"
     if told["psnr"] is not None:
         head += f", PSNR {told['psnr']:.1f} dB"
     spread = dict(enumerate(spreads))

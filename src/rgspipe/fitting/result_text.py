@@ -23,15 +23,20 @@ def as_html(headline: str, lines: Sequence[str], reason: str) -> str:
     return f"<b>{escape(headline)}</b><ul>{items}</ul>{escape(reason)}"
 
 
-#: How fits that did not converge ended, where the name of the status is no phrase.
-ENDS = {FitStatus.MAX_ITERATIONS: "out of steps", FitStatus.AT_BOUND: "stopped at the edge"}
+#: How fits ended, where the name of the status alone is no phrase.
+ENDS = {FitStatus.MAX_ITERATIONS: "out of iterations", FitStatus.AT_BOUND: "stopped at the bound"}
 
 
 def headline(count: int, status: FitStatus, seconds: float) -> str:
     """How many lights, how the fit ended, and what it took: "2 lights, converged in 1.4 s"."""
     found = "no light" if count == 0 else f"{count} light{'s' if count > 1 else ''}"
-    end, after = ENDS.get(status, status.replace("_", " ")), "in" if status is FitStatus.CONVERGED else "after"
-    return f"{found}, {end} {after} {seconds:.2g} s"
+    return f"{found}, {ending(status, f'{seconds:.2g} s')}"
+
+
+def ending(status: FitStatus, duration: str) -> str:
+    """How a fit ended, and what it took: "converged in 1.4 s", "ambiguous after 1.4 s"."""
+    after = "in" if status is FitStatus.CONVERGED else "after"
+    return f"{ENDS.get(status, status.replace('_', ' '))} {after} {duration}"
 
 
 def light_lines(lights: LightRig, covariance: Sequence[Tensor]) -> list[str]:
