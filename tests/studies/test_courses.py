@@ -43,6 +43,7 @@ def test_long_courses_keep_their_ends_and_most_of_their_beginning() -> None:
 def test_steps_with_other_lights_than_the_answer_are_passed_over() -> None:
     curve = _curve(4).assign(x_1=[0.1, math.nan, math.nan, math.nan])
     assert [one.step for one in course_of(curve, TRUTH)] == [1, 2, 3]
+    assert [one.step for one in course_of(curve.assign(y_1=0.2, z_1=0.3, r_1=1.0, g_1=1.0, b_1=1.0), TRUTH * 2)] == [0]
     spot = SpotLight(*(torch.ones(3, dtype=torch.float64) for _ in range(3)), "gaussian", 0.5, 0.1)
     assert course_of(curve, (spot,)) == []
 

@@ -14,6 +14,7 @@ from matplotlib.lines import Line2D
 
 from rgspipe.evaluation import plots
 from rgspipe.evaluation.arrays import ArrayLike, to_array
+from rgspipe.evaluation.convergence import light_positions
 from rgspipe.evaluation.scene_drawing import PANELS, TRUTH, draw_surfaces, frame_panel, window
 from rgspipe.scene import LightRig
 
@@ -125,8 +126,7 @@ def _ways(
 
 def _lights(course: pd.DataFrame) -> list[npt.NDArray]:
     """(steps, 3) of each light."""
-    names = [suffix for suffix in ("", *(f"_{k}" for k in range(1, 9))) if f"x{suffix}" in course]
-    ways = [course[[f"{axis}{suffix}" for axis in "xyz"]].dropna().to_numpy(dtype=float) for suffix in names]
+    ways = [way[np.isfinite(way).all(axis=1)] for way in np.moveaxis(light_positions(course), 1, 0)]
     return [way for way in ways if len(way)]
 
 
