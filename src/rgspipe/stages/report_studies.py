@@ -14,7 +14,7 @@ from rgspipe.pages.light_studies import LightStudy
 from rgspipe.studies.lights import KINDS
 from rgspipe.studies.written import TABLE
 
-STAGE, CAPTURES = "study", "captures"
+STUDY, CAPTURES = "study", "captures"
 
 
 def study_files(config: RgspipeConfig) -> list[Path]:
@@ -65,10 +65,10 @@ def newest_studies(config: RgspipeConfig, kind: str) -> list[Artifact]:
 def _studies(config: RgspipeConfig, kind: str) -> Iterator[Artifact]:
     """Whole studies with rows of this scene; in all folders, as a study over several scenes lies in one scene's."""
     root = Path(config.outputs)
-    for path in sorted(root.glob(f"*/{STAGE}/*/{TABLE}")):
+    for path in sorted(root.glob(f"*/{STUDY}/*/{TABLE}")):
         if path.parent.is_symlink() or path.parent.name.startswith("."):
             continue
-        found = _readable(ArtifactStore(root), Key(path.parents[2].name, STAGE, path.parent.name))
+        found = _readable(ArtifactStore(root), Key(path.parents[2].name, STUDY, path.parent.name))
         # Studies that were made before they had kinds have none.
         if found is not None and found.facts.get("kind") == kind and len(study_rows(found, config)):
             yield found
