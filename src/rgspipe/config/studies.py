@@ -33,9 +33,10 @@ class StudyConfig(Options):
     """What a study compares: cases, methods and numbers of views."""
 
     kind: Kind = "captures"
-    """what it is about: what becomes of a trained scene when its capture gets worse; of recovered lights errors against
-    the number of views, cases of errors in images and model, classes of lights, kinds of lights, how often 95 % regions
-    hold the truth, or the paper's method beside ours; or the courses of fits from their start to their answer"""
+    """what it is about: captures (what becomes of a trained scene when its capture gets worse); of recovered lights
+    views (how many), robustness (errors of images and model), classes (where the light is), kinds (of lights), regions
+    (how often those of 95 % hold the truth) or adam (the paper's method beside ours); courses (of fits from their start
+    to their answer)"""
     cases: tuple[str, ...] = ("clean",)
     """what is compared: `clean`, or overrides such as target_capture.noise=0.03, several joined by spaces, and `NAME: `
     before them where wanted"""
@@ -48,7 +49,7 @@ class StudyConfig(Options):
     limit: int | None = option(None, low=1, high=100000)
     """targets of each class, where fit.limit does not say; all if null"""
     paper_adam_limit: int | None = option(1, low=1, high=100000)
-    """the same of paper_adam, which takes minutes a target, beside other methods"""
+    """the same for paper_adam, which takes minutes a target"""
     paper_adam_views: tuple[int, ...] | None = option(None, low=1, high=1000)
     """numbers of views that paper_adam is run on; all if null"""
 
