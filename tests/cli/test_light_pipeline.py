@@ -13,7 +13,7 @@ from rgspipe.config import RgspipeConfig, with_changes
 from rgspipe.stages import NAMES, load_stage
 
 #: Keys of how a run is done, which no fit depends on.
-OPERATION = ("stage", "light_study")
+OPERATION = ("stage", "study")
 
 
 def _settings(config: RgspipeConfig) -> str:

@@ -57,7 +57,8 @@ def build(
         make(folder)
         return facts
 
-    recipe = {"config": {"targets.count": list(count)}, "inputs": {"freeze": ["f1"]}, "code": {}}
+    settings = {"targets.count": list(count), "study": {"methods": ["paper_adam"]}}
+    recipe = {"config": settings, "inputs": {"freeze": ["f1"]}, "code": {}}
     return ArtifactStore(root).build(Key("room", stage, fingerprint), recipe, whole)[0]
 
 
@@ -73,7 +74,7 @@ def _courses(folder: Path) -> None:
     row = {"target": "visible_000", "occlusion": "visible", "method": "paper_adam", "steps": 1250, "seconds": 31.5}
     row |= {"position_error_start": 0.5, "position_error_end": 0.012, "seconds_to_limit": float("nan")}
     row |= {f"{name}_{end}": 0.25 for name in ("intensity_error", "image_error") for end in ("start", "end")}
-    pd.DataFrame([row]).to_csv(folder / "convergence.csv", index=False)
+    pd.DataFrame([{"kind": "courses", "scene": "room"} | row]).to_csv(folder / "study.csv", index=False)
     (folder / "pictures").mkdir()
     (folder / "pictures" / "visible_000.png").write_bytes(PNG)
 
@@ -122,7 +123,7 @@ def test_generated_targets_are_in_the_order_of_kinds_and_numbers_of_lights(tmp_p
 
 
 def test_courses_and_tracks_are_shown_with_what_was_measured(tmp_path: Path) -> None:
-    build(tmp_path, "convergence", "01", _courses)
+    build(tmp_path, "study", "01", _courses, kind="courses")
     build(tmp_path, "track", "01", _track)
     courses, track = found_sections(config(tmp_path), None)
     assert courses.rows == [

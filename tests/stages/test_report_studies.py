@@ -29,14 +29,14 @@ def _build(
         pd.DataFrame({"scene": scenes, "made": key.fingerprint}).to_csv(folder / "study.csv", index=False)
         return {"kind": kind}
 
-    recipe = {"config": {"light_study": {"methods": list(methods)}}, "inputs": inputs, "code": {}}
+    recipe = {"config": {"study": {"methods": list(methods)}}, "inputs": inputs, "code": {}}
     return ArtifactStore(root).build(key, recipe, make)[0]
 
 
 def _study(
     root: Path, fingerprint: str, kind: str, *scenes: str, evaluated: str = "e1", folder: str = "cornell"
 ) -> None:
-    _build(root, Key(folder, "light_study", fingerprint), {"evaluate": [evaluated]}, kind, scenes)
+    _build(root, Key(folder, "study", fingerprint), {"evaluate": [evaluated]}, kind, scenes)
 
 
 @pytest.fixture
@@ -50,8 +50,8 @@ def test_of_each_kind_the_newest_study_that_has_the_scene_is_taken(tmp_path: Pat
     _study(tmp_path, "02", "views", "cornell")
     _study(tmp_path, "03", "classes", "cornell", "corner", "cornell", folder="corner")
     _study(tmp_path, "04", "views", "corner")
-    (tmp_path / "cornell" / "light_study" / "05").mkdir()
-    (tmp_path / "cornell" / "light_study" / "05" / "study.csv").write_text("scene\ncornell\n")
+    (tmp_path / "cornell" / "study" / "05").mkdir()
+    (tmp_path / "cornell" / "study" / "05" / "study.csv").write_text("scene\ncornell\n")
     found = found_light_studies(_config(tmp_path), None)
     assert [(study.kind, study.table["made"].astype(int).tolist()) for study in found] == [
         ("views", [2]),
@@ -64,7 +64,7 @@ def test_of_each_kind_the_newest_study_that_has_the_scene_is_taken(tmp_path: Pat
 def test_a_study_of_other_methods_does_not_hide_one_of_its_kind(tmp_path: Path, days: None) -> None:
     both = ("search_lm", "paper_adam")
     for fingerprint, methods in (("01", both), ("02", ("search_lm",)), ("03", both)):
-        key = Key("cornell", "light_study", fingerprint)
+        key = Key("cornell", "study", fingerprint)
         _build(tmp_path, key, {"evaluate": ["e1"]}, "kinds", ("cornell",), methods)
     found = found_light_studies(_config(tmp_path), None)
     assert [study.table["made"].astype(int).tolist() for study in found] == [[2], [3]]
@@ -81,7 +81,7 @@ def test_a_study_of_another_frozen_scene_is_marked(tmp_path: Path) -> None:
 
 
 def _captures(root: Path, folder: str, fingerprint: str, scenes: tuple[str, ...], judged: str) -> Artifact:
-    return _build(root, Key(folder, "study", fingerprint), {"judge": [judged]}, scenes=scenes)
+    return _build(root, Key(folder, "study", fingerprint), {"judge": [judged]}, "captures", scenes)
 
 
 def test_the_newest_study_of_captures_counts_wherever_it_lies(tmp_path: Path, days: None) -> None:

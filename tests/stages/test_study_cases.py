@@ -7,13 +7,11 @@ import pytest
 from rgspipe.cli.compose import compose_config
 from rgspipe.config import RgspipeConfig, with_changes
 from rgspipe.errors import InputError
-from rgspipe.stages.study_cases import checked_cases, chosen_scenes, parse_case
-
-LISTED = "light_study.cases"
+from rgspipe.stages.study_cases import LISTED, checked_cases, chosen_scenes, parse_case
 
 
 def _changes(*texts: str) -> list[dict[str, object]]:
-    return [case.changes for case in checked_cases(RgspipeConfig(), LISTED, texts)]
+    return [case.changes for case in checked_cases(with_changes(RgspipeConfig(), {"study.cases": texts}))]
 
 
 def test_a_value_means_the_artifact_that_it_means_on_the_command_line() -> None:
@@ -50,8 +48,9 @@ def test_two_cases_of_one_name_are_refused() -> None:
 
 def test_scenes_are_those_that_are_named_or_the_one_that_is_configured() -> None:
     config = with_changes(RgspipeConfig(), {"scene.name": "mine"})
-    assert [(changes, one.scene.name) for changes, one in chosen_scenes(config, [])] == [({}, "mine")]
-    found = [(one.scene.kind, one.scene.name) for _, one in chosen_scenes(config, ["corner", "room"])]
+    assert [(changes, one.scene.name) for changes, one in chosen_scenes(config)] == [({}, "mine")]
+    several = with_changes(config, {"study.scenes": ["corner", "room"]})
+    found = [(one.scene.kind, one.scene.name) for _, one in chosen_scenes(several)]
     assert found == [("corner", None), ("room", None)]
 
 
@@ -72,7 +71,7 @@ def test_scenes_are_those_that_are_named_or_the_one_that_is_configured() -> None
     ],
 )
 def test_a_case_is_what_it_says(text: str, name: str | None, changes: dict) -> None:
-    found = parse_case(text, "study.cases")
+    found = parse_case(text)
     assert found.name == (name or " ".join(text.split())) and found.changes == changes
     assert [type(value) for value in found.changes.values()] == [type(value) for value in changes.values()]
 
@@ -95,4 +94,4 @@ def test_a_case_is_what_it_says(text: str, name: str | None, changes: dict) -> N
 )
 def test_a_case_that_says_nothing_is_refused(text: str) -> None:
     with pytest.raises(InputError, match=r"study\.cases"):
-        parse_case(text, "study.cases")
+        parse_case(text)

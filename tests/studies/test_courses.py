@@ -11,7 +11,7 @@ import pytest
 import torch
 
 from rgspipe.scene import PointLight, SpotLight
-from rgspipe.studies.course_figure import COLOURS, course_figure
+from rgspipe.studies.course_figure import COLOURS, course_figure, courses_figure
 from rgspipe.studies.courses import MOST_STEPS, course_of, course_summary, course_table
 
 TRUTH = (PointLight(torch.tensor([0.5, 0.5, 1.0], dtype=torch.float64), torch.full((3,), 2.0, dtype=torch.float64)),)
@@ -43,6 +43,7 @@ def test_long_courses_keep_their_ends_and_most_of_their_beginning() -> None:
 def test_steps_with_other_lights_than_the_answer_are_passed_over() -> None:
     curve = _curve(4).assign(x_1=[0.1, math.nan, math.nan, math.nan])
     assert [one.step for one in course_of(curve, TRUTH)] == [1, 2, 3]
+    assert [one.step for one in course_of(curve.assign(y_1=0.2, z_1=0.3, r_1=1.0, g_1=1.0, b_1=1.0), TRUTH * 2)] == [0]
     spot = SpotLight(*(torch.ones(3, dtype=torch.float64) for _ in range(3)), "gaussian", 0.5, 0.1)
     assert course_of(curve, (spot,)) == []
 
@@ -69,7 +70,7 @@ def test_the_time_to_the_limit_counts_from_where_the_error_stays_below_it() -> N
 @pytest.mark.parametrize("truth", [TRUTH, ()], ids=["known", "unknown"])
 def test_the_figure_draws_each_method_over_steps_and_seconds_and_its_way_twice(truth: tuple) -> None:
     parts = [
-        course_table(course_of(_curve(steps), TRUTH), truth, 2.0).assign(method=method, image_error=0.1)
+        course_table(course_of(_curve(steps), TRUTH), truth, 2.0).assign(method=method, image_error=0.1, target="a")
         for method, steps in (("search_lm", 5), ("paper_adam", 100))
     ]
     cloud = np.random.default_rng(0).uniform(size=(200, 3))
@@ -87,10 +88,27 @@ def test_the_figure_draws_each_method_over_steps_and_seconds_and_its_way_twice(t
 
 
 def test_a_start_far_outside_is_in_both_drawings_and_a_camera_out_of_sight_has_no_mark() -> None:
-    course = course_table(course_of(_curve(3), TRUTH), TRUTH, 2.0).assign(method="paper_adam", image_error=0.1)
+    course = course_table(course_of(_curve(3), TRUTH), TRUTH, 2.0).assign(
+        target="a", method="paper_adam", image_error=0.1
+    )
     course = course.assign(x=[0.5, 1.5, 0.5], y=[0.5, -0.4, 0.5], z=[1.9, 1.0, 1.0])
     cloud = np.random.default_rng(0).uniform(size=(200, 3))
     figure = course_figure(course, TRUTH, cloud, np.tile([0.0, 0.0, 1.0], (200, 1)), np.full((1, 3), 9.0))
     (above, side), way = figure.subfigs[1].axes, course[["x", "y", "z"]].to_numpy()
     assert all(above.viewLim.contains(x, y) and side.viewLim.contains(x, z) for x, y, z in way)
     assert "camera" not in [text.get_text() for text in figure.legends[0].get_texts()]
+
+
+def test_the_figure_of_all_targets_has_a_line_for_each_of_them_and_each_method() -> None:
+    parts = [
+        course_table(course_of(_curve(steps), TRUTH), TRUTH, 2.0).assign(target=target, method=method, image_error=0.1)
+        for target in ("a", "b")
+        for method, steps in (("search_lm", 5), ("paper_adam", 100))
+    ]
+    figure = courses_figure(pd.concat(parts))
+    assert len(figure.axes) == 6
+    for axis in figure.axes:
+        colours = [matplotlib.colors.to_hex(line.get_color()) for line in axis.lines]
+        # A line and the point at its end.
+        assert all(colours.count(COLOURS[name].lower()) == 4 for name in ("search_lm", "paper_adam"))
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["search_lm", "paper_adam"]

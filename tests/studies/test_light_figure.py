@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from rgspipe.evaluation.plots import png_of
-from rgspipe.studies.light_figure import light_study_figure
+from rgspipe.studies.light_figure import light_figure
 from rgspipe.studies.lights import KINDS
 
 
@@ -30,7 +30,7 @@ def _table(**lists: list) -> pd.DataFrame:
 
 def test_errors_are_drawn_over_views_with_what_was_stated_and_foretold() -> None:
     table = _table(occlusion=["visible", "occluded", "all"], views=[1, 2, 4]).assign(predicted=0.006)
-    figure = light_study_figure(table, "views")
+    figure = light_figure(table, "views")
     assert [axis.get_title(loc="left") for axis in figure.axes[:3]] == ["visible", "occluded", "all classes"]
     first = figure.axes[0]
     assert [list(line.get_xdata()) for line in first.lines[:3]] == [[1, 2, 4]] * 3
@@ -43,7 +43,7 @@ def test_errors_are_drawn_over_views_with_what_was_stated_and_foretold() -> None
 
 
 def test_a_single_class_is_not_drawn_twice() -> None:
-    figure = light_study_figure(_table(occlusion=["around_corner", "all"], views=[1, 3]), "views")
+    figure = light_figure(_table(occlusion=["around_corner", "all"], views=[1, 3]), "views")
     assert [axis.get_title(loc="left") for axis in figure.axes] == ["around the corner", "", ""]
 
 
@@ -51,7 +51,7 @@ def test_a_single_class_is_not_drawn_twice() -> None:
 def test_the_key_of_a_figure_over_views_has_room(classes: list[str]) -> None:
     """A lone column of panels would cut off half of it."""
     table = _table(occlusion=classes, views=[1, 3], method=["search_lm", "paper_adam"]).assign(predicted=0.006)
-    figure = light_study_figure(table, "views")
+    figure = light_figure(table, "views")
     png_of(figure)
     key = figure.legends[0].get_window_extent()
     assert len(figure.legends[0].get_texts()) == 4 and key.x0 >= 0 and key.x1 <= figure.bbox.width
@@ -59,7 +59,7 @@ def test_the_key_of_a_figure_over_views_has_room(classes: list[str]) -> None:
 
 
 def test_without_predictions_none_are_drawn() -> None:
-    figure = light_study_figure(_table(views=[1, 2], method=["search_lm", "paper_adam"]), "views")
+    figure = light_figure(_table(views=[1, 2], method=["search_lm", "paper_adam"]), "views")
     # Of each method what was measured and what fits state, and the limit of a success.
     assert len(figure.axes[0].lines) == 5
     words = [text.get_text() for text in figure.legends[0].get_texts()]
@@ -68,7 +68,7 @@ def test_without_predictions_none_are_drawn() -> None:
 
 def test_cases_are_rows_and_scenes_series() -> None:
     table = _table(scene=["cornell", "corner"], case=["clean", "noise 3 %"], occlusion=["visible", "all"])
-    figure = light_study_figure(table, "robustness")
+    figure = light_figure(table, "robustness")
     assert [label.get_text() for label in figure.axes[0].get_yticklabels()] == ["clean", "noise 3 %"]
     assert [text.get_text() for text in figure.legends[0].get_texts()] == ["cornell", "corner"]
     assert [axis.get_title(loc="left") for axis in figure.axes][-1] == "silently wrong (%)"
@@ -78,7 +78,7 @@ def test_cases_are_rows_and_scenes_series() -> None:
 
 def test_classes_of_scenes_are_rows_and_surfels_series() -> None:
     table = _table(scene=["cornell", "corner"], case=["trained", "true"], views=[1, 3], occlusion=["visible", "all"])
-    figure = light_study_figure(table, "classes")
+    figure = light_figure(table, "classes")
     rows = [label.get_text() for label in figure.axes[0].get_yticklabels()]
     assert rows == ["cornell: visible", "corner: visible"]
     words = [text.get_text() for text in figure.legends[0].get_texts()]
@@ -89,9 +89,9 @@ def test_classes_of_scenes_are_rows_and_surfels_series() -> None:
 def test_failed_fits_are_drawn_at_the_end_of_the_range(kind: str) -> None:
     table = _table(views=[1, 2], occlusion=["visible", "all"])
     table.loc[0, ["position_high", "intensity", "intensity_high"]] = math.inf
-    assert len(png_of(light_study_figure(table, kind))) > 5000
+    assert len(png_of(light_figure(table, kind))) > 5000
 
 
 def test_nothing_to_draw_is_said() -> None:
     with pytest.raises(ValueError, match="known truth"):
-        light_study_figure(_table(views=[1]).assign(position=math.nan), "views")
+        light_figure(_table(views=[1]).assign(position=math.nan), "views")

@@ -15,7 +15,6 @@ STAGE_TABLES = {
     "evaluate": "metrics.csv",
     "judge": "quality.csv",
     "study": "study.csv",
-    "light_study": "study.csv",
     "benchmark": "benchmark.csv",
 }
 

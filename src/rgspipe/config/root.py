@@ -16,7 +16,7 @@ from rgspipe.config.light import LightConfig, ViewsConfig
 from rgspipe.config.relight import RelightConfig
 from rgspipe.config.report import OverviewConfig, ReportConfig
 from rgspipe.config.scene import SceneConfig
-from rgspipe.config.studies import ConvergenceConfig, EvaluateConfig, LightStudyConfig, StudyConfig
+from rgspipe.config.studies import EvaluateConfig, StudyConfig
 from rgspipe.config.targets import TargetsConfig
 from rgspipe.config.track import TrackConfig
 from rgspipe.config.train import TrainConfig
@@ -78,6 +78,4 @@ class RgspipeConfig(Options):
     target_capture: TargetCapture = TargetCapture()
     track: TrackConfig = TrackConfig()
     targets: TargetsConfig = TargetsConfig()
-    light_study: LightStudyConfig = LightStudyConfig()
     relight: RelightConfig = RelightConfig()
-    convergence: ConvergenceConfig = ConvergenceConfig()

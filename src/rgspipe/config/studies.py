@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal, get_args
+from dataclasses import dataclass, fields
+from typing import Literal
 
 from rgspipe.config.scene import Modelled
+from rgspipe.errors import InputError
 from rgspipe.fitting.options import Method
 from rgspipe.options import Options, option
 
-#: What a study of lights is about.
-LightStudy = Literal["views", "robustness", "classes", "kinds", "regions", "adam"]
+#: What a study is about.
+Kind = Literal["captures", "views", "robustness", "classes", "kinds", "regions", "adam", "courses"]
+
+#: Settings that only some kinds of study have a use for; those that are not listed here use all of them.
+UNUSED: dict[Kind, tuple[str, ...]] = {
+    "captures": ("views", "methods", "paper_adam_limit", "paper_adam_views"),
+    "courses": ("cases", "scenes", "views", "paper_adam_limit", "paper_adam_views"),
+}
 
 
 @dataclass(frozen=True)
@@ -23,24 +30,13 @@ class EvaluateConfig(Options):
 
 @dataclass(frozen=True)
 class StudyConfig(Options):
-    """What becomes of a trained scene when its capture gets worse."""
+    """What a study compares: cases, methods and numbers of views."""
 
-    cases: tuple[str, ...] = ("clean",)
-    """captures: `clean`, or overrides such as capture.depth_noise=0.01, several joined by spaces, and `NAME: ` before
-    them where wanted"""
-    scenes: tuple[Modelled, ...] = ()
-    """scenes that are compared; by default the one that is configured"""
-    limit: int | None = option(6, low=1, high=100000)
-    """lights of each class that are recovered in each case"""
-
-
-@dataclass(frozen=True)
-class LightStudyConfig(Options):
-    """What recovered lights are like over numbers of views, bad images and models, or where the lights are."""
-
-    kind: LightStudy = "robustness"
-    """the figure: errors against the number of views; cases of errors in images and model; classes of lights; kinds of
-    lights; how often 95 % regions hold the truth; or the paper's method beside ours"""
+    kind: Kind = "captures"
+    """what it is about: captures (what becomes of a trained scene when its capture gets worse); of recovered lights
+    views (how many), robustness (errors of images and model), classes (where the light is), kinds (of lights), regions
+    (how often those of 95 % hold the truth) or adam (the paper's method beside ours); courses (of fits from their start
+    to their answer)"""
     cases: tuple[str, ...] = ("clean",)
     """what is compared: `clean`, or overrides such as target_capture.noise=0.03, several joined by spaces, and `NAME: `
     before them where wanted"""
@@ -50,17 +46,26 @@ class LightStudyConfig(Options):
     """numbers of views"""
     methods: tuple[Method, ...] = ("search_lm",)
     """methods"""
+    limit: int | None = option(None, low=1, high=100000)
+    """targets of each class, where fit.limit does not say; all if null"""
     paper_adam_limit: int | None = option(1, low=1, high=100000)
-    """targets of each class that paper_adam is run on"""
+    """the same for paper_adam, which takes minutes a target"""
     paper_adam_views: tuple[int, ...] | None = option(None, low=1, high=1000)
-    """numbers of views that paper_adam, which takes minutes a target, is run on; all if null"""
+    """numbers of views that paper_adam is run on; all if null"""
 
+    def check(self) -> None:
+        """Refuse settings that the kind of study has no use for.
 
-@dataclass(frozen=True)
-class ConvergenceConfig(Options):
-    """How methods get from their start to their answer."""
-
-    methods: tuple[Method, ...] = get_args(Method)
-    """methods that are compared"""
-    limit: int = option(1, low=1, high=100000)
-    """targets of each class, where fit.limit does not say"""
+        Raises:
+            InputError: one of them is not as it is by default.
+        """
+        plain = {item.name: item.default for item in fields(self)}
+        for name in UNUSED.get(self.kind, ()):
+            if getattr(self, name) != plain[name]:
+                used = [one for one in plain if one not in UNUSED[self.kind]]
+                raise InputError(
+                    name,
+                    expected=f"its default where study.kind={self.kind}, which uses {', '.join(used)}",
+                    found=str(getattr(self, name)),
+                    remedy=f"Leave study.{name} out, or choose another study.kind.",
+                )

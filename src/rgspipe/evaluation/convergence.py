@@ -1,8 +1,10 @@
-"""The course of a fit: loss and position error at every step."""
+"""The course of a fit, as its convergence.csv says it: lights, loss and position error at every step."""
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections.abc import Collection
 
 import numpy as np
 import numpy.typing as npt
@@ -34,17 +36,28 @@ def convergence_table(curve: pd.DataFrame, target: dict, truth: LightRig, scene_
     error = np.full(len(curve), math.nan)
     if truth and {"x", "y", "z"} <= set(curve.columns):
         wanted = np.stack([to_array(light.position) for light in truth])
-        error = np.array([_worst_distance(step, wanted) for step in _positions(curve)]) / scene_size
+        error = np.array([_worst_distance(step, wanted) for step in light_positions(curve)]) / scene_size
     seconds = curve["seconds"].to_numpy(dtype=float) if "seconds" in curve.columns else math.nan
     described = {name: target[name] for name in COLUMNS[:4]}
     measured = {"step": curve["step"], "seconds": seconds, "loss": curve["loss"], "position_error": error}
     return pd.DataFrame(described | measured, columns=COLUMNS, index=curve.index).reset_index(drop=True)
 
 
-def _positions(curve: pd.DataFrame) -> npt.NDArray[np.float64]:
-    """(steps, lights, 3) of a fit's steps."""
-    suffixes = ["", *(f"_{k}" for k in range(1, len(curve.columns)) if f"x_{k}" in curve.columns)]
-    lights = [curve[[axis + suffix for axis in "xyz"]].to_numpy(dtype=float) for suffix in suffixes]
+def light_suffix(index: int) -> str:
+    """What ends the names of a light's columns."""
+    return "" if index == 0 else f"_{index}"
+
+
+def light_suffixes(columns: Collection[str]) -> list[str]:
+    """`light_suffix` of each light that the columns have."""
+    return list(itertools.takewhile(lambda suffix: f"x{suffix}" in columns, map(light_suffix, itertools.count())))
+
+
+def light_positions(curve: pd.DataFrame) -> npt.NDArray[np.float64]:
+    """(steps, lights, 3) of a fit's steps; NaN where a step has fewer lights than others."""
+    lights = [
+        curve[[axis + suffix for axis in "xyz"]].to_numpy(dtype=float) for suffix in light_suffixes(curve.columns)
+    ]
     return np.stack(lights, axis=1)
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import pandas as pd
 
 from rgspipe.pages.html import figure_address
-from rgspipe.studies.light_figure import light_study_figure
+from rgspipe.studies.light_figure import light_figure
 from rgspipe.studies.light_table import NOTES, shown_rows
 
 #: What each kind is called, and asks.
@@ -54,8 +54,8 @@ class LightStudy:
     """A study of recovered lights.
 
     Attributes:
-        kind: one of `light_study.KINDS`.
-        table: rows of `light_study.case_rows`.
+        kind: one of `lights.KINDS`.
+        table: rows of `lights.case_rows`.
         remark: what the reader must know, or "".
     """
 
@@ -81,5 +81,5 @@ def _shown(study: LightStudy) -> dict[str, Any]:
         "alt": ALT[study.kind],
         "headings": headings,
         "rows": [list(row.values()) for row in rows],
-        "figure": figure_address(lambda: light_study_figure(study.table, study.kind)),
+        "figure": figure_address(lambda: light_figure(study.table, study.kind)),
     }

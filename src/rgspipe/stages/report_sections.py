@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 
 import pandas as pd
@@ -21,6 +21,7 @@ from rgspipe.pages.html import bare_percent, decimals, label, percent
 from rgspipe.pages.section import Section
 from rgspipe.pages.targets_figure import targets_figure
 from rgspipe.scene import LightRig, Surfels
+from rgspipe.stages.report_studies import newest_studies, study_rows
 
 #: Generated targets that are shown of each kind.
 SHOWN = 4
@@ -39,7 +40,7 @@ KINDS = {
 
 def section_files(config: RgspipeConfig) -> list[Path]:
     """The manifests of what `found_galleries` and `found_sections` take: they hold the checksums of all files."""
-    found = [*_generated(config), *_newest(config, "convergence").values(), *_newest(config, "track").values()]
+    found = [*_generated(config), *newest_studies(config, "courses"), *_newest(config, "track").values()]
     return [artifact.path / MANIFEST for artifact in found]
 
 
@@ -49,15 +50,15 @@ def found_galleries(config: RgspipeConfig, surfels: Surfels | None) -> list[Sect
 
 
 def found_sections(config: RgspipeConfig, freeze: Artifact | None) -> list[Section]:
-    """The newest courses of fits and the newest track.
+    """The newest courses of fits, of each set of methods, and the newest track.
 
     Args:
         freeze: the frozen scene that the report shows.
     """
-    makers: Mapping[str, Callable[[Artifact, str], Section]] = {"convergence": _courses, "track": _track}
-    return [
-        make(made, _remark(made, freeze)) for stage, make in makers.items() for made in _newest(config, stage).values()
+    courses = [
+        _courses(made, study_rows(made, config), _remark(made, freeze)) for made in newest_studies(config, "courses")
     ]
+    return courses + [_track(made, _remark(made, freeze)) for made in _newest(config, "track").values()]
 
 
 def _targets(made: Artifact, surfels: Surfels) -> Section:
@@ -103,8 +104,7 @@ def _rig_words(rig: LightRig) -> str:
     return " and ".join(f"{count} {name}{'s' if count > 1 else ''}" for name, count in sorted(counted.items()))
 
 
-def _courses(made: Artifact, remark: str) -> Section:
-    summary = pd.read_csv(made.file("convergence.csv"), dtype={"target": str})
+def _courses(made: Artifact, summary: pd.DataFrame, remark: str) -> Section:
     columns = ["<Target", "<Light", "<Method", "Steps", "Time (s)", "Solved after (s)"]
     columns += ["Position error (%)", "Intensity error (%)", "Image error (%)"]
     rows = [
@@ -113,10 +113,11 @@ def _courses(made: Artifact, remark: str) -> Section:
         + [" → ".join(bare_percent(row[f"{name}_{end}"]) for end in ("start", "end")) for name in _COMPARED]
         for row in summary.to_dict("records")
     ]
+    methods = dict.fromkeys(summary["method"])
     pictures = {name: made.file(f"pictures/{name}.png").read_bytes() for name in dict.fromkeys(summary["target"])}
     return Section(
-        "courses",
-        "From start to answer",
+        f"courses-{made.fingerprint}",
+        f"From start to answer: {' beside '.join(methods)}",
         ["What each method does with the same targets, from where it starts to what it answers."],
         columns,
         rows,

@@ -1,4 +1,4 @@
-"""The studies that a report shows: the newest of bad captures, and of lights those of each kind and set of methods."""
+"""The studies that a report shows: of each kind and set of methods the newest."""
 
 from __future__ import annotations
 
@@ -14,14 +14,12 @@ from rgspipe.pages.light_studies import LightStudy
 from rgspipe.studies.lights import KINDS
 from rgspipe.studies.written import TABLE
 
-CAPTURES, LIGHTS = "study", "light_study"
+STUDY, CAPTURES = "study", "captures"
 
 
 def study_files(config: RgspipeConfig) -> list[Path]:
     """The tables of the studies that `found_captures` and `found_light_studies` take."""
-    captures = _newest_captures(config)
-    studies = [*([] if captures is None else [captures]), *_newest_lights(config).values()]
-    return [study.path / TABLE for study in studies]
+    return [study.path / TABLE for kind in (CAPTURES, *KINDS) for study in newest_studies(config, kind)]
 
 
 def found_captures(config: RgspipeConfig, judged: Sequence[Artifact]) -> tuple[pd.DataFrame | None, str]:
@@ -30,7 +28,7 @@ def found_captures(config: RgspipeConfig, judged: Sequence[Artifact]) -> tuple[p
     Args:
         judged: the judgements that the report shows; a study of the same scene has the first of them among its own.
     """
-    found = _newest_captures(config)
+    found = next(iter(newest_studies(config, CAPTURES)), None)
     if found is None:
         return None, ""
     same = bool(judged) and judged[0].fingerprint in found.manifest["inputs"].get("judge", ())
@@ -38,7 +36,7 @@ def found_captures(config: RgspipeConfig, judged: Sequence[Artifact]) -> tuple[p
     remark = (
         "" if same else f"This study, of {day}, was made with other settings, data or code than the rest of this page."
     )
-    return _rows(found, config), remark
+    return study_rows(found, config), remark
 
 
 def found_light_studies(config: RgspipeConfig, freeze: Artifact | None) -> list[LightStudy]:
@@ -47,37 +45,32 @@ def found_light_studies(config: RgspipeConfig, freeze: Artifact | None) -> list[
     Args:
         freeze: the frozen scene that the report shows; a study of the same scene has fits of it.
     """
-    found = _newest_lights(config)
     return [
-        LightStudy(kind, _rows(study, config), _remark(config, study, freeze))
+        LightStudy(kind, study_rows(study, config), _remark(config, study, freeze))
         for kind in KINDS
-        for (its_kind, _), study in sorted(found.items(), key=lambda item: len(item[0][1]))
-        if its_kind == kind
+        for study in newest_studies(config, kind)
     ]
 
 
-def _newest_captures(config: RgspipeConfig) -> Artifact | None:
-    return max(_studies(config, CAPTURES), key=_made, default=None)
+def newest_studies(config: RgspipeConfig, kind: str) -> list[Artifact]:
+    """The newest study of a kind with rows of this scene, of each set of methods; those of few methods first."""
+    newest: dict[tuple[str, ...], Artifact] = {}
+    for found in _studies(config, kind):
+        methods = tuple(found.manifest["config"]["study"]["methods"])
+        if methods not in newest or _made(found) > _made(newest[methods]):
+            newest[methods] = found
+    return [newest[methods] for methods in sorted(newest, key=len)]
 
 
-def _newest_lights(config: RgspipeConfig) -> dict[tuple[str, tuple[str, ...]], Artifact]:
-    """By kind and methods."""
-    newest: dict[tuple[str, tuple[str, ...]], Artifact] = {}
-    for found in _studies(config, LIGHTS):
-        asked = str(found.facts["kind"]), tuple(found.manifest["config"].get(LIGHTS, {}).get("methods", ()))
-        if asked not in newest or _made(found) > _made(newest[asked]):
-            newest[asked] = found
-    return newest
-
-
-def _studies(config: RgspipeConfig, stage: str) -> Iterator[Artifact]:
+def _studies(config: RgspipeConfig, kind: str) -> Iterator[Artifact]:
     """Whole studies with rows of this scene; in all folders, as a study over several scenes lies in one scene's."""
     root = Path(config.outputs)
-    for path in sorted(root.glob(f"*/{stage}/*/{TABLE}")):
+    for path in sorted(root.glob(f"*/{STUDY}/*/{TABLE}")):
         if path.parent.is_symlink() or path.parent.name.startswith("."):
             continue
-        found = _readable(ArtifactStore(root), Key(path.parents[2].name, stage, path.parent.name))
-        if found is not None and len(_rows(found, config)):
+        found = _readable(ArtifactStore(root), Key(path.parents[2].name, STUDY, path.parent.name))
+        # Studies that were made before they had kinds have none.
+        if found is not None and found.facts.get("kind") == kind and len(study_rows(found, config)):
             yield found
 
 
@@ -93,8 +86,9 @@ def _made(study: Artifact) -> str:
     return str(study.manifest.get("created", ""))
 
 
-def _rows(study: Artifact, config: RgspipeConfig) -> pd.DataFrame:
-    table = pd.read_csv(study.file(TABLE))
+def study_rows(study: Artifact, config: RgspipeConfig) -> pd.DataFrame:
+    """The rows of a study that are of this scene."""
+    table = pd.read_csv(study.file(TABLE), dtype={"target": str})
     return table[table["scene"] == config.scene.folder].reset_index(drop=True)
 
 

@@ -1,73 +1,53 @@
-"""Compare what bad captures cost, over cases and scenes: one table, one figure."""
+"""Compare cases, methods and numbers of views: bad captures, recovered lights, ways to the answer."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
-import pandas as pd
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 from rgspipe.config import RgspipeConfig
-from rgspipe.evaluation.markdown import markdown_table
+from rgspipe.stages import study_captures, study_courses, study_lights
 from rgspipe.stages.base import Need, Stage, StageContext
-from rgspipe.stages.sources import has_truth
-from rgspipe.stages.study_cases import checked_cases, chosen_scenes
-from rgspipe.studies.capture_figure import capture_figure
-from rgspipe.studies.captures import TRUTH, study_row, with_factors
+from rgspipe.stages.study_kind import StudyKind
+from rgspipe.studies import lights
 from rgspipe.studies.written import write_study
 
-#: What tables leave out of the names of cases: captures are what is studied.
-SECTION = "capture."
-
-#: What study.md shows of study.csv: headings and formats.
-SHOWN = {
-    "scene": ("scene", ""),
-    "case": ("capture", ""),
-    "psnr": ("PSNR (dB)", ".1f"),
-    "psnr_off_edges": ("off edges", ".1f"),
-    "ssim": ("SSIM", ".4f"),
-    "flip": ("FLIP", ".3f"),
-    "albedo_l1": ("albedo error", ".2%"),
-    "position_error": ("light: position error", ".2%"),
-    "intensity_error": ("intensity error", ".2%"),
-    "solved": ("solved", ".0%"),
-    "factor": ("over true surfels", ".1f"),
+#: What `study.kind` may be.
+KINDS: Mapping[str, StudyKind] = {
+    "captures": study_captures.KIND,
+    **dict.fromkeys(lights.KINDS, study_lights.KIND),
+    "courses": study_courses.KIND,
 }
 
 
 def run(context: StageContext) -> None:
-    """Write study.csv, study.md and study.png."""
-    rows = []
-    judged, evaluated = context.input_lists["judge"], context.input_lists["evaluate"]
-    for (scene, case, _), quality, lights in zip(_cases(context.config), judged, evaluated, strict=True):
-        tables = pd.read_csv(quality.file("quality.csv")), pd.read_csv(lights.file("summary.csv"))
-        rows.append(study_row(scene, case, *tables))
-    table = with_factors(pd.DataFrame(rows))
-    write_study(context.folder, table, markdown_table(table, SHOWN), capture_figure(table))
-    context.note(cases=len(table))
+    """Write study.csv, study.md, study.png and what the kind puts beside them."""
+    study = _kind(context.config).gather(context)
+    write_study(context.folder, context.config.study.kind, study)
+    context.note(kind=context.config.study.kind, rows=len(study.table))
 
 
-def _cases(config: RgspipeConfig) -> Iterator[tuple[str, str, dict[str, object]]]:
-    """(scene, case, configuration changes) of every row; the last of a scene has true surfels where they are known."""
-    for scene, chosen in chosen_scenes(config, config.study.scenes):
-        for case in checked_cases(chosen, "study.cases", config.study.cases):
-            yield chosen.scene.folder, case.name.replace(SECTION, ""), scene | case.changes
-        if has_truth(chosen):
-            yield chosen.scene.folder, TRUTH, scene | {"freeze.surfels": "truth"}
+def _kind(config: RgspipeConfig) -> StudyKind:
+    return KINDS[config.study.kind]
 
 
-def _inputs(config: RgspipeConfig) -> list[Need]:
-    lights = {"fit.method": "search_lm", "fit.limit": config.study.limit, "fit.target": None}
-    lights |= {"views.count": 1, "views.indices": None}
-    needs = []
-    for _, _, changes in _cases(config):
-        needs += [Need("judge", changes), Need("evaluate", changes | lights)]
-    return needs
+def _inputs(config: RgspipeConfig) -> Sequence[Need | str]:
+    return _kind(config).inputs(config)
+
+
+def _keys(config: RgspipeConfig) -> Sequence[str]:
+    return _kind(config).keys(config)
+
+
+def _files(config: RgspipeConfig) -> Sequence[Path]:
+    return _kind(config).files(config)
 
 
 STAGE = Stage(
     name="study",
-    help="what bad captures cost: images, albedo and recovered lights, over cases and scenes",
+    help="cases, methods and numbers of views side by side: one table, one figure",
     run=run,
     inputs=_inputs,
-    config_keys=("study",),
+    config_keys=_keys,
+    files=_files,
 )

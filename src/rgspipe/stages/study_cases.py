@@ -17,8 +17,11 @@ from rgspipe.config.core import describe
 from rgspipe.errors import InputError
 from rgspipe.studies.captures import CLEAN
 
+#: The key that lists cases.
+LISTED = "study.cases"
+
 #: What a case cannot change: how the study itself is run.
-OPERATION = ("stage", "upstream", "outputs", "study", "light_study", "report", "overview", "debug")
+OPERATION = ("stage", "upstream", "outputs", "study", "report", "overview", "debug")
 
 #: One override: what stands in brackets or quotes may have spaces in it.
 OVERRIDE = re.compile(r"""(?:\[[^\]]*\]|'[^']*'|"[^"]*"|\S)+""")
@@ -37,42 +40,38 @@ class Case:
     changes: dict[str, Any]
 
 
-def chosen_scenes(config: RgspipeConfig, kinds: Sequence[str]) -> Iterator[tuple[dict[str, object], RgspipeConfig]]:
-    """The configuration changes of each kind of scene, and the configuration with them.
+def chosen_scenes(config: RgspipeConfig) -> Iterator[tuple[dict[str, object], RgspipeConfig]]:
+    """The configuration changes of each scene of a study, and the configuration with them.
 
-    Without kinds that is the one that is configured.
+    Without any that is the one that is configured.
     """
-    for kind in kinds or [None]:
+    for kind in config.study.scenes or [None]:
         changes: dict[str, object] = {} if kind is None else {"scene.kind": kind, "scene.name": None}
         yield changes, with_changes(config, changes)
 
 
-def checked_cases(config: RgspipeConfig, listed: str, texts: Sequence[str]) -> list[Case]:
-    """The cases that the key `listed` lists, their values in the types of the configuration.
+def checked_cases(config: RgspipeConfig) -> list[Case]:
+    """The cases that the configuration lists, their values in the types of the configuration.
 
     A value means the same artifact as on the command line: 1 for a number with a fraction becomes 1.0.
 
     Raises:
         InputError: a case is unclear, two have one name, or a key or value is none of the configuration.
     """
-    cases = [_checked(config, listed, text, parse_case(text, listed)) for text in texts]
+    cases = [_checked(config, text, parse_case(text)) for text in config.study.cases]
     names = [case.name for case in cases]
     for name in names:
         if names.count(name) > 1:
             raise InputError(
-                listed, expected="a name of its own for each case", found=f"{name!r} twice", remedy="Name them apart."
+                LISTED, expected="a name of its own for each case", found=f"{name!r} twice", remedy="Name them apart."
             )
     return cases
 
 
-def parse_case(text: str, listed: str) -> Case:
+def parse_case(text: str) -> Case:
     """A case: overrides as on the command line, with a name in front if wanted, or `CLEAN`.
 
     "train.steps=0 capture.views=50", "few views: capture.views=25", "as it is: clean".
-
-    Args:
-        text: the case.
-        listed: the configuration key that lists it, for messages.
 
     Raises:
         InputError: it is neither `CLEAN` nor overrides of single values.
@@ -81,26 +80,26 @@ def parse_case(text: str, listed: str) -> Case:
     if not colon:
         name, settings = text, text
     if not name.strip() or not settings.strip():
-        raise _unclear(text, listed)
+        raise _unclear(text)
     overrides = [] if settings.strip() == CLEAN else OVERRIDE.findall(settings)
-    return Case(" ".join(name.split()), dict(_change(override, text, listed) for override in overrides))
+    return Case(" ".join(name.split()), dict(_change(override, text) for override in overrides))
 
 
-def _change(override: str, text: str, listed: str) -> tuple[str, Any]:
+def _change(override: str, text: str) -> tuple[str, Any]:
     """Key and value of an override, as Hydra reads it."""
     try:
         parsed: Override = OverridesParser.create().parse_override(override)
     except HydraException:
-        raise _unclear(text, listed) from None
+        raise _unclear(text) from None
     plain = parsed.type == OverrideType.CHANGE and not parsed.is_sweep_override()
     if not plain or not parsed.key_or_group or parsed.value() == "":
-        raise _unclear(text, listed)
+        raise _unclear(text)
     return parsed.key_or_group, parsed.value()
 
 
-def _unclear(text: str, listed: str) -> InputError:
+def _unclear(text: str) -> InputError:
     return InputError(
-        listed,
+        LISTED,
         expected=f"{CLEAN}, or key=value as on the command line, several joined by spaces, with a name in front where "
         "wanted",
         found=repr(text),
@@ -108,14 +107,14 @@ def _unclear(text: str, listed: str) -> InputError:
     )
 
 
-def _checked(config: RgspipeConfig, listed: str, text: str, case: Case) -> Case:
+def _checked(config: RgspipeConfig, text: str, case: Case) -> Case:
     known = [key for key, _, _ in describe(config)]
     for key in case.changes:
         if key not in known:
-            raise _unknown(listed, text, key, known)
+            raise _unknown(text, key, known)
         if key.partition(".")[0] in OPERATION:
             raise InputError(
-                listed,
+                LISTED,
                 expected="settings of what is studied",
                 found=f"{text!r}: {key} says how the study is run",
                 remedy="Give it beside the study, not in a case.",
@@ -125,16 +124,21 @@ def _checked(config: RgspipeConfig, listed: str, text: str, case: Case) -> Case:
         changed.scene.check_path()
     except InputError as error:
         raise InputError(
-            f"{listed}: {text!r}: {error.where}", expected=error.expected, found=error.found, remedy=error.remedy
+            f"{LISTED}: {text!r}: {error.where}", expected=error.expected, found=error.found, remedy=error.remedy
         ) from None
     return Case(case.name, {key: get_value(changed, key) for key in case.changes})
 
 
-def _unknown(listed: str, text: str, key: str, known: Sequence[str]) -> InputError:
+def _unknown(text: str, key: str, known: Sequence[str]) -> InputError:
     near = difflib.get_close_matches(key, known, n=2, cutoff=0.6)
     return InputError(
-        listed,
+        LISTED,
         expected="keys of the configuration",
         found=f"{text!r}: no key {key}",
         remedy=f"Did you mean {' or '.join(near)}?" if near else "python -m rgspipe --help lists the keys.",
     )
+
+
+def target_limit(config: RgspipeConfig) -> int | None:
+    """How many targets of each class a study takes; None for all."""
+    return config.study.limit if config.fit.limit is None else config.fit.limit

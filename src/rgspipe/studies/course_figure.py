@@ -14,6 +14,7 @@ from matplotlib.lines import Line2D
 
 from rgspipe.evaluation import plots
 from rgspipe.evaluation.arrays import ArrayLike, to_array
+from rgspipe.evaluation.convergence import light_positions
 from rgspipe.evaluation.scene_drawing import PANELS, TRUTH, draw_surfaces, frame_panel, window
 from rgspipe.scene import LightRig
 
@@ -37,7 +38,7 @@ def course_figure(
     """One target: three measures against the step and against seconds, and the ways of the lights.
 
     Args:
-        courses: rows of `course_table` of each method, with `method` and `image_error` beside them.
+        courses: rows of `course_table` of each method, with `target`, `method` and `image_error` beside them.
         truth: empty if unknown.
         cloud, normals: (N, 3) of the scene's surfels.
         cameras: (V, 3) origins.
@@ -45,11 +46,7 @@ def course_figure(
     with matplotlib.rc_context(plots.STYLE):
         figure = Figure(figsize=(10.5, 10.0), layout="constrained")
         upper, lower = figure.subfigures(2, 1, height_ratios=(5.2, 4.8))
-        axes = upper.subplots(2, 3)
-        for row, (clock, label) in enumerate((("step", "step"), ("seconds", "time (s)"))):
-            for axis, (name, title) in zip(axes[row], MEASURES, strict=True):
-                _curves(axis, courses, clock, name)
-                axis.set(xlabel=label, title=title if row == 0 else "")
+        _measures(upper.subplots(2, 3), courses)
         surfaces, eyes = (to_array(cloud), to_array(normals)), to_array(cameras).reshape(-1, 3)
         in_sight = _ways(lower.subplots(1, 2), courses, truth, *surfaces, eyes)
         handles = [_handle(str(name)) for name in dict.fromkeys(courses["method"])]
@@ -58,11 +55,33 @@ def course_figure(
     return figure
 
 
+def courses_figure(courses: pd.DataFrame) -> Figure:
+    """All targets: three measures against the step and against seconds, a line a target and method.
+
+    Args:
+        courses: as for `course_figure`.
+    """
+    with matplotlib.rc_context(plots.STYLE):
+        figure = Figure(figsize=(10.5, 5.6), layout="constrained")
+        _measures(figure.subplots(2, 3), courses)
+        handles = [_handle(str(name)) for name in dict.fromkeys(courses["method"])]
+        figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), fontsize=8.5)
+    return figure
+
+
+def _measures(axes: npt.NDArray, courses: pd.DataFrame) -> None:
+    """Each measure against the step above, against seconds below."""
+    for row, (clock, label) in enumerate((("step", "step"), ("seconds", "time (s)"))):
+        for axis, (name, title) in zip(axes[row], MEASURES, strict=True):
+            _curves(axis, courses, clock, name)
+            axis.set(xlabel=label, title=title if row == 0 else "")
+
+
 def _curves(axis: Axes, courses: pd.DataFrame, clock: str, name: str) -> None:
     axis.grid(True)
     axis.set_yscale("log")
     if courses[name].notna().any():
-        for method, course in courses.groupby("method", sort=False):
+        for (_, method), course in courses.groupby(["target", "method"], sort=False):
             values = np.maximum(course[name].to_numpy(dtype=float), 1e-6)
             style = {"color": _colour(str(method)), "ls": DASHES.get(str(method), "-")}
             axis.plot(course[clock], values, lw=1.5, **style)
@@ -107,8 +126,7 @@ def _ways(
 
 def _lights(course: pd.DataFrame) -> list[npt.NDArray]:
     """(steps, 3) of each light."""
-    names = [suffix for suffix in ("", *(f"_{k}" for k in range(1, 9))) if f"x{suffix}" in course]
-    ways = [course[[f"{axis}{suffix}" for axis in "xyz"]].dropna().to_numpy(dtype=float) for suffix in names]
+    ways = [way[np.isfinite(way).all(axis=1)] for way in np.moveaxis(light_positions(course), 1, 0)]
     return [way for way in ways if len(way)]
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from rgspipe.evaluation.convergence import light_suffix, light_suffixes
 from rgspipe.evaluation.tables import rig_errors
 from rgspipe.scene import Light, LightRig
 from rgspipe.scene.lights.light import AXIS_COLUMNS
@@ -100,9 +101,11 @@ def _spread(count: int, most: int) -> list[int]:
 
 def _rig(row: dict, found: LightRig) -> LightRig | None:
     """The lights of a row; None where they are others than those that were found."""
-    lights = [_light(row, "" if index == 0 else f"_{index}", light) for index, light in enumerate(found)]
-    further = row.get(f"x_{len(found)}", math.nan)
-    return None if not lights or None in lights or math.isfinite(further) else tuple(lights)
+    present = [suffix for suffix in light_suffixes(row) if math.isfinite(row[f"x{suffix}"])]
+    if not found or len(present) != len(found):
+        return None
+    lights = [_light(row, suffix, light) for suffix, light in zip(present, found, strict=True)]
+    return None if None in lights else tuple(lights)
 
 
 def _light(row: dict, suffix: str, found: Light) -> Light | None:
@@ -114,7 +117,7 @@ def _light(row: dict, suffix: str, found: Light) -> Light | None:
 
 def _places(rig: LightRig) -> dict[str, float]:
     return {
-        name + ("" if index == 0 else f"_{index}"): value
+        name + light_suffix(index): value
         for index, light in enumerate(rig)
         for name, value in zip("xyz", light.position.tolist(), strict=True)
     }

@@ -43,12 +43,12 @@ PANELS: tuple[Panel, ...] = (
 VIEW_PANELS = (("position", "position error (%)", 100.0), ("success", "solved (%)", 100.0), ("seconds", "s a fit", 1.0))
 
 
-def light_study_figure(table: pd.DataFrame, kind: str) -> Figure:
+def light_figure(table: pd.DataFrame, kind: str) -> Figure:
     """The figure of a study.
 
     Args:
-        table: its rows, see `light_study.case_rows`.
-        kind: one of `light_study.KINDS`.
+        table: its rows, see `lights.case_rows`.
+        kind: one of `lights.KINDS`.
 
     Raises:
         ValueError: there is nothing to draw.

@@ -51,8 +51,8 @@ def shown_rows(table: pd.DataFrame, kind: str) -> tuple[list[str], list[Row]]:
     """Headings, and for each row its cells by heading as text.
 
     Args:
-        table: rows of `light_study.case_rows`; of views also with `predicted`.
-        kind: one of `light_study.KINDS`; those of `TOGETHER` show all classes together, the others each, and all of
+        table: rows of `lights.case_rows`; of views also with `predicted`.
+        kind: one of `lights.KINDS`; those of `TOGETHER` show all classes together, the others each, and all of
             them together where there are several.
     """
     rows = table[table["occlusion"] == ALL] if kind in TOGETHER else without_repeats(table)

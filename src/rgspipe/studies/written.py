@@ -1,7 +1,9 @@
-"""What every study writes: its rows, the same as people read them, and a figure."""
+"""What every study comes to, and the files it is written to."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import pandas as pd
@@ -12,8 +14,34 @@ from rgspipe.evaluation.plots import png_of
 TABLE, TEXT, FIGURE = "study.csv", "study.md", "study.png"
 
 
-def write_study(folder: Path, table: pd.DataFrame, text: str, figure: Figure) -> None:
-    """Write study.csv, study.md (Markdown) and study.png into the folder."""
+@dataclass(frozen=True)
+class Study:
+    """What a study found.
+
+    Attributes:
+        table: its rows; `scene` says of which scene each is.
+        text: the same as people read them, in Markdown.
+        figure: the same drawn.
+        beside: further files by their paths within the folder of the study.
+    """
+
+    table: pd.DataFrame
+    text: str
+    figure: Figure
+    beside: Mapping[str, bytes] = field(default_factory=dict)
+
+
+def write_study(folder: Path, kind: str, study: Study) -> None:
+    """Write study.csv, study.md, study.png and what stands beside them into the folder.
+
+    Args:
+        kind: of the study; the first column of study.csv.
+    """
+    table = study.table.copy()
+    table.insert(0, "kind", kind)
     table.to_csv(folder / TABLE, index=False)
-    (folder / TEXT).write_text(text, encoding="utf-8")
-    (folder / FIGURE).write_bytes(png_of(figure))
+    (folder / TEXT).write_text(study.text, encoding="utf-8")
+    (folder / FIGURE).write_bytes(png_of(study.figure))
+    for name, content in study.beside.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(content)

@@ -1,4 +1,4 @@
-"""Compare recovered lights over numbers of views, errors of images and model, or classes: a table and a figure."""
+"""Studies of recovered lights: over numbers of views, errors of images and model, classes and kinds of lights."""
 
 from __future__ import annotations
 
@@ -9,14 +9,15 @@ import pandas as pd
 
 from rgspipe.artifacts import Artifact
 from rgspipe.config import RgspipeConfig
-from rgspipe.config.studies import LightStudyConfig
+from rgspipe.config.studies import StudyConfig
 from rgspipe.datasets.advice_file import SUGGESTED, own_views_in_order
-from rgspipe.stages.base import Need, Stage, StageContext
+from rgspipe.stages.base import Need, StageContext
 from rgspipe.stages.study_cases import checked_cases, chosen_scenes
-from rgspipe.studies.light_figure import light_study_figure
+from rgspipe.stages.study_kind import StudyKind
+from rgspipe.studies.light_figure import light_figure
 from rgspipe.studies.light_table import markdown
 from rgspipe.studies.lights import case_rows, predicted_errors
-from rgspipe.studies.written import write_study
+from rgspipe.studies.written import Study
 
 #: What an evaluation says of each target: columns that are not numbers.
 TYPES = {"target": str, "result": str, "reason": str, "success": "boolean", "inside_95": "boolean"}
@@ -38,8 +39,7 @@ class Cell:
     foretells: bool
 
 
-def run(context: StageContext) -> None:
-    """Write study.csv, study.md and study.png."""
+def _gather(context: StageContext) -> Study:
     config, cells = context.config, _cells(context.config)
     fits = iter(context.input_lists.get("fit_light", ()))
     parts, predictions = [], []
@@ -54,10 +54,7 @@ def run(context: StageContext) -> None:
     table = pd.concat(parts, ignore_index=True)
     if predictions:
         table = table.merge(pd.concat(predictions), how="left")
-    kind = config.light_study.kind
-    table.insert(0, "kind", kind)
-    write_study(context.folder, table, markdown(table, kind), light_study_figure(table, kind))
-    context.note(kind=kind, rows=len(table))
+    return Study(table, markdown(table, config.study.kind), light_figure(table, config.study.kind))
 
 
 def _advice(fit: Artifact, targets: pd.DataFrame) -> dict[str, pd.DataFrame]:
@@ -71,9 +68,9 @@ def _cells(config: RgspipeConfig) -> list[Cell]:
 
 
 def _each_cell(config: RgspipeConfig) -> Iterator[Cell]:
-    wanted = config.light_study
-    for scene, chosen in chosen_scenes(config, wanted.scenes):
-        for case in checked_cases(chosen, "light_study.cases", wanted.cases):
+    wanted = config.study
+    for scene, chosen in chosen_scenes(config):
+        for case in checked_cases(chosen):
             for method in wanted.methods:
                 for views in _numbers_of_views(wanted, method):
                     foretells = wanted.kind == "views" and method == "search_lm" and views == min(wanted.views)
@@ -81,16 +78,22 @@ def _each_cell(config: RgspipeConfig) -> Iterator[Cell]:
                     yield Cell(chosen.scene.folder, case.name, changes, foretells)
 
 
-def _numbers_of_views(wanted: LightStudyConfig, method: str) -> list[int]:
+def _numbers_of_views(wanted: StudyConfig, method: str) -> tuple[int, ...]:
     own = wanted.paper_adam_views if method == "paper_adam" else None
     return wanted.views if own is None else own
 
 
 def _fit_changes(config: RgspipeConfig, method: str, views: int, foretells: bool) -> dict[str, object]:
     changes: dict[str, object] = {"fit.method": method, "views.count": views, "views.indices": None}
-    if method == "paper_adam" and config.fit.limit is None:
-        changes["fit.limit"] = config.light_study.paper_adam_limit
+    limit = config.study.paper_adam_limit if method == "paper_adam" else config.study.limit
+    if config.fit.limit is None and limit is not None:
+        changes["fit.limit"] = limit
     return changes | ({"fit.suggest_view": True} if foretells else {})
+
+
+def _keys(config: RgspipeConfig) -> tuple[str, ...]:
+    """Intervals are drawn with the seed."""
+    return ("study", "seed")
 
 
 def _inputs(config: RgspipeConfig) -> list[Need]:
@@ -101,10 +104,4 @@ def _inputs(config: RgspipeConfig) -> list[Need]:
     return needs
 
 
-STAGE = Stage(
-    name="light_study",
-    help="recovered lights over numbers of views, errors of images and model, or classes: a table and a figure",
-    run=run,
-    inputs=_inputs,
-    config_keys=("light_study", "seed"),
-)
+KIND = StudyKind(inputs=_inputs, gather=_gather, keys=_keys)

@@ -1,8 +1,9 @@
-"""Compare how methods get from their start to their answer, on a few targets."""
+"""Studies of courses: how methods get from their start to their answer, on a few targets."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import pandas as pd
@@ -16,6 +17,7 @@ from rgspipe.datasets.light_file import read_lights
 from rgspipe.datasets.location import dataset_root
 from rgspipe.datasets.read_files import files_read
 from rgspipe.datasets.views import View
+from rgspipe.evaluation.markdown import markdown_table
 from rgspipe.evaluation.metrics import longest_side
 from rgspipe.evaluation.plots import png_of
 from rgspipe.evaluation.tables import class_of
@@ -23,44 +25,64 @@ from rgspipe.fitting import FitViews
 from rgspipe.progress import progress_bar
 from rgspipe.scene import LightRig
 from rgspipe.stages import fit_light
-from rgspipe.stages.base import Need, Stage, StageContext
+from rgspipe.stages.base import Need, StageContext
 from rgspipe.stages.fit_capture import captured_views
 from rgspipe.stages.fit_light import Fitter
 from rgspipe.stages.fit_targets import used_views
 from rgspipe.stages.sources import target_stage
+from rgspipe.stages.study_cases import target_limit
+from rgspipe.stages.study_kind import StudyKind
 from rgspipe.stages.true_lights import scene_bounds, truth_file
-from rgspipe.studies.course_figure import course_figure
+from rgspipe.studies.course_figure import course_figure, courses_figure
 from rgspipe.studies.courses import CourseStep, course_of, course_summary, course_table
+from rgspipe.studies.written import Study
 
-#: A row a step, a row a fit, and a picture a target.
-COURSES, SUMMARY, PICTURES = "courses.csv", "convergence.csv", "pictures"
+#: What stands beside the table, which has a row a fit: a row a step, and a picture a target.
+COURSES, PICTURES = "courses.csv", "pictures"
+
+#: What study.md shows of study.csv: headings and formats.
+SHOWN = {
+    "target": ("target", ""),
+    "occlusion": ("light", ""),
+    "method": ("method", ""),
+    "steps": ("steps", ""),
+    "seconds": ("time (s)", ".2f"),
+    "seconds_to_limit": ("solved after (s)", ".2f"),
+    "position_error_start": ("position error: start", ".2%"),
+    "position_error_end": ("end", ".2%"),
+    "intensity_error_start": ("intensity error: start", ".2%"),
+    "intensity_error_end": ("end", ".2%"),
+    "image_error_start": ("image error: start", ".2%"),
+    "image_error_end": ("end", ".2%"),
+}
 
 
-def run(context: StageContext) -> None:
-    """Write courses.csv, convergence.csv and pictures/<target>.png; quick, so an interrupted run begins again."""
+def _gather(context: StageContext) -> Study:
+    """The summary of all courses, with the courses themselves and a picture of each target beside it."""
     config, fits = context.config, context.input_lists["fit_light"]
     dataset = next((context.inputs.get(stage) for stage in target_stage(config)), None)
     bounds, _ = scene_bounds(dataset, context.inputs["freeze"])
     size = math.nan if bounds is None else longest_side(bounds)
     fitter = Fitter.create(context)
     results = pd.read_csv(fits[0].file("results.csv"), dtype={"target": str})
-    (context.folder / PICTURES).mkdir(exist_ok=True)
-    parts = []
+    parts: list[pd.DataFrame] = []
+    pictures: dict[str, bytes] = {}
     for row in progress_bar(results.to_dict("records"), "comparing courses", unit="target"):
         name, path = row["target"], truth_file(config, dataset, row["target"])
         truth = () if path is None else read_lights(path)
         views, prepared = _views(fitter, _target_folder(config, dataset, name), name)
-        courses = _courses(fits, config.convergence.methods, name, truth, size, views, prepared)
+        courses = _courses(fits, config.study.methods, name, truth, size, views, prepared)
         courses.insert(0, "target", name)
         courses.insert(1, "occlusion", class_of(row["occlusion"], len(truth)))
         surfels, origins = prepared.prepared.frozen.surfels, torch.stack([view.camera.origin for view in views])
         figure = course_figure(courses, truth, surfels.centers, surfels.normals, origins)
-        (context.folder / PICTURES / f"{name}.png").write_bytes(png_of(figure, dpi=130))
+        pictures[f"{PICTURES}/{name}.png"] = png_of(figure, dpi=130)
         parts.append(courses)
     joined = pd.concat(parts, ignore_index=True)
-    joined.to_csv(context.folder / COURSES, index=False)
-    course_summary(joined, config.evaluate.success).to_csv(context.folder / SUMMARY, index=False)
-    context.note(targets=len(results), methods=list(config.convergence.methods))
+    table = course_summary(joined, config.evaluate.success)
+    table.insert(0, "scene", config.scene.folder)
+    beside = {COURSES: joined.to_csv(index=False).encode()} | pictures
+    return Study(table, markdown_table(table, SHOWN), courses_figure(joined), beside)
 
 
 def _target_folder(config: RgspipeConfig, dataset: Artifact | None, name: str) -> Path:
@@ -76,8 +98,8 @@ def _views(fitter: Fitter, folder: Path, name: str) -> tuple[list[View], FitView
 
 
 def _courses(
-    fits: list[Artifact],
-    methods: list[str],
+    fits: Sequence[Artifact],
+    methods: Sequence[str],
     name: str,
     truth: LightRig,
     size: float,
@@ -109,13 +131,13 @@ def _image_error(prepared: FitViews, step: CourseStep, images: list[torch.Tensor
 
 
 def _inputs(config: RgspipeConfig) -> list[Need | str]:
-    limit = config.convergence.limit if config.fit.limit is None else config.fit.limit
-    fits = [Need("fit_light", {"fit.method": method, "fit.limit": limit}) for method in config.convergence.methods]
+    changes = {"fit.limit": target_limit(config)}
+    fits = [Need("fit_light", {"fit.method": method} | changes) for method in config.study.methods]
     return [*fits, *target_stage(config), "freeze"]
 
 
 def _keys(config: RgspipeConfig) -> list[str]:
-    return [*fit_light.STAGE.keys(config), "convergence", "evaluate.success", "fit.truth"]
+    return [*fit_light.STAGE.keys(config), "study", "evaluate.success", "fit.truth"]
 
 
 def _files(config: RgspipeConfig) -> list[Path]:
@@ -124,11 +146,4 @@ def _files(config: RgspipeConfig) -> list[Path]:
     return target if config.fit.truth is None else [*target, Path(config.fit.truth)]
 
 
-STAGE = Stage(
-    name="convergence",
-    help="how each method gets from its start to its answer",
-    run=run,
-    inputs=_inputs,
-    config_keys=_keys,
-    files=_files,
-)
+KIND = StudyKind(inputs=_inputs, gather=_gather, keys=_keys, files=_files)

@@ -1,4 +1,4 @@
-"""stage=convergence on fits of a light in a small room."""
+"""Studies of courses, on fits of a light in a small room."""
 
 from __future__ import annotations
 
@@ -13,12 +13,13 @@ from PIL import Image
 
 from frozen_store import RESOLUTION, artifact, frozen_artifact, write_targets
 from lit_room import room_cameras
+from rgspipe.cli.compose import compose_config
 from rgspipe.config import RgspipeConfig, with_changes
 from rgspipe.datasets.light_file import write_lights
 from rgspipe.fitting import FitViews
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import PointLight
-from rgspipe.stages import convergence
+from rgspipe.stages import study
 from rgspipe.stages.base import StageContext
 
 PLACE = (0.1, -0.25, 0.3)
@@ -48,11 +49,16 @@ def test_methods_are_compared_by_the_same_measures(tmp_path: Path) -> None:
         artifact(tmp_path / f"fit_{steps}", "fit_light", lambda folder, steps=steps: _write_fit(folder, steps))
         for steps in (4, 7)
     ]
-    changes = {"views.count": 2, "convergence.methods": ["search_lm", "paper_adam"], "effects.auto": False}
-    config = with_changes(RgspipeConfig(stage="convergence"), changes)
+    changes = {
+        "views.count": 2,
+        "study.kind": "courses",
+        "study.methods": ["search_lm", "paper_adam"],
+        "effects.auto": False,
+    }
+    config = with_changes(RgspipeConfig(stage="study"), changes)
     (tmp_path / "out").mkdir()
     inputs = {"freeze": freeze, "generate_dataset": targets}
-    convergence.run(StageContext(config, inputs, {"fit_light": fits}, tmp_path / "out"))
+    study.run(StageContext(config, inputs, {"fit_light": fits}, tmp_path / "out"))
     courses = pd.read_csv(tmp_path / "out" / "courses.csv")
     assert courses["method"].value_counts().to_dict() == {"search_lm": 4, "paper_adam": 7}
     for _, course in courses.groupby("method"):
@@ -60,16 +66,22 @@ def test_methods_are_compared_by_the_same_measures(tmp_path: Path) -> None:
         assert np.all(np.diff(errors) < 0.0) and errors[0] > 0.01
         assert errors[-1] < 1e-12  # Measured 0: the same render, written as float32.
         assert course["position_error"].iloc[-1] == pytest.approx(0.0, abs=1e-12)
-    summary = pd.read_csv(tmp_path / "out" / "convergence.csv")
+    assert list(courses)[:2] == ["target", "occlusion"] and "kind" not in courses
+    summary = pd.read_csv(tmp_path / "out" / "study.csv")
+    assert summary["kind"].tolist() == ["courses"] * 2 and summary["scene"].tolist() == ["cornell"] * 2
     assert summary["steps"].tolist() == [3, 6] and (summary["seconds_to_limit"] == summary["seconds"]).all()
+    rows = (tmp_path / "out" / "study.md").read_text().splitlines()
+    assert len(rows) == 4 and rows[2].startswith("| rig_0000 | visible | search_lm | 3 | 0.30 | 0.30 |")
+    with Image.open(tmp_path / "out" / "study.png") as picture:
+        assert min(picture.size) > 500
     with Image.open(tmp_path / "out" / "pictures" / "rig_0000.png") as picture:
         assert min(picture.size) > 1000
 
 
 def test_each_method_is_run_on_few_targets_unless_a_limit_is_given() -> None:
-    config = RgspipeConfig(stage="convergence")
-    fits = [need for need in convergence.STAGE.needs(config) if need.stage == "fit_light"]
+    config = compose_config(["stage=study", "experiment=courses"])
+    fits = [need for need in study.STAGE.needs(config) if need.stage == "fit_light"]
     assert [need.changes["fit.method"] for need in fits] == ["search_lm", "paper_adam", "finite_differences"]
     assert {need.changes["fit.limit"] for need in fits} == {1}
-    (first, *_) = convergence.STAGE.needs(with_changes(config, {"fit.limit": 3}))
+    (first, *_) = study.STAGE.needs(with_changes(config, {"fit.limit": 3}))
     assert first.changes["fit.limit"] == 3

@@ -13,11 +13,11 @@ import pytest
 from rgspipe.artifacts import Artifact, ArtifactStore, Key
 from rgspipe.cli.compose import compose_config
 from rgspipe.config import RgspipeConfig, with_changes
-from rgspipe.config.studies import LightStudy
+from rgspipe.config.studies import Kind
 from rgspipe.datasets.advice_file import own_views_in_order
 from rgspipe.errors import InputError
 from rgspipe.evaluation.tables import TARGET_COLUMNS
-from rgspipe.stages import light_study
+from rgspipe.stages import study
 from rgspipe.stages.base import StageContext
 from rgspipe.studies.lights import KINDS
 
@@ -26,8 +26,8 @@ ADVICE += "in_order,2,view_1,0.004\nin_order,3,view_2,0.003\nin_order,4,train/r_
 
 
 def _config(**changes: object) -> RgspipeConfig:
-    named = {f"light_study.{key}": value for key, value in changes.items()}
-    return with_changes(RgspipeConfig(), {"stage": "light_study"} | named)
+    named = {f"study.{key}": value for key, value in changes.items()}
+    return with_changes(RgspipeConfig(), {"stage": "study", "study.kind": "robustness"} | named)
 
 
 def _artifact(root: Path, stage: str, fingerprint: str, files: Mapping[str, str]) -> Artifact:
@@ -54,7 +54,7 @@ def _metrics(views: int, error: float) -> str:
 
 def _run(config: RgspipeConfig, lists: Mapping[str, list[Artifact]], folder: Path) -> pd.DataFrame:
     folder.mkdir()
-    light_study.run(StageContext(config, {name: found[0] for name, found in lists.items()}, lists, folder))
+    study.run(StageContext(config, {name: found[0] for name, found in lists.items()}, lists, folder))
     assert (folder / "study.png").read_bytes().startswith(b"\x89PNG")
     assert (folder / "study.md").read_text().startswith("| ")
     return pd.read_csv(folder / "study.csv")
@@ -63,7 +63,7 @@ def _run(config: RgspipeConfig, lists: Mapping[str, list[Artifact]], folder: Pat
 def test_a_study_asks_for_every_case_method_and_number_of_views_of_every_scene() -> None:
     cases = ["clean", "noise: target_capture.noise=0.03"]
     config = _config(cases=cases, scenes=["cornell", "corner"], views=[1, 3], methods=["search_lm", "paper_adam"])
-    needs = light_study.STAGE.needs(config)
+    needs = study.STAGE.needs(config)
     assert [need.stage for need in needs] == ["evaluate"] * 16
     assert needs[0].changes["scene.kind"] == "cornell" and needs[8].changes["scene.kind"] == "corner"
     noisy = needs[7].changes
@@ -74,24 +74,24 @@ def test_a_study_asks_for_every_case_method_and_number_of_views_of_every_scene()
 
 
 def test_the_fits_of_fewest_views_foretell_the_others() -> None:
-    needs = light_study.STAGE.needs(_config(kind="views", views=[2, 4], methods=["search_lm", "paper_adam"]))
+    needs = study.STAGE.needs(_config(kind="views", views=[2, 4], methods=["search_lm", "paper_adam"]))
     asked = [(need.stage, need.changes["fit.method"], need.changes["views.count"]) for need in needs]
     assert asked[:3] == [("fit_light", "search_lm", 2), ("evaluate", "search_lm", 2), ("evaluate", "search_lm", 4)]
     assert [bool(need.changes.get("fit.suggest_view")) for need in needs] == [True, True, False, False, False]
 
 
 def test_every_kind_that_can_be_asked_for_can_be_shown() -> None:
-    assert get_args(LightStudy) == KINDS
+    assert get_args(Kind) == tuple(study.KINDS) == ("captures", *KINDS, "courses")
 
 
 def test_a_case_has_the_last_word() -> None:
-    (need,) = light_study.STAGE.needs(_config(cases=["four: views.count=4 fit.limit=2"]))
+    (need,) = study.STAGE.needs(_config(cases=["four: views.count=4 fit.limit=2"]))
     assert need.changes["views.count"] == 4 and need.changes["fit.limit"] == 2
 
 
 def test_a_case_that_is_none_is_refused_before_anything_is_made() -> None:
-    with pytest.raises(InputError, match=r"light_study\.cases.*target_capture\.noise"):
-        light_study.STAGE.needs(_config(cases=["target_capture.nose=0.1"]))
+    with pytest.raises(InputError, match=r"study\.cases.*target_capture\.noise"):
+        study.STAGE.needs(_config(cases=["target_capture.nose=0.1"]))
 
 
 #: Studies that are prepared: their kinds, and on how many cells the paper's method runs.
@@ -108,33 +108,33 @@ PREPARED = {
 
 @pytest.mark.parametrize("name", PREPARED)
 def test_every_study_that_is_prepared_composes_and_names_its_cases(name: str) -> None:
-    config = compose_config(["stage=light_study", f"experiment={name}"])
+    config = compose_config(["stage=study", f"experiment={name}"])
     kind, slow = PREPARED[name]
-    assert config.light_study.kind == kind
-    needs = light_study.STAGE.needs(config)
+    assert config.study.kind == kind
+    needs = study.STAGE.needs(config)
     fits = [need for need in needs if need.stage == "evaluate"]
     searches = [need for need in fits if need.changes["fit.method"] == "search_lm"]
-    study = config.light_study
-    assert len(searches) == max(1, len(study.scenes)) * len(study.cases) * len(study.views)
+    wanted = config.study
+    assert len(searches) == max(1, len(wanted.scenes)) * len(wanted.cases) * len(wanted.views)
     assert len(fits) - len(searches) == slow
 
 
 def test_the_papers_method_is_compared_on_the_targets_of_the_search() -> None:
-    config = compose_config(["stage=light_study", "experiment=light_adam"])
-    fits = [need.changes for need in light_study.STAGE.needs(config)]
+    config = compose_config(["stage=study", "experiment=light_adam"])
+    fits = [need.changes for need in study.STAGE.needs(config)]
     assert config.fit.limit == 5 and not any("fit.limit" in changes for changes in fits)
     methods = [changes["fit.method"] for changes in fits]
     assert methods == ["search_lm", "paper_adam"] * 2
 
 
 def test_the_papers_method_has_numbers_of_views_of_its_own() -> None:
-    config = compose_config(["stage=light_study", "experiment=light_views"])
-    fits = [need.changes for need in light_study.STAGE.needs(config) if need.stage == "evaluate"]
+    config = compose_config(["stage=study", "experiment=light_views"])
+    fits = [need.changes for need in study.STAGE.needs(config) if need.stage == "evaluate"]
     slow = [changes for changes in fits if changes["fit.method"] == "paper_adam"]
     assert [changes["views.count"] for changes in slow] == [1, 4, 8] and len(fits) == 11
     assert all(changes["fit.limit"] == 20 for changes in slow)
     everywhere = _config(views=[1, 2], methods=["paper_adam"])
-    assert [need.changes["views.count"] for need in light_study.STAGE.needs(everywhere)] == [1, 2]
+    assert [need.changes["views.count"] for need in study.STAGE.needs(everywhere)] == [1, 2]
 
 
 def test_views_are_one_table_with_what_was_foretold(tmp_path: Path) -> None:
