@@ -9,6 +9,7 @@ import pytest
 
 import rgspipe as rg
 from rgspipe.datasets.views import View
+from rgspipe.scene.lights import KINDS
 from tiny_dataset import tiny_camera
 
 
@@ -17,6 +18,10 @@ def test_every_public_name_is_there_and_explains_itself(name: str) -> None:
     found = getattr(rg, name)
     assert name in dir(rg)
     assert isinstance(found, str) or (found.__doc__ and found.__name__ == name)
+
+
+def test_every_kind_of_light_is_public() -> None:
+    assert {kind.__name__ for kind in KINDS.values()} <= {*rg.__all__}
 
 
 def test_names_that_are_not_there_are_told_as_of_any_module() -> None:

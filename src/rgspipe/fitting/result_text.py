@@ -57,7 +57,7 @@ def light_line(light: Light, covariance: Sequence[Sequence[float]] | None = None
     told += "" if variances is None else _deviation(variances[:3], "{:.4f}")
     if light.axis is not None:
         told += f", axis ({', '.join(f'{value:.3f}' for value in light.axis.tolist())})"
-        number = light.shape[0]
+    for number in light.shape[:1]:
         told += f", {number.key.replace('_', ' ')} {number.shown(getattr(light, number.name)):.1f}{number.unit}"
     told += f", RGB ({colour}) W/sr"
     return told + ("" if variances is None else _deviation(variances[-3:], "{:.3f}"))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import fields, replace
 from pathlib import Path
 
@@ -16,11 +16,12 @@ from torch import Tensor
 from double_precision import irradiance
 from rgspipe.datasets.light_file import read_lights, write_lights
 from rgspipe.errors import InputError
+from rgspipe.fitting.result_text import light_line
 from rgspipe.renderer.effects import Effects
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.rig import rig_irradiance
 from rgspipe.scene import Light
-from rgspipe.scene.lights import KINDS, SpotLight
+from rgspipe.scene.lights import KINDS, AxialLight, SpotLight
 from rgspipe.scene.lights.angles import angle_from_axis
 from rooms import closed_box
 
@@ -152,6 +153,23 @@ def test_derivatives_of_its_relative_intensity_are_those_of_finite_differences(l
             expected = (exact_intensity(ends[0], softness) - exact_intensity(ends[1], softness)) / 2e-6
             # Measured at most 1.9e-5, of a cone of 15°.
             assert float((slope - expected).abs().max()) < 1e-4 * float(expected.abs().max()), name
+
+
+def test_a_kind_may_have_an_axis_and_no_numbers() -> None:
+    """None of those that are there is like that: derivatives and what is printed must not ask for a first number."""
+
+    class Bowl(AxialLight):
+        kind = "bowl"
+        shape = ()
+
+        def profile_at(self, angle: Tensor, numbers: Mapping[str, Tensor], softness: float = 0.0) -> tuple:
+            return 0.5 * (1.0 + torch.cos(angle)), -0.5 * torch.sin(angle)
+
+    Bowl.__abstractmethods__ = frozenset()
+    light = Bowl(PLACE, COLOUR, AXIS)
+    relative = light.relative_intensity(points(), shape_free=True)
+    assert {*relative.by} == {"position", "direction"}
+    assert light_line(light).startswith("bowl at (") and "axis (" in light_line(light)
 
 
 def exact_intensity(light: Light, softness: float = 0.0) -> Tensor:

@@ -77,7 +77,7 @@ class AxialLight(Light):
         numbers = {name: value.detach().clone().requires_grad_(shape_free) for name, value in numbers.items()}
         with torch.set_grad_enabled(shape_free):
             value, slope = self.profile_at(angle, numbers, softness)
-        by_shape = _towards_numbers(value, numbers) if shape_free else {}
+        by_shape = _towards_numbers(value, numbers) if shape_free and numbers else {}
         value, slope = value.detach(), slope.detach()[:, None]
         # The angle does not depend on the axis' length, so the derivative towards the axis falls with it.
         by_axis = slope * by_axis / axis.norm()
