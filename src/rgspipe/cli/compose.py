@@ -42,6 +42,9 @@ FREE_SECTIONS = (
 #: How a launcher is chosen: by the group of this program or by Hydra's own.
 LAUNCHER_GROUPS = ("launcher", "hydra/launcher")
 
+#: How many jobs of a sweep run side by side.
+JOBS_AT_ONCE = "hydra.launcher.n_jobs"
+
 #: The launcher that sends jobs to a cluster.
 SLURM_LAUNCHER = "hydra_plugins.rgspipe_slurm.SlurmLauncher"
 
@@ -107,6 +110,10 @@ def check_sweep(overrides: Sequence[str]) -> RgspipeConfig:
         the configuration of the first job.
     """
     parsed = _parse(overrides)
+    if any(override.key_or_group == JOBS_AT_ONCE and override.value() == 0 for override in parsed):
+        raise InputError(
+            JOBS_AT_ONCE, expected="a number of jobs, or -1 for one a core", found="0", remedy=f"Try {JOBS_AT_ONCE}=1."
+        )
     first = [_first_value(override) for override in parsed]
     config = compose_config(first)
     for index, override in enumerate(parsed):

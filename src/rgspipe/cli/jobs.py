@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime
 import sys
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -50,11 +51,11 @@ def run_jobs(overrides: Sequence[str], stage_loader: StageLoader, multirun: bool
     if stage_loader is load_stage:
         check_stage(config.stage)
     mode = "sweep" if multirun else "run"
-    folder = (
-        given_folder(overrides, mode)
-        or given_folder(overrides, "run")
-        or new_run_folder(Path(config.outputs), "sweep" if multirun else config.stage)
-    )
+    folder = given_folder(overrides, mode) or given_folder(overrides, "run")
+    if folder is None:
+        folder = new_run_folder(Path(config.outputs), "sweep" if multirun else config.stage)
+    else:
+        _make(folder, f"hydra.{mode}.dir", exist_ok=True)
     # Said again even where it was given: interpolations such as the time must not be resolved twice.
     chosen = f"hydra.{mode}.dir={quoted(folder)}"
     # Worked out here: within a job Hydra composes nothing else.
@@ -87,17 +88,39 @@ def run_hydra(arguments: Sequence[str], stage_loader: StageLoader, usual: Usual)
 
 
 def new_run_folder(outputs: Path, what: str) -> Path:
-    """Make outputs/runs/<time>_<what>, with a number if another run has the name."""
+    """Make outputs/runs/<time>_<what>, with a number if another run has the name.
+
+    Raises:
+        InputError: no folder can be made there.
+    """
     stamp = datetime.datetime.now().strftime("%Y-%m-%d_%H-%M-%S")
     number = 1
     while True:
         folder = outputs / "runs" / f"{stamp}_{what}{f'_{number}' if number > 1 else ''}"
         try:
-            folder.mkdir(parents=True)
+            _make(folder, "outputs", exist_ok=False)
         except FileExistsError:
             number += 1
         else:
             return folder
+
+
+def _make(folder: Path, key: str, exist_ok: bool) -> None:
+    """Make a folder that the setting `key` asks for."""
+    try:
+        folder.mkdir(parents=True, exist_ok=exist_ok)
+        # Made is not yet written to: the disk may be full, and a folder that was there may be another user's.
+        with tempfile.TemporaryFile(dir=folder) as file:
+            file.write(b" ")
+    except OSError as error:
+        if isinstance(error, FileExistsError) and folder.is_dir():
+            raise
+        raise InputError(
+            key,
+            expected="a folder that can be made and written to",
+            found=f"{folder}: {error.strerror}",
+            remedy=f"Give another one: {key}=FOLDER.",
+        ) from None
 
 
 def quoted(path: Path) -> str:
