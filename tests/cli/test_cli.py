@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-REFUSED = 2
+REFUSED, UNREAD = 2, 141
 
 
 @pytest.fixture
@@ -39,6 +39,23 @@ def test_without_arguments_it_says_what_it_can_do(rgspipe) -> None:
     assert result.returncode == 0
     for word in ("generate_dataset", "fit_light", "cornell", "external", "pipeline=smoke"):
         assert word in result.stdout
+
+
+@pytest.mark.parametrize("arguments", [[], ["--help"], ["--help", "fit"]])
+def test_nobody_need_read_on(arguments: list[str], tmp_path: Path, child_environment: dict[str, str]) -> None:
+    """As with `rgspipe --help | head -1`: no traceback, also where the output is shorter than a pipe holds."""
+    command = [sys.executable, "-m", "rgspipe", *arguments]
+    started = subprocess.Popen(
+        command, cwd=tmp_path, env=child_environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    started.stdout.close()
+    assert started.stderr.read() == ""
+    assert started.wait() == UNREAD
+
+
+def test_a_terminal_may_know_ascii_alone(rgspipe) -> None:
+    result = rgspipe("--help", "fit", PYTHONIOENCODING="ascii", PYTHONUTF8="0", LC_ALL="C")
+    assert (result.returncode, result.stderr) == (0, "") and result.stdout.isascii()
 
 
 def test_help_explains_stages_scenes_groups_and_keys_without_torch(rgspipe) -> None:

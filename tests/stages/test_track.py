@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import pandas as pd
@@ -53,3 +55,12 @@ def test_the_published_method_does_not_track() -> None:
     config = with_changes(RgspipeConfig(stage="track"), {"fit.method": "paper_adam"})
     with pytest.raises(InputError, match=r"fit\.method"):
         track.STAGE.needs(config)
+
+
+def test_images_elsewhere_are_among_the_files_of_a_track(dataset: Path, change: Callable, tmp_path: Path) -> None:
+    """An image outside of `track.folder` that changes must not leave the finished track in use."""
+    outside = tmp_path / "elsewhere.exr"
+    shutil.move(dataset / "targets/one/view_0.exr", outside)
+    change("targets/one/transforms.json", lambda content: content["frames"][0].update(file_path=str(outside)))
+    config = with_changes(RgspipeConfig(stage="track"), {"track.folder": str(dataset)})
+    assert outside in track.STAGE.files(config)

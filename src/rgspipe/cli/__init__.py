@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
 
 from rgspipe.cli.help import help_text, overview
-from rgspipe.cli.messages import EXIT_INPUT, EXIT_INTERRUPTED, show_input_error
+from rgspipe.cli.messages import EXIT_INPUT, EXIT_INTERRUPTED, EXIT_UNREAD, show_input_error
 from rgspipe.errors import InputError
 from rgspipe.pipeline import StageLoader
 from rgspipe.stages import load_stage
@@ -24,8 +25,17 @@ def main(arguments: Sequence[str] | None = None, stage_loader: StageLoader = loa
         stage_loader: gives a stage by name.
     """
     arguments = list(sys.argv[1:] if arguments is None else arguments)
+    for stream in (sys.stdout, sys.stderr):
+        # A terminal that knows ASCII alone shows the rest as escapes.
+        stream.reconfigure(errors="backslashreplace")
     try:
-        return _dispatch(arguments, stage_loader)
+        code = _dispatch(arguments, stage_loader)
+        sys.stdout.flush()
+        return code
+    except BrokenPipeError:
+        # Nobody reads on, as with `| head`. What is still to be written at the end goes nowhere.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return EXIT_UNREAD
     except InputError as error:
         # The configuration may be what is wrong, so the wish for a traceback is read from the words themselves.
         show_input_error(error, "debug.traceback=true" in arguments)

@@ -10,8 +10,9 @@ from pathlib import Path
 
 from rgspipe.errors import InputError
 
-#: Exit status of a run that failed, of one whose input cannot be used, and of one that was stopped with Ctrl-C.
-EXIT_FAILED, EXIT_INPUT, EXIT_INTERRUPTED = 1, 2, 130
+#: Exit status of a run that failed, of one whose input cannot be used, of one that was stopped with Ctrl-C, and of one
+#: whose output nobody reads any more.
+EXIT_FAILED, EXIT_INPUT, EXIT_INTERRUPTED, EXIT_UNREAD = 1, 2, 130, 141
 
 TRACEBACK_VARIABLE = "RGSPIPE_TRACEBACK"
 

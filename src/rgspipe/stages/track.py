@@ -10,6 +10,7 @@ import torch
 from rgspipe.config import RgspipeConfig
 from rgspipe.datasets.light_file import read_lights, write_lights
 from rgspipe.datasets.location import dataset_root, open_dataset
+from rgspipe.datasets.read_files import files_read
 from rgspipe.datasets.views import Target
 from rgspipe.errors import InputError
 from rgspipe.evaluation.plots import png_of
@@ -107,7 +108,7 @@ def _inputs(config: RgspipeConfig) -> list[Need | str]:
 
 
 def _files(config: RgspipeConfig) -> list[Path]:
-    return [] if config.track.folder is None else [Path(config.track.folder)]
+    return [] if config.track.folder is None else files_read(config.track.folder)
 
 
 STAGE = Stage(
