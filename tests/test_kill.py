@@ -34,6 +34,7 @@ TINY = {
     "freeze.gather_rays": 16,
     "freeze.patches": 40,
     "freeze.dictionary_grid": 4,
+    "report.views": "[1]",
     "fit.adam.epochs": 1,
     "fit.adam.steps": 10,
 }
