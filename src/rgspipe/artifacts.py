@@ -24,7 +24,7 @@ from typing import Any
 from filelock import FileLock, Timeout
 
 from rgspipe.errors import InputError
-from rgspipe.files import point_at, sha256, sync, sync_tree, write_json
+from rgspipe.files import make_folder, point_at, publish, sha256, write_json
 from rgspipe.machine import PeakMemory, library_versions, machine
 from rgspipe.strict_json import parse_json
 
@@ -170,7 +170,7 @@ class ArtifactStore:
             the artifact, and whether this call made it.
         """
         path, partial = self.path(key), self.partial(key)
-        path.parent.mkdir(parents=True, exist_ok=True)
+        make_folder(path.parent)
         with _locked(path.parent / f".lock-{key.fingerprint}", key):
             if (found := self.find(key)) is not None:
                 return found, False
@@ -202,9 +202,7 @@ class ArtifactStore:
             "files": _inventory(partial),
         }
         write_json(partial / MANIFEST, manifest)
-        sync_tree(partial)
-        partial.rename(path)
-        sync(path.parent)
+        publish(partial, path)
 
 
 def _locked(lock_file: Path, key: Key) -> FileLock:

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import csv
+import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
+
+from rgspipe.files import write_text
 
 TABLE = "table.csv"
 
@@ -36,10 +39,11 @@ def write_sweep_table(folder: Path, jobs: Sequence[tuple[Path, Mapping[str, Any]
         own = {"job": path.name, "state": status["state"], **{key: settings.get(key, "") for key in differing}}
         rows += [{**own, **row} for row in _result_rows(status)]
     columns = list(dict.fromkeys(["job", "state", *differing, *(name for row in rows for name in row)]))
-    with (folder / TABLE).open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.DictWriter(stream, columns)
-        writer.writeheader()
-        writer.writerows(rows)
+    stream = io.StringIO(newline="")
+    writer = csv.DictWriter(stream, columns)
+    writer.writeheader()
+    writer.writerows(rows)
+    write_text(folder / TABLE, stream.getvalue())
     return folder / TABLE
 
 

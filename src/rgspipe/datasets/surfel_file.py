@@ -27,7 +27,6 @@ MAKE_AGAIN = "Remove it and run the stage that makes it again."
 def save_surfels(path: str | Path, surfels: Surfels) -> None:
     """Write `surfels` with their coverage; the file appears under its name only when it is whole."""
     path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
     note = {"format": FORMAT, "version": VERSION, "coverage": asdict(surfels.coverage)}
     gloss = {} if surfels.gloss is None else {GLOSS + name: part for name, part in surfels.gloss.tensors().items()}
     save_tensors(path, surfels.tensors() | gloss, note)

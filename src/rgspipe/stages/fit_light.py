@@ -16,6 +16,7 @@ from rgspipe.datasets.location import dataset_root
 from rgspipe.datasets.read_files import files_read
 from rgspipe.datasets.views import Target, View
 from rgspipe.evaluation.fit_folder import read_result, write_result
+from rgspipe.files import write_text
 from rgspipe.fitting import FitViews, PaperAdam, Search, Solver
 from rgspipe.fitting.options import MOST_LIGHTS, AdamOptions, SearchOptions
 from rgspipe.options import Options
@@ -47,7 +48,7 @@ def run(context: StageContext) -> None:
         if not (context.folder / target.name).is_dir():
             fitter.fit(target, context.folder)
         rows.append(_row(context, target))
-    pd.DataFrame(rows).to_csv(context.folder / "results.csv", index=False)
+    write_text(context.folder / "results.csv", pd.DataFrame(rows).to_csv(index=False))
     context.note(targets=len(targets), view_sets=len(fitter.prepared))
 
 
