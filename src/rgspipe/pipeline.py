@@ -39,6 +39,7 @@ NO_RESULT = (
     "rgspipe.stages.sources",
     "rgspipe.status",
     "rgspipe.variants",
+    "rgspipe.whole_files",
 )
 
 #: At most this many causes are named for one stage in the plan.

@@ -27,6 +27,7 @@ from rgspipe.benchmark.truth import Truth
 from rgspipe.evaluation.plots import png_of, svg_bytes
 from rgspipe.evaluation.timing import load_average
 from rgspipe.files import write_bytes, write_json, write_text
+from rgspipe.whole_files import WholeFiles
 
 #: Surfels of the comparison of gather operators, whose reference has thousands of rays a surfel.
 GATHER_SURFELS, GATHER_RAYS = 2_500, (32, 128, 512)
@@ -80,14 +81,13 @@ def _of_one_size(rows: pd.DataFrame) -> pd.DataFrame:
 
 
 def _part(bench: Bench, name: str, measure: Callable[[Bench], pd.DataFrame]) -> pd.DataFrame:
-    path = bench.folder / f"{name}.csv"
-    if not path.exists():
+    path, beside = bench.folder / f"{name}.csv", _load_path(bench, name)
+    whole = WholeFiles(bench.folder)
+    if not whole.keeps(path, beside):
         load = load_average()
-        table = measure(bench)
-        write_json(_load_path(bench, name), {"load_average": round(load, 2)})
-        hidden = path.with_name(f".{path.name}")
-        write_text(hidden, table.to_csv(index=False))
-        hidden.rename(path)
+        write_text(path, measure(bench).to_csv(index=False))
+        write_json(beside, {"load_average": round(load, 2)})
+        whole.add(path, beside)
     return pd.read_csv(path)
 
 

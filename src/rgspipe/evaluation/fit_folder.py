@@ -38,7 +38,7 @@ def write_result(
     further: Mapping[str, bytes] | None = None,
     spoken: Spoken = PYTHON,
 ) -> None:
-    """Write lights.json, convergence.csv, fit.png and final.exr; `folder` appears when it is whole.
+    """Write lights.json, convergence.csv, fit.png and final.exr; `folder` appears when it is whole, in place of any.
 
     fit.png has one row a view: target, start, midway, end, difference. final.exr is the first view's
     final image; those of further views are final_1.exr and so on. `further` holds more files by name; settings in the
@@ -57,6 +57,7 @@ def write_result(
         write_image(partial / ("final.exr" if index == 0 else f"final_{index}.exr"), image.cpu().numpy())
     for name, content in (further or {}).items():
         write_bytes(partial / name, content)
+    shutil.rmtree(folder, ignore_errors=True)
     publish(partial, folder)
 
 

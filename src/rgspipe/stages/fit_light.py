@@ -37,16 +37,19 @@ from rgspipe.stages.light_spec import light_spec
 from rgspipe.stages.scene_effects import chosen_effects, frozen_scene, wanted_effects
 from rgspipe.stages.sources import image_stage, require_images, target_stage
 from rgspipe.stages.spoken import COMMAND_LINE
+from rgspipe.whole_files import WholeFiles
 
 
 def run(context: StageContext) -> None:
     """Write results.csv and a folder per target; targets that an earlier attempt finished are kept."""
     fitter = Fitter.create(context)
     targets = select_targets(all_targets(context), context.config)
-    rows = []
+    rows, whole = [], WholeFiles(context.folder)
     for target in progress_bar(targets, "fitting lights", unit="target"):
-        if not (context.folder / target.name).is_dir():
+        folder = context.folder / target.name
+        if not whole.keeps(folder):
             fitter.fit(target, context.folder)
+            whole.add(folder)
         rows.append(_row(context, target))
     write_text(context.folder / "results.csv", pd.DataFrame(rows).to_csv(index=False))
     context.note(targets=len(targets), view_sets=len(fitter.prepared))
