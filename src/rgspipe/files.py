@@ -150,13 +150,15 @@ def _settle(temporary: Path, permissions: int) -> None:
 
 
 def _write_error(error: Exception, temporary: Path) -> int | None:
-    """The system's number of an error that kept a file from being written; None for any other.
-
-    Libraries that write files themselves tell it in words alone.
-    """
+    """The system's number of an error that kept a file from being written; None for any other."""
     if isinstance(error, OSError):
         own = error.filename is None or Path(os.fsdecode(error.filename)) == temporary
         return error.errno if own else None
+    return told_number(error)
+
+
+def told_number(error: Exception) -> int | None:
+    """The system's number of an error of writing that a library tells in words alone; None if it tells none."""
     return next((number for number in UNWRITABLE if os.strerror(number) in str(error)), None)
 
 

@@ -38,6 +38,7 @@ NO_RESULT = (
     "rgspipe.stages.base",
     "rgspipe.stages.sources",
     "rgspipe.status",
+    "rgspipe.unwritable",
     "rgspipe.variants",
     "rgspipe.whole_files",
 )
@@ -231,6 +232,7 @@ def _keys(node: Node) -> set[str]:
 def _take(node: Node, store: ArtifactStore, variant: str) -> Artifact:
     artifact = store.find(node.key)
     assert artifact is not None
+    artifact.check_sizes()
     store.point_at(node.key, variant)
     return artifact
 
