@@ -7,6 +7,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
 import time
 
@@ -59,6 +60,15 @@ def _break(context: StageContext) -> None:
     (context.folder / "seed.txt").write_text(f"{context.config.seed}\n")
 
 
+def _crunch(context: StageContext) -> None:
+    (context.folder / "begun.txt").write_text("begun\n")
+    # A long call into native code, which hears signals when it is over.
+    signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    time.sleep(1.5)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])
+    time.sleep(60.0)
+
+
 def _views(config: RgspipeConfig) -> list[Need]:
     return [Need("grow", {"views.count": count}) for count in config.report.views]
 
@@ -67,8 +77,9 @@ SOW = Stage("sow", "writes rows", _sow, config_keys=("dataset.resolution",))
 GROW = Stage("grow", "adds them up", _grow, inputs=lambda config: ["sow"], config_keys=("views",))
 HARVEST = Stage("harvest", "brings it in", _harvest, inputs=_views)
 BREAK = Stage("break", "fails on some seeds", _break, config_keys=("seed",))
+CRUNCH = Stage("crunch", "is busy", _crunch, config_keys=("seed",))
 
-STAGES = {stage.name: stage for stage in (SOW, GROW, HARVEST, BREAK)}
+STAGES = {stage.name: stage for stage in (SOW, GROW, HARVEST, BREAK, CRUNCH)}
 
 
 def load(name: str) -> Stage:

@@ -21,6 +21,9 @@ STATUS = "status.json"
 #: How a run may stand.
 STATES = ("running", "done", "failed", "stopped", "killed")
 
+#: What became of a run that was stopped with Ctrl-C.
+STOPPED = "stopped by the user"
+
 #: What every status file says, and what one of a run that goes on, or is done, says as well.
 NEEDED = {"state", "stage", "overrides"}
 BESIDE = {"running": {"pid", "process_start"}, "done": {"result"}}
@@ -110,7 +113,7 @@ class RunStatus:
 
     def stopped(self, exit_code: int) -> None:
         """Say that the user has stopped the run."""
-        self._end("stopped", {"error": "stopped by the user", "exit_code": exit_code})
+        self._end("stopped", {"error": STOPPED, "exit_code": exit_code})
 
     def _end(self, state: str, more: Mapping[str, Any]) -> None:
         seconds = round(time.perf_counter() - self._clock, 3)
@@ -164,6 +167,14 @@ def record_killed(folder: Path, overrides: Sequence[str], error: str) -> dict[st
     values |= {"state": "killed", "ended": _now(), "error": error, "exit_code": 1}
     write_json(folder / STATUS, values)
     return values
+
+
+def record_stopped(root: Path, exit_code: int) -> None:
+    """Say of all runs below `root` that have not ended, or were killed, that the user has stopped them."""
+    for folder, values in read_statuses(root):
+        if values["state"] in ("running", "killed"):
+            stopped = {"state": "stopped", "ended": _now(), "error": STOPPED, "exit_code": exit_code}
+            write_json(folder / STATUS, values | stopped)
 
 
 def read_statuses(root: Path) -> list[tuple[Path, dict[str, Any]]]:

@@ -33,7 +33,7 @@ from rgspipe.errors import InputError
 from rgspipe.files import NO_RIGHT
 from rgspipe.pipeline import StageLoader, Usual, run
 from rgspipe.stages import load_stage
-from rgspipe.status import RunStatus, read_status, read_statuses
+from rgspipe.status import RunStatus, read_status, read_statuses, record_stopped
 
 #: What a run writes about itself: its configuration and how it ended.
 RUN_BYTES = 2**16
@@ -65,7 +65,12 @@ def run_jobs(overrides: Sequence[str], stage_loader: StageLoader, multirun: bool
     chosen = f"hydra.{mode}.dir={quoted(folder)}"
     # Worked out here: within a job Hydra composes nothing else.
     usual = usual_command(overrides)
-    code = run_hydra([*(["-m"] if multirun else []), *overrides, chosen], stage_loader, usual)
+    try:
+        code = run_hydra([*(["-m"] if multirun else []), *overrides, chosen], stage_loader, usual)
+    except KeyboardInterrupt:
+        if multirun:  # jobs in processes of their own are killed before they can say so
+            record_stopped(folder, EXIT_INTERRUPTED)
+        raise
     if multirun:
         return _sweep_summary(folder, code)
     status = read_status(folder)
