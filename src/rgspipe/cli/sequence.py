@@ -17,12 +17,16 @@ import yaml
 from rgspipe.cli.compose import leaves_machine
 from rgspipe.cli.jobs import new_run_folder, quoted
 from rgspipe.cli.messages import EXIT_FAILED
+from rgspipe.datasets.input_file import input_file
 from rgspipe.errors import InputError
 from rgspipe.resources import resource_folder
 from rgspipe.status import read_statuses
 
 #: What each step of a pipeline is run with.
 RGSPIPE = (sys.executable, "-m", "rgspipe")
+
+#: Bytes of the largest pipeline that is read.
+MOST_BYTES = 2**20
 
 #: Seconds after which a step that goes on is told of Ctrl-C once more.
 PATIENCE = 10.0
@@ -44,7 +48,8 @@ def load_sequence(name: str) -> list[SequenceStep]:
         InputError: there is none, or it is not a list of steps.
     """
     folder = resource_folder("pipelines")
-    path = Path(name) if name.endswith((".yaml", ".yml")) else folder / f"{name}.yaml"
+    given = name.endswith((".yaml", ".yml"))
+    path = input_file(name, "the steps of a pipeline", most_bytes=MOST_BYTES) if given else folder / f"{name}.yaml"
     if not path.is_file():
         names = [file.stem for file in sorted(folder.glob("*.yaml"))]
         near = difflib.get_close_matches(name, names, n=1)
@@ -52,7 +57,7 @@ def load_sequence(name: str) -> list[SequenceStep]:
         raise InputError("pipeline", expected=f"one of {', '.join(names)}", found=repr(name), remedy=remedy)
     try:
         data = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except yaml.YAMLError as error:
+    except (yaml.YAMLError, UnicodeDecodeError, RecursionError) as error:
         found = " ".join(str(error).split())
         raise InputError(path, expected="YAML", found=found, remedy="Correct the file.") from None
     steps = data.get("steps") if isinstance(data, dict) else None

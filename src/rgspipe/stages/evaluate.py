@@ -176,7 +176,11 @@ def _plain(value: Any) -> Any:
 
 
 def _truth_file(config: RgspipeConfig) -> list[Path]:
-    return [] if config.fit.truth is None else [Path(config.fit.truth)]
+    """The true lights that are given, read now: what is wrong with them should show before lights are fitted."""
+    if config.fit.truth is None:
+        return []
+    read_lights(config.fit.truth)
+    return [Path(config.fit.truth)]
 
 
 STAGE = Stage(

@@ -89,7 +89,7 @@ def _targets(context: StageContext) -> Iterator[tuple[Target, LightRig]]:
         groups: dict[int, list[tuple[Path, LightRig]]] = {}
         for path in target_folders(folder):
             truth = dataset_root(folder) / "truth" / f"{path.name}.json"
-            rig = read_lights(truth) if truth.is_file() else ()
+            rig = read_lights(truth) if truth.exists() else ()
             groups.setdefault(len(rig), []).append((path, rig))
         groups.pop(0, None)
         for count, members in sorted(groups.items()):

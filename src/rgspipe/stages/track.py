@@ -88,7 +88,7 @@ def _frames(
 def _truths(root: Path, names: Sequence[str]) -> list[LightRig]:
     """The true lights of every frame; none where one is not known."""
     files = [root / "truth" / f"{name}.json" for name in names]
-    return [read_lights(path) for path in files] if all(path.is_file() for path in files) else []
+    return [read_lights(path) for path in files] if all(path.exists() for path in files) else []
 
 
 def _folder(context: StageContext) -> Path:
