@@ -14,6 +14,7 @@ import pytest
 
 from rgspipe.artifacts import Artifact, ArtifactStore, Key
 from rgspipe.errors import InputError
+from rgspipe.unwritable import told_below
 
 KEY = Key("scene", "stage", "0123456789abcdef")
 RECIPE = {"config": {"a.b": 1}, "inputs": {}, "foreign": {}, "code": {}}
@@ -189,7 +190,10 @@ def test_a_disk_that_is_full_in_the_middle_of_a_stage_is_told(tmp_path: Path, er
         raise error(folder / "second.txt")
 
     store = ArtifactStore(tmp_path)
-    with pytest.raises(InputError, match=r"room on the disk.*No space left.*What is done is kept") as caught:
+    with (
+        pytest.raises(InputError, match=r"room on the disk.*No space left.*What is done is kept") as caught,
+        told_below(tmp_path),
+    ):
         store.build(KEY, RECIPE, fill)
     assert caught.value.where == str(tmp_path)
     artifact, _ = store.build(KEY, RECIPE, make)
@@ -200,7 +204,7 @@ def test_an_error_of_reading_elsewhere_is_no_matter_of_the_store(tmp_path: Path)
     def read(folder: Path) -> Mapping[str, object]:
         raise PermissionError(errno.EACCES, "Permission denied", str(tmp_path.parent / "mine.exr"))
 
-    with pytest.raises(PermissionError):
+    with pytest.raises(PermissionError), told_below(tmp_path):
         ArtifactStore(tmp_path).build(KEY, RECIPE, read)
 
 

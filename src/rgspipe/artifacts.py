@@ -28,7 +28,6 @@ from rgspipe.errors import InputError
 from rgspipe.files import UNWRITABLE, make_folder, point_at, publish, sha256, write_json
 from rgspipe.machine import PeakMemory, library_versions, machine
 from rgspipe.strict_json import parse_json
-from rgspipe.unwritable import writing_below
 
 SCHEMA_VERSION = 1
 MANIFEST = "manifest.json"
@@ -191,16 +190,7 @@ class ArtifactStore:
 
         Returns:
             the artifact, and whether this call made it.
-
-        Raises:
-            InputError: the store cannot be written to, or its disk is full.
         """
-        with writing_below(self.root):
-            return self._build(key, recipe, make, variant)
-
-    def _build(
-        self, key: Key, recipe: Mapping[str, Any], make: Callable[[Path], Mapping[str, Any]], variant: str
-    ) -> tuple[Artifact, bool]:
         path, partial = self.path(key), self.partial(key)
         make_folder(path.parent)
         with _locked(path.parent / f".lock-{key.fingerprint}", key):
@@ -273,7 +263,7 @@ def _read_manifest(folder: Path, key: Key) -> Mapping[str, Any]:
         manifest = parse_json(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise InputError(path, expected=expected, found="no file", remedy=remedy) from None
-    except (OSError, ValueError) as error:
+    except (IsADirectoryError, ValueError) as error:
         raise InputError(path, expected=expected, found=f"damaged JSON ({error})", remedy=remedy) from None
     if not isinstance(manifest, dict) or manifest.get("schema") != SCHEMA_VERSION:
         raise InputError(path, expected=expected, found="another schema", remedy=remedy)

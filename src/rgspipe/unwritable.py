@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import pwd
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -12,11 +13,11 @@ from rgspipe.files import NO_ROOM, UNWRITABLE, told_number
 
 
 @contextlib.contextmanager
-def writing_below(root: Path) -> Iterator[None]:
-    """Have errors of the block that keep it from writing below `root` raised as InputErrors.
+def told_below(root: Path) -> Iterator[None]:
+    """Have errors of the block that keep it from reading and writing below `root` raised as InputErrors.
 
     Raises:
-        InputError: there is no room, or no right to write; names what could not be written.
+        InputError: there is no room, or no right to read or write; names what could not be used.
     """
     try:
         yield
@@ -30,7 +31,7 @@ def writing_below(root: Path) -> Iterator[None]:
 
 
 def refusal(where: str, path: Path, number: int) -> InputError:
-    """What to say where `path` could not be written, with the system's number of the error."""
+    """What to say where `path` could not be read or written, with the system's number of the error."""
     if number in NO_ROOM:
         return InputError(
             where,
@@ -41,14 +42,14 @@ def refusal(where: str, path: Path, number: int) -> InputError:
         )
     return InputError(
         where,
-        expected="a folder that can be written to",
+        expected="a folder that can be read and written to",
         found=f"{path}: {os.strerror(number)}{_owner(path)}",
-        remedy="Give a folder of yours, outputs=FOLDER, or have its owner let you write there (chmod -R g+w).",
+        remedy="Give a folder of yours, outputs=FOLDER, or have its owner let you in (chmod -R g+rwX).",
     )
 
 
 def _number(error: Exception, root: Path) -> int | None:
-    """The system's number of an error that concerns writing below `root`; None for any other."""
+    """The system's number of an error that concerns files below `root`; None for any other."""
     number = error.errno if isinstance(error, OSError) else told_number(error)
     if not isinstance(error, OSError) or error.filename is None:
         # Words of a library or of another process, and a stream that is written to, name no file.
@@ -58,11 +59,16 @@ def _number(error: Exception, root: Path) -> int | None:
 
 
 def _owner(path: Path) -> str:
-    """Whose it is, or the folder that is there, if not the user's own."""
-    there = next((place for place in (path, *path.parents) if place.exists()), None)
-    if there is None or there.stat().st_uid == os.geteuid():
-        return ""
+    """Whose it is, or the folder above it that can be seen, if not the user's own."""
+    for place in (path, *path.parents):
+        with contextlib.suppress(OSError):
+            user = place.stat().st_uid
+            return "" if user == os.geteuid() else f" ({place} belongs to {_name(user)})"
+    return ""
+
+
+def _name(user: int) -> str:
     try:
-        return f" ({there} belongs to {there.owner()})"
-    except KeyError:  # a user that this machine does not know
-        return f" ({there} belongs to the user {there.stat().st_uid})"
+        return pwd.getpwuid(user).pw_name
+    except KeyError:  # one that this machine does not know
+        return f"the user {user}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import os
 import sys
 import tempfile
 from collections.abc import Sequence
@@ -116,7 +117,8 @@ def new_run_folder(outputs: Path, what: str, elsewhere: bool = True) -> Path:
         return _numbered(outputs, what)
     except InputError as error:
         cause = error.__cause__
-        if not (elsewhere and outputs.is_dir() and isinstance(cause, OSError) and cause.errno in NO_RIGHT):
+        there = os.access(outputs, os.R_OK | os.X_OK)
+        if not (elsewhere and there and isinstance(cause, OSError) and cause.errno in NO_RIGHT):
             raise
     folder = Path(tempfile.mkdtemp(prefix="rgspipe_run_"))
     print(f"{outputs} can only be read ({cause.strerror}): what is there is reused; status: {folder}", file=sys.stderr)
