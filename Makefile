@@ -9,7 +9,7 @@ TEST_WORKERS ?= 2
 ARGS ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup test test-slurm smoke reproduce scenes train-study light-study bench docs lint house
+.PHONY: help setup test test-slurm crash smoke reproduce scenes train-study light-study bench docs lint house
 
 help:  ## this list
 	@echo "rgspipe: from images of a scene, find its lights"
@@ -30,6 +30,9 @@ test: setup  ## every test
 
 test-slurm: setup  ## sweeps on a Slurm cluster of this machine alone (Debian: apt-get install slurm-wlm munge)
 	$(VENV)/bin/python -m pytest -q -m slurm $(ARGS) tests/slurm
+
+crash: setup  ## power cuts while the whole way is made on a tiny scene: what the next run ends with (minutes; ARGS=NUMBER of cuts)
+	$(VENV)/bin/python tests/power_cut.py $(ARGS)
 
 smoke: setup  ## the whole way on a tiny scene, in minutes
 	$(RGSPIPE) pipeline=smoke $(ARGS)

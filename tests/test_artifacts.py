@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import multiprocessing
+import os
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -12,6 +14,7 @@ import pytest
 
 from rgspipe.artifacts import Artifact, ArtifactStore, Key
 from rgspipe.errors import InputError
+from rgspipe.unwritable import told_below
 
 KEY = Key("scene", "stage", "0123456789abcdef")
 RECIPE = {"config": {"a.b": 1}, "inputs": {}, "foreign": {}, "code": {}}
@@ -136,6 +139,73 @@ def test_processes_that_need_the_same_artifact_make_it_once(tmp_path: Path) -> N
         worker.join(timeout=30)
     assert [worker.exitcode for worker in workers] == [0, 0, 0]
     assert log.read_text() == "made\n"
+
+
+def test_who_finds_an_artifact_made_links_to_it(tmp_path: Path) -> None:
+    """Its maker may have been killed before it did, and another variant has a link of its own."""
+    artifact = built(tmp_path)
+    links = artifact.path.parent
+    (links / "latest").unlink()
+    ArtifactStore(tmp_path).build(KEY, RECIPE, make)
+    ArtifactStore(tmp_path).build(KEY, RECIPE, make, "seed=1")
+    assert [(links / name).resolve() for name in ("latest", "latest-seed=1")] == [artifact.path.resolve()] * 2
+
+
+def test_sizes_are_checked_without_reading(tmp_path: Path) -> None:
+    artifact = built(tmp_path)
+    artifact.check_sizes()
+    _tamper(artifact.path / "sub" / "data.bin")
+    ArtifactStore(tmp_path).find(KEY).check_sizes()
+    (artifact.path / "note.txt").write_bytes(b"")
+    with pytest.raises(InputError, match=r"note\.txt: expected the 7 bytes that stage wrote, found 0 bytes"):
+        ArtifactStore(tmp_path).find(KEY).check_sizes()
+
+
+@pytest.mark.parametrize(("mask", "mode"), [(0o002, 0o664), (0o022, 0o644), (0o077, 0o600)])
+def test_the_umask_says_who_may_hold_a_lock(tmp_path: Path, mask: int, mode: int) -> None:
+    former = os.umask(mask)
+    try:
+        built(tmp_path)
+    finally:
+        os.umask(former)
+    assert (tmp_path / "scene" / "stage" / f".lock-{KEY.fingerprint}").stat().st_mode & 0o777 == mode
+
+
+def full(path: Path) -> OSError:
+    return OSError(errno.ENOSPC, "No space left on device", str(path))
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        full,
+        lambda path: OSError(errno.ENOSPC, "No space left on device"),
+        lambda path: RuntimeError("Blender ended with status 1. Its last lines:\nNo space left on device"),
+    ],
+    ids=["a file", "a stream", "words"],
+)
+def test_a_disk_that_is_full_in_the_middle_of_a_stage_is_told(tmp_path: Path, error) -> None:
+    def fill(folder: Path) -> Mapping[str, object]:
+        (folder / "first.txt").write_text("kept\n")
+        raise error(folder / "second.txt")
+
+    store = ArtifactStore(tmp_path)
+    with (
+        pytest.raises(InputError, match=r"room on the disk.*No space left.*What is done is kept") as caught,
+        told_below(tmp_path),
+    ):
+        store.build(KEY, RECIPE, fill)
+    assert caught.value.where == str(tmp_path)
+    artifact, _ = store.build(KEY, RECIPE, make)
+    assert "first.txt" in artifact.manifest["files"]
+
+
+def test_an_error_of_reading_elsewhere_is_no_matter_of_the_store(tmp_path: Path) -> None:
+    def read(folder: Path) -> Mapping[str, object]:
+        raise PermissionError(errno.EACCES, "Permission denied", str(tmp_path.parent / "mine.exr"))
+
+    with pytest.raises(PermissionError), told_below(tmp_path):
+        ArtifactStore(tmp_path).build(KEY, RECIPE, read)
 
 
 def test_the_lock_ends_with_its_holder(tmp_path: Path) -> None:

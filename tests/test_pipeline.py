@@ -75,6 +75,28 @@ def test_stages_remark_on_what_is_made_already(config: RgspipeConfig) -> None:
     assert last_lines()[0].startswith("harvest  reuse") and last_lines()[1] == "made: harvest."
 
 
+@pytest.mark.parametrize("stage", ["harvest", "grow"])
+def test_a_file_that_was_cut_off_after_it_was_made_is_told_where_it_is_reused(
+    config: RgspipeConfig, stage: str
+) -> None:
+    artifact = run(config, toys.load)
+    made = artifact.path if stage == "harvest" else next((artifact.path.parents[1] / "grow").glob("[0-9a-f]*"))
+    file = next(made.glob("total*.txt"))
+    file.write_bytes(b"")
+    wanted = config if stage == "harvest" else with_changes(config, {"report.views": [1, 2, 3]})
+    with pytest.raises(InputError, match=r"bytes that \w+ wrote, found 0 bytes\. Remove the folder") as caught:
+        run(wanted, toys.load)
+    assert caught.value.where == str(file)
+
+
+def test_a_link_that_was_lost_is_made_again(config: RgspipeConfig) -> None:
+    artifact = run(config, toys.load)
+    link = artifact.path.parent / "latest"
+    link.unlink()
+    run(config, toys.load)
+    assert link.resolve() == artifact.path.resolve()
+
+
 def test_keys_that_do_not_matter_do_not_rebuild(config: RgspipeConfig) -> None:
     run(config, toys.load)
     other = with_changes(config, {"seed": 7, "debug.traceback": True, "train.steps": 3})

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import json
 import os
 import signal
 import subprocess
@@ -12,6 +14,17 @@ from pathlib import Path
 import pytest
 
 from rgspipe.status import RunStatus, process_start, read_status, read_statuses
+
+
+def status_text(**changes: object) -> str:
+    """A status file of a run of this process, with some values changed."""
+    values = {"state": "running", "stage": "freeze", "overrides": [], "pid": 1, "process_start": "?"}
+    return json.dumps(values | changes)
+
+
+def test_a_status_file_of_these_values_alone_is_believed(tmp_path: Path) -> None:
+    (tmp_path / "status.json").write_text(status_text(state="done", result="x", seconds=1, exit_code=0))
+    assert read_status(tmp_path)["state"] == "done"
 
 
 def test_a_run_is_running_then_done(tmp_path: Path) -> None:
@@ -71,7 +84,31 @@ def test_a_run_on_another_machine_is_believed(tmp_path: Path) -> None:
     assert read_status(tmp_path)["state"] == "running"
 
 
-@pytest.mark.parametrize("content", ["", "{", "[1]", '{"state": "done"}', "[" * 100_000])
+@pytest.mark.parametrize(
+    "content",
+    [
+        "",
+        "{",
+        "[1]",
+        '{"state": "done"}',
+        "[" * 100_000,
+        status_text(pid="4"),
+        status_text(pid=True),
+        status_text(pid=None),
+        status_text(process_start=7),
+        status_text(overrides="seed=1"),
+        status_text(overrides=["seed=1", 2]),
+        status_text(stage=None),
+        status_text(state=["done"]),
+        status_text(state="dune"),
+        status_text(host=5),
+        status_text(state="done"),
+        status_text(state="done", result=3),
+        status_text(state="done", result="x", seconds="long"),
+        status_text(state="failed", exit_code="1"),
+        '{"state": "running", "stage": "freeze", "overrides": []}',
+    ],
+)
 def test_a_damaged_status_file_does_not_hide_the_others(tmp_path: Path, content: str) -> None:
     for name in ("1", "2"):
         RunStatus.start(tmp_path / name, "freeze", []).done(Path("outputs/x"))
@@ -83,3 +120,16 @@ def test_a_run_that_its_user_stopped_has_not_failed(tmp_path: Path) -> None:
     RunStatus.start(tmp_path, "freeze", []).stopped(130)
     values = read_status(tmp_path)
     assert (values["state"], values["exit_code"]) == ("stopped", 130) and "traceback" not in values
+
+
+def test_a_status_that_cannot_be_written_hides_not_what_became_of_the_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    status = RunStatus.start(tmp_path, "freeze", [])
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "fsync", full)
+    status.failed(RuntimeError("no luck"), 1)
+    assert [str(tmp_path / "status.json") in record.message for record in caplog.records] == [True]

@@ -7,30 +7,32 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
 import time
 
 from rgspipe.cli import main
 from rgspipe.config import RgspipeConfig
 from rgspipe.errors import InputError
+from rgspipe.files import replacing, write_text
 from rgspipe.stages.base import Need, Stage, StageContext
+from rgspipe.whole_files import WholeFiles
 
 PAUSE_VARIABLE = "TOY_PAUSE"
 
 
 def _sow(context: StageContext) -> None:
-    pause = float(os.environ.get(PAUSE_VARIABLE, "0"))
+    pause, whole = float(os.environ.get(PAUSE_VARIABLE, "0")), WholeFiles(context.folder)
     for row in range(context.config.dataset.resolution):
         path = context.folder / f"row_{row:02d}.txt"
-        if path.exists():
+        if whole.keeps(path):
             continue
-        temporary = context.scratch / path.name
-        with temporary.open("w") as stream:
+        with replacing(path) as temporary, temporary.open("w") as stream:
             for column in range(4):
                 stream.write(f"{row * 4 + column}\n")
                 stream.flush()
                 time.sleep(pause / 4)
-        temporary.rename(path)
+        whole.add(path)
     context.note(rows=context.config.dataset.resolution)
     with (context.folder.parent / "made.log").open("a") as log:
         log.write(f"{os.getpid()}\n")
@@ -40,7 +42,7 @@ def _grow(context: StageContext) -> None:
     seeds = context.inputs["sow"]
     rows = [seeds.file(name).read_text().split() for name in sorted(seeds.manifest["files"])]
     total = sum(int(number) for row in rows for number in row)
-    (context.folder / "total.txt").write_text(f"{total * context.config.views.count}\n")
+    write_text(context.folder / "total.txt", f"{total * context.config.views.count}\n")
     context.note(threads=os.environ.get("OMP_NUM_THREADS"), spinning=os.environ.get("OMP_WAIT_POLICY"))
 
 
@@ -59,6 +61,15 @@ def _break(context: StageContext) -> None:
     (context.folder / "seed.txt").write_text(f"{context.config.seed}\n")
 
 
+def _crunch(context: StageContext) -> None:
+    (context.folder / "begun.txt").write_text("begun\n")
+    # A long call into native code, which hears signals when it is over.
+    signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    time.sleep(1.5)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])
+    time.sleep(60.0)
+
+
 def _views(config: RgspipeConfig) -> list[Need]:
     return [Need("grow", {"views.count": count}) for count in config.report.views]
 
@@ -67,8 +78,9 @@ SOW = Stage("sow", "writes rows", _sow, config_keys=("dataset.resolution",))
 GROW = Stage("grow", "adds them up", _grow, inputs=lambda config: ["sow"], config_keys=("views",))
 HARVEST = Stage("harvest", "brings it in", _harvest, inputs=_views)
 BREAK = Stage("break", "fails on some seeds", _break, config_keys=("seed",))
+CRUNCH = Stage("crunch", "is busy", _crunch, config_keys=("seed",))
 
-STAGES = {stage.name: stage for stage in (SOW, GROW, HARVEST, BREAK)}
+STAGES = {stage.name: stage for stage in (SOW, GROW, HARVEST, BREAK, CRUNCH)}
 
 
 def load(name: str) -> Stage:

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import datetime
 import logging
+import os
 import shutil
 import time
 from collections.abc import Callable, Mapping
@@ -24,7 +25,7 @@ from typing import Any
 from filelock import FileLock, Timeout
 
 from rgspipe.errors import InputError
-from rgspipe.files import point_at, sha256, sync, sync_tree, write_json
+from rgspipe.files import UNWRITABLE, make_folder, point_at, publish, sha256, write_json
 from rgspipe.machine import PeakMemory, library_versions, machine
 from rgspipe.strict_json import parse_json
 
@@ -95,15 +96,30 @@ class Artifact:
             self.file(name)
         return self.path
 
+    def check_sizes(self) -> None:
+        """See that every file is there and as long as it was written; reads none of them.
+
+        Raises:
+            InputError: one is missing, or was cut off.
+        """
+        for name, entry in self.manifest["files"].items():
+            self._check_size(self.path / name, entry)
+
     def _verify(self, path: Path, entry: Mapping[str, Any]) -> None:
+        self._check_size(path, entry)
+        if sha256(path) != entry["sha256"]:
+            raise self._damaged(path, entry, "other content (its checksum differs)")
+
+    def _check_size(self, path: Path, entry: Mapping[str, Any]) -> None:
+        if not path.is_file():
+            raise self._damaged(path, entry, "no file")
+        if (size := path.stat().st_size) != entry["bytes"]:
+            raise self._damaged(path, entry, f"{size} bytes")
+
+    def _damaged(self, path: Path, entry: Mapping[str, Any], found: str) -> InputError:
         expected = f"the {entry['bytes']} bytes that {self.stage} wrote"
         remedy = f"Remove the folder {self.path} and run again: the stage will make it anew."
-        if not path.is_file():
-            raise InputError(path, expected=expected, found="no file", remedy=remedy)
-        if (size := path.stat().st_size) != entry["bytes"]:
-            raise InputError(path, expected=expected, found=f"{size} bytes", remedy=remedy)
-        if sha256(path) != entry["sha256"]:
-            raise InputError(path, expected=expected, found="other content (its checksum differs)", remedy=remedy)
+        return InputError(path, expected=expected, found=found, remedy=remedy)
 
 
 @dataclass(frozen=True)
@@ -146,9 +162,15 @@ class ArtifactStore:
             return None
 
     def point_at(self, key: Key, variant: str = "") -> None:
-        """Let `latest`, or `latest-<variant>`, be this artifact."""
-        link = LATEST + (f"-{variant}" if variant else "")
-        point_at(self.root / key.scene / key.stage / link, key.fingerprint)
+        """Let `latest`, or `latest-<variant>`, be this artifact; a store that cannot be written to keeps its links."""
+        link = self.root / key.scene / key.stage / (LATEST + (f"-{variant}" if variant else ""))
+        try:
+            point_at(link, key.fingerprint)
+        except OSError as error:
+            if error.errno not in UNWRITABLE:
+                raise
+            if not (link.is_symlink() and link.readlink() == Path(key.fingerprint)):
+                log.warning("%s stays as it is: %s", link, error.strerror)
 
     def build(
         self,
@@ -170,9 +192,11 @@ class ArtifactStore:
             the artifact, and whether this call made it.
         """
         path, partial = self.path(key), self.partial(key)
-        path.parent.mkdir(parents=True, exist_ok=True)
+        make_folder(path.parent)
         with _locked(path.parent / f".lock-{key.fingerprint}", key):
             if (found := self.find(key)) is not None:
+                # Who made it may have been killed before it was linked to, and may call it otherwise.
+                self.point_at(key, variant)
                 return found, False
             resumed = partial.exists()
             partial.mkdir(exist_ok=True)
@@ -202,12 +226,12 @@ class ArtifactStore:
             "files": _inventory(partial),
         }
         write_json(partial / MANIFEST, manifest)
-        sync_tree(partial)
-        partial.rename(path)
-        sync(path.parent)
+        publish(partial, path)
 
 
 def _locked(lock_file: Path, key: Key) -> FileLock:
+    # The umask says who else may hold it: whoever may write to the folder of a group must be able to.
+    os.close(os.open(lock_file, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o666))
     lock = FileLock(lock_file)
     try:
         return lock.acquire(timeout=0)
@@ -239,7 +263,7 @@ def _read_manifest(folder: Path, key: Key) -> Mapping[str, Any]:
         manifest = parse_json(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise InputError(path, expected=expected, found="no file", remedy=remedy) from None
-    except (OSError, ValueError) as error:
+    except (IsADirectoryError, ValueError) as error:
         raise InputError(path, expected=expected, found=f"damaged JSON ({error})", remedy=remedy) from None
     if not isinstance(manifest, dict) or manifest.get("schema") != SCHEMA_VERSION:
         raise InputError(path, expected=expected, found="another schema", remedy=remedy)

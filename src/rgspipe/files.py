@@ -1,43 +1,112 @@
-"""Files that are whole or not there: atomic writes, durable folders, checksums."""
+"""Files that are whole or not there, also after a power cut: the one way in which they are written, and checksums."""
 
 from __future__ import annotations
 
 import contextlib
+import errno
 import hashlib
 import json
 import os
+import secrets
+import stat
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+#: Why a file cannot be written though nothing is wrong with what it holds: no room, or no right to.
+NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+NO_RIGHT = (errno.EROFS, errno.EACCES, errno.EPERM)
+UNWRITABLE = NO_ROOM + NO_RIGHT
 
-def write_text(path: Path, text: str) -> None:
-    """Write `text` so that `path` holds either its former content or all of the new one, even after a power cut."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    with temporary.open("w", encoding="utf-8") as stream:
-        stream.write(text)
-        stream.flush()
-        os.fsync(stream.fileno())
-    temporary.replace(path)
+#: Characters of a file's name that the one it is written under repeats: names may have 255 bytes.
+LONGEST_STEM = 40
 
 
-def write_json(path: Path, value: Any) -> None:
-    """`write_text` of indented JSON, its folder made where it is not there.
+@contextlib.contextmanager
+def replacing(path: str | Path) -> Iterator[Path]:
+    """An empty file beside `path`, which takes its name once the block has written it.
+
+    So `path` holds either its former content or all of the new one, even after a power cut, and nobody sees half of
+    it. The folder is made where it is not there. The file that is written to has the suffix of `path` and a name that
+    nobody can foresee; who may read it is what the umask says.
+
+    Raises:
+        OSError: the file cannot be written; names it.
+    """
+    path = Path(path)
+    make_folder(path.parent)
+    temporary = path.with_name(f".{path.stem[:LONGEST_STEM]}.{secrets.token_hex(8)}{path.suffix}")
+    try:
+        permissions = _create(temporary)
+        try:
+            yield temporary
+            _settle(temporary, permissions)
+            temporary.replace(path)
+        finally:
+            temporary.unlink(missing_ok=True)
+        sync(path.parent)
+    except Exception as error:
+        if (number := _write_error(error, temporary)) is None:
+            raise
+        raise OSError(number, os.strerror(number), str(path)) from error
+
+
+def write_bytes(path: str | Path, content: bytes) -> None:
+    """Write `content` as `replacing` does."""
+    with replacing(path) as temporary:
+        temporary.write_bytes(content)
+
+
+def write_text(path: str | Path, text: str) -> None:
+    """Write `text` in UTF-8 as `replacing` does."""
+    write_bytes(path, text.encode())
+
+
+def write_json(path: str | Path, value: Any) -> None:
+    """`write_text` of indented JSON.
 
     Raises:
         ValueError: there is a NaN or an infinity, which JSON does not know.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
     write_text(path, json.dumps(value, indent=1, allow_nan=False, ensure_ascii=False) + "\n")
 
 
+def append_line(path: Path, line: str) -> None:
+    """Add a line at the end of a file and bring it to the disk; one that was cut off before stays a line of its own."""
+    flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_NOFOLLOW
+    descriptor = os.open(path, flags, 0o666)
+    try:
+        os.write(descriptor, f"\n{line}".encode())
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+    sync(path.parent)
+
+
 def point_at(link: Path, target: str) -> None:
-    """Make the symbolic link `link` point at `target` (relative to its folder), in one step."""
-    temporary = link.with_name(f".{link.name}.{os.getpid()}")
-    with contextlib.suppress(FileNotFoundError):
-        temporary.unlink()
+    """Make the symbolic link `link` point at `target` (relative to its folder), in one step, also after a power cut."""
+    temporary = link.with_name(f".{secrets.token_hex(8)}")
     temporary.symlink_to(target)
-    temporary.replace(link)
+    try:
+        temporary.replace(link)
+    finally:
+        temporary.unlink(missing_ok=True)
+    sync(link.parent)
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder, and those above it, where they are not there, so that they outlast a power cut."""
+    missing = [place for place in (folder, *folder.parents) if not place.exists()]
+    folder.mkdir(parents=True, exist_ok=True)
+    for place in missing:
+        sync(place.parent)
+
+
+def publish(partial: Path, folder: Path) -> None:
+    """Bring a folder with all that is in it to the disk, then rename it: `folder` is whole or not there."""
+    sync_tree(partial)
+    partial.rename(folder)
+    sync(folder.parent)
 
 
 def sync_tree(folder: Path) -> None:
@@ -49,11 +118,48 @@ def sync_tree(folder: Path) -> None:
 
 def sync(path: Path) -> None:
     """Bring one file's content, or one folder's list of names, to the disk."""
-    descriptor = os.open(path, os.O_RDONLY)
     try:
+        descriptor = os.open(path, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+    except OSError as error:
+        # A folder that may be written to but not listed, or a network file system that keeps names in its own way.
+        if error.errno not in (errno.EACCES, errno.EINVAL) or not path.is_dir():
+            raise
+
+
+def _create(temporary: Path) -> int:
+    """Make an empty file that was not there, and follow no link; the permissions that it got."""
+    descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW, 0o666)
+    try:
+        return stat.S_IMODE(os.fstat(descriptor).st_mode)
+    finally:
+        os.close(descriptor)
+
+
+def _settle(temporary: Path, permissions: int) -> None:
+    """Bring what was written to the disk; some libraries make a file of their own, for its owner alone."""
+    descriptor = os.open(temporary, os.O_RDONLY | os.O_NOFOLLOW)
+    try:
+        os.fchmod(descriptor, permissions)
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
+
+
+def _write_error(error: Exception, temporary: Path) -> int | None:
+    """The system's number of an error that kept a file from being written; None for any other."""
+    if isinstance(error, OSError):
+        own = error.filename is None or Path(os.fsdecode(error.filename)) == temporary
+        return error.errno if own else None
+    return told_number(error)
+
+
+def told_number(error: Exception) -> int | None:
+    """The system's number of an error of writing that a library tells in words alone; None if it tells none."""
+    return next((number for number in UNWRITABLE if os.strerror(number) in str(error)), None)
 
 
 def sha256(path: Path) -> str:

@@ -20,6 +20,7 @@ from rgspipe.files import tree_digest
 from rgspipe.fingerprints import differences, fingerprint
 from rgspipe.source_code import SourceCode
 from rgspipe.stages.base import Stage, StageContext
+from rgspipe.unwritable import told_below
 from rgspipe.variants import variant_name
 
 StageLoader = Callable[[str], Stage]
@@ -38,7 +39,9 @@ NO_RESULT = (
     "rgspipe.stages.base",
     "rgspipe.stages.sources",
     "rgspipe.status",
+    "rgspipe.unwritable",
     "rgspipe.variants",
+    "rgspipe.whole_files",
 )
 
 #: At most this many causes are named for one stage in the plan.
@@ -191,8 +194,14 @@ def run(
         usual: what is called `latest`; None calls everything so.
 
     Raises:
-        InputError: an input cannot be used, or is missing under `upstream=require`.
+        InputError: an input cannot be used, or is missing under `upstream=require`; the store cannot be read or
+            written to, or its disk is full.
     """
+    with told_below(Path(config.outputs)):
+        return _run(config, load_stage, overrides, usual)
+
+
+def _run(config: RgspipeConfig, load_stage: StageLoader, overrides: Sequence[str], usual: Usual | None) -> Artifact:
     store = ArtifactStore(Path(config.outputs))
     resolver = _Resolver(load_stage)
     root = resolver.resolve(config.stage, config, {})
@@ -230,6 +239,7 @@ def _keys(node: Node) -> set[str]:
 def _take(node: Node, store: ArtifactStore, variant: str) -> Artifact:
     artifact = store.find(node.key)
     assert artifact is not None
+    artifact.check_sizes()
     store.point_at(node.key, variant)
     return artifact
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import logging
 import os
 import socket
 import time
@@ -17,8 +18,31 @@ from rgspipe.strict_json import parse_json
 
 STATUS = "status.json"
 
-#: What every status file says.
+#: How a run may stand.
+STATES = ("running", "done", "failed", "stopped", "killed")
+
+#: What became of a run that was stopped with Ctrl-C.
+STOPPED = "stopped by the user"
+
+#: What every status file says, and what one of a run that goes on, or is done, says as well.
 NEEDED = {"state", "stage", "overrides"}
+BESIDE = {"running": {"pid", "process_start"}, "done": {"result"}}
+
+#: What is read of a status file, and what it is.
+TYPES: Mapping[str, type | tuple[type, ...]] = {
+    "state": str,
+    "stage": str,
+    "overrides": list,
+    "host": str,
+    "pid": int,
+    "process_start": (str, type(None)),
+    "result": str,
+    "error": str,
+    "seconds": (int, float),
+    "exit_code": int,
+}
+
+log = logging.getLogger(__name__)
 
 
 def _now() -> str:
@@ -89,12 +113,15 @@ class RunStatus:
 
     def stopped(self, exit_code: int) -> None:
         """Say that the user has stopped the run."""
-        self._end("stopped", {"error": "stopped by the user", "exit_code": exit_code})
+        self._end("stopped", {"error": STOPPED, "exit_code": exit_code})
 
     def _end(self, state: str, more: Mapping[str, Any]) -> None:
         seconds = round(time.perf_counter() - self._clock, 3)
         self.values |= {"state": state, "ended": _now(), "seconds": seconds, **more}
-        self._write()
+        try:
+            self._write()
+        except OSError as error:  # what became of the run matters more, and is told besides
+            log.warning("%s cannot be written: %s", self.path, error.strerror)
 
     def _write(self) -> None:
         write_json(self.path, self.values)
@@ -114,12 +141,22 @@ def read_status(folder: Path) -> dict[str, Any] | None:
         values = parse_json(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         values = None
-    if not isinstance(values, dict) or not values.keys() >= NEEDED:
+    if not _is_status(values):
         return {"state": "damaged", "stage": "", "overrides": [], "command": "", "error": f"{path} cannot be read"}
     here = values.get("host", socket.gethostname()) == socket.gethostname()
     if values["state"] == "running" and here and process_start(values["pid"]) != values["process_start"]:
         values["state"] = "killed"
     return values
+
+
+def _is_status(values: object) -> bool:
+    """Whether a status file says what it should, in the types that it should have."""
+    if not isinstance(values, dict) or not values.keys() >= NEEDED or values["state"] not in STATES:
+        return False
+    typed = all(isinstance(values[name], kind) for name, kind in TYPES.items() if name in values)
+    no_truths = not any(isinstance(values.get(name), bool) for name in ("pid", "seconds", "exit_code"))
+    named = values.keys() >= BESIDE.get(values["state"], set())
+    return typed and no_truths and named and all(isinstance(text, str) for text in values["overrides"])
 
 
 def record_killed(folder: Path, overrides: Sequence[str], error: str) -> dict[str, Any]:
@@ -130,6 +167,14 @@ def record_killed(folder: Path, overrides: Sequence[str], error: str) -> dict[st
     values |= {"state": "killed", "ended": _now(), "error": error, "exit_code": 1}
     write_json(folder / STATUS, values)
     return values
+
+
+def record_stopped(root: Path, exit_code: int) -> None:
+    """Say of all runs below `root` that have not ended, or were killed, that the user has stopped them."""
+    for folder, values in read_statuses(root):
+        if values["state"] in ("running", "killed"):
+            stopped = {"state": "stopped", "ended": _now(), "error": STOPPED, "exit_code": exit_code}
+            write_json(folder / STATUS, values | stopped)
 
 
 def read_statuses(root: Path) -> list[tuple[Path, dict[str, Any]]]:

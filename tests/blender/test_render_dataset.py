@@ -51,7 +51,7 @@ def dataset(rendered: Path) -> Dataset:
 
 
 def _digests(folder: Path) -> dict[str, str]:
-    paths = sorted(path for path in folder.rglob("*") if path.is_file())
+    paths = sorted(path for path in folder.rglob("*") if path.is_file() and not path.name.startswith("."))
     return {str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest() for path in paths}
 
 
@@ -114,17 +114,32 @@ def test_frames_do_not_depend_on_how_many_there_are(rendered: Path, tmp_path: Pa
     assert len(same) == 8 and same.items() <= digests.items()
 
 
-def test_damage_is_repaired_and_the_rest_is_kept(rendered: Path, tmp_path: Path) -> None:
+def test_damage_is_repaired_and_the_rest_is_kept(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     render_dataset(replace(JOB, train_views=2, test_views=0, targets_per_class=0), tmp_path)
     before = _digests(tmp_path)
     kept = tmp_path / "train/r_0001.exr"
     stamp = kept.stat().st_mtime_ns
     cut = tmp_path / "train/r_0000.exr"
-    cut.write_bytes(cut.read_bytes()[:-30])
+    # Whole images in the wrong place can be read, so that reading is no proof.
+    cut.write_bytes(kept.read_bytes())
+    (tmp_path / "train/r_0000_depth.exr").write_bytes(b"")
     (tmp_path / "transforms_train.json").unlink()
     render_dataset(replace(JOB, train_views=2, test_views=0, targets_per_class=0), tmp_path)
     assert _digests(tmp_path) == before
     assert kept.stat().st_mtime_ns == stamp
+    assert [record.message for record in caplog.records] == [
+        "1 of the frames that lie there are not as they were written: rendered again"
+    ]
+
+
+def test_where_the_job_was_cut_off_all_is_rendered_again(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    job = replace(JOB, train_views=1, test_views=0, targets_per_class=0)
+    render_dataset(job, tmp_path)
+    before, stamp = _digests(tmp_path), (tmp_path / "train/r_0000.exr").stat().st_mtime_ns
+    (tmp_path / "job.json").write_text("")
+    render_dataset(job, tmp_path)
+    assert _digests(tmp_path) == before and (tmp_path / "train/r_0000.exr").stat().st_mtime_ns > stamp
+    assert "job.json cannot be read" in caplog.records[0].message
 
 
 def _start(folder: Path, environment: dict[str, str]) -> subprocess.Popen:

@@ -58,6 +58,12 @@ def test_a_terminal_may_know_ascii_alone(rgspipe) -> None:
     assert (result.returncode, result.stderr) == (0, "") and result.stdout.isascii()
 
 
+def test_hydra_shows_the_whole_configuration(rgspipe) -> None:
+    result = rgspipe("--cfg", "job", "stage=freeze", "seed=7")
+    assert result.returncode == 0, result.stderr
+    assert "stage: freeze" in result.stdout and "seed: 7" in result.stdout
+
+
 def test_help_explains_stages_scenes_groups_and_keys_without_torch(rgspipe) -> None:
     result = rgspipe("--help")
     assert result.returncode == 0

@@ -26,6 +26,7 @@ from rgspipe.scene import PointLight
 from rgspipe.scene.lights import LedLight
 from rgspipe.stages import fit_extras, fit_light, freeze
 from rgspipe.stages.base import StageContext
+from rgspipe.whole_files import RECORD
 
 LIGHTS = {
     ("visible_000", "visible"): (VISIBLE, (1.0, 2.0, 0.5)),
@@ -114,7 +115,7 @@ def test_fits_every_target_and_writes_all_of_its_files(inputs, tmp_path):
             "final.exr",
         }
     assert (table["psnr"] > 60).all() and (table["result"] == "converged").all()
-    assert not list(tmp_path.glob(".*"))
+    assert list(tmp_path.glob(".*")) == [tmp_path / RECORD]
 
 
 def test_goes_on_after_an_interruption(inputs, tmp_path):
@@ -128,6 +129,19 @@ def test_goes_on_after_an_interruption(inputs, tmp_path):
     table = _fit(inputs, tmp_path)
     assert len(table) == 3 and (again / "lights.json").is_file()
     assert (tmp_path / "visible_000" / "lights.json").read_bytes() == kept
+
+
+def test_a_target_whose_files_were_emptied_by_a_power_cut_is_fitted_again(inputs, tmp_path, caplog):
+    before = _fit(inputs, tmp_path)
+    kept, cut = (tmp_path / name / "lights.json" for name in ("visible_000", "occluded_000"))
+    stamp = kept.stat().st_mtime_ns
+    cut.write_bytes(b"")
+    (tmp_path / "results.csv").unlink()
+    again = _fit(inputs, tmp_path)
+    pd.testing.assert_frame_equal(again.drop(columns="seconds"), before.drop(columns="seconds"))
+    assert kept.stat().st_mtime_ns == stamp and cut.stat().st_size > 0
+    told = [record.message for record in caplog.records if "made again" in record.message]
+    assert len(told) == 1 and str(cut.parent) in told[0]
 
 
 def test_the_same_seed_gives_the_same_table(inputs, tmp_path):

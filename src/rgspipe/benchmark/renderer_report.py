@@ -26,7 +26,8 @@ from rgspipe.benchmark.settings import Setting, Workshop, sweep
 from rgspipe.benchmark.truth import Truth
 from rgspipe.evaluation.plots import png_of, svg_bytes
 from rgspipe.evaluation.timing import load_average
-from rgspipe.files import write_json
+from rgspipe.files import write_bytes, write_json, write_text
+from rgspipe.whole_files import WholeFiles
 
 #: Surfels of the comparison of gather operators, whose reference has thousands of rays a surfel.
 GATHER_SURFELS, GATHER_RAYS = 2_500, (32, 128, 512)
@@ -67,11 +68,11 @@ def run_bench(bench: Bench) -> None:
         "scaling": scaling_figure(measured["scaling"]),
     }
     for name, figure in figures.items():
-        (bench.folder / f"{name}.svg").write_bytes(svg_bytes(figure))
-        (bench.folder / f"{name}.png").write_bytes(png_of(figure))
-    front.to_csv(bench.folder / "front.csv", index=False)
+        write_bytes(bench.folder / f"{name}.svg", svg_bytes(figure))
+        write_bytes(bench.folder / f"{name}.png", png_of(figure))
+    write_text(bench.folder / "front.csv", front.to_csv(index=False))
     loads = {name: json.loads(_load_path(bench, name).read_text())["load_average"] for name in PARTS}
-    (bench.folder / REPORT).write_text(tables.report(measured, front, loads, bench.presets), encoding="utf-8")
+    write_text(bench.folder / REPORT, tables.report(measured, front, loads, bench.presets))
 
 
 def _of_one_size(rows: pd.DataFrame) -> pd.DataFrame:
@@ -80,14 +81,13 @@ def _of_one_size(rows: pd.DataFrame) -> pd.DataFrame:
 
 
 def _part(bench: Bench, name: str, measure: Callable[[Bench], pd.DataFrame]) -> pd.DataFrame:
-    path = bench.folder / f"{name}.csv"
-    if not path.exists():
+    path, beside = bench.folder / f"{name}.csv", _load_path(bench, name)
+    whole = WholeFiles(bench.folder)
+    if not whole.keeps(path, beside):
         load = load_average()
-        table = measure(bench)
-        write_json(_load_path(bench, name), {"load_average": round(load, 2)})
-        hidden = path.with_name(f".{path.name}")
-        table.to_csv(hidden, index=False)
-        hidden.rename(path)
+        write_text(path, measure(bench).to_csv(index=False))
+        write_json(beside, {"load_average": round(load, 2)})
+        whole.add(path, beside)
     return pd.read_csv(path)
 
 

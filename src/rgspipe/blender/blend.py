@@ -13,6 +13,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
+from rgspipe.datasets.input_file import input_file
 from rgspipe.errors import InputError
 
 #: Sockets by which a surface or a volume glows, by node type, and what turns them off.
@@ -79,8 +80,7 @@ def _set_to_zero(tree: bpy.types.NodeTree, node: bpy.types.Node, name: str) -> N
 
 
 def _open(path: Path) -> None:
-    if not path.is_file():
-        raise InputError(path, expected="a .blend file", found="no such file", remedy="Correct scene.path.")
+    input_file(path, "a .blend file")
     try:
         # Scripts in the file stay off: it is data.
         bpy.ops.wm.open_mainfile(filepath=str(path), use_scripts=False, load_ui=False)

@@ -11,10 +11,11 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol, TypeVar
+from typing import Generic, Protocol, TypeVar
 
 from rgspipe.blender.process import MESSAGE_PREFIX
 from rgspipe.errors import InputError
+from rgspipe.whole_files import WholeFiles
 
 #: Linux: prctl option by which a process is killed when its parent dies.
 PR_SET_PDEATHSIG = 1
@@ -40,23 +41,39 @@ class Parent:
 
     number: int
 
-    def missing(self, frames: Sequence[FrameType], is_whole: Callable[[FrameType], bool]) -> list[FrameType]:
-        """The frames that are not there yet; the parent is told how many there are and how many are done."""
-        missing = [frame for frame in frames if not is_whole(frame)]
-        _tell(total=len(frames), done=len(frames) - len(missing))
-        return missing
-
-    def each(self, frames: Iterable[FrameType]) -> Iterator[FrameType]:
-        """Frame by frame, which the parent is told of when it is done; ends this process if the parent is gone."""
-        for frame in frames:
-            self.require()
-            yield frame
-            _tell(frame=frame.name)
-
     def require(self) -> None:
         """End this process if the parent has ended."""
         if os.getppid() != self.number:
             sys.exit("The process that asked for these images is gone.")
+
+
+class Frames(Generic[FrameType]):
+    """The frames that are rendered into a folder, which keeps a record of those that are whole.
+
+    Args:
+        parent: which is told how far it is.
+        folder: that they are rendered into.
+        files: of a frame, below the folder.
+    """
+
+    def __init__(self, parent: Parent, folder: Path, files: Callable[[FrameType, Path], Sequence[Path]]) -> None:
+        self._parent, self._folder, self._files = parent, folder, files
+        self._whole = WholeFiles(folder)
+
+    def missing(self, frames: Sequence[FrameType]) -> list[FrameType]:
+        """Those that are not there as they were written; the parent is told how many there are and what was damaged."""
+        missing = [frame for frame in frames if not self._whole.has(*self._files(frame, self._folder))]
+        damaged = sum(self._files(frame, self._folder)[-1].exists() for frame in missing)
+        _tell(total=len(frames), done=len(frames) - len(missing), damaged=damaged)
+        return missing
+
+    def each(self, frames: Iterable[FrameType]) -> Iterator[FrameType]:
+        """Frame by frame, which is noted and the parent told of when it is done; ends this process if that is gone."""
+        for frame in frames:
+            self._parent.require()
+            yield frame
+            self._whole.add(*self._files(frame, self._folder))
+            _tell(frame=frame.name)
 
 
 def serve(render: Callable[[dict, Path, Parent], None]) -> None:

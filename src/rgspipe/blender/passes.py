@@ -13,7 +13,6 @@ from rgspipe.blender.job import RenderSettings
 from rgspipe.blender.lamp import shape_lamp
 from rgspipe.blender.plan import Frame
 from rgspipe.datasets.exr import read_channels, write_channels, write_image
-from rgspipe.errors import InputError
 from rgspipe.scene import Camera, Light, PointLight
 from rgspipe.scene.lights import WATTS_PER_INTENSITY
 
@@ -124,19 +123,6 @@ def frame_files(frame: Frame, folder: Path) -> list[Path]:
     """The files of a frame; the image, written last, stands last."""
     surfaces = [folder / f"{frame.name}_{kind}.exr" for kind in SURFACE_CHANNELS] if frame.has_surfaces else []
     return [*surfaces, folder / f"{frame.name}.exr"]
-
-
-def is_whole(frame: Frame, folder: Path) -> bool:
-    """Whether all files of a frame are there and can be read, at the right size."""
-    shape = (frame.camera.height, frame.camera.width)
-    for path in frame_files(frame, folder):
-        try:
-            channels = read_channels(path)
-        except InputError:
-            return False
-        if any(values.shape != shape for values in channels.values()):
-            return False
-    return True
 
 
 def _stack(passes: dict[str, np.ndarray], name: str, channels: str) -> np.ndarray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import logging
 import os
 import shutil
 import subprocess
@@ -16,6 +17,7 @@ from rgspipe.datasets.json_file import read_json
 from rgspipe.errors import InputError
 from rgspipe.files import write_json
 from rgspipe.progress import progress_bar
+from rgspipe.whole_files import WholeFiles
 
 #: Prefix of the lines on the child's stdout that are messages; the rest is Blender's own talk.
 MESSAGE_PREFIX = "@rgspipe "
@@ -28,6 +30,8 @@ SCRATCH = ".scratch"
 
 #: Lines of Blender's output that an error shows.
 TAIL_LINES = 15
+
+log = logging.getLogger(__name__)
 
 
 def require_bpy(where: str, remedy: str) -> None:
@@ -78,12 +82,12 @@ def run_blender(module: str, job: dict, name: str, folder: Path) -> None:
 def _claim(job: dict, folder: Path) -> None:
     """Write the job into its folder, or see that it is the one that is there."""
     path = folder / JOB_FILE
-    wanted = json.loads(json.dumps(job))
-    if not path.exists():
+    wanted, found = json.loads(json.dumps(job)), _claimed(path)
+    if found is None:
+        # Whatever lies there, nobody knows any more of which job it is.
+        WholeFiles(folder).forget()
         write_json(path, wanted)
-        return
-    found = read_json(path, "the job that these images belong to")
-    if found != wanted:
+    elif found != wanted:
         keys = sorted(key for key in wanted.keys() | found.keys() if wanted.get(key) != found.get(key))
         raise InputError(
             path,
@@ -91,6 +95,17 @@ def _claim(job: dict, folder: Path) -> None:
             found=f"another one (it differs in {', '.join(keys)})",
             remedy="Choose an empty folder, or remove this one.",
         )
+
+
+def _claimed(path: Path) -> dict | None:
+    """The job that a folder belongs to; None where there is none, or its file was cut off."""
+    if not path.exists():
+        return None
+    try:
+        return read_json(path, "the job that these images belong to")
+    except InputError as error:
+        log.warning("%s cannot be read (%s): its images are rendered again", path, error.found)
+        return None
 
 
 def _environment(scratch: Path) -> dict[str, str]:
@@ -113,6 +128,8 @@ def _follow(child: subprocess.Popen, scene: str) -> tuple[str, dict | None]:
             input_error = message.get("input_error", input_error)
             if "total" in message:
                 bar.begin(message["total"], message["done"])
+            if damaged := message.get("damaged"):
+                log.warning("%d of the frames that lie there are not as they were written: rendered again", damaged)
             if "frame" in message:
                 bar.update(1)
     return "\n".join(tail), input_error

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rgspipe.blender.child import Parent, serve
+from rgspipe.blender.child import Frames, Parent, serve
 from rgspipe.blender.job import DatasetJob
 from rgspipe.blender.process import SCRATCH, require_bpy, run_blender
 
@@ -25,7 +25,7 @@ def render_dataset(job: DatasetJob, folder: Path) -> None:
 
 def _render(content: dict, folder: Path, parent: Parent) -> None:
     """Write the dataset's JSON files, then render every frame that is missing in `folder`."""
-    from rgspipe.blender.passes import Studio, is_whole
+    from rgspipe.blender.passes import Studio, frame_files
     from rgspipe.blender.plan import make_plan
     from rgspipe.blender.scenes import open_scene
     from rgspipe.blender.write import write_dataset_files
@@ -34,9 +34,10 @@ def _render(content: dict, folder: Path, parent: Parent) -> None:
     prepared = open_scene(job)
     plan = make_plan(job, prepared.layout, prepared.geometry)
     write_dataset_files(job, plan, prepared, folder)
-    missing = parent.missing(plan.frames, lambda frame: is_whole(frame, folder))
+    frames = Frames(parent, folder, frame_files)
+    missing = frames.missing(plan.frames)
     studio = Studio(prepared.scene, job.settings, folder / SCRATCH)
-    for frame in parent.each(missing):
+    for frame in frames.each(missing):
         studio.render(frame, folder)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rgspipe.blender.child import Parent, serve
+from rgspipe.blender.child import Frames, Parent, serve
 from rgspipe.blender.process import SCRATCH, require_bpy, run_blender
 from rgspipe.blender.room_job import RoomJob
 
@@ -25,13 +25,14 @@ def render_room(job: RoomJob, folder: Path) -> None:
 def _render(content: dict, folder: Path, parent: Parent) -> None:
     """Render every image of a room that is missing in `folder`."""
     from rgspipe.blender.passes import Studio
-    from rgspipe.blender.room import build_room, is_whole, write_frame
+    from rgspipe.blender.room import build_room, frame_files, write_frame
 
     job = RoomJob.from_json(content)
-    missing = parent.missing(job.frames(), lambda frame: is_whole(frame, folder))
+    frames = Frames(parent, folder, frame_files)
+    missing = frames.missing(job.frames())
     for kind in job.settings:
         studio = Studio(build_room(job), job.settings[kind], folder / SCRATCH)
-        for frame in parent.each(frame for frame in missing if frame.kind == kind):
+        for frame in frames.each(frame for frame in missing if frame.kind == kind):
             write_frame(studio, frame, folder)
 
 

@@ -10,8 +10,7 @@ from rgspipe.blender.materials import diffuse_material
 from rgspipe.blender.meshes import add, new_scene, polygon
 from rgspipe.blender.passes import Studio
 from rgspipe.blender.room_job import RoomFrame, RoomJob
-from rgspipe.datasets.exr import read_channels, write_channels
-from rgspipe.errors import InputError
+from rgspipe.datasets.exr import write_channels
 
 
 def build_room(job: RoomJob) -> bpy.types.Scene:
@@ -33,14 +32,9 @@ def write_frame(studio: Studio, frame: RoomFrame, folder: Path) -> None:
     mean, noise = 0.5 * (first + second), 0.5 * (first - second)
     channels = {name: mean[..., index] for index, name in enumerate("RGB")}
     channels |= {f"noise.{name}": noise[..., index] for index, name in enumerate("RGB")}
-    write_channels(folder / f"{frame.name}.exr", channels)
+    write_channels(frame_files(frame, folder)[0], channels)
 
 
-def is_whole(frame: RoomFrame, folder: Path) -> bool:
-    """Whether an image is there and can be read, at the right size."""
-    try:
-        channels = read_channels(folder / f"{frame.name}.exr")
-    except InputError:
-        return False
-    shape = (frame.camera.height, frame.camera.width)
-    return len(channels) == 6 and all(values.shape == shape for values in channels.values())
+def frame_files(frame: RoomFrame, folder: Path) -> list[Path]:
+    """The file of a frame."""
+    return [folder / f"{frame.name}.exr"]

@@ -56,6 +56,10 @@ def _dispatch(arguments: list[str], stage_loader: StageLoader) -> int:
         from rgspipe.cli.runs import show_runs
 
         return show_runs(arguments[1:])
+    if arguments[0] == "verify":
+        from rgspipe.cli.verify import verify
+
+        return verify(arguments[1:])
     name = next((text.partition("=")[2] for text in arguments if text.startswith("pipeline=")), None)
     if name is not None:
         from rgspipe.cli.sequence import run_sequence

@@ -101,6 +101,7 @@ More:
   launcher=slurm        the jobs of a sweep on a Slurm cluster; hydra.launcher.partition=NAME and so on
   --cfg job             show the whole configuration instead of running it
   debug.traceback=true  show tracebacks (or set RGSPIPE_TRACEBACK=1)
+  verify                read every result and say which were damaged since they were made
   --hydra-help          options of Hydra, which reads the command line
 Exit status: 0 done, 1 failed, 2 input that cannot be used."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import os
 import sys
 import tempfile
 from collections.abc import Sequence
@@ -30,9 +31,13 @@ from rgspipe.cli.compose import (
 from rgspipe.cli.messages import EXIT_FAILED, EXIT_INPUT, EXIT_INTERRUPTED, show_failure, show_input_error
 from rgspipe.cli.sweep_table import write_sweep_table
 from rgspipe.errors import InputError
+from rgspipe.files import NO_RIGHT
 from rgspipe.pipeline import StageLoader, Usual, run
 from rgspipe.stages import load_stage
-from rgspipe.status import RunStatus, read_status, read_statuses
+from rgspipe.status import RunStatus, read_status, read_statuses, record_stopped
+
+#: What a run writes about itself: its configuration and how it ended.
+RUN_BYTES = 2**16
 
 #: Stages whose result is told in lines on the terminal.
 TOLD = ("fit_light", "track", "evaluate")
@@ -53,26 +58,35 @@ def run_jobs(overrides: Sequence[str], stage_loader: StageLoader, multirun: bool
     mode = "sweep" if multirun else "run"
     folder = given_folder(overrides, mode) or given_folder(overrides, "run")
     if folder is None:
-        folder = new_run_folder(Path(config.outputs), "sweep" if multirun else config.stage)
+        what = "sweep" if multirun else config.stage
+        folder = new_run_folder(Path(config.outputs), what, elsewhere=not leaves_machine(overrides))
     else:
         _make(folder, f"hydra.{mode}.dir", exist_ok=True)
     # Said again even where it was given: interpolations such as the time must not be resolved twice.
     chosen = f"hydra.{mode}.dir={quoted(folder)}"
     # Worked out here: within a job Hydra composes nothing else.
     usual = usual_command(overrides)
-    code = run_hydra([*(["-m"] if multirun else []), *overrides, chosen], stage_loader, usual)
+    try:
+        code = run_hydra([*(["-m"] if multirun else []), *overrides, chosen], stage_loader, usual)
+    except KeyboardInterrupt:
+        if multirun:  # jobs in processes of their own are killed before they can say so
+            record_stopped(folder, EXIT_INTERRUPTED)
+        raise
     if multirun:
         return _sweep_summary(folder, code)
     status = read_status(folder)
     return max(code, EXIT_FAILED if status is None else int(status.get("exit_code", EXIT_FAILED)))
 
 
-def run_hydra(arguments: Sequence[str], stage_loader: StageLoader, usual: Usual) -> int:
-    """Hand the arguments to Hydra as they are; its exit status."""
+def run_hydra(arguments: Sequence[str], stage_loader: StageLoader, usual: Usual | None = None) -> int:
+    """Hand the arguments to Hydra as they are; its exit status, or the largest of jobs in this process."""
+
+    codes = [0]
 
     # A closure, so that worker processes get the stage loader and what is usual with it.
     def job(values: DictConfig) -> int:
-        return _job(values, stage_loader, usual)
+        codes.append(_job(values, stage_loader, usual))
+        return codes[-1]
 
     register_schema()
     application = hydra.main(version_base=HYDRA_VERSION_BASE, config_path=config_folder(), config_name=CONFIG_NAME)(job)
@@ -84,15 +98,34 @@ def run_hydra(arguments: Sequence[str], stage_loader: StageLoader, usual: Usual)
         return error.code if isinstance(error.code, int) else EXIT_FAILED
     finally:
         sys.argv = former
-    return 0
+    return max(codes)
 
 
-def new_run_folder(outputs: Path, what: str) -> Path:
+def new_run_folder(outputs: Path, what: str, elsewhere: bool = True) -> Path:
     """Make outputs/runs/<time>_<what>, with a number if another run has the name.
+
+    Args:
+        outputs: the store.
+        what: is run.
+        elsewhere: whether a temporary folder will do where the store is there but may only be read: all that a run
+            needs may be in it.
 
     Raises:
         InputError: no folder can be made there.
     """
+    try:
+        return _numbered(outputs, what)
+    except InputError as error:
+        cause = error.__cause__
+        there = os.access(outputs, os.R_OK | os.X_OK)
+        if not (elsewhere and there and isinstance(cause, OSError) and cause.errno in NO_RIGHT):
+            raise
+    folder = Path(tempfile.mkdtemp(prefix="rgspipe_run_"))
+    print(f"{outputs} can only be read ({cause.strerror}): what is there is reused; status: {folder}", file=sys.stderr)
+    return folder
+
+
+def _numbered(outputs: Path, what: str) -> Path:
     stamp = datetime.datetime.now().strftime("%Y-%m-%d_%H-%M-%S")
     number = 1
     while True:
@@ -111,7 +144,7 @@ def _make(folder: Path, key: str, exist_ok: bool) -> None:
         folder.mkdir(parents=True, exist_ok=exist_ok)
         # Made is not yet written to: the disk may be full, and a folder that was there may be another user's.
         with tempfile.TemporaryFile(dir=folder) as file:
-            file.write(b" ")
+            file.write(bytes(RUN_BYTES))
     except OSError as error:
         if isinstance(error, FileExistsError) and folder.is_dir():
             raise
@@ -120,7 +153,7 @@ def _make(folder: Path, key: str, exist_ok: bool) -> None:
             expected="a folder that can be made and written to",
             found=f"{folder}: {error.strerror}",
             remedy=f"Give another one: {key}=FOLDER.",
-        ) from None
+        ) from error
 
 
 def quoted(path: Path) -> str:
@@ -129,7 +162,7 @@ def quoted(path: Path) -> str:
     return f"'{text}'"
 
 
-def _job(values: DictConfig, stage_loader: StageLoader, usual: Usual) -> int:
+def _job(values: DictConfig, stage_loader: StageLoader, usual: Usual | None) -> int:
     """One run, or one job of a sweep; its exit status."""
     settings = HydraConfig.get()
     overrides = list(settings.overrides.task)

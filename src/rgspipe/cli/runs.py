@@ -11,11 +11,7 @@ from rgspipe.status import read_statuses
 
 def show_runs(arguments: Sequence[str]) -> int:
     """Print a line for each run below outputs/runs (or `outputs=DIR`)."""
-    outputs = Path("outputs")
-    for text in arguments:
-        if not text.startswith("outputs="):
-            raise InputError(repr(text), expected="outputs=DIR", found="something else", remedy="Leave it away.")
-        outputs = Path(text.partition("=")[2])
+    outputs = given_outputs(arguments)
     runs = read_statuses(outputs / "runs")
     for folder, status in runs:
         seconds = f"{status['seconds']:.0f} s" if "seconds" in status else ""
@@ -24,3 +20,17 @@ def show_runs(arguments: Sequence[str]) -> int:
     if not runs:
         print(f"No runs in {outputs / 'runs'}.")
     return 0
+
+
+def given_outputs(arguments: Sequence[str]) -> Path:
+    """The folder of results that a command about what is there already names, or the usual one.
+
+    Raises:
+        InputError: it names something else.
+    """
+    outputs = Path("outputs")
+    for text in arguments:
+        if not text.startswith("outputs="):
+            raise InputError(repr(text), expected="outputs=DIR", found="something else", remedy="Leave it away.")
+        outputs = Path(text.partition("=")[2])
+    return outputs

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import signal
 import subprocess
 import sys
 import time
@@ -13,14 +14,22 @@ from typing import Any
 
 import yaml
 
+from rgspipe.cli.compose import leaves_machine
 from rgspipe.cli.jobs import new_run_folder, quoted
 from rgspipe.cli.messages import EXIT_FAILED
+from rgspipe.datasets.input_file import input_file
 from rgspipe.errors import InputError
 from rgspipe.resources import resource_folder
 from rgspipe.status import read_statuses
 
 #: What each step of a pipeline is run with.
 RGSPIPE = (sys.executable, "-m", "rgspipe")
+
+#: Bytes of the largest pipeline that is read.
+MOST_BYTES = 2**20
+
+#: Seconds after which a step that goes on is told of Ctrl-C once more.
+PATIENCE = 10.0
 
 
 @dataclass(frozen=True)
@@ -39,7 +48,8 @@ def load_sequence(name: str) -> list[SequenceStep]:
         InputError: there is none, or it is not a list of steps.
     """
     folder = resource_folder("pipelines")
-    path = Path(name) if name.endswith((".yaml", ".yml")) else folder / f"{name}.yaml"
+    given = name.endswith((".yaml", ".yml"))
+    path = input_file(name, "the steps of a pipeline", most_bytes=MOST_BYTES) if given else folder / f"{name}.yaml"
     if not path.is_file():
         names = [file.stem for file in sorted(folder.glob("*.yaml"))]
         near = difflib.get_close_matches(name, names, n=1)
@@ -47,7 +57,7 @@ def load_sequence(name: str) -> list[SequenceStep]:
         raise InputError("pipeline", expected=f"one of {', '.join(names)}", found=repr(name), remedy=remedy)
     try:
         data = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except yaml.YAMLError as error:
+    except (yaml.YAMLError, UnicodeDecodeError, RecursionError) as error:
         found = " ".join(str(error).split())
         raise InputError(path, expected="YAML", found=found, remedy="Correct the file.") from None
     steps = data.get("steps") if isinstance(data, dict) else None
@@ -79,7 +89,7 @@ def run_sequence(name: str, extra: Sequence[str], program: Sequence[str] = RGSPI
     """
     steps = load_sequence(name)
     outputs = Path(next((text.partition("=")[2] for text in extra if text.startswith("outputs=")), "outputs"))
-    folder = new_run_folder(outputs, f"pipeline-{Path(name).stem}")
+    folder = new_run_folder(outputs, f"pipeline-{Path(name).stem}", elsewhere=not leaves_machine(extra))
     start, seconds, results = time.perf_counter(), [], []
     for number, step in enumerate(steps, 1):
         run_folder = folder / f"{number:02d}_{step.stage}"
@@ -87,7 +97,7 @@ def run_sequence(name: str, extra: Sequence[str], program: Sequence[str] = RGSPI
         print(f"[{number}/{len(steps)}] python -m rgspipe {' '.join(command)}", flush=True)
         begin = time.perf_counter()
         key = "hydra.sweep.dir" if step.sweep else "hydra.run.dir"
-        code = subprocess.run([*program, *command, f"{key}={quoted(run_folder)}"]).returncode
+        code = _run([*program, *command, f"{key}={quoted(run_folder)}"])
         seconds.append(time.perf_counter() - begin)
         if code != 0:
             print(f"Step {number} ({step.stage}) failed; see {run_folder}. What is done is kept.", file=sys.stderr)
@@ -95,6 +105,20 @@ def run_sequence(name: str, extra: Sequence[str], program: Sequence[str] = RGSPI
         results = [Path(status["result"]) for _, status in read_statuses(run_folder)]
     _print_summary(steps, seconds, time.perf_counter() - start, results)
     return 0
+
+
+def _run(command: Sequence[str]) -> int:
+    """The exit status of a command. Ctrl-C reaches it as well, and it may take its time to write down that it did."""
+    with subprocess.Popen(command) as child:
+        try:
+            return child.wait()
+        except KeyboardInterrupt:
+            try:
+                child.wait(PATIENCE)
+            except subprocess.TimeoutExpired:  # only this process was told
+                child.send_signal(signal.SIGINT)
+                child.wait()
+            raise
 
 
 def _print_summary(steps: Sequence[SequenceStep], seconds: Sequence[float], total: float, results: list[Path]) -> None:

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import csv
+import io
+import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
+
+from rgspipe.files import write_text
 
 TABLE = "table.csv"
 
@@ -23,7 +27,7 @@ def write_sweep_table(folder: Path, jobs: Sequence[tuple[Path, Mapping[str, Any]
     """Write table.csv of a sweep.
 
     Columns: `job` (its folder's name), `state`, one for each override in which the jobs differ, and those of the
-    jobs' own tables. A job without a result, or whose stage has no table, has one row without these.
+    jobs' own tables. A job without a result or a table that can be read has one row without these.
 
     Args:
         folder: the sweep's.
@@ -36,10 +40,11 @@ def write_sweep_table(folder: Path, jobs: Sequence[tuple[Path, Mapping[str, Any]
         own = {"job": path.name, "state": status["state"], **{key: settings.get(key, "") for key in differing}}
         rows += [{**own, **row} for row in _result_rows(status)]
     columns = list(dict.fromkeys(["job", "state", *differing, *(name for row in rows for name in row)]))
-    with (folder / TABLE).open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.DictWriter(stream, columns)
-        writer.writeheader()
-        writer.writerows(rows)
+    stream = io.StringIO(newline="")
+    writer = csv.DictWriter(stream, columns)
+    writer.writeheader()
+    writer.writerows(rows)
+    write_text(folder / TABLE, stream.getvalue())
     return folder / TABLE
 
 
@@ -57,5 +62,11 @@ def _result_rows(status: Mapping[str, Any]) -> list[dict[str, str]]:
     name = STAGE_TABLES.get(status["stage"])
     if status["state"] != "done" or name is None:
         return [{}]
-    with (Path(status["result"]) / name).open(newline="", encoding="utf-8") as stream:
-        return list(csv.DictReader(stream))
+    path = Path(status["result"]) / name
+    try:
+        with path.open(newline="", encoding="utf-8") as stream:
+            rows = list(csv.DictReader(stream))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        print(f"The table has no results of this job: {path} cannot be read ({error})", file=sys.stderr)
+        return [{}]
+    return [{key: text for key, text in row.items() if key is not None} for row in rows]

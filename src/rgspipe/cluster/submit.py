@@ -15,6 +15,7 @@ from rgspipe.cluster.job import SweepJob
 from rgspipe.cluster.options import SlurmOptions
 from rgspipe.cluster.queue import cancel
 from rgspipe.errors import InputError
+from rgspipe.files import make_folder, point_at
 
 #: Folder of a sweep with Slurm's script and the jobs' output.
 LOGS = "slurm"
@@ -88,9 +89,8 @@ def _executor(folder: Path, options: SlurmOptions) -> submitit.SlurmExecutor:
 
 
 def _link(link: Path, log: Path) -> None:
-    link.parent.mkdir(parents=True, exist_ok=True)
-    link.unlink(missing_ok=True)
-    link.symlink_to(os.path.relpath(log, link.parent.resolve()))
+    make_folder(link.parent)
+    point_at(link, os.path.relpath(log, link.parent.resolve()))
 
 
 def _refused(error: Exception) -> InputError:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Literal, get_args
 
 from rgspipe.blender.options import HotdogParameters, RoomParameters
+from rgspipe.datasets.input_file import input_file, input_folder
 from rgspipe.datasets.ply_options import PlyOptions
 from rgspipe.errors import InputError
 from rgspipe.options import Options, option
@@ -116,8 +117,8 @@ class SceneConfig(Options):
         if self.path is None:
             remedy = f"Say which: scene={self.kind} scene.path=PATH."
             raise InputError("scene.path", expected=what, found="nothing", remedy=remedy)
-        path = Path(self.path)
-        if not (path.is_file() if self.kind != "external" else path.is_dir()):
-            found = "no such file or folder" if not path.exists() else "something else"
+        try:
+            (input_folder if self.kind == "external" else input_file)(self.path, what)
+        except InputError as error:
             remedy = "Check scene.path; a relative path starts at the current folder."
-            raise InputError(path, expected=what, found=found, remedy=remedy)
+            raise InputError(error.where, expected=what, found=error.found, remedy=remedy) from None

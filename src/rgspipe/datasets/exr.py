@@ -1,8 +1,7 @@
-"""OpenEXR images, read with every check that keeps a broken file from going further, written atomically."""
+"""OpenEXR images, read with every check that keeps a broken file from going further, written whole."""
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +9,7 @@ import OpenEXR
 
 from rgspipe.datasets.input_file import check_pixel_count, input_file
 from rgspipe.errors import InputError
+from rgspipe.files import replacing
 
 #: Pixels of the largest image of which only a part is stored, 8K: a file of a few bytes could claim any size.
 MOST_CROPPED = 2**25
@@ -162,20 +162,13 @@ def write_channels(path: str | Path, channels: dict[str, np.ndarray]) -> None:
 
     The file appears under its name only when it is whole.
     """
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
     stored = {}
     for name, values in channels.items():
         values = np.asarray(values)
         stored[name] = np.ascontiguousarray(values if values.dtype == np.float16 else values.astype(np.float32))
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
-    # OpenEXR chooses the format by the suffix, so the temporary name keeps it.
-    temporary = path.with_name(f".{path.stem}.{os.getpid()}.partial.exr")
-    try:
+    with replacing(path) as temporary:
         OpenEXR.File(header, stored).write(str(temporary))
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def write_image(path: str | Path, image: np.ndarray, alpha: np.ndarray | None = None) -> None:

@@ -16,7 +16,7 @@ from rgspipe.datasets.classes import OCCLUSIONS
 from rgspipe.datasets.frames import FrameEntry, read_entries
 from rgspipe.datasets.images import read_colour, read_depth, read_mask, read_vectors
 from rgspipe.datasets.info import DatasetInfo, read_info
-from rgspipe.datasets.input_file import is_plain_name
+from rgspipe.datasets.input_file import input_folder, is_plain_name
 from rgspipe.datasets.json_file import read_json, required, shown
 from rgspipe.datasets.tensoir import is_tensoir, load_tensoir
 from rgspipe.datasets.views import Dataset, Target, View
@@ -37,9 +37,7 @@ def load_dataset(root: str | Path, *, train: bool = True, test: bool = True, tar
     Raises:
         InputError: any file is missing, broken or inconsistent.
     """
-    root = Path(root)
-    if not root.is_dir():
-        raise InputError(root, expected="the folder of a dataset", found="no such folder", remedy="Check the path.")
+    root = input_folder(root, "the folder of a dataset")
     if is_tensoir(root):
         return load_tensoir(root, train=train, test=test)
     info = read_info(root)
@@ -65,11 +63,7 @@ def load_target(folder: str | Path) -> Target:
     Raises:
         InputError: the folder has no frames or images, or any file is broken or inconsistent.
     """
-    folder = Path(folder)
-    if not folder.is_dir():
-        raise InputError(
-            folder, expected="the folder of a fit target", found="no such folder", remedy="Check the path."
-        )
+    folder = input_folder(folder, "the folder of a fit target")
     # "." and "DIR/sub/.." have names, too.
     place = folder.resolve() if folder.name in ("", "..") else folder
     _check_name(place.name, folder)
@@ -99,7 +93,7 @@ def _load_targets(root: Path) -> tuple[Target, ...]:
 def _listed_targets(folder: Path) -> dict[str, str]:
     """The names and classes of targets.json in `folder`; empty if there is no such file."""
     path = folder / "targets.json"
-    if not path.is_file():
+    if not path.exists():
         return {}
     listed = required(read_json(path, "the list of fit targets"), "targets", path)
     classes = {}

@@ -38,7 +38,7 @@ def read_info(root: Path) -> DatasetInfo | None:
         InputError: another version, an unknown depth convention, or images that are not premultiplied.
     """
     path = root / "dataset_info.json"
-    if not path.is_file():
+    if not path.exists():
         return None
     content = read_json(path, "what the dataset's images mean")
     version = required(content, "version", path)

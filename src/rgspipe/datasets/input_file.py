@@ -40,6 +40,23 @@ def input_file(path: str | Path, expected: str, *, most_bytes: int | None = None
     return Path(path)
 
 
+def input_folder(path: str | Path, expected: str) -> Path:
+    """`path`, found to be a folder.
+
+    Raises:
+        InputError: no such folder, a file or anything else, or a name that cannot be.
+    """
+    try:
+        found = "a file" if stat.S_ISREG(mode := Path(path).stat().st_mode) else "a pipe or a device"
+    except FileNotFoundError:
+        raise InputError(path, expected=expected, found="no such folder", remedy="Check the path.") from None
+    except (OSError, ValueError) as error:
+        raise InputError(_short(path), expected=expected, found=_why(error), remedy="Check the path.") from None
+    if not stat.S_ISDIR(mode):
+        raise InputError(path, expected=expected, found=found, remedy="Check the path.")
+    return Path(path)
+
+
 def check_pixel_count(path: Path, width: int, height: int, most: int | None = None) -> None:
     """Refuse an image that has no pixels, or more than `most` (by default `MOST_PIXELS`).
 

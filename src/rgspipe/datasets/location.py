@@ -20,7 +20,7 @@ TARGET = "transforms.json"
 def dataset_root(folder: str | Path) -> Path:
     """The folder of the dataset that `folder` is, or points at."""
     pointer = Path(folder) / POINTER
-    if not pointer.is_file():
+    if not pointer.exists():
         return Path(folder)
     root = required(read_json(pointer, "the folder of a dataset"), "root", pointer)
     if not isinstance(root, str):
@@ -48,7 +48,7 @@ def load_views(folder: str | Path, split: Literal["train", "test"] = "train") ->
     Raises:
         InputError: any file is missing, broken or inconsistent.
     """
-    if (Path(folder) / TARGET).is_file():
+    if (Path(folder) / TARGET).exists():
         return load_target(folder).views
     dataset = open_dataset(folder, train=split == "train", test=split == "test", targets=False)
     return dataset.train if split == "train" else dataset.test

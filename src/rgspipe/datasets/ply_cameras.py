@@ -18,7 +18,7 @@ NAME, LEVELS_UP = "cameras.json", 3
 def find_cameras(ply: Path) -> Path | None:
     """cameras.json of the model that a PLY file belongs to, if there is one."""
     folders = list(ply.resolve().parents)[: LEVELS_UP + 1]
-    return next((folder / NAME for folder in folders if (folder / NAME).is_file()), None)
+    return next((folder / NAME for folder in folders if (folder / NAME).exists()), None)
 
 
 def read_viewpoints(path: Path) -> Tensor:

@@ -17,6 +17,7 @@ import numpy as np
 from scipy.special import expit
 
 from rgspipe.datasets.conversion import Loss, loss
+from rgspipe.datasets.input_file import input_file
 from rgspipe.datasets.opacity_profile import FittedProfiles, fit_profiles, smoothstep
 from rgspipe.datasets.ply_gaussians import Discs, exponentials, unit_quaternions
 from rgspipe.datasets.ply_options import PlyOptions
@@ -30,6 +31,9 @@ MARKS = ("geovalue", "ad_0", "as_0", "b_0", "s_0")
 LOW, HIGH = 0.2, 0.9
 
 CONFIG, LEVELS_UP = "cfg_args", 3
+
+#: Bytes of the largest cfg_args that is read.
+MOST_BYTES = 2**20
 
 
 @dataclass(frozen=True)
@@ -96,7 +100,7 @@ def read_radiosity(table: VertexTable, options: PlyOptions) -> Discs:
 def find_config(ply: Path) -> Path | None:
     """cfg_args of the model that a PLY file belongs to, if there is one."""
     folders = list(ply.resolve().parents)[: LEVELS_UP + 1]
-    return next((folder / CONFIG for folder in folders if (folder / CONFIG).is_file()), None)
+    return next((folder / CONFIG for folder in folders if (folder / CONFIG).exists()), None)
 
 
 def find_ranges(ply: Path) -> tuple[Ranges, str]:
@@ -115,6 +119,7 @@ def find_ranges(ply: Path) -> tuple[Ranges, str]:
 def _parse_ranges(path: Path) -> Ranges:
     """The numbers in the text `Namespace(name=value, …)`, which is parsed and never run."""
     error = InputError(path, expected="Namespace(…) with numbers", found="something else", remedy="Correct the file.")
+    input_file(path, "the configuration of a model", most_bytes=MOST_BYTES)
     try:
         call = ast.parse(path.read_text(encoding="utf-8").strip(), mode="eval").body
         if not isinstance(call, ast.Call):

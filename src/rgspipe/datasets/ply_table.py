@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +12,7 @@ from plyfile import PlyData, PlyElement, PlyListProperty, PlyParseError
 from rgspipe.datasets.input_file import input_file
 from rgspipe.datasets.ply_header import check_header
 from rgspipe.errors import InputError
+from rgspipe.files import replacing
 
 ELEMENT = "vertex"
 
@@ -131,16 +131,10 @@ def read_vertices(path: str | Path) -> VertexTable:
 
 def write_vertices(path: str | Path, columns: Mapping[str, np.ndarray], comments: Sequence[str]) -> None:
     """Write columns (N,) as float properties, binary little-endian, in their order; whole or not at all."""
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
     count = len(next(iter(columns.values())))
     data = np.empty(count, dtype=[(name, "<f4") for name in columns])
     for name, values in columns.items():
         data[name] = values
     content = PlyData([PlyElement.describe(data, ELEMENT)], byte_order="<", comments=list(comments))
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    try:
+    with replacing(path) as temporary:
         content.write(str(temporary))
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)

@@ -8,6 +8,7 @@ from typing import Any
 
 from torch import Tensor
 
+from rgspipe.datasets.input_file import input_file
 from rgspipe.datasets.json_file import is_number
 from rgspipe.datasets.surfel_range import check_surfels
 from rgspipe.datasets.tensor_file import load_tensors, save_tensors
@@ -27,7 +28,6 @@ MAKE_AGAIN = "Remove it and run the stage that makes it again."
 def save_surfels(path: str | Path, surfels: Surfels) -> None:
     """Write `surfels` with their coverage; the file appears under its name only when it is whole."""
     path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
     note = {"format": FORMAT, "version": VERSION, "coverage": asdict(surfels.coverage)}
     gloss = {} if surfels.gloss is None else {GLOSS + name: part for name, part in surfels.gloss.tensors().items()}
     save_tensors(path, surfels.tensors() | gloss, note)
@@ -40,9 +40,7 @@ def load_surfels(path: str | Path) -> Surfels:
         InputError: no such file, not safetensors, truncated, another version, or tensors that are missing,
             of a wrong shape or type, not finite, or gloss that makes energy.
     """
-    path = Path(path)
-    if not path.is_file():
-        raise InputError(path, expected="a file with surfels", found="no such file", remedy="Check the path.")
+    path = input_file(path, "a file with surfels")
     tensors, note = load_tensors(path)
     coverage = _coverage(path, note)
     _check_tensors(path, tensors)

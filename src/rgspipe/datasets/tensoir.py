@@ -88,8 +88,8 @@ def _view(folder: Path) -> View:
         camera,
         image,
         alpha,
-        normal=_normals(normal, camera) if normal.is_file() else None,
-        albedo=_albedo(albedo, camera) if albedo.is_file() else None,
+        normal=_normals(normal, camera) if normal.exists() else None,
+        albedo=_albedo(albedo, camera) if albedo.exists() else None,
     )
 
 

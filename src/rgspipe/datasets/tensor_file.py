@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from pathlib import Path
 from typing import Any
 
@@ -14,20 +13,16 @@ from torch import Tensor
 from rgspipe.datasets.input_file import input_file
 from rgspipe.datasets.limits import LARGEST
 from rgspipe.errors import InputError
+from rgspipe.files import replacing
 
 MAKE_AGAIN = "Remove it and run the stage that makes it again."
 
 
 def save_tensors(path: Path, tensors: dict[str, Tensor], note: dict[str, Any] | None = None) -> None:
     """Write `tensors` and a JSON-able `note` to `path`; a reader never sees half a file."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    temporary.touch()
-    permissions = temporary.stat().st_mode
     whole = {name: tensor.detach().cpu().contiguous() for name, tensor in tensors.items()}
-    safetensors.torch.save_file(whole, temporary, metadata={"note": json.dumps(note or {}, sort_keys=True)})
-    # safetensors writes for the owner alone; here, as everywhere, the umask decides.
-    temporary.chmod(permissions)
-    temporary.replace(path)
+    with replacing(path) as temporary:
+        safetensors.torch.save_file(whole, temporary, metadata={"note": json.dumps(note or {}, sort_keys=True)})
 
 
 def load_tensors(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:

@@ -16,6 +16,7 @@ from rgspipe.datasets.json_file import read_json
 from rgspipe.datasets.light_file import read_lights
 from rgspipe.evaluation.images import progress_strip, save_png, stack
 from rgspipe.evaluation.metrics import psnr
+from rgspipe.files import publish, write_bytes, write_text
 from rgspipe.fitting.fit import FitViews
 from rgspipe.fitting.result import FitResult, Step
 from rgspipe.fitting.words import PYTHON, Spoken
@@ -37,7 +38,7 @@ def write_result(
     further: Mapping[str, bytes] | None = None,
     spoken: Spoken = PYTHON,
 ) -> None:
-    """Write lights.json, convergence.csv, fit.png and final.exr; `folder` appears when it is whole.
+    """Write lights.json, convergence.csv, fit.png and final.exr; `folder` appears when it is whole, in place of any.
 
     fit.png has one row a view: target, start, midway, end, difference. final.exr is the first view's
     final image; those of further views are final_1.exr and so on. `further` holds more files by name; settings in the
@@ -55,8 +56,9 @@ def write_result(
     for index, image in enumerate(final):
         write_image(partial / ("final.exr" if index == 0 else f"final_{index}.exr"), image.cpu().numpy())
     for name, content in (further or {}).items():
-        (partial / name).write_bytes(content)
-    partial.rename(folder)
+        write_bytes(partial / name, content)
+    shutil.rmtree(folder, ignore_errors=True)
+    publish(partial, folder)
 
 
 def read_result(folder: Path) -> dict[str, object]:
@@ -89,7 +91,7 @@ def _write_convergence(path: Path, steps: Sequence[Step]) -> None:
         for index, step in enumerate(steps)
     ]
     empty = ["step", "loss", *"xyzrgb", "seconds"]
-    pd.DataFrame(rows, columns=list(rows[0]) if rows else empty).to_csv(path, index=False)
+    write_text(path, pd.DataFrame(rows, columns=list(rows[0]) if rows else empty).to_csv(index=False))
 
 
 def _light_columns(rig: LightRig) -> dict[str, float]:

@@ -12,6 +12,7 @@ from PIL import Image
 
 from rgspipe.errors import InputError
 from rgspipe.evaluation.arrays import ArrayLike, to_array
+from rgspipe.files import write_bytes
 from rgspipe.scene import srgb
 
 Bytes = npt.NDArray[np.uint8]
@@ -118,10 +119,7 @@ def save_png(path: str | Path, pixels: Bytes) -> None:
     Raises:
         InputError: the pixels are something else, such as radiance, of which `tone_map` makes them.
     """
-    path = Path(path)
-    partial = path.with_name(path.name + ".partial")
-    partial.write_bytes(png_bytes(pixels))
-    partial.replace(path)
+    write_bytes(path, png_bytes(pixels))
 
 
 def fit_within(png: bytes, max_bytes: int, max_width: int = 1600, min_width: int = 240) -> bytes:

@@ -33,7 +33,7 @@ class StageContext:
         inputs: for each needed stage its artifact; the first one where several are needed.
         input_lists: for each needed stage all its artifacts, in the order of the needs.
         folder: where the result goes. After an interruption it still holds what an earlier attempt wrote, so a long
-            stage can go on; write such files to a name that starts with a dot, then rename.
+            stage can go on with what `WholeFiles` knows to be whole.
     """
 
     config: RgspipeConfig

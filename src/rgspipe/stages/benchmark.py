@@ -26,7 +26,7 @@ from rgspipe.datasets.views import Target, View
 from rgspipe.errors import InputError
 from rgspipe.evaluation.metrics import longest_side
 from rgspipe.evaluation.timing import load_average
-from rgspipe.files import write_json
+from rgspipe.files import write_json, write_text
 from rgspipe.fitting import FitViews, LightSpec
 from rgspipe.machine import machine
 from rgspipe.renderer.frozen import FrozenScene
@@ -87,7 +87,7 @@ def _fit(context: StageContext) -> None:
     cameras = _camera(frozen, 128), _camera(frozen, 256)
     timings = fit_steps(frozen, *cameras, position.float(), context.config.benchmark.repetitions)
     table = pd.DataFrame([asdict(timing) for timing in timings])
-    table.to_csv(context.folder / "benchmark.csv", index=False)
+    write_text(context.folder / "benchmark.csv", table.to_csv(index=False))
     context.note(surfels=len(frozen.surfels), gather_entries=frozen.gather.entries)
     write_json(context.folder / "benchmark.json", {"machine": machine(), "timings": table.to_dict("records")})
     print(table.to_string(index=False, float_format="%.2f"))
@@ -100,9 +100,9 @@ def _search(context: StageContext) -> None:
     bounds, _ = scene_bounds(dataset, context.inputs["freeze"])
     targets = _known_targets(context, frozen, dataset)
     table = search_table(targets, longest_side(bounds))
-    table.to_csv(context.folder / "search.csv", index=False)
+    write_text(context.folder / "search.csv", table.to_csv(index=False))
     text = search_markdown(table)
-    (context.folder / "search.md").write_text(text, encoding="utf-8")
+    write_text(context.folder / "search.md", text)
     context.note(targets=len(targets))
     print(text)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,7 +20,7 @@ from rgspipe.datasets.light_file import read_lights
 from rgspipe.datasets.location import dataset_root
 from rgspipe.evaluation import convergence, metrics, plots, tables
 from rgspipe.evaluation.landscape_plot import landscape_figure
-from rgspipe.files import write_json
+from rgspipe.files import write_bytes, write_json, write_text
 from rgspipe.scene import Camera, LightRig, PointLight
 from rgspipe.stages.base import Stage, StageContext
 from rgspipe.stages.sources import target_stage
@@ -50,9 +49,9 @@ def run(context: StageContext) -> None:
     covariances = {name: _covariances(fit, name) for name in estimates}
     targets = tables.target_table(results, estimates, truth.rigs, size, config.evaluate.success, covariances)
     summary = tables.summary_table(targets, config.seed)
-    targets.to_csv(context.folder / "metrics.csv", index=False)
-    summary.to_csv(context.folder / "summary.csv", index=False)
-    _curves(fit, targets, truth.rigs, size).to_csv(context.folder / "convergence.csv", index=False)
+    write_text(context.folder / "metrics.csv", targets.to_csv(index=False))
+    write_text(context.folder / "summary.csv", summary.to_csv(index=False))
+    write_text(context.folder / "convergence.csv", _curves(fit, targets, truth.rigs, size).to_csv(index=False))
     content = {
         "version": 1,
         "scene_size": size,
@@ -118,8 +117,7 @@ def _copy_pictures(fit: Artifact, targets: pd.DataFrame, folder: Path) -> list[d
             if source not in fit.manifest["files"]:
                 continue
             name = f"pictures/{occlusion}_{kind}.png"
-            (folder / "pictures").mkdir(exist_ok=True)
-            shutil.copyfile(fit.file(source), folder / name)
+            write_bytes(folder / name, fit.file(source).read_bytes())
             measured = {key: float(rows.loc[target, key]) for key in ("position_error", "psnr")}
             pictures.append({"file": name, "target": target, "occlusion": occlusion, "kind": kind} | measured)
     return pictures
@@ -138,8 +136,7 @@ def _draw_landscapes(
             landscape, rig = read_landscape(fit.file(source)), truths.get(target, ())
             truth = tables.nearest_position(landscape.trajectory[-1], rig)
             name = f"pictures/{occlusion}_{kind}_landscape.png"
-            (folder / "pictures").mkdir(exist_ok=True)
-            (folder / name).write_bytes(plots.png_of(landscape_figure(landscape, truth)))
+            write_bytes(folder / name, plots.png_of(landscape_figure(landscape, truth)))
             unmeasured = {"position_error": None, "psnr": None}
             entry = {"file": name, "target": target, "occlusion": occlusion, "kind": "landscape"}
             pictures.append(entry | unmeasured)
@@ -179,7 +176,11 @@ def _plain(value: Any) -> Any:
 
 
 def _truth_file(config: RgspipeConfig) -> list[Path]:
-    return [] if config.fit.truth is None else [Path(config.fit.truth)]
+    """The true lights that are given, read now: what is wrong with them should show before lights are fitted."""
+    if config.fit.truth is None:
+        return []
+    read_lights(config.fit.truth)
+    return [Path(config.fit.truth)]
 
 
 STAGE = Stage(

@@ -70,7 +70,7 @@ def training_cameras(dataset: Path | None, like: Camera) -> list[Named]:
     if dataset is None:
         return []
     path = dataset_root(dataset) / "transforms_train.json"
-    if not path.is_file():
+    if not path.exists():
         return []
     entries = read_entries(path, "the cameras of the training views")
     return [(f"train/{entry.image_path.stem}", entry.camera(*_size(entry, like))) for entry in entries]

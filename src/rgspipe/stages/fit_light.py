@@ -16,6 +16,7 @@ from rgspipe.datasets.location import dataset_root
 from rgspipe.datasets.read_files import files_read
 from rgspipe.datasets.views import Target, View
 from rgspipe.evaluation.fit_folder import read_result, write_result
+from rgspipe.files import write_text
 from rgspipe.fitting import FitViews, PaperAdam, Search, Solver
 from rgspipe.fitting.options import MOST_LIGHTS, AdamOptions, SearchOptions
 from rgspipe.options import Options
@@ -36,18 +37,21 @@ from rgspipe.stages.light_spec import light_spec
 from rgspipe.stages.scene_effects import chosen_effects, frozen_scene, wanted_effects
 from rgspipe.stages.sources import image_stage, require_images, target_stage
 from rgspipe.stages.spoken import COMMAND_LINE
+from rgspipe.whole_files import WholeFiles
 
 
 def run(context: StageContext) -> None:
     """Write results.csv and a folder per target; targets that an earlier attempt finished are kept."""
     fitter = Fitter.create(context)
     targets = select_targets(all_targets(context), context.config)
-    rows = []
+    rows, whole = [], WholeFiles(context.folder)
     for target in progress_bar(targets, "fitting lights", unit="target"):
-        if not (context.folder / target.name).is_dir():
+        folder = context.folder / target.name
+        if not whole.keeps(folder):
             fitter.fit(target, context.folder)
+            whole.add(folder)
         rows.append(_row(context, target))
-    pd.DataFrame(rows).to_csv(context.folder / "results.csv", index=False)
+    write_text(context.folder / "results.csv", pd.DataFrame(rows).to_csv(index=False))
     context.note(targets=len(targets), view_sets=len(fitter.prepared))
 
 

@@ -9,6 +9,7 @@ from rgspipe.datasets.location import open_dataset
 from rgspipe.evaluation.held_out import held_out_picture
 from rgspipe.evaluation.images import save_png
 from rgspipe.evaluation.judgement import kinds_of_views, render_views
+from rgspipe.files import write_text
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.stages.base import Need, Stage, StageContext
 from rgspipe.stages.sources import has_truth, require_images
@@ -28,11 +29,11 @@ def run(context: StageContext) -> None:
 
     quality = renders.quality()
     quality.insert(0, "surfels", surfels)
-    quality.to_csv(context.folder / "quality.csv", index=False)
+    write_text(context.folder / "quality.csv", quality.to_csv(index=False))
     split = pd.DataFrame(columns=SPLIT) if kinds is None else renders.split(kinds).assign(surfels=surfels)[SPLIT]
-    split.to_csv(context.folder / "split.csv", index=False)
+    write_text(context.folder / "split.csv", split.to_csv(index=False))
     table = renders.table("pixels")
-    table.to_csv(context.folder / "views.csv", index=False)
+    write_text(context.folder / "views.csv", table.to_csv(index=False))
     picture = held_out_picture(views, renders.images["pixels"], table["psnr"], renders.albedo)
     save_png(context.folder / "comparison.png", picture)
     save_png(context.folder / "typical.png", renders.typical("pixels"))

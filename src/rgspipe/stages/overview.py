@@ -9,6 +9,7 @@ from urllib.parse import quote
 from rgspipe.artifacts import MANIFEST, Artifact, ArtifactStore
 from rgspipe.config import RgspipeConfig
 from rgspipe.datasets.json_file import read_json
+from rgspipe.files import write_text
 from rgspipe.pages.overview import SceneEntry, render_overview
 from rgspipe.resources import resource_folder
 from rgspipe.stages.base import Stage, StageContext
@@ -22,7 +23,7 @@ def run(context: StageContext) -> None:
     found = _reports(context.config)
     missing = {name: command(name) for name in context.config.overview.scenes if name not in found}
     page = render_overview([_entry(name, artifact) for name, artifact in found.items()], missing)
-    (context.folder / PAGE).write_text(page, encoding="utf-8")
+    write_text(context.folder / PAGE, page)
     context.note(scenes=list(found), missing=list(missing))
 
 

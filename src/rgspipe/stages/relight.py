@@ -13,6 +13,7 @@ from rgspipe.datasets.light_file import read_lights
 from rgspipe.datasets.read_files import files_read
 from rgspipe.errors import InputError
 from rgspipe.evaluation.images import save_png
+from rgspipe.files import write_text
 from rgspipe.relighting.pictures import contact_sheet
 from rgspipe.relighting.rigs import random_rig
 from rgspipe.scene import Camera, LightRig
@@ -41,7 +42,7 @@ def run(context: StageContext) -> None:
     else:
         compares = shows(wanted) in COMPARED
         table = relight_targets(context, relighter) if compares else _relight_rig(context, relighter)
-        table.to_csv(context.folder / TABLE, index=False)
+        write_text(context.folder / TABLE, table.to_csv(index=False))
         times = table["milliseconds"].tolist()
     for kind, reasons in relighter.reasons.items():
         print(f"effects of {kind}: " + "; ".join(reasons))

@@ -11,6 +11,7 @@ import torch
 from rgspipe.config.relight import RelightConfig
 from rgspipe.errors import InputError
 from rgspipe.evaluation.images import save_png
+from rgspipe.files import write_bytes, write_text
 from rgspipe.progress import progress_bar
 from rgspipe.relighting.pictures import developed, grid, video
 from rgspipe.relighting.sweeps import (
@@ -55,7 +56,7 @@ def write_sweep(relighter: Relighter, camera: Camera, folder: Path) -> list[floa
             found="black frames",
             remedy="The spot may stand behind a wall: set relight.path.position, or center, radius and height.",
         )
-    _table(spots).to_csv(folder / TABLE, index=False)
+    write_text(folder / TABLE, _table(spots).to_csv(index=False))
     frames = developed(images)
     # A spot that turns plays forth and back; one that goes around ends where it began.
     turns = wanted.sweep == "aim"
@@ -63,7 +64,7 @@ def write_sweep(relighter: Relighter, camera: Camera, folder: Path) -> list[floa
     save_png(folder / STRIP, grid([frames[index] for index in chosen], A_ROW))
     shown = there_and_back(frames) if turns else frames
     length = wanted.path.seconds * len(shown) / len(frames)
-    (folder / VIDEO).write_bytes(video(shown, length))
+    write_bytes(folder / VIDEO, video(shown, length))
     return seconds
 
 

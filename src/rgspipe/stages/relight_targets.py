@@ -18,6 +18,7 @@ from rgspipe.datasets.location import dataset_root
 from rgspipe.datasets.views import Target
 from rgspipe.errors import InputError
 from rgspipe.evaluation.plots import png_of
+from rgspipe.files import write_bytes, write_text
 from rgspipe.progress import progress_bar
 from rgspipe.relighting.pictures import Relit, comparison_figure
 from rgspipe.relighting.sweeps import spread_frames
@@ -47,13 +48,13 @@ def relight_targets(context: StageContext, relighter: Relighter) -> pd.DataFrame
             rows.append(row | compared(image, truth))
     table = pd.DataFrame(rows)
     summary = relight_summary(table)
-    summary.to_csv(context.folder / SUMMARY, index=False)
+    write_text(context.folder / SUMMARY, summary.to_csv(index=False))
     shown = []
     for row in table.loc[typical_rows(table)].to_dict("records"):
         render, _ = read_image(image_path(context.folder, row["rig"], row["view"]))
         shown.append(Relit(row["lights"], truths[row["rig"], row["view"]], render, row["psnr"]))
     if shown:
-        (context.folder / COMPARISON).write_bytes(png_of(comparison_figure(shown)))
+        write_bytes(context.folder / COMPARISON, png_of(comparison_figure(shown)))
     # Equal images have no finite PSNR, and JSON no infinity.
     means = [round(mean, 2) if math.isfinite(mean) else None for mean in summary["psnr"]]
     context.note(psnr=dict(zip(summary["lights"].astype(str), means, strict=True)))
@@ -88,7 +89,7 @@ def _targets(context: StageContext) -> Iterator[tuple[Target, LightRig]]:
         groups: dict[int, list[tuple[Path, LightRig]]] = {}
         for path in target_folders(folder):
             truth = dataset_root(folder) / "truth" / f"{path.name}.json"
-            rig = read_lights(truth) if truth.is_file() else ()
+            rig = read_lights(truth) if truth.exists() else ()
             groups.setdefault(len(rig), []).append((path, rig))
         groups.pop(0, None)
         for count, members in sorted(groups.items()):

@@ -14,7 +14,7 @@ from rgspipe.config.core import plain
 from rgspipe.datasets.json_file import read_json
 from rgspipe.datasets.surfel_file import load_surfels
 from rgspipe.evaluation.plots import CameraMark
-from rgspipe.files import write_json
+from rgspipe.files import write_bytes, write_json, write_text
 from rgspipe.pages import report
 from rgspipe.pages.overview import scene_summary
 from rgspipe.pages.provenance import StageRecord, stage_record
@@ -38,12 +38,12 @@ def run(context: StageContext) -> None:
     write_json(context.folder / SUMMARY, scene_summary(contents))
     if contents.gallery is not None and contents.gallery.train:
         # The view with the most to see: what varies most compresses least.
-        (context.folder / VIEW).write_bytes(max((shot.png for shot in contents.gallery.train), key=len))
+        write_bytes(context.folder / VIEW, max((shot.png for shot in contents.gallery.train), key=len))
     held_out = _optional_bytes(next(iter(context.input_lists.get("judge", ())), None), "typical.png")
     if held_out is not None:
-        (context.folder / HELD_OUT).write_bytes(held_out)
+        write_bytes(context.folder / HELD_OUT, held_out)
     page = report.render_report(contents)
-    (context.folder / REPORT).write_text(page, encoding="utf-8")
+    write_text(context.folder / REPORT, page)
     context.note(bytes=len(page.encode("utf-8")), fits=len(contents.targets))
 
 

@@ -47,7 +47,7 @@ def camera_mark(camera: Camera) -> CameraMark:
 def _truths(dataset: Dataset) -> dict[str, LightRig]:
     """The true lights of the targets that have a light file."""
     paths: dict[str, Path] = {target.name: dataset.root / "truth" / f"{target.name}.json" for target in dataset.targets}
-    return {name: read_lights(path) for name, path in paths.items() if path.is_file()}
+    return {name: read_lights(path) for name, path in paths.items() if path.exists()}
 
 
 def _errors(targets: pd.DataFrame) -> dict[str, float]:

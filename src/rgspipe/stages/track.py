@@ -15,6 +15,7 @@ from rgspipe.datasets.views import Target
 from rgspipe.errors import InputError
 from rgspipe.evaluation.plots import png_of
 from rgspipe.evaluation.track_table import track_figure, track_table
+from rgspipe.files import write_bytes, write_text
 from rgspipe.fitting.fit import FitViews
 from rgspipe.fitting.model.capture import ImageCapture
 from rgspipe.fitting.tracking.frame import FrameStatus
@@ -44,7 +45,7 @@ def run(context: StageContext) -> None:
     names = [target.name for target in targets]
     truths, surfels = _truths(dataset_root(folder), names), views.prepared.frozen.surfels
     table = track_table(track, names, truths, views.prepared.frozen.size)
-    table.to_csv(context.folder / "track.csv", index=False)
+    write_text(context.folder / "track.csv", table.to_csv(index=False))
     for name, frame in zip(names, track, strict=True):
         told = {
             "status": str(frame.status),
@@ -54,7 +55,7 @@ def run(context: StageContext) -> None:
         write_lights(context.folder / "frames" / f"{name}.json", frame.result.lights, told)
     origins = torch.stack([view.camera.origin for view in views.prepared.views])
     figure = track_figure(table, truths, surfels.centers, surfels.normals, origins)
-    (context.folder / "track.png").write_bytes(png_of(figure))
+    write_bytes(context.folder / "track.png", png_of(figure))
     statuses = {str(status): sum(frame.status == status for frame in track) for status in FrameStatus}
     context.note(frames=len(track), **statuses)
 
@@ -87,7 +88,7 @@ def _frames(
 def _truths(root: Path, names: Sequence[str]) -> list[LightRig]:
     """The true lights of every frame; none where one is not known."""
     files = [root / "truth" / f"{name}.json" for name in names]
-    return [read_lights(path) for path in files] if all(path.is_file() for path in files) else []
+    return [read_lights(path) for path in files] if all(path.exists() for path in files) else []
 
 
 def _folder(context: StageContext) -> Path:

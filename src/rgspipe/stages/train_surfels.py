@@ -19,7 +19,7 @@ from rgspipe.degradation.capture import degraded
 from rgspipe.evaluation.held_out import held_out_picture
 from rgspipe.evaluation.held_out_views import render_held_out
 from rgspipe.evaluation.images import save_png
-from rgspipe.files import write_json
+from rgspipe.files import write_json, write_text
 from rgspipe.machine import PeakMemory
 from rgspipe.options import settings
 from rgspipe.scene.gloss import Gloss
@@ -114,7 +114,7 @@ def _corrections(measured: Sequence[View], refined: Sequence[View]) -> dict[str,
 def _write_table(path: Path, trained: Trained) -> None:
     rows = [asdict(record) for record in trained.records]
     table = pd.DataFrame(rows).rename(columns={"phase": "kind", "step": "round"})
-    table[["round", "kind", "loss", "psnr", "seconds"]].to_csv(path, index=False)
+    write_text(path, table[["round", "kind", "loss", "psnr", "seconds"]].to_csv(index=False))
 
 
 STAGE = Stage(

@@ -39,7 +39,7 @@ def _dataset_file(dataset: Artifact | None, name: str) -> Path | None:
     if name in dataset.manifest["files"]:
         return dataset.file(name)
     foreign = dataset_root(dataset.path) / name
-    return foreign if foreign.is_file() else None
+    return foreign if foreign.exists() else None
 
 
 def _checked_bounds(stated: object, path: Path) -> list[list[float]]:

@@ -10,6 +10,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from rgspipe.evaluation.plots import png_of
+from rgspipe.files import write_bytes, write_text
 
 TABLE, TEXT, FIGURE = "study.csv", "study.md", "study.png"
 
@@ -39,9 +40,8 @@ def write_study(folder: Path, kind: str, study: Study) -> None:
     """
     table = study.table.copy()
     table.insert(0, "kind", kind)
-    table.to_csv(folder / TABLE, index=False)
-    (folder / TEXT).write_text(study.text, encoding="utf-8")
-    (folder / FIGURE).write_bytes(png_of(study.figure))
+    write_text(folder / TABLE, table.to_csv(index=False))
+    write_text(folder / TEXT, study.text)
+    write_bytes(folder / FIGURE, png_of(study.figure))
     for name, content in study.beside.items():
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        (folder / name).write_bytes(content)
+        write_bytes(folder / name, content)

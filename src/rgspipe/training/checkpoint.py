@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
+import logging
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
+from typing import Any
 
 import torch
 from torch import Tensor
 
 from rgspipe.datasets.tensor_file import load_tensors, save_tensors
+from rgspipe.errors import InputError
 from rgspipe.scene.gloss import Gloss
 from rgspipe.scene.lights import PointLight
 from rgspipe.scene.surfels import Surfels
 from rgspipe.training.record import Record
 from rgspipe.training.refine import RefineState
 
+log = logging.getLogger(__name__)
+
 
 class Checkpoint:
-    """One file that holds the newest state of a training.
+    """One file that holds the newest state of a training, and a checksum of it: a state that was damaged is dropped.
 
     Args:
         path: of the file; it need not exist.
@@ -53,20 +60,19 @@ class Checkpoint:
             for group in ("parameters", "first", "second"):
                 tensors |= {f"{group}.{name}": tensor for name, tensor in getattr(state, group).items()}
             tensors["start_log_scales"] = state.start_log_scales
-        save_tensors(self.path, tensors, note)
+        save_tensors(self.path, tensors, note | {"sha256": _digest(tensors, note)})
 
     @property
     def records(self) -> list[Record]:
         """The training table up to the kept state; empty if there is none."""
-        if not self.path.exists():
-            return []
-        return [Record(**row) for row in load_tensors(self.path)[1]["records"]]
+        kept = self._kept()
+        return [] if kept is None else [Record(**row) for row in kept[1]["records"]]
 
     def load(self, like: Surfels) -> tuple[Surfels, Tensor, RefineState | None, list[PointLight]] | None:
         """What `save` kept, or None; `like` gives what of the coverage is not trained."""
-        if not self.path.exists():
+        if (kept := self._kept()) is None:
             return None
-        tensors, note = load_tensors(self.path)
+        tensors, note = kept
         low, high = note["thresholds"]
         coverage, gloss = replace(like.coverage, low=low, high=high), _group(tensors, "gloss")
         surfels = replace(
@@ -83,6 +89,30 @@ class Checkpoint:
             RefineState(*groups, tensors["start_log_scales"], note["step"], note["losses"], note["errors"]),
             lights,
         )
+
+    def _kept(self) -> tuple[dict[str, Tensor], dict[str, Any]] | None:
+        """What the file holds; None if there is none, or it is not what was written, and then it is removed."""
+        if not self.path.exists():
+            return None
+        try:
+            tensors, note = load_tensors(self.path)
+            if note.pop("sha256", None) == _digest(tensors, note):
+                return tensors, note
+            found = "its checksum differs"
+        except InputError as error:
+            found = error.found
+        log.warning("%s is not as it was written (%s): the training begins anew", self.path, found)
+        self.path.unlink()
+        return None
+
+
+def _digest(tensors: dict[str, Tensor], note: dict[str, Any]) -> str:
+    """SHA-256 of all numbers, what they are called, and the note."""
+    digest = hashlib.sha256(json.dumps(note, sort_keys=True).encode())
+    for name, tensor in sorted(tensors.items()):
+        digest.update(f"{name} {tensor.dtype} {tuple(tensor.shape)} ".encode())
+        digest.update(tensor.detach().cpu().contiguous().numpy().tobytes())
+    return digest.hexdigest()
 
 
 def _group(tensors: dict[str, Tensor], prefix: str) -> dict[str, Tensor]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -13,6 +12,7 @@ from rgspipe.blender.pool.rigs import RigPlan
 from rgspipe.datasets.exr import write_image
 from rgspipe.datasets.gs3_write import write_target_list
 from rgspipe.datasets.light_file import write_lights
+from rgspipe.files import write_bytes
 from rgspipe.progress import progress_bar
 
 
@@ -24,14 +24,14 @@ def write_targets(pool_folder: Path, pool: Sequence[PooledLight], rigs: Sequence
         pool: the lights that the rigs' members count.
         folder: where targets/ and truth/ go.
     """
-    shutil.copyfile(pool_folder / INFO, folder / INFO)
+    write_bytes(folder / INFO, (pool_folder / INFO).read_bytes())
     listed = []
     for number, rig in enumerate(progress_bar(rigs, "adding lights", unit="target")):
         name, members = f"rig_{number:04d}", [pool[index] for index in rig.members]
         target = folder / "targets" / name
         for view in range(len(members[0].images)):
             write_image(target / f"view_{view}.exr", *add_images(members, rig, view))
-        shutil.copyfile(pool_folder / CAMERAS, target / "transforms.json")
+        write_bytes(target / "transforms.json", (pool_folder / CAMERAS).read_bytes())
         shares = [{"share": share} for share in rig.shares]
         write_lights(folder / "truth" / f"{name}.json", rig.lights, {"lights": shares})
         listed.append((name, common_class([light.occlusion for light in members])))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rgspipe.blender.child import Parent, serve
+from rgspipe.blender.child import Frames, Parent, serve
 from rgspipe.blender.pool.job import PoolJob
 from rgspipe.blender.process import SCRATCH, require_bpy, run_blender
 
@@ -24,7 +24,7 @@ def render_pool(job: PoolJob, folder: Path) -> None:
 
 def _render(content: dict, folder: Path, parent: Parent) -> None:
     """Write what is known of the pool, then render every image that is missing in `folder`."""
-    from rgspipe.blender.passes import Studio, is_whole
+    from rgspipe.blender.passes import Studio, frame_files
     from rgspipe.blender.pool.plan import make_plan
     from rgspipe.blender.pool.pool_file import write_pool
     from rgspipe.blender.scenes import open_scene
@@ -37,10 +37,10 @@ def _render(content: dict, folder: Path, parent: Parent) -> None:
     entries = [(plan.name, plan.occlusion, plan.light) for plan in lights]
     write_pool(folder, job.dataset.scene, entries, cameras, bounds, prepared.rescale, list(prepared.offset))
     shapes = {frame.name: plan.light for plan in lights for frame in plan.frames}
-    frames = [frame for plan in lights for frame in plan.frames]
-    missing = parent.missing(frames, lambda frame: is_whole(frame, folder))
+    frames = Frames(parent, folder, frame_files)
+    missing = frames.missing([frame for plan in lights for frame in plan.frames])
     studio = Studio(prepared.scene, job.dataset.settings, folder / SCRATCH)
-    for frame in parent.each(missing):
+    for frame in frames.each(missing):
         studio.shape(shapes[frame.name])
         studio.render(frame, folder)
 
