@@ -24,8 +24,8 @@ def test_every_number_is_halved_and_doubled_alone() -> None:
         assert options != usual and type(options) is Search
     assert found["starts"] == ["2", "8"] and found["bar.least"] == ["0.1", "0.4"]
     assert found["schedule.softly"] == ["(2, 2, 2)", "(6, 8, 8)"]
-    # A number of steps that is not less than all of them is out of range.
-    assert found["schedule.first"] == ["2"]
+    # What is out of range is not tried.
+    assert found["schedule.promising"] == ["0.335"]
 
 
 def test_the_table_has_a_row_for_each_and_the_usual_first(monkeypatch) -> None:

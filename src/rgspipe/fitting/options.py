@@ -68,9 +68,8 @@ class ScheduleOptions(Options):
     """Turns of a refinement, and which starts go on from one to the next."""
 
     steps: int = option(6, low=2, high=10000)
-    """steps of a start to the end, in its last turn"""
-    first: int = option(3, low=1, high=10000)
-    """steps of a rig of points before the better ones go on"""
+    """steps of a start to the end; of points half of them are taken before the better starts go on, and rigs that are
+    compared with one another take as many twice"""
     softness: tuple[float, ...] = option((0.3, 0.15, 0.05), low=0, high=3)
     """of rigs with an axis: by how much edges are wider in the turns before the last one, rad"""
     softly: tuple[int, ...] = option((3, 4, 4), low=1, high=10000)
@@ -89,8 +88,6 @@ class ScheduleOptions(Options):
             found = f"{len(self.softly)} numbers of steps"
             expected = f"{len(self.softness)} of them, one for each softness"
             raise InputError("softly", expected=expected, found=found, remedy="Give as many of both.")
-        if self.first >= self.steps:
-            raise InputError("first", expected="less than steps", found=str(self.first), remedy="Give fewer.")
 
 
 @dataclass(frozen=True)
@@ -107,11 +104,13 @@ class BarOptions(Options):
     faint: float = option(0.12, low=0, high=1)
     """a light that sends less than this share of the image's energy is faint …"""
     least_faint: float = option(0.5, low=0, high=1)
-    """… and has to lower the cost by this share: what explains an error of the model is faint"""
+    """… and has to lower the cost by this share: what explains an error of the model is faint. A rig that lowers it so
+    much has no rival"""
     merged: float = option(0.03, low=0, high=10)
     """lights of one kind that end closer than this part of the scene's size are one, where their number is open"""
     least_energy: float = option(0.01, low=0, high=1)
-    """a light with less than this share of the image's energy is none, where the number is open"""
+    """a light with less than this share of the image's energy is none, where the number is open, and nobody asks where
+    else it could be"""
 
 
 @dataclass(frozen=True)
@@ -124,18 +123,12 @@ class OneMoreOptions(Options):
     """the best candidate beside the answer must promise to lower the squared relative error by this share …"""
     begins_faint: float = option(0.03, low=0, high=1)
     """… and a light that begins with less than this share of the energy, by as much as faint ones must"""
-    tries: int = option(2, low=1, high=1000)
-    """so many rigs of each kind of candidate are refined"""
 
 
 @dataclass(frozen=True)
 class RivalOptions(Options):
-    """What counts as another answer."""
+    """What counts as another answer: lights that stand elsewhere (`certainty.doubtful`) and explain as much."""
 
-    apart: float = option(0.05, low=0, high=10)
-    """rigs are different where a light is farther from its counterpart than this part of the scene's size"""
-    far: float = option(0.5, low=0, high=1)
-    """a rival is refined unless the best rig's robust cost is lower by this share"""
     deviations: float = option(2.0, low=0, high=1000)
     """standard deviations between losses within which two rigs are equally good"""
     pixels_per_error: float = option(25.0, low=1, high=1e6)
@@ -143,11 +136,7 @@ class RivalOptions(Options):
     energy: float = option(1.5, low=1, high=1000)
     """a rival leaves at most so many times the energy unexplained that the best rig does"""
     stride: float = option(1.2, low=1, high=100)
-    """where the place of a light is not determined, others are tried so many times `apart` away …"""
-    least_energy: float = option(0.01, low=0, high=1)
-    """… if it sends this share of the image's energy"""
-    steps: int = option(12, low=2, high=10000)
-    """steps of either rig under the robust loss, and half as many of the rival by plain squares"""
+    """where the place of a light is not determined, others are tried so many times `certainty.doubtful` away"""
 
 
 @dataclass(frozen=True)
@@ -170,7 +159,8 @@ class CertaintyOptions(Options):
     """κ: by what factor, in standard deviations, errors of the model are larger than the residual shows. The 95 %
     quantile of what it takes to hold the truth, over half of the targets of one trained scene; measured on others"""
     doubtful: float = option(0.05, low=0, high=10)
-    """a position whose error is expected to be larger than this part of the scene's size is said to be in doubt"""
+    """a place is told where it is known within this part of the scene's size: a position whose error is expected to be
+    larger is said to be in doubt, and lights that are farther from those that were found are another answer"""
     on_surface: float = option(0.002, low=0, high=1)
     """a light nearer to a surface than this part of the scene's size stands on it: 6 mm in a room of 3 m"""
     poorly: float = option(0.05, low=0, high=1)
@@ -239,11 +229,7 @@ class SplitOptions(Options):
     steps: tuple[int, ...] = option((4, 4, 8), low=1, high=10000)
     """steps of each round"""
     kept: int = option(5, low=1, high=1000)
-    """so many of the split rigs take the next round …"""
-    polished: int = option(2, low=1, high=1000)
-    """… and so many are polished on all pixels"""
-    better: float = option(0.8, low=0, high=1)
-    """a split rig is the answer where it leaves less than this part of the error unexplained"""
+    """so many of the split rigs take the next round"""
 
     def check(self) -> None:
         if len(self.softness) != len(self.steps):
@@ -262,10 +248,8 @@ class MotionOptions(Options):
     """… and of its change from one frame to the next"""
     alike: float = option(0.95, low=0, high=1)
     """correlation of these changes where one thing carries the lights: the rest is what a turn does to them"""
-    intensity_change: float = option(0.02, low=0, high=1000)
-    """of the relative change of an intensity from one frame to the next"""
-    shape_change: float = option(0.02, low=0, high=1000)
-    """of the change of a shape's numbers"""
+    change: float = option(0.02, low=0, high=1000)
+    """of the relative change of an intensity, and of the change of a shape's numbers, from one frame to the next"""
 
 
 @dataclass(frozen=True)

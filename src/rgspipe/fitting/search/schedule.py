@@ -44,7 +44,8 @@ def refined_starts(
 def _turns(options: ScheduleOptions, aimed: bool) -> list[tuple[float, int]]:
     """Softness of edges [rad], and most steps, of each turn."""
     if not aimed:
-        return [(0.0, options.first), (0.0, options.steps - options.first)]
+        half = options.steps // 2
+        return [(0.0, half), (0.0, options.steps - half)]
     return [*zip(options.softness, options.softly, strict=True), (0.0, options.steps)]
 
 

@@ -52,12 +52,12 @@ def one_more_light(
         refiner: on the problem that the answer was searched on.
         candidates: of each kind of light.
     """
-    more, bar, steps = options.one_more, options.bar, options.schedule.steps
+    more, bar, steps, tries = options.one_more, options.bar, options.schedule.steps, max(1, options.starts // 2)
     if refiner.unexplained(answer) < more.noticeable:
         return None
     rigs: list[EmitterRig] = []
     for kind in candidates:
-        promise, extended = kind.promised(answer, refiner.problem, more.tries, refiner.region.size)
+        promise, extended = kind.promised(answer, refiner.problem, tries, refiner.region.size)
         sure = promise >= bar.least_faint
         if promise >= more.promised and (sure or _last_share(refiner, extended[0]) >= more.begins_faint):
             rigs += extended

@@ -49,9 +49,10 @@ def split_lights(
         states = [coarse.at(state, soft(state.emitters, softness)) for state in states]
         states = [coarse.refined(state, PLAIN, steps) for state in states]
         states = sorted(states, key=coarse.unexplained)[: options.kept]
-    polished = [fit_from(problem, state.emitters, search.iterations, search) for state in states[: options.polished]]
+    best = states[: max(1, search.starts // 2)]
+    polished = [fit_from(problem, state.emitters, search.iterations, search) for state in best]
     best = min(polished, key=lambda other: other.loss)
-    chosen = best if best.loss < options.better * result.loss else result
+    chosen = best if best.loss < (1.0 - search.bar.least) * result.loss else result
     return replace(
         chosen,
         seconds=result.seconds + coarse.meter.seconds,
