@@ -23,9 +23,9 @@ def test_every_number_is_halved_and_doubled_alone() -> None:
         found.setdefault(name, []).append(value)
         assert options != usual and type(options) is Search
     assert found["starts"] == ["2", "8"] and found["bar.least"] == ["0.1", "0.4"]
-    assert found["schedule.softly"] == ["(2, 2, 2)", "(6, 8, 8)"]
+    assert found["schedule.softness"] == ["(0.15, 0.075, 0.025)", "(0.6, 0.3, 0.1)"]
     # What is out of range is not tried.
-    assert found["schedule.promising"] == ["0.335"]
+    assert found["certainty.largest_share"] == ["0.475"]
 
 
 def test_the_table_has_a_row_for_each_and_the_usual_first(monkeypatch) -> None:

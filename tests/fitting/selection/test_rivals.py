@@ -60,8 +60,7 @@ def test_a_rival_says_how_far_it_is(room, point_light) -> None:
     off, unknown = placed(refiner, 0.02), torch.diag(torch.tensor([torch.inf] * 3 + [1.0] * 3, dtype=torch.float64))
     found = rival_elsewhere(refiner, off, [unknown], LENIENT)
     # A light is moved so far, unless the edge of the room stops it.
-    distance = LENIENT.rivals.stride * LENIENT.certainty.doubtful
-    assert found is not None and found.distance == pytest.approx(distance, rel=1e-9)
+    assert found is not None and found.distance == pytest.approx(LENIENT.certainty.doubtful, rel=1e-9)
 
 
 def test_rivals_of_another_number_have_no_distance(room, point_light) -> None:

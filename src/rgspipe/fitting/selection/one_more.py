@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rgspipe.fitting.options import SearchOptions
-from rgspipe.fitting.search.compare import best_state, drop, light_energies, wanted
+from rgspipe.fitting.search.compare import best_state, drop, wanted
 from rgspipe.fitting.search.refine import Refiner, State
 from rgspipe.fitting.search.schedule import refined_starts
 from rgspipe.fitting.search.starts import Candidates, EmitterRig
@@ -52,23 +52,16 @@ def one_more_light(
         refiner: on the problem that the answer was searched on.
         candidates: of each kind of light.
     """
-    more, bar, steps, tries = options.one_more, options.bar, options.schedule.steps, max(1, options.starts // 2)
-    if refiner.unexplained(answer) < more.noticeable:
+    bar, steps, tries = options.bar, options.schedule.steps, max(1, options.starts // 2)
+    if refiner.unexplained(answer) < bar.noticeable:
         return None
     rigs: list[EmitterRig] = []
     for kind in candidates:
         promise, extended = kind.promised(answer, refiner.problem, tries, refiner.region.size)
-        sure = promise >= bar.least_faint
-        if promise >= more.promised and (sure or _last_share(refiner, extended[0]) >= more.begins_faint):
+        if promise >= bar.least and promise >= wanted(refiner.start(extended[0], ROBUST), bar):
             rigs += extended
     if not rigs:
         return None
     rich = best_state(refiner.problem, refined_starts(refiner, rigs, steps, options.schedule))
     simple, rich = (refiner.refined(state, ROBUST, steps) for state in (answer, rich))
     return OneMore(simple, rich, drop(refiner.problem, simple, rich), wanted(rich, bar))
-
-
-def _last_share(refiner: Refiner, rig: EmitterRig) -> float:
-    """What the last light of a rig sends of all its energy, at first sight."""
-    energies = light_energies(refiner.start(rig, ROBUST))
-    return energies[-1] / sum(energies) if sum(energies) > 0.0 else 0.0

@@ -69,13 +69,13 @@ def _rival(refiner: Refiner, best: State, other: State) -> Rival:
 def _moved(refiner: Refiner, best: State, covariance: Sequence[Tensor], options: SearchOptions) -> Iterator[State]:
     """The rig with one light moved along an axis, of those that are there and whose place is not determined."""
     apart = options.certainty.doubtful * refiner.region.size
-    steps = options.rivals.stride * apart * torch.cat([torch.eye(3), -torch.eye(3)]).double()
+    steps = apart * torch.cat([torch.eye(3), -torch.eye(3)]).double()
     for index, share in enumerate(energy_shares(best)):
         if share >= options.bar.least_energy and bool(torch.isinf(covariance[index].diagonal()[:3]).any()):
-            for place in refiner.region.clip(best.emitters[index].position + steps):
+            for place in best.emitters[index].position + steps:
                 rig = [*best.emitters]
                 rig[index] = rig[index].placed(place)
-                if rig_distance(rig, best.emitters) > apart:
+                if torch.equal(refiner.region.clip(place), place):
                     yield refiner.start(rig, PLAIN)
 
 
