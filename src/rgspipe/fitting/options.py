@@ -93,6 +93,18 @@ class RivalOptions(Options):
 
 
 @dataclass(frozen=True)
+class LossOptions(Options):
+    """How much pixels count while rigs are searched and compared; the answer is polished by plain squares."""
+
+    floor: float = option(0.05, low=1e-6, high=1)
+    """of weights 1/(y + floor · mean y): pixels darker than this share of the mean count no more than it does"""
+    error: float = option(0.03, low=1e-6, high=1)
+    """what a model of a scene is wrong by, relative to a pixel: rounding that is larger counts, too"""
+    medians: float = option(3.0, low=0.1, high=1000)
+    """residuals beyond this many medians lose their weight (Cauchy loss)"""
+
+
+@dataclass(frozen=True)
 class StepLimits(Options):
     """The longest step: as far as derivatives at its start may be trusted."""
 
@@ -141,6 +153,7 @@ class SearchOptions(Options):
     schedule: ScheduleOptions = ScheduleOptions()
     bar: BarOptions = BarOptions()
     rivals: RivalOptions = RivalOptions()
+    loss: LossOptions = LossOptions()
     limits: StepLimits = StepLimits()
     certainty: CertaintyOptions = CertaintyOptions()
 

@@ -78,7 +78,7 @@ def robust_costs(problem: LightProblem, states: Sequence[State]) -> list[float]:
 def _losses_and_scale(problem: LightProblem, states: Sequence[State]) -> tuple[list[Tensor], float]:
     base = ROBUST.base(problem)
     residuals = [base * problem.residual(state.columns, state.intensity) for state in states]
-    scale = min(cauchy_scale(residual) for residual in residuals)
+    scale = min(cauchy_scale(problem, residual) for residual in residuals)
     return [(residual.double() / scale).square().log1p().mean(dim=1) for residual in residuals], scale
 
 

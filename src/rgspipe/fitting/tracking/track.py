@@ -196,7 +196,7 @@ class _Tracker:
     def _problem(self, index: int) -> LightProblem:
         images, capture = self.taken[index]
         stacked = self.views.prepared.stack_images(images)
-        return self.views.problem(stacked, capture).sharpest()
+        return self.views.problem(stacked, capture, self.search.loss).sharpest()
 
     def _limit(self, index: int, way: int) -> float:
         """The cost from which on a frame is lost, by the frames next to it on the side that it is followed from."""
