@@ -209,7 +209,9 @@ class TrackOptions(Options):
     """How moving lights are followed from frame to frame, each by as many steps as a search may take in the end."""
 
     lost: float = option(2.0, low=1, high=1000)
-    """a frame that is so many times worse explained than those next to it is searched anew"""
+    """a frame that is so many times worse explained than those next to it is searched anew …"""
+    explained: float = option(1e-3, low=0, high=1)
+    """… but median residuals below this part of a pixel are as good as none"""
     searches: int = option(6, low=1, high=10000)
     """most frames that are searched from nothing, those of the beginning and lost ones together"""
     together: bool = False

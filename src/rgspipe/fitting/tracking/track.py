@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -202,9 +201,7 @@ class _Tracker:
         """The cost from which on a frame is lost, by the frames next to it on the side that it is followed from."""
         near = [self.found.get(index - way * back) for back in range(1, self.options.remembered + 1)]
         costs = [known.frame.cost for known in near if known is not None and known.frame.status != FrameStatus.LOST]
-        # What nobody doubts as a share of the energy is the square of a residual.
-        least = math.sqrt(self.search.bar.noticeable)
-        return self.options.lost * max(least, float(np.median(costs))) if costs else 1.0
+        return self.options.lost * max(self.options.explained, float(np.median(costs))) if costs else 1.0
 
     def _emitters(self, rig: LightRig) -> tuple[Emitter, ...]:
         return soft(tuple(Emitter.of(light, self.views.lights.shape_free) for light in rig), 0.0)
