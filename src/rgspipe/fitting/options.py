@@ -76,6 +76,8 @@ class BarOptions(Options):
     least_energy: float = option(0.01, low=0, high=1)
     """a light with less than this share of the image's energy is none, where the number is open, and nobody asks where
     else it could be"""
+    begins_faint: float = option(0.03, low=0, high=1)
+    """a candidate that begins with less than this share of the energy promises as much as a faint light has to lower"""
     noticeable: float = option(1e-4, low=0, high=1)
     """an answer that leaves less than this share of the blocks' energy misses no light: that is rounding, or noise"""
 

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rgspipe.fitting.options import SearchOptions
-from rgspipe.fitting.search.compare import best_state, drop, wanted
+from rgspipe.fitting.search.compare import best_state, drop, energy_shares, wanted
 from rgspipe.fitting.search.refine import Refiner, State
 from rgspipe.fitting.search.schedule import refined_starts
 from rgspipe.fitting.search.starts import Candidates, EmitterRig
@@ -58,10 +58,16 @@ def one_more_light(
     rigs: list[EmitterRig] = []
     for kind in candidates:
         promise, extended = kind.promised(answer, refiner.problem, tries, refiner.region.size)
-        if promise >= bar.least and promise >= wanted(refiner.start(extended[0], ROBUST), bar):
+        sure = promise >= bar.least_faint
+        if promise >= bar.least and (sure or _last_share(refiner, extended[0]) >= bar.begins_faint):
             rigs += extended
     if not rigs:
         return None
     rich = best_state(refiner.problem, refined_starts(refiner, rigs, steps, options.schedule))
     simple, rich = (refiner.refined(state, ROBUST, steps) for state in (answer, rich))
     return OneMore(simple, rich, drop(refiner.problem, simple, rich), wanted(rich, bar))
+
+
+def _last_share(refiner: Refiner, rig: EmitterRig) -> float:
+    """What the last light of a rig sends of all its energy, at first sight."""
+    return energy_shares(refiner.start(rig, ROBUST))[-1]
