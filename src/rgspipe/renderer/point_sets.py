@@ -46,8 +46,8 @@ def cosine_directions(axes: Tensor, rays: int, generator: torch.Generator, point
 
 
 def neighbour_angle(count: int) -> float:
-    """How far apart `count` evenly spread directions are [rad]: no more can all keep farther (Fejes Tóth 1943)."""
-    return math.sqrt(8.0 * math.pi / (math.sqrt(3.0) * count))
+    """How far apart `count` evenly spread directions are [rad]: the side of each one's share of the sphere."""
+    return math.sqrt(4.0 * math.pi / count)
 
 
 def fibonacci_directions(count: int) -> Tensor:
