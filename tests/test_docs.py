@@ -117,7 +117,7 @@ def test_the_site_builds_strictly_and_needs_nothing_from_the_web(tmp_path: Path)
     assert "fit.search.starts" in pages["reference/settings.html"]
     shown = re.findall(r'id="rgspipe\.([\w.]+)"', pages["reference/api.html"])
     assert {name for name in rgspipe.__all__ if not name.startswith("__")} <= set(shown)
-    assert {"Surfels.from_ply", "FitResult.save", "Search.starts", "fitting.options.RivalOptions.apart"} <= set(shown)
+    assert {"Surfels.from_ply", "FitResult.save", "Search.starts", "fitting.options.RivalOptions.energy"} <= set(shown)
     assert "Search.rivals" in pages["reference/api.html"]
 
 

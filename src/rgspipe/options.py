@@ -20,7 +20,7 @@ import math
 import sys
 import types
 import typing
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
@@ -54,10 +54,7 @@ class Options:
     """
 
     def __new__(cls, *args: Any, **values: Any) -> Self:
-        names = [item.name for item in dataclasses.fields(cls)]
-        for name in values:
-            if name not in names:
-                raise _unknown(name, names)
+        check_names(values, [item.name for item in dataclasses.fields(cls)])
         return super().__new__(cls)
 
     def __post_init__(self) -> None:
@@ -214,10 +211,18 @@ def _setting(owner: type, item: dataclasses.Field, hint: Any) -> Setting | None:
     return Setting(item.name, hint, optional, length, rule.get("low"), rule.get("high"), tuple(choices), owner)
 
 
-def _unknown(name: str, names: Sequence[str]) -> InputError:
-    near = difflib.get_close_matches(name, names, n=3)
-    remedy = f"Did you mean {' or '.join(near)}?" if near else f"There are {', '.join(names)}."
-    return InputError(name, expected="the name of an option", found="no such option", remedy=remedy)
+def check_names(given: Iterable[str], names: Sequence[str], owner: str = "") -> None:
+    """Refuse what is none of the names, with those that are like it.
+
+    Raises:
+        InputError: `where` is the name, after that of its owner if it has one.
+    """
+    for name in given:
+        if name not in names:
+            near = difflib.get_close_matches(name, names, n=3)
+            remedy = f"Did you mean {' or '.join(near)}?" if near else f"There are {', '.join(names)}."
+            where = f"{owner}.{name}" if owner else name
+            raise InputError(where, expected="the name of an option", found="no such option", remedy=remedy)
 
 
 def shown(value: Any) -> str:

@@ -46,7 +46,7 @@ def test_a_case_has_a_row_for_each_class_and_one_for_all() -> None:
     assert whole["position_low"] == 0.002 and whole["position_high"] == math.inf
     assert (whole["success"], whole["inside_95"]) == (0.25, pytest.approx(2 / 3))
     assert whole["stated"] == 0.002 and whole["converged"] == 0.75 and whole["ambiguous"] == 0.25
-    assert whole["axis"] == 1.0 and math.isnan(whole["cone"]) and whole["right_number"] == 0.75
+    assert whole["axis"] == 1.0 and math.isnan(whole["shape"]) and whole["right_number"] == 0.75
     assert whole["right_types"] == 0.5
     # Only "c" says converged, is off and states no region with the truth.
     assert rows["silent"].tolist() == [0.0, 0.5, 0.25]
@@ -98,7 +98,7 @@ def test_text_shows_what_differs_and_says_what_is_not_known() -> None:
     text = markdown(pd.concat([table, table.assign(scene="corner")]), "classes")
     assert text.startswith("| scene | views | light |") and text.count("\n") == 8 and "| corner |" in text
     headings, rows = shown_rows(table, "kinds")
-    assert len(rows) == 1 and rows[0]["axis"] == "1.00° (0.50–1.50)" and rows[0]["cone"] == "—"
+    assert len(rows) == 1 and rows[0]["axis"] == "1.00° (0.50–1.50)" and rows[0]["shape"] == "—"
     assert rows[0]["right number"].startswith("75 %") and rows[0]["right types"].startswith("50 %")
     assert rows[0]["truth in 95 % region"].count("–") == 0
     (row,) = shown_rows(table, "regions")[1]

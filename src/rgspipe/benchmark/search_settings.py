@@ -68,7 +68,7 @@ def search_table(targets: Sequence[KnownTarget], size: float) -> pd.DataFrame:
 
 def varied(options: Search) -> Iterator[tuple[str, str, Search]]:
     """Each number of the options, nested ones by dotted names, halved and doubled where its range allows that."""
-    for name in _numbers(type(options)):
+    for name in numbers(type(options)):
         value = _get(options, name)
         for factor in FACTORS:
             changed = _scaled(value, factor)
@@ -122,10 +122,11 @@ def _outcome(targets: Sequence[KnownTarget], options: Search, size: float) -> di
     }
 
 
-def _numbers(options: type[Options], prefix: str = "") -> Iterator[str]:
+def numbers(options: type[Options], prefix: str = "") -> Iterator[str]:
+    """The dotted names of all numbers among options, nested ones included."""
     for setting in settings(options):
         if setting.section is not None:
-            yield from _numbers(setting.section, f"{prefix}{setting.name}.")
+            yield from numbers(setting.section, f"{prefix}{setting.name}.")
         elif setting.type in (int, float):
             yield f"{prefix}{setting.name}"
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from rgspipe.errors import InputError
 from rgspipe.options import Options, option
 
 #: Ways from images to lights; `finite_differences` is search_lm with derivatives by central differences.
@@ -20,47 +19,25 @@ class AimedOptions(Options):
     """Candidates with an axis: every candidate position, aimed everywhere."""
 
     axes: int = option(60, low=4, high=10000)
-    """directions in which each position is aimed"""
-    softness: float = option(0.15, low=0, high=3)
-    """candidates' rims are so much wider than they are, rad, as directions are so far apart"""
+    """directions in which each position is aimed; the fewer, the wider are the rims of candidates"""
     blocks: int = option(256, low=16, high=100000)
-    """all views together have about so many blocks: there are many candidates"""
-    groups: int = option(250, low=1, high=100000)
-    """what bounces is followed from about so many groups of patches: a wide rim needs no more"""
-    least_seen: float = option(0.01, low=0, high=1)
-    """candidates that send less than this share of the brightest one's light to the views are left out"""
+    """all views together have about so many blocks, as there are many candidates, and what bounces is followed from
+    about so many groups of patches"""
+    starts: int = option(3, low=1, high=1000)
+    """starts for each wanted one"""
 
 
 @dataclass(frozen=True)
 class CombinationOptions(Options):
     """How candidates are put together to starts."""
 
-    variety: int = option(40, low=1, high=10000)
-    """so many times the wanted number of combinations are looked at, as neighbours of the best are much like it"""
     separation: float = option(0.16, low=0, high=10)
-    """starts stand so far apart, a part of the scene's size …"""
-    turned: float = option(0.85, low=-1, high=1)
-    """… or their axes differ by this cosine"""
+    """starts stand so far apart, a part of the scene's size, or their axes differ by more than neighbouring ones do"""
     all_pairs: int = option(900, low=0, high=100000)
     """up to this many candidates all pairs are tried"""
     beam: int = option(24, low=1, high=10000)
-    """combinations that are kept while lights are added one by one"""
-    joining: int = option(16, low=1, high=10000)
-    """of the candidates that may join a combination, so many are tried with exact intensities"""
-
-
-@dataclass(frozen=True)
-class TrialOptions(Options):
-    """How many starts are tried."""
-
-    aimed: int = option(3, low=1, high=1000)
-    """starts for each wanted one, where candidates have an axis"""
-    batches: int = option(4, low=1, high=1000)
-    """a number of lights that is known is searched from up to so many times the wanted starts …"""
-    well_explained: float = option(0.02, low=0, high=1)
-    """… until the best one leaves less than this share of the blocks' energy unexplained"""
-    settled: int = option(2, low=1, high=1000)
-    """so many of the starts that look best, by either loss, are refined with plain squares"""
+    """combinations that are kept while lights are added one by one, candidates for each of them that are tried with
+    exact intensities, and combinations that are looked at for each wanted one, as neighbours are much alike"""
 
 
 @dataclass(frozen=True)
@@ -68,29 +45,15 @@ class ScheduleOptions(Options):
     """Turns of a refinement, and which starts go on from one to the next."""
 
     steps: int = option(6, low=2, high=10000)
-    """steps of a start to the end, in its last turn"""
-    first: int = option(3, low=1, high=10000)
-    """steps of a rig of points before the better ones go on"""
+    """steps of a start in its last turn; those before it, and that of points before the better ones go on, take half of
+    them, and rigs that are compared with one another twice as many"""
     softness: tuple[float, ...] = option((0.3, 0.15, 0.05), low=0, high=3)
     """of rigs with an axis: by how much edges are wider in the turns before the last one, rad"""
-    softly: tuple[int, ...] = option((3, 4, 4), low=1, high=10000)
-    """steps of each of these turns"""
     going_on: float = option(0.4, low=0, high=1)
     """share of the starts, at least two of them, that take a turn after the one before: the best go on"""
-    thoroughly: float = option(0.5, low=0, high=1)
-    """the same, where the best starts of all failed"""
-    promising: float = option(0.67, low=0, high=1)
-    """share of starts with an axis that take the first turn, by how they look before it"""
-    met: float = option(0.01, low=0, high=10)
-    """rigs whose lights are within this part of the scene's size, and as many rad, are on their way to one place"""
-
-    def check(self) -> None:
-        if len(self.softness) != len(self.softly):
-            found = f"{len(self.softly)} numbers of steps"
-            expected = f"{len(self.softness)} of them, one for each softness"
-            raise InputError("softly", expected=expected, found=found, remedy="Give as many of both.")
-        if self.first >= self.steps:
-            raise InputError("first", expected="less than steps", found=str(self.first), remedy="Give fewer.")
+    met: float = option(0.02, low=0, high=10)
+    """rigs whose lights are within this part of the scene's size, and as many rad, are on their way to one place; and
+    two lights of one rig that end so close are one, where their number is open"""
 
 
 @dataclass(frozen=True)
@@ -101,53 +64,46 @@ class BarOptions(Options):
     """
 
     least: float = option(0.2, low=0, high=1)
-    """one more light, or a spot in the place of a point light, lowers it by this share …"""
+    """one more light, or a spot in the place of a point light, lowers it by this share; a candidate beside an answer
+    promises to before it is refined, and lights that are split lower what is left of the energy by as much …"""
     doubtful: float = option(0.07, low=0, high=1)
-    """… and one that lowers it by more than this share may be there, which the answer says"""
+    """… and one that lowers it by more than this share may be there, which the answer says: less is hopeless"""
     faint: float = option(0.12, low=0, high=1)
     """a light that sends less than this share of the image's energy is faint …"""
     least_faint: float = option(0.5, low=0, high=1)
-    """… and has to lower the cost by this share: what explains an error of the model is faint"""
-    merged: float = option(0.03, low=0, high=10)
-    """lights of one kind that end closer than this part of the scene's size are one, where their number is open"""
+    """… and has to lower the cost by this share: what explains an error of the model is faint. A rig that lowers it so
+    much has no rival"""
     least_energy: float = option(0.01, low=0, high=1)
-    """a light with less than this share of the image's energy is none, where the number is open"""
-
-
-@dataclass(frozen=True)
-class OneMoreOptions(Options):
-    """When a light more than were asked for is looked for."""
-
-    noticeable: float = option(1e-4, low=0, high=1)
-    """an answer that leaves less than this share of the blocks' energy is not doubted: that is rounding, or noise"""
-    promised: float = option(0.23, low=0, high=1)
-    """the best candidate beside the answer must promise to lower the squared relative error by this share …"""
+    """a light with less than this share of the image's energy is none, where the number is open, and nobody asks where
+    else it could be"""
     begins_faint: float = option(0.03, low=0, high=1)
-    """… and a light that begins with less than this share of the energy, by as much as faint ones must"""
-    tries: int = option(2, low=1, high=1000)
-    """so many rigs of each kind of candidate are refined"""
+    """a candidate that begins with less than this share of the energy promises as much as a faint light has to lower"""
+    noticeable: float = option(1e-4, low=0, high=1)
+    """an answer that leaves less than this share of the blocks' energy misses no light: that is rounding, or noise"""
 
 
 @dataclass(frozen=True)
 class RivalOptions(Options):
-    """What counts as another answer."""
+    """What counts as another answer: lights that stand elsewhere (`certainty.doubtful`) and explain as much."""
 
-    apart: float = option(0.05, low=0, high=10)
-    """rigs are different where a light is farther from its counterpart than this part of the scene's size"""
-    far: float = option(0.5, low=0, high=1)
-    """a rival is refined unless the best rig's robust cost is lower by this share"""
     deviations: float = option(2.0, low=0, high=1000)
     """standard deviations between losses within which two rigs are equally good"""
     pixels_per_error: float = option(25.0, low=1, high=1e6)
     """errors of about so many neighbouring pixels are one: what the model gets wrong is smooth"""
     energy: float = option(1.5, low=1, high=1000)
     """a rival leaves at most so many times the energy unexplained that the best rig does"""
-    stride: float = option(1.2, low=1, high=100)
-    """where the place of a light is not determined, others are tried so many times `apart` away …"""
-    least_energy: float = option(0.01, low=0, high=1)
-    """… if it sends this share of the image's energy"""
-    steps: int = option(12, low=2, high=10000)
-    """steps of either rig under the robust loss, and half as many of the rival by plain squares"""
+
+
+@dataclass(frozen=True)
+class LossOptions(Options):
+    """How much pixels count while rigs are searched and compared; the answer is polished by plain squares."""
+
+    floor: float = option(0.05, low=1e-6, high=1)
+    """of weights 1/(y + floor · mean y): pixels darker than this share of the mean count no more than it does"""
+    error: float = option(0.03, low=1e-6, high=1)
+    """what a model of a scene is wrong by, relative to a pixel: rounding that is larger counts, too"""
+    medians: float = option(3.0, low=0.1, high=1000)
+    """residuals beyond this many medians lose their weight (Cauchy loss)"""
 
 
 @dataclass(frozen=True)
@@ -170,11 +126,17 @@ class CertaintyOptions(Options):
     """κ: by what factor, in standard deviations, errors of the model are larger than the residual shows. The 95 %
     quantile of what it takes to hold the truth, over half of the targets of one trained scene; measured on others"""
     doubtful: float = option(0.05, low=0, high=10)
-    """a position whose error is expected to be larger than this part of the scene's size is said to be in doubt"""
+    """a place is told where it is known within this part of the scene's size: a position whose error is expected to be
+    larger is said to be in doubt, and lights that stand as far from those that were found are another answer"""
     on_surface: float = option(0.002, low=0, high=1)
     """a light nearer to a surface than this part of the scene's size stands on it: 6 mm in a room of 3 m"""
     poorly: float = option(0.05, low=0, high=1)
-    """an answer that leaves more than this share of the target's energy unexplained is none"""
+    """an answer that leaves more than this share of the target's energy unexplained is none, and is searched on"""
+    largest_share: float = option(0.95, low=0, high=0.999)
+    """no cell's share of the evidence counts as more than this: one that tells everything cannot be left out"""
+    common: float = option(0.4, low=0, high=1)
+    """η: the share of the variance of the model's errors that all views have in common. Chosen on every other of 60
+    targets of one trained scene, such that fits of one and of two views foretell what fits of two and of four state"""
 
 
 @dataclass(frozen=True)
@@ -182,16 +144,18 @@ class SearchOptions(Options):
     """How `search_lm` searches: a dictionary with closed-form intensity, then Levenberg-Marquardt."""
 
     starts: int = option(4, low=1, high=4096)
-    """best candidates that are refined"""
+    """best candidates that are refined; half as many where something is only tried beside an answer"""
+    batches: int = option(4, low=1, high=1000)
+    """a number of lights that is known is searched from up to so many times the wanted starts, until the best one
+    leaves less unexplained than an answer may (`certainty.poorly`)"""
     iterations: int = option(30, low=1, high=10000)
     """most Levenberg-Marquardt steps of the final refinement"""
     aimed: AimedOptions = AimedOptions()
     combinations: CombinationOptions = CombinationOptions()
-    trials: TrialOptions = TrialOptions()
     schedule: ScheduleOptions = ScheduleOptions()
     bar: BarOptions = BarOptions()
-    one_more: OneMoreOptions = OneMoreOptions()
     rivals: RivalOptions = RivalOptions()
+    loss: LossOptions = LossOptions()
     limits: StepLimits = StepLimits()
     certainty: CertaintyOptions = CertaintyOptions()
 
@@ -229,30 +193,6 @@ class AdamOptions(StartOptions):
 
 
 @dataclass(frozen=True)
-class SplitOptions(Options):
-    """How two lights that a search took for one are found: a strong one is split in the place of the faintest."""
-
-    apart: float = option(0.06, low=1e-4, high=1)
-    """the halves of a light are put so far apart, a part of the scene's size"""
-    softness: tuple[float, ...] = option((0.15, 0.05, 0.0), low=0, high=3)
-    """by how much edges are wider in each round of refinement, rad"""
-    steps: tuple[int, ...] = option((4, 4, 8), low=1, high=10000)
-    """steps of each round"""
-    kept: int = option(5, low=1, high=1000)
-    """so many of the split rigs take the next round …"""
-    polished: int = option(2, low=1, high=1000)
-    """… and so many are polished on all pixels"""
-    better: float = option(0.8, low=0, high=1)
-    """a split rig is the answer where it leaves less than this part of the error unexplained"""
-
-    def check(self) -> None:
-        if len(self.softness) != len(self.steps):
-            expected = f"{len(self.softness)} of them, one for each softness"
-            found = f"{len(self.steps)} numbers of steps"
-            raise InputError("steps", expected=expected, found=found, remedy="Give as many of both.")
-
-
-@dataclass(frozen=True)
 class MotionOptions(Options):
     """How lights may move: standard deviations of what is known of them, and of what changes from frame to frame."""
 
@@ -262,20 +202,18 @@ class MotionOptions(Options):
     """… and of its change from one frame to the next"""
     alike: float = option(0.95, low=0, high=1)
     """correlation of these changes where one thing carries the lights: the rest is what a turn does to them"""
-    intensity_change: float = option(0.02, low=0, high=1000)
-    """of the relative change of an intensity from one frame to the next"""
-    shape_change: float = option(0.02, low=0, high=1000)
-    """of the change of a shape's numbers"""
+    change: float = option(0.02, low=0, high=1000)
+    """of the relative change of an intensity, and of the change of a shape's numbers, from one frame to the next"""
 
 
 @dataclass(frozen=True)
 class TrackOptions(Options):
-    """How moving lights are followed from frame to frame."""
+    """How moving lights are followed from frame to frame, each by as many steps as a search may take in the end."""
 
     lost: float = option(2.0, low=1, high=1000)
-    """a frame that is so many times worse explained than those next to it is searched anew"""
-    iterations: int = option(15, low=1, high=10000)
-    """most Levenberg-Marquardt steps of a frame"""
+    """a frame that is so many times worse explained than those next to it is searched anew …"""
+    explained: float = option(1e-3, low=0, high=1)
+    """… but median residuals below this part of a pixel are as good as none"""
     searches: int = option(6, low=1, high=10000)
     """most frames that are searched from nothing, those of the beginning and lost ones together"""
     together: bool = False
@@ -284,5 +222,4 @@ class TrackOptions(Options):
     """a frame is not sure where a light has less than this part of the strongest one's intensity"""
     remembered: int = option(5, low=1, high=10000)
     """frames before, whose median residual tells whether a frame is lost"""
-    split: SplitOptions = SplitOptions()
     motion: MotionOptions = MotionOptions()

@@ -87,7 +87,7 @@ def _search(refiner: Refiner, candidates: Sequence[Candidates], options: SearchO
     """Search, then doubt what was found."""
     search = RigSearch(refiner, candidates, options, kinds_open=len(spec.kinds) > 1)
     found = search.unknown() if spec.count is None else search.known(spec.count)
-    rival = rival_among(refiner, found.best, found.others, options.rivals)
+    rival = rival_among(refiner, found.best, found.others, options)
     doubted = Doubted()
     if spec.count is not None:
         doubted = doubted_number(refiner, candidates, found.best, spec.count, options)
@@ -130,7 +130,7 @@ def _result(
     problem, meter, last = refiner.problem, refiner.meter, refiner.step(best)
     spread = light_covariances(problem, best, options.certainty)
     if not any(isinstance(finding, Rival) for finding in findings):
-        rival = rival_elsewhere(refiner, best, spread.calibrated, options.rivals)
+        rival = rival_elsewhere(refiner, best, spread.calibrated, options)
         findings = findings if rival is None else (rival, *findings)
     return FitResult(
         lights=last.lights,

@@ -39,7 +39,7 @@ class Search(SearchOptions):
 
     def fit(self, views: TargetViews, images: Tensor, capture: ImageCapture) -> FitResult:
         """The lights of images (all pixels of all views, 3)."""
-        problem, blocks = views.problem(images, capture), views.blocks
+        problem, blocks = views.problem(images, capture, self.loss), views.blocks
         if self.derivatives == "differences":
             problem, blocks = by_differences(problem), DifferenceModel(blocks, views.prepared.frozen.size)
         result = fit_search_lm(problem, views.coarse(self.aimed), self, views.lights, blocks)

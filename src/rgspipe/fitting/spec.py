@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import NoReturn
+from dataclasses import dataclass, fields
+from typing import Any, NoReturn, Self
 
 from rgspipe.errors import InputError
 from rgspipe.fitting.options import MOST_LIGHTS
+from rgspipe.options import check_names
 from rgspipe.scene.lights import KINDS, Light
 
 #: Each light may be a point or a spot: it is a spot where that is worth it.
@@ -31,13 +32,17 @@ class LightSpec:
             them is then only where to begin.
 
     Raises:
-        InputError: an unknown type, a count out of range, or a shape of another kind.
+        InputError: an unknown field or type, a count out of range, or a shape of another kind.
     """
 
     type: str = "point"
     count: int | None = 1
     shape: Light | None = None
     shape_free: bool = False
+
+    def __new__(cls, *args: Any, **values: Any) -> Self:
+        check_names(values, [item.name for item in fields(cls)], "LightSpec")
+        return super().__new__(cls)
 
     def __post_init__(self) -> None:
         if self.type not in TYPES:

@@ -13,7 +13,7 @@ from rgspipe.errors import InputError
 from rgspipe.fitting.model.capture import ImageCapture
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.model.views import PreparedViews, prepare_views
-from rgspipe.fitting.options import AimedOptions
+from rgspipe.fitting.options import AimedOptions, LossOptions
 from rgspipe.fitting.search.aimed_candidates import aimed_candidates
 from rgspipe.fitting.search.coarse import CoarseImages, coarse_images
 from rgspipe.fitting.spec import LightSpec, as_spec
@@ -107,9 +107,12 @@ class TargetViews:
         model = self.pixels if self.sharp else SurfelModel(self.prepared, self.effects)
         return model.on(self.prepared.every_pixel)
 
-    def problem(self, stacked: Tensor, capture: ImageCapture | None = None) -> LightProblem:
+    def problem(
+        self, stacked: Tensor, capture: ImageCapture | None = None, loss: LossOptions | None = None
+    ) -> LightProblem:
         """The problem that images stacked by `PreparedViews.stack_images`, (all pixels, 3), pose."""
-        return LightProblem.create(self.prepared, stacked, self.effects, capture, self.pixels if self.sharp else None)
+        sharp = self.pixels if self.sharp else None
+        return LightProblem.create(self.prepared, stacked, self.effects, capture, sharp, loss)
 
     def render(self, lights: Light | Sequence[Light]) -> list[Float[Tensor, "H W 3"]]:
         """(H, W, 3) image per view of the scene under lights, with the fit's effects; black without any."""

@@ -45,6 +45,11 @@ def cosine_directions(axes: Tensor, rays: int, generator: torch.Generator, point
     return torch.nn.functional.normalize(local @ axes, dim=-1)
 
 
+def neighbour_angle(count: int) -> float:
+    """How far apart `count` evenly spread directions are [rad]: the side of each one's share of the sphere."""
+    return math.sqrt(4.0 * math.pi / count)
+
+
 def fibonacci_directions(count: int) -> Tensor:
     """(count, 3) float32 unit vectors, spread evenly over the sphere."""
     index = torch.arange(count, dtype=torch.float64)

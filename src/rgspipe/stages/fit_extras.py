@@ -56,6 +56,7 @@ def further_files(
             wanted=config.wanted_accuracy,
             effects=views.effects,
             capture=capture,
+            certainty=config.search.certainty,
         )
         names = [name for name, _ in candidates]
         files[SUGGESTED] = _advice_table(advice, names).to_csv(index=False).encode()

@@ -79,7 +79,7 @@ def _columns(rows: pd.DataFrame, kind: str) -> dict[str, Callable[[Row], str]]:
     columns["intensity error"] = lambda row: _interval(row, "intensity", 1)
     if kind in OF_LIGHTS:
         columns["axis"] = lambda row: _degrees(row, "axis")
-        columns["cone"] = lambda row: _degrees(row, "cone")
+        columns["shape"] = lambda row: _degrees(row, "shape")
         columns["right number"] = lambda row: _interval(row, "right_number", 0)
         # Studies that were made before types were compared do not have it.
         if "right_types" in rows:

@@ -27,7 +27,7 @@ MEDIANS = {
     "intensity": "intensity_error",
     "seconds": "seconds",
     "axis": "axis_error",
-    "cone": "shape_error",
+    "shape": "shape_error",
 }
 #: Shares of the targets, likewise.
 SHARES = {
@@ -53,7 +53,7 @@ def case_rows(
 
     Returns:
         `KEYS`, `count` and `with_truth` (targets, and those with a known truth), and
-        - `position` (fraction of the scene), `intensity` (fraction), `seconds`, of spots `axis` and `cone` (degrees):
+        - `position` (fraction of the scene), `intensity` (fraction), `seconds`, of spots `axis` and `shape` (degrees):
           medians, each with `_low` and `_high`;
         - `success` (within the limit, with the right number of lights), `inside_95` (the truth lies inside the region
           that the fit states for 95 %), `right_number` (of lights) and `right_types` (their number is right, and each

@@ -10,7 +10,8 @@ import torch
 
 from lit_room import HIDDEN, room_cameras
 from rgspipe.fitting import ImageCapture
-from rgspipe.fitting.certainty.advice import COMMON, MOST_VIEWS, suggest_views
+from rgspipe.fitting.certainty.advice import MOST_VIEWS, suggest_views
+from rgspipe.fitting.options import CertaintyOptions
 from rgspipe.renderer.effects import Effects
 from rgspipe.scene import Camera, PointLight, look_at
 
@@ -56,7 +57,8 @@ def test_a_view_more_halves_what_is_not_common_to_views(room, fitted):
     assert again.ranked[0].position_sd == pytest.approx(again.present_sd / math.sqrt(2.0), rel=1e-6)
     model_only = replace(fitted, noise_covariance=tuple(0.0 * matrix for matrix in fitted.covariance))
     again = suggest_views(room.frozen, model_only, [camera], [camera, camera], wanted=0.0)
-    left = [math.sqrt(COMMON + (1.0 - COMMON) / views) * again.present_sd for views in (2, 3)]
+    common = CertaintyOptions().common
+    left = [math.sqrt(common + (1.0 - common) / views) * again.present_sd for views in (2, 3)]
     assert [view.position_sd for view in again.plan] == pytest.approx(left, rel=1e-6)
 
 

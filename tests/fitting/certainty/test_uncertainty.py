@@ -15,6 +15,7 @@ from rgspipe.fitting.findings import Undetermined
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.moments import group_moments, information, scores
 from rgspipe.fitting.model.problem import LightProblem
+from rgspipe.fitting.options import CertaintyOptions
 from rgspipe.fitting.search.refine import State
 from rgspipe.scene import PointLight
 
@@ -41,7 +42,9 @@ def _coverage(correlated: float, trials: int = 400) -> tuple[float, float]:
         root, unknown = whitener(per_cell.sum(0))
         assert not bool(unknown.any())
         variance = float(residual.square().sum()) / (cells * size - unknowns)
-        model = sandwich(root, per_cell, torch.einsum("kpi,kp->ki", jacobian, residual))
+        model = sandwich(
+            root, per_cell, torch.einsum("kpi,kp->ki", jacobian, residual), CertaintyOptions().largest_share
+        )
         whitened = torch.linalg.solve(root, found)
         for index, matrix in enumerate((inflated(model, variance, 1.0), variance * torch.eye(3, dtype=torch.float64))):
             inside[index] += float(whitened @ torch.linalg.solve(matrix, whitened)) < CHI_SQUARE_95

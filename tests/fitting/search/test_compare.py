@@ -97,7 +97,7 @@ def test_twins_are_merged_and_faint_lights_dropped(problem: LightProblem) -> Non
     three = state(problem, VISIBLE, shifted(VISIBLE, 0.01), HIDDEN)
     for strengths, kept in (((0.5, 1.0, 1.0), [1, 2]), ((0.0, 1.0, 1e-3), [1])):
         intensity = torch.tensor(strengths, dtype=torch.float64)[:, None].expand(3, 3)
-        assert worth_keeping(replace(three, intensity=intensity), BAR, 1.0) == kept
+        assert worth_keeping(replace(three, intensity=intensity), BAR, MET) == kept
 
 
 def test_rigs_that_met_are_refined_once(problem: LightProblem) -> None:

@@ -9,7 +9,7 @@ from emitters import emitter_at
 from lit_room import VISIBLE
 from rgspipe.fitting.findings import Rival
 from rgspipe.fitting.model.problem import LightProblem
-from rgspipe.fitting.options import RivalOptions
+from rgspipe.fitting.options import BarOptions, RivalOptions, ScheduleOptions, SearchOptions
 from rgspipe.fitting.search.compare import drop
 from rgspipe.fitting.search.refine import Refiner, State
 from rgspipe.fitting.search.weighting import ROBUST
@@ -43,12 +43,16 @@ def test_a_place_that_is_not_determined_is_looked_at(room, point_light) -> None:
     for covariance, tried in ((known, 0), (unknown, 6)):
         true = placed(refiner, 0.0)
         before = refiner.meter.evaluations
-        assert rival_elsewhere(refiner, true, [covariance], RivalOptions()) is None
+        assert rival_elsewhere(refiner, true, [covariance], SearchOptions()) is None
         assert refiner.meter.evaluations - before == tried
 
 
 #: Nearly everything is as good as the answer.
-LENIENT = RivalOptions(deviations=1000.0, energy=1000.0, far=1.0, steps=2)
+LENIENT = SearchOptions(
+    rivals=RivalOptions(deviations=1000.0, energy=1000.0),
+    bar=BarOptions(least_faint=1.0),
+    schedule=ScheduleOptions(steps=2),
+)
 
 
 def test_a_rival_says_how_far_it_is(room, point_light) -> None:
@@ -56,7 +60,7 @@ def test_a_rival_says_how_far_it_is(room, point_light) -> None:
     off, unknown = placed(refiner, 0.02), torch.diag(torch.tensor([torch.inf] * 3 + [1.0] * 3, dtype=torch.float64))
     found = rival_elsewhere(refiner, off, [unknown], LENIENT)
     # A light is moved so far, unless the edge of the room stops it.
-    assert found is not None and found.distance == pytest.approx(LENIENT.stride * LENIENT.apart, rel=1e-9)
+    assert found is not None and found.distance == pytest.approx(LENIENT.certainty.doubtful, rel=1e-9)
 
 
 def test_rivals_of_another_number_have_no_distance(room, point_light) -> None:

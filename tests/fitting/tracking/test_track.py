@@ -74,7 +74,7 @@ def test_searches_are_counted(room, point_light) -> None:
     No step is longer than 0.12 of the scene, so two of them do not reach over the jump, whichever way they go.
     """
     frames = [room.images(point_light(place), 2) for place in (VISIBLE, (0.4, -0.4, -0.4))]
-    track = track_lights(room.two, frames, options=TrackOptions(searches=1, iterations=2))
+    track = track_lights(room.two, frames, options=TrackOptions(searches=1), search=Search(iterations=2))
     assert sorted(frame.status for frame in track) == [FrameStatus.LOST, FrameStatus.SEARCHED]
     lost = next(frame for frame in track if frame.status == FrameStatus.LOST)
     assert not _sure(lost) and lost.cost > 0.1

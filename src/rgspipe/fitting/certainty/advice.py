@@ -40,10 +40,6 @@ from rgspipe.scene import Camera
 #: Images that are only predicted need no more pixels than this along their longer side.
 COARSE_PIXELS = 48
 
-#: η: the share of the variance of the model's errors that all views have in common. Chosen on every other of 60 targets
-#: of one trained scene, such that fits of one and of two views foretell what fits of two and of four then state.
-COMMON = 0.4
-
 #: The plan of views goes up to this many.
 MOST_VIEWS = 8
 
@@ -108,6 +104,7 @@ def suggest_views(
     wanted: float,
     effects: Effects = ALL_EFFECTS,
     capture: ImageCapture | None = None,
+    certainty: CertaintyOptions | None = None,
 ) -> ViewAdvice:
     """Rank further cameras for a fit by what they would leave uncertain.
 
@@ -119,6 +116,7 @@ def suggest_views(
         wanted: position error to reach, a fraction of the scene's size.
         effects: parts of light transport of the fit; direct light is taken at surfels' centres here.
         capture: how its images were taken, and others would be; as radiance if None.
+        certainty: how sure the fit said that it was.
 
     Raises:
         ValueError: the fit found no light, or used no camera.
@@ -127,9 +125,10 @@ def suggest_views(
         raise ValueError("views can be suggested only for a fit with lights and cameras")
     cameras = [*present, *candidates]
     clips = _clips(result, capture or ImageCapture(), len(present), len(cameras))
-    evidence = _evidence(frozen, result, cameras, effects, clips)
+    options = certainty or CertaintyOptions()
+    evidence = _evidence(frozen, result, cameras, effects, clips, options.cell)
     first = list(range(len(present)))
-    forecast = _Forecast.fitted_to(result, evidence, first, frozen.size)
+    forecast = _Forecast.fitted_to(result, evidence, first, frozen.size, options.common)
     others = range(len(present), len(present) + len(candidates))
     found = [SuggestedView(view - len(present), forecast.position_sd([*first, view])) for view in others]
     # Cameras that differ by rounding alone keep their order.
@@ -185,23 +184,26 @@ class _Evidence:
 
 @dataclass(frozen=True)
 class _Forecast:
-    """Predicts what sets of views leave uncertain."""
+    """Predicts what sets of views leave uncertain; `common` is η, `noise` σ² and `model` τ²."""
 
     evidence: _Evidence
+    common: float
     noise: float
     model: float
     size: float
     present_sd: float
 
     @classmethod
-    def fitted_to(cls, result: FitResult, evidence: _Evidence, present: list[int], size: float) -> _Forecast:
+    def fitted_to(
+        cls, result: FitResult, evidence: _Evidence, present: list[int], size: float, common: float
+    ) -> _Forecast:
         """With noise and error of the model such that the present views give the fit's own covariance."""
-        unit = cls(evidence, 1.0, 1.0, size, 0.0)
+        unit = cls(evidence, common, 1.0, 1.0, size, 0.0)
         noise, model = unit.variances(present)
         own = [_trace(part) for part in result.noise_covariance]
         rest = [max(_trace(whole) - part, 0.0) for whole, part in zip(result.covariance, own, strict=True)]
         worst = max(_trace(whole) for whole in result.covariance)
-        return cls(evidence, _ratio(own, noise), _ratio(rest, model), size, math.sqrt(worst) / size)
+        return cls(evidence, common, _ratio(own, noise), _ratio(rest, model), size, math.sqrt(worst) / size)
 
     def variances(self, views: Sequence[int]) -> tuple[list[float], list[float]]:
         """Per light the sum of its position's variances from noise and from errors of the model, for unit size."""
@@ -213,9 +215,9 @@ class _Forecast:
         noise, model = [], []
         for position in self.evidence.positions:
             lost = bool(unknown[position].any())
-            common, own = together[:, position].square().sum(), alone[..., position].square().sum()
+            shared, own = together[:, position].square().sum(), alone[..., position].square().sum()
             noise.append(math.inf if lost else float(root[position].square().sum()))
-            model.append(math.inf if lost else float(COMMON * common + (1.0 - COMMON) * own))
+            model.append(math.inf if lost else float(self.common * shared + (1.0 - self.common) * own))
         return noise, model
 
     def position_sd(self, views: Sequence[int]) -> float:
@@ -226,12 +228,13 @@ class _Forecast:
 
 
 def _evidence(
-    frozen: FrozenScene, result: FitResult, cameras: Sequence[Camera], effects: Effects, clips: Tensor
+    frozen: FrozenScene, result: FitResult, cameras: Sequence[Camera], effects: Effects, clips: Tensor, cell: float
 ) -> _Evidence:
     """The evidence of every camera, from small images of the lights that were found.
 
     Args:
         clips: (V,) radiance from which on values tell nothing.
+        cell: side of the surface's cells, a part of the scene's size.
     """
     small = [camera.reduced(COARSE_PIXELS) for camera in cameras]
     weights = [
@@ -245,7 +248,7 @@ def _evidence(
     intensity = torch.stack([light.intensity.double().cpu() for light in result.lights])
     columns = [problem.evaluate(emitter) for emitter in emitters]
     image = -problem.residual(columns, intensity)
-    cells, count = surface_cells(views, CertaintyOptions().cell)
+    cells, count = surface_cells(views, cell)
     ends = torch.tensor([camera.pixel_count for camera in small]).cumsum(0)
     view = torch.searchsorted(ends, views.pixels.cpu(), right=True)
     # A small pixel stands for as many as it covers of the camera's own.

@@ -27,9 +27,6 @@ from rgspipe.fitting.options import CertaintyOptions
 from rgspipe.fitting.search.refine import State
 from rgspipe.fitting.search.weighting import PLAIN
 
-#: No cell's share of the evidence counts as more than this: one that tells everything cannot be left out.
-LARGEST_SHARE = 0.95
-
 #: Directions with less information than this part of the largest are not determined: information goes with the square
 #: of the image, and that of ten unknowns that do nothing is rounding up to this.
 RANK = 10.0 * ROUNDING**2
@@ -102,7 +99,7 @@ def _joint(
     cell_scores = scores(values, owners, state.intensity)
     noise = float(values[..., -1, -1].sum()) / max(1, residual.numel() - cells.shape[-1])
     root, unknown = whitener(cells.sum(dim=0))
-    model = sandwich(root, cells, cell_scores)
+    model = sandwich(root, cells, cell_scores, options.largest_share)
     return (root @ inflated(model, noise, options.inflation) @ root.T, unknown), (noise * root @ root.T, unknown)
 
 
@@ -120,16 +117,17 @@ def whitener(matrix: Tensor) -> tuple[Tensor, Tensor]:
     return root, unknown
 
 
-def sandwich(root: Tensor, cells: Tensor, cell_scores: Tensor) -> Tensor:
+def sandwich(root: Tensor, cells: Tensor, cell_scores: Tensor, largest_share: float) -> Tensor:
     """(m, m) V: the spread of the answer when one cell after the other is left out, in whitened unknowns.
 
     Args:
         root: (n, m) of `whitener`, for the sum of all cells.
         cells: (K, n, n) information of each cell.
         cell_scores: (K, n) its Σ Jᵀr.
+        largest_share: of the evidence that a cell may have.
     """
     shares, vectors = torch.linalg.eigh(root.T @ cells @ root)
-    amplified = 1.0 / (1.0 - shares.clamp(min=0.0, max=LARGEST_SHARE))
+    amplified = 1.0 / (1.0 - shares.clamp(min=0.0, max=largest_share))
     turned = torch.einsum("kij,ki->kj", vectors, cell_scores @ root)
     moves = torch.einsum("kij,kj->ki", vectors, amplified * turned)
     return moves.T @ moves

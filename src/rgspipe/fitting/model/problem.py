@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import torch
@@ -14,16 +14,11 @@ from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.exposure import ExposedMoments, best_factors, moments_by_view
 from rgspipe.fitting.model.moments import Moments, moments
 from rgspipe.fitting.model.views import PreparedViews
+from rgspipe.fitting.options import LossOptions
 from rgspipe.renderer.effects import ALL_EFFECTS, Effects
 from rgspipe.renderer.images.model import ImageModel, SurfelModel
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.sums import average, total
-
-#: In relative weights 1/(y + floor·mean y): pixels darker than this share of the mean count no more than it does.
-RELATIVE_FLOOR = 0.05
-
-#: What a model of a scene is wrong by, relative to a pixel: rounding that is larger counts, too.
-RELATIVE_ERROR = 0.03
 
 #: Images in float32 are wrong by less than this part of a pixel, so a share ROUNDING² of the energy says nothing.
 #: True lights leave up to 4e-13, measured, and how much differs from one processor to another.
@@ -48,6 +43,7 @@ class LightProblem:
         exposure_free: whether these are only a guess, and are found together with the intensities.
         clip: (P, 1) float32 radiance at which the target is clipped, over `scale`; None where it is not.
         noise: (P, 3) float32 standard deviation of the target's rounding, over `scale`; None where there is none.
+        loss: how much pixels count.
     """
 
     views: PreparedViews
@@ -59,6 +55,7 @@ class LightProblem:
     exposure_free: bool = False
     clip: Tensor | None = None
     noise: Tensor | None = None
+    loss: LossOptions = field(default_factory=LossOptions)
 
     @classmethod
     def create(
@@ -68,6 +65,7 @@ class LightProblem:
         effects: Effects | None = None,
         capture: ImageCapture | None = None,
         sharp: ImageModel | None = None,
+        loss: LossOptions | None = None,
     ) -> LightProblem:
         """The problem for images stacked by `PreparedViews.stack_images`, (all pixels, 3), seen through surfels."""
         capture = capture or ImageCapture()
@@ -78,7 +76,8 @@ class LightProblem:
             scale, normalised = 0.0, torch.zeros_like(target)
         problem = cls(views, SurfelModel(views, effects or ALL_EFFECTS), normalised.float(), scale, sharp)
         free = capture.exposure_free and len(views.views) > 1
-        problem = replace(problem, exposures=torch.ones(len(views.views)).double(), exposure_free=free)
+        exposures = torch.ones(len(views.views)).double()
+        problem = replace(problem, exposures=exposures, exposure_free=free, loss=loss or LossOptions())
         if capture.clip is None or scale == 0.0:
             return problem
         clip = torch.full_like(problem.target[:, :1], capture.clip / scale)
@@ -155,9 +154,9 @@ class LightProblem:
 
     def relative_weights(self) -> Tensor:
         """(P, 1) weights that make errors relative to the pixel's own brightness, where rounding is not larger."""
-        size = self.target.mean(dim=1, keepdim=True).clamp(min=0.0) + RELATIVE_FLOOR
+        size = self.target.mean(dim=1, keepdim=True).clamp(min=0.0) + self.loss.floor
         if self.noise is not None:
-            size = (size.square() + (self.noise.mean(dim=1, keepdim=True) / RELATIVE_ERROR).square()).sqrt()
+            size = (size.square() + (self.noise.mean(dim=1, keepdim=True) / self.loss.error).square()).sqrt()
         # A block counts as much as its pixels do together.
         counts = self.model.counts.to(size)
         return (counts / average(counts)).sqrt()[:, None] / size
@@ -168,7 +167,7 @@ class LightProblem:
         Args:
             blocks: (B, P) the averages. Those of which more than a quarter is saturated hardly count.
         """
-        relative = 1.0 / (target.mean(dim=1).clamp(min=0.0) + RELATIVE_FLOOR)
+        relative = 1.0 / (target.mean(dim=1).clamp(min=0.0) + self.loss.floor)
         weights = (counts * relative.square())[:, None].expand(target.shape)
         if self.clip is None:
             return weights

@@ -17,11 +17,8 @@ from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.view_weights import ViewWeights
 from rgspipe.scene.arrays import ArrayLike, as_tensor, check_finite, check_radiance
 
-#: Pixels that surfels cover less than this show something the scene does not have.
-LEAST_COVERAGE = 0.9
-
-#: Pixels with a mask below this are not the scene's.
-LEAST_MASK = 0.9
+#: Pixels of which less than this is the scene's, by what surfels cover or by their mask, show something else.
+LEAST_SHARE = 0.9
 
 #: So much a mask may be out of range: it may have been resampled.
 ROUNDING = 1e-3
@@ -98,7 +95,7 @@ def prepare_views(
 
 
 def _trusted(view: ViewWeights, mask: Tensor, mask_edges: bool) -> Tensor:
-    chosen = (view.coverage.cpu() > LEAST_COVERAGE) & (mask.reshape(-1).cpu() >= LEAST_MASK)
+    chosen = (view.coverage.cpu() > LEAST_SHARE) & (mask.reshape(-1).cpu() >= LEAST_SHARE)
     return chosen & ~view.edges.cpu() if mask_edges else chosen
 
 

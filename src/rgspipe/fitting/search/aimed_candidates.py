@@ -18,7 +18,7 @@ from rgspipe.renderer.dictionary import LightDictionary
 from rgspipe.renderer.effects import ALL_EFFECTS, Effects
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.images.blocks import BlockModel, block_model, patch_radiance
-from rgspipe.renderer.point_sets import fibonacci_directions
+from rgspipe.renderer.point_sets import fibonacci_directions, neighbour_angle
 from rgspipe.scene.lights import AxialLight
 from rgspipe.scene.lights.angles import angle_from_axis
 
@@ -33,26 +33,25 @@ def aimed_candidates(
     """Candidate lights of given shapes at the dictionary's positions, with their coarse images.
 
     A light's coarse image follows from that of a point light at its place: the part of light that the profile lets
-    through is taken at the mean place of what each block sees, and of each group of patches.
+    through is taken at the mean place of what each block sees, and of each group of patches. Rims are wider by a third
+    of what lies between neighbouring directions, so that a light that is aimed between them is like both.
     """
     options = options or AimedOptions()
     side = max(6, round(math.sqrt(options.blocks / len(views.views))))
     model = block_model(views, side, effects)
-    lit = _lit_by_points(views, dictionary, model, options.groups)
-    directions = fibonacci_directions(options.axes).to(lit.places)
+    lit = _lit_by_points(views, dictionary, model, options.blocks)
+    directions, spacing = fibonacci_directions(options.axes).to(lit.places), neighbour_angle(options.axes)
     images, positions, axes, kinds = [], [], [], []
     for index in progress_bar(range(len(dictionary)), "aimed candidates", unit="place"):
         angle = angle_from_axis(directions[:, None], lit.places - dictionary.positions[index].to(lit.places))
-        seen = torch.cat([_aimed_seen(shape, angle, lit, index, options.softness) for shape in shapes])
+        seen = torch.cat([_aimed_seen(shape, angle, lit, index, spacing / 3.0) for shape in shapes])
         images.append(seen)
         positions.append(dictionary.positions[index].expand(len(seen), 3))
         axes.append(directions.repeat(len(shapes), 1))
         kinds.append(torch.arange(len(shapes)).repeat_interleave(options.axes))
     joined = [torch.cat(parts) for parts in (images, positions, axes, kinds)]
-    brightness = joined[0].sum(dim=(1, 2))
-    kept = brightness > options.least_seen * brightness.amax()
-    seen, origins, aims, which = (part[kept.to(part.device)] for part in joined)
-    return CoarseImages(model.average, model.counts, seen, origins, tuple(shapes), aims, which)
+    seen, origins, aims, which = joined
+    return CoarseImages(model.average, model.counts, seen, origins, tuple(shapes), aims, which, spacing)
 
 
 @dataclass(frozen=True)

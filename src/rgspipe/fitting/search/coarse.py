@@ -27,6 +27,7 @@ class CoarseImages:
         shapes: lights of the kind and of each shape that is tried, wherever they are.
         axes: (C, 3) of the candidates; None where they shine alike in all directions.
         which: (C,) int64 index into `shapes` of each candidate; None for the first.
+        spacing: between neighbouring axes [rad].
     """
 
     blocks: SparseOperator
@@ -36,6 +37,7 @@ class CoarseImages:
     shapes: tuple[Light, ...]
     axes: Tensor | None = None
     which: Tensor | None = None
+    spacing: float = 0.0
 
     def __len__(self) -> int:
         return len(self.positions)

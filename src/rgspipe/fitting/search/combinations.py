@@ -193,7 +193,7 @@ def _best_of_each_place(order: Sequence[int], positions: Tensor, most: int) -> l
 def _extended(scored: Scored, beam: Sequence[tuple[int, ...]], options: CombinationOptions) -> list[tuple[int, ...]]:
     found: dict[tuple[int, ...], float] = {}
     for combination in beam:
-        for index, gain in extensions(scored, scored.images[list(combination)], options.joining):
+        for index, gain in extensions(scored, scored.images[list(combination)], options.beam):
             if index not in combination:
                 found[tuple(sorted((*combination, index)))] = gain
     return sorted(found, key=lambda combination: -found[combination])[: options.beam]

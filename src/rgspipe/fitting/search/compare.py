@@ -46,8 +46,8 @@ def _met(one: Sequence[Emitter], other: Sequence[Emitter], met: float, size: flo
     return all(a.light.kind == b.light.kind and a.distance(b, size) < met for a, b in pairs)
 
 
-def worth_keeping(state: State, bar: BarOptions, size: float) -> list[int]:
-    """Indices of the lights that send enough of the image's energy and do not coincide with a brighter one."""
+def worth_keeping(state: State, bar: BarOptions, apart: float) -> list[int]:
+    """Indices of the lights that send enough of the image's energy and are `apart` from brighter ones of their kind."""
     energies = light_energies(state)
     kept: list[int] = []
     for index in sorted(range(len(energies)), key=lambda k: -energies[k]):
@@ -56,7 +56,7 @@ def worth_keeping(state: State, bar: BarOptions, size: float) -> list[int]:
             other
             for other in kept
             if state.emitters[other].light.kind == emitter.light.kind
-            and float((state.emitters[other].position - emitter.position).norm()) < bar.merged * size
+            and float((state.emitters[other].position - emitter.position).norm()) < apart
         ]
         if not twins and energies[index] >= bar.least_energy * sum(energies):
             kept.append(index)
@@ -78,7 +78,7 @@ def robust_costs(problem: LightProblem, states: Sequence[State]) -> list[float]:
 def _losses_and_scale(problem: LightProblem, states: Sequence[State]) -> tuple[list[Tensor], float]:
     base = ROBUST.base(problem)
     residuals = [base * problem.residual(state.columns, state.intensity) for state in states]
-    scale = min(cauchy_scale(residual) for residual in residuals)
+    scale = min(cauchy_scale(problem, residual) for residual in residuals)
     return [(residual.double() / scale).square().log1p().mean(dim=1) for residual in residuals], scale
 
 

@@ -11,7 +11,7 @@ from itertools import zip_longest
 
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.options import MOST_LIGHTS, SearchOptions
-from rgspipe.fitting.search.compare import best_state, distinct, drop, passed, ranked, worth_keeping
+from rgspipe.fitting.search.compare import best_state, distinct, drop, passed, worth_keeping
 from rgspipe.fitting.search.refine import Refiner, State
 from rgspipe.fitting.search.schedule import refined_starts
 from rgspipe.fitting.search.starts import Candidates, EmitterRig
@@ -69,7 +69,7 @@ class RigSearch:
             if found is None:
                 break
             # More steps rarely gain as much again, so a rig that is far from worth it needs none.
-            hopeless = best is not None and drop(self.refiner.problem, best.best, found.best) < 0.5 * bar.least
+            hopeless = best is not None and drop(self.refiner.problem, best.best, found.best) < bar.doubtful
             found = found if hopeless else self._further(found)
             compared[lights] = found.best
             if hopeless or (best is not None and not passed(self.refiner.problem, best.best, found.best, bar)):
@@ -84,13 +84,12 @@ class RigSearch:
         return Found(answer, others, compared)
 
     def settled(self, states: Sequence[State]) -> State:
-        """Of the best states the one that explains most after some steps of plain squares.
+        """Of the best states by either loss the one that explains most after some steps of plain squares.
 
         The polish takes plain squares: a rig that only a forgiving loss likes, for which the brightest pixels are
-        outliers, would walk far in it. So the best by plain squares are among those that are tried.
+        outliers, would walk far in it. So the best one by plain squares is tried, too.
         """
-        most = self.options.trials.settled
-        chosen = [*ranked(self.refiner.problem, states)[:most], *sorted(states, key=self.refiner.unexplained)[:most]]
+        chosen = [best_state(self.refiner.problem, states), min(states, key=self.refiner.unexplained)]
         steps = min(self.options.schedule.steps, self.options.iterations)
         tried = distinct(chosen, self.options.schedule.met, self.refiner.region.size)
         return min((self.refiner.refined(state, PLAIN, steps) for state in tried), key=self.refiner.unexplained)
@@ -108,7 +107,7 @@ class RigSearch:
             previous: a refined rig of one light fewer, to grow from.
             patient: whether further starts follow while all explain little.
         """
-        batches = self.options.trials.batches if patient else 1
+        batches = self.options.batches if patient else 1
         starts = [self._starts(kind, lights, previous, batches) for kind in self.candidates]
         found = [self._refined(rigs, batches) for rigs in starts if rigs]
         if not found:
@@ -122,7 +121,7 @@ class RigSearch:
 
     def _starts(self, candidates: Candidates, lights: int, previous: State | None, batches: int) -> list[EmitterRig]:
         size = self.refiner.region.size
-        count = self.options.starts * (self.options.trials.aimed if candidates.aimed else 1) * batches
+        count = self.options.starts * (self.options.aimed.starts if candidates.aimed else 1) * batches
         if previous is None or len(previous.emitters) != lights - 1:
             return candidates.rigs(lights, count, size)
         half = max(1, count // 2)
@@ -138,9 +137,9 @@ class RigSearch:
         refined, size = [], math.ceil(len(rigs) / batches)
         for first in range(0, len(rigs), size):
             part = rigs[first : first + size]
-            refined += refined_starts(self.refiner, part, self.options.iterations, self.options.schedule, first > 0)
+            refined += refined_starts(self.refiner, part, self.options.iterations, self.options.schedule)
             best = best_state(self.refiner.problem, refined) if compared else self.settled(refined)
-            if self.refiner.unexplained(best) < self.options.trials.well_explained:
+            if self.refiner.unexplained(best) < self.options.certainty.poorly:
                 break
         return Found(best, tuple(refined))
 
@@ -161,7 +160,8 @@ class RigSearch:
 
     def _pruned(self, state: State) -> State:
         """The rig without lights that add next to nothing or coincide with another."""
-        kept = worth_keeping(state, self.options.bar, self.refiner.region.size)
+        apart = self.options.schedule.met * self.refiner.region.size
+        kept = worth_keeping(state, self.options.bar, apart)
         if len(kept) == len(state.emitters) or not kept:
             return state
         fewer = self.refiner.start([state.emitters[index] for index in kept], ROBUST)

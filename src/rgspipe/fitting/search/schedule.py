@@ -17,7 +17,7 @@ HARD_RIM = 0.01
 
 
 def refined_starts(
-    refiner: Refiner, rigs: Sequence[EmitterRig], iterations: int, options: ScheduleOptions, thorough: bool = False
+    refiner: Refiner, rigs: Sequence[EmitterRig], iterations: int, options: ScheduleOptions
 ) -> list[State]:
     """Those of the starts that are refined to the end, by at most `iterations` steps at a time.
 
@@ -26,13 +26,11 @@ def refined_starts(
     """
     aimed = any(emitter.axis is not None for rig in rigs for emitter in rig)
     turns, weighting = _turns(options, aimed), PLAIN if aimed else ROBUST
-    share, rim = options.thoroughly if thorough else options.going_on, turns[0][0]
+    rim = turns[0][0]
     states = [refiner.start(soft(rig, rim), weighting) for rig in rigs]
-    if aimed and not thorough:
-        states = _best(refiner.problem, states, options.promising, weighting)
     for turn, (softness, steps) in enumerate(turns):
         if turn > 0:
-            best = _best(refiner.problem, states, share, weighting)
+            best = _best(refiner.problem, states, options.going_on, weighting)
             states = distinct(best, options.met, refiner.region.size)
         if softness != rim:
             rim = softness
@@ -43,9 +41,10 @@ def refined_starts(
 
 def _turns(options: ScheduleOptions, aimed: bool) -> list[tuple[float, int]]:
     """Softness of edges [rad], and most steps, of each turn."""
+    half = options.steps // 2
     if not aimed:
-        return [(0.0, options.first), (0.0, options.steps - options.first)]
-    return [*zip(options.softness, options.softly, strict=True), (0.0, options.steps)]
+        return [(0.0, half), (0.0, options.steps - half)]
+    return [*((softness, half) for softness in options.softness), (0.0, options.steps)]
 
 
 def soft(rig: EmitterRig, softness: float) -> EmitterRig:

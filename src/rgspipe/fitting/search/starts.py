@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import zip_longest
@@ -74,7 +75,7 @@ class Candidates:
             count = min(count, int(costs.isfinite().sum()))
             apart = self.options.separation * size
             return [self.emitters([k]) for k in best_apart(costs, self.coarse.positions.cpu(), count, apart)]
-        looked_at = self.options.variety * count
+        looked_at = self.options.beam * count
         combinations = best_combinations(self.scored, self.coarse.positions, lights, looked_at, self.options)
         rigs = self._different((self.emitters(combination) for combination in combinations), count, size)
         if lights > 1:
@@ -87,7 +88,7 @@ class Candidates:
     def extended(self, state: State, count: int, size: float) -> list[EmitterRig]:
         """At most `count` rigs: the lights of a refined one and one candidate more."""
         fixed = torch.stack([self.scored.coarse_of(self.problem, self.coarse, emitter) for emitter in state.emitters])
-        return self._extended(state, extensions(self.scored, fixed, self.options.joining), count, size)
+        return self._extended(state, extensions(self.scored, fixed, self.options.beam), count, size)
 
     def promised(self, state: State, searched: LightProblem, count: int, size: float) -> tuple[float, list[EmitterRig]]:
         """By what share one candidate more lowers the blocks' squared relative error, and `extended`.
@@ -103,7 +104,7 @@ class Candidates:
             seen = [self.coarse.blocks @ self.problem.evaluate(one)[:, :, 0].contiguous() for one in state.emitters]
         fixed = torch.stack([self.scored.weighted(self.problem, self.coarse, image) for image in seen])
         left = 1.0 - explained(self.scored, fixed)
-        found = extensions(self.scored, fixed, self.options.joining)
+        found = extensions(self.scored, fixed, self.options.beam)
         promise = (found[0][1] - (1.0 - left)) / left if left > 0.0 else 0.0
         return promise, self._extended(state, found, count, size)
 
@@ -124,7 +125,7 @@ class Candidates:
     def _apart(self, one: EmitterRig, other: EmitterRig, size: float) -> bool:
         if rig_distance(one, other) > self.options.separation * size:
             return True
-        return any(a.axis is not None and _turn(a, other) < self.options.turned for a in one)
+        return any(a.axis is not None and _turn(a, other) < math.cos(self.coarse.spacing) for a in one)
 
 
 def _turn(emitter: Emitter, rig: EmitterRig) -> float:

@@ -10,9 +10,6 @@ from torch import Tensor
 
 from rgspipe.fitting.model.problem import ROUNDING, LightProblem
 
-#: Residuals beyond this many medians lose their weight (Cauchy loss).
-CAUCHY_MEDIANS = 3.0
-
 
 @dataclass(frozen=True)
 class Weighting:
@@ -40,10 +37,10 @@ class Weighting:
         """
         base, residual = self.base(problem), problem.residual(columns, intensity)
         if problem.clip is None:
-            return self.squared(base, residual, cauchy_scale(base * residual))
+            return self.squared(base, residual, cauchy_scale(problem, base * residual))
         # The active set of this step: a clipped value counts only where the image is darker than it.
         counted = ~problem.saturated | (residual > 0.0)
-        scale = cauchy_scale((base * residual)[~problem.saturated])
+        scale = cauchy_scale(problem, (base * residual)[~problem.saturated])
         return self.squared(base, residual, scale) * counted
 
 
@@ -52,6 +49,6 @@ class Weighting:
 ROBUST, PLAIN = Weighting(relative=True, robust=True), Weighting(relative=False, robust=False)
 
 
-def cauchy_scale(weighted: Tensor) -> float:
-    """The residual at which the Cauchy loss lets go: three medians, above rounding."""
-    return CAUCHY_MEDIANS * float(weighted.abs().median()) + ROUNDING if weighted.numel() else 1.0
+def cauchy_scale(problem: LightProblem, weighted: Tensor) -> float:
+    """The residual at which the Cauchy loss lets go: some medians, above rounding."""
+    return problem.loss.medians * float(weighted.abs().median()) + ROUNDING if weighted.numel() else 1.0

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rgspipe.fitting.options import SearchOptions
-from rgspipe.fitting.search.compare import best_state, drop, light_energies, wanted
+from rgspipe.fitting.search.compare import best_state, drop, energy_shares, wanted
 from rgspipe.fitting.search.refine import Refiner, State
 from rgspipe.fitting.search.schedule import refined_starts
 from rgspipe.fitting.search.starts import Candidates, EmitterRig
@@ -52,14 +52,14 @@ def one_more_light(
         refiner: on the problem that the answer was searched on.
         candidates: of each kind of light.
     """
-    more, bar, steps = options.one_more, options.bar, options.schedule.steps
-    if refiner.unexplained(answer) < more.noticeable:
+    bar, steps, tries = options.bar, options.schedule.steps, max(1, options.starts // 2)
+    if refiner.unexplained(answer) < bar.noticeable:
         return None
     rigs: list[EmitterRig] = []
     for kind in candidates:
-        promise, extended = kind.promised(answer, refiner.problem, more.tries, refiner.region.size)
+        promise, extended = kind.promised(answer, refiner.problem, tries, refiner.region.size)
         sure = promise >= bar.least_faint
-        if promise >= more.promised and (sure or _last_share(refiner, extended[0]) >= more.begins_faint):
+        if promise >= bar.least and (sure or _last_share(refiner, extended[0]) >= bar.begins_faint):
             rigs += extended
     if not rigs:
         return None
@@ -70,5 +70,4 @@ def one_more_light(
 
 def _last_share(refiner: Refiner, rig: EmitterRig) -> float:
     """What the last light of a rig sends of all its energy, at first sight."""
-    energies = light_energies(refiner.start(rig, ROBUST))
-    return energies[-1] / sum(energies) if sum(energies) > 0.0 else 0.0
+    return energy_shares(refiner.start(rig, ROBUST))[-1]

@@ -10,7 +10,7 @@ from torch import Tensor
 
 from rgspipe.fitting.findings import Rival
 from rgspipe.fitting.model.problem import ROUNDING, LightProblem
-from rgspipe.fitting.options import RivalOptions
+from rgspipe.fitting.options import RivalOptions, SearchOptions
 from rgspipe.fitting.search.compare import (
     best_state,
     drop,
@@ -24,25 +24,28 @@ from rgspipe.fitting.search.weighting import PLAIN, ROBUST
 from rgspipe.sums import average, total
 
 
-def rival_among(refiner: Refiner, best: State, others: Sequence[State], options: RivalOptions) -> Rival | None:
+def rival_among(refiner: Refiner, best: State, others: Sequence[State], options: SearchOptions) -> Rival | None:
     """One of the `others` that is another answer, if there is one; those that come near are refined first."""
-    problem, apart = refiner.problem, options.apart * refiner.region.size
+    problem, apart = refiner.problem, options.certainty.doubtful * refiner.region.size
     rivals = [state for state in others if rig_distance(state.emitters, best.emitters) > apart]
     if not rivals:
         return None
     rival = best_state(problem, rivals)
-    if drop(problem, rival, best) > options.far:
+    if drop(problem, rival, best) > options.bar.least_faint:
         return None
-    one, other = (refiner.refined(state, ROBUST, options.steps) for state in (best, rival))
-    if rig_distance(one.emitters, other.emitters) <= apart or not equally_good(problem, one, other, options):
+    steps = options.schedule.steps
+    one, other = (refiner.refined(state, ROBUST, 2 * steps) for state in (best, rival))
+    if rig_distance(one.emitters, other.emitters) <= apart or not equally_good(problem, one, other, options.rivals):
         return None
     # The answer is one of plain squares, so a rival has to be one, too.
-    other = refiner.refined(other, PLAIN, options.steps // 2)
+    other = refiner.refined(other, PLAIN, steps)
     clear = rig_distance(best.emitters, other.emitters) > apart
-    return _rival(refiner, best, other) if clear and _leaves_as_little(refiner, best, other, options) else None
+    return _rival(refiner, best, other) if clear and _leaves_as_little(refiner, best, other, options.rivals) else None
 
 
-def rival_elsewhere(refiner: Refiner, best: State, covariance: Sequence[Tensor], options: RivalOptions) -> Rival | None:
+def rival_elsewhere(
+    refiner: Refiner, best: State, covariance: Sequence[Tensor], options: SearchOptions
+) -> Rival | None:
     """The rig with a light whose place is not determined, if it explains as much from a clearly different one.
 
     A search meets such rivals only by chance: where its starts end in a valley without a floor is up to the last bits.
@@ -51,8 +54,9 @@ def rival_elsewhere(refiner: Refiner, best: State, covariance: Sequence[Tensor],
         refiner: on the problem that the answer was polished on.
         covariance: of each light, see `FitResult.covariance`; infinite where nothing is determined.
     """
+    rivals = options.rivals
     for other in _moved(refiner, best, covariance, options):
-        if equally_good(refiner.problem, best, other, options) and _leaves_as_little(refiner, best, other, options):
+        if equally_good(refiner.problem, best, other, rivals) and _leaves_as_little(refiner, best, other, rivals):
             return _rival(refiner, best, other)
     return None
 
@@ -62,16 +66,16 @@ def _rival(refiner: Refiner, best: State, other: State) -> Rival:
     return Rival(distance if math.isfinite(distance) else None)
 
 
-def _moved(refiner: Refiner, best: State, covariance: Sequence[Tensor], options: RivalOptions) -> Iterator[State]:
+def _moved(refiner: Refiner, best: State, covariance: Sequence[Tensor], options: SearchOptions) -> Iterator[State]:
     """The rig with one light moved along an axis, of those that are there and whose place is not determined."""
-    apart = options.apart * refiner.region.size
-    steps = options.stride * apart * torch.cat([torch.eye(3), -torch.eye(3)]).double()
+    apart = options.certainty.doubtful * refiner.region.size
+    steps = apart * torch.cat([torch.eye(3), -torch.eye(3)]).double()
     for index, share in enumerate(energy_shares(best)):
-        if share >= options.least_energy and bool(torch.isinf(covariance[index].diagonal()[:3]).any()):
-            for place in refiner.region.clip(best.emitters[index].position + steps):
+        if share >= options.bar.least_energy and bool(torch.isinf(covariance[index].diagonal()[:3]).any()):
+            for place in best.emitters[index].position + steps:
                 rig = [*best.emitters]
                 rig[index] = rig[index].placed(place)
-                if rig_distance(rig, best.emitters) > apart:
+                if torch.equal(refiner.region.clip(place), place):
                     yield refiner.start(rig, PLAIN)
 
 

@@ -7,11 +7,12 @@ prediction and C its covariance, the cost
 
 (at the best intensities a, so that a lamp that is dimmed is no noise) is lowered by Levenberg-Marquardt (iterated
 extended Kalman filter; Bell and Cathey 1993). f makes up for errors of the model, which neighbouring pixels share, so
-that N values tell less than as many independent ones.
+that N values tell less than as many independent ones, and no less than one: 1 ≤ f² ≤ N.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import torch
@@ -26,9 +27,6 @@ from rgspipe.fitting.search.weighting import PLAIN
 from rgspipe.fitting.selection.diagnosis import standing
 from rgspipe.fitting.tracking.motion import Motion, references
 from rgspipe.fitting.tracking.predicted_rig import Evidence, PredictedRig
-
-#: f stays in these bounds.
-INFLATIONS = (1.0, 100.0)
 
 
 @dataclass(frozen=True)
@@ -51,7 +49,7 @@ def observed(
     refiner = _refiner(problem, rig)
     problem, state = refiner.problem, refiner.start(rig, PLAIN)
     spread = light_covariances(problem, state, certainty)
-    inflation = inflation_of(spread)
+    inflation = inflation_of(spread, problem.target.numel())
     intensity = problem.scale * state.intensity
     evidence = Evidence.of(problem, state, references(intensity))
     information = evidence.information() / (evidence.variance * inflation**2)
@@ -76,16 +74,18 @@ def follow(
     information = evidence.information() / (evidence.variance * inflation**2)
     motion = predicted.updated(state.emitters, problem.scale * state.intensity, information)
     spread = light_covariances(problem, state, certainty)
-    return Followed(_result(refiner, state, motion, spread, certainty), motion, inflation_of(spread))
+    return Followed(
+        _result(refiner, state, motion, spread, certainty), motion, inflation_of(spread, problem.target.numel())
+    )
 
 
-def inflation_of(spread: Covariances) -> float:
-    """f: by how much the deviations of positions are larger than noise alone would have them."""
+def inflation_of(spread: Covariances, values: int) -> float:
+    """f: by how much the deviations of positions are larger than noise alone in N `values` would have them."""
     pairs = zip(spread.calibrated, spread.noise, strict=True)
     logs = torch.cat([0.5 * (one.diagonal()[:3] / other.diagonal()[:3]).log() for one, other in pairs])
     logs = logs[torch.isfinite(logs)]
-    factor = float(logs.mean().exp()) if len(logs) else INFLATIONS[1]
-    return min(max(factor, INFLATIONS[0]), INFLATIONS[1])
+    factor = float(logs.mean().exp()) if len(logs) else math.inf
+    return min(max(factor, 1.0), math.sqrt(values))
 
 
 def _refiner(problem: LightProblem, rig: EmitterRig) -> Refiner:

@@ -82,8 +82,7 @@ class Motion:
         forward[moving, count + torch.arange(len(moving))] = 1.0
         basis = torch.block_diag(turned, torch.eye(count - len(turned)).double(), turned[moving][:, moving])
         forward = basis @ forward
-        drift = torch.full((count,), self.options.intensity_change, dtype=torch.float64)
-        drift[: len(turned)] = self.options.shape_change
+        drift = torch.full((count,), self.options.change, dtype=torch.float64)
         drift[moving] = 0.0
         rates = _rate_covariance(self.rig, self.options.rate_change, self.options.alike if self.together else 0.0)
         noise = torch.block_diag(torch.diag(drift.square()), rates)

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from rgspipe.fitting.model.moments import Moments, scores
-from rgspipe.fitting.model.problem import LightProblem
+from rgspipe.fitting.model.problem import ROUNDING, LightProblem
 from rgspipe.fitting.search.moves import allowed_share, moved_rig, rig_move
 from rgspipe.fitting.search.refine import Refiner, State
 from rgspipe.fitting.search.starts import EmitterRig
@@ -17,9 +17,6 @@ from rgspipe.fitting.search.weighting import PLAIN
 from rgspipe.fitting.tracking.motion import Motion, offset, turns
 from rgspipe.optim.levenberg_marquardt import NormalEquations
 from rgspipe.sums import total
-
-#: Residuals below this part of the mean radiance are rounding.
-LEAST_NOISE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -48,7 +45,7 @@ class Evidence:
         size = problem.views.frozen.size
         colours = (reference / problem.scale).repeat_interleave(3)
         units = torch.cat([*(emitter.units(size) for emitter in state.emitters), colours])
-        return cls(state, weights, moments, max(LEAST_NOISE**2, moments.cost / counted), units)
+        return cls(state, weights, moments, max(ROUNDING**2, moments.cost / counted), units)
 
     def information(self) -> Tensor:
         """(D + 3L, D + 3L) JᵀJ."""

@@ -27,9 +27,6 @@ from rgspipe.scene import LightRig
 from rgspipe.scene.arrays import ArrayLike, as_list
 from rgspipe.sums import total
 
-#: Median residuals below this part of a pixel are as good as none.
-SMALL_COST = 1e-3
-
 
 def track_lights(
     views: FitViews,
@@ -157,7 +154,7 @@ class _Tracker:
 
     def _followed(self, problem: LightProblem, before: _Known, way: int) -> _Known:
         made = follow(
-            problem, before.motion.predicted(), before.inflation, self.options.iterations, self.search.certainty
+            problem, before.motion.predicted(), before.inflation, self.search.iterations, self.search.certainty
         )
         status = FrameStatus.TRACKED if way > 0 else FrameStatus.TRACED_BACK
         return self._doubted(self._known(problem, made, status), before.anchored)
@@ -174,7 +171,7 @@ class _Tracker:
         images, capture = self.taken[index]
         result = self.views.fit(images, solver=self.search, capture=capture)
         problem = self._problem(index)
-        result = split_lights(problem, result, self.views.blocks, self.search, self.options.split)
+        result = split_lights(problem, result, self.views.blocks, self.search)
         if not result.lights:
             return None
         if before is not None:
@@ -198,13 +195,13 @@ class _Tracker:
     def _problem(self, index: int) -> LightProblem:
         images, capture = self.taken[index]
         stacked = self.views.prepared.stack_images(images)
-        return self.views.problem(stacked, capture).sharpest()
+        return self.views.problem(stacked, capture, self.search.loss).sharpest()
 
     def _limit(self, index: int, way: int) -> float:
         """The cost from which on a frame is lost, by the frames next to it on the side that it is followed from."""
         near = [self.found.get(index - way * back) for back in range(1, self.options.remembered + 1)]
         costs = [known.frame.cost for known in near if known is not None and known.frame.status != FrameStatus.LOST]
-        return self.options.lost * max(SMALL_COST, float(np.median(costs))) if costs else 1.0
+        return self.options.lost * max(self.options.explained, float(np.median(costs))) if costs else 1.0
 
     def _emitters(self, rig: LightRig) -> tuple[Emitter, ...]:
         return soft(tuple(Emitter.of(light, self.views.lights.shape_free) for light in rig), 0.0)

@@ -13,13 +13,12 @@ from dataclasses import replace
 import torch
 
 from rgspipe.fitting.model.emitter import Emitter
-from rgspipe.fitting.model.problem import LightProblem
-from rgspipe.fitting.options import SearchOptions, SplitOptions
+from rgspipe.fitting.model.problem import ROUNDING, LightProblem
+from rgspipe.fitting.options import SearchOptions
 from rgspipe.fitting.result import FitResult
 from rgspipe.fitting.search.refine import Refiner
-from rgspipe.fitting.search.schedule import soft
+from rgspipe.fitting.search.schedule import refined_starts
 from rgspipe.fitting.search.starts import EmitterRig
-from rgspipe.fitting.search.weighting import PLAIN
 from rgspipe.fitting.search_lm import fit_from
 from rgspipe.renderer.images.model import ImageModel
 from rgspipe.scene.lights.coordinates import tangents
@@ -30,28 +29,26 @@ def split_lights(
     result: FitResult,
     blocks: ImageModel | None,
     search: SearchOptions | None = None,
-    options: SplitOptions | None = None,
 ) -> FitResult:
     """The result, or one with a light split in two in the place of its faintest if that explains clearly more.
 
     Args:
         problem: of all pixels.
         blocks: the views as blocks of pixels, on which split rigs are refined.
-        search: how split rigs are polished.
-        options: how lights are split.
+        search: how split rigs are refined and polished. The halves of a light are put as far apart as two answers are.
     """
-    search, options = search or SearchOptions(), options or SplitOptions()
+    search = search or SearchOptions()
     if len(result.lights) < 2:
         return result
     coarse = Refiner.of(problem.coarsest(blocks))
-    states = [coarse.start(rig, PLAIN) for rig in split_rigs(result, options.apart * coarse.region.size)]
-    for softness, steps in zip(options.softness, options.steps, strict=True):
-        states = [coarse.at(state, soft(state.emitters, softness)) for state in states]
-        states = [coarse.refined(state, PLAIN, steps) for state in states]
-        states = sorted(states, key=coarse.unexplained)[: options.kept]
-    polished = [fit_from(problem, state.emitters, search.iterations, search) for state in states[: options.polished]]
+    rigs = split_rigs(result, search.certainty.doubtful * coarse.region.size)
+    states = refined_starts(coarse, rigs, search.iterations, search.schedule)
+    best = sorted(states, key=coarse.unexplained)[: max(1, search.starts // 2)]
+    polished = [fit_from(problem, state.emitters, search.iterations, search) for state in best]
     best = min(polished, key=lambda other: other.loss)
-    chosen = best if best.loss < options.better * result.loss else result
+    # Below rounding no rig is the better one.
+    left, before = (max(one.loss, ROUNDING**2) for one in (best, result))
+    chosen = best if left < (1.0 - search.bar.least) * before else result
     return replace(
         chosen,
         seconds=result.seconds + coarse.meter.seconds,
