@@ -15,7 +15,7 @@ import torch
 from rgspipe.datasets.classes import OCCLUSIONS
 from rgspipe.datasets.frames import FrameEntry, read_entries
 from rgspipe.datasets.images import read_colour, read_depth, read_mask, read_vectors
-from rgspipe.datasets.info import DatasetInfo, read_info
+from rgspipe.datasets.info import INFO, DatasetInfo, read_info
 from rgspipe.datasets.input_file import is_plain_name
 from rgspipe.datasets.json_file import read_json, required, shown
 from rgspipe.datasets.tensoir import is_tensoir, load_tensoir
@@ -155,7 +155,7 @@ def _load_surface(entry: FrameEntry, camera, info: DatasetInfo | None) -> _Surfa
     if entry.depth_path is not None:
         if info is None:
             raise InputError(
-                entry.transforms_path.parent / "dataset_info.json",
+                entry.transforms_path.parent / INFO,
                 expected='a file that says what the depth images hold, with "depth_convention": "planar_z" or '
                 '"depth_convention": "ray_distance"',
                 found="no such file",

@@ -17,6 +17,7 @@ from rgspipe.datasets.views import Dataset
 from rgspipe.errors import InputError
 from rgspipe.fitting.model.capture import SATURATED
 from rgspipe.stages.base import Stage, StageContext
+from rgspipe.stages.check_conventions import check_conventions
 from rgspipe.stages.scene_model import scene_model
 from rgspipe.stages.sources import require_images
 
@@ -49,6 +50,7 @@ def _take_external(context: StageContext) -> None:
     """Read every file of the user's dataset, so that what is wrong shows now and not an hour later."""
     root = _existing_path(context.config, "the folder of a dataset")
     dataset = load_dataset(root)
+    check_conventions(dataset)
     point_at_dataset(context.folder, root)
     context.note(train=len(dataset.train), test=len(dataset.test), targets=len(dataset.targets))
     _tell_saturated(root, dataset, context)
