@@ -18,6 +18,7 @@ from rgspipe.datasets.images import read_colour, read_depth, read_mask, read_vec
 from rgspipe.datasets.info import INFO, DatasetInfo, read_info
 from rgspipe.datasets.input_file import is_plain_name
 from rgspipe.datasets.json_file import read_json, required, shown
+from rgspipe.datasets.saturation import with_saturation
 from rgspipe.datasets.tensoir import is_tensoir, load_tensoir
 from rgspipe.datasets.views import Dataset, Target, View
 from rgspipe.errors import InputError
@@ -51,10 +52,8 @@ def load_dataset(root: str | Path, *, train: bool = True, test: bool = True, tar
 def load_split(root: Path, split: str, info: DatasetInfo | None) -> tuple[View, ...]:
     """The views of transforms_<split>.json, each with its light."""
     entries = read_entries(root / f"transforms_{split}.json", f"the cameras and lights of the {split} views")
-    return tuple(
-        _load_view(entry, root, info, with_light=True)
-        for entry in progress_bar(entries, f"reading {split} views", unit="view")
-    )
+    reading = progress_bar(entries, f"reading {split} views", unit="view")
+    return with_saturation(entries, [_load_view(entry, root, info, with_light=True) for entry in reading])
 
 
 def load_target(folder: str | Path) -> Target:
@@ -77,7 +76,8 @@ def load_target(folder: str | Path) -> Target:
     entries = read_entries(folder / "transforms.json", "the cameras of a fit target")
     entries[0].refuse_other_world()
     info = _target_info(folder, place)
-    return Target(place.name, occlusion, tuple(_load_view(entry, folder, info, with_light=False) for entry in entries))
+    views = [_load_view(entry, folder, info, with_light=False) for entry in entries]
+    return Target(place.name, occlusion, with_saturation(entries, views))
 
 
 def _target_info(folder: Path, place: Path) -> DatasetInfo | None:
