@@ -6,7 +6,7 @@ import warnings
 from pathlib import Path
 
 import numpy as np
-from PIL import Image, UnidentifiedImageError
+from PIL import ExifTags, Image, UnidentifiedImageError
 
 from rgspipe.datasets.input_file import check_pixel_count, input_file
 from rgspipe.errors import InputError
@@ -87,7 +87,10 @@ def _levels(path: Path, kind: str) -> np.ndarray:
             with Image.open(path, formats=[kind]) as file:
                 check_pixel_count(path, *file.size)
                 _check_depth(path, kind)
+                _check_orientation(path, file)
                 return _unpacked(path, file)
+    except InputError:
+        raise
     except UnidentifiedImageError as error:
         raise _refusal(
             path, f"a {kind} image, as its name says", "an unreadable file: another format, or damaged"
@@ -104,6 +107,20 @@ def _check_depth(path: Path, kind: str) -> None:
         header = stream.read(COLOUR_TYPE + 1)
     if kind == "PNG" and header[DEPTH] == 16 and header[COLOUR_TYPE] in COLOURED:
         raise _refusal(path, "8 bits a channel", "16, of which half would be lost")
+
+
+def _check_orientation(path: Path, file: Image.Image) -> None:
+    """Refuse pixels that are to be turned before they are shown: a camera's pose may be meant for either."""
+    turned = file.getexif().get(ExifTags.Base.Orientation, 1)
+    if turned not in (0, 1):
+        raise InputError(
+            path,
+            expected="pixels as they are shown: no EXIF orientation, or 1",
+            found=f"orientation {turned}",
+            remedy="If poses and intrinsics are of the pixels as they are stored (COLMAP takes them so), remove the "
+            "tag (exiftool -Orientation= FILE); if they are of the image as it is shown, turn the pixels (mogrify "
+            "-auto-orient FILE).",
+        )
 
 
 def _unpacked(path: Path, file: Image.Image) -> np.ndarray:

@@ -9,6 +9,7 @@ import torch
 from torch import Tensor
 
 from rgspipe.datasets.classes import Occlusion
+from rgspipe.errors import InputError
 from rgspipe.scene import Camera, PointLight
 from rgspipe.scene.shapes import Float
 
@@ -75,3 +76,18 @@ class Dataset:
     train: tuple[View, ...]
     test: tuple[View, ...]
     targets: tuple[Target, ...]
+
+    def left_out(self) -> tuple[View, ...]:
+        """The held-out views, of which there must be some.
+
+        Raises:
+            InputError: the dataset has none.
+        """
+        if not self.test:
+            raise InputError(
+                self.root / "transforms_test.json",
+                expected="views that are left out of training, to judge it by",
+                found="none",
+                remedy="Move some frames of transforms_train.json there.",
+            )
+        return self.test
