@@ -5,9 +5,10 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from misread_views import misread_view
+from misread_views import lit_view, misread_view
 from raycast import room_views
 from rgspipe.config import RgspipeConfig, with_changes
 from rgspipe.datasets.exr import write_channels, write_image
@@ -36,6 +37,22 @@ def _written(root: Path, meant: Reading, convention: str = "planar_z") -> Path:
     info = json.loads((root / "dataset_info.json").read_text())
     (root / "dataset_info.json").write_text(json.dumps(info | {"depth_convention": convention}))
     return root
+
+
+def test_lamps_of_other_axes_are_told(tmp_path: Path) -> None:
+    root = _written(tmp_path / "room", Reading())
+    generator, entries = np.random.default_rng(5), []
+    for view in room_views(24, 20, normals=True):
+        lamp = generator.uniform(-0.35, 0.35, 3)
+        lit = lit_view(view, PointLight(lamp, 1.0), generator)
+        write_image(root / f"{view.name}.exr", lit.image.numpy())
+        write_channels(root / f"{view.name}_depth.exr", {"Z": view.depth.numpy()})
+        entries.append(frame_entry(view.name, view.camera, PointLight(lamp * [1, -1, -1], 1.0), ("depth",)))
+    write_transforms(root / "transforms_train.json", entries)
+    with pytest.raises(
+        InputError, match=r"pl_pos: .* 0\.\d+ with the places with y and z of other sign\. Change the sign"
+    ):
+        _check(root, tmp_path / "out")
 
 
 def _check(root: Path, folder: Path) -> None:

@@ -8,6 +8,7 @@ from rgspipe.datasets.info import INFO, read_info
 from rgspipe.datasets.views import Dataset
 from rgspipe.errors import InputError
 from rgspipe.evidence.conventions import Finding, misread
+from rgspipe.evidence.lamps import misplaced
 from rgspipe.evidence.readings import Reading
 from rgspipe.evidence.reprojection import Agreement
 
@@ -18,7 +19,7 @@ OTHER = {"planar_z": "ray_distance", "ray_distance": "planar_z"}
 
 
 def check_conventions(dataset: Dataset) -> None:
-    """Refuse training views whose depth contradicts their poses, where it would not if both were read otherwise.
+    """Refuse training views whose depth or brightness contradicts their poses and lamps, where it would not otherwise.
 
     Raises:
         InputError: naming the file that states it, what was found, and what to do.
@@ -29,6 +30,15 @@ def check_conventions(dataset: Dataset) -> None:
     finding = misread(dataset.train, info.depth_convention == "ray_distance")
     if finding is not None:
         raise _refusal(dataset.root, info.depth_convention, finding)
+    lamps = misplaced(dataset.train)
+    if lamps is not None:
+        raise InputError(
+            f"{dataset.root / TRANSFORMS}: pl_pos",
+            expected="places of lamps, in the axes and the unit of the poses, near which surfaces are brighter",
+            found=f"a rank correlation of {lamps.stated:.2f} between brightness and the light that surfaces would get "
+            f"as read, {lamps.found:.2f} with the places {lamps.lamps.words}",
+            remedy=lamps.lamps.remedy,
+        )
 
 
 def _refusal(root: Path, convention: str, finding: Finding) -> InputError:
