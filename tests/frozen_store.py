@@ -63,9 +63,9 @@ def write_targets(folder: Path, images: Mapping[str, Sequence[torch.Tensor]], tr
 
 
 def write_display_target(
-    folder: Path, images: Sequence[torch.Tensor], alphas: Sequence[torch.Tensor] | None = None
+    folder: Path, images: Sequence[torch.Tensor], alphas: Sequence[torch.Tensor] | None = None, suffix: str = ".png"
 ) -> None:
-    """A target of 8-bit PNG images of radiance (H, W, 3), clipped at 1, with straight alpha (H, W) if given."""
+    """A target of 8-bit images of radiance (H, W, 3), clipped at 1, with straight alpha (H, W) if given."""
     folder.mkdir(parents=True)
     for index, image in enumerate(images):
         levels = np.round(255.0 * srgb.encode(image.double().clamp(0.0, 1.0).numpy())).astype(np.uint8)
@@ -73,6 +73,6 @@ def write_display_target(
             levels = np.concatenate(
                 [levels, np.round(255.0 * alphas[index].numpy()[..., None]).astype(np.uint8)], axis=2
             )
-        Image.fromarray(levels).save(folder / f"view_{index}.png")
+        Image.fromarray(levels).save(folder / f"view_{index}{suffix}")
     entries = [frame_entry(f"./view_{index}", camera) for index, camera in enumerate(room_cameras(RESOLUTION))]
-    write_transforms(folder / "transforms.json", [entry | {"file_ext": ".png"} for entry in entries])
+    write_transforms(folder / "transforms.json", [entry | {"file_ext": suffix} for entry in entries])

@@ -29,7 +29,7 @@ FLOORS = (
     ("renderer",),
     ("fitting", "completion"),
     ("training",),
-    ("degradation", "robustness", "blender", "olat", "evaluation"),
+    ("degradation", "evidence", "robustness", "blender", "olat", "evaluation"),
     ("relighting", "studies", "benchmark", "pages"),
     ("config",),
     ("stages",),

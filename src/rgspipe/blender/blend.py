@@ -13,6 +13,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
+from rgspipe.blender.left_out import left_out
 from rgspipe.datasets.input_file import input_file
 from rgspipe.errors import InputError
 
@@ -25,11 +26,12 @@ GLOWING_SOCKETS = {
 }
 
 
-def open_normalised(path: str | Path) -> tuple[bpy.types.Scene, float, tuple[float, float, float]]:
+def open_normalised(path: str | Path) -> tuple[bpy.types.Scene, float, tuple[float, float, float], list[str]]:
     """A new scene with the surfaces of a .blend file, centred at the origin, longest side 1.
 
     Returns:
-        the scene, and `rescale` and `offset` by which a point x of the file became (x + offset) · rescale.
+        the scene, `rescale` and `offset` by which a point x of the file became (x + offset) · rescale, and sentences
+        about what of the file is left out or not modelled.
 
     Raises:
         InputError: no such file, not a .blend file, or one without a surface to render.
@@ -46,6 +48,7 @@ def open_normalised(path: str | Path) -> tuple[bpy.types.Scene, float, tuple[flo
             found="none that is rendered",
             remedy="Add an object with faces, or show the hidden ones in renders.",
         )
+    remarks = left_out(source, [material for mesh, _ in copies for material in mesh.materials])
     lo, hi = _bounds(copies)
     longest = float((hi - lo).max())
     if not np.isfinite(longest) or longest <= 0:
@@ -58,7 +61,7 @@ def open_normalised(path: str | Path) -> tuple[bpy.types.Scene, float, tuple[flo
         scene.collection.objects.link(bpy.data.objects.new(f"surface_{index}", mesh))
     remove_emission()
     bpy.context.view_layer.update()
-    return scene, rescale, tuple(offset.tolist())
+    return scene, rescale, tuple(offset.tolist()), remarks
 
 
 def remove_emission() -> None:

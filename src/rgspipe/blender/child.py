@@ -41,6 +41,10 @@ class Parent:
 
     number: int
 
+    def remark(self, text: str) -> None:
+        """Have the parent say something to people."""
+        _tell(remark=text)
+
     def require(self) -> None:
         """End this process if the parent has ended."""
         if os.getppid() != self.number:

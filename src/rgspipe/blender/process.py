@@ -126,6 +126,8 @@ def _follow(child: subprocess.Popen, scene: str) -> tuple[str, dict | None]:
                 continue
             message = json.loads(line[len(MESSAGE_PREFIX) :])
             input_error = message.get("input_error", input_error)
+            if "remark" in message:
+                print(f"warning: {message['remark']}")
             if "total" in message:
                 bar.begin(message["total"], message["done"])
             if damaged := message.get("damaged"):

@@ -32,6 +32,8 @@ def _render(content: dict, folder: Path, parent: Parent) -> None:
 
     job = DatasetJob.from_json(content)
     prepared = open_scene(job)
+    for remark in prepared.remarks:
+        parent.remark(f"{job.model.path}: {remark}")
     plan = make_plan(job, prepared.layout, prepared.geometry)
     write_dataset_files(job, plan, prepared, folder)
     frames = Frames(parent, folder, frame_files)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import bpy
@@ -26,6 +27,7 @@ class PreparedScene:
         geometry: its surfaces.
         layout: draws cameras and lights.
         rescale, offset: how the original coordinates became the scene's: (x + offset) · rescale.
+        remarks: sentences about what of the original is left out or not modelled.
     """
 
     scene: bpy.types.Scene
@@ -33,6 +35,7 @@ class PreparedScene:
     layout: Layout
     rescale: float
     offset: tuple[float, float, float]
+    remarks: Sequence[str] = ()
 
 
 def open_scene(job: DatasetJob) -> PreparedScene:
@@ -51,8 +54,8 @@ def open_scene(job: DatasetJob) -> PreparedScene:
 
 
 def _open_file(file: BlendFile, resolution: int) -> PreparedScene:
-    scene, rescale, offset = blend.open_normalised(file.path)
+    scene, rescale, offset, remarks = blend.open_normalised(file.path)
     geometry = scene_geometry(scene)
     space = FreeSpace(geometry)
     layout = RoomLayout(space, resolution) if space.is_room else ObjectLayout(space, resolution)
-    return PreparedScene(scene, geometry, layout, rescale, offset)
+    return PreparedScene(scene, geometry, layout, rescale, offset, remarks)

@@ -6,10 +6,11 @@ import warnings
 from pathlib import Path
 
 import numpy as np
-from PIL import Image, UnidentifiedImageError
+from PIL import ExifTags, Image, UnidentifiedImageError
 
 from rgspipe.datasets.input_file import check_pixel_count, input_file
 from rgspipe.errors import InputError
+from rgspipe.scene import srgb
 
 #: What a file may be, by its suffix. Pillow would start Ghostscript for an EPS image by another name.
 FORMATS = {".png": "PNG", ".jpg": "JPEG", ".jpeg": "JPEG"}
@@ -19,6 +20,10 @@ MODES = {"1": "L", "L": "L", "LA": "LA", "RGB": "RGB", "RGBA": "RGBA", "P": "RGB
 
 #: Depth and colour type in a PNG's header; the type of pixels with three or four channels.
 DEPTH, COLOUR_TYPE, COLOURED = 24, 25, (2, 4, 6)
+
+#: Levels by which a JPEG's colours may miss, besides what its tables leave out: brightness and two differences of
+#: colour are rounded, and these go into blue 1.77 times.
+COLOUR_ROUNDING = 1.5
 
 LARGEST_LEVEL = {np.dtype(np.uint8): 255.0, np.dtype(np.uint16): 65535.0}
 
@@ -51,6 +56,21 @@ def read_display_colour(path: Path) -> np.ndarray:
     return values if alpha is None else np.concatenate([values, alpha[..., None]], axis=2)
 
 
+def saturated_from(path: Path) -> float:
+    """Linear radiance from which on an 8-bit image that can be read may have been clipped at its brightest level.
+
+    In a PNG that is the brightest level itself, in a JPEG also what may have become of it: the levels within twice
+    the standard deviation of what its table of brightness leaves out. Coefficients of an orthonormal transform are
+    rounded to multiples of q, so that the error of a pixel has the variance of q² / 12 in the mean.
+    """
+    margin = 0.5
+    if _format(path) == "JPEG":
+        with Image.open(path, formats=["JPEG"]) as file:
+            table = np.asarray(file.quantization[0], dtype=np.float64)
+        margin += COLOUR_ROUNDING + 2.0 * float(np.sqrt(np.mean(table**2) / 12.0))
+    return float(srgb.decode(np.array(max(255.0 - margin, 0.0) / 255.0)))
+
+
 def _format(path: Path) -> str:
     kind = FORMATS.get(path.suffix.lower())
     if kind is None:
@@ -67,7 +87,10 @@ def _levels(path: Path, kind: str) -> np.ndarray:
             with Image.open(path, formats=[kind]) as file:
                 check_pixel_count(path, *file.size)
                 _check_depth(path, kind)
+                _check_orientation(path, file)
                 return _unpacked(path, file)
+    except InputError:
+        raise
     except UnidentifiedImageError as error:
         raise _refusal(
             path, f"a {kind} image, as its name says", "an unreadable file: another format, or damaged"
@@ -84,6 +107,20 @@ def _check_depth(path: Path, kind: str) -> None:
         header = stream.read(COLOUR_TYPE + 1)
     if kind == "PNG" and header[DEPTH] == 16 and header[COLOUR_TYPE] in COLOURED:
         raise _refusal(path, "8 bits a channel", "16, of which half would be lost")
+
+
+def _check_orientation(path: Path, file: Image.Image) -> None:
+    """Refuse pixels that are to be turned before they are shown: a camera's pose may be meant for either."""
+    turned = file.getexif().get(ExifTags.Base.Orientation, 1)
+    if turned not in (0, 1):
+        raise InputError(
+            path,
+            expected="pixels as they are shown: no EXIF orientation, or 1",
+            found=f"orientation {turned}",
+            remedy="If poses and intrinsics are of the pixels as they are stored (COLMAP takes them so), remove the "
+            "tag (exiftool -Orientation= FILE); if they are of the image as it is shown, turn the pixels (mogrify "
+            "-auto-orient FILE).",
+        )
 
 
 def _unpacked(path: Path, file: Image.Image) -> np.ndarray:

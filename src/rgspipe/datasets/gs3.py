@@ -15,24 +15,28 @@ import torch
 from rgspipe.datasets.classes import OCCLUSIONS
 from rgspipe.datasets.frames import FrameEntry, read_entries
 from rgspipe.datasets.images import read_colour, read_depth, read_mask, read_vectors
-from rgspipe.datasets.info import DatasetInfo, read_info
+from rgspipe.datasets.info import INFO, DatasetInfo, read_info
 from rgspipe.datasets.input_file import input_folder, is_plain_name
 from rgspipe.datasets.json_file import read_json, required, shown
+from rgspipe.datasets.saturation import with_saturation
 from rgspipe.datasets.tensoir import is_tensoir, load_tensoir
 from rgspipe.datasets.views import Dataset, Target, View
 from rgspipe.errors import InputError
 from rgspipe.progress import progress_bar
-from rgspipe.scene import PointLight
+from rgspipe.scene import Camera, PointLight
 
 #: Files of a result, beside the folders of targets.
 TAKEN = ("results.csv", "manifest.json")
+
+#: The views that are left out of training; a dataset can do without.
+TEST = "transforms_test.json"
 
 
 def load_dataset(root: str | Path, *, train: bool = True, test: bool = True, targets: bool = True) -> Dataset:
     """Read the wanted parts of the dataset in the folder `root`; what is not wanted is empty.
 
-    A dataset without targets/ has no targets; every split that is wanted must be there. A folder of TensoIR is read
-    as what it is.
+    A dataset without targets/ has no targets, and one without transforms_test.json no views that are left out. A folder
+    of TensoIR is read as what it is.
 
     Raises:
         InputError: any file is missing, broken or inconsistent.
@@ -41,7 +45,7 @@ def load_dataset(root: str | Path, *, train: bool = True, test: bool = True, tar
     if is_tensoir(root):
         return load_tensoir(root, train=train, test=test)
     info = read_info(root)
-    splits = {"train": train, "test": test}
+    splits = {"train": train, "test": test and (root / TEST).exists()}
     loaded = {name: load_split(root, name, info) if wanted else () for name, wanted in splits.items()}
     return Dataset(root, loaded["train"], loaded["test"], _load_targets(root) if targets else ())
 
@@ -49,10 +53,8 @@ def load_dataset(root: str | Path, *, train: bool = True, test: bool = True, tar
 def load_split(root: Path, split: str, info: DatasetInfo | None) -> tuple[View, ...]:
     """The views of transforms_<split>.json, each with its light."""
     entries = read_entries(root / f"transforms_{split}.json", f"the cameras and lights of the {split} views")
-    return tuple(
-        _load_view(entry, root, info, with_light=True)
-        for entry in progress_bar(entries, f"reading {split} views", unit="view")
-    )
+    reading = progress_bar(entries, f"reading {split} views", unit="view")
+    return with_saturation(entries, [_load_view(entry, root, info, with_light=True) for entry in reading])
 
 
 def load_target(folder: str | Path) -> Target:
@@ -71,7 +73,8 @@ def load_target(folder: str | Path) -> Target:
     entries = read_entries(folder / "transforms.json", "the cameras of a fit target")
     entries[0].refuse_other_world()
     info = _target_info(folder, place)
-    return Target(place.name, occlusion, tuple(_load_view(entry, folder, info, with_light=False) for entry in entries))
+    views = [_load_view(entry, folder, info, with_light=False) for entry in entries]
+    return Target(place.name, occlusion, with_saturation(entries, views))
 
 
 def _target_info(folder: Path, place: Path) -> DatasetInfo | None:
@@ -132,7 +135,7 @@ def _load_view(entry: FrameEntry, root: Path, info: DatasetInfo | None, *, with_
     if entry.mask_path is not None:
         mask = read_mask(entry.mask_path, camera)
         image, alpha = image * mask[..., None], alpha * mask
-    surface = _load_surface(entry, camera, info)
+    surface = _load_surface(entry, camera, info, needed=with_light)
     light = PointLight(*entry.light()) if with_light else None
     return View(
         _name(entry.image_path, root), camera, image, alpha, light, surface.depth, surface.normal, surface.albedo
@@ -144,12 +147,13 @@ def _name(path: Path, root: Path) -> str:
     return path.relative_to(root).with_suffix("").as_posix() if path.is_relative_to(root) else path.stem
 
 
-def _load_surface(entry: FrameEntry, camera, info: DatasetInfo | None) -> _Surface:
+def _load_surface(entry: FrameEntry, camera: Camera, info: DatasetInfo | None, needed: bool) -> _Surface:
     depth = None
-    if entry.depth_path is not None:
+    # What a target's depth holds need not be said: no fit asks for it.
+    if entry.depth_path is not None and (needed or (info is not None and info.depth_convention is not None)):
         if info is None:
             raise InputError(
-                entry.transforms_path.parent / "dataset_info.json",
+                entry.transforms_path.parent / INFO,
                 expected='a file that says what the depth images hold, with "depth_convention": "planar_z" or '
                 '"depth_convention": "ray_distance"',
                 found="no such file",

@@ -10,6 +10,9 @@ from rgspipe.errors import InputError
 
 VERSION = 1
 
+#: Its name in the folder of a dataset or of a target.
+INFO = "dataset_info.json"
+
 #: The depth conventions and what they say.
 DEPTH_CONVENTIONS = {
     "planar_z": "distance along the camera's axis, as Blender's Z pass",
@@ -37,7 +40,7 @@ def read_info(root: Path) -> DatasetInfo | None:
     Raises:
         InputError: another version, an unknown depth convention, or images that are not premultiplied.
     """
-    path = root / "dataset_info.json"
+    path = root / INFO
     if not path.exists():
         return None
     content = read_json(path, "what the dataset's images mean")

@@ -51,4 +51,4 @@ def load_views(folder: str | Path, split: Literal["train", "test"] = "train") ->
     if (Path(folder) / TARGET).exists():
         return load_target(folder).views
     dataset = open_dataset(folder, train=split == "train", test=split == "test", targets=False)
-    return dataset.train if split == "train" else dataset.test
+    return dataset.train if split == "train" else dataset.left_out()

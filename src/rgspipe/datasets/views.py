@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+import torch
 from torch import Tensor
 
 from rgspipe.datasets.classes import Occlusion
+from rgspipe.errors import InputError
 from rgspipe.scene import Camera, PointLight
 from rgspipe.scene.shapes import Float
 
@@ -26,6 +28,8 @@ class View:
             NaN where it is not known.
         normal: (H, W, 3) float32 unit world normals that face the camera; 0 where there is no surface.
         albedo: (H, W, 3) float32 diffuse reflectance; 0 where there is no surface.
+        saturated_from: radiance from which on the image tells only that the scene is at least so bright; None where
+            it holds radiance as it was.
     """
 
     name: str
@@ -36,6 +40,18 @@ class View:
     depth: Float[Tensor, "H W"] | None = None
     normal: Float[Tensor, "H W 3"] | None = None
     albedo: Float[Tensor, "H W 3"] | None = None
+    saturated_from: float | None = None
+
+    @property
+    def saturated(self) -> Tensor:
+        """(H, W, 3) bool: where the image tells only that the scene is at least so bright."""
+        if self.saturated_from is None:
+            return torch.zeros_like(self.image, dtype=torch.bool)
+        return self.image >= self.saturated_from
+
+    def as_photographed(self, rendered: Float[Tensor, "H W 3"]) -> Float[Tensor, "H W 3"]:
+        """A render (H, W, 3) that is the image wherever that is saturated and the render at least as bright."""
+        return torch.where(self.saturated & (rendered >= self.image), self.image, rendered)
 
     def __repr__(self) -> str:
         known = [name for name in ("light", "depth", "normal", "albedo") if getattr(self, name) is not None]
@@ -60,3 +76,18 @@ class Dataset:
     train: tuple[View, ...]
     test: tuple[View, ...]
     targets: tuple[Target, ...]
+
+    def left_out(self) -> tuple[View, ...]:
+        """The held-out views, of which there must be some.
+
+        Raises:
+            InputError: the dataset has none.
+        """
+        if not self.test:
+            raise InputError(
+                self.root / "transforms_test.json",
+                expected="views that are left out of training, to judge it by",
+                found="none",
+                remedy="Move some frames of transforms_train.json there.",
+            )
+        return self.test

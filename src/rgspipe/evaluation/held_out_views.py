@@ -18,7 +18,6 @@ from rgspipe.evaluation.metrics import psnr
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.transport import PatchTransport
-from rgspipe.renderer.view_weights import ViewWeights
 from rgspipe.scene.surfels import Surfels
 from rgspipe.training.gloss import GlossScene, render_gloss
 from rgspipe.training.gloss_light import operators_from
@@ -34,7 +33,7 @@ class HeldOut:
 
     Attributes:
         views: V views with their true images.
-        images: V renders (H, W, 3), linear radiance.
+        images: V renders (H, W, 3), linear radiance, saturated where the photographs are.
         albedo: V images (H, W, 3) of the surfels' albedo.
     """
 
@@ -96,10 +95,10 @@ def render_held_out(
     else:
         bounced = [None] * len(views) if transport is None else indirect_irradiance(lighting, own, transport)
         flat = [model.image(own, indirect) for model, indirect in zip(models, bounced, strict=True)]
-    images = tuple(_image(weight, pixels) for weight, pixels in zip(weights, flat, strict=True))
+    images = tuple(_image(view, pixels) for view, pixels in zip(views, flat, strict=True))
     albedo = tuple(weight.image(own).numpy() for weight in weights)
     return HeldOut(tuple(views), images, albedo)
 
 
-def _image(weights: ViewWeights, pixels: Tensor) -> npt.NDArray[np.float32]:
-    return pixels.reshape(weights.camera.height, weights.camera.width, 3).numpy()
+def _image(view: View, pixels: Tensor) -> npt.NDArray[np.float32]:
+    return view.as_photographed(pixels.reshape(view.image.shape)).numpy()

@@ -32,7 +32,7 @@ class Renders:
 
     Attributes:
         views: with their true images and lights.
-        images: by the key in `PLACES`, V images (H, W, 3), linear radiance.
+        images: by the key in `PLACES`, V images (H, W, 3), linear radiance, saturated where the photographs are.
         albedo: V images (H, W, 3).
         count: surfels of the scene.
     """
@@ -83,7 +83,7 @@ def render_views(frozen: FrozenScene, views: Sequence[View]) -> Renders:
         weights = frozen.view(view.camera)
         albedo.append(weights.image(frozen.surfels.albedo.float()).numpy())
         for place, at_pixels in PLACES.items():
-            images[place].append(_render(frozen, weights, view, at_pixels).numpy())
+            images[place].append(view.as_photographed(_render(frozen, weights, view, at_pixels)).numpy())
     return Renders(tuple(views), images, albedo, len(frozen.surfels))
 
 

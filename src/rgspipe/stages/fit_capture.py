@@ -8,7 +8,7 @@ from rgspipe.config import RgspipeConfig
 from rgspipe.datasets.views import View
 from rgspipe.degradation.target_capture import captured
 from rgspipe.errors import InputError
-from rgspipe.fitting.model.capture import ImageCapture, stored_in_eight_bits
+from rgspipe.fitting.model.capture import SATURATED, ImageCapture, stored_in_eight_bits
 
 #: Configuration keys that all this depends on.
 KEYS = ("target_capture", "fit.exposure", "fit.clip")
@@ -17,7 +17,8 @@ KEYS = ("target_capture", "fit.exposure", "fit.clip")
 def captured_views(views: Sequence[View], target: str, config: RgspipeConfig) -> tuple[list[View], ImageCapture]:
     """The views of a target with the errors of `target_capture`, and what a fit may know of how they were taken.
 
-    Images that hold nothing but the levels of 8-bit sRGB are clipped at 1; others are not, unless `fit.clip` says so.
+    Images that hold nothing but the levels of 8-bit sRGB are clipped at 1, others where their values pile up; or both
+    where `fit.clip` says so.
 
     Raises:
         InputError: the paper's method is asked for unknown exposures.
@@ -34,6 +35,12 @@ def captured_views(views: Sequence[View], target: str, config: RgspipeConfig) ->
             )
         return taken, ImageCapture()
     clip = white if white is not None else config.fit.clip
-    if clip is None and all(stored_in_eight_bits(view.image, view.alpha) for view in taken):
-        clip = 1.0
-    return taken, ImageCapture(free, clip)
+    return taken, ImageCapture(free, clip) if clip is not None else _found_capture(taken, free)
+
+
+def _found_capture(views: Sequence[View], free: bool) -> ImageCapture:
+    """What the images themselves tell of where they are clipped."""
+    limits = [view.saturated_from for view in views if view.saturated_from is not None]
+    if all(stored_in_eight_bits(view.image, view.alpha) for view in views):
+        return ImageCapture(free, 1.0, min(limits, default=SATURATED))
+    return ImageCapture(free, limits[0]) if len(limits) == len(views) and len(set(limits)) == 1 else ImageCapture(free)

@@ -5,18 +5,19 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from rgspipe.blender.job import DatasetJob
 from rgspipe.blender.render_dataset import render_dataset
 from rgspipe.config import RgspipeConfig
 from rgspipe.config.scene import MODELLED
-from rgspipe.datasets.frames import read_entries
 from rgspipe.datasets.gs3 import load_dataset
 from rgspipe.datasets.location import point_at_dataset
 from rgspipe.datasets.read_files import files_read
 from rgspipe.datasets.views import Dataset
 from rgspipe.errors import InputError
-from rgspipe.fitting.model.capture import SATURATED
 from rgspipe.stages.base import Stage, StageContext
+from rgspipe.stages.check_conventions import check_conventions
 from rgspipe.stages.scene_model import scene_model
 from rgspipe.stages.sources import require_images
 
@@ -49,31 +50,23 @@ def _take_external(context: StageContext) -> None:
     """Read every file of the user's dataset, so that what is wrong shows now and not an hour later."""
     root = _existing_path(context.config, "the folder of a dataset")
     dataset = load_dataset(root)
+    check_conventions(dataset)
     point_at_dataset(context.folder, root)
     context.note(train=len(dataset.train), test=len(dataset.test), targets=len(dataset.targets))
-    _tell_saturated(root, dataset, context)
+    _tell_saturated(dataset, context)
 
 
-def _tell_saturated(root: Path, dataset: Dataset, context: StageContext) -> None:
-    """Say which share of the pixels of 8-bit training images has a channel at the brightest level."""
-    path = root / "transforms_train.json"
-    if not path.is_file():  # a folder of TensoIR, which is not trained on
-        return
-    entries = read_entries(path, "the training views")
-    images = [
-        view.image
-        for entry, view in zip(entries, dataset.train, strict=True)
-        if entry.image_path.suffix.lower() != ".exr"
-    ]
+def _tell_saturated(dataset: Dataset, context: StageContext) -> None:
+    """Say which share of the pixels of training images has a channel that is saturated, where images can be."""
+    images = [view for view in dataset.train if view.saturated_from is not None]
     if not images:
         return
-    bright = sum(int((image >= SATURATED).any(dim=-1).sum()) for image in images)
-    share = bright / sum(image.shape[0] * image.shape[1] for image in images)
+    share = float(np.mean([float(view.saturated.any(dim=-1).float().mean()) for view in images]))
     context.note(saturated=round(share, 4))
     if share > NOTICEABLE:
         print(
-            f"warning: {100 * share:.1f} % of the pixels of 8-bit training images are saturated, and count as if they "
-            "were no brighter than that: expose less, or use linear EXR"
+            f"warning: {100 * share:.1f} % of the pixels of {len(images)} training images are saturated. They tell "
+            "only that the scene is at least so bright, and are left out: expose less, or use linear EXR"
         )
 
 

@@ -21,7 +21,7 @@ SPLIT = ["surfels", "light", "kind", "pixels", "error", "psnr"]
 def run(context: StageContext) -> None:
     """Write quality.csv, split.csv, views.csv, comparison.png and typical.png."""
     require_images(context.config, "held-out views")
-    views = open_dataset(context.inputs["generate_dataset"].folder(), train=False, targets=False).test
+    views = open_dataset(context.inputs["generate_dataset"].folder(), train=False, targets=False).left_out()
     scenes = [FrozenScene.load(artifact.folder()) for artifact in context.input_lists["freeze"]]
     renders, surfels = render_views(scenes[0], views), context.config.freeze.surfels
     # Edges of shadows are told by the true surfels, so that scenes are split alike.

@@ -137,7 +137,7 @@ def _camera_views(config: RgspipeConfig, folder: Path | None) -> Sequence[View]:
     if split == "targets":
         return load_target(_first_target(config, folder)).views
     dataset = open_dataset(folder, train=split == "train", test=split == "test", targets=False)
-    return dataset.train if split == "train" else dataset.test
+    return dataset.train if split == "train" else dataset.left_out()
 
 
 def _first_target(config: RgspipeConfig, folder: Path | None) -> Path:

@@ -6,6 +6,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -36,7 +37,7 @@ NO_RESULT = ("memory_mib", "scratch", "checkpoint_every")
 
 
 def run(context: StageContext) -> None:
-    """Write surfels.safetensors, training.csv, metrics.json and comparison.png."""
+    """Write surfels.safetensors, training.csv, metrics.json and, where views are left out, comparison.png."""
     memory, config = PeakMemory(), context.config.train
     options = replace(config, scratch=config.scratch or context.scratch)
     dataset = open_dataset(context.inputs["generate_dataset"].folder(), targets=False)
@@ -48,20 +49,15 @@ def run(context: StageContext) -> None:
     save_surfels(context.folder / "surfels.safetensors", trained.surfels)
     _write_table(context.folder / "training.csv", trained)
 
-    began = time.perf_counter()
-    frozen = build_frozen(trained.surfels, options)
-    held_out = render_held_out(
-        trained.surfels,
-        dataset.test,
-        frozen.transport,
-        options.supersampling,
-        options.at_pixels,
-        OperatorStore.of(options),
-        frozen.gather,
-    )
-    seconds = {"training": trained.records[-1].seconds, "held_out": time.perf_counter() - began}
-    metrics = held_out.summary() | {"surfels": len(trained.surfels), "seconds": seconds["training"]}
-    if config.direct_only:
+    seconds = {"training": trained.records[-1].seconds}
+    metrics: dict[str, Any] = {}
+    if dataset.test:
+        began = time.perf_counter()
+        metrics = _held_out(trained, dataset.test, options, context.folder)
+        seconds["held_out"] = time.perf_counter() - began
+    print(_quality(metrics))
+    metrics |= {"surfels": len(trained.surfels), "seconds": seconds["training"]}
+    if config.direct_only and dataset.test:
         metrics["direct_only_psnr"] = _direct_only(trained, train_views, dataset.test, options)
     metrics["peak_memory_mib"] = memory.mib()
     metrics["operators_mib"] = trained.stored.mib()
@@ -70,13 +66,41 @@ def run(context: StageContext) -> None:
     if options.light_rounds > 0:
         metrics["lights"] = _corrections(train_views, trained.views)
     write_json(context.folder / "metrics.json", metrics)
-    picture = held_out_picture(held_out.views, held_out.images, held_out.psnr, held_out.albedo)
-    save_png(context.folder / "comparison.png", picture)
     context.note(
-        test_psnr_mean=metrics["test_psnr_mean"],
+        test_psnr_mean=metrics.get("test_psnr_mean"),
         surfels=len(trained.surfels),
         seconds={name: round(value, 3) for name, value in seconds.items()},
     )
+
+
+def _held_out(trained: Trained, views: tuple[View, ...], options: TrainOptions, folder: Path) -> dict[str, Any]:
+    """Measures of the views that training never saw, with a picture of them in `folder`."""
+    frozen = build_frozen(trained.surfels, options)
+    held_out = render_held_out(
+        trained.surfels,
+        views,
+        frozen.transport,
+        options.supersampling,
+        options.at_pixels,
+        OperatorStore.of(options),
+        frozen.gather,
+    )
+    picture = held_out_picture(held_out.views, held_out.images, held_out.psnr, held_out.albedo)
+    save_png(folder / "comparison.png", picture)
+    return held_out.summary()
+
+
+def _quality(metrics: dict[str, Any]) -> str:
+    """One line on how well the scene renders what it was not trained on."""
+    if "per_view" not in metrics:
+        return "training: no view was left out of it (transforms_test.json), so nothing tells how good the scene is"
+    rows = [row for row in metrics["per_view"] if row["psnr"] is not None]
+    if not rows:
+        return "training: no PSNR, as the views that were left out are black"
+    worst = min(rows, key=lambda row: row["psnr"])
+    mean = sum(row["psnr"] for row in rows) / len(rows)
+    shown = f"{worst['psnr']:.1f} dB in the worst ({worst['name']})"
+    return f"training: PSNR {mean:.1f} dB on {len(rows)} views that were left out, {shown}"
 
 
 def _direct_only(

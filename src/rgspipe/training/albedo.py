@@ -216,11 +216,13 @@ def _of_view(indirect: Tensor | None, v: int) -> Tensor | None:
 
 
 def pixel_weight(view: View, coverage: Tensor) -> Tensor:
-    """(P,) weights; none where surfels and photograph disagree on what is covered, which is for the geometry."""
+    """(P,) weights; none where surfels and photograph disagree on what is covered, which is for the geometry, and
+    none where the photograph is saturated."""
     image, alpha = view.image.reshape(-1, 3).float(), view.alpha.reshape(-1).float()
     peak = torch.quantile(image, 0.99).clamp(min=1e-12)
     weight = 1.0 / (image.mean(dim=1) / peak + 0.1) / peak.square()
     trusted = (coverage >= MINIMUM_COVERAGE) & ((alpha - coverage).abs() <= COVERAGE_MISMATCH)
+    trusted &= ~view.saturated.reshape(-1, 3).any(dim=1)
     return torch.where(trusted, weight, torch.zeros_like(weight))
 
 

@@ -57,6 +57,7 @@ class RefineView:
         light: how its light reaches the surfels.
         edges: (pixels,) bool.
         peak: what its errors are measured against.
+        saturated: (pixels, 3) bool, where the image tells only that the scene is at least so bright; None for nowhere.
     """
 
     camera: Camera
@@ -65,6 +66,14 @@ class RefineView:
     light: SurfelLight
     edges: Tensor
     peak: float
+    saturated: Tensor | None = None
+
+    def as_photographed(self, pixels: Tensor, rendered: Tensor) -> Tensor:
+        """Rendered pixels (P, 3), no brighter than the image where that is saturated."""
+        if self.saturated is None:
+            return rendered
+        met = self.saturated[pixels] & (rendered >= self.image[pixels])
+        return torch.where(met, self.image[pixels], rendered)
 
 
 @dataclass
@@ -184,7 +193,10 @@ def _step_loss(
     bvh = SurfelBvh(surfels)
     hits = composite(bvh, rays[0], rays[1])
     colours = shade_rays(bvh, surfels, thresholds, radiance, *rays, hits)
-    images = [pixel_means(draw, seen) for draw, seen in zip(draws, _split(draws, colours), strict=True)]
+    images = [
+        view.as_photographed(draw.pixels, pixel_means(draw, seen))
+        for view, draw, seen in zip(chosen, draws, _split(draws, colours), strict=True)
+    ]
     data = _image_term(chosen, draws, images, options)
     prior = torch.zeros(())
     if options.alpha_weight > 0.0:

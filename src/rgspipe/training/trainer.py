@@ -152,7 +152,11 @@ def _turned_by_shading(
     if roughness(surfels, pairs) < LEAST_ROUGHNESS:
         return None
     lights = surfel_lights(surfels, [view.light for view in views], radiance / surfels.albedo.clamp(min=1e-6))
-    weights = each_view(surfels, views, supersampling=1)
+    # Saturated pixels tell as little of shading as edges do, and are left out with them.
+    weights = (
+        replace(weight, edges=weight.edges | view.saturated.reshape(-1, 3).any(dim=1))
+        for weight, view in zip(each_view(surfels, views, supersampling=1), views, strict=True)
+    )
     images = [view.image.reshape(-1, 3).float() for view in views]
     turned = fit_normals(surfels, weights, images, lights, pairs)
     return fit_heights(turned, measured, find_neighbours(turned, spacing))
@@ -226,10 +230,11 @@ def refine_views(surfels: Surfels, views: Sequence[View], radiance: Tensor) -> l
     lights = surfel_lights(surfels, [view.light for view in views], radiance / surfels.albedo.clamp(min=1e-6))
     found = []
     for view, light in zip(views, lights, strict=True):
-        image = view.image.reshape(-1, 3).float()
+        image, alpha = view.image.reshape(-1, 3).float(), view.alpha.reshape(-1).float()
         edges = build_view_weights(bvh, view.camera, supersampling=1).edges
         peak = float(torch.quantile(image, 0.995).clamp(min=1e-12))
-        found.append(RefineView(view.camera, image, view.alpha.reshape(-1).float(), light, edges, peak))
+        saturated = None if view.saturated_from is None else view.saturated.reshape(-1, 3)
+        found.append(RefineView(view.camera, image, alpha, light, edges, peak, saturated))
     return found
 
 
@@ -248,7 +253,8 @@ class _Log:
         for view, render in zip(views, fitted.renders, strict=True):
             image = view.image.reshape(-1, 3)
             peak = torch.quantile(image, 0.995).clamp(min=1e-12)
-            errors.append(float(average(((render - image) / peak).square())))
+            shown = view.as_photographed(render.reshape(view.image.shape)).reshape(-1, 3)
+            errors.append(float(average(((shown - image) / peak).square())))
         self._add(phase, 0, float(np.mean(errors)), float(np.mean([_decibels(error) for error in errors])))
         self.stored = max(self.stored, fitted.stored, key=lambda stored: stored.memory + stored.file)
         last = self.records[-1]

@@ -24,7 +24,7 @@ import torch
 from torch import Tensor
 
 from rgspipe.fitting.certainty.uncertainty import surface_cells, whitener
-from rgspipe.fitting.model.capture import SATURATED, ImageCapture
+from rgspipe.fitting.model.capture import ImageCapture
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.moments import group_moments, information, scores
 from rgspipe.fitting.model.problem import LightProblem
@@ -143,7 +143,7 @@ def suggest_views(
 
 def _clips(result: FitResult, capture: ImageCapture, present: int, count: int) -> Tensor:
     """(count,) radiance from which on each view is saturated, in the exposure of the first one."""
-    limit = math.inf if capture.clip is None else SATURATED * capture.clip
+    limit = math.inf if capture.clip is None else capture.saturated * capture.clip
     clips = torch.full((count,), limit, dtype=torch.float64)
     if result.exposures:
         clips[:present] /= torch.tensor(result.exposures, dtype=torch.float64)

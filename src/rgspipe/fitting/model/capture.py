@@ -17,7 +17,7 @@ LEVELS = 255.0
 #: How far from a level, in levels, a value may be that was stored as one.
 ROUNDING = 1e-2
 
-#: A value from here on, as a part of the clip, is saturated: half a level below the brightest one.
+#: … and that is where images hold their levels: half a level below the brightest one.
 SATURATED = float(srgb.decode(np.array((LEVELS - 0.5) / LEVELS)))
 
 
@@ -29,10 +29,12 @@ class ImageCapture:
         exposure_free: whether every view but the first has an unknown exposure.
         clip: radiance of the brightest level of 8-bit sRGB images, at which they are clipped; None for images that hold
             radiance as it was. Saturated values tell only that the radiance is at least so high.
+        saturated: a value from here on, as a part of the clip, is saturated.
     """
 
     exposure_free: bool = False
     clip: float | None = None
+    saturated: float = SATURATED
 
 
 def stored_in_eight_bits(image: Tensor, alpha: Tensor) -> bool:

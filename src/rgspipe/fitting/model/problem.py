@@ -42,6 +42,7 @@ class LightProblem:
         exposures: (V,) float64 of the views, by which the target is divided already.
         exposure_free: whether these are only a guess, and are found together with the intensities.
         clip: (P, 1) float32 radiance at which the target is clipped, over `scale`; None where it is not.
+        saturated_from: the part of the clip from which on values are saturated.
         noise: (P, 3) float32 standard deviation of the target's rounding, over `scale`; None where there is none.
         loss: how much pixels count.
     """
@@ -54,6 +55,7 @@ class LightProblem:
     exposures: Tensor | None = None
     exposure_free: bool = False
     clip: Tensor | None = None
+    saturated_from: float = SATURATED
     noise: Tensor | None = None
     loss: LossOptions = field(default_factory=LossOptions)
 
@@ -81,7 +83,8 @@ class LightProblem:
         if capture.clip is None or scale == 0.0:
             return problem
         clip = torch.full_like(problem.target[:, :1], capture.clip / scale)
-        return replace(problem, clip=clip, noise=rounding_noise(target / scale, capture.clip / scale).float())
+        noise = rounding_noise(target / scale, capture.clip / scale).float()
+        return replace(problem, clip=clip, saturated_from=capture.saturated, noise=noise)
 
     @property
     def black(self) -> bool:
@@ -140,7 +143,7 @@ class LightProblem:
         """(P, 3) bool: values that tell only that the radiance is at least so high."""
         if self.clip is None:
             return torch.zeros_like(self.target, dtype=torch.bool)
-        return self.target >= SATURATED * self.clip
+        return self.target >= self.saturated_from * self.clip
 
     def unclipped(self, weights: Tensor) -> Tensor:
         """Weights (P, 1) or (P, 3) that leave out values of which it is not known whether they are met."""

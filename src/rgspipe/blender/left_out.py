@@ -1,0 +1,137 @@
+"""What a user's .blend file holds that no surfel can be, and what leaving it out costs."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
+
+import bpy
+
+#: Nodes that let light through, and those that mirror.
+CLEAR = {"BSDF_GLASS", "BSDF_REFRACTION", "BSDF_TRANSPARENT", "BSDF_TRANSLUCENT", "BSDF_RAY_PORTAL"}
+MIRRORING = {"BSDF_GLOSSY", "BSDF_METALLIC", "BSDF_ANISOTROPIC"}
+
+#: Inputs that all have to be above 0 for a surface to glow.
+GLOWING = {"EMISSION": ("Strength", "Color"), "BSDF_PRINCIPLED": ("Emission Strength", "Emission Color")}
+
+#: Names of materials that a sentence lists.
+LISTED = 4
+
+Test = Callable[[bpy.types.ShaderNodeTree], bool]
+
+
+def left_out(scene: bpy.types.Scene, materials: Iterable[bpy.types.Material]) -> list[str]:
+    """Sentences about the open file as it is, one a subject.
+
+    Args:
+        scene: what is rendered of it.
+        materials: of the surfaces that are.
+    """
+    used = sorted({material for material in materials if material is not None}, key=lambda material: material.name)
+    found = {what: _named(used, test) for what, test in TESTS.items()}
+    sentences = [_lamps(scene), _world(scene)]
+    sentences += [f"{what} of {names} {COSTS[what]}" for what, names in found.items() if names]
+    sentences.append(_other_objects(scene))
+    return [sentence for sentence in sentences if sentence]
+
+
+def _lamps(scene: bpy.types.Scene) -> str:
+    kinds = Counter(item.data.type.lower() for item in scene.objects if item.type == "LIGHT" and not item.hide_render)
+    if not kinds:
+        return ""
+    listed = ", ".join(f"{count} {kind}" for kind, count in sorted(kinds.items()))
+    return f"light of its lamps ({listed}) is left out: a point light of our own is all that shines in each image"
+
+
+def _world(scene: bpy.types.Scene) -> str:
+    tree = None if scene.world is None else scene.world.node_tree
+    shines = tree is not None and any(
+        node.type == "BACKGROUND" and _above_zero(node, "Strength") and _above_zero(node, "Color")
+        for node in reached(tree)
+    )
+    return "light of its world is left out: what is around the scene is black" if shines else ""
+
+
+def _other_objects(scene: bpy.types.Scene) -> str:
+    kinds = {"VOLUME": "volumes", "CURVES": "hair", "POINTCLOUD": "point clouds"}
+    count = Counter(kinds[item.type] for item in scene.objects if item.type in kinds and not item.hide_render)
+    if not count:
+        return ""
+    listed = ", ".join(f"{kind}: {number}" for kind, number in sorted(count.items()))
+    return f"objects that are no surfaces ({listed}) are left out: they are in no image"
+
+
+def _named(materials: Sequence[bpy.types.Material], test: Test) -> str:
+    """The names of those with a property; empty for none."""
+    names = [material.name for material in materials if material.node_tree is not None and test(material.node_tree)]
+    more = [f"{len(names) - LISTED} more"] if len(names) > LISTED else []
+    return ", ".join([*(f'"{name}"' for name in names[:LISTED]), *more])
+
+
+def _glows(tree: bpy.types.ShaderNodeTree) -> bool:
+    return any(
+        node.type in GLOWING and all(_above_zero(node, name) for name in GLOWING[node.type]) for node in reached(tree)
+    )
+
+
+def _clear(tree: bpy.types.ShaderNodeTree) -> bool:
+    return any(
+        node.type in CLEAR
+        or (node.type == "BSDF_PRINCIPLED" and (_above_zero(node, "Transmission Weight") or _below_one(node, "Alpha")))
+        for node in reached(tree)
+    )
+
+
+def _mirrors(tree: bpy.types.ShaderNodeTree) -> bool:
+    return any(
+        node.type in MIRRORING or (node.type == "BSDF_PRINCIPLED" and _above_zero(node, "Metallic"))
+        for node in reached(tree)
+    )
+
+
+def _scatters(tree: bpy.types.ShaderNodeTree) -> bool:
+    outputs = [node for node in tree.nodes if node.type == "OUTPUT_MATERIAL" and node.is_active_output]
+    return any(node.inputs["Volume"].is_linked for node in outputs)
+
+
+#: What a material may be besides a diffuse surface, and what comes of it.
+TESTS: dict[str, Test] = {"light": _glows, "glass": _clear, "metal": _mirrors, "fog": _scatters}
+COSTS = {
+    "light": "is left out: nothing glows",
+    "glass": "is in the images, but a surfel lets no light through: what is seen through it, and the light that "
+    "falls through it, is taken for its own colour, and a lamp behind it is not found",
+    "metal": "is in the images, but surfels are diffuse (train.gloss=auto finds broad highlights): what it mirrors is "
+    "taken for its own colour",
+    "fog": "is in the images, but no model has any: surfaces behind it are taken for paler or darker than they are",
+}
+
+
+def reached(tree: bpy.types.ShaderNodeTree) -> Iterator[bpy.types.Node]:
+    """The nodes that lead to an output of a tree, those of groups included."""
+    outputs = {"OUTPUT_MATERIAL", "OUTPUT_WORLD", "GROUP_OUTPUT"}
+    waiting = [node for node in tree.nodes if node.type in outputs and getattr(node, "is_active_output", True)]
+    seen = set()
+    while waiting:
+        node = waiting.pop()
+        if node.name in seen:
+            continue
+        seen.add(node.name)
+        yield node
+        if node.type == "GROUP" and node.node_tree is not None:
+            yield from reached(node.node_tree)
+        waiting += [link.from_node for socket in node.inputs for link in socket.links]
+
+
+def _above_zero(node: bpy.types.Node, name: str) -> bool:
+    """Whether an input may be above 0: it is, or something is linked to it."""
+    socket = node.inputs.get(name)
+    if socket is None:
+        return False
+    value = socket.default_value
+    return socket.is_linked or (value > 0.0 if isinstance(value, float) else max(value[:3]) > 0.0)
+
+
+def _below_one(node: bpy.types.Node, name: str) -> bool:
+    """Whether an input may be below 1: it is, or something is linked to it."""
+    socket = node.inputs.get(name)
+    return socket is not None and (socket.is_linked or socket.default_value < 1.0)
