@@ -79,7 +79,7 @@ def _check(root: Path, folder: Path) -> None:
 def test_what_was_meant_is_said(tmp_path: Path, meant: Reading, file: str, found: str, remedy: str) -> None:
     root = _written(tmp_path / "room", meant)
     with pytest.raises(
-        InputError, match=rf"found 9\d % of \d+ points that agree {found}.* as read\. .*{remedy}"
+        InputError, match=rf"found 9\d % of \d+ points agreeing {found}.* as read\. .*{remedy}"
     ) as caught:
         _check(root, tmp_path / "out")
     assert caught.value.where == str(root / file)

@@ -49,15 +49,15 @@ def _refusal(root: Path, convention: str, finding: Finding) -> InputError:
         root / TRANSFORMS if about_poses else root / INFO,
         expected="camera-to-world poses with OpenGL axes and depth of their unit and of the stated convention, "
         f"{convention}, by which the views agree where they show the same places",
-        found=f"{_agreement(finding.found)} under {' and '.join(meant)}, {_agreement(finding.stated)} as read",
+        found=f"{_share(finding.found)} agreeing under {' and '.join(meant)}, and {_share(finding.stated)} as read",
         remedy=" ".join(_remedies(reading, OTHER[convention])),
     )
 
 
-def _agreement(result: Agreement) -> str:
+def _share(result: Agreement) -> str:
     if not result.tested:
-        return "not one that could be compared"
-    return f"{100 * result.share:.0f} % of {result.tested} points that agree"
+        return "none that could be compared"
+    return f"{100 * result.share:.0f} % of {result.tested} points"
 
 
 def _meant(reading: Reading, other: str) -> list[str]:
