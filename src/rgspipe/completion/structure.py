@@ -7,6 +7,7 @@ until they meet. The side from which the cameras looked is closed right behind t
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -70,7 +71,7 @@ def continued(
 
 
 def _beyond(plane: Plane, members: cKDTree, grid: Grid, seen: np.ndarray, spacing: float) -> Continued:
-    """The places of a plane within the box that hang together with its surfels and that nothing speaks against."""
+    """The places of a plane within the box that its surfels border on more than what cameras saw through does."""
     normal = plane.normal.numpy()
     raster = _Raster.on_plane(normal, plane.offset, grid, spacing)
     places = raster.places
@@ -79,10 +80,7 @@ def _beyond(plane: Plane, members: cKDTree, grid: Grid, seen: np.ndarray, spacin
     pierced = grid.at(seen, places).reshape(raster.shape)
     # One place wide it is the blur of an edge.
     unknown = binary_opening(within & ~pierced | supported, np.ones((3, 3))) & ~supported
-    labels, _ = label(unknown | supported)
-    reached = np.unique(labels[supported])
-    kept = unknown & np.isin(labels, reached[reached > 0])
-    return raster.chosen(kept, normal)
+    return raster.chosen(_parts(unknown, lambda rim: supported[rim].sum() > pierced[rim].sum(), outer=True), normal)
 
 
 def _side(
@@ -100,14 +98,24 @@ def _side(
     unknown &= (surfaces.query(places)[0] > BARE * spacing).reshape(raster.shape)
     unknown = binary_opening(unknown, np.ones((3, 3)))
     near = (known.query(places)[0] <= 2.0 * BARE * spacing).reshape(raster.shape)
+    return raster.chosen(_parts(unknown, lambda rim: near[rim].mean() > 0.5, outer=False), normal)
+
+
+def _parts(unknown: np.ndarray, is_kept: Callable[[np.ndarray], bool], outer: bool) -> np.ndarray:
+    """The connected parts of `unknown` (A, B) that are to be kept.
+
+    Args:
+        is_kept: asked of the rim (A, B) of a part.
+        outer: whether the rim is what lies around the part, or else what of the part lies at its edge.
+    """
     labels, count = label(unknown)
     kept = np.zeros_like(unknown)
     for index in range(1, count + 1):
         part = labels == index
-        rim = part & ~_eroded(part)
-        if near[rim].mean() > 0.5:
+        rim = binary_dilation(part) & ~part if outer else part & ~_eroded(part)
+        if is_kept(rim):
             kept |= part
-    return raster.chosen(kept, normal)
+    return kept
 
 
 def _eroded(part: np.ndarray) -> np.ndarray:

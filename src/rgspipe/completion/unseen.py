@@ -84,15 +84,15 @@ def _unseen(surfels: Surfels, cameras: Sequence[Camera], spacing: float) -> Cont
     """Where surfels are missing, in a room whose axes are x, y and z."""
     centers = surfels.centers.double().cpu()
     eyes = torch.stack([camera.origin.double().cpu() for camera in cameras])
-    edge = spacing / CELLS_PER_SPACING
+    edge, bvh = spacing / CELLS_PER_SPACING, _tree(surfels)
     lower = torch.minimum(centers.amin(dim=0), eyes.amin(dim=0) - BEHIND * edge)
     upper = torch.maximum(centers.amax(dim=0), eyes.amax(dim=0) + BEHIND * edge)
-    grid = Grid.over(lower, upper, edge)
+    guessed = _guessed(surfels, bvh, cameras, Grid.over(lower, upper, edge), spacing)
+    # What lies before an open front is no part of the room, and needs no cells.
+    known = torch.cat([centers, torch.from_numpy(guessed.places)])
+    grid = Grid.over(known.amin(dim=0), known.amax(dim=0), edge)
     cell = float(grid.cell.mean())
-    bvh = _tree(surfels)
     seen = seen_through(grid, bvh, cameras, MARGIN * cell)
-    guessed = continued(planes_of(surfels, spacing), centers.numpy(), grid, seen.numpy(), spacing)
-    guessed = guessed.chosen(_is_within(bvh, guessed, spacing))
     free = seen
     while True:
         bvh = _tree(_joined(surfels, guessed.places, guessed.normals, spacing))
@@ -107,6 +107,15 @@ def _unseen(surfels: Surfels, cameras: Sequence[Camera], spacing: float) -> Cont
     rest = Continued(places[bare], normals[bare])
     rest = rest.chosen(_is_solid(bvh, rest.places - CELLS_PER_SPACING * cell * rest.normals))
     return Continued.joined([guessed, rest.chosen(_apart(rest.places, spacing))])
+
+
+def _guessed(
+    surfels: Surfels, bvh: SurfelBvh, cameras: Sequence[Camera], grid: Grid, spacing: float
+) -> Continued:
+    """What the planes of surfels become where nothing was seen, but for what lies behind walls."""
+    seen = seen_through(grid, bvh, cameras, MARGIN * float(grid.cell.mean())).numpy()
+    guessed = continued(planes_of(surfels, spacing), surfels.centers.double().cpu().numpy(), grid, seen, spacing)
+    return guessed.chosen(_is_within(bvh, guessed, spacing))
 
 
 def _turned(surfels: Surfels, frame: Tensor) -> Surfels:
