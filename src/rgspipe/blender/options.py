@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 from rgspipe.options import Options, option
 
@@ -51,3 +52,21 @@ class RoomParameters(Options):
     """textures on floor, walls and furniture; without them every part has one colour"""
     segments: int = option(192, low=48, high=2000)
     """faces around whatever is round"""
+
+
+@dataclass(frozen=True)
+class ZooParameters(Options):
+    """A room that nobody tuned: plan, furniture, colours and cameras are drawn from a seed."""
+
+    seed: int = option(0, low=0, high=2**31 - 1)
+    """which room"""
+    plan: Literal["any", "box", "l", "t", "alcove", "two_rooms"] = "any"
+    """its floor; any draws it"""
+    tone: Literal["any", "white", "dark", "mixed"] = "any"
+    """its colours: albedo 0.85 to 0.95, 0.02 to 0.3, or 0.1 to 0.9; any draws which"""
+    fronts: Literal["any", "closed", "open"] = "any"
+    """whether one wall is missing; only a box and an alcove may be open"""
+    views: Literal["any", "standing", "one_side"] = "any"
+    """where cameras stand: among the furniture, or all along one side"""
+    lens: float | None = option(None, low=5, high=150)
+    """field of view of its cameras, degrees; drawn between 30 and 75 if null"""

@@ -12,6 +12,7 @@ from rgspipe.blender.cameras import MAX_DRAWS, Layout, no_room
 from rgspipe.blender.geometry import Geometry
 from rgspipe.blender.job import DatasetJob
 from rgspipe.blender.models.parameters import BlendFile
+from rgspipe.blender.options import ZooParameters
 from rgspipe.blender.targets import MIN_LIT_SHARE, is_of_class, lit_share, random_intensity
 from rgspipe.scene import Camera, PointLight
 
@@ -103,13 +104,13 @@ def _view_light(
 def _targets(
     job: DatasetJob, layout: Layout, geometry: Geometry, cameras: list[Camera], occlusion: str
 ) -> list[TargetPlan]:
-    """The targets of one class: all that are wanted, or as many as a user's scene has room for."""
+    """The targets of one class: all that are wanted, or as many as a scene that is not ours to choose has room for."""
     targets: list[TargetPlan] = []
     for index in range(job.targets_per_class):
         rng = np.random.default_rng([job.seed, STREAMS[occlusion], index])
         position = _find(job, layout, geometry, cameras, occlusion, rng)
         if position is None:
-            if not isinstance(job.model, BlendFile):
+            if not isinstance(job.model, BlendFile | ZooParameters):
                 raise no_room(f"a light of the class {occlusion}")
             log.warning("The scene has no place for a light of the class %s: no such targets.", occlusion)
             return targets

@@ -11,11 +11,11 @@ from rgspipe.blender import blend
 from rgspipe.blender.cameras import Layout, ObjectLayout, RoomLayout
 from rgspipe.blender.geometry import FreeSpace, Geometry, scene_geometry
 from rgspipe.blender.job import DatasetJob
-from rgspipe.blender.models import cornell, corner, hotdog, room
+from rgspipe.blender.models import cornell, corner, hotdog, room, zoo
 from rgspipe.blender.models.parameters import BlendFile, kind_of
 
 #: The scenes that are modelled here.
-MODELS = {"cornell": cornell, "corner": corner, "hotdog": hotdog, "room": room}
+MODELS = {"cornell": cornell, "corner": corner, "hotdog": hotdog, "room": room, "zoo": zoo}
 
 
 @dataclass(frozen=True)

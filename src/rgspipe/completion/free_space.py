@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -47,6 +48,20 @@ class Grid:
         """(X · Y · Z, 3) float64 middles of the cells."""
         index = torch.cartesian_prod(*(torch.arange(count, dtype=torch.float64) for count in self.shape))
         return self.lower + (index + 0.5) * self.cell
+
+    @property
+    def upper(self) -> Tensor:
+        """(3,) float64 corner of the last cell."""
+        return self.lower + self.cell * torch.tensor(self.shape)
+
+    def contains(self, places: np.ndarray) -> np.ndarray:
+        """(P,) bool: whether places (P, 3) are in the box."""
+        return ((places >= self.lower.numpy()) & (places <= self.upper.numpy())).all(axis=1)
+
+    def at(self, values: np.ndarray, places: np.ndarray) -> np.ndarray:
+        """(P,) what the cells of places (P, 3) have among `values` (X, Y, Z); outside of the box the nearest cell."""
+        index = np.floor((places - self.lower.numpy()) / self.cell.numpy()).astype(np.int64)
+        return values[tuple(index.clip(0, np.array(self.shape) - 1).T)]
 
 
 def seen_through(grid: Grid, bvh: SurfelBvh, cameras: Sequence[Camera], margin: float) -> Tensor:

@@ -39,14 +39,23 @@ def with_hidden_room(grid: Grid, bvh: SurfelBvh, seen: Tensor, unsure: Tensor) -
 
 def part_of_fronts(bvh: SurfelBvh, points: Tensor) -> Tensor:
     """(P,) float32 part of all directions from each of `points` (P, 3) in which the front of a surface is met first."""
+    return parts_in_sight(bvh, points)[0]
+
+
+def parts_in_sight(bvh: SurfelBvh, points: Tensor) -> tuple[Tensor, Tensor]:
+    """Parts of all directions from each of `points` (P, 3) in which fronts and backs are met first, float32 (P,) each.
+
+    What is left to 1 leaves the scene.
+    """
     directions = fibonacci_directions(LOOKS)
-    parts = [_part_of_fronts(bvh, chunk, directions) for chunk in points.split(CHUNK)]
-    return torch.cat(parts)
+    fronts, backs = zip(*(_parts_in_sight(bvh, chunk, directions) for chunk in points.split(CHUNK)), strict=True)
+    return torch.cat(fronts), torch.cat(backs)
 
 
-def _part_of_fronts(bvh: SurfelBvh, points: Tensor, directions: Tensor) -> Tensor:
+def _parts_in_sight(bvh: SurfelBvh, points: Tensor, directions: Tensor) -> tuple[Tensor, Tensor]:
     rays = directions.repeat(len(points), 1)
     hits = composite(bvh, points.repeat_interleave(len(directions), dim=0), rays, two_sided=True)
     normals = bvh.surfels.normals.to(hits.weights)[hits.indices.long().clamp(min=0)]
     facing = (normals * rays.to(hits.weights)[:, None]).sum(dim=2) < 0.0
-    return (hits.weights * facing).sum(dim=1).reshape(len(points), -1).mean(dim=1).cpu()
+    fronts, backs = ((hits.weights * side).sum(dim=1) for side in (facing, ~facing))
+    return tuple(part.reshape(len(points), -1).mean(dim=1).cpu() for part in (fronts, backs))

@@ -15,11 +15,14 @@ import numpy as np
 import torch
 from scipy.ndimage import gaussian_filter, map_coordinates
 from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
 from skimage.measure import marching_cubes
 from torch import Tensor
 
 from rgspipe.completion.free_space import Grid, seen_through
-from rgspipe.completion.hidden_room import with_hidden_room
+from rgspipe.completion.hidden_room import parts_in_sight, with_hidden_room
+from rgspipe.completion.planes import frame_of, planes_of
+from rgspipe.completion.structure import BARE, Continued, continued
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.openness import openness
 from rgspipe.scene import Camera
@@ -35,15 +38,11 @@ MOST_OPEN = 0.5
 #: Cells of the grid along the distance of two surfels, and how far rays must reach past a cell's middle, in cells.
 CELLS_PER_SPACING, MARGIN = 2.0, 0.5
 
+#: Cells between a camera and the side of the box: a camera stands in the room, not in its wall.
+BEHIND = 2.0
+
 #: Blur of the boundary, in cells: it takes the steps of the cells away.
 BLUR = 1.0
-
-#: A place of the boundary is without surfels if none is within so many distances of neighbours.
-BARE = 1.1
-
-#: More unseen surfels than this part of the seen ones are not added: so few cameras do not tell surfaces from space
-#: that nobody looked into, and walls across it would hide what is there.
-MOST_UNSEEN = 0.1
 
 #: Cells within so many distances of a surfel are taken for no room: rays of theirs pass between surfels.
 NEAR = 0.6
@@ -61,7 +60,7 @@ SCALE = 0.87
 def with_unseen_surfaces(surfels: Surfels, cameras: Sequence[Camera]) -> Surfels:
     """The surfels and, after them, those of surfaces that no camera saw.
 
-    Nothing is added to an object in empty space, nor to a scene of which the cameras saw too little.
+    Nothing is added to an object in empty space.
 
     Args:
         surfels: N ≥ 2 of a scene that `cameras` saw.
@@ -70,24 +69,94 @@ def with_unseen_surfaces(surfels: Surfels, cameras: Sequence[Camera]) -> Surfels
     bvh = SurfelBvh(replace(surfels, centers=surfels.centers.double()))
     if not cameras or len(surfels) <= NEIGHBOURS or openness(bvh, surfels) > MOST_OPEN:
         return surfels
+    centers = surfels.centers.double().cpu().numpy()
+    spacing = float(np.median(cKDTree(centers).query(centers, k=2)[0][:, 1]))
+    frame = frame_of(planes_of(surfels, spacing))
+    found = _unseen(_turned(surfels, frame), [_camera_turned(camera, frame) for camera in cameras], spacing)
+    if not len(found):
+        return surfels
+    log.info("%d surfels close the scene where no camera saw what is there.", len(found))
+    axes = frame.numpy()
+    return _joined(surfels, found.places @ axes, found.normals @ axes, spacing)
+
+
+def _unseen(surfels: Surfels, cameras: Sequence[Camera], spacing: float) -> Continued:
+    """Where surfels are missing, in a room whose axes are x, y and z."""
     centers = surfels.centers.double().cpu()
-    tree = cKDTree(centers.numpy())
-    spacing = float(np.median(tree.query(centers.numpy(), k=2)[0][:, 1]))
-    grid = Grid.over(centers.amin(dim=0), centers.amax(dim=0), spacing / CELLS_PER_SPACING)
+    eyes = torch.stack([camera.origin.double().cpu() for camera in cameras])
+    edge, bvh = spacing / CELLS_PER_SPACING, _tree(surfels)
+    lower = torch.minimum(centers.amin(dim=0), eyes.amin(dim=0) - BEHIND * edge)
+    upper = torch.maximum(centers.amax(dim=0), eyes.amax(dim=0) + BEHIND * edge)
+    # Edges are looked for at the distance of surfels: finer cells would take eight times as long.
+    guessed = _guessed(surfels, bvh, cameras, Grid.over(lower, upper, spacing), spacing)
+    # What lies before an open front is no part of the room, and needs no cells.
+    known = torch.cat([centers, torch.from_numpy(guessed.places)])
+    grid = Grid.over(known.amin(dim=0), known.amax(dim=0), edge)
     cell = float(grid.cell.mean())
     seen = seen_through(grid, bvh, cameras, MARGIN * cell)
-    free = with_hidden_room(grid, bvh, seen, _near(tree, grid, NEAR * spacing))
+    free = seen
+    while True:
+        bvh = _tree(_joined(surfels, guessed.places, guessed.normals, spacing))
+        tree = cKDTree(np.concatenate([centers.numpy(), guessed.places]))
+        free = with_hidden_room(grid, bvh, free, _near(tree, grid, NEAR * spacing))
+        bounds = _bounds_room(guessed, grid, free.numpy(), spacing)
+        if bounds.all():
+            break
+        guessed = guessed.chosen(bounds)
     places, normals = _boundary(grid, free.numpy(), seen.numpy())
     bare = tree.query(places)[0] > BARE * max(spacing, CELLS_PER_SPACING * cell)
-    places, normals = places[bare], normals[bare]
-    chosen = _apart(places, spacing)
-    if len(chosen) > MOST_UNSEEN * len(surfels):
-        log.info("The cameras saw too little of the scene to close it where they saw nothing.")
-        return surfels
-    if not chosen:
-        return surfels
-    log.info("%d surfels close the scene where no camera saw what is there.", len(chosen))
-    return _joined(surfels, places[chosen], normals[chosen], spacing)
+    rest = Continued(places[bare], normals[bare])
+    rest = rest.chosen(_is_solid(bvh, rest.places - CELLS_PER_SPACING * cell * rest.normals))
+    return Continued.joined([guessed, rest.chosen(_apart(rest.places, spacing))])
+
+
+def _guessed(surfels: Surfels, bvh: SurfelBvh, cameras: Sequence[Camera], grid: Grid, spacing: float) -> Continued:
+    """What the planes of surfels become where nothing was seen, but for what lies behind walls."""
+    seen = seen_through(grid, bvh, cameras, MARGIN * float(grid.cell.mean())).numpy()
+    guessed = continued(planes_of(surfels, spacing), surfels.centers.double().cpu().numpy(), grid, seen, spacing)
+    return guessed.chosen(_is_within(bvh, guessed, spacing))
+
+
+def _turned(surfels: Surfels, frame: Tensor) -> Surfels:
+    """The surfels in coordinates along the rows of `frame` (3, 3)."""
+    centers = surfels.centers.double().cpu() @ frame.T
+    turn = Rotation.from_matrix(frame.numpy())
+    own = Rotation.from_quat(surfels.rotations.double().cpu().numpy(), scalar_first=True)
+    rotations = torch.from_numpy((turn * own).as_quat(scalar_first=True))
+    return replace(surfels, centers=centers.to(surfels.centers), rotations=rotations.to(surfels.rotations))
+
+
+def _camera_turned(camera: Camera, frame: Tensor) -> Camera:
+    turn = torch.eye(4, dtype=torch.float64)
+    turn[:3, :3] = frame
+    pose = turn @ camera.camera_to_world.double().cpu()
+    return replace(camera, camera_to_world=pose.to(camera.camera_to_world))
+
+
+def _tree(surfels: Surfels) -> SurfelBvh:
+    return SurfelBvh(replace(surfels, centers=surfels.centers.double()))
+
+
+def _is_within(bvh: SurfelBvh, guessed: Continued, spacing: float) -> np.ndarray:
+    """(G,) bool: the guessed places that face no backs of surfaces, as what lies behind the walls of a room does."""
+    if not len(guessed):
+        return np.zeros(0, dtype=bool)
+    fronts, backs = parts_in_sight(bvh, torch.from_numpy(guessed.places + spacing * guessed.normals))
+    return (fronts >= backs).numpy()
+
+
+def _bounds_room(guessed: Continued, grid: Grid, free: np.ndarray, spacing: float) -> np.ndarray:
+    """(G,) bool: the guessed places with room before them and none behind."""
+    before, behind = (guessed.places + side * spacing * guessed.normals for side in (1.0, -1.0))
+    return grid.at(free, before) & ~(grid.at(free, behind) & grid.contains(behind))
+
+
+def _is_solid(bvh: SurfelBvh, points: np.ndarray) -> np.ndarray:
+    """(P,) bool: the points (P, 3) from which one sees more of the backs of surfaces than of what is outside."""
+    if not len(points):
+        return np.zeros(0, dtype=bool)
+    fronts, backs = parts_in_sight(bvh, torch.from_numpy(points))
+    return (backs > 1.0 - fronts - backs).numpy()
 
 
 def _near(tree: cKDTree, grid: Grid, reach: float) -> Tensor:

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, get_args
 
-from rgspipe.blender.options import HotdogParameters, RoomParameters
+from rgspipe.blender.options import HotdogParameters, RoomParameters, ZooParameters
 from rgspipe.datasets.input_file import input_file, input_folder
 from rgspipe.datasets.ply_options import PlyOptions
 from rgspipe.errors import InputError
 from rgspipe.options import Options, option
 
 #: Scenes that are modelled in code.
-Modelled = Literal["cornell", "corner", "hotdog", "room"]
+Modelled = Literal["cornell", "corner", "hotdog", "room", "zoo"]
 MODELLED: tuple[Modelled, ...] = get_args(Modelled)
 
 Colour = tuple[float, float, float]
@@ -83,6 +83,7 @@ class SceneConfig(Options):
     corner: CornerConfig = CornerConfig()
     hotdog: HotdogParameters = HotdogParameters()
     room: RoomParameters = RoomParameters()
+    zoo: ZooParameters = ZooParameters()
     ply: PlyOptions = PlyOptions()
 
     @property

@@ -58,6 +58,15 @@ class PatchTransport:
         solved = torch.stack([inverse @ patches[:, c] for c, inverse in enumerate(self.inverse)], dim=1)
         return (self.gather @ solved.reshape(-1, channels * lightings)).reshape(count, channels, lightings)
 
+    def gathered_transposed(self, received: Tensor) -> Tensor:
+        """(N, 3, K) the transpose of `gathered` applied to (N, 3, K): Rᵀ Hᵀ F_pᵀ."""
+        count, channels, lightings = received.shape
+        patches = self.gather.transposed @ received.reshape(count, channels * lightings)
+        patches = patches.reshape(-1, channels, lightings)
+        solved = torch.stack([inverse.T @ patches[:, c] for c, inverse in enumerate(self.inverse)], dim=1)
+        flat = self.average.transposed @ solved.reshape(-1, channels * lightings)
+        return flat.reshape(count, channels, lightings)
+
     def indirect(self, direct: Tensor) -> Tensor:
         """(N, 3, K) indirect part of the radiosity for K lightings with direct radiosity (N, 3, K)."""
         return self.albedo[:, :, None] * self.gathered(direct)

@@ -24,6 +24,8 @@ def scene_model(scene: SceneConfig) -> Model:
         return scene.hotdog
     if scene.kind == "room":
         return scene.room
+    if scene.kind == "zoo":
+        return scene.zoo
     return BlendFile(scene.path)
 
 

@@ -1,8 +1,8 @@
-"""Albedo from images: linear least squares with the indirect light held from the round before.
+"""Albedo from images: Gauss-Newton with all bounces.
 
-With the light that bounces known, each image is linear in albedo: image_v = D_v (ρ ∘ I_v) + W_v (ρ ∘ L_v), see
-`view_model`. L_v depends on ρ itself and is taken from the last round; undamped, that loop oscillates around a
-value that is too dark, so each round goes only part of the way.
+image_v = D_v (ρ ∘ I_v) + W_v (ρ ∘ L_v), see `view_model`, where L_v depends on ρ itself. Its derivative is exact, so a
+few rounds arrive also where light bounces ten times, and places that no image shows get the albedo that the light of
+all others calls for.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from rgspipe.progress import progress_bar
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.transport import PatchTransport, with_albedo
 from rgspipe.scene.surfels import Surfels
-from rgspipe.training.lighting import Lighting, indirect_irradiance
+from rgspipe.training.lighting import LIGHTINGS_AT_ONCE, Lighting, indirect_irradiance
 from rgspipe.training.view_model import ViewModel
 
-#: Part of the way to the least-squares solution that a round goes when light bounces.
+#: Part of the way to the least-squares solution that a round goes where the light that bounces is held.
 DAMPING = 0.45
 
 #: Rounds that the next one is mixed from, and how little their differences may count.
@@ -32,6 +32,9 @@ MIXED, MIXING_RIDGE = 3, 1e-4
 
 #: Conjugate-gradient steps of a round; each round starts from the last one's solution.
 CG_STEPS = 6
+
+#: How often a step that makes things worse is halved before the round is given up.
+HALVES = 5
 
 #: Albedo stays within these: below is numerically black, above rooms that never darken.
 ALBEDO_RANGE = (0.005, 0.98)
@@ -102,22 +105,158 @@ def solve_albedo(
         transport: light between surfels; None solves as if light did not bounce.
         prior: pulls towards known albedo.
     """
-    albedo = surfels.albedo.float()
-    indirect, mixing = None, Mixing(DAMPING if transport is not None else 1.0)
+    at = Linearised.of(problem, lighting, surfels.albedo.float().clamp(*ALBEDO_RANGE), transport)
+    normals, pixel_weights = surfels.normals.float(), problem.pixel_weights
     for index in progress_bar(range(rounds), "albedo", unit="round"):
+        if index > 0:
+            pixel_weights = robust_weights(problem.images, problem.pixel_weights, at.renders)
+        laplacian = graph_laplacian(problem.neighbours, normals, at.albedo if index > 1 else None)
+        quadratic = Quadratic.of(at, pixel_weights, laplacian, prior)
+        at = _no_worse(at, quadratic, quadratic.solution() - at.albedo)
+    return at.albedo, at.indirect
+
+
+@dataclass(frozen=True)
+class Linearised:
+    """Images and how they change with the albedo, all bounces included.
+
+    With E the direct irradiance over π, G the light that bounces of a direct radiosity and L = G(ρ ∘ E), a change δ of
+    the albedo changes L by G(δ ∘ (E + L)): what a surface reflects more goes the way of a lamp's light.
+
+    Attributes:
+        problem: the images.
+        lighting: of V views.
+        albedo: (N, 3) ρ.
+        transport: G at ρ; None if light does not bounce.
+        indirect: (V, N, 3) L; None likewise.
+        renders: V images (P, 3).
+    """
+
+    problem: AlbedoProblem
+    lighting: Lighting
+    albedo: Tensor
+    transport: PatchTransport | None
+    indirect: Tensor | None
+    renders: list[Tensor]
+
+    @classmethod
+    def of(
+        cls, problem: AlbedoProblem, lighting: Lighting, albedo: Tensor, transport: PatchTransport | None
+    ) -> Linearised:
+        indirect = None
         if transport is not None:
             transport = with_albedo(transport, albedo)
             indirect = indirect_irradiance(lighting, albedo, transport)
-        pixel_weights = problem.pixel_weights
-        if index > 0:
-            renders = [problem.render(v, albedo, indirect) for v in range(len(problem.images))]
-            pixel_weights = robust_weights(problem.images, problem.pixel_weights, renders)
-        laplacian = graph_laplacian(problem.neighbours, surfels.normals.float(), albedo if index > 1 else None)
-        solution = _least_squares(problem, pixel_weights, indirect, laplacian, albedo, prior).clamp(*ALBEDO_RANGE)
-        albedo = mixing.next(albedo, solution).clamp(*ALBEDO_RANGE)
-    if transport is not None:
-        indirect = indirect_irradiance(lighting, albedo, with_albedo(transport, albedo))
-    return albedo, indirect
+        renders = [problem.render(v, albedo, indirect) for v in range(len(problem.images))]
+        return cls(problem, lighting, albedo, transport, indirect, renders)
+
+    def moved(self, change: Tensor) -> Linearised:
+        """The same after a change (N, 3) of the albedo, which stays within ALBEDO_RANGE."""
+        return Linearised.of(self.problem, self.lighting, (self.albedo + change).clamp(*ALBEDO_RANGE), self.transport)
+
+    def change(self, albedo: Tensor) -> list[Tensor]:
+        """V images (P, 3) by which the images change with the albedo, to first order, for a change (N, 3)."""
+        models = self.problem.models
+        if self.indirect is None:
+            return [model.shown(albedo, None) for model in models]
+        found = []
+        for views in _blocks(len(models)):
+            received = self._received(views)
+            more = self.transport.gathered((albedo * received).permute(1, 2, 0).contiguous()).permute(2, 0, 1)
+            bounced = albedo * self.indirect[views] + self.albedo * more
+            found += [models[v].shown(albedo, part) for v, part in zip(views, bounced, strict=True)]
+        return found
+
+    def transposed(self, images: Sequence[Tensor]) -> Tensor:
+        """(N, 3) the transpose of `change` applied to V images (P, 3)."""
+        models, total = self.problem.models, torch.zeros_like(self.albedo)
+        for views in _blocks(len(models)):
+            direct, bounced = zip(*(models[v].shown_transposed(images[v]) for v in views), strict=True)
+            total += torch.stack(direct).sum(dim=0)
+            if self.indirect is not None:
+                weight = torch.stack(bounced)
+                back = (self.albedo * weight).permute(1, 2, 0).contiguous()
+                sent = self.transport.gathered_transposed(back).permute(2, 0, 1)
+                total += (self.indirect[views] * weight + self._received(views) * sent).sum(dim=0)
+        return total
+
+    def _received(self, views: Sequence[int]) -> Tensor:
+        """(K, N, 3) direct and indirect irradiance over π in some views."""
+        return self.lighting.of_views(views).direct() + self.indirect[views]
+
+
+@dataclass(frozen=True)
+class Quadratic:
+    """The squared errors of images that are linear in the albedo, and what pulls at it.
+
+    Attributes:
+        at: the linear images.
+        pixel_weights: V weights (P,).
+        smoothness: weight of the Laplacian.
+        laplacian: of the likeness of neighbours.
+        weight, target: (N, 1) and (N, 3), pull.
+        precondition: (N, 3) about the inverse of the diagonal.
+    """
+
+    at: Linearised
+    pixel_weights: Sequence[Tensor]
+    smoothness: float
+    laplacian: Laplacian
+    weight: Tensor
+    target: Tensor
+    precondition: Tensor
+
+    @classmethod
+    def of(
+        cls, at: Linearised, pixel_weights: Sequence[Tensor], laplacian: Laplacian, prior: AlbedoPrior | None
+    ) -> Quadratic:
+        diagonal = torch.zeros_like(at.albedo)
+        for v, model in enumerate(at.problem.models):
+            diagonal += model.squared(pixel_weights[v], _of_view(at.indirect, v))
+        scale = float(diagonal[diagonal > 0].median()) if bool((diagonal > 0).any()) else 1.0
+        weight, target = pull(prior, at.albedo)
+        weight, smooth = scale * weight, SMOOTHNESS * scale
+        precondition = 1.0 / (diagonal + weight + smooth * laplacian.diagonal()[:, None])
+        return cls(at, pixel_weights, smooth, laplacian, weight, target, precondition)
+
+    def solution(self) -> Tensor:
+        """(N, 3) albedo after a few conjugate-gradient steps from where it is, each channel on its own."""
+        at = self.at
+        missing = [image - render for image, render in zip(at.problem.images, at.renders, strict=True)]
+        right = at.transposed(self._weighted(missing)) + self.weight * (self.target - at.albedo)
+        right = right - self.smoothness * (self.laplacian.matrix @ at.albedo)
+        start = torch.zeros_like(at.albedo)
+        return at.albedo + conjugate_gradients(self._normal, right, lambda x: self.precondition * x, start)
+
+    def loss(self, at: Linearised) -> float:
+        """What is minimised, at another albedo and its own images; float64."""
+        squared = zip(self.pixel_weights, self.at.problem.images, at.renders, strict=True)
+        images = sum(float((w[:, None] * (a - b).square()).sum(dtype=torch.float64)) for w, a, b in squared)
+        smooth = self.smoothness * float((at.albedo * (self.laplacian.matrix @ at.albedo)).sum(dtype=torch.float64))
+        return images + smooth + float((self.weight * (at.albedo - self.target).square()).sum(dtype=torch.float64))
+
+    def _normal(self, x: Tensor) -> Tensor:
+        pulls = self.weight * x + self.smoothness * (self.laplacian.matrix @ x)
+        return pulls + self.at.transposed(self._weighted(self.at.change(x)))
+
+    def _weighted(self, images: Sequence[Tensor]) -> list[Tensor]:
+        return [weight[:, None] * image for weight, image in zip(self.pixel_weights, images, strict=True)]
+
+
+def _no_worse(at: Linearised, quadratic: Quadratic, step: Tensor) -> Linearised:
+    """Where a step leads, or the first of its halves that makes nothing worse; `at` if there is none."""
+    before = quadratic.loss(at)
+    for _ in range(HALVES):
+        found = at.moved(step)
+        if quadratic.loss(found) <= before:
+            return found
+        step = 0.5 * step
+    return at
+
+
+def _blocks(count: int) -> list[list[int]]:
+    """0 … count − 1 in parts of LIGHTINGS_AT_ONCE."""
+    return [list(range(first, min(first + LIGHTINGS_AT_ONCE, count))) for first in range(0, count, LIGHTINGS_AT_ONCE)]
 
 
 class Mixing:
@@ -145,35 +284,6 @@ class Mixing:
         share = torch.linalg.solve(normal + (ridge + 1e-30) * torch.eye(normal.shape[1]), right).to(x)
         change = torch.einsum("nck,ck->nc", steps + self._step * changes, share)
         return x + self._step * misses[..., -1] - change
-
-
-def _least_squares(
-    problem: AlbedoProblem,
-    pixel_weights: Sequence[Tensor],
-    indirect: Tensor | None,
-    laplacian: Laplacian,
-    start: Tensor,
-    prior: AlbedoPrior | None,
-) -> Tensor:
-    """A few preconditioned conjugate-gradient steps on the normal equations, each channel on its own."""
-    right, diagonal = torch.zeros_like(start), torch.zeros_like(start)
-    for v, model in enumerate(problem.models):
-        light = _of_view(indirect, v)
-        right += model.transposed(pixel_weights[v][:, None] * problem.images[v], light)
-        diagonal += model.squared(pixel_weights[v], light)
-    scale = float(diagonal[diagonal > 0].median()) if bool((diagonal > 0).any()) else 1.0
-    weight, target = pull(prior, start)
-    weight, smooth = scale * weight, SMOOTHNESS * scale
-
-    def normal_operator(x: Tensor) -> Tensor:
-        result = weight * x + smooth * (laplacian.matrix @ x)
-        for v, model in enumerate(problem.models):
-            light = _of_view(indirect, v)
-            result += model.transposed(pixel_weights[v][:, None] * model.image(x, light), light)
-        return result
-
-    precondition = 1.0 / (diagonal + weight + smooth * laplacian.diagonal()[:, None])
-    return conjugate_gradients(normal_operator, right + weight * target, lambda x: precondition * x, start)
 
 
 def pull(prior: AlbedoPrior | None, like: Tensor) -> tuple[Tensor, Tensor]:

@@ -38,13 +38,21 @@ class ViewModel:
 
     def image(self, albedo: Tensor, indirect: Tensor | None) -> Tensor:
         """(P, 3) radiance of surfels of `albedo` (N, 3) under `indirect` (N, 3); None for no light that bounces."""
+        return self.shown(albedo, None if indirect is None else albedo * indirect)
+
+    def shown(self, albedo: Tensor, bounced: Tensor | None) -> Tensor:
+        """(P, 3) radiance where surfels of `albedo` (N, 3) reflect `bounced` (N, 3) of the light that bounces."""
         image = self.direct.matrix @ (albedo * self.intensity)
-        return image if indirect is None else image + self.weights.operator.matrix @ (albedo * indirect)
+        return image if bounced is None else image + self.weights.operator.matrix @ bounced
 
     def transposed(self, pixels: Tensor, indirect: Tensor | None) -> Tensor:
         """(N, 3) the transpose of `image` applied to (P, 3)."""
-        surfels = self.intensity * (self.direct.transposed @ pixels)
-        return surfels if indirect is None else surfels + indirect * (self.weights.operator.transposed @ pixels)
+        direct, bounced = self.shown_transposed(pixels)
+        return direct if indirect is None else direct + indirect * bounced
+
+    def shown_transposed(self, pixels: Tensor) -> tuple[Tensor, Tensor]:
+        """The transpose of `shown` applied to (P, 3): (N, 3) towards the albedo and towards what bounces."""
+        return self.intensity * (self.direct.transposed @ pixels), self.weights.operator.transposed @ pixels
 
     def squared(self, pixel_weights: Tensor, indirect: Tensor | None) -> Tensor:
         """(N, 3) diagonal of the normal equations with weights (P,): Σ_p w_p (D_pj I + W_pj L_j)²."""

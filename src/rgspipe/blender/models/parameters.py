@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rgspipe.blender.options import HotdogParameters, RoomParameters
+from rgspipe.blender.options import HotdogParameters, RoomParameters, ZooParameters
 from rgspipe.scene.models import Box, CornellBox, Corridor
 
 
@@ -23,7 +23,7 @@ class BlendFile:
             raise ValueError("a blend file needs a path")
 
 
-Model = CornellBox | Corridor | HotdogParameters | RoomParameters | BlendFile
+Model = CornellBox | Corridor | HotdogParameters | RoomParameters | ZooParameters | BlendFile
 
 #: The kinds of scenes that Blender renders.
 KINDS: dict[str, type[Model]] = {
@@ -31,6 +31,7 @@ KINDS: dict[str, type[Model]] = {
     "corner": Corridor,
     "hotdog": HotdogParameters,
     "room": RoomParameters,
+    "zoo": ZooParameters,
     "blend": BlendFile,
 }
 
