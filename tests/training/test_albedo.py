@@ -11,7 +11,7 @@ from rgspipe.datasets.views import View
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.scene import Camera, PointLight, Surfels, look_at
 from rgspipe.scene.rectangles import inside_of_box, solid_box, surfels_on
-from rgspipe.training.albedo import AlbedoPrior, AlbedoProblem, Mixing
+from rgspipe.training.albedo import AlbedoPrior, AlbedoProblem
 from rgspipe.training.lighting import indirect_irradiance, trace_lighting
 from rgspipe.training.materials import build_frozen, fit_materials, trace_views
 from rgspipe.training.options import MaterialOptions
@@ -114,16 +114,3 @@ def test_pixels_where_surfels_overhang_the_object_say_nothing(room: Surfels) -> 
     problem = AlbedoProblem.build(room, models_of(room, [view], at_pixels=False), [view])
     weight = problem.pixel_weights[0].reshape(24, 24)
     assert bool((weight[:, :12] > 0.0).all()) and bool((weight[:, 12:] == 0.0).all())
-
-
-def test_mixing_solves_a_linear_fixed_point_sooner_than_damping() -> None:
-    """x = b − a x with slopes up to 1.5, where undamped steps diverge."""
-    slope = torch.linspace(0.2, 1.5, 50)[:, None].repeat(1, 3)
-    truth = 1.0 / (1.0 + slope)
-    mixed, damped, mixing = torch.zeros(50, 3), torch.zeros(50, 3), Mixing(0.45)
-    for _ in range(5):
-        mixed = mixing.next(mixed, 1.0 - slope * mixed)
-        damped = damped + 0.45 * (1.0 - slope * damped - damped)
-    errors = [float((found - truth).abs().max()) for found in (mixed, damped)]
-    # Measured 0.002 and 0.017.
-    assert errors[0] < 0.3 * errors[1]

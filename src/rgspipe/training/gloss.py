@@ -20,12 +20,13 @@ from rgspipe.renderer.transport import PatchTransport, with_albedo
 from rgspipe.scene.camera import Camera
 from rgspipe.scene.gloss import Gloss
 from rgspipe.scene.surfels import Surfels
-from rgspipe.training.albedo import ALBEDO_RANGE, DAMPING, AlbedoPrior, AlbedoProblem, Mixing, robust_weights
+from rgspipe.training.albedo import ALBEDO_RANGE, AlbedoPrior, AlbedoProblem, robust_weights
 from rgspipe.training.gloss_light import GlossBounces, OperatorsOf, highlight_light
 from rgspipe.training.gloss_model import GlossLight, GlossView, Reflection, centre_cosines
 from rgspipe.training.gloss_search import find_lobes, searched_views
 from rgspipe.training.gloss_solve import GlossProblem
 from rgspipe.training.lighting import Lighting
+from rgspipe.training.mixing import DAMPING, Mixing
 from rgspipe.training.view_model import ViewModel
 
 #: Mean specular reflectance below which a surfel is diffuse.

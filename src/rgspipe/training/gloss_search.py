@@ -13,9 +13,9 @@ from torch import Tensor
 from rgspipe.progress import progress_bar
 from rgspipe.renderer.clusters import cluster_patches
 from rgspipe.scene.surfels import Surfels
-from rgspipe.training.albedo import nearest_surfels
 from rgspipe.training.gloss_model import GlossLight, Reflection
 from rgspipe.training.gloss_solve import GlossProblem
+from rgspipe.training.likeness import nearest_surfels
 from rgspipe.training.view_model import ViewModel
 
 #: Exponents that are tried.

@@ -12,17 +12,10 @@ from torch import Tensor
 
 from rgspipe.scene.surfels import Surfels
 from rgspipe.sums import average
-from rgspipe.training.albedo import (
-    ALBEDO_RANGE,
-    SMOOTHNESS,
-    AlbedoPrior,
-    Laplacian,
-    conjugate_gradients,
-    graph_laplacian,
-    nearest_surfels,
-    pull,
-)
+from rgspipe.training.albedo import ALBEDO_RANGE, AlbedoPrior
+from rgspipe.training.albedo_solve import SMOOTHNESS, conjugate_gradients, pull
 from rgspipe.training.gloss_model import EXPONENT_RANGE, GlossLight, GlossView, Reflection
+from rgspipe.training.likeness import Laplacian, graph_laplacian, nearest_surfels
 from rgspipe.training.view_model import ViewModel
 
 #: Weight of neighbours' likeness in specular reflectance and in the logarithm of the exponent, against the mean of

@@ -15,7 +15,8 @@ from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.transport import PatchTransport
 from rgspipe.renderer.view_weights import ViewWeights, build_view_weights
 from rgspipe.scene.surfels import Surfels
-from rgspipe.training.albedo import AlbedoPrior, AlbedoProblem, solve_albedo
+from rgspipe.training.albedo import AlbedoPrior, AlbedoProblem
+from rgspipe.training.albedo_solve import solve_albedo
 from rgspipe.training.gloss import GlossScene, fit_gloss
 from rgspipe.training.gloss_light import operators_from
 from rgspipe.training.lighting import trace_lighting

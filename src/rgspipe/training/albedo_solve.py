@@ -1,0 +1,234 @@
+"""Albedo from images: Gauss-Newton with all bounces.
+
+image_v = D_v (ρ ∘ I_v) + W_v (ρ ∘ L_v), see `view_model`, where L_v depends on ρ itself. Its derivative is exact, so a
+few rounds arrive also where light bounces ten times, and places that no image shows get the albedo that the light of
+all others calls for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from rgspipe.progress import progress_bar
+from rgspipe.renderer.transport import PatchTransport, with_albedo
+from rgspipe.scene.surfels import Surfels
+from rgspipe.training.albedo import ALBEDO_RANGE, AlbedoPrior, AlbedoProblem, robust_weights
+from rgspipe.training.lighting import LIGHTINGS_AT_ONCE, Lighting, indirect_irradiance
+from rgspipe.training.likeness import Laplacian, graph_laplacian
+
+#: Conjugate-gradient steps of a round; each round starts from the last one's solution.
+CG_STEPS = 6
+
+#: How often a step that makes things worse is halved before the round is given up.
+HALVES = 5
+
+#: Weight of neighbours' likeness, of the pull to GREY, over the images' in the median surfel.
+SMOOTHNESS, PULL, GREY = 0.1, 0.003, 0.5
+
+
+def solve_albedo(
+    problem: AlbedoProblem,
+    surfels: Surfels,
+    lighting: Lighting,
+    transport: PatchTransport | None,
+    rounds: int,
+    prior: AlbedoPrior | None = None,
+) -> tuple[Tensor, Tensor | None]:
+    """Albedo (N, 3), and the indirect irradiance over π (V, N, 3) that belongs to it; None without a transport.
+
+    Args:
+        surfels: their albedo is where the rounds start.
+        transport: light between surfels; None solves as if light did not bounce.
+        prior: pulls towards known albedo.
+    """
+    at = Linearised.of(problem, lighting, surfels.albedo.float().clamp(*ALBEDO_RANGE), transport)
+    normals, pixel_weights = surfels.normals.float(), problem.pixel_weights
+    for index in progress_bar(range(rounds), "albedo", unit="round"):
+        if index > 0:
+            pixel_weights = robust_weights(problem.images, problem.pixel_weights, at.renders)
+        laplacian = graph_laplacian(problem.neighbours, normals, at.albedo if index > 1 else None)
+        quadratic = Quadratic.of(at, pixel_weights, laplacian, prior)
+        at = no_worse(at, quadratic, quadratic.solution() - at.albedo)
+    return at.albedo, at.indirect
+
+
+@dataclass(frozen=True)
+class Linearised:
+    """Images and how they change with the albedo, all bounces included.
+
+    With E the direct irradiance over π, G the light that bounces of a direct radiosity and L = G(ρ ∘ E), a change δ of
+    the albedo changes L by G(δ ∘ (E + L)): what a surface reflects more goes the way of a lamp's light.
+
+    Attributes:
+        problem: the images.
+        lighting: of V views.
+        albedo: (N, 3) ρ.
+        transport: G at ρ; None if light does not bounce.
+        indirect: (V, N, 3) L; None likewise.
+        renders: V images (P, 3).
+    """
+
+    problem: AlbedoProblem
+    lighting: Lighting
+    albedo: Tensor
+    transport: PatchTransport | None
+    indirect: Tensor | None
+    renders: list[Tensor]
+
+    @classmethod
+    def of(
+        cls, problem: AlbedoProblem, lighting: Lighting, albedo: Tensor, transport: PatchTransport | None
+    ) -> Linearised:
+        indirect = None
+        if transport is not None:
+            transport = with_albedo(transport, albedo)
+            indirect = indirect_irradiance(lighting, albedo, transport)
+        renders = [problem.render(v, albedo, indirect) for v in range(len(problem.images))]
+        return cls(problem, lighting, albedo, transport, indirect, renders)
+
+    def moved(self, change: Tensor) -> Linearised:
+        """The same after a change (N, 3) of the albedo, which stays within ALBEDO_RANGE."""
+        return Linearised.of(self.problem, self.lighting, (self.albedo + change).clamp(*ALBEDO_RANGE), self.transport)
+
+    def change(self, albedo: Tensor) -> list[Tensor]:
+        """V images (P, 3) by which the images change with the albedo, to first order, for a change (N, 3)."""
+        models = self.problem.models
+        if self.indirect is None:
+            return [model.shown(albedo, None) for model in models]
+        found = []
+        for views in _blocks(len(models)):
+            received = self._received(views)
+            more = self.transport.gathered((albedo * received).permute(1, 2, 0).contiguous()).permute(2, 0, 1)
+            bounced = albedo * self.indirect[views] + self.albedo * more
+            found += [models[v].shown(albedo, part) for v, part in zip(views, bounced, strict=True)]
+        return found
+
+    def transposed(self, images: Sequence[Tensor]) -> Tensor:
+        """(N, 3) the transpose of `change` applied to V images (P, 3)."""
+        models, total = self.problem.models, torch.zeros_like(self.albedo)
+        for views in _blocks(len(models)):
+            direct, bounced = zip(*(models[v].shown_transposed(images[v]) for v in views), strict=True)
+            total += torch.stack(direct).sum(dim=0)
+            if self.indirect is not None:
+                weight = torch.stack(bounced)
+                back = (self.albedo * weight).permute(1, 2, 0).contiguous()
+                sent = self.transport.gathered_transposed(back).permute(2, 0, 1)
+                total += (self.indirect[views] * weight + self._received(views) * sent).sum(dim=0)
+        return total
+
+    def _received(self, views: Sequence[int]) -> Tensor:
+        """(K, N, 3) direct and indirect irradiance over π in some views."""
+        return self.lighting.of_views(views).direct() + self.indirect[views]
+
+
+@dataclass(frozen=True)
+class Quadratic:
+    """The squared errors of images that are linear in the albedo, and what pulls at it.
+
+    Attributes:
+        at: the linear images.
+        pixel_weights: V weights (P,).
+        smoothness: weight of the Laplacian.
+        laplacian: of the likeness of neighbours.
+        weight, target: (N, 1) and (N, 3), pull.
+        precondition: (N, 3) about the inverse of the diagonal.
+    """
+
+    at: Linearised
+    pixel_weights: Sequence[Tensor]
+    smoothness: float
+    laplacian: Laplacian
+    weight: Tensor
+    target: Tensor
+    precondition: Tensor
+
+    @classmethod
+    def of(
+        cls, at: Linearised, pixel_weights: Sequence[Tensor], laplacian: Laplacian, prior: AlbedoPrior | None
+    ) -> Quadratic:
+        diagonal = torch.zeros_like(at.albedo)
+        for v, model in enumerate(at.problem.models):
+            diagonal += model.squared(pixel_weights[v], None if at.indirect is None else at.indirect[v])
+        scale = float(diagonal[diagonal > 0].median()) if bool((diagonal > 0).any()) else 1.0
+        weight, target = pull(prior, at.albedo)
+        weight, smooth = scale * weight, SMOOTHNESS * scale
+        precondition = 1.0 / (diagonal + weight + smooth * laplacian.diagonal()[:, None])
+        return cls(at, pixel_weights, smooth, laplacian, weight, target, precondition)
+
+    def solution(self) -> Tensor:
+        """(N, 3) albedo after a few conjugate-gradient steps from where it is, each channel on its own."""
+        at = self.at
+        missing = [image - render for image, render in zip(at.problem.images, at.renders, strict=True)]
+        right = at.transposed(self._weighted(missing)) + self.weight * (self.target - at.albedo)
+        right = right - self.smoothness * (self.laplacian.matrix @ at.albedo)
+        start = torch.zeros_like(at.albedo)
+        return at.albedo + conjugate_gradients(self._normal, right, lambda x: self.precondition * x, start)
+
+    def loss(self, at: Linearised) -> float:
+        """What is minimised, at another albedo and its own images; float64."""
+        squared = zip(self.pixel_weights, self.at.problem.images, at.renders, strict=True)
+        images = sum(float((w[:, None] * (a - b).square()).sum(dtype=torch.float64)) for w, a, b in squared)
+        smooth = self.smoothness * float((at.albedo * (self.laplacian.matrix @ at.albedo)).sum(dtype=torch.float64))
+        return images + smooth + float((self.weight * (at.albedo - self.target).square()).sum(dtype=torch.float64))
+
+    def _normal(self, x: Tensor) -> Tensor:
+        pulls = self.weight * x + self.smoothness * (self.laplacian.matrix @ x)
+        return pulls + self.at.transposed(self._weighted(self.at.change(x)))
+
+    def _weighted(self, images: Sequence[Tensor]) -> list[Tensor]:
+        return [weight[:, None] * image for weight, image in zip(self.pixel_weights, images, strict=True)]
+
+
+def no_worse(at: Linearised, quadratic: Quadratic, step: Tensor) -> Linearised:
+    """Where a step leads, or the first of its halves that makes nothing worse; `at` if there is none."""
+    before = quadratic.loss(at)
+    for _ in range(HALVES):
+        found = at.moved(step)
+        if quadratic.loss(found) <= before:
+            return found
+        step = 0.5 * step
+    return at
+
+
+def _blocks(count: int) -> list[list[int]]:
+    """0 … count − 1 in parts of LIGHTINGS_AT_ONCE."""
+    return [list(range(first, min(first + LIGHTINGS_AT_ONCE, count))) for first in range(0, count, LIGHTINGS_AT_ONCE)]
+
+
+def pull(prior: AlbedoPrior | None, like: Tensor) -> tuple[Tensor, Tensor]:
+    """Weight (N, 1) and target (N, 3) that together stand for GREY and the prior."""
+    if prior is None:
+        return torch.full_like(like[:, :1], PULL), torch.full_like(like, GREY)
+    weight = prior.weight.to(like)[:, None]
+    return PULL + weight, (PULL * GREY + weight * prior.albedo.to(like)) / (PULL + weight)
+
+
+def conjugate_gradients(
+    operator: Callable[[Tensor], Tensor],
+    right: Tensor,
+    precondition: Callable[[Tensor], Tensor],
+    x: Tensor,
+    steps: int = CG_STEPS,
+) -> Tensor:
+    """So many steps from x (M, C) towards the solution of `operator` x = `right`, each column on its own.
+
+    Args:
+        precondition: about the operator's inverse, symmetric.
+    """
+    residual = right - operator(x)
+    z = precondition(residual)
+    direction, energy = z, (residual * z).sum(dim=0)
+    for _ in range(steps):
+        image = operator(direction)
+        step = energy / (direction * image).sum(dim=0).clamp(min=1e-30)
+        x = x + step * direction
+        residual = residual - step * image
+        z = precondition(residual)
+        renewed = (residual * z).sum(dim=0)
+        direction = z + renewed / energy.clamp(min=1e-30) * direction
+        energy = renewed
+    return x

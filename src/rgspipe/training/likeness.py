@@ -1,0 +1,48 @@
+"""Which surfels are neighbours on one surface of one colour, and what their likeness weighs."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse
+import torch
+from scipy.spatial import cKDTree
+from torch import Tensor
+
+from rgspipe.renderer.sparse import SparseOperator
+
+#: Step of albedo that counts as an edge.
+ALBEDO_EDGE = 0.08
+
+
+def nearest_surfels(centers: Tensor, others: Tensor) -> Tensor:
+    """(N, ≤ 6) int64 nearest surfels by position over the scene's size and `others` (N, 3), e.g. normals."""
+    size = float((centers.amax(dim=0) - centers.amin(dim=0)).amax())
+    features = torch.cat([centers / max(size, 1e-12), 0.5 * others], dim=1).double().cpu().numpy()
+    count = min(7, len(features))
+    return torch.from_numpy(cKDTree(features).query(features, k=count, workers=-1)[1].reshape(len(features), -1)[:, 1:])
+
+
+def graph_laplacian(neighbours: Tensor, normals: Tensor | None, albedo: Tensor | None) -> Laplacian:
+    """Graph Laplacian over neighbours on one surface (any if None); neighbours of another colour are let go."""
+    count, degree = neighbours.shape
+    row, column = torch.arange(count).repeat_interleave(degree), neighbours.reshape(-1)
+    weight = torch.ones(len(row)) if normals is None else ((normals[row] * normals[column]).sum(dim=1) > 0.7).float()
+    if albedo is not None:
+        weight = weight / (1.0 + ((albedo[row] - albedo[column]).abs().amax(dim=1) / ALBEDO_EDGE).square())
+    parts = (weight.numpy(), (row.numpy(), column.numpy()))
+    adjacency = scipy.sparse.coo_matrix(parts, shape=(count, count)).tocsr()
+    adjacency = 0.5 * (adjacency + adjacency.T)
+    degrees = np.asarray(adjacency.sum(axis=1)).ravel()
+    return Laplacian(scipy.sparse.diags(degrees) - adjacency, degrees)
+
+
+class Laplacian:
+    """A symmetric operator and its diagonal."""
+
+    def __init__(self, matrix: scipy.sparse.csr_matrix, degrees: np.ndarray) -> None:
+        self.sparse = matrix.tocsc()
+        self.matrix = SparseOperator.from_scipy(matrix.tocsr()).matrix
+        self._degrees = torch.from_numpy(degrees).float()
+
+    def diagonal(self) -> Tensor:
+        return self._degrees
