@@ -15,7 +15,7 @@ from rgspipe.blender.job import DatasetJob, RenderSettings
 from rgspipe.blender.materials import checker_material, diffuse_material, glossy_material, striped_material
 from rgspipe.blender.meshes import add, new_scene, polygon
 from rgspipe.blender.models import hotdog
-from rgspipe.blender.models.parameters import HotdogParameters, Model, RoomParameters, kind_of
+from rgspipe.blender.models.parameters import HotdogParameters, Model, RoomParameters, ZooParameters, kind_of
 from rgspipe.blender.passes import Studio
 from rgspipe.blender.plan import Frame, make_plan
 from rgspipe.blender.scenes import MODELS, open_scene
@@ -30,6 +30,9 @@ SCENES: dict[str, Model] = {
     "wide_corner": Corridor(width=0.36, height=1.0),
     "hotdog": HotdogParameters(segments=48),
     "room": RoomParameters(segments=48),
+    "zoo_standing": ZooParameters(seed=3, plan="l", views="standing"),
+    "zoo_one_side": ZooParameters(seed=1, plan="box", fronts="closed", views="one_side"),
+    "zoo_open": ZooParameters(seed=2, plan="box", fronts="open", views="one_side"),
 }
 
 

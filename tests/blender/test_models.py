@@ -20,6 +20,7 @@ pytestmark = pytest.mark.slow
 Run = Callable[..., None]
 SCRIPT = "models_in_blender.py"
 CORNERS = {"corner": 0.32, "narrow_corner": 0.28, "wide_corner": 0.36}
+ZOO = ("zoo_standing", "zoo_one_side", "zoo_open")
 ALL = ("cornell", "hotdog", "room", *CORNERS)
 
 
@@ -31,11 +32,11 @@ def found(in_blender: Run, tmp_path_factory: pytest.TempPathFactory) -> dict[str
     return {path.stem: json.loads(path.read_text()) for path in folder.glob("*.json")}
 
 
-@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize("name", [*ALL, *ZOO])
 def test_a_scene_fills_the_unit_cube_and_is_diffuse(found: dict, name: str) -> None:
     lo, hi = np.array(found[name]["bounds"])
     assert (lo >= -0.5 - 1e-6).all() and (hi <= 0.5 + 1e-6).all()
-    assert (hi - lo)[:2] == pytest.approx(1.0, abs=0.02)  # the hot dog's plate is 0.99 across
+    assert (hi - lo)[: 1 if name in ZOO else 2] == pytest.approx(1.0, abs=0.02)  # the hot dog's plate is 0.99 across
     assert found[name]["shaders"] == ["BSDF_DIFFUSE"]
 
 
@@ -45,6 +46,13 @@ def test_blender_and_exact_surfels_are_given_the_same_surfaces(found: dict) -> N
     for name, model in exact.items():
         area = float(model.rectangles().areas.sum())
         assert found[name]["area"] == pytest.approx(area, rel=1e-5)  # Blender's coordinates are float32
+
+
+def test_cameras_of_a_zoo_stand_in_the_room_or_along_its_first_side(found: dict) -> None:
+    standing, one_side, front = (np.array(found[name]["cameras"])[:, 1] - found[name]["bounds"][0][1] for name in ZOO)
+    assert np.ptp(standing) > 0.3  # measured 0.54
+    assert (one_side > 0.0).all() and float(one_side.max()) < 0.15  # of a depth of 1 at most
+    assert (front < 0.0).all()
 
 
 @pytest.mark.parametrize("name", ALL)

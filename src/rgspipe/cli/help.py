@@ -21,6 +21,7 @@ SCENES = """\
   corner     a closed corridor around a corner; targets with the light in the other leg (occlusion=around_corner)
   hotdog     a hot dog on a plate: curved and textured, in empty space
   room       a closed room with furniture, textured
+  zoo        a room that nobody tuned, drawn from a seed: scene=zoo scene.zoo.seed=7 scene.name=zoo_7
   blend      a Blender file of yours: scene=blend scene.path=my.blend
   external   images, cameras and lights from disk, no Blender needed: scene=external scene.path=DIR"""
 

@@ -188,10 +188,9 @@ def _place(
     """x and y of a free circle of the floor, which is then taken; None if none is found."""
     for _ in range(TRIES):
         x, y = rng.uniform(-0.5, 0.5, 2)
-        around = [(x + radius * math.cos(t), y + radius * math.sin(t)) for t in np.linspace(0.0, 2.0 * math.pi, 16)]
         clear = all(math.hypot(x - u, y - v) > radius + other + 0.02 for u, v, other in taken)
         apart = all(abs(x - wall.center[0]) > radius + PARTITION for wall in partitions)
-        if clear and apart and all(inside(outline, u, v) for u, v in around):
+        if clear and apart and inside(outline, x, y) and wall_distance(outline, x, y) > radius:
             taken.append((x, y, radius))
             return float(x), float(y)
     return None
@@ -202,6 +201,16 @@ def inside(outline: Outline, x: float, y: float) -> bool:
     sides = zip(outline, (*outline[1:], outline[0]), strict=True)
     crossed = [(u, v, p, q) for (u, v), (p, q) in sides if (v > y) != (q > y)]
     return sum(u + (y - v) * (p - u) / (q - v) > x for u, v, p, q in crossed) % 2 == 1
+
+
+def wall_distance(outline: Outline, x: float, y: float) -> float:
+    """Distance of a point from the nearest side of an outline."""
+    found = []
+    for (u, v), (p, q) in zip(outline, (*outline[1:], outline[0]), strict=True):
+        along = ((x - u) * (p - u) + (y - v) * (q - v)) / ((p - u) ** 2 + (q - v) ** 2)
+        along = min(max(along, 0.0), 1.0)
+        found.append(math.hypot(x - u - along * (p - u), y - v - along * (q - v)))
+    return min(found)
 
 
 def _finishes(rng: np.random.Generator, tone: str, count: int) -> tuple[Finish, ...]:
