@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from rgspipe.errors import InputError
 from rgspipe.options import Options, option
 
 #: Ways from images to lights; `finite_differences` is search_lm with derivatives by central differences.
@@ -45,15 +46,25 @@ class ScheduleOptions(Options):
     """Turns of a refinement, and which starts go on from one to the next."""
 
     steps: int = option(6, low=2, high=10000)
-    """steps of a start in its last turn; those before it, and that of points before the better ones go on, take half of
-    them, and rigs that are compared with one another twice as many"""
+    """steps of a start in its last turn; points take half of them before the better ones go on, and rigs that are
+    compared with one another twice as many"""
     softness: tuple[float, ...] = option((0.3, 0.15, 0.05), low=0, high=3)
     """of rigs with an axis: by how much edges are wider in the turns before the last one, rad"""
+    softly: tuple[int, ...] = option((3, 4, 4), low=1, high=10000)
+    """steps of each of these turns"""
+    promising: float = option(0.67, low=0, high=1)
+    """share of starts with an axis that take the first turn, by how they look before it"""
     going_on: float = option(0.4, low=0, high=1)
     """share of the starts, at least two of them, that take a turn after the one before: the best go on"""
     met: float = option(0.02, low=0, high=10)
     """rigs whose lights are within this part of the scene's size, and as many rad, are on their way to one place; and
     two lights of one rig that end so close are one, where their number is open"""
+
+    def check(self) -> None:
+        if len(self.softness) != len(self.softly):
+            found = f"{len(self.softly)} numbers of steps"
+            expected = f"{len(self.softness)} of them, one for each softness"
+            raise InputError("softly", expected=expected, found=found, remedy="Give as many of both.")
 
 
 @dataclass(frozen=True)

@@ -28,6 +28,8 @@ def refined_starts(
     turns, weighting = _turns(options, aimed), PLAIN if aimed else ROBUST
     rim = turns[0][0]
     states = [refiner.start(soft(rig, rim), weighting) for rig in rigs]
+    if aimed:
+        states = _best(refiner.problem, states, options.promising, weighting)
     for turn, (softness, steps) in enumerate(turns):
         if turn > 0:
             best = _best(refiner.problem, states, options.going_on, weighting)
@@ -41,10 +43,10 @@ def refined_starts(
 
 def _turns(options: ScheduleOptions, aimed: bool) -> list[tuple[float, int]]:
     """Softness of edges [rad], and most steps, of each turn."""
-    half = options.steps // 2
     if not aimed:
+        half = options.steps // 2
         return [(0.0, half), (0.0, options.steps - half)]
-    return [*((softness, half) for softness in options.softness), (0.0, options.steps)]
+    return [*zip(options.softness, options.softly, strict=True), (0.0, options.steps)]
 
 
 def soft(rig: EmitterRig, softness: float) -> EmitterRig:
