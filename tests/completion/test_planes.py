@@ -39,7 +39,7 @@ def test_few_surfels_are_no_plane() -> None:
 @pytest.mark.parametrize("angles", [(0.0, 0.0, 0.0), (0.2, -0.1, 0.3), (-0.4, 0.3, 0.5)])
 def test_the_frame_is_that_of_the_walls_and_a_rotation(room: Surfels, angles: tuple[float, float, float]) -> None:
     turn = torch.from_numpy(Rotation.from_euler("xyz", angles).as_matrix())
-    planes = [type(plane)(turn @ plane.normal, plane.offset, plane.members) for plane in planes_of(room, SPACING)]
+    planes = [plane.turned(turn) for plane in planes_of(room, SPACING)]
     frame = frame_of(planes)
     torch.testing.assert_close(frame @ turn, torch.eye(3, dtype=torch.float64), rtol=0.0, atol=1e-12)
     assert float(torch.linalg.det(frame)) == pytest.approx(1.0)

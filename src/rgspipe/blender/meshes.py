@@ -99,6 +99,19 @@ def revolved(name: str, profile: np.ndarray, segments: int, materials: np.ndarra
     return swept(name, rings, np.asarray(materials)[..., None])
 
 
+def ball(radius: float) -> np.ndarray:
+    """Outline of a ball around the origin."""
+    angle = np.linspace(0.0, math.pi, 96)
+    outline = radius * np.stack([np.sin(angle), -np.cos(angle)], axis=-1)
+    outline[[0, -1], 0] = 0.0
+    return outline
+
+
+def drum(radius: float, height: float) -> np.ndarray:
+    """Outline of an upright cylinder that stands on the origin."""
+    return np.array([[0.0, 0.0], [radius, 0.0], [radius, height], [0.0, height]])
+
+
 def _smooth(mesh: bpy.types.Mesh) -> bpy.types.Mesh:
     """Merge the points of poles, turn all faces outward, and smooth."""
     shape = bmesh.new()

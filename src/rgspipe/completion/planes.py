@@ -35,6 +35,10 @@ class Plane:
     offset: float
     members: Tensor
 
+    def turned(self, frame: Tensor) -> Plane:
+        """The same in coordinates along the rows of `frame` (3, 3)."""
+        return Plane(frame @ self.normal, self.offset, self.members)
+
 
 def planes_of(surfels: Surfels, spacing: float) -> list[Plane]:
     """The planes with FEWEST surfels or more, those with most first; no surfel is on two.

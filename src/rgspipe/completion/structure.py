@@ -7,7 +7,7 @@ until they meet. The side from which the cameras looked is closed right behind t
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,7 +50,7 @@ class Continued:
         )
 
 
-def continued(planes: list[Plane], centers: np.ndarray, grid: Grid, seen: np.ndarray, spacing: float) -> Continued:
+def continued(planes: Sequence[Plane], centers: np.ndarray, grid: Grid, seen: np.ndarray, spacing: float) -> Continued:
     """What the planes of surfels become where nothing was seen, and the sides of the grid's box that they lead to.
 
     Args:

@@ -21,7 +21,7 @@ from torch import Tensor
 
 from rgspipe.completion.free_space import Grid, seen_through
 from rgspipe.completion.hidden_room import parts_in_sight, with_hidden_room
-from rgspipe.completion.planes import frame_of, planes_of
+from rgspipe.completion.planes import Plane, frame_of, planes_of
 from rgspipe.completion.structure import BARE, Continued, continued
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.openness import openness
@@ -66,13 +66,14 @@ def with_unseen_surfaces(surfels: Surfels, cameras: Sequence[Camera]) -> Surfels
         surfels: N ≥ 2 of a scene that `cameras` saw.
         cameras: those that it was made from.
     """
-    bvh = SurfelBvh(replace(surfels, centers=surfels.centers.double()))
-    if not cameras or len(surfels) <= NEIGHBOURS or openness(bvh, surfels) > MOST_OPEN:
+    if not cameras or len(surfels) <= NEIGHBOURS or openness(_tree(surfels), surfels) > MOST_OPEN:
         return surfels
     centers = surfels.centers.double().cpu().numpy()
     spacing = float(np.median(cKDTree(centers).query(centers, k=2)[0][:, 1]))
-    frame = frame_of(planes_of(surfels, spacing))
-    found = _unseen(_turned(surfels, frame), [_camera_turned(camera, frame) for camera in cameras], spacing)
+    planes = planes_of(surfels, spacing)
+    frame = frame_of(planes)
+    planes = [plane.turned(frame) for plane in planes]
+    found = _unseen(_turned(surfels, frame), planes, [_camera_turned(camera, frame) for camera in cameras], spacing)
     if not len(found):
         return surfels
     log.info("%d surfels close the scene where no camera saw what is there.", len(found))
@@ -80,7 +81,7 @@ def with_unseen_surfaces(surfels: Surfels, cameras: Sequence[Camera]) -> Surfels
     return _joined(surfels, found.places @ axes, found.normals @ axes, spacing)
 
 
-def _unseen(surfels: Surfels, cameras: Sequence[Camera], spacing: float) -> Continued:
+def _unseen(surfels: Surfels, planes: Sequence[Plane], cameras: Sequence[Camera], spacing: float) -> Continued:
     """Where surfels are missing, in a room whose axes are x, y and z."""
     centers = surfels.centers.double().cpu()
     eyes = torch.stack([camera.origin.double().cpu() for camera in cameras])
@@ -88,7 +89,10 @@ def _unseen(surfels: Surfels, cameras: Sequence[Camera], spacing: float) -> Cont
     lower = torch.minimum(centers.amin(dim=0), eyes.amin(dim=0) - BEHIND * edge)
     upper = torch.maximum(centers.amax(dim=0), eyes.amax(dim=0) + BEHIND * edge)
     # Edges are looked for at the distance of surfels: finer cells would take eight times as long.
-    guessed = _guessed(surfels, bvh, cameras, Grid.over(lower, upper, spacing), spacing)
+    coarse = Grid.over(lower, upper, spacing)
+    looked_through = seen_through(coarse, bvh, cameras, MARGIN * float(coarse.cell.mean()))
+    guessed = continued(planes, centers.numpy(), coarse, looked_through.numpy(), spacing)
+    guessed = guessed.chosen(_is_within(bvh, guessed, spacing))
     # What lies before an open front is no part of the room, and needs no cells.
     known = torch.cat([centers, torch.from_numpy(guessed.places)])
     grid = Grid.over(known.amin(dim=0), known.amax(dim=0), edge)
@@ -108,13 +112,6 @@ def _unseen(surfels: Surfels, cameras: Sequence[Camera], spacing: float) -> Cont
     rest = Continued(places[bare], normals[bare])
     rest = rest.chosen(_is_solid(bvh, rest.places - CELLS_PER_SPACING * cell * rest.normals))
     return Continued.joined([guessed, rest.chosen(_apart(rest.places, spacing))])
-
-
-def _guessed(surfels: Surfels, bvh: SurfelBvh, cameras: Sequence[Camera], grid: Grid, spacing: float) -> Continued:
-    """What the planes of surfels become where nothing was seen, but for what lies behind walls."""
-    seen = seen_through(grid, bvh, cameras, MARGIN * float(grid.cell.mean())).numpy()
-    guessed = continued(planes_of(surfels, spacing), surfels.centers.double().cpu().numpy(), grid, seen, spacing)
-    return guessed.chosen(_is_within(bvh, guessed, spacing))
 
 
 def _turned(surfels: Surfels, frame: Tensor) -> Surfels:

@@ -23,10 +23,8 @@ TARGET_DEGREES = 75.0
 def build(model: Corridor) -> bpy.types.Scene:
     """A new scene with the corridor, a pillar and a crate in one leg, and a cabinet in the other."""
     scene, plan = new_scene(), model.plan()
-    top = 0.5 * plan.height
-    floor, ceiling = [(x, y, -top) for x, y in plan.outline], [(x, y, top) for x, y in reversed(plan.outline)]
-    add(scene, polygon("floor", floor), diffuse_material("floor", plan.floor))
-    add(scene, polygon("ceiling", ceiling), diffuse_material("ceiling", plan.ceiling))
+    add(scene, polygon("floor", plan.floor_corners()), diffuse_material("floor", plan.floor))
+    add(scene, polygon("ceiling", plan.ceiling_corners()), diffuse_material("ceiling", plan.ceiling))
     add_rectangles(scene, plan.wall_rectangles(), [f"wall_{index}" for index in range(len(plan.walls))])
     for name, item in model.furniture().items():
         add(scene, box(name, item.size), diffuse_material(name, item.albedo), place=item.center, turn=item.turn)

@@ -17,7 +17,7 @@ from rgspipe.blender.materials import (
     mottled_material,
     striped_material,
 )
-from rgspipe.blender.meshes import add, box, new_scene, polygon, revolved
+from rgspipe.blender.meshes import add, ball, box, drum, new_scene, polygon, revolved
 from rgspipe.blender.models.parameters import RoomParameters
 from rgspipe.scene.models import Vector
 
@@ -165,30 +165,17 @@ def _add_round_things(scene: bpy.types.Scene, materials: Materials, segments: in
     """Heights of the outlines are counted from the floor."""
     table = 0.25
     things = {
-        "ball": (_ball(0.055), (-0.17, 0.05, table + 0.055), "ball"),
+        "ball": (ball(0.055), (-0.17, 0.05, table + 0.055), "ball"),
         "vase": (_vase(), (0.05, 0.12, table), "china"),
-        "stool": (_drum(0.075, 0.17), (-0.33, -0.2, 0.0), "fabric"),
-        "pot": (_drum(0.06, 0.1), (0.12, 0.4, 0.0), "clay"),
-        "leaves": (_ball(0.09), (0.12, 0.4, 0.17), "leaves"),
-        "lamp foot": (_drum(0.06, 0.02), (-0.38, -0.41, 0.0), "iron"),
-        "lamp pole": (_drum(0.014, 0.42), (-0.38, -0.41, 0.01), "iron"),
+        "stool": (drum(0.075, 0.17), (-0.33, -0.2, 0.0), "fabric"),
+        "pot": (drum(0.06, 0.1), (0.12, 0.4, 0.0), "clay"),
+        "leaves": (ball(0.09), (0.12, 0.4, 0.17), "leaves"),
+        "lamp foot": (drum(0.06, 0.02), (-0.38, -0.41, 0.0), "iron"),
+        "lamp pole": (drum(0.014, 0.42), (-0.38, -0.41, 0.01), "iron"),
         "lampshade": (_shade(), (-0.38, -0.41, 0.4), "lampshade"),
     }
     for name, (outline, (x, y, z), material) in things.items():
         add(scene, revolved(name, outline, segments), materials[material], place=(x, y, z - TOP))
-
-
-def _ball(radius: float) -> np.ndarray:
-    """Outline of a ball around the origin."""
-    angle = np.linspace(0.0, math.pi, 96)
-    outline = radius * np.stack([np.sin(angle), -np.cos(angle)], axis=-1)
-    outline[[0, -1], 0] = 0.0
-    return outline
-
-
-def _drum(radius: float, height: float) -> np.ndarray:
-    """Outline of an upright cylinder that stands on the origin."""
-    return np.array([[0.0, 0.0], [radius, 0.0], [radius, height], [0.0, height]])
 
 
 def _shade() -> np.ndarray:

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import bpy
 import numpy as np
 
-from rgspipe.blender.cameras import MAX_DRAWS, USUAL_CLASSES, RoomLayout, aimed, free_place, no_room
+from rgspipe.blender.cameras import MAX_DRAWS, RoomLayout, aimed, free_place, no_room
 from rgspipe.blender.geometry import FreeSpace
 from rgspipe.blender.materials import checker_material, diffuse_material, mottled_material, striped_material
-from rgspipe.blender.meshes import add, box, new_scene, polygon, revolved
+from rgspipe.blender.meshes import add, ball, box, drum, new_scene, polygon, revolved
 from rgspipe.blender.options import ZooParameters
 from rgspipe.blender.targets import classify
 from rgspipe.scene import Camera
-from rgspipe.scene.models.zoo import STREAMS, Finish, RoundThing, ZooRoom, draw_room, inside
+from rgspipe.scene.models.zoo import STREAMS, Finish, ZooRoom, draw_room, inside
 
 #: Faces around whatever is round.
 SEGMENTS = 128
@@ -35,15 +34,17 @@ def build(parameters: ZooParameters) -> bpy.types.Scene:
     """A new scene with the room and all that stands in it."""
     scene, room = new_scene(), _room(parameters)
     materials = [_material(f"finish_{index}", finish) for index, finish in enumerate(room.finishes)]
-    surfaces = _shell(room.plan.outline, 0.5 * room.plan.height)
-    for index, (name, corners) in enumerate(surfaces.items()):
+    walls = room.plan.wall_rectangles().corners.tolist()
+    faces = [*walls, room.plan.floor_corners(), room.plan.ceiling_corners()]
+    for index, corners in enumerate(faces):
         if index != room.open_wall:
-            add(scene, polygon(name, corners), materials[index])
-    rest = iter(materials[len(surfaces) :])
+            add(scene, polygon(f"face_{index}", corners), materials[index])
+    rest = iter(materials[len(faces) :])
     for index, item in enumerate(room.boxes):
         add(scene, box(f"box_{index}", item.size), next(rest), place=item.center, turn=item.turn)
     for index, item in enumerate(room.round_things):
-        add(scene, revolved(f"round_{index}", _outline(item), SEGMENTS), next(rest), place=item.center)
+        outline = ball(item.radius) if item.kind == "ball" else drum(item.radius, item.height)
+        add(scene, revolved(f"round_{index}", outline, SEGMENTS), next(rest), place=item.center)
     bpy.context.view_layer.update()
     return scene
 
@@ -71,7 +72,6 @@ class ZooLayout(RoomLayout):
     room: ZooRoom | None = None
     one_side: bool = False
     degrees: float = 60.0
-    classes: tuple[str, ...] = USUAL_CLASSES
 
     def camera(self, rng: np.random.Generator, index: int) -> Camera:
         for _ in range(MAX_DRAWS):
@@ -137,17 +137,6 @@ def _room(parameters: ZooParameters) -> ZooRoom:
     return draw_room(parameters.seed, parameters.plan, parameters.tone, parameters.fronts)
 
 
-def _shell(outline: tuple[tuple[float, float], ...], top: float) -> dict[str, list[tuple[float, float, float]]]:
-    """Corners of the walls in their order, of the floor and of the ceiling; fronts look into the room."""
-    following = (*outline[1:], outline[0])
-    walls = {
-        f"wall_{index}": [(*end, -top), (*start, -top), (*start, top), (*end, top)]
-        for index, (start, end) in enumerate(zip(outline, following, strict=True))
-    }
-    floor = {"floor": [(x, y, -top) for x, y in outline], "ceiling": [(x, y, top) for x, y in reversed(outline)]}
-    return walls | floor
-
-
 def _material(name: str, finish: Finish) -> bpy.types.Material:
     if finish.pattern == "checker":
         return checker_material(name, finish.albedo, finish.other, finish.size)
@@ -156,13 +145,3 @@ def _material(name: str, finish: Finish) -> bpy.types.Material:
     if finish.pattern == "mottled":
         return mottled_material(name, finish.albedo, finish.other, finish.size)
     return diffuse_material(name, finish.albedo)
-
-
-def _outline(item: RoundThing) -> np.ndarray:
-    """(P, 2) radius and height along the outline, from its lowest point up."""
-    if item.kind == "drum":
-        return np.array([[0.0, 0.0], [item.radius, 0.0], [item.radius, item.height], [0.0, item.height]])
-    angle = np.linspace(0.0, math.pi, 96)
-    outline = item.radius * np.stack([np.sin(angle), 1.0 - np.cos(angle)], axis=-1)
-    outline[[0, -1], 0] = 0.0
-    return outline

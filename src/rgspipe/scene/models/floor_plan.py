@@ -37,6 +37,14 @@ class FloorPlan:
         )
         return sum(others, first)
 
+    def floor_corners(self) -> list[Vector]:
+        """Corners of the floor as one face, which looks up; it may have corners that point inwards."""
+        return [(x, y, -0.5 * self.height) for x, y in self.outline]
+
+    def ceiling_corners(self) -> list[Vector]:
+        """The same of the ceiling, which looks down."""
+        return [(x, y, 0.5 * self.height) for x, y in reversed(self.outline)]
+
     def rectangles(self) -> Rectangles:
         """The walls, then floor and ceiling, strip by strip from the least y."""
         surfaces, top = self.wall_rectangles(), 0.5 * self.height

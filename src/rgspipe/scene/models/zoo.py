@@ -52,7 +52,7 @@ class RoundThing:
 
     Attributes:
         kind: "ball" or "drum".
-        center: of what it covers of the floor, and its lowest point, scene units.
+        center: the middle of a ball, of a drum that of its foot; scene units.
         radius, height: scene units; the height of a ball is twice its radius.
     """
 
@@ -174,7 +174,8 @@ def _furniture(
         kind, radius = str(rng.choice(["ball", "drum"])), rng.uniform(0.03, 0.1)
         tall = 2.0 * radius if kind == "ball" else height * rng.uniform(0.1, 0.6)
         if (place := _place(rng, outline, partitions, taken, radius)) is not None:
-            round_things.append(RoundThing(kind, (*place, -0.5 * height), radius, tall))
+            rise = radius if kind == "ball" else 0.0
+            round_things.append(RoundThing(kind, (*place, rise - 0.5 * height), radius, tall))
     return tuple(boxes), tuple(round_things)
 
 
