@@ -44,6 +44,7 @@ def any_surfels(draw: st.DrawFn) -> Surfels:
         "albedo": albedo,
         "clip_offsets": draw(numbers(COUNT, 2, low=-1, high=NO_CLIP)),
         "clip_angles": draw(numbers(COUNT, 2, low=-4, high=4)),
+        "guessed": draw(numbers(COUNT, low=0, high=2)),
     }
     coverage = Coverage(low, draw(st.floats(low + 1e-3, 1.0)), draw(st.floats(1e-6, 10.0)), draw(st.floats(1e-6, 1.0)))
     return Surfels(**{name: torch.from_numpy(x) for name, x in parts.items()}, coverage=coverage, gloss=gloss)

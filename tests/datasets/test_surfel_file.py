@@ -110,3 +110,9 @@ def test_wrong_notes_are_refused(tmp_path, surfels, change, message):
     save_tensors(tmp_path / "s.safetensors", surfels.tensors(), {**note_of(surfels), **change})
     with pytest.raises(InputError, match=message):
         load_surfels(tmp_path / "s.safetensors")
+
+
+def test_files_from_before_surfels_were_guessed_are_read(tmp_path, surfels):
+    old = {name: tensor for name, tensor in surfels.tensors().items() if name != "guessed"}
+    save_tensors(tmp_path / "s.safetensors", old, note_of(surfels))
+    assert not bool(load_surfels(tmp_path / "s.safetensors").guessed.any())

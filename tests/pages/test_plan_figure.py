@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rgspipe.evaluation.plots import CameraMark, png_of
-from rgspipe.pages.plan_figure import plan_figure
+from rgspipe.pages.plan_figure import GUESSED, SEEN, plan_figure
 
 CAMERA = CameraMark((0.5, -2.0, 0.5), (0.0, 1.0, 0.0), 0.7)
 
@@ -29,6 +29,15 @@ def test_both_panels_have_one_scale_and_show_cameras_lights_and_classes():
     scales = [axis.get_window_extent().width / np.ptp(axis.get_xlim()) for axis in (above, side)]
     assert scales[0] == pytest.approx(scales[1], rel=0.02)  # 0.003 measured
     assert above.get_ylim()[0] < -2.0 < side.get_xlim()[1]
+
+
+def test_what_no_camera_saw_has_a_colour_of_its_own():
+    cloud, guessed = np.random.default_rng(0).uniform(size=(100, 3)), np.arange(100) < 30
+    figure = plan_figure(cloud, None, [CAMERA] * 3, [], {}, (), guessed)
+    drawn = [(line.get_color(), len(line.get_xdata())) for line in figure.axes[0].lines[:2]]
+    assert drawn == [(SEEN, 70), (GUESSED, 30)]
+    assert _legend(figure)[-1] == "surface that no camera saw, added to close the room"
+    assert not any("no camera" in text for text in _legend(plan_figure(cloud, None, [CAMERA] * 3, [], {})))
 
 
 def test_a_camera_far_away_does_not_shrink_the_rest():

@@ -27,6 +27,7 @@ from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.openness import openness
 from rgspipe.scene import Camera
 from rgspipe.scene.gloss import Gloss
+from rgspipe.scene.guesses import spread_of_albedo
 from rgspipe.scene.surfels import NO_CLIP, Surfels, quaternion_from_normal
 
 log = logging.getLogger(__name__)
@@ -216,6 +217,7 @@ def _joined(surfels: Surfels, places: np.ndarray, normals: np.ndarray, spacing: 
         "albedo": surfels.albedo[torch.from_numpy(nearest).to(surfels.albedo.device)].mean(dim=1),
         "clip_offsets": torch.full((count, 2), NO_CLIP),
         "clip_angles": torch.zeros(count, 2),
+        "guessed": spread_of_albedo(surfels).expand(count),
     }
     joined = {name: torch.cat([tensor, own[name].to(tensor)]) for name, tensor in surfels.tensors().items()}
     gloss = surfels.gloss

@@ -55,6 +55,8 @@ OWN = {
     "clip_offsets": ("clip_offset_0", "clip_offset_1"),
     "clip_angles": ("clip_angle_0", "clip_angle_1"),
 }
+#: Only in files of scenes that were closed where no camera saw what is there.
+OWN_GUESSED = "guessed"
 OWN_GLOSS = {"reflectance": ("gloss_0", "gloss_1", "gloss_2"), "exponents": ("gloss_exponent",)}
 
 Layout = Literal["full", "viewer"]
@@ -130,6 +132,8 @@ def read_own(table: VertexTable, options: PlyOptions) -> tuple[Surfels, Conversi
         "clip_offsets": own["clip_offsets"],
         "clip_angles": own["clip_angles"],
     }
+    if OWN_GUESSED in table.names:
+        tensors["guessed"] = table.columns(OWN_GUESSED)[:, 0]
     parts = {name: torch.from_numpy(values).float() for name, values in tensors.items()}
     coverage = _inferred(table, parts, options) if note is None else _noted(table, note)
     surfels = _with_gloss(Surfels(**parts, coverage=coverage, gloss=None), table)
@@ -248,6 +252,8 @@ def _own_columns(surfels: Surfels) -> dict[str, np.ndarray]:
     tensors = {names: getattr(surfels, field) for field, names in OWN.items()}
     if surfels.gloss is not None:
         tensors |= {names: getattr(surfels.gloss, field) for field, names in OWN_GLOSS.items()}
+    if bool(surfels.guessed.any()):
+        tensors[(OWN_GUESSED,)] = surfels.guessed
     columns = {}
     for names, tensor in tensors.items():
         values = tensor.detach().cpu().numpy().reshape(len(surfels), -1)
@@ -266,4 +272,6 @@ def _unseen(surfels: Surfels, where: str) -> list[Loss]:
     if surfels.gloss is not None:
         size = surfels.gloss.reflectance.amax(dim=1).double().cpu().numpy()
         losses.append(loss(f"gloss: {where} it", size, 0.0, "largest specular reflectance"))
+    guessed = surfels.guessed.double().cpu().numpy()
+    losses.append(loss(f"surfels that are guessed: {where} that they are", guessed, 0.0, "largest doubt of log albedo"))
     return losses

@@ -22,6 +22,9 @@ VERSION = 1
 #: Before the names of the tensors of a scene's gloss; a diffuse scene has none.
 GLOSS = "gloss."
 
+#: Tensors that files of earlier versions lack.
+OPTIONAL = {"guessed"}
+
 MAKE_AGAIN = "Remove it and run the stage that makes it again."
 
 
@@ -64,7 +67,7 @@ def _check_tensors(path: Path, tensors: dict[str, Tensor]) -> None:
     names = set(tensor_names())
     if any(name.startswith(GLOSS) for name in tensors):
         names |= {GLOSS + field.name for field in fields(Gloss)}
-    if set(tensors) != names:
+    if set(tensors) not in (names, names - OPTIONAL):
         listed = ", ".join(sorted(tensors)) or "none"
         raise InputError(path, expected=f"the tensors {', '.join(sorted(names))}", found=listed, remedy=MAKE_AGAIN)
     kinds = {tensor.dtype for tensor in tensors.values()}

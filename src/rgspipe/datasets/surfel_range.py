@@ -22,6 +22,7 @@ def check_surfels(path: Path, surfels: Surfels, remedy: str) -> None:
         "scales": (surfels.scales, 0.0, FARTHEST),
         "opacities": (surfels.opacities, 0.0, 1.0 + ROUNDING),
         "albedo": (surfels.albedo, 0.0, 1.0 + ROUNDING),
+        "guessed": (surfels.guessed, 0.0, FARTHEST),
         "lengths of rotations": (surfels.rotations.norm(dim=1), ROUNDING, FARTHEST),
     }
     for name, (values, low, high) in wanted.items():

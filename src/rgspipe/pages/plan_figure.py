@@ -16,6 +16,7 @@ from rgspipe.evaluation.arrays import ArrayLike, to_array
 from rgspipe.evaluation.plots import CameraMark
 from rgspipe.evaluation.tables import class_order
 
+SEEN, GUESSED = "#c4c9d0", "#e07a52"
 TRAIN_CAMERA, TRAIN_LIGHT, TARGET_CAMERA = "#8a9099", "#c79a00", "#222222"
 #: Length of a camera's viewing direction, fraction of the drawing's longest side.
 REACH = 0.045
@@ -32,6 +33,7 @@ def plan_figure(
     lights: ArrayLike,
     targets: Mapping[str, ArrayLike],
     target_cameras: Sequence[CameraMark] = (),
+    guessed: ArrayLike | None = None,
 ) -> Figure:
     """A drawing of a dataset, z up.
 
@@ -42,6 +44,7 @@ def plan_figure(
         lights: (L, 3) lights of training views.
         targets: by class, (K, 3) true lights of the targets.
         target_cameras: cameras of the targets.
+        guessed: (N,) above 0 for points that no camera saw, drawn in a colour of their own.
 
     Raises:
         ValueError: there is nothing to draw.
@@ -52,6 +55,7 @@ def plan_figure(
     placed = [np.asarray(to_array(found), dtype=float).reshape(-1, 3) for found in targets.values()]
     low, high = _window([part for part in (points, lights, *placed) if part is not None and len(part)], origins)
     facing = None if normals is None else to_array(normals)
+    unseen = np.zeros(0 if points is None else len(points), bool) if guessed is None else to_array(guessed) > 0.0
     with matplotlib.rc_context(plots.STYLE):
         wide, deep, tall = (high - low).tolist()
         height = PANELS / (wide + deep) * max(deep, tall) + BORDER
@@ -59,7 +63,8 @@ def plan_figure(
         axes = figure.subplots(1, 2, width_ratios=(wide, deep))
         for axis, title, across, up in zip(axes, ("from above", "from the side"), (0, 1), (1, 2), strict=True):
             if points is not None:
-                _cloud(axis, points, facing, across, up)
+                for chosen, colour in ((~unseen, SEEN), (unseen, GUESSED)):
+                    _cloud(axis, points[chosen], None if facing is None else facing[chosen], across, up, colour)
             _cameras(axis, cameras, across, up, REACH * float((high - low).max()), TRAIN_CAMERA, 0.8)
             _cameras(axis, target_cameras, across, up, 2.0 * REACH * float((high - low).max()), TARGET_CAMERA, 1.6)
             axis.plot(lights[:, across], lights[:, up], "+", color=TRAIN_LIGHT, ms=5, mew=1.0, zorder=3)
@@ -71,6 +76,9 @@ def plan_figure(
             axis.set_ylabel(f"{'xyz'[up]} (scene units)")
             axis.set_title(title)
         handles = _handles(bool(cameras), bool(len(lights)), targets, bool(target_cameras))
+        if unseen.any():
+            words = "surface that no camera saw, added to close the room"
+            handles.append(Line2D([], [], color=GUESSED, marker=".", ls="", ms=5, label=words))
         figure.legend(handles=handles, loc="outside lower center", ncols=4, fontsize=8.5)
     return figure
 
@@ -89,13 +97,13 @@ def _window(parts: Sequence[npt.NDArray], origins: npt.NDArray) -> tuple[npt.NDA
     return low - margin, high + margin
 
 
-def _cloud(axis: Axes, points: npt.NDArray, facing: npt.NDArray | None, across: int, up: int) -> None:
+def _cloud(axis: Axes, points: npt.NDArray, facing: npt.NDArray | None, across: int, up: int, colour: str) -> None:
     along = 3 - across - up
     if facing is not None:
         points = points[np.abs(facing[:, along]) < 0.7]
     if len(points) > plots.CLOUD_POINTS:
         points = points[np.random.default_rng(0).permutation(len(points))[: plots.CLOUD_POINTS]]
-    axis.plot(points[:, across], points[:, up], ".", ms=1.4, color="#c4c9d0", mew=0, zorder=0)
+    axis.plot(points[:, across], points[:, up], ".", ms=1.4, color=colour, mew=0, zorder=0)
 
 
 def _cameras(

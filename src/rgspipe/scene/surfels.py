@@ -27,10 +27,16 @@ ENTRIES = {
     "albedo": (3,),
     "clip_offsets": (2,),
     "clip_angles": (2,),
+    "guessed": (),
 }
 
 #: What is possible where not every number is: the least and the most, with the rounding of float32.
-RANGES = {"scales": (0.0, math.inf), "opacities": (-1e-5, 1.0 + 1e-5), "albedo": (-1e-5, 1.0 + 1e-5)}
+RANGES = {
+    "scales": (0.0, math.inf),
+    "opacities": (-1e-5, 1.0 + 1e-5),
+    "albedo": (-1e-5, 1.0 + 1e-5),
+    "guessed": (0.0, math.inf),
+}
 
 #: A clip offset that never clips: beyond the footprint of any surfel, whatever the scene's unit. A power of two, so
 #: that it is the same in float32 and float64.
@@ -86,6 +92,8 @@ class Surfels:
         clip_angles: (N, 2) direction φ of the edges' outward normals in the (u, v) plane, rad.
         coverage: how surfels compose to surfaces; belongs to the scene, as it was trained with it.
         gloss: what they reflect besides, or None if all of them are diffuse.
+        guessed: (N,) where no camera saw the surface and it was added to close the scene, the standard deviation of the
+            logarithm of its albedo; 0 where one did, and None for 0 everywhere.
 
     Raises:
         InputError: a tensor has another shape.
@@ -101,9 +109,13 @@ class Surfels:
     clip_angles: Given
     coverage: Coverage
     gloss: Gloss | None = None
+    guessed: Given | None = None
 
     def __post_init__(self) -> None:
         count: int | str = "N"
+        if self.guessed is None:
+            opacities = as_tensor(self.opacities, "surfels.opacities", ("N",))
+            object.__setattr__(self, "guessed", torch.zeros_like(opacities))
         for name, entries in ENTRIES.items():
             tensor = as_tensor(getattr(self, name), f"surfels.{name}", (count, *entries))
             object.__setattr__(self, name, tensor)

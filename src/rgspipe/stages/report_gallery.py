@@ -81,5 +81,6 @@ def _plan(dataset: Dataset, truths: dict[str, LightRig], surfels: Surfels | None
         [view.light.position.tolist() for view in dataset.train if view.light is not None],
         {name: found for name, found in placed.items() if found},
         [camera_mark(view.camera) for view in seen],
+        None if surfels is None else surfels.guessed,
     )
     return png_of(figure, dpi=120)

@@ -3,14 +3,15 @@
 With J the derivatives of the image towards the n unknowns x (parameters of all lights and their intensities), r the
 residual and H = Σ JᵀJ, the covariance is
 
-    H^{-½} (σ² I + κ² (V − σ² I)₊) H^{-½} ,     V = Σ_k d_k d_kᵀ ,     d_k = (I − G_k)⁻¹ H^{-½} s_k
+    H^{-½} (σ² I + κ² (V − σ² I)₊ + U) H^{-½} ,     V = Σ_k d_k d_kᵀ ,     d_k = (I − G_k)⁻¹ H^{-½} s_k
 
 σ² is the residual's variance: what the noise alone leaves uncertain. V is the sandwich estimate over cells k of the
 surface (Huber 1967, White 1980, clustered as by Liang and Zeger 1986): s_k = Σ Jᵀr over the pixels of all views that
 look at the cell, so an error of the model counts once, however many pixels and views show it. G_k = H^{-½} H_k H^{-½}
 is the share of the evidence that the cell gives; with it d_k is how the answer moves when the cell is left out (the
 jackknife, Bell and McCaffrey 2002). ( )₊ keeps eigenvalues above zero, so that the noise is a lower bound. κ makes up
-for what the residual cannot show, as the fit has explained it away; it was chosen on fits with known truth.
+for what the residual cannot show, as the fit has explained it away; it was chosen on fits with known truth. U is what
+surfaces that no camera saw leave uncertain, as their albedo is guessed (`certainty.guesses`).
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from rgspipe.fitting.certainty.guesses import guess_scores
 from rgspipe.fitting.model.moments import group_moments, information, scores
 from rgspipe.fitting.model.problem import ROUNDING, LightProblem
 from rgspipe.fitting.model.views import PreparedViews
@@ -99,8 +101,9 @@ def _joint(
     cell_scores = scores(values, owners, state.intensity)
     noise = float(values[..., -1, -1].sum()) / max(1, residual.numel() - cells.shape[-1])
     root, unknown = whitener(cells.sum(dim=0))
-    model = sandwich(root, cells, cell_scores, options.largest_share)
-    return (root @ inflated(model, noise, options.inflation) @ root.T, unknown), (noise * root @ root.T, unknown)
+    model = inflated(sandwich(root, cells, cell_scores, options.largest_share), noise, options.inflation)
+    guessed = guess_scores(problem, state, weights) @ root
+    return (root @ (model + guessed.T @ guessed) @ root.T, unknown), (noise * root @ root.T, unknown)
 
 
 def whitener(matrix: Tensor) -> tuple[Tensor, Tensor]:

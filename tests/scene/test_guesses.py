@@ -1,0 +1,54 @@
+"""Surfaces that no camera saw: which surfels are of one, and how much a guess of their albedo is in doubt."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+import torch
+
+from rgspipe.scene import Surfels
+from rgspipe.scene.guesses import LEAST_DOUBT, MOST, guessed_surfaces, spread_of_albedo
+from rooms import closed_box
+
+
+@pytest.fixture
+def box() -> Surfels:
+    return closed_box(0.1)
+
+
+def guessed_where(surfels: Surfels, chosen: torch.Tensor) -> Surfels:
+    return replace(surfels, guessed=chosen.to(surfels.centers))
+
+
+def test_what_was_seen_is_no_guess(box):
+    assert guessed_surfaces(box).shape == (0, len(box))
+    assert float(spread_of_albedo(box)) == LEAST_DOUBT  # all of one albedo
+
+
+def test_walls_that_meet_are_surfaces_of_their_own_and_the_largest_comes_first(box):
+    floor, wall = box.normals[:, 2] > 0.9, (box.normals[:, 0] > 0.9) & (box.centers[:, 2] > 0.0)
+    marks = guessed_surfaces(guessed_where(box, floor | wall))
+    assert torch.equal(marks.bool(), torch.stack([floor, wall]))
+
+
+def test_two_patches_of_one_wall_are_two_surfaces(box):
+    floor, x = box.normals[:, 2] > 0.9, box.centers[:, 0]
+    marks = guessed_surfaces(guessed_where(box, floor & (x.abs() > 0.3)))
+    assert len(marks) == 2 and torch.equal(marks.sum(dim=0) > 0, floor & (x.abs() > 0.3))
+
+
+def test_many_small_surfaces_are_doubted_together(box):
+    alone = torch.zeros(len(box), dtype=torch.bool)
+    alone[:: len(box) // 30] = True
+    marks = guessed_surfaces(guessed_where(box, alone))
+    assert len(marks) == MOST + 1 and torch.equal(marks.sum(dim=0), alone.to(marks))
+
+
+def test_the_spread_is_that_of_what_cameras_saw(box):
+    albedo = torch.where((box.centers[:, 0] > 0.0)[:, None], 0.2, 0.8).expand(-1, 3).double()
+    seen = replace(box, albedo=albedo)
+    half = 0.5 * math.log(4.0)
+    assert float(spread_of_albedo(seen)) == pytest.approx(half, rel=0.01)  # measured 0.6931, as many on either side
+    assert float(spread_of_albedo(guessed_where(seen, albedo[:, 0] > 0.5))) == LEAST_DOUBT
