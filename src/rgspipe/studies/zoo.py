@@ -1,0 +1,140 @@
+"""What became of the lights in rooms that nobody tuned: a row a fit, and their figures against each property."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import pandas as pd
+
+from rgspipe.evaluation.tables import ALL, TARGET_COLUMNS, class_order
+from rgspipe.studies.lights import figures, silent
+
+#: What a fit says that could not be made.
+FAILED = "failed"
+
+#: Ranges of properties: column, and the least value of each range but the first.
+RANGES: Mapping[str, tuple[float, ...]] = {
+    "train_views": (50, 75),
+    "lens": (45.0, 60.0),
+    "noise": (0.03, 0.06),
+    "unseen": (0.05, 0.15, 0.3),
+}
+
+#: Properties that have names.
+NAMED = ("occlusion", "plan", "tone", "fronts", "stand", "grade")
+
+#: Rooms of their own interest: white ones with noise up to this, and the quarter with few views and narrow lenses.
+LITTLE_NOISE, QUARTER = 0.03, 0.25
+WHITE, SCARCE = "white, noise up to 3 %", "quarter with the fewest views and narrowest lenses"
+
+#: What all fits together are called.
+EVERYTHING = "all"
+
+
+@dataclass(frozen=True)
+class Group:
+    """Fits that have something in common.
+
+    Attributes:
+        name: the property.
+        value: what they have in common, as text.
+        rows: the fits.
+    """
+
+    name: str
+    value: str
+    rows: pd.DataFrame
+
+
+def fit_rows(room: Mapping[str, Any], targets: pd.DataFrame) -> pd.DataFrame:
+    """The rows of a room whose lights were looked for.
+
+    Args:
+        room: its properties by column.
+        targets: rows of `tables.target_table`.
+
+    Returns:
+        The properties, the columns of `targets`, and `silent`: converged, not solved, and the truth in no region.
+    """
+    return targets.assign(**room, silent=silent(targets), failed_in=None)
+
+
+def failed_rows(
+    room: Mapping[str, Any], classes: Sequence[str], method: str, views: int, stage: str, reason: str
+) -> pd.DataFrame:
+    """The rows of a room whose lights could not be looked for, one a class.
+
+    They count as not solved, but where the room itself could not be made.
+
+    Args:
+        stage: what failed.
+        reason: why, in words.
+    """
+    made = stage != "generate_dataset"
+    known = {"position_error": math.inf, "success": False} if made else {"position_error": math.nan, "success": None}
+    row = dict.fromkeys(TARGET_COLUMNS, math.nan) | {"inside_95": None, "count_right": None, "types_right": None}
+    row |= {"target": "", "method": method, "views": views, "result": FAILED, "reason": reason, "lights_found": 0}
+    rows = [row | known | {"occlusion": name} for name in classes]
+    return pd.DataFrame(rows).assign(**room, silent=False, failed_in=stage)
+
+
+def summary(table: pd.DataFrame, seed: int) -> pd.DataFrame:
+    """The figures of all fits, and of each group of them.
+
+    Args:
+        table: rows of `fit_rows` and `failed_rows`.
+        seed: of the resampling behind intervals.
+
+    Returns:
+        A row for each `part`, `case`, `method`, `property`, `value` and number of `views`, with the number of `rooms`
+        and the columns of `lights.figures`.
+    """
+    rows = []
+    for (part, case, method), chosen in table.groupby(["part", "case", "method"], sort=False):
+        for group in groups(chosen):
+            for views, fits in group.rows.groupby("views"):
+                named = {"part": part, "case": case, "method": method, "property": group.name, "value": group.value}
+                named |= {"views": int(views), "rooms": fits["seed"].nunique()}
+                rows.append(named | figures(fits, seed))
+    return pd.DataFrame(rows)
+
+
+def groups(table: pd.DataFrame) -> Iterator[Group]:
+    """All fits, then those of each value of each property; a property that none of them has is left out."""
+    yield Group(EVERYTHING, ALL, table)
+    for name in NAMED:
+        values = table[name].dropna()
+        for value in class_order(values) if name == "occlusion" else sorted(set(values)):
+            yield Group(name, str(value), table[table[name] == value])
+    for name, limits in RANGES.items():
+        yield from _ranges(table, name, limits)
+    white = table[(table["tone"] == "white") & (table["noise"] <= LITTLE_NOISE)]
+    yield from (Group("rooms", name, rows) for name, rows in ((WHITE, white), (SCARCE, scarce(table))) if len(rows))
+
+
+def _ranges(table: pd.DataFrame, name: str, limits: Sequence[float]) -> Iterator[Group]:
+    edges = (-math.inf, *limits, math.inf)
+    values = table[name].astype(float)
+    for low, high in pairwise(edges):
+        rows = table[(values >= low) & (values < high)]
+        if len(rows):
+            yield Group(name, range_text(name, low, high), rows)
+
+
+def range_text(name: str, low: float, high: float) -> str:
+    """ "below 50", "50 to 75", "30 % and more"."""
+    ends = [f"{100 * end:g} %" if name in ("noise", "unseen") else f"{end:g}" for end in (low, high)]
+    if math.isinf(low):
+        return f"below {ends[1]}"
+    return f"{ends[0]} and more" if math.isinf(high) else f"{ends[0]} to {ends[1]}"
+
+
+def scarce(table: pd.DataFrame) -> pd.DataFrame:
+    """Fits of the quarter of the rooms with the fewest views and narrowest lenses, both ranks counting alike."""
+    rooms = table.drop_duplicates("seed").dropna(subset=["lens"])
+    order = rooms.assign(rank=rooms["train_views"].rank() + rooms["lens"].rank()).sort_values(["rank", "seed"])
+    return table[table["seed"].isin(order["seed"].head(int(QUARTER * len(order))))]
