@@ -21,7 +21,7 @@ from rgspipe.stages.study_cases import checked_cases, target_limit
 from rgspipe.stages.study_kind import StudyKind
 from rgspipe.stages.study_lights import TYPES
 from rgspipe.studies.written import Study
-from rgspipe.studies.zoo import failed_rows, fit_rows, summary
+from rgspipe.studies.zoo import Row, failed_rows, fit_rows, fits_table, summary
 from rgspipe.studies.zoo_figure import zoo_figure
 from rgspipe.studies.zoo_page import page
 from rgspipe.studies.zoo_rooms import camera_properties, part_of, photographed, room_properties, share_unseen
@@ -58,8 +58,7 @@ class Cell:
 def _gather(context: StageContext) -> Study:
     cells = list(_cells(context.config))
     attempts = zip(*(context.attempts(stage, len(cells)) for stage in STAGES), strict=True)
-    table = pd.concat([_rows(cell, *made) for cell, made in zip(cells, attempts, strict=True)], ignore_index=True)
-    table.insert(0, "scene", "zoo_" + table["seed"].astype(str))
+    table = fits_table([row for cell, made in zip(cells, attempts, strict=True) for row in _rows(cell, *made)])
     figures = summary(table, context.config.seed)
     context.note(failed=int((table["failed_in"].notna()).sum()))
     beside = {SUMMARY: figures.to_csv(index=False).encode()}
@@ -68,7 +67,7 @@ def _gather(context: StageContext) -> Study:
 
 def _rows(
     cell: Cell, dataset: Artifact | Failure, trained: Artifact | Failure, evaluated: Artifact | Failure
-) -> pd.DataFrame:
+) -> list[Row]:
     """The fits of a cell, or why there are none."""
     room = _properties(cell, dataset, trained)
     if isinstance(evaluated, Artifact):

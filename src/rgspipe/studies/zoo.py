@@ -16,6 +16,10 @@ from rgspipe.studies.lights import figures, silent
 #: What a fit says that could not be made.
 FAILED = "failed"
 
+#: Columns that are true, false or not known, and numbers that a room may lack.
+VERDICTS = ("success", "inside_95", "count_right", "types_right")
+MEASURED = ("lens", "unseen", "surfels", "held_out_psnr", "training_seconds")
+
 #: Ranges of properties: column, and the least value of each range but the first.
 RANGES: Mapping[str, tuple[float, ...]] = {
     "train_views": (50, 75),
@@ -35,6 +39,9 @@ WHITE, SCARCE = "white, noise up to 3 %", "quarter with the fewest views and nar
 EVERYTHING = "all"
 
 
+Row = Mapping[str, Any]
+
+
 @dataclass(frozen=True)
 class Group:
     """Fits that have something in common.
@@ -50,7 +57,7 @@ class Group:
     rows: pd.DataFrame
 
 
-def fit_rows(room: Mapping[str, Any], targets: pd.DataFrame) -> pd.DataFrame:
+def fit_rows(room: Row, targets: pd.DataFrame) -> list[Row]:
     """The rows of a room whose lights were looked for.
 
     Args:
@@ -60,12 +67,11 @@ def fit_rows(room: Mapping[str, Any], targets: pd.DataFrame) -> pd.DataFrame:
     Returns:
         The properties, the columns of `targets`, and `silent`: converged, not solved, and the truth in no region.
     """
-    return targets.assign(**room, silent=silent(targets), failed_in=None)
+    told = targets.assign(silent=silent(targets))
+    return [dict(room) | row | {"failed_in": None} for row in told.to_dict("records")]
 
 
-def failed_rows(
-    room: Mapping[str, Any], classes: Sequence[str], method: str, views: int, stage: str, reason: str
-) -> pd.DataFrame:
+def failed_rows(room: Row, classes: Sequence[str], method: str, views: int, stage: str, reason: str) -> list[Row]:
     """The rows of a room whose lights could not be looked for, one a class.
 
     They count as not solved, but where the room itself could not be made.
@@ -75,18 +81,24 @@ def failed_rows(
         reason: why, in words.
     """
     made = stage != "generate_dataset"
-    known = {"position_error": math.inf, "success": False} if made else {"position_error": math.nan, "success": None}
-    row = dict.fromkeys(TARGET_COLUMNS, math.nan) | {"inside_95": None, "count_right": None, "types_right": None}
+    row = dict(room) | dict.fromkeys(TARGET_COLUMNS, math.nan) | dict.fromkeys(VERDICTS)
+    row |= {"position_error": math.inf, "success": False} if made else {}
     row |= {"target": "", "method": method, "views": views, "result": FAILED, "reason": reason, "lights_found": 0}
-    rows = [row | known | {"occlusion": name} for name in classes]
-    return pd.DataFrame(rows).assign(**room, silent=False, failed_in=stage)
+    return [row | {"occlusion": name, "silent": False, "failed_in": stage} for name in classes]
+
+
+def fits_table(rows: Sequence[Row]) -> pd.DataFrame:
+    """Rows of `fit_rows` and `failed_rows` as one table, its `scene` first."""
+    table = pd.DataFrame(rows).astype(dict.fromkeys(VERDICTS, "boolean") | dict.fromkeys(MEASURED, float))
+    table.insert(0, "scene", "zoo_" + table["seed"].astype(str))
+    return table
 
 
 def summary(table: pd.DataFrame, seed: int) -> pd.DataFrame:
     """The figures of all fits, and of each group of them.
 
     Args:
-        table: rows of `fit_rows` and `failed_rows`.
+        table: see `fits_table`.
         seed: of the resampling behind intervals.
 
     Returns:

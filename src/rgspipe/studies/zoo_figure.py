@@ -29,7 +29,7 @@ def zoo_figure(table: pd.DataFrame) -> Figure:
     """Success with its 95 % interval in ranges of each property above, the error of each fit below.
 
     Args:
-        table: rows of `zoo.fit_rows` and `zoo.failed_rows`, of one or more cases.
+        table: see `zoo.fits_table`; of one or more cases.
 
     Raises:
         ValueError: the table is empty.

@@ -73,7 +73,7 @@ def page(table: pd.DataFrame, summary: pd.DataFrame) -> str:
     """The study as Markdown.
 
     Args:
-        table: rows of `zoo.fit_rows` and `zoo.failed_rows`.
+        table: see `zoo.fits_table`.
         summary: of them, see `zoo.summary`.
     """
     parts = [f"# Rooms that nobody tuned\n\n{NOTE}\n\n![success and error]({FIGURE})\n"]
