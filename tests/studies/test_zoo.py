@@ -6,9 +6,9 @@ import math
 
 import pandas as pd
 import pytest
-from zoo_fits import five_rooms, room_of, targets
 
 from rgspipe.studies.zoo import SCARCE, WHITE, fit_rows, fits_table, groups, range_text, scarce, summary
+from zoo_fits import five_rooms, room_of, targets
 
 
 def _row(figures: pd.DataFrame, part: str, name: str, value: str, views: int = 1) -> pd.Series:
@@ -40,7 +40,7 @@ def test_fits_are_grouped_by_every_property_that_is_known() -> None:
     # Seeds 1 and 5 have 30 and 40 views, seed 3 has 80.
     assert views[["value", "rooms"]].to_numpy().tolist() == [["below 50", 2], ["75 and more", 1]]
     unseen = figures[(figures["property"] == "unseen") & (figures["views"] == 3)]
-    assert set(unseen["value"]) == {"5 % to 15 %", "30 % and more"} and "grade" not in set(figures["property"])
+    assert set(unseen["value"]) == {"5 to 15 %", "30 % and more"} and "grade" not in set(figures["property"])
     assert set(figures.loc[figures["property"] == "occlusion", "value"]) == {"visible", "out_of_frame", "occluded"}
     assert set(figures["views"]) == {1, 3}
 
@@ -68,5 +68,5 @@ def test_the_scarce_quarter_is_of_rooms_and_by_both_ranks() -> None:
 
 def test_ranges_read_as_they_are_meant() -> None:
     assert range_text("lens", -math.inf, 45.0) == "below 45"
-    assert range_text("unseen", 0.05, 0.15) == "5 % to 15 %"
+    assert range_text("unseen", 0.05, 0.15) == "5 to 15 %"
     assert range_text("noise", 0.06, math.inf) == "6 % and more"

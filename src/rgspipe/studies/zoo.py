@@ -138,11 +138,11 @@ def _ranges(table: pd.DataFrame, name: str, limits: Sequence[float]) -> Iterator
 
 
 def range_text(name: str, low: float, high: float) -> str:
-    """ "below 50", "50 to 75", "30 % and more"."""
-    ends = [f"{100 * end:g} %" if name in ("noise", "unseen") else f"{end:g}" for end in (low, high)]
+    """ "below 50", "5 to 15 %", "30 % and more"."""
+    factor, unit = (100, " %") if name in ("noise", "unseen") else (1, "")
     if math.isinf(low):
-        return f"below {ends[1]}"
-    return f"{ends[0]} and more" if math.isinf(high) else f"{ends[0]} to {ends[1]}"
+        return f"below {factor * high:g}{unit}"
+    return f"{factor * low:g}{unit} and more" if math.isinf(high) else f"{factor * low:g} to {factor * high:g}{unit}"
 
 
 def scarce(table: pd.DataFrame) -> pd.DataFrame:

@@ -29,6 +29,7 @@ TITLES = {
 #: What the list of rooms shows: headings and formats.
 ROOMS = {
     "seed": ("seed", ""),
+    "case": ("case", ""),
     "plan": ("plan", ""),
     "tone": ("tone", ""),
     "albedo": ("albedo", ".2f"),
@@ -103,8 +104,9 @@ def _cells(row: Row, alike: list[str]) -> list[str]:
 
 
 def _rooms(table: pd.DataFrame) -> pd.DataFrame:
-    """A row a room, and a case where training differs."""
-    return table.drop_duplicates(["seed", "held_out_psnr"]).sort_values("seed")
+    """A row a room; where there are several cases, one for each."""
+    rows = table.drop_duplicates(["seed", "case"]).sort_values("seed", kind="stable")
+    return rows if several(rows, ["case"]) else rows.drop(columns="case")
 
 
 def _trouble(table: pd.DataFrame) -> list[str]:
