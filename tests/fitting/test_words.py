@@ -17,6 +17,7 @@ from rgspipe.fitting.findings import (
     OnSurface,
     OutOfSteps,
     PoorlyExplained,
+    PoorScene,
     Rival,
     Uncertain,
     Undetermined,
@@ -104,3 +105,8 @@ def test_findings_are_data() -> None:
     fields = json.loads(json.dumps([LightSpare(3, 3, 0.04, 0.2).data(), DOUBT.data()]))
     assert fields[0] == {"finding": "light_spare", "number": 3, "count": 3, "gain": 0.04, "wanted": 0.2}
     assert fields[1] == {"finding": "undetermined", "number": 1, "count": 1, "fields": ["intensity"]}
+
+
+def test_a_poor_scene_is_no_place_for_an_answer_that_is_sure() -> None:
+    assert gravest([PoorScene(0.05)]) is FitStatus.UNDETERMINED
+    assert "The scene is poor: lights in it are expected to be off by 5 % of its size." in explained([PoorScene(0.05)])

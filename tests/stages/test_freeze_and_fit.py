@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -13,16 +14,19 @@ import pytest
 import torch
 
 from lit_room import HIDDEN, VISIBLE, frozen_room, room_cameras, room_surfels
-from rgspipe.artifacts import Artifact, ArtifactStore, Key
+from rgspipe.artifacts import MANIFEST, Artifact, ArtifactStore, Key
 from rgspipe.config import RgspipeConfig, with_changes
 from rgspipe.datasets.exr import write_image
+from rgspipe.datasets.grade_file import GRADE, save_grade
 from rgspipe.datasets.gs3_write import frame_entry, write_transforms
 from rgspipe.datasets.landscape_file import read_landscape
 from rgspipe.datasets.light_file import read_lights
 from rgspipe.datasets.surfel_file import save_surfels
 from rgspipe.errors import InputError
 from rgspipe.fitting import FitViews
+from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import PointLight
+from rgspipe.scene.grade import SceneGrade
 from rgspipe.scene.lights import LedLight
 from rgspipe.stages import fit_extras, fit_light, freeze
 from rgspipe.stages.base import StageContext
@@ -116,6 +120,34 @@ def test_fits_every_target_and_writes_all_of_its_files(inputs, tmp_path):
         }
     assert (table["psnr"] > 60).all() and (table["result"] == "converged").all()
     assert list(tmp_path.glob(".*")) == [tmp_path / RECORD]
+
+
+def test_a_poor_scene_is_refused_unless_it_is_asked_for_and_then_says_so(inputs, tmp_path):
+    def poor(folder: Path) -> None:
+        for path in inputs["freeze"].folder().iterdir():
+            if path.name != MANIFEST:
+                shutil.copy(path, folder)
+        save_grade(folder / GRADE, SceneGrade(9.7, 8, 0.5, 0.0, 0.0, 0.0))
+
+    graded = inputs | {"freeze": _build(tmp_path / "store", "freeze", poor)}
+    with pytest.raises(InputError, match=r"The scene is poor.*5\.0 % of its size.*fit\.poor_scene=true"):
+        _fit(graded, tmp_path / "refused")
+    table = _fit(graded, tmp_path / "asked", fit__poor_scene=True, fit__limit=1)
+    assert (table["result"] == "undetermined").all() and table["reason"].str.contains("The scene is poor").all()
+
+
+def test_a_grade_goes_with_the_surfels_to_the_frozen_scene(tmp_path):
+    grade = SceneGrade(43.0, 8, 0.01, 0.02, 0.005, 0.0)
+
+    def trained(folder: Path) -> None:
+        save_surfels(folder / "surfels.safetensors", room_surfels())
+        save_grade(folder / GRADE, grade)
+
+    config = with_changes(RgspipeConfig(stage="freeze"), {"freeze.gather_rays": 8, "freeze.dictionary_grid": 2})
+    (tmp_path / "frozen").mkdir()
+    surfels = {"train_surfels": _build(tmp_path / "store", "train_surfels", trained)}
+    freeze.run(StageContext(config, surfels, {}, tmp_path / "frozen"))
+    assert FrozenScene.load(tmp_path / "frozen").grade == grade
 
 
 def test_goes_on_after_an_interruption(inputs, tmp_path):

@@ -33,6 +33,8 @@ class FitConfig(Options):
     adam: AdamOptions = AdamOptions()
     shape: Literal["known", "free"] = "known"
     """whether shapes such as cones are those that light.* says, or recovered, too"""
+    poor_scene: bool = False
+    """fit even where the scene was graded poor, and the answer is not to be trusted"""
     suggest_view: bool = False
     """say which further camera would help most, and how many views are needed"""
     wanted_accuracy: float = option(0.003, low=0, high=1)

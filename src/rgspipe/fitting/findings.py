@@ -119,6 +119,14 @@ class OnSurface(Finding):
 
 
 @dataclass(frozen=True)
+class PoorScene(Finding):
+    """The scene itself was graded poor: its lights are expected to be off by `error`, a part of its size."""
+
+    error: float
+    status = FitStatus.UNDETERMINED
+
+
+@dataclass(frozen=True)
 class OutOfSteps(Finding):
     """All steps were used while the loss was still falling."""
 

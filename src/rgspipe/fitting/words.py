@@ -14,6 +14,7 @@ from rgspipe.fitting.findings import (
     LightSpare,
     MaybeOneMore,
     OnSurface,
+    PoorScene,
     Rival,
     Uncertain,
     Undetermined,
@@ -109,6 +110,10 @@ def _on_surface(found: OnSurface, spoken: Spoken) -> str:
     return f"{which} stands on a surface, where lights that belong elsewhere are stopped: give more views."
 
 
+def _poor_scene(found: PoorScene, spoken: Spoken) -> str:
+    return f"The scene is poor: lights in it are expected to be off by {percent(found.error)} of its size."
+
+
 def _all_steps(found: AllStepsTaken, spoken: Spoken) -> str:
     change = 100.0 * found.change
     words = "hardly changed" if abs(change) < 1.0 else f"{'fell' if change < 0.0 else 'rose'} by {abs(change):.0f} %"
@@ -132,6 +137,7 @@ _WORDS: dict[type[Finding], Callable[..., str]] = {
     Undetermined: _undetermined,
     Uncertain: _uncertain,
     OnSurface: _on_surface,
+    PoorScene: _poor_scene,
     AllStepsTaken: _all_steps,
     MaybeOneMore: _maybe,
     ExposureUnknown: _exposure,

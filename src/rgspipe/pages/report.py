@@ -9,6 +9,7 @@ from typing import Any
 import pandas as pd
 
 from rgspipe.evaluation import goals, metrics, plots
+from rgspipe.evaluation.grading import graded_words
 from rgspipe.evaluation.quality_plots import split_figure
 from rgspipe.evaluation.tables import ALL
 from rgspipe.pages.gallery import Gallery, Shot
@@ -19,6 +20,7 @@ from rgspipe.pages.provenance import StageRecord
 from rgspipe.pages.quality import compared_lights, quality_columns, quality_rows
 from rgspipe.pages.relit import Relighting, relightings
 from rgspipe.pages.section import Section, shown_sections
+from rgspipe.scene.grade import SceneGrade
 from rgspipe.studies.capture_figure import capture_figure
 from rgspipe.studies.captures import TRUTH
 
@@ -51,6 +53,7 @@ class ReportContents:
         fits: pictures of single fits.
         cloud, normals: (N, 3) surfel centres and normals of the frozen scene, or None.
         cameras: cameras of the targets.
+        grade: of the frozen scene, where it was measured.
         training: the trainer's metrics: `test_psnr_mean`, `test_psnr_median`, `test_psnr_min`,
             `test_psnr_off_edges_mean`, `direct_only_psnr` [dB], `surfels`, `seconds`, `per_view`.
         training_log: one row a training round, or None.
@@ -81,6 +84,7 @@ class ReportContents:
     cloud: Any = None
     normals: Any = None
     cameras: Sequence[plots.CameraMark] = ()
+    grade: SceneGrade | None = None
     training: Mapping[str, Any] | None = None
     training_log: pd.DataFrame | None = None
     quality: pd.DataFrame | None = None
@@ -111,6 +115,7 @@ def render_report(contents: ReportContents) -> str:
         "report.html",
         contents=contents,
         tiles=tiles(found),
+        grade=None if contents.grade is None else graded_words(contents.grade),
         gallery=_gallery(contents.gallery),
         study=[] if contents.study is None else contents.study.to_dict("records"),
         light_studies=light_studies(contents.light_studies),

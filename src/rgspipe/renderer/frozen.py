@@ -34,6 +34,7 @@ from rgspipe.renderer.transport import PatchTransport, build_patch_transport
 from rgspipe.renderer.view_weights import ViewWeights, build_view_weights
 from rgspipe.scene.arrays import ArrayLike, as_tensor
 from rgspipe.scene.camera import Camera
+from rgspipe.scene.grade import SceneGrade
 from rgspipe.scene.lights import Light, LightRig, as_rig, check_numbers
 from rgspipe.scene.shapes import Float
 from rgspipe.scene.surfels import Surfels
@@ -54,6 +55,7 @@ class FrozenScene:
         centers: (N, 3) float64 centres as they were given, which rays and lights are measured from: far from the origin
             float32 cannot hold them. None for `surfels.centers`.
         candidates: its dictionary of lights, if it is made already; see `dictionary`.
+        grade: how good it is, where that was measured.
     """
 
     surfels: Surfels
@@ -64,6 +66,7 @@ class FrozenScene:
     gloss: GlossyTransport | None = None
     centers: Float[Tensor, "N 3"] | None = None
     candidates: LightDictionary | None = None
+    grade: SceneGrade | None = None
 
     @classmethod
     def freeze(cls, surfels: Surfels, *, gather_rays: int = 256, patches: int = 1000, seed: int = 0) -> FrozenScene:
@@ -122,6 +125,7 @@ class FrozenScene:
             transport=self.transport,
             gloss=self.gloss,
             candidates=self.__dict__.get("dictionary", self.candidates),
+            grade=self.grade,
         )
 
     def __repr__(self) -> str:
@@ -144,6 +148,7 @@ class FrozenScene:
             self.areas.to(device),
             transport=self.transport.to(device),
             candidates=None if candidates is None else candidates.to(device),
+            grade=self.grade,
             **{name: None if part is None else part.to(device) for name, part in parts.items()},
         )
 

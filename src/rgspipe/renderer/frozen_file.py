@@ -11,6 +11,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from rgspipe.datasets.grade_file import GRADE, load_grade, save_grade
 from rgspipe.datasets.surfel_file import load_surfels, save_surfels
 from rgspipe.datasets.tensor_file import load_tensors, save_tensors
 from rgspipe.errors import InputError
@@ -19,6 +20,7 @@ from rgspipe.renderer.glossy_operators import OPERATOR_NAMES, PAIR_NAMES, Exchan
 from rgspipe.renderer.glossy_transport import GlossyTransport
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.transport import PatchTransport
+from rgspipe.scene.grade import SceneGrade
 from rgspipe.scene.surfels import Surfels
 
 SURFELS, GATHER, TRANSPORT, GLOSS, DICTIONARY = (
@@ -38,6 +40,7 @@ def save_parts(
     transport: PatchTransport,
     gloss: GlossyTransport | None,
     candidates: LightDictionary | None,
+    grade: SceneGrade | None,
 ) -> None:
     """Write the parts of a frozen scene; those that are None have no file."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -52,8 +55,10 @@ def save_parts(
     if candidates is not None:
         tensors = {"positions": candidates.positions, "irradiance": candidates.irradiance}
         files[DICTIONARY] = tensors, {"grid": candidates.grid, "seed": candidates.seed}
-    for name in (GATHER, TRANSPORT, GLOSS, DICTIONARY):
+    for name in (GATHER, TRANSPORT, GLOSS, DICTIONARY, GRADE):
         (folder / name).unlink(missing_ok=True)
+    if grade is not None:
+        save_grade(folder / GRADE, grade)
     for name, (tensors, note) in files.items():
         save_tensors(folder / name, tensors, note)
 
@@ -78,6 +83,7 @@ def load_parts(folder: Path, *, gather: bool) -> dict[str, Any]:
         "transport": transport,
         "gloss": _load_gloss(folder / GLOSS, replace(surfels, centers=centers), transport) if glossy else None,
         "candidates": _load_dictionary(known, len(surfels)) if known.exists() else None,
+        "grade": load_grade(folder / GRADE) if (folder / GRADE).exists() else None,
     }
 
 

@@ -15,7 +15,9 @@ from rgspipe.datasets.gs3 import load_target
 from rgspipe.datasets.location import dataset_root
 from rgspipe.datasets.read_files import files_read
 from rgspipe.datasets.views import Target, View
+from rgspipe.errors import InputError
 from rgspipe.evaluation.fit_folder import read_result, write_result
+from rgspipe.evaluation.grading import graded_words
 from rgspipe.files import write_text
 from rgspipe.fitting import FitViews, PaperAdam, Search, Solver
 from rgspipe.fitting.options import MOST_LIGHTS, AdamOptions, SearchOptions
@@ -28,6 +30,7 @@ from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.monte_carlo import MonteCarloSolver
 from rgspipe.renderer.zonal_harmonics import BandLimit
 from rgspipe.scene import PointLight
+from rgspipe.scene.grade import Grade
 from rgspipe.stages import fit_capture
 from rgspipe.stages.base import Stage, StageContext
 from rgspipe.stages.fit_capture import captured_views
@@ -69,7 +72,9 @@ class Fitter:
     @classmethod
     def create(cls, context: StageContext) -> Fitter:
         config, artifact = context.config, context.inputs["freeze"]
-        frozen, effects = frozen_scene(config, artifact), _effects(context)
+        frozen = frozen_scene(config, artifact)
+        _require_fit(frozen, config, artifact)
+        effects = _effects(context)
         dataset = context.inputs["generate_dataset"].path if "generate_dataset" in context.inputs else None
         lights = _training_lights(context) if config.fit.method == "paper_adam" else ()
         return cls(config, frozen, lights, effects, dataset)
@@ -126,6 +131,22 @@ class Fitter:
                 mask_edges=self.config.fit.search.mask_edges,
             )
         return self.prepared[key]
+
+
+def _require_fit(frozen: FrozenScene, config: RgspipeConfig, artifact: Artifact) -> None:
+    """Refuse a scene in which no light is found where it is.
+
+    Raises:
+        InputError: it was graded poor, and nobody asked for it nevertheless.
+    """
+    grade = frozen.grade
+    if grade is not None and grade.grade is Grade.POOR and not config.fit.poor_scene:
+        raise InputError(
+            artifact.path,
+            expected="a scene that is fit for finding lights",
+            found=graded_words(grade),
+            remedy="Mend the scene, or set fit.poor_scene=true to fit nevertheless; answers will say so.",
+        )
 
 
 def _given(options: Options, kind: type[Options]) -> dict[str, object]:

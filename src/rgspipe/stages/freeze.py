@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
+from rgspipe.datasets.grade_file import GRADE, load_grade
 from rgspipe.datasets.surfel_file import load_surfels
 from rgspipe.degradation.model_error import with_error
 from rgspipe.files import write_json
@@ -19,7 +20,8 @@ from rgspipe.stages.sources import surfel_stage
 def run(context: StageContext) -> None:
     """Write the folder of a frozen scene, and effects.json."""
     options = context.config.freeze
-    surfels = load_surfels(context.inputs[surfel_stage(context.config)].file(SURFELS))
+    source = context.inputs[surfel_stage(context.config)]
+    surfels = load_surfels(source.file(SURFELS))
     surfels = with_error(surfels, context.config.model_error)
     begin = time.perf_counter()
     frozen = FrozenScene.freeze(surfels, gather_rays=options.gather_rays, patches=options.patches, seed=options.seed)
@@ -29,6 +31,8 @@ def run(context: StageContext) -> None:
     # Where no surfel can shade another, candidates without shadow rays are the same.
     shadows = not bounds.shadows.proved
     frozen = frozen.with_dictionary(options.dictionary_grid, seed=options.seed, shadows=shadows)
+    if (source.folder() / GRADE).exists():
+        frozen = replace(frozen, grade=load_grade(source.folder() / GRADE))
     end = time.perf_counter()
     effects = {"bounds": asdict(bounds), "milliseconds": measure_costs(frozen)}
     write_json(context.folder / EFFECTS, effects)

@@ -11,6 +11,7 @@ import pandas as pd
 from rgspipe.artifacts import Artifact
 from rgspipe.config import RgspipeConfig
 from rgspipe.config.core import plain
+from rgspipe.datasets.grade_file import GRADE, load_grade
 from rgspipe.datasets.json_file import read_json
 from rgspipe.datasets.surfel_file import load_surfels
 from rgspipe.evaluation.plots import CameraMark
@@ -18,6 +19,7 @@ from rgspipe.files import write_bytes, write_json, write_text
 from rgspipe.pages import report
 from rgspipe.pages.overview import scene_summary
 from rgspipe.pages.provenance import StageRecord, stage_record
+from rgspipe.scene.grade import SceneGrade
 from rgspipe.stages.base import Need, Stage, StageContext
 from rgspipe.stages.report_gallery import dataset_gallery
 from rgspipe.stages.report_relight import found_relightings, relight_files
@@ -68,6 +70,7 @@ def _contents(context: StageContext) -> report.ReportContents:
         cloud=None if surfels is None else surfels.centers,
         normals=None if surfels is None else surfels.normals,
         cameras=_cameras(described),
+        grade=_grade(context.inputs.get("freeze")),
         training=_training(trained),
         training_log=_optional_table(trained, "training.csv"),
         quality=_joined(judged, "quality.csv"),
@@ -124,6 +127,12 @@ def _cameras(described: Iterable[Mapping[str, Any]]) -> list[CameraMark]:
 
 def _surfels(freeze: Artifact | None) -> Any:
     return None if freeze is None else load_surfels(freeze.file("surfels.safetensors"))
+
+
+def _grade(frozen: Artifact | None) -> SceneGrade | None:
+    if frozen is None or GRADE not in frozen.manifest["files"]:
+        return None
+    return load_grade(frozen.file(GRADE))
 
 
 def _training(trained: Artifact | None) -> Mapping[str, Any] | None:

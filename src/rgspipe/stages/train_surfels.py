@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
 from dataclasses import asdict, replace
@@ -13,10 +14,12 @@ import pandas as pd
 import torch
 
 from rgspipe.config.train import TrainConfig
+from rgspipe.datasets.grade_file import GRADE, save_grade
 from rgspipe.datasets.location import open_dataset
 from rgspipe.datasets.surfel_file import load_surfels, save_surfels
 from rgspipe.datasets.views import View
 from rgspipe.degradation.capture import degraded
+from rgspipe.evaluation.grading import grade_scene, graded_words
 from rgspipe.evaluation.held_out import held_out_picture
 from rgspipe.evaluation.held_out_views import render_held_out
 from rgspipe.evaluation.images import save_png
@@ -24,13 +27,18 @@ from rgspipe.files import write_json, write_text
 from rgspipe.machine import PeakMemory
 from rgspipe.options import settings
 from rgspipe.scene.gloss import Gloss
+from rgspipe.scene.grade import SceneGrade
 from rgspipe.stages.base import Stage, StageContext
+from rgspipe.training.albedo import ALBEDO_RANGE
 from rgspipe.training.checkpoint import Checkpoint
 from rgspipe.training.materials import build_frozen, fit_materials
 from rgspipe.training.operator_store import OperatorStore
 from rgspipe.training.options import TrainOptions
 from rgspipe.training.prior import prior_from_maps
 from rgspipe.training.trainer import Trained, train
+
+#: Views that a scene is graded by where none was left out of training.
+MOST_JUDGED = 12
 
 #: Settings that a training can be resumed with another value of: they do not change the surfels.
 NO_RESULT = ("memory_mib", "scratch", "checkpoint_every")
@@ -50,12 +58,12 @@ def run(context: StageContext) -> None:
     _write_table(context.folder / "training.csv", trained)
 
     seconds = {"training": trained.records[-1].seconds}
-    metrics: dict[str, Any] = {}
-    if dataset.test:
-        began = time.perf_counter()
-        metrics = _held_out(trained, dataset.test, options, context.folder)
-        seconds["held_out"] = time.perf_counter() - began
+    began = time.perf_counter()
+    metrics, grade = _judged(trained, dataset.test, options, context.folder)
+    seconds["held_out"] = time.perf_counter() - began
     print(_quality(metrics))
+    print(graded_words(grade))
+    save_grade(context.folder / GRADE, grade)
     metrics |= {"surfels": len(trained.surfels), "seconds": seconds["training"]}
     if config.direct_only and dataset.test:
         metrics["direct_only_psnr"] = _direct_only(trained, train_views, dataset.test, options)
@@ -73,10 +81,16 @@ def run(context: StageContext) -> None:
     )
 
 
-def _held_out(trained: Trained, views: tuple[View, ...], options: TrainOptions, folder: Path) -> dict[str, Any]:
-    """Measures of the views that training never saw, with a picture of them in `folder`."""
+def _judged(
+    trained: Trained, left_out: tuple[View, ...], options: TrainOptions, folder: Path
+) -> tuple[dict[str, Any], SceneGrade]:
+    """Measures of the views that training never saw, with a picture of them in `folder`; and the scene's grade.
+
+    Where no view was left out there are no measures, and the grade is of views that the scene was trained on.
+    """
     frozen = build_frozen(trained.surfels, options)
-    held_out = render_held_out(
+    views = left_out or trained.views[:: math.ceil(len(trained.views) / MOST_JUDGED)]
+    judged = render_held_out(
         trained.surfels,
         views,
         frozen.transport,
@@ -85,9 +99,14 @@ def _held_out(trained: Trained, views: tuple[View, ...], options: TrainOptions, 
         OperatorStore.of(options),
         frozen.gather,
     )
-    picture = held_out_picture(held_out.views, held_out.images, held_out.psnr, held_out.albedo)
+    psnr = float(np.mean(judged.psnr)) if left_out else None
+    truths = [view.image for view in judged.views]
+    grade = grade_scene(frozen, judged.images, truths, psnr=psnr, highest_albedo=ALBEDO_RANGE[1])
+    if not left_out:
+        return {}, grade
+    picture = held_out_picture(judged.views, judged.images, judged.psnr, judged.albedo)
     save_png(folder / "comparison.png", picture)
-    return held_out.summary()
+    return judged.summary(), grade
 
 
 def _quality(metrics: dict[str, Any]) -> str:

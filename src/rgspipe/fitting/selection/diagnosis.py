@@ -8,10 +8,11 @@ from dataclasses import dataclass
 from torch import Tensor
 
 from rgspipe.fitting.certainty.doubts import doubts
-from rgspipe.fitting.findings import AtBound, Finding, FitStatus, MaybeOneMore, OutOfSteps, PoorlyExplained
+from rgspipe.fitting.findings import AtBound, Finding, FitStatus, MaybeOneMore, OutOfSteps, PoorlyExplained, PoorScene
 from rgspipe.fitting.options import BarOptions, CertaintyOptions
 from rgspipe.fitting.search.compare import robust_costs, wanted
 from rgspipe.fitting.search.refine import Refiner, State
+from rgspipe.scene.grade import Grade
 
 
 def standing(
@@ -25,10 +26,12 @@ def standing(
     """
     options = options or CertaintyOptions()
     problem, region, loss = refiner.problem, refiner.region, refiner.unexplained(state)
+    grade = problem.views.frozen.grade
     at_bound = any(region.at_bound(emitter.position) for emitter in state.emitters)
     return [
         *([AtBound()] if at_bound else []),
         *([PoorlyExplained(loss)] if loss > options.poorly else []),
+        *([PoorScene(grade.error)] if grade is not None and grade.grade is Grade.POOR else []),
         *doubts(state.lights(problem), covariance, problem.views.frozen.surfels, region.size, options),
         *([OutOfSteps()] if state.status is FitStatus.MAX_ITERATIONS else []),
     ]
