@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 
 import pandas as pd
 
 from rgspipe.evaluation.tables import TARGET_COLUMNS
 from rgspipe.scene.models.zoo import draw_room
-from rgspipe.studies.zoo import MEASURED, failed_rows, fit_rows, fits_table
+from rgspipe.studies.zoo import MEASURED, failed_rows, fit_rows, fits_table, summary
 from rgspipe.studies.zoo_rooms import part_of, room_properties
 
 CLASSES = ("visible", "out_of_frame", "occluded")
@@ -46,3 +47,9 @@ def five_rooms() -> pd.DataFrame:
         nowhere = room_of(5, **dict.fromkeys((*MEASURED, "stand", "grade")))
         rows += failed_rows(nowhere, CLASSES, "search_lm", views, "generate_dataset", "no place for a camera")
     return fits_table(rows)
+
+
+@cache
+def five_rooms_figures() -> pd.DataFrame:
+    """Their summary; made once, as a hundred intervals take a second."""
+    return summary(five_rooms(), 0, resamples=50)

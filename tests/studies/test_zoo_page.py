@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from rgspipe.studies.zoo import summary
 from rgspipe.studies.zoo_page import TITLES, page
 from rgspipe.studies.zoo_rooms import FINAL, WORK
-from zoo_fits import five_rooms
+from zoo_fits import five_rooms, five_rooms_figures
 
 
 def _parts() -> dict[str, str]:
-    table = five_rooms()
-    text = page(table, summary(table, 0, resamples=50))
+    text = page(five_rooms(), five_rooms_figures())
     _, work, final = text.split("\n## ")
     assert work.startswith(TITLES[WORK]) and final.startswith(TITLES[FINAL])
     return {WORK: work, FINAL: final}
