@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from zoo_fits import five_rooms
-
 from rgspipe.studies.zoo import summary
 from rgspipe.studies.zoo_page import TITLES, page
 from rgspipe.studies.zoo_rooms import FINAL, WORK
+from zoo_fits import five_rooms
 
 
 def _parts() -> dict[str, str]:
