@@ -52,6 +52,8 @@ def zoo_figure(table: pd.DataFrame) -> Figure:
                     _success(axes[0, column], fits, name, factor, style | {"ls": LINES[str(part)]}, index)
                     _errors(axes[1, column], fits, name, factor, style)
             axes[1, column].set_xlabel(label)
+            most = factor * float(np.nanmax([0.0, *table[name].astype(float)]))
+            axes[1, column].set_xlim(0.0, 1.08 * most + 1.0)
         _dress(axes)
         figure.legend(handles=_handles(table, series), loc="outside upper center", ncols=6)
     return figure
