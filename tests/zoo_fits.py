@@ -45,7 +45,7 @@ def five_rooms() -> pd.DataFrame:
         rows += fit_rows(room_of(3, train_views=80, unseen=0.4, grade="good"), targets(views, (0.02, 0.03, 0.04)))
         rows += fit_rows(room_of(4, train_views=60), targets(views, (0.001, 0.002, 0.003)))
         nowhere = room_of(5, **dict.fromkeys((*MEASURED, "stand", "grade")))
-        rows += failed_rows(nowhere, CLASSES, "search_lm", views, "generate_dataset", "no place for a camera")
+        rows += failed_rows(nowhere, CLASSES, "search_lm", views, "generate_dataset", "no place | for a camera")
     return fits_table(rows)
 
 

@@ -1,4 +1,4 @@
-"""A room of the zoo from Blender to the table, as small as it goes, beside one that cannot be trained."""
+"""A room of the zoo that Blender renders and that cannot be trained: the study ends with a row that says so."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ from rgspipe.cli.compose import compose_config
 from rgspipe.pipeline import run
 from rgspipe.stages import load_stage
 
-#: About 20 s.
-TINY = (
+#: One view with hardly any depth leaves nothing to make surfels of.
+BLIND = (
+    'study.cases=["blind: capture.depth_missing=0.99 capture.views=1"]',
     "study.zoo.seeds=[3]",
     "study.zoo.fewest_views=4",
     "study.zoo.most_views=4",
@@ -22,28 +23,17 @@ TINY = (
     "dataset.test_views=1",
     "dataset.samples=1",
     "dataset.test_samples=1",
-    "init.surfels=300",
-    "train.rounds=1",
-    "train.steps=3",
-    "train.gather_rays=16",
-    "train.patches=40",
-    "freeze.gather_rays=16",
-    "freeze.patches=40",
-    "freeze.dictionary_grid=4",
 )
 
 
 @pytest.mark.slow
-def test_a_room_goes_the_whole_way_and_one_that_cannot_be_trained_is_a_row(tmp_path: Path) -> None:
-    # Depth that is missing nearly everywhere leaves nothing to make surfels of.
-    cases = 'study.cases=[clean,"blind: capture.depth_missing=0.99 capture.views=1"]'
-    config = compose_config(["stage=study", "experiment=zoo", f"outputs={tmp_path / 'outputs'}", *TINY, cases])
+def test_a_room_that_cannot_be_trained_is_no_end_of_the_study(tmp_path: Path) -> None:
+    config = compose_config(["stage=study", "experiment=zoo", f"outputs={tmp_path / 'outputs'}", *BLIND])
     study = run(config, load_stage)
     table = pd.read_csv(study.file("study.csv"))
-    whole, blind = table[table["case"] == "clean"], table[table["case"] == "blind"]
-    assert set(whole["occlusion"]) == {"visible", "out_of_frame", "occluded"} and len(whole) == 3
-    assert whole["held_out_psnr"].notna().all() and whole["failed_in"].isna().all()
-    assert whole["train_views"].tolist() == [4] * 3 and whole["lens"].between(25.0, 85.0).all()
-    assert whole["grade"].isin(["good", "fair", "poor"]).all() and whole["unseen"].between(0.0, 1.0).all()
-    print(blind[["failed_in", "reason", "train_views"]].to_string())
-    assert study.file("study.png").read_bytes().startswith(b"\x89PNG")
+    assert table["occlusion"].tolist() == ["visible", "out_of_frame", "occluded"] and not table["success"].any()
+    assert set(table["failed_in"]) == {"init_depth"} and table["reason"].str.contains("depth pixels").all()
+    # What Blender made is known all the same; lenses of a room differ by a tenth.
+    assert table["lens"].between(27.0, 82.5).all() and table["held_out_psnr"].isna().all()
+    assert table["train_views"].tolist() == [1] * 3 and table["plan"].tolist() == ["box"] * 3
+    assert "### Rooms that failed" in study.file("study.md").read_text()

@@ -117,6 +117,7 @@ def _rooms(table: pd.DataFrame) -> pd.DataFrame:
 def _trouble(table: pd.DataFrame) -> list[str]:
     """Lists of silent errors, of misleading grades and of rooms that failed; empty where there are none."""
     failed = table[table["result"] == FAILED].drop_duplicates(["seed", "case", "reason"])
+    failed = failed.assign(reason=failed["reason"].str.replace("|", r"\|"))
     lists = (
         ("Wrong without a word", table[table["silent"]], WRONG),
         (f"Graded good, and off by more than {MISLED:.0%}".replace("%", " %"), misled(table), WRONG),
