@@ -26,8 +26,19 @@ def load_grade(path: Path) -> SceneGrade:
     """
     content = read_json(path, "the grade of a scene")
     names = [field.name for field in fields(SceneGrade)]
-    values = {name: content.get(name) for name in names} if isinstance(content, dict) else {}
-    if not values or not all(is_number(value) or (name == "psnr" and value is None) for name, value in values.items()):
-        expected = f"the numbers {', '.join(names)}"
-        raise InputError(path, expected=expected, found=str(content)[:120], remedy="Train the scene again.")
+    unknown = [name for name in names if name not in content or not _is_known(name, content[name])]
+    if unknown:
+        expected, found = f"the numbers {', '.join(names)}", f"{', '.join(unknown)} missing or no number"
+        raise InputError(path, expected=expected, found=found, remedy="Train the scene again.")
+    place = content["unseen_at"]
+    values = {name: content[name] for name in names} | {"unseen_at": None if place is None else tuple(place)}
     return SceneGrade(**values)
+
+
+def _is_known(name: str, value: object) -> bool:
+    """Whether a grade may have this value under this name."""
+    if value is None:
+        return name in ("psnr", "unseen_at")
+    if name == "unseen_at":
+        return isinstance(value, list) and len(value) == 3 and all(is_number(part) for part in value)
+    return is_number(value)
