@@ -9,7 +9,7 @@ TEST_WORKERS ?= 2
 ARGS ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup test test-slurm crash smoke reproduce scenes train-study light-study bench docs lint house
+.PHONY: help setup test test-slurm crash fuzz smoke reproduce scenes train-study light-study bench docs lint house
 
 help:  ## this list
 	@echo "rgspipe: from images of a scene, find its lights"
@@ -33,6 +33,9 @@ test-slurm: setup  ## sweeps on a Slurm cluster of this machine alone (Debian: a
 
 crash: setup  ## power cuts while the whole way is made on a tiny scene: what the next run ends with (minutes; ARGS=NUMBER of cuts)
 	$(VENV)/bin/python tests/power_cut.py $(ARGS)
+
+fuzz: setup  ## damaged files of every kind that is read: each is read or refused (a minute; ARGS="CASES SEED")
+	$(VENV)/bin/python tests/fuzz.py $(ARGS)
 
 smoke: setup  ## the whole way on a tiny scene, in minutes
 	$(RGSPIPE) pipeline=smoke $(ARGS)

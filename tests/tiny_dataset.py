@@ -29,10 +29,8 @@ def tiny_light() -> PointLight:
     return PointLight(*torch.tensor(values, dtype=torch.float64))
 
 
-@pytest.fixture
-def dataset(tmp_path: Path) -> Path:
+def write_tiny_dataset(root: Path) -> None:
     """One training view with depth, normals and albedo, one test view, one target with one view."""
-    root = tmp_path / "scene"
     image = np.full((HEIGHT, WIDTH, 3), 0.25, np.float32)
     depth = np.full((HEIGHT, WIDTH), 2.0, np.float32)
     depth[0, 0] = 1e10
@@ -48,6 +46,13 @@ def dataset(tmp_path: Path) -> Path:
     write_transforms(root / "targets/one/transforms.json", [frame_entry("view_0", tiny_camera())])
     write_target_list(root, [("one", "visible")])
     write_info(root, "tiny", [[-0.5] * 3, [0.5] * 3], 1.0, [0.0] * 3)
+
+
+@pytest.fixture
+def dataset(tmp_path: Path) -> Path:
+    """The folder of a tiny dataset."""
+    root = tmp_path / "scene"
+    write_tiny_dataset(root)
     return root
 
 

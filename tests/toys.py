@@ -1,11 +1,13 @@
 """Small real stages to test the graph, the store and the command line with, and a command line that runs them.
 
 `sow` writes one file for each row, slowly, and goes on after an interruption; `grow` sums them up; `harvest` needs
-`grow` for several numbers of views.
+`grow` for several numbers of views. `break` fails with some seeds; `gather` takes what `after` made of it with several,
+and goes on without those that failed.
 """
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import sys
@@ -15,10 +17,13 @@ from rgspipe.cli import main
 from rgspipe.config import RgspipeConfig
 from rgspipe.errors import InputError
 from rgspipe.files import replacing, write_text
-from rgspipe.stages.base import Need, Stage, StageContext
+from rgspipe.stages.base import Failure, Need, Stage, StageContext
 from rgspipe.whole_files import WholeFiles
 
 PAUSE_VARIABLE = "TOY_PAUSE"
+
+#: The seed with which `break` finds the disk full, and those that `gather` takes.
+FULL, GATHERED = 7, (5, 1, 6, 2)
 
 
 def _sow(context: StageContext) -> None:
@@ -58,7 +63,21 @@ def _break(context: StageContext) -> None:
         raise InputError("seed", expected="another one", found="2", remedy="Choose another.")
     if context.config.seed == 3:
         os._exit(9)
+    if context.config.seed == FULL:
+        raise OSError(errno.ENOSPC, "no space left")
     (context.folder / "seed.txt").write_text(f"{context.config.seed}\n")
+
+
+def _after(context: StageContext) -> None:
+    write_text(context.folder / "seed.txt", context.inputs["break"].file("seed.txt").read_text())
+
+
+def _gather(context: StageContext) -> None:
+    lines = [
+        f"{found.stage}: {found.reason}\n" if isinstance(found, Failure) else found.file("seed.txt").read_text()
+        for found in context.attempts("after", len(GATHERED))
+    ]
+    write_text(context.folder / "gathered.txt", "".join(lines))
 
 
 def _crunch(context: StageContext) -> None:
@@ -70,6 +89,10 @@ def _crunch(context: StageContext) -> None:
     time.sleep(60.0)
 
 
+def _seeds(config: RgspipeConfig) -> list[Need]:
+    return [Need("after", {"seed": seed}, may_fail=True) for seed in GATHERED]
+
+
 def _views(config: RgspipeConfig) -> list[Need]:
     return [Need("grow", {"views.count": count}) for count in config.report.views]
 
@@ -78,9 +101,11 @@ SOW = Stage("sow", "writes rows", _sow, config_keys=("dataset.resolution",))
 GROW = Stage("grow", "adds them up", _grow, inputs=lambda config: ["sow"], config_keys=("views",))
 HARVEST = Stage("harvest", "brings it in", _harvest, inputs=_views)
 BREAK = Stage("break", "fails on some seeds", _break, config_keys=("seed",))
+AFTER = Stage("after", "takes what broke or not", _after, inputs=lambda config: ["break"])
+GATHER = Stage("gather", "takes what there is", _gather, inputs=_seeds)
 CRUNCH = Stage("crunch", "is busy", _crunch, config_keys=("seed",))
 
-STAGES = {stage.name: stage for stage in (SOW, GROW, HARVEST, BREAK, CRUNCH)}
+STAGES = {stage.name: stage for stage in (SOW, GROW, HARVEST, BREAK, AFTER, GATHER, CRUNCH)}
 
 
 def load(name: str) -> Stage:

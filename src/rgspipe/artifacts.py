@@ -107,7 +107,11 @@ class Artifact:
 
     def _verify(self, path: Path, entry: Mapping[str, Any]) -> None:
         self._check_size(path, entry)
-        if sha256(path) != entry["sha256"]:
+        try:
+            content = sha256(path)
+        except OSError as error:
+            raise self._damaged(path, entry, f"an unreadable file ({error.strerror})") from None
+        if content != entry["sha256"]:
             raise self._damaged(path, entry, "other content (its checksum differs)")
 
     def _check_size(self, path: Path, entry: Mapping[str, Any]) -> None:
@@ -255,6 +259,18 @@ def _inventory(folder: Path) -> dict[str, dict[str, Any]]:
     }
 
 
+def _is_whole(manifest: Mapping[str, Any]) -> bool:
+    """Whether a manifest has what is asked of it later."""
+    files, facts = manifest.get("files"), manifest.get("facts")
+    if not isinstance(files, dict) or not isinstance(facts, dict):
+        return False
+    kinds = {"bytes": int, "sha256": str}
+    return all(
+        isinstance(entry, dict) and all(isinstance(entry.get(name), kind) for name, kind in kinds.items())
+        for entry in files.values()
+    )
+
+
 def _read_manifest(folder: Path, key: Key) -> Mapping[str, Any]:
     path = folder / MANIFEST
     remedy = f"Remove the folder {folder} and run again: the stage will make it anew."
@@ -263,10 +279,12 @@ def _read_manifest(folder: Path, key: Key) -> Mapping[str, Any]:
         manifest = parse_json(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise InputError(path, expected=expected, found="no file", remedy=remedy) from None
-    except (IsADirectoryError, ValueError) as error:
+    except ValueError as error:
         raise InputError(path, expected=expected, found=f"damaged JSON ({error})", remedy=remedy) from None
+    except OSError as error:
+        raise InputError(path, expected=expected, found=f"an unreadable file ({error})", remedy=remedy) from None
     if not isinstance(manifest, dict) or manifest.get("schema") != SCHEMA_VERSION:
         raise InputError(path, expected=expected, found="another schema", remedy=remedy)
-    if manifest.get("fingerprint") != key.fingerprint or not isinstance(manifest.get("files"), dict):
+    if (manifest.get("fingerprint"), manifest.get("stage")) != (key.fingerprint, key.stage) or not _is_whole(manifest):
         raise InputError(path, expected=expected, found="a manifest that is not its own", remedy=remedy)
     return manifest

@@ -7,19 +7,18 @@ anything is made.
 from __future__ import annotations
 
 import logging
-import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from rgspipe.artifacts import Artifact, ArtifactStore, Key
 from rgspipe.config import RgspipeConfig, get_value, with_changes
 from rgspipe.errors import InputError
 from rgspipe.files import tree_digest
 from rgspipe.fingerprints import differences, fingerprint
+from rgspipe.nodes import Making, Node, indispensable
 from rgspipe.source_code import SourceCode
-from rgspipe.stages.base import Stage, StageContext
+from rgspipe.stages.base import Stage
 from rgspipe.unwritable import told_below
 from rgspipe.variants import variant_name
 
@@ -33,6 +32,7 @@ NO_RESULT = (
     "rgspipe.errors",
     "rgspipe.files",
     "rgspipe.machine",
+    "rgspipe.nodes",
     "rgspipe.options",
     "rgspipe.pipeline",
     "rgspipe.progress",
@@ -48,27 +48,6 @@ NO_RESULT = (
 SHOWN_CAUSES = 3
 
 log = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True)
-class Node:
-    """One artifact of the graph, made or not.
-
-    Attributes:
-        stage: what makes it.
-        config: the configuration it is made with.
-        changes: how that differs from the configuration of the run.
-        key: where it belongs.
-        recipe: the config values, inputs, foreign files and code behind its fingerprint.
-        inputs: the artifacts it is made from.
-    """
-
-    stage: Stage
-    config: RgspipeConfig
-    changes: Mapping[str, object]
-    key: Key
-    recipe: Mapping[str, Any]
-    inputs: tuple[Node, ...]
 
 
 @dataclass(frozen=True)
@@ -104,9 +83,9 @@ class _Resolver:
 
     def resolve(self, name: str, config: RgspipeConfig, changes: Mapping[str, object]) -> Node:
         stage = self.load_stage(name)
+        needs = stage.needs(config)
         inputs = tuple(
-            self.resolve(need.stage, with_changes(config, need.changes), {**changes, **need.changes})
-            for need in stage.needs(config)
+            self.resolve(need.stage, with_changes(config, need.changes), {**changes, **need.changes}) for need in needs
         )
         recipe = {
             "config": {key: get_value(config, key) for key in sorted(stage.keys(config))},
@@ -115,7 +94,7 @@ class _Resolver:
             "code": self.code.fingerprints(stage.run.__module__),
         }
         key = Key(config.scene.folder, stage.name, fingerprint({"stage": stage.name, **recipe}))
-        return Node(stage, config, changes, key, recipe, inputs)
+        return Node(stage, config, changes, key, recipe, inputs, tuple(need.may_fail for need in needs))
 
     def _file(self, path: Path) -> str:
         if str(path) not in self.files:
@@ -211,9 +190,10 @@ def _run(config: RgspipeConfig, load_stage: StageLoader, overrides: Sequence[str
         _refuse_missing(steps, overrides)
     names = {step.node.key: _variant(step.node, resolver, overrides, usual) for step in steps}
     artifacts = {step.node.key: _take(step.node, store, names[step.node.key]) for step in steps if step.reused}
+    made = Making(store, names, indispensable(root), artifacts)
     for step in steps:
         if not step.reused:
-            artifacts[step.node.key] = _make(step.node, store, artifacts, names[step.node.key])
+            made.make(step.node)
     return artifacts[root.key]
 
 
@@ -241,25 +221,6 @@ def _take(node: Node, store: ArtifactStore, variant: str) -> Artifact:
     assert artifact is not None
     artifact.check_sizes()
     store.point_at(node.key, variant)
-    return artifact
-
-
-def _make(node: Node, store: ArtifactStore, artifacts: Mapping[Key, Artifact], variant: str) -> Artifact:
-    lists: dict[str, list[Artifact]] = {}
-    for needed in node.inputs:
-        lists.setdefault(needed.stage.name, []).append(artifacts[needed.key])
-
-    def make(folder: Path) -> Mapping[str, Any]:
-        inputs = {name: found[0] for name, found in lists.items()}
-        context = StageContext(node.config, inputs, lists, folder)
-        node.stage.run(context)
-        return context.facts
-
-    log.info("%s: %s", node.stage.name, node.stage.help)
-    start = time.perf_counter()
-    artifact, made = store.build(node.key, node.recipe, make, variant)
-    verb = "made" if made else "made by another process"
-    log.info("%s: %s in %.1f s: %s", node.stage.name, verb, time.perf_counter() - start, artifact.path)
     return artifact
 
 

@@ -18,6 +18,7 @@ OTHERS = {
     "methods": ["paper_adam"],
     "paper_adam_limit": None,
     "paper_adam_views": [1],
+    "zoo": {"seeds": [7]},
 }
 
 

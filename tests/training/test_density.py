@@ -83,7 +83,21 @@ def test_errors_land_on_the_surfels_that_the_wrong_pixels_show(views: list[View]
     radiance = torch.rand(3, len(box), 3, generator=torch.Generator().manual_seed(0))
     images = [view.operator @ shown for view, shown in zip(weights, radiance, strict=True)]
     images[1][500] += 1.0
-    errors = surfel_errors(iter(weights), radiance, images)
+    shown = [replace(view, image=image.reshape(view.image.shape)) for view, image in zip(views, images, strict=True)]
+    errors = surfel_errors(iter(weights), radiance, shown)
     row = weights[1].operator.to_scipy()[500].toarray()[0]
     assert bool((errors[torch.from_numpy(row == 0.0)] == 0.0).all())
     assert float(errors.sum()) > 0.0
+
+
+def test_saturated_pixels_ask_for_no_detail_where_the_render_is_brighter(views: list[View]) -> None:
+    box = painted_box()
+    weights, radiance = trace_views(box, views, 1), torch.ones(3, len(box), 3)
+    clip = 0.5 * float(min((weight.operator @ shown).amax() for weight, shown in zip(weights, radiance, strict=True)))
+    clipped = [
+        replace(view, image=(weight.operator @ shown).clamp(max=clip).reshape(view.image.shape), saturated_from=clip)
+        for view, weight, shown in zip(views, weights, radiance, strict=True)
+    ]
+    assert float(surfel_errors(iter(weights), radiance, clipped).max()) < 1e-12
+    unsaid = [replace(view, saturated_from=None) for view in clipped]
+    assert float(surfel_errors(iter(weights), radiance, unsaid).max()) > 0.1

@@ -11,12 +11,14 @@ from rgspipe.fitting.options import Method
 from rgspipe.options import Options, option
 
 #: What a study is about.
-Kind = Literal["captures", "views", "robustness", "classes", "kinds", "regions", "adam", "courses"]
+Kind = Literal["captures", "views", "robustness", "classes", "kinds", "regions", "adam", "courses", "zoo"]
 
 #: Settings that only some kinds of study have a use for; those that are not listed here use all of them.
 UNUSED: dict[Kind, tuple[str, ...]] = {
-    "captures": ("views", "methods", "paper_adam_limit", "paper_adam_views"),
-    "courses": ("cases", "scenes", "views", "paper_adam_limit", "paper_adam_views"),
+    "captures": ("views", "methods", "paper_adam_limit", "paper_adam_views", "zoo"),
+    **dict.fromkeys(("views", "robustness", "classes", "kinds", "regions", "adam"), ("zoo",)),
+    "courses": ("cases", "scenes", "views", "paper_adam_limit", "paper_adam_views", "zoo"),
+    "zoo": ("scenes", "paper_adam_limit", "paper_adam_views"),
 }
 
 
@@ -29,6 +31,36 @@ class EvaluateConfig(Options):
 
 
 @dataclass(frozen=True)
+class ZooStudyConfig(Options):
+    """Which rooms of the zoo a study takes, and how they are photographed."""
+
+    seeds: tuple[int, ...] = option((1, 3, 5), low=0, high=2**31 - 1)
+    """rooms, by scene.zoo.seed: odd ones are for work, even ones only for final figures"""
+    fewest_views: int = option(25, low=2, high=100000)
+    """training views: how many are drawn from the seed at least"""
+    most_views: int = option(100, low=2, high=100000)
+    """and at most"""
+    least_noise: float = option(0.0, low=0, high=10)
+    """capture.image_noise and target_capture.noise: what is drawn from the seed at least"""
+    most_noise: float = option(0.1, low=0, high=10)
+    """and at most"""
+
+    def check(self) -> None:
+        """Refuse ranges that hold nothing, and rooms that are named twice.
+
+        Raises:
+            InputError: says which.
+        """
+        for least, most in (("fewest_views", "most_views"), ("least_noise", "most_noise")):
+            if getattr(self, least) > getattr(self, most):
+                found = f"{getattr(self, most)} below {least}, {getattr(self, least)}"
+                raise InputError(most, expected=f"no less than {least}", found=found, remedy="Change one of them.")
+        twice = sorted({seed for seed in self.seeds if self.seeds.count(seed) > 1})
+        if twice:
+            raise InputError("seeds", expected="each room once", found=f"{twice[0]} twice", remedy="Name it once.")
+
+
+@dataclass(frozen=True)
 class StudyConfig(Options):
     """What a study compares: cases, methods and numbers of views."""
 
@@ -36,7 +68,7 @@ class StudyConfig(Options):
     """what it is about: captures (what becomes of a trained scene when its capture gets worse); of recovered lights
     views (how many), robustness (errors of images and model), classes (where the light is), kinds (of lights), regions
     (how often those of 95 % hold the truth) or adam (the paper's method beside ours); courses (of fits from their start
-    to their answer)"""
+    to their answer); zoo (rooms that nobody tuned)"""
     cases: tuple[str, ...] = ("clean",)
     """what is compared: `clean`, or overrides such as target_capture.noise=0.03, several joined by spaces, and `NAME: `
     before them where wanted"""
@@ -52,6 +84,7 @@ class StudyConfig(Options):
     """the same for paper_adam, which takes minutes a target"""
     paper_adam_views: tuple[int, ...] | None = option(None, low=1, high=1000)
     """numbers of views that paper_adam is run on; all if null"""
+    zoo: ZooStudyConfig = ZooStudyConfig()
 
     def check(self) -> None:
         """Refuse settings that the kind of study has no use for.

@@ -12,6 +12,9 @@ from rgspipe.scene.grade import SceneGrade
 
 GRADE = "grade.json"
 
+#: No number of a grade but its place is as large: PSNR is in decibels, the others are parts of the light.
+LARGEST = 1e6
+
 
 def save_grade(path: Path, grade: SceneGrade) -> None:
     """Write the grade; the file appears under its name only when it is whole."""
@@ -22,13 +25,13 @@ def load_grade(path: Path) -> SceneGrade:
     """The grade that `save_grade` wrote.
 
     Raises:
-        InputError: no such file, no JSON, or a number is missing.
+        InputError: no such file, no JSON, or a number is missing or impossible.
     """
     content = read_json(path, "the grade of a scene")
     names = [field.name for field in fields(SceneGrade)]
     unknown = [name for name in names if name not in content or not _is_known(name, content[name])]
     if unknown:
-        expected, found = f"the numbers {', '.join(names)}", f"{', '.join(unknown)} missing or no number"
+        expected, found = f"the numbers {', '.join(names)}", f"{', '.join(unknown)} missing, no number or too large"
         raise InputError(path, expected=expected, found=found, remedy="Train the scene again.")
     place = content["unseen_at"]
     values = {name: content[name] for name in names} | {"unseen_at": None if place is None else tuple(place)}
@@ -41,4 +44,4 @@ def _is_known(name: str, value: object) -> bool:
         return name in ("psnr", "unseen_at")
     if name == "unseen_at":
         return isinstance(value, list) and len(value) == 3 and all(is_number(part) for part in value)
-    return is_number(value)
+    return is_number(value) and -LARGEST < value < LARGEST

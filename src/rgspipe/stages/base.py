@@ -18,10 +18,25 @@ class Need:
     Attributes:
         stage: the other stage's name.
         changes: values by dotted key, such as {"views.count": 3}.
+        may_fail: whether the stage goes on without it where it cannot be made.
     """
 
     stage: str
     changes: Mapping[str, object] = field(default_factory=dict)
+    may_fail: bool = False
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Why an artifact could not be made.
+
+    Attributes:
+        stage: what failed: its own stage, or one before it.
+        reason: in words.
+    """
+
+    stage: str
+    reason: str
 
 
 @dataclass(frozen=True)
@@ -31,9 +46,10 @@ class StageContext:
     Attributes:
         config: the whole configuration; only what `config_keys` names may influence the result.
         inputs: for each needed stage its artifact; the first one where several are needed.
-        input_lists: for each needed stage all its artifacts, in the order of the needs.
+        input_lists: for each needed stage all its artifacts, in the order of the needs, without those that failed.
         folder: where the result goes. After an interruption it still holds what an earlier attempt wrote, so a long
             stage can go on with what `WholeFiles` knows to be whole.
+        failures: of needs that may fail: by stage, and by the place among the needs of that stage.
     """
 
     config: RgspipeConfig
@@ -41,6 +57,12 @@ class StageContext:
     input_lists: Mapping[str, Sequence[Artifact]]
     folder: Path
     facts: dict[str, Any] = field(default_factory=dict)
+    failures: Mapping[str, Mapping[int, Failure]] = field(default_factory=dict)
+
+    def attempts(self, stage: str, count: int) -> list[Artifact | Failure]:
+        """What became of the `count` needs of a stage, in their order."""
+        made, failed = iter(self.input_lists.get(stage, ())), self.failures.get(stage, {})
+        return [failed[place] if place in failed else next(made) for place in range(count)]
 
     def note(self, **facts: Any) -> None:
         """Keep JSON values in the manifest, under "facts"."""

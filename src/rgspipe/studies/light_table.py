@@ -75,24 +75,24 @@ def _columns(rows: pd.DataFrame, kind: str) -> dict[str, Callable[[Row], str]]:
     if kind not in TOGETHER:
         columns["light"] = _class
     columns["targets"] = lambda row: str(row["count"])
-    columns["position error"] = lambda row: _interval(row, "position", 2)
-    columns["intensity error"] = lambda row: _interval(row, "intensity", 1)
+    columns["position error"] = lambda row: with_interval(row, "position", 2)
+    columns["intensity error"] = lambda row: with_interval(row, "intensity", 1)
     if kind in OF_LIGHTS:
         columns["axis"] = lambda row: _degrees(row, "axis")
         columns["shape"] = lambda row: _degrees(row, "shape")
-        columns["right number"] = lambda row: _interval(row, "right_number", 0)
+        columns["right number"] = lambda row: with_interval(row, "right_number", 0)
         # Studies that were made before types were compared do not have it.
         if "right_types" in rows:
-            columns["right types"] = lambda row: _interval(row, "right_types", 0)
-    columns["solved"] = lambda row: _interval(row, "success", 0)
+            columns["right types"] = lambda row: with_interval(row, "right_types", 0)
+    columns["solved"] = lambda row: with_interval(row, "success", 0)
     columns["s a fit"] = lambda row: "—" if math.isnan(row["seconds"]) else f"{row['seconds']:.2f}"
     if kind == "views":
         columns["stated"] = lambda row: percent(row["stated"])
         columns["predicted"] = lambda row: percent(row.get("predicted", math.nan))
-    inside = _interval if kind == "regions" else lambda row, name, digits: percent(row[name], digits)
+    inside = with_interval if kind == "regions" else lambda row, name, digits: percent(row[name], digits)
     columns["truth in 95 % region"] = lambda row: inside(row, "inside_95", 0)
     if kind in TOGETHER:
-        columns["silent"] = lambda row: _interval(row, "silent", 0)
+        columns["silent"] = lambda row: with_interval(row, "silent", 0)
         columns["says"] = _statuses
     return columns
 
@@ -106,7 +106,7 @@ def _class(row: Row) -> str:
     return "all classes" if name == ALL else LABELS.get(name, name)
 
 
-def _interval(row: Row, name: str, digits: int) -> str:
+def with_interval(row: Row, name: str, digits: int) -> str:
     """ "0.31 % (0.22–0.45)"."""
     low, high = row[f"{name}_low"], row[f"{name}_high"]
     middle = percent(row[name], digits)

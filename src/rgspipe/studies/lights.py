@@ -68,7 +68,7 @@ def case_rows(
         for name in [*class_order(group["occlusion"]), ALL]:
             chosen = group if name == ALL else group[group["occlusion"] == name]
             named = dict(zip(KEYS, (scene, case, method, int(views), name), strict=True))
-            rows.append(named | _figures(chosen, seed, resamples))
+            rows.append(named | figures(chosen, seed, resamples))
     return pd.DataFrame(rows)
 
 
@@ -105,7 +105,8 @@ def wilson_interval(successes: int, count: int) -> tuple[float, float]:
     return float(interval.low), float(interval.high)
 
 
-def _figures(group: pd.DataFrame, seed: int, resamples: int) -> dict[str, float]:
+def figures(group: pd.DataFrame, seed: int, resamples: int = metrics.RESAMPLES) -> dict[str, float]:
+    """The figures of some targets, see `case_rows`."""
     known = group["position_error"].notna()
     found: dict[str, float] = {"count": len(group), "with_truth": int(known.sum())}
     for name, column in MEDIANS.items():
@@ -113,9 +114,13 @@ def _figures(group: pd.DataFrame, seed: int, resamples: int) -> dict[str, float]
     for name, column in SHARES.items():
         found |= _share(name, group[column])
     found["stated"] = float(group["position_sd"].median()) if group["position_sd"].notna().any() else math.nan
-    missed = ~_true(group["success"]) & ~_true(group["inside_95"]) & (group["result"] == "converged")
-    found |= _share("silent", missed[known])
+    found |= _share("silent", silent(group)[known])
     return found | {status: float((group["result"] == status).mean()) for status in STATUSES}
+
+
+def silent(targets: pd.DataFrame) -> pd.Series:
+    """Whether each target is wrong without a word, where its truth is known: converged, missed, in no region."""
+    return ~_true(targets["success"]) & ~_true(targets["inside_95"]) & (targets["result"] == "converged")
 
 
 def _median(name: str, values: pd.Series, seed: int, resamples: int) -> dict[str, float]:

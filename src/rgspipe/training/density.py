@@ -8,6 +8,7 @@ from dataclasses import replace
 import torch
 from torch import Tensor
 
+from rgspipe.datasets.views import View
 from rgspipe.renderer.view_weights import ViewWeights
 from rgspipe.scene.surfels import NO_CLIP, Surfels
 
@@ -20,18 +21,22 @@ APART, SHORTER = 0.6, 0.8
 SPLIT_SHARE, FAINTEST = 0.03, 0.03
 
 
-def surfel_errors(weights: Iterable[ViewWeights], radiance: Tensor, images: Sequence[Tensor]) -> Tensor:
+def surfel_errors(weights: Iterable[ViewWeights], radiance: Tensor, views: Sequence[View]) -> Tensor:
     """(N,) squared error of all views, each in units of its peak, shared out by the surfels' weights in the pixels.
 
+    A saturated pixel has none where the render is at least as bright.
+
     Args:
-        weights, images: of V views; images (pixels, 3).
+        weights: of V views.
         radiance: (V, N, 3) of the surfels under the views' lights.
     """
     total = torch.zeros(radiance.shape[1])
-    for view, shown, image in zip(weights, radiance, images, strict=True):
+    for weight, shown, view in zip(weights, radiance, views, strict=True):
+        image = view.image.float()
         peak = torch.quantile(image, 0.995).clamp(min=1e-12)
-        error = ((view.operator @ shown - image) / peak).square().mean(dim=1, keepdim=True)
-        total += (view.operator.transposed @ error)[:, 0]
+        render = view.as_photographed((weight.operator @ shown).reshape(image.shape))
+        error = ((render - image) / peak).square().mean(dim=2).reshape(-1, 1)
+        total += (weight.operator.transposed @ error)[:, 0]
     return total
 
 

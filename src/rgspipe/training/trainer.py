@@ -211,8 +211,7 @@ def _refine_geometry(
 
 def _redistributed(surfels: Surfels, views: Sequence[View], radiance: Tensor, most: int) -> tuple[Surfels, Tensor]:
     weights = each_view(surfels, views, supersampling=1)
-    errors = surfel_errors(weights, radiance, [view.image.reshape(-1, 3).float() for view in views])
-    return redistributed(surfels, errors, most)
+    return redistributed(surfels, surfel_errors(weights, radiance, views), most)
 
 
 def _relit(surfels: Surfels, views: Sequence[View], options: TrainOptions) -> Tensor:

@@ -84,7 +84,9 @@ def surface_cells(views: PreparedViews, cell: float) -> tuple[Tensor, int]:
         return torch.zeros(len(places), dtype=torch.int64), 1
     # The first cell is centred on the scene's corner, so that walls lie well inside of their cells.
     index = torch.round(places / side).long()
-    found, labels = torch.unique(index, dim=0, return_inverse=True)
+    x, y, z = (index - index.amin(dim=0)).unbind(dim=1)
+    # One number a cell: sorting rows takes many times as long.
+    found, labels = torch.unique((x * (1 + y.amax()) + y) * (1 + z.amax()) + z, return_inverse=True)
     return labels, len(found)
 
 

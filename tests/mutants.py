@@ -1,0 +1,226 @@
+"""Files with something wrong: small valid ones of every kind that is read, their mutants, and what reading must do.
+
+A mutant is read, with finite numbers only, or refused by an error that names the file; nothing else, and at once.
+"""
+
+from __future__ import annotations
+
+import json
+import random
+import re
+import shutil
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from PIL import Image
+
+from ply_files import gaussian_columns, radiosity_columns, write_ply
+from rgspipe.artifacts import ArtifactStore, Key
+from rgspipe.datasets.exr import read_channels, write_channels, write_image
+from rgspipe.datasets.grade_file import load_grade, save_grade
+from rgspipe.datasets.images import read_colour
+from rgspipe.datasets.light_file import read_lights, write_lights
+from rgspipe.datasets.location import open_dataset
+from rgspipe.datasets.ply import read_ply
+from rgspipe.datasets.ply_options import PlyOptions
+from rgspipe.datasets.surfel_file import load_surfels, save_surfels
+from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.scene import Camera, PointLight, SpotLight
+from rgspipe.scene.gloss import Gloss
+from rgspipe.scene.grade import SceneGrade
+from rooms import closed_box
+from tiny_dataset import write_tiny_dataset
+
+#: What a reader makes of a folder: all of its numbers.
+Numbers = Iterator[torch.Tensor]
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of file.
+
+    Attributes:
+        file: the one that is changed, in the folder.
+        make: writes it, and what belongs to it, into an empty folder.
+        read: reads the folder.
+    """
+
+    file: str
+    make: Callable[[Path], object]
+    read: Callable[[Path], Numbers]
+
+
+def _image(name: str, mode: str) -> Kind:
+    def make(folder: Path) -> None:
+        values = np.random.default_rng(0).integers(0, 256, (8, 8, 4), dtype=np.uint8)
+        Image.fromarray(values).convert(mode).save(folder / name)
+
+    return Kind(name, make, lambda folder: iter(read_colour(folder / name)))
+
+
+def _surfels(folder: Path) -> None:
+    box = closed_box(0.5).to(torch.float32)
+    gloss = Gloss(torch.full((len(box), 3), 0.1), torch.full((len(box),), 20.0))
+    save_surfels(folder / "a.safetensors", type(box)(**box.tensors(), coverage=box.coverage, gloss=gloss))
+
+
+def _read_surfels(folder: Path) -> Numbers:
+    return iter(load_surfels(folder / "a.safetensors").tensors().values())
+
+
+def _frozen(folder: Path) -> None:
+    FrozenScene.freeze(closed_box(0.5), gather_rays=8, patches=4).with_dictionary(2).save(folder)
+    save_grade(folder / "grade.json", SceneGrade(30.0, 8, 0.01, 0.1, 0.05, 0.01, 0.0, (0.1, 0.2, 0.3)))
+
+
+def _read_frozen(folder: Path) -> Numbers:
+    scene = FrozenScene.load(folder, gather=True)
+    yield from (*scene.surfels.tensors().values(), scene.areas, scene.centers, scene.transport.inverse)
+    yield from (scene.candidates.positions, scene.candidates.irradiance)
+    # Sparse parts are used, as indices out of range crash nothing before.
+    yield scene.render(
+        Camera.look_at([0.0, 0.0, 0.0], [0.5, 0, 0], width=4, height=4), PointLight([0.1, 0.1, 0.1], 1.0)
+    )
+
+
+def _lights(folder: Path) -> None:
+    spot = SpotLight([0, 1, 0], 2.0, [0, 0, -1], "linear", 0.5, 0.2)
+    write_lights(folder / "a.json", (PointLight([0, 0, 1], 1.0), spot))
+
+
+def _read_lights(folder: Path) -> Numbers:
+    return (value for light in read_lights(folder / "a.json") for value in (light.position, light.intensity))
+
+
+def _read_dataset(folder: Path) -> Numbers:
+    dataset = open_dataset(folder)
+    targets = [view for target in dataset.targets for view in target.views]
+    for view in (*dataset.train, *dataset.test, *targets):
+        yield from (view.image, view.alpha, view.camera.camera_to_world)
+        yield from () if view.light is None else (view.light.position, view.light.intensity)
+
+
+def _artifact(folder: Path) -> None:
+    def write(made: Path) -> dict:
+        (made / "x").write_text("1")
+        return {}
+
+    ArtifactStore(folder).build(Key("room", "freeze", "aa"), {"config": {}, "inputs": {}, "code": {}}, write)
+
+
+def _read_artifact(folder: Path) -> Numbers:
+    artifact = ArtifactStore(folder).find(Key("room", "freeze", "aa"))
+    if artifact is not None:
+        artifact.folder()
+    return iter(())
+
+
+def _of_dataset(name: str) -> Kind:
+    return Kind(name, write_tiny_dataset, _read_dataset)
+
+
+def _of_frozen(name: str) -> Kind:
+    return Kind(name, _frozen, _read_frozen)
+
+
+def _ply(columns: Callable[[], dict], text: bool = False) -> Kind:
+    return Kind(
+        "a.ply",
+        lambda folder: write_ply(folder / "a.ply", columns(), text=text),
+        lambda folder: iter(read_ply(folder / "a.ply", PlyOptions()).surfels.tensors().values()),
+    )
+
+
+KINDS: dict[str, Kind] = {
+    "EXR": Kind(
+        "a.exr",
+        lambda folder: write_image(folder / "a.exr", np.ones((8, 8, 3)), np.ones((8, 8))),
+        lambda folder: iter(read_colour(folder / "a.exr")),
+    ),
+    "EXR channels": Kind(
+        "a.exr",
+        lambda folder: write_channels(folder / "a.exr", {"Z": np.ones((8, 8), np.float32)}),
+        lambda folder: (torch.from_numpy(np.zeros_like(one)) for one in read_channels(folder / "a.exr").values()),
+    ),
+    "PNG": _image("a.png", "RGBA"),
+    "PNG, palette": _image("a.png", "P"),
+    "JPEG": _image("a.jpg", "RGB"),
+    "light file": Kind("a.json", _lights, _read_lights),
+    "grade": Kind(
+        "a.json",
+        lambda folder: save_grade(folder / "a.json", SceneGrade(30.0, 8, 0.01, 0.1, 0.05, 0.01, 0.0, (0.1, 0.2, 0.3))),
+        lambda folder: iter([torch.tensor(load_grade(folder / "a.json").error)]),
+    ),
+    "PLY, 3DGS": _ply(gaussian_columns),
+    "PLY, text": _ply(gaussian_columns, text=True),
+    "PLY, RadiosityGS": _ply(radiosity_columns),
+    "surfels": Kind("a.safetensors", _surfels, _read_surfels),
+    "frozen: transport": _of_frozen("transport.safetensors"),
+    "frozen: gather": _of_frozen("gather.safetensors"),
+    "frozen: dictionary": _of_frozen("dictionary.safetensors"),
+    "training views": _of_dataset("transforms_train.json"),
+    "test views": _of_dataset("transforms_test.json"),
+    "dataset_info.json": _of_dataset("dataset_info.json"),
+    "targets.json": _of_dataset("targets/targets.json"),
+    "a target's views": _of_dataset("targets/one/transforms.json"),
+    "depth": _of_dataset("train/r_0000_depth.exr"),
+    "manifest": Kind("room/freeze/aa/manifest.json", _artifact, _read_artifact),
+}
+
+#: Values that stand in for another one of a JSON file.
+STRANGE = (
+    *(None, True, "", "x", [], {}, 0, -1, 0.5, 1e-320, 1e308, -1e30, 10**400, "../../x", "\0", "é" * 5000),
+    *([[]], [0] * 4, [1e400], {"x": []}),
+)
+
+
+def mutated(content: bytes, random_: random.Random) -> bytes:
+    """The content with some bytes changed, cut off or put in, or a value of its JSON replaced."""
+    found = _of_json(content, random_) if random_.random() < 0.5 else None
+    if found is not None:
+        return found
+    place = random_.randrange(len(content))
+    if random_.random() < 0.15:
+        return content[:place]
+    # Headers are short, and most of what can go wrong is in them.
+    place = place if random_.random() < 0.4 else random_.randrange(min(len(content), 400))
+    other = random_.choice([bytes([random_.randrange(256)]), b"\xff" * 4, b"\0" * 4, b"9" * 9, b"[" * 5000])
+    return content[:place] + other + content[place + random_.choice([0, len(other)]) :]
+
+
+def _of_json(content: bytes, random_: random.Random) -> bytes | None:
+    """The content with one value of the JSON that it is, or begins with, replaced or left out; None if it is none."""
+    start, size = (8, int.from_bytes(content[:8], "little")) if content[8:9] == b"{" else (0, len(content))
+    try:
+        value = json.loads(content[start : start + size])
+    except (ValueError, UnicodeDecodeError):
+        return None
+    places = list(_places(value))
+    if not places:
+        return None
+    holder, key = random_.choice(places)
+    if random_.random() < 0.2:
+        del holder[key]
+    else:
+        holder[key] = random_.choice(STRANGE)
+    text = re.sub(r"\bInfinity\b", "1e999", json.dumps(value)).encode()
+    return (len(text).to_bytes(8, "little") if start else b"") + text + content[start + size :]
+
+
+def _places(value: object) -> Iterator[tuple]:
+    """Every place within lists and objects, with what holds it."""
+    items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    for key, part in items:
+        yield value, key
+        yield from _places(part)
+
+
+def fresh(kind: Kind, folder: Path) -> bytes:
+    """Make the files of a kind in a folder that is emptied before; what is in the one that is changed."""
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    kind.make(folder)
+    return (folder / kind.file).read_bytes()
