@@ -33,7 +33,7 @@ FLOORS = (
     ("relighting", "studies", "benchmark", "pages"),
     ("config",),
     ("stages",),
-    ("pipeline",),
+    ("pipeline", "nodes"),
     ("cluster", "cli"),
     ("__main__",),
 )

@@ -13,10 +13,12 @@ from lit_room import room_surfels
 from rgspipe.artifacts import Artifact, ArtifactStore, Key
 from rgspipe.cli.compose import compose_config
 from rgspipe.config import RgspipeConfig, with_changes
+from rgspipe.datasets.grade_file import GRADE, save_grade
 from rgspipe.datasets.gs3_write import frame_entry, write_transforms
 from rgspipe.datasets.surfel_file import save_surfels
 from rgspipe.errors import InputError
 from rgspipe.scene import Camera, look_at
+from rgspipe.scene.grade import SceneGrade
 from rgspipe.stages import study
 from rgspipe.stages.base import Failure, StageContext
 from rgspipe.stages.study_zoo import STAGES
@@ -81,6 +83,7 @@ def _artifact(root: Path, stage: str, views: int) -> Artifact:
             write_transforms(folder / "transforms_train.json", [frame_entry("train/r_0000", camera)])
         elif stage == "train_surfels":
             save_surfels(folder / "surfels.safetensors", room_surfels())
+            save_grade(folder / GRADE, SceneGrade(33.0, 4, residual=0.04, guessed=0.25, doubt=0.03, at_bound=0.0))
             (folder / "metrics.json").write_text(json.dumps({"test_psnr_mean": 33.0, "seconds": 80.0}))
         else:
             (folder / "metrics.csv").write_text(ROWS.format(views=views))
@@ -104,6 +107,8 @@ def test_a_room_that_failed_is_a_row_with_its_reason(tmp_path: Path) -> None:
     good, failed = table[table["seed"] == 4], table[table["seed"] == 7]
     assert good["silent"].tolist() == [False, True] * 2 and good["success"].tolist() == [True, False] * 2
     assert set(good["lens"]) == {90.0} and set(good["held_out_psnr"]) == {33.0} and set(good["unseen"]) == {0.0}
+    assert set(good["grade"]) == {"good"} and good["grade_error"].tolist() == pytest.approx([0.005] * 4)
+    assert set(good["guessed"]) == {0.25} and failed["grade"].isna().all()
     assert set(failed["reason"]) == {"the loss is NaN"} and set(failed["failed_in"]) == {"train_surfels"}
     assert failed["lens"].tolist() == [90.0] * 6 and failed["held_out_psnr"].isna().all()
     text = (tmp_path / "out" / "study.md").read_text()

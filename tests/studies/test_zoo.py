@@ -7,8 +7,8 @@ import math
 import pandas as pd
 import pytest
 
-from rgspipe.studies.zoo import SCARCE, WHITE, fit_rows, fits_table, groups, range_text, scarce, summary
-from zoo_fits import five_rooms, room_of, targets
+from rgspipe.studies.zoo import SCARCE, WHITE, fit_rows, fits_table, groups, misled, range_text, scarce
+from zoo_fits import five_rooms, five_rooms_figures, room_of, targets
 
 
 def _row(figures: pd.DataFrame, part: str, name: str, value: str, views: int = 1) -> pd.Series:
@@ -25,7 +25,7 @@ def test_a_fit_is_silently_wrong_if_it_converged_off_the_truth_and_outside_its_r
 
 
 def test_a_failed_training_counts_as_missed_and_a_room_that_could_not_be_built_does_not_count() -> None:
-    figures = summary(five_rooms(), 0)
+    figures = five_rooms_figures()
     final, work = (_row(figures, part, "all", "all") for part in ("final", "work"))
     assert (final["rooms"], final["count"], final["success"]) == (2, 6, 0.5)
     assert math.isinf(final["position"]) or final["position"] > 0.003  # The median lies between 0.003 and ∞.
@@ -35,12 +35,13 @@ def test_a_failed_training_counts_as_missed_and_a_room_that_could_not_be_built_d
 
 
 def test_fits_are_grouped_by_every_property_that_is_known() -> None:
-    figures = summary(five_rooms(), 0)
+    figures = five_rooms_figures()
     views = figures[(figures["property"] == "train_views") & (figures["part"] == "work") & (figures["views"] == 3)]
     # Seeds 1 and 5 have 30 and 40 views, seed 3 has 80.
     assert views[["value", "rooms"]].to_numpy().tolist() == [["below 50", 2], ["75 and more", 1]]
     unseen = figures[(figures["property"] == "unseen") & (figures["views"] == 3)]
-    assert set(unseen["value"]) == {"5 to 15 %", "30 % and more"} and "grade" not in set(figures["property"])
+    assert set(unseen["value"]) == {"5 to 15 %", "30 % and more"}
+    assert set(figures.loc[figures["property"] == "grade", "value"]) == {"fair", "good"}
     assert set(figures.loc[figures["property"] == "occlusion", "value"]) == {"visible", "out_of_frame", "occluded"}
     assert set(figures["views"]) == {1, 3}
 
@@ -64,6 +65,10 @@ def test_the_scarce_quarter_is_of_rooms_and_by_both_ranks() -> None:
     table = fits_table(rows)
     assert sorted(set(scarce(table)["seed"])) == [0, 1] and len(scarce(table)) == 4
     assert SCARCE in {group.value for group in groups(table)}
+
+
+def test_grades_that_say_good_where_lights_are_far_off_are_named() -> None:
+    assert misled(five_rooms())[["seed", "position_error"]].to_numpy().tolist() == [[3, 0.04]] * 2
 
 
 def test_ranges_read_as_they_are_meant() -> None:

@@ -12,9 +12,10 @@ from zoo_fits import five_rooms
 
 def test_success_of_ranges_stands_over_errors_of_fits() -> None:
     figure = zoo_figure(five_rooms())
-    solved, by_views, errors, _ = figure.axes
-    assert [axis.get_xlabel() for axis in figure.axes[2:]] == [
-        "share of surface that no camera saw (%)",
+    solved, _, by_views, errors, _, errors_by_views = figure.axes
+    assert [axis.get_xlabel() for axis in figure.axes[3:]] == [
+        "area that no camera saw (%)",
+        "guessed, of what surfaces look at (%)",
         "training views",
     ]
     points = {(round(float(x), 1), round(float(y), 1)) for line in solved.lines for x, y in line.get_xydata()}
@@ -24,7 +25,7 @@ def test_success_of_ranges_stands_over_errors_of_fits() -> None:
     assert {round(float(x)) for line in by_views.lines for x in line.get_xdata()} == {30, 40, 60, 80}
     drawn = np.concatenate([line.get_ydata() for line in errors.lines if line.get_marker() != "None"])
     assert drawn.min() == pytest.approx(0.1) and len(drawn) == 24
-    assert max(max(line.get_ydata()) for line in figure.axes[3].lines) == 100.0 * ERROR_RANGE[1]
+    assert max(max(line.get_ydata()) for line in errors_by_views.lines) == 100.0 * ERROR_RANGE[1]
     words = [text.get_text() for text in figure.legends[0].get_texts()]
     assert words == ["1 view", "3 views", "odd seeds (work)", "even seeds (final)"]
 

@@ -12,6 +12,7 @@ from rgspipe.artifacts import Artifact
 from rgspipe.blender.options import ZooParameters
 from rgspipe.config import RgspipeConfig, with_changes
 from rgspipe.datasets.frames import read_entries
+from rgspipe.datasets.grade_file import GRADE, load_grade
 from rgspipe.datasets.json_file import read_json
 from rgspipe.datasets.location import dataset_root
 from rgspipe.datasets.surfel_file import load_surfels
@@ -21,7 +22,7 @@ from rgspipe.stages.study_cases import checked_cases, target_limit
 from rgspipe.stages.study_kind import StudyKind
 from rgspipe.stages.study_lights import TYPES
 from rgspipe.studies.written import Study
-from rgspipe.studies.zoo import Row, failed_rows, fit_rows, fits_table, summary
+from rgspipe.studies.zoo import MEASURED, Row, failed_rows, fit_rows, fits_table, summary
 from rgspipe.studies.zoo_figure import zoo_figure
 from rgspipe.studies.zoo_page import page
 from rgspipe.studies.zoo_rooms import camera_properties, part_of, photographed, room_properties, share_unseen
@@ -34,9 +35,6 @@ CLASSES = ("visible", "out_of_frame", "occluded")
 
 #: The stages that a cell needs one artifact of each of.
 STAGES = ("generate_dataset", "train_surfels", "evaluate")
-
-#: What `train_surfels` says of the scene that it made, where it does.
-GRADE = "grade.json"
 
 
 @dataclass(frozen=True)
@@ -83,7 +81,7 @@ def _properties(cell: Cell, dataset: Artifact | Failure, trained: Artifact | Fai
     config, room = cell.config, _room(cell.config.scene.zoo)
     known = {"seed": cell.seed, "part": part_of(cell.seed), "case": cell.case} | room_properties(room)
     known |= {"train_views": config.capture.views or config.dataset.train_views, "noise": config.capture.image_noise}
-    known |= dict.fromkeys(("lens", "stand", "unseen", "surfels", "held_out_psnr", "training_seconds", "grade"))
+    known |= dict.fromkeys((*MEASURED, "stand", "grade"))
     if isinstance(dataset, Artifact):
         entries = read_entries(dataset_root(dataset.folder()) / "transforms_train.json", "the training views")
         size = config.dataset.resolution
@@ -100,13 +98,15 @@ def _room(zoo: ZooParameters) -> ZooRoom:
 def _training(trained: Artifact) -> dict[str, Any]:
     metrics = read_json(trained.file("metrics.json"), "the measures of a training")
     surfels = load_surfels(trained.file("surfels.safetensors"))
-    graded = GRADE in trained.manifest["files"]
+    grade = load_grade(trained.file(GRADE))
     return {
         "unseen": share_unseen(surfels),
         "surfels": len(surfels),
         "held_out_psnr": metrics.get("test_psnr_mean"),
         "training_seconds": metrics["seconds"],
-        "grade": read_json(trained.file(GRADE), "the grade of a scene")["grade"] if graded else None,
+        "grade": str(grade.grade),
+        "grade_error": grade.error,
+        "guessed": grade.guessed,
     }
 
 

@@ -10,7 +10,9 @@ from typing import Any
 
 import pandas as pd
 
+from rgspipe.evaluation.metrics import RESAMPLES
 from rgspipe.evaluation.tables import ALL, TARGET_COLUMNS, class_order
+from rgspipe.scene.grade import Grade
 from rgspipe.studies.lights import figures, silent
 
 #: What a fit says that could not be made.
@@ -18,7 +20,7 @@ FAILED = "failed"
 
 #: Columns that are true, false or not known, and numbers that a room may lack.
 VERDICTS = ("success", "inside_95", "count_right", "types_right")
-MEASURED = ("lens", "unseen", "surfels", "held_out_psnr", "training_seconds")
+MEASURED = ("lens", "unseen", "guessed", "surfels", "held_out_psnr", "training_seconds", "grade_error")
 
 #: Ranges of properties: column, and the least value of each range but the first.
 RANGES: Mapping[str, tuple[float, ...]] = {
@@ -26,6 +28,7 @@ RANGES: Mapping[str, tuple[float, ...]] = {
     "lens": (45.0, 60.0),
     "noise": (0.03, 0.06),
     "unseen": (0.05, 0.15, 0.3),
+    "guessed": (0.05, 0.15, 0.3),
 }
 
 #: Properties that have names.
@@ -34,6 +37,9 @@ NAMED = ("occlusion", "plan", "tone", "fronts", "stand", "grade")
 #: Rooms of their own interest: white ones with noise up to this, and the quarter with few views and narrow lenses.
 LITTLE_NOISE, QUARTER = 0.03, 0.25
 WHITE, SCARCE = "white, noise up to 3 %", "quarter with the fewest views and narrowest lenses"
+
+#: A scene whose grade says good, but whose lights are off by more than this, has been graded wrongly.
+MISLED = 0.03
 
 #: What all fits together are called.
 EVERYTHING = "all"
@@ -94,12 +100,12 @@ def fits_table(rows: Sequence[Row]) -> pd.DataFrame:
     return table
 
 
-def summary(table: pd.DataFrame, seed: int) -> pd.DataFrame:
+def summary(table: pd.DataFrame, seed: int, resamples: int = RESAMPLES) -> pd.DataFrame:
     """The figures of all fits, and of each group of them.
 
     Args:
         table: see `fits_table`.
-        seed: of the resampling behind intervals.
+        seed, resamples: of the resampling behind intervals of medians.
 
     Returns:
         A row for each `part`, `case`, `method`, `property`, `value` and number of `views`, with the number of `rooms`
@@ -111,7 +117,7 @@ def summary(table: pd.DataFrame, seed: int) -> pd.DataFrame:
             for views, fits in group.rows.groupby("views"):
                 named = {"part": part, "case": case, "method": method, "property": group.name, "value": group.value}
                 named |= {"views": int(views), "rooms": fits["seed"].nunique()}
-                rows.append(named | figures(fits, seed))
+                rows.append(named | figures(fits, seed, resamples))
     return pd.DataFrame(rows)
 
 
@@ -139,10 +145,15 @@ def _ranges(table: pd.DataFrame, name: str, limits: Sequence[float]) -> Iterator
 
 def range_text(name: str, low: float, high: float) -> str:
     """ "below 50", "5 to 15 %", "30 % and more"."""
-    factor, unit = (100, " %") if name in ("noise", "unseen") else (1, "")
+    factor, unit = (100, " %") if name in ("noise", "unseen", "guessed") else (1, "")
     if math.isinf(low):
         return f"below {factor * high:g}{unit}"
     return f"{factor * low:g}{unit} and more" if math.isinf(high) else f"{factor * low:g} to {factor * high:g}{unit}"
+
+
+def misled(table: pd.DataFrame) -> pd.DataFrame:
+    """Fits that are off by more than `MISLED` in scenes whose grade is good."""
+    return table[(table["grade"] == Grade.GOOD) & (table["position_error"] > MISLED)]
 
 
 def scarce(table: pd.DataFrame) -> pd.DataFrame:

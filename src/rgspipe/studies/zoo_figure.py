@@ -18,7 +18,11 @@ from rgspipe.studies.zoo import RANGES
 from rgspipe.studies.zoo_rooms import FINAL, WORK
 
 #: Column, label of the axis and factor of each pair of panels.
-AXES = (("unseen", "share of surface that no camera saw (%)", 100.0), ("train_views", "training views", 1.0))
+AXES = (
+    ("unseen", "area that no camera saw (%)", 100.0),
+    ("guessed", "guessed, of what surfaces look at (%)", 100.0),
+    ("train_views", "training views", 1.0),
+)
 
 #: Lines and fillings of the two kinds of seeds.
 LINES = {WORK: (0, (3.0, 2.0)), FINAL: "-"}
@@ -38,7 +42,7 @@ def zoo_figure(table: pd.DataFrame) -> Figure:
         raise ValueError("the study has no rows")
     series = list(table.groupby(["case", "method", "views"], sort=False))
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(10.0, 6.6), layout="constrained")
+        figure = Figure(figsize=(13.0, 6.6), layout="constrained")
         axes = figure.subplots(2, len(AXES), sharex="col", sharey="row")
         for column, (name, label, factor) in enumerate(AXES):
             for index, (_, rows) in enumerate(series):
@@ -48,6 +52,8 @@ def zoo_figure(table: pd.DataFrame) -> Figure:
                     _success(axes[0, column], fits, name, factor, style | {"ls": LINES[str(part)]}, index)
                     _errors(axes[1, column], fits, name, factor, style)
             axes[1, column].set_xlabel(label)
+            most = factor * float(np.nanmax([0.0, *table[name].astype(float)]))
+            axes[1, column].set_xlim(0.0, 1.08 * most + 1.0)
         _dress(axes)
         figure.legend(handles=_handles(table, series), loc="outside upper center", ncols=6)
     return figure

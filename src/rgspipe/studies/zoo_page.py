@@ -10,7 +10,7 @@ from rgspipe.evaluation.plots import LABELS
 from rgspipe.studies.light_table import Row, with_interval
 from rgspipe.studies.lights import several
 from rgspipe.studies.written import FIGURE
-from rgspipe.studies.zoo import EVERYTHING, FAILED
+from rgspipe.studies.zoo import EVERYTHING, FAILED, MISLED, misled
 from rgspipe.studies.zoo_rooms import FINAL, WORK
 
 NOTE = (
@@ -40,13 +40,15 @@ ROOMS = {
     "lens": ("lens (°)", ".0f"),
     "noise": ("noise", ".1%"),
     "unseen": ("unseen", ".1%"),
+    "guessed": ("guessed", ".1%"),
     "held_out_psnr": ("PSNR (dB)", ".1f"),
     "training_seconds": ("training (s)", ".0f"),
     "grade": ("grade", ""),
+    "grade_error": ("expected error", ".1%"),
 }
 
-#: What the list of silent errors shows.
-SILENT = {
+#: What the lists of silent errors and of misleading grades show.
+WRONG = {
     "seed": ("seed", ""),
     "case": ("case", ""),
     "occlusion": ("light", ""),
@@ -54,7 +56,9 @@ SILENT = {
     "position_error": ("position error", ".2%"),
     "position_sd": ("stated", ".2%"),
     "held_out_psnr": ("PSNR (dB)", ".1f"),
-    "unseen": ("unseen", ".1%"),
+    "guessed": ("guessed", ".1%"),
+    "grade": ("grade", ""),
+    "result": ("says", ""),
 }
 
 #: What the list of failures shows.
@@ -67,7 +71,8 @@ PROPERTIES = {
     "stand": "cameras",
     "train_views": "training views",
     "lens": "lens, degrees",
-    "unseen": "share unseen",
+    "unseen": "area unseen",
+    "guessed": "guessed of what surfaces look at",
 }
 
 
@@ -110,7 +115,12 @@ def _rooms(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def _trouble(table: pd.DataFrame) -> list[str]:
-    """Lists of silent errors and of rooms that failed; empty where there are none."""
+    """Lists of silent errors, of misleading grades and of rooms that failed; empty where there are none."""
     failed = table[table["result"] == FAILED].drop_duplicates(["seed", "case", "reason"])
-    lists = (("Wrong without a word", table[table["silent"]], SILENT), ("Rooms that failed", failed, FAILURES))
+    failed = failed.assign(reason=failed["reason"].str.replace("|", r"\|"))
+    lists = (
+        ("Wrong without a word", table[table["silent"]], WRONG),
+        (f"Graded good, and off by more than {MISLED:.0%}".replace("%", " %"), misled(table), WRONG),
+        ("Rooms that failed", failed, FAILURES),
+    )
     return [f"### {title}\n\n{markdown_table(rows, shown)}" for title, rows, shown in lists if len(rows)]

@@ -29,7 +29,10 @@ def part_of(seed: int) -> str:
 
 
 def photographed(seed: int, views: tuple[int, int], noise: tuple[float, float]) -> tuple[int, float]:
-    """Number of training views and relative noise of a room, each evenly within its range, ends included."""
+    """Number of training views and relative noise of a room, each evenly within its range, ends included.
+
+    Another range of views is another draw of the noise, too.
+    """
     rng = np.random.default_rng([seed, STREAM])
     return int(rng.integers(views[0], views[1] + 1)), round(float(rng.uniform(*noise)), 4)
 
