@@ -73,7 +73,7 @@ def _read_surfels(folder: Path) -> Numbers:
 
 def _frozen(folder: Path) -> None:
     FrozenScene.freeze(closed_box(0.5), gather_rays=8, patches=4).with_dictionary(2).save(folder)
-    save_grade(folder / "grade.json", SceneGrade(30.0, 8, 0.01, 0.1, 0.05, 0.0))
+    save_grade(folder / "grade.json", SceneGrade(30.0, 8, 0.01, 0.1, 0.05, 0.01, 0.0, (0.1, 0.2, 0.3)))
 
 
 def _read_frozen(folder: Path) -> Numbers:
@@ -151,7 +151,7 @@ KINDS: dict[str, Kind] = {
     "light file": Kind("a.json", _lights, _read_lights),
     "grade": Kind(
         "a.json",
-        lambda folder: save_grade(folder / "a.json", SceneGrade(30.0, 8, 0.01, 0.1, 0.05, 0.0)),
+        lambda folder: save_grade(folder / "a.json", SceneGrade(30.0, 8, 0.01, 0.1, 0.05, 0.01, 0.0, (0.1, 0.2, 0.3))),
         lambda folder: iter([torch.tensor(load_grade(folder / "a.json").error)]),
     ),
     "PLY, 3DGS": _ply(gaussian_columns),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
@@ -11,9 +12,9 @@ from rgspipe.errors import InputError
 from rgspipe.scene.grade import SceneGrade
 
 
-@pytest.mark.parametrize("psnr", [None, 31.5])
-def test_a_grade_comes_back(tmp_path: Path, psnr: float | None) -> None:
-    grade = SceneGrade(psnr, 8, 0.02, 0.1, 0.05, 0.0)
+@pytest.mark.parametrize(("psnr", "place"), [(None, None), (31.5, (0.5, -1.0, 2.0))])
+def test_a_grade_comes_back(tmp_path: Path, psnr: float | None, place: tuple[float, float, float] | None) -> None:
+    grade = SceneGrade(psnr, 8, 0.02, 0.1, 0.05, 0.01, 0.0, place)
     save_grade(tmp_path / "grade.json", grade)
     assert load_grade(tmp_path / "grade.json") == grade
 
@@ -22,4 +23,14 @@ def test_a_grade_comes_back(tmp_path: Path, psnr: float | None) -> None:
 def test_what_is_no_grade_is_refused(tmp_path: Path, text: str) -> None:
     (tmp_path / "grade.json").write_text(text)
     with pytest.raises(InputError, match="residual"):
+        load_grade(tmp_path / "grade.json")
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("unseen_at", [1.0, 2.0]), ("unseen_at", 3.0), ("missing", None), ("doubt", 1e7)]
+)
+def test_what_a_number_cannot_be_is_refused_by_its_name(tmp_path: Path, name: str, value: object) -> None:
+    content = SceneGrade(31.5, 8, 0.02, 0.1, 0.05, 0.01, 0.0).data() | {name: value}
+    (tmp_path / "grade.json").write_text(json.dumps(content))
+    with pytest.raises(InputError, match=f"{name} missing, no number or too large"):
         load_grade(tmp_path / "grade.json")

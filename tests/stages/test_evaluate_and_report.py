@@ -4,6 +4,7 @@ import json
 import math
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -13,6 +14,7 @@ import torch
 from rgspipe.artifacts import Artifact, ArtifactStore, Key
 from rgspipe.config import RgspipeConfig, with_changes
 from rgspipe.datasets.exr import write_image
+from rgspipe.datasets.grade_file import GRADE, save_grade
 from rgspipe.datasets.gs3_write import frame_entry, write_transforms
 from rgspipe.datasets.landscape_file import PLANES, Landscape, PlaneLoss, landscape_bytes
 from rgspipe.datasets.light_file import write_lights
@@ -20,7 +22,8 @@ from rgspipe.datasets.surfel_file import save_surfels
 from rgspipe.errors import InputError
 from rgspipe.evaluation import images
 from rgspipe.scene import NO_CLIP, Camera, Coverage, PointLight, Surfels, look_at
-from rgspipe.stages import evaluate, report
+from rgspipe.scene.grade import SceneGrade
+from rgspipe.stages import evaluate, judge, report
 from rgspipe.stages.base import StageContext
 
 TARGETS = (("visible_000", "visible"), ("visible_001", "visible"), ("occluded_000", "occluded"))
@@ -219,6 +222,26 @@ def test_report_gathers_evaluations_training_and_provenance(tmp_path, config):
 def test_report_without_anything_still_says_so(tmp_path, config):
     report.STAGE.run(_context(tmp_path / "report", config))
     assert "No lights were fitted" in (tmp_path / "report" / "report.html").read_text()
+
+
+def test_a_report_does_without_views_that_are_left_out_and_has_the_grade_above_the_fits(tmp_path, config, dataset):
+    (dataset / "transforms_test.json").unlink()
+    external = with_changes(config, {"scene.kind": "external"})
+    inputs = {"generate_dataset": SimpleNamespace(folder=lambda: dataset)}
+    judged = _artifact(tmp_path, "judge", lambda folder: judge.run(StageContext(external, inputs, {}, folder)))
+    grade = SceneGrade(None, 12, 0.2, 0.0, 0.0, 0.35, 0.0, (0.5, 0.0, 0.25))
+
+    def frozen(folder: Path) -> None:
+        _write_freeze(folder)
+        save_grade(folder / GRADE, grade)
+
+    trained = _artifact(tmp_path, "train_surfels", lambda folder: (folder / "metrics.json").write_text("{}"))
+    parts = {"judge": [judged], "freeze": [_artifact(tmp_path, "freeze", frozen)], "train_surfels": [trained]}
+    report.STAGE.run(_context(tmp_path / "report", external, **parts))
+    html = (tmp_path / "report" / "report.html").read_text()
+    assert "The scene is poor" in html and "first of all around (0.50, 0.00, 0.25)" in html
+    assert html.index("The scene is poor") < html.index('id="trained"') < html.index('id="lights"')
+    assert "no picture that compares" in html and "Where the squared error sits" not in html
 
 
 def test_report_needs_every_method_with_every_number_of_views(config):

@@ -127,7 +127,7 @@ def test_a_poor_scene_is_refused_unless_it_is_asked_for_and_then_says_so(inputs,
         for path in inputs["freeze"].folder().iterdir():
             if path.name != MANIFEST:
                 shutil.copy(path, folder)
-        save_grade(folder / GRADE, SceneGrade(9.7, 8, 0.5, 0.0, 0.0, 0.0))
+        save_grade(folder / GRADE, SceneGrade(9.7, 8, 0.5, 0.0, 0.0, 0.0, 0.0))
 
     graded = inputs | {"freeze": _build(tmp_path / "store", "freeze", poor)}
     with pytest.raises(InputError, match=r"The scene is poor.*5\.0 % of its size.*fit\.poor_scene=true"):
@@ -137,7 +137,7 @@ def test_a_poor_scene_is_refused_unless_it_is_asked_for_and_then_says_so(inputs,
 
 
 def test_a_grade_goes_with_the_surfels_to_the_frozen_scene(tmp_path):
-    grade = SceneGrade(43.0, 8, 0.01, 0.02, 0.005, 0.0)
+    grade = SceneGrade(43.0, 8, 0.01, 0.02, 0.005, 0.01, 0.0, (0.1, 0.2, -0.3))
 
     def trained(folder: Path) -> None:
         save_surfels(folder / "surfels.safetensors", room_surfels())

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import pandas as pd
 import pytest
@@ -82,6 +83,25 @@ def test_a_scene_is_judged_beside_its_truth_where_that_is_known() -> None:
     assert [need.changes for need in needs if need.stage == "freeze"] == [{}, {"freeze.surfels": "truth"}]
     needs = judge.STAGE.needs(_config(scene__kind="external"))
     assert [need.changes for need in needs if need.stage == "freeze"] == [{}]
+
+
+def test_a_dataset_that_leaves_out_no_view_is_judged_by_nothing_and_a_study_of_captures_refuses_it(
+    tmp_path: Path, dataset: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (dataset / "transforms_test.json").unlink()
+    inputs = {"generate_dataset": SimpleNamespace(folder=lambda: dataset)}
+    external = {"scene__kind": "external", "scene__path": str(dataset), "scene__name": "own"}
+
+    def empty(folder: Path) -> None:
+        judge.run(StageContext(_config(**external), inputs, {}, folder))
+
+    made = _artifact(tmp_path, "judge", "aa", empty)
+    assert "judge: no view was left out of training (transforms_test.json)" in capsys.readouterr().out
+    assert list(pd.read_csv(made.file("quality.csv"))) == ["surfels", "light", *QUALITY]
+    assert all(pd.read_csv(made.file(f"{name}.csv")).empty for name in ("quality", "split", "views"))
+    lists = {"judge": [made], "evaluate": [made]}
+    with pytest.raises(InputError, match=r"left out of training.*no transforms_test\.json"):
+        study.run(StageContext(_config(study__kind="captures", **external), {}, lists, tmp_path))
 
 
 def test_surfels_without_images_cannot_be_judged(tmp_path: Path) -> None:

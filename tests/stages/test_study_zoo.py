@@ -83,7 +83,9 @@ def _artifact(root: Path, stage: str, views: int) -> Artifact:
             write_transforms(folder / "transforms_train.json", [frame_entry("train/r_0000", camera)])
         elif stage == "train_surfels":
             save_surfels(folder / "surfels.safetensors", room_surfels())
-            save_grade(folder / GRADE, SceneGrade(33.0, 4, residual=0.04, guessed=0.25, doubt=0.03, at_bound=0.0))
+            save_grade(
+                folder / GRADE, SceneGrade(33.0, 4, residual=0.04, guessed=0.25, doubt=0.03, at_bound=0.0, missing=0.0)
+            )
             (folder / "metrics.json").write_text(json.dumps({"test_psnr_mean": 33.0, "seconds": 80.0}))
         else:
             (folder / "metrics.csv").write_text(ROWS.format(views=views))

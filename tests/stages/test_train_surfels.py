@@ -13,8 +13,10 @@ from painted_room import painted_box, painted_views
 from rgspipe.config import RgspipeConfig
 from rgspipe.config.train import TrainConfig
 from rgspipe.datasets.exr import write_image
+from rgspipe.datasets.grade_file import load_grade
 from rgspipe.datasets.gs3_write import frame_entry, write_transforms
 from rgspipe.datasets.surfel_file import save_surfels
+from rgspipe.evaluation.grading import graded_words
 from rgspipe.options import settings
 from rgspipe.stages.base import StageContext
 from rgspipe.stages.train_surfels import NO_RESULT, STAGE
@@ -57,6 +59,11 @@ def test_it_says_how_well_it_renders_what_it_was_not_trained_on(
     context = _trained(tmp_path, left_out)
     metrics = json.loads((tmp_path / "out/metrics.json").read_text())
     said = capsys.readouterr().out
+    grade = load_grade(tmp_path / "out/grade.json")
+    assert graded_words(grade) in said and grade.views == (left_out or 8)
+    assert grade.psnr == (pytest.approx(metrics["test_psnr_mean"]) if left_out else None)
+    # Views of a painted box that is closed, by which it is trained: nothing is guessed or missing.
+    assert grade.guessed == 0.0 and grade.missing < 0.005
     assert (tmp_path / "out/comparison.png").is_file() == bool(left_out)
     if not left_out:
         assert "training: no view was left out of it" in said and context.facts["test_psnr_mean"] is None

@@ -12,7 +12,7 @@ from rgspipe.scene.grade import SceneGrade
 
 GRADE = "grade.json"
 
-#: No number of a grade is as large: PSNR is in decibels, the others are parts of the light.
+#: No number of a grade but its place is as large: PSNR is in decibels, the others are parts of the light.
 LARGEST = 1e6
 
 
@@ -25,13 +25,23 @@ def load_grade(path: Path) -> SceneGrade:
     """The grade that `save_grade` wrote.
 
     Raises:
-        InputError: no such file, no JSON, or a number is missing.
+        InputError: no such file, no JSON, or a number is missing or impossible.
     """
     content = read_json(path, "the grade of a scene")
     names = [field.name for field in fields(SceneGrade)]
-    values = {name: content.get(name) for name in names} if isinstance(content, dict) else {}
-    known = {name: value for name, value in values.items() if not (name == "psnr" and value is None)}
-    if not values or not all(is_number(value) and -LARGEST < value < LARGEST for value in known.values()):
-        expected = f"the numbers {', '.join(names)}, none beyond {LARGEST:g}"
-        raise InputError(path, expected=expected, found=str(content)[:120], remedy="Train the scene again.")
+    unknown = [name for name in names if name not in content or not _is_known(name, content[name])]
+    if unknown:
+        expected, found = f"the numbers {', '.join(names)}", f"{', '.join(unknown)} missing, no number or too large"
+        raise InputError(path, expected=expected, found=found, remedy="Train the scene again.")
+    place = content["unseen_at"]
+    values = {name: content[name] for name in names} | {"unseen_at": None if place is None else tuple(place)}
     return SceneGrade(**values)
+
+
+def _is_known(name: str, value: object) -> bool:
+    """Whether a grade may have this value under this name."""
+    if value is None:
+        return name in ("psnr", "unseen_at")
+    if name == "unseen_at":
+        return isinstance(value, list) and len(value) == 3 and all(is_number(part) for part in value)
+    return is_number(value) and -LARGEST < value < LARGEST

@@ -42,8 +42,11 @@ def write_lights(path: str | Path, rig: LightRig, extra: dict | None = None) -> 
     """Write a rig; `extra` holds further top-level fields, its "lights" a list of further fields per light.
 
     Raises:
+        InputError: `path` is a folder.
         ValueError: `extra` would overwrite a field of the format.
     """
+    if Path(path).is_dir():
+        raise InputError(path, expected="the name of a file", found="a folder", remedy="Add one: lights.json in it.")
     extra = dict(extra or {})
     further = extra.pop("lights", [{}] * len(rig))
     if len(further) != len(rig):

@@ -6,15 +6,25 @@ from collections.abc import Sequence
 
 import numpy as np
 import torch
+from torch import Tensor
 
 from rgspipe.evaluation.arrays import ArrayLike, to_array
+from rgspipe.evaluation.escaped_light import escaped_light
 from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.scene.camera import Camera
 from rgspipe.scene.grade import Grade, SceneGrade
 
 #: Pixels along the side of a block whose error is one. Edges of things are errors of a pixel or two, and move no light
 #: that is found by what bounces. Blocks half and twice as large find 1.30 and 0.75 times as much error in a trained
 #: Cornell box.
 BLOCK = 8
+
+#: Radius of the place where a photograph would help most, in parts of the scene's size: a whole wall of a
+#: room. And how many such places are tried.
+PLACE, BALLS = 0.5, 256
+
+#: Less of the light than this is not worth a word: some passes between surfels where walls meet.
+LEAST = 0.005
 
 #: Albedo this near to its upper bound is at it.
 NEAR_BOUND = 1e-3
@@ -25,6 +35,7 @@ def grade_scene(
     images: Sequence[ArrayLike],
     truths: Sequence[ArrayLike],
     *,
+    cameras: Sequence[Camera],
     psnr: float | None,
     highest_albedo: float,
 ) -> SceneGrade:
@@ -33,16 +44,42 @@ def grade_scene(
     Args:
         frozen: with its gather operator.
         images, truths: renders (H, W, 3) of views under their lights, and what they should be.
+        cameras: those that the scene was made from.
         psnr: of them, dB, if they were left out of training.
         highest_albedo: that training allows.
     """
     surfels, seen = frozen.surfels, frozen.surfels.guessed == 0.0
     area = (frozen.areas * seen).double()
     area = area / area.sum().clamp(min=1e-300)
-    marks = torch.stack([(~seen).float(), surfels.guessed.float()], dim=1)
-    guessed, doubt = (area[:, None] * (frozen.gather @ marks).double()).sum(dim=0).tolist()
+    looked_at = (frozen.gather.transposed @ area.float()[:, None])[:, 0].double()
+    guessed, doubts = looked_at * ~seen, looked_at * surfels.guessed
+    escaped = escaped_light(frozen, cameras)
     at_bound = float(area[(surfels.albedo >= highest_albedo - NEAR_BOUND).any(dim=1)].sum())
-    return SceneGrade(psnr, len(images), structured_error(images, truths), guessed, doubt, at_bound)
+    places = torch.cat([surfels.centers.double()[~seen].cpu(), escaped.places])
+    return SceneGrade(
+        psnr,
+        len(images),
+        residual=structured_error(images, truths),
+        guessed=float(guessed.sum()),
+        doubt=float(doubts.sum()),
+        missing=float(escaped.shares.sum()),
+        at_bound=at_bound,
+        unseen_at=_fullest(places, torch.cat([doubts[~seen].cpu(), escaped.shares]), PLACE * frozen.size),
+    )
+
+
+def _fullest(places: Tensor, weights: Tensor, radius: float) -> tuple[float, float, float] | None:
+    """The middle of what the ball around one of `places` (P, 3) that holds most of `weights` (P,) holds of them.
+
+    None where all weights together are less than LEAST.
+    """
+    if float(weights.sum()) < LEAST:
+        return None
+    tried = places[:: max(1, len(places) // BALLS)]
+    near = torch.cdist(tried, places) <= radius
+    held = near[(near.double() @ weights).argmax()]
+    x, y, z = ((places[held] * weights[held, None]).sum(dim=0) / weights[held].sum()).tolist()
+    return x, y, z
 
 
 def structured_error(images: Sequence[ArrayLike], truths: Sequence[ArrayLike]) -> float:
@@ -74,18 +111,24 @@ def graded_words(grade: SceneGrade) -> str:
     parts = [
         (grade.residual, f"renders are {_percent(grade.residual)} off, noise apart"),
         (grade.doubt, f"{_percent(grade.guessed)} of what surfaces look at was seen by no camera and is guessed"),
+        (grade.missing, f"{_percent(grade.missing)} of what surfaces look at was seen by no camera and is left open"),
         (grade.at_bound, f"the albedo of {_percent(grade.at_bound)} is as high as it may be, as if light were missing"),
     ]
-    reasons = "; ".join(words for size, words in sorted(parts, reverse=True) if size >= 0.005)
+    reasons = "; ".join(words for size, words in sorted(parts, reverse=True) if size >= LEAST)
     error = f"lights found by bounced light are expected to be {100.0 * grade.error:.1f} % of its size off"
     words = f"The scene is {grade.grade}: {error}" + (f" ({reasons})." if reasons else ".")
     return words if grade.grade is Grade.GOOD else f"{words} {_advice(grade)}"
 
 
 def _advice(grade: SceneGrade) -> str:
-    if grade.residual >= max(grade.doubt, grade.at_bound):
+    if grade.residual >= max(grade.doubt, grade.missing, grade.at_bound):
         return "Check poses, lamps and exposure of the training images, or train longer."
-    return "Photograph what no view shows: the report's drawing of the dataset has it in colour."
+    if grade.unseen_at is None:
+        return (
+            "Check the power of the lamps and the exposure of the training images: the scene seems too bright for them."
+        )
+    place = ", ".join(f"{value:.2f}" for value in grade.unseen_at)
+    return f"Photograph what no view shows, first of all around ({place}); the report draws guesses in colour."
 
 
 def _percent(share: float) -> str:

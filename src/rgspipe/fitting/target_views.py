@@ -63,7 +63,8 @@ class TargetViews:
         """What all targets of one set of cameras share; see `fit_lights` for the arguments.
 
         Raises:
-            InputError: masks do not fit the cameras, or leave no pixel; or a kind of light that is not known.
+            InputError: no scene or no camera; masks do not fit the cameras, or leave no pixel; or a kind of light that
+                is not known.
         """
         weights = _weights(scene, cameras)
         masks = None if masks is None else as_list(masks, axes=2)
@@ -121,6 +122,9 @@ class TargetViews:
 
 def _weights(scene: FrozenScene, cameras: Cameras) -> list[ViewWeights]:
     """Of each camera."""
+    if not isinstance(scene, FrozenScene):
+        remedy = "FrozenScene.load(folder) reads one, FrozenScene.freeze(surfels) makes one."
+        raise InputError("scene", expected="a FrozenScene", found=type(scene).__name__, remedy=remedy)
     views = [cameras] if isinstance(cameras, Camera | ViewWeights) else list(cameras)
     for index, view in enumerate(views):
         if not isinstance(view, Camera | ViewWeights):

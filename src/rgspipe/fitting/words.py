@@ -31,7 +31,8 @@ MEANINGS = {
     "of the lights (their number, their type).",
     FitStatus.UNDETERMINED: "These views do not tell all of the lights.",
     FitStatus.UNEXPLAINED: "These lights leave much of the target unexplained: their number or type may be another, or "
-    "the scene that was photographed is not the one that was frozen; say more of the lights, or search more starts.",
+    "the scene that was photographed is not the one that was frozen, or the image is not linear radiance; say more of "
+    "the lights, or search more starts.",
     FitStatus.NOT_ENOUGH_LIGHT: "The target is black, or no light in the scene can explain it: check its exposure, "
     "its mask and that it shows this scene.",
 }

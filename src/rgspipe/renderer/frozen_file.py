@@ -67,10 +67,14 @@ def load_parts(folder: Path, *, gather: bool) -> dict[str, Any]:
     """The parts that `save_parts` wrote, by name, on the CPU; the gather operator only where it is asked for.
 
     Raises:
-        InputError: no such folder, or a file is missing, broken, or does not belong to the others.
+        InputError: no such folder, or none of a scene, or a file is missing, broken, or does not belong to the others.
     """
     if not folder.is_dir():
         raise InputError(folder, expected="the folder of a frozen scene", found="no such folder", remedy=MAKE_AGAIN)
+    if not (folder / TRANSPORT).exists() and not (folder / SURFELS).exists():
+        found = "neither surfels nor transport in it"
+        remedy = "Name the folder that holds them: outputs/<scene>/freeze/latest, or what FrozenScene.save was given."
+        raise InputError(folder, expected="the folder of a frozen scene", found=found, remedy=remedy)
     surfels = load_surfels(folder / SURFELS)
     areas, centers, transport = _load_transport(folder / TRANSPORT, surfels.albedo.float())
     glossy = surfels.gloss is not None and len(surfels.gloss.glossy) > 0

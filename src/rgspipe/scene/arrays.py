@@ -18,6 +18,9 @@ ArrayLike: TypeAlias = "Tensor | npt.ArrayLike"
 #: Kinds of numpy's types that are numbers: booleans, integers, floats.
 NUMBERS = "biuf"
 
+#: What to pass where numbers are meant, if nothing more can be said.
+REMEDY = "Pass a list, numpy array or tensor."
+
 #: Noise reaches about as far below zero as above it; what reaches so many times as far is a broken pixel.
 NOISE = 2.0
 
@@ -25,7 +28,9 @@ NOISE = 2.0
 Axis = int | str
 
 
-def as_tensor(value: ArrayLike, name: str, shape: Sequence[Axis], dtype: torch.dtype | None = None) -> Tensor:
+def as_tensor(
+    value: ArrayLike, name: str, shape: Sequence[Axis], dtype: torch.dtype | None = None, remedy: str = REMEDY
+) -> Tensor:
     """`value` as a floating-point tensor of `shape`.
 
     A tensor of floats stays the one that it is, with its device and its gradients, unless `dtype` says otherwise;
@@ -34,15 +39,16 @@ def as_tensor(value: ArrayLike, name: str, shape: Sequence[Axis], dtype: torch.d
     Args:
         name: what errors call it.
         shape: entries along each axis, names where any number will do, such as ("H", "W", 3).
+        remedy: what errors tell to do.
 
     Raises:
         InputError: it holds no numbers, or has another shape.
     """
-    tensor = value if isinstance(value, Tensor) else _from_numbers(value, name, shape)
+    tensor = value if isinstance(value, Tensor) else _from_numbers(value, name, shape, remedy)
     if not tensor.is_floating_point():
         tensor = tensor.double()
     if not _fits(tensor.shape, shape):
-        _refuse(name, shape, f"shape {_written(tensor.shape)}")
+        _refuse(name, shape, f"shape {_written(tensor.shape)}", remedy)
     return tensor if dtype is None else tensor.to(dtype)
 
 
@@ -85,7 +91,7 @@ def check_radiance(where: object, least: float, most: float) -> None:
         raise InputError(where, expected="radiance, which is not negative", found=found, remedy="Export it again.")
 
 
-def _from_numbers(value: object, name: str, shape: Sequence[Axis]) -> Tensor:
+def _from_numbers(value: object, name: str, shape: Sequence[Axis], remedy: str) -> Tensor:
     if isinstance(value, list | tuple) and any(isinstance(part, Tensor) for part in value):
         return torch.stack([torch.as_tensor(part).double() for part in value])
     try:
@@ -93,7 +99,7 @@ def _from_numbers(value: object, name: str, shape: Sequence[Axis]) -> Tensor:
     except ValueError:  # rows of different lengths
         array = np.array(None)
     if array.dtype.kind not in NUMBERS:
-        _refuse(name, shape, f"{type(value).__name__} {value!r}"[:120])
+        _refuse(name, shape, f"{type(value).__name__} {value!r}"[:120], remedy)
     return torch.from_numpy(array.astype(np.float64))
 
 
@@ -101,10 +107,8 @@ def _fits(found: Sequence[int], wanted: Sequence[Axis]) -> bool:
     return len(found) == len(wanted) and all(isinstance(b, str) or a == b for a, b in zip(found, wanted, strict=True))
 
 
-def _refuse(name: str, shape: Sequence[Axis], found: str) -> NoReturn:
-    raise InputError(
-        name, expected=f"numbers of shape {_written(shape)}", found=found, remedy="Pass a list, numpy array or tensor."
-    )
+def _refuse(name: str, shape: Sequence[Axis], found: str, remedy: str) -> NoReturn:
+    raise InputError(name, expected=f"numbers of shape {_written(shape)}", found=found, remedy=remedy)
 
 
 def _written(shape: Sequence[Axis]) -> str:

@@ -25,7 +25,7 @@ class Grade(StrEnum):
 
 @dataclass(frozen=True)
 class SceneGrade:
-    """What is known of a scene's errors. All but `psnr` and `views` are parts of the light.
+    """What is known of a scene's errors. All but `psnr`, `views` and `unseen_at` are parts of the light.
 
     Attributes:
         psnr: mean over the views that were left out of training, dB; None where none was.
@@ -33,7 +33,9 @@ class SceneGrade:
         residual: error of the renders that neighbouring pixels share, over the images: no noise.
         guessed: of what surfaces look at, the part that no camera saw and that was added.
         doubt: what is unknown of the light that comes from there.
+        missing: of what surfaces look at, the part where nothing is and where no camera saw that nothing is.
         at_bound: area of the surfels whose albedo is as high as it may be, as if light were missing.
+        unseen_at: (x, y, z) around which most of what is guessed or missing lies, scene units; None where nothing is.
     """
 
     psnr: float | None
@@ -41,12 +43,14 @@ class SceneGrade:
     residual: float
     guessed: float
     doubt: float
+    missing: float
     at_bound: float
+    unseen_at: tuple[float, float, float] | None = None
 
     @property
     def error(self) -> float:
         """Expected position error of a light that is found by what bounces, in parts of the scene's size."""
-        return ERROR_PER_LIGHT * math.hypot(self.residual, self.doubt, self.at_bound)
+        return ERROR_PER_LIGHT * math.hypot(self.residual, self.doubt, self.missing, self.at_bound)
 
     @property
     def grade(self) -> Grade:

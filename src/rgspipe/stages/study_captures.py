@@ -6,7 +6,9 @@ from collections.abc import Iterator
 
 import pandas as pd
 
+from rgspipe.artifacts import Artifact
 from rgspipe.config import RgspipeConfig
+from rgspipe.errors import InputError
 from rgspipe.evaluation.markdown import markdown_table
 from rgspipe.stages.base import Need, StageContext
 from rgspipe.stages.sources import has_truth
@@ -39,10 +41,26 @@ def _gather(context: StageContext) -> Study:
     rows = []
     judged, evaluated = context.input_lists["judge"], context.input_lists["evaluate"]
     for (scene, case, _), quality, lights in zip(_cases(context.config), judged, evaluated, strict=True):
-        tables = pd.read_csv(quality.file("quality.csv")), pd.read_csv(lights.file("summary.csv"))
-        rows.append(study_row(scene, case, *tables))
+        rows.append(study_row(scene, case, _quality(quality), pd.read_csv(lights.file("summary.csv"))))
     table = with_factors(pd.DataFrame(rows))
     return Study(table, markdown_table(table, SHOWN), capture_figure(table))
+
+
+def _quality(judged: Artifact) -> pd.DataFrame:
+    """The quality table of a judgement.
+
+    Raises:
+        InputError: it is empty, as the dataset has no views that are left out of training.
+    """
+    table = pd.read_csv(judged.file("quality.csv"))
+    if table.empty:
+        raise InputError(
+            judged.path,
+            expected="a scene that was judged by views left out of training, to compare captures by",
+            found="none: its dataset has no transforms_test.json",
+            remedy="Move some frames of transforms_train.json there.",
+        )
+    return table
 
 
 def _cases(config: RgspipeConfig) -> Iterator[tuple[str, str, dict[str, object]]]:

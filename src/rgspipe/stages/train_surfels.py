@@ -101,7 +101,8 @@ def _judged(
     )
     psnr = float(np.mean(judged.psnr)) if left_out else None
     truths = [view.image for view in judged.views]
-    grade = grade_scene(frozen, judged.images, truths, psnr=psnr, highest_albedo=ALBEDO_RANGE[1])
+    cameras = [view.camera for view in trained.views]
+    grade = grade_scene(frozen, judged.images, truths, cameras=cameras, psnr=psnr, highest_albedo=ALBEDO_RANGE[1])
     if not left_out:
         return {}, grade
     picture = held_out_picture(judged.views, judged.images, judged.psnr, judged.albedo)
@@ -112,7 +113,7 @@ def _judged(
 def _quality(metrics: dict[str, Any]) -> str:
     """One line on how well the scene renders what it was not trained on."""
     if "per_view" not in metrics:
-        return "training: no view was left out of it (transforms_test.json), so nothing tells how good the scene is"
+        return "training: no view was left out of it (transforms_test.json): the scene is graded by views that it knows"
     rows = [row for row in metrics["per_view"] if row["psnr"] is not None]
     if not rows:
         return "training: no PSNR, as the views that were left out are black"

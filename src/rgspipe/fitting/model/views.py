@@ -15,7 +15,7 @@ from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.images.viewed_pixels import ViewedPixels
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.view_weights import ViewWeights
-from rgspipe.scene.arrays import ArrayLike, as_tensor, check_finite, check_radiance
+from rgspipe.scene.arrays import REMEDY, ArrayLike, as_tensor, check_finite, check_radiance
 
 #: Pixels of which less than this is the scene's, by what surfels cover or by their mask, show something else.
 LEAST_SHARE = 0.9
@@ -25,6 +25,12 @@ ROUNDING = 1e-3
 
 #: A light has six unknowns, and each pixel tells three numbers; fewer pixels than this tell nothing reliable.
 LEAST_PIXELS = 8
+
+#: What to do about an image of another shape.
+IMAGE_REMEDY = (
+    "Pass RGB with the channels last, as high and as wide as its camera; image[..., :3] drops alpha, and rg.load_views "
+    "reads files."
+)
 
 
 @dataclass(frozen=True)
@@ -108,7 +114,7 @@ def _one_each(
         InputError: they are fewer or more, of another size, or not finite; or they are images of display values.
     """
     if len(values) != len(views):
-        expected, found = f"one for each of the {len(views)} views", f"{len(values)} of them"
+        expected, found = f"as many as there are views ({len(views)})", f"{len(values)} of them"
         raise InputError(name, expected=expected, found=found, remedy=f"Pass as many {name} as cameras.")
     checked = []
     for index, (view, value) in enumerate(zip(views, values, strict=True)):
@@ -120,7 +126,8 @@ def _one_each(
                 found="levels from 0 to 255",
                 remedy="rg.load_views reads files as radiance, and rgspipe.scene.srgb.decode makes it of levels / 255.",
             )
-        tensor = as_tensor(value, where, (view.camera.height, view.camera.width, *channels))
+        size = (view.camera.height, view.camera.width, *channels)
+        tensor = as_tensor(value, where, size, remedy=IMAGE_REMEDY if channels else REMEDY)
         check_finite(tensor, where, "Make it again.")
         checked.append(tensor)
     return checked

@@ -259,7 +259,7 @@ def check_numbers(rig: LightRig) -> None:
 
 
 def _refuse(where: str, expected: str, found: object) -> NoReturn:
-    remedy = "Pass one, such as PointLight([0, 0, 0.3], 1.0)."
+    remedy = "Pass one, such as PointLight([0, 0, 0.3], 1.0), or the lights of a fit: result.lights."
     raise InputError(where, expected=expected, found=type(found).__name__, remedy=remedy)
 
 
