@@ -26,7 +26,7 @@ $(STAMP): requirements.txt pyproject.toml
 	@touch $@
 
 test: setup  ## every test
-	$(VENV)/bin/python -m pytest -q -n $(TEST_WORKERS) --dist loadgroup $(ARGS)
+	$(VENV)/bin/python -m pytest -q -n $(TEST_WORKERS) --dist loadfile --no-loadscope-reorder $(ARGS)
 
 test-slurm: setup  ## sweeps on a Slurm cluster of this machine alone (Debian: apt-get install slurm-wlm munge)
 	$(VENV)/bin/python -m pytest -q -m slurm $(ARGS) tests/slurm
