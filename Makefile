@@ -25,8 +25,9 @@ $(STAMP): requirements.txt pyproject.toml
 	$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps -e .
 	@touch $@
 
+# Bytecode is written even where it is not otherwise: tests start a hundred processes that import the package.
 test: setup  ## every test
-	$(VENV)/bin/python -m pytest -q -n $(TEST_WORKERS) --dist loadgroup $(ARGS)
+	PYTHONDONTWRITEBYTECODE= $(VENV)/bin/python -m pytest -q -n $(TEST_WORKERS) --dist loadfile --no-loadscope-reorder $(ARGS)
 
 test-slurm: setup  ## sweeps on a Slurm cluster of this machine alone (Debian: apt-get install slurm-wlm munge)
 	$(VENV)/bin/python -m pytest -q -m slurm $(ARGS) tests/slurm

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from tiny_dataset import change, dataset
+from warm_start import WarmStart
 
 __all__ = ["change", "dataset"]
 
@@ -24,6 +26,17 @@ def child_environment() -> dict[str, str]:
     return {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
 
 
+@pytest.fixture(scope="session")
+def warm_start(child_environment: dict[str, str]) -> Iterator[WarmStart]:
+    """Starts commands that need not import anything any more, one at a time."""
+    with WarmStart(child_environment) as place:
+        yield place
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Slow tests first, so that no worker is left with one of minutes when the others are done."""
-    items.sort(key=lambda item: item.get_closest_marker("slow") is None)
+    """Files with slow tests first, so that no worker is left with one of minutes when the others are done.
+
+    Tests of a file stay together: what they share is made once (`make test` gives workers whole files).
+    """
+    slow = {item.path for item in items if item.get_closest_marker("slow") is not None}
+    items.sort(key=lambda item: item.path not in slow)

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import random
-import signal
-import subprocess
 import time
 from pathlib import Path
 
 import pytest
 
-from whole_way import finish, results, start
+from warm_start import WarmStart
+from whole_way import ARGUMENTS, results
 
 KILLS = 20
 
@@ -29,13 +27,17 @@ def assert_nothing_half_made(folder: Path) -> None:
             assert hashlib.sha256((artifact / name).read_bytes()).hexdigest() == record["sha256"], artifact / name
 
 
+def finish(folder: Path, warm_start: WarmStart) -> None:
+    assert warm_start.start(folder, ARGUMENTS).wait(timeout=300) == 0, (folder / "stderr").read_text()[-3000:]
+
+
 @pytest.mark.slow
-@pytest.mark.xdist_group("kill")
-def test_killed_runs_end_with_the_same_result(tmp_path: Path, child_environment: dict[str, str]) -> None:
+def test_killed_runs_end_with_the_same_result(tmp_path: Path, warm_start: WarmStart) -> None:
+    # Forked, not started anew: a third of each run would be imports, which write nothing that a kill could spoil.
     undisturbed = tmp_path / "undisturbed"
     undisturbed.mkdir()
     begin = time.monotonic()
-    finish(undisturbed, child_environment)
+    finish(undisturbed, warm_start)
     whole = time.monotonic() - begin
     expected = results(undisturbed)
     stages = {Path(name).parts[2] for name in expected}
@@ -50,17 +52,16 @@ def test_killed_runs_end_with_the_same_result(tmp_path: Path, child_environment:
         # A few kills while one result is made, so that they reach the later stages too.
         for attempt in range(KILLS - kills):
             begin = time.monotonic()
-            process = start(folder, child_environment)
+            command = warm_start.start(folder, ARGUMENTS)
             try:
-                process.wait(timeout=moments.uniform(0.1, 0.6) * whole)
-                assert process.returncode == 0, (folder / "log").read_text()[-3000:]
+                status = command.wait(timeout=moments.uniform(0.1, 0.6) * whole)
+                assert status == 0, (folder / "stderr").read_text()[-3000:]
                 # Other work may have held up the first run: too long a time would leave most runs alive.
                 whole = whole if attempt else time.monotonic() - begin
                 break
-            except subprocess.TimeoutExpired:
-                os.killpg(process.pid, signal.SIGKILL)
-                process.wait()
+            except TimeoutError:
+                command.kill()
                 kills += 1
                 assert_nothing_half_made(folder)
-        finish(folder, child_environment)
+        finish(folder, warm_start)
         assert results(folder) == expected

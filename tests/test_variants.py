@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 import toys
 from rgspipe.artifacts import ArtifactStore
-from rgspipe.cli.compose import compose_config, usual_command
+from rgspipe.cli.compose import check_sweep, compose_config, usual_command
 from rgspipe.config import RgspipeConfig, with_changes
 from rgspipe.pipeline import Usual, resolve, run
 from rgspipe.variants import LONGEST, variant_name
@@ -90,7 +90,14 @@ def test_the_newest_is_what_was_asked_for_last(plain: RgspipeConfig, tmp_path: P
 
 def test_the_usual_command_is_the_one_without_what_varies() -> None:
     overrides = ["stage=freeze", "scene=corner", "freeze.surfels=truth", "experiment=smoke", "fit.limit=2"]
-    usual = usual_command([*overrides, "views.count=2,3", "fit=search_lm,paper_adam", "report.views=[1,3]"])
+    sweep = [*overrides, "views.count=2,3", "fit=search_lm,paper_adam", "report.views=[1,3]"]
+    usual = usual_command(sweep, check_sweep(sweep))
     assert usual.swept == {"views.count", "fit"}
     expected = compose_config([*overrides, "report.views=[1,3]"])
     assert usual.config == with_changes(expected, {"freeze.surfels": "trained"})
+
+
+def test_where_nothing_varies_the_usual_command_is_the_command() -> None:
+    overrides = ["stage=freeze", "scene=corner", "fit.limit=2"]
+    usual = usual_command(overrides, compose_config(overrides))
+    assert (usual.config, usual.swept) == (compose_config(overrides), frozenset())

@@ -36,7 +36,7 @@ class Source:
 
 @dataclass
 class SourceCode:
-    """The modules of packages as they are on disk; each file is looked for and read once.
+    """The modules of packages as they are on disk; each file is looked for and read once, and followed once a module.
 
     Attributes:
         passed_over: modules and packages that are neither counted nor followed.
@@ -45,6 +45,7 @@ class SourceCode:
     passed_over: Sequence[str] = ()
     _files: dict[str, dict[str, Path]] = field(default_factory=dict)
     _sources: dict[str, tuple[str, frozenset[str]]] = field(default_factory=dict)
+    _found: dict[str, dict[str, str]] = field(default_factory=dict)
 
     def fingerprints(self, module: str) -> dict[str, str]:
         """For a module and each that it runs, imported directly or not, the digest of what it does.
@@ -55,6 +56,11 @@ class SourceCode:
         Raises:
             ValueError: there is no such module.
         """
+        if module not in self._found:
+            self._found[module] = self._follow(module)
+        return self._found[module]
+
+    def _follow(self, module: str) -> dict[str, str]:
         tops = {OWN, module.partition(".")[0]}
         if module not in self._modules(module):
             raise ValueError(f"no module {module!r}")

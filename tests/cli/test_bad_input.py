@@ -3,25 +3,32 @@
 from __future__ import annotations
 
 import hashlib
-import subprocess
-import sys
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from rgspipe.datasets.exr import write_channels
+from warm_start import WarmStart
 
 REFUSED = 2
 
 
+@dataclass(frozen=True)
+class Ended:
+    """How a command ended."""
+
+    returncode: int
+    stderr: str
+
+
 @pytest.fixture
-def run_cli(tmp_path: Path, child_environment: dict[str, str]) -> Callable[..., subprocess.CompletedProcess[str]]:
-    def run(*arguments: str) -> subprocess.CompletedProcess[str]:
-        command = [sys.executable, "-m", "rgspipe", *arguments]
-        options = {"cwd": tmp_path, "env": child_environment, "stdin": subprocess.DEVNULL, "timeout": 120}
-        return subprocess.run(command, capture_output=True, text=True, **options)
+def run_cli(tmp_path: Path, warm_start: WarmStart) -> Callable[..., Ended]:
+    def run(*arguments: str) -> Ended:
+        status = warm_start.start(tmp_path, arguments).wait(timeout=120)
+        return Ended(status, (tmp_path / "stderr").read_text())
 
     return run
 

@@ -77,3 +77,9 @@ def fitted():
 def full_contents() -> report.ReportContents:
     """Everything that a report can show."""
     return make_contents()
+
+
+@pytest.fixture(scope="session")
+def full_report() -> str:
+    """The report of that, as HTML; reports of equal contents are equal, so it is made once."""
+    return report.render_report(make_contents())

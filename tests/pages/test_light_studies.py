@@ -38,14 +38,15 @@ def test_a_study_without_truth_says_so(table: pd.DataFrame) -> None:
     assert shown["figure"]["source"] is None and "known truth" in shown["figure"]["reason"]
 
 
-def test_a_report_shows_the_studies_that_were_made(full_contents, table: pd.DataFrame) -> None:
-    assert "Studies of recovered lights" not in Page(report.render_report(full_contents)).text
+def test_a_report_shows_the_studies_that_were_made(full_report, full_contents, table: pd.DataFrame) -> None:
+    before = Page(full_report)
+    assert "Studies of recovered lights" not in before.text
     studies = [LightStudy(kind, table.assign(case="<b>"), "Of another day.") for kind in KINDS]
     html = report.render_report(dataclasses.replace(full_contents, light_studies=studies))
     page = Page(html)
     for text in ("Studies of recovered lights", "How many views it takes", "Of another day.", NOTES["robustness"][:40]):
         assert text in page.text
     assert "<b>" not in html and "&lt;b&gt;" in html
-    assert len(page.pictures) == len(Page(report.render_report(full_contents)).pictures) + len(KINDS)
+    assert len(page.pictures) == len(before.pictures) + len(KINDS)
     assert all(words for _, words in page.pictures)
     assert {address.removeprefix("#") for address in page.addresses if address.startswith("#")} <= set(page.names)

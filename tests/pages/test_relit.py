@@ -33,8 +33,8 @@ def test_every_kind_is_described() -> None:
     assert set(ALT) == set(KINDS)
 
 
-def test_a_report_shows_what_was_relit_and_nothing_where_nothing_was(full_contents) -> None:
-    before = Page(report.render_report(full_contents))
+def test_a_report_shows_what_was_relit_and_nothing_where_nothing_was(full_report, full_contents) -> None:
+    before = Page(full_report)
     assert "In other lights" not in before.text
     html = report.render_report(dataclasses.replace(full_contents, relightings=everything()))
     page = Page(html)

@@ -25,7 +25,6 @@ from slurm.room import LIGHTS, write_room
 
 pytestmark = [
     pytest.mark.slurm,
-    pytest.mark.xdist_group("slurm"),
     pytest.mark.skipif(
         bool(missing_programs()),
         reason=f"needs Slurm (Debian: apt-get install slurm-wlm munge); there is no {', '.join(missing_programs())}",

@@ -97,10 +97,15 @@ def compose_config(overrides: Sequence[str]) -> RgspipeConfig:
         raise _composition_error(error, overrides) from None
 
 
-def usual_command(overrides: Sequence[str]) -> Usual:
-    """What a command, or each job of a sweep, would make if nothing varied."""
+def usual_command(overrides: Sequence[str], config: RgspipeConfig) -> Usual:
+    """What a command, or each job of a sweep, would make if nothing varied.
+
+    Args:
+        config: of these overrides, or of a sweep's first job.
+    """
     swept = frozenset(str(override.key_or_group) for override in _parse(overrides) if override.is_sweep_override())
-    return Usual(compose_config(plain_overrides(overrides, swept)), swept)
+    plain = plain_overrides(overrides, swept)
+    return Usual(config if plain == list(overrides) else compose_config(plain), swept)
 
 
 def check_sweep(overrides: Sequence[str]) -> RgspipeConfig:

@@ -65,7 +65,7 @@ def run_jobs(overrides: Sequence[str], stage_loader: StageLoader, multirun: bool
     # Said again even where it was given: interpolations such as the time must not be resolved twice.
     chosen = f"hydra.{mode}.dir={quoted(folder)}"
     # Worked out here: within a job Hydra composes nothing else.
-    usual = usual_command(overrides)
+    usual = usual_command(overrides, config)
     try:
         code = run_hydra([*(["-m"] if multirun else []), *overrides, chosen], stage_loader, usual)
     except KeyboardInterrupt:

@@ -10,7 +10,6 @@ from collections.abc import Mapping
 from typing import TypeVar
 
 import numpy as np
-from scipy.stats import ttest_1samp
 
 from rgspipe.evidence.readings import Numbers
 
@@ -37,4 +36,7 @@ def clearly_above(values: Numbers) -> bool:
     """Whether the mean of values (V,) is above zero by more than chance."""
     if np.ptp(values) == 0.0:
         return bool(values[0] > 0.0)
+    # Slow to import, and asked only where readings come close.
+    from scipy.stats import ttest_1samp
+
     return bool(ttest_1samp(values, 0.0, alternative="greater").pvalue < CHANCE)

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import spearmanr
 
 from rgspipe.datasets.views import View
 from rgspipe.evidence.comparison import FEWEST_VIEWS, REMAINDER, clearly_above, plainest
@@ -131,4 +130,7 @@ def _correlation(view: View, surface: _Surface, lamps: Lamps) -> float:
     received = np.maximum((path * surface.normals).sum(axis=1), 0.0) / squared**1.5
     if np.ptp(received) == 0.0 or np.ptp(surface.brightness) == 0.0:
         return 0.0
+    # Slow to import, and asked only of lamps that are given.
+    from scipy.stats import spearmanr
+
     return float(spearmanr(received, surface.brightness).statistic)

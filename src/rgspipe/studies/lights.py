@@ -10,7 +10,6 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
-from scipy.stats import binomtest
 
 from rgspipe.evaluation import metrics
 from rgspipe.evaluation.tables import ALL, class_order
@@ -101,6 +100,9 @@ def wilson_interval(successes: int, count: int) -> tuple[float, float]:
     """
     if count == 0:
         return math.nan, math.nan
+    # Slow to import, and the command line imports this module for every report.
+    from scipy.stats import binomtest
+
     interval = binomtest(successes, count).proportion_ci(0.95, method="wilson")
     return float(interval.low), float(interval.high)
 
