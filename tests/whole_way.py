@@ -25,6 +25,8 @@ TINY = {
     "train.checkpoint_every": 3,
     "train.gather_rays": 16,
     "train.patches": 40,
+    # So few photographs make a poor scene.
+    "fit.poor_scene": "true",
     "freeze.gather_rays": 16,
     "freeze.patches": 40,
     "freeze.dictionary_grid": 4,

@@ -107,11 +107,7 @@ class Artifact:
 
     def _verify(self, path: Path, entry: Mapping[str, Any]) -> None:
         self._check_size(path, entry)
-        try:
-            content = sha256(path)
-        except OSError as error:
-            raise self._damaged(path, entry, f"an unreadable file ({error.strerror})") from None
-        if content != entry["sha256"]:
+        if sha256(path) != entry["sha256"]:
             raise self._damaged(path, entry, "other content (its checksum differs)")
 
     def _check_size(self, path: Path, entry: Mapping[str, Any]) -> None:
@@ -279,10 +275,8 @@ def _read_manifest(folder: Path, key: Key) -> Mapping[str, Any]:
         manifest = parse_json(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise InputError(path, expected=expected, found="no file", remedy=remedy) from None
-    except ValueError as error:
+    except (IsADirectoryError, ValueError) as error:
         raise InputError(path, expected=expected, found=f"damaged JSON ({error})", remedy=remedy) from None
-    except OSError as error:
-        raise InputError(path, expected=expected, found=f"an unreadable file ({error})", remedy=remedy) from None
     if not isinstance(manifest, dict) or manifest.get("schema") != SCHEMA_VERSION:
         raise InputError(path, expected=expected, found="another schema", remedy=remedy)
     if (manifest.get("fingerprint"), manifest.get("stage")) != (key.fingerprint, key.stage) or not _is_whole(manifest):

@@ -52,3 +52,15 @@ def test_what_is_damaged_is_named(
 def test_a_folder_that_is_not_there_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["verify", f"outputs={tmp_path / 'nowhere'}"]) == 2
     assert "no such folder" in capsys.readouterr().err
+
+
+def test_what_cannot_be_read_is_told_and_the_rest_is_verified(
+    outputs: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (path,) = (outputs / "cornell" / "grow").glob("[0-9a-f]*/manifest.json")
+    path.unlink()
+    path.symlink_to(path.name)  # a link to itself: also root cannot read it
+    assert main(["verify", f"outputs={outputs}"]) == 2
+    told = capsys.readouterr()
+    assert told.out.startswith("2 of 3 artifacts") and str(path) in told.err
+    assert "Too many levels of symbolic links" in " ".join(told.err.split())

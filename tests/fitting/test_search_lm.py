@@ -142,7 +142,7 @@ def test_masked_pixels_do_not_count(room, point_light):
 @pytest.mark.parametrize(
     ("images", "message"),
     [
-        ([], "one for each"),
+        ([], "as many as there are views"),
         ([torch.ones(47, 48, 3)], r"images\[0\]: expected numbers of shape \(48, 48, 3\), found shape \(47, 48, 3\)"),
         (np.ones((2, 48, 48, 3)), "found 2"),
         (np.ones((1, 48, 48, 3), np.uint8), "linear radiance"),

@@ -29,6 +29,9 @@ def verify(arguments: Sequence[str]) -> int:
             artifact.folder()
         except InputError as error:
             show_input_error(error)
+        except OSError as error:
+            place, remedy = error.filename or str(key), "Ask whoever owns it for the right to read it."
+            show_input_error(InputError(place, expected="a file to read", found=str(error.strerror), remedy=remedy))
         else:
             whole.append(artifact)
     size = sum(entry["bytes"] for artifact in whole for entry in artifact.manifest["files"].values())

@@ -144,7 +144,7 @@ def _require_fit(frozen: FrozenScene, config: RgspipeConfig, artifact: Artifact)
         raise InputError(
             artifact.path,
             expected="a scene that is fit for finding lights",
-            found=graded_words(grade),
+            found=graded_words(grade).removesuffix("."),
             remedy="Mend the scene, or set fit.poor_scene=true to fit nevertheless; answers will say so.",
         )
 
