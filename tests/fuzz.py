@@ -7,6 +7,7 @@ nor refused by an error that names the file is kept in fuzz_found/ with what hap
 from __future__ import annotations
 
 import random
+import re
 import resource
 import signal
 import sys
@@ -100,9 +101,9 @@ def _outcome(name: str, folder: Path, mutant: bytes) -> str:
     finally:
         signal.alarm(0)
     FOUND.mkdir(exist_ok=True)
-    stem = FOUND / f"{name.replace(' ', '_').replace('/', '_')}_{time.monotonic_ns()}"
-    stem.with_suffix(".txt").write_text(story)
-    stem.with_suffix(Path(kind.file).suffix).write_bytes(mutant)
+    stem = f"{re.sub('[^a-z0-9]+', '_', name.lower())}_{time.monotonic_ns()}"
+    (FOUND / f"{stem}.txt").write_text(story)
+    (FOUND / f"{stem}{Path(kind.file).suffix}").write_bytes(mutant)
     return "fell"
 
 

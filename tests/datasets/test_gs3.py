@@ -199,9 +199,10 @@ def test_depth_without_a_convention_shows_both(dataset: Path, change: Change) ->
     change("dataset_info.json", lambda info: info.pop("depth_convention"))
     with pytest.raises(InputError, match=r'dataset_info\.json.*"planar_z".*"ray_distance"'):
         load_dataset(dataset)
-    change("dataset_info.json", lambda info: info.update(depth_convention="inverse"))
-    with pytest.raises(InputError, match=r'"planar_z".*"ray_distance".*inverse'):
-        load_dataset(dataset)
+    for other in ("inverse", ["inverse"]):
+        change("dataset_info.json", lambda info, other=other: info.update(depth_convention=other))
+        with pytest.raises(InputError, match=r'"planar_z".*"ray_distance".*inverse'):
+            load_dataset(dataset)
     (dataset / "dataset_info.json").unlink()
     with pytest.raises(InputError, match=r'dataset_info\.json.*"planar_z".*"ray_distance".*no such file'):
         load_dataset(dataset)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from rgspipe.datasets.json_file import read_json, required
+from rgspipe.datasets.json_file import read_json, required, shown
 from rgspipe.errors import InputError
 
 VERSION = 1
@@ -56,8 +56,8 @@ def read_info(root: Path) -> DatasetInfo | None:
             remedy="Multiply the colours by alpha.",
         )
     convention = content.get("depth_convention")
-    if convention is not None and convention not in DEPTH_CONVENTIONS:
-        raise _convention_error(path, repr(convention))
+    if convention is not None and convention not in list(DEPTH_CONVENTIONS):
+        raise _convention_error(path, shown(convention))
     return DatasetInfo(path, convention)
 
 
