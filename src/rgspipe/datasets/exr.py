@@ -11,8 +11,9 @@ from rgspipe.datasets.input_file import check_pixel_count, input_file
 from rgspipe.errors import InputError
 from rgspipe.files import replacing
 
-#: Pixels of the largest image of which only a part is stored, 8K: a file of a few bytes could claim any size.
-MOST_CROPPED = 2**25
+#: Pixels of the largest image of which only a part is stored, 4096²: a file of a few bytes could claim any size, and
+#: four channels of so many pixels are read in half of a GiB.
+MOST_CROPPED = 2**24
 
 RENDER_AGAIN = "Export or render this image again."
 
