@@ -31,7 +31,7 @@ def picture(seed: int = 0) -> np.ndarray:
 def test_noise_of_the_photographs_is_no_error_of_the_scene():
     truth = picture()
     noisy = [truth + 0.3 * np.random.default_rng(seed).standard_normal(truth.shape) for seed in range(8)]
-    # Measured 0.005: plain it is 0.29.
+    # Measured 0.009: plain it is 0.28.
     assert structured_error([truth] * 8, noisy) < 0.02
 
 
@@ -40,7 +40,7 @@ def test_a_smooth_error_is_measured_with_noise_on_top():
     ramp = np.linspace(0.8, 1.2, 96)[None, :, None]
     plain = float(np.sqrt(np.square(truth * (ramp - 1.0)).sum() / np.square(truth).sum()))
     found = structured_error([truth * ramp] * 4, [truth] * 4)
-    # Measured 0.993 of it; 0.97 with noise on top.
+    # Measured 0.958 of it, and 0.951 with noise on top: what the texture of the picture adds to it is no shared error.
     assert found == pytest.approx(plain, rel=0.05)
     noisy = [truth + 0.2 * np.random.default_rng(seed).standard_normal(truth.shape) for seed in range(4)]
     assert structured_error([truth * ramp] * 4, noisy) == pytest.approx(plain, rel=0.1)
@@ -65,7 +65,7 @@ def test_what_was_guessed_counts_by_how_much_is_seen_of_it():
         frozen = FrozenScene.freeze(marked, gather_rays=64, patches=50)
         grade = grade_scene(frozen, [picture()], [picture()], cameras=[INSIDE], psnr=None, highest_albedo=0.98)
         # A wall of a cube fills 0.2 of what the other walls see.
-        assert grade.guessed == pytest.approx(0.2 if share else 0.0, abs=0.01)  # measured 0.2002
+        assert grade.guessed == pytest.approx(0.2 if share else 0.0, abs=0.01)  # measured 0.2003
         assert grade.doubt == pytest.approx(share * grade.guessed, rel=1e-5) and grade.at_bound == 0.0
         assert grade.missing < 1e-3  # measured 0
         # The wall whose normal is +x stands at x = −0.5. Measured (−0.50, 0.05, −0.06).
@@ -106,7 +106,7 @@ def test_albedo_at_its_bound_is_told_by_area():
     albedo = torch.where((box.normals[:, 2] > 0.9)[:, None], 0.98, 0.5).expand(-1, 3)
     frozen = FrozenScene.freeze(replace(box, albedo=albedo), gather_rays=16, patches=50)
     grade = grade_scene(frozen, [picture()], [picture()], cameras=[INSIDE], psnr=None, highest_albedo=0.98)
-    assert grade.at_bound == pytest.approx(1 / 6, rel=0.05)  # measured 0.1667
+    assert grade.at_bound == pytest.approx(1 / 6, rel=0.05)  # measured 0.1661
     assert "the albedo of 17 % is as high as it may be" in graded_words(grade)
 
 

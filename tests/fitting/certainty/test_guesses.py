@@ -73,7 +73,7 @@ def test_a_wrong_guess_moves_the_answer_as_foretold(scene, point_light, where):
     spread = torch.block_diag(state.emitters[0].spread(), exact.scale * torch.eye(3, dtype=torch.float64))
     foretold = spread @ torch.linalg.solve(information, scores[0]) * step / DOUBT
     moved = torch.cat([found.position - light.position, found.intensity - light.intensity]).double()
-    # Measured relative differences 0.013 and 0.028.
+    # Measured relative differences 0.009 and 0.030 of positions, 0.005 and 0.019 of intensities.
     assert float((moved - foretold)[:3].norm()) < 0.1 * float(moved[:3].norm())
     assert float((moved - foretold)[3:].norm()) < 0.1 * float(moved[3:].norm())
 
@@ -87,6 +87,7 @@ def test_guesses_widen_the_region_and_nothing_guessed_leaves_it(scene, point_lig
         matrix = light_covariances(problem, state_of(problem, light)).calibrated[0]
         widths[name] = float(matrix[:3, :3].trace().sqrt())
         assert float(torch.linalg.eigvalsh(matrix).min()) > 0.0
+    # Measured 1e5: without a guess the images are explained to rounding.
     assert widths["guessed"] > 3.0 * widths["seen"]
 
 
