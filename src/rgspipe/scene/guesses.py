@@ -9,6 +9,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 from torch import Tensor
 
+from rgspipe.scene.spacing import surfel_spacing
 from rgspipe.scene.surfels import Surfels
 
 #: Surfels no farther apart than so many of their distances, and turned by less than 45°, are of one surface.
@@ -45,9 +46,11 @@ def guessed_surfaces(surfels: Surfels) -> Tensor:
 
 
 def _spacing(surfels: Surfels) -> float:
-    """Median distance of neighbours; 0 of fewer than two surfels."""
-    centers = surfels.centers.double().cpu().numpy()
-    return float(torch.from_numpy(cKDTree(centers).query(centers, k=[2])[0]).median()) if len(centers) > 1 else 0.0
+    """Distance of neighbours; 0 where no two are of one surface."""
+    try:
+        return surfel_spacing(surfels.centers.cpu(), surfels.normals.cpu())
+    except ValueError:
+        return 0.0
 
 
 def _together(centers: Tensor, normals: Tensor, spacing: float) -> Tensor:

@@ -6,13 +6,11 @@ bounces on of that the image changes by δ·d. Least squares take that for a mov
 
 from __future__ import annotations
 
-import torch
 from torch import Tensor
 
-from rgspipe.fitting.model.moments import moments, scores
+from rgspipe.fitting.model.moments import image_scores
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.search.refine import State
-from rgspipe.scene.guesses import guessed_surfaces
 
 
 def guess_scores(problem: LightProblem, state: State, weights: Tensor) -> Tensor:
@@ -21,17 +19,13 @@ def guess_scores(problem: LightProblem, state: State, weights: Tensor) -> Tensor
     Args:
         weights: (P, 3) or (P, 1) squared weights of the pixels.
     """
-    images = _changes(problem, state)
-    found = [moments(state.columns, image, weights) for image in images]
-    own = [scores(part.values, part.owners, state.intensity) for part in found]
-    unknowns = sum(columns.shape[2] - 1 for columns in state.columns) + 3 * len(state.columns)
-    return torch.stack(own) if own else torch.zeros((0, unknowns), dtype=torch.float64)
+    return image_scores(state.columns, _changes(problem, state), weights, state.intensity)
 
 
 def _changes(problem: LightProblem, state: State) -> Tensor:
     """(S, P, 3) τ d, of images as the problem's target is; none where light does not bounce."""
     views, effects = problem.views, problem.model.effects
-    surfaces = guessed_surfaces(views.frozen.surfels)
+    surfaces = views.guesses
     if not len(surfaces) or not effects.interreflection:
         return problem.target.new_zeros((0, *problem.target.shape))
     sent = views.frozen.radiance_of(state.lights(problem), effects).detach()

@@ -108,9 +108,24 @@ def information(values: Tensor, owners: Tensor, intensity: Tensor) -> Tensor:
 
 def scores(values: Tensor, owners: Tensor, intensity: Tensor) -> Tensor:
     """(…, D + 3L) sums of Jacobian times target, of the unknowns of `information`; for moments of the residual."""
+    return _scores(values[..., :-1, -1], owners, intensity)
+
+
+def image_scores(columns: Sequence[Tensor], images: Tensor, weights: Tensor, intensity: Tensor) -> Tensor:
+    """(S, D + 3L) float64 sums of Jacobian times images (S, P, 3), of the unknowns of `information`.
+
+    Args:
+        columns, weights: as in `moments`.
+    """
+    _, weighted = _joined(columns, images.new_zeros(images.shape[1:]), weights)
+    against = torch.einsum("cpk,spc->sck", weighted[:, :, :-1], images.double())
+    return _scores(against.cpu(), _owners(columns), intensity)
+
+
+def _scores(against: Tensor, owners: Tensor, intensity: Tensor) -> Tensor:
+    """Of the sums (…, 3, L + D) of unit images and derivatives times a target."""
     count, parameters = len(intensity), len(owners)
-    against = values[..., :-1, -1]
-    full = values.new_zeros((*values.shape[:-3], parameters + 3 * count))
+    full = against.new_zeros((*against.shape[:-2], parameters + 3 * count))
     for channel in range(3):
         full[..., :parameters] += intensity[owners, channel] * against[..., channel, count:]
         full[..., parameters + channel :: 3] = against[..., channel, :count]

@@ -16,6 +16,7 @@ from rgspipe.renderer.images.viewed_pixels import ViewedPixels
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.view_weights import ViewWeights
 from rgspipe.scene.arrays import REMEDY, ArrayLike, as_tensor, check_finite, check_radiance
+from rgspipe.scene.guesses import guessed_surfaces
 
 #: Pixels of which less than this is the scene's, by what surfels cover or by their mask, show something else.
 LEAST_SHARE = 0.9
@@ -47,6 +48,11 @@ class PreparedViews(ViewedPixels):
     def every_pixel(self) -> ViewedPixels:
         """All pixels of all views, edges included."""
         return ViewedPixels.every(self.frozen, self.views)
+
+    @cached_property
+    def guesses(self) -> Tensor:
+        """(S, N) 1 where a surfel of the scene is of one of S surfaces that no camera saw."""
+        return guessed_surfaces(self.frozen.surfels)
 
     def stack_images(self, images: Sequence[ArrayLike]) -> Tensor:
         """(all pixels, 3) float32 of one image (H, W, 3) per view.
