@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from rgspipe.renderer.frozen import FrozenScene
     from rgspipe.renderer.ply import load_ply
     from rgspipe.scene import Camera, Surfels
-    from rgspipe.scene.lights import LedLight, Light, PointLight, SpotLight
+    from rgspipe.scene.lights import LedLight, Light, PanelLight, PointLight, SphereLight, SpotLight
     from rgspipe.scene.models import CornellBox, Corridor, exact_surfels
     from rgspipe.training.trainer import Trained, TrainOptions, train
 
@@ -52,7 +52,7 @@ _HOMES = {
     "renderer.frozen": ("FrozenScene",),
     "renderer.ply": ("load_ply",),
     "scene": ("Camera", "Surfels"),
-    "scene.lights": ("LedLight", "Light", "PointLight", "SpotLight"),
+    "scene.lights": ("LedLight", "Light", "PanelLight", "PointLight", "SphereLight", "SpotLight"),
     "scene.models": ("CornellBox", "Corridor", "exact_surfels"),
     "training.trainer": ("TrainOptions", "Trained", "train"),
 }
@@ -71,10 +71,12 @@ __all__ = [
     "LedLight",
     "Light",
     "LightSpec",
+    "PanelLight",
     "PaperAdam",
     "PlyOptions",
     "PointLight",
     "Search",
+    "SphereLight",
     "SpotLight",
     "Surfels",
     "TrackOptions",

@@ -10,11 +10,10 @@ from mathutils import Matrix
 
 from rgspipe.blender import cycles
 from rgspipe.blender.job import RenderSettings
-from rgspipe.blender.lamp import shape_lamp
+from rgspipe.blender.lamp import place_lamp
 from rgspipe.blender.plan import Frame
 from rgspipe.datasets.exr import read_channels, write_channels, write_image
-from rgspipe.scene import Camera, Light, PointLight
-from rgspipe.scene.lights import WATTS_PER_INTENSITY
+from rgspipe.scene import Camera, Light
 
 #: Suffixes of the surface files beside an image, and their channels.
 SURFACE_CHANNELS = {"depth": ("Z",), "normal": ("X", "Y", "Z"), "albedo": ("R", "G", "B")}
@@ -37,17 +36,11 @@ class Studio:
         cycles.configure(scene, settings)
         self._camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
         self._camera.data.clip_start, self._camera.data.clip_end = 1e-3, 1e3
-        light = bpy.data.lights.new("light", "POINT")
-        light.shadow_soft_size = 0.0
-        light.use_soft_falloff = False
-        self._light = bpy.data.objects.new("light", light)
+        self._light = bpy.data.objects.new("light", bpy.data.lights.new("light", "POINT"))
+        self._light.visible_camera = False
         for item in (self._camera, self._light):
             scene.collection.objects.link(item)
         scene.camera = self._camera
-
-    def shape(self, light: Light) -> None:
-        """Let the lamp shine as `light` does, a point or a spot; place and intensity come with each frame."""
-        shape_lamp(self._light.data, light)
 
     def render(self, frame: Frame, folder: Path) -> None:
         """Render `frame` and write its files below `folder`, each whole or not at all."""
@@ -57,11 +50,11 @@ class Studio:
         write_image(folder / f"{frame.name}.exr", image, alpha)
 
     def radiance(
-        self, camera: Camera, light: PointLight, seed: int, samples: int | None = None
+        self, camera: Camera, light: Light, seed: int, samples: int | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
         """Mean over each pixel: radiance (H, W, 3) and alpha (H, W); with the settings' samples by default."""
         place_camera(self._camera, camera)
-        place_light(self._light, light)
+        place_lamp(self._light, light)
         cycles.use_colour_sampling(self._scene, samples or self._settings.samples, self._settings.denoise, seed)
         passes = self._passes()
         return _stack(passes, "Combined", "RGB"), passes["Combined.A"]
@@ -76,7 +69,7 @@ class Studio:
 
     def _write_surfaces(self, frame: Frame, folder: Path) -> None:
         place_camera(self._camera, frame.camera)
-        place_light(self._light, frame.light)
+        place_lamp(self._light, frame.light)
         cycles.use_center_sampling(self._scene)
         passes = self._passes()
         depth = passes["Depth.Z"]
@@ -100,14 +93,6 @@ def place_camera(item: bpy.types.Object, camera: Camera) -> None:
         raise ValueError(
             f"Blender takes no focal length of {camera.fx:g} pixels at {camera.width} (it made it {stored:g})"
         )
-
-
-def place_light(item: bpy.types.Object, light: PointLight) -> None:
-    """Give Blender's light our position and radiant intensity [W/sr]."""
-    item.location = light.position.tolist()
-    peak = float(light.intensity.max())
-    item.data.energy = WATTS_PER_INTENSITY * peak
-    item.data.color = (light.intensity / peak).tolist()
 
 
 def face_camera(normal: np.ndarray, camera: Camera) -> np.ndarray:

@@ -57,8 +57,10 @@ def light_line(light: Light, covariance: Sequence[Sequence[float]] | None = None
     told += "" if variances is None else _deviation(variances[:3], "{:.4f}")
     if light.axis is not None:
         told += f", axis ({', '.join(f'{value:.3f}' for value in light.axis.tolist())})"
-    for number in light.shape[:1]:
-        told += f", {number.key.replace('_', ' ')} {number.shown(getattr(light, number.name)):.1f}{number.unit}"
+    for number in light.shape:
+        if number.decimals is not None:
+            value = number.shown(getattr(light, number.name))
+            told += f", {number.key.replace('_', ' ')} {value:.{number.decimals}f}{number.unit}"
     told += f", RGB ({colour}) W/sr"
     return told + ("" if variances is None else _deviation(variances[-3:], "{:.3f}"))
 

@@ -18,6 +18,7 @@ from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.options import SearchOptions
 from rgspipe.fitting.result import FitResult, dark_result
 from rgspipe.fitting.search.coarse import CoarseImages
+from rgspipe.fitting.search.grow import grown
 from rgspipe.fitting.search.refine import Refiner, State
 from rgspipe.fitting.search.rig_search import RigSearch
 from rgspipe.fitting.search.starts import Candidates
@@ -48,7 +49,8 @@ def fit_search_lm(
     if problem.black:
         return dark_result(meter.seconds)
     problem = _roughly_exposed(problem, coarse)
-    candidates = [Candidates.of(problem, images, spec.shape_free, options.combinations) for images in coarse]
+    free = spec.seed.shape_free
+    candidates = [Candidates.of(problem, images, free, options.combinations) for images in coarse]
     candidates = [one for one in candidates if one.lit]
     if not candidates:
         return dark_result(meter.seconds)
@@ -87,6 +89,7 @@ def _search(refiner: Refiner, candidates: Sequence[Candidates], options: SearchO
     """Search, then doubt what was found."""
     search = RigSearch(refiner, candidates, options, kinds_open=len(spec.kinds) > 1)
     found = search.unknown() if spec.count is None else search.known(spec.count)
+    found = grown(refiner, found, spec.kinds[-1], spec.shape_free, options) if spec.extended else found
     rival = rival_among(refiner, found.best, found.others, options)
     doubted = Doubted()
     if spec.count is not None:

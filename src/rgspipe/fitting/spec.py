@@ -60,6 +60,17 @@ class LightSpec:
         return (*(KINDS[name].shaped() for name in names[:-1]), self.shape or KINDS[names[-1]].shaped())
 
     @property
+    def extended(self) -> bool:
+        """Whether they have an extent."""
+        return self.seed is not self
+
+    @property
+    def seed(self) -> LightSpec:
+        """The lights in one point that a search looks for first; itself where these are they."""
+        kind = self.kinds[-1]
+        return self if kind.seed is kind else LightSpec(kind.seed.kind, self.count, kind.seed)
+
+    @property
     def aimed(self) -> bool:
         """Whether lights with an axis may be among them."""
         return any(light.axis is not None for light in self.kinds)

@@ -84,7 +84,7 @@ class TargetViews:
     def coarse(self, options: AimedOptions) -> tuple[CoarseImages, ...]:
         """Images of the candidates of each kind of light that is looked for, the plainest first; made once."""
         if options not in self._coarse_made:
-            self._coarse_made[options] = tuple(self._coarse(kind, options) for kind in self.lights.kinds)
+            self._coarse_made[options] = tuple(self._coarse(kind, options) for kind in self.lights.seed.kinds)
         return self._coarse_made[options]
 
     @cached_property
@@ -94,7 +94,7 @@ class TargetViews:
     def _coarse(self, kind: Light, options: AimedOptions) -> CoarseImages:
         if kind.axis is None:
             return coarse_images(self.blocks, self.dictionary)
-        shapes = kind.variants() if self.lights.shape_free else (kind,)
+        shapes = kind.variants() if self.lights.seed.shape_free else (kind,)
         return aimed_candidates(self.prepared, self.dictionary, shapes, options, self.effects)
 
     @cached_property

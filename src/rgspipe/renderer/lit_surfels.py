@@ -9,6 +9,7 @@ from torch import Tensor
 
 from rgspipe.renderer.direct import unit_irradiance
 from rgspipe.renderer.effects import Effects
+from rgspipe.renderer.extent import added
 from rgspipe.renderer.kernels.lit_transmittance import lit_transmittance
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.pixel_direct import surfel_transmittance
@@ -45,6 +46,12 @@ def lit_surfels(bvh: SurfelBvh, light: UnitLight, effects: Effects, least: float
     factor, factor_slope = (part[0] for part in unit_irradiance(bvh, position[None], shadows=False))
     moved = factor_slope * passing[:, None] + factor[:, None] * slope
     return LitSurfels(passing, slope, attenuated(torch.cat([(factor * passing)[:, None], moved], dim=1), sent, light))
+
+
+def lit_columns(bvh: SurfelBvh, light: UnitLight, effects: Effects, least: float | None = None) -> Tensor:
+    """`LitSurfels.columns` (N, 1 + D) of a light that may have an extent."""
+    (columns,) = added(light, lambda part: (lit_surfels(bvh, part, effects, least).columns,))
+    return columns
 
 
 def _transmittance(

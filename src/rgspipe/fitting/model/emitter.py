@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import accumulate
@@ -10,7 +10,7 @@ from itertools import accumulate
 import torch
 from torch import Tensor
 
-from rgspipe.scene.lights import Light, RelativeIntensity
+from rgspipe.scene.lights import Light
 from rgspipe.scene.lights.coordinates import Coordinate
 
 #: R, G and B.
@@ -40,7 +40,7 @@ class Emitter:
         """The emitter of a light, with an axis of unit length."""
         light = light.detached()
         if light.axis is None:
-            return cls(light)
+            return cls(light, shape_free)
         return cls(light.at(light.position, torch.nn.functional.normalize(light.axis, dim=0)), shape_free)
 
     @classmethod
@@ -134,9 +134,9 @@ class Emitter:
         moving = [(one.spread(self._value(name)).T, one.motion) for name, one in self.coordinates.items() if one.motion]
         return torch.cat([torch.cat([scale * spread for scale in scales[how]], dim=1) for spread, how in moving])
 
-    def slopes(self, sent: RelativeIntensity) -> Tensor:
-        """(N, D) natural derivatives of its relative intensity towards its parameters: scene units and rad."""
-        by = self.light.tied_slopes(sent.by)
+    def slopes(self, by: Mapping[str, Tensor]) -> Tensor:
+        """(N, D) natural derivatives towards its parameters, scene units and rad, from those towards its fields."""
+        by = self.light.tied_slopes(by)
         return torch.cat([one.slopes(self._value(name), by[name]) for name, one in self.coordinates.items()], dim=1)
 
     def _value(self, name: str) -> Tensor | float:

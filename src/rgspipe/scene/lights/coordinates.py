@@ -170,7 +170,45 @@ class Ratio(Positive):
         return abs(math.log(max(value, self.low) / max(other, self.low)))
 
 
-PLACE, AXIS = Place(), Axis()
+class Length(Coordinate):
+    """A length, in units of the scene's size. A length below zero is that above it: what has it is turned around."""
+
+    count = 1
+
+    def units(self, value: float, size: float) -> list[float]:
+        return [size]
+
+    def moved(self, value: float, step: Tensor, size: float) -> float:
+        return abs(value + size * float(step[0]))
+
+    def offset(self, value: float, other: float, size: float) -> Tensor:
+        return torch.tensor([(other - value) / size if size > 0.0 else 0.0], dtype=torch.float64)
+
+    def distance(self, value: float, other: float, size: float) -> float:
+        return abs(value - other) / size if size > 0.0 else 0.0
+
+
+@dataclass(frozen=True)
+class Turn(Coordinate):
+    """An angle [rad] after which everything is as before."""
+
+    period: float
+    count = 1
+
+    def units(self, value: float, size: float) -> list[float]:
+        return [1.0]
+
+    def moved(self, value: float, step: Tensor, size: float) -> float:
+        return math.remainder(value + float(step[0]), self.period)
+
+    def offset(self, value: float, other: float, size: float) -> Tensor:
+        return torch.tensor([math.remainder(other - value, self.period)], dtype=torch.float64)
+
+    def distance(self, value: float, other: float, size: float) -> float:
+        return abs(math.remainder(value - other, self.period))
+
+
+PLACE, AXIS, LENGTH = Place(), Axis(), Length()
 
 
 def tangents(axis: Tensor) -> Tensor:
