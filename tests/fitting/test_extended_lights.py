@@ -10,6 +10,7 @@ import torch
 
 from lit_room import HIDDEN, VISIBLE
 from rgspipe.datasets.light_file import read_lights
+from rgspipe.errors import InputError
 from rgspipe.evaluation.tables import rig_errors
 from rgspipe.fitting import FitResult, FitStatus, FitViews, LightSpec
 from rgspipe.scene import Light
@@ -74,3 +75,19 @@ def test_the_answer_is_printed_written_and_read(room, tmp_path: Path) -> None:
     result.save(tmp_path / "lights.json")
     (read,) = read_lights(tmp_path / "lights.json")
     assert read.columns() == result.lights[0].columns()
+
+
+@pytest.mark.parametrize("mounted", [False, True], ids=["free", "mounted"])
+def test_a_panel_that_lies_in_the_ceiling_is_found(room, mounted: bool) -> None:
+    truth = PanelLight([0.1, -0.2, 0.499], COLOUR, [0.0, 0.0, -1.0], 0.3, 0.15, 0.4)
+    result = fit(room, truth, LightSpec("panel", shape_free=True, mounted=mounted), sharp=True)
+    errors = rig_errors(result.lights, (truth,), 1.0)
+    assert result.status is FitStatus.CONVERGED
+    assert errors.position < 2e-3 and errors.axis < 0.2 and errors.shape < 0.02
+    if mounted:
+        assert errors.axis < 1e-5 and not bool(result.covariance[0][3:6].any())
+
+
+def test_only_panels_lie_on_surfaces() -> None:
+    with pytest.raises(InputError, match="mounted"):
+        LightSpec("sphere", mounted=True)

@@ -62,6 +62,8 @@ class LightConfig(Options):
     """type of the unknown lights"""
     count: int | None = option(1, low=1, high=MOST_LIGHTS)
     """how many unknown lights; null finds out"""
+    mount: Literal["free", "surface"] = "free"
+    """surface: they lie on surfaces of the scene and shine away from them (panels alone), which fixes their axes"""
     spot: SpotConfig = SpotConfig()
     led: LedConfig = LedConfig()
     sphere: SphereConfig = SphereConfig()

@@ -89,7 +89,7 @@ def _search(refiner: Refiner, candidates: Sequence[Candidates], options: SearchO
     """Search, then doubt what was found."""
     search = RigSearch(refiner, candidates, options, kinds_open=len(spec.kinds) > 1)
     found = search.unknown() if spec.count is None else search.known(spec.count)
-    found = grown(refiner, found, spec.kinds[-1], spec.shape_free, options) if spec.extended else found
+    found = grown(refiner, found, spec, options) if spec.extended else found
     rival = rival_among(refiner, found.best, found.others, options)
     doubted = Doubted()
     if spec.count is not None:

@@ -30,6 +30,7 @@ class LightSpec:
             `SpotLight.shaped("gaussian", 0.4, 0.1)`; the kind's usual one if None.
         shape_free: whether the numbers of the shape (cone angle, exponent …) are recovered, too; what `shape` says of
             them is then only where to begin.
+        mounted: whether they lie on surfaces of the scene, and shine away from them: panels alone.
 
     Raises:
         InputError: an unknown field or type, a count out of range, or a shape of another kind.
@@ -39,6 +40,7 @@ class LightSpec:
     count: int | None = 1
     shape: Light | None = None
     shape_free: bool = False
+    mounted: bool = False
 
     def __new__(cls, *args: Any, **values: Any) -> Self:
         check_names(values, [item.name for item in fields(cls)], "LightSpec")
@@ -52,6 +54,9 @@ class LightSpec:
         kind = shaped_kind(self.type)
         if self.shape is not None and self.shape.kind != kind:
             _refuse("shape", f"a {kind}, as the type is {self.type}", self.shape, "Let type and shape agree.")
+
+        if self.mounted and not self.kinds[-1].flush:
+            _refuse("mounted", "False, but for panels", self.mounted, "Lights of other kinds stand free.")
 
     @property
     def kinds(self) -> tuple[Light, ...]:

@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 
 from rgspipe.scene.lights import Light
-from rgspipe.scene.lights.coordinates import Coordinate
+from rgspipe.scene.lights.coordinates import KNOWN, Coordinate, OnPlane
 
 #: R, G and B.
 COLOURS = 3
@@ -29,11 +29,13 @@ class Emitter:
         light: float64 on the CPU; its intensity is not looked at.
         shape_free: whether its shape moves.
         softness: by how much its edge of light is widened for now [rad]; see `Light.relative_intensity`.
+        plane: (3,) float64 normal of the surface that it lies on and shines away from; None where it is free.
     """
 
     light: Light
     shape_free: bool = False
     softness: float = 0.0
+    plane: Tensor | None = None
 
     @classmethod
     def of(cls, light: Light, shape_free: bool = False) -> Emitter:
@@ -67,7 +69,8 @@ class Emitter:
     @cached_property
     def coordinates(self) -> dict[str, Coordinate]:
         """By the light's fields."""
-        return self.light.coordinates(self.shape_free)
+        free = self.light.coordinates(self.shape_free)
+        return free if self.plane is None else free | {"position": OnPlane(self.plane), "direction": KNOWN}
 
     @cached_property
     def parameters(self) -> int:

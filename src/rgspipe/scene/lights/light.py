@@ -127,6 +127,11 @@ class Light(ByValue, ABC):
         return math.inf
 
     @property
+    def flush(self) -> bool:
+        """Whether it is a surface that may lie on another, which casts no shadow on what it lights."""
+        return False
+
+    @property
     def plain(self) -> Light:
         """The simpler light at its place that a fit tries instead; itself if there is none."""
         return self

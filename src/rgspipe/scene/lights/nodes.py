@@ -16,6 +16,15 @@ from rgspipe.scene.shapes import Float
 
 
 @dataclass(frozen=True)
+class FacetLight(LedLight):
+    """A small piece of a surface that shines to one side, and may lie on another surface."""
+
+    @property
+    def flush(self) -> bool:
+        return True
+
+
+@dataclass(frozen=True)
 class Nodes:
     """The points that a light with an extent is made of; each has the same part of its intensity.
 
@@ -33,7 +42,7 @@ class Nodes:
         part = intensity / len(self.positions)
         if self.direction is None:
             return tuple(PointLight(position, part) for position in self.positions)
-        return tuple(LedLight(position, part, self.direction, 1.0) for position in self.positions)
+        return tuple(FacetLight(position, part, self.direction, 1.0) for position in self.positions)
 
 
 @cache

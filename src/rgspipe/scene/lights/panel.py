@@ -67,6 +67,10 @@ class PanelLight(AxialLight):
         return 1.0
 
     @property
+    def flush(self) -> bool:
+        return True
+
+    @property
     def seed(self) -> LedLight:
         return LedLight(self.position, self.intensity, self.direction, 1.0)
 
