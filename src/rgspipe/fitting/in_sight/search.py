@@ -1,0 +1,223 @@
+"""A search that finds out which pixels are lamps in sight, and looks for lights in all others.
+
+What is striking enough is left out at once. All else is fitted first, as if there were no lamps in sight: only where
+that explains little, or less than half of what is saturated, suspects are left out and it is searched again. Suspects
+are lamps if the lights that were found without them do not light them: else they come back.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from rgspipe.fitting.findings import LampElsewhere, LampsLeftOut, PoorlyExplained
+from rgspipe.fitting.in_sight.confirm import LEAST_PIXELS, confirmed, located, too_bright
+from rgspipe.fitting.in_sight.lamp import BESIDE, LampInSight, Mask, given_lamps, grown, left_out, parts
+from rgspipe.fitting.in_sight.places import places
+from rgspipe.fitting.in_sight.sight import Numbers, Sight, needed_intensity
+from rgspipe.fitting.in_sight.suspects import POSSIBLE, SURE, Bar, shaded, suspects, usual
+from rgspipe.fitting.model.capture import ImageCapture
+from rgspipe.fitting.result import FitResult
+from rgspipe.fitting.target_views import TargetViews
+
+#: A fit is made again where more than this part of what was left out for it are no lamp's pixels, or beside them …
+SPARED = 0.5
+
+#: … but not more often than that.
+ROUNDS = 3
+
+#: Lights that leave less than this part of what others leave of the same pixels are the better ones by far.
+FAR_BETTER = 0.5
+
+Fit = Callable[[TargetViews], FitResult]
+
+
+@dataclass(frozen=True)
+class Lookout:
+    """Images in which lamps may be in sight.
+
+    Attributes:
+        views: they are of.
+        images: (all pixels, 3), stacked.
+        capture: how they were taken.
+    """
+
+    views: TargetViews
+    images: Tensor
+    capture: ImageCapture
+
+    @property
+    def size(self) -> float:
+        return self.views.prepared.frozen.size
+
+    @property
+    def sights(self) -> tuple[Sight, ...]:
+        return self.views.sights
+
+    @cached_property
+    def greys(self) -> list[Numbers]:
+        """(H, W) mean radiance of the channels, one a view."""
+        return [_grey(image) for image in self.views.prepared.split(self.images)]
+
+    def exposed(self, result: FitResult) -> list[Numbers]:
+        """The greys, divided by the exposures that a fit found."""
+        exposures = result.exposures or (1.0,) * len(self.greys)
+        return [grey / exposure for grey, exposure in zip(self.greys, exposures, strict=True)]
+
+    def suspects(self, bar: Bar) -> list[LampInSight]:
+        """By the images alone."""
+        shadings = [shaded(sight, grey) for sight, grey in zip(self.sights, self.greys, strict=True)]
+        levels = [usual(sight, shading) for sight, shading in zip(self.sights, shadings, strict=True)]
+        values = [
+            np.minimum(shading, level)[sight.surface]
+            for sight, shading, level in zip(self.sights, shadings, levels, strict=True)
+        ]
+        needed = needed_intensity(self.views.prepared, float(np.concatenate(values).mean()))
+        return suspects(self.sights, self.greys, needed, bar)
+
+    def unexplained(self, result: FitResult) -> list[LampInSight]:
+        """By what a fit leaves of the images: all that is possible where it is poor, or else what is saturated."""
+        if not result.lights:
+            return []
+        if _poor(result):
+            return self.suspects(POSSIBLE)
+        return [] if self.capture.clip is None else self._too_bright(result)
+
+    def _too_bright(self, result: FitResult) -> list[LampInSight]:
+        """What is saturated, and far from that under a fit's lights."""
+        full = self.images >= self.capture.saturated * self.capture.clip
+        if not bool(full.any()):
+            return []
+        found = []
+        masks = [mask.all(dim=2).cpu().numpy() for mask in self.views.prepared.split(full)]
+        seen = zip(self.sights, self.exposed(result), self.rendered(result), masks, strict=True)
+        for view, (sight, image, rendered, mask) in enumerate(seen):
+            cores = parts(too_bright(sight, image, rendered) & mask)
+            found += [LampInSight(view, core, grown(core, BESIDE)) for core in cores if core.sum() >= LEAST_PIXELS]
+        return found
+
+    def rendered(self, result: FitResult) -> list[Numbers]:
+        """(H, W) mean radiance of the channels under a fit's lights, one a view."""
+        with torch.no_grad():
+            return [_grey(image) for image in self.views.render(result.lights)]
+
+    def without(self, lamps: Sequence[LampInSight]) -> TargetViews:
+        """The views less the lamps' pixels, looked at first from where the lamps may stand."""
+        masks = left_out(lamps, [grey.shape for grey in self.greys])
+        return self.views.without(masks, places(self.sights, lamps, self.size))
+
+    def confirmed(self, lamps: Sequence[LampInSight], result: FitResult) -> list[LampInSight]:
+        """Those that a fit without them does not light."""
+        rendered = self.rendered(result)
+        return confirmed(self.sights, self.exposed(result), lamps, result.lights, rendered, self.size)
+
+    def left(self, views: TargetViews, result: FitResult) -> float:
+        """Share of the energy of the pixels of `views` that a fit's lights leave."""
+        pixels = views.prepared.pixels
+        image = torch.cat([image.reshape(-1, 3) for image in self.views.render(result.lights)])[pixels].double()
+        exposures = torch.tensor(result.exposures or [1.0] * len(self.greys), dtype=torch.float64)
+        target = self.images[pixels].double()
+        rest = target - image * exposures.to(image)[views.prepared.view_of][:, None]
+        return float(rest.square().sum() / target.square().sum())
+
+    def told(self, result: FitResult, lamps: Sequence[LampInSight]) -> FitResult:
+        """A fit without some lamps' pixels, with what is to be said of them."""
+        lamps = located(self.sights, lamps, result.lights, self.size)
+        masks = left_out(lamps, [grey.shape for grey in self.greys])
+        count, views = int(sum(mask.sum() for mask in masks)), sum(bool(mask.any()) for mask in masks)
+        elsewhere = [LampElsewhere(lamp.view, *lamp.place) for lamp in lamps if lamp.light is None and result.lights]
+        findings = (*result.findings, *elsewhere, LampsLeftOut(len(lamps), count, views))
+        return replace(result, findings=findings, lamps=tuple(lamps))
+
+
+def fit_without(views: TargetViews, images: Tensor, capture: ImageCapture, fit: Fit, masks: Sequence) -> FitResult:
+    """A fit that leaves out given pixels of lamps, masks (H, W) bool, one a view."""
+    lookout, lamps = Lookout(views, images, capture), given_lamps(masks)
+    return lookout.told(fit(lookout.without(lamps)), lamps) if lamps else fit(views)
+
+
+def fit_on_lookout(views: TargetViews, images: Tensor, capture: ImageCapture, fit: Fit) -> FitResult:
+    """A fit that leaves out the lamps that it finds in sight; without any it is `fit` of all pixels."""
+    lookout, fits = Lookout(views, images, capture), _Fits(fit)
+    # Pools of narrow lights end as sharply as lamps do, so images that may hold some are fitted first.
+    aimed = any(kind.axis is not None for kind in views.lights.kinds)
+    striking = [] if aimed else lookout.suspects(SURE)
+    whole = None if striking else fits(views)
+    found, lamps = _without_lamps(lookout, fits, striking or lookout.unexplained(whole))
+    if lamps and _poor(found if whole is None else whole):
+        whole = fits(views) if whole is None else whole
+        lamps = lamps if _far_better(lookout, lookout.without(lamps), found, whole) else []
+    if lamps:
+        return fits.spent(lookout.told(found, lamps))
+    return fits.spent(fits(views) if whole is None else whole)
+
+
+def _without_lamps(
+    lookout: Lookout, fit: Fit, lamps: Sequence[LampInSight]
+) -> tuple[FitResult | None, Sequence[LampInSight]]:
+    """A fit without what it does not light of some suspects, and these."""
+    found, kept = None, lamps
+    for _ in range(ROUNDS):
+        if not kept:
+            return None, []
+        lamps, found = kept, fit(lookout.without(kept))
+        kept = lookout.confirmed(lamps, found)
+        if _agree(lamps, kept):
+            break
+    return found, lamps
+
+
+def _agree(before: Sequence[LampInSight], after: Sequence[LampInSight]) -> bool:
+    """Whether what was left out holds all that had to be, little more, and nothing that was no lamp."""
+    for view in {lamp.view for lamp in (*before, *after)}:
+        out = [lamp for lamp in before if lamp.view == view]
+        wanted = [lamp for lamp in after if lamp.view == view]
+        if any(not any((lamp.core & one.pixels).any() for one in wanted) for lamp in out):
+            return False
+        left, core, most = (np.any(masks, axis=0) for masks in _masks(out, wanted))
+        if (core & ~left).any() or (left & ~most).sum() > SPARED * left.sum():
+            return False
+    return True
+
+
+def _masks(out: Sequence[LampInSight], wanted: Sequence[LampInSight]) -> tuple[list[Mask], list[Mask], list[Mask]]:
+    """Of one view: what was left out, what has to be, and what may be."""
+    return [lamp.pixels for lamp in out], [lamp.core for lamp in wanted], [lamp.pixels for lamp in wanted]
+
+
+def _poor(result: FitResult) -> bool:
+    return any(isinstance(finding, PoorlyExplained) for finding in result.findings)
+
+
+def _far_better(lookout: Lookout, rest: TargetViews, found: FitResult, whole: FitResult) -> bool:
+    """Whether a fit without lamps is to be preferred to one with them."""
+    if not whole.lights:
+        return True
+    return lookout.left(rest, found) < FAR_BETTER * lookout.left(rest, whole)
+
+
+class _Fits:
+    """Fits of one target, and what all of them take."""
+
+    def __init__(self, fit: Fit) -> None:
+        self.fit, self.made = fit, []
+
+    def __call__(self, views: TargetViews) -> FitResult:
+        self.made.append(self.fit(views))
+        return self.made[-1]
+
+    def spent(self, result: FitResult) -> FitResult:
+        """A result with what all fits took."""
+        if len(self.made) == 1:
+            return result
+        sums = {name: sum(getattr(one, name) for one in self.made) for name in ("seconds", "iterations", "evaluations")}
+        return replace(result, **sums)
+
+
+def _grey(image: Tensor) -> Numbers:
+    return image.detach().double().mean(dim=2).cpu().numpy()
