@@ -76,7 +76,7 @@ class TargetViews:
         prepared = prepare_views(scene, weights, masks=masks, mask_edges=mask_edges)
         return cls(prepared, as_spec(lights), effects, sharp)
 
-    def without(self, pixels: Sequence[ArrayLike], places: Tensor) -> Self:
+    def without(self, pixels: Sequence[ArrayLike], places: Tensor | None = None) -> Self:
         """The same views less `pixels` (H, W) bool, one mask a view, searched from `places` (K, 3), too.
 
         Raises:

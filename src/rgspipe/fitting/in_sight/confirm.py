@@ -10,7 +10,7 @@ import scipy.ndimage
 
 from rgspipe.fitting.in_sight.lamp import BESIDE, TOUCHING, LampInSight, Mask, grown, parts
 from rgspipe.fitting.in_sight.sight import Numbers, Sight
-from rgspipe.fitting.in_sight.suspects import sent, shaded, usual
+from rgspipe.fitting.in_sight.suspects import sent, shaded
 from rgspipe.scene import Light, LightRig
 
 #: A lamp's pixels are so many times as bright as lights that stand elsewhere can make what is behind it.
@@ -54,7 +54,7 @@ def too_bright(sight: Sight, image: Numbers, rendered: Numbers) -> Mask:
     """(H, W) bool, pixels that are brighter than lights make them, or their neighbours, and than most of the view."""
     shading = shaded(sight, image)
     lit = scipy.ndimage.maximum_filter(rendered, footprint=TOUCHING)
-    return (image > BRIGHTER * lit) & (shading > usual(sight, shading))
+    return (image > BRIGHTER * lit) & (shading > np.median(shading[sight.surface]))
 
 
 def located(views: Sequence[Sight], lamps: Sequence[LampInSight], lights: LightRig, size: float) -> list[LampInSight]:
@@ -77,11 +77,13 @@ def _is_lamp(
 def _light_at(sight: Sight, lamp: LampInSight, lights: Sequence[Light], size: float) -> int | None:
     """The number (from 1) of the light that projects closest to a lamp, if that is close."""
     away = scipy.ndimage.distance_transform_edt(~lamp.core)
+    # Of a lamp that something hides in part, the middle may be hidden.
+    half = 0.5 * max(int(np.ptp(places)) + 1 for places in np.nonzero(lamp.core))
     beside = {}
     for number, light in enumerate(lights, start=1):
         (column, row), depth = (part.tolist() for part in sight.camera.project(light.position.double().cpu()))
         if depth > 0.0:
-            allowed = BESIDE + NEAR * size * sight.camera.fx / depth
+            allowed = BESIDE + half + NEAR * size * sight.camera.fx / depth
             distance = _distance(away, column, row)
             if distance <= allowed:
                 beside[distance] = number

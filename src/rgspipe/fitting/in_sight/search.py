@@ -38,6 +38,14 @@ Fit = Callable[[TargetViews], FitResult]
 
 
 @dataclass(frozen=True)
+class Answer:
+    """A fit, and the lamps whose pixels it was made without."""
+
+    result: FitResult
+    lamps: Sequence[LampInSight]
+
+
+@dataclass(frozen=True)
 class Lookout:
     """Images in which lamps may be in sight.
 
@@ -72,7 +80,7 @@ class Lookout:
     def suspects(self, bar: Bar) -> list[LampInSight]:
         """By the images alone."""
         shadings = [shaded(sight, grey) for sight, grey in zip(self.sights, self.greys, strict=True)]
-        levels = [usual(sight, shading) for sight, shading in zip(self.sights, shadings, strict=True)]
+        levels = [usual(sight, shading, bar.compact) for sight, shading in zip(self.sights, shadings, strict=True)]
         values = [
             np.minimum(shading, level)[sight.surface]
             for sight, shading, level in zip(self.sights, shadings, levels, strict=True)
@@ -80,16 +88,16 @@ class Lookout:
         needed = needed_intensity(self.views.prepared, float(np.concatenate(values).mean()))
         return suspects(self.sights, self.greys, needed, bar)
 
-    def unexplained(self, result: FitResult) -> list[LampInSight]:
-        """By what a fit leaves of the images: all that is possible where it is poor, or else what is saturated."""
-        if not result.lights:
-            return []
-        if _poor(result):
-            return self.suspects(POSSIBLE)
-        return [] if self.capture.clip is None else self._too_bright(result)
+    def striking(self) -> list[LampInSight]:
+        """What no reflection is; and, as a lamp in one view may be in the others, too, what may be one there."""
+        sure = self.suspects(SURE)
+        told = {lamp.view for lamp in sure}
+        return [*sure, *(lamp for lamp in self.suspects(POSSIBLE) if lamp.view not in told)] if sure else []
 
-    def _too_bright(self, result: FitResult) -> list[LampInSight]:
+    def too_bright(self, result: FitResult) -> list[LampInSight]:
         """What is saturated, and far from that under a fit's lights."""
+        if self.capture.clip is None or not result.lights:
+            return []
         full = self.images >= self.capture.saturated * self.capture.clip
         if not bool(full.any()):
             return []
@@ -125,9 +133,10 @@ class Lookout:
         rest = target - image * exposures.to(image)[views.prepared.view_of][:, None]
         return float(rest.square().sum() / target.square().sum())
 
-    def told(self, result: FitResult, lamps: Sequence[LampInSight]) -> FitResult:
-        """A fit without some lamps' pixels, with what is to be said of them."""
-        lamps = located(self.sights, lamps, result.lights, self.size)
+    def told(self, answer: Answer) -> FitResult:
+        """A fit with what is to be said of the lamps that it left out."""
+        result = answer.result
+        lamps = located(self.sights, answer.lamps, result.lights, self.size)
         masks = left_out(lamps, [grey.shape for grey in self.greys])
         count, views = int(sum(mask.sum() for mask in masks)), sum(bool(mask.any()) for mask in masks)
         elsewhere = [LampElsewhere(lamp.view, *lamp.place) for lamp in lamps if lamp.light is None and result.lights]
@@ -138,7 +147,7 @@ class Lookout:
 def fit_without(views: TargetViews, images: Tensor, capture: ImageCapture, fit: Fit, masks: Sequence) -> FitResult:
     """A fit that leaves out given pixels of lamps, masks (H, W) bool, one a view."""
     lookout, lamps = Lookout(views, images, capture), given_lamps(masks)
-    return lookout.told(fit(lookout.without(lamps)), lamps) if lamps else fit(views)
+    return lookout.told(Answer(fit(lookout.without(lamps)), lamps)) if lamps else fit(views)
 
 
 def fit_on_lookout(views: TargetViews, images: Tensor, capture: ImageCapture, fit: Fit) -> FitResult:
@@ -146,30 +155,29 @@ def fit_on_lookout(views: TargetViews, images: Tensor, capture: ImageCapture, fi
     lookout, fits = Lookout(views, images, capture), _Fits(fit)
     # Pools of narrow lights end as sharply as lamps do, so images that may hold some are fitted first.
     aimed = any(kind.axis is not None for kind in views.lights.kinds)
-    striking = [] if aimed else lookout.suspects(SURE)
-    whole = None if striking else fits(views)
-    found, lamps = _without_lamps(lookout, fits, striking or lookout.unexplained(whole))
-    if lamps and _poor(found if whole is None else whole):
-        whole = fits(views) if whole is None else whole
-        lamps = lamps if _far_better(lookout, lookout.without(lamps), found, whole) else []
-    if lamps:
-        return fits.spent(lookout.told(found, lamps))
-    return fits.spent(fits(views) if whole is None else whole)
+    answers = [] if aimed else _without_lamps(lookout, fits, lookout.striking())
+    if answers and not _poor(answers[0].result):
+        return fits.spent(lookout.told(answers[0]))
+    whole = fits(views)
+    if _poor(whole):
+        answers = [*_without_lamps(lookout, fits, lookout.suspects(POSSIBLE)), *answers]
+        answers = [answer for answer in answers if _far_better(lookout, answer, whole)]
+    else:
+        answers = _without_lamps(lookout, fits, lookout.too_bright(whole))
+    return fits.spent(lookout.told(answers[0]) if answers else whole)
 
 
-def _without_lamps(
-    lookout: Lookout, fit: Fit, lamps: Sequence[LampInSight]
-) -> tuple[FitResult | None, Sequence[LampInSight]]:
-    """A fit without what it does not light of some suspects, and these."""
-    found, kept = None, lamps
+def _without_lamps(lookout: Lookout, fit: Fit, lamps: Sequence[LampInSight]) -> list[Answer]:
+    """A fit without what it does not light of some suspects; none where it lights all of them."""
+    answers, kept = [], lamps
     for _ in range(ROUNDS):
         if not kept:
-            return None, []
-        lamps, found = kept, fit(lookout.without(kept))
-        kept = lookout.confirmed(lamps, found)
+            return []
+        lamps, result = kept, fit(lookout.without(kept))
+        kept, answers = lookout.confirmed(lamps, result), [Answer(result, lamps)]
         if _agree(lamps, kept):
             break
-    return found, lamps
+    return answers
 
 
 def _agree(before: Sequence[LampInSight], after: Sequence[LampInSight]) -> bool:
@@ -194,11 +202,12 @@ def _poor(result: FitResult) -> bool:
     return any(isinstance(finding, PoorlyExplained) for finding in result.findings)
 
 
-def _far_better(lookout: Lookout, rest: TargetViews, found: FitResult, whole: FitResult) -> bool:
+def _far_better(lookout: Lookout, answer: Answer, whole: FitResult) -> bool:
     """Whether a fit without lamps is to be preferred to one with them."""
     if not whole.lights:
         return True
-    return lookout.left(rest, found) < FAR_BETTER * lookout.left(rest, whole)
+    rest = lookout.without(answer.lamps)
+    return lookout.left(rest, answer.result) < FAR_BETTER * lookout.left(rest, whole)
 
 
 class _Fits:

@@ -14,9 +14,6 @@ import numpy as np
 from rgspipe.fitting.in_sight.lamp import BESIDE, LampInSight, Mask, grown, parts
 from rgspipe.fitting.in_sight.sight import Numbers, Sight
 
-#: What is compact covers less than this share of a view.
-COMPACT = 0.1
-
 #: Surroundings lie between `BESIDE` pixels and so many from what they surround.
 AROUND = 5
 
@@ -26,21 +23,23 @@ LEVELS = 0.75
 
 @dataclass(frozen=True)
 class Bar:
-    """How much brighter, albedo apart, a lamp's pixels are: than nine tenths of the view's, than what is around them.
+    """How much brighter, albedo apart, a lamp's pixels are than others of the view, and than what is around them.
 
     Attributes:
-        view: times as bright as the view.
+        view: times as bright as the view …
+        compact: … apart from this share of it, the brightest: no lamp covers more.
         around: times as bright as the surroundings.
         share: of the intensity that makes the scene as bright as it is, at least so much has to come from them.
     """
 
     view: float
+    compact: float
     around: float
-    share: float
+    share: float = 0.02
 
 
 #: What no reflection is, and what one may be where no lights explain the images.
-SURE, POSSIBLE = Bar(view=8.0, around=6.0, share=0.02), Bar(view=3.0, around=2.0, share=0.02)
+SURE, POSSIBLE = Bar(view=8.0, compact=0.1, around=6.0), Bar(view=3.0, compact=0.35, around=2.0)
 
 
 def suspects(views: Sequence[Sight], images: Sequence[Numbers], needed: float, bar: Bar = SURE) -> list[LampInSight]:
@@ -56,7 +55,7 @@ def suspects(views: Sequence[Sight], images: Sequence[Numbers], needed: float, b
 
 def _suspects(index: int, sight: Sight, image: Numbers, needed: float, bar: Bar) -> Iterator[LampInSight]:
     shading = shaded(sight, image)
-    striking = shading > bar.view * usual(sight, shading)
+    striking = shading > bar.view * usual(sight, shading, bar.compact)
     if not striking.any():
         return
     for core in parts(striking):
@@ -70,9 +69,9 @@ def shaded(sight: Sight, image: Numbers) -> Numbers:
     return np.where(sight.surface, image / sight.albedo, 0.0)
 
 
-def usual(sight: Sight, shading: Numbers) -> float:
-    """What all but a compact part of a view's `shading` (H, W) is below."""
-    return float(np.quantile(shading[sight.surface], 1.0 - COMPACT)) if sight.surface.any() else 0.0
+def usual(sight: Sight, shading: Numbers, compact: float) -> float:
+    """What all but a `compact` share of a view's `shading` (H, W) is below."""
+    return float(np.quantile(shading[sight.surface], 1.0 - compact)) if sight.surface.any() else 0.0
 
 
 def sent(sight: Sight, excess: Numbers, pixels: Mask) -> float:

@@ -62,13 +62,14 @@ class PreparedViews(ViewedPixels):
         Raises:
             InputError: too few pixels are left.
         """
-        out = np.concatenate([np.asarray(mask, dtype=bool).reshape(-1) for mask in pixels])
-        kept = np.flatnonzero(~out[self.pixels.cpu().numpy()])
+        out = [torch.from_numpy(np.asarray(mask, dtype=bool)) for mask in pixels]
+        kept = (~torch.cat([mask.reshape(-1) for mask in out])[self.pixels.cpu()]).nonzero()[:, 0]
         if len(kept) < LEAST_PIXELS:
             expected, found = f"at least {LEAST_PIXELS} pixels that are no lamp's", f"{len(kept)} of {len(self.pixels)}"
             raise InputError("emitters", expected=expected, found=found, remedy="Mark only what is a lamp itself.")
-        operator = SparseOperator.from_scipy(self.operator.to_scipy()[kept], self.operator.matrix.device)
-        return replace(self, pixels=self.pixels[torch.from_numpy(kept)], operator=operator)
+        operator = SparseOperator.from_scipy(self.operator.to_scipy()[kept.numpy()], self.operator.matrix.device)
+        masks = tuple(torch.where(mask.to(own.device), 0.0, own) for own, mask in zip(self.masks, out, strict=True))
+        return replace(self, pixels=self.pixels[kept.to(self.pixels.device)], operator=operator, masks=masks)
 
     def emitter_masks(self, masks: Sequence[ArrayLike]) -> list[npt.NDArray[np.bool_]]:
         """(H, W) bool a view, of masks that are 1 where a lamp's own pixels are.
