@@ -10,17 +10,17 @@ import scipy.ndimage
 
 from rgspipe.fitting.in_sight.lamp import BESIDE, TOUCHING, LampInSight, Mask, grown, parts
 from rgspipe.fitting.in_sight.sight import Numbers, Sight
-from rgspipe.fitting.in_sight.suspects import sent, shaded
+from rgspipe.fitting.in_sight.suspects import LEAST_PIXELS, sent, shaded
 from rgspipe.scene import Light, LightRig
 
 #: A lamp's pixels are so many times as bright as lights that stand elsewhere can make what is behind it.
 BRIGHTER = 2.5
 
-#: A lamp that no light was found for sends at least this part of what all lights send: highlights and fireflies do not.
-LEAST_SHARE = 0.1
+#: … or so many times, where they are saturated and may be brighter than they look.
+AT_LEAST = 1.5
 
-#: … and covers at least so many pixels.
-LEAST_PIXELS = 3
+#: A lamp that no light was found for sends at least this part of what all lights send: highlights do not.
+LEAST_SHARE = 0.1
 
 #: A light is where a lamp is seen if it stands within this part of the scene's size beside the rays through it.
 NEAR = 0.02
@@ -32,29 +32,35 @@ def confirmed(
     lamps: Sequence[LampInSight],
     lights: LightRig,
     rendered: Sequence[Numbers],
+    full: Sequence[Mask],
     size: float,
 ) -> list[LampInSight]:
     """What of the lamps is nothing that `lights` light, with the numbers of the lights that stand there.
 
     Args:
         images, rendered: (H, W) mean radiance of the channels, one a view, as they are and under the lights.
+        full: (H, W) bool, one a view, pixels that are saturated.
         size: the scene's, scene units.
     """
     found = []
-    for view, (sight, image, lit) in enumerate(zip(views, images, rendered, strict=True)):
+    for view, (sight, image, lit, most) in enumerate(zip(views, images, rendered, full, strict=True)):
         here = [lamp for lamp in lamps if lamp.view == view]
         if here:
-            cores = parts(too_bright(sight, image, lit))
+            cores = parts(too_bright(sight, image, lit, most))
             named = located(views, [LampInSight(view, core, grown(core, BESIDE)) for core in cores], lights, size)
             found += [lamp for lamp in named if _is_lamp(sight, image - lit, lamp, here, lights)]
     return found
 
 
-def too_bright(sight: Sight, image: Numbers, rendered: Numbers) -> Mask:
-    """(H, W) bool, pixels that are brighter than lights make them, or their neighbours, and than most of the view."""
+def too_bright(sight: Sight, image: Numbers, rendered: Numbers, full: Mask) -> Mask:
+    """(H, W) bool, pixels that are brighter than lights make them, or their neighbours, and than most of the view.
+
+    Args:
+        full: (H, W) bool, which are saturated.
+    """
     shading = shaded(sight, image)
     lit = scipy.ndimage.maximum_filter(rendered, footprint=TOUCHING)
-    return (image > BRIGHTER * lit) & (shading > np.median(shading[sight.surface]))
+    return (image > np.where(full, AT_LEAST, BRIGHTER) * lit) & (shading > np.median(shading[sight.surface]))
 
 
 def located(views: Sequence[Sight], lamps: Sequence[LampInSight], lights: LightRig, size: float) -> list[LampInSight]:

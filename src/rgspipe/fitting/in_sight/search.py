@@ -1,8 +1,8 @@
 """A search that finds out which pixels are lamps in sight, and looks for lights in all others.
 
-What is striking enough is left out at once. All else is fitted first, as if there were no lamps in sight: only where
-that explains little, or less than half of what is saturated, suspects are left out and it is searched again. Suspects
-are lamps if the lights that were found without them do not light them: else they come back.
+What is striking enough is left out at once. Everything else is fitted first, as if there were no lamps in sight: only
+where that explains little, all that may be a lamp is left out, and it is searched again. Suspects are lamps if the
+lights that were found without them do not light them: else they come back.
 """
 
 from __future__ import annotations
@@ -16,13 +16,16 @@ import torch
 from torch import Tensor
 
 from rgspipe.fitting.findings import LampElsewhere, LampsLeftOut, PoorlyExplained
-from rgspipe.fitting.in_sight.confirm import LEAST_PIXELS, confirmed, located, too_bright
-from rgspipe.fitting.in_sight.lamp import BESIDE, LampInSight, Mask, given_lamps, grown, left_out, parts
+from rgspipe.fitting.in_sight.confirm import confirmed, located
+from rgspipe.fitting.in_sight.lamp import LampInSight, Mask, given_lamps, left_out
 from rgspipe.fitting.in_sight.places import places
 from rgspipe.fitting.in_sight.sight import Numbers, Sight, needed_intensity
-from rgspipe.fitting.in_sight.suspects import POSSIBLE, SURE, Bar, shaded, suspects, usual
+from rgspipe.fitting.in_sight.suspects import POSSIBLE, SURE, Bar, saturated, shaded, suspects, usual
 from rgspipe.fitting.model.capture import ImageCapture
+from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.result import FitResult
+from rgspipe.fitting.search.refine import Refiner
+from rgspipe.fitting.search.weighting import PLAIN
 from rgspipe.fitting.target_views import TargetViews
 
 #: A fit is made again where more than this part of what was left out for it are no lamp's pixels, or beside them …
@@ -30,6 +33,9 @@ SPARED = 0.5
 
 #: … but not more often than that.
 ROUNDS = 3
+
+#: Steps of a fit that goes on without what is saturated.
+FURTHER = 5
 
 #: Lights that leave less than this part of what others leave of the same pixels are the better ones by far.
 FAR_BETTER = 0.5
@@ -94,20 +100,28 @@ class Lookout:
         told = {lamp.view for lamp in sure}
         return [*sure, *(lamp for lamp in self.suspects(POSSIBLE) if lamp.view not in told)] if sure else []
 
-    def too_bright(self, result: FitResult) -> list[LampInSight]:
-        """What is saturated, and far from that under a fit's lights."""
-        if self.capture.clip is None or not result.lights:
-            return []
+    @cached_property
+    def full(self) -> list[Mask]:
+        """(H, W) bool a view, pixels that are saturated in all channels."""
+        if self.capture.clip is None:
+            return [np.zeros(grey.shape, dtype=bool) for grey in self.greys]
         full = self.images >= self.capture.saturated * self.capture.clip
-        if not bool(full.any()):
+        return [mask.all(dim=2).cpu().numpy() for mask in self.views.prepared.split(full)]
+
+    @cached_property
+    def saturated(self) -> list[LampInSight]:
+        """What is saturated and compact."""
+        return saturated(self.sights, self.greys, self.full)
+
+    def doubtful(self, result: FitResult) -> list[LampInSight]:
+        """What is saturated and no longer lit when a fit goes a little further without it."""
+        if not result.lights or not self.saturated:
             return []
-        found = []
-        masks = [mask.all(dim=2).cpu().numpy() for mask in self.views.prepared.split(full)]
-        seen = zip(self.sights, self.exposed(result), self.rendered(result), masks, strict=True)
-        for view, (sight, image, rendered, mask) in enumerate(seen):
-            cores = parts(too_bright(sight, image, rendered) & mask)
-            found += [LampInSight(view, core, grown(core, BESIDE)) for core in cores if core.sum() >= LEAST_PIXELS]
-        return found
+        views = self.without(self.saturated)
+        refiner = Refiner.of(views.problem(self.images, self.capture).sharpest())
+        rig = [Emitter.fitted(light, matrix) for light, matrix in zip(result.lights, result.covariance, strict=True)]
+        state = refiner.refined(refiner.start(rig, PLAIN), PLAIN, FURTHER)
+        return self.confirmed(self.saturated, replace(result, lights=state.lights(refiner.problem)))
 
     def rendered(self, result: FitResult) -> list[Numbers]:
         """(H, W) mean radiance of the channels under a fit's lights, one a view."""
@@ -122,7 +136,7 @@ class Lookout:
     def confirmed(self, lamps: Sequence[LampInSight], result: FitResult) -> list[LampInSight]:
         """Those that a fit without them does not light."""
         rendered = self.rendered(result)
-        return confirmed(self.sights, self.exposed(result), lamps, result.lights, rendered, self.size)
+        return confirmed(self.sights, self.exposed(result), lamps, result.lights, rendered, self.full, self.size)
 
     def left(self, views: TargetViews, result: FitResult) -> float:
         """Share of the energy of the pixels of `views` that a fit's lights leave."""
@@ -160,10 +174,11 @@ def fit_on_lookout(views: TargetViews, images: Tensor, capture: ImageCapture, fi
         return fits.spent(lookout.told(answers[0]))
     whole = fits(views)
     if _poor(whole):
-        answers = [*_without_lamps(lookout, fits, lookout.suspects(POSSIBLE)), *answers]
+        possible = [*lookout.suspects(POSSIBLE), *lookout.saturated]
+        answers = [*_without_lamps(lookout, fits, possible), *answers]
         answers = [answer for answer in answers if _far_better(lookout, answer, whole)]
     else:
-        answers = _without_lamps(lookout, fits, lookout.too_bright(whole))
+        answers = _without_lamps(lookout, fits, lookout.doubtful(whole))
     return fits.spent(lookout.told(answers[0]) if answers else whole)
 
 

@@ -38,12 +38,18 @@ class Bar:
     share: float = 0.02
 
 
+#: What is saturated may be a lamp if it is so many times as bright as the surroundings.
+SATURATED = 1.25
+
+#: What is saturated, or does not light the scene, has to cover so many pixels.
+LEAST_PIXELS = 3
+
 #: What no reflection is, and what one may be where no lights explain the images.
 SURE, POSSIBLE = Bar(view=8.0, compact=0.1, around=6.0), Bar(view=3.0, compact=0.35, around=2.0)
 
 
 def suspects(views: Sequence[Sight], images: Sequence[Numbers], needed: float, bar: Bar = SURE) -> list[LampInSight]:
-    """Of all views.
+    """What is brighter than reflections are, of all views.
 
     Args:
         images: (H, W) mean radiance of the channels, one a view.
@@ -55,12 +61,30 @@ def suspects(views: Sequence[Sight], images: Sequence[Numbers], needed: float, b
 
 def _suspects(index: int, sight: Sight, image: Numbers, needed: float, bar: Bar) -> Iterator[LampInSight]:
     shading = shaded(sight, image)
-    striking = shading > bar.view * usual(sight, shading, bar.compact)
-    if not striking.any():
-        return
-    for core in parts(striking):
+    bright = shading > bar.view * usual(sight, shading, bar.compact)
+    for core in parts(bright) if bright.any() else ():
         sends = sent(sight, image, core) >= bar.share * needed
-        if sends and np.median(shading[core]) >= bar.around * _around(sight, shading, core, striking):
+        if sends and np.median(shading[core]) >= bar.around * _around(sight, shading, core, bright):
+            yield LampInSight(index, core, grown(core, BESIDE))
+
+
+def saturated(views: Sequence[Sight], images: Sequence[Numbers], full: Sequence[Mask]) -> list[LampInSight]:
+    """What is saturated, and how bright is not known, in all views.
+
+    Args:
+        full: (H, W) bool, one a view, pixels that are saturated.
+    """
+    triples = zip(views, images, full, strict=True)
+    return [
+        lamp for index, (sight, image, most) in enumerate(triples) for lamp in _saturated(index, sight, image, most)
+    ]
+
+
+def _saturated(index: int, sight: Sight, image: Numbers, full: Mask) -> Iterator[LampInSight]:
+    shading = shaded(sight, image)
+    for core in parts(full & sight.surface) if full.any() else ():
+        compact = LEAST_PIXELS <= core.sum() <= POSSIBLE.compact * core.size
+        if compact and np.median(shading[core]) >= SATURATED * _around(sight, shading, core, full):
             yield LampInSight(index, core, grown(core, BESIDE))
 
 
