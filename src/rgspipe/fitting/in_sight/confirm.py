@@ -17,7 +17,7 @@ from rgspipe.scene import Light, LightRig
 BRIGHTER = 2.5
 
 #: … or so many times, where they are saturated and may be brighter than they look.
-AT_LEAST = 1.5
+AT_LEAST = 1.25
 
 #: A lamp that no light was found for sends at least this part of what all lights send: highlights do not.
 LEAST_SHARE = 0.1
