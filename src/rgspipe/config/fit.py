@@ -45,6 +45,8 @@ class FitConfig(Options):
     """whether the images hold radiance, or every view but the first has an unknown factor, too"""
     clip: float | None = option(None, low=1e-12, high=1e12)
     """radiance at which images are clipped; by default 1 for 8-bit sRGB, else none"""
+    emitters: Literal["auto", "off"] = "auto"
+    """whether pixels of lamps that are in sight are looked for and left out; those of `emitter_path` always are"""
     targets: Literal["dataset", "generated"] = "dataset"
     """whose targets: the dataset's, or those that stage=generate_targets makes as targets.* says"""
     spot_basis: Literal["exact", "sh"] = "exact"

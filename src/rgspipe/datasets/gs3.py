@@ -136,9 +136,16 @@ def _load_view(entry: FrameEntry, root: Path, info: DatasetInfo | None, *, with_
         mask = read_mask(entry.mask_path, camera)
         image, alpha = image * mask[..., None], alpha * mask
     surface = _load_surface(entry, camera, info, needed=with_light)
-    light = PointLight(*entry.light()) if with_light else None
     return View(
-        _name(entry.image_path, root), camera, image, alpha, light, surface.depth, surface.normal, surface.albedo
+        _name(entry.image_path, root),
+        camera,
+        image,
+        alpha,
+        PointLight(*entry.light()) if with_light else None,
+        surface.depth,
+        surface.normal,
+        surface.albedo,
+        emitters=None if entry.emitter_path is None else read_mask(entry.emitter_path, camera) >= 0.5,
     )
 
 

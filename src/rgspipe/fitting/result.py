@@ -11,6 +11,7 @@ from torch import Tensor
 from rgspipe.datasets.covariance_file import covariance_fields
 from rgspipe.datasets.light_file import write_lights
 from rgspipe.fitting.findings import Dark, Finding, FitStatus, gravest
+from rgspipe.fitting.in_sight.lamp import LampInSight
 from rgspipe.fitting.result_text import as_html, as_text, headline, light_lines
 from rgspipe.fitting.words import PYTHON, Spoken, explained
 from rgspipe.scene import LightRig
@@ -63,6 +64,7 @@ class FitResult:
         noise_covariance: the same with the residual as independent noise of the pixels, by plain Gauss-Newton. Errors
             of the model are shared by neighbouring pixels, so it is far too small for a scene that was trained.
         exposures: of each view over the first one's; all 1 where they were known.
+        lamps: those in sight, whose pixels were left out.
     """
 
     lights: LightRig
@@ -77,6 +79,7 @@ class FitResult:
     costs: Mapping[int, float] = field(default_factory=dict)
     noise_covariance: tuple[Float[Tensor, "_ _"], ...] = ()
     exposures: tuple[float, ...] = ()
+    lamps: tuple[LampInSight, ...] = ()
 
     @property
     def status(self) -> FitStatus:
@@ -117,6 +120,7 @@ class FitResult:
             "reason": explained(self.findings, spoken),
             "findings": [finding.data() for finding in self.findings],
             "exposures": list(self.exposures),
+            "emitters": [lamp.data() for lamp in self.lamps],
             "lights": covariance_fields(
                 len(self.lights), {"covariance": self.covariance, "noise_covariance": self.noise_covariance}
             ),

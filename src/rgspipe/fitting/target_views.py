@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
 
 from torch import Tensor
 
 from rgspipe.errors import InputError
+from rgspipe.fitting.in_sight.sight import Sight, sights
 from rgspipe.fitting.model.capture import ImageCapture
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.model.views import PreparedViews, prepare_views
@@ -41,12 +42,16 @@ class TargetViews:
         lights: what is known of the lights.
         effects: parts of light transport.
         sharp: whether the last steps of a fit, and the images of its lights, take direct light where pixels look.
+        whole: the views of which these leave pixels out; None if they do not.
+        places: (K, 3) float32 where a search begins, too, besides the scene's candidates; None for these alone.
     """
 
     prepared: PreparedViews
     lights: LightSpec
     effects: Effects
     sharp: bool = True
+    whole: TargetViews | None = None
+    places: Tensor | None = None
 
     @classmethod
     def prepare(
@@ -71,10 +76,25 @@ class TargetViews:
         prepared = prepare_views(scene, weights, masks=masks, mask_edges=mask_edges)
         return cls(prepared, as_spec(lights), effects, sharp)
 
-    @property
+    def without(self, pixels: Sequence[ArrayLike], places: Tensor | None = None) -> Self:
+        """The same views less `pixels` (H, W) bool, one mask a view, searched from `places` (K, 3), too.
+
+        Raises:
+            InputError: too few pixels are left.
+        """
+        return replace(self, prepared=self.prepared.without(pixels), whole=self, places=places)
+
+    @cached_property
+    def sights(self) -> tuple[Sight, ...]:
+        """What the pixels look at."""
+        return sights(self.prepared)
+
+    @cached_property
     def dictionary(self) -> LightDictionary:
-        """The candidates that a search begins with: the scene's own."""
-        return self.prepared.frozen.candidates_with(self.effects.shadows)
+        """The candidates that a search begins with: the scene's own, and those of `places`."""
+        frozen, shadows = self.prepared.frozen, self.effects.shadows
+        own = frozen.candidates_with(shadows)
+        return own if self.places is None else own.joined(frozen.bvh, self.places, shadows)
 
     @cached_property
     def blocks(self) -> BlockModel:
@@ -100,7 +120,7 @@ class TargetViews:
     @cached_property
     def pixels(self) -> PixelModel:
         """How the trusted pixels see lights where they look."""
-        return PixelModel.of(self.prepared, self.effects)
+        return PixelModel.of(self.prepared, self.effects) if self.whole is None else self.whole.pixels.on(self.prepared)
 
     @cached_property
     def images(self) -> ViewModel:

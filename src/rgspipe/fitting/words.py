@@ -10,6 +10,8 @@ from rgspipe.fitting.findings import (
     ExposureUnknown,
     Finding,
     FitStatus,
+    LampElsewhere,
+    LampsLeftOut,
     LightMissing,
     LightSpare,
     MaybeOneMore,
@@ -130,6 +132,16 @@ def _exposure(found: ExposureUnknown, spoken: Spoken) -> str:
     return "One view cannot tell its exposure from the lights' intensity: intensities are relative to the exposure."
 
 
+def _elsewhere(found: LampElsewhere, spoken: Spoken) -> str:
+    place = f"at column {found.column:.0f}, row {found.row:.0f} of view {found.view}"
+    return f"A lamp is in sight {place}, and no light was found there: there may be more lights, or it is no lamp."
+
+
+def _left_out(found: LampsLeftOut, spoken: Spoken) -> str:
+    views = f"{found.views} views" if found.views > 1 else "one view"
+    return f"Pixels of lamps in sight were left out: {found.pixels} in {views}."
+
+
 #: Findings that say more than their status does.
 _WORDS: dict[type[Finding], Callable[..., str]] = {
     LightMissing: _missing,
@@ -142,6 +154,8 @@ _WORDS: dict[type[Finding], Callable[..., str]] = {
     AllStepsTaken: _all_steps,
     MaybeOneMore: _maybe,
     ExposureUnknown: _exposure,
+    LampElsewhere: _elsewhere,
+    LampsLeftOut: _left_out,
 }
 
 

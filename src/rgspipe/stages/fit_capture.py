@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import torch
+
 from rgspipe.config import RgspipeConfig
 from rgspipe.datasets.views import View
 from rgspipe.degradation.target_capture import captured
 from rgspipe.errors import InputError
+from rgspipe.fitting.fit import Emitters
 from rgspipe.fitting.model.capture import SATURATED, ImageCapture, stored_in_eight_bits
 
 #: Configuration keys that all this depends on.
@@ -36,6 +39,13 @@ def captured_views(views: Sequence[View], target: str, config: RgspipeConfig) ->
         return taken, ImageCapture()
     clip = white if white is not None else config.fit.clip
     return taken, ImageCapture(free, clip) if clip is not None else _found_capture(taken, free)
+
+
+def known_emitters(views: Sequence[View], config: RgspipeConfig) -> Emitters:
+    """What is known of lamps in sight: masks where a view of the target has one, or else what is configured."""
+    if any(view.emitters is not None for view in views):
+        return [torch.zeros_like(view.alpha) if view.emitters is None else view.emitters for view in views]
+    return "auto" if config.fit.emitters == "auto" else None
 
 
 def _found_capture(views: Sequence[View], free: bool) -> ImageCapture:

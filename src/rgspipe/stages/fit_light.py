@@ -33,7 +33,7 @@ from rgspipe.scene import PointLight
 from rgspipe.scene.grade import Grade
 from rgspipe.stages import fit_capture
 from rgspipe.stages.base import Stage, StageContext
-from rgspipe.stages.fit_capture import captured_views
+from rgspipe.stages.fit_capture import captured_views, known_emitters
 from rgspipe.stages.fit_extras import Named, further_files, training_cameras
 from rgspipe.stages.fit_targets import all_targets, select_targets, target_seed, used_views
 from rgspipe.stages.light_spec import light_spec
@@ -89,7 +89,8 @@ class Fitter:
         if isinstance(self.frozen.solver, MonteCarloSolver):
             # Every target draws its own rays, whichever targets an earlier attempt has finished.
             self.frozen.solver.generator.manual_seed(seed)
-        result = prepared.fit(taken, solver=self.solver(seed), capture=capture)
+        emitters = known_emitters(views, self.config)
+        result = prepared.fit(taken, solver=self.solver(seed), capture=capture, emitters=emitters)
         config = self.config.fit
         further = further_files(config, prepared, taken, result, self._other_cameras(target, chosen), capture)
         # Pictures and their PSNR are those of the first view's exposure.
@@ -250,7 +251,7 @@ def _keys(config: RgspipeConfig) -> list[str]:
         "views.indices",
         *fit_capture.KEYS,
     ]
-    keys += ["fit.suggest_view", "fit.landscape"]
+    keys += ["fit.emitters", "fit.suggest_view", "fit.landscape"]
     keys += ["fit.wanted_accuracy"] if config.fit.suggest_view else []
     keys += ["fit.adam"] if config.fit.method == "paper_adam" else ["fit.search", "fit.shape"]
     keys += ["fit.sh_degree", "fit.sh_mirrored"] if config.fit.spot_basis == "sh" else []

@@ -169,7 +169,7 @@ class _Tracker:
     def _searched(self, index: int, status: FrameStatus, before: _Known | None) -> _Known | None:
         """A frame searched from nothing, in the order of the lights before; None where no light is found."""
         images, capture = self.taken[index]
-        result = self.views.fit(images, solver=self.search, capture=capture)
+        result = self.views.fit(images, solver=self.search, capture=capture, emitters=None)
         problem = self._problem(index)
         result = split_lights(problem, result, self.views.blocks, self.search)
         if not result.lights:
