@@ -30,6 +30,7 @@ class LightSpec:
             `SpotLight.shaped("gaussian", 0.4, 0.1)`; the kind's usual one if None.
         shape_free: whether the numbers of the shape (cone angle, exponent …) are recovered, too; what `shape` says of
             them is then only where to begin.
+        ambient: whether there may be light besides, from all around through openings; its radiance is recovered, too.
 
     Raises:
         InputError: an unknown field or type, a count out of range, or a shape of another kind.
@@ -39,6 +40,7 @@ class LightSpec:
     count: int | None = 1
     shape: Light | None = None
     shape_free: bool = False
+    ambient: bool = False
 
     def __new__(cls, *args: Any, **values: Any) -> Self:
         check_names(values, [item.name for item in fields(cls)], "LightSpec")
