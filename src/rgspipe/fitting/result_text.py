@@ -66,7 +66,7 @@ def light_line(light: Light, covariance: Sequence[Sequence[float]] | None = None
 
 def ambient_line(ambient: Strength) -> str:
     """Light from all around in a line: its RGB radiance, how sure that is, and what share of the image it is."""
-    return f"ambient {_strength_words(ambient)} W/(m² sr){_share_words(ambient)}"
+    return f"ambient {_strength_words(ambient)} W/(sr·unit²){_share_words(ambient)}"
 
 
 def base_line(scale: Strength) -> str:

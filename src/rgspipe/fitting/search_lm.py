@@ -28,6 +28,7 @@ from rgspipe.fitting.search.refine import Refiner, State
 from rgspipe.fitting.search.rig_search import RigSearch
 from rgspipe.fitting.search.starts import Candidates
 from rgspipe.fitting.search.weighting import PLAIN
+from rgspipe.fitting.selection.ambient import ambient_found, ambient_missing
 from rgspipe.fitting.selection.diagnosis import Costs, standing
 from rgspipe.fitting.selection.number import Doubted, doubted_number, faded_light
 from rgspipe.fitting.selection.rivals import rival_among, rival_elsewhere
@@ -66,6 +67,10 @@ def fit_search_lm(
     findings = found.findings
     if spec.count is not None and not any(isinstance(finding, LightSpare) for finding in findings):
         findings = (*findings, *faded_light(refiner, best, options))
+    if spec.ambient:
+        findings = (*findings, *ambient_found(polished.problem, best, options.bar))
+    else:
+        findings = (*findings, *ambient_missing(refiner, candidates, found.best, findings, options))
     return _result(polished, best, findings, Costs.of(refiner, found.compared), options)
 
 

@@ -120,7 +120,7 @@ class TargetViews:
 
     @cached_property
     def ambient(self) -> Tensor | None:
-        """(N, 3) radiance of the surfels under a void of radiance 1; None where no such light is looked for or arrives."""
+        """(N, 3) radiance of the surfels under a void of radiance 1; None where none is looked for or arrives."""
         if not self.lights.ambient:
             return None
         return ambient_radiance(self.prepared.frozen, self.effects.interreflection)

@@ -12,7 +12,10 @@ from rgspipe.fitting.findings import (
     FitStatus,
     LightMissing,
     LightSpare,
+    MaybeAmbient,
     MaybeOneMore,
+    MuchAmbient,
+    NoOpening,
     OnSurface,
     PoorScene,
     Rival,
@@ -48,13 +51,15 @@ class Spoken:
     Attributes:
         count: a given number of lights; takes the number.
         uncounted: a number of lights that is to be found.
+        ambient: light from all around besides.
     """
 
     count: Callable[[int], str]
     uncounted: str
+    ambient: str
 
 
-PYTHON = Spoken("LightSpec(count={})".format, "LightSpec(count=None)")
+PYTHON = Spoken("LightSpec(count={})".format, "LightSpec(count=None)", "LightSpec(ambient=True)")
 
 
 def explained(findings: Sequence[Finding], spoken: Spoken = PYTHON) -> str:
@@ -130,6 +135,19 @@ def _exposure(found: ExposureUnknown, spoken: Spoken) -> str:
     return "One view cannot tell its exposure from the lights' intensity: intensities are relative to the exposure."
 
 
+def _much_ambient(found: MuchAmbient, spoken: Spoken) -> str:
+    return f"{percent(found.share)} of the light in the images comes from all around, through openings."
+
+
+def _maybe_ambient(found: MaybeAmbient, spoken: Spoken) -> str:
+    gain = f"Light from all around would lower the cost by {percent(found.gain)}: there may be some"
+    return f"{gain}; allow for it ({spoken.ambient}), or give images with the lamps off."
+
+
+def _no_opening(found: NoOpening, spoken: Spoken) -> str:
+    return "The scene is closed: no light comes in from all around."
+
+
 #: Findings that say more than their status does.
 _WORDS: dict[type[Finding], Callable[..., str]] = {
     LightMissing: _missing,
@@ -142,6 +160,9 @@ _WORDS: dict[type[Finding], Callable[..., str]] = {
     AllStepsTaken: _all_steps,
     MaybeOneMore: _maybe,
     ExposureUnknown: _exposure,
+    MuchAmbient: _much_ambient,
+    MaybeAmbient: _maybe_ambient,
+    NoOpening: _no_opening,
 }
 
 

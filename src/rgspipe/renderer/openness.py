@@ -45,8 +45,8 @@ def openness(bvh: SurfelBvh, surfels: Surfels) -> float:
 def void_irradiance(bvh: SurfelBvh, rays: int = VOID_RAYS, *, seed: int = 0) -> Tensor:
     """(N,) float32 irradiance of every surfel from a void of radiance 1 all around: π where nothing is in the way.
 
-    E_i = π · the mean over cosine-distributed directions of what passes all surfels, of which backs stop light as fronts
-    do. Rays that meet a surface are stopped by all of it: what leaks past one is noise of the representation.
+    E_i = π · the mean over cosine-distributed directions of what passes all surfels, whose backs stop light as their
+    fronts do. Rays that meet a surface are stopped by all of it: what leaks past one is noise of the representation.
 
     Args:
         rays: of every surfel; of one that sees half of the void E is known to 1 % with 256 and 0.6 % with 512.

@@ -53,8 +53,8 @@ class Strength:
     """How strong a known image is in a target.
 
     Attributes:
-        value: (3,) float64, of light from the void its radiance [W/(m² sr) in the units of the lights' intensity over
-            scene unit²]; of a base its factor.
+        value: (3,) float64, of light from the void its radiance [W/(sr·unit²): the lights' intensities over
+            scene units²]; of a base its factor.
         covariance: (3, 3) float64, calibrated as those of lights are; infinite variances where nothing is determined.
         share: of all that the model's image sends, summed over pixels and colours.
     """

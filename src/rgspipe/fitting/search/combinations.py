@@ -33,7 +33,7 @@ class Scored:
         square: (C, 3) float64 squared length of the images.
         product: (C, 3) float64 their products with the target.
         energy: squared length of the target.
-        known: (3, A, B) float32 orthonormal rows that span the known images of each colour.
+        known: (3, A, B) float32 orthonormal rows that span the known images of each colour; None without such images.
     """
 
     images: Tensor
@@ -41,7 +41,7 @@ class Scored:
     square: Tensor
     product: Tensor
     energy: float
-    known: Tensor
+    known: Tensor | None = None
 
     @classmethod
     def of(cls, problem: LightProblem, coarse: CoarseImages) -> Scored:
@@ -49,7 +49,7 @@ class Scored:
         root = problem.block_weights(target, coarse.counts.to(target), coarse.blocks).sqrt()
         images = (coarse.images * root.to(coarse.images)).permute(0, 2, 1).contiguous()
         weighted = (target * root).T
-        known = _known_span(problem, coarse, root).to(images)
+        known = _known_span(problem, coarse, root)
         images, weighted = _without(images, known), _without(weighted, known)
         wanted = weighted.to(images)
         square = torch.stack([images[:, c].square().sum(dim=1) for c in range(3)], dim=1).double()
@@ -67,18 +67,18 @@ class Scored:
         return _without((image * root.to(image)).T, self.known)
 
 
-def _known_span(problem: LightProblem, coarse: CoarseImages, root: Tensor) -> Tensor:
+def _known_span(problem: LightProblem, coarse: CoarseImages, root: Tensor) -> Tensor | None:
     """(3, A, B) float64 orthonormal rows that span the known images, over blocks, times `root` (B, 3)."""
     seen = [(coarse.blocks @ image.image).double() * root for image in problem.known]
     if not seen:
-        return torch.zeros((3, 0, len(root)), dtype=torch.float64, device=root.device)
+        return None
     vectors, sizes, rows = torch.linalg.svd(torch.stack(seen).permute(2, 0, 1), full_matrices=False)
-    return rows * (sizes > LEAST_LEFT * sizes.amax(dim=1, keepdim=True))[:, :, None]
+    return (rows * (sizes > LEAST_LEFT * sizes.amax(dim=1, keepdim=True))[:, :, None]).float()
 
 
-def _without(images: Tensor, known: Tensor) -> Tensor:
+def _without(images: Tensor, known: Tensor | None) -> Tensor:
     """Images (…, 3, B) without their parts in the span of `known` (3, A, B); 0 where next to nothing is left."""
-    if known.shape[1] == 0:
+    if known is None:
         return images
     known = known.to(images)
     there = torch.einsum("...cb,cab->...ca", images, known)
