@@ -42,6 +42,8 @@ class LightConfig(Options):
     """type of the unknown lights"""
     count: int | None = option(1, low=1, high=MOST_LIGHTS)
     """how many unknown lights; null finds out"""
+    ambient: bool = False
+    """whether there may be light besides, from all around through openings; its radiance is found, too"""
     spot: SpotConfig = SpotConfig()
     led: LedConfig = LedConfig()
 

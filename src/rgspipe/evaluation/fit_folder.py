@@ -37,21 +37,24 @@ def write_result(
     targets: Sequence[Tensor],
     further: Mapping[str, bytes] | None = None,
     spoken: Spoken = PYTHON,
+    there: Sequence[Tensor] | None = None,
 ) -> None:
     """Write lights.json, convergence.csv, fit.png and final.exr; `folder` appears when it is whole, in place of any.
 
     fit.png has one row a view: target, start, midway, end, difference. final.exr is the first view's
     final image; those of further views are final_1.exr and so on. `further` holds more files by name; settings in the
-    reason are named as `spoken` has them.
+    reason are named as `spoken` has them. `there` is what every view shows besides the lights, if that was looked for
+    or given: it stands in all images of the fit, and in fit.png by itself beside the target.
     """
     partial = folder.with_name(f".{folder.name}.partial")
     shutil.rmtree(partial, ignore_errors=True)
     partial.mkdir(parents=True)
-    shown = [views.render(rig) for rig in _milestones(result)]
+    shown = [_with(views.render(rig), there) for rig in _milestones(result)]
     final = shown[-1]
     result.save(partial / "lights.json", spoken, psnr=_psnr(final, targets))
     _write_convergence(partial / "convergence.csv", result.trajectory)
-    rows = [progress_strip(target, [images[k] for images in shown]) for k, target in enumerate(targets)]
+    first = [there] if there else []
+    rows = [progress_strip(target, [images[k] for images in (*first, *shown)]) for k, target in enumerate(targets)]
     save_png(partial / "fit.png", stack(rows))
     for index, image in enumerate(final):
         write_image(partial / ("final.exr" if index == 0 else f"final_{index}.exr"), image.cpu().numpy())
@@ -59,6 +62,11 @@ def write_result(
         write_bytes(partial / name, content)
     shutil.rmtree(folder, ignore_errors=True)
     publish(partial, folder)
+
+
+def _with(images: Sequence[Tensor], there: Sequence[Tensor] | None) -> list[Tensor]:
+    """Images of lights with what is there besides."""
+    return [image + other.to(image) for image, other in zip(images, there, strict=True)] if there else [*images]
 
 
 def read_result(folder: Path) -> dict[str, object]:

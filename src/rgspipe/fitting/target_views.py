@@ -126,11 +126,17 @@ class TargetViews:
         return ambient_radiance(self.prepared.frozen, self.effects.interreflection)
 
     def there_anyway(self, result: FitResult, capture: ImageCapture | None = None) -> list[Float[Tensor, "H W 3"]]:
-        """(H, W, 3) per view of what a fit found in its images besides the lights, in the exposure of each view."""
+        """(H, W, 3) per view of what a fit found in its images besides the lights, in the exposure of each view.
+
+        Empty where nothing else was looked for or given.
+        """
         prepared, base = self.prepared, None if capture is None else capture.base
+        if base is None and result.ambient is None:
+            return []
         image = torch.zeros((prepared.every_pixel.operator.shape[0], 3), device=prepared.frozen.device)
         if result.ambient is not None and self.ambient is not None:
-            exposures = torch.tensor(result.exposures).to(image)[prepared.every_pixel.view_of]
+            exposures = torch.tensor(result.exposures or [1.0] * len(prepared.views))
+            exposures = exposures.to(image)[prepared.every_pixel.view_of]
             sent = self.ambient * result.ambient.value.to(self.ambient)
             image = exposures[:, None] * (prepared.every_pixel.operator @ sent)
         if base is not None:

@@ -21,7 +21,7 @@ def light_spec(config: RgspipeConfig) -> LightSpec:
     light, kind = config.light, shaped_kind(config.light.type)
     section = getattr(light, kind, None)
     shape = None if section is None else light_shape(kind, section, f"light.{kind}")
-    return LightSpec(light.type, light.count, shape, config.fit.shape == "free")
+    return LightSpec(light.type, light.count, shape, config.fit.shape == "free", light.ambient)
 
 
 def _refuse_unknowns(config: RgspipeConfig) -> None:
@@ -34,6 +34,7 @@ def _refuse_unknowns(config: RgspipeConfig) -> None:
         ("light.type", " or ".join(KINDS), config.light.type, config.light.type == AUTO),
         ("light.count", "a number from 1 to 8", "null", config.light.count is None),
         ("fit.shape", "known", config.fit.shape, config.fit.shape == "free"),
+        ("light.ambient", "false", "true", config.light.ambient),
     ]
     for key, expected, found, unknown in asked:
         if unknown:

@@ -1,4 +1,4 @@
-"""What is known of how a target's images were taken: exposures, clipped and rounded values, and what was there anyway."""
+"""What is known of how a target's images were taken: exposures, clipped and rounded values, and a base."""
 
 from __future__ import annotations
 

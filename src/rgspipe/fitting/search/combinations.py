@@ -72,7 +72,7 @@ def _known_span(problem: LightProblem, coarse: CoarseImages, root: Tensor) -> Te
     seen = [(coarse.blocks @ image.image).double() * root for image in problem.known]
     if not seen:
         return None
-    vectors, sizes, rows = torch.linalg.svd(torch.stack(seen).permute(2, 0, 1), full_matrices=False)
+    _, sizes, rows = torch.linalg.svd(torch.stack(seen).permute(2, 0, 1), full_matrices=False)
     return (rows * (sizes > LEAST_LEFT * sizes.amax(dim=1, keepdim=True))[:, :, None]).float()
 
 
