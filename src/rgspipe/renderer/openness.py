@@ -22,7 +22,7 @@ from rgspipe.sums import average
 LOOKING, RAYS = 256, 32
 
 #: Rays of every surfel where light from the void is to be known surfel by surfel.
-VOID_RAYS = 512
+VOID_RAYS = 256
 
 
 def openness(bvh: SurfelBvh, surfels: Surfels) -> float:
@@ -49,7 +49,7 @@ def void_irradiance(bvh: SurfelBvh, rays: int = VOID_RAYS, *, seed: int = 0) -> 
     fronts do. Rays that meet a surface are stopped by all of it: what leaks past one is noise of the representation.
 
     Args:
-        rays: of every surfel; of one that sees half of the void E is known to 1 % with 256 and 0.6 % with 512.
+        rays: of every surfel; with 256 E is known to 0.4 % of that of an open plane (root mean square, a Cornell box).
         seed: of the rays.
     """
     surfels, generator = bvh.surfels, torch.Generator().manual_seed(seed)
