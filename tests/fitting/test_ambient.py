@@ -34,17 +34,17 @@ def test_a_light_beside_as_much_ambient_light(open_room, point_light, where, cou
     light = point_light(where)
     radiance = radiance_for(frozen, views, (light,), 0.5)
     exact = fit_lights(frozen, views, lit_images(frozen, views, (light,), radiance), lights=AMBIENT, sharp=False)
-    assert float((exact.lights[0].position - light.position).norm()) < 1e-4  # measured 2e-6
-    torch.testing.assert_close(exact.ambient.value, radiance.double(), rtol=1e-4, atol=0.0)  # measured 4e-8
+    assert float((exact.lights[0].position - light.position).norm()) < 1e-5  # measured 5e-8
+    torch.testing.assert_close(exact.ambient.value, radiance.double(), rtol=1e-5, atol=0.0)  # measured 7e-8
     noisy = lit_images(frozen, views, (light,), radiance, noise=0.02)
     found = fit_lights(frozen, views, noisy, lights=AMBIENT, sharp=False)
     error = found.lights[0].position - light.position
-    # Measured with 2 % of noise: 0.0006 and 0.0008 with one view, 0.0002 with three.
-    assert float(error.norm()) < 0.003
+    # Measured with 2 % of noise: 0.0005 and 0.0006 with one view, 0.0004 and 0.0001 with three.
+    assert float(error.norm()) < 0.002
     assert found.status is FitStatus.CONVERGED
-    assert float(((found.ambient.value / radiance) - 1.0).abs().max()) < 0.01  # measured 0.003
+    assert float(((found.ambient.value / radiance) - 1.0).abs().max()) < 0.01  # measured 0.0043
     away = found.ambient.value - radiance.double()
-    assert float(away @ torch.linalg.solve(found.ambient.covariance, away)) < 25.0  # measured 0.2 to 9
+    assert float(away @ torch.linalg.solve(found.ambient.covariance, away)) < 12.0  # measured 0.3 to 2.2
     [much] = [finding for finding in found.findings if isinstance(finding, MuchAmbient)]
     assert much.share == pytest.approx(0.5, abs=0.06)  # of the pixels that count: 0.48 to 0.55
 
@@ -75,8 +75,8 @@ def test_allowing_for_ambient_light_that_is_not_there_costs_nothing(open_room, p
     images = lit_images(frozen, views, (light,), torch.zeros(3), noise=0.02)
     plain, allowed = (fit_lights(frozen, views, images, lights=spec, sharp=False) for spec in ("point", AMBIENT))
     errors = [float((result.lights[0].position - light.position).norm()) for result in (plain, allowed)]
-    assert errors[1] < 0.003 and errors[1] < 2.0 * errors[0] + 1e-3
-    assert allowed.ambient.share < 0.02
+    assert errors[1] < 0.001 and errors[1] < 2.0 * errors[0]  # measured 0.0003 both
+    assert allowed.ambient.share < 0.002  # measured 0.0002
     assert not any(isinstance(finding, MuchAmbient) for finding in allowed.findings)
 
 
@@ -90,7 +90,7 @@ def test_two_lights_beside_ambient_light(open_room, point_light, count: int | No
     assert len(result.lights) == 2 and result.status is FitStatus.CONVERGED
     for light in rig:
         nearest = min(float((found.position - light.position).norm()) for found in result.lights)
-        assert nearest < 0.005  # measured 0.0011 at most
+        assert nearest < 0.002  # measured 0.0005 at most
     assert float((result.ambient.value / radiance - 1.0).abs().max()) < 0.01
 
 
@@ -100,16 +100,17 @@ def test_exposures_are_found_beside_ambient_light(open_room, point_light) -> Non
     images = lit_images(frozen, views, (light,), radiance_for(frozen, views, (light,), 0.5), noise=0.005)
     taken = [image * factor for image, factor in zip(images, exposures, strict=True)]
     result = fit_lights(frozen, views, taken, lights=AMBIENT, capture=ImageCapture(exposure_free=True), sharp=False)
-    assert float((result.lights[0].position - light.position).norm()) < 0.005
-    assert result.exposures == pytest.approx(exposures, rel=0.01)
+    assert float((result.lights[0].position - light.position).norm()) < 0.001  # measured 0.0001
+    assert result.exposures == pytest.approx(exposures, rel=1e-3)  # measured 6e-5
 
 
 def test_a_target_of_ambient_light_alone_has_no_light(open_room) -> None:
     frozen, views = open_room[0], open_room[1][:1]
     fit = FitViews.prepare(frozen, views, lights=AMBIENT, sharp=False)
     result = fit.fit([2.0 * TINT * ambient_image(frozen, view) for view in views])
-    assert result.status is FitStatus.NOT_ENOUGH_LIGHT or result.lights[0].intensity.max() < 1e-4
-    torch.testing.assert_close(result.ambient.value, 2.0 * TINT.double(), rtol=1e-3, atol=0.0)
+    assert result.status is FitStatus.NOT_ENOUGH_LIGHT and not result.lights
+    assert "100 % of the light" in result.reason
+    torch.testing.assert_close(result.ambient.value, 2.0 * TINT.double(), rtol=1e-5, atol=0.0)
 
 
 def test_in_a_closed_room_none_arrives(room, point_light) -> None:
@@ -135,10 +136,12 @@ def test_images_with_the_lamps_off(open_room, point_light, where, scale_free: bo
     factor = 0.25 if scale_free else 1.0
     capture = ImageCapture(base=BaseImages([factor * image for image in base], scale_free))
     result = fit_lights(frozen, views, images, capture=capture, sharp=False)
-    assert float((result.lights[0].position - light.position).norm()) < 0.006  # measured 0.0019 at most
+    assert (
+        float((result.lights[0].position - light.position).norm()) < 0.001
+    )  # measured 0.0002 at most; 0.44 and 1.1 with the base left in
     assert result.status is FitStatus.CONVERGED
     if scale_free:
-        assert result.base_scale.value.tolist() == pytest.approx([4.0] * 3, rel=0.01)
+        assert result.base_scale.value.tolist() == pytest.approx([4.0] * 3, rel=1e-3)  # measured 2e-4
     else:
         same = fit_lights(frozen, views, images, base=base, sharp=False)
         assert torch.equal(same.lights[0].position, result.lights[0].position) and result.base_scale is None

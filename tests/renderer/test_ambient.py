@@ -32,7 +32,7 @@ def test_a_floor_before_a_wall_lacks_the_wall_s_form_factor() -> None:
     found = void_irradiance(SurfelBvh(surfels))[: len(floor)] / math.pi
     distance = floor[:, 0]
     error = found - (1.0 - 0.5 * (1.0 - distance / (distance.square() + 1.0).sqrt()))
-    # Measured: 0.0052 root mean square, 0.017 at most, -6e-4 on the average.
+    # Measured: 0.0051 root mean square, 0.017 at most, -5e-4 on the average.
     assert float(error.square().mean().sqrt()) < 0.01
     assert float(error.abs().max()) < 0.03
     assert abs(float(error.mean())) < 0.002
@@ -54,13 +54,13 @@ def test_it_is_what_the_float64_reference_integrates() -> None:
         passing = torch.where(passing < 0.5, 0.0, passing)
         expected.append(4.0 * math.pi / len(directions) * float(cosine[cosine > 0] @ passing))
     error = found.double() - torch.tensor(expected)
-    # Measured: 0.0072 root mean square of π for the open plane, of which the reference's own directions are a part.
-    assert float(error.square().mean().sqrt()) < 0.015
+    # Measured: 0.0040 root mean square, of values with a deviation of 0.41; both have rays of their own.
+    assert float(error.square().mean().sqrt()) < 0.01
     assert float(found.std()) > 0.2
 
 
 def test_nothing_arrives_in_a_closed_room() -> None:
-    assert float(void_irradiance(SurfelBvh(room_surfels())).mean()) < 1e-4  # measured 2e-5
+    assert float(void_irradiance(SurfelBvh(room_surfels())).mean()) < 1e-4  # measured 1.6e-5
     frozen = frozen_room()
     assert ambient_radiance(frozen) is None and rough_ambient_radiance(frozen) is None
     assert not ambient_image(frozen, open_room_cameras(8)[0]).any()
@@ -73,9 +73,9 @@ def test_a_furnace_of_void_and_white_walls_has_one_radiance() -> None:
         surfels_on(surfels.centers, surfels.normals, 0.07, 0.999), gather_rays=256, patches=400, seed=0
     )
     radiance = ambient_radiance(white)
-    # Measured: 0.997 on the average, a standard deviation of 0.024: every surfel has rays of its own.
-    assert abs(float(radiance.mean()) - 1.0) < 0.02
-    assert float(radiance.std()) < 0.05
+    # Measured: 0.984 on the average, as corners leak, with a standard deviation of 0.006.
+    assert abs(float(radiance.mean()) - 1.0) < 0.03
+    assert float(radiance.std()) < 0.02
 
 
 def test_it_bounces_as_the_full_transport_says() -> None:
@@ -84,7 +84,7 @@ def test_it_bounces_as_the_full_transport_says() -> None:
     exact = solve_radiosity_directly(frozen.gather, frozen.surfels.albedo, direct)
     found = ambient_radiance(frozen)
     error = (found - exact).norm() / exact.norm()
-    assert float(error) < 0.02  # measured 0.0057: light per patch is an average
+    assert float(error) < 0.02  # measured 0.0055: light per patch is an average
     assert torch.equal(ambient_radiance(frozen, interreflection=False), direct)
 
 
@@ -103,5 +103,5 @@ def test_the_operators_alone_know_it_roughly() -> None:
     frozen = frozen_open_room()
     rough, exact = rough_void_irradiance(frozen.transport), frozen.void_irradiance
     error = (rough - exact) / math.pi
-    # Measured: 0.020 root mean square with 64 rays a surfel, -0.0006 on the average.
-    assert float(error.square().mean().sqrt()) < 0.04 and abs(float(error.mean())) < 0.005
+    # Measured: 0.012 root mean square with 64 rays a surfel, 0.001 on the average.
+    assert float(error.square().mean().sqrt()) < 0.025 and abs(float(error.mean())) < 0.003

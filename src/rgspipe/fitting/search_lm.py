@@ -13,7 +13,7 @@ import torch
 from torch import Tensor
 
 from rgspipe.fitting.certainty.uncertainty import light_covariances
-from rgspipe.fitting.findings import Finding, LightMissing, LightSpare, Rival
+from rgspipe.fitting.findings import Finding, LightMissing, LightSpare, MuchAmbient, Rival
 from rgspipe.fitting.meter import Meter
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.exposure import rough_exposures
@@ -171,8 +171,10 @@ def _without_lights(problem: LightProblem, meter: Meter) -> FitResult:
     state, gram = State((), columns, found.intensity), moments(columns, problem.target, weights).values
     variance = found.cost / max(1, problem.target.numel() - found.intensity.numel())
     spreads = [torch.diag(variance * one.unit**2 / gram[:, k, k]) for k, one in enumerate(problem.known)]
+    strengths = _strengths(problem, state, spreads)
+    told = [MuchAmbient(strengths["ambient"].share)] if "ambient" in strengths else []
     loss = problem.unexplained(columns, found.intensity)
-    return replace(result, loss=loss, **_strengths(problem, state, spreads))
+    return replace(result, findings=(*result.findings, *told), loss=loss, **strengths)
 
 
 def _strengths(problem: LightProblem, best: State, covariance: Sequence[Tensor]) -> dict[str, Strength]:
