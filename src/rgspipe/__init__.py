@@ -16,17 +16,18 @@ from typing import TYPE_CHECKING, Any
 from rgspipe.threads import settle_threads
 
 if TYPE_CHECKING:
-    from rgspipe.datasets.light_file import read_lights, write_lights
+    from rgspipe.datasets.light_file import read_ambient, read_lights, write_lights
     from rgspipe.datasets.location import load_views
     from rgspipe.datasets.ply import PlyOptions, save_ply
     from rgspipe.datasets.surfel_file import load_surfels, save_surfels
     from rgspipe.datasets.views import View
     from rgspipe.errors import InputError
     from rgspipe.evaluation.images import save_png, tone_map
-    from rgspipe.fitting import FitResult, FitStatus, FitViews, ImageCapture, LightSpec, fit_lights
+    from rgspipe.fitting import BaseImages, FitResult, FitStatus, FitViews, ImageCapture, LightSpec, fit_lights
     from rgspipe.fitting.options import TrackOptions
     from rgspipe.fitting.solvers import PaperAdam, Search
     from rgspipe.fitting.tracking.track import track_lights
+    from rgspipe.renderer.ambient import ambient_image
     from rgspipe.renderer.effects import Effects
     from rgspipe.renderer.frozen import FrozenScene
     from rgspipe.renderer.ply import load_ply
@@ -37,17 +38,18 @@ if TYPE_CHECKING:
 
 #: Where the public names live; they are imported when first used, so that `import rgspipe` stays quick.
 _HOMES = {
-    "datasets.light_file": ("read_lights", "write_lights"),
+    "datasets.light_file": ("read_ambient", "read_lights", "write_lights"),
     "datasets.location": ("load_views",),
     "datasets.ply": ("PlyOptions", "save_ply"),
     "datasets.surfel_file": ("load_surfels", "save_surfels"),
     "datasets.views": ("View",),
     "errors": ("InputError",),
     "evaluation.images": ("save_png", "tone_map"),
-    "fitting": ("FitResult", "FitStatus", "FitViews", "ImageCapture", "LightSpec", "fit_lights"),
+    "fitting": ("BaseImages", "FitResult", "FitStatus", "FitViews", "ImageCapture", "LightSpec", "fit_lights"),
     "fitting.options": ("TrackOptions",),
     "fitting.solvers": ("PaperAdam", "Search"),
     "fitting.tracking.track": ("track_lights",),
+    "renderer.ambient": ("ambient_image",),
     "renderer.effects": ("Effects",),
     "renderer.frozen": ("FrozenScene",),
     "renderer.ply": ("load_ply",),
@@ -58,6 +60,7 @@ _HOMES = {
 }
 
 __all__ = [
+    "BaseImages",
     "Camera",
     "CornellBox",
     "Corridor",
@@ -84,11 +87,13 @@ __all__ = [
     "Trained",
     "View",
     "__version__",
+    "ambient_image",
     "exact_surfels",
     "fit_lights",
     "load_ply",
     "load_surfels",
     "load_views",
+    "read_ambient",
     "read_lights",
     "save_ply",
     "save_png",

@@ -25,6 +25,10 @@ class FitConfig(Options):
     """the method"""
     target: str | None = None
     """a target's folder; by default the dataset's own targets"""
+    base: str | None = None
+    """folder of images like those of `target`, from the same cameras, with the lamps off: what was there anyway"""
+    base_scale: Literal["known", "free"] = "known"
+    """whether that is in the target as it is, or a factor times, per colour, that is found, too"""
     truth: str | None = None
     """light file with the true lights of `target`, for evaluate only"""
     limit: int | None = option(None, low=1, high=100000)

@@ -64,6 +64,8 @@ class LightConfig(Options):
     """how many unknown lights; null finds out"""
     mount: Literal["free", "surface"] = "free"
     """surface: they lie on surfaces of the scene and shine away from them (panels alone), which fixes their axes"""
+    ambient: bool = False
+    """whether there may be light besides, from all around through openings; its radiance is found, too"""
     spot: SpotConfig = SpotConfig()
     led: LedConfig = LedConfig()
     sphere: SphereConfig = SphereConfig()

@@ -39,23 +39,25 @@ def write_result(
     targets: Sequence[Tensor],
     further: Mapping[str, bytes] | None = None,
     spoken: Spoken = PYTHON,
+    there: Sequence[Tensor] | None = None,
 ) -> None:
     """Write lights.json, convergence.csv, fit.png and final.exr; `folder` appears when it is whole, in place of any.
 
     fit.png has one row a view: target, start, midway, end, difference. final.exr is the first view's
     final image; those of further views are final_1.exr and so on. Where pixels of lamps in sight were left out, they
     are outlined in fit.png, and emitters.png, emitters_1.png and so on are their masks. `further` holds more files by
-    name; settings in the reason are named as `spoken` has them.
+    name; settings in the reason are named as `spoken` has them. `there` is what every view shows besides the lights, if
+    that was looked for or given: it stands in all images of the fit, and in fit.png by itself beside the target.
     """
     partial = folder.with_name(f".{folder.name}.partial")
     shutil.rmtree(partial, ignore_errors=True)
     partial.mkdir(parents=True)
-    shown = [views.render(rig) for rig in _milestones(result)]
+    shown = [_with(views.render(rig), there) for rig in _milestones(result)]
     final = shown[-1]
     masks = left_out(result.lamps, [image.shape[:2] for image in final]) if result.lamps else None
     result.save(partial / "lights.json", spoken, psnr=_psnr(final, targets, masks))
     _write_convergence(partial / "convergence.csv", result.trajectory)
-    save_png(partial / "fit.png", _picture(targets, shown, masks))
+    save_png(partial / "fit.png", _picture(targets, [*([there] if there else []), *shown], masks))
     for index, mask in enumerate(masks or ()):
         save_png(partial / _numbered("emitters", index, "png"), np.repeat(255 * mask.astype(np.uint8)[..., None], 3, 2))
     for index, image in enumerate(final):
@@ -64,6 +66,11 @@ def write_result(
         write_bytes(partial / name, content)
     shutil.rmtree(folder, ignore_errors=True)
     publish(partial, folder)
+
+
+def _with(images: Sequence[Tensor], there: Sequence[Tensor] | None) -> list[Tensor]:
+    """Images of lights with what is there besides."""
+    return [image + other.to(image) for image, other in zip(images, there, strict=True)] if there else [*images]
 
 
 def read_result(folder: Path) -> dict[str, object]:

@@ -178,6 +178,29 @@ class LampsLeftOut(Finding):
     status = FitStatus.CONVERGED
 
 
+@dataclass(frozen=True)
+class MuchAmbient(Finding):
+    """Light from all around through openings is the share `share` of the image's light."""
+
+    share: float
+    status = FitStatus.CONVERGED
+
+
+@dataclass(frozen=True)
+class MaybeAmbient(Finding):
+    """Light from all around, which was not allowed for, would lower the robust cost by the share `gain`."""
+
+    gain: float
+    status = FitStatus.CONVERGED
+
+
+@dataclass(frozen=True)
+class NoOpening(Finding):
+    """Light from all around was allowed for, and the scene is closed: none arrives."""
+
+    status = FitStatus.CONVERGED
+
+
 def gravest(findings: Sequence[Finding]) -> FitStatus:
     """The status of an answer."""
     held = {finding.status for finding in findings}

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 from rgspipe.errors import InputError
 from rgspipe.fitting.in_sight.search import fit_on_lookout, fit_without
-from rgspipe.fitting.model.capture import ImageCapture
+from rgspipe.fitting.model.capture import BaseImages, ImageCapture
 from rgspipe.fitting.result import FitResult
 from rgspipe.fitting.solvers import Search, Solver
 from rgspipe.fitting.spec import LightSpec
@@ -67,6 +67,7 @@ def fit_lights(
     *,
     lights: str | LightSpec = "point",
     solver: Solver | None = None,
+    base: Sequence[ArrayLike] | ArrayLike | None = None,
     masks: Sequence[ArrayLike] | ArrayLike | None = None,
     capture: ImageCapture | None = None,
     effects: Effects = ALL_EFFECTS,
@@ -86,6 +87,8 @@ def fit_lights(
         lights: what is known of the lights: the name of a kind, of which there is one, or "auto" for a point or a
             spot; or all that there is to know.
         solver: how, such as `Search(starts=8)` or `PaperAdam(seed=1)`; `Search()` if None.
+        base: what `images` show with the lamps off, taken as they were; it is taken away from them. More can be said of
+            it in `capture`.
         masks: (H, W) per camera, the scene's share of each pixel (the image's alpha); 1 if None.
         capture: what is known of how the images were taken; as radiance, with known exposures, if None.
         effects: parts of light transport.
@@ -108,4 +111,6 @@ def fit_lights(
     views = FitViews.prepare(
         scene, cameras, lights=lights, masks=masks, effects=effects, sharp=sharp, mask_edges=mask_edges
     )
+    if base is not None:
+        capture = replace(capture or ImageCapture(), base=BaseImages(as_list(base, axes=3)))
     return views.fit(images, solver=solver, capture=capture, emitters=emitters)

@@ -31,6 +31,7 @@ class LightSpec:
         shape_free: whether the numbers of the shape (cone angle, exponent …) are recovered, too; what `shape` says of
             them is then only where to begin.
         mounted: whether they lie on surfaces of the scene, and shine away from them: panels alone.
+        ambient: whether there may be light besides, from all around through openings; its radiance is recovered, too.
 
     Raises:
         InputError: an unknown field or type, a count out of range, or a shape of another kind.
@@ -41,6 +42,7 @@ class LightSpec:
     shape: Light | None = None
     shape_free: bool = False
     mounted: bool = False
+    ambient: bool = False
 
     def __new__(cls, *args: Any, **values: Any) -> Self:
         check_names(values, [item.name for item in fields(cls)], "LightSpec")
@@ -73,7 +75,7 @@ class LightSpec:
     def seed(self) -> LightSpec:
         """The lights in one point that a search looks for first; itself where these are they."""
         kind = self.kinds[-1]
-        return self if kind.seed is kind else LightSpec(kind.seed.kind, self.count, kind.seed)
+        return self if kind.seed is kind else LightSpec(kind.seed.kind, self.count, kind.seed, ambient=self.ambient)
 
     @property
     def aimed(self) -> bool:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
 
+import torch
 from torch import Tensor
 
 from rgspipe.errors import InputError
@@ -15,9 +16,11 @@ from rgspipe.fitting.model.capture import ImageCapture
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.model.views import PreparedViews, prepare_views
 from rgspipe.fitting.options import AimedOptions, LossOptions
+from rgspipe.fitting.result import FitResult
 from rgspipe.fitting.search.aimed_candidates import aimed_candidates
 from rgspipe.fitting.search.coarse import CoarseImages, coarse_images
 from rgspipe.fitting.spec import LightSpec, as_spec
+from rgspipe.renderer.ambient import ambient_radiance
 from rgspipe.renderer.dictionary import LightDictionary
 from rgspipe.renderer.effects import ALL_EFFECTS, Effects
 from rgspipe.renderer.frozen import FrozenScene
@@ -133,7 +136,33 @@ class TargetViews:
     ) -> LightProblem:
         """The problem that images stacked by `PreparedViews.stack_images`, (all pixels, 3), pose."""
         sharp = self.pixels if self.sharp else None
-        return LightProblem.create(self.prepared, stacked, self.effects, capture, sharp, loss)
+        return LightProblem.create(self.prepared, stacked, self.effects, capture, sharp, loss, self.ambient)
+
+    @cached_property
+    def ambient(self) -> Tensor | None:
+        """(N, 3) radiance of the surfels under a void of radiance 1; None where none is looked for or arrives."""
+        if not self.lights.ambient:
+            return None
+        return ambient_radiance(self.prepared.frozen, self.effects.interreflection)
+
+    def there_anyway(self, result: FitResult, capture: ImageCapture | None = None) -> list[Float[Tensor, "H W 3"]]:
+        """(H, W, 3) per view of what a fit found in its images besides the lights, in the exposure of each view.
+
+        Empty where nothing else was looked for or given.
+        """
+        prepared, base = self.prepared, None if capture is None else capture.base
+        if base is None and result.ambient is None:
+            return []
+        image = torch.zeros((prepared.every_pixel.operator.shape[0], 3), device=prepared.frozen.device)
+        if result.ambient is not None and self.ambient is not None:
+            exposures = torch.tensor(result.exposures or [1.0] * len(prepared.views))
+            exposures = exposures.to(image)[prepared.every_pixel.view_of]
+            sent = self.ambient * result.ambient.value.to(self.ambient)
+            image = exposures[:, None] * (prepared.every_pixel.operator @ sent)
+        if base is not None:
+            factor = 1.0 if result.base_scale is None else result.base_scale.value.to(image)
+            image = image + factor * prepared.stack_images(base.images, "base")
+        return prepared.split(image)
 
     def render(self, lights: Light | Sequence[Light]) -> list[Float[Tensor, "H W 3"]]:
         """(H, W, 3) image per view of the scene under lights, with the fit's effects; black without any."""

@@ -14,7 +14,10 @@ from rgspipe.fitting.findings import (
     LampsLeftOut,
     LightMissing,
     LightSpare,
+    MaybeAmbient,
     MaybeOneMore,
+    MuchAmbient,
+    NoOpening,
     OnSurface,
     PoorScene,
     Rival,
@@ -50,13 +53,15 @@ class Spoken:
     Attributes:
         count: a given number of lights; takes the number.
         uncounted: a number of lights that is to be found.
+        ambient: light from all around besides.
     """
 
     count: Callable[[int], str]
     uncounted: str
+    ambient: str
 
 
-PYTHON = Spoken("LightSpec(count={})".format, "LightSpec(count=None)")
+PYTHON = Spoken("LightSpec(count={})".format, "LightSpec(count=None)", "LightSpec(ambient=True)")
 
 
 def explained(findings: Sequence[Finding], spoken: Spoken = PYTHON) -> str:
@@ -142,6 +147,19 @@ def _left_out(found: LampsLeftOut, spoken: Spoken) -> str:
     return f"Pixels of lamps in sight were left out: {found.pixels} in {views}."
 
 
+def _much_ambient(found: MuchAmbient, spoken: Spoken) -> str:
+    return f"{percent(found.share)} of the light in the images comes from all around, through openings."
+
+
+def _maybe_ambient(found: MaybeAmbient, spoken: Spoken) -> str:
+    gain = f"Light from all around would lower the cost by {percent(found.gain)}: there may be some"
+    return f"{gain}; allow for it ({spoken.ambient}), or give images with the lamps off."
+
+
+def _no_opening(found: NoOpening, spoken: Spoken) -> str:
+    return "The scene is closed: no light comes in from all around."
+
+
 #: Findings that say more than their status does.
 _WORDS: dict[type[Finding], Callable[..., str]] = {
     LightMissing: _missing,
@@ -156,6 +174,9 @@ _WORDS: dict[type[Finding], Callable[..., str]] = {
     ExposureUnknown: _exposure,
     LampElsewhere: _elsewhere,
     LampsLeftOut: _left_out,
+    MuchAmbient: _much_ambient,
+    MaybeAmbient: _maybe_ambient,
+    NoOpening: _no_opening,
 }
 
 

@@ -81,15 +81,15 @@ class PreparedViews(ViewedPixels):
         _check_masks(checked, "emitters", "1 where a lamp is, 0 elsewhere")
         return [(mask >= 0.5).cpu().numpy() for mask in checked]
 
-    def stack_images(self, images: Sequence[ArrayLike]) -> Tensor:
-        """(all pixels, 3) float32 of one image (H, W, 3) per view.
+    def stack_images(self, images: Sequence[ArrayLike], name: str = "images") -> Tensor:
+        """(all pixels, 3) float32 of one image (H, W, 3) per view, called `name` in errors.
 
         Raises:
             InputError: a wrong number of images, a wrong size, display values, or pixels that are not finite.
         """
-        checked = _one_each("images", images, self.views, (3,))
+        checked = _one_each(name, images, self.views, (3,))
         for index, image in enumerate(checked):
-            check_radiance(f"images[{index}]", float(image.detach().min()), float(image.detach().max()))
+            check_radiance(f"{name}[{index}]", float(image.detach().min()), float(image.detach().max()))
         return torch.cat([image.detach().reshape(-1, 3).float() for image in checked]).to(self.operator.matrix.device)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from rgspipe.errors import InputError
 from rgspipe.fitting.findings import FitStatus
 from rgspipe.fitting.fit import FitViews
 from rgspipe.fitting.model.capture import ImageCapture
@@ -51,9 +52,19 @@ def track_lights(
         options: how.
         search: how frames are searched from nothing.
         capture: of all frames, or one for each.
+
+    Raises:
+        InputError: light from all around, or images with the lamps off of unknown strength, are among the unknowns.
     """
     same = capture is None or isinstance(capture, ImageCapture)
     captures = [capture or ImageCapture()] * len(frames) if same else capture
+    if views.lights.ambient or any(one.base is not None and one.base.scale_free for one in captures):
+        raise InputError(
+            "lights.ambient" if views.lights.ambient else "base",
+            expected="nothing unknown but lights in a sequence",
+            found="light that is there anyway, of unknown strength",
+            remedy="Give images with the lamps off, of known strength, or fit each frame by itself.",
+        )
     taken = list(zip((as_list(images, axes=3) for images in frames), captures, strict=True))
     return _Tracker(views, search or Search(), options or TrackOptions(), taken).run()
 
