@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from rgspipe.fitting.options import TrackOptions
     from rgspipe.fitting.solvers import PaperAdam, Search
     from rgspipe.fitting.tracking.track import track_lights
+    from rgspipe.light_export.export import LightExport, export_lights
     from rgspipe.renderer.ambient import ambient_image
     from rgspipe.renderer.effects import Effects
     from rgspipe.renderer.frozen import FrozenScene
@@ -49,6 +50,7 @@ _HOMES = {
     "fitting.options": ("TrackOptions",),
     "fitting.solvers": ("PaperAdam", "Search"),
     "fitting.tracking.track": ("track_lights",),
+    "light_export.export": ("LightExport", "export_lights"),
     "renderer.ambient": ("ambient_image",),
     "renderer.effects": ("Effects",),
     "renderer.frozen": ("FrozenScene",),
@@ -73,6 +75,7 @@ __all__ = [
     "InputError",
     "LedLight",
     "Light",
+    "LightExport",
     "LightSpec",
     "PanelLight",
     "PaperAdam",
@@ -89,6 +92,7 @@ __all__ = [
     "__version__",
     "ambient_image",
     "exact_surfels",
+    "export_lights",
     "fit_lights",
     "load_ply",
     "load_surfels",
