@@ -186,3 +186,21 @@ def test_the_published_method_takes_only_what_is_given(ready: dict[int, FitViews
     one, other = (views.fit(each, solver=solver, emitters=share > 0.0) for each in (image, brighter))
     assert torch.equal(one.lights[0].position, other.lights[0].position) and len(one.lamps) == 1
     assert views.fit(image, solver=solver).lamps == ()
+
+
+def test_hardly_anything_is_in_sight_besides(ready: dict[int, FitViews]) -> None:
+    """A view without a surface, a lamp in the dark, and views with few pixels, down to none without the lamp's."""
+    views, light = ready[1], lit((0.1, -0.25, 0.2))
+    frozen, (camera, *_) = views.prepared.frozen, room_cameras(8)
+    small = FitViews.prepare(frozen, [camera], mask_edges=False)
+    _, images, _ = painted(small, light, 0.08)
+    away = Camera.look_at([2.0, 0.0, 0.0], [3.0, 0.0, 0.0], width=8, height=8)
+    both = FitViews.prepare(frozen, [camera, away], mask_edges=False)
+    noise = 1e-3 * torch.randn((64, 64, 3), generator=torch.Generator().manual_seed(0))
+    noise[20:24, 30:34] = 5.0
+    assert off(small.fit(images), light) < 1e-4  # of 8², 20 of which are left out
+    tiny = FitViews.prepare(frozen, [room_cameras(4)[0]], mask_edges=False)
+    _, few, _ = painted(tiny, light, 0.2)
+    for ready_views, target in ((tiny, few), (both, both.render(light)), (views, [noise - 0.01])):
+        found, plain = (ready_views.fit(target, emitters=emitters) for emitters in ("auto", None))
+        assert same(found, plain) and found.lamps == ()

@@ -91,7 +91,8 @@ class Lookout:
             np.minimum(shading, level)[sight.surface]
             for sight, shading, level in zip(self.sights, shadings, levels, strict=True)
         ]
-        needed = needed_intensity(self.views.prepared, float(np.concatenate(values).mean()))
+        seen = np.concatenate(values)
+        needed = needed_intensity(self.views.prepared, float(seen.mean()) if seen.size else 0.0)
         return suspects(self.sights, self.greys, needed, bar)
 
     def striking(self) -> list[LampInSight]:
@@ -115,7 +116,7 @@ class Lookout:
 
     def doubtful(self, result: FitResult) -> list[LampInSight]:
         """What is saturated and no longer lit when a fit goes a little further without it."""
-        if not result.lights or not self.saturated:
+        if not result.lights or not self.saturated or not self.enough_without(self.saturated):
             return []
         views = self.without(self.saturated)
         refiner = Refiner.of(views.problem(self.images, self.capture).sharpest())
@@ -132,6 +133,17 @@ class Lookout:
         """The views less the lamps' pixels, looked at first from where the lamps may stand."""
         masks = left_out(lamps, [grey.shape for grey in self.greys])
         return self.views.without(masks, places(self.sights, lamps, self.size))
+
+    def enough_without(self, lamps: Sequence[LampInSight]) -> bool:
+        """Whether most of the trusted pixels are left without the lamps'."""
+        masks = left_out(lamps, [grey.shape for grey in self.greys])
+        out = np.concatenate([mask.reshape(-1) for mask in masks])[self.views.prepared.pixels.cpu().numpy()]
+        return float(out.mean()) < 0.5
+
+    def sure(self, answer: Answer) -> bool:
+        """Whether lights explain what was not left out, and stand where lamps are: pools of light are no lamps."""
+        lamps = located(self.sights, answer.lamps, answer.result.lights, self.size)
+        return not _poor(answer.result) and all(lamp.light is not None for lamp in lamps)
 
     def confirmed(self, lamps: Sequence[LampInSight], result: FitResult) -> list[LampInSight]:
         """Those that a fit without them does not light."""
@@ -174,9 +186,9 @@ def fit_on_lookout(views: TargetViews, images: Tensor, capture: ImageCapture, fi
         return fits.spent(lookout.told(answers[0]))
     whole = fits(views)
     if _poor(whole):
-        possible = [*lookout.suspects(POSSIBLE), *lookout.saturated]
+        possible = lookout.striking() if aimed else [*lookout.suspects(POSSIBLE), *lookout.saturated]
         answers = [*_without_lamps(lookout, fits, possible), *answers]
-        answers = [answer for answer in answers if _far_better(lookout, answer, whole)]
+        answers = [one for one in answers if _far_better(lookout, one, whole) and (not aimed or lookout.sure(one))]
     else:
         answers = _without_lamps(lookout, fits, lookout.doubtful(whole))
     return fits.spent(lookout.told(answers[0]) if answers else whole)
@@ -186,9 +198,11 @@ def _without_lamps(lookout: Lookout, fit: Fit, lamps: Sequence[LampInSight]) -> 
     """A fit without what it does not light of some suspects; none where it lights all of them."""
     answers, kept = [], lamps
     for _ in range(ROUNDS):
-        if not kept:
+        if not kept or not lookout.enough_without(kept):
             return []
         lamps, result = kept, fit(lookout.without(kept))
+        if not result.lights:
+            return []
         kept, answers = lookout.confirmed(lamps, result), [Answer(result, lamps)]
         if _agree(lamps, kept):
             break

@@ -61,7 +61,9 @@ def suspects(views: Sequence[Sight], images: Sequence[Numbers], needed: float, b
 
 def _suspects(index: int, sight: Sight, image: Numbers, needed: float, bar: Bar) -> Iterator[LampInSight]:
     shading = shaded(sight, image)
-    bright = shading > bar.view * usual(sight, shading, bar.compact)
+    level = usual(sight, shading, bar.compact)
+    # Where most of a view is dark, what is lit says nothing of lamps.
+    bright = (shading > bar.view * level) & (level > 0.0)
     for core in parts(bright) if bright.any() else ():
         sends = sent(sight, image, core) >= bar.share * needed
         if sends and np.median(shading[core]) >= bar.around * _around(sight, shading, core, bright):
