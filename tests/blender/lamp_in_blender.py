@@ -21,7 +21,7 @@ SAMPLES = 1024
 
 def _render(studio: Studio, name: str, light: Light, folder: Path) -> None:
     studio.shape(light)
-    studio.render(Frame(name, plane_camera(), PointLight(light.position, light.intensity), 1, False), folder)
+    studio.render(Frame(name, plane_camera(), (PointLight(light.position, light.intensity),), 1, False), folder)
 
 
 def _use_blender_s_spot(spot: SpotLight) -> None:

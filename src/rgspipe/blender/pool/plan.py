@@ -70,7 +70,7 @@ def _plan(job: PoolJob, cameras: list[Camera], index: int, occlusion: str, light
     rng = np.random.default_rng([job.dataset.seed, STREAMS[job.kind], index, 1])
     name, lamp = f"light_{index:04d}", PointLight(light.position, light.intensity)
     frames = tuple(
-        Frame(f"{name}/view_{number}", camera, lamp, int(rng.integers(2**31 - 1)), False)
+        Frame(f"{name}/view_{number}", camera, (lamp,), int(rng.integers(2**31 - 1)), False)
         for number, camera in enumerate(cameras[: job.views])
     )
     return LightPlan(name, occlusion, light, frames)
