@@ -51,10 +51,11 @@ def load_dataset(root: str | Path, *, train: bool = True, test: bool = True, tar
 
 
 def load_split(root: Path, split: str, info: DatasetInfo | None) -> tuple[View, ...]:
-    """The views of transforms_<split>.json, each with its light."""
+    """The views of transforms_<split>.json, each with its light; without lights where no frame names one."""
     entries = read_entries(root / f"transforms_{split}.json", f"the cameras and lights of the {split} views")
+    lit = any(entry.names_light for entry in entries)
     reading = progress_bar(entries, f"reading {split} views", unit="view")
-    return with_saturation(entries, [_load_view(entry, root, info, with_light=True) for entry in reading])
+    return with_saturation(entries, [_load_view(entry, root, info, light=lit, depth=True) for entry in reading])
 
 
 def load_target(folder: str | Path) -> Target:
@@ -73,7 +74,7 @@ def load_target(folder: str | Path) -> Target:
     entries = read_entries(folder / "transforms.json", "the cameras of a fit target")
     entries[0].refuse_other_world()
     info = _target_info(folder, place)
-    views = [_load_view(entry, folder, info, with_light=False) for entry in entries]
+    views = [_load_view(entry, folder, info, light=False, depth=False) for entry in entries]
     return Target(place.name, occlusion, with_saturation(entries, views))
 
 
@@ -129,16 +130,17 @@ class _Surface:
     albedo: torch.Tensor | None
 
 
-def _load_view(entry: FrameEntry, root: Path, info: DatasetInfo | None, *, with_light: bool) -> View:
+def _load_view(entry: FrameEntry, root: Path, info: DatasetInfo | None, *, light: bool, depth: bool) -> View:
+    """A view; it must name its `light`, and say what its `depth` means if it has any."""
     image, alpha = read_colour(entry.image_path)
     camera = entry.camera(image.shape[1], image.shape[0])
     if entry.mask_path is not None:
         mask = read_mask(entry.mask_path, camera)
         image, alpha = image * mask[..., None], alpha * mask
-    surface = _load_surface(entry, camera, info, needed=with_light)
-    light = PointLight(*entry.light()) if with_light else None
+    surface = _load_surface(entry, camera, info, needed=depth)
+    lamp = PointLight(*entry.light()) if light else None
     return View(
-        _name(entry.image_path, root), camera, image, alpha, light, surface.depth, surface.normal, surface.albedo
+        _name(entry.image_path, root), camera, image, alpha, lamp, surface.depth, surface.normal, surface.albedo
     )
 
 
