@@ -32,6 +32,9 @@ from rgspipe.training.regularise import find_neighbours
 #: Weight below which two neighbours are of different surfaces.
 APART = 0.05
 
+#: Difference of two predicted log-albedos at which neighbours count half as one surface.
+PAINT = 0.15
+
 #: Steps of the search for the variances; each is two factorisations.
 VARIANCE_STEPS = 45
 
@@ -67,21 +70,18 @@ class Graph:
     sizes: Numbers
 
     @classmethod
-    def of(cls, surfels: Surfels) -> Graph:
-        """Of surfels that stand where they are."""
+    def of(cls, surfels: Surfels, predicted: Numbers) -> Graph:
+        """Of surfels that stand where they are; neighbours whose `predicted` albedo (N, 3) differs are less of one."""
         spacing = surfel_spacing(surfels.centers.cpu(), surfels.normals.cpu())
         pairs = find_neighbours(surfels.to("cpu"), spacing)
         first, second = (part.numpy() for part in (pairs.first, pairs.second))
         weight = pairs.weight.double().numpy()
+        apart = np.abs(np.log(predicted[first]) - np.log(predicted[second])).max(axis=1)
+        weight = weight / (1.0 + (apart / PAINT) ** 2)
         joined, count = weight > APART, len(surfels)
         adjacency = sp.coo_matrix((weight[joined], (first[joined], second[joined])), (count, count))
         labels = connected_components(adjacency, directed=False)[1]
         return cls(first, second, weight, np.bincount(labels)[labels].astype(np.float64))
-
-    def where_alike(self, values: Numbers, scale: float) -> Graph:
-        """With weights that fall where `values` (N, 3) of neighbours differ by more than `scale` (Cauchy)."""
-        apart = np.abs(values[self.first] - values[self.second]).max(axis=1)
-        return replace(self, weight=self.weight / (1.0 + (apart / scale) ** 2))
 
     @cached_property
     def laplacian(self) -> sp.csc_matrix:
@@ -112,6 +112,10 @@ class Field:
     measured: Numbers
     trust: Numbers
     variances: Variances
+
+    def trusted(self, trust: Numbers) -> Field:
+        """With another trust (N,)."""
+        return replace(self, trust=trust)
 
     @cached_property
     def weight(self) -> Numbers:

@@ -11,7 +11,7 @@ the lamps, in parts of the scene's size, and the logarithms of their intensities
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -78,13 +78,24 @@ class LampProblem:
         frozen: the surfels, for what a lamp sends to each.
         received: what they send each other.
         field: the field that is eliminated.
-        target: (N, 3) log L − log ρ̂.
+        radiance: (N, 3) L.
+        predicted: (N, 3) ρ̂.
+        pixels: (N,) variance of log L by the pixels alone; infinite where none shows the surfel.
+        rays: of the gather, from each surfel.
     """
 
     frozen: FrozenScene
     received: Received
     field: Field
-    target: Numbers
+    radiance: Numbers
+    predicted: Numbers
+    pixels: Numbers
+    rays: int
+
+    @cached_property
+    def target(self) -> Numbers:
+        """(N, 3) log L − log ρ̂."""
+        return np.log(self.radiance) - np.log(self.predicted)
 
     @cached_property
     def size(self) -> float:
@@ -114,6 +125,10 @@ class LampProblem:
     def residual(self, lamps: Lamps | None) -> Numbers:
         """(N, 3) r."""
         return self.target - np.log(self.arriving(lamps))
+
+    def albedo(self, lamps: Lamps) -> Numbers:
+        """(N, 3) the albedo that is most likely under the lamps, also of what was not seen; any number above 0."""
+        return self.predicted * np.exp(self.field.mean(self.residual(lamps)))
 
     def cost(self, lamps: Lamps | None) -> float:
         """What the lamps leave."""
@@ -187,8 +202,3 @@ def _split(step: Tensor) -> tuple[Numbers, Numbers]:
     """Moves (K, 3) and gains (K, 3) of a step (6 K,)."""
     numbers = step.numpy().reshape(-1, NUMBERS)
     return numbers[:, :3], numbers[:, 3:]
-
-
-def with_field(problem: LampProblem, field: Field) -> LampProblem:
-    """The problem with another field."""
-    return replace(problem, field=field)

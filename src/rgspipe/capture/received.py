@@ -11,7 +11,8 @@ the measured radiance becomes.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -30,22 +31,29 @@ class Received:
         gather: (N, N) F.
         unseen: (U,) surfels whose radiance was not measured.
         albedo: (U, 3) of those.
-        known: (N, 3) G, radiance per unit albedo.
+        seen: (N, 3) F_·s L_s, what arrives from the seen.
     """
 
     gather: sp.csr_matrix
     unseen: np.ndarray
     albedo: Numbers
-    known: Numbers
+    seen: Numbers
 
     @classmethod
     def of(cls, gather: sp.csr_matrix, radiance: Numbers, seen: np.ndarray, albedo: Numbers) -> Received:
         """With the measured `radiance` (N, 3) where `seen` (N,) bool, and `albedo` (N, 3) elsewhere."""
         unseen = (~seen).nonzero()[0]
-        first = gather @ np.where(seen[:, None], radiance, 0.0)
-        made = cls(gather, unseen, albedo[unseen], first)
-        known = np.stack([made.spread(first[:, channel : channel + 1], channel)[:, 0] for channel in range(3)], axis=1)
-        return cls(gather, unseen, albedo[unseen], known)
+        return cls(gather, unseen, albedo[unseen], gather @ np.where(seen[:, None], radiance, 0.0))
+
+    def with_albedo(self, albedo: Numbers) -> Received:
+        """With another albedo (N, 3); that of the seen is not looked at."""
+        return replace(self, albedo=albedo[self.unseen])
+
+    @cached_property
+    def known(self) -> Numbers:
+        """(N, 3) G, radiance per unit albedo."""
+        columns = [self.spread(self.seen[:, channel : channel + 1], channel) for channel in range(3)]
+        return np.concatenate(columns, axis=1)
 
     def spread(self, arriving: Numbers, channel: int | None = None) -> Numbers:
         """(N, K) T e of `arriving` (N, K): with what returns from the unseen; by the mean albedo if `channel` is None."""

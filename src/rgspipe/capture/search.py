@@ -8,13 +8,14 @@ that is left out looks like paint, and the more of it there is to explain, the l
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rgspipe.capture.doubts import model_variance, trust
 from rgspipe.capture.lamps import DARK, NUMBERS, LampProblem, Lamps
 from rgspipe.capture.radiance import Numbers
+from rgspipe.training.albedo import ALBEDO_RANGE
 
 #: Candidates that are refined, and least distance of two of them in parts of the scene's size.
 TRIES, APART = 5, 0.14
@@ -34,9 +35,6 @@ WORTH = 4.0
 
 #: Rounds in which outliers, variances and the albedo of the unseen follow from the lamps and these from them.
 ROUNDS = 3
-
-#: Error at which a surfel counts half, in medians of all.
-OUTLIER = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,25 +105,28 @@ def _best_apart(costs: Numbers, places: Numbers, apart: float) -> list[int]:
     return chosen
 
 
-def settled(problem: LampProblem, lamps: Lamps, rounds: int = ROUNDS) -> tuple[LampProblem, Lamps]:
+def settled(problem: LampProblem, lamps: Lamps) -> Tried:
     """With variances, outliers and the albedo of the unseen that belong to the lamps, and lamps that belong to these."""
-    for _ in range(rounds):
-        problem = _reweighted(problem, lamps)
+    for _ in range(ROUNDS):
+        problem = weighed(problem, lamps)
         lamps = problem.refined(problem.lamps(lamps.places, lamps.logs), LAST)
-    return problem, lamps
+    return Tried.of(problem, lamps)
 
 
-def _reweighted(problem: LampProblem, lamps: Lamps) -> LampProblem:
-    residual = problem.residual(lamps)
+def weighed(problem: LampProblem, lamps: Lamps | None) -> LampProblem:
+    """The problem with what belongs to `lamps`: the albedo of the unseen, variances, and trust in the surfels."""
+    measured = problem.pixels + model_variance(problem, lamps, problem.rays)
+    problem = replace(problem, field=replace(problem.field, measured=measured))
+    if lamps is None:
+        return problem
+    albedo = np.clip(problem.albedo(lamps), *ALBEDO_RANGE)
+    problem = replace(problem, received=problem.received.with_albedo(albedo))
+    residual = problem.residual(problem.lamps(lamps.places, lamps.logs))
     field = problem.field.fitted(residual)
-    noise = np.abs(residual - field.mean(residual)).mean(axis=1)
-    used = np.isfinite(field.measured)
-    typical = OUTLIER * max(float(np.median(noise[used])), 1e-4)
-    trust = np.where(used, 1.0 / (1.0 + (noise / typical) ** 2), 0.0)
-    return replace(problem, field=replace(field, trust=trust))
+    return replace(problem, field=field.trusted(trust(field, residual)))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Tried:
     """Lamps of one number.
 
@@ -139,27 +140,67 @@ class Tried:
     lamps: Lamps
     deviance: float
 
-
-def tried(problem: LampProblem, candidates: Candidates, before: Tried | None) -> Tried:
-    """One lamp more than `before`; the same surfels are trusted, so that numbers can be compared."""
-    lamps = with_one_more(problem, candidates, None if before is None else before.lamps)
-    for _ in range(2):
-        problem = replace(problem, field=problem.field.fitted(problem.residual(lamps)))
-        lamps = problem.refined(lamps, LAST)
-    return Tried(problem, lamps, problem.field.deviance(problem.residual(lamps)))
+    @classmethod
+    def of(cls, problem: LampProblem, lamps: Lamps) -> Tried:
+        """With the variances as they are most likely."""
+        residual = problem.residual(lamps)
+        field = problem.field.fitted(residual)
+        return cls(replace(problem, field=field), lamps, field.deviance(residual))
 
 
-def is_worth(fewer: Tried, more: Tried) -> bool:
-    """Whether the lamp that `more` has beyond `fewer` is there."""
+@dataclass(frozen=True, eq=False)
+class OneMore:
+    """Lamps, and the best found that are one more, both by the surfels that the latter trust.
+
+    Attributes:
+        gain: by how much the lamp lowers −2 log p.
+        wanted: by how much it would have to.
+    """
+
+    fewer: Tried
+    more: Tried
+    gain: float
+    wanted: float
+
+    @property
+    def worth(self) -> bool:
+        """Whether that lamp is there."""
+        return self.gain >= self.wanted
+
+
+def one_more(candidates: Candidates, fewer: Tried) -> OneMore:
+    """The best lamps found that are one more than `fewer`."""
+    more = settled(fewer.problem, with_one_more(fewer.problem, candidates, fewer.lamps))
+    again = more.problem.lamps(fewer.lamps.places, fewer.lamps.logs)
+    less = Tried.of(more.problem, more.problem.refined(again, LAST))
     measurements = 3 * int((more.problem.field.weight > 0.0).sum())
-    return fewer.deviance - more.deviance > WORTH * NUMBERS * np.log(measurements)
+    wanted = WORTH * NUMBERS * float(np.log(max(measurements, 2)))
+    return OneMore(less, more, less.deviance - more.deviance, wanted)
 
 
-def found_lamps(problem: LampProblem, candidates: Candidates, count: int | None, most: int) -> Sequence[Tried]:
-    """Lamps of rising number, the last of them the answer, or one that is not worth it behind the answer."""
-    found: list[Tried] = []
-    while len(found) < (count or most):
-        found.append(tried(found[-1].problem if found else problem, candidates, found[-1] if found else None))
-        if count is None and len(found) > 1 and not is_worth(found[-2], found[-1]):
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """Lamps that were found.
+
+    Attributes:
+        best: the lamps.
+        compared: each number with the next, as far as it was asked; the last of them may not be worth it.
+    """
+
+    best: Tried
+    compared: tuple[OneMore, ...]
+
+
+def found_lamps(problem: LampProblem, count: int | None, most: int) -> Answer:
+    """So many lamps, or as many as what was measured calls for, one to `most`."""
+    problem = weighed(problem, None)
+    candidates = Candidates.of(problem)
+    best = settled(problem, with_one_more(problem, candidates, None))
+    compared: list[OneMore] = []
+    while count is None or len(best.lamps) < count:
+        found = one_more(candidates, best)
+        compared.append(found)
+        if count is None and (not found.worth or len(best.lamps) == most):
             break
-    return found
+        best = found.more
+    return Answer(best, tuple(compared))

@@ -1,0 +1,83 @@
+"""How sure the lamps of a capture are, with errors that neighbouring surfels share.
+
+The likelihood takes what is measured at two surfels for independent, apart from the albedo. Errors of the gather, of
+shadows' edges and of the geometry are not: they are those of a corner or of a wall. So the scores of the lamps' numbers
+are added up over blocks of neighbours, and what they vary by from block to block is what they vary by (Liang and Zeger
+1986):
+
+    C = H⁻¹ + H⁻¹ (Σ_b u_b u_bᵀ) H⁻¹ ,    H = Jᵀ Σ⁻¹ J ,    u_b = Σ_(i in b) J_i (Σ⁻¹ r)_i .
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rgspipe.capture.lamps import NUMBERS, LampProblem, Lamps
+from rgspipe.capture.radiance import Numbers
+from rgspipe.renderer.clusters import cluster_patches
+
+#: Blocks of neighbours over the whole scene.
+BLOCKS = 40
+
+#: A lamp whose place is less sure than this part of the scene's size is a guess.
+GUESS = 0.05
+
+#: Standard deviation of the logarithm of all intensities together up to which their scale is tied down.
+TIED = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class Certainty:
+    """What is not known of K lamps.
+
+    Attributes:
+        places: (K, 3, 3) covariance, scene units².
+        gains: (K, 3) standard deviations of the logarithms of the intensities.
+        scale: that of all intensities together; the albedo has the same, the other way round.
+        bounced: part of the light on what was seen that other surfaces send there: what ties the scale down.
+    """
+
+    places: Numbers
+    gains: Numbers
+    scale: float
+    bounced: float
+
+    @classmethod
+    def of(cls, problem: LampProblem, lamps: Lamps) -> Certainty:
+        """Of lamps as they were fitted."""
+        covariance = _covariance(problem, lamps)
+        count, size = len(lamps), problem.size
+        numbers = covariance.reshape(count, NUMBERS, count, NUMBERS)
+        own = numbers[np.arange(count), :, np.arange(count)]
+        every = np.zeros((count, NUMBERS))
+        every[:, 3:] = 1.0 / (3 * count)
+        scale = every.reshape(-1) @ covariance @ every.reshape(-1)
+        used = problem.field.weight > 0.0
+        arriving = problem.arriving(lamps)[used]
+        bounced = float(np.median(problem.received.known[used] / arriving))
+        gains = np.sqrt(np.diagonal(own[:, 3:, 3:], axis1=1, axis2=2))
+        return cls(size**2 * own[:, :3, :3], gains, float(np.sqrt(scale)), bounced)
+
+    def spread(self, size: float) -> Numbers:
+        """(K,) standard deviation of the distance of each lamp from where it is said to be, in parts of `size`."""
+        return np.sqrt(np.trace(self.places, axis1=1, axis2=2)) / size
+
+    @property
+    def is_tied(self) -> bool:
+        """Whether intensities and albedo are known, and not only their product."""
+        return self.scale <= TIED
+
+
+def _covariance(problem: LampProblem, lamps: Lamps) -> Numbers:
+    """(6 K, 6 K) C of the lamps' numbers."""
+    residual, jacobian = problem.residual(lamps), problem.jacobian(lamps)
+    whitened = problem.field.whitened(residual)
+    scores = np.einsum("cnd,nc->nd", jacobian, whitened)
+    surfels = problem.frozen.surfels
+    blocks = cluster_patches(surfels.centers.double(), surfels.normals, BLOCKS, seed=0)
+    sums = np.zeros((int(blocks.max()) + 1, scores.shape[1]))
+    np.add.at(sums, blocks, scores)
+    inverse = problem.covariance(lamps)
+    return inverse + inverse @ (sums.T @ sums) @ inverse
