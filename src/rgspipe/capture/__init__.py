@@ -1,1 +1,1 @@
-"""x"""
+"""Rooms from ordinary photographs: under which lamps they were taken, and what the surfaces reflect, both unknown."""

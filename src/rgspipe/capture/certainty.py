@@ -1,16 +1,16 @@
 """How sure the lamps of a capture are, with errors that neighbouring surfels share.
 
 The likelihood takes what is measured at two surfels for independent, apart from the albedo. Errors of the gather, of
-shadows' edges and of the geometry are not: they are those of a corner or of a wall. So the scores of the lamps' numbers
-are added up over blocks of neighbours, and what they vary by from block to block is what they vary by (Liang and Zeger
-1986):
+shadows' edges and of the geometry are not: they are those of a corner or of a wall. So the lamps are fitted again
+without each of B parts of the scene, and what they vary by is what they are known to (the jackknife of Quenouille and
+Tukey, with blocks as Künsch 1989 has them), beside what the likelihood knows:
 
-    C = H⁻¹ + H⁻¹ (Σ_b u_b u_bᵀ) H⁻¹ ,    H = Jᵀ Σ⁻¹ J ,    u_b = Σ_(i in b) J_i (Σ⁻¹ r)_i .
+    C = (Jᵀ Σ⁻¹ J)⁻¹ + (B − 1)/B Σ_b (θ_b − θ̄)(θ_b − θ̄)ᵀ .
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,8 +18,8 @@ from rgspipe.capture.lamps import NUMBERS, LampProblem, Lamps
 from rgspipe.capture.radiance import Numbers
 from rgspipe.renderer.clusters import cluster_patches
 
-#: Blocks of neighbours over the whole scene.
-BLOCKS = 40
+#: Blocks of neighbours over the whole scene, and steps of the lamps without one of them.
+BLOCKS, STEPS = 12, 6
 
 #: A lamp whose place is less sure than this part of the scene's size is a guess.
 GUESS = 0.05
@@ -72,12 +72,19 @@ class Certainty:
 
 def _covariance(problem: LampProblem, lamps: Lamps) -> Numbers:
     """(6 K, 6 K) C of the lamps' numbers."""
-    residual, jacobian = problem.residual(lamps), problem.jacobian(lamps)
-    whitened = problem.field.whitened(residual)
-    scores = np.einsum("cnd,nc->nd", jacobian, whitened)
     surfels = problem.frozen.surfels
     blocks = cluster_patches(surfels.centers.double(), surfels.normals, BLOCKS, seed=0)
-    sums = np.zeros((int(blocks.max()) + 1, scores.shape[1]))
-    np.add.at(sums, blocks, scores)
-    inverse = problem.covariance(lamps)
-    return inverse + inverse @ (sums.T @ sums) @ inverse
+    found = np.stack([_numbers(problem, _without(problem, lamps, blocks == block)) for block in np.unique(blocks)])
+    apart = found - found.mean(axis=0)
+    return problem.covariance(lamps) + (len(found) - 1) / len(found) * (apart.T @ apart)
+
+
+def _without(problem: LampProblem, lamps: Lamps, left_out: np.ndarray) -> Lamps:
+    """The lamps as they would be without the measurements that are `left_out` (N,) bool."""
+    field = problem.field.trusted(np.where(left_out, 0.0, problem.field.trust))
+    return replace(problem, field=field).refined(lamps, STEPS)
+
+
+def _numbers(problem: LampProblem, lamps: Lamps) -> Numbers:
+    """(6 K,) the lamps' numbers."""
+    return np.concatenate([lamps.places / problem.size, lamps.logs], axis=1).reshape(-1)

@@ -59,10 +59,16 @@ class Lamps:
         """(N, 3) what arrives from all of them."""
         return np.einsum("knc,kc->nc", self.shares, np.exp(self.logs))
 
+    def sent(self, areas: Numbers) -> Numbers:
+        """(K,) flux of each on surfels of `areas` (N,), all channels together."""
+        return np.einsum("knc,kc,n->k", self.shares, np.exp(self.logs), areas)
+
     def lights(self) -> tuple[PointLight, ...]:
         """They as lights, W/sr."""
         intensities = np.pi * np.exp(self.logs)
-        return tuple(PointLight(torch.tensor(x), torch.tensor(a)) for x, a in zip(self.places, intensities, strict=True))
+        return tuple(
+            PointLight(torch.tensor(x), torch.tensor(a)) for x, a in zip(self.places, intensities, strict=True)
+        )
 
     def at(self, chosen: Sequence[int]) -> Lamps:
         """Some of them."""

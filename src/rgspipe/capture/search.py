@@ -2,8 +2,10 @@
 
 A candidate beside the lamps that are known is ranked with the intensity that suits it, in one grey channel, by a few
 steps of Gauss and Newton that all candidates take at once. The best are refined. One lamp more is there if it makes
-what was measured so much more likely, with the variances of the albedo estimated anew for either number of lamps: a lamp
-that is left out looks like paint, and the more of it there is to explain, the less is paint expected to change.
+what was measured so much more likely, with the variances of the albedo estimated anew for either number: a lamp that is left out looks
+like paint, and the more of it there is to explain, the less is paint expected to change. How much is enough is what a
+light of a fit has to lower its cost by (`fitting.options.BarOptions`), as p is one of squares: of n measurements a share
+g of their squares is worth −n log(1 − g) of −2 log p.
 """
 
 from __future__ import annotations
@@ -13,8 +15,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rgspipe.capture.doubts import model_variance, trust
-from rgspipe.capture.lamps import DARK, NUMBERS, LampProblem, Lamps
+from rgspipe.capture.lamps import DARK, LampProblem, Lamps
 from rgspipe.capture.radiance import Numbers
+from rgspipe.fitting.options import BarOptions
 from rgspipe.training.albedo import ALBEDO_RANGE
 
 #: Candidates that are refined, and least distance of two of them in parts of the scene's size.
@@ -29,9 +32,8 @@ LONGEST_GAIN = 1.5
 #: Candidates that are ranked at once.
 BATCH = 128
 
-#: Parts of −2 log p that one more lamp has to lower for each of its numbers and each e-fold of measurements (Schwarz
-#: 1978 has 1). Errors of gather and geometry are not independent from surfel to surfel, as the likelihood has it.
-WORTH = 4.0
+#: How much one more lamp has to explain.
+BAR = BarOptions()
 
 #: Rounds in which outliers, variances and the albedo of the unseen follow from the lamps and these from them.
 ROUNDS = 3
@@ -106,7 +108,7 @@ def _best_apart(costs: Numbers, places: Numbers, apart: float) -> list[int]:
 
 
 def settled(problem: LampProblem, lamps: Lamps) -> Tried:
-    """With variances, outliers and the albedo of the unseen that belong to the lamps, and lamps that belong to these."""
+    """With variances, outliers and unseen albedo that belong to the lamps, and lamps that belong to these."""
     for _ in range(ROUNDS):
         problem = weighed(problem, lamps)
         lamps = problem.refined(problem.lamps(lamps.places, lamps.logs), LAST)
@@ -153,14 +155,23 @@ class OneMore:
     """Lamps, and the best found that are one more, both by the surfels that the latter trust.
 
     Attributes:
-        gain: by how much the lamp lowers −2 log p.
-        wanted: by how much it would have to.
+        gain: share of the squares that the lamp explains.
+        wanted: the share that it has to.
     """
 
     fewer: Tried
     more: Tried
     gain: float
     wanted: float
+
+    @classmethod
+    def between(cls, fewer: Tried, more: Tried) -> OneMore:
+        """By the variances that are most likely for either."""
+        measurements = 3 * int((more.problem.field.weight > 0.0).sum())
+        gain = 1.0 - float(np.exp(min(0.0, more.deviance - fewer.deviance) / max(measurements, 1)))
+        sent = more.lamps.sent(more.problem.frozen.areas.double().cpu().numpy())
+        faint = sent.min() < BAR.faint * sent.sum()
+        return cls(fewer, more, gain, BAR.least_faint if faint else BAR.least)
 
     @property
     def worth(self) -> bool:
@@ -173,9 +184,7 @@ def one_more(candidates: Candidates, fewer: Tried) -> OneMore:
     more = settled(fewer.problem, with_one_more(fewer.problem, candidates, fewer.lamps))
     again = more.problem.lamps(fewer.lamps.places, fewer.lamps.logs)
     less = Tried.of(more.problem, more.problem.refined(again, LAST))
-    measurements = 3 * int((more.problem.field.weight > 0.0).sum())
-    wanted = WORTH * NUMBERS * float(np.log(max(measurements, 2)))
-    return OneMore(less, more, less.deviance - more.deviance, wanted)
+    return OneMore.between(less, more)
 
 
 @dataclass(frozen=True, eq=False)
