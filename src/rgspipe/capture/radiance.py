@@ -31,8 +31,14 @@ LEAST_COVERAGE = 0.9
 #: Weight of pixels beside edges: they say where nothing else does.
 EDGE_WEIGHT = 0.03
 
-#: Rounds of reweighting, and steps that exposures and radiance take in turn.
-ROUNDS, TURNS = 4, 30
+#: Surfels with a larger part of their pixels saturated are brighter than the rest of them say.
+MOST_CLIPPED = 0.3
+
+#: Rounds of reweighting.
+ROUNDS = 4
+
+#: Draws of the pixels' errors, by which variances are known to a fifth.
+DRAWS = 48
 
 #: Relative error at which a pixel counts half, in medians of all.
 OUTLIER = 3.0
@@ -80,17 +86,25 @@ def measured_radiance(
     base = np.concatenate([_base(*pair) for pair in zip(weights, views, strict=True)])
     exposures, robust = np.ones(len(views)), np.ones(len(base))
     floor = FLOOR * np.quantile(image.mean(axis=1)[base > 0.0], 0.99) if (base > 0.0).any() else 1.0
-    for _ in range(ROUNDS):
+    for turn in range(ROUNDS):
         weight = base * robust
         if free_exposure:
-            exposures = _exposures(rows, image, of_view, weight, len(views))
+            shown = None if turn == 0 else shown.mean(axis=1)
+            exposures = _exposures(rows, image.mean(axis=1), of_view, weight, shown)
         level = exposures[of_view][:, None]
-        radiance, seen = _radiance(rows, image / level, weight)
+        radiance, seen, normal = _radiance(rows, image / level, weight)
         shown = rows @ radiance
         relative = (image / level - shown).mean(axis=1) / (shown.mean(axis=1) + floor)
         error = float(np.median(np.abs(relative[base == 1.0]))) if (base == 1.0).any() else 0.0
         robust = 1.0 / (1.0 + (relative / max(OUTLIER * error, 1e-6)) ** 2)
-    return _measured(rows, weight, relative * (shown.mean(axis=1) + floor), radiance, seen, exposures, error)
+    off = relative * (shown.mean(axis=1) + floor)
+    variance = _log_variance(rows, weight, off, normal, radiance)
+    seen = np.where(_clipped(rows, views) > MOST_CLIPPED, 0.0, seen)
+    known = seen > 0.0
+    middle = np.median(radiance[known], axis=0) if known.any() else np.ones(3)
+    least = 1e-6 * np.maximum(middle, 1e-300)
+    radiance = np.where(known[:, None], np.maximum(radiance, least), middle)
+    return Measured(radiance, np.where(known, variance, np.inf), seen, exposures, error)
 
 
 def _base(weights: ViewWeights, view: View) -> Numbers:
@@ -101,50 +115,68 @@ def _base(weights: ViewWeights, view: View) -> Numbers:
     return np.where(edges.numpy(), EDGE_WEIGHT, 1.0) * whole.double().numpy()
 
 
-def _radiance(rows: sp.csr_matrix, image: Numbers, weight: Numbers) -> tuple[Numbers, Numbers]:
-    """(N, 3) radiance, and (N,) how much of the pixels shows each surfel."""
+def _clipped(rows: sp.csr_matrix, views: Sequence[View]) -> Numbers:
+    """(N,) part of the pixels of each surfel that are saturated."""
+    saturated = np.concatenate([view.saturated.any(dim=-1).reshape(-1).double().numpy() for view in views])
+    return (rows.T @ saturated) / np.maximum(np.asarray(rows.sum(axis=0)).ravel(), 1e-12)
+
+
+def _radiance(rows: sp.csr_matrix, image: Numbers, weight: Numbers) -> tuple[Numbers, Numbers, sp.linalg.SuperLU]:
+    """(N, 3) radiance, (N,) how much of the pixels shows each surfel, and the normal equations."""
     weighted = rows.multiply(weight[:, None]).tocsr()
     seen = np.asarray(weighted.sum(axis=0)).ravel()
     mean = (weighted.T @ image) / np.maximum(seen, 1e-12)[:, None]
     pull = PULL * seen + 1e-9
-    normal = (rows.T @ weighted + sp.diags(pull)).tocsc()
+    normal = factorised((rows.T @ weighted + sp.diags(pull)).tocsc())
     right = weighted.T @ image + pull[:, None] * mean
-    return np.maximum(factorised(normal).solve(right), 0.0), seen
+    return np.maximum(normal.solve(right), 0.0), seen, normal
 
 
-def _exposures(rows: sp.csr_matrix, image: Numbers, of_view: NDArray[np.intp], weight: Numbers, count: int) -> Numbers:
-    """(V,) factors by which photographs of the same surfels differ: means over surfels and over views, in turn."""
-    weighted = rows.multiply(weight[:, None]).tocsr()
-    seen = np.maximum(np.asarray(weighted.sum(axis=0)).ravel(), 1e-12)
-    grey, exposures = image.mean(axis=1), np.ones(count)
-    for _ in range(TURNS):
-        radiance = (weighted.T @ (grey / exposures[of_view])) / seen
-        shown = rows @ radiance
-        over = np.bincount(of_view, weight * grey * shown, count)
-        exposures = over / np.maximum(np.bincount(of_view, weight * shown**2, count), 1e-300)
-        exposures = np.where(exposures > 0.0, exposures, 1.0)
-        exposures /= np.exp(np.log(exposures).mean())
-    return exposures
+def _exposures(
+    rows: sp.csr_matrix, grey: Numbers, of_view: NDArray[np.intp], weight: Numbers, shown: Numbers | None
+) -> Numbers:
+    """(V,) factors by which photographs of the same surfels differ, of mean logarithm 0.
+
+    Args:
+        grey: (P,) pixels.
+        shown: (P,) what they would be without the factors; None before anything is known of it.
+    """
+    count = int(of_view.max()) + 1
+    if shown is None:
+        return _first_exposures(
+            rows, grey, sp.csr_matrix((weight, (of_view, np.arange(len(weight)))), (count, len(grey)))
+        )
+    over, under = (np.bincount(of_view, weight * values, count) for values in (grey * shown, shown**2))
+    gains = np.log(np.where(over > 0.0, over, 1.0) / np.where(over > 0.0, under, 1.0))
+    return np.exp(gains - gains.mean())
 
 
-def _measured(
-    rows: sp.csr_matrix,
-    weight: Numbers,
-    off: Numbers,
-    radiance: Numbers,
-    seen: Numbers,
-    exposures: Numbers,
-    error: float,
-) -> Measured:
-    """With the variance that pixels which are `off` (P,) by so much leave in the logarithm of each surfel's mean."""
-    squares = rows.T @ (weight * off**2)
-    grey = np.maximum(radiance.mean(axis=1), 1e-300)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        variance = np.where(seen > 0.0, squares / seen**2 / grey**2, np.inf)
-    known = seen > 0.0
-    middle = np.median(radiance[known], axis=0) if known.any() else np.ones(3)
-    least = 1e-6 * np.maximum(middle, 1e-300)
-    return Measured(np.where(known[:, None], np.maximum(radiance, least), middle), variance, seen, exposures, error)
+def _first_exposures(rows: sp.csr_matrix, grey: Numbers, views: sp.csr_matrix) -> Numbers:
+    """The same by surfels' means: their logarithms l_vi are g_v + r_i, and r is eliminated.
+
+    Args:
+        views: (V, P) the pixels' weights in the row of their photograph.
+    """
+    shown = (views @ rows).toarray()
+    mean = (views @ rows.multiply(grey[:, None]).tocsr()).toarray() / np.maximum(shown, 1e-12)
+    counted = np.where((shown >= 1.0) & (mean > 0.0), shown, 0.0)
+    logs = np.log(np.where(counted > 0.0, mean, 1.0))
+    total = np.maximum(counted.sum(axis=0), 1e-12)
+    laplacian = np.diag(counted.sum(axis=1)) - (counted / total) @ counted.T
+    right = (counted * (logs - (counted * logs).sum(axis=0) / total)).sum(axis=1)
+    gains = np.linalg.lstsq(laplacian, right, rcond=1e-9)[0]
+    return np.exp(gains - gains.mean())
+
+
+def _log_variance(
+    rows: sp.csr_matrix, weight: Numbers, off: Numbers, normal: sp.linalg.SuperLU, radiance: Numbers
+) -> Numbers:
+    """(N,) variance of the logarithm of the radiance, by draws of what pixels are `off` (P,) by."""
+    rng = np.random.default_rng(0)
+    noise = (weight * off)[:, None] * rng.standard_normal((len(off), DRAWS))
+    squared = (normal.solve(rows.T @ noise) ** 2).mean(axis=1)
+    grey = radiance.mean(axis=1)
+    return np.where(grey > 0.0, squared / np.where(grey > 0.0, grey, 1.0) ** 2, np.inf)
 
 
 def factorised(matrix: sp.csc_matrix) -> sp.linalg.SuperLU:
