@@ -37,6 +37,8 @@ if TYPE_CHECKING:
 
 #: Where the public names live; they are imported when first used, so that `import rgspipe` stays quick.
 _HOMES = {
+    "capture.captured": ("Captured", "capture_scene"),
+    "capture.options": ("CaptureOptions",),
     "datasets.light_file": ("read_lights", "write_lights"),
     "datasets.location": ("load_views",),
     "datasets.ply": ("PlyOptions", "save_ply"),
@@ -59,6 +61,8 @@ _HOMES = {
 
 __all__ = [
     "Camera",
+    "CaptureOptions",
+    "Captured",
     "CornellBox",
     "Corridor",
     "Effects",
@@ -82,6 +86,7 @@ __all__ = [
     "Trained",
     "View",
     "__version__",
+    "capture_scene",
     "exact_surfels",
     "fit_lights",
     "load_ply",

@@ -5,7 +5,9 @@ shadows' edges and of the geometry are not: they are those of a corner or of a w
 without each of B parts of the scene, and what they vary by is what they are known to (the jackknife of Quenouille and
 Tukey, with blocks as Künsch 1989 has them), beside what the likelihood knows:
 
-    C = (Jᵀ Σ⁻¹ J)⁻¹ + (B − 1)/B Σ_b (θ_b − θ̄)(θ_b − θ̄)ᵀ .
+    C = (Jᵀ Σ⁻¹ J)⁻¹ + (B − 1)/B Σ_b (θ_b − θ̄)(θ_b − θ̄)ᵀ ,
+
+and to no place better than surfels resolve light.
 """
 
 from __future__ import annotations
@@ -17,9 +19,14 @@ import numpy as np
 from rgspipe.capture.lamps import NUMBERS, LampProblem, Lamps
 from rgspipe.capture.radiance import Numbers
 from rgspipe.renderer.clusters import cluster_patches
+from rgspipe.scene.spacing import surfel_spacing
 
 #: Blocks of neighbours over the whole scene, and steps of the lamps without one of them.
 BLOCKS, STEPS = 12, 6
+
+#: No coordinate is known better than to this part of the distance of neighbours, over which light is taken for even:
+#: with 2000 to 4000 surfels in a Cornell box lamps were 0.1 to 0.3 of it off where the rest of C said 0.05.
+RESOLVED = 0.1
 
 #: A lamp whose place is less sure than this part of the scene's size is a guess.
 GUESS = 0.05
@@ -51,6 +58,7 @@ class Certainty:
         count, size = len(lamps), problem.size
         numbers = covariance.reshape(count, NUMBERS, count, NUMBERS)
         own = numbers[np.arange(count), :, np.arange(count)]
+        places = size**2 * own[:, :3, :3] + (RESOLVED * _spacing(problem)) ** 2 * np.eye(3)
         every = np.zeros((count, NUMBERS))
         every[:, 3:] = 1.0 / (3 * count)
         scale = every.reshape(-1) @ covariance @ every.reshape(-1)
@@ -58,7 +66,7 @@ class Certainty:
         arriving = problem.arriving(lamps)[used]
         bounced = float(np.median(problem.received.known[used] / arriving))
         gains = np.sqrt(np.diagonal(own[:, 3:, 3:], axis1=1, axis2=2))
-        return cls(size**2 * own[:, :3, :3], gains, float(np.sqrt(scale)), bounced)
+        return cls(places, gains, float(np.sqrt(scale)), bounced)
 
     def spread(self, size: float) -> Numbers:
         """(K,) standard deviation of the distance of each lamp from where it is said to be, in parts of `size`."""
@@ -68,6 +76,12 @@ class Certainty:
     def is_tied(self) -> bool:
         """Whether intensities and albedo are known, and not only their product."""
         return self.scale <= TIED
+
+
+def _spacing(problem: LampProblem) -> float:
+    """Distance of neighbours, scene units."""
+    surfels = problem.frozen.surfels
+    return surfel_spacing(surfels.centers.cpu(), surfels.normals.cpu())
 
 
 def _covariance(problem: LampProblem, lamps: Lamps) -> Numbers:

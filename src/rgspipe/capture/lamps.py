@@ -1,4 +1,4 @@
-"""Lamps that explain the measured radiance whatever the albedo is: the problem that Levenberg and Marquardt's steps solve.
+"""Lamps that explain the measured radiance whatever the albedo is, as a problem of least squares.
 
 With d = Σ a T e(x) + G what arrives, the residual is
 

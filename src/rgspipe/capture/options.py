@@ -17,7 +17,7 @@ class CaptureOptions(Options):
     most: int = option(4, low=1, high=8)
     """most lamps that are looked for where their number is not known"""
     exposure: Literal["same", "free"] = "same"
-    """whether all photographs were exposed alike, or each has an exposure of its own, which is found by what they share"""
+    """whether all photographs were exposed alike, or each has its own exposure, found by what they share"""
     albedo_prior: Literal["none", "dataset"] = "none"
     """what is known of the albedo: nothing, or the albedo maps of the training views, from any method and up to a scale
     of each image"""

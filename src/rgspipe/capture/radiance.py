@@ -84,20 +84,19 @@ def measured_radiance(
     image = np.concatenate([view.image.reshape(-1, 3).double().numpy() for view in views])
     of_view = np.repeat(np.arange(len(views)), [view.camera.pixel_count for view in views])
     base = np.concatenate([_base(*pair) for pair in zip(weights, views, strict=True)])
-    exposures, robust = np.ones(len(views)), np.ones(len(base))
+    exposures, robust, shown = np.ones(len(views)), np.ones(len(base)), None
     floor = FLOOR * np.quantile(image.mean(axis=1)[base > 0.0], 0.99) if (base > 0.0).any() else 1.0
-    for turn in range(ROUNDS):
+    for _ in range(ROUNDS):
         weight = base * robust
         if free_exposure:
-            shown = None if turn == 0 else shown.mean(axis=1)
             exposures = _exposures(rows, image.mean(axis=1), of_view, weight, shown)
         level = exposures[of_view][:, None]
         radiance, seen, normal = _radiance(rows, image / level, weight)
-        shown = rows @ radiance
-        relative = (image / level - shown).mean(axis=1) / (shown.mean(axis=1) + floor)
+        shown = (rows @ radiance).mean(axis=1)
+        off = (image / level).mean(axis=1) - shown
+        relative = off / (shown + floor)
         error = float(np.median(np.abs(relative[base == 1.0]))) if (base == 1.0).any() else 0.0
         robust = 1.0 / (1.0 + (relative / max(OUTLIER * error, 1e-6)) ** 2)
-    off = relative * (shown.mean(axis=1) + floor)
     variance = _log_variance(rows, weight, off, normal, radiance)
     seen = np.where(_clipped(rows, views) > MOST_CLIPPED, 0.0, seen)
     known = seen > 0.0

@@ -56,7 +56,7 @@ class Received:
         return np.concatenate(columns, axis=1)
 
     def spread(self, arriving: Numbers, channel: int | None = None) -> Numbers:
-        """(N, K) T e of `arriving` (N, K): with what returns from the unseen; by the mean albedo if `channel` is None."""
+        """(N, K) T e of `arriving` (N, K), with what returns from the unseen; grey if `channel` is None."""
         if not len(self.unseen):
             return arriving
         albedo = self.albedo.mean(axis=1) if channel is None else self.albedo[:, channel]

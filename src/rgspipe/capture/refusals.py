@@ -17,18 +17,20 @@ from rgspipe.renderer.view_weights import ViewWeights
 #: Surfels that two photographs have to share for one exposure to follow from the other, and how many pixels show one.
 SHARED, SHOWN = 10, 0.3
 
-#: Least part of the surfels that has to be measured.
-LEAST_MEASURED = 0.05
+#: Least part of the surfels that has to be measured, and to be brighter than DARK times the brightest pixel.
+LEAST_MEASURED, DARK = 0.05, 1e-4
 
 
 def check_views(views: Sequence[View], where: str | Path) -> None:
     """Refuse photographs with lights of their own.
 
     Raises:
-        InputError: there is no photograph, or one has a known light.
+        InputError: there is no photograph, all are black, or one has a known light.
     """
     if not views:
         raise InputError(where, expected="photographs", found="none", remedy="Add some to transforms_train.json.")
+    if not max(float(view.image.max()) for view in views) > 0.0:
+        raise _black(where)
     lit = [view for view in views if view.light is not None]
     if lit:
         raise InputError(
@@ -80,10 +82,14 @@ def check_measured(seen: np.ndarray, radiance: Numbers, views: Sequence[View], w
             remedy="Expose less, or use linear EXR; check the poses if nothing is saturated.",
         )
     brightest = max(float(view.image.max()) for view in views)
-    if not brightest > 0.0 or not (radiance[seen].mean(axis=1) > 1e-4 * brightest).mean() > LEAST_MEASURED:
-        raise InputError(
-            where,
-            expected="photographs of surfaces that light falls on",
-            found="images that are black but for some pixels",
-            remedy="Switch the lamps on, or expose more; walls that reflect nothing tell nothing of lamps.",
-        )
+    if not (radiance[seen].mean(axis=1) > DARK * brightest).mean() > LEAST_MEASURED:
+        raise _black(where)
+
+
+def _black(where: str | Path) -> InputError:
+    return InputError(
+        where,
+        expected="photographs of surfaces that light falls on",
+        found="images that are black, but for some pixels at most",
+        remedy="Switch the lamps on, or expose more; walls that reflect nothing tell nothing of lamps.",
+    )

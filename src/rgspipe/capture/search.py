@@ -2,10 +2,10 @@
 
 A candidate beside the lamps that are known is ranked with the intensity that suits it, in one grey channel, by a few
 steps of Gauss and Newton that all candidates take at once. The best are refined. One lamp more is there if it makes
-what was measured so much more likely, with the variances of the albedo estimated anew for either number: a lamp that is left out looks
-like paint, and the more of it there is to explain, the less is paint expected to change. How much is enough is what a
-light of a fit has to lower its cost by (`fitting.options.BarOptions`), as p is one of squares: of n measurements a share
-g of their squares is worth −n log(1 − g) of −2 log p.
+what was measured so much more likely, with the variances of the albedo estimated anew for either number: a lamp that is
+left out looks like paint, and the more of it there is to explain, the less is paint expected to change. How much is
+enough is what a light of a fit has to lower its cost by (`fitting.options.BarOptions`): of n measurements a share g of
+their squares is worth −n log(1 − g) of −2 log p.
 """
 
 from __future__ import annotations
