@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING, Any
 from rgspipe.threads import settle_threads
 
 if TYPE_CHECKING:
+    from rgspipe.capture.captured import Captured, capture_scene
+    from rgspipe.capture.options import CaptureOptions
     from rgspipe.datasets.light_file import read_lights, write_lights
     from rgspipe.datasets.location import load_views
     from rgspipe.datasets.ply import PlyOptions, save_ply

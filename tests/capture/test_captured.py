@@ -51,13 +51,6 @@ def test_the_albedo_is_that_of_the_paint() -> None:
     room = painted_room()
     measured = (found().answer.best.problem.field.weight > 0.0)[: len(room)]
     off = np.log(found().surfels.albedo[: len(room)].numpy() / room.albedo.numpy())[measured]
-    print(
-        "ALB",
-        np.median(np.abs(off)),
-        errors(found()),
-        found().certainty.scale,
-        found().certainty.spread(found().frozen.size),
-    )
     assert np.median(np.abs(off)) < 0.05, np.median(np.abs(off))
 
 
@@ -66,7 +59,6 @@ def test_a_scene_under_the_found_lamps_looks_as_it_was_photographed() -> None:
     view = photographs()[3]
     with torch.no_grad():
         error = (frozen.render(view.camera, found().lamps) - view.image).square().mean().sqrt()
-    print("IMG", float(error / view.image.square().mean().sqrt()))
     assert float(error / view.image.square().mean().sqrt()) < 0.05
 
 

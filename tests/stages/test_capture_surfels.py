@@ -71,4 +71,3 @@ def test_it_says_how_far_lamps_are_from_those_that_are_known_to_have_been_on(out
     assert metrics["truth"]["position_error"][0] < 0.015, metrics["truth"]
     assert abs(metrics["truth"]["intensity_ratio"][0] - 1.0) < 0.15, metrics["truth"]
     assert metrics["words"].startswith("1 lamp was on")
-    print("STAGE", metrics["truth"])

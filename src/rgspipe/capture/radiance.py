@@ -44,8 +44,9 @@ DRAWS = 48
 OUTLIER = 3.0
 
 #: Pull towards the mean of the pixels, over the weight of the pixels: neighbours overlap, so that their difference is
-#: known worse than their mean.
-PULL = 0.05
+#: known worse than their mean. The mean is smoother than the radiance is, which costs light where it changes fast: in a
+#: painted room a pull of 0.05 leaves the intensities of lamps 5 % too small, one of 0.01 has them 1 % too large.
+PULL = 0.01
 
 #: Part of the bright pixels' radiance that is added to a pixel's own before errors are relative to it.
 FLOOR = 0.02
