@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING, Any
 from rgspipe.threads import settle_threads
 
 if TYPE_CHECKING:
+    from rgspipe.capture.captured import Captured, capture_scene
+    from rgspipe.capture.options import CaptureOptions
     from rgspipe.datasets.light_file import read_ambient, read_lights, write_lights
     from rgspipe.datasets.location import load_views
     from rgspipe.datasets.ply import PlyOptions, save_ply
@@ -40,6 +42,8 @@ if TYPE_CHECKING:
 #: Where the public names live; they are imported when first used, so that `import rgspipe` stays quick.
 _HOMES = {
     "datasets.light_file": ("read_ambient", "read_lights", "write_lights"),
+    "capture.captured": ("Captured", "capture_scene"),
+    "capture.options": ("CaptureOptions",),
     "datasets.location": ("load_views",),
     "datasets.ply": ("PlyOptions", "save_ply"),
     "datasets.surfel_file": ("load_surfels", "save_surfels"),
@@ -64,6 +68,8 @@ _HOMES = {
 __all__ = [
     "BaseImages",
     "Camera",
+    "CaptureOptions",
+    "Captured",
     "CornellBox",
     "Corridor",
     "Effects",
@@ -91,6 +97,7 @@ __all__ = [
     "View",
     "__version__",
     "ambient_image",
+    "capture_scene",
     "exact_surfels",
     "export_lights",
     "fit_lights",

@@ -30,7 +30,7 @@ def _frame(name: str, origin: tuple, height: float, seed: int) -> Frame:
     pose = look_at(torch.tensor(origin), torch.zeros(3))
     camera = Camera.from_field_of_view(pose, 1.0, 16, 16)
     light = PointLight(torch.tensor([0.1, -0.2, height]).double(), torch.tensor([0.5, 1.0, 2.0]).double())
-    return Frame(name, camera, light, seed, True)
+    return Frame(name, camera, (light,), seed, True)
 
 
 def plane(folder: Path) -> None:

@@ -22,7 +22,7 @@ SAMPLES = 1024
 
 
 def _render(studio: Studio, name: str, light: Light, folder: Path) -> None:
-    studio.render(Frame(name, plane_camera(), light, 1, False), folder)
+    studio.render(Frame(name, plane_camera(), (light,), 1, False), folder)
 
 
 def _blender_s_spot(lamp: bpy.types.Object, spot: SpotLight) -> None:

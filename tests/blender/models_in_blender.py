@@ -53,9 +53,9 @@ def _describe(job: DatasetJob) -> dict:
     targets = [
         {
             "class": target.occlusion,
-            "light": target.frames[0].light.position.tolist(),
-            "blocked": [geometry.blocked(f.camera.origin.numpy(), f.light.position.numpy()) for f in target.frames],
-            "lit": [lit_share(f.light.position.numpy(), f.camera, geometry) for f in target.frames],
+            "light": target.frames[0].lights[0].position.tolist(),
+            "blocked": [geometry.blocked(f.camera.origin.numpy(), f.lights[0].position.numpy()) for f in target.frames],
+            "lit": [lit_share(f.lights[0].position.numpy(), f.camera, geometry) for f in target.frames],
             "origins": [frame.camera.origin.tolist() for frame in target.frames],
         }
         for target in plan.targets
@@ -67,7 +67,7 @@ def _describe(job: DatasetJob) -> dict:
         "shaders": sorted({node.type for m in bpy.data.materials for node in m.node_tree.nodes if "BSDF" in node.type}),
         "cameras": [frame.camera.origin.tolist() for frame in plan.train],
         "room": [geometry.clearance(frame.camera.origin.numpy()) for frame in plan.frames],
-        "views_lit": [lit_share(f.light.position.numpy(), f.camera, geometry) for f in plan.train],
+        "views_lit": [lit_share(f.lights[0].position.numpy(), f.camera, geometry) for f in plan.train],
         "targets": targets,
     }
 
@@ -129,7 +129,7 @@ def _studio(folder: Path, resolution: int, samples: int) -> Studio:
 def _frame(name: str, origin: tuple, light: tuple, resolution: int, angle: float) -> Frame:
     pose = look_at(torch.tensor(origin).double(), torch.zeros(3).double())
     camera = Camera.from_field_of_view(pose, angle, resolution, resolution)
-    return Frame(name, camera, PointLight(torch.tensor(light).double(), torch.ones(3).double()), 1, True)
+    return Frame(name, camera, (PointLight(torch.tensor(light).double(), torch.ones(3).double()),), 1, True)
 
 
 if __name__ == "__main__":

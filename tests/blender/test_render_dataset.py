@@ -24,6 +24,7 @@ from rgspipe.blender.render_dataset import render_dataset
 from rgspipe.blender.targets import in_frame
 from rgspipe.datasets.gs3 import load_dataset
 from rgspipe.datasets.light_file import read_lights
+from rgspipe.datasets.location import LAMPS_TRUTH
 from rgspipe.datasets.views import Dataset
 from rgspipe.errors import InputError
 from rgspipe.scene.models import Box
@@ -222,3 +223,15 @@ def test_a_room_full_of_boxes_is_refused(tmp_path: Path) -> None:
     full = replace(JOB.model, boxes=(Box((0.0, 0.0, 0.0), (0.98, 0.98, 0.98), 0.0),))
     with pytest.raises(InputError, match="room for"):
         render_dataset(replace(JOB, model=full), tmp_path)
+
+
+def test_lamps_that_are_on_in_all_views_are_named_nowhere_but_in_the_truth(tmp_path: Path) -> None:
+    job = replace(JOB, lamps_known=False, lamps=3, train_views=2, targets_per_class=0)
+    render_dataset(job, tmp_path)
+    dataset, lamps = load_dataset(tmp_path), read_lights(tmp_path / LAMPS_TRUTH)
+    assert [view.light for view in dataset.train] == [None, None] and dataset.test[0].light is not None
+    assert len(lamps) == 3
+    apart = [float((a.position - b.position).norm()) for a in lamps for b in lamps if a is not b]
+    assert min(apart) >= 0.25
+    # Brighter than under the least of them alone, as all of them are on.
+    assert all(float(view.image.mean()) > 0.02 for view in dataset.train)

@@ -340,3 +340,20 @@ def test_a_negative_pixel_is_no_radiance(dataset: Path) -> None:
     write_image(dataset / "train/r_0000.exr", image)
     with pytest.raises(InputError, match=r"r_0000\.exr.*which is not negative.*down to -10, and none above 0.25"):
         load_dataset(dataset)
+
+
+def test_views_under_lamps_that_nothing_names_have_no_lights(dataset: Path, change: Change) -> None:
+    def unnamed(content: dict) -> None:
+        for frame in content["frames"]:
+            del frame["pl_pos"], frame["pl_intensity"]
+
+    change("transforms_train.json", unnamed)
+    loaded = load_dataset(dataset)
+    assert [view.light for view in loaded.train] == [None]
+    assert loaded.test[0].light is not None and loaded.train[0].depth is not None
+
+
+def test_a_view_that_names_half_of_a_light_is_wrong(dataset: Path, change: Change) -> None:
+    change("transforms_train.json", lambda content: content["frames"][0].pop("pl_pos"))
+    with pytest.raises(InputError, match="pl_pos"):
+        load_dataset(dataset)

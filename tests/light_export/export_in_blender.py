@@ -35,7 +35,7 @@ def main(folder: Path, metres: float) -> None:
     for name, light in plane_lights().items():
         sys.argv = ["blender", "--", str(folder / "saved.blend")] if name == "point" else ["blender"]
         runpy.run_path(str(folder / name / "lamps_blender.py"))
-        studio.render(Frame(name, camera, light, 1, False), folder)
+        studio.render(Frame(name, camera, (light,), 1, False), folder)
         for item in {*bpy.data.objects} - before:
             bpy.data.objects.remove(item)
 

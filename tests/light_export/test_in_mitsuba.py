@@ -17,12 +17,13 @@ from spots_on_plane import ALBEDO, SIZE, plane_camera, plane_image
 mi = pytest.importorskip("mitsuba", reason="mitsuba is not installed (extra bench)")
 pytestmark = pytest.mark.slow
 
-PLACE, AXIS = [0.1, -0.2, 0.9], [0.3, 0.2, -1.0]
+PLACE = [0.1, -0.2, 0.9]
+AXIS = torch.nn.functional.normalize(torch.tensor([0.3, 0.2, -1.0]).double(), dim=0)
 LIGHTS = {
     "point": PointLight(PLACE, [0.5, 1.0, 2.0]),
-    "linear": SpotLight(PLACE, [0.5, 1.0, 2.0], torch.nn.functional.normalize(torch.tensor(AXIS), dim=0), "linear", 0.45, 0.2),
+    "linear": SpotLight(PLACE, [0.5, 1.0, 2.0], AXIS, "linear", 0.45, 0.2),
     "sphere": SphereLight(PLACE, [0.5, 1.0, 2.0], 0.1),
-    "panel": PanelLight(PLACE, [0.5, 1.0, 2.0], torch.nn.functional.normalize(torch.tensor(AXIS), dim=0), 0.2, 0.1, 0.4),
+    "panel": PanelLight(PLACE, [0.5, 1.0, 2.0], AXIS, 0.2, 0.1, 0.4),
 }
 
 

@@ -43,6 +43,8 @@ class DatasetJob(DatasetOptions):
     """least distance of training, test and ordinary target lights from any surface"""
     hidden_light_clearance: float = option(0.05, low=0, high=1)
     """the same for occluded targets"""
+    lamps_known: bool = True
+    """whether each training view has one known lamp of its own; or else `lamps` are on in all of them, and unknown"""
 
     @property
     def settings(self) -> RenderSettings:

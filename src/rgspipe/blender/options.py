@@ -22,6 +22,8 @@ class DatasetOptions(Options):
     """fit targets of each occlusion class that suits the scene"""
     target_views: int = option(3, low=1, high=3)
     """fixed cameras that see each fit target"""
+    lamps: int = option(2, low=1, high=8)
+    """lamps that are on in all training views alike, where these are unknown (scene.lamps=unknown)"""
     samples: int = option(48, low=1, high=1000000)
     """paths per pixel of training views and targets"""
     test_samples: int = option(192, low=1, high=1000000)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import bpy
@@ -23,7 +24,7 @@ SENSOR_WIDTH = 36.0
 
 
 class Studio:
-    """A scene with one camera and one light that are moved from frame to frame.
+    """A scene with one camera, and lamps that are moved from frame to frame.
 
     Args:
         scene: what stands there already; its camera is replaced.
@@ -36,28 +37,40 @@ class Studio:
         cycles.configure(scene, settings)
         self._camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
         self._camera.data.clip_start, self._camera.data.clip_end = 1e-3, 1e3
-        self._light = bpy.data.objects.new("light", bpy.data.lights.new("light", "POINT"))
-        self._light.visible_camera = False
-        for item in (self._camera, self._light):
-            scene.collection.objects.link(item)
+        scene.collection.objects.link(self._camera)
         scene.camera = self._camera
+        self._lamps = [self._new_lamp()]
 
     def render(self, frame: Frame, folder: Path) -> None:
         """Render `frame` and write its files below `folder`, each whole or not at all."""
         if frame.has_surfaces:
             self._write_surfaces(frame, folder)
-        image, alpha = self.radiance(frame.camera, frame.light, frame.seed, frame.samples)
+        image, alpha = self.radiance(frame.camera, frame.lights, frame.seed, frame.samples)
         write_image(folder / f"{frame.name}.exr", image, alpha)
 
     def radiance(
-        self, camera: Camera, light: Light, seed: int, samples: int | None = None
+        self, camera: Camera, lights: Sequence[Light], seed: int, samples: int | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
         """Mean over each pixel: radiance (H, W, 3) and alpha (H, W); with the settings' samples by default."""
         place_camera(self._camera, camera)
-        place_lamp(self._light, light)
+        self._switch_on(lights)
         cycles.use_colour_sampling(self._scene, samples or self._settings.samples, self._settings.denoise, seed)
         passes = self._passes()
         return _stack(passes, "Combined", "RGB"), passes["Combined.A"]
+
+    def _new_lamp(self) -> bpy.types.Object:
+        lamp = bpy.data.objects.new("light", bpy.data.lights.new("light", "POINT"))
+        lamp.visible_camera = False
+        self._scene.collection.objects.link(lamp)
+        return lamp
+
+    def _switch_on(self, lights: Sequence[Light]) -> None:
+        """Place a lamp for each of `lights`, and leave no other on."""
+        self._lamps += [self._new_lamp() for _ in range(len(lights) - len(self._lamps))]
+        for index, lamp in enumerate(self._lamps):
+            lamp.hide_render = index >= len(lights)
+        for lamp, light in zip(self._lamps, lights, strict=False):
+            place_lamp(lamp, light)
 
     def _passes(self) -> dict[str, np.ndarray]:
         """Render, and return all passes by "<pass>.<channel>"."""
@@ -69,7 +82,7 @@ class Studio:
 
     def _write_surfaces(self, frame: Frame, folder: Path) -> None:
         place_camera(self._camera, frame.camera)
-        place_lamp(self._light, frame.light)
+        self._switch_on(frame.lights)
         cycles.use_center_sampling(self._scene)
         passes = self._passes()
         depth = passes["Depth.Z"]

@@ -22,7 +22,10 @@ log = logging.getLogger(__name__)
 MAX_LIGHTS = 50
 
 #: Numbers of the random streams; part of the seed, so never renumber them.
-STREAMS = {"train": 0, "test": 1, "visible": 2, "out_of_frame": 3, "occluded": 4, "around_corner": 5}
+STREAMS = {"train": 0, "test": 1, "visible": 2, "out_of_frame": 3, "occluded": 4, "around_corner": 5, "lamps": 6}
+
+#: Least distance of two lamps that are on together, in parts of the scene's longest side.
+LAMPS_APART = 0.25
 
 
 @dataclass(frozen=True)
@@ -32,7 +35,7 @@ class Frame:
     Attributes:
         name: path of the image below the dataset's folder, without suffix.
         camera: the camera, square pixels.
-        light: the only light.
+        lights: all that are on.
         seed: of Cycles.
         has_surfaces: whether depth, normal and albedo are wanted, too.
         samples: Cycles samples a pixel; those of the job if None.
@@ -40,7 +43,7 @@ class Frame:
 
     name: str
     camera: Camera
-    light: Light
+    lights: tuple[Light, ...]
     seed: int
     has_surfaces: bool
     samples: int | None = None
@@ -57,11 +60,16 @@ class TargetPlan:
 
 @dataclass(frozen=True)
 class Plan:
-    """All frames of a dataset, in the order in which they are rendered."""
+    """All frames of a dataset, in the order in which they are rendered.
+
+    Attributes:
+        lamps: those that are on in all training views, if their lights are to be unknown.
+    """
 
     train: tuple[Frame, ...]
     test: tuple[Frame, ...]
     targets: tuple[TargetPlan, ...]
+    lamps: tuple[PointLight, ...] = ()
 
     @property
     def frames(self) -> list[Frame]:
@@ -74,20 +82,47 @@ def make_plan(job: DatasetJob, layout: Layout, geometry: Geometry) -> Plan:
     Raises:
         InputError: the scene has no room for a camera or a light.
     """
-    train = tuple(_view(job, layout, geometry, "train", index) for index in range(job.train_views))
+    lamps = () if job.lamps_known else _lamps(job, layout, geometry)
+    train = tuple(_view(job, layout, geometry, "train", index, lamps) for index in range(job.train_views))
     test = tuple(_view(job, layout, geometry, "test", index) for index in range(job.test_views))
     cameras = layout.target_cameras()
     targets = [target for occlusion in layout.classes for target in _targets(job, layout, geometry, cameras, occlusion)]
-    return Plan(train, test, tuple(targets))
+    return Plan(train, test, tuple(targets), lamps)
 
 
-def _view(job: DatasetJob, layout: Layout, geometry: Geometry, split: str, index: int) -> Frame:
+def _lamps(job: DatasetJob, layout: Layout, geometry: Geometry) -> tuple[PointLight, ...]:
+    """The lamps that were on when all training views were taken, none next to another.
+
+    Raises:
+        InputError: the scene has no room for so many.
+    """
+    rng = np.random.default_rng([job.seed, STREAMS["lamps"]])
+    apart = LAMPS_APART * float((geometry.hi - geometry.lo).max())
+    places: list[np.ndarray] = []
+    for _ in range(MAX_DRAWS // 4):
+        place = layout.light(rng, job.light_clearance)
+        if all(np.linalg.norm(place - other) >= apart for other in places):
+            places.append(place)
+        if len(places) == job.lamps:
+            return tuple(_light(place, random_intensity(rng)) for place in places)
+    raise no_room(f"{job.lamps} lamps that are apart")
+
+
+def _view(
+    job: DatasetJob,
+    layout: Layout,
+    geometry: Geometry,
+    split: str,
+    index: int,
+    lamps: tuple[PointLight, ...] = (),
+) -> Frame:
+    """A view under a light of its own, or under `lamps` if there are any."""
     rng = np.random.default_rng([job.seed, STREAMS[split], index])
     camera = layout.camera(rng, index)
     position = _view_light(job, layout, geometry, camera, rng)
-    light = _light(position, np.full(3, rng.uniform(0.75, 1.3)))
+    lights = lamps or (_light(position, np.full(3, rng.uniform(0.75, 1.3))),)
     samples = job.test_samples if split == "test" else None
-    return Frame(f"{split}/r_{index:04d}", camera, light, int(rng.integers(2**31 - 1)), True, samples)
+    return Frame(f"{split}/r_{index:04d}", camera, lights, int(rng.integers(2**31 - 1)), True, samples)
 
 
 def _view_light(
@@ -117,7 +152,7 @@ def _targets(
         light = _light(position, random_intensity(rng))
         name = f"{occlusion}_{index:03d}"
         frames = tuple(
-            Frame(f"targets/{name}/view_{number}", camera, light, int(rng.integers(2**31 - 1)), False)
+            Frame(f"targets/{name}/view_{number}", camera, (light,), int(rng.integers(2**31 - 1)), False)
             for number, camera in enumerate(cameras[: job.target_views])
         )
         targets.append(TargetPlan(name, occlusion, frames))

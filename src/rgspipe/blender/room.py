@@ -28,7 +28,7 @@ def write_frame(studio: Studio, frame: RoomFrame, folder: Path) -> None:
 
     Half the difference of two independent halves is as large as the error of their mean.
     """
-    first, second = (studio.radiance(frame.camera, frame.light, seed)[0] for seed in frame.seeds)
+    first, second = (studio.radiance(frame.camera, (frame.light,), seed)[0] for seed in frame.seeds)
     mean, noise = 0.5 * (first + second), 0.5 * (first - second)
     channels = {name: mean[..., index] for index, name in enumerate("RGB")}
     channels |= {f"noise.{name}": noise[..., index] for index, name in enumerate("RGB")}

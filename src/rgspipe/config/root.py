@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from rgspipe.blender.options import DatasetOptions
+from rgspipe.capture.options import CaptureOptions
 from rgspipe.config.benchmark import BenchmarkConfig
 from rgspipe.config.effects import EffectsConfig
 from rgspipe.config.export import ExportConfig
@@ -61,6 +62,7 @@ class RgspipeConfig(Options):
     capture: Capture = Capture()
     init: InitConfig = InitConfig()
     train: TrainConfig = TrainConfig()
+    lamps: CaptureOptions = CaptureOptions()
     freeze: FreezeConfig = FreezeConfig()
     export: ExportConfig = ExportConfig()
     views: ViewsConfig = ViewsConfig()

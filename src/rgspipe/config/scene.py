@@ -79,6 +79,9 @@ class SceneConfig(Options):
     """its name under outputs/; by default that of the file or folder"""
     path: str | None = None
     """blend, ply: the file; external: the dataset's folder"""
+    lamps: Literal["known", "unknown"] = "known"
+    """known: each training view has one lamp of its own, which the dataset gives; unknown: some lamps were on in all
+    training views alike, and they are found with the albedo (stage=capture_surfels)"""
     cornell: CornellConfig = CornellConfig()
     corner: CornerConfig = CornerConfig()
     hotdog: HotdogParameters = HotdogParameters()

@@ -143,6 +143,11 @@ class FrameEntry:
                 remedy="Write the poses as those of the training views are, and leave the key away.",
             )
 
+    @property
+    def names_light(self) -> bool:
+        """Whether the frame says anything of a light of its own."""
+        return bool(self.fields.keys() & {"pl_pos", "pl_intensity"})
+
     def light(self) -> tuple[Tensor, Tensor]:
         """Position (3,) and intensity (3,) [W/sr] of the frame's light, float64; the file holds watts.
 

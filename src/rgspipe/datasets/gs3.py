@@ -52,10 +52,11 @@ def load_dataset(root: str | Path, *, train: bool = True, test: bool = True, tar
 
 
 def load_split(root: Path, split: str, info: DatasetInfo | None) -> tuple[View, ...]:
-    """The views of transforms_<split>.json, each with its light."""
+    """The views of transforms_<split>.json, each with its light; without lights where no frame names one."""
     entries = read_entries(root / f"transforms_{split}.json", f"the cameras and lights of the {split} views")
+    lit = any(entry.names_light for entry in entries)
     reading = progress_bar(entries, f"reading {split} views", unit="view")
-    return with_saturation(entries, [_load_view(entry, root, info, with_light=True) for entry in reading])
+    return with_saturation(entries, [_load_view(entry, root, info, light=lit, depth=True) for entry in reading])
 
 
 def load_target(folder: str | Path, base: str | Path | None = None) -> Target:
@@ -78,7 +79,7 @@ def load_target(folder: str | Path, base: str | Path | None = None) -> Target:
     entries[0].refuse_other_world()
     info = _target_info(folder, place)
     pairs = zip(entries, base_paths(entries, base), strict=True)
-    views = [_load_view(entry, folder, info, with_light=False, base=path) for entry, path in pairs]
+    views = [_load_view(entry, folder, info, light=False, depth=False, base=path) for entry, path in pairs]
     return Target(place.name, occlusion, with_saturation(entries, views))
 
 
@@ -135,20 +136,21 @@ class _Surface:
 
 
 def _load_view(
-    entry: FrameEntry, root: Path, info: DatasetInfo | None, *, with_light: bool, base: Path | None = None
+    entry: FrameEntry, root: Path, info: DatasetInfo | None, *, light: bool, depth: bool, base: Path | None = None
 ) -> View:
+    """A view; it must name its `light`, and say what its `depth` means if it has any; `base` is with the lamps off."""
     image, alpha = read_colour(entry.image_path)
     camera = entry.camera(image.shape[1], image.shape[0])
     mask = None if entry.mask_path is None else read_mask(entry.mask_path, camera)
     if mask is not None:
         image, alpha = image * mask[..., None], alpha * mask
-    surface = _load_surface(entry, camera, info, needed=with_light)
+    surface = _load_surface(entry, camera, info, needed=depth)
     view = View(
         _name(entry.image_path, root),
         camera,
         image,
         alpha,
-        PointLight(*entry.light()) if with_light else None,
+        PointLight(*entry.light()) if light else None,
         surface.depth,
         surface.normal,
         surface.albedo,

@@ -13,6 +13,9 @@ from rgspipe.files import write_json
 
 POINTER = "dataset.json"
 
+#: In a dataset that was rendered under lamps that are not known: where they were.
+LAMPS_TRUTH = "truth/lamps.json"
+
 #: What a folder of a fit target has, and one of a dataset has not.
 TARGET = "transforms.json"
 

@@ -66,7 +66,8 @@ def require_lights(views: Sequence[View], root: Path) -> None:
         "pl_intensity), with depth",
         found=f"{len(dark)} of {len(views)} views without one, such as {dark[0].name}: TensoIR folders have "
         "environment light, and no depth",
-        remedy="Render the scene with point lights (scene=blend scene.path=its .blend file), or photograph it so and "
+        remedy="Where some lamps were on in all views alike, say scene.lamps=unknown: they are found with the albedo. "
+        "Else render the scene with point lights (scene=blend scene.path=its .blend file), or photograph it so and "
         "describe the images in transforms_train.json (docs/reference/formats.md); albedo maps can go with "
         "them as albedo_path, for train.albedo_prior=dataset.",
     )

@@ -16,6 +16,7 @@ NAMES = (
     "generate_dataset",
     "init_depth",
     "train_surfels",
+    "capture_surfels",
     "true_surfels",
     "import_ply",
     "freeze",

@@ -30,7 +30,8 @@ def run(context: StageContext) -> None:
     if context.config.scene.kind == "external":
         _take_external(context)
     else:
-        render_dataset(dataset_job(context.config), context.folder)
+        job = replace(dataset_job(context.config), lamps_known=context.config.scene.lamps == "known")
+        render_dataset(job, context.folder)
     context.note(kind=context.config.scene.kind)
 
 
@@ -87,8 +88,8 @@ def _inputs(config: RgspipeConfig) -> tuple[()]:
 def _config_keys(config: RgspipeConfig) -> tuple[str, ...]:
     kind = config.scene.kind
     if kind in MODELLED:
-        return ("scene.kind", f"scene.{kind}", "dataset")
-    return ("scene.kind", "dataset") if kind == "blend" else ("scene.kind",)
+        return ("scene.kind", f"scene.{kind}", "scene.lamps", "dataset")
+    return ("scene.kind", "scene.lamps", "dataset") if kind == "blend" else ("scene.kind", "scene.lamps")
 
 
 def _files(config: RgspipeConfig) -> tuple[Path, ...]:

@@ -20,7 +20,8 @@ def run(context: StageContext) -> None:
     init = context.config.init
     root = dataset_root(context.inputs["generate_dataset"].folder())
     views = degraded(load_dataset(root, test=False, targets=False).train, context.config.capture)
-    require_lights(views, root)
+    if context.config.scene.lamps == "known":
+        require_lights(views, root)
     start = time.perf_counter()
     surfels = initialise_surfels(
         views,
@@ -45,5 +46,5 @@ STAGE = Stage(
     help="turns the depth of the training views into surfels",
     run=run,
     inputs=lambda config: ["generate_dataset"],
-    config_keys=("init", "capture", "scene.kind"),
+    config_keys=("init", "capture", "scene.kind", "scene.lamps"),
 )

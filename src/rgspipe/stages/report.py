@@ -25,7 +25,7 @@ from rgspipe.stages.report_gallery import dataset_gallery
 from rgspipe.stages.report_relight import found_relightings, relight_files
 from rgspipe.stages.report_sections import found_galleries, found_sections, section_files
 from rgspipe.stages.report_studies import found_captures, found_light_studies, study_files
-from rgspipe.stages.sources import has_truth
+from rgspipe.stages.sources import has_truth, trained_stage
 
 REPORT = "report.html"
 #: What a page over scenes shows of this one.
@@ -57,7 +57,7 @@ def _contents(context: StageContext) -> report.ReportContents:
     judged = context.input_lists.get("judge", ())
     described = [read_json(artifact.file("metrics.json"), "what an evaluation found") for artifact in evaluations]
     surfels = _surfels(context.inputs.get("freeze"))
-    trained = context.inputs.get("train_surfels")
+    trained = context.inputs.get(trained_stage(config))
     verdicts = {"success": "boolean", "inside_95": "boolean", "count_right": "boolean", "types_right": "boolean"}
     targets = _table(evaluations, "metrics.csv", verdicts | {"result": str, "reason": str})
     study, remark = found_captures(config, judged)
@@ -164,7 +164,7 @@ def _stages(context: StageContext, described: Sequence[Mapping[str, Any]]) -> li
     """Every artifact behind the report, in the order of the pipeline; fits and evaluations stand in pairs."""
     records = [
         stage_record(stage, artifact.manifest)
-        for stage in ("generate_dataset", "init_depth", "train_surfels", "freeze", "judge")
+        for stage in ("generate_dataset", "init_depth", "train_surfels", "capture_surfels", "freeze", "judge")
         for artifact in context.input_lists.get(stage, ())
     ]
     for stage in ("fit_light", "evaluate"):
@@ -193,7 +193,7 @@ def _inputs(config: RgspipeConfig) -> list[Need | str]:
             if method == "paper_adam" and config.fit.limit is None:
                 changes["fit.limit"] = config.report.paper_adam_limit
             needs += [Need("fit_light", changes), Need("evaluate", changes)]
-    return [*needs, *_judgements(config), "freeze", "train_surfels", "init_depth", "generate_dataset"]
+    return [*needs, *_judgements(config), "freeze", trained_stage(config), "init_depth", "generate_dataset"]
 
 
 def _judgements(config: RgspipeConfig) -> list[Need | str]:

@@ -23,7 +23,12 @@ def surfel_stage(config: RgspipeConfig) -> str:
                 remedy="Leave freeze.surfels away.",
             )
         return "import_ply"
-    return "true_surfels" if config.freeze.surfels == "truth" else "train_surfels"
+    return "true_surfels" if config.freeze.surfels == "truth" else trained_stage(config)
+
+
+def trained_stage(config: RgspipeConfig) -> str:
+    """The stage that makes surfels of photographs: by lamps that are known, or with lamps that are found."""
+    return "train_surfels" if config.scene.lamps == "known" else "capture_surfels"
 
 
 def has_truth(config: RgspipeConfig) -> bool:

@@ -71,7 +71,7 @@ def _plan(job: PoolJob, cameras: list[Camera], index: int, occlusion: str, light
     rng = np.random.default_rng([job.dataset.seed, STREAMS[job.kind], index, 1])
     name = f"light_{index:04d}"
     frames = tuple(
-        Frame(f"{name}/view_{number}", camera, light, int(rng.integers(2**31 - 1)), False)
+        Frame(f"{name}/view_{number}", camera, (light,), int(rng.integers(2**31 - 1)), False)
         for number, camera in enumerate(cameras[: job.views])
     )
     return LightPlan(name, occlusion, light, frames)

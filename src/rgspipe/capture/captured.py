@@ -1,0 +1,136 @@
+"""A scene from photographs under unknown lamps: surfels with their albedo, and the lamps that were on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from rgspipe.capture.certainty import Certainty
+from rgspipe.capture.field import Field, Graph, Variances
+from rgspipe.capture.lamps import LampProblem
+from rgspipe.capture.options import CaptureOptions
+from rgspipe.capture.radiance import Measured, Numbers, measured_radiance
+from rgspipe.capture.received import Received
+from rgspipe.capture.refusals import check_measured, check_overlap, check_views
+from rgspipe.capture.search import Answer, found_lamps
+from rgspipe.completion import with_unseen_surfaces
+from rgspipe.datasets.views import View
+from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.renderer.view_weights import ViewWeights
+from rgspipe.scene.guesses import LEAST_DOUBT
+from rgspipe.scene.lights import PointLight
+from rgspipe.scene.surfels import Surfels
+from rgspipe.training.albedo import ALBEDO_RANGE
+from rgspipe.training.initialise import initialise_surfels
+from rgspipe.training.materials import trace_views
+from rgspipe.training.prior import albedo_prior
+
+#: Albedo of surfaces of which nothing is known.
+GREY = 0.5
+
+#: Fewer pixels than this, all together, do not measure a surfel.
+LEAST_SEEN = 0.3
+
+#: Draws of the albedo for its uncertainty, which is then known to a tenth of itself.
+DRAWS = 48
+
+
+@dataclass(frozen=True, repr=False)
+class Captured:
+    """What photographs told.
+
+    Attributes:
+        surfels: N with their albedo; those of surfaces that no camera saw are marked as guesses.
+        lamps: that were on, W/sr.
+        certainty: of the lamps.
+        doubt: (N,) float32 standard deviation of the logarithm of each albedo, the common scale not counted.
+        measured: radiance of the surfels, and exposures of the photographs.
+        answer: how the number of lamps was chosen.
+        frozen: the surfels with their light transport, as the lamps were found with.
+    """
+
+    surfels: Surfels
+    lamps: tuple[PointLight, ...]
+    certainty: Certainty
+    doubt: Tensor
+    measured: Measured
+    answer: Answer
+    frozen: FrozenScene
+
+    def __repr__(self) -> str:
+        return f"Captured({self.surfels!r}, {len(self.lamps)} lamps)"
+
+
+def capture_scene(
+    views: Sequence[View],
+    surfels: Surfels | int,
+    options: CaptureOptions | None = None,
+    *,
+    where: str | Path = "the photographs",
+) -> Captured:
+    """Albedo and lamps of a room from photographs that were all taken while the same unknown lamps were on.
+
+    Args:
+        views: the photographs, with their cameras; their lights are not known.
+        surfels: the geometry, or how many to make from the depth of the views.
+        options: how; the defaults if None.
+        where: the dataset's folder, for errors.
+
+    Raises:
+        InputError: the photographs have known lights, show nothing, are all saturated, or do not overlap; or there is
+            no depth to make surfels from.
+    """
+    options = options or CaptureOptions()
+    check_views(views, where)
+    if isinstance(surfels, int):
+        surfels = initialise_surfels(views, surfels, seed=options.seed, where=where)
+    surfels = surfels.to(torch.float32)
+    if options.unseen:
+        surfels = with_unseen_surfaces(surfels, [view.camera for view in views])
+    weights = trace_views(surfels, views, options.supersampling)
+    free = options.exposure == "free"
+    if free:
+        check_overlap(weights, where)
+    measured = measured_radiance(weights, views, free_exposure=free)
+    check_measured(measured.seen >= LEAST_SEEN, measured.radiance, views, where)
+    frozen = FrozenScene.freeze(surfels, gather_rays=options.gather_rays, seed=options.seed)
+    frozen = frozen.with_dictionary(options.grid, seed=options.seed)
+    problem = _problem(frozen, measured, _predicted(weights, views, options), options.gather_rays)
+    return _captured(problem, measured, found_lamps(problem, options.count, options.most), options)
+
+
+def _predicted(weights: Sequence[ViewWeights], views: Sequence[View], options: CaptureOptions) -> Numbers:
+    """(N, 3) albedo as far as it is known before."""
+    surfels = weights[0].operator.shape[1]
+    if options.albedo_prior == "none":
+        return np.full((surfels, 3), GREY)
+    albedo, weight = (part.double().numpy() for part in albedo_prior(weights, views))
+    known = weight > 0.0
+    # A prediction is known up to a scale, and what no map shows is as the middle of the rest.
+    middle = np.median(albedo[known], axis=0) if known.any() else GREY
+    return np.where(known[:, None], albedo, middle)
+
+
+def _problem(frozen: FrozenScene, measured: Measured, predicted: Numbers, rays: int) -> LampProblem:
+    gather = frozen.gather.to_scipy().astype(np.float64).tocsr()
+    seen = measured.seen >= LEAST_SEEN
+    received = Received.of(gather, measured.radiance, seen, predicted)
+    pixels = np.where(seen, measured.variance, np.inf)
+    field = Field(Graph.of(frozen.surfels, predicted), pixels, seen.astype(np.float64), Variances())
+    return LampProblem(frozen, received, field, measured.radiance, predicted, pixels, rays)
+
+
+def _captured(problem: LampProblem, measured: Measured, answer: Answer, options: CaptureOptions) -> Captured:
+    best = answer.best
+    albedo = torch.from_numpy(np.clip(best.problem.albedo(best.lamps), *ALBEDO_RANGE)).float()
+    doubt = torch.from_numpy(best.problem.field.deviation(DRAWS, options.seed)).float()
+    surfels = problem.frozen.surfels
+    guessed = torch.where(surfels.guessed > 0.0, doubt.clamp(min=LEAST_DOUBT), 0.0)
+    surfels = replace(surfels, albedo=albedo, guessed=guessed)
+    certainty = Certainty.of(best.problem, best.lamps)
+    return Captured(surfels, best.lamps.lights(), certainty, doubt, measured, answer, problem.frozen)

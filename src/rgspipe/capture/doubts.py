@@ -1,0 +1,72 @@
+"""Where the model of light cannot be trusted: noise of the gather, edges of shadows, and whatever else is off.
+
+Beside what pixels say, a measurement of a surfel's albedo has the variance, of its logarithm,
+
+    ( Σ_k (a_k e_k°)² Var_j T_kj + (Σ_j F_ij L_j² − (F L)_i²) / R ) / d_i² :
+
+the transmittance T_k of a lamp varies by so much over the surfel and its neighbours, e_k° what it would send without
+shadows, and R rays of the gather have met radiance that varies by so much. Errors that nothing foretells are taken
+for draws of Student's t (Lange, Little and Taylor 1989): each surfel is judged by what all others say of it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+import torch
+
+from rgspipe.capture.field import Field, Graph
+from rgspipe.capture.lamps import LampProblem, Lamps
+from rgspipe.capture.radiance import Numbers
+
+#: Degrees of freedom of Student's t.
+FREEDOM = 4.0
+
+#: Draws of the field for what all others say of a surfel.
+DRAWS = 32
+
+#: Neighbours count fully for the variation of shadows above this weight.
+BESIDE = 0.2
+
+
+def model_variance(problem: LampProblem, lamps: Lamps | None, rays: int) -> Numbers:
+    """(N,) variance of log L − log d by the model of light alone."""
+    arriving = problem.arriving(lamps).mean(axis=1)
+    variance = _gather_variance(problem, rays)
+    if lamps is not None:
+        places, gains = torch.from_numpy(lamps.places), np.exp(lamps.logs).mean(axis=1)
+        shadowed = problem.frozen.unit_irradiance(places)[0].double().numpy()
+        open_ = problem.frozen.unit_irradiance(places, shadows=False)[0].double().numpy()
+        for gain, lit, unlit in zip(gains, shadowed, open_, strict=True):
+            passing = np.divide(lit, unlit, out=np.ones_like(lit), where=unlit > 0.0)
+            variance = variance + (gain * unlit) ** 2 * _variation(problem.field.graph, passing, unlit > 0.0)
+    return variance / arriving**2
+
+
+def _gather_variance(problem: LampProblem, rays: int) -> Numbers:
+    """(N,) variance of F L, by as many rays."""
+    grey = problem.radiance.mean(axis=1)
+    gather = problem.received.gather
+    return np.maximum(gather @ grey**2 - (gather @ grey) ** 2, 0.0) / rays
+
+
+def _variation(graph: Graph, values: Numbers, counted: np.ndarray) -> Numbers:
+    """(N,) variance of `values` (N,) over each surfel and those of its neighbours that are `counted` (N,) bool."""
+    near = (graph.weight > BESIDE) & counted[graph.second] & counted[graph.first]
+    count = len(values)
+    ones = np.ones(int(near.sum()))
+    beside = sp.csr_matrix((ones, (graph.first[near], graph.second[near])), (count, count)) + sp.eye(count)
+    number = np.asarray(beside.sum(axis=1)).ravel()
+    mean = (beside @ values) / number
+    return np.maximum((beside @ values**2) / number - mean**2, 0.0)
+
+
+def trust(field: Field, residual: Numbers, seed: int = 0) -> Numbers:
+    """(N,) what the measurements with residuals (N, C) count beside their variance, by what all others say of them."""
+    known = np.isfinite(field.measured)
+    plain = field.trusted(known.astype(np.float64))
+    explained = np.minimum(field.weight * field.deviation(DRAWS, seed) ** 2, 0.95)
+    left = residual - field.mean(residual)
+    # The field follows what it is given: without a surfel's own part it would be further off.
+    squared = plain.weight * (left**2).mean(axis=1) / (1.0 - explained)
+    return np.where(known, (FREEDOM + 1.0) / (FREEDOM + squared), 0.0)

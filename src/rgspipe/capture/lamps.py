@@ -1,0 +1,210 @@
+"""Lamps that explain the measured radiance whatever the albedo is, as a problem of least squares.
+
+With d = Σ a T e(x) + G what arrives, the residual is
+
+    r = log L − log ρ̂ − log d ,
+
+and its cost rᵀ Σ⁻¹ r, from which the field of log-albedo is eliminated (`capture.field`). Parameters are the places of
+the lamps, in parts of the scene's size, and the logarithms of their intensities over π.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from rgspipe.capture.field import Field
+from rgspipe.capture.radiance import Numbers
+from rgspipe.capture.received import Received
+from rgspipe.optim.levenberg_marquardt import NormalEquations, least_squares, within
+from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.scene.lights import PointLight
+
+#: Longest steps: of a place in parts of the scene's size, and of the logarithm of an intensity.
+LONGEST_MOVE, LONGEST_GAIN = 0.12, 1.0
+
+#: Of a lamp six numbers are looked for: its place, and its intensity in three channels.
+NUMBERS = 6
+
+#: Light below this part of the median counts as this much: its logarithm says nothing.
+DARK = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Lamps:
+    """K lamps, and what they make of the problem.
+
+    Attributes:
+        places: (K, 3) float64, scene units.
+        logs: (K, 3) logarithms of the intensities over π.
+        shares: (K, N, 3) T e of each at unit intensity.
+        slopes: (K, N, 3, 3) its derivatives towards the place, per size of the scene; the last axis is the channel.
+    """
+
+    places: Numbers
+    logs: Numbers
+    shares: Numbers
+    slopes: Numbers
+
+    def __len__(self) -> int:
+        return len(self.places)
+
+    @cached_property
+    def arriving(self) -> Numbers:
+        """(N, 3) what arrives from all of them."""
+        return np.einsum("knc,kc->nc", self.shares, np.exp(self.logs))
+
+    def sent(self, areas: Numbers) -> Numbers:
+        """(K,) flux of each on surfels of `areas` (N,), all channels together."""
+        return np.einsum("knc,kc,n->k", self.shares, np.exp(self.logs), areas)
+
+    def lights(self) -> tuple[PointLight, ...]:
+        """They as lights, W/sr."""
+        intensities = np.pi * np.exp(self.logs)
+        return tuple(
+            PointLight(torch.tensor(x), torch.tensor(a)) for x, a in zip(self.places, intensities, strict=True)
+        )
+
+    def at(self, chosen: Sequence[int]) -> Lamps:
+        """Some of them."""
+        index = np.array(chosen, dtype=np.intp)
+        return Lamps(self.places[index], self.logs[index], self.shares[index], self.slopes[index])
+
+
+@dataclass(frozen=True, eq=False)
+class LampProblem:
+    """What lamps are looked for in.
+
+    Attributes:
+        frozen: the surfels, for what a lamp sends to each.
+        received: what they send each other.
+        field: the field that is eliminated.
+        radiance: (N, 3) L.
+        predicted: (N, 3) ρ̂.
+        pixels: (N,) variance of log L by the pixels alone; infinite where none shows the surfel.
+        rays: of the gather, from each surfel.
+    """
+
+    frozen: FrozenScene
+    received: Received
+    field: Field
+    radiance: Numbers
+    predicted: Numbers
+    pixels: Numbers
+    rays: int
+
+    @cached_property
+    def target(self) -> Numbers:
+        """(N, 3) log L − log ρ̂."""
+        return np.log(self.radiance) - np.log(self.predicted)
+
+    @cached_property
+    def size(self) -> float:
+        """Longest side of the scene."""
+        return self.frozen.size
+
+    @cached_property
+    def bounds(self) -> tuple[Numbers, Numbers]:
+        """(3,) corners of where lamps may be."""
+        lower, upper = self.frozen.surroundings.bounds
+        return lower.numpy(), upper.numpy()
+
+    def lamps(self, places: Numbers, logs: Numbers) -> Lamps:
+        """Lamps at places (K, 3)."""
+        shares, slopes = self.frozen.unit_irradiance(torch.from_numpy(np.atleast_2d(places)))
+        shares, slopes = shares.double().numpy(), self.size * slopes.double().numpy()
+        count, surfels = shares.shape
+        columns = np.concatenate([shares[:, :, None], slopes], axis=2).transpose(1, 0, 2).reshape(surfels, -1)
+        spread = self.received.spread_colours(columns).reshape(surfels, count, 4, 3).transpose(1, 0, 2, 3)
+        return Lamps(np.atleast_2d(places), logs, spread[:, :, 0], spread[:, :, 1:])
+
+    def arriving(self, lamps: Lamps | None) -> Numbers:
+        """(N, 3) d."""
+        light = self.received.known + (0.0 if lamps is None else lamps.arriving)
+        return np.maximum(light, DARK * np.median(light))
+
+    def residual(self, lamps: Lamps | None) -> Numbers:
+        """(N, 3) r."""
+        return self.target - np.log(self.arriving(lamps))
+
+    def albedo(self, lamps: Lamps) -> Numbers:
+        """(N, 3) the albedo that is most likely under the lamps, also of what was not seen; any number above 0."""
+        return self.predicted * np.exp(self.field.mean(self.residual(lamps)))
+
+    def cost(self, lamps: Lamps | None) -> float:
+        """What the lamps leave."""
+        residual = self.residual(lamps)
+        return float((residual * self.field.whitened(residual)).sum())
+
+    def refined(self, lamps: Lamps, steps: int) -> Lamps:
+        """A place of least cost near `lamps`."""
+        return least_squares(self, lamps, steps).value
+
+    def around(self, lamps: Lamps) -> _Around:
+        """The problem around `lamps`."""
+        return _Around(self, lamps)
+
+    def jacobian(self, lamps: Lamps) -> Numbers:
+        """(3, N, 6 K) derivatives of log d towards the lamps' numbers, by channel."""
+        arriving, gains = self.arriving(lamps), np.exp(lamps.logs)
+        columns = np.zeros((3, len(arriving), NUMBERS * len(lamps)))
+        for channel in range(3):
+            for k in range(len(lamps)):
+                own = gains[k, channel] / arriving[:, channel]
+                begin = NUMBERS * k
+                columns[channel, :, begin : begin + 3] = lamps.slopes[k, :, :, channel] * own[:, None]
+                columns[channel, :, begin + 3 + channel] = lamps.shares[k, :, channel] * own
+        return columns
+
+    def covariance(self, lamps: Lamps) -> Numbers:
+        """(6 K, 6 K) of the lamps' numbers, what is not known of the albedo included."""
+        return np.linalg.pinv(self.around(lamps).normal.matrix.numpy(), hermitian=True)
+
+
+@dataclass(frozen=True, eq=False)
+class _Around:
+    """The problem around some lamps."""
+
+    problem: LampProblem
+    lamps: Lamps
+
+    @cached_property
+    def normal(self) -> NormalEquations:
+        residual, jacobian = self.problem.residual(self.lamps), self.problem.jacobian(self.lamps)
+        width, field = jacobian.shape[2], self.problem.field
+        matrix, direction, cost = np.zeros((width, width)), np.zeros(width), 0.0
+        for channel in range(3):
+            own = residual[:, channel]
+            whitened = field.whitened(np.column_stack([jacobian[channel], own]))
+            matrix += jacobian[channel].T @ whitened[:, :-1]
+            direction += jacobian[channel].T @ whitened[:, -1]
+            cost += float(own @ whitened[:, -1])
+        return NormalEquations(torch.from_numpy(0.5 * (matrix + matrix.T)), torch.from_numpy(direction), cost)
+
+    def allowed(self, step: Tensor) -> float:
+        moves, gains = _split(step)
+        longest = float(np.linalg.norm(moves, axis=1).max())
+        return min(within(longest, LONGEST_MOVE), within(float(np.abs(gains).max()), LONGEST_GAIN))
+
+    def moved(self, step: Tensor) -> tuple[Numbers, Numbers]:
+        moves, gains = _split(step)
+        places = np.clip(self.lamps.places + self.problem.size * moves, *self.problem.bounds)
+        return places, self.lamps.logs + gains
+
+    def distance(self, place: tuple[Numbers, Numbers]) -> float:
+        return float(np.linalg.norm(place[0] - self.lamps.places, axis=1).max()) / self.problem.size
+
+    def evaluated(self, place: tuple[Numbers, Numbers]) -> tuple[float, Lamps]:
+        lamps = self.problem.lamps(*place)
+        return self.problem.cost(lamps), lamps
+
+
+def _split(step: Tensor) -> tuple[Numbers, Numbers]:
+    """Moves (K, 3) and gains (K, 3) of a step (6 K,)."""
+    numbers = step.numpy().reshape(-1, NUMBERS)
+    return numbers[:, :3], numbers[:, 3:]

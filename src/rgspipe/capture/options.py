@@ -1,0 +1,33 @@
+"""What steers the search for the lamps of a capture. Nothing here loads torch, for the command line."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from rgspipe.options import Options, option
+
+
+@dataclass(frozen=True)
+class CaptureOptions(Options):
+    """How lamps and albedo are found in photographs under lamps that nobody measured."""
+
+    count: int | None = option(None, low=1, high=8)
+    """how many lamps were on; found if null"""
+    most: int = option(4, low=1, high=8)
+    """most lamps that are looked for where their number is not known"""
+    exposure: Literal["same", "free"] = "same"
+    """whether all photographs were exposed alike, or each has its own exposure, found by what they share"""
+    albedo_prior: Literal["none", "dataset"] = "none"
+    """what is known of the albedo: nothing, or the albedo maps of the training views, from any method and up to a scale
+    of each image"""
+    unseen: bool = True
+    """close rooms where no camera saw what is there"""
+    gather_rays: int = option(512, low=8, high=65536)
+    """hemisphere rays of a surfel: what surfaces send each other is measured, not fitted, so that noise of it stays"""
+    supersampling: int = option(4, low=1, high=16)
+    """rays per edge pixel in view weights, squared"""
+    grid: int = option(8, low=2, high=32)
+    """candidates for lamps along each axis"""
+    seed: int = option(0, low=0, high=2**31 - 1)
+    """draws of rays and candidates"""

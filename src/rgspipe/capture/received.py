@@ -1,0 +1,74 @@
+"""What surfaces receive: from each other, measured, and from lamps, with what comes back from where no camera looked.
+
+A surfel reflects L = ρ (Σ a e + F L), F the gather operator. Of the surfels s that were seen L is known. Those that no
+camera saw, u, send what they get, with the albedo that the field continues into them:
+
+    L_u = (1 − ρ_u F_uu)⁻¹ ρ_u (Σ a e_u + F_us L_s) .
+
+So all that arrives is linear in the lamps,  Σ a T e + G ,  with  T e = e + F_·u (1 − ρ_u F_uu)⁻¹ ρ_u e_u  and G what
+the measured radiance becomes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+
+from rgspipe.capture.radiance import Numbers
+
+#: Bounces among surfels that no camera saw.
+BOUNCES = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Received:
+    """Light that arrives at N surfels.
+
+    Attributes:
+        gather: (N, N) F.
+        unseen: (U,) surfels whose radiance was not measured.
+        albedo: (U, 3) of those.
+        seen: (N, 3) F_·s L_s, what arrives from the seen.
+    """
+
+    gather: sp.csr_matrix
+    unseen: np.ndarray
+    albedo: Numbers
+    seen: Numbers
+
+    @classmethod
+    def of(cls, gather: sp.csr_matrix, radiance: Numbers, seen: np.ndarray, albedo: Numbers) -> Received:
+        """With the measured `radiance` (N, 3) where `seen` (N,) bool, and `albedo` (N, 3) elsewhere."""
+        unseen = (~seen).nonzero()[0]
+        return cls(gather, unseen, albedo[unseen], gather @ np.where(seen[:, None], radiance, 0.0))
+
+    def with_albedo(self, albedo: Numbers) -> Received:
+        """With another albedo (N, 3); that of the seen is not looked at."""
+        return replace(self, albedo=albedo[self.unseen])
+
+    @cached_property
+    def known(self) -> Numbers:
+        """(N, 3) G, radiance per unit albedo."""
+        columns = [self.spread(self.seen[:, channel : channel + 1], channel) for channel in range(3)]
+        return np.concatenate(columns, axis=1)
+
+    def spread(self, arriving: Numbers, channel: int | None = None) -> Numbers:
+        """(N, K) T e of `arriving` (N, K), with what returns from the unseen; grey if `channel` is None."""
+        if not len(self.unseen):
+            return arriving
+        albedo = self.albedo.mean(axis=1) if channel is None else self.albedo[:, channel]
+        within = self.gather[self.unseen][:, self.unseen]
+        first = arriving[self.unseen]
+        sent = albedo[:, None] * first
+        for _ in range(BOUNCES):
+            sent = albedo[:, None] * (first + within @ sent)
+        return arriving + self.gather[:, self.unseen] @ sent
+
+    def spread_colours(self, arriving: Numbers) -> Numbers:
+        """(N, K, 3) `spread` in each channel."""
+        if not len(self.unseen):
+            return np.repeat(arriving[:, :, None], 3, axis=2)
+        return np.stack([self.spread(arriving, channel) for channel in range(3)], axis=2)

@@ -1,0 +1,95 @@
+"""Photographs that say nothing of lamps, refused in a sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
+
+from rgspipe.capture.radiance import Numbers
+from rgspipe.datasets.views import View
+from rgspipe.errors import InputError
+from rgspipe.renderer.view_weights import ViewWeights
+
+#: Surfels that two photographs have to share for one exposure to follow from the other, and how many pixels show one.
+SHARED, SHOWN = 10, 0.3
+
+#: Least part of the surfels that has to be measured, and to be brighter than DARK times the brightest pixel.
+LEAST_MEASURED, DARK = 0.05, 1e-4
+
+
+def check_views(views: Sequence[View], where: str | Path) -> None:
+    """Refuse photographs with lights of their own.
+
+    Raises:
+        InputError: there is no photograph, all are black, or one has a known light.
+    """
+    if not views:
+        raise InputError(where, expected="photographs", found="none", remedy="Add some to transforms_train.json.")
+    if not max(float(view.image.max()) for view in views) > 0.0:
+        raise _black(where)
+    lit = [view for view in views if view.light is not None]
+    if lit:
+        raise InputError(
+            where,
+            expected="photographs that were taken while the same unknown lamps were on (scene.lamps=unknown)",
+            found=f"{len(lit)} of {len(views)} with a known light of their own, such as {lit[0].name}",
+            remedy="Train on them instead (scene.lamps=known), or take pl_pos and pl_intensity out of "
+            "transforms_train.json if they mean nothing.",
+        )
+
+
+def check_overlap(weights: Sequence[ViewWeights], where: str | Path) -> None:
+    """Refuse photographs of unknown exposure that share nothing.
+
+    Raises:
+        InputError: some show no surface that any of the others shows.
+    """
+    shown = sp.vstack([sp.csr_matrix(view.operator.to_scipy().sum(axis=0)) for view in weights])
+    shown = (shown > SHOWN).astype(np.int64)
+    shared = (shown @ shown.T).toarray() >= SHARED
+    groups, labels = connected_components(sp.csr_matrix(shared), directed=False)
+    if groups > 1:
+        sizes = sorted(np.bincount(labels).tolist(), reverse=True)
+        raise InputError(
+            where,
+            expected="photographs that show the same surfaces as others do, so that their exposures follow",
+            found=f"{groups} groups of {', '.join(map(str, sizes))} photographs that share nothing",
+            remedy="Add photographs in between, or expose all alike (lamps.exposure=same).",
+        )
+
+
+def check_measured(seen: np.ndarray, radiance: Numbers, views: Sequence[View], where: str | Path) -> None:
+    """Refuse photographs that measure no radiance.
+
+    Args:
+        seen: (N,) bool, surfels that were measured.
+        radiance: (N, 3) of them.
+
+    Raises:
+        InputError: next to all is saturated or outside of the surfaces, or all is black.
+    """
+    clipped = float(np.mean([float(view.saturated.any(dim=-1).double().mean()) for view in views]))
+    if seen.mean() < LEAST_MEASURED:
+        raise InputError(
+            where,
+            expected="photographs that tell how bright the surfaces are",
+            found=f"{100 * clipped:.0f} % of the pixels saturated, and {100 * float(seen.mean()):.0f} % of the "
+            "surfaces measured",
+            remedy="Expose less, or use linear EXR; check the poses if nothing is saturated.",
+        )
+    brightest = max(float(view.image.max()) for view in views)
+    if not (radiance[seen].mean(axis=1) > DARK * brightest).mean() > LEAST_MEASURED:
+        raise _black(where)
+
+
+def _black(where: str | Path) -> InputError:
+    return InputError(
+        where,
+        expected="photographs of surfaces that light falls on",
+        found="images that are black, but for some pixels at most",
+        remedy="Switch the lamps on, or expose more; walls that reflect nothing tell nothing of lamps.",
+    )

@@ -1,0 +1,215 @@
+"""Where lamps may be: candidates all over the scene, ranked on surfels alone, and how many of them it takes.
+
+A candidate beside the lamps that are known is ranked with the intensity that suits it, in one grey channel, by a few
+steps of Gauss and Newton that all candidates take at once. The best are refined. One lamp more is there if it makes
+what was measured so much more likely, with the variances of the albedo estimated anew for either number: a lamp that is
+left out looks like paint, and the more of it there is to explain, the less is paint expected to change. How much is
+enough is what a light of a fit has to lower its cost by (`fitting.options.BarOptions`): of n measurements a share g of
+their squares is worth −n log(1 − g) of −2 log p.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rgspipe.capture.doubts import model_variance, trust
+from rgspipe.capture.lamps import DARK, LampProblem, Lamps
+from rgspipe.capture.radiance import Numbers
+from rgspipe.fitting.options import BarOptions
+from rgspipe.training.albedo import ALBEDO_RANGE
+
+#: Candidates that are refined, and least distance of two of them in parts of the scene's size.
+TRIES, APART = 5, 0.14
+
+#: Steps of candidates' intensities, and of lamps: at first and at last.
+RANKING, FIRST, LAST = 5, 8, 25
+
+#: Largest step of the logarithm of a candidate's intensity.
+LONGEST_GAIN = 1.5
+
+#: Candidates that are ranked at once.
+BATCH = 128
+
+#: How much one more lamp has to explain.
+BAR = BarOptions()
+
+#: Rounds in which outliers, variances and the albedo of the unseen follow from the lamps and these from them.
+ROUNDS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """Places of lamps, and what a grey lamp at each sends to every surfel, T e.
+
+    Attributes:
+        places: (C, 3) scene units.
+        shares: (N, C).
+    """
+
+    places: Numbers
+    shares: Numbers
+
+    @classmethod
+    def of(cls, problem: LampProblem) -> Candidates:
+        """Those of the scene's dictionary."""
+        dictionary = problem.frozen.dictionary
+        shares = problem.received.spread(dictionary.irradiance.double().cpu().numpy().T)
+        return cls(dictionary.positions.double().numpy(), shares)
+
+
+def ranked(problem: LampProblem, candidates: Candidates, known: Lamps | None) -> tuple[Numbers, Numbers]:
+    """(C,) cost of one more grey lamp at each candidate, and (C,) the logarithm of its intensity over π."""
+    target = problem.target.mean(axis=1)
+    light = problem.received.known + (0.0 if known is None else known.arriving)
+    light = np.maximum(np.exp(np.log(np.maximum(light, 1e-300)).mean(axis=1)), DARK * np.median(light))
+    sent = np.exp(target) * 0.2
+    costs, logs = [], []
+    for begin in range(0, candidates.shares.shape[1], BATCH):
+        shares = candidates.shares[:, begin : begin + BATCH]
+        typical = np.array([np.median(column[column > 0.0]) if (column > 0.0).any() else 1.0 for column in shares.T])
+        gain = np.log(np.median(sent) / np.maximum(typical, 1e-300))
+        for _ in range(RANKING):
+            own = shares * np.exp(gain)
+            arriving = own + light[:, None]
+            residual, slope = target[:, None] - np.log(arriving), own / arriving
+            whitened = problem.field.whitened(slope)
+            step = (whitened * residual).sum(axis=0) / np.maximum((whitened * slope).sum(axis=0), 1e-12)
+            gain = gain + np.clip(step, -LONGEST_GAIN, LONGEST_GAIN)
+        residual = target[:, None] - np.log(shares * np.exp(gain) + light[:, None])
+        costs.append((residual * problem.field.whitened(residual)).sum(axis=0))
+        logs.append(gain)
+    return np.concatenate(costs), np.concatenate(logs)
+
+
+def with_one_more(problem: LampProblem, candidates: Candidates, known: Lamps | None) -> Lamps:
+    """The best lamps found that are one more than `known`."""
+    costs, logs = ranked(problem, candidates, known)
+    found = []
+    for index in _best_apart(costs, candidates.places, APART * problem.size):
+        place, log = candidates.places[index][None], np.full((1, 3), logs[index])
+        places = place if known is None else np.concatenate([known.places, place])
+        gains = log if known is None else np.concatenate([known.logs, log])
+        lamps = problem.refined(problem.lamps(places, gains), FIRST)
+        found.append((problem.cost(lamps), lamps))
+    return problem.refined(min(found, key=lambda pair: pair[0])[1], LAST)
+
+
+def _best_apart(costs: Numbers, places: Numbers, apart: float) -> list[int]:
+    """The TRIES candidates of least cost that are apart from each other."""
+    chosen: list[int] = []
+    for index in np.argsort(costs):
+        if all(np.linalg.norm(places[index] - places[other]) > apart for other in chosen):
+            chosen.append(int(index))
+        if len(chosen) == TRIES:
+            break
+    return chosen
+
+
+def settled(problem: LampProblem, lamps: Lamps) -> Tried:
+    """With variances, outliers and unseen albedo that belong to the lamps, and lamps that belong to these."""
+    for _ in range(ROUNDS):
+        problem = weighed(problem, lamps)
+        lamps = problem.refined(problem.lamps(lamps.places, lamps.logs), LAST)
+    return Tried.of(problem, lamps)
+
+
+def weighed(problem: LampProblem, lamps: Lamps | None) -> LampProblem:
+    """The problem with what belongs to `lamps`: the albedo of the unseen, variances, and trust in the surfels."""
+    measured = problem.pixels + model_variance(problem, lamps, problem.rays)
+    problem = replace(problem, field=replace(problem.field, measured=measured))
+    if lamps is None:
+        return problem
+    albedo = np.clip(problem.albedo(lamps), *ALBEDO_RANGE)
+    problem = replace(problem, received=problem.received.with_albedo(albedo))
+    residual = problem.residual(problem.lamps(lamps.places, lamps.logs))
+    field = problem.field.fitted(residual)
+    return replace(problem, field=field.trusted(trust(field, residual)))
+
+
+@dataclass(frozen=True, eq=False)
+class Tried:
+    """Lamps of one number.
+
+    Attributes:
+        problem: with the variances that they make most likely.
+        lamps: as fitted.
+        deviance: −2 log p of what was measured.
+    """
+
+    problem: LampProblem
+    lamps: Lamps
+    deviance: float
+
+    @classmethod
+    def of(cls, problem: LampProblem, lamps: Lamps) -> Tried:
+        """With the variances as they are most likely."""
+        residual = problem.residual(lamps)
+        field = problem.field.fitted(residual)
+        return cls(replace(problem, field=field), lamps, field.deviance(residual))
+
+
+@dataclass(frozen=True, eq=False)
+class OneMore:
+    """Lamps, and the best found that are one more, both by the surfels that the latter trust.
+
+    Attributes:
+        gain: share of the squares that the lamp explains.
+        wanted: the share that it has to.
+    """
+
+    fewer: Tried
+    more: Tried
+    gain: float
+    wanted: float
+
+    @classmethod
+    def between(cls, fewer: Tried, more: Tried) -> OneMore:
+        """By the variances that are most likely for either."""
+        measurements = 3 * int((more.problem.field.weight > 0.0).sum())
+        gain = 1.0 - float(np.exp(min(0.0, more.deviance - fewer.deviance) / max(measurements, 1)))
+        sent = more.lamps.sent(more.problem.frozen.areas.double().cpu().numpy())
+        faint = sent.min() < BAR.faint * sent.sum()
+        return cls(fewer, more, gain, BAR.least_faint if faint else BAR.least)
+
+    @property
+    def worth(self) -> bool:
+        """Whether that lamp is there."""
+        return self.gain >= self.wanted
+
+
+def one_more(candidates: Candidates, fewer: Tried) -> OneMore:
+    """The best lamps found that are one more than `fewer`."""
+    more = settled(fewer.problem, with_one_more(fewer.problem, candidates, fewer.lamps))
+    again = more.problem.lamps(fewer.lamps.places, fewer.lamps.logs)
+    less = Tried.of(more.problem, more.problem.refined(again, LAST))
+    return OneMore.between(less, more)
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """Lamps that were found.
+
+    Attributes:
+        best: the lamps.
+        compared: each number with the next, as far as it was asked; the last of them may not be worth it.
+    """
+
+    best: Tried
+    compared: tuple[OneMore, ...]
+
+
+def found_lamps(problem: LampProblem, count: int | None, most: int) -> Answer:
+    """So many lamps, or as many as what was measured calls for, one to `most`."""
+    problem = weighed(problem, None)
+    candidates = Candidates.of(problem)
+    best = settled(problem, with_one_more(problem, candidates, None))
+    compared: list[OneMore] = []
+    while count is None or len(best.lamps) < count:
+        found = one_more(candidates, best)
+        compared.append(found)
+        if count is None and (not found.worth or len(best.lamps) == most):
+            break
+        best = found.more
+    return Answer(best, tuple(compared))

@@ -1,0 +1,71 @@
+"""What was found in a capture, in sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rgspipe.capture.captured import Captured
+from rgspipe.capture.certainty import GUESS
+from rgspipe.capture.search import BAR
+
+#: Photographs whose pixels disagree by more than this, in the middle, are not of one diffuse scene.
+DISAGREE = 0.1
+
+#: More of the surfels than this unmeasured is worth a word.
+UNMEASURED = 0.1
+
+
+def captured_words(found: Captured) -> str:
+    """Sentences: the lamps, how sure they are, whether intensities and albedo are told apart, and what to doubt."""
+    return " ".join([_lamps(found), _number(found), _scale(found), *_doubts(found)])
+
+
+def _lamps(found: Captured) -> str:
+    spread = found.certainty.spread(found.frozen.size)
+    one = "1 lamp was on" if len(found.lamps) == 1 else f"{len(found.lamps)} lamps were on"
+    places = [
+        f"({', '.join(f'{value:.2f}' for value in lamp.position.tolist())}), {_place(part)}"
+        for lamp, part in zip(found.lamps, spread, strict=True)
+    ]
+    return f"{one} in the photographs: {'; '.join(places)}."
+
+
+def _place(part: float) -> str:
+    sure = f"known to {100.0 * part:.1f} % of the scene's size"
+    return f"a guess, {sure}" if part > GUESS else sure
+
+
+def _number(found: Captured) -> str:
+    compared = found.answer.compared
+    if not compared:
+        return "Their number was given, and not asked."
+    last = compared[-1]
+    explains = f"explains {100.0 * last.gain:.0f} % of what is left, and has to explain {100.0 * last.wanted:.0f} %"
+    if len(last.fewer.lamps) < len(found.lamps):
+        return f"The last of them {explains}."
+    if last.worth:
+        return f"There may be more: one more {explains}, but no more are looked for (lamps.most)."
+    return f"{'There may be one more: it' if last.gain > BAR.doubtful else 'One more'} {explains}."
+
+
+def _scale(found: Captured) -> str:
+    certainty = found.certainty
+    percent = f"{100.0 * certainty.scale:.0f} %"
+    bounced = f"{100.0 * certainty.bounced:.0f} % of the light on what was seen comes from other surfaces"
+    if certainty.is_tied:
+        return f"Intensities and albedo are told apart to {percent}: {bounced}, which is measured."
+    return (
+        f"Only the products of intensities and albedo are known, their scale to {percent} ({bounced}): surfaces are "
+        "expected to reflect about half."
+    )
+
+
+def _doubts(found: Captured) -> Iterator[str]:
+    unmeasured = 1.0 - float((found.answer.best.problem.field.weight > 0.0).mean())
+    if unmeasured > UNMEASURED:
+        yield f"{100.0 * unmeasured:.0f} % of the surfaces were not measured, and are taken for what borders on them."
+    if found.measured.error > DISAGREE:
+        yield (
+            f"Photographs disagree by {100.0 * found.measured.error:.0f} % about the same surfaces: gloss, other "
+            "exposures (lamps.exposure=free) or poses."
+        )

@@ -1,0 +1,90 @@
+"""Lamps and albedo of a painted room come out of photographs in which both are unknown."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from photographed_room import LAMPS, painted_room, photographs
+from rgspipe.capture.captured import Captured, capture_scene
+from rgspipe.capture.lamp_file import write_lamps
+from rgspipe.capture.options import CaptureOptions
+from rgspipe.capture.words import captured_words
+from rgspipe.datasets.light_file import read_lights
+from rgspipe.evaluation.tables import match_positions
+
+OPTIONS = CaptureOptions(gather_rays=256, supersampling=2, grid=6, most=3)
+
+
+def blank_room() -> torch.Tensor:
+    surfels = painted_room()
+    return replace(surfels, albedo=torch.full_like(surfels.albedo, 0.5))
+
+
+@cache
+def found() -> Captured:
+    return capture_scene(photographs(), blank_room(), OPTIONS)
+
+
+def errors(captured: Captured) -> tuple[np.ndarray, np.ndarray]:
+    """Distances of the lamps from the true ones over the room's size, and ratios of intensities."""
+    places = (np.stack([lamp.position.numpy() for lamp in rig]) for rig in (captured.lamps, LAMPS))
+    pairs = [(captured.lamps[own], LAMPS[true]) for own, true in match_positions(*places)]
+    distances = [float((a.position - b.position).norm()) / captured.frozen.size for a, b in pairs]
+    return np.array(distances), np.array([float(a.intensity.mean() / b.intensity.mean()) for a, b in pairs])
+
+
+def test_both_lamps_are_found_and_no_third() -> None:
+    assert len(found().lamps) == 2
+    distances, ratios = errors(found())
+    assert distances.max() < 0.008, distances  # 0.0050
+    assert np.abs(ratios - 1.0).max() < 0.05, ratios  # 0.005
+
+
+def test_the_albedo_is_that_of_the_paint() -> None:
+    # Surfels that close what no camera saw come after those that were given.
+    room = painted_room()
+    measured = (found().answer.best.problem.field.weight > 0.0)[: len(room)]
+    off = np.log(found().surfels.albedo[: len(room)].numpy() / room.albedo.numpy())[measured]
+    assert np.median(np.abs(off)) < 0.015, np.median(np.abs(off))  # 0.0043
+
+
+def test_a_scene_under_the_found_lamps_looks_as_it_was_photographed() -> None:
+    frozen = type(found().frozen).freeze(found().surfels, gather_rays=256)
+    view = photographs()[3]
+    with torch.no_grad():
+        error = (frozen.render(view.camera, found().lamps) - view.image).square().mean().sqrt()
+    assert float(error / view.image.square().mean().sqrt()) < 0.05
+
+
+def test_the_errors_are_those_that_it_says() -> None:
+    spread = found().certainty.spread(found().frozen.size)
+    assert (errors(found())[0] < 2.0 * spread).all()  # 0.0050 of 0.013
+    assert (spread < 0.05).all()
+    assert 0.0 < found().certainty.scale < 0.2
+
+
+def test_the_lamps_are_a_light_file(tmp_path: Path) -> None:
+    write_lamps(tmp_path / "lamps.json", found())
+    assert read_lights(tmp_path / "lamps.json") == found().lamps
+    content = json.loads((tmp_path / "lamps.json").read_text())
+    assert len(content["lights"][0]["covariance"]) == 3
+    assert content["scale_tied"] == found().certainty.is_tied
+
+
+def test_the_words_say_what_was_found() -> None:
+    words = captured_words(found())
+    assert words.startswith("2 lamps were on in the photographs: (")
+    assert "known to" in words and "has to explain" in words
+
+
+def test_a_given_number_is_not_asked() -> None:
+    alone = capture_scene(photographs(LAMPS[:1]), blank_room(), replace(OPTIONS, count=1))
+    assert len(alone.lamps) == 1
+    assert "Their number was given" in captured_words(alone)
+    assert float((alone.lamps[0].position - LAMPS[0].position).norm()) < 0.01

@@ -1,0 +1,81 @@
+"""Radiance of surfels is measured, whatever single photographs get wrong."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+import torch
+
+from photographed_room import LAMPS, frozen_room, photographs
+from rgspipe.capture.radiance import Measured, measured_radiance
+from rgspipe.datasets.views import View
+from rgspipe.renderer.view_weights import ViewWeights
+from rgspipe.training.materials import trace_views
+
+
+@cache
+def weights() -> tuple[ViewWeights, ...]:
+    return trace_views(frozen_room().surfels, photographs(), 2)
+
+
+def truth() -> np.ndarray:
+    with torch.no_grad():
+        return frozen_room().radiance_of(LAMPS).double().numpy()
+
+
+def error(found: Measured) -> float:
+    """Median relative error of surfels that pixels show."""
+    seen = found.seen > 2.0
+    assert seen.mean() > 0.7  # 0.74
+    return float(np.median(np.abs(found.radiance / truth() - 1.0)[seen]))
+
+
+def test_it_is_that_of_the_scene() -> None:
+    assert error(measured_radiance(weights(), photographs())) < 0.01  # 0.0055
+
+
+def test_exposures_follow_from_what_photographs_share() -> None:
+    factors = torch.linspace(-0.8, 0.8, 14).exp()
+    views = [replace(view, image=view.image * factor) for view, factor in zip(photographs(), factors, strict=True)]
+    found = measured_radiance(weights(), views, free_exposure=True)
+    np.testing.assert_allclose(found.exposures, factors.numpy(), rtol=0.01)  # 0.004
+    assert error(found) < 0.01  # 0.0056
+
+
+def _with_stain(view: View) -> View:
+    image = view.image.clone()
+    image[20:40, 20:40] = 5.0
+    return replace(view, image=image)
+
+
+def test_what_one_photograph_alone_shows_does_not_count() -> None:
+    views = [_with_stain(view) if index == 0 else view for index, view in enumerate(photographs())]
+    assert error(measured_radiance(weights(), views)) < 0.01  # 0.0054
+
+
+def test_saturated_pixels_do_not_count() -> None:
+    limit = float(torch.stack([view.image for view in photographs()]).quantile(0.9))
+    views = [replace(view, image=view.image.clamp(max=limit), saturated_from=limit) for view in photographs()]
+    found = measured_radiance(weights(), views)
+    clipped = (truth() > 1.3 * limit).any(axis=1) & (measured_radiance(weights(), photographs()).seen > 2.0)
+    assert clipped.sum() > 20
+    assert np.isinf(found.variance[clipped]).mean() > 0.9
+
+
+def test_the_variance_is_that_of_the_error() -> None:
+    generator = torch.Generator().manual_seed(0)
+    views = [
+        replace(view, image=view.image * (1.0 + 0.1 * torch.randn(view.image.shape, generator=generator)))
+        for view in photographs()
+    ]
+    found = measured_radiance(weights(), views)
+    exact = measured_radiance(weights(), photographs())
+    seen = found.seen > 5.0
+    off = np.log(found.radiance / exact.radiance).mean(axis=1)[seen]
+    # The median square of a normal deviate is 0.455.
+    ratio = float(np.sqrt(np.median(off**2 / found.variance[seen]) / 0.455))
+    # 1.53: pixels that are far off are taken for outliers, and their errors are not counted.
+    assert ratio == pytest.approx(1.0, abs=0.8)
