@@ -17,7 +17,7 @@ from rgspipe.datasets.exr import write_image
 from rgspipe.datasets.gs3_write import frame_entry, write_transforms
 from rgspipe.datasets.light_file import write_lights
 from rgspipe.datasets.surfel_file import save_surfels
-from rgspipe.scene import LightRig, srgb
+from rgspipe.scene import LightRig, Surfels, srgb
 from rgspipe.stages import freeze
 from rgspipe.stages.base import StageContext
 
@@ -35,11 +35,9 @@ def artifact(root: Path, stage: str, make: Callable[[Path], None]) -> Artifact:
     return ArtifactStore(root).build(Key("room", stage, "aa"), recipe, build)[0]
 
 
-def frozen_artifact(root: Path, **changes: object) -> Artifact:
+def frozen_artifact(root: Path, surfels: Callable[[], Surfels] = room_surfels, **changes: object) -> Artifact:
     """The room, frozen; `changes` to the configuration by key, with __ for the dot."""
-    trained = artifact(
-        root, "train_surfels", lambda folder: save_surfels(folder / "surfels.safetensors", room_surfels())
-    )
+    trained = artifact(root, "train_surfels", lambda folder: save_surfels(folder / "surfels.safetensors", surfels()))
     small = {"freeze.gather_rays": 64, "freeze.patches": 150, "freeze.dictionary_grid": 6}
     named = {key.replace("__", "."): value for key, value in changes.items()}
     config = with_changes(RgspipeConfig(stage="freeze"), small | named)

@@ -42,9 +42,11 @@ def plane_image(light: Light, subsamples: int = 16) -> np.ndarray:
     """L = ρ/π · I · p(θ) cosθ/r², averaged over each pixel's `subsamples`² subpixels."""
     origins, directions, _ = plane_camera().rays(subsamples=subsamples)
     points = origins - (origins[:, 2] / directions[:, 2])[:, None] * directions
-    to_light = light.position - points
-    irradiance = to_light[:, 2] / to_light.norm(dim=1) ** 3
-    if light.axis is not None:
-        irradiance = irradiance * light.relative_intensity_towards(points)
-    radiance = torch.tensor(ALBEDO) / math.pi * light.intensity * irradiance[:, None]
+    radiance = torch.zeros((len(points), 3), dtype=torch.float64)
+    for part in light.parts():
+        to_light = part.position - points
+        irradiance = to_light[:, 2] / to_light.norm(dim=1) ** 3
+        if part.axis is not None:
+            irradiance = irradiance * part.relative_intensity_towards(points)
+        radiance += torch.tensor(ALBEDO) / math.pi * part.intensity * irradiance[:, None]
     return radiance.reshape(SIZE, SIZE, subsamples**2, 3).mean(dim=2).numpy()

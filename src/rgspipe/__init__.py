@@ -18,22 +18,24 @@ from rgspipe.threads import settle_threads
 if TYPE_CHECKING:
     from rgspipe.capture.captured import Captured, capture_scene
     from rgspipe.capture.options import CaptureOptions
-    from rgspipe.datasets.light_file import read_lights, write_lights
+    from rgspipe.datasets.light_file import read_ambient, read_lights, write_lights
     from rgspipe.datasets.location import load_views
     from rgspipe.datasets.ply import PlyOptions, save_ply
     from rgspipe.datasets.surfel_file import load_surfels, save_surfels
     from rgspipe.datasets.views import View
     from rgspipe.errors import InputError
     from rgspipe.evaluation.images import save_png, tone_map
-    from rgspipe.fitting import FitResult, FitStatus, FitViews, ImageCapture, LightSpec, fit_lights
+    from rgspipe.fitting import BaseImages, FitResult, FitStatus, FitViews, ImageCapture, LightSpec, fit_lights
     from rgspipe.fitting.options import TrackOptions
     from rgspipe.fitting.solvers import PaperAdam, Search
     from rgspipe.fitting.tracking.track import track_lights
+    from rgspipe.light_export.export import LightExport, export_lights
+    from rgspipe.renderer.ambient import ambient_image
     from rgspipe.renderer.effects import Effects
     from rgspipe.renderer.frozen import FrozenScene
     from rgspipe.renderer.ply import load_ply
     from rgspipe.scene import Camera, Surfels
-    from rgspipe.scene.lights import LedLight, Light, PointLight, SpotLight
+    from rgspipe.scene.lights import LedLight, Light, PanelLight, PointLight, SphereLight, SpotLight
     from rgspipe.scene.models import CornellBox, Corridor, exact_surfels
     from rgspipe.training.trainer import Trained, TrainOptions, train
 
@@ -41,27 +43,30 @@ if TYPE_CHECKING:
 _HOMES = {
     "capture.captured": ("Captured", "capture_scene"),
     "capture.options": ("CaptureOptions",),
-    "datasets.light_file": ("read_lights", "write_lights"),
+    "datasets.light_file": ("read_ambient", "read_lights", "write_lights"),
     "datasets.location": ("load_views",),
     "datasets.ply": ("PlyOptions", "save_ply"),
     "datasets.surfel_file": ("load_surfels", "save_surfels"),
     "datasets.views": ("View",),
     "errors": ("InputError",),
     "evaluation.images": ("save_png", "tone_map"),
-    "fitting": ("FitResult", "FitStatus", "FitViews", "ImageCapture", "LightSpec", "fit_lights"),
+    "fitting": ("BaseImages", "FitResult", "FitStatus", "FitViews", "ImageCapture", "LightSpec", "fit_lights"),
     "fitting.options": ("TrackOptions",),
     "fitting.solvers": ("PaperAdam", "Search"),
     "fitting.tracking.track": ("track_lights",),
+    "light_export.export": ("LightExport", "export_lights"),
+    "renderer.ambient": ("ambient_image",),
     "renderer.effects": ("Effects",),
     "renderer.frozen": ("FrozenScene",),
     "renderer.ply": ("load_ply",),
     "scene": ("Camera", "Surfels"),
-    "scene.lights": ("LedLight", "Light", "PointLight", "SpotLight"),
+    "scene.lights": ("LedLight", "Light", "PanelLight", "PointLight", "SphereLight", "SpotLight"),
     "scene.models": ("CornellBox", "Corridor", "exact_surfels"),
     "training.trainer": ("TrainOptions", "Trained", "train"),
 }
 
 __all__ = [
+    "BaseImages",
     "Camera",
     "CaptureOptions",
     "Captured",
@@ -76,11 +81,14 @@ __all__ = [
     "InputError",
     "LedLight",
     "Light",
+    "LightExport",
     "LightSpec",
+    "PanelLight",
     "PaperAdam",
     "PlyOptions",
     "PointLight",
     "Search",
+    "SphereLight",
     "SpotLight",
     "Surfels",
     "TrackOptions",
@@ -88,12 +96,15 @@ __all__ = [
     "Trained",
     "View",
     "__version__",
+    "ambient_image",
     "capture_scene",
     "exact_surfels",
+    "export_lights",
     "fit_lights",
     "load_ply",
     "load_surfels",
     "load_views",
+    "read_ambient",
     "read_lights",
     "save_ply",
     "save_png",

@@ -8,7 +8,9 @@ from pathlib import Path
 import bpy
 from mathutils import Vector
 
+from rgspipe.blender import passes
 from rgspipe.blender.job import RenderSettings
+from rgspipe.blender.lamp import place_lamp
 from rgspipe.blender.materials import diffuse_material
 from rgspipe.blender.meshes import add, polygon
 from rgspipe.blender.passes import Studio
@@ -20,13 +22,12 @@ SAMPLES = 1024
 
 
 def _render(studio: Studio, name: str, light: Light, folder: Path) -> None:
-    studio.shape(light)
-    studio.render(Frame(name, plane_camera(), (PointLight(light.position, light.intensity),), 1, False), folder)
+    studio.render(Frame(name, plane_camera(), (light,), 1, False), folder)
 
 
-def _use_blender_s_spot(spot: SpotLight) -> None:
-    """Turn the studio's lamp into Blender's spot of the same cone."""
-    lamp = bpy.data.objects["light"]
+def _blender_s_spot(lamp: bpy.types.Object, spot: SpotLight) -> None:
+    """Give `lamp` Blender's spot of the same cone, in the place of ours."""
+    place_lamp(lamp, PointLight(spot.position, spot.intensity))
     lamp.data.type = "SPOT"
     lamp.data.spot_size, lamp.data.spot_blend = 2.0 * spot.cone_angle, spot.falloff
     lamp.rotation_mode = "QUATERNION"
@@ -44,8 +45,8 @@ def main(folder: Path) -> None:
         _render(studio, name, light, folder)
     _render(studio, "again", lights["point"], folder)
     spot = lights["smoothstep"]
-    _use_blender_s_spot(spot)
-    _render(studio, "blender", PointLight(spot.position, spot.intensity), folder)
+    passes.place_lamp = _blender_s_spot
+    _render(studio, "blender", spot, folder)
 
 
 if __name__ == "__main__":

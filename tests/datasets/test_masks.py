@@ -7,9 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 from PIL import Image
 
 from rgspipe.datasets.exr import write_channels
+from rgspipe.datasets.frames import read_entries
 from rgspipe.datasets.gs3 import load_target
 from rgspipe.errors import InputError
 
@@ -48,3 +50,14 @@ def test_broken_masks_are_named(dataset: Path, change: Change) -> None:
     write_channels(dataset / "targets/one/mask.exr", {"Y": 2.0 * MASK.astype(np.float32)})
     with pytest.raises(InputError, match=r"mask\.exr.*0 to 1"):
         load_target(dataset / "targets/one")
+
+
+def test_where_lamps_are_is_read_and_leaves_the_image_alone(dataset: Path, change: Change) -> None:
+    (before,) = load_target(dataset / "targets/one").views
+    assert before.emitters is None
+    Image.fromarray(MASK).save(dataset / "targets/one/emitters.png")
+    change(TARGET, lambda content: content["frames"][0].update(emitter_path="emitters.png"))
+    (view,) = load_target(dataset / "targets/one").views
+    assert view.emitters[:, :3].all() and not view.emitters[:, 3:].any()
+    assert torch.equal(view.image, before.image) and torch.equal(view.alpha, before.alpha)
+    assert dataset / "targets/one/emitters.png" in read_entries(dataset / TARGET, "a target")[0].files

@@ -27,7 +27,7 @@ from rgspipe.fitting.words import MEANINGS, Spoken, explained
 
 DOUBT = Undetermined(1, 1, ("intensity",))
 DOUBTED = "Not determined by these views: intensity."
-ELSEWHERE = Spoken("lamps:{}".format, "lamps:?")
+ELSEWHERE = Spoken("lamps:{}".format, "lamps:?", "daylight")
 
 
 def test_without_a_finding_a_fit_has_converged() -> None:

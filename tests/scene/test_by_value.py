@@ -21,7 +21,7 @@ def test_lights_are_equal_where_all_their_numbers_are(light: Light) -> None:
     assert LIGHTS.index(same) == [one.kind for one in LIGHTS].index(light.kind)
     assert light != replace(light, position=light.position + 1e-6) and light != replace(light, intensity=2.0)
     for number in light.shape:
-        assert light != replace(light, **{number.name: 1.01 * getattr(light, number.name)})
+        assert light != replace(light, **{number.name: getattr(light, number.name) + 0.01})
 
 
 def test_gradients_change_nothing_and_rounding_does() -> None:

@@ -1,8 +1,8 @@
-"""A lamp that shines as any of our lights that stand in one point.
+"""A lamp that shines as any of our lights.
 
-Light is emitted by a point lamp of radius 0 whose shader multiplies it with the light's profile of the angle between
-its axis and the direction in which the light leaves: one way for all profiles, also for those that Blender's own
-spots do not have.
+Light is emitted by a point lamp, of radius 0 unless the light is a sphere, whose shader multiplies it with the light's
+profile of the angle between its axis and the direction in which the light leaves: one way for all profiles, also for
+those that Blender's own spots do not have. A panel is Blender's own rectangle.
 """
 
 from __future__ import annotations
@@ -11,14 +11,31 @@ from collections.abc import Callable
 from functools import partial
 
 import bpy
+import torch
+from mathutils import Matrix
 
 from rgspipe.scene import Light
+from rgspipe.scene.lights import WATTS_PER_INTENSITY, PanelLight, SphereLight
 
 Value = bpy.types.NodeSocket | float
 
 
-def shape_lamp(lamp: bpy.types.Light, light: Light) -> None:
-    """Give `lamp` the profile and the axis of `light`; its place and intensity are not looked at."""
+def place_lamp(item: bpy.types.Object, light: Light) -> None:
+    """Give `item` a lamp with the extent, the profile, the axis, the place and the intensity of `light`."""
+    before, item.data = item.data, _panel(light) if isinstance(light, PanelLight) else _bulb(light)
+    if before is not None:
+        bpy.data.lights.remove(before)
+    peak = float(light.intensity.max())
+    watts = float(light.power().max()) / peak if isinstance(light, PanelLight) else WATTS_PER_INTENSITY
+    item.data.energy = watts * peak
+    item.data.color = (light.intensity / peak).tolist()
+    item.matrix_world = _pose(light)
+
+
+def _bulb(light: Light) -> bpy.types.Light:
+    lamp = bpy.data.lights.new("light", "POINT")
+    lamp.use_soft_falloff = False
+    lamp.shadow_soft_size = light.radius if isinstance(light, SphereLight) else 0.0
     lamp.use_nodes = True
     nodes = _Nodes(lamp.node_tree)
     emission, output = nodes.add("ShaderNodeEmission"), nodes.add("ShaderNodeOutputLight")
@@ -26,6 +43,23 @@ def shape_lamp(lamp: bpy.types.Light, light: Light) -> None:
     if light.axis is not None:
         relative = light.emission(_Maths(nodes), nodes.cosine(light.axis.tolist()))
         nodes.tree.links.new(relative, emission.inputs["Strength"])
+    return lamp
+
+
+def _panel(light: PanelLight) -> bpy.types.Light:
+    lamp = bpy.data.lights.new("light", "AREA")
+    lamp.shape, lamp.size, lamp.size_y = "RECTANGLE", light.width, light.height
+    return lamp
+
+
+def _pose(light: Light) -> Matrix:
+    """Blender's lamps shine along −z; a panel's width is along x."""
+    pose = torch.eye(4, dtype=torch.float64)
+    if isinstance(light, PanelLight):
+        across, up = light.sides()
+        pose[:3, :3] = torch.stack([across, -up, -light.axis / light.axis.norm()], dim=1)
+    pose[:3, 3] = light.position
+    return Matrix(pose.tolist())
 
 
 class _Nodes:

@@ -11,11 +11,10 @@ from mathutils import Matrix
 
 from rgspipe.blender import cycles
 from rgspipe.blender.job import RenderSettings
-from rgspipe.blender.lamp import shape_lamp
+from rgspipe.blender.lamp import place_lamp
 from rgspipe.blender.plan import Frame
 from rgspipe.datasets.exr import read_channels, write_channels, write_image
-from rgspipe.scene import Camera, Light, PointLight
-from rgspipe.scene.lights import WATTS_PER_INTENSITY
+from rgspipe.scene import Camera, Light
 
 #: Suffixes of the surface files beside an image, and their channels.
 SURFACE_CHANNELS = {"depth": ("Z",), "normal": ("X", "Y", "Z"), "albedo": ("R", "G", "B")}
@@ -42,10 +41,6 @@ class Studio:
         scene.camera = self._camera
         self._lamps = [self._new_lamp()]
 
-    def shape(self, light: Light) -> None:
-        """Let the lamp shine as `light` does, a point or a spot; place and intensity come with each frame."""
-        shape_lamp(self._lamps[0].data, light)
-
     def render(self, frame: Frame, folder: Path) -> None:
         """Render `frame` and write its files below `folder`, each whole or not at all."""
         if frame.has_surfaces:
@@ -54,7 +49,7 @@ class Studio:
         write_image(folder / f"{frame.name}.exr", image, alpha)
 
     def radiance(
-        self, camera: Camera, lights: Sequence[PointLight], seed: int, samples: int | None = None
+        self, camera: Camera, lights: Sequence[Light], seed: int, samples: int | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
         """Mean over each pixel: radiance (H, W, 3) and alpha (H, W); with the settings' samples by default."""
         place_camera(self._camera, camera)
@@ -64,20 +59,18 @@ class Studio:
         return _stack(passes, "Combined", "RGB"), passes["Combined.A"]
 
     def _new_lamp(self) -> bpy.types.Object:
-        light = bpy.data.lights.new("light", "POINT")
-        light.shadow_soft_size = 0.0
-        light.use_soft_falloff = False
-        lamp = bpy.data.objects.new("light", light)
+        lamp = bpy.data.objects.new("light", bpy.data.lights.new("light", "POINT"))
+        lamp.visible_camera = False
         self._scene.collection.objects.link(lamp)
         return lamp
 
-    def _switch_on(self, lights: Sequence[PointLight]) -> None:
+    def _switch_on(self, lights: Sequence[Light]) -> None:
         """Place a lamp for each of `lights`, and leave no other on."""
         self._lamps += [self._new_lamp() for _ in range(len(lights) - len(self._lamps))]
         for index, lamp in enumerate(self._lamps):
             lamp.hide_render = index >= len(lights)
         for lamp, light in zip(self._lamps, lights, strict=False):
-            place_light(lamp, light)
+            place_lamp(lamp, light)
 
     def _passes(self) -> dict[str, np.ndarray]:
         """Render, and return all passes by "<pass>.<channel>"."""
@@ -113,14 +106,6 @@ def place_camera(item: bpy.types.Object, camera: Camera) -> None:
         raise ValueError(
             f"Blender takes no focal length of {camera.fx:g} pixels at {camera.width} (it made it {stored:g})"
         )
-
-
-def place_light(item: bpy.types.Object, light: PointLight) -> None:
-    """Give Blender's light our position and radiant intensity [W/sr]."""
-    item.location = light.position.tolist()
-    peak = float(light.intensity.max())
-    item.data.energy = WATTS_PER_INTENSITY * peak
-    item.data.color = (light.intensity / peak).tolist()
 
 
 def face_camera(normal: np.ndarray, camera: Camera) -> np.ndarray:

@@ -14,7 +14,7 @@ from rgspipe.blender.job import DatasetJob
 from rgspipe.blender.models.parameters import BlendFile
 from rgspipe.blender.options import ZooParameters
 from rgspipe.blender.targets import MIN_LIT_SHARE, is_of_class, lit_share, random_intensity
-from rgspipe.scene import Camera, PointLight
+from rgspipe.scene import Camera, Light, PointLight
 
 log = logging.getLogger(__name__)
 
@@ -43,7 +43,7 @@ class Frame:
 
     name: str
     camera: Camera
-    lights: tuple[PointLight, ...]
+    lights: tuple[Light, ...]
     seed: int
     has_surfaces: bool
     samples: int | None = None

@@ -25,6 +25,10 @@ class FitConfig(Options):
     """the method"""
     target: str | None = None
     """a target's folder; by default the dataset's own targets"""
+    base: str | None = None
+    """folder of images like those of `target`, from the same cameras, with the lamps off: what was there anyway"""
+    base_scale: Literal["known", "free"] = "known"
+    """whether that is in the target as it is, or a factor times, per colour, that is found, too"""
     truth: str | None = None
     """light file with the true lights of `target`, for evaluate only"""
     limit: int | None = option(None, low=1, high=100000)
@@ -45,6 +49,8 @@ class FitConfig(Options):
     """whether the images hold radiance, or every view but the first has an unknown factor, too"""
     clip: float | None = option(None, low=1e-12, high=1e12)
     """radiance at which images are clipped; by default 1 for 8-bit sRGB, else none"""
+    emitters: Literal["auto", "off"] = "auto"
+    """whether pixels of lamps that are in sight are looked for and left out; those of `emitter_path` always are"""
     targets: Literal["dataset", "generated"] = "dataset"
     """whose targets: the dataset's, or those that stage=generate_targets makes as targets.* says"""
     spot_basis: Literal["exact", "sh"] = "exact"

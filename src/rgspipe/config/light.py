@@ -35,15 +35,41 @@ class LedConfig(Options):
 
 
 @dataclass(frozen=True)
+class SphereConfig(Options):
+    """The size of unknown spheres."""
+
+    radius: float = option(0.05, low=0, high=1e6)
+    """scene units; with fit.shape=free it is found"""
+
+
+@dataclass(frozen=True)
+class PanelConfig(Options):
+    """The size of unknown panels: rectangles that shine to one side."""
+
+    width: float = option(0.2, low=0, high=1e6)
+    """scene units; with fit.shape=free it is found, as are the next two"""
+    height: float = option(0.2, low=0, high=1e6)
+    """scene units"""
+    turn: float = option(0.0, low=-180, high=180)
+    """around the panel's axis, degrees; 0 has the width along x where the panel looks straight down"""
+
+
+@dataclass(frozen=True)
 class LightConfig(Options):
     """What is looked for."""
 
-    type: Literal["point", "spot", "led", "auto"] = "point"
+    type: Literal["point", "spot", "led", "sphere", "panel", "auto"] = "point"
     """type of the unknown lights"""
     count: int | None = option(1, low=1, high=MOST_LIGHTS)
     """how many unknown lights; null finds out"""
+    mount: Literal["free", "surface"] = "free"
+    """surface: they lie on surfaces of the scene and shine away from them (panels alone), which fixes their axes"""
+    ambient: bool = False
+    """whether there may be light besides, from all around through openings; its radiance is found, too"""
     spot: SpotConfig = SpotConfig()
     led: LedConfig = LedConfig()
+    sphere: SphereConfig = SphereConfig()
+    panel: PanelConfig = PanelConfig()
 
 
 @dataclass(frozen=True)

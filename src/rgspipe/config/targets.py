@@ -12,6 +12,17 @@ from rgspipe.fitting.options import MOST_LIGHTS
 from rgspipe.options import Options, option
 
 
+def check_order(name: str, ends: tuple[float, float] | None) -> None:
+    """Refuse a range that ends before it begins.
+
+    Raises:
+        InputError: says so.
+    """
+    if ends is not None and ends[0] > ends[1]:
+        expected, found = "the least value, then the largest", f"[{ends[0]:g},{ends[1]:g}]"
+        raise InputError(name, expected=expected, found=found, remedy="Put them in order.")
+
+
 @dataclass(frozen=True)
 class TargetSpotConfig(Options):
     """The spots of generated targets; each range is drawn from uniformly."""
@@ -26,19 +37,16 @@ class TargetSpotConfig(Options):
     def check(self) -> None:
         """Refuse ranges that end before they begin."""
         for name in ("cone_angle", "falloff"):
-            low, high = getattr(self, name)
-            if low > high:
-                expected, found = "the least value, then the largest", f"[{low:g},{high:g}]"
-                raise InputError(name, expected=expected, found=found, remedy="Put them in order.")
+            check_order(name, getattr(self, name))
 
 
 @dataclass(frozen=True)
 class TargetsConfig(Options):
     """Generated fit targets: sums of single lights, each of which is rendered once."""
 
-    kind: Literal["points", "spots", "mixed", "drive"] = "points"
-    """lights of a target: points, spots, of each at least one, or the headlights of a car that drives around the bend
-    of scene=corner"""
+    kind: Literal["points", "spots", "mixed", "spheres", "panels", "drive"] = "points"
+    """lights of a target: points, spots, of each at least one, spheres, panels, or the headlights of a car that drives
+    around the bend of scene=corner"""
     number: int = option(40, low=1, high=100000)
     """targets; a drive has `frames`"""
     count: tuple[int, int] = option((1, 1), low=1, high=MOST_LIGHTS)
@@ -69,3 +77,15 @@ class TargetsConfig(Options):
     max_bounces: int | None = option(None, low=0, high=1024)
     """bounces of a path; by default the dataset's. Around a corner 12 lose 2 to 4 %"""
     spot: TargetSpotConfig = TargetSpotConfig()
+    radius: tuple[float, float] = option((0.02, 0.08), low=0, high=1)
+    """least and largest radius of spheres, scene units"""
+    side: tuple[float, float] = option((0.1, 0.3), low=0.001, high=10)
+    """least and largest side of panels, scene units"""
+    mounted: tuple[float, float] | None = option(None, low=0.0001, high=1)
+    """least and largest distance between a lamp and the surface that it hangs on, scene units; null for lamps that hang
+    free. Panels always lie on a surface: without this, 0.002 before it"""
+
+    def check(self) -> None:
+        """Refuse ranges that end before they begin."""
+        for name in ("radius", "side", "mounted"):
+            check_order(name, getattr(self, name))

@@ -71,14 +71,24 @@ class FrameEntry:
         return self._optional_path("albedo_path")
 
     @property
+    def base_path(self) -> Path | None:
+        """The same view with the lamps off, if there is one."""
+        return self._optional_path("base_path")
+
+    @property
     def mask_path(self) -> Path | None:
         """The image of which pixels count, if there is one."""
         return self._optional_path("mask_path")
 
     @property
+    def emitter_path(self) -> Path | None:
+        """The image of where lamps themselves are to be seen, if there is one."""
+        return self._optional_path("emitter_path")
+
+    @property
     def files(self) -> list[Path]:
         """All images of the frame."""
-        maps = (self.depth_path, self.normal_path, self.albedo_path, self.mask_path)
+        maps = (self.depth_path, self.normal_path, self.albedo_path, self.base_path, self.mask_path, self.emitter_path)
         return [self.image_path, *(path for path in maps if path is not None)]
 
     def camera(self, width: int, height: int) -> Camera:

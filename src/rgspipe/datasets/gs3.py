@@ -7,11 +7,12 @@ broken, missing or ambiguous gets past this module.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import torch
 
+from rgspipe.datasets.base_images import base_paths, read_base
 from rgspipe.datasets.classes import OCCLUSIONS
 from rgspipe.datasets.frames import FrameEntry, read_entries
 from rgspipe.datasets.images import read_colour, read_depth, read_mask, read_vectors
@@ -58,10 +59,13 @@ def load_split(root: Path, split: str, info: DatasetInfo | None) -> tuple[View, 
     return with_saturation(entries, [_load_view(entry, root, info, light=lit, depth=True) for entry in reading])
 
 
-def load_target(folder: str | Path) -> Target:
+def load_target(folder: str | Path, base: str | Path | None = None) -> Target:
     """A fit target: a folder with transforms.json (cameras only) and its images.
 
     Its class is looked up in targets.json beside the folder; without that it is "unknown".
+
+    Args:
+        base: a folder with the same views with the lamps off, see `base_images`; what the frames name if None.
 
     Raises:
         InputError: the folder has no frames or images, or any file is broken or inconsistent.
@@ -74,7 +78,8 @@ def load_target(folder: str | Path) -> Target:
     entries = read_entries(folder / "transforms.json", "the cameras of a fit target")
     entries[0].refuse_other_world()
     info = _target_info(folder, place)
-    views = [_load_view(entry, folder, info, light=False, depth=False) for entry in entries]
+    pairs = zip(entries, base_paths(entries, base), strict=True)
+    views = [_load_view(entry, folder, info, light=False, depth=False, base=path) for entry, path in pairs]
     return Target(place.name, occlusion, with_saturation(entries, views))
 
 
@@ -130,18 +135,34 @@ class _Surface:
     albedo: torch.Tensor | None
 
 
-def _load_view(entry: FrameEntry, root: Path, info: DatasetInfo | None, *, light: bool, depth: bool) -> View:
+def _load_view(
+    entry: FrameEntry,
+    root: Path,
+    info: DatasetInfo | None,
+    *,
+    light: bool,
+    depth: bool,
+    base: Path | None = None,
+) -> View:
     """A view; it must name its `light`, and say what its `depth` means if it has any."""
     image, alpha = read_colour(entry.image_path)
     camera = entry.camera(image.shape[1], image.shape[0])
-    if entry.mask_path is not None:
-        mask = read_mask(entry.mask_path, camera)
+    mask = None if entry.mask_path is None else read_mask(entry.mask_path, camera)
+    if mask is not None:
         image, alpha = image * mask[..., None], alpha * mask
     surface = _load_surface(entry, camera, info, needed=depth)
-    lamp = PointLight(*entry.light()) if light else None
-    return View(
-        _name(entry.image_path, root), camera, image, alpha, lamp, surface.depth, surface.normal, surface.albedo
+    view = View(
+        _name(entry.image_path, root),
+        camera,
+        image,
+        alpha,
+        PointLight(*entry.light()) if light else None,
+        surface.depth,
+        surface.normal,
+        surface.albedo,
+        emitters=None if entry.emitter_path is None else read_mask(entry.emitter_path, camera) >= 0.5,
     )
+    return view if base is None else replace(view, base=read_base(base, camera, mask))
 
 
 def _name(path: Path, root: Path) -> str:

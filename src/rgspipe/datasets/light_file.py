@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import torch
+from torch import Tensor
 
 from rgspipe.datasets.json_file import is_number, numbers, read_json, required
 from rgspipe.datasets.limits import FARTHEST, STRONGEST
@@ -15,6 +16,9 @@ from rgspipe.files import write_json
 from rgspipe.scene.lights import KINDS, Light, LightRig
 
 VERSION = 1
+
+#: The entry of light that comes from all around, and what it says of it.
+AMBIENT, RADIANCE = "ambient", "radiance"
 
 #: Vectors shorter than this are enlarged before they are squared.
 TINY = 1e-100
@@ -36,6 +40,23 @@ def read_lights(path: str | Path) -> LightRig:
     if not isinstance(lights, list) or not all(isinstance(light, dict) for light in lights):
         raise InputError(path, expected='a list of objects under "lights"', found=repr(lights)[:120], remedy="Fix it.")
     return tuple(_read_light(light, path, f"lights[{index}]") for index, light in enumerate(lights))
+
+
+def read_ambient(path: str | Path) -> Tensor | None:
+    """The RGB radiance (3,) float64 of the void in a light file; None where it says nothing of it.
+
+    Raises:
+        InputError: missing or unreadable file, or impossible values.
+    """
+    content = read_json(path, "a light file")
+    if AMBIENT not in content:
+        return None
+    place = f"{path}: {AMBIENT}"
+    radiance = numbers(required(content[AMBIENT], RADIANCE, place), 3, place, RADIANCE)
+    if min(radiance) < 0 or max(radiance) > STRONGEST:
+        expected = f"radiance from 0 to {STRONGEST:g}"
+        raise InputError(f"{place}.{RADIANCE}", expected=expected, found=str(radiance), remedy="Correct it.")
+    return torch.tensor(radiance, dtype=torch.float64)
 
 
 def write_lights(path: str | Path, rig: LightRig, extra: dict | None = None) -> None:

@@ -30,6 +30,8 @@ class View:
         albedo: (H, W, 3) float32 diffuse reflectance; 0 where there is no surface.
         saturated_from: radiance from which on the image tells only that the scene is at least so bright; None where
             it holds radiance as it was.
+        emitters: (H, W) bool, where the image shows lamps themselves; None where nobody said so.
+        base: (H, W, 3) the same with the lamps off, in a fit target.
     """
 
     name: str
@@ -41,6 +43,8 @@ class View:
     normal: Float[Tensor, "H W 3"] | None = None
     albedo: Float[Tensor, "H W 3"] | None = None
     saturated_from: float | None = None
+    emitters: Tensor | None = None
+    base: Float[Tensor, "H W 3"] | None = None
 
     @property
     def saturated(self) -> Tensor:

@@ -7,6 +7,7 @@ import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import torch
 from torch import Tensor
@@ -14,10 +15,11 @@ from torch import Tensor
 from rgspipe.datasets.exr import write_image
 from rgspipe.datasets.json_file import read_json
 from rgspipe.datasets.light_file import read_lights
-from rgspipe.evaluation.images import progress_strip, save_png, stack
+from rgspipe.evaluation.images import Bytes, line_of_text, progress_strip, save_png, stack
 from rgspipe.evaluation.metrics import psnr
 from rgspipe.files import publish, write_bytes, write_text
 from rgspipe.fitting.fit import FitViews
+from rgspipe.fitting.in_sight.lamp import Mask, left_out
 from rgspipe.fitting.result import FitResult, Step
 from rgspipe.fitting.words import PYTHON, Spoken
 from rgspipe.scene import LightRig
@@ -37,28 +39,38 @@ def write_result(
     targets: Sequence[Tensor],
     further: Mapping[str, bytes] | None = None,
     spoken: Spoken = PYTHON,
+    there: Sequence[Tensor] | None = None,
 ) -> None:
     """Write lights.json, convergence.csv, fit.png and final.exr; `folder` appears when it is whole, in place of any.
 
     fit.png has one row a view: target, start, midway, end, difference. final.exr is the first view's
-    final image; those of further views are final_1.exr and so on. `further` holds more files by name; settings in the
-    reason are named as `spoken` has them.
+    final image; those of further views are final_1.exr and so on. Where pixels of lamps in sight were left out, they
+    are outlined in fit.png, and emitters.png, emitters_1.png and so on are their masks. `further` holds more files by
+    name; settings in the reason are named as `spoken` has them. `there` is what every view shows besides the lights, if
+    that was looked for or given: it stands in all images of the fit, and in fit.png by itself beside the target.
     """
     partial = folder.with_name(f".{folder.name}.partial")
     shutil.rmtree(partial, ignore_errors=True)
     partial.mkdir(parents=True)
-    shown = [views.render(rig) for rig in _milestones(result)]
+    shown = [_with(views.render(rig), there) for rig in _milestones(result)]
     final = shown[-1]
-    result.save(partial / "lights.json", spoken, psnr=_psnr(final, targets))
+    masks = left_out(result.lamps, [image.shape[:2] for image in final]) if result.lamps else None
+    result.save(partial / "lights.json", spoken, psnr=_psnr(final, targets, masks))
     _write_convergence(partial / "convergence.csv", result.trajectory)
-    rows = [progress_strip(target, [images[k] for images in shown]) for k, target in enumerate(targets)]
-    save_png(partial / "fit.png", stack(rows))
+    save_png(partial / "fit.png", _picture(targets, [*([there] if there else []), *shown], masks))
+    for index, mask in enumerate(masks or ()):
+        save_png(partial / _numbered("emitters", index, "png"), np.repeat(255 * mask.astype(np.uint8)[..., None], 3, 2))
     for index, image in enumerate(final):
-        write_image(partial / ("final.exr" if index == 0 else f"final_{index}.exr"), image.cpu().numpy())
+        write_image(partial / _numbered("final", index, "exr"), image.cpu().numpy())
     for name, content in (further or {}).items():
         write_bytes(partial / name, content)
     shutil.rmtree(folder, ignore_errors=True)
     publish(partial, folder)
+
+
+def _with(images: Sequence[Tensor], there: Sequence[Tensor] | None) -> list[Tensor]:
+    """Images of lights with what is there besides."""
+    return [image + other.to(image) for image, other in zip(images, there, strict=True)] if there else [*images]
 
 
 def read_result(folder: Path) -> dict[str, object]:
@@ -77,9 +89,31 @@ def _milestones(result: FitResult) -> list[LightRig]:
     return [steps[0].lights, steps[len(steps) // 2].lights, result.lights]
 
 
-def _psnr(images: Sequence[Tensor], targets: Sequence[Tensor]) -> float | None:
-    """PSNR over all pixels of all views, at most BEST_PSNR; None where it has no meaning."""
-    joined = [torch.cat([image.detach().reshape(-1, 1, 3).cpu() for image in group]) for group in (images, targets)]
+def _picture(targets: Sequence[Tensor], shown: Sequence[Sequence[Tensor]], masks: Sequence[Mask] | None) -> Bytes:
+    """One row a view, and a line that says what is outlined if anything is."""
+    rows = [
+        progress_strip(target, [images[k] for images in shown], None if masks is None else masks[k])
+        for k, target in enumerate(targets)
+    ]
+    return stack(
+        rows if masks is None else [*rows, line_of_text("lamps in sight: left out of the fit", rows[0].shape[1])]
+    )
+
+
+def _numbered(name: str, index: int, suffix: str) -> str:
+    """The name of the file of a view: that of the first one has no number."""
+    return f"{name}.{suffix}" if index == 0 else f"{name}_{index}.{suffix}"
+
+
+def _psnr(images: Sequence[Tensor], targets: Sequence[Tensor], masks: Sequence[Mask] | None) -> float | None:
+    """PSNR over all pixels of all views but those of lamps, at most BEST_PSNR; None where it has no meaning."""
+    kept = [torch.ones(image.shape[:2], dtype=torch.bool) for image in images]
+    if masks is not None:
+        kept = [torch.from_numpy(~mask) for mask in masks]
+    joined = [
+        torch.cat([image.detach().cpu()[chosen].reshape(-1, 1, 3) for image, chosen in zip(group, kept, strict=True)])
+        for group in (images, targets)
+    ]
     value = psnr(*joined)
     return None if math.isnan(value) else min(value, BEST_PSNR)
 

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
-from PIL import Image
+import scipy.ndimage
+from PIL import Image, ImageDraw
 
 from rgspipe.errors import InputError
 from rgspipe.evaluation.arrays import ArrayLike, to_array
@@ -23,6 +24,9 @@ WHITE_PERCENTILE = 97.0
 DIFFERENCE_SPAN = 0.2
 #: Width of the white gap between panels, pixels.
 GAP = 4
+
+#: The colour of outlines.
+OUTLINE = (0, 190, 255)
 
 # Ends and middle of the difference colours: too dark, equal, too bright (safe with colour blindness).
 _TOO_DARK, _EQUAL, _TOO_BRIGHT = (33, 102, 172), (247, 247, 247), (178, 24, 43)
@@ -69,13 +73,36 @@ def comparison_strip(target: ArrayLike, render: ArrayLike) -> Bytes:
     return progress_strip(target, [render])
 
 
-def progress_strip(target: ArrayLike, renders: Sequence[ArrayLike]) -> Bytes:
-    """(H, …, 3) uint8: target | each render in turn | signed difference of the last, exposed for the target."""
+def progress_strip(
+    target: ArrayLike, renders: Sequence[ArrayLike], left_out: npt.NDArray[np.bool_] | None = None
+) -> Bytes:
+    """(H, …, 3) uint8: target | each render in turn | signed difference of the last, exposed for the target.
+
+    Pixels that were left out, a mask (H, W), are outlined in the target and in the difference.
+    """
     if not renders:
         raise ValueError("a strip needs at least one render")
     factor = display_gain(target)
     panels = [tone_map(target, factor), *(tone_map(render, factor) for render in renders)]
-    return beside([*panels, signed_difference(target, renders[-1], factor)])
+    panels.append(signed_difference(target, renders[-1], factor))
+    if left_out is not None:
+        panels[0], panels[-1] = (outlined(panel, left_out) for panel in (panels[0], panels[-1]))
+    return beside(panels)
+
+
+def outlined(panel: Bytes, mask: npt.NDArray[np.bool_]) -> Bytes:
+    """A panel (H, W, 3) with the pixels around those of a mask (H, W) in the colour OUTLINE."""
+    around = scipy.ndimage.binary_dilation(mask, structure=np.ones((3, 3))) & ~mask
+    return np.where(around[:, :, None], np.array(OUTLINE, dtype=np.uint8), panel)
+
+
+def line_of_text(words: str, width: int) -> Bytes:
+    """(16, width, 3) uint8 words in black after a frame of the colour OUTLINE, cut off where they do not fit."""
+    picture = Image.new("RGB", (width, 16), "white")
+    draw = ImageDraw.Draw(picture)
+    draw.rectangle((3, 3, 11, 11), outline=OUTLINE)
+    draw.text((17, 2), words, fill="black")
+    return np.asarray(picture)
 
 
 def beside(panels: Sequence[Bytes], gap: int = GAP) -> Bytes:

@@ -136,8 +136,9 @@ def rig_errors(estimate: LightRig, truth: LightRig, scene_size: float) -> RigErr
     if not truth:
         raise ValueError("the true rig has no light")
     if not estimate:
-        lost = math.inf if any(light.axis is not None for light in truth) else math.nan
-        return RigErrors(math.inf, math.inf, lost, lost, ())
+        axis = math.inf if any(light.axis is not None for light in truth) else math.nan
+        shape = math.inf if any(light.shape for light in truth) else math.nan
+        return RigErrors(math.inf, math.inf, axis, shape, ())
     found = np.stack([to_array(light.position) for light in estimate])
     wanted = np.stack([to_array(light.position) for light in truth])
     pairs = match_positions(found, wanted)
@@ -149,13 +150,14 @@ def rig_errors(estimate: LightRig, truth: LightRig, scene_size: float) -> RigErr
 
 def _shape_errors(pairs: Sequence[tuple[Light, Light]]) -> tuple[float, float]:
     """The largest errors of axes [degrees] and of the first numbers of shapes of matched lights (estimate, truth)."""
-    aimed = [(found, wanted) for found, wanted in pairs if wanted.axis is not None]
-    if not aimed:
-        return math.nan, math.nan
-    if not all(found.kind == wanted.kind for found, wanted in aimed):
-        return math.inf, math.inf
-    axes = [metrics.angle_between(found.axis, wanted.axis) for found, wanted in aimed]
-    return max(axes), max((_first_number(found, wanted) for found, wanted in aimed if wanted.shape), default=math.nan)
+    axes, shapes = [], []
+    for found, wanted in pairs:
+        alike = found.kind == wanted.kind
+        if wanted.axis is not None:
+            axes.append(metrics.angle_between(found.axis, wanted.axis) if alike else math.inf)
+        if wanted.shape:
+            shapes.append(_first_number(found, wanted) if alike else math.inf)
+    return max(axes, default=math.nan), max(shapes, default=math.nan)
 
 
 def _first_number(found: Light, wanted: Light) -> float:

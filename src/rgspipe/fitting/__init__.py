@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from rgspipe.fitting.findings import FitStatus
     from rgspipe.fitting.fit import FitViews, fit_lights
-    from rgspipe.fitting.model.capture import ImageCapture
+    from rgspipe.fitting.model.capture import BaseImages, ImageCapture
     from rgspipe.fitting.options import TrackOptions
     from rgspipe.fitting.result import FitResult, Step
     from rgspipe.fitting.solvers import PaperAdam, Search, Solver
     from rgspipe.fitting.spec import LightSpec
 
 __all__ = [
+    "BaseImages",
     "FitResult",
     "FitStatus",
     "FitViews",
@@ -34,7 +35,7 @@ __all__ = [
 _HOMES = {
     "rgspipe.fitting.findings": ("FitStatus",),
     "rgspipe.fitting.fit": ("FitViews", "fit_lights"),
-    "rgspipe.fitting.model.capture": ("ImageCapture",),
+    "rgspipe.fitting.model.capture": ("BaseImages", "ImageCapture"),
     "rgspipe.fitting.options": ("TrackOptions",),
     "rgspipe.fitting.result": ("FitResult", "Step"),
     "rgspipe.fitting.solvers": ("PaperAdam", "Search", "Solver"),

@@ -65,6 +65,16 @@ class LightMissing(Finding):
 
 
 @dataclass(frozen=True)
+class LampElsewhere(Finding):
+    """View `view` (from 0) shows a lamp at `column` and `row` [pixels], and no light was found where it may stand."""
+
+    view: int
+    column: float
+    row: float
+    status = FitStatus.UNEXPLAINED
+
+
+@dataclass(frozen=True)
 class Rival(Finding):
     """Clearly different lights explain the target as well.
 
@@ -154,6 +164,39 @@ class MaybeOneMore(Finding):
 @dataclass(frozen=True)
 class ExposureUnknown(Finding):
     """A single view cannot tell its exposure from the lights' intensity."""
+
+    status = FitStatus.CONVERGED
+
+
+@dataclass(frozen=True)
+class LampsLeftOut(Finding):
+    """`count` times a lamp is in sight, in `views` of the views; its `pixels`, of all views, were left out."""
+
+    count: int
+    pixels: int
+    views: int
+    status = FitStatus.CONVERGED
+
+
+@dataclass(frozen=True)
+class MuchAmbient(Finding):
+    """Light from all around through openings is the share `share` of the image's light."""
+
+    share: float
+    status = FitStatus.CONVERGED
+
+
+@dataclass(frozen=True)
+class MaybeAmbient(Finding):
+    """Light from all around, which was not allowed for, would lower the robust cost by the share `gain`."""
+
+    gain: float
+    status = FitStatus.CONVERGED
+
+
+@dataclass(frozen=True)
+class NoOpening(Finding):
+    """Light from all around was allowed for, and the scene is closed: none arrives."""
 
     status = FitStatus.CONVERGED
 

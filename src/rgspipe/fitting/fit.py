@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 from rgspipe.errors import InputError
-from rgspipe.fitting.model.capture import ImageCapture
+from rgspipe.fitting.in_sight.search import fit_on_lookout, fit_without
+from rgspipe.fitting.model.capture import BaseImages, ImageCapture
 from rgspipe.fitting.result import FitResult
 from rgspipe.fitting.solvers import Search, Solver
 from rgspipe.fitting.spec import LightSpec
@@ -14,6 +16,9 @@ from rgspipe.fitting.target_views import Cameras, TargetViews
 from rgspipe.renderer.effects import ALL_EFFECTS, Effects
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene.arrays import ArrayLike, as_list
+
+#: What is known of lamps in sight: their pixels, that there are none, or nothing.
+Emitters: TypeAlias = "str | Sequence[ArrayLike] | ArrayLike | None"
 
 
 @dataclass(frozen=True)
@@ -28,6 +33,7 @@ class FitViews(TargetViews):
         *,
         solver: Solver | None = None,
         capture: ImageCapture | None = None,
+        emitters: Emitters = "auto",
     ) -> FitResult:
         """The lights of one image a view; see `fit_lights`."""
         stacked = self.prepared.stack_images(as_list(images, axes=3))
@@ -39,7 +45,19 @@ class FitViews(TargetViews):
                 found=f"{solver!r}",
                 remedy="Pass such an object.",
             )
-        return solver.fit(self, stacked, capture or ImageCapture())
+        capture = capture or ImageCapture()
+
+        def fit(views: TargetViews) -> FitResult:
+            return solver.fit(views, stacked, capture)
+
+        if emitters is None:
+            return fit(self)
+        if not isinstance(emitters, str):
+            return fit_without(self, stacked, capture, fit, self.prepared.emitter_masks(as_list(emitters, axes=2)))
+        if emitters != "auto":
+            raise InputError("emitters", expected='"auto", masks or None', found=repr(emitters), remedy="Choose one.")
+        # The published method has no way to look twice.
+        return fit_on_lookout(self, stacked, capture, fit) if isinstance(solver, Search) else fit(self)
 
 
 def fit_lights(
@@ -49,11 +67,13 @@ def fit_lights(
     *,
     lights: str | LightSpec = "point",
     solver: Solver | None = None,
+    base: Sequence[ArrayLike] | ArrayLike | None = None,
     masks: Sequence[ArrayLike] | ArrayLike | None = None,
     capture: ImageCapture | None = None,
     effects: Effects = ALL_EFFECTS,
     sharp: bool = True,
     mask_edges: bool = True,
+    emitters: Emitters = "auto",
 ) -> FitResult:
     """Recover the lights of images of a frozen scene.
 
@@ -67,12 +87,17 @@ def fit_lights(
         lights: what is known of the lights: the name of a kind, of which there is one, or "auto" for a point or a
             spot; or all that there is to know.
         solver: how, such as `Search(starts=8)` or `PaperAdam(seed=1)`; `Search()` if None.
+        base: what `images` show with the lamps off, taken as they were; it is taken away from them. More can be said of
+            it in `capture`.
         masks: (H, W) per camera, the scene's share of each pixel (the image's alpha); 1 if None.
         capture: what is known of how the images were taken; as radiance, with known exposures, if None.
         effects: parts of light transport.
         sharp: whether the last steps take direct light where pixels look, shadows' edges included; else at surfels'
             centres, which is quicker and less accurate.
         mask_edges: whether a search leaves out pixels on silhouettes, creases and depth jumps.
+        emitters: lamps that are in sight, whose own pixels no light explains: "auto" for a `Search` that finds them,
+            left out and looked for where they are seen; (H, W) masks per camera that are 1 there; None if there is
+            none to be left out.
 
     Returns:
         The lights, why the fit stopped, and how it got there. A target that is black gives a result without
@@ -86,4 +111,6 @@ def fit_lights(
     views = FitViews.prepare(
         scene, cameras, lights=lights, masks=masks, effects=effects, sharp=sharp, mask_edges=mask_edges
     )
-    return views.fit(images, solver=solver, capture=capture)
+    if base is not None:
+        capture = replace(capture or ImageCapture(), base=BaseImages(as_list(base, axes=3)))
+    return views.fit(images, solver=solver, capture=capture, emitters=emitters)

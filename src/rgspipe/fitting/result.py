@@ -9,9 +9,11 @@ from pathlib import Path
 from torch import Tensor
 
 from rgspipe.datasets.covariance_file import covariance_fields
-from rgspipe.datasets.light_file import write_lights
+from rgspipe.datasets.light_file import AMBIENT, RADIANCE, write_lights
 from rgspipe.fitting.findings import Dark, Finding, FitStatus, gravest
-from rgspipe.fitting.result_text import as_html, as_text, headline, light_lines
+from rgspipe.fitting.in_sight.lamp import LampInSight
+from rgspipe.fitting.model.known_images import Strength
+from rgspipe.fitting.result_text import ambient_line, as_html, as_text, base_line, headline, light_lines
 from rgspipe.fitting.words import PYTHON, Spoken, explained
 from rgspipe.scene import LightRig
 from rgspipe.scene.shapes import Float
@@ -63,6 +65,10 @@ class FitResult:
         noise_covariance: the same with the residual as independent noise of the pixels, by plain Gauss-Newton. Errors
             of the model are shared by neighbouring pixels, so it is far too small for a scene that was trained.
         exposures: of each view over the first one's; all 1 where they were known.
+        lamps: those in sight, whose pixels were left out.
+        ambient: the radiance that comes from all around through openings; None where no such light was looked for, or
+            none can arrive.
+        base_scale: how many times images with the lamps off are in the target; None where that was known.
     """
 
     lights: LightRig
@@ -77,6 +83,9 @@ class FitResult:
     costs: Mapping[int, float] = field(default_factory=dict)
     noise_covariance: tuple[Float[Tensor, "_ _"], ...] = ()
     exposures: tuple[float, ...] = ()
+    lamps: tuple[LampInSight, ...] = ()
+    ambient: Strength | None = None
+    base_scale: Strength | None = None
 
     @property
     def status(self) -> FitStatus:
@@ -97,7 +106,12 @@ class FitResult:
 
     def _told(self) -> tuple[str, list[str], str]:
         first = headline(len(self.lights), self.status, self.seconds)
-        return first, light_lines(self.lights, self.covariance), self.reason
+        lines = light_lines(self.lights, self.covariance)
+        if self.ambient is not None:
+            lines.append(ambient_line(self.ambient))
+        if self.base_scale is not None:
+            lines.append(base_line(self.base_scale))
+        return first, lines, self.reason
 
     def save(self, path: str | Path, spoken: Spoken = PYTHON, **more: object) -> None:
         """Write a light file with the covariances, and beside the lights how the fit went.
@@ -117,11 +131,20 @@ class FitResult:
             "reason": explained(self.findings, spoken),
             "findings": [finding.data() for finding in self.findings],
             "exposures": list(self.exposures),
+            "emitters": [lamp.data() for lamp in self.lamps],
+            **({} if self.ambient is None else {AMBIENT: _strength_fields(self.ambient, RADIANCE)}),
+            **({} if self.base_scale is None else {"base_scale": _strength_fields(self.base_scale, "factor")}),
             "lights": covariance_fields(
                 len(self.lights), {"covariance": self.covariance, "noise_covariance": self.noise_covariance}
             ),
         }
         write_lights(path, self.lights, fit | more)
+
+
+def _strength_fields(strength: Strength, name: str) -> dict[str, object]:
+    """For a light file: the value by `name`, how sure it is, and its share of the light."""
+    [spread] = covariance_fields(1, {"covariance": (strength.covariance,)})
+    return {name: strength.value.tolist(), **spread, "share": strength.share}
 
 
 def dark_result(seconds: float) -> FitResult:

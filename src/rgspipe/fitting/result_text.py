@@ -9,6 +9,7 @@ from html import escape
 from torch import Tensor
 
 from rgspipe.fitting.findings import FitStatus
+from rgspipe.fitting.model.known_images import Strength
 from rgspipe.scene import Light, LightRig
 
 
@@ -57,10 +58,31 @@ def light_line(light: Light, covariance: Sequence[Sequence[float]] | None = None
     told += "" if variances is None else _deviation(variances[:3], "{:.4f}")
     if light.axis is not None:
         told += f", axis ({', '.join(f'{value:.3f}' for value in light.axis.tolist())})"
-    for number in light.shape[:1]:
-        told += f", {number.key.replace('_', ' ')} {number.shown(getattr(light, number.name)):.1f}{number.unit}"
+    for number in light.shape:
+        if number.decimals is not None:
+            value = number.shown(getattr(light, number.name))
+            told += f", {number.key.replace('_', ' ')} {value:.{number.decimals}f}{number.unit}"
     told += f", RGB ({colour}) W/sr"
     return told + ("" if variances is None else _deviation(variances[-3:], "{:.3f}"))
+
+
+def ambient_line(ambient: Strength) -> str:
+    """Light from all around in a line: its RGB radiance, how sure that is, and what share of the image it is."""
+    return f"ambient {_strength_words(ambient)} W/(sr·unit²){_share_words(ambient)}"
+
+
+def base_line(scale: Strength) -> str:
+    """How many times images with the lamps off are in the target, in a line."""
+    return f"lamps off {_strength_words(scale)} times{_share_words(scale)}"
+
+
+def _strength_words(strength: Strength) -> str:
+    colour = ", ".join(f"{value:.3f}" for value in strength.value.tolist())
+    return f"RGB ({colour}){_deviation(strength.covariance.diagonal().tolist(), '{:.3f}')}"
+
+
+def _share_words(strength: Strength) -> str:
+    return f", {100.0 * strength.share:.0f} % of the light"
 
 
 def _deviation(variances: Sequence[float], form: str) -> str:

@@ -9,19 +9,27 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import torch
+from torch import Tensor
+
 from rgspipe.fitting.certainty.uncertainty import light_covariances
-from rgspipe.fitting.findings import Finding, LightMissing, LightSpare, Rival
+from rgspipe.fitting.findings import Finding, LightMissing, LightSpare, MuchAmbient, Rival
 from rgspipe.fitting.meter import Meter
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.exposure import rough_exposures
+from rgspipe.fitting.model.known_images import FIELDS, Strength
+from rgspipe.fitting.model.moments import moments
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.options import SearchOptions
 from rgspipe.fitting.result import FitResult, dark_result
 from rgspipe.fitting.search.coarse import CoarseImages
+from rgspipe.fitting.search.compare import column_energies
+from rgspipe.fitting.search.grow import grown
 from rgspipe.fitting.search.refine import Refiner, State
 from rgspipe.fitting.search.rig_search import RigSearch
 from rgspipe.fitting.search.starts import Candidates
 from rgspipe.fitting.search.weighting import PLAIN
+from rgspipe.fitting.selection.ambient import ambient_found, ambient_missing
 from rgspipe.fitting.selection.diagnosis import Costs, standing
 from rgspipe.fitting.selection.number import Doubted, doubted_number, faded_light
 from rgspipe.fitting.selection.rivals import rival_among, rival_elsewhere
@@ -48,18 +56,23 @@ def fit_search_lm(
     if problem.black:
         return dark_result(meter.seconds)
     problem = _roughly_exposed(problem, coarse)
-    candidates = [Candidates.of(problem, images, spec.shape_free, options.combinations) for images in coarse]
+    free = spec.seed.shape_free
+    candidates = [Candidates.of(problem, images, free, options.combinations) for images in coarse]
     candidates = [one for one in candidates if one.lit]
     if not candidates:
-        return dark_result(meter.seconds)
+        return _without_lights(problem, meter)
     refiner = Refiner.of(problem.coarsest(blocks), meter, options.limits)
     found = _search(refiner, candidates, options, spec)
     polished, best = _polished(refiner.on(problem.sharpest()), found.best, options.iterations)
-    if not bool((best.intensity > 0).any()):
-        return dark_result(meter.seconds)
+    if not bool((best.intensity[: len(best.emitters)] > 0).any()):
+        return _without_lights(polished.problem, meter)
     findings = found.findings
     if spec.count is not None and not any(isinstance(finding, LightSpare) for finding in findings):
         findings = (*findings, *faded_light(refiner, best, options))
+    if spec.ambient:
+        findings = (*findings, *ambient_found(polished.problem, best, options.bar))
+    else:
+        findings = (*findings, *ambient_missing(refiner, candidates, found.best, findings, options))
     return _result(polished, best, findings, Costs.of(refiner, found.compared), options)
 
 
@@ -87,6 +100,7 @@ def _search(refiner: Refiner, candidates: Sequence[Candidates], options: SearchO
     """Search, then doubt what was found."""
     search = RigSearch(refiner, candidates, options, kinds_open=len(spec.kinds) > 1)
     found = search.unknown() if spec.count is None else search.known(spec.count)
+    found = grown(refiner, found, spec, options) if spec.extended else found
     rival = rival_among(refiner, found.best, found.others, options)
     doubted = Doubted()
     if spec.count is not None:
@@ -104,10 +118,11 @@ def _roughly_exposed(problem: LightProblem, coarse: Sequence[CoarseImages]) -> L
     if not problem.exposure_free or not len(coarse[0]):
         return problem
     images = coarse[0]
+    seen = torch.cat([images.images, *((images.blocks @ one.image)[None] for one in problem.known)])
     target = images.blocks @ problem.target
     weights = problem.block_weights(target, images.counts.to(target), images.blocks)
     views = view_of_blocks(images.blocks, problem.views)
-    return problem.with_exposures(rough_exposures(images.images, target, weights, views, len(problem.exposures)))
+    return problem.with_exposures(rough_exposures(seen, target, weights, views, len(problem.exposures)))
 
 
 def _polished(refiner: Refiner, best: State, iterations: int) -> tuple[Refiner, State]:
@@ -145,4 +160,31 @@ def _result(
         costs=costs.by_count,
         exposures=tuple(problem.exposures.tolist()),
         noise_covariance=spread.noise,
+        **_strengths(problem, best, spread.known),
     )
+
+
+def _without_lights(problem: LightProblem, meter: Meter) -> FitResult:
+    """The result for a target that known images alone explain, or nothing."""
+    result = dark_result(meter.seconds)
+    if not problem.known:
+        return result
+    columns, weights = problem.known_columns, problem.unclipped(PLAIN.base(problem).square())
+    found = problem.moments(columns, weights)
+    state, gram = State((), columns, found.intensity), moments(columns, problem.target, weights).values
+    variance = found.cost / max(1, problem.target.numel() - found.intensity.numel())
+    spreads = [torch.diag(variance * one.unit**2 / gram[:, k, k]) for k, one in enumerate(problem.known)]
+    strengths = _strengths(problem, state, spreads)
+    told = [MuchAmbient(strengths["ambient"].share)] if "ambient" in strengths else []
+    loss = problem.unexplained(columns, found.intensity)
+    return replace(result, findings=(*result.findings, *told), loss=loss, **strengths)
+
+
+def _strengths(problem: LightProblem, best: State, covariance: Sequence[Tensor]) -> dict[str, Strength]:
+    """How strong known images are, by the fields of a result."""
+    count, energies = len(best.emitters), column_energies(best)
+    parts = zip(problem.known, best.intensity[count:], covariance, energies[count:], strict=True)
+    return {
+        FIELDS[one.name]: Strength(one.unit * value, spread, energy / max(sum(energies), 1e-300))
+        for one, value, spread, energy in parts
+    }

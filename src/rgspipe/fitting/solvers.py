@@ -61,9 +61,12 @@ class PaperAdam(AdamOptions):
         """The lights of images (all pixels of all views, 3).
 
         Raises:
-            ValueError: exposures are free, images are clipped, or kind, number or shape of the lights are not known.
+            ValueError: exposures are free, images are clipped or have a base, there may be ambient light, or kind,
+                number or shape of the lights are not known.
         """
         if capture != ImageCapture():
-            raise ValueError("PaperAdam takes images as radiance with known exposures: use Search")
+            raise ValueError("PaperAdam takes images as radiance with known exposures, lit by lamps alone: use Search")
+        if views.lights.ambient:
+            raise ValueError("PaperAdam knows no light from all around: use Search")
         problem, prior = LightProblem.create(views.prepared, images, views.effects), LightPrior.of(self.training_lights)
         return fit_paper_adam(problem, images, self, prior, self.seed, views.lights)

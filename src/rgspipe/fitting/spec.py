@@ -30,6 +30,8 @@ class LightSpec:
             `SpotLight.shaped("gaussian", 0.4, 0.1)`; the kind's usual one if None.
         shape_free: whether the numbers of the shape (cone angle, exponent …) are recovered, too; what `shape` says of
             them is then only where to begin.
+        mounted: whether they lie on surfaces of the scene, and shine away from them: panels alone.
+        ambient: whether there may be light besides, from all around through openings; its radiance is recovered, too.
 
     Raises:
         InputError: an unknown field or type, a count out of range, or a shape of another kind.
@@ -39,6 +41,8 @@ class LightSpec:
     count: int | None = 1
     shape: Light | None = None
     shape_free: bool = False
+    mounted: bool = False
+    ambient: bool = False
 
     def __new__(cls, *args: Any, **values: Any) -> Self:
         check_names(values, [item.name for item in fields(cls)], "LightSpec")
@@ -53,11 +57,25 @@ class LightSpec:
         if self.shape is not None and self.shape.kind != kind:
             _refuse("shape", f"a {kind}, as the type is {self.type}", self.shape, "Let type and shape agree.")
 
+        if self.mounted and not self.kinds[-1].flush:
+            _refuse("mounted", "False, but for panels", self.mounted, "Lights of other kinds stand free.")
+
     @property
     def kinds(self) -> tuple[Light, ...]:
         """A light of each kind that may be there, of the shape that it has; the plainest first."""
         names = AUTO_KINDS if self.type == AUTO else (self.type,)
         return (*(KINDS[name].shaped() for name in names[:-1]), self.shape or KINDS[names[-1]].shaped())
+
+    @property
+    def extended(self) -> bool:
+        """Whether they have an extent."""
+        return self.seed is not self
+
+    @property
+    def seed(self) -> LightSpec:
+        """The lights in one point that a search looks for first; itself where these are they."""
+        kind = self.kinds[-1]
+        return self if kind.seed is kind else LightSpec(kind.seed.kind, self.count, kind.seed, ambient=self.ambient)
 
     @property
     def aimed(self) -> bool:

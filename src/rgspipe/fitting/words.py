@@ -10,9 +10,14 @@ from rgspipe.fitting.findings import (
     ExposureUnknown,
     Finding,
     FitStatus,
+    LampElsewhere,
+    LampsLeftOut,
     LightMissing,
     LightSpare,
+    MaybeAmbient,
     MaybeOneMore,
+    MuchAmbient,
+    NoOpening,
     OnSurface,
     PoorScene,
     Rival,
@@ -48,13 +53,15 @@ class Spoken:
     Attributes:
         count: a given number of lights; takes the number.
         uncounted: a number of lights that is to be found.
+        ambient: light from all around besides.
     """
 
     count: Callable[[int], str]
     uncounted: str
+    ambient: str
 
 
-PYTHON = Spoken("LightSpec(count={})".format, "LightSpec(count=None)")
+PYTHON = Spoken("LightSpec(count={})".format, "LightSpec(count=None)", "LightSpec(ambient=True)")
 
 
 def explained(findings: Sequence[Finding], spoken: Spoken = PYTHON) -> str:
@@ -130,6 +137,29 @@ def _exposure(found: ExposureUnknown, spoken: Spoken) -> str:
     return "One view cannot tell its exposure from the lights' intensity: intensities are relative to the exposure."
 
 
+def _elsewhere(found: LampElsewhere, spoken: Spoken) -> str:
+    place = f"at column {found.column:.0f}, row {found.row:.0f} of view {found.view}"
+    return f"A lamp is in sight {place}, and no light was found there: there may be more lights, or it is no lamp."
+
+
+def _left_out(found: LampsLeftOut, spoken: Spoken) -> str:
+    views = f"{found.views} views" if found.views > 1 else "one view"
+    return f"Pixels of lamps in sight were left out: {found.pixels} in {views}."
+
+
+def _much_ambient(found: MuchAmbient, spoken: Spoken) -> str:
+    return f"{percent(found.share)} of the light in the images comes from all around, through openings."
+
+
+def _maybe_ambient(found: MaybeAmbient, spoken: Spoken) -> str:
+    gain = f"Light from all around would lower the cost by {percent(found.gain)}: there may be some"
+    return f"{gain}; allow for it ({spoken.ambient}), or give images with the lamps off."
+
+
+def _no_opening(found: NoOpening, spoken: Spoken) -> str:
+    return "The scene is closed: no light comes in from all around."
+
+
 #: Findings that say more than their status does.
 _WORDS: dict[type[Finding], Callable[..., str]] = {
     LightMissing: _missing,
@@ -142,6 +172,11 @@ _WORDS: dict[type[Finding], Callable[..., str]] = {
     AllStepsTaken: _all_steps,
     MaybeOneMore: _maybe,
     ExposureUnknown: _exposure,
+    LampElsewhere: _elsewhere,
+    LampsLeftOut: _left_out,
+    MuchAmbient: _much_ambient,
+    MaybeAmbient: _maybe_ambient,
+    NoOpening: _no_opening,
 }
 
 

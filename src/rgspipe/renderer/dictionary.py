@@ -57,6 +57,12 @@ class LightDictionary:
         """The same with the irradiance on another device."""
         return replace(self, irradiance=self.irradiance.to(device))
 
+    def joined(self, bvh: SurfelBvh, positions: Tensor, shadows: bool = True) -> LightDictionary:
+        """The same with further unit lights at `positions` (K, 3), among N surfels."""
+        more = _irradiance(bvh, positions, shadows)
+        irradiance = torch.cat([self.irradiance, more.to(self.irradiance)])
+        return replace(self, positions=torch.cat([self.positions, positions.to(self.positions)]), irradiance=irradiance)
+
 
 def candidate_grid(lower: Tensor, upper: Tensor, grid: int, seed: int) -> Tensor:
     """(grid³, 3) jittered points in the box from `lower` to `upper` (3,), float32."""
@@ -93,16 +99,20 @@ def build_dictionary(
     within = len(positions)
     if surroundings.open:
         positions = torch.cat([positions, surroundings.shell_points()])
-    rows = [
-        unit_irradiance(bvh, positions[start : start + BATCH], shadows)[0]
-        for start in progress_bar(range(0, len(positions), BATCH), "light dictionary", unit="batch")
-    ]
-    irradiance = torch.cat(rows) if rows else torch.zeros((0, len(bvh.surfels)), device=bvh.device)
+    irradiance = _irradiance(bvh, positions, shadows, shown=True)
     flux = irradiance @ areas.to(irradiance)
     kept = flux > 0.0
     if within > 0:
         kept[:within] = flux[:within] > LEAST_FLUX * flux[:within].amax()
     return LightDictionary(positions[kept.cpu()], irradiance[kept], grid, seed)
+
+
+def _irradiance(bvh: SurfelBvh, positions: Tensor, shadows: bool, shown: bool = False) -> Tensor:
+    """(C, N) of unit lights at `positions` (C, 3) on every surfel."""
+    batches = range(0, len(positions), BATCH)
+    batches = progress_bar(batches, "light dictionary", unit="batch") if shown else batches
+    rows = [unit_irradiance(bvh, positions[start : start + BATCH], shadows)[0] for start in batches]
+    return torch.cat(rows) if rows else torch.zeros((0, len(bvh.surfels)), device=bvh.device)
 
 
 def _clear_of_surfels(surfels: Surfels, positions: Tensor) -> Tensor:

@@ -24,8 +24,9 @@ class Effects:
     """how profiles are encoded in spherical harmonics; None for the exact ones"""
 
     def lights(self, rig: LightRig) -> LightRig:
-        """The lights of a rig as these effects have them."""
-        return rig if self.cones else tuple(light.plain for light in rig)
+        """The lights of a rig as these effects have them, each in one point."""
+        shaped = rig if self.cones else tuple(light.plain for light in rig)
+        return tuple(part for light in shaped for part in light.parts())
 
 
 #: All of them, exactly.

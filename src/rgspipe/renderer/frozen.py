@@ -26,7 +26,7 @@ from rgspipe.renderer.images.viewed_pixels import ViewedPixels
 from rgspipe.renderer.indirect import IndirectSolver, Solver, indirect_solver
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.mutual_visibility import build_needed_gather
-from rgspipe.renderer.openness import openness
+from rgspipe.renderer.openness import openness, void_irradiance
 from rgspipe.renderer.rig import rig_irradiance, unit_response
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.surroundings import OPEN, Surroundings
@@ -155,8 +155,7 @@ class FrozenScene:
     @cached_property
     def bvh(self) -> SurfelBvh:
         """The hierarchy for shadow and camera rays."""
-        placed = self.surfels if self.centers is None else replace(self.surfels, centers=self.centers)
-        return SurfelBvh(placed)
+        return SurfelBvh(self.surfels if self.centers is None else replace(self.surfels, centers=self.centers))
 
     @cached_property
     def _recent(self) -> RecentViews:
@@ -170,16 +169,17 @@ class FrozenScene:
     @property
     def size(self) -> float:
         """Longest side of the bounding box, scene units; 0 of an empty scene."""
-        if not len(self.surfels):
-            return 0.0
-        lower, upper = self.bounds
-        return float((upper - lower).amax())
+        return float((self.bounds[1] - self.bounds[0]).amax()) if len(self.surfels) else 0.0
 
     @cached_property
     def openness(self) -> float:
         """Share of what the surfaces look at that is void; see `renderer.openness`."""
-        placed = self.surfels if self.centers is None else replace(self.surfels, centers=self.centers)
-        return openness(self.bvh, placed)
+        return openness(self.bvh, self.bvh.surfels)
+
+    @cached_property
+    def void_irradiance(self) -> Float[Tensor, " N"]:
+        """(N,) irradiance from a void of radiance 1 all around; made when first asked for, which takes seconds."""
+        return void_irradiance(self.bvh)
 
     @cached_property
     def surroundings(self) -> Surroundings:

@@ -9,11 +9,13 @@ from torch import Tensor
 
 from rgspipe.renderer.direct import unit_irradiance
 from rgspipe.renderer.effects import Effects
+from rgspipe.renderer.extent import added
 from rgspipe.renderer.kernels.lit_transmittance import lit_transmittance
+from rgspipe.renderer.kernels.shadow import RECEIVER_FADE, RECEIVER_SKIP
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.pixel_direct import surfel_transmittance
 from rgspipe.renderer.unit_light import UnitLight, attenuated, emitted_intensity
-from rgspipe.scene.lights import RelativeIntensity
+from rgspipe.scene.lights import Light, RelativeIntensity
 
 
 @dataclass(frozen=True)
@@ -21,11 +23,13 @@ class LitSurfels:
     """What a light of unit intensity sends to N surfels, and how that changes when it moves.
 
     Attributes:
+        origin: (3,) where shadow rays end.
         passing: (N,) transmittance of the way to each.
         slope: (N, 3) its derivative towards the light's position.
         columns: (N, 1 + D) irradiance per W/sr and its derivatives towards the light's own numbers.
     """
 
+    origin: Tensor
     passing: Tensor
     slope: Tensor
     columns: Tensor
@@ -41,10 +45,30 @@ def lit_surfels(bvh: SurfelBvh, light: UnitLight, effects: Effects, least: float
     """
     position = light.light.position
     sent = emitted_intensity(light, bvh.surfels.centers, effects.spots)
-    passing, slope = _transmittance(bvh, position, sent, effects.shadows, least)
+    origin = shadow_origin(bvh, light.light)
+    passing, slope = _transmittance(bvh, origin, sent, effects.shadows, least)
     factor, factor_slope = (part[0] for part in unit_irradiance(bvh, position[None], shadows=False))
     moved = factor_slope * passing[:, None] + factor[:, None] * slope
-    return LitSurfels(passing, slope, attenuated(torch.cat([(factor * passing)[:, None], moved], dim=1), sent, light))
+    columns = attenuated(torch.cat([(factor * passing)[:, None], moved], dim=1), sent, light)
+    return LitSurfels(origin, passing, slope, columns)
+
+
+def shadow_origin(bvh: SurfelBvh, light: Light) -> Tensor:
+    """(3,) where shadow rays to a light end: at its place, or so far before one that lies on a surface that surfels of
+    that surface, which are nowhere quite where it is, are passed, as they are at the other end of the ray.
+
+    That it moves when the light turns is left out of derivatives.
+    """
+    if not light.flush or not len(bvh.surfels):
+        return light.position
+    away = float(RECEIVER_SKIP + RECEIVER_FADE) * float(bvh.surfels.scales.detach().median())
+    return light.position + away * torch.nn.functional.normalize(light.axis, dim=0)
+
+
+def lit_columns(bvh: SurfelBvh, light: UnitLight, effects: Effects, least: float | None = None) -> Tensor:
+    """`LitSurfels.columns` (N, 1 + D) of a light that may have an extent."""
+    (columns,) = added(light, lambda part: (lit_surfels(bvh, part, effects, least).columns,))
+    return columns
 
 
 def _transmittance(

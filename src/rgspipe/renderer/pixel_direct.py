@@ -59,13 +59,15 @@ class PixelDirect:
         reach = torch.where(self._view.edges.to(reach.device), reach, torch.full_like(reach, torch.inf))
         return on_planes(origins, directions, centers, normals, reach)
 
-    def image(self, position: Tensor, passing: Tensor, slope: Tensor) -> Tensor:
+    def image(self, position: Tensor, passing: Tensor, slope: Tensor, origin: Tensor | None = None) -> Tensor:
         """(P, 3, 4) radiance under a light of 1 W/sr in RGB at `position` (3,), and its derivative towards x, y, z.
 
         Args:
             passing, slope: `surfel_transmittance` of the light.
+            origin: (3,) where shadow rays end; at the light if None.
         """
-        return self._light.image(position, passing, slope, self._own_passing(position, passing))
+        own = self._own_passing(position if origin is None else origin, passing)
+        return self._light.image(position, passing, slope, own)
 
     def operator(self, position: Tensor, passing: Tensor) -> SparseOperator:
         """(P, N) irradiance per W/sr where each pixel looks on each surfel, times the view's weight of it.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
@@ -34,8 +35,8 @@ class UnitLight(Protocol):
         """Whether its shape is among the numbers."""
         ...
 
-    def slopes(self, sent: RelativeIntensity) -> Tensor:
-        """(N, D) derivatives of its relative intensity towards the numbers."""
+    def slopes(self, by: Mapping[str, Tensor]) -> Tensor:
+        """(N, D) derivatives towards the numbers, of what has these towards the light's fields."""
         ...
 
 
@@ -59,7 +60,7 @@ def attenuated(columns: Tensor, sent: RelativeIntensity | None, light: UnitLight
     if sent is None:
         return columns
     between = [1] * (columns.ndim - 2)
-    value, slopes = sent.value.reshape(-1, *between, 1), light.slopes(sent)
+    value, slopes = sent.value.reshape(-1, *between, 1), light.slopes(sent.by)
     slopes = slopes.reshape(len(slopes), *between, slopes.shape[1])
     unit = columns[..., :1]
     products = slopes * unit
@@ -96,9 +97,9 @@ class OwnLight:
         others += [number.name for number in self.given.shape]
         return ("position", *(name for name in others if _wanted(getattr(self.given, name))))
 
-    def slopes(self, sent: RelativeIntensity) -> Tensor:
-        """(N, D) derivatives of its relative intensity towards its tensors, one after the other."""
-        slopes = [sent.by[name] for name in self.names]
+    def slopes(self, by: Mapping[str, Tensor]) -> Tensor:
+        """(N, D) derivatives towards its tensors, one after the other."""
+        slopes = [by[name] for name in self.names]
         return torch.cat([slope if slope.ndim > 1 else slope[:, None] for slope in slopes], dim=1)
 
     def attached(self, value: Tensor, slopes: Tensor) -> Tensor:

@@ -1,4 +1,4 @@
-"""Write the scene's surfels as a PLY file that public viewers of Gaussians open."""
+"""Write the scene's surfels as a PLY file that public viewers of Gaussians open, or lights for other programs."""
 
 from __future__ import annotations
 
@@ -6,9 +6,15 @@ from dataclasses import replace
 from pathlib import Path
 
 from rgspipe.config import RgspipeConfig
+from rgspipe.datasets.covariance_file import read_covariances
+from rgspipe.datasets.info import INFO
+from rgspipe.datasets.json_file import numbers, read_json
 from rgspipe.datasets.light_file import read_lights
 from rgspipe.datasets.ply import save_ply
 from rgspipe.datasets.surfel_file import load_surfels
+from rgspipe.errors import InputError
+from rgspipe.light_export.export import export_lights
+from rgspipe.light_export.world import World
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.frozen_file import SURFELS
 from rgspipe.stages.base import Stage, StageContext
@@ -16,8 +22,11 @@ from rgspipe.stages.sources import surfel_stage
 
 
 def run(context: StageContext) -> None:
-    """Write surfels.ply and conversion.json; light in the colours is of the scene with all bounces."""
+    """Write surfels.ply and conversion.json, light in the colours with all bounces; or the files of lights."""
     options = context.config.export
+    if options.lights is not None:
+        _lights(context)
+        return
     path = context.folder / "surfels.ply"
     if options.light is None:
         (source,) = context.inputs.values()
@@ -32,7 +41,33 @@ def run(context: StageContext) -> None:
     context.note(surfels=conversion.surfels, layout=options.layout)
 
 
+def _lights(context: StageContext) -> None:
+    """The lights of export.light for other programs, where they are in the file that the scene was made from."""
+    config, path = context.config, context.config.export.light
+    dataset = context.inputs.get("generate_dataset")
+    world = _world(config.export.metres, None if dataset is None else dataset.folder() / INFO)
+    rig = read_lights(path)
+    done = export_lights(rig, context.folder, config.export.lights, world=world, covariances=read_covariances(path))
+    print("\n".join(done.lines))
+    context.note(lights=len(rig), formats=list(config.export.lights))
+
+
+def _world(metres: float, info: Path | None) -> World:
+    """How the coordinates of the scene came about; of scenes that were not moved, only their unit."""
+    if info is None or not info.exists():
+        return World(metres)
+    content = read_json(info, "what the dataset's images mean")
+    offset = numbers(content.get("offset", [0.0, 0.0, 0.0]), 3, info, "offset")
+    (rescale,) = numbers([content.get("rescale", 1.0)], 1, info, "rescale")
+    return World(metres, rescale, tuple(offset))
+
+
 def _inputs(config: RgspipeConfig) -> list[str]:
+    if config.export.lights is not None:
+        if config.export.light is None:
+            remedy = "Name the light file of a fit: export.light=outputs/…/lights.json."
+            raise InputError("export.light", expected="a light file for export.lights", found="null", remedy=remedy)
+        return ["generate_dataset"] if config.scene.kind == "blend" else []
     return [surfel_stage(config) if config.export.light is None else "freeze"]
 
 
@@ -46,7 +81,7 @@ def _files(config: RgspipeConfig) -> list[Path]:
 
 STAGE = Stage(
     name="export",
-    help="writes surfels.ply, which viewers of Gaussians open",
+    help="writes surfels.ply, which viewers of Gaussians open, or lights for other programs",
     run=run,
     inputs=_inputs,
     config_keys=("export",),

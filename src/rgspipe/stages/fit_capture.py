@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+
+import torch
 
 from rgspipe.config import RgspipeConfig
 from rgspipe.datasets.views import View
 from rgspipe.degradation.target_capture import captured
 from rgspipe.errors import InputError
-from rgspipe.fitting.model.capture import SATURATED, ImageCapture, stored_in_eight_bits
+from rgspipe.fitting.fit import Emitters
+from rgspipe.fitting.model.capture import SATURATED, BaseImages, ImageCapture, stored_in_eight_bits
 
 #: Configuration keys that all this depends on.
-KEYS = ("target_capture", "fit.exposure", "fit.clip")
+KEYS = ("target_capture", "fit.exposure", "fit.clip", "fit.base_scale")
 
 
 def captured_views(views: Sequence[View], target: str, config: RgspipeConfig) -> tuple[list[View], ImageCapture]:
@@ -21,21 +25,56 @@ def captured_views(views: Sequence[View], target: str, config: RgspipeConfig) ->
     where `fit.clip` says so.
 
     Raises:
-        InputError: the paper's method is asked for unknown exposures.
+        InputError: the paper's method is asked for unknown exposures or given a base, only some of the views have a
+            base, or one is stored in 8 bits beside images that are not.
     """
-    free = config.fit.exposure == "free"
+    free, base = config.fit.exposure == "free", _base(views, target, config)
     taken, white = captured(views, target, config.target_capture)
     if config.fit.method == "paper_adam":
-        if free:
+        if free or base is not None:
             raise InputError(
-                "fit.exposure",
-                expected="known with fit=paper_adam",
-                found="free",
-                remedy="Use fit=search_lm for images of unknown exposure.",
+                "fit.exposure" if free else "fit.base",
+                expected="known with fit=paper_adam" if free else "none with fit=paper_adam",
+                found="free" if free else "images with the lamps off",
+                remedy="Use fit=search_lm for such images.",
             )
         return taken, ImageCapture()
     clip = white if white is not None else config.fit.clip
-    return taken, ImageCapture(free, clip) if clip is not None else _found_capture(taken, free)
+    capture = ImageCapture(free, clip) if clip is not None else _found_capture(taken, free)
+    return taken, capture if base is None else replace(capture, base=base)
+
+
+def _base(views: Sequence[View], target: str, config: RgspipeConfig) -> BaseImages | None:
+    """What the views show with the lamps off; None where they say nothing of it.
+
+    Raises:
+        InputError: see `captured_views`.
+    """
+    images = [view.base for view in views if view.base is not None]
+    if not images:
+        return None
+    if len(images) < len(views):
+        expected, remedy = "an image with the lamps off for every view that is used", "Add base_path to all frames."
+        raise InputError(f"target {target}", expected=expected, found=f"{len(images)} of {len(views)}", remedy=remedy)
+    eight = [stored_in_eight_bits(view.base, view.alpha) for view in views]
+    if any(eight) and not all(stored_in_eight_bits(view.image, view.alpha) for view in views):
+        raise InputError(
+            f"target {target}",
+            expected="images with the lamps off that hold radiance, as the target's do",
+            found="levels of 8 bits",
+            remedy="Store both the same way: of a value that is clipped in one alone no difference is known.",
+        )
+    if config.target_capture != type(config.target_capture)():
+        expected, remedy = "targets without images with the lamps off", "Leave target_capture away."
+        raise InputError("target_capture", expected=expected, found=f"some of {target}", remedy=remedy)
+    return BaseImages(images, config.fit.base_scale == "free")
+
+
+def known_emitters(views: Sequence[View], config: RgspipeConfig) -> Emitters:
+    """What is known of lamps in sight: masks where a view of the target has one, or else what is configured."""
+    if any(view.emitters is not None for view in views):
+        return [torch.zeros_like(view.alpha) if view.emitters is None else view.emitters for view in views]
+    return "auto" if config.fit.emitters == "auto" else None
 
 
 def _found_capture(views: Sequence[View], free: bool) -> ImageCapture:

@@ -20,6 +20,7 @@ from rgspipe.datasets.location import dataset_root
 from rgspipe.fitting import FitResult, FitViews
 from rgspipe.fitting.certainty.advice import ViewAdvice, suggest_views
 from rgspipe.fitting.certainty.landscape import loss_slices
+from rgspipe.fitting.in_sight.lamp import left_out
 from rgspipe.fitting.model.capture import ImageCapture
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.scene import Camera
@@ -108,7 +109,9 @@ def _advice_words(advice: ViewAdvice, names: Sequence[str]) -> bytes:
 
 
 def _landscape(views: FitViews, images: Sequence[Tensor], result: FitResult, capture: ImageCapture) -> bytes:
-    """The loss around the first light, with the exposures that were found."""
+    """The loss around the first light, with the exposures that were found, of the pixels that were fitted."""
+    if result.lamps:
+        views = views.without(left_out(result.lamps, [image.shape[:2] for image in images]))
     known = replace(capture, exposure_free=False)
     problem = views.problem(views.prepared.stack_images(images), known)
     if result.exposures:

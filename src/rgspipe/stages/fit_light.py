@@ -33,7 +33,7 @@ from rgspipe.scene import PointLight
 from rgspipe.scene.grade import Grade
 from rgspipe.stages import fit_capture
 from rgspipe.stages.base import Stage, StageContext
-from rgspipe.stages.fit_capture import captured_views
+from rgspipe.stages.fit_capture import captured_views, known_emitters
 from rgspipe.stages.fit_extras import Named, further_files, training_cameras
 from rgspipe.stages.fit_targets import all_targets, select_targets, target_seed, used_views
 from rgspipe.stages.light_spec import light_spec
@@ -89,13 +89,16 @@ class Fitter:
         if isinstance(self.frozen.solver, MonteCarloSolver):
             # Every target draws its own rays, whichever targets an earlier attempt has finished.
             self.frozen.solver.generator.manual_seed(seed)
-        result = prepared.fit(taken, solver=self.solver(seed), capture=capture)
+        emitters = known_emitters(views, self.config)
+        result = prepared.fit(taken, solver=self.solver(seed), capture=capture, emitters=emitters)
         config = self.config.fit
         further = further_files(config, prepared, taken, result, self._other_cameras(target, chosen), capture)
         # Pictures and their PSNR are those of the first view's exposure.
         exposures = result.exposures or [1.0] * len(views)
         images = [image / exposure for image, exposure in zip(taken, exposures, strict=True)]
-        write_result(folder / target.name, result, prepared, images, further, COMMAND_LINE)
+        there = prepared.there_anyway(result, capture)
+        there = there and [image / exposure for image, exposure in zip(there, exposures, strict=True)]
+        write_result(folder / target.name, result, prepared, images, further, COMMAND_LINE, there)
 
     def solver(self, seed: int = 0) -> Solver:
         """The method that is configured; `seed` is that of a target."""
@@ -250,19 +253,32 @@ def _keys(config: RgspipeConfig) -> list[str]:
         "views.indices",
         *fit_capture.KEYS,
     ]
-    keys += ["fit.suggest_view", "fit.landscape"]
+    keys += ["fit.emitters", "fit.suggest_view", "fit.landscape"]
     keys += ["fit.wanted_accuracy"] if config.fit.suggest_view else []
     keys += ["fit.adam"] if config.fit.method == "paper_adam" else ["fit.search", "fit.shape"]
     keys += ["fit.sh_degree", "fit.sh_mirrored"] if config.fit.spot_basis == "sh" else []
-    return keys if config.fit.target is not None else [*keys, "occlusion", "fit.limit"]
+    return [*keys, "fit.base"] if config.fit.target is not None else [*keys, "occlusion", "fit.limit"]
 
 
 def _files(config: RgspipeConfig) -> list[Path]:
     """The user's target, read now: what is wrong with it should show before a scene is trained for it."""
-    if config.fit.target is None:
+    target, base = config.fit.target, config.fit.base
+    if target is None:
+        _refuse_base(base)
         return []
-    load_target(config.fit.target)
-    return files_read(config.fit.target)
+    load_target(target, base)
+    return [*files_read(target), *([] if base is None else files_read(base))]
+
+
+def _refuse_base(base: str | None) -> None:
+    """Refuse images with the lamps off where they are of no target.
+
+    Raises:
+        InputError: there are some.
+    """
+    if base is not None:
+        expected, remedy = "nothing without fit.target", "Name the target that it belongs to: fit.target=DIR."
+        raise InputError("fit.base", expected=expected, found=base, remedy=remedy)
 
 
 STAGE = Stage(

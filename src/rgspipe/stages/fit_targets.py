@@ -20,7 +20,7 @@ STREAM = 0
 def all_targets(context: StageContext) -> Sequence[Target]:
     """The targets of the fit's stage, or the user's own."""
     if context.config.fit.target is not None:
-        return [load_target(context.config.fit.target)]
+        return [load_target(context.config.fit.target, context.config.fit.base)]
     [stage] = target_stage(context.config)
     return open_dataset(context.inputs[stage].folder(), train=False, test=False).targets
 

@@ -9,7 +9,7 @@ import pandas as pd
 
 from rgspipe.config import RgspipeConfig
 from rgspipe.config.relight import RelightConfig
-from rgspipe.datasets.light_file import read_lights
+from rgspipe.datasets.light_file import read_ambient, read_lights
 from rgspipe.datasets.read_files import files_read
 from rgspipe.errors import InputError
 from rgspipe.evaluation.images import save_png
@@ -63,7 +63,8 @@ def shows(wanted: RelightConfig) -> str:
 def _relight_rig(context: StageContext, relighter: Relighter) -> pd.DataFrame:
     """One rig in every camera: images/, lights/ and sheet.png; a row an image."""
     name, rig = _rig(context, relighter)
-    rows, images = relighter.write(context.folder, name, rig, _cameras(context))
+    ambient = None if context.config.relight.lights is None else read_ambient(context.config.relight.lights)
+    rows, images = relighter.write(context.folder, name, rig, _cameras(context), ambient)
     save_png(context.folder / SHEET, contact_sheet(images))
     return pd.DataFrame(rows)
 
@@ -140,6 +141,7 @@ def _files(config: RgspipeConfig) -> list[Path]:
     """Light file and target, read now: what is wrong with them should show before a scene is trained."""
     wanted, files = config.relight, []
     if wanted.lights is not None:
+        read_ambient(wanted.lights)
         if not read_lights(wanted.lights):
             raise InputError(wanted.lights, expected="at least one light", found="none", remedy="Add a light.")
         files.append(Path(wanted.lights))

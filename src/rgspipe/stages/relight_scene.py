@@ -15,10 +15,11 @@ from rgspipe.artifacts import Artifact
 from rgspipe.config import RgspipeConfig
 from rgspipe.datasets.exr import write_image
 from rgspipe.datasets.gs3 import load_target
-from rgspipe.datasets.light_file import write_lights
+from rgspipe.datasets.light_file import AMBIENT, RADIANCE, write_lights
 from rgspipe.datasets.location import dataset_root, open_dataset
 from rgspipe.datasets.views import View
 from rgspipe.errors import InputError
+from rgspipe.renderer.ambient import ambient_image
 from rgspipe.renderer.effect_choice import RigKind
 from rgspipe.renderer.effects import Effects
 from rgspipe.renderer.frozen import FrozenScene
@@ -55,8 +56,14 @@ class Relighter:
     def of(cls, config: RgspipeConfig, freeze: Artifact) -> Relighter:
         return cls(config, freeze, frozen_scene(config, freeze))
 
-    def render(self, cameras: Sequence[Camera], rig: LightRig) -> tuple[list[Tensor], float]:
-        """(H, W, 3) image of every camera under `rig`, and the seconds that all of them took once they are prepared."""
+    def render(
+        self, cameras: Sequence[Camera], rig: LightRig, ambient: Tensor | None = None
+    ) -> tuple[list[Tensor], float]:
+        """(H, W, 3) image of every camera under `rig`, and the seconds that all of them took once they are prepared.
+
+        Args:
+            ambient: (3,) radiance from all around, that comes in through openings.
+        """
         model = self._model(cameras, self._effects(rig))
         if model is not self._rendered:
             # The first image of a camera works out what the others share.
@@ -64,21 +71,32 @@ class Relighter:
             self._rendered = model
         began = time.perf_counter()
         images = model.views.split(model.image(rig))
-        return [image.cpu() for image in images], time.perf_counter() - began
+        seconds = time.perf_counter() - began
+        if ambient is not None:
+            views = (self._view(camera) for camera in cameras)
+            lit = (ambient.to(images[0]) * ambient_image(self.frozen, view) for view in views)
+            images = [image + other for image, other in zip(images, lit, strict=True)]
+        return [image.cpu() for image in images], seconds
 
     def write(
-        self, folder: Path, name: str, rig: LightRig, views: Sequence[tuple[int, Camera]]
+        self,
+        folder: Path,
+        name: str,
+        rig: LightRig,
+        views: Sequence[tuple[int, Camera]],
+        ambient: Tensor | None = None,
     ) -> tuple[list[dict[str, object]], list[np.ndarray]]:
         """Render a rig in cameras with their indices, and write images/<name>/view_<index>.exr and lights/<name>.json.
 
         Returns:
             a row of what is known of each image, and the images, (H, W, 3) linear radiance.
         """
-        images, seconds = self.render([camera for _, camera in views], rig)
+        images, seconds = self.render([camera for _, camera in views], rig, ambient)
         arrays = [image.numpy() for image in images]
         for (index, _), array in zip(views, arrays, strict=True):
             write_image(image_path(folder, name, index), array)
-        write_lights(folder / "lights" / f"{name}.json", rig)
+        more = None if ambient is None else {AMBIENT: {RADIANCE: ambient.tolist()}}
+        write_lights(folder / "lights" / f"{name}.json", rig, more)
         known = {"rig": name, "lights": len(rig)}
         rows = [known | {"view": index, "milliseconds": 1e3 * seconds / len(views)} for index, _ in views]
         return rows, arrays

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from rgspipe.blender.fixed_view import FixedView
 from rgspipe.blender.pool.job import PoolJob, SpotRange
+from rgspipe.blender.pool.lamps import LampRange
 from rgspipe.blender.pool.pool_file import read_pool
 from rgspipe.blender.pool.render_pool import render_pool
 from rgspipe.config import RgspipeConfig
@@ -22,6 +23,9 @@ from rgspipe.stages.sources import has_truth
 
 #: Of a camera: where it stands, what it looks at, degrees across.
 CAMERA_NUMBERS = 7
+
+#: Kinds of targets with spots.
+SPOTS = ("spots", "mixed", "drive")
 
 
 def run(context: StageContext) -> None:
@@ -56,9 +60,10 @@ def pool_job(config: RgspipeConfig) -> PoolJob:
         wanted.kind,
         wanted.frames if wanted.kind == "drive" else wanted.pool,
         wanted.classes,
-        spot_range(wanted.spot) if wanted.kind != "points" else SpotRange(),
+        spot_range(wanted.spot) if wanted.kind in SPOTS else SpotRange(),
         wanted.views,
         fixed_views(wanted),
+        LampRange(wanted.radius, wanted.side, wanted.mounted),
     )
 
 
@@ -86,7 +91,7 @@ def check_scene(config: RgspipeConfig) -> None:
     if wanted.kind == "mixed" and config.stage == "render_olat":
         raise InputError(
             "targets.kind",
-            expected="points, spots or drive: mixed targets take one pool of points and one of spots",
+            expected="one type (points, spots …): mixed targets take one pool of points and one of spots",
             found="mixed",
             remedy="Use stage=generate_targets, which renders both.",
         )
@@ -151,9 +156,10 @@ def _keys(config: RgspipeConfig) -> list[str]:
     quality = [f"dataset.{name}" for name in ("resolution", "samples", "denoise", "max_bounces")]
     wanted = ["kind", "views", "resolution", "samples", "pool_seed"]
     wanted += ["frames"] if config.targets.kind == "drive" else ["pool", "classes"]
-    wanted += [] if config.targets.kind == "points" else ["spot"]
+    wanted += ["spot"] if config.targets.kind in SPOTS else []
+    wanted += {"spheres": ["radius"], "panels": ["side"]}.get(config.targets.kind, [])
     # Named only where they are set: else they say nothing that the scene and the dataset's keys do not.
-    wanted += [name for name in ("cameras", "max_bounces") if getattr(config.targets, name) is not None]
+    wanted += [name for name in ("cameras", "max_bounces", "mounted") if getattr(config.targets, name) is not None]
     return [*scene, *quality, *(f"targets.{name}" for name in wanted)]
 
 

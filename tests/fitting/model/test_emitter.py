@@ -80,15 +80,15 @@ def test_derivatives_of_a_relative_intensity_are_those_of_steps(shape: Light) ->
     points = PLACE + torch.nn.functional.normalize(torch.randn(3000, 3, generator=generator, dtype=torch.float64))
     relative = shape.at(PLACE, AXIS).relative_intensity(points, shape_free=True)
     if relative is None:
-        assert emitter.parameters == 3
+        assert emitter.light.axis is None
         return
-    slopes = emitter.slopes(relative) * emitter.units(2.0).float()
+    slopes = emitter.slopes(relative.by) * emitter.units(2.0).float()
     for k in range(emitter.parameters):
         step = 1e-5 * torch.eye(emitter.parameters, dtype=torch.float64)[k]
         ends = [emitter.moved(sign * step, 2.0).light.relative_intensity_towards(points) for sign in (1, -1)]
         expected = (ends[0] - ends[1]) / 2e-5
         # Measured at most 2.1e-5, of a cone of 15°.
-        assert float((slopes[:, k] - expected).abs().max()) < 1e-4 * float(expected.abs().max())
+        assert float((slopes[:, k] - expected).abs().max()) <= 1e-4 * float(expected.abs().max())
 
 
 @pytest.mark.parametrize("shape", ANY, ids=name_of)

@@ -152,7 +152,7 @@ def test_derivatives_of_its_relative_intensity_are_those_of_finite_differences(l
             ends = [replace(light, **{name: getattr(light, name) + sign * 1e-6 * way}) for sign in (1.0, -1.0)]
             expected = (exact_intensity(ends[0], softness) - exact_intensity(ends[1], softness)) / 2e-6
             # Measured at most 1.9e-5, of a cone of 15°.
-            assert float((slope - expected).abs().max()) < 1e-4 * float(expected.abs().max()), name
+            assert float((slope - expected).abs().max()) <= 1e-4 * float(expected.abs().max()), name
 
 
 def test_a_kind_may_have_an_axis_and_no_numbers() -> None:
@@ -245,10 +245,12 @@ def test_light_on_surfels_knows_how_it_changes_with_every_tensor(light: Light) -
     weights = torch.rand(len(surfels), 3, generator=torch.Generator().manual_seed(1), dtype=torch.float64)
 
     def exact(**changed: Tensor) -> float:
-        one = replace(light, **changed)
-        relative = 1.0 if one.axis is None else one.relative_intensity_towards(surfels.centers)
-        lit = irradiance(surfels, one.position, shadows=False) * relative
-        return float((lit[:, None] * one.intensity * weights).sum())
+        total = 0.0
+        for one in replace(light, **changed).parts():
+            relative = 1.0 if one.axis is None else one.relative_intensity_towards(surfels.centers)
+            lit = irradiance(surfels, one.position, shadows=False) * relative
+            total += float((lit[:, None] * one.intensity * weights).sum())
+        return total
 
     leaves = {name: value.clone().requires_grad_() for name, value in values.items()}
     (rig_irradiance(bvh, (replace(light, **leaves),), Effects(shadows=False)) * weights).sum().backward()
@@ -258,5 +260,5 @@ def test_light_on_surfels_knows_how_it_changes_with_every_tensor(light: Light) -
             torch.tensor([exact(**{name: value + h}) - exact(**{name: value - h}) for h in steps]).double() / 2e-6
         )
         found = leaves[name].grad.reshape(-1)
-        # Measured at most 1e-5, of the falloff of a cone of 15°.
-        assert float((found - expected).norm()) < 5e-5 * float(expected.norm()), name
+        # Measured at most 1e-5, of the falloff of a cone of 15°; of twelve or sixteen points 1e-4.
+        assert float((found - expected).norm()) < (5e-5 if light.seed is light else 3e-4) * float(expected.norm()), name

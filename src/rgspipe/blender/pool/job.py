@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Literal
 
 import numpy as np
 
 from rgspipe.blender.fixed_view import FixedView
 from rgspipe.blender.job import DatasetJob
+from rgspipe.blender.pool.lamps import LampRange
 from rgspipe.datasets.classes import LIGHT_CLASSES, LightClass
 from rgspipe.scene.lights import SpotLight, SpotProfile
 from rgspipe.scene.lights.spot_profiles import PROFILES
 
-#: What a pool holds: point lights, spots, or the headlights of a car on its way.
-Kind = Literal["points", "spots", "drive"]
+#: What a pool holds: point lights, spots, spheres, panels, or the headlights of a car on its way.
+Kind = Literal["points", "spots", "spheres", "panels", "drive"]
 
 #: Lights of a car.
 HEADLIGHTS = 2
@@ -68,6 +69,7 @@ class PoolJob:
         classes: where points and spots are, in turn; those that the scene has none of are left out.
         spot: the profile of spots and headlights; a drive takes the least of its ranges.
         views: cameras that see every light.
+        lamps: the sizes of spheres and panels, and how near to surfaces lights are.
         cameras: where they are; by default the scene's own (`pool_cameras`).
     """
 
@@ -78,6 +80,7 @@ class PoolJob:
     spot: SpotRange = SpotRange()
     views: int = 3
     cameras: tuple[FixedView, ...] = ()
+    lamps: LampRange = field(default_factory=LampRange)
 
     def __post_init__(self) -> None:
         if self.number < 1:
@@ -98,4 +101,6 @@ class PoolJob:
         cameras = tuple(
             FixedView(tuple(view["origin"]), tuple(view["focus"]), view["degrees"]) for view in content["cameras"]
         )
-        return cls(dataset, content["kind"], content["number"], classes, ranges, content["views"], cameras)
+        lamps = {name: value if value is None else tuple(value) for name, value in content["lamps"].items()}
+        lamps = LampRange(**lamps)
+        return cls(dataset, content["kind"], content["number"], classes, ranges, content["views"], cameras, lamps)

@@ -17,13 +17,14 @@ from rgspipe.blender.pool.cameras import pool_cameras
 from rgspipe.blender.pool.drive import headlights
 from rgspipe.blender.pool.job import PoolJob
 from rgspipe.blender.targets import classify, is_around_corner, is_of_class
-from rgspipe.scene import Camera, Light, PointLight, SpotLight
+from rgspipe.scene import Camera, Light, SpotLight
+from rgspipe.scene.lights import SphereLight
 from rgspipe.scene.models import Corridor
 
 log = logging.getLogger(__name__)
 
 #: Numbers of the random streams; part of the seed, so never renumber them.
-STREAMS = {"points": 10, "spots": 11, "drive": 12}
+STREAMS = {"points": 10, "spots": 11, "drive": 12, "spheres": 13, "panels": 14}
 
 
 @dataclass(frozen=True)
@@ -34,7 +35,7 @@ class LightPlan:
         name: folder of its images below that of the pool.
         occlusion: its class; "unknown" if it belongs to none.
         light: 1 W/sr, on its axis if it has one.
-        frames: one image for each camera, of a point light in its place.
+        frames: one image for each camera.
     """
 
     name: str
@@ -68,9 +69,9 @@ def make_plan(job: PoolJob, layout: Layout, geometry: Geometry) -> list[LightPla
 
 def _plan(job: PoolJob, cameras: list[Camera], index: int, occlusion: str, light: Light) -> LightPlan:
     rng = np.random.default_rng([job.dataset.seed, STREAMS[job.kind], index, 1])
-    name, lamp = f"light_{index:04d}", PointLight(light.position, light.intensity)
+    name = f"light_{index:04d}"
     frames = tuple(
-        Frame(f"{name}/view_{number}", camera, (lamp,), int(rng.integers(2**31 - 1)), False)
+        Frame(f"{name}/view_{number}", camera, (light,), int(rng.integers(2**31 - 1)), False)
         for number, camera in enumerate(cameras[: job.views])
     )
     return LightPlan(name, occlusion, light, frames)
@@ -112,20 +113,30 @@ def _draw(place: _Place, occlusion: str, index: int) -> Light | None:
     job = place.job
     rng = np.random.default_rng([job.dataset.seed, STREAMS[job.kind], index, 0])
     for _ in range(MAX_DRAWS // 4):
-        if occlusion == "occluded":
-            position = place.layout.hidden_light(rng, job.dataset.hidden_light_clearance)
-        else:
-            position = place.layout.light(rng, job.dataset.light_clearance)
-        if not is_of_class(position, occlusion, place.layout.classes, place.cameras, place.geometry):
+        light = _placed(place, occlusion, rng)
+        if light is None or not _is_of_class(place, light, occlusion):
             continue
-        light = _spot(place, occlusion, position, rng) if job.kind == "spots" else _point(position)
+        light = _spot(place, occlusion, light.position.numpy(), rng) if job.kind == "spots" else light
         if light is not None:
             return light
     return None
 
 
-def _point(position: np.ndarray) -> PointLight:
-    return PointLight(torch.from_numpy(position), torch.ones(3, dtype=torch.float64))
+def _is_of_class(place: _Place, light: Light, occlusion: str) -> bool:
+    return is_of_class(light.position.numpy(), occlusion, place.layout.classes, place.cameras, place.geometry)
+
+
+def _placed(place: _Place, occlusion: str, rng: np.random.Generator) -> Light | None:
+    """A light of 1 W/sr somewhere in the scene, or on one of its surfaces; None if it does not fit there."""
+    job, lamps = place.job, place.job.lamps
+    hidden = occlusion == "occluded"
+    clearance = job.dataset.hidden_light_clearance if hidden else job.dataset.light_clearance
+    lamp = lamps.draw(rng, job.kind)
+    clearance = max(clearance, lamp.radius) if isinstance(lamp, SphereLight) else clearance
+    position = (place.layout.hidden_light if hidden else place.layout.light)(rng, clearance)
+    if lamps.mounted is not None or job.kind == "panels":
+        return lamps.hung(lamp, position, place.geometry, rng)
+    return lamp.at(torch.from_numpy(position))
 
 
 def _spot(place: _Place, occlusion: str, position: np.ndarray, rng: np.random.Generator) -> SpotLight | None:

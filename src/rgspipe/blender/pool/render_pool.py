@@ -36,12 +36,10 @@ def _render(content: dict, folder: Path, parent: Parent) -> None:
     cameras = [frame.camera for frame in lights[0].frames]
     entries = [(plan.name, plan.occlusion, plan.light) for plan in lights]
     write_pool(folder, job.dataset.scene, entries, cameras, bounds, prepared.rescale, list(prepared.offset))
-    shapes = {frame.name: plan.light for plan in lights for frame in plan.frames}
     frames = Frames(parent, folder, frame_files)
     missing = frames.missing([frame for plan in lights for frame in plan.frames])
     studio = Studio(prepared.scene, job.dataset.settings, folder / SCRATCH)
     for frame in frames.each(missing):
-        studio.shape(shapes[frame.name])
         studio.render(frame, folder)
 
 

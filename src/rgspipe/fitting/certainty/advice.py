@@ -26,12 +26,14 @@ from torch import Tensor
 from rgspipe.fitting.certainty.uncertainty import surface_cells, whitener
 from rgspipe.fitting.model.capture import ImageCapture
 from rgspipe.fitting.model.emitter import Emitter
+from rgspipe.fitting.model.known_images import KnownImage
 from rgspipe.fitting.model.moments import group_moments, information, scores
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.model.views import prepare_views
 from rgspipe.fitting.options import CertaintyOptions
 from rgspipe.fitting.result import FitResult
 from rgspipe.progress import progress_bar
+from rgspipe.renderer.ambient import ambient_radiance
 from rgspipe.renderer.effects import ALL_EFFECTS, Effects
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.images.model import SurfelModel
@@ -246,7 +248,11 @@ def _evidence(
     pairs = zip(result.lights, result.covariance, strict=True)
     emitters = [Emitter.fitted(light, matrix) for light, matrix in pairs]
     intensity = torch.stack([light.intensity.double().cpu() for light in result.lights])
-    columns = [problem.evaluate(emitter) for emitter in emitters]
+    radiance = None if result.ambient is None else ambient_radiance(frozen, effects.interreflection)
+    if radiance is not None:
+        problem = problem.with_known(KnownImage("ambient", views.operator @ radiance, 1.0))
+        intensity = torch.cat([intensity, result.ambient.value[None]])
+    columns = [*(problem.evaluate(emitter) for emitter in emitters), *problem.known_columns]
     image = -problem.residual(columns, intensity)
     cells, count = surface_cells(views, cell)
     ends = torch.tensor([camera.pixel_count for camera in small]).cumsum(0)

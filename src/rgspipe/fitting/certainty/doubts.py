@@ -32,7 +32,8 @@ def doubts(
     uncertain = [_uncertain(matrix, scene_size, number, len(rig), options.doubtful) for number, (_, matrix) in lights]
     # The covariance of a light that stands on a surface is that of a place that it could not leave.
     limit = options.on_surface * scene_size
-    standing = [number for number, (light, _) in lights if distance_to_surface(surfels, light.position) < limit]
+    free = [(number, light) for number, (light, _) in lights if not light.flush]
+    standing = [number for number, light in free if distance_to_surface(surfels, light.position) < limit]
     on_surface = [OnSurface(number, len(rig)) for number in standing]
     return [finding for finding in (*undetermined, *uncertain, *on_surface) if finding is not None]
 

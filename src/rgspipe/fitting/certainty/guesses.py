@@ -29,6 +29,9 @@ def _changes(problem: LightProblem, state: State) -> Tensor:
     if not len(surfaces) or not effects.interreflection:
         return problem.target.new_zeros((0, *problem.target.shape))
     sent = views.frozen.radiance_of(state.lights(problem), effects).detach()
+    for known, strength in zip(problem.known, state.intensity[len(state.emitters) :], strict=True):
+        if known.sent is not None:
+            sent = sent + known.sent * (known.unit * strength).to(sent)
     doubt = views.frozen.surfels.guessed * surfaces
     own = doubt.T[:, None, :].to(sent) * sent[:, :, None]
     changed = views.operator @ (own + views.frozen.indirect(own)).reshape(len(sent), -1)

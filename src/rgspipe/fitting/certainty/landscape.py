@@ -63,7 +63,7 @@ def loss_slices(
         if not torch.equal(region.clip(position), position):
             return float("nan")
         moved = rig[light].placed(position)
-        columns = [*fixed, problem.evaluate(moved)]
+        columns = [*fixed, problem.evaluate(moved), *problem.known_columns]
         return problem.unexplained(columns, best_intensity(problem, columns))
 
     losses = torch.empty((len(PLANES), points, points), dtype=torch.float64)

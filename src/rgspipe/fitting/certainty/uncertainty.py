@@ -41,10 +41,12 @@ class Covariances:
     Attributes:
         calibrated: of noise and errors of the model.
         noise: of noise alone, which takes the residual as independent in every pixel.
+        known: (3, 3) of the strength of each known image, as `calibrated`.
     """
 
     calibrated: tuple[Tensor, ...] = ()
     noise: tuple[Tensor, ...] = ()
+    known: tuple[Tensor, ...] = ()
 
 
 def light_covariances(problem: LightProblem, state: State, options: CertaintyOptions | None = None) -> Covariances:
@@ -54,7 +56,7 @@ def light_covariances(problem: LightProblem, state: State, options: CertaintyOpt
     has an infinite variance and no covariance with the rest.
     """
     owners = torch.cat([torch.full((emitter.parameters,), index) for index, emitter in enumerate(state.emitters)])
-    blocks = []
+    blocks, strengths = [], []
     for joint, unknown in _joint(problem, state, options or CertaintyOptions()):
         per_light = []
         for index, emitter in enumerate(state.emitters):
@@ -64,7 +66,10 @@ def light_covariances(problem: LightProblem, state: State, options: CertaintyOpt
             undetermined = (spread.abs() @ unknown[chosen].double()) > 0.0
             per_light.append(_open(spread @ joint[chosen][:, chosen] @ spread.T, undetermined))
         blocks.append(tuple(per_light))
-    return Covariances(*blocks)
+        rows = len(owners) + 3 * len(state.emitters) + 3 * torch.arange(len(problem.known))[:, None] + torch.arange(3)
+        pairs = zip(problem.known, rows, strict=True)
+        strengths.append(tuple(_open(one.unit**2 * joint[row][:, row], unknown[row]) for one, row in pairs))
+    return Covariances(*blocks, known=strengths[0])
 
 
 def surface_cells(views: PreparedViews, cell: float) -> tuple[Tensor, int]:

@@ -1,15 +1,18 @@
-"""What is known of how a target's images were taken: exposures, and values that are clipped and rounded."""
+"""What is known of how a target's images were taken: exposures, clipped and rounded values, and a base."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import torch
 from torch import Tensor
 
+from rgspipe.errors import InputError
 from rgspipe.scene import srgb
+from rgspipe.scene.arrays import ArrayLike
 
 #: Levels of an 8-bit image.
 LEVELS = 255.0
@@ -21,6 +24,19 @@ ROUNDING = 1e-2
 SATURATED = float(srgb.decode(np.array((LEVELS - 0.5) / LEVELS)))
 
 
+@dataclass(frozen=True, eq=False)
+class BaseImages:
+    """The same views with the lamps off, each taken with the exposure of its view and clipped where that is.
+
+    Attributes:
+        images: (H, W, 3) linear radiance per view.
+        scale_free: whether they are in the target a factor times, per colour, that is not known.
+    """
+
+    images: Sequence[ArrayLike]
+    scale_free: bool = False
+
+
 @dataclass(frozen=True)
 class ImageCapture:
     """How images were taken.
@@ -30,11 +46,25 @@ class ImageCapture:
         clip: radiance of the brightest level of 8-bit sRGB images, at which they are clipped; None for images that hold
             radiance as it was. Saturated values tell only that the radiance is at least so high.
         saturated: a value from here on, as a part of the clip, is saturated.
+        base: what was there anyway; nothing if None.
+
+    Raises:
+        InputError: neither exposures nor the factor of the base are known.
     """
 
     exposure_free: bool = False
     clip: float | None = None
     saturated: float = SATURATED
+    base: BaseImages | None = None
+
+    def __post_init__(self) -> None:
+        if self.exposure_free and self.base is not None and self.base.scale_free:
+            raise InputError(
+                "base",
+                expected="images in the exposures of their views, where exposures are free",
+                found="an unknown factor besides",
+                remedy="Take target and base with the same settings of the camera, and say that the factor is known.",
+            )
 
 
 def stored_in_eight_bits(image: Tensor, alpha: Tensor) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import accumulate
@@ -10,8 +10,8 @@ from itertools import accumulate
 import torch
 from torch import Tensor
 
-from rgspipe.scene.lights import Light, RelativeIntensity
-from rgspipe.scene.lights.coordinates import Coordinate
+from rgspipe.scene.lights import Light
+from rgspipe.scene.lights.coordinates import KNOWN, Coordinate, OnPlane
 
 #: R, G and B.
 COLOURS = 3
@@ -29,18 +29,20 @@ class Emitter:
         light: float64 on the CPU; its intensity is not looked at.
         shape_free: whether its shape moves.
         softness: by how much its edge of light is widened for now [rad]; see `Light.relative_intensity`.
+        plane: (3,) float64 normal of the surface that it lies on and shines away from; None where it is free.
     """
 
     light: Light
     shape_free: bool = False
     softness: float = 0.0
+    plane: Tensor | None = None
 
     @classmethod
     def of(cls, light: Light, shape_free: bool = False) -> Emitter:
         """The emitter of a light, with an axis of unit length."""
         light = light.detached()
         if light.axis is None:
-            return cls(light)
+            return cls(light, shape_free)
         return cls(light.at(light.position, torch.nn.functional.normalize(light.axis, dim=0)), shape_free)
 
     @classmethod
@@ -67,7 +69,8 @@ class Emitter:
     @cached_property
     def coordinates(self) -> dict[str, Coordinate]:
         """By the light's fields."""
-        return self.light.coordinates(self.shape_free)
+        free = self.light.coordinates(self.shape_free)
+        return free if self.plane is None else free | {"position": OnPlane(self.plane), "direction": KNOWN}
 
     @cached_property
     def parameters(self) -> int:
@@ -134,9 +137,9 @@ class Emitter:
         moving = [(one.spread(self._value(name)).T, one.motion) for name, one in self.coordinates.items() if one.motion]
         return torch.cat([torch.cat([scale * spread for scale in scales[how]], dim=1) for spread, how in moving])
 
-    def slopes(self, sent: RelativeIntensity) -> Tensor:
-        """(N, D) natural derivatives of its relative intensity towards its parameters: scene units and rad."""
-        by = self.light.tied_slopes(sent.by)
+    def slopes(self, by: Mapping[str, Tensor]) -> Tensor:
+        """(N, D) natural derivatives towards its parameters, scene units and rad, from those towards its fields."""
+        by = self.light.tied_slopes(by)
         return torch.cat([one.slopes(self._value(name), by[name]) for name, one in self.coordinates.items()], dim=1)
 
     def _value(self, name: str) -> Tensor | float:

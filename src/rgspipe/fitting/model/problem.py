@@ -12,6 +12,7 @@ from torch import Tensor
 from rgspipe.fitting.model.capture import SATURATED, ImageCapture, rounding_noise
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.exposure import ExposedMoments, best_factors, moments_by_view
+from rgspipe.fitting.model.known_images import KnownImage
 from rgspipe.fitting.model.moments import Moments, moments
 from rgspipe.fitting.model.views import PreparedViews
 from rgspipe.fitting.options import LossOptions
@@ -41,10 +42,11 @@ class LightProblem:
         sharp: how they see lights at best; None where that is how they do. See `sharpest`.
         exposures: (V,) float64 of the views, by which the target is divided already.
         exposure_free: whether these are only a guess, and are found together with the intensities.
-        clip: (P, 1) float32 radiance at which the target is clipped, over `scale`; None where it is not.
+        clip: (P, 1) or (P, 3) float32 radiance at which the target is clipped, over `scale`; None where it is not.
         saturated_from: the part of the clip from which on values are saturated.
         noise: (P, 3) float32 standard deviation of the target's rounding, over `scale`; None where there is none.
         loss: how much pixels count.
+        known: images that are in the target anyway, of unknown strength.
     """
 
     views: PreparedViews
@@ -58,6 +60,7 @@ class LightProblem:
     saturated_from: float = SATURATED
     noise: Tensor | None = None
     loss: LossOptions = field(default_factory=LossOptions)
+    known: tuple[KnownImage, ...] = ()
 
     @classmethod
     def create(
@@ -68,10 +71,17 @@ class LightProblem:
         capture: ImageCapture | None = None,
         sharp: ImageModel | None = None,
         loss: LossOptions | None = None,
+        ambient: Tensor | None = None,
     ) -> LightProblem:
-        """The problem for images stacked by `PreparedViews.stack_images`, (all pixels, 3), seen through surfels."""
+        """The problem for images stacked by `PreparedViews.stack_images`, (all pixels, 3), seen through surfels.
+
+        Args:
+            ambient: (N, 3) radiance of the surfels under a void of radiance 1, if there may be light from there.
+        """
         capture = capture or ImageCapture()
-        target = stacked[views.pixels].double()
+        taken = stacked[views.pixels].double()
+        base = None if capture.base is None else views.stack_images(capture.base.images, "base")[views.pixels].double()
+        target = taken if base is None or capture.base.scale_free else taken - base
         scale = max(0.0, float(average(target)))
         normalised = target / scale if scale > 0.0 else target
         if not bool(torch.isfinite(normalised).all()):
@@ -80,11 +90,39 @@ class LightProblem:
         free = capture.exposure_free and len(views.views) > 1
         exposures = torch.ones(len(views.views)).double()
         problem = replace(problem, exposures=exposures, exposure_free=free, loss=loss or LossOptions())
-        if capture.clip is None or scale == 0.0:
+        if scale == 0.0:
             return problem
-        clip = torch.full_like(problem.target[:, :1], capture.clip / scale)
-        noise = rounding_noise(target / scale, capture.clip / scale).float()
-        return replace(problem, clip=clip, saturated_from=capture.saturated, noise=noise)
+        if ambient is not None:
+            problem = problem.with_known(KnownImage("ambient", views.operator @ ambient, scale, ambient))
+        if base is not None and capture.base.scale_free:
+            problem = problem.with_known(KnownImage("base", (base / scale).float(), 1.0))
+        return problem if capture.clip is None else problem._clipped(capture, taken / scale, base)
+
+    def _clipped(self, capture: ImageCapture, taken: Tensor, base: Tensor | None) -> LightProblem:
+        """The problem of images that are clipped: of `taken` (P, 3), over the scale, less `base` (P, 3) or with it.
+
+        Where the base is saturated nothing is known of the lights: what is left of the target there is at least 0.
+        """
+        clip = capture.clip / self.scale
+        limit, noise = torch.full_like(self.target[:, :1], clip), rounding_noise(taken, clip)
+        target = self.target
+        if base is not None:
+            base = base / self.scale
+            unknown = base >= capture.saturated * clip
+            below = 0.0 if capture.base.scale_free else base / capture.saturated
+            limit = torch.where(unknown, 0.0, clip - below).float()
+            target = torch.where(unknown, 0.0, target)
+            noise = (noise.square() + rounding_noise(base, clip).square()).sqrt()
+        return replace(self, target=target, clip=limit, saturated_from=capture.saturated, noise=noise.float())
+
+    def with_known(self, image: KnownImage) -> LightProblem:
+        """The problem of a target in which `image` may be besides, after those that may be there already."""
+        return replace(self, known=(*self.known, image))
+
+    @property
+    def known_columns(self) -> tuple[Tensor, ...]:
+        """(P, 3, 1) of each known image; they stand behind the lights' evaluations wherever these are put together."""
+        return tuple(image.column for image in self.known)
 
     @property
     def black(self) -> bool:
@@ -114,16 +152,17 @@ class LightProblem:
         glossy = self.views.frozen.gloss is not None and self.model.effects.lobes
         if blocks is None or self.clip is not None or glossy:
             return self
-        return replace(self, target=blocks.average @ self.target, model=blocks, noise=None)
+        known = tuple(image.averaged(blocks.average) for image in self.known)
+        return replace(self, target=blocks.average @ self.target, model=blocks, noise=None, known=known)
 
     def moments(self, columns: Sequence[Tensor], weights: Tensor) -> Moments | ExposedMoments:
-        """Weighted moments of the lights' evaluations against the target."""
+        """Weighted moments of the lights' evaluations, and of known images behind them, against the target."""
         if not self.exposure_free:
             return moments(columns, self.target, weights)
         return moments_by_view(columns, self.target, weights, self.model.bounds)
 
     def residual(self, columns: Sequence[Tensor], intensity: Tensor) -> Tensor:
-        """(P, 3) float32 target − image at intensities (L, 3), both over `scale`.
+        """(P, 3) float32 target − image at intensities (L, 3), both over `scale`; L counts known images, too.
 
         The image has its best exposures where these are free. Where the target is clipped, and the image as bright as
         that or brighter, nothing is known to be wrong: the residual is 0.
@@ -180,4 +219,15 @@ class LightProblem:
     def unexplained(self, columns: Sequence[Tensor], intensity: Tensor) -> float:
         """Σ (target − image)² / Σ target², the loss that is reported: 0 is a perfect fit, 1 a black image."""
         energy = float(total(self.target.double().square()))
+        return float(total(self.residual(columns, intensity).double().square())) / energy if energy > 0.0 else 0.0
+
+    def unexplained_of_lights(self, columns: Sequence[Tensor], intensity: Tensor) -> float:
+        """`unexplained` as a share of what the target has besides known images."""
+        if not self.known:
+            return self.unexplained(columns, intensity)
+        count = len(self.known)
+        lights = self.target.double()
+        for image, strength in zip(self.known, intensity[-count:], strict=True):
+            lights = lights - image.image.double() * strength.to(lights)
+        energy = float(total(lights.square()))
         return float(total(self.residual(columns, intensity).double().square())) / energy if energy > 0.0 else 0.0

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
+import numpy as np
+import numpy.typing as npt
 import scipy.sparse
 import torch
 from torch import Tensor
@@ -54,15 +56,40 @@ class PreparedViews(ViewedPixels):
         """(S, N) 1 where a surfel of the scene is of one of S surfaces that no camera saw."""
         return guessed_surfaces(self.frozen.surfels)
 
-    def stack_images(self, images: Sequence[ArrayLike]) -> Tensor:
-        """(all pixels, 3) float32 of one image (H, W, 3) per view.
+    def without(self, pixels: Sequence[ArrayLike]) -> PreparedViews:
+        """The same views less `pixels` (H, W) bool, one mask a view.
+
+        Raises:
+            InputError: too few pixels are left.
+        """
+        out = [torch.from_numpy(np.asarray(mask, dtype=bool)) for mask in pixels]
+        kept = (~torch.cat([mask.reshape(-1) for mask in out])[self.pixels.cpu()]).nonzero()[:, 0]
+        if len(kept) < LEAST_PIXELS:
+            expected, found = f"at least {LEAST_PIXELS} pixels that are no lamp's", f"{len(kept)} of {len(self.pixels)}"
+            raise InputError("emitters", expected=expected, found=found, remedy="Mark only what is a lamp itself.")
+        operator = SparseOperator.from_scipy(self.operator.to_scipy()[kept.numpy()], self.operator.matrix.device)
+        masks = tuple(torch.where(mask.to(own.device), 0.0, own) for own, mask in zip(self.masks, out, strict=True))
+        return replace(self, pixels=self.pixels[kept.to(self.pixels.device)], operator=operator, masks=masks)
+
+    def emitter_masks(self, masks: Sequence[ArrayLike]) -> list[npt.NDArray[np.bool_]]:
+        """(H, W) bool a view, of masks that are 1 where a lamp's own pixels are.
+
+        Raises:
+            InputError: a wrong number of them, a wrong size, or impossible values.
+        """
+        checked = _one_each("emitters", masks, self.views, ())
+        _check_masks(checked, "emitters", "1 where a lamp is, 0 elsewhere")
+        return [(mask >= 0.5).cpu().numpy() for mask in checked]
+
+    def stack_images(self, images: Sequence[ArrayLike], name: str = "images") -> Tensor:
+        """(all pixels, 3) float32 of one image (H, W, 3) per view, called `name` in errors.
 
         Raises:
             InputError: a wrong number of images, a wrong size, display values, or pixels that are not finite.
         """
-        checked = _one_each("images", images, self.views, (3,))
+        checked = _one_each(name, images, self.views, (3,))
         for index, image in enumerate(checked):
-            check_radiance(f"images[{index}]", float(image.detach().min()), float(image.detach().max()))
+            check_radiance(f"{name}[{index}]", float(image.detach().min()), float(image.detach().max()))
         return torch.cat([image.detach().reshape(-1, 3).float() for image in checked]).to(self.operator.matrix.device)
 
 
@@ -139,7 +166,9 @@ def _one_each(
     return checked
 
 
-def _check_masks(masks: Sequence[Tensor]) -> None:
+def _check_masks(
+    masks: Sequence[Tensor], name: str = "masks", expected: str = "the scene's share of each pixel, 0 to 1"
+) -> None:
     """Refuse masks that are no shares of pixels, such as levels of 8 bits.
 
     Raises:
@@ -149,8 +178,8 @@ def _check_masks(masks: Sequence[Tensor]) -> None:
         least, most = float(mask.min()), float(mask.max())
         if least < -ROUNDING or most > 1.0 + ROUNDING:
             raise InputError(
-                f"masks[{index}]",
-                expected="the scene's share of each pixel, 0 to 1",
+                f"{name}[{index}]",
+                expected=expected,
                 found=f"values from {least:.4g} to {most:.4g}",
                 remedy="Divide levels of 8 bits by 255, and clamp what is left.",
             )

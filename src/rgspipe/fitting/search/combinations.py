@@ -1,4 +1,8 @@
-"""Which candidates together look most like a target, with their intensities in closed form."""
+"""Which candidates together look most like a target, with their intensities in closed form.
+
+Of a target with known images candidates have to look like what those leave: the part of every image that lies in their
+span is taken out of it.
+"""
 
 from __future__ import annotations
 
@@ -15,6 +19,9 @@ from rgspipe.fitting.options import CombinationOptions
 from rgspipe.fitting.search.coarse import CoarseImages
 from rgspipe.sums import total
 
+#: A candidate of which known images leave less than this share, squared, is one of them: it explains nothing.
+LEAST_LEFT = 1e-4
+
 
 @dataclass(frozen=True)
 class Scored:
@@ -26,6 +33,7 @@ class Scored:
         square: (C, 3) float64 squared length of the images.
         product: (C, 3) float64 their products with the target.
         energy: squared length of the target.
+        known: (3, A, B) float32 orthonormal rows that span the known images of each colour; None without such images.
     """
 
     images: Tensor
@@ -33,6 +41,7 @@ class Scored:
     square: Tensor
     product: Tensor
     energy: float
+    known: Tensor | None = None
 
     @classmethod
     def of(cls, problem: LightProblem, coarse: CoarseImages) -> Scored:
@@ -40,21 +49,42 @@ class Scored:
         root = problem.block_weights(target, coarse.counts.to(target), coarse.blocks).sqrt()
         images = (coarse.images * root.to(coarse.images)).permute(0, 2, 1).contiguous()
         weighted = (target * root).T
+        known = _known_span(problem, coarse, root)
+        images, weighted = _without(images, known), _without(weighted, known)
         wanted = weighted.to(images)
         square = torch.stack([images[:, c].square().sum(dim=1) for c in range(3)], dim=1).double()
         product = torch.stack([images[:, c] @ wanted[c] for c in range(3)], dim=1).double()
-        return cls(images, wanted, square, product, float(total(weighted.square())))
+        return cls(images, wanted, square, product, float(total(weighted.square())), known)
 
     def coarse_of(self, problem: LightProblem, coarse: CoarseImages, emitter: Emitter) -> Tensor:
         """(3, B) weighted coarse image of a light that is no candidate."""
         return self.weighted(problem, coarse, coarse.blocks @ problem.evaluate(emitter)[:, :, 0].contiguous())
 
-    @staticmethod
-    def weighted(problem: LightProblem, coarse: CoarseImages, image: Tensor) -> Tensor:
-        """(3, B) coarse image (B, 3), weighted as those of the candidates are."""
+    def weighted(self, problem: LightProblem, coarse: CoarseImages, image: Tensor) -> Tensor:
+        """(3, B) coarse image (B, 3), weighted as those of the candidates are, without what known images have of it."""
         target = (coarse.blocks @ problem.target).double()
         root = problem.block_weights(target, coarse.counts.to(target), coarse.blocks).sqrt()
-        return (image * root.to(image)).T
+        return _without((image * root.to(image)).T, self.known)
+
+
+def _known_span(problem: LightProblem, coarse: CoarseImages, root: Tensor) -> Tensor | None:
+    """(3, A, B) float64 orthonormal rows that span the known images, over blocks, times `root` (B, 3)."""
+    seen = [(coarse.blocks @ image.image).double() * root for image in problem.known]
+    if not seen:
+        return None
+    _, sizes, rows = torch.linalg.svd(torch.stack(seen).permute(2, 0, 1), full_matrices=False)
+    return (rows * (sizes > LEAST_LEFT * sizes.amax(dim=1, keepdim=True))[:, :, None]).float()
+
+
+def _without(images: Tensor, known: Tensor | None) -> Tensor:
+    """Images (…, 3, B) without their parts in the span of `known` (3, A, B); 0 where next to nothing is left."""
+    if known is None:
+        return images
+    known = known.to(images)
+    there = torch.einsum("...cb,cab->...ca", images, known)
+    left = images - torch.einsum("...ca,cab->...cb", there, known)
+    before, after = (part.square().sum(dim=-1, keepdim=True) for part in (images, left))
+    return torch.where(after > LEAST_LEFT * before, left, 0.0)
 
 
 def single_gains(scored: Scored) -> Tensor:
@@ -68,9 +98,17 @@ def bright_gains(problem: LightProblem, coarse: CoarseImages) -> Tensor:
     """(C,) `single_gains` of plain squares, in which bright blocks count more than dim ones."""
     target = coarse.blocks @ problem.target
     counts = coarse.counts.to(target)
+    square = coarse.square
+    if problem.known:
+        root = counts.double().sqrt()[:, None].expand(-1, 3)
+        known = _known_span(problem, coarse, root)
+        target = _without((target * root).T, known).T.to(target) / root.to(target)
+        within = torch.einsum("kbc,cab->kca", coarse.images * root.to(coarse.images), known.to(coarse.images))
+        square = square - within.double().square().sum(dim=2)
+        square = torch.where(square > LEAST_LEFT * coarse.square, square, 0.0)
     product = torch.einsum("kbc,bc->kc", coarse.images, counts[:, None] * target).double().clamp(min=0.0)
-    reached = coarse.square > 0
-    explained = torch.where(reached, product.square() / torch.where(reached, coarse.square, 1.0), 0.0)
+    reached = square > 0
+    explained = torch.where(reached, product.square() / torch.where(reached, square, 1.0), 0.0)
     return explained.sum(dim=1) / float(total(counts[:, None] * target.square()))
 
 

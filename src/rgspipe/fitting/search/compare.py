@@ -123,6 +123,11 @@ def energy_shares(state: State) -> list[float]:
 
 def light_energies(state: State) -> list[float]:
     """What each light sends into the image, summed over its pixels and colours."""
+    return column_energies(state)[: len(state.emitters)]
+
+
+def column_energies(state: State) -> list[float]:
+    """`light_energies`, and likewise of the known images behind the lights."""
     return [
         float(total((column[:, :, 0] * strength.to(column)).double()))
         for column, strength in zip(state.columns, state.intensity, strict=True)

@@ -36,8 +36,8 @@ class State:
 
     Attributes:
         emitters: the L lights.
-        columns: per light its image and derivatives, see `LightProblem.evaluate`.
-        intensity: (L, 3) over the problem's scale.
+        columns: per light its image and derivatives, see `LightProblem.evaluate`; and then the known images.
+        intensity: (L, 3) over the problem's scale, and how strong known images are in rows behind them.
         steps: how it got there.
         status: why it stopped there.
     """
@@ -51,7 +51,7 @@ class State:
     def lights(self, problem: LightProblem) -> LightRig:
         return tuple(
             emitter.shining(problem.scale * strength)
-            for emitter, strength in zip(self.emitters, self.intensity, strict=True)
+            for emitter, strength in zip(self.emitters, self.intensity[: len(self.emitters)], strict=True)
         )
 
 
@@ -108,14 +108,15 @@ class Refiner:
         return replace(found.value, steps=tuple(steps), status=STATUSES[found.ended])
 
     def columns(self, rig: Sequence[Emitter], known: State | None = None) -> tuple[Tensor, ...]:
-        """`LightProblem.evaluate` of each light; those that stand in `known` as well are not made again."""
+        """`LightProblem.evaluate` of each light and the known images; lights that `known` has are not made again."""
         before = [None] * len(rig) if known is None else known.emitters
         changed = [emitter for emitter, other in zip(rig, before, strict=True) if emitter is not other]
         self.meter.evaluations += self.problem.renderings(changed)
-        return tuple(
+        lights = (
             known.columns[index] if emitter is before[index] else self.problem.evaluate(emitter)
             for index, emitter in enumerate(rig)
         )
+        return (*lights, *self.problem.known_columns)
 
     def step(self, state: State) -> Step:
         """The state as a step of the fit, now."""

@@ -102,6 +102,7 @@ class Candidates:
             seen = [column[:, :, 0] for column in state.columns]
         else:
             seen = [self.coarse.blocks @ self.problem.evaluate(one)[:, :, 0].contiguous() for one in state.emitters]
+        seen = seen[: len(state.emitters)]
         fixed = torch.stack([self.scored.weighted(self.problem, self.coarse, image) for image in seen])
         left = 1.0 - explained(self.scored, fixed)
         found = extensions(self.scored, fixed, self.options.beam)

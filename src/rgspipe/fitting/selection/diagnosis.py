@@ -25,7 +25,8 @@ def standing(
         covariance: of each, see `FitResult.covariance`.
     """
     options = options or CertaintyOptions()
-    problem, region, loss = refiner.problem, refiner.region, refiner.unexplained(state)
+    problem, region = refiner.problem, refiner.region
+    loss = problem.unexplained_of_lights(state.columns, state.intensity)
     grade = problem.views.frozen.grade
     at_bound = any(region.at_bound(emitter.position) for emitter in state.emitters)
     return [

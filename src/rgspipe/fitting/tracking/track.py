@@ -9,6 +9,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from rgspipe.errors import InputError
 from rgspipe.fitting.findings import FitStatus
 from rgspipe.fitting.fit import FitViews
 from rgspipe.fitting.model.capture import ImageCapture
@@ -51,9 +52,19 @@ def track_lights(
         options: how.
         search: how frames are searched from nothing.
         capture: of all frames, or one for each.
+
+    Raises:
+        InputError: light from all around, or images with the lamps off of unknown strength, are among the unknowns.
     """
     same = capture is None or isinstance(capture, ImageCapture)
     captures = [capture or ImageCapture()] * len(frames) if same else capture
+    if views.lights.ambient or any(one.base is not None and one.base.scale_free for one in captures):
+        raise InputError(
+            "lights.ambient" if views.lights.ambient else "base",
+            expected="nothing unknown but lights in a sequence",
+            found="light that is there anyway, of unknown strength",
+            remedy="Give images with the lamps off, of known strength, or fit each frame by itself.",
+        )
     taken = list(zip((as_list(images, axes=3) for images in frames), captures, strict=True))
     return _Tracker(views, search or Search(), options or TrackOptions(), taken).run()
 
@@ -169,7 +180,7 @@ class _Tracker:
     def _searched(self, index: int, status: FrameStatus, before: _Known | None) -> _Known | None:
         """A frame searched from nothing, in the order of the lights before; None where no light is found."""
         images, capture = self.taken[index]
-        result = self.views.fit(images, solver=self.search, capture=capture)
+        result = self.views.fit(images, solver=self.search, capture=capture, emitters=None)
         problem = self._problem(index)
         result = split_lights(problem, result, self.views.blocks, self.search)
         if not result.lights:

@@ -15,7 +15,7 @@ from rgspipe.renderer.effects import ALL_EFFECTS, Effects
 from rgspipe.renderer.images.model import ImageModel
 from rgspipe.renderer.images.viewed_pixels import ViewedPixels
 from rgspipe.renderer.kernels.lit_transmittance import LEAST_LIT
-from rgspipe.renderer.lit_surfels import lit_surfels
+from rgspipe.renderer.lit_surfels import lit_columns
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.transport import PatchTransport
 from rgspipe.renderer.unit_light import UnitLight
@@ -70,7 +70,7 @@ class BlockModel(ImageModel):
         return seen.reshape(3, len(self), -1).transpose(0, 1)
 
     def columns(self, light: UnitLight) -> Tensor:
-        return self.seen(lit_surfels(self.frozen.bvh, light, self.effects, LEAST_LIT).columns)
+        return self.seen(lit_columns(self.frozen.bvh, light, self.effects, LEAST_LIT))
 
     def seen(self, irradiance: Tensor) -> Tensor:
         """(B, 3, K) radiance under K direct irradiances (N, K), with all that bounces."""

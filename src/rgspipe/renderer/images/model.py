@@ -10,11 +10,12 @@ import torch
 from torch import Tensor
 
 from rgspipe.renderer.effects import Effects
+from rgspipe.renderer.extent import added
 from rgspipe.renderer.glossy_transport import GlossyTransport
 from rgspipe.renderer.images.glossy import seen_light, seen_with_gloss
 from rgspipe.renderer.images.viewed_pixels import ViewedPixels
 from rgspipe.renderer.kernels.lit_transmittance import LEAST_LIT
-from rgspipe.renderer.lit_surfels import lit_surfels
+from rgspipe.renderer.lit_surfels import lit_columns, lit_surfels
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.unit_light import UnitLight
 from rgspipe.scene.lights import LightRig
@@ -106,10 +107,16 @@ class SurfelModel(ViewModel):
 
     def columns(self, light: UnitLight) -> Tensor:
         frozen, bounces = self.views.frozen, self.effects.interreflection
-        lit = lit_surfels(frozen.bvh, light, self.effects, LEAST_LIT).columns
-        if self.gloss is not None:
-            return seen_with_gloss(self.views, light.light.position, lit, bounces)
-        return self.views.seen(frozen.radiance(lit, bounces))
+        if self.gloss is None:
+            lit = lit_columns(frozen.bvh, light, self.effects, LEAST_LIT)
+            return self.views.seen(frozen.radiance(lit, bounces))
+
+        def glossy(part: UnitLight) -> tuple[Tensor]:
+            lit = lit_surfels(frozen.bvh, part, self.effects, LEAST_LIT).columns
+            return (seen_with_gloss(self.views, part.light.position, lit, bounces),)
+
+        (columns,) = added(light, glossy)
+        return columns
 
     def image(self, rig: LightRig) -> Tensor:
         frozen = self.views.frozen

@@ -10,6 +10,7 @@ import torch
 from torch import Tensor
 
 from rgspipe.renderer.effects import Effects
+from rgspipe.renderer.extent import added
 from rgspipe.renderer.images.glossy import bounced_light, seen_light, seen_with_gloss
 from rgspipe.renderer.images.highlights import PixelHighlights
 from rgspipe.renderer.images.model import ViewModel
@@ -53,14 +54,11 @@ class PixelModel(ViewModel):
         return torch.cat([direct.points for direct in self.direct])[self.views.pixels]
 
     def columns(self, light: UnitLight) -> Tensor:
-        frozen = self.views.frozen
-        lit = lit_surfels(frozen.bvh, light, self.effects, LEAST_LIT)
-        columns = self._direct(light, lit)
-        if not self.effects.interreflection:
+        columns, lit = added(light, self._columns)
+        if self.gloss is not None or not self.effects.interreflection:
             return columns
-        if self.gloss is not None:
-            return columns + seen_with_gloss(self.views, light.light.position, lit.columns, True, bounced_only=True)
-        return columns + self.views.seen(frozen.radiance(lit.columns) - frozen.radiance(lit.columns, indirect=False))
+        frozen = self.views.frozen
+        return columns + self.views.seen(frozen.radiance(lit) - frozen.radiance(lit, indirect=False))
 
     def image(self, rig: LightRig) -> Tensor:
         frozen, own = self.views.frozen, [OwnLight(light) for light in self.effects.lights(rig)]
@@ -77,10 +75,19 @@ class PixelModel(ViewModel):
         reflected = frozen.surfels.albedo * (response.summed() / math.pi)
         return image + self.views.seen(frozen.indirect(reflected[:, :, None]))[:, :, 0]
 
+    def _columns(self, light: UnitLight) -> tuple[Tensor, Tensor]:
+        """(P, 3, 1 + D) of a light in one point, without what bounces diffusely; and (N, 1 + D) its irradiance."""
+        lit = lit_surfels(self.views.frozen.bvh, light, self.effects, LEAST_LIT)
+        columns = self._direct(light, lit)
+        if self.gloss is not None and self.effects.interreflection:
+            place = light.light.position
+            columns = columns + seen_with_gloss(self.views, place, lit.columns, True, bounced_only=True)
+        return columns, lit.columns
+
     def _direct(self, light: UnitLight, lit: LitSurfels) -> Tensor:
         """(P, 3, 1 + D) direct light of a unit light."""
         position = light.light.position
-        images = [direct.image(position, lit.passing, lit.slope) for direct in self.direct]
+        images = [direct.image(position, lit.passing, lit.slope, lit.origin) for direct in self.direct]
         for index, highlights in enumerate(self.highlights):
             images[index] = images[index] + highlights.image(position, lit.passing, lit.slope)
         columns = torch.cat(images)[self.views.pixels]

@@ -11,11 +11,14 @@ from rgspipe.scene.lights.light import (
     as_rig,
     check_numbers,
 )
+from rgspipe.scene.lights.nodes import Nodes
+from rgspipe.scene.lights.panel import PanelLight
 from rgspipe.scene.lights.point import PointLight
+from rgspipe.scene.lights.sphere import SphereLight
 from rgspipe.scene.lights.spot import SpotLight, SpotProfile
 
 #: Every kind by its name.
-KINDS: dict[str, type[Light]] = {kind.kind: kind for kind in (PointLight, SpotLight, LedLight)}
+KINDS: dict[str, type[Light]] = {kind.kind: kind for kind in (PointLight, SpotLight, LedLight, SphereLight, PanelLight)}
 
 __all__ = [
     "KINDS",
@@ -24,9 +27,12 @@ __all__ = [
     "LedLight",
     "Light",
     "LightRig",
+    "Nodes",
+    "PanelLight",
     "PointLight",
     "RelativeIntensity",
     "ShapeNumber",
+    "SphereLight",
     "SpotLight",
     "SpotProfile",
     "as_rig",

@@ -103,7 +103,9 @@ class AxialLight(Light):
 
 
 def _towards_numbers(value: Tensor, numbers: Mapping[str, Tensor]) -> dict[str, Tensor]:
-    """Derivatives (N,) of relative intensities (N,) towards their own numbers (N,)."""
+    """Derivatives (N,) of relative intensities (N,) towards numbers (N,) that they may depend on."""
+    if not value.requires_grad:
+        return {name: torch.zeros_like(value) for name in numbers}
     slopes = torch.autograd.grad(value.sum(), tuple(numbers.values()), allow_unused=True)
     filled = (torch.zeros_like(value) if slope is None else slope for slope in slopes)
     return dict(zip(numbers, filled, strict=True))

@@ -83,6 +83,60 @@ class Place(Coordinate):
         return by
 
 
+@dataclass(frozen=True)
+class OnPlane(Place):
+    """A position that stays on a plane, in units of the scene's size.
+
+    Attributes:
+        normal: (3,) float64 of unit length.
+    """
+
+    normal: Tensor
+    count = 2
+
+    def units(self, value: Tensor, size: float) -> list[float]:
+        return [size] * 2
+
+    def moved(self, value: Tensor, step: Tensor, size: float) -> Tensor:
+        return value + size * step @ tangents(self.normal)
+
+    def offset(self, value: Tensor, other: Tensor, size: float) -> Tensor:
+        return tangents(self.normal) @ super().offset(value, other, size)
+
+    def slopes(self, value: Tensor, by: Tensor) -> Tensor:
+        return by @ tangents(self.normal).T.to(by)
+
+    def spread(self, value: Tensor) -> Tensor:
+        return tangents(self.normal).T
+
+
+class Known(Coordinate):
+    """A vector that does not move."""
+
+    count = 0
+
+    def units(self, value: Tensor, size: float) -> list[float]:
+        return []
+
+    def moved(self, value: Tensor, step: Tensor, size: float) -> Tensor:
+        return value
+
+    def offset(self, value: Tensor, other: Tensor, size: float) -> Tensor:
+        return torch.zeros(0, dtype=torch.float64)
+
+    def distance(self, value: Tensor, other: Tensor, size: float) -> float:
+        return 0.0
+
+    def stretch(self, step: Tensor) -> tuple[float, float]:
+        return 0.0, 0.0
+
+    def slopes(self, value: Tensor, by: Tensor) -> Tensor:
+        return by[:, :0]
+
+    def spread(self, value: Tensor) -> Tensor:
+        return torch.zeros(len(value), 0, dtype=torch.float64)
+
+
 class Axis(Coordinate):
     """A unit vector, by two turns tangent to the sphere at where it points [rad]."""
 
@@ -170,7 +224,45 @@ class Ratio(Positive):
         return abs(math.log(max(value, self.low) / max(other, self.low)))
 
 
-PLACE, AXIS = Place(), Axis()
+class Length(Coordinate):
+    """A length, in units of the scene's size. A length below zero is that above it: what has it is turned around."""
+
+    count = 1
+
+    def units(self, value: float, size: float) -> list[float]:
+        return [size]
+
+    def moved(self, value: float, step: Tensor, size: float) -> float:
+        return abs(value + size * float(step[0]))
+
+    def offset(self, value: float, other: float, size: float) -> Tensor:
+        return torch.tensor([(other - value) / size if size > 0.0 else 0.0], dtype=torch.float64)
+
+    def distance(self, value: float, other: float, size: float) -> float:
+        return abs(value - other) / size if size > 0.0 else 0.0
+
+
+@dataclass(frozen=True)
+class Turn(Coordinate):
+    """An angle [rad] after which everything is as before."""
+
+    period: float
+    count = 1
+
+    def units(self, value: float, size: float) -> list[float]:
+        return [1.0]
+
+    def moved(self, value: float, step: Tensor, size: float) -> float:
+        return math.remainder(value + float(step[0]), self.period)
+
+    def offset(self, value: float, other: float, size: float) -> Tensor:
+        return torch.tensor([math.remainder(other - value, self.period)], dtype=torch.float64)
+
+    def distance(self, value: float, other: float, size: float) -> float:
+        return abs(math.remainder(value - other, self.period))
+
+
+PLACE, AXIS, LENGTH, KNOWN = Place(), Axis(), Length(), Known()
 
 
 def tangents(axis: Tensor) -> Tensor:

@@ -6,7 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any, ClassVar, NoReturn, Protocol, Self
+from typing import TYPE_CHECKING, Any, ClassVar, NoReturn, Protocol, Self
 
 import numpy as np
 import torch
@@ -17,6 +17,9 @@ from rgspipe.scene.arrays import ArrayLike, as_tensor, check_finite
 from rgspipe.scene.by_value import ByValue
 from rgspipe.scene.lights.coordinates import PLACE, Coordinate
 from rgspipe.scene.shapes import Float, Given
+
+if TYPE_CHECKING:
+    from rgspipe.scene.lights.nodes import Nodes
 
 #: What tables call the components of an axis.
 AXIS_COLUMNS = ("ax", "ay", "az")
@@ -49,6 +52,7 @@ class ShapeNumber:
         unit: for people: "°" for angles, which fields hold in rad.
         coordinate: how a fit moves it; None where it does not.
         largest: what it can be at most, the others as they are.
+        decimals: with which people are told it; None where it is left to files and tables.
     """
 
     name: str
@@ -56,6 +60,7 @@ class ShapeNumber:
     unit: str = ""
     coordinate: Coordinate | None = None
     largest: float = math.inf
+    decimals: int | None = 1
 
     def shown(self, value: float) -> float:
         """A value of the field in `unit`."""
@@ -122,9 +127,44 @@ class Light(ByValue, ABC):
         return math.inf
 
     @property
+    def flush(self) -> bool:
+        """Whether it is a surface that may lie on another, which casts no shadow on what it lights."""
+        return False
+
+    @property
     def plain(self) -> Light:
         """The simpler light at its place that a fit tries instead; itself if there is none."""
         return self
+
+    @property
+    def seed(self) -> Light:
+        """The light in one point that a search looks for in its stead; itself if it has no extent."""
+        return self
+
+    def nodes(self, values: Mapping[str, Tensor]) -> Nodes | None:
+        """The points that it is made of; None if it stands in one.
+
+        Args:
+            values: its position, its direction if it has an axis, and the numbers of its shape, as tensors; what comes
+                back is differentiable towards them.
+        """
+        return None
+
+    def parts(self) -> tuple[Light, ...]:
+        """Lights in one point each that shine together as it does, differentiable towards its tensors."""
+        nodes = self.nodes(self.places())
+        return (self,) if nodes is None else nodes.lights(self.intensity)
+
+    def places(self) -> dict[str, Tensor]:
+        """What `nodes` is asked with: its fields but for the intensity, of the dtype of its position."""
+        names = ["position", *(["direction"] if self.axis is not None else []), *(one.name for one in self.shape)]
+        values = {name: getattr(self, name) for name in names if not isinstance(getattr(self, name), str)}
+        to = {"dtype": self.position.dtype, "device": self.position.device}
+        return {name: torch.as_tensor(value, **to) for name, value in values.items()}
+
+    def grown(self, size: float) -> tuple[Self, ...]:
+        """Lights of this kind at its place that a fit begins with, in a scene of `size`, where its shape is free."""
+        return (self,)
 
     @abstractmethod
     def power(self) -> Float[Tensor, " 3"]:

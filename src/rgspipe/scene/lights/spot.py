@@ -63,7 +63,7 @@ class SpotLight(AxialLight):
         profile = self._profile
         moves = FALLOFF if self.profile == "gaussian" else None
         widest = profile.largest_falloff(self.cone_angle)
-        rim = ShapeNumber("falloff", profile.falloff_key, profile.falloff_unit, moves, widest)
+        rim = ShapeNumber("falloff", profile.falloff_key, profile.falloff_unit, moves, widest, decimals=None)
         return ShapeNumber("cone_angle", "cone_angle", "°", CONE), rim
 
     @property

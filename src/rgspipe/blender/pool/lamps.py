@@ -1,0 +1,62 @@
+"""Lamps as they hang in rooms: of some size, and near a surface."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import torch
+
+from rgspipe.scene import Light, PointLight
+from rgspipe.scene.lights import PanelLight, SphereLight
+
+if TYPE_CHECKING:
+    from rgspipe.blender.geometry import Geometry
+
+#: Half of all lamps hang from what is above them, the others from what is beside them along an axis.
+UP, SIDES = (0.0, 0.0, 1.0), ((1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, -1.0, 0.0))
+
+#: Scene units between a panel and what it lies on, if nothing is said.
+FLUSH = 0.002
+
+
+@dataclass(frozen=True)
+class LampRange:
+    """What lamps are drawn from, uniformly, in scene units.
+
+    Attributes:
+        radius: least and largest, of spheres.
+        side: the same, of panels' sides.
+        mounted: least and largest distance from the surface that a lamp hangs on; None where lamps hang free. Panels
+            always lie on a surface, FLUSH before it where this is None.
+    """
+
+    radius: tuple[float, float] = (0.02, 0.08)
+    side: tuple[float, float] = (0.1, 0.3)
+    mounted: tuple[float, float] | None = None
+
+    def draw(self, rng: np.random.Generator, kind: str) -> Light:
+        """A lamp of 1 W/sr, wherever it is."""
+        if kind == "spheres":
+            return SphereLight.shaped(float(rng.uniform(*self.radius)))
+        if kind == "panels":
+            width, height = rng.uniform(*self.side, 2).tolist()
+            return PanelLight.shaped(width, height, float(rng.uniform(-0.5 * math.pi, 0.5 * math.pi)))
+        return PointLight.shaped()
+
+    def hung(self, lamp: Light, near: np.ndarray, geometry: Geometry, rng: np.random.Generator) -> Light | None:
+        """The lamp on a surface that `near` (3,) looks at; None if it does not fit there."""
+        towards = np.array(UP if rng.uniform() < 0.5 else SIDES[rng.integers(len(SIDES))])
+        gap = float(rng.uniform(*(self.mounted or (FLUSH, FLUSH))))
+        reach = gap + (lamp.radius if isinstance(lamp, SphereLight) else 0.0)
+        distance, in_front = geometry.cast(near, towards)
+        if not in_front or not reach < distance < math.inf:
+            return None
+        place = near + (distance - reach) * towards
+        if geometry.clearance(place) < (1.0 - 1e-3) * reach:
+            return None
+        lamp = lamp.at(torch.from_numpy(place), torch.from_numpy(-towards))
+        nodes = [one.position.numpy() for one in lamp.parts()]
+        return None if any(geometry.blocked(place, node) for node in nodes) else lamp

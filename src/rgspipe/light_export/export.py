@@ -1,0 +1,104 @@
+"""Write lights in the formats of other programs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, get_args
+
+from torch import Tensor
+
+from rgspipe.datasets.light_file import write_lights
+from rgspipe.errors import InputError
+from rgspipe.files import write_text
+from rgspipe.light_export.blend import blend
+from rgspipe.light_export.gltf import gltf
+from rgspipe.light_export.ies import ies
+from rgspipe.light_export.mitsuba import mitsuba
+from rgspipe.light_export.three import three
+from rgspipe.light_export.usd import usda
+from rgspipe.light_export.world import World, table
+from rgspipe.scene import Light, LightRig
+from rgspipe.scene.lights import as_rig
+
+Format = Literal["blend", "usda", "gltf", "mitsuba", "three", "ies", "json"]
+FORMATS: tuple[Format, ...] = get_args(Format)
+
+#: Files of formats that hold all lights in one.
+NAMES = {"blend": "lamps_blender.py", "usda": "lamps.usda", "gltf": "lamps.gltf"}
+NAMES |= {"mitsuba": "lamps_mitsuba.xml", "three": "lamps_three.json", "json": "lamps.json"}
+
+_WRITERS: dict[str, Callable[[LightRig], tuple[str, list[str]]]] = {
+    "usda": usda,
+    "gltf": gltf,
+    "mitsuba": mitsuba,
+    "three": three,
+}
+
+
+@dataclass(frozen=True)
+class LightExport:
+    """What was written.
+
+    Attributes:
+        files: in the order of the formats.
+        lines: for people: what was done to the lights, and what a format does not hold.
+    """
+
+    files: tuple[Path, ...]
+    lines: tuple[str, ...]
+
+
+def export_lights(
+    lights: Light | Sequence[Light],
+    folder: str | Path,
+    formats: Sequence[Format] = FORMATS,
+    *,
+    metres: float = 1.0,
+    world: World | None = None,
+    covariances: Sequence[Tensor | None] = (),
+) -> LightExport:
+    """Write lights into `folder` for other programs: a file a format, and lamps.txt with their units.
+
+    Args:
+        formats: blend (a script for Blender), usda, gltf, mitsuba (XML), three (JSON), ies (a file a light), json.
+        metres: per scene unit.
+        world: how scene units came about, instead of `metres`.
+        covariances: of each light, of which the first three rows are its place [scene units²].
+
+    Raises:
+        InputError: an unknown format, or a length of no metres.
+    """
+    world = world or World(metres)
+    if not 0.0 < world.unit < float("inf"):
+        raise InputError("metres", expected="above 0", found=f"{world.unit:g}", remedy="Say how long a scene unit is.")
+    for name in formats:
+        if name not in FORMATS:
+            raise InputError("formats", expected=" or ".join(FORMATS), found=repr(name), remedy="Correct the name.")
+    rig, folder = world.lights(as_rig(lights)), Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    regions = [None if one is None else world.unit**2 * one[:3, :3] for one in covariances]
+    files, notes = [], []
+    for name in formats:
+        for path, text, said in _texts(name, rig, folder, regions):
+            files.append(path)
+            notes += said
+            if text is None:
+                write_lights(path, rig, {"units": "metres, W/sr"})
+            else:
+                write_text(path, text)
+    write_text(folder / "lamps.txt", f"{world.line()}\n\n{table(rig)}" + "".join(f"{note}\n" for note in notes))
+    return LightExport(tuple(files), (world.line(), *notes))
+
+
+def _texts(
+    name: str, rig: LightRig, folder: Path, regions: Sequence[Tensor | None]
+) -> list[tuple[Path, str | None, list[str]]]:
+    """Files of a format, each with its text (None for a light file) and what it does not hold."""
+    if name == "ies":
+        named = [(f"lamp_{number}", light) for number, light in enumerate(rig, start=1)]
+        return [(folder / f"{stem}.ies", *ies(light, stem)) for stem, light in named]
+    if name == "json":
+        return [(folder / NAMES[name], None, [])]
+    return [(folder / NAMES[name], *(blend(rig, regions) if name == "blend" else _WRITERS[name](rig)))]

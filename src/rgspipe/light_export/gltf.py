@@ -1,0 +1,65 @@
+"""glTF 2.0 with KHR_lights_punctual: Y is up, metres, candela."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import torch
+
+from rgspipe.light_export.parts import cone, is_cone, peak_and_colour, pose
+from rgspipe.light_export.world import LUMENS_PER_WATT
+from rgspipe.scene import Light, LightRig
+from rgspipe.scene.lights import PanelLight, SphereLight
+
+#: From axes with Z up to those with Y up.
+Y_UP = torch.tensor([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]], dtype=torch.float64)
+
+CONVENTION = f"intensity [cd] = {LUMENS_PER_WATT:g} lm/W x radiant intensity [W/sr] of the brightest channel"
+
+
+def gltf(rig: LightRig) -> tuple[str, list[str]]:
+    """The text of a file, and what it does not hold."""
+    held = [(number, light) for number, light in enumerate(rig, start=1) if not isinstance(light, PanelLight)]
+    content = {
+        "asset": {"version": "2.0", "generator": "rgspipe", "extras": {"photometry": CONVENTION}},
+        "scene": 0,
+        "scenes": [{"nodes": [*range(len(held))]} if held else {}],
+    }
+    if held:
+        lights = {"KHR_lights_punctual": {"lights": [_light(number, light) for number, light in held]}}
+        content |= {"extensionsUsed": [*lights], "extensions": lights}
+        content["nodes"] = [_node(index, number, light) for index, (number, light) in enumerate(held)]
+    return json.dumps(content, indent=1) + "\n", [
+        note for n, light in enumerate(rig, start=1) for note in _notes(n, light)
+    ]
+
+
+def _light(number: int, light: Light) -> dict:
+    peak, colour = peak_and_colour(light)
+    fields = {"name": f"light {number}", "color": colour, "intensity": LUMENS_PER_WATT * peak}
+    if not is_cone(light):
+        return fields | {"type": "point"}
+    inner, outer = cone(light)
+    outer = min(outer, 0.5 * math.pi)
+    return fields | {"type": "spot", "spot": {"innerConeAngle": min(inner, 0.999 * outer), "outerConeAngle": outer}}
+
+
+def _node(index: int, number: int, light: Light) -> dict:
+    matrix = (Y_UP @ pose(light) @ _turned_back(light)).T.reshape(-1).tolist()
+    return {"name": f"light {number}", "matrix": matrix, "extensions": {"KHR_lights_punctual": {"light": index}}}
+
+
+def _turned_back(light: Light) -> torch.Tensor:
+    """Without an axis nothing is turned: the node keeps the axes of glTF."""
+    return torch.eye(4, dtype=torch.float64) if light.axis is not None else Y_UP.T
+
+
+def _notes(number: int, light: Light) -> list[str]:
+    if isinstance(light, PanelLight):
+        return [f"light {number}: glTF has no area lights; the panel is left out."]
+    if isinstance(light, SphereLight):
+        return [f"light {number}: glTF has no lights of a size; the sphere of radius {light.radius:.4g} m is a point."]
+    if is_cone(light):
+        return [f"light {number}: a spot of glTF falls with a squared ramp of the cosine, a {light.kind} does not."]
+    return []

@@ -1,0 +1,50 @@
+"""LM-63 (IES) files: the candela of a light by the angle from its axis, type C, absolute photometry."""
+
+from __future__ import annotations
+
+import math
+
+import torch
+
+from rgspipe.light_export.world import candela
+from rgspipe.scene import Light
+from rgspipe.scene.lights import PanelLight, SphereLight
+
+#: Vertical angles from straight along the axis to straight back [degrees].
+ANGLES = torch.linspace(0.0, 180.0, 361, dtype=torch.float64)
+
+
+def ies(light: Light, name: str) -> tuple[str, list[str]]:
+    """The text of a light's file, and what it does not hold."""
+    share = torch.ones_like(ANGLES) if light.axis is None else light.relative_intensity_at(torch.deg2rad(ANGLES))
+    values = (candela(light) * share).tolist()
+    width, length, height = _extent(light)
+    header = [
+        "IESNA:LM-63-2002",
+        f"[TEST] {name}",
+        "[TESTLAB] rgspipe",
+        "[ISSUEDATE] -",
+        "[MANUFAC] -",
+        f"[LUMINAIRE] {light.kind}",
+        "TILT=NONE",
+        # 1 lamp, absolute (-1 lm), multiplier, angles, type C, metres.
+        f"1 -1 1 {len(ANGLES)} 1 1 2 {width:.6g} {length:.6g} {height:.6g}",
+        "1 1 0",
+    ]
+    text = "\r\n".join([*header, _wrapped(ANGLES.tolist()), "0", _wrapped(values), ""])
+    return text, [f"{name}: colour is not in the file, only candela (luminance of the RGB)."]
+
+
+def _extent(light: Light) -> tuple[float, float, float]:
+    """Width, length and height [m]; negative ones are those of something round."""
+    if isinstance(light, PanelLight):
+        return float(light.width), float(light.height), 0.0
+    if isinstance(light, SphereLight):
+        return (-2.0 * float(light.radius),) * 3
+    return 0.0, 0.0, 0.0
+
+
+def _wrapped(values: list[float], count: int = 10) -> str:
+    """Lines of LM-63 may have 256 characters."""
+    shown = [f"{value:.6g}" if math.isfinite(value) else "0" for value in values]
+    return "\r\n".join(" ".join(shown[first : first + count]) for first in range(0, len(shown), count))

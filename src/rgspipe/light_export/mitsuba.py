@@ -1,0 +1,56 @@
+"""Mitsuba 3: emitters to be put into a scene's XML."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from rgspipe.light_export.parts import cone, is_cone, pose
+from rgspipe.scene import Light, LightRig, SpotLight
+from rgspipe.scene.lights import PanelLight, SphereLight
+
+
+def mitsuba(rig: LightRig) -> tuple[str, list[str]]:
+    """The text of a file, and what it does not hold."""
+    notes = [note for number, light in enumerate(rig, start=1) for note in _notes(number, light)]
+    return "\n".join(['<scene version="3.0.0">', *map(_emitter, rig), "</scene>", ""]), notes
+
+
+def _emitter(light: Light) -> str:
+    x, y, z = light.position.tolist()
+    if isinstance(light, SphereLight) and light.radius > 0.0:
+        radiance = _rgb("radiance", light, 1.0 / (math.pi * light.radius**2))
+        place = f'<point name="center" x="{x!r}" y="{y!r}" z="{z!r}"/><float name="radius" value="{light.radius!r}"/>'
+        return f'  <shape type="sphere">{place}<emitter type="area">{radiance}</emitter></shape>'
+    if isinstance(light, PanelLight):
+        radiance = _rgb("radiance", light, 1.0 / (light.width * light.height))
+        # Mitsuba's rectangle spans −1 to 1 and shines along +z; z of our frame is against the axis.
+        scaled = pose(light)
+        scaled[:3, 0] *= 0.5 * light.width
+        scaled[:3, 1] *= -0.5 * light.height
+        scaled[:3, 2] *= -1.0
+        return f'  <shape type="rectangle">{_matrix(scaled)}<emitter type="area">{radiance}</emitter></shape>'
+    if is_cone(light):
+        inner, outer = (math.degrees(angle) for angle in cone(light))
+        angles = f'<float name="beam_width" value="{inner!r}"/><float name="cutoff_angle" value="{outer!r}"/>'
+        # Mitsuba's spot looks along +z.
+        turned = pose(light)
+        turned[:3, 1:3] *= -1.0
+        return f'  <emitter type="spot">{_matrix(turned)}{angles}{_rgb("intensity", light)}</emitter>'
+    place = f'<point name="position" x="{x!r}" y="{y!r}" z="{z!r}"/>'
+    return f'  <emitter type="point">{place}{_rgb("intensity", light)}</emitter>'
+
+
+def _notes(number: int, light: Light) -> list[str]:
+    if is_cone(light) and not (isinstance(light, SpotLight) and light.profile == "linear"):
+        return [f"light {number}: a spot of Mitsuba falls linearly with the angle, a {light.kind} does not."]
+    return []
+
+
+def _rgb(name: str, light: Light, factor: float = 1.0) -> str:
+    return f'<rgb name="{name}" value="{", ".join(repr(factor * value) for value in light.intensity.tolist())}"/>'
+
+
+def _matrix(matrix: Sequence[Sequence[float]]) -> str:
+    values = " ".join(repr(float(value)) for row in matrix for value in row)
+    return f'<transform name="to_world"><matrix value="{values}"/></transform>'

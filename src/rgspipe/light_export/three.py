@@ -1,0 +1,66 @@
+"""three.js: an object for its ObjectLoader; metres, candela, Z is up as in the scene."""
+
+from __future__ import annotations
+
+import json
+import math
+import uuid
+
+from rgspipe.light_export.parts import cone, is_cone, peak_and_colour, pose
+from rgspipe.light_export.world import LUMENS_PER_WATT
+from rgspipe.scene import Light, LightRig, SpotLight, srgb
+from rgspipe.scene.lights import PanelLight, SphereLight
+
+
+def three(rig: LightRig) -> tuple[str, list[str]]:
+    """The text of a file, and what it does not hold."""
+    children = [child for number, light in enumerate(rig, start=1) for child in _objects(number, light)]
+    content = {
+        "metadata": {"version": 4.6, "type": "Object", "generator": "rgspipe"},
+        "object": {"uuid": _id("lights"), "type": "Group", "name": "lights, z up", "children": children},
+    }
+    notes = ["three.js colours have 8 bits a channel."] if rig else []
+    return json.dumps(content, indent=1) + "\n", [
+        *notes,
+        *(n for i, one in enumerate(rig, start=1) for n in _notes(i, one)),
+    ]
+
+
+def _objects(number: int, light: Light) -> list[dict]:
+    name = f"light {number}"
+    peak, colour = peak_and_colour(light)
+    red, green, blue = (round(255.0 * float(srgb.encode(value))) for value in colour)
+    fields = {
+        "uuid": _id(name),
+        "name": name,
+        "color": red << 16 | green << 8 | blue,
+        "matrix": pose(light).T.reshape(-1).tolist(),
+    }
+    if isinstance(light, PanelLight):
+        # nits: candela along the axis over the area.
+        area = light.width * light.height
+        shown = {"type": "RectAreaLight", "width": light.width, "height": light.height}
+        return [fields | shown | {"intensity": LUMENS_PER_WATT * peak / area}]
+    fields |= {"intensity": LUMENS_PER_WATT * peak, "distance": 0, "decay": 2}
+    if not is_cone(light):
+        return [fields | {"type": "PointLight"}]
+    inner, outer = cone(light)
+    aim = pose(light)
+    aim[:3, 3] = light.position + light.axis
+    target = {"uuid": _id(f"{name} target"), "type": "Object3D", "name": f"{name} target"}
+    target["matrix"] = aim.T.reshape(-1).tolist()
+    shown = {"type": "SpotLight", "angle": min(outer, 0.5 * math.pi), "penumbra": 1.0 - inner / outer}
+    return [fields | shown | {"target": target["uuid"]}, target]
+
+
+def _notes(number: int, light: Light) -> list[str]:
+    if isinstance(light, SphereLight):
+        return [f"light {number}: three.js has no spheres; that of radius {light.radius:.4g} m is a point."]
+    if is_cone(light) and not (isinstance(light, SpotLight) and light.profile == "smoothstep"):
+        return [f"light {number}: a spot of three.js falls with a smoothstep of the cosine, a {light.kind} does not."]
+    return []
+
+
+def _id(name: str) -> str:
+    """The same for the same name, so that the same lights give the same file."""
+    return str(uuid.uuid5(uuid.NAMESPACE_URL, f"rgspipe:{name}"))

@@ -1,0 +1,62 @@
+"""USD with UsdLux: metres, Z is up."""
+
+from __future__ import annotations
+
+import math
+
+from rgspipe.light_export.parts import cone, is_cone, peak_and_colour, pose
+from rgspipe.scene import Light, LightRig
+from rgspipe.scene.lights import PanelLight, SphereLight
+
+HEADER = """#usda 1.0
+(
+    defaultPrim = "Lights"
+    metersPerUnit = 1
+    upAxis = "Z"
+)
+
+def Xform "Lights" (
+    kind = "component"
+)
+{
+"""
+
+
+def usda(rig: LightRig) -> tuple[str, list[str]]:
+    """The text of a file, and what it does not hold."""
+    lights = "\n".join(_light(number, light) for number, light in enumerate(rig, start=1))
+    return f"{HEADER}{lights}}}\n", [note for n, light in enumerate(rig, start=1) for note in _notes(n, light)]
+
+
+def _light(number: int, light: Light) -> str:
+    peak, colour = peak_and_colour(light)
+    if isinstance(light, PanelLight):
+        kind, radiance = "RectLight", peak / (light.width * light.height)
+        own = {"float inputs:width": light.width, "float inputs:height": light.height}
+    else:
+        # With normalize, radiance is intensity over the area 4πr², and a sphere of radiance L sends πr²L: 4 times I.
+        kind, radiance = "SphereLight", 4.0 * peak
+        radius = light.radius if isinstance(light, SphereLight) else 0.0
+        own = {"float inputs:radius": radius, "bool inputs:normalize": 1}
+        own |= {} if radius > 0.0 else {"bool treatAsPoint": 1}
+    schema = ""
+    if is_cone(light):
+        inner, outer = cone(light)
+        schema = ' (\n        prepend apiSchemas = ["ShapingAPI"]\n    )'
+        own |= {"float inputs:shaping:cone:angle": math.degrees(outer)}
+        own |= {"float inputs:shaping:cone:softness": max(0.0, 1.0 - inner / outer)}
+    own |= {"float inputs:intensity": radiance}
+    lines = [f"        {name} = {value!r}" for name, value in own.items()]
+    lines.append(f"        color3f inputs:color = ({', '.join(map(repr, colour))})")
+    rows = ", ".join(f"({', '.join(map(repr, row))})" for row in pose(light).T.tolist())
+    lines.append(f"        matrix4d xformOp:transform = ( {rows} )")
+    lines.append('        uniform token[] xformOpOrder = ["xformOp:transform"]')
+    return f'    def {kind} "light_{number}"{schema}\n    {{\n' + "\n".join(lines) + "\n    }\n"
+
+
+def _notes(number: int, light: Light) -> list[str]:
+    if is_cone(light):
+        return [
+            f"light {number}: a cone of USD falls off as its renderer likes, the profile of a {light.kind} is not held."
+        ]
+    return []

@@ -1,0 +1,68 @@
+"""Spheres that shine: bulbs and globes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import ClassVar, Self
+
+from torch import Tensor
+
+from rgspipe.scene.lights.coordinates import LENGTH
+from rgspipe.scene.lights.light import WATTS_PER_INTENSITY, Light, Reader, ShapeNumber
+from rgspipe.scene.lights.nodes import Nodes, ball_nodes
+from rgspipe.scene.lights.point import PointLight
+from rgspipe.scene.shapes import Float
+
+#: Radii that a fit begins with, in parts of the scene's size: where the radius is 0, nothing tells which way it goes.
+RADII = (0.02, 0.06)
+
+
+@dataclass(frozen=True)
+class SphereLight(Light):
+    """A sphere of even radiance I/(πr²): seen whole, it lights surfaces as a point of intensity I in its middle does.
+
+    Attributes:
+        radius: r ≥ 0, scene units.
+
+    Raises:
+        ValueError: the radius is below 0.
+    """
+
+    kind: ClassVar[str] = "sphere"
+
+    radius: float
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.radius >= 0.0:
+            raise ValueError(f"a sphere needs a radius ≥ 0, got {self.radius}")
+
+    @classmethod
+    def shaped(cls, radius: float = 0.05) -> Self:
+        return cls([0.0, 0.0, 0.0], 1.0, radius)
+
+    @property
+    def shape(self) -> tuple[ShapeNumber, ...]:
+        return (ShapeNumber("radius", "radius", "", LENGTH, decimals=4),)
+
+    @property
+    def plain(self) -> PointLight:
+        return PointLight(self.position, self.intensity)
+
+    @property
+    def seed(self) -> PointLight:
+        return self.plain
+
+    def nodes(self, values: Mapping[str, Tensor]) -> Nodes:
+        return Nodes(values["position"] + values["radius"] * ball_nodes().to(values["position"]))
+
+    def grown(self, size: float) -> tuple[Self, ...]:
+        return tuple(replace(self, radius=share * size) for share in RADII)
+
+    def power(self) -> Float[Tensor, " 3"]:
+        return WATTS_PER_INTENSITY * self.intensity
+
+    @classmethod
+    def from_fields(cls, position: Tensor, intensity: Tensor, reader: Reader) -> Self:
+        return cls(position, intensity, reader.number("radius"))

@@ -1,0 +1,124 @@
+"""Lights in the formats of other programs say what ours do, in their units and axes."""
+
+from __future__ import annotations
+
+import json
+import math
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+import rgspipe as rg
+from rgspipe.errors import InputError
+from rgspipe.light_export.export import FORMATS, NAMES, export_lights
+from rgspipe.light_export.world import World, candela, lumens
+from rgspipe.scene import Light
+from rgspipe.scene.lights import KINDS
+
+AXIS = torch.nn.functional.normalize(torch.tensor([0.5, 0.3, -0.8], dtype=torch.float64), dim=0)
+RIG = tuple(
+    kind.shaped().at(torch.tensor([0.1 * k, 0.2, 0.3]).double(), AXIS, torch.tensor([1.0, 2.0, 0.5]).double())
+    for k, kind in enumerate(KINDS.values())
+)
+BY_KIND = {light.kind: light for light in RIG}
+
+
+def text(folder: Path, name: str, *lights: Light, **options: object) -> str:
+    export_lights(lights, folder, [name], **options)
+    return (folder / NAMES[name]).read_text()
+
+
+def test_every_format_is_written_for_every_kind(tmp_path: Path) -> None:
+    done = export_lights(RIG, tmp_path, metres=2.0, covariances=[1e-4 * torch.eye(6).double()] * len(RIG))
+    assert {path.name for path in done.files} == {*NAMES.values(), *(f"lamp_{n}.ies" for n in range(1, len(RIG) + 1))}
+    assert all(path.stat().st_size > 0 for path in done.files)
+    # What a format does not hold is said of each light.
+    assert any("the panel is left out" in line for line in done.lines)
+    assert "lumens" not in (tmp_path / "lamps.txt").read_text() and "683" in (tmp_path / "lamps.txt").read_text()
+
+
+@pytest.mark.parametrize("metres", [0.1, 1.0, 10.0])
+def test_a_light_file_in_metres_gives_the_same_irradiance(tmp_path: Path, metres: float) -> None:
+    """I/d² is the same in both units."""
+    text(tmp_path, "json", *RIG, metres=metres)
+    for light, exported in zip(RIG, rg.read_lights(tmp_path / "lamps.json"), strict=True):
+        torch.testing.assert_close(exported.position, metres * light.position)
+        torch.testing.assert_close(exported.intensity / metres**2, light.intensity)
+    sphere = rg.read_lights(tmp_path / "lamps.json")[[*BY_KIND].index("sphere")]
+    assert sphere.radius == pytest.approx(metres * BY_KIND["sphere"].radius)
+
+
+def test_scaling_and_offset_of_a_scene_are_undone() -> None:
+    """scene = (file + offset) · rescale, and a lamp of so many watts has them again."""
+    there, watts = torch.tensor([3.0, -2.0, 5.0]).double(), 100.0
+    world = World(1.0, 0.125, (-1.0, 0.5, -2.0))
+    in_scene = (there + torch.tensor(world.offset).double()) * world.rescale
+    found = rg.PointLight(in_scene, watts / (4.0 * math.pi) * world.rescale**2)
+    (light,) = world.lights((found,))
+    torch.testing.assert_close(light.position, there)
+    torch.testing.assert_close(light.power(), torch.full((3,), watts).double())
+
+
+def test_photometric_units_are_683_lumens_a_watt_of_luminance() -> None:
+    white = rg.PointLight([0.0, 0.0, 0.0], 1.0)
+    assert candela(white) == pytest.approx(683.0) and lumens(white) == pytest.approx(4.0 * math.pi * 683.0)
+
+
+def test_gltf_is_y_up_and_its_lights_shine_along_minus_z(tmp_path: Path) -> None:
+    content = json.loads(text(tmp_path, "gltf", BY_KIND["point"], BY_KIND["spot"]))
+    lights = content["extensions"]["KHR_lights_punctual"]["lights"]
+    assert [light["type"] for light in lights] == ["point", "spot"]
+    assert lights[0]["intensity"] == pytest.approx(2.0 * 683.0) and lights[0]["color"] == [0.5, 1.0, 0.25]
+    for node, light in zip(content["nodes"], (BY_KIND["point"], BY_KIND["spot"]), strict=True):
+        matrix = np.array(node["matrix"]).reshape(4, 4).T
+        x, y, z = light.position.tolist()
+        np.testing.assert_allclose(matrix[:3, 3], [x, z, -y])
+        np.testing.assert_allclose(matrix[:3, :3] @ matrix[:3, :3].T, np.eye(3), atol=1e-12)
+    x, y, z = AXIS.tolist()
+    np.testing.assert_allclose(matrix[:3, :3] @ [0, 0, -1], [x, z, -y], atol=1e-12)
+
+
+def test_mitsuba_s_emitters_have_our_radiance_and_axes(tmp_path: Path) -> None:
+    root = ElementTree.fromstring(text(tmp_path, "mitsuba", *RIG))
+    values = [[float(x) for x in rgb.get("value").split(",")] for rgb in root.iter("rgb")]
+    sphere, panel = BY_KIND["sphere"], BY_KIND["panel"]
+    np.testing.assert_allclose(values[0], [1.0, 2.0, 0.5])
+    np.testing.assert_allclose(values[3], sphere.intensity / (math.pi * sphere.radius**2))
+    np.testing.assert_allclose(values[4], panel.intensity / (panel.width * panel.height))
+    matrices = [np.array(m.get("value").split(), dtype=float).reshape(4, 4) for m in root.iter("matrix")]
+    for matrix in matrices:  # spots and rectangles look along +z
+        direction = matrix[:3, :3] @ [0, 0, 1]
+        np.testing.assert_allclose(direction / np.linalg.norm(direction), AXIS, atol=1e-12)
+        assert np.linalg.det(matrix[:3, :3]) > 0.0
+    area = 4.0 * np.linalg.norm(np.cross(matrices[-1][:3, 0], matrices[-1][:3, 1]))
+    assert area == pytest.approx(panel.width * panel.height)
+
+
+def test_ies_files_have_the_candela_of_every_angle(tmp_path: Path) -> None:
+    led = BY_KIND["led"]
+    export_lights(led, tmp_path, ["ies"])
+    raw = (tmp_path / "lamp_1.ies").read_bytes().decode("ascii")
+    lines = raw.split("\r\n")
+    assert lines[0] == "IESNA:LM-63-2002" and max(map(len, lines)) < 256
+    numbers = [float(x) for x in " ".join(lines[lines.index("TILT=NONE") + 1 :]).split()]
+    count = int(numbers[3])
+    angles, values = numbers[13 : 13 + count], numbers[14 + count :]
+    assert angles[0] == 0.0 and angles[-1] == 180.0 and len(values) == count
+    np.testing.assert_allclose(values[0], candela(led), rtol=1e-5)
+    at_60 = values[angles.index(60.0)]
+    assert at_60 == pytest.approx(candela(led) * 0.5**led.exponent, rel=1e-5)
+
+
+def test_the_same_lights_give_the_same_files(tmp_path: Path) -> None:
+    one, other = (export_lights(RIG, tmp_path / name).files for name in "ab")
+    assert [path.read_bytes() for path in one] == [path.read_bytes() for path in other]
+
+
+def test_wrong_requests_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="formats"):
+        export_lights(RIG, tmp_path, ["fbx"])
+    with pytest.raises(InputError, match="metres"):
+        export_lights(RIG, tmp_path, FORMATS, metres=0.0)
