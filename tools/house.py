@@ -29,6 +29,7 @@ FLOORS = (
     ("renderer",),
     ("fitting", "completion"),
     ("training",),
+    ("capture",),
     ("degradation", "evidence", "robustness", "blender", "olat", "evaluation"),
     ("relighting", "studies", "benchmark", "pages"),
     ("config",),

@@ -41,9 +41,9 @@ if TYPE_CHECKING:
 
 #: Where the public names live; they are imported when first used, so that `import rgspipe` stays quick.
 _HOMES = {
-    "datasets.light_file": ("read_ambient", "read_lights", "write_lights"),
     "capture.captured": ("Captured", "capture_scene"),
     "capture.options": ("CaptureOptions",),
+    "datasets.light_file": ("read_ambient", "read_lights", "write_lights"),
     "datasets.location": ("load_views",),
     "datasets.ply": ("PlyOptions", "save_ply"),
     "datasets.surfel_file": ("load_surfels", "save_surfels"),

@@ -136,9 +136,15 @@ class _Surface:
 
 
 def _load_view(
-    entry: FrameEntry, root: Path, info: DatasetInfo | None, *, light: bool, depth: bool, base: Path | None = None
+    entry: FrameEntry,
+    root: Path,
+    info: DatasetInfo | None,
+    *,
+    light: bool,
+    depth: bool,
+    base: Path | None = None,
 ) -> View:
-    """A view; it must name its `light`, and say what its `depth` means if it has any; `base` is with the lamps off."""
+    """A view; it must name its `light`, and say what its `depth` means if it has any."""
     image, alpha = read_colour(entry.image_path)
     camera = entry.camera(image.shape[1], image.shape[0])
     mask = None if entry.mask_path is None else read_mask(entry.mask_path, camera)

@@ -125,9 +125,18 @@ class Lookout:
         return self.confirmed(self.saturated, replace(result, lights=state.lights(refiner.problem)))
 
     def rendered(self, result: FitResult) -> list[Numbers]:
-        """(H, W) mean radiance of the channels under a fit's lights, one a view."""
+        """(H, W) mean radiance of the channels under a fit's lights, one a view, over its exposures."""
+        exposures = result.exposures or (1.0,) * len(self.greys)
+        return [_grey(image) / exposure for image, exposure in zip(self.explained(result), exposures, strict=True)]
+
+    def explained(self, result: FitResult) -> list[Tensor]:
+        """(H, W, 3) what a fit has for the images, one a view: its lights, and what is there besides them."""
         with torch.no_grad():
-            return [_grey(image) for image in self.views.render(result.lights)]
+            shown = self.views.render(result.lights)
+        exposures = result.exposures or (1.0,) * len(shown)
+        exposed = [image * exposure for image, exposure in zip(shown, exposures, strict=True)]
+        there = self.views.there_anyway(result, self.capture)
+        return [image + other.to(image) for image, other in zip(exposed, there, strict=True)] if there else exposed
 
     def without(self, lamps: Sequence[LampInSight]) -> TargetViews:
         """The views less the lamps' pixels, looked at first from where the lamps may stand."""
@@ -153,11 +162,9 @@ class Lookout:
     def left(self, views: TargetViews, result: FitResult) -> float:
         """Share of the energy of the pixels of `views` that a fit's lights leave."""
         pixels = views.prepared.pixels
-        image = torch.cat([image.reshape(-1, 3) for image in self.views.render(result.lights)])[pixels].double()
-        exposures = torch.tensor(result.exposures or [1.0] * len(self.greys), dtype=torch.float64)
+        image = torch.cat([image.reshape(-1, 3) for image in self.explained(result)])[pixels].double()
         target = self.images[pixels].double()
-        rest = target - image * exposures.to(image)[views.prepared.view_of][:, None]
-        return float(rest.square().sum() / target.square().sum())
+        return float((target - image).square().sum() / target.square().sum())
 
     def told(self, answer: Answer) -> FitResult:
         """A fit with what is to be said of the lamps that it left out."""
