@@ -9,7 +9,7 @@ TEST_WORKERS ?= 2
 ARGS ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup test test-slurm crash fuzz smoke reproduce scenes train-study light-study bench docs lint house
+.PHONY: help setup test test-slurm third-party crash fuzz smoke reproduce scenes train-study light-study bench docs lint house
 
 help:  ## this list
 	@echo "rgspipe: from images of a scene, find its lights"
@@ -31,6 +31,11 @@ test: setup  ## every test
 
 test-slurm: setup  ## sweeps on a Slurm cluster of this machine alone (Debian: apt-get install slurm-wlm munge)
 	$(VENV)/bin/python -m pytest -q -m slurm $(ARGS) tests/slurm
+
+third-party: setup  ## what is exported, read by Mitsuba, USD and the validator of glTF (minutes; npm for the last)
+	$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check -r requirements-third-party.txt
+	! command -v npm > /dev/null || npm install --silent --no-fund --prefix $(VENV)/npm gltf-validator@2.0.0-dev.3.10
+	$(VENV)/bin/python -m pytest -q tests/light_export $(ARGS)
 
 crash: setup  ## power cuts while the whole way is made on a tiny scene: what the next run ends with (minutes; ARGS=NUMBER of cuts)
 	$(VENV)/bin/python tests/power_cut.py $(ARGS)

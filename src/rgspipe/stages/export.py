@@ -45,14 +45,14 @@ def _lights(context: StageContext) -> None:
     """The lights of export.light for other programs, where they are in the file that the scene was made from."""
     config, path = context.config, context.config.export.light
     dataset = context.inputs.get("generate_dataset")
-    world = _world(config.export.metres, None if dataset is None else dataset.folder() / INFO)
+    world = world_of(config.export.metres, None if dataset is None else dataset.folder() / INFO)
     rig = read_lights(path)
     done = export_lights(rig, context.folder, config.export.lights, world=world, covariances=read_covariances(path))
     print("\n".join(done.lines))
     context.note(lights=len(rig), formats=list(config.export.lights))
 
 
-def _world(metres: float, info: Path | None) -> World:
+def world_of(metres: float, info: Path | None) -> World:
     """How the coordinates of the scene came about; of scenes that were not moved, only their unit."""
     if info is None or not info.exists():
         return World(metres)
