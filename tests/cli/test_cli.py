@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+import rgspipe as rg
+
 REFUSED, UNREAD = 2, 141
 
 
@@ -67,11 +69,25 @@ def test_hydra_shows_the_whole_configuration(rgspipe) -> None:
 def test_help_explains_stages_scenes_groups_and_keys_without_torch(rgspipe) -> None:
     result = rgspipe("--help")
     assert result.returncode == 0
-    for word in ("train_surfels", "blend", "accuracy", "draft | reference | standard", "upstream=require", "dataset"):
+    for word in ("train_surfels", "accuracy", "draft | reference | standard", "upstream=require", "dataset"):
         assert word in result.stdout
     assert "8 to 8192" in rgspipe("--help", "dataset").stdout
     code = "import sys; from rgspipe.cli import main; main(['--help']); sys.exit('torch' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True).returncode == 0
+
+
+@pytest.mark.parametrize(("arguments", "lines"), [((), 55), (("--help",), 50), (("--help", "fit_light"), 20)])
+def test_help_fits_a_screen(rgspipe, arguments: tuple[str, ...], lines: int) -> None:
+    shown = rgspipe(*arguments).stdout.splitlines()
+    # Scenes and first commands have lines of up to 115 characters.
+    assert len(shown) <= lines and max(map(len, shown)) <= 120
+
+
+def test_a_stage_is_explained_and_the_version_told(rgspipe) -> None:
+    shown = rgspipe("--help", "fit_light").stdout
+    assert "stage=fit_light" in shown and "--help fit" in shown
+    told = rgspipe("--version").stdout
+    assert told.startswith(f"rgspipe {rg.__version__}") and "torch" in told and "Python 3." in told
 
 
 @pytest.mark.parametrize(
@@ -104,6 +120,10 @@ def test_a_run_prints_its_plan_and_result_and_leaves_a_status(rgspipe, tmp_path:
     assert manifest["facts"]["spinning"] == "PASSIVE"
     again = rgspipe("stage=grow", "dataset.resolution=8", toys=True)
     assert "reuse" in again.stdout and "make" not in again.stdout
+    name = next((tmp_path / "outputs" / "runs").rglob("status.json")).parent.relative_to(tmp_path / "outputs" / "runs")
+    assert "command" in rgspipe("status", str(name)).stdout
+    assert rgspipe("status", "no_such_run").returncode == REFUSED
+    assert "No such runs" in rgspipe("status", "state=failed").stdout
     listed = rgspipe("status")
     assert listed.stdout.count("done") == 2
 

@@ -6,7 +6,7 @@ import os
 import sys
 from collections.abc import Sequence
 
-from rgspipe.cli.help import help_text, overview
+from rgspipe.cli.help import help_text, overview, version_text
 from rgspipe.cli.messages import EXIT_INPUT, EXIT_INTERRUPTED, EXIT_UNREAD, show_input_error
 from rgspipe.errors import InputError
 from rgspipe.pipeline import StageLoader
@@ -51,6 +51,9 @@ def _dispatch(arguments: list[str], stage_loader: StageLoader) -> int:
         return 0
     if arguments[0] in ("-h", "--help", "help"):
         print(help_text(arguments[1:]))
+        return 0
+    if arguments[0] == "--version":
+        print(version_text())
         return 0
     if arguments[0] == "status":
         from rgspipe.cli.runs import show_runs

@@ -3,16 +3,35 @@
 from __future__ import annotations
 
 import difflib
+import platform
+import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from rgspipe import __version__
 from rgspipe.config import RgspipeConfig
 from rgspipe.config.core import describe
 from rgspipe.errors import InputError
+from rgspipe.machine import library_versions
 from rgspipe.options import shown
 from rgspipe.resources import resource_folder
-from rgspipe.stages import NAMES, stage_summary
+from rgspipe.stages import NAMES, stage_summary, stage_text
+
+#: Columns of what is printed.
+WIDTH = 100
+
+#: Sections of settings that steer a stage of another name.
+STAGE_SECTIONS = {
+    "generate_dataset": ("scene", "dataset", "capture"),
+    "init_depth": ("init",),
+    "train_surfels": ("train", "init"),
+    "capture_surfels": ("lamps",),
+    "render_olat": ("targets",),
+    "generate_targets": ("targets",),
+    "fit_light": ("fit", "light", "views", "effects"),
+    "render_truth": ("benchmark",),
+}
 
 SCENES = """\
   cornell    a Cornell box with two boxes, modelled and rendered with Blender; scene.cornell.* sets its measures
@@ -78,63 +97,86 @@ Results are in outputs/<scene>/<stage>/latest. Keys and groups: python -m rgspip
 
 
 def help_text(topics: Sequence[str] = ()) -> str:
-    """The long help, or the keys of one section or group.
+    """What there is to set, on a screen; or a stage, or the keys of one section or group.
 
     Raises:
         InputError: there is no such section.
     """
     if topics:
         return "\n\n".join(_topic(topic) for topic in topics)
+    pipelines = ", ".join(path.stem for path in sorted(resource_folder("pipelines").glob("*.yaml")))
     return f"""\
-{overview()}
+python -m rgspipe [-m] stage=NAME [scene=NAME] [GROUP=CHOICE …] [KEY=VALUE …]
 
-Groups (GROUP=CHOICE) of settings:
+Stages (--help STAGE says what one does; python -m rgspipe lists all, with scenes and first commands):
+{_wrapped(", ".join(NAMES), "  ")}
+
+Pipelines, several stages in a row (pipeline=NAME): {pipelines}
+
+Groups of settings (--help GROUP):
 {_groups()}
 
-Pipelines (pipeline=NAME): {", ".join(path.stem for path in sorted(resource_folder("pipelines").glob("*.yaml")))}
-
-Keys (KEY=VALUE), by section; python -m rgspipe --help SECTION shows one with its units and ranges:
-{_sections()}
+Sections of keys (--help SECTION lists them with units, ranges and defaults, --help fit.target one):
+{_wrapped(", ".join(name for name in sections() if name), "  ")}
 
 More:
   upstream=require      refuse, instead of making, missing inputs
-  -m                    sweep over all combinations of comma-separated values; hydra.launcher.n_jobs=K jobs at once
+  -m                    sweep over comma-separated values; hydra.launcher.n_jobs=K jobs at once
   launcher=slurm        the jobs of a sweep on a Slurm cluster; hydra.launcher.partition=NAME and so on
   --cfg job             show the whole configuration instead of running it
   debug.traceback=true  show tracebacks (or set RGSPIPE_TRACEBACK=1)
+  status                how the runs so far ended; status NAME shows one, status state=failed some
   verify                read every result and say which were damaged since they were made
+  --version             of rgspipe, Python and the libraries
   --hydra-help          options of Hydra, which reads the command line
 Exit status: 0 done, 1 failed, 2 input that cannot be used."""
 
 
+def version_text() -> str:
+    """The versions that a report of a mistake should name."""
+    versions = {"Python": platform.python_version(), **library_versions()}
+    return "\n".join([f"rgspipe {__version__}", *(f"  {name} {version}" for name, version in versions.items())])
+
+
 def _stages() -> str:
-    return "\n".join(f"  {name:<17} {stage_summary(name)}".rstrip() for name in NAMES)
+    return "\n".join(f"  {name:<17} {_shortened(stage_summary(name), WIDTH - 20)}".rstrip() for name in NAMES)
 
 
 def _groups() -> str:
-    return "\n".join(f"  {name:<11} {_choices(files)}" for name, files in groups().items())
+    return "\n".join(_wrapped(_choices(files), f"  {name:<11} ") for name, files in groups().items())
 
 
 def _choices(files: Sequence[Path]) -> str:
     return " | ".join(path.stem for path in files)
 
 
-def _sections() -> str:
-    return "\n".join(
-        f"  {name:<11} {', '.join(setting.key.removeprefix(f'{name}.') for setting in settings)}"
-        for name, settings in sections().items()
-    )
+def _wrapped(text: str, first: str) -> str:
+    return textwrap.fill(text, WIDTH, initial_indent=first, subsequent_indent=" " * len(first))
+
+
+def _shortened(text: str, width: int) -> str:
+    return text if len(text) <= width else textwrap.shorten(text, width, placeholder=" …")
+
+
+def _stage(name: str) -> str:
+    """What a stage does, and where what steers it is explained."""
+    text = stage_text(name)
+    keys = [f"  --help {section}" for section in sections() if section and section in STAGE_SECTIONS.get(name, ())]
+    return "\n".join([f"stage={name}", "", text, *(["", "Its settings:", *keys] if keys else [])])
 
 
 def _topic(topic: str) -> str:
     every = [setting for settings in sections().values() for setting in settings]
     rows = [setting for setting in every if setting.key == topic or setting.key.startswith(f"{topic}.")]
-    if not rows and topic not in groups():
+    if not rows and topic not in groups() and topic not in NAMES:
         names = [setting.key for setting in every]
-        near = difflib.get_close_matches(topic, [*names, *(name.partition(".")[0] for name in names)], n=1)
+        near = difflib.get_close_matches(topic, [*names, *NAMES, *(name.partition(".")[0] for name in names)], n=1)
         remedy = f"Did you mean {near[0]}?" if near else "python -m rgspipe --help lists them."
-        raise InputError(f"--help {topic}", expected="a section, a key or a group", found="none", remedy=remedy)
-    lines = [f"{topic}={_choices(groups()[topic])}"] if topic in groups() else []
+        raise InputError(
+            f"--help {topic}", expected="a stage, a section, a key or a group", found="none", remedy=remedy
+        )
+    lines = [_stage(topic)] if topic in NAMES else []
+    lines += [f"{topic}={_choices(groups()[topic])}"] if topic in groups() else []
     width = max((len(setting.key) for setting in rows), default=0)
     lines += [f"  {setting.key:<{width}}  {setting.meaning}; default {setting.default}" for setting in rows]
     return "\n".join(lines)

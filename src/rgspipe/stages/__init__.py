@@ -50,7 +50,13 @@ def load_stage(name: str) -> Stage:
 
 
 def stage_summary(name: str) -> str:
-    """The first line of a stage module's docstring, read without importing it (and torch with it)."""
+    """The first line of `stage_text`."""
+    text = stage_text(name)
+    return text.splitlines()[0] if text else ""
+
+
+def stage_text(name: str) -> str:
+    """A stage module's docstring, read without importing it (and torch with it)."""
     source = Path(__file__).with_name(f"{name}.py")
     text = ast.get_docstring(ast.parse(source.read_text(encoding="utf-8"))) if source.is_file() else None
-    return text.splitlines()[0] if text else ""
+    return text or ""
