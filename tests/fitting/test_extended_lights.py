@@ -12,7 +12,7 @@ from lit_room import HIDDEN, VISIBLE
 from rgspipe.datasets.light_file import read_lights
 from rgspipe.errors import InputError
 from rgspipe.evaluation.tables import rig_errors
-from rgspipe.fitting import FitResult, FitStatus, FitViews, LightSpec
+from rgspipe.fitting import FitResult, FitStatus, FitViews, LightSpec, PaperAdam
 from rgspipe.scene import Light
 from rgspipe.scene.lights import PanelLight, PointLight, SphereLight
 
@@ -91,3 +91,9 @@ def test_a_panel_that_lies_in_the_ceiling_is_found(room, mounted: bool) -> None:
 def test_only_panels_lie_on_surfaces() -> None:
     with pytest.raises(InputError, match="mounted"):
         LightSpec("sphere", mounted=True)
+
+
+def test_the_paper_s_method_takes_lights_in_one_point(room) -> None:
+    views = FitViews.prepare(room.frozen, room.views, lights=LightSpec("sphere"), sharp=False)
+    with pytest.raises(ValueError, match="one point"):
+        views.fit(views.render(SphereLight(VISIBLE, COLOUR, 0.06)), solver=PaperAdam())

@@ -61,12 +61,14 @@ class PaperAdam(AdamOptions):
         """The lights of images (all pixels of all views, 3).
 
         Raises:
-            ValueError: exposures are free, images are clipped or have a base, there may be ambient light, or kind,
-                number or shape of the lights are not known.
+            ValueError: exposures are free, images are clipped or have a base, there may be ambient light, lights have
+                an extent, or their kind, number or shape are not known.
         """
         if capture != ImageCapture():
             raise ValueError("PaperAdam takes images as radiance with known exposures, lit by lamps alone: use Search")
         if views.lights.ambient:
             raise ValueError("PaperAdam knows no light from all around: use Search")
+        if views.lights.extended:
+            raise ValueError("PaperAdam moves lights in one point: use Search")
         problem, prior = LightProblem.create(views.prepared, images, views.effects), LightPrior.of(self.training_lights)
         return fit_paper_adam(problem, images, self, prior, self.seed, views.lights)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from rgspipe.config import RgspipeConfig
 from rgspipe.errors import InputError
 from rgspipe.fitting import LightSpec
-from rgspipe.fitting.spec import AUTO, shaped_kind
+from rgspipe.fitting.spec import shaped_kind
 from rgspipe.scene.lights import KINDS
 from rgspipe.stages.light_shape import light_shape
 
@@ -34,8 +34,9 @@ def _refuse_unknowns(config: RgspipeConfig) -> None:
     Raises:
         InputError: it is asked for others.
     """
+    points = [name for name in KINDS if not LightSpec(name).extended]
     asked = [
-        ("light.type", " or ".join(KINDS), config.light.type, config.light.type == AUTO),
+        ("light.type", " or ".join(points), config.light.type, config.light.type not in points),
         ("light.count", "a number from 1 to 8", "null", config.light.count is None),
         ("fit.shape", "known", config.fit.shape, config.fit.shape == "free"),
         ("light.ambient", "false", "true", config.light.ambient),
