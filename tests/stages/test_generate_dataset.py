@@ -84,7 +84,7 @@ def test_boxes_stand_on_the_floor_of_a_centred_room() -> None:
 @pytest.mark.parametrize("kind", MODELLED)
 def test_every_scene_of_ours_is_built_from_its_own_section(kind: str) -> None:
     assert kind_of(dataset_job(_config(kind=kind)).model) == kind
-    assert STAGE.keys(_config(kind=kind)) == ("scene.kind", f"scene.{kind}", "dataset")
+    assert STAGE.keys(_config(kind=kind)) == ("scene.kind", f"scene.{kind}", "scene.lamps", "dataset")
 
 
 def test_the_configured_corridor_is_the_model_s_default() -> None:
@@ -101,7 +101,7 @@ def test_gloss_that_makes_light_is_refused() -> None:
 
 
 def test_only_what_matters_is_in_the_fingerprint() -> None:
-    assert STAGE.keys(_config(kind="external")) == ("scene.kind",)
+    assert STAGE.keys(_config(kind="external")) == ("scene.kind", "scene.lamps")
     assert "scene.cornell" not in STAGE.keys(_config(kind="blend"))
     assert {"scene.cornell", "dataset"} <= set(STAGE.keys(_config(kind="cornell")))
 
