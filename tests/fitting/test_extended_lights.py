@@ -83,7 +83,8 @@ def test_a_panel_that_lies_in_the_ceiling_is_found(room, mounted: bool) -> None:
     result = fit(room, truth, LightSpec("panel", shape_free=True, mounted=mounted), sharp=True)
     errors = rig_errors(result.lights, (truth,), 1.0)
     assert result.status is FitStatus.CONVERGED
-    assert errors.position < 2e-3 and errors.axis < 0.2 and errors.shape < 0.02
+    # Measured 1e-8 of a free one; 1.2e-3 and 4e-3 of one on the ceiling's plane, which is 0.001 behind it.
+    assert errors.position < 4e-3 and errors.axis < 0.01 and errors.shape < 0.01
     if mounted:
         assert errors.axis < 1e-5 and not bool(result.covariance[0][3:6].any())
 

@@ -38,8 +38,9 @@ def rendered(tmp_path_factory: pytest.TempPathFactory, child_environment: dict[s
 @pytest.mark.parametrize("name", plane_lights())
 def test_cycles_renders_what_was_exported(rendered: Path, name: str) -> None:
     image, expected = read_image(rendered / f"{name}.exr")[0], plane_image(plane_lights()[name])
-    np.testing.assert_allclose(image, expected, atol=1e-2 * expected.max())
-    assert abs(image.mean() / expected.mean() - 1.0) < 2e-3
+    # Measured at most 1.1e-3 of the brightest pixel, and 1.7e-4 of the mean, both of the panel.
+    np.testing.assert_allclose(image, expected, atol=5e-3 * expected.max())
+    assert abs(image.mean() / expected.mean() - 1.0) < 1e-3
 
 
 def test_a_file_of_its_own_can_be_saved(rendered: Path) -> None:
