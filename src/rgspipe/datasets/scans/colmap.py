@@ -17,6 +17,9 @@ from rgspipe.datasets.scans.options import ScanOptions
 from rgspipe.datasets.scans.poses import from_quaternion, placed
 from rgspipe.errors import InputError
 
+#: Of the cameras.
+AXES = "opencv"
+
 WANTED = "sparse/0/ (or sparse/, or the folder itself) with cameras and images, .bin or .txt"
 
 #: Where a model may be, and photographs.
@@ -65,7 +68,7 @@ def read(root: Path, options: ScanOptions) -> Scan:
             "depth of a sensor or of a mesh into depth/, in the unit of the model's poses.",
         )
     unit = "lengths are in the model's own unit, which is metres only if it was scaled (scene.rgbd.pose_unit)"
-    return Scan("colmap", images_path, (cameras_path, images_path), frames, (unit,))
+    return Scan("colmap", images_path, (cameras_path, images_path), frames, options.camera_axes(AXES), (unit,))
 
 
 def _model(root: Path) -> tuple[Path, Path] | None:
@@ -90,7 +93,7 @@ def _frame(
     return ScanFrame(
         image=folder / photograph.name,
         lens=cameras[photograph.camera],
-        pose=placed(matrix, f"{where}: {photograph.name}", options, opencv=True),
+        pose=placed(matrix, f"{where}: {photograph.name}", options, AXES),
         depth=_depth(root, photograph.name, options),
     )
 

@@ -106,6 +106,7 @@ class Scan:
         stated: the file or folder that states the poses, for errors.
         sources: files beside the frames' that were read.
         frames: in the order of the capture.
+        axes: of the cameras in the files, as they were read: "opengl" or "opencv".
         notes: what people should know of what was assumed.
     """
 
@@ -113,6 +114,7 @@ class Scan:
     stated: Path
     sources: tuple[Path, ...]
     frames: tuple[ScanFrame, ...]
+    axes: str
     notes: tuple[str, ...] = ()
 
     def thinned(self, most: int) -> Scan:

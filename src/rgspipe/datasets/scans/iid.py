@@ -17,6 +17,9 @@ from rgspipe.datasets.scans.pictures import read_depth_image, size_of
 from rgspipe.errors import InputError
 from rgspipe.scene import look_at
 
+#: Of the cameras.
+AXES = "opengl"
+
 WANTED = "im.png (or im/NAME.png) with albedo and depth beside it"
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".exr")
@@ -54,7 +57,7 @@ def read(root: Path, options: ScanOptions) -> Scan:
     frame = ScanFrame(image, lens, pose, DepthImage(depth, unit), _partner(root, image, "albedo"))
     scale = "of median depth 1, not in metres" if options.depth_unit is None else "by scene.rgbd.depth_unit"
     notes = (f"a field of view of {options.fov:g}° is taken for granted (scene.rgbd.fov)", f"lengths are {scale}")
-    return Scan("iid", image, (), (frame,), notes)
+    return Scan("iid", image, (), (frame,), options.camera_axes(AXES), notes)
 
 
 def _images(root: Path) -> list[Path]:

@@ -16,6 +16,9 @@ from rgspipe.datasets.scans.poses import matrix_of, placed
 from rgspipe.errors import InputError
 
 TRANSFORMS = "transforms.json"
+#: Of the cameras.
+AXES = "opengl"
+
 WANTED = "transforms.json"
 
 #: Metres of 1 in a depth PNG, where the file does not say.
@@ -42,7 +45,7 @@ def read(root: Path, options: ScanOptions) -> Scan:
     frames = tuple(_frame(entry, scale, options) for entry in entries)
     turned = "applied_transform" in entries[0].shared
     notes = ("the world's axes are those of the file, after its applied_transform",) if turned else ()
-    return Scan("nerfstudio", path, (path,), frames, notes)
+    return Scan("nerfstudio", path, (path,), frames, options.camera_axes(AXES), notes)
 
 
 def _frame(entry: FrameEntry, scale: float, options: ScanOptions) -> ScanFrame:
@@ -54,7 +57,7 @@ def _frame(entry: FrameEntry, scale: float, options: ScanOptions) -> ScanFrame:
     return ScanFrame(
         image=entry.transforms_path.parent / _text(entry, "file_path"),
         lens=_lens(entry),
-        pose=placed(matrix, where, options, opencv=False),
+        pose=placed(matrix, where, options, AXES),
         depth=_depth(entry, options),
     )
 

@@ -35,3 +35,7 @@ class ScanOptions(Options):
     """metres of 1 in the cameras' places; by default 1"""
     fov: float = option(85.0, low=1, high=179)
     """horizontal field of view of a photograph without a camera (iid), degrees"""
+
+    def camera_axes(self, usual: str) -> str:
+        """Axes of the cameras in the files of a layout that has these."""
+        return usual if self.axes == "layout" else self.axes

@@ -16,6 +16,9 @@ from rgspipe.datasets.scans.options import ScanOptions
 from rgspipe.datasets.scans.poses import placed
 from rgspipe.errors import InputError
 
+#: Of the cameras.
+AXES = "opengl"
+
 WANTED = "keyframes/corrected_cameras/ or keyframes/cameras/"
 
 #: Folders of cameras and their photographs: what the app corrected afterwards goes first.
@@ -44,7 +47,9 @@ def read(root: Path, options: ScanOptions) -> Scan:
     if not files:
         raise InputError(keyframes / cameras, expected="a .json file a camera", found="none", remedy="Export raw data.")
     frames = tuple(_frame(path, keyframes, images, options) for path in files)
-    return Scan("polycam", keyframes / cameras, tuple(files), frames, ("the world's z is up",))
+    return Scan(
+        "polycam", keyframes / cameras, tuple(files), frames, options.camera_axes(AXES), ("the world's z is up",)
+    )
 
 
 def _frame(path: Path, keyframes: Path, images: str, options: ScanOptions) -> ScanFrame:
@@ -60,6 +65,6 @@ def _frame(path: Path, keyframes: Path, images: str, options: ScanOptions) -> Sc
     return ScanFrame(
         image=keyframes / images / f"{path.stem}.jpg",
         lens=Lens(*lens, *size),
-        pose=placed(matrix, path, options, opencv=False),
+        pose=placed(matrix, path, options, AXES),
         depth=measured if depth.is_file() else None,
     )

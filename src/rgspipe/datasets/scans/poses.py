@@ -20,21 +20,20 @@ RIGID = 1e-2
 FLIP = np.diag([1.0, -1.0, -1.0, 1.0])
 
 
-def placed(matrix: Numbers, where: str | Path, options: ScanOptions, *, opencv: bool) -> Numbers:
+def placed(matrix: Numbers, where: str | Path, options: ScanOptions, axes: str) -> Numbers:
     """A (4, 4) camera-to-world transform with OpenGL axes, exactly rigid.
 
     Args:
         matrix: (4, 4) camera-to-world as the files have it.
         where: names it in errors.
         options: their axes and unit of places stand over the layout's.
-        opencv: whether the layout's axes are OpenCV's.
+        axes: the layout's, "opengl" or "opencv".
 
     Raises:
         InputError: it is no rigid transform; says what else it may be.
     """
     check_rigid(matrix, where)
-    opencv = opencv if options.axes == "layout" else options.axes == "opencv"
-    pose = matrix @ FLIP if opencv else matrix.copy()
+    pose = matrix @ FLIP if options.camera_axes(axes) == "opencv" else matrix.copy()
     # Few digits leave a rotation that is none; the nearest one is.
     left, _, right = np.linalg.svd(pose[:3, :3])
     pose[:3, :3] = left @ right

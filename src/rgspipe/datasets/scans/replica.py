@@ -10,6 +10,9 @@ from rgspipe.datasets.scans.options import ScanOptions
 from rgspipe.datasets.scans.poses import placed, read_numbers
 from rgspipe.errors import InputError
 
+#: Of the cameras.
+AXES = "opencv"
+
 WANTED = "traj.txt and results/"
 
 #: The rendered frames' camera and steps of depth a metre, where no cam_params.json says so.
@@ -41,9 +44,11 @@ def read(root: Path, options: ScanOptions) -> Scan:
     frames = []
     for index, (pose, image) in enumerate(zip(poses, images, strict=True)):
         depth = image.with_name(f"{image.stem.replace('frame', 'depth')}.png")
-        pose = placed(pose, f"{path}: line {index + 1}", options, opencv=True)
+        pose = placed(pose, f"{path}: line {index + 1}", options, AXES)
         frames.append(ScanFrame(image, lens, pose, DepthImage(depth, unit) if depth.is_file() else None))
-    return Scan("replica", path, (path, *([parameters] if parameters else [])), tuple(frames))
+    return Scan(
+        "replica", path, (path, *([parameters] if parameters else [])), tuple(frames), options.camera_axes(AXES)
+    )
 
 
 def _camera(path: Path | None) -> tuple[Lens, float]:

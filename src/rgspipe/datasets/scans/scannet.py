@@ -16,6 +16,9 @@ from rgspipe.datasets.scans.pictures import size_of
 from rgspipe.datasets.scans.poses import placed, read_numbers
 from rgspipe.errors import InputError
 
+#: Of the cameras.
+AXES = "opencv"
+
 WANTED = "color/, pose/ and intrinsic/"
 
 MILLIMETRE = 1e-3
@@ -48,7 +51,8 @@ def read(root: Path, options: ScanOptions) -> Scan:
     lost = len(images) - len(tracked)
     texts = tuple(root / "pose" / f"{image.stem}.txt" for image in images)
     notes = (f"{lost} of {len(images)} frames without a pose are left out",) if lost else ()
-    return Scan("scannet", root / "pose", (*texts, *sorted((root / "intrinsic").glob("*.txt"))), frames, notes)
+    texts += tuple(sorted((root / "intrinsic").glob("*.txt")))
+    return Scan("scannet", root / "pose", texts, frames, options.camera_axes(AXES), notes)
 
 
 def _frame(root: Path, image: Path, matrix: np.ndarray, lens: Lens, options: ScanOptions) -> ScanFrame:
@@ -60,7 +64,7 @@ def _frame(root: Path, image: Path, matrix: np.ndarray, lens: Lens, options: Sca
     measured = None
     if depth.is_file():
         measured = DepthImage(depth, unit, _lens(own, depth) if own.is_file() else None)
-    return ScanFrame(image, lens, placed(matrix, where, options, opencv=True), measured)
+    return ScanFrame(image, lens, placed(matrix, where, options, AXES), measured)
 
 
 def _lens(path: Path, image: Path) -> Lens:
