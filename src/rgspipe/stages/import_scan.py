@@ -34,7 +34,15 @@ def _files(config: RgspipeConfig) -> list[Path]:
     """The files of the frames that are taken, and those that describe them."""
     scan = read_scan(_path(config), config.scene.rgbd)
     files = [*scan.sources, *(path for frame in scan.frames for path in frame.files)]
-    return [path for path in dict.fromkeys(files) if path.is_file()]
+    return [path for path in dict.fromkeys(files) if _is_there(path)]
+
+
+def _is_there(path: Path) -> bool:
+    """Whether a file can be hashed; what cannot is told when it is read."""
+    try:
+        return path.is_file()
+    except OSError:  # a name that is too long
+        return False
 
 
 STAGE = Stage(

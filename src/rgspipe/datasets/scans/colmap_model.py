@@ -10,7 +10,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from rgspipe.datasets.input_file import input_file
+from rgspipe.datasets.input_file import LONGEST_NAME, input_file
 from rgspipe.datasets.json_file import shown
 from rgspipe.datasets.scans.frame import Lens, Numbers
 from rgspipe.errors import InputError
@@ -19,6 +19,9 @@ from rgspipe.errors import InputError
 MODELS = {0: ("SIMPLE_PINHOLE", 3), 1: ("PINHOLE", 4), 2: ("SIMPLE_RADIAL", 4), 3: ("RADIAL", 5), 4: ("OPENCV", 8)}
 
 MOST_BYTES = 2**32
+
+#: A quaternion shorter than this is none.
+LEAST_NORM = 1e-6
 
 Parts = TypeVar("Parts")
 
@@ -65,7 +68,7 @@ def _whole(path: Path, read: Callable[[Path, bytes], Parts]) -> Parts:
         return read(path, input_file(path, "a part of a COLMAP model", most_bytes=MOST_BYTES).read_bytes())
     except InputError:
         raise
-    except (struct.error, ValueError, IndexError, UnicodeDecodeError) as error:
+    except (struct.error, ValueError, IndexError, OverflowError) as error:
         found = f"other content, or half of it ({error})"
         raise InputError(path, expected="a part of a COLMAP model", found=found, remedy="Copy it anew.") from error
 
@@ -135,7 +138,12 @@ def _binary_images(path: Path, content: bytes) -> list[Photograph]:
 
 
 def _photograph(name: str, camera: int, values: Sequence[float]) -> Photograph:
-    return Photograph(name, camera, np.array(values[:4]), np.array(values[4:]))
+    numbers = np.array(values)
+    if len(numbers) != 7 or not np.isfinite(numbers).all() or np.linalg.norm(numbers[:4]) < LEAST_NORM:
+        raise ValueError(f"no pose of {shown(name)}")
+    if not all(part.isprintable() and 0 < len(part.encode()) <= LONGEST_NAME for part in name.split("/")):
+        raise ValueError(f"no name of an image: {shown(name)}")
+    return Photograph(name, camera, numbers[:4], numbers[4:])
 
 
 def _lines(content: bytes) -> list[str]:

@@ -11,6 +11,7 @@ from rgspipe.datasets.exr import write_channels, write_image
 from rgspipe.datasets.gs3_write import frame_entry, write_transforms
 from rgspipe.datasets.info import INFO
 from rgspipe.datasets.scans.frame import Scan, ScanFrame
+from rgspipe.datasets.scans.lens_check import check_shape
 from rgspipe.datasets.scans.options import ScanOptions
 from rgspipe.datasets.scans.pictures import exposure_of, read_depth_image, read_picture
 from rgspipe.datasets.scans.resample import resampled_colour, resampled_depth, straight_camera
@@ -88,6 +89,7 @@ def _written(
     """The entry of a frame whose files were written, and the part of its depth that is known, if there is any."""
     camera = straight_camera(frame.lens, frame.pose, options.resolution, frame.image)
     picture = read_picture(frame.image, options.response)
+    check_shape(frame.image, picture.light.shape, frame.lens)
     light, clipped = resampled_colour(picture.light, picture.clipped_from, camera, frame.lens)
     entry: dict = {}
     if picture.clipped_from is not None:

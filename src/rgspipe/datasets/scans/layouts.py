@@ -8,6 +8,7 @@ from types import ModuleType
 from rgspipe.datasets.input_file import input_folder
 from rgspipe.datasets.scans import colmap, iid, nerfstudio, polycam, replica, scannet
 from rgspipe.datasets.scans.frame import Scan
+from rgspipe.datasets.scans.lens_check import check_lens
 from rgspipe.datasets.scans.options import LAYOUTS, ScanOptions
 from rgspipe.errors import InputError
 
@@ -24,7 +25,12 @@ def read_scan(root: str | Path, options: ScanOptions) -> Scan:
         InputError: no layout or several fit, or files of the layout are missing or broken.
     """
     root = input_folder(root, "the folder of a capture")
-    return READERS[_layout(root, options)].read(root, options).thinned(options.frames)
+    scan = READERS[_layout(root, options)].read(root, options).thinned(options.frames)
+    for frame in scan.frames:
+        check_lens(frame.lens, f"{scan.stated}: intrinsics of {frame.image.name}")
+        if frame.depth is not None and frame.depth.lens is not None:
+            check_lens(frame.depth.lens, f"{scan.stated}: intrinsics of {frame.depth.path.name}")
+    return scan
 
 
 def _layout(root: Path, options: ScanOptions) -> str:

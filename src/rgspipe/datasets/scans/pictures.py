@@ -76,12 +76,15 @@ def exposure_of(path: Path) -> float | None:
     """Shutter time × ISO / aperture², by the file's EXIF; None where it does not state all three."""
     if path.suffix.lower() == ".exr":
         return None
-    with Image.open(input_file(path, "a photograph"), formats=["JPEG", "PNG"]) as file:
-        stated = file.getexif().get_ifd(ExifTags.IFD.Exif)
     keys = (ExifTags.Base.ExposureTime, ExifTags.Base.ISOSpeedRatings, ExifTags.Base.FNumber)
     try:
+        with Image.open(input_file(path, "a photograph"), formats=["JPEG", "PNG"]) as file:
+            stated = file.getexif().get_ifd(ExifTags.IFD.Exif)
         shutter, sensitivity, aperture = (float(np.ravel(stated.get(key, 0))[0]) for key in keys)
-    except (TypeError, ValueError, ZeroDivisionError):
+    except InputError:
+        raise
+    except (OSError, SyntaxError, TypeError, ValueError, ZeroDivisionError):
+        # Whether its pixels can be read is asked elsewhere.
         return None
     return shutter * sensitivity / aperture**2 if min(shutter, sensitivity, aperture) > 0.0 else None
 

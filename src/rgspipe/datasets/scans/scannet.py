@@ -69,6 +69,8 @@ def _frame(root: Path, image: Path, matrix: np.ndarray, lens: Lens, options: Sca
 
 def _lens(path: Path, image: Path) -> Lens:
     matrix = read_numbers(path, 4, "intrinsics")
+    if len(matrix) < 3:
+        raise InputError(path, expected="3 or 4 lines of intrinsics", found=f"{len(matrix)}", remedy="Write it anew.")
     width, height = size_of(image)
     # Pixel centres are whole numbers there.
     return Lens(matrix[0, 0], matrix[1, 1], matrix[0, 2] + 0.5, matrix[1, 2] + 0.5, width, height)
