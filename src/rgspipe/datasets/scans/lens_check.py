@@ -36,7 +36,8 @@ def check_lens(lens: Lens, where: str | Path) -> None:
     if not all(FOCAL[0] * side <= focal <= FOCAL[1] * side for focal in (lens.fx, lens.fy)):
         expected = f"focal lengths in pixels of an image of {lens.width} × {lens.height}"
         raise InputError(where, expected=expected, found=f"{lens.fx:g}, {lens.fy:g}", remedy="Correct them.")
-    if abs(lens.cx - 0.5 * lens.width) > BESIDE * lens.width or abs(lens.cy - 0.5 * lens.height) > BESIDE * lens.height:
+    across, down = lens.cx / lens.width - 0.5, lens.cy / lens.height - 0.5
+    if not (abs(across) <= BESIDE and abs(down) <= BESIDE):  # also where they are NaN
         raise InputError(
             where,
             expected=f"a principal point near the middle of {lens.width} × {lens.height} pixels",

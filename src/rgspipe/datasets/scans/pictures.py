@@ -158,7 +158,8 @@ def _colmap_array(path: Path) -> npt.NDArray[np.float64]:
     except (ValueError, IndexError) as error:
         found = f"other bytes ({error})"
         raise InputError(path, expected="a depth map of COLMAP", found=found, remedy="Write it anew.") from error
-    return values[: width * height].reshape(height, width).astype(np.float64)
+    with np.errstate(invalid="ignore"):
+        return values[: width * height].reshape(height, width).astype(np.float64)
 
 
 def size_of(path: Path) -> tuple[int, int]:

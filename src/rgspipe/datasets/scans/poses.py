@@ -57,9 +57,10 @@ def check_rigid(matrix: Numbers, where: str | Path) -> None:
         found = "a transposed matrix: columns in the place of rows" if transposed else f"last row {matrix[3].tolist()}"
         raise InputError(where, expected=expected, found=found, remedy="Write the matrix row by row.")
     rotation = matrix[:3, :3]
-    determinant = float(np.linalg.det(rotation))
-    error = float(np.abs(rotation.T @ rotation - np.eye(3)).max())
-    if error > RIGID:
+    with np.errstate(over="ignore", invalid="ignore"):
+        determinant = float(np.linalg.det(rotation))
+        error = float(np.abs(rotation.T @ rotation - np.eye(3)).max())
+    if not error <= RIGID:
         found = f"RᵀR − 1 up to {error:.2g}, determinant {determinant:.3g}"
         raise InputError(where, expected=expected, found=found, remedy="Take scale and shear out of the rotation.")
     if determinant < 0.0:
