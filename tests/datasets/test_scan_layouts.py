@@ -200,3 +200,25 @@ def test_two_layouts_are_not_guessed_between(tmp_path: Path) -> None:
     assert read_scan(tmp_path, ScanOptions(format="colmap")).layout == "colmap"
     with pytest.raises(InputError, match=r"traj\.txt.*looks like nerfstudio and colmap"):
         read_scan(tmp_path, ScanOptions(format="replica"))
+
+
+def test_several_photographs_without_poses_are_refused(tmp_path: Path) -> None:
+    write_iid(tmp_path, VIEWS[0], (24, 40))
+    for kind in ("im", "depth"):
+        (tmp_path / kind).mkdir()
+    (tmp_path / "im.png").rename(tmp_path / "im/a.png")
+    (tmp_path / "depth.exr").rename(tmp_path / "depth/a.exr")
+    assert read_scan(tmp_path, ScanOptions()).layout == "iid"
+    (tmp_path / "im/b.png").write_bytes((tmp_path / "im/a.png").read_bytes())
+    with pytest.raises(InputError, match="without poses several do not go together"):
+        read_scan(tmp_path, ScanOptions())
+
+
+def test_turned_photographs_and_intrinsics_of_other_ones_are_refused(tmp_path: Path) -> None:
+    write_nerfstudio(tmp_path / "a", VIEWS, shared={"w": 48, "cx": 24.0})
+    with pytest.raises(InputError, match=r"0\.exr.*shape of its intrinsics, 48 × 32"):
+        back(tmp_path / "a")
+    for key, value, words in (("cx", 2.0, "principal point"), ("fl_x", 1e6, "focal"), ("k1", 1e3, "distortion")):
+        write_nerfstudio(tmp_path / key, VIEWS, shared={key: value})
+        with pytest.raises(InputError, match=words):
+            read_scan(tmp_path / key, ScanOptions())
