@@ -9,6 +9,7 @@ import json
 import random
 import re
 import shutil
+import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,21 +22,36 @@ from ply_files import gaussian_columns, radiosity_columns, write_ply
 from rgspipe.artifacts import ArtifactStore, Key
 from rgspipe.datasets.exr import read_channels, write_channels, write_image
 from rgspipe.datasets.grade_file import load_grade, save_grade
+from rgspipe.datasets.gs3 import load_dataset
 from rgspipe.datasets.images import read_colour
 from rgspipe.datasets.light_file import read_lights, write_lights
 from rgspipe.datasets.location import open_dataset
 from rgspipe.datasets.ply import read_ply
 from rgspipe.datasets.ply_options import PlyOptions
+from rgspipe.datasets.scans.importing import import_scan
+from rgspipe.datasets.scans.layouts import read_scan
+from rgspipe.datasets.scans.options import ScanOptions
 from rgspipe.datasets.surfel_file import load_surfels, save_surfels
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import Camera, PointLight, SpotLight
 from rgspipe.scene.gloss import Gloss
 from rgspipe.scene.grade import SceneGrade
 from rooms import closed_box
+from scan_layouts import (
+    photographed,
+    write_colmap,
+    write_nerfstudio,
+    write_polycam,
+    write_replica,
+    write_scannet,
+)
 from tiny_dataset import write_tiny_dataset
 
 #: What a reader makes of a folder: all of its numbers.
 Numbers = Iterator[torch.Tensor]
+
+#: Photographs of a capture.
+SCANNED = photographed(2, 8)
 
 
 @dataclass(frozen=True)
@@ -122,6 +138,26 @@ def _of_dataset(name: str) -> Kind:
     return Kind(name, write_tiny_dataset, _read_dataset)
 
 
+def _of_scan(file: str, write: Callable[[Path], None]) -> Kind:
+    """A file of a capture of two photographs, which is imported."""
+
+    def read(folder: Path) -> Numbers:
+        options = ScanOptions(resolution=8)
+        with tempfile.TemporaryDirectory(dir=folder.parent) as made:
+            import_scan(read_scan(folder, options), options, Path(made))
+            views = load_dataset(made, targets=False).train
+        return iter([view.image for view in views] + [view.camera.camera_to_world for view in views])
+
+    return Kind(file, write, read)
+
+
+def _colmap_map(root: Path) -> None:
+    write_colmap(root, SCANNED, True, depth=False)
+    path = root / "stereo/depth_maps/00.exr.geometric.bin"
+    path.parent.mkdir(parents=True)
+    path.write_bytes(b"8&8&1&" + SCANNED[0].depth.numpy().astype("<f4").tobytes())
+
+
 def _of_frozen(name: str) -> Kind:
     return Kind(name, _frozen, _read_frozen)
 
@@ -167,6 +203,18 @@ KINDS: dict[str, Kind] = {
     "targets.json": _of_dataset("targets/targets.json"),
     "a target's views": _of_dataset("targets/one/transforms.json"),
     "depth": _of_dataset("train/r_0000_depth.exr"),
+    "scan: nerfstudio": _of_scan("transforms.json", lambda root: write_nerfstudio(root, SCANNED, ".png", ".png")),
+    "scan: wide PNG": _of_scan("images/0.16.png", lambda root: write_nerfstudio(root, SCANNED, ".16.png", ".png")),
+    "scan: depth": _of_scan("depth/0.png", lambda root: write_nerfstudio(root, SCANNED, ".png", ".png")),
+    "scan: Polycam": _of_scan(
+        "keyframes/corrected_cameras/1000.json", lambda root: write_polycam(root, *2 * [SCANNED])
+    ),
+    "scan: COLMAP cameras": _of_scan("sparse/0/cameras.bin", lambda root: write_colmap(root, SCANNED, True)),
+    "scan: COLMAP images": _of_scan("sparse/0/images.bin", lambda root: write_colmap(root, SCANNED, True)),
+    "scan: COLMAP text": _of_scan("sparse/0/images.txt", lambda root: write_colmap(root, SCANNED, False)),
+    "scan: COLMAP map": _of_scan("stereo/depth_maps/00.exr.geometric.bin", _colmap_map),
+    "scan: Replica": _of_scan("traj.txt", lambda root: write_replica(root, SCANNED)),
+    "scan: ScanNet": _of_scan("intrinsic/intrinsic_color.txt", lambda root: write_scannet(root, SCANNED)),
     "manifest": Kind("room/freeze/aa/manifest.json", _artifact, _read_artifact),
 }
 

@@ -83,6 +83,8 @@ def test_choosing_a_method_by_group_or_by_key_means_the_same() -> None:
         ("scene.name=runs", ["scene.name"]),
         ("scene.name=a/b", ["scene.name"]),
         ("scene=external", ["scene.path", "folder"]),
+        ("scene=rgbd", ["scene.path", "capture's folder"]),
+        ("scene.rgbd.format=arkit", ["scene.rgbd.format", "polycam"]),
         ("upstream=maybe", ["upstream", "require"]),
         ("seed=1,2", ["seed", "-m"]),
         ("seed=[1", ["seed=[1"]),

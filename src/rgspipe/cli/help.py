@@ -23,6 +23,7 @@ WIDTH = 100
 
 #: Sections of settings that steer a stage of another name.
 STAGE_SECTIONS = {
+    "import_scan": ("scene",),
     "generate_dataset": ("scene", "dataset", "capture"),
     "init_depth": ("init",),
     "train_surfels": ("train", "init"),
@@ -42,7 +43,8 @@ SCENES = """\
   room       a closed room with furniture, textured
   zoo        a room that nobody tuned, drawn from a seed: scene=zoo scene.zoo.seed=7 scene.name=zoo_7
   blend      a Blender file of yours: scene=blend scene.path=my.blend
-  external   images, cameras and lights from disk, no Blender needed: scene=external scene.path=DIR"""
+  external   images, cameras and lights from disk, no Blender needed: scene=external scene.path=DIR
+  rgbd       a scan, with the lamps that were on unknown: scene=rgbd scene.path=DIR"""
 
 EXAMPLES = """\
   python -m rgspipe pipeline=smoke                                  the whole way, tiny, in minutes

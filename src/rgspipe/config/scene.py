@@ -9,12 +9,17 @@ from typing import Literal, get_args
 from rgspipe.blender.options import HotdogParameters, RoomParameters, ZooParameters
 from rgspipe.datasets.input_file import input_file, input_folder
 from rgspipe.datasets.ply_options import PlyOptions
+from rgspipe.datasets.scans.options import ScanOptions
 from rgspipe.errors import InputError
 from rgspipe.options import Options, option
 
 #: Scenes that are modelled in code.
 Modelled = Literal["cornell", "corner", "hotdog", "room", "zoo"]
 MODELLED: tuple[Modelled, ...] = get_args(Modelled)
+
+#: What `scene.path` has to be, by kind.
+PATHS = {"blend": "a .blend file", "external": "a dataset's folder", "ply": "a .ply file"}
+PATHS |= {"rgbd": "a capture's folder"}
 
 Colour = tuple[float, float, float]
 
@@ -73,12 +78,12 @@ class CornerConfig(Options):
 class SceneConfig(Options):
     """What is looked at."""
 
-    kind: Literal[Modelled, "blend", "external", "ply"] = "cornell"
+    kind: Literal[Modelled, "blend", "external", "ply", "rgbd"] = "cornell"
     """where the scene comes from"""
     name: str | None = None
     """its name under outputs/; by default that of the file or folder"""
     path: str | None = None
-    """blend, ply: the file; external: the dataset's folder"""
+    """blend, ply: the file; external: the dataset's folder; rgbd: that of a capture in another program's layout"""
     lamps: Literal["known", "unknown"] = "known"
     """known: each training view has one lamp of its own, which the dataset gives; unknown: some lamps were on in all
     training views alike, and they are found with the albedo (stage=capture_surfels)"""
@@ -88,6 +93,7 @@ class SceneConfig(Options):
     room: RoomParameters = RoomParameters()
     zoo: ZooParameters = ZooParameters()
     ply: PlyOptions = PlyOptions()
+    rgbd: ScanOptions = ScanOptions()
 
     @property
     def folder(self) -> str:
@@ -108,6 +114,13 @@ class SceneConfig(Options):
                 found=repr(name),
                 remedy="Set it to a name for the scene's folder.",
             )
+        if self.kind == "rgbd" and self.lamps == "known":
+            raise InputError(
+                "lamps",
+                expected="unknown: no layout of a capture says where lamps were",
+                found="known",
+                remedy="Leave it away; scene=rgbd sets it.",
+            )
 
     def check_path(self) -> None:
         """Refuse a scene whose file or folder is not there.
@@ -115,14 +128,14 @@ class SceneConfig(Options):
         Raises:
             InputError: says what should be.
         """
-        what = {"blend": "a .blend file", "external": "a dataset's folder", "ply": "a .ply file"}.get(self.kind)
+        what = PATHS.get(self.kind)
         if what is None:
             return
         if self.path is None:
             remedy = f"Say which: scene={self.kind} scene.path=PATH."
             raise InputError("scene.path", expected=what, found="nothing", remedy=remedy)
         try:
-            (input_folder if self.kind == "external" else input_file)(self.path, what)
+            (input_folder if self.kind in ("external", "rgbd") else input_file)(self.path, what)
         except InputError as error:
             remedy = "Check scene.path; a relative path starts at the current folder."
             raise InputError(error.where, expected=what, found=error.found, remedy=remedy) from None

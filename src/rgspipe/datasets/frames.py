@@ -86,6 +86,19 @@ class FrameEntry:
         return self._optional_path("emitter_path")
 
     @property
+    def saturated_from(self) -> float | None:
+        """Radiance from which on the image tells only that the scene is at least so bright, if the file says so.
+
+        Raises:
+            InputError: it is no number above 0.
+        """
+        value = self.fields.get("saturated_from")
+        if value is not None and not (is_number(value) and value > 0):
+            place = f"{self.where}.saturated_from"
+            raise InputError(place, expected="radiance above 0", found=shown(value), remedy="Correct it.")
+        return None if value is None else float(value)
+
+    @property
     def files(self) -> list[Path]:
         """All images of the frame."""
         maps = (self.depth_path, self.normal_path, self.albedo_path, self.base_path, self.mask_path, self.emitter_path)

@@ -19,9 +19,14 @@ def with_saturation(entries: Sequence[FrameEntry], views: Sequence[View]) -> tup
     linear = [entry.image_path.suffix.lower() == ".exr" for entry in entries]
     clipped = common_maximum([view for view, is_linear in zip(views, linear, strict=True) if is_linear])
     return tuple(
-        replace(view, saturated_from=clipped if is_linear else saturated_from(entry.image_path))
+        replace(view, saturated_from=_limit(entry, clipped if is_linear else saturated_from(entry.image_path)))
         for entry, view, is_linear in zip(entries, views, linear, strict=True)
     )
+
+
+def _limit(entry: FrameEntry, found: float | None) -> float | None:
+    """What the file itself says of an image stands over what its pixels say."""
+    return found if entry.saturated_from is None else entry.saturated_from
 
 
 def common_maximum(views: Sequence[View]) -> float | None:

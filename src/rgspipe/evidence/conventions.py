@@ -38,7 +38,7 @@ def misread(views: Sequence[View], along_rays: bool) -> Finding | None:
         views: their depth may be missing.
         along_rays: whether their files state depth along rays.
     """
-    measured = [view for view in views if view.depth is not None and bool(view.depth.isfinite().any())]
+    measured = _measured(views)
     if len(measured) < FEWEST_VIEWS:
         return None
     trials = Trials.draw(measured, along_rays)
@@ -48,3 +48,15 @@ def misread(views: Sequence[View], along_rays: bool) -> Finding | None:
     if 1.0 - found.share > REMAINDER * (1.0 - stated.share) or not clearly_above(found.scores):
         return None
     return Finding(meant, found, stated)
+
+
+def stated_agreement(views: Sequence[View], along_rays: bool) -> Agreement | None:
+    """How the views' depth agrees as it was read; None where there are too few views to say."""
+    measured = _measured(views)
+    if len(measured) < FEWEST_VIEWS:
+        return None
+    return Trials.draw(measured, along_rays).agreement(READINGS[0])
+
+
+def _measured(views: Sequence[View]) -> list[View]:
+    return [view for view in views if view.depth is not None and bool(view.depth.isfinite().any())]

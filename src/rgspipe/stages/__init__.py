@@ -13,6 +13,7 @@ from rgspipe.stages.base import Need, Stage, StageContext
 __all__ = ["NAMES", "Need", "Stage", "StageContext", "load_stage", "stage_summary"]
 
 NAMES = (
+    "import_scan",
     "generate_dataset",
     "init_depth",
     "train_surfels",

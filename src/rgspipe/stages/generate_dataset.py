@@ -1,4 +1,4 @@
-"""Make the images: render a scene of ours or a .blend file with Blender, or take a dataset from disk."""
+"""Make the images: render a scene of ours or a .blend file with Blender, or take a dataset or a capture from disk."""
 
 from __future__ import annotations
 
@@ -26,9 +26,11 @@ NOTICEABLE = 0.01
 
 
 def run(context: StageContext) -> None:
-    """Leave a dataset in the stage's folder, or a pointer to the user's, which is checked first."""
+    """Leave a dataset in the stage's folder, or a pointer to one that is there, which is checked first."""
     if context.config.scene.kind == "external":
-        _take_external(context)
+        _take(context, _existing_path(context.config, "the folder of a dataset"))
+    elif context.config.scene.kind == "rgbd":
+        _take(context, context.inputs["import_scan"].folder())
     else:
         job = replace(dataset_job(context.config), lamps_known=context.config.scene.lamps == "known")
         render_dataset(job, context.folder)
@@ -47,9 +49,8 @@ def dataset_job(config: RgspipeConfig) -> DatasetJob:
     return DatasetJob(scene=config.scene.folder, model=scene_model(scene), **vars(config.dataset))
 
 
-def _take_external(context: StageContext) -> None:
-    """Read every file of the user's dataset, so that what is wrong shows now and not an hour later."""
-    root = _existing_path(context.config, "the folder of a dataset")
+def _take(context: StageContext, root: Path) -> None:
+    """Read every file of a dataset that is there, so that what is wrong shows now and not an hour later."""
     dataset = load_dataset(root)
     check_conventions(dataset)
     point_at_dataset(context.folder, root)
@@ -80,9 +81,9 @@ def _existing_path(config: RgspipeConfig, what: str) -> Path:
     return Path(path).resolve()
 
 
-def _inputs(config: RgspipeConfig) -> tuple[()]:
+def _inputs(config: RgspipeConfig) -> tuple[str, ...]:
     require_images(config, "this stage or one before it")
-    return ()
+    return ("import_scan",) if config.scene.kind == "rgbd" else ()
 
 
 def _config_keys(config: RgspipeConfig) -> tuple[str, ...]:
@@ -93,7 +94,7 @@ def _config_keys(config: RgspipeConfig) -> tuple[str, ...]:
 
 
 def _files(config: RgspipeConfig) -> tuple[Path, ...]:
-    if config.scene.kind in MODELLED or config.scene.path is None or not Path(config.scene.path).exists():
+    if config.scene.kind in (*MODELLED, "rgbd") or config.scene.path is None or not Path(config.scene.path).exists():
         return ()
     path = Path(config.scene.path).resolve()
     return tuple(files_read(path)) if config.scene.kind == "external" else (path,)

@@ -33,7 +33,7 @@ def trained_stage(config: RgspipeConfig) -> str:
 
 def has_truth(config: RgspipeConfig) -> bool:
     """Whether the scene is one that Blender renders, with passes of its true surfaces."""
-    return config.scene.kind not in ("external", "ply")
+    return config.scene.kind not in ("external", "ply", "rgbd")
 
 
 def image_stage(config: RgspipeConfig) -> list[str]:

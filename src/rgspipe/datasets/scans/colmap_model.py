@@ -1,0 +1,151 @@
+"""The two files of a COLMAP model that are needed, as text and as binary: cameras and images."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+
+from rgspipe.datasets.input_file import LONGEST_NAME, input_file
+from rgspipe.datasets.json_file import shown
+from rgspipe.datasets.scans.frame import Lens, Numbers
+from rgspipe.errors import InputError
+
+#: Camera models by COLMAP's numbers, with how many parameters each has; of the others no lens is known here.
+MODELS = {0: ("SIMPLE_PINHOLE", 3), 1: ("PINHOLE", 4), 2: ("SIMPLE_RADIAL", 4), 3: ("RADIAL", 5), 4: ("OPENCV", 8)}
+
+MOST_BYTES = 2**32
+
+#: A quaternion shorter than this is none.
+LEAST_NORM = 1e-6
+
+Parts = TypeVar("Parts")
+
+
+@dataclass(frozen=True, eq=False)
+class Photograph:
+    """An image of a model.
+
+    Attributes:
+        name: of its file.
+        camera: the number of its camera.
+        quaternion, translation: (w, x, y, z) and (3,) of the transform that takes the world to the camera.
+    """
+
+    name: str
+    camera: int
+    quaternion: Numbers
+    translation: Numbers
+
+
+def read_cameras(path: Path) -> dict[int, Lens]:
+    """Lenses by number.
+
+    Raises:
+        InputError: a broken file, or a model with another kind of distortion.
+    """
+    return _whole(path, _binary_cameras if path.suffix == ".bin" else _text_cameras)
+
+
+def read_images(path: Path) -> list[Photograph]:
+    """All images, at least one.
+
+    Raises:
+        InputError: a broken file, or none.
+    """
+    photographs = _whole(path, _binary_images if path.suffix == ".bin" else _text_images)
+    if not photographs:
+        raise InputError(path, expected="registered images", found="none", remedy="Run colmap mapper again.")
+    return photographs
+
+
+def _whole(path: Path, read: Callable[[Path, bytes], Parts]) -> Parts:
+    try:
+        return read(path, input_file(path, "a part of a COLMAP model", most_bytes=MOST_BYTES).read_bytes())
+    except InputError:
+        raise
+    except (struct.error, ValueError, IndexError, OverflowError) as error:
+        found = f"other content, or half of it ({error})"
+        raise InputError(path, expected="a part of a COLMAP model", found=found, remedy="Copy it anew.") from error
+
+
+def _lens(path: Path, model: str, size: Sequence[int], values: Sequence[float]) -> Lens:
+    match model:
+        case "SIMPLE_PINHOLE" | "SIMPLE_RADIAL" | "RADIAL":
+            focal, cx, cy, *radial = values
+            return Lens(focal, focal, cx, cy, *size, tuple(radial))
+        case "PINHOLE":
+            return Lens(*values, *size)
+        case "OPENCV":
+            fx, fy, cx, cy, k1, k2, p1, p2 = values
+            return Lens(fx, fy, cx, cy, *size, (k1, k2), (p1, p2))
+    raise InputError(
+        path,
+        expected=f"cameras of the models {', '.join(name for name, _ in MODELS.values())}",
+        found=shown(model),
+        remedy="Undistort the photographs (colmap image_undistorter) and give its output as scene.path.",
+    )
+
+
+def _text_cameras(path: Path, content: bytes) -> dict[int, Lens]:
+    found = {}
+    for line in _lines(content):
+        if line.strip():
+            number, model, width, height, *values = line.split()
+            found[int(number)] = _lens(path, model, (int(width), int(height)), [float(value) for value in values])
+    return found
+
+
+def _binary_cameras(path: Path, content: bytes) -> dict[int, Lens]:
+    (count,), place = struct.unpack_from("<Q", content), 8
+    found = {}
+    for _ in range(count):
+        number, kind, width, height = struct.unpack_from("<iiQQ", content, place)
+        model, parameters = MODELS.get(kind, (f"number {kind}", 0))
+        values = struct.unpack_from(f"<{parameters}d", content, place + 24)
+        found[number] = _lens(path, model, (width, height), values)
+        place += 24 + 8 * parameters
+    return found
+
+
+def _text_images(path: Path, content: bytes) -> list[Photograph]:
+    # Each image has a second line, of its points, which may be empty.
+    found = []
+    for line in _lines(content)[::2]:
+        if line.strip():
+            _, *values, camera, name = line.split(maxsplit=9)
+            found.append(_photograph(name.strip(), int(camera), [float(value) for value in values]))
+    return found
+
+
+def _binary_images(path: Path, content: bytes) -> list[Photograph]:
+    (count,), place = struct.unpack_from("<Q", content), 8
+    found = []
+    for _ in range(count):
+        _, *values, camera = struct.unpack_from("<i7di", content, place)
+        place += 64
+        end = content.index(b"\0", place)
+        found.append(_photograph(content[place:end].decode(), camera, values))
+        (points,) = struct.unpack_from("<Q", content, end + 1)
+        place = end + 9 + 24 * points
+    if place != len(content):
+        raise ValueError(f"{len(content)} bytes, and images end at {place}")
+    return found
+
+
+def _photograph(name: str, camera: int, values: Sequence[float]) -> Photograph:
+    numbers = np.array(values)
+    if len(numbers) != 7 or not np.isfinite(numbers).all() or np.linalg.norm(numbers[:4]) < LEAST_NORM:
+        raise ValueError(f"no pose of {shown(name)}")
+    if not all(part.isprintable() and 0 < len(part.encode()) <= LONGEST_NAME for part in name.split("/")):
+        raise ValueError(f"no name of an image: {shown(name)}")
+    return Photograph(name, camera, numbers[:4], numbers[4:])
+
+
+def _lines(content: bytes) -> list[str]:
+    """Without comments; empty lines mean something."""
+    return [line for line in content.decode().splitlines() if not line.startswith("#")]

@@ -1,0 +1,124 @@
+"""What every layout is read into: photographs with their cameras, and the depth that belongs to them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+Numbers = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Lens:
+    """A pinhole in front of which lines may bend. Pixel (column x, row y) has its centre at (x + 0.5, y + 0.5).
+
+    Attributes:
+        fx, fy, cx, cy: focal lengths and principal point, pixels.
+        width, height: of the images that these belong to, pixels.
+        radial: k1, k2, …: a point at distance r from the axis (at depth 1) is seen 1 + k1 r² + k2 r⁴ + … as far out.
+        tangential: p1, p2 of Brown's model, as OpenCV and COLMAP have them.
+    """
+
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    width: int
+    height: int
+    radial: tuple[float, ...] = ()
+    tangential: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def bends(self) -> bool:
+        """Whether straight lines do not stay straight."""
+        return any((*self.radial, *self.tangential))
+
+    def resized(self, width: int, height: int) -> Lens:
+        """The lens before images of another size that show the same."""
+        across, down = width / self.width, height / self.height
+        focal = {"fx": self.fx * across, "fy": self.fy * down, "cx": self.cx * across, "cy": self.cy * down}
+        return replace(self, **focal, width=width, height=height)
+
+    def places(self, x: Numbers, y: Numbers) -> tuple[Numbers, Numbers]:
+        """Columns and rows where rays (x right, y down, 1 forward) land in the image."""
+        squared = x**2 + y**2
+        factor, power = np.ones_like(squared), np.ones_like(squared)
+        for coefficient in self.radial:
+            power = power * squared
+            factor = factor + coefficient * power
+        p1, p2 = self.tangential
+        bent_x = x * factor + 2.0 * p1 * x * y + p2 * (squared + 2.0 * x**2)
+        bent_y = y * factor + p1 * (squared + 2.0 * y**2) + 2.0 * p2 * x * y
+        return self.fx * bent_x + self.cx, self.fy * bent_y + self.cy
+
+
+@dataclass(frozen=True, eq=False)
+class DepthImage:
+    """A depth image of a photograph.
+
+    Attributes:
+        path: PNG (16 bits), EXR, or COLMAP's binary array.
+        unit: what a stored 1 is, in the unit of the cameras' places.
+        lens: its own, where it is not the photograph's at another size.
+        confidence: an image of the same size that is 0 where depth is not to be believed.
+    """
+
+    path: Path
+    unit: float
+    lens: Lens | None = None
+    confidence: Path | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class ScanFrame:
+    """One photograph.
+
+    Attributes:
+        image: PNG, JPEG or EXR.
+        lens: of the image; its size is that which intrinsics were stated for.
+        pose: (4, 4) float64 rigid camera-to-world transform, OpenGL axes.
+        depth: measured or predicted, if there is any.
+        albedo: a predicted map, if there is one.
+    """
+
+    image: Path
+    lens: Lens
+    pose: Numbers
+    depth: DepthImage | None = None
+    albedo: Path | None = None
+
+    @property
+    def files(self) -> list[Path]:
+        """All images of the frame."""
+        depth = [] if self.depth is None else [self.depth.path, self.depth.confidence]
+        return [path for path in (self.image, *depth, self.albedo) if path is not None]
+
+
+@dataclass(frozen=True, eq=False)
+class Scan:
+    """A capture as its files describe it; nothing but the cameras has been read.
+
+    Attributes:
+        layout: its name.
+        stated: the file or folder that states the poses, for errors.
+        sources: files beside the frames' that were read.
+        frames: in the order of the capture.
+        axes: of the cameras in the files, as they were read: "opengl" or "opencv".
+        notes: what people should know of what was assumed.
+    """
+
+    layout: str
+    stated: Path
+    sources: tuple[Path, ...]
+    frames: tuple[ScanFrame, ...]
+    axes: str
+    notes: tuple[str, ...] = ()
+
+    def thinned(self, most: int) -> Scan:
+        """At most so many of the frames, evenly spaced, the first and the last among them."""
+        count = len(self.frames)
+        chosen = sorted({round(place) for place in np.linspace(0, count - 1, min(count, most))})
+        return replace(self, frames=tuple(self.frames[index] for index in chosen))

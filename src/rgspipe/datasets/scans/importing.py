@@ -1,0 +1,111 @@
+"""A capture of another program written as a dataset in our own layout, at the size that is worked with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from rgspipe.datasets.exr import write_channels, write_image
+from rgspipe.datasets.gs3_write import frame_entry, write_transforms
+from rgspipe.datasets.info import INFO
+from rgspipe.datasets.scans.frame import Scan, ScanFrame
+from rgspipe.datasets.scans.lens_check import check_shape
+from rgspipe.datasets.scans.options import ScanOptions
+from rgspipe.datasets.scans.pictures import exposure_of, read_depth_image, read_picture
+from rgspipe.datasets.scans.resample import resampled_colour, resampled_depth, straight_camera
+from rgspipe.files import write_json
+from rgspipe.progress import progress_bar
+
+TRANSFORMS = "transforms_train.json"
+
+VERSION = 1
+
+
+@dataclass(frozen=True)
+class Imported:
+    """What was written.
+
+    Attributes:
+        frames: photographs.
+        with_depth: those of them that have depth somewhere.
+        known: part of their pixels whose depth is known.
+        exif: whether photographs were made alike by the exposures that they state.
+        notes: what was assumed.
+    """
+
+    frames: int
+    with_depth: int
+    known: float
+    exif: bool
+    notes: tuple[str, ...]
+
+    def words(self, layout: str) -> str:
+        """The report for people."""
+        exposures = ", made alike by their EXIF exposures" if self.exif else ""
+        lines = [
+            f"{layout}: {self.frames} photographs{exposures}; {self.with_depth} with depth, known in "
+            f"{100 * self.known:.0f} % of their pixels"
+        ]
+        return "\n".join(lines + [f"  {note}" for note in self.notes])
+
+
+def import_scan(scan: Scan, options: ScanOptions, folder: Path) -> Imported:
+    """Write the photographs of a capture as training views under lamps that are not known.
+
+    Raises:
+        InputError: a file is missing, broken, or of another kind than its layout says.
+    """
+    exposures = _exposures(scan, options)
+    factors = np.ones(len(scan.frames)) if exposures is None else exposures
+    entries, known = [], []
+    pairs = list(zip(scan.frames, factors, strict=True))
+    for index, (frame, factor) in enumerate(progress_bar(pairs, "reading photographs", unit="photograph")):
+        entry, share = _written(frame, float(factor), options, folder, f"train/r_{index:04d}")
+        entries.append(entry | {"source": frame.image.name})
+        known.append(share)
+    write_transforms(folder / TRANSFORMS, entries)
+    write_json(folder / INFO, {"version": VERSION, "depth_convention": "planar_z", "layout": scan.layout})
+    shares = [share for share in known if share]
+    share = float(np.mean(shares)) if shares else 0.0
+    return Imported(len(entries), len(shares), share, exposures is not None, scan.notes)
+
+
+def _exposures(scan: Scan, options: ScanOptions) -> np.ndarray | None:
+    """(V,) exposures by EXIF over their geometric mean; None where one does not say."""
+    if options.exposure != "exif":
+        return None
+    stated = [exposure_of(frame.image) for frame in scan.frames]
+    known = np.array([value for value in stated if value is not None])
+    if len(known) < len(stated):
+        return None
+    return known / np.exp(np.log(known).mean())
+
+
+def _written(
+    frame: ScanFrame, exposure: float, options: ScanOptions, folder: Path, name: str
+) -> tuple[dict, float | None]:
+    """The entry of a frame whose files were written, and the part of its depth that is known, if there is any."""
+    camera = straight_camera(frame.lens, frame.pose, options.resolution, frame.image)
+    picture = read_picture(frame.image, options.response)
+    check_shape(frame.image, picture.light.shape, frame.lens)
+    light, clipped = resampled_colour(picture.light, picture.clipped_from, camera, frame.lens)
+    entry: dict = {}
+    if picture.clipped_from is not None:
+        limit = np.float32(picture.clipped_from)
+        light = np.where(clipped, np.maximum(light, limit), light)
+        entry["saturated_from"] = float(limit / np.float32(exposure))
+    write_image(folder / f"{name}.exr", light / np.float32(exposure))
+    surfaces, share = [], None
+    if frame.depth is not None:
+        depth = resampled_depth(read_depth_image(frame.depth), camera, frame.depth.lens or frame.lens)
+        share = float(np.isfinite(depth).mean())
+    if share:
+        write_channels(folder / f"{name}_depth.exr", {"Z": depth})
+        surfaces.append("depth")
+    if frame.albedo is not None:
+        albedo, _ = resampled_colour(read_picture(frame.albedo, options.response).light, None, camera, frame.lens)
+        write_image(folder / f"{name}_albedo.exr", albedo)
+        surfaces.append("albedo")
+    return frame_entry(name, camera, surfaces=tuple(surfaces)) | entry, share

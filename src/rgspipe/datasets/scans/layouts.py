@@ -1,0 +1,66 @@
+"""Which layout a folder has, and reading it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import ModuleType
+
+from rgspipe.datasets.input_file import input_folder
+from rgspipe.datasets.scans import colmap, iid, nerfstudio, polycam, replica, scannet
+from rgspipe.datasets.scans.frame import Scan
+from rgspipe.datasets.scans.lens_check import check_lens
+from rgspipe.datasets.scans.options import LAYOUTS, ScanOptions
+from rgspipe.errors import InputError
+
+READERS: dict[str, ModuleType] = dict(zip(LAYOUTS, (nerfstudio, polycam, colmap, replica, scannet, iid), strict=True))
+
+#: Names of a folder that errors list.
+SHOWN = 12
+
+
+def read_scan(root: str | Path, options: ScanOptions) -> Scan:
+    """The cameras of a capture, thinned to the frames that are wanted; no pixel has been read.
+
+    Raises:
+        InputError: no layout or several fit, or files of the layout are missing or broken.
+    """
+    root = input_folder(root, "the folder of a capture")
+    scan = READERS[_layout(root, options)].read(root, options).thinned(options.frames)
+    for frame in scan.frames:
+        check_lens(frame.lens, f"{scan.stated}: intrinsics of {frame.image.name}")
+        if frame.depth is not None and frame.depth.lens is not None:
+            check_lens(frame.depth.lens, f"{scan.stated}: intrinsics of {frame.depth.path.name}")
+    return scan
+
+
+def _layout(root: Path, options: ScanOptions) -> str:
+    fitting = [name for name, reader in READERS.items() if reader.found_in(root)]
+    if options.format != "auto":
+        if options.format not in fitting:
+            wanted = READERS[options.format].WANTED
+            others = f" (it looks like {' and '.join(fitting)})" if fitting else ""
+            raise InputError(
+                root,
+                expected=f"{wanted}, of a capture in the layout {options.format}",
+                found=f"{_listed(root)}{others}",
+                remedy="Correct scene.path or scene.rgbd.format.",
+            )
+        return options.format
+    if len(fitting) == 1:
+        return fitting[0]
+    if fitting:
+        remedy = f"Say which: scene.rgbd.format={fitting[0]}."
+        found = f"files of {' and '.join(fitting)}"
+        raise InputError(root, expected="a capture in one layout", found=found, remedy=remedy)
+    wanted = "; ".join(f"{name}: {reader.WANTED}" for name, reader in READERS.items())
+    raise InputError(
+        root,
+        expected=f"a capture in one of these layouts: {wanted}",
+        found=_listed(root),
+        remedy="Correct scene.path: it is the folder that holds these. A dataset in our own layout is scene=external.",
+    )
+
+
+def _listed(root: Path) -> str:
+    names = sorted(f"{path.name}/" if path.is_dir() else path.name for path in root.iterdir())
+    return ", ".join(names[:SHOWN]) + (", …" if len(names) > SHOWN else "") if names else "an empty folder"

@@ -1,0 +1,114 @@
+"""nerfstudio: `transforms.json` with intrinsics, distortion and camera-to-world poses with OpenGL axes.
+
+Poses may have been scaled and turned (`applied_scale`, `applied_transform`): the scale is undone, so that metres are
+metres, the turn is kept.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rgspipe.datasets.frames import FrameEntry, read_entries
+from rgspipe.datasets.json_file import is_number, shown
+from rgspipe.datasets.scans.frame import DepthImage, Lens, Scan, ScanFrame
+from rgspipe.datasets.scans.options import ScanOptions
+from rgspipe.datasets.scans.poses import matrix_of, placed
+from rgspipe.errors import InputError
+
+TRANSFORMS = "transforms.json"
+#: Of the cameras.
+AXES = "opengl"
+
+WANTED = "transforms.json"
+
+#: Metres of 1 in a depth PNG, where the file does not say.
+MILLIMETRE = 1e-3
+
+#: Models whose distortion is that of `Lens`.
+STRAIGHT = ("OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "PERSPECTIVE")
+
+
+def found_in(root: Path) -> bool:
+    """Whether the folder has this layout."""
+    return (root / TRANSFORMS).is_file()
+
+
+def read(root: Path, options: ScanOptions) -> Scan:
+    """The cameras of all frames.
+
+    Raises:
+        InputError: missing keys, another camera model, or poses that are not rigid.
+    """
+    path = root / TRANSFORMS
+    entries = read_entries(path, "the cameras of a nerfstudio capture")
+    scale = _positive(entries[0], "applied_scale", 1.0)
+    frames = tuple(_frame(entry, scale, options) for entry in entries)
+    turned = "applied_transform" in entries[0].shared
+    notes = ("the world's axes are those of the file, after its applied_transform",) if turned else ()
+    return Scan("nerfstudio", path, (path,), frames, options.camera_axes(AXES), notes)
+
+
+def _frame(entry: FrameEntry, scale: float, options: ScanOptions) -> ScanFrame:
+    where = f"{entry.where}.transform_matrix"
+    if "transform_matrix" not in entry.fields:
+        raise InputError(where, expected="a 4 × 4 matrix", found="no such key", remedy="Add it.")
+    matrix = matrix_of(entry.fields["transform_matrix"], where)
+    matrix[:3, 3] /= scale
+    return ScanFrame(
+        image=entry.transforms_path.parent / _text(entry, "file_path"),
+        lens=_lens(entry),
+        pose=placed(matrix, where, options, AXES),
+        depth=_depth(entry, options),
+    )
+
+
+def _lens(entry: FrameEntry) -> Lens:
+    model = _value(entry, "camera_model", "OPENCV")
+    if model not in STRAIGHT:
+        raise InputError(
+            f"{entry.where}: camera_model",
+            expected=f"one of {', '.join(STRAIGHT)}",
+            found=shown(model),
+            remedy="Undistort the photographs first (colmap image_undistorter).",
+        )
+    width, height = (int(_positive(entry, key)) for key in ("w", "h"))
+    fx = _positive(entry, "fl_x")
+    centre = [_number(entry, key, 0.5 * size) for key, size in (("cx", width), ("cy", height))]
+    radial = tuple(_number(entry, key, 0.0) for key in ("k1", "k2", "k3", "k4"))
+    tangential = (_number(entry, "p1", 0.0), _number(entry, "p2", 0.0))
+    return Lens(fx, _positive(entry, "fl_y", fx), *centre, width, height, radial, tangential)
+
+
+def _depth(entry: FrameEntry, options: ScanOptions) -> DepthImage | None:
+    if "depth_file_path" not in entry.fields:
+        return None
+    path = entry.transforms_path.parent / _text(entry, "depth_file_path")
+    default = 1.0 if path.suffix.lower() == ".exr" else MILLIMETRE
+    stated = _positive(entry, "depth_unit_scale_factor", default)
+    return DepthImage(path, stated if options.depth_unit is None else options.depth_unit)
+
+
+def _value(entry: FrameEntry, key: str, default: object = None) -> object:
+    return entry.fields.get(key, entry.shared.get(key, default))
+
+
+def _number(entry: FrameEntry, key: str, default: float | None = None) -> float:
+    value = _value(entry, key, default)
+    if not is_number(value):
+        found = "no such key, here or at the top" if value is None else shown(value)
+        raise InputError(f"{entry.where}: {key}", expected="a finite number", found=found, remedy=f"Add {key}.")
+    return float(value)
+
+
+def _positive(entry: FrameEntry, key: str, default: float | None = None) -> float:
+    value = _number(entry, key, default)
+    if value <= 0.0:
+        raise InputError(f"{entry.where}: {key}", expected="above 0", found=f"{value:g}", remedy="Correct it.")
+    return value
+
+
+def _text(entry: FrameEntry, key: str) -> str:
+    value = entry.fields.get(key)
+    if not isinstance(value, str) or not value:
+        raise InputError(f"{entry.where}.{key}", expected="a path", found=shown(value), remedy="Correct it.")
+    return value

@@ -1,0 +1,41 @@
+"""What a capture in another program's layout leaves open. Nothing here loads torch, for the command line."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+from rgspipe.options import Options, option
+
+#: Layouts that are read.
+Layout = Literal["nerfstudio", "polycam", "colmap", "replica", "scannet", "iid"]
+LAYOUTS: tuple[Layout, ...] = get_args(Layout)
+
+
+@dataclass(frozen=True)
+class ScanOptions(Options):
+    """How a capture in the layout of another program is read."""
+
+    format: Literal[Layout, "auto"] = "auto"
+    """the layout; auto: told by the files that are there"""
+    frames: int = option(60, low=1, high=100_000)
+    """at most so many photographs, evenly spaced"""
+    resolution: int = option(160, low=8, high=8192)
+    """pixels along the longer side that photographs are reduced to"""
+    response: Literal["srgb", "linear"] = "srgb"
+    """how levels of PNG and JPEG rise with light; EXR is linear"""
+    exposure: Literal["exif", "same"] = "exif"
+    """exif: photographs are made alike by shutter, aperture and ISO where all of them state them; same: taken as they
+    are"""
+    axes: Literal["layout", "opengl", "opencv"] = "layout"
+    """axes of the cameras, where files do not keep to their layout: y up and z backwards, or y down and z forwards"""
+    depth_unit: float | None = option(None, low=1e-9, high=1e9)
+    """metres of 1 in a depth image, where files do not keep to their layout"""
+    pose_unit: float | None = option(None, low=1e-9, high=1e9)
+    """metres of 1 in the cameras' places; by default 1"""
+    fov: float = option(85.0, low=1, high=179)
+    """horizontal field of view of a photograph without a camera (iid), degrees"""
+
+    def camera_axes(self, usual: str) -> str:
+        """Axes of the cameras in the files of a layout that has these."""
+        return usual if self.axes == "layout" else self.axes

@@ -1,0 +1,179 @@
+"""The pixels of a capture's files: photographs as linear light with what is clipped, and depth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+from PIL import ExifTags, Image
+
+from rgspipe.datasets.display_image import COLOUR_TYPE, COLOURED, DEPTH, read_display, saturated_from
+from rgspipe.datasets.exr import read_channels
+from rgspipe.datasets.images import NO_SURFACE, read_colour
+from rgspipe.datasets.input_file import check_pixel_count, input_file
+from rgspipe.datasets.scans.frame import DepthImage
+from rgspipe.errors import InputError
+from rgspipe.scene import srgb
+
+Pixels = npt.NDArray[np.float32]
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """A photograph.
+
+    Attributes:
+        light: (H, W, 3) float32, linear.
+        clipped_from: where it is as bright as this the photograph tells only that there was at least so much light;
+            None where it was not clipped by its format.
+    """
+
+    light: Pixels
+    clipped_from: float | None
+
+
+def read_picture(path: Path, response: str) -> Picture:
+    """A photograph in 8 or 16 bits, by its `response` ("srgb" or "linear"), or in floats.
+
+    Raises:
+        InputError: missing or broken file, another format than the suffix says, or pixels to be turned (EXIF).
+    """
+    if path.suffix.lower() == ".exr":
+        return Picture(read_colour(path)[0].numpy(), None)
+    if _has_wide_colours(path):
+        levels, limit = _wide_colours(path), 1.0 - 0.5 / 65535.0
+    else:
+        levels, _ = read_display(path)
+        # Of levels that are stored, not of light: the file's own curve is another matter.
+        limit = float(srgb.encode(np.array(saturated_from(path))))
+    levels = np.repeat(levels, 3, axis=2) if levels.shape[2] == 1 else levels
+    if response == "linear":
+        return Picture(levels, limit)
+    return Picture(srgb.decode(levels).astype(np.float32), float(srgb.decode(np.array(limit))))
+
+
+def read_depth_image(image: DepthImage) -> Pixels:
+    """(H, W) float32 depth in the unit of the cameras' places; NaN where it is not known.
+
+    Raises:
+        InputError: missing or broken file, colours, 8 bits, or a confidence of another size.
+    """
+    stored = _stored_depth(image.path)
+    known = np.isfinite(stored) & (stored > 0.0) & (stored < NO_SURFACE)
+    if image.confidence is not None:
+        sure = _confidence(image.confidence)
+        if sure.shape != stored.shape:
+            expected = f"{stored.shape[1]} × {stored.shape[0]} pixels, as {image.path.name}"
+            found = f"{sure.shape[1]} × {sure.shape[0]}"
+            raise InputError(image.confidence, expected=expected, found=found, remedy="Export both at one size.")
+        known &= sure > 0.0
+    return np.where(known, stored * image.unit, np.nan).astype(np.float32)
+
+
+def exposure_of(path: Path) -> float | None:
+    """Shutter time × ISO / aperture², by the file's EXIF; None where it does not state all three."""
+    if path.suffix.lower() == ".exr":
+        return None
+    keys = (ExifTags.Base.ExposureTime, ExifTags.Base.ISOSpeedRatings, ExifTags.Base.FNumber)
+    try:
+        with Image.open(input_file(path, "a photograph"), formats=["JPEG", "PNG"]) as file:
+            stated = file.getexif().get_ifd(ExifTags.IFD.Exif)
+        shutter, sensitivity, aperture = (float(np.ravel(stated.get(key, 0))[0]) for key in keys)
+    except InputError:
+        raise
+    except (OSError, SyntaxError, TypeError, ValueError, ZeroDivisionError):
+        # Whether its pixels can be read is asked elsewhere.
+        return None
+    return shutter * sensitivity / aperture**2 if min(shutter, sensitivity, aperture) > 0.0 else None
+
+
+def _has_wide_colours(path: Path) -> bool:
+    """Whether it is a PNG with 16 bits a colour, of which Pillow by itself reads half."""
+    if path.suffix.lower() != ".png":
+        return False
+    with input_file(path, "a photograph").open("rb") as stream:
+        header = stream.read(COLOUR_TYPE + 1)
+    return len(header) > COLOUR_TYPE and header[DEPTH] == 16 and header[COLOUR_TYPE] in COLOURED
+
+
+def _wide_colours(path: Path) -> Pixels:
+    """(H, W, 3) in [0, 1]: upper bytes, and then lower ones, which a reader of the other byte order takes for upper."""
+    try:
+        upper, lower = (_bytes(path, order) for order in ("B", "L"))
+    except InputError:
+        raise
+    except (OSError, SyntaxError, ValueError, MemoryError) as error:
+        found = f"an unreadable file ({error})"
+        raise InputError(path, expected="a whole PNG image", found=found, remedy="Export it again.") from error
+    return ((256.0 * upper + lower)[..., :3] / 65535.0).astype(np.float32)
+
+
+def _bytes(path: Path, order: str) -> npt.NDArray[np.float64]:
+    with Image.open(path, formats=["PNG"]) as file:
+        check_pixel_count(path, *file.size)
+        file.tile = [part._replace(args=f"{file.mode};16{order}") for part in file.tile]
+        return np.asarray(file).astype(np.float64)
+
+
+def _stored_depth(path: Path) -> npt.NDArray[np.float64]:
+    suffix = path.suffix.lower()
+    if suffix == ".bin":
+        return _colmap_array(path)
+    if suffix == ".exr":
+        channels = read_channels(path)
+        first = next(iter(channels.values()))
+        if not all(np.array_equal(first, other, equal_nan=True) for other in channels.values()):
+            found = ", ".join(sorted(channels))
+            raise InputError(path, expected="one channel of depth", found=found, remedy="Export only the depth.")
+        return first.astype(np.float64)
+    levels, _ = read_display(path)
+    with Image.open(path) as file:
+        narrow = not file.mode.startswith("I")
+    if narrow or levels.shape[2] != 1:
+        raise InputError(
+            path,
+            expected="depth in 16 bits of grey, or EXR",
+            found="8 bits, which is a picture of depth",
+            remedy="Export the depth itself.",
+        )
+    return np.round(levels[..., 0].astype(np.float64) * 65535.0)
+
+
+def _confidence(path: Path) -> Pixels:
+    levels, _ = read_display(path)
+    return levels[..., 0]
+
+
+def _colmap_array(path: Path) -> npt.NDArray[np.float64]:
+    """(H, W) of "width&height&channels&" and float32, rows first."""
+    content = input_file(path, "a depth map of COLMAP").read_bytes()
+    parts = content[:64].split(b"&", 3)
+    try:
+        width, height, channels = (int(part) for part in parts[:3])
+        start = sum(len(part) + 1 for part in parts[:3])
+        check_pixel_count(path, width, height)
+        values = np.frombuffer(content, "<f4", width * height * channels, start)
+    except (ValueError, IndexError) as error:
+        found = f"other bytes ({error})"
+        raise InputError(path, expected="a depth map of COLMAP", found=found, remedy="Write it anew.") from error
+    with np.errstate(invalid="ignore"):
+        return values[: width * height].reshape(height, width).astype(np.float64)
+
+
+def size_of(path: Path) -> tuple[int, int]:
+    """Width and height of an image.
+
+    Raises:
+        InputError: missing or broken file.
+    """
+    if path.suffix.lower() == ".exr":
+        height, width = next(iter(read_channels(path).values())).shape
+        return width, height
+    try:
+        with Image.open(input_file(path, "an image"), formats=["PNG", "JPEG"]) as file:
+            return file.size
+    except (OSError, SyntaxError, ValueError) as error:
+        found = f"an unreadable file ({error})"
+        raise InputError(path, expected="a PNG or JPEG image", found=found, remedy="Export it again.") from error
