@@ -127,9 +127,8 @@ class LampControls:
         value = number.shown(float(getattr(light, number.name)))
         label = number.name.replace("_", " ") + (f" {number.unit}" if number.unit else "")
         hint = f"The lamp's {number.name.replace('_', ' ')}{' in degrees' if number.unit == '°' else ''}."
-        field = self._client.gui.add_number(
-            label, round(value, 4), step=0.5 if number.unit == "°" else 0.005, hint=hint
-        )
+        step = 0.5 if number.unit == "°" else 0.005
+        field = self._client.gui.add_number(label, round(value, 4), step=step, hint=hint)
         field.on_update(self._by_visitor(lambda: self._shape(number, field.value)))
         return field
 

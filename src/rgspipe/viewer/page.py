@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import tempfile
 import threading
 from collections.abc import Callable
@@ -25,6 +26,9 @@ MOVING = 80
 
 #: Length of a camera's frustum, and radius of a true lamp's ball, of the scene's size.
 FRUSTUM, TRUTH = 0.06, 0.015
+
+#: From this cosine on a view along the vertical keeps its own way of being up.
+STEEP = 0.95
 
 _FOUND, _TRUE = (255, 140, 0), (0, 160, 80)
 
@@ -51,6 +55,7 @@ class Page:
         self._client, self._session, self._turn, self._searching = client, session, turn, False
         self._resolution = resolution
         self._regions: list = []
+        self._seen = b""
         self.painter = Painter(session, self.camera, self._show, resolution, turn)
         gui = client.gui
         gui.add_markdown(_HELP)
@@ -73,7 +78,9 @@ class Page:
         self._go_to(camera)
         for photograph in session.photographs:
             self._frustum(photograph)
-        client.camera.on_update(lambda _: self.painter.changed())
+        if session.found is not None:
+            self._draw_found()
+        client.camera.on_update(lambda _: self._moved())
         self.painter.changed()
 
     def camera(self, longest: int) -> Camera | None:
@@ -83,6 +90,13 @@ class Page:
             return camera_of(held.position, held.wxyz, held.fov, held.aspect, longest)
         except (ValueError, ZeroDivisionError):  # a canvas without a size, or a turn of length zero
             return None
+
+    def _moved(self) -> None:
+        camera = self.camera(self._resolution)
+        # The browser tells of its camera also where it stands still.
+        if camera is not None and camera.key != self._seen:
+            self._seen = camera.key
+            self.painter.changed()
 
     def leave(self) -> None:
         """The visitor is gone."""
@@ -96,8 +110,9 @@ class Page:
         self._told.content = "Searching …"
         try:
             with self._turn:
-                self._session.take(self._session.search())
-            self._told.content = "```\n" + repr(self._session.found) + "\n```"
+                result = self._session.search()
+                self._session.take(result)
+            self._told.content = "```\n" + repr(result) + "\n```"
             self._draw_found()
             self.lamps.refresh()
             self._compare()
@@ -180,14 +195,16 @@ class Page:
         frustum.on_click(lambda _: self._go_to(photograph.camera))
 
     def _go_to(self, camera: Camera) -> None:
-        position, wxyz, fov = pose_of(camera)
-        held, scene = self._client.camera, self._session.images.frozen
-        ahead = -camera.camera_to_world[:3, 2].numpy() * max(scene.size, 1e-3)
+        position, _, fov = pose_of(camera)
+        held = self._client.camera
+        forward, up = -camera.camera_to_world[:3, 2].numpy(), camera.camera_to_world[:3, 1].numpy()
+        # On a page that is narrower than the picture, its sides are to be seen rather than its top and bottom.
+        across = math.tan(0.5 * fov) * camera.width / camera.height
+        fov = 2.0 * math.atan(max(math.tan(0.5 * fov), across / max(held.aspect, 0.1)))
         with self._client.atomic():
-            held.up_direction = (
-                camera.camera_to_world[:3, 1].numpy() if abs(ahead[2]) > 0.95 * scene.size else (0, 0, 1)
-            )
-            held.position, held.look_at, held.fov = position, position + ahead, fov
+            held.up_direction = up if abs(forward[2]) > STEEP else (0.0, 0.0, 1.0)
+            held.position, held.fov = position, fov
+            held.look_at = position + forward * max(self._session.images.frozen.size, 1e-3)
 
     def _draw_found(self) -> None:
         for mesh in self._regions:

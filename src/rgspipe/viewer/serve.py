@@ -15,7 +15,7 @@ from rgspipe.scene import Camera, LightRig
 from rgspipe.scene.lights import Light, as_rig
 from rgspipe.viewer.cameras import first_camera
 from rgspipe.viewer.lamp_images import LampImages
-from rgspipe.viewer.session import Photograph, Session
+from rgspipe.viewer.session import Found, Photograph, Session
 
 if TYPE_CHECKING:
     from rgspipe.viewer.page import Page
@@ -38,6 +38,7 @@ class Viewer:
         lights: LightRig,
         photographs: Sequence[Photograph],
         truth: LightRig,
+        found: Found | None,
         camera: Camera,
         port: int,
         resolution: int,
@@ -46,7 +47,7 @@ class Viewer:
 
         self.pages: dict[int, Page] = {}
         self._turn, self._images = threading.Lock(), LampImages(frozen)
-        self._given = lights, list(photographs), truth
+        self._given = lights, list(photographs), truth, found
         self._camera, self._resolution = camera, resolution
         self._server = viser.ViserServer(host=LOOPBACK, port=port, verbose=False)
         # Sharing would send the page through a server of viser's makers.
@@ -75,8 +76,8 @@ class Viewer:
     def _welcome(self, client) -> None:
         from rgspipe.viewer.page import Page
 
-        lights, photographs, truth = self._given
-        session = Session(self._images, lights, list(photographs), truth)
+        lights, photographs, truth, found = self._given
+        session = Session(self._images, lights, list(photographs), truth, found=found)
         self.pages[client.client_id] = Page(client, session, self._camera, self._resolution, self._turn)
 
     def _bye(self, client) -> None:
@@ -92,6 +93,7 @@ def view(
     camera: Camera | None = None,
     photographs: Sequence[Photograph] = (),
     truth: Sequence[Light] = (),
+    found: Found | None = None,
     port: int = 8080,
     resolution: int = 256,
 ) -> Viewer:
@@ -103,6 +105,7 @@ def view(
         camera: of the first picture; in front of the scene if None.
         photographs: of the scene under lamps that are to be found; see `rgspipe.viewer.session.as_photographs`.
         truth: those lamps, where they are known.
+        found: lamps that a fit found, whose regions are drawn.
         port: of the page; the next free one where it is taken.
         resolution: pixels along the longer side of pictures at rest, 32 to 2048.
 
@@ -123,4 +126,4 @@ def view(
     if camera is None:
         camera = photographs[0].camera if photographs else first_camera(*scene.bounds)
     rig = tuple(light.to(torch.float64).detached() for light in as_rig(lights))
-    return Viewer(scene, rig, photographs, tuple(truth), camera, port, resolution)
+    return Viewer(scene, rig, photographs, tuple(truth), found, camera, port, resolution)

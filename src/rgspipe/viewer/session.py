@@ -36,6 +36,14 @@ class Photograph:
     image: Tensor
 
 
+@dataclass(frozen=True, eq=False)
+class Found:
+    """Lamps that a search found, each with a covariance that begins with its position; none of those if not known."""
+
+    lights: LightRig
+    covariance: tuple[Tensor, ...] = ()
+
+
 @dataclass
 class Session:
     """The state of one visitor; scenes and what is kept of their images are shared.
@@ -47,7 +55,7 @@ class Session:
         truth: those lamps, where they are known.
         exposure: stops; at 0 the first picture's 97th percentile is white.
         irradiance: whether pictures show irradiance in false colours.
-        found: what the last search found.
+        found: lamps that a search found, with their covariances as `FitResult` has them.
     """
 
     images: LampImages
@@ -56,7 +64,7 @@ class Session:
     truth: LightRig = ()
     exposure: float = 0.0
     irradiance: bool = False
-    found: FitResult | None = None
+    found: Found | None = None
     _gain: float | None = None
     _past: list[LightRig] = field(default_factory=list)
     _gesture: str | None = None
@@ -151,7 +159,7 @@ class Session:
 
     def take(self, result: FitResult) -> None:
         """Make what was found the lamps."""
-        self.found = result
+        self.found = Found(result.lights, result.covariance)
         self.change(result.lights)
 
     def save(self, path: str | Path) -> None:
