@@ -80,7 +80,7 @@ def test_a_lamp_is_moved_photographed_and_found(viewer: Viewer, browser_page) ->
     assert (session.image(camera) - expected).abs().max() < 1e-3 * expected.max()
     browser_page.get_by_role("button", name="take a photograph").click()
     until(lambda: len(session.photographs) == 1)
-    browser_page.locator("input").nth(2).fill("0.2")
+    browser_page.locator("input[inputmode=decimal]").first.fill("0.2")
     browser_page.keyboard.press("Enter")
     until(lambda: abs(float(session.lights[0].position[0]) - 0.2) < 1e-6)
     browser_page.get_by_role("button", name="find the lights").click()

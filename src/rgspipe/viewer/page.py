@@ -56,6 +56,7 @@ class Page:
         self._resolution = resolution
         self._regions: list = []
         self._seen = b""
+        self._frusta: list = []
         self.painter = Painter(session, self.camera, self._show, resolution, turn)
         gui = client.gui
         gui.add_markdown(_HELP)
@@ -96,7 +97,14 @@ class Page:
         # The browser tells of its camera also where it stands still.
         if camera is not None and camera.key != self._seen:
             self._seen = camera.key
+            self._hide_near(camera)
             self.painter.changed()
+
+    def _hide_near(self, camera: Camera) -> None:
+        """Hide the frustum of the photograph whose camera the visitor looks through."""
+        least = FRUSTUM * self._session.images.frozen.size
+        for frustum in self._frusta:
+            frustum.visible = float(np.linalg.norm(frustum.position - camera.origin.numpy())) > least
 
     def leave(self) -> None:
         """The visitor is gone."""
@@ -189,9 +197,13 @@ class Page:
             fov,
             photograph.camera.width / photograph.camera.height,
             scale=FRUSTUM * self._session.images.frozen.size,
+            thickness=2.0,
+            thickness_units="screen",
+            color=(230, 230, 230),
             wxyz=wxyz,
             position=position,
         )
+        self._frusta.append(frustum)
         frustum.on_click(lambda _: self._go_to(photograph.camera))
 
     def _go_to(self, camera: Camera) -> None:

@@ -51,9 +51,8 @@ class Viewer:
         self._camera, self._resolution = camera, resolution
         self._server = viser.ViserServer(host=LOOPBACK, port=port, verbose=False)
         # Sharing would send the page through a server of viser's makers.
-        self._server.gui.configure_theme(
-            control_layout="collapsible", show_logo=False, show_share_button=False, dark_mode=True
-        )
+        self._server.gui.configure_theme(show_logo=False, show_share_button=False, dark_mode=True)
+        self._server.gui.main_panel.dock_right()
         self._server.gui.set_panel_label("rgspipe")
         self._server.scene.set_up_direction("+z")
         self._server.on_client_connect(self._welcome)
