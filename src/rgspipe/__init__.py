@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from rgspipe.scene.lights import LedLight, Light, PanelLight, PointLight, SphereLight, SpotLight
     from rgspipe.scene.models import CornellBox, Corridor, exact_surfels
     from rgspipe.training.trainer import Trained, TrainOptions, train
+    from rgspipe.viewer.serve import Viewer, view
 
 #: Where the public names live; they are imported when first used, so that `import rgspipe` stays quick.
 _HOMES = {
@@ -63,6 +64,7 @@ _HOMES = {
     "scene.lights": ("LedLight", "Light", "PanelLight", "PointLight", "SphereLight", "SpotLight"),
     "scene.models": ("CornellBox", "Corridor", "exact_surfels"),
     "training.trainer": ("TrainOptions", "Trained", "train"),
+    "viewer.serve": ("Viewer", "view"),
 }
 
 __all__ = [
@@ -95,6 +97,7 @@ __all__ = [
     "TrainOptions",
     "Trained",
     "View",
+    "Viewer",
     "__version__",
     "ambient_image",
     "capture_scene",
@@ -112,6 +115,7 @@ __all__ = [
     "tone_map",
     "track_lights",
     "train",
+    "view",
     "write_lights",
 ]
 

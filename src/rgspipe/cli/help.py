@@ -128,6 +128,7 @@ More:
   --cfg job             show the whole configuration instead of running it
   debug.traceback=true  show tracebacks (or set RGSPIPE_TRACEBACK=1)
   status                how the runs so far ended; status NAME shows one, status state=failed some
+  view FOLDER           a frozen scene in the browser, where lamps are moved and found
   verify                read every result and say which were damaged since they were made
   --version             of rgspipe, Python and the libraries
   --hydra-help          options of Hydra, which reads the command line

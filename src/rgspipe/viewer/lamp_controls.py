@@ -1,0 +1,179 @@
+"""A visitor's lamps: a gizmo at each, and the fields of the one that is chosen."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import torch
+import viser
+
+from rgspipe.scene.lights import Light
+from rgspipe.viewer.cameras import axis_of, turned_to
+from rgspipe.viewer.session import OFFERED, Session
+
+#: Length of a gizmo's arms and radius of the ball in it, of the scene's size.
+ARMS, BALL = 0.12, 0.012
+
+#: Weakest level of a lamp that its colour can still be told at, W/sr.
+FAINT = 1e-9
+
+
+class LampControls:
+    """Gizmos and fields that change the lamps of a session.
+
+    Args:
+        client: the visitor.
+        session: whose lamps.
+        changed: is called after every change.
+    """
+
+    def __init__(self, client: viser.ClientHandle, session: Session, changed: Callable[[], None]) -> None:
+        self._client, self._session, self._changed = client, session, changed
+        self._chosen, self._gizmos, self._numbers = 0, [], []
+        gui = client.gui
+        self._which = gui.add_dropdown("lamp", ["none"], hint="The lamp that the fields below are about.")
+        buttons = (
+            ("add a lamp", "A lamp above the scene's middle; key N.", self.add),
+            ("remove it", "Take the chosen lamp away; key X.", self.remove),
+            ("undo", "Take the last change of lamps back; a whole drag counts as one. Key Z.", self.undo),
+        )
+        for name, hint, action in buttons:
+            gui.add_button(name, hint=hint).on_click(lambda _, action=action: action())
+        self._kind = gui.add_dropdown("kind", list(OFFERED), hint="Point, spot, sphere or panel, at the same place.")
+        self._place = gui.add_vector3("place", (0.0, 0.0, 0.0), step=0.01, hint="Scene units; or drag the gizmo.")
+        self._colour = gui.add_rgb("colour", (255, 255, 255), hint="Colour of the lamp; its brightest channel is 255.")
+        self._level = gui.add_number("W/sr", 1.0, min=0.0, step=0.01, hint="Intensity of the brightest channel.")
+        self._folder = gui.add_folder("shape")
+        self._which.on_update(self._by_visitor(self._choose))
+        self._kind.on_update(self._by_visitor(lambda: self._with(session.as_kind, self._kind.value)))
+        for field in (self._place, self._colour, self._level):
+            field.on_update(self._by_visitor(self._read))
+        self.refresh()
+
+    def add(self) -> None:
+        """A further lamp, chosen."""
+        self._chosen = self._session.add()
+        self._renew()
+
+    def remove(self) -> None:
+        """Take the chosen lamp away."""
+        self._with(self._session.remove)
+
+    def undo(self) -> None:
+        """Take the last change back."""
+        if self._session.undo():
+            self._renew()
+
+    def refresh(self) -> None:
+        """Show the session's lamps, as after a search."""
+        for gizmo in self._gizmos:
+            gizmo.remove()
+        lights = self._session.lights
+        self._chosen = min(self._chosen, max(len(lights) - 1, 0))
+        names = [f"{index + 1} {light.kind}" for index, light in enumerate(lights)] or ["none"]
+        self._which.options = names
+        self._which.value = names[self._chosen]
+        self._gizmos = [self._gizmo(index, light) for index, light in enumerate(lights)]
+        self._show_fields()
+
+    def _gizmo(self, index: int, light: Light) -> Any:
+        size, scene = self._session.images.frozen.size, self._client.scene
+        turn = (1.0, 0.0, 0.0, 0.0) if light.axis is None else turned_to(light.axis)
+        gizmo = scene.add_transform_controls(
+            f"/lamps/{index}",
+            scale=ARMS * size,
+            disable_rotations=light.axis is None,
+            depth_test=False,
+            position=tuple(light.position.tolist()),
+            wxyz=turn,
+        )
+        scene.add_icosphere(f"/lamps/{index}/ball", radius=BALL * size, color=_shown(light)[0])
+        gizmo.on_update(lambda event, index=index: self._dragged(index, event.target, event.phase))
+        return gizmo
+
+    def _dragged(self, index: int, gizmo: Any, phase: str) -> None:
+        if index >= len(self._session.lights):
+            return
+        light = self._session.lights[index]
+        axis = None if light.axis is None else axis_of(gizmo.wxyz)
+        self._session.replace(index, light.at(torch.tensor(np.asarray(gizmo.position)).double(), axis), f"drag {index}")
+        if phase == "end":
+            self._chosen = index
+            self._which.value = self._which.options[index]
+            self._show_fields()
+        self._changed()
+
+    def _show_fields(self) -> None:
+        for number in self._numbers:
+            number.remove()
+        self._numbers = []
+        lights = self._session.lights
+        self._folder.visible = bool(lights) and bool(lights[self._chosen].shape)
+        for field in (self._kind, self._place, self._colour, self._level):
+            field.disabled = not lights
+        if not lights:
+            return
+        light = lights[self._chosen]
+        self._kind.value = light.kind if light.kind in OFFERED else OFFERED[0]
+        self._place.value = tuple(round(x, 4) for x in light.position.tolist())
+        self._colour.value, self._level.value = _shown(light)
+        with self._folder:
+            self._numbers = [self._number(light, number) for number in light.shape]
+
+    def _number(self, light: Light, number: Any) -> Any:
+        value = number.shown(float(getattr(light, number.name)))
+        label = number.name.replace("_", " ") + (f" {number.unit}" if number.unit else "")
+        hint = f"The lamp's {number.name.replace('_', ' ')}{' in degrees' if number.unit == '°' else ''}."
+        step = 0.5 if number.unit == "°" else 0.005
+        field = self._client.gui.add_number(label, round(value, 4), step=step, hint=hint)
+        field.on_update(self._by_visitor(lambda: self._shape(number, field.value)))
+        return field
+
+    def _shape(self, number: Any, value: float) -> None:
+        light = self._session.lights[self._chosen]
+        try:
+            changed = light.changed(number.name, number.natural(value))
+        except ValueError:  # a number on the way to the one that is meant, such as -, or an impossible one
+            return
+        self._session.replace(self._chosen, changed, f"{number.name} {self._chosen}")
+        self._changed()
+
+    def _read(self) -> None:
+        light = self._session.lights[self._chosen]
+        colour = torch.tensor(self._colour.value).double() / 255.0
+        intensity = colour / colour.amax().clamp(min=1.0 / 255.0) * max(self._level.value, 0.0)
+        place = torch.tensor(self._place.value).double()
+        self._session.replace(self._chosen, light.at(place, None, intensity), f"fields {self._chosen}")
+        gizmo = self._gizmos[self._chosen]
+        gizmo.position = tuple(place.tolist())
+        self._changed()
+
+    def _choose(self) -> None:
+        self._chosen = self._which.options.index(self._which.value)
+        self._show_fields()
+
+    def _with(self, action: Callable[..., None], *given: Any) -> None:
+        if self._session.lights:
+            action(self._chosen, *given)
+            self._renew()
+
+    def _renew(self) -> None:
+        self.refresh()
+        self._changed()
+
+    @staticmethod
+    def _by_visitor(action: Callable[[], None]) -> Callable[[Any], None]:
+        """Fields also tell of values that the program gave them, which change nothing."""
+        return lambda event: action() if event.client is not None else None
+
+
+def _shown(light: Light) -> tuple[tuple[int, int, int], float]:
+    """A lamp's colour in bytes, the brightest channel 255, and that channel's intensity."""
+    level = float(light.intensity.amax())
+    if not (level > FAINT and math.isfinite(level)):
+        return (255, 255, 255), max(level, 0.0)
+    red, green, blue = (round(255.0 * x / level) for x in light.intensity.tolist())
+    return (red, green, blue), level

@@ -1,0 +1,125 @@
+"""What a visitor of the viewer changes, without any page."""
+
+from __future__ import annotations
+
+import pytest
+import torch
+
+from lit_room import VISIBLE, frozen_room, room_cameras
+from rgspipe.datasets.light_file import read_lights
+from rgspipe.errors import InputError
+from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.scene import PointLight
+from rgspipe.viewer.lamp_images import LampImages
+from rgspipe.viewer.session import OFFERED, Session, same_lights
+
+LAMP = PointLight(list(VISIBLE), [0.6, 0.5, 0.4])
+
+
+@pytest.fixture(scope="module")
+def frozen() -> FrozenScene:
+    return frozen_room()
+
+
+@pytest.fixture
+def session(frozen: FrozenScene) -> Session:
+    return Session(LampImages(frozen), (LAMP,))
+
+
+@pytest.mark.parametrize("kind", OFFERED)
+def test_the_picture_is_that_of_the_scene_under_all_lamps(session: Session, kind: str) -> None:
+    camera = room_cameras(32)[0]
+    index = session.add(kind)
+    session.replace(index, session.lights[index].at(torch.tensor([-0.2, 0.1, 0.2]).double()))
+    expected = session.images.frozen.render(camera, session.lights)
+    # The sum over lamps in float32 is 1.9e-7 of the brightest pixel off.
+    assert (session.image(camera) - expected).abs().max() < 1e-5 * expected.max()
+
+
+def test_a_colour_renders_nothing_and_a_moved_lamp_is_rendered_alone(
+    session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    camera, rendered = room_cameras(16)[0], []
+    made = session.images._rendered
+    monkeypatch.setattr(session.images, "_rendered", lambda *given: rendered.append(given) or made(*given))
+    session.add("spot")
+    session.image(camera, "soft")
+    assert len(rendered) == 2
+    session.replace(0, LAMP.at(LAMP.position, None, 2.0 * LAMP.intensity))
+    session.image(camera, "soft")
+    assert len(rendered) == 2
+    session.replace(0, LAMP.at(LAMP.position + 0.01))
+    session.image(camera, "soft")
+    assert len(rendered) == 3
+
+
+def test_a_drag_is_undone_as_one(session: Session) -> None:
+    for step in range(1, 4):
+        session.replace(0, LAMP.at(LAMP.position + 0.01 * step), "drag 0")
+    session.rest()
+    session.replace(0, LAMP.at(LAMP.position - 0.1), "drag 0")
+    assert session.undo()
+    assert torch.allclose(session.lights[0].position, LAMP.position + 0.03)
+    assert session.undo() and same_lights(session.lights, (LAMP,))
+    assert not session.undo()
+
+
+def test_lamps_come_go_and_change_their_kind(session: Session) -> None:
+    assert session.add("spot") == 1
+    session.as_kind(0, "panel")
+    assert [light.kind for light in session.lights] == ["panel", "spot"]
+    assert torch.equal(session.lights[0].position, LAMP.position)
+    session.remove(1)
+    session.undo()
+    assert len(session.lights) == 2
+
+
+def test_without_lamps_it_is_dark(frozen: FrozenScene) -> None:
+    session, camera = Session(LampImages(frozen)), room_cameras(8)[0]
+    assert not session.picture(camera)[0].any()
+    session.irradiance = True
+    session.picture(camera)
+
+
+def test_irradiance_is_the_radiance_of_white_surfaces_times_pi(session: Session) -> None:
+    camera = room_cameras(16)[0]
+    radiance = session.images.image(camera, session.lights, "soft")
+    session.irradiance = True
+    # All surfels have the albedo 0.6, 0.5, 0.4; float32 makes 3.0e-7 of a difference.
+    expected = radiance * torch.pi / torch.tensor([0.6, 0.5, 0.4])
+    assert torch.allclose(session.image(camera, "soft"), expected, rtol=1e-4, atol=1e-5)
+    picture, top = session.picture(camera)
+    assert picture.shape == (16, 16, 3) and top > 0
+
+
+def test_the_lamp_of_photographs_is_found_and_taken(session: Session) -> None:
+    for camera in room_cameras(32):
+        session.photograph(camera)
+    session.replace(0, LAMP.at(LAMP.position + 0.2))
+    assert session.compared(0).shape == (32, 96, 3)
+    session.take(session.search("point"))
+    # Found 2.7e-8 off.
+    assert torch.allclose(session.lights[0].position, LAMP.position, atol=1e-3)
+    assert same_lights(session.truth, (LAMP,))
+
+
+def test_photographs_of_other_lamps_are_dropped(session: Session) -> None:
+    camera = room_cameras(8)[0]
+    session.photograph(camera)
+    session.photograph(camera)
+    assert len(session.photographs) == 2
+    session.add("point")
+    session.photograph(camera)
+    assert len(session.photographs) == 1
+
+
+def test_a_search_without_photographs_is_refused(session: Session) -> None:
+    with pytest.raises(InputError, match="target=DIR"):
+        session.search()
+
+
+def test_lamps_and_a_still_are_saved(session: Session, tmp_path) -> None:
+    session.save(tmp_path / "lights.json")
+    assert same_lights(read_lights(tmp_path / "lights.json"), session.lights)
+    session.save_still(tmp_path / "still.png", room_cameras(8)[0])
+    assert (tmp_path / "still.png").stat().st_size > 0
