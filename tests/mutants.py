@@ -19,20 +19,23 @@ from PIL import Image
 
 from ply_files import gaussian_columns, radiosity_columns, write_ply
 from rgspipe.artifacts import ArtifactStore, Key
+from rgspipe.datasets.covariance_file import covariance_fields, read_covariances
 from rgspipe.datasets.exr import read_channels, write_channels, write_image
 from rgspipe.datasets.grade_file import load_grade, save_grade
 from rgspipe.datasets.images import read_colour
-from rgspipe.datasets.light_file import read_lights, write_lights
+from rgspipe.datasets.light_file import read_ambient, read_lights, write_lights
 from rgspipe.datasets.location import open_dataset
 from rgspipe.datasets.ply import read_ply
+from rgspipe.datasets.ply_cameras import read_viewpoints
 from rgspipe.datasets.ply_options import PlyOptions
 from rgspipe.datasets.surfel_file import load_surfels, save_surfels
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import Camera, PointLight, SpotLight
 from rgspipe.scene.gloss import Gloss
 from rgspipe.scene.grade import SceneGrade
+from rgspipe.scene.lights import LedLight, PanelLight, SphereLight
 from rooms import closed_box
-from tiny_dataset import write_tiny_dataset
+from tiny_dataset import HEIGHT, WIDTH, tiny_camera, write_tiny_dataset
 
 #: What a reader makes of a folder: all of its numbers.
 Numbers = Iterator[torch.Tensor]
@@ -91,8 +94,26 @@ def _lights(folder: Path) -> None:
     write_lights(folder / "a.json", (PointLight([0, 0, 1], 1.0), spot))
 
 
+def _extents(folder: Path) -> None:
+    """Lights with a shape, and the light from all around, as a fit writes them."""
+    place = [0.0, 0.0, 1.0]
+    lamps = (
+        SphereLight(place, 1.0, 0.1),
+        PanelLight(place, 1.0, [0, 0, -1], 0.2, 0.1, 0.3),
+        LedLight(place, 1.0, [0, 0, -1], 2.0),
+    )
+    spreads = covariance_fields(len(lamps), {"covariance": [torch.eye(3)] * len(lamps)})
+    write_lights(folder / "a.json", lamps, {"lights": spreads, "ambient": {"radiance": [0.1, 0.2, 0.3]}})
+
+
 def _read_lights(folder: Path) -> Numbers:
-    return (value for light in read_lights(folder / "a.json") for value in (light.position, light.intensity))
+    for light in read_lights(folder / "a.json"):
+        numbers = (value for value in light.file_fields().values() if not isinstance(value, str))
+        yield from (light.position, light.intensity, *(torch.as_tensor(value) for value in numbers))
+    ambient = read_ambient(folder / "a.json")
+    yield from () if ambient is None else (ambient,)
+    # Infinite variances are meant.
+    yield from (torch.nan_to_num(matrix, nan=torch.nan) for matrix in read_covariances(folder / "a.json"))
 
 
 def _read_dataset(folder: Path) -> Numbers:
@@ -100,7 +121,32 @@ def _read_dataset(folder: Path) -> Numbers:
     targets = [view for target in dataset.targets for view in target.views]
     for view in (*dataset.train, *dataset.test, *targets):
         yield from (view.image, view.alpha, view.camera.camera_to_world)
+        yield from (values for values in (view.base, view.normal, view.albedo) if values is not None)
         yield from () if view.light is None else (view.light.position, view.light.intensity)
+
+
+def _lamps_off(folder: Path) -> None:
+    """A target whose frame names its image with the lamps off, a mask, and where lamps are."""
+    write_tiny_dataset(folder)
+    target = folder / "targets/one"
+    write_image(target / "off.exr", np.full((HEIGHT, WIDTH, 3), 0.1))
+    Image.fromarray(np.full((HEIGHT, WIDTH), 255, np.uint8)).save(target / "mask.png")
+    content = json.loads((target / "transforms.json").read_text())
+    content["frames"][0] |= {"base_path": "off", "mask_path": "mask.png", "emitter_path": "mask.png"}
+    (target / "transforms.json").write_text(json.dumps(content))
+
+
+def _tensoir(folder: Path) -> None:
+    (folder / "train_000").mkdir()
+    pose = ",".join(str(value) for value in tiny_camera().camera_to_world.flatten().tolist())
+    camera = {"cam_transform_mat": pose, "cam_angle_x": 0.7, "imw": WIDTH, "imh": HEIGHT}
+    (folder / "train_000/metadata.json").write_text(json.dumps(camera))
+    for name in ("rgba_sunset", "albedo", "normal"):
+        Image.new("RGBA", (WIDTH, HEIGHT), (90, 60, 200, 255)).save(folder / f"train_000/{name}.png")
+
+
+def _viewpoints(folder: Path) -> None:
+    (folder / "cameras.json").write_text(json.dumps([{"position": [0.0, 1.0, 2.0]}] * 2))
 
 
 def _artifact(folder: Path) -> None:
@@ -120,6 +166,14 @@ def _read_artifact(folder: Path) -> Numbers:
 
 def _of_dataset(name: str) -> Kind:
     return Kind(name, write_tiny_dataset, _read_dataset)
+
+
+def _of_lamps_off(name: str) -> Kind:
+    return Kind(f"targets/one/{name}", _lamps_off, _read_dataset)
+
+
+def _of_tensoir(name: str) -> Kind:
+    return Kind(f"train_000/{name}", _tensoir, _read_dataset)
 
 
 def _of_frozen(name: str) -> Kind:
@@ -149,6 +203,7 @@ KINDS: dict[str, Kind] = {
     "PNG, palette": _image("a.png", "P"),
     "JPEG": _image("a.jpg", "RGB"),
     "light file": Kind("a.json", _lights, _read_lights),
+    "a fit's light file": Kind("a.json", _extents, _read_lights),
     "grade": Kind(
         "a.json",
         lambda folder: save_grade(folder / "a.json", SceneGrade(30.0, 8, 0.01, 0.1, 0.05, 0.01, 0.0, (0.1, 0.2, 0.3))),
@@ -167,6 +222,15 @@ KINDS: dict[str, Kind] = {
     "targets.json": _of_dataset("targets/targets.json"),
     "a target's views": _of_dataset("targets/one/transforms.json"),
     "depth": _of_dataset("train/r_0000_depth.exr"),
+    "normals": _of_dataset("train/r_0000_normal.exr"),
+    "views, lamps off": _of_lamps_off("transforms.json"),
+    "image, lamps off": _of_lamps_off("off.exr"),
+    "mask": _of_lamps_off("mask.png"),
+    "TensoIR, camera": _of_tensoir("metadata.json"),
+    "TensoIR, normals": _of_tensoir("normal.png"),
+    "cameras of a PLY": Kind(
+        "cameras.json", _viewpoints, lambda folder: iter(read_viewpoints(folder / "cameras.json"))
+    ),
     "manifest": Kind("room/freeze/aa/manifest.json", _artifact, _read_artifact),
 }
 
