@@ -19,7 +19,6 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from functools import cache, partial
-from pathlib import Path
 
 from rgspipe.cli.compose import compose_config
 from rgspipe.config import RgspipeConfig
@@ -66,6 +65,14 @@ def known() -> tuple[str, ...]:
     return (*_keys(plain(RgspipeConfig())), *groups)
 
 
+def _value(key: str) -> object:
+    """What a setting is by default; a group has no value."""
+    value = plain(RgspipeConfig())
+    for part in key.split("."):
+        value = value.get(part) if isinstance(value, Mapping) else None
+    return {None: "null", True: "true", False: "false"}.get(value, value) if not isinstance(value, dict | list) else "x"
+
+
 def _keys(values: Mapping, prefix: str = "") -> list[str]:
     found = []
     for key, value in values.items():
@@ -89,7 +96,9 @@ def _word(random_: random.Random) -> str:
         key = random_.choice("+~") * random_.randint(1, 2) + key
     elif kind < 0.35:
         return random_.choice([key, value, f"{key}:{value}", f"{key}=={value}", f"{key}@{value}={value}"])
-    elif kind < 0.6:
+    elif kind < 0.55:  # what is there anyway, where it is a plain value
+        value = str(_value(key))
+    elif kind < 0.75:
         value = str(random_.choice([random_.randint(-5, 5), random_.uniform(-2, 2), 10.0 ** random_.randint(-40, 40)]))
     return f"{key}={value}"
 
