@@ -9,7 +9,7 @@ TEST_WORKERS ?= 2
 ARGS ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup test test-slurm third-party crash fuzz smoke reproduce scenes train-study light-study bench docs lint house
+.PHONY: help setup test test-slurm third-party crash fuzz fuzz-commands smoke reproduce scenes train-study light-study bench docs lint house
 
 help:  ## this list
 	@echo "rgspipe: from images of a scene, find its lights"
@@ -42,6 +42,9 @@ crash: setup  ## power cuts while the whole way is made on a tiny scene: what th
 
 fuzz: setup  ## damaged files of every kind that is read: each is read or refused (a minute; ARGS="CASES SEED")
 	$(VENV)/bin/python tests/fuzz.py $(ARGS)
+
+fuzz-commands: setup  ## command lines made up by chance: each is right or refused with a remedy (minutes; ARGS="COMPOSED STARTED SEED")
+	$(VENV)/bin/python tests/command_lines.py $(ARGS)
 
 smoke: setup  ## the whole way on a tiny scene, in minutes
 	$(RGSPIPE) pipeline=smoke $(ARGS)

@@ -23,7 +23,8 @@ from types import FrameType
 
 import torch
 
-from mutants import KINDS, fresh, mutated
+from mutants import mutated
+from readable_files import KINDS, fresh
 from rgspipe.errors import InputError
 from rgspipe.progress import progress_bar
 

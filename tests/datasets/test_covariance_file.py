@@ -29,9 +29,17 @@ def test_a_file_without_covariances_has_none(tmp_path: Path) -> None:
     assert read_covariances(path) == ()
 
 
-@pytest.mark.parametrize("broken", [[["wide"]], [[1.0, 2.0], [3.0]], 7])
+@pytest.mark.parametrize("broken", [[["wide"]], [[1.0, 2.0], [3.0]], 7, [], [[1.0, 2.0]], [["nan"]], [[-1.0]]])
 def test_what_is_no_matrix_is_refused(tmp_path: Path, broken: object) -> None:
     path = tmp_path / "lights.json"
     path.write_text(json.dumps({"lights": [{"covariance": broken}]}))
     with pytest.raises(InputError, match="covariance"):
+        read_covariances(path)
+
+
+@pytest.mark.parametrize("lights", [5, {"x": []}, ["x"], None])
+def test_lights_that_are_no_objects_are_refused(tmp_path: Path, lights: object) -> None:
+    path = tmp_path / "lights.json"
+    path.write_text(json.dumps({"lights": lights}))
+    with pytest.raises(InputError, match="lights: expected a list of objects"):
         read_covariances(path)

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 import torch
 
-from rgspipe.datasets.light_file import read_lights, write_lights
+from rgspipe.datasets.light_file import read_ambient, read_lights, write_lights
 from rgspipe.errors import InputError
 from rgspipe.scene import PointLight, SpotLight
 
@@ -70,6 +70,9 @@ def test_further_fields_cannot_replace_the_format_s_own(tmp_path: Path) -> None:
         ),
         ({"position": [0, 0, 1e308]}, r"lights\[0\]\.position.*within"),
         ({"intensity": [1, 1e308, 1]}, r"lights\[0\]\.intensity.*up to|from 0 to"),
+        ({"type": "sphere", "radius": 1e308}, r"lights\[0\]\.radius.*within"),
+        ({"type": "panel", "direction": [0, 0, 1], "width": 1e11, "height": 1, "turn": 0}, r"\.width.*within"),
+        ({"type": "led", "direction": [0, 0, 1], "exponent": 1e200}, r"\.exponent.*within"),
         ({"type": "spot", "direction": [0, 0, 1], "profile": "cosine"}, "profile.*gaussian or smoothstep or linear"),
         ({"type": "spot", "direction": [0, 0, 1], "profile": "gaussian", "cone_angle": 1}, '"falloff"'),
     ],
@@ -104,3 +107,11 @@ def test_a_missing_file_is_named(tmp_path: Path) -> None:
 def test_a_tiny_direction_keeps_its_way(tmp_path: Path) -> None:
     (light,) = read_lights(_write(tmp_path / "lights.json", type="led", direction=[0, 3e-300, 4e-300], exponent=1))
     torch.testing.assert_close(light.direction, _vector(0.0, 0.6, 0.8), rtol=0, atol=1e-15)  # measured: 1.1e-16
+
+
+@pytest.mark.parametrize("ambient", [7, [1, 2, 3], None, "radiance", {}, {"radiance": [1, 1e30, 1]}])
+def test_what_is_wrong_with_ambient_light_is_named(tmp_path: Path, ambient: object) -> None:
+    path = tmp_path / "lights.json"
+    path.write_text(json.dumps({"version": 1, "lights": [], "ambient": ambient}))
+    with pytest.raises(InputError, match="ambient"):
+        read_ambient(path)

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from mutants import KINDS, fresh, mutated
+from mutants import mutated
+from readable_files import KINDS, fresh
 from rgspipe.errors import InputError
 
 #: Mutants of each kind of file; seeded, so that every run sees the same. `make fuzz` reads many more.

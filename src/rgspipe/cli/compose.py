@@ -13,7 +13,7 @@ from hydra import compose, initialize_config_dir
 from hydra.core.config_store import ConfigStore
 from hydra.core.global_hydra import GlobalHydra
 from hydra.core.override_parser.overrides_parser import OverridesParser
-from hydra.core.override_parser.types import Override
+from hydra.core.override_parser.types import Override, QuotedString
 from hydra.errors import HydraException, MissingConfigException, OverrideParseException
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
@@ -91,6 +91,7 @@ def compose_config(overrides: Sequence[str]) -> RgspipeConfig:
     parsed = _parse(overrides)
     _check_keys(parsed)
     _check_single(parsed)
+    _check_choices(parsed)
     try:
         return typed(_compose(overrides))
     except (HydraException, OmegaConfBaseException) as error:
@@ -232,6 +233,19 @@ def _check_single(overrides: Sequence[Override]) -> None:
             key, _, found = (override.input_line or "").partition("=")
             remedy = "Add -m to run one job for each value, or write a list as [a,b]."
             raise InputError(key, expected="one value", found=found, remedy=remedy)
+
+
+def _check_choices(overrides: Sequence[Override]) -> None:
+    """Refuse what is no name as the choice of a group: Hydra raises a bare error, or none."""
+    for override in overrides:
+        key = override.key_or_group
+        folder = resource_folder("conf") / key
+        is_group = key.startswith("hydra/") or ("." not in key and folder.is_dir())
+        if not is_group or isinstance(override.value(), str | QuotedString):
+            continue
+        options = ", ".join(sorted(path.stem for path in folder.glob("*.yaml"))) or "those that Hydra has"
+        found = (override.input_line or "").partition("=")[2]
+        raise InputError(key, expected=f"one of {options}", found=found, remedy=f"Choose one: {key}=NAME.")
 
 
 def _composition_error(error: Exception, overrides: Sequence[str]) -> InputError:

@@ -9,7 +9,7 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
-from rgspipe.datasets.json_file import read_json
+from rgspipe.datasets.json_file import read_json, shown
 from rgspipe.errors import InputError
 
 
@@ -22,21 +22,30 @@ def read_covariances(path: str | Path) -> tuple[Tensor, ...]:
     """The float64 covariance of each light of a fit's light file; empty if it has none.
 
     Raises:
-        InputError: it is not rows of numbers.
+        InputError: the lights are no list of objects, or a covariance is no square of numbers with variances ≥ 0.
     """
     lights = read_json(path, "a fit's light file").get("lights", [])
+    if not isinstance(lights, list) or not all(isinstance(light, dict) for light in lights):
+        raise _refusal(path, "lights", "a list of objects", shown(lights))
     if not all("covariance" in light for light in lights):
         return ()
+    return tuple(_matrix(light["covariance"], path) for light in lights)
+
+
+def _matrix(rows: object, path: str | Path) -> Tensor:
     try:
         # float() reads "inf", too.
-        return tuple(
-            torch.tensor([[float(value) for value in row] for row in light["covariance"]], dtype=torch.float64)
-            for light in lights
-        )
+        matrix = torch.tensor([[float(value) for value in row] for row in rows], dtype=torch.float64)
     except (TypeError, ValueError) as error:
-        raise InputError(
-            f"{path}: covariance", expected="rows of numbers", found=str(error), remedy="Make the fit again."
-        ) from None
+        raise _refusal(path, "covariance", "rows of numbers", str(error)) from None
+    square = matrix.ndim == 2 and matrix.shape[0] == matrix.shape[1]
+    if not square or matrix.isnan().any() or (matrix.diagonal() < 0).any():
+        raise _refusal(path, "covariance", "as many rows as columns, with variances ≥ 0", shown(rows))
+    return matrix
+
+
+def _refusal(path: str | Path, key: str, expected: str, found: str) -> InputError:
+    return InputError(f"{path}: {key}", expected=expected, found=found, remedy="Make the fit again.")
 
 
 def _rows(matrix: Tensor) -> list[list[float | str]]:

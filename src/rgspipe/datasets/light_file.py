@@ -9,7 +9,7 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
-from rgspipe.datasets.json_file import is_number, numbers, read_json, required
+from rgspipe.datasets.json_file import is_number, numbers, read_json, required, shown
 from rgspipe.datasets.limits import FARTHEST, STRONGEST
 from rgspipe.errors import InputError
 from rgspipe.files import write_json
@@ -52,6 +52,9 @@ def read_ambient(path: str | Path) -> Tensor | None:
     if AMBIENT not in content:
         return None
     place = f"{path}: {AMBIENT}"
+    if not isinstance(content[AMBIENT], dict):
+        expected, found = f'an object with "{RADIANCE}"', shown(content[AMBIENT])
+        raise InputError(place, expected=expected, found=found, remedy="Correct it.")
     radiance = numbers(required(content[AMBIENT], RADIANCE, place), 3, place, RADIANCE)
     if min(radiance) < 0 or max(radiance) > STRONGEST:
         expected = f"radiance from 0 to {STRONGEST:g}"
@@ -128,6 +131,8 @@ class _Fields:
         value = required(self.fields, key, self.place)
         if not is_number(value):
             raise self.refusal(key, "a number", repr(value))
+        if abs(value) > FARTHEST:
+            raise self.refusal(key, f"a number within ±{FARTHEST:g}", repr(value))
         return float(value)
 
     def choice(self, key: str, names: Sequence[str]) -> str:

@@ -92,4 +92,7 @@ def _coverage(path: Path, note: Any) -> Coverage:
     if not isinstance(values, dict) or set(values) != set(names) or not all(map(is_number, values.values())):
         wanted = f"coverage with the numbers {', '.join(names)}"
         raise InputError(path, expected=wanted, found=repr(values)[:120], remedy=MAKE_AGAIN)
-    return Coverage(**values)
+    try:
+        return Coverage(**values)
+    except ValueError as error:
+        raise InputError(path, expected="a coverage that can be", found=str(error), remedy=MAKE_AGAIN) from None

@@ -1,0 +1,286 @@
+"""Files of every kind that is read, each with what writes it and what reads it."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import tempfile
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from PIL import Image
+
+from ply_files import gaussian_columns, radiosity_columns, write_ply
+from rgspipe.artifacts import ArtifactStore, Key
+from rgspipe.datasets.covariance_file import covariance_fields, read_covariances
+from rgspipe.datasets.exr import read_channels, write_channels, write_image
+from rgspipe.datasets.grade_file import load_grade, save_grade
+from rgspipe.datasets.gs3 import load_dataset
+from rgspipe.datasets.images import read_colour
+from rgspipe.datasets.light_file import read_ambient, read_lights, write_lights
+from rgspipe.datasets.location import open_dataset
+from rgspipe.datasets.ply import read_ply
+from rgspipe.datasets.ply_cameras import read_viewpoints
+from rgspipe.datasets.ply_options import PlyOptions
+from rgspipe.datasets.scans.importing import import_scan
+from rgspipe.datasets.scans.layouts import read_scan
+from rgspipe.datasets.scans.options import ScanOptions
+from rgspipe.datasets.surfel_file import load_surfels, save_surfels
+from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.scene import Camera, PointLight, SpotLight
+from rgspipe.scene.gloss import Gloss
+from rgspipe.scene.grade import SceneGrade
+from rgspipe.scene.lights import LedLight, PanelLight, SphereLight
+from rooms import closed_box
+from scan_layouts import (
+    photographed,
+    write_colmap,
+    write_nerfstudio,
+    write_polycam,
+    write_replica,
+    write_scannet,
+)
+from tiny_dataset import HEIGHT, WIDTH, tiny_camera, write_tiny_dataset
+
+#: What a reader makes of a folder: all of its numbers.
+Numbers = Iterator[torch.Tensor]
+
+#: Photographs of a capture.
+SCANNED = photographed(2, 8)
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of file.
+
+    Attributes:
+        file: the one that is changed, in the folder.
+        make: writes it, and what belongs to it, into an empty folder.
+        read: reads the folder.
+    """
+
+    file: str
+    make: Callable[[Path], object]
+    read: Callable[[Path], Numbers]
+
+
+def _image(name: str, mode: str) -> Kind:
+    def make(folder: Path) -> None:
+        values = np.random.default_rng(0).integers(0, 256, (8, 8, 4), dtype=np.uint8)
+        Image.fromarray(values).convert(mode).save(folder / name)
+
+    return Kind(name, make, lambda folder: iter(read_colour(folder / name)))
+
+
+def _surfels(folder: Path) -> None:
+    box = closed_box(0.5).to(torch.float32)
+    gloss = Gloss(torch.full((len(box), 3), 0.1), torch.full((len(box),), 20.0))
+    save_surfels(folder / "a.safetensors", type(box)(**box.tensors(), coverage=box.coverage, gloss=gloss))
+
+
+def _read_surfels(folder: Path) -> Numbers:
+    return iter(load_surfels(folder / "a.safetensors").tensors().values())
+
+
+def _frozen(folder: Path) -> None:
+    FrozenScene.freeze(closed_box(0.5), gather_rays=8, patches=4).with_dictionary(2).save(folder)
+    save_grade(folder / "grade.json", SceneGrade(30.0, 8, 0.01, 0.1, 0.05, 0.01, 0.0, (0.1, 0.2, 0.3)))
+
+
+def _read_frozen(folder: Path) -> Numbers:
+    scene = FrozenScene.load(folder, gather=True)
+    yield from (*scene.surfels.tensors().values(), scene.areas, scene.centers, scene.transport.inverse)
+    yield from (scene.candidates.positions, scene.candidates.irradiance)
+    # Sparse parts are used, as indices out of range crash nothing before.
+    yield scene.render(
+        Camera.look_at([0.0, 0.0, 0.0], [0.5, 0, 0], width=4, height=4), PointLight([0.1, 0.1, 0.1], 1.0)
+    )
+
+
+def _lights(folder: Path) -> None:
+    spot = SpotLight([0, 1, 0], 2.0, [0, 0, -1], "linear", 0.5, 0.2)
+    write_lights(folder / "a.json", (PointLight([0, 0, 1], 1.0), spot))
+
+
+def _extents(folder: Path) -> None:
+    """Lights with a shape, and the light from all around, as a fit writes them."""
+    place = [0.0, 0.0, 1.0]
+    lamps = (
+        SphereLight(place, 1.0, 0.1),
+        PanelLight(place, 1.0, [0, 0, -1], 0.2, 0.1, 0.3),
+        LedLight(place, 1.0, [0, 0, -1], 2.0),
+    )
+    spreads = covariance_fields(len(lamps), {"covariance": [torch.eye(3)] * len(lamps)})
+    write_lights(folder / "a.json", lamps, {"lights": spreads, "ambient": {"radiance": [0.1, 0.2, 0.3]}})
+
+
+def _read_lights(folder: Path) -> Numbers:
+    for light in read_lights(folder / "a.json"):
+        numbers = (value for value in light.file_fields().values() if not isinstance(value, str))
+        yield from (light.position, light.intensity, *(torch.as_tensor(value) for value in numbers))
+    ambient = read_ambient(folder / "a.json")
+    yield from () if ambient is None else (ambient,)
+    # Infinite variances are meant.
+    yield from (torch.nan_to_num(matrix, nan=torch.nan) for matrix in read_covariances(folder / "a.json"))
+
+
+def _read_dataset(folder: Path) -> Numbers:
+    dataset = open_dataset(folder)
+    targets = [view for target in dataset.targets for view in target.views]
+    for view in (*dataset.train, *dataset.test, *targets):
+        yield from (view.image, view.alpha, view.camera.camera_to_world)
+        yield from (values for values in (view.base, view.normal, view.albedo) if values is not None)
+        yield from () if view.light is None else (view.light.position, view.light.intensity)
+
+
+def _lamps_off(folder: Path) -> None:
+    """A target whose frame names its image with the lamps off, a mask, and where lamps are."""
+    write_tiny_dataset(folder)
+    target = folder / "targets/one"
+    write_image(target / "off.exr", np.full((HEIGHT, WIDTH, 3), 0.1))
+    Image.fromarray(np.full((HEIGHT, WIDTH), 255, np.uint8)).save(target / "mask.png")
+    content = json.loads((target / "transforms.json").read_text())
+    content["frames"][0] |= {"base_path": "off", "mask_path": "mask.png", "emitter_path": "mask.png"}
+    (target / "transforms.json").write_text(json.dumps(content))
+
+
+def _tensoir(folder: Path) -> None:
+    (folder / "train_000").mkdir()
+    pose = ",".join(str(value) for value in tiny_camera().camera_to_world.flatten().tolist())
+    camera = {"cam_transform_mat": pose, "cam_angle_x": 0.7, "imw": WIDTH, "imh": HEIGHT}
+    (folder / "train_000/metadata.json").write_text(json.dumps(camera))
+    for name in ("rgba_sunset", "albedo", "normal"):
+        Image.new("RGBA", (WIDTH, HEIGHT), (90, 60, 200, 255)).save(folder / f"train_000/{name}.png")
+
+
+def _viewpoints(folder: Path) -> None:
+    (folder / "cameras.json").write_text(json.dumps([{"position": [0.0, 1.0, 2.0]}] * 2))
+
+
+def _artifact(folder: Path) -> None:
+    def write(made: Path) -> dict:
+        (made / "x").write_text("1")
+        return {}
+
+    ArtifactStore(folder).build(Key("room", "freeze", "aa"), {"config": {}, "inputs": {}, "code": {}}, write)
+
+
+def _read_artifact(folder: Path) -> Numbers:
+    artifact = ArtifactStore(folder).find(Key("room", "freeze", "aa"))
+    if artifact is not None:
+        artifact.folder()
+    return iter(())
+
+
+def _of_dataset(name: str) -> Kind:
+    return Kind(name, write_tiny_dataset, _read_dataset)
+
+
+def _of_scan(file: str, write: Callable[[Path], None]) -> Kind:
+    """A file of a capture of two photographs, which is imported."""
+
+    def read(folder: Path) -> Numbers:
+        options = ScanOptions(resolution=8)
+        with tempfile.TemporaryDirectory(dir=folder.parent) as made:
+            import_scan(read_scan(folder, options), options, Path(made))
+            views = load_dataset(made, targets=False).train
+        return iter([view.image for view in views] + [view.camera.camera_to_world for view in views])
+
+    return Kind(file, write, read)
+
+
+def _colmap_map(root: Path) -> None:
+    write_colmap(root, SCANNED, True, depth=False)
+    path = root / "stereo/depth_maps/00.exr.geometric.bin"
+    path.parent.mkdir(parents=True)
+    path.write_bytes(b"8&8&1&" + SCANNED[0].depth.numpy().astype("<f4").tobytes())
+
+
+def _of_lamps_off(name: str) -> Kind:
+    return Kind(f"targets/one/{name}", _lamps_off, _read_dataset)
+
+
+def _of_tensoir(name: str) -> Kind:
+    return Kind(f"train_000/{name}", _tensoir, _read_dataset)
+
+
+def _of_frozen(name: str) -> Kind:
+    return Kind(name, _frozen, _read_frozen)
+
+
+def _ply(columns: Callable[[], dict], text: bool = False) -> Kind:
+    return Kind(
+        "a.ply",
+        lambda folder: write_ply(folder / "a.ply", columns(), text=text),
+        lambda folder: iter(read_ply(folder / "a.ply", PlyOptions()).surfels.tensors().values()),
+    )
+
+
+KINDS: dict[str, Kind] = {
+    "EXR": Kind(
+        "a.exr",
+        lambda folder: write_image(folder / "a.exr", np.ones((8, 8, 3)), np.ones((8, 8))),
+        lambda folder: iter(read_colour(folder / "a.exr")),
+    ),
+    "EXR channels": Kind(
+        "a.exr",
+        lambda folder: write_channels(folder / "a.exr", {"Z": np.ones((8, 8), np.float32)}),
+        lambda folder: (torch.from_numpy(np.zeros_like(one)) for one in read_channels(folder / "a.exr").values()),
+    ),
+    "PNG": _image("a.png", "RGBA"),
+    "PNG, palette": _image("a.png", "P"),
+    "JPEG": _image("a.jpg", "RGB"),
+    "light file": Kind("a.json", _lights, _read_lights),
+    "a fit's light file": Kind("a.json", _extents, _read_lights),
+    "grade": Kind(
+        "a.json",
+        lambda folder: save_grade(folder / "a.json", SceneGrade(30.0, 8, 0.01, 0.1, 0.05, 0.01, 0.0, (0.1, 0.2, 0.3))),
+        lambda folder: iter([torch.tensor(load_grade(folder / "a.json").error)]),
+    ),
+    "PLY, 3DGS": _ply(gaussian_columns),
+    "PLY, text": _ply(gaussian_columns, text=True),
+    "PLY, RadiosityGS": _ply(radiosity_columns),
+    "surfels": Kind("a.safetensors", _surfels, _read_surfels),
+    "frozen: transport": _of_frozen("transport.safetensors"),
+    "frozen: gather": _of_frozen("gather.safetensors"),
+    "frozen: dictionary": _of_frozen("dictionary.safetensors"),
+    "training views": _of_dataset("transforms_train.json"),
+    "test views": _of_dataset("transforms_test.json"),
+    "dataset_info.json": _of_dataset("dataset_info.json"),
+    "targets.json": _of_dataset("targets/targets.json"),
+    "a target's views": _of_dataset("targets/one/transforms.json"),
+    "depth": _of_dataset("train/r_0000_depth.exr"),
+    "scan: nerfstudio": _of_scan("transforms.json", lambda root: write_nerfstudio(root, SCANNED, ".png", ".png")),
+    "scan: wide PNG": _of_scan("images/0.16.png", lambda root: write_nerfstudio(root, SCANNED, ".16.png", ".png")),
+    "scan: depth": _of_scan("depth/0.png", lambda root: write_nerfstudio(root, SCANNED, ".png", ".png")),
+    "scan: Polycam": _of_scan(
+        "keyframes/corrected_cameras/1000.json", lambda root: write_polycam(root, *2 * [SCANNED])
+    ),
+    "scan: COLMAP cameras": _of_scan("sparse/0/cameras.bin", lambda root: write_colmap(root, SCANNED, True)),
+    "scan: COLMAP images": _of_scan("sparse/0/images.bin", lambda root: write_colmap(root, SCANNED, True)),
+    "scan: COLMAP text": _of_scan("sparse/0/images.txt", lambda root: write_colmap(root, SCANNED, False)),
+    "scan: COLMAP map": _of_scan("stereo/depth_maps/00.exr.geometric.bin", _colmap_map),
+    "scan: Replica": _of_scan("traj.txt", lambda root: write_replica(root, SCANNED)),
+    "scan: ScanNet": _of_scan("intrinsic/intrinsic_color.txt", lambda root: write_scannet(root, SCANNED)),
+    "normals": _of_dataset("train/r_0000_normal.exr"),
+    "views, lamps off": _of_lamps_off("transforms.json"),
+    "image, lamps off": _of_lamps_off("off.exr"),
+    "mask": _of_lamps_off("mask.png"),
+    "TensoIR, camera": _of_tensoir("metadata.json"),
+    "TensoIR, normals": _of_tensoir("normal.png"),
+    "cameras of a PLY": Kind(
+        "cameras.json", _viewpoints, lambda folder: iter(read_viewpoints(folder / "cameras.json"))
+    ),
+    "manifest": Kind("room/freeze/aa/manifest.json", _artifact, _read_artifact),
+}
+
+
+def fresh(kind: Kind, folder: Path) -> bytes:
+    """Make the files of a kind in a folder that is emptied before; what is in the one that is changed."""
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    kind.make(folder)
+    return (folder / kind.file).read_bytes()
