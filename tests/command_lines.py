@@ -119,7 +119,8 @@ def composed(seed: int, index: int) -> tuple[str, str]:
 def _helps(error: InputError, words: Sequence[str]) -> bool:
     """Whether an error is one paragraph with a remedy that names something of the command line, or what is missing."""
     text = str(error)
-    names = {part for word in words for part in word.lstrip("+~").partition("=")[0].split(".")} | {"stage"}
+    names = {part for word in words for part in word.lstrip("+~").partition("=")[0].split(".")}
+    names |= {"stage", *map(repr, words)}
     return bool(error.remedy) and "\n" not in text and any(name and name in text for name in names)
 
 
@@ -149,7 +150,8 @@ def process(seed: int, index: int) -> tuple[str, str]:
     told = ended.stderr.decode(errors="replace")
     if ended.returncode == 0 and "Traceback" not in told:
         return "done", ""
-    if ended.returncode == 2 and "Traceback" not in told and "Error: " in told:
+    # Options that Hydra does not have are refused by argparse, with a small e.
+    if ended.returncode == 2 and "Traceback" not in told and "rror: " in told:
         return "refused", ""
     return "fell", f"{words} {extra}\nexit status {ended.returncode}\n{told[-2000:]}"
 

@@ -92,6 +92,16 @@ def test_a_damaged_manifest_is_refused_by_name(tmp_path: Path, content: str | No
         ArtifactStore(tmp_path).find(KEY)
 
 
+@pytest.mark.parametrize("name", ["", "../x", "/x", "sub/../../x", "x" * 5000, "\ud800" * 300])
+def test_a_manifest_that_names_files_elsewhere_or_that_cannot_be_is_refused(tmp_path: Path, name: str) -> None:
+    path = built(tmp_path).path / "manifest.json"
+    manifest = json.loads(path.read_text())
+    manifest["files"][name] = manifest["files"]["note.txt"]
+    path.write_text(json.dumps(manifest))
+    with pytest.raises(InputError, match=r"manifest\.json"):
+        ArtifactStore(tmp_path).find(KEY)
+
+
 def test_a_file_that_never_was_is_a_programming_mistake(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"note\.txt"):
         built(tmp_path).file("other.txt")

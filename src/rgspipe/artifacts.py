@@ -25,7 +25,7 @@ from typing import Any
 from filelock import FileLock, Timeout
 
 from rgspipe.errors import InputError
-from rgspipe.files import UNWRITABLE, make_folder, point_at, publish, sha256, write_json
+from rgspipe.files import LONGEST_NAME, UNWRITABLE, make_folder, point_at, publish, sha256, write_json
 from rgspipe.machine import PeakMemory, library_versions, machine
 from rgspipe.strict_json import parse_json
 
@@ -258,12 +258,20 @@ def _inventory(folder: Path) -> dict[str, dict[str, Any]]:
 def _is_whole(manifest: Mapping[str, Any]) -> bool:
     """Whether a manifest has what is asked of it later."""
     files, facts = manifest.get("files"), manifest.get("facts")
-    if not isinstance(files, dict) or not isinstance(facts, dict):
+    if not isinstance(files, dict) or not isinstance(facts, dict) or not all(map(_lies_within, files)):
         return False
     kinds = {"bytes": int, "sha256": str}
     return all(
         isinstance(entry, dict) and all(isinstance(entry.get(name), kind) for name, kind in kinds.items())
         for entry in files.values()
+    )
+
+
+def _lies_within(name: str) -> bool:
+    """Whether a name can be that of a file within a folder."""
+    parts = name.split("/")
+    return not {"", ".", ".."} & set(parts) and all(
+        len(part.encode(errors="replace")) <= LONGEST_NAME for part in parts
     )
 
 

@@ -21,6 +21,9 @@ UNWRITABLE = NO_ROOM + NO_RIGHT
 #: Characters of a file's name that the one it is written under repeats: names may have 255 bytes.
 LONGEST_STEM = 40
 
+#: The longest name of a file or folder that is taken, bytes: file systems take 255, and one in the making is longer.
+LONGEST_NAME = 200
+
 
 @contextlib.contextmanager
 def replacing(path: str | Path) -> Iterator[Path]:

@@ -46,3 +46,9 @@ def test_a_given_folder_that_cannot_be_made_is_refused() -> None:
 def test_no_job_at_once_is_refused() -> None:
     with pytest.raises(InputError, match=r"n_jobs"):
         run_jobs(["stage=freeze", "seed=1,2", "hydra.launcher.n_jobs=0"], load_stage, multirun=True)
+
+
+def test_a_launcher_that_is_no_name_is_refused() -> None:
+    """Whether runs leave the machine is asked before anything is composed."""
+    with pytest.raises(InputError, match="launcher=NAME"):
+        run_jobs(["stage=freeze", "launcher=null"], load_stage, multirun=False)

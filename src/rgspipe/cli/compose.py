@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
@@ -139,9 +139,11 @@ def given_folder(overrides: Sequence[str], mode: str) -> Path | None:
 
 def leaves_machine(overrides: Sequence[str]) -> bool:
     """Whether the command line names a launcher that sends jobs to a cluster, where single runs are to go too."""
-    named = [override.input_line or "" for override in _parse(overrides) if override.key_or_group in LAUNCHER_GROUPS]
-    if not named:
+    launchers = [override for override in _parse(overrides) if override.key_or_group in LAUNCHER_GROUPS]
+    if not launchers:
         return False
+    _check_choices(override for override in launchers if not override.is_sweep_override())
+    named = [override.input_line or "" for override in launchers]
     try:
         return str(_compose(named, hydra=True).hydra.launcher._target_) == SLURM_LAUNCHER
     except HydraException as error:
@@ -235,13 +237,14 @@ def _check_single(overrides: Sequence[Override]) -> None:
             raise InputError(key, expected="one value", found=found, remedy=remedy)
 
 
-def _check_choices(overrides: Sequence[Override]) -> None:
+def _check_choices(overrides: Iterable[Override]) -> None:
     """Refuse what is no name as the choice of a group: Hydra raises a bare error, or none."""
     for override in overrides:
         key = override.key_or_group
         folder = resource_folder("conf") / key
         is_group = key.startswith("hydra/") or ("." not in key and folder.is_dir())
-        if not is_group or isinstance(override.value(), str | QuotedString):
+        value = override.value()
+        if not is_group or (isinstance(value, str | QuotedString) and "${" not in str(value)):
             continue
         options = ", ".join(sorted(path.stem for path in folder.glob("*.yaml"))) or "those that Hydra has"
         found = (override.input_line or "").partition("=")[2]

@@ -6,12 +6,10 @@ import stat
 from pathlib import Path
 
 from rgspipe.errors import InputError
+from rgspipe.files import LONGEST_NAME
 
 #: Pixels of the largest image that is read; decoded, it takes 1.2 GB.
 MOST_PIXELS = 100_000_000
-
-#: The longest name of a target, bytes: file systems take 255, and a name in the making is longer.
-LONGEST_NAME = 200
 
 
 def input_file(path: str | Path, expected: str, *, most_bytes: int | None = None) -> Path:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import torch
 from torch import Tensor
+from torch.autograd.functional import jacobian
 
 from rgspipe.renderer.unit_light import UnitLight
 from rgspipe.scene.lights import Light
@@ -34,28 +35,35 @@ class Part:
         return torch.cat([by[name] for name in _fields(self.light)], dim=1)
 
 
-def added(light: UnitLight, columns: Callable[[UnitLight], tuple[Tensor, ...]]) -> tuple[Tensor, ...]:
-    """Columns (…, 1 + D) of a light from those of lights in one point, added up over the points that it is made of."""
-    parts = parts_of(light)
+def added(
+    light: UnitLight, columns: Callable[[UnitLight], tuple[Tensor, ...]], few: bool = False
+) -> tuple[Tensor, ...]:
+    """Columns (…, 1 + D) of a light from those of lights in one point, added up over the points that it is made of.
+
+    Args:
+        few: whether of few points, see `Light.nodes`.
+    """
+    parts = parts_of(light, few)
     if parts is None:
         return columns(light)
     seen = ([one @ part.chain.to(one) for one in columns(part)] for part in parts)
     return tuple(map(sum, zip(*seen, strict=True)))
 
 
-def parts_of(light: UnitLight) -> list[Part] | None:
+def parts_of(light: UnitLight, few: bool = False) -> list[Part] | None:
     """The points that a light is made of, and how they move with its numbers; None of a light in one point."""
-    lights = light.light.parts()
+    lights = light.light.parts(few)
     if len(lights) == 1:
         return None
     places, share = light.light.places(), 1.0 / len(lights)
 
-    def numbers(values: dict[str, Tensor]) -> Tensor:
-        nodes = light.light.nodes(values)
+    def numbers(*values: Tensor) -> Tensor:
+        nodes = light.light.nodes(dict(zip(places, values, strict=True)), few)
         axes = [] if nodes.direction is None else [nodes.direction.expand_as(nodes.positions)]
         return torch.cat([nodes.positions, *axes], dim=1)
 
-    by_field = torch.func.jacfwd(numbers)(places)
+    # Backwards, as torch.func takes 3 s to be imported.
+    by_field = dict(zip(places, jacobian(numbers, tuple(places.values())), strict=True))
     rows, count = len(lights), 3 * len(_fields(lights[0]))
     flat = {name: by.reshape(rows * count, *by.shape[2:]) for name, by in by_field.items()}
     moved = light.slopes(flat).reshape(rows, count, -1)

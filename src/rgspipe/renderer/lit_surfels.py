@@ -65,9 +65,11 @@ def shadow_origin(bvh: SurfelBvh, light: Light) -> Tensor:
     return light.position + away * torch.nn.functional.normalize(light.axis, dim=0)
 
 
-def lit_columns(bvh: SurfelBvh, light: UnitLight, effects: Effects, least: float | None = None) -> Tensor:
-    """`LitSurfels.columns` (N, 1 + D) of a light that may have an extent."""
-    (columns,) = added(light, lambda part: (lit_surfels(bvh, part, effects, least).columns,))
+def lit_columns(
+    bvh: SurfelBvh, light: UnitLight, effects: Effects, least: float | None = None, few: bool = False
+) -> Tensor:
+    """`LitSurfels.columns` (N, 1 + D) of a light that may have an extent, of few points if asked for."""
+    (columns,) = added(light, lambda part: (lit_surfels(bvh, part, effects, least).columns,), few)
     return columns
 
 

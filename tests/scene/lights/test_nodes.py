@@ -12,8 +12,8 @@ from torch import Tensor
 
 from rgspipe.scene import Light
 from rgspipe.scene.lights import PanelLight, PointLight, SphereLight
-from rgspipe.scene.lights.nodes import ball_nodes
-from rgspipe.scene.lights.panel import sides
+from rgspipe.scene.lights.nodes import ball_nodes, square_nodes
+from rgspipe.scene.lights.panel import SIDE, sides
 
 MIDDLE = torch.tensor([0.2, -0.1, 0.4], dtype=torch.float64)
 
@@ -103,3 +103,12 @@ def test_its_points_share_its_intensity(light: Light) -> None:
 def test_sizes_below_zero_are_refused(kind: type[Light], values: tuple) -> None:
     with pytest.raises(ValueError, match="≥ 0"):
         kind(MIDDLE, 1.0, *values)
+
+
+def test_few_points_have_the_moments_of_what_they_stand_for() -> None:
+    """Along any way a disc of radius 1 has the variance 1/4, and a square of side 1 has 1/12."""
+    ways = torch.nn.functional.normalize(torch.randn(200, 3, generator=torch.Generator().manual_seed(1)), dim=1)
+    for nodes, variance in ((ball_nodes(few=True), 0.25), (square_nodes(SIDE, few=True), 1.0 / 12.0)):
+        along = nodes @ torch.nn.functional.normalize(ways[:, : nodes.shape[1]], dim=1).double().T
+        torch.testing.assert_close(along.mean(dim=0), torch.zeros(200).double())
+        torch.testing.assert_close(along.square().mean(dim=0), torch.full((200,), variance).double())

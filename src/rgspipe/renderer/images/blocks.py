@@ -70,7 +70,7 @@ class BlockModel(ImageModel):
         return seen.reshape(3, len(self), -1).transpose(0, 1)
 
     def columns(self, light: UnitLight) -> Tensor:
-        return self.seen(lit_columns(self.frozen.bvh, light, self.effects, LEAST_LIT))
+        return self.seen(lit_columns(self.frozen.bvh, light, self.effects, LEAST_LIT, few=True))
 
     def seen(self, irradiance: Tensor) -> Tensor:
         """(B, 3, K) radiance under K direct irradiances (N, K), with all that bounces."""

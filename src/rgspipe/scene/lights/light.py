@@ -141,18 +141,19 @@ class Light(ByValue, ABC):
         """The light in one point that a search looks for in its stead; itself if it has no extent."""
         return self
 
-    def nodes(self, values: Mapping[str, Tensor]) -> Nodes | None:
+    def nodes(self, values: Mapping[str, Tensor], few: bool = False) -> Nodes | None:
         """The points that it is made of; None if it stands in one.
 
         Args:
             values: its position, its direction if it has an axis, and the numbers of its shape, as tensors; what comes
                 back is differentiable towards them.
+            few: as few as have its middle and its second moments, for a search, which renders it often.
         """
         return None
 
-    def parts(self) -> tuple[Light, ...]:
+    def parts(self, few: bool = False) -> tuple[Light, ...]:
         """Lights in one point each that shine together as it does, differentiable towards its tensors."""
-        nodes = self.nodes(self.places())
+        nodes = self.nodes(self.places(), few)
         return (self,) if nodes is None else nodes.lights(self.intensity)
 
     def places(self) -> dict[str, Tensor]:

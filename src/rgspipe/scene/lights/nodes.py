@@ -46,14 +46,17 @@ class Nodes:
 
 
 @cache
-def ball_nodes() -> Tensor:
-    """(12, 3) float64 points that shine as a uniform sphere of radius 1 does: the corners of an icosahedron.
+def ball_nodes(few: bool = False) -> Tensor:
+    """(12, 3) float64 points that shine as a uniform sphere of radius 1 does: the corners of an icosahedron; if `few`,
+    (6, 3) those of an octahedron, with the same second moments.
 
     Seen from afar such a sphere is a disc of even brightness, and so is a cloud of points with the density
     1/√(1 − R²) within the ball (Abel). The field of a spherical cloud is that of a point in its middle (Newton's shell
     theorem, as irradiance falls with the square of the distance), so only occluders and horizons tell the two apart.
     The icosahedron of radius √¾ has the cloud's second moments, and integrates polynomials up to the fifth degree.
     """
+    if few:
+        return math.sqrt(0.75) * torch.cat([torch.eye(3), -torch.eye(3)]).double()
     golden = 0.5 * (1.0 + math.sqrt(5.0))
     corners = [(0.0, one, other * golden) for one in (-1.0, 1.0) for other in (-1.0, 1.0)]
     turned = [torch.tensor(corners, dtype=torch.float64).roll(shift, dims=1) for shift in range(3)]
@@ -61,7 +64,10 @@ def ball_nodes() -> Tensor:
 
 
 @cache
-def square_nodes(side: int) -> Tensor:
-    """(side², 2) float64 middles of the pieces of a square of side 1 around 0."""
+def square_nodes(side: int, few: bool = False) -> Tensor:
+    """(side², 2) float64 middles of the pieces of a square of side 1 around 0; if `few`, (4, 2) those of Gauss and
+    Legendre, with the square's second moments."""
     middles = (torch.arange(side, dtype=torch.float64) + 0.5) / side - 0.5
+    if few:
+        middles = torch.tensor([-0.5, 0.5], dtype=torch.float64) / math.sqrt(3.0)
     return torch.cartesian_prod(middles, middles)

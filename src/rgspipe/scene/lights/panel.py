@@ -86,9 +86,9 @@ class PanelLight(AxialLight):
         values = self.places()
         return sides(values["direction"], values["turn"])
 
-    def nodes(self, values: Mapping[str, Tensor]) -> Nodes:
+    def nodes(self, values: Mapping[str, Tensor], few: bool = False) -> Nodes:
         across, up = sides(values["direction"], values["turn"])
-        places = square_nodes(SIDE).to(across)
+        places = square_nodes(SIDE, few).to(across)
         offsets = places[:, :1] * values["width"] * across + places[:, 1:] * values["height"] * up
         return Nodes(values["position"] + offsets, values["direction"])
 

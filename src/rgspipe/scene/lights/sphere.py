@@ -54,8 +54,8 @@ class SphereLight(Light):
     def seed(self) -> PointLight:
         return self.plain
 
-    def nodes(self, values: Mapping[str, Tensor]) -> Nodes:
-        return Nodes(values["position"] + values["radius"] * ball_nodes().to(values["position"]))
+    def nodes(self, values: Mapping[str, Tensor], few: bool = False) -> Nodes:
+        return Nodes(values["position"] + values["radius"] * ball_nodes(few).to(values["position"]))
 
     def grown(self, size: float) -> tuple[Self, ...]:
         return tuple(replace(self, radius=share * size) for share in RADII)
