@@ -257,8 +257,10 @@ def _inventory(folder: Path) -> dict[str, dict[str, Any]]:
 
 def _is_whole(manifest: Mapping[str, Any]) -> bool:
     """Whether a manifest has what is asked of it later."""
-    files, facts = manifest.get("files"), manifest.get("facts")
-    if not isinstance(files, dict) or not isinstance(facts, dict) or not all(map(_lies_within, files)):
+    files, facts, inputs = manifest.get("files"), manifest.get("facts"), manifest.get("inputs")
+    if not all(isinstance(part, dict) for part in (files, facts, inputs)) or not all(map(_lies_within, files)):
+        return False
+    if not all(isinstance(prints, list) and all(isinstance(one, str) for one in prints) for prints in inputs.values()):
         return False
     kinds = {"bytes": int, "sha256": str}
     return all(

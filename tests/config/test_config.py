@@ -62,6 +62,7 @@ def test_choosing_a_method_by_group_or_by_key_means_the_same() -> None:
         ("scene=cornel", ["scene=cornell", "external"]),
         ("fit=", ["search_lm"]),
         ("scene=[[1]]", ["scene:", "cornell", "[[1]]", "scene=NAME"]),
+        ("fit=" + 300 * "x", ["fit:", "search_lm", "xxx…", "fit=NAME"]),
         ("effects=${seed}", ["effects:", "${seed}", "effects=NAME"]),
         ("+accuracy=inf", ["accuracy:", "draft", "inf"]),
         ("hydra/launcher=3", ["hydra/launcher:", "3"]),

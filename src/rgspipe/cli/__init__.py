@@ -63,6 +63,10 @@ def _dispatch(arguments: list[str], stage_loader: StageLoader) -> int:
         from rgspipe.cli.verify import verify
 
         return verify(arguments[1:])
+    if arguments[0] == "outputs":
+        from rgspipe.cli.outputs import show_outputs
+
+        return show_outputs(arguments[1:])
     if arguments[0] == "view":
         from rgspipe.cli.view import view_folder
 

@@ -21,6 +21,7 @@ from omegaconf.errors import OmegaConfBaseException
 from rgspipe.config import RgspipeConfig
 from rgspipe.config.core import build, plain, unknown_key
 from rgspipe.errors import InputError
+from rgspipe.files import LONGEST_NAME
 from rgspipe.pipeline import Usual
 from rgspipe.resources import resource_folder
 from rgspipe.stages import NAMES, load_stage
@@ -243,12 +244,16 @@ def _check_choices(overrides: Iterable[Override]) -> None:
         key = override.key_or_group
         folder = resource_folder("conf") / key
         is_group = key.startswith("hydra/") or ("." not in key and folder.is_dir())
-        value = override.value()
-        if not is_group or (isinstance(value, str | QuotedString) and "${" not in str(value)):
+        if not is_group or _may_be_name(override.value()):
             continue
         options = ", ".join(sorted(path.stem for path in folder.glob("*.yaml"))) or "those that Hydra has"
         found = (override.input_line or "").partition("=")[2]
+        found = found if len(found) <= LONGEST_NAME else f"{found[:LONGEST_NAME]}…"
         raise InputError(key, expected=f"one of {options}", found=found, remedy=f"Choose one: {key}=NAME.")
+
+
+def _may_be_name(value: object) -> bool:
+    return isinstance(value, str | QuotedString) and "${" not in str(value) and len(str(value)) <= LONGEST_NAME
 
 
 def _composition_error(error: Exception, overrides: Sequence[str]) -> InputError:

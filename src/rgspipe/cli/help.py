@@ -129,6 +129,7 @@ More:
   debug.traceback=true  show tracebacks (or set RGSPIPE_TRACEBACK=1)
   status                how the runs so far ended; status NAME shows one, status state=failed some
   view FOLDER           a frozen scene in the browser, where lamps are moved and found
+  outputs               what the results take on the disk; outputs prune removes what nothing needs any more
   verify                read every result and say which were damaged since they were made
   --version             of rgspipe, Python and the libraries
   --hydra-help          options of Hydra, which reads the command line

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 
-from rgspipe.artifacts import Artifact, ArtifactStore, Key
+from rgspipe.artifacts import Artifact, ArtifactStore
 from rgspipe.cli.messages import EXIT_INPUT, show_input_error
 from rgspipe.cli.runs import given_outputs
 from rgspipe.datasets.input_file import input_folder
 from rgspipe.errors import InputError
 from rgspipe.progress import progress_bar
+from rgspipe.retention import artifact_keys
 
 
 def verify(arguments: Sequence[str]) -> int:
@@ -20,7 +20,7 @@ def verify(arguments: Sequence[str]) -> int:
         the exit status: 2 if any is.
     """
     outputs = input_folder(given_outputs(arguments), "the folder of results")
-    keys = list(_keys(outputs))
+    keys = list(artifact_keys(outputs))
     whole: list[Artifact] = []
     for key in progress_bar(keys, "reading", unit="artifact"):
         try:
@@ -37,11 +37,3 @@ def verify(arguments: Sequence[str]) -> int:
     size = sum(entry["bytes"] for artifact in whole for entry in artifact.manifest["files"].values())
     print(f"{len(whole)} of {len(keys)} artifacts in {outputs} are as they were made ({size / 1e6:.1f} MB)")
     return 0 if len(whole) == len(keys) else EXIT_INPUT
-
-
-def _keys(outputs: Path) -> Iterator[Key]:
-    """Every folder that has the place and the name of an artifact."""
-    for path in sorted(outputs.glob("*/*/*")):
-        scene, stage, fingerprint = path.relative_to(outputs).parts
-        if scene != "runs" and path.is_dir() and not path.is_symlink() and not fingerprint.startswith("."):
-            yield Key(scene, stage, fingerprint)

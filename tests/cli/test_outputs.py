@@ -1,0 +1,76 @@
+"""`rgspipe outputs` says what results take, and removes them only where that is asked for twice."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+import pytest
+
+import toys
+from rgspipe.cli import main
+from rgspipe.config import RgspipeConfig, with_changes
+from rgspipe.pipeline import run
+from rgspipe.status import process_start
+
+
+def harvest(outputs: Path, resolution: int) -> None:
+    changes = {"stage": "harvest", "outputs": str(outputs), "dataset.resolution": resolution, "report.views": [1]}
+    run(with_changes(RgspipeConfig(), changes), toys.load)
+
+
+@pytest.fixture
+def outputs(tmp_path: Path) -> Path:
+    """What two runs of three stages made; no link leads to what the first did."""
+    harvest(tmp_path, 9)
+    harvest(tmp_path, 8)
+    return tmp_path
+
+
+def test_results_are_listed_by_scene_and_stage(outputs: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["outputs", f"outputs={outputs}"]) == 0
+    told = capsys.readouterr().out.splitlines()
+    assert told[0].split() == ["scene", "stage", "folders", "size", "newest"]
+    assert {tuple(line.split()[:3]) for line in told[1:4]} == {
+        ("cornell", name, "2") for name in ("sow", "grow", "harvest")
+    }
+    assert told[4].endswith(f"MB in {outputs}")
+
+
+def test_nothing_goes_without_being_told_to(outputs: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["outputs", "prune", f"outputs={outputs}"]) == 0
+    assert "say remove=true to do it: 3 of 6 folders" in capsys.readouterr().out
+    assert main(["outputs", "prune", f"outputs={outputs}", "remove=true"]) == 0
+    assert "Removed 3 of 6 folders" in capsys.readouterr().out
+    assert main(["outputs", "prune", f"outputs={outputs}", "remove=true"]) == 0
+    assert "Nothing to remove" in capsys.readouterr().out
+    assert main(["verify", f"outputs={outputs}"]) == 0
+    assert capsys.readouterr().out.startswith("3 of 3")
+
+
+def test_nothing_goes_while_a_run_may_need_it(outputs: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = outputs / "runs" / "now"
+    folder.mkdir(parents=True)
+    values = {"state": "running", "stage": "grow", "overrides": [], "command": "", "pid": os.getpid()}
+    values |= {"process_start": process_start(os.getpid()), "started": "2026-01-01T00:00:00+00:00"}
+    (folder / "status.json").write_text(json.dumps(values))
+    assert main(["outputs", "prune", f"outputs={outputs}", "remove=true"]) == 2
+    assert "now" in capsys.readouterr().err
+    assert len(list(outputs.glob("cornell/*/[0-9a-f]*"))) == 6
+
+
+@pytest.mark.parametrize(
+    ("word", "found"),
+    [("older=3", "30d"), ("remove=yes", "remove=true"), ("spring", "prune"), ("outputs=/nowhere", "/nowhere")],
+)
+def test_what_cannot_be_meant_is_refused(
+    outputs: Path, capsys: pytest.CaptureFixture[str], word: str, found: str
+) -> None:
+    assert main(["outputs", "prune", f"outputs={outputs}", word]) == 2
+    assert found in capsys.readouterr().err
+
+
+def test_a_list_removes_nothing(outputs: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["outputs", f"outputs={outputs}", "remove=true"]) == 2
+    assert "prune" in capsys.readouterr().err

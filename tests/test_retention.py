@@ -1,0 +1,101 @@
+"""What may be removed from a store: nothing that stays needs it, and a kill leaves nothing half there."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+from filelock import FileLock
+
+from rgspipe.artifacts import ArtifactStore, Key
+from rgspipe.errors import InputError
+from rgspipe.retention import Choice, Stored, artifact_keys, removable, remove, stored
+
+
+def put(root: Path, stage: str, name: str, scene: str = "room", **inputs: str) -> Key:
+    """An artifact that was made from others."""
+    key = Key(scene, stage, name)
+    recipe = {"config": {}, "inputs": {stage: [one] for stage, one in inputs.items()}, "foreign": {}, "code": {}}
+    ArtifactStore(root).build(key, recipe, lambda folder: {"bytes": (folder / "a").write_bytes(b"12345")})
+    return key
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Path:
+    """Two scenes that were trained, of which the first was fitted to twice, and a report of the first of these fits."""
+    put(tmp_path, "train", "a1")
+    put(tmp_path, "fit", "b1", train="a1")
+    put(tmp_path, "report", "c1", fit="b1")
+    put(tmp_path, "fit", "b2", train="a1")
+    put(tmp_path, "fit", "b3", train="a1")
+    put(tmp_path, "train", "a2", scene="hall")
+    return tmp_path
+
+
+def names(chosen: list[Stored]) -> set[str]:
+    return {one.key.fingerprint for one in chosen}
+
+
+def test_what_no_link_leads_to_and_no_report_needs_goes(store: Path) -> None:
+    """b3 is the latest fit, b1 is in the report, and a1 is what both were made from."""
+    assert names(removable(stored(store), Choice())) == {"b2"}
+
+
+@pytest.mark.parametrize(
+    ("choice", "gone"),
+    [
+        (Choice(stage="fit"), {"b2", "b3"}),  # b1 is in the report
+        (Choice(stage="train"), {"a2"}),  # fits stay, so what they were made from does
+        (Choice(scene="hall"), {"a2"}),
+        (Choice(scene="room"), {"b2", "b3"}),
+        (Choice(stage="report"), {"c1"}),
+        (Choice(older=3600.0), set()),
+        (Choice(scene="room", older=0.0), {"b2", "b3"}),
+    ],
+)
+def test_what_was_chosen_goes_unless_what_stays_needs_it(store: Path, choice: Choice, gone: set[str]) -> None:
+    assert names(removable(stored(store), choice)) == gone
+
+
+def test_what_goes_takes_its_links_along_and_the_rest_is_whole(store: Path) -> None:
+    everything = stored(store)
+    assert sum(one.bytes for one in everything) > 30  # their manifests count
+    gone = list(remove(store, removable(everything, Choice(stage="fit"))))
+    assert names(gone) == {"b2", "b3"}
+    assert not (store / "room" / "fit" / "latest").is_symlink() and (store / "room" / "train" / "latest").exists()
+    kept = list(artifact_keys(store))
+    assert {key.fingerprint for key in kept} == {"a1", "b1", "c1", "a2"}
+    for key in kept:
+        ArtifactStore(store).find(key).folder()
+
+
+def test_a_removal_that_was_killed_ends_with_the_next(store: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def killed(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched, pytest.raises(KeyboardInterrupt):
+        patched.setattr(shutil, "rmtree", killed)
+        list(remove(store, removable(stored(store), Choice())))
+    assert (store / "room" / "fit" / ".gone-b2" / "a").exists()
+    assert names(stored(store)) == {"a1", "b1", "b3", "c1", "a2"}
+    assert list(remove(store, [])) == []
+    assert not (store / "room" / "fit" / ".gone-b2").exists()
+
+
+def test_what_interrupted_runs_left_goes_unless_a_process_is_at_it(store: Path) -> None:
+    partial = store / "room" / "fit" / ".partial-b9"
+    partial.mkdir()
+    (partial / "half").write_bytes(b"123")
+    chosen = removable(stored(store), Choice())
+    assert names(chosen) == {"b2", "b9"}
+    with FileLock(store / "room" / "fit" / ".lock-b9"):
+        assert names(list(remove(store, chosen))) == {"b2"}
+    assert partial.exists()
+    assert names(list(remove(store, removable(stored(store), Choice())))) == {"b9"}
+
+
+def test_a_damaged_manifest_is_named_as_nobody_knows_what_it_needs(store: Path) -> None:
+    (store / "room" / "report" / "c1" / "manifest.json").write_text("{")
+    with pytest.raises(InputError, match=r"manifest\.json"):
+        stored(store)
