@@ -257,7 +257,7 @@ def _inventory(folder: Path) -> dict[str, dict[str, Any]]:
 
 def _is_whole(manifest: Mapping[str, Any]) -> bool:
     """Whether a manifest has what is asked of it later."""
-    files, facts, inputs = manifest.get("files"), manifest.get("facts"), manifest.get("inputs")
+    files, facts, inputs = manifest.get("files"), manifest.get("facts"), manifest.get("inputs", {})
     if not all(isinstance(part, dict) for part in (files, facts, inputs)) or not all(map(_lies_within, files)):
         return False
     if not all(isinstance(prints, list) and all(isinstance(one, str) for one in prints) for prints in inputs.values()):
