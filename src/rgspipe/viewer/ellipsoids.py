@@ -24,7 +24,10 @@ def region(position: Tensor, covariance: Tensor, size: float) -> tuple[np.ndarra
         covariance: (D, D), the position first; what has no finite variance is drawn as long as MOST.
         size: of the scene.
     """
-    block = np.nan_to_num(covariance[:3, :3].numpy(), nan=0.0, posinf=(MOST * size) ** 2, neginf=0.0)
+    block = covariance[:3, :3].double().numpy().copy()
+    unknown = ~np.isfinite(np.diagonal(block))
+    block[unknown] = block[:, unknown] = 0.0
+    block[unknown, unknown] = (MOST * size) ** 2
     values, vectors = np.linalg.eigh(0.5 * (block + block.T))
     axes = np.clip(np.sqrt(np.maximum(values, 0.0) * QUANTILE), LEAST * size, MOST * size)
     points, faces = _ball()

@@ -1,0 +1,53 @@
+"""`rgspipe view FOLDER`: what it is told, and that it serves a page until it is interrupted."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import urllib.request
+from pathlib import Path
+
+import pytest
+import torch
+
+from rgspipe.cli.view import Wanted, parsed
+from rgspipe.errors import InputError
+from rgspipe.renderer.frozen import FrozenScene
+from rooms import closed_box
+
+
+def test_a_folder_and_keys_are_understood() -> None:
+    words = ["a/b", "lights=l.json", "target=t", "fit=f", "port=0", "resolution=64"]
+    assert parsed(words) == Wanted(Path("a/b"), "l.json", "t", "f", 0, 64)
+    assert parsed(["a"]) == Wanted(Path("a"))
+
+
+@pytest.mark.parametrize(
+    ("words", "found"),
+    [
+        ([], "view outputs/cornell/freeze/latest"),
+        (["a", "b"], "a b"),
+        (["a", "prt=3"], "Did you mean port="),
+        (["a", "port=x"], "port: expected a whole number"),
+        (["a", "port=70000"], "70000"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused(words: list[str], found: str) -> None:
+    with pytest.raises(InputError) as caught:
+        parsed(words)
+    assert found in str(caught.value)
+
+
+def test_a_page_is_served_until_it_is_interrupted(tmp_path: Path) -> None:
+    FrozenScene.freeze(closed_box(0.5).to(torch.float32)).save(tmp_path / "box")
+    command = [sys.executable, "-m", "rgspipe", "view", str(tmp_path / "box"), "port=0"]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "OMP_NUM_THREADS": "1"}
+    with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True) as process:
+        url = next((line for line in process.stdout if "Ctrl-C" in line), "").partition(" ")[0]
+        assert url.startswith("http://127.0.0.1:")
+        with urllib.request.urlopen(url, timeout=30) as page:
+            assert page.status == 200 and b"<html" in page.read().lower()
+        process.send_signal(signal.SIGINT)
+        assert process.wait(timeout=30) == 0
