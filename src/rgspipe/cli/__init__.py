@@ -67,6 +67,10 @@ def _dispatch(arguments: list[str], stage_loader: StageLoader) -> int:
         from rgspipe.cli.outputs import show_outputs
 
         return show_outputs(arguments[1:])
+    if arguments[0] == "doctor":
+        from rgspipe.cli.doctor import doctor
+
+        return doctor(arguments[1:])
     if arguments[0] == "view":
         from rgspipe.cli.view import view_folder
 

@@ -130,6 +130,7 @@ More:
   status                how the runs so far ended; status NAME shows one, status state=failed some
   view FOLDER           a frozen scene in the browser, where lamps are moved and found
   outputs               what the results take on the disk; outputs prune removes what nothing needs any more
+  doctor                whether all that is needed is here and works, and how accurate and fast it is
   verify                read every result and say which were damaged since they were made
   --version             of rgspipe, Python and the libraries
   --hydra-help          options of Hydra, which reads the command line
