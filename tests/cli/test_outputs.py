@@ -49,6 +49,15 @@ def test_results_of_a_stage_are_listed_one_by_one(outputs: Path, capsys: pytest.
     assert all("MB" in line and "h ago" in line for line in told)
 
 
+def test_what_a_killed_removal_left_goes_whatever_is_chosen_next(outputs: Path) -> None:
+    left = outputs / "cornell" / "fit_light" / f".gone-{16 * 'a'}"
+    left.mkdir(parents=True)
+    assert main(["outputs", "prune", f"outputs={outputs}", "stage=fit_light"]) == 2
+    assert left.exists()
+    assert main(["outputs", "prune", f"outputs={outputs}", "stage=fit_light", "remove=true"]) == 2
+    assert not left.exists()
+
+
 def test_nothing_is_said_to_be_in_a_folder_of_something_else(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -39,10 +39,13 @@ def show_outputs(arguments: Sequence[str]) -> int:
     values = _values([text for text in words if text not in ("list", "prune")])
     outputs = input_folder(given_outputs([f"outputs={values.get('outputs', 'outputs')}"]), "the folder of results")
     choice = Choice(values.get("scene"), values.get("stage"), _seconds(values["older"]) if "older" in values else None)
+    really = values.get("remove") == "true"
+    if really:
+        list(remove(outputs, []))  # what a removal that was killed has left
     everything = stored(outputs)
     _check_names(choice, everything)
     if prune:
-        return _prune(outputs, everything, choice, really=values.get("remove") == "true")
+        return _prune(outputs, everything, choice, really)
     shown = [one for one in everything if _is_listed(choice, one)]
     if not shown:
         print(f"No {'such ' if everything else ''}results in {outputs}.")
