@@ -59,6 +59,39 @@ def test_the_plan_says_why(config: RgspipeConfig) -> None:
     assert "reuse" in text and "make" in text and "views.count 3 → 2" in text
 
 
+def test_the_plan_says_what_it_will_take_where_that_is_known(config: RgspipeConfig) -> None:
+    def text(changes: dict[str, object]) -> list[str]:
+        changed = with_changes(config, changes)
+        return describe_plan(plan(resolve(changed, toys.load), ArtifactStore(Path(config.outputs)))).splitlines()
+
+    assert not any("0.1 s" in line for line in text({})) and "Expected" not in text({})[-1]
+    run(with_changes(config, {"stage": "grow", "views.count": 1}), toys.load)
+    assert "Expected" in text({})[-1] and "and what harvest will take" in text({})[-1]
+    run(config, toys.load)
+    assert "Expected" not in text({})[-1]
+    sow, *grown, harvest, total = text({"dataset.resolution": 9})[1:]
+    assert "  ~0.1 s  dataset.resolution 8 → 9" in sow and "  ~0.1 s  another grow" in harvest
+    assert all("~0.1 s" in line for line in grown)
+    assert total == "Expected: 0.1 s (from earlier runs here; ~: with other settings)"
+
+
+def test_what_the_plan_could_not_remark_yet_is_said_when_a_stage_begins(
+    config: RgspipeConfig, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level("INFO")
+    stage = dataclasses.replace(
+        toys.HARVEST, remarks=lambda config, made: ["always.", f"of {' '.join(made) or 'none'}."]
+    )
+    load = {**toys.STAGES, "harvest": stage}.__getitem__
+    run(config, load)
+    said = "\n".join(record.getMessage() for record in caplog.records)
+    assert [said.count(remark) for remark in ("always.", "of none.", "of grow.")] == [1, 1, 1]
+    caplog.clear()
+    run(with_changes(config, {"report.views": [1]}), load)
+    said = "\n".join(record.getMessage() for record in caplog.records)
+    assert [said.count(remark) for remark in ("always.", "of none.", "of grow.")] == [1, 0, 1]
+
+
 def test_stages_remark_on_what_is_made_already(config: RgspipeConfig) -> None:
     """Below their lines in the plan: nothing yet, then of the inputs, then of the artifact itself."""
     stage = dataclasses.replace(toys.HARVEST, remarks=lambda config, made: [f"made: {' '.join(sorted(made))}."])
@@ -66,7 +99,10 @@ def test_stages_remark_on_what_is_made_already(config: RgspipeConfig) -> None:
 
     def last_lines() -> list[str]:
         store = ArtifactStore(Path(config.outputs))
-        return [line.strip() for line in describe_plan(plan(resolve(config, load), store)).splitlines()[-2:]]
+        lines = [line.strip() for line in describe_plan(plan(resolve(config, load), store)).splitlines()]
+        return lines[
+            (begin := next(place for place, line in enumerate(lines) if line.startswith("harvest"))) : begin + 2
+        ]
 
     assert last_lines()[0].startswith("harvest  make") and last_lines()[1] == "made: ."
     run(with_changes(config, {"stage": "grow", "views.count": 1}), load)

@@ -2,21 +2,30 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
 import shutil
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from filelock import FileLock
 
 from rgspipe.artifacts import ArtifactStore, Key
 from rgspipe.errors import InputError
-from rgspipe.retention import Choice, Stored, artifact_keys, removable, remove, stored
+from rgspipe.retention import Choice, Stored, artifact_keys, in_the_making, removable, remove, stored
+
+
+def full(name: str) -> str:
+    """The fingerprint that tests call by its first two digits."""
+    return f"{name:f<16}"
 
 
 def put(root: Path, stage: str, name: str, scene: str = "room", **inputs: str) -> Key:
     """An artifact that was made from others."""
-    key = Key(scene, stage, name)
-    recipe = {"config": {}, "inputs": {stage: [one] for stage, one in inputs.items()}, "foreign": {}, "code": {}}
+    key = Key(scene, stage, full(name))
+    recipe = {"config": {}, "inputs": {stage: [full(one)] for stage, one in inputs.items()}, "foreign": {}, "code": {}}
     ArtifactStore(root).build(key, recipe, lambda folder: {"bytes": (folder / "a").write_bytes(b"12345")})
     return key
 
@@ -34,7 +43,7 @@ def store(tmp_path: Path) -> Path:
 
 
 def names(chosen: list[Stored]) -> set[str]:
-    return {one.key.fingerprint for one in chosen}
+    return {one.key.fingerprint[:2] for one in chosen}
 
 
 def test_what_no_link_leads_to_and_no_report_needs_goes(store: Path) -> None:
@@ -65,7 +74,7 @@ def test_what_goes_takes_its_links_along_and_the_rest_is_whole(store: Path) -> N
     assert names(gone) == {"b2", "b3"}
     assert not (store / "room" / "fit" / "latest").is_symlink() and (store / "room" / "train" / "latest").exists()
     kept = list(artifact_keys(store))
-    assert {key.fingerprint for key in kept} == {"a1", "b1", "c1", "a2"}
+    assert {key.fingerprint[:2] for key in kept} == {"a1", "b1", "c1", "a2"}
     for key in kept:
         ArtifactStore(store).find(key).folder()
 
@@ -77,25 +86,72 @@ def test_a_removal_that_was_killed_ends_with_the_next(store: Path, monkeypatch: 
     with monkeypatch.context() as patched, pytest.raises(KeyboardInterrupt):
         patched.setattr(shutil, "rmtree", killed)
         list(remove(store, removable(stored(store), Choice())))
-    assert (store / "room" / "fit" / ".gone-b2" / "a").exists()
+    assert (store / "room" / "fit" / f".gone-{full('b2')}" / "a").exists()
     assert names(stored(store)) == {"a1", "b1", "b3", "c1", "a2"}
     assert list(remove(store, [])) == []
-    assert not (store / "room" / "fit" / ".gone-b2").exists()
+    assert not (store / "room" / "fit" / f".gone-{full('b2')}").exists()
+
+
+@pytest.mark.parametrize("step", range(8))
+def test_a_kill_at_any_step_leaves_whole_results_and_links_that_lead_somewhere(
+    store: Path, step: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """b3 and b2 go: the lock of each, its links, its name, its files."""
+    steps = 0
+
+    def counted(function: Callable[..., Any]) -> Callable[..., Any]:
+        def call(*given: Any, **named: Any) -> Any:
+            nonlocal steps
+            steps += 1
+            if steps > step:
+                raise KeyboardInterrupt
+            return function(*given, **named)
+
+        return call
+
+    with monkeypatch.context() as patched, contextlib.suppress(KeyboardInterrupt):
+        for owner, name in ((Path, "unlink"), (Path, "rename"), (os, "open"), (shutil, "rmtree")):
+            patched.setattr(owner, name, counted(getattr(owner, name)))
+        list(remove(store, removable(stored(store), Choice(stage="fit"))))
+    assert steps > step
+    for key in artifact_keys(store):
+        ArtifactStore(store).find(key).folder()
+    assert all(link.exists() for link in store.glob("*/*/latest*"))
+    list(remove(store, removable(stored(store), Choice(stage="fit"))))
+    assert names(stored(store)) == {"a1", "b1", "c1", "a2"}
+    assert not list(store.glob("*/*/.gone-*"))
+
+
+def test_what_another_process_removes_is_no_mistake(store: Path) -> None:
+    chosen = removable(stored(store), Choice(stage="fit"))
+    assert names(list(remove(store, chosen))) == {"b2", "b3"}
+    assert list(remove(store, chosen)) == []
+
+
+def test_a_process_that_makes_something_is_seen(store: Path) -> None:
+    assert in_the_making(store) is None
+    with FileLock(store / "room" / "fit" / f".lock-{full('b9')}"):
+        assert in_the_making(store) == store / "room" / "fit" / full("b9")
+
+
+def test_other_folders_are_no_results(tmp_path: Path) -> None:
+    (tmp_path / "letters" / "mother" / "2020").mkdir(parents=True)
+    assert stored(tmp_path) == [] and list(artifact_keys(tmp_path)) == []
 
 
 def test_what_interrupted_runs_left_goes_unless_a_process_is_at_it(store: Path) -> None:
-    partial = store / "room" / "fit" / ".partial-b9"
+    partial = store / "room" / "fit" / f".partial-{full('b9')}"
     partial.mkdir()
     (partial / "half").write_bytes(b"123")
     chosen = removable(stored(store), Choice())
     assert names(chosen) == {"b2", "b9"}
-    with FileLock(store / "room" / "fit" / ".lock-b9"):
+    with FileLock(store / "room" / "fit" / f".lock-{full('b9')}"):
         assert names(list(remove(store, chosen))) == {"b2"}
     assert partial.exists()
     assert names(list(remove(store, removable(stored(store), Choice())))) == {"b9"}
 
 
 def test_a_damaged_manifest_is_named_as_nobody_knows_what_it_needs(store: Path) -> None:
-    (store / "room" / "report" / "c1" / "manifest.json").write_text("{")
+    (store / "room" / "report" / full("c1") / "manifest.json").write_text("{")
     with pytest.raises(InputError, match=r"manifest\.json"):
         stored(store)

@@ -19,7 +19,7 @@ def fingerprint(value: Any) -> str:
 
 def differences(now: Mapping[str, Any], before: Mapping[str, Any]) -> list[str]:
     """What changed between two recipes, one phrase each, such as "dataset.resolution 64 → 128"."""
-    phrases = _config_differences(now["config"], before.get("config", {}))
+    phrases = config_differences(now["config"], before.get("config", {}))
     for kind, text in (("code", "the code of {} changed"), ("foreign", "the files in {} changed")):
         old = before.get(kind, {})
         phrases += [text.format(name) for name, digest in now[kind].items() if old.get(name) != digest]
@@ -28,7 +28,8 @@ def differences(now: Mapping[str, Any], before: Mapping[str, Any]) -> list[str]:
     return phrases
 
 
-def _config_differences(now: Mapping[str, Any], before: Mapping[str, Any]) -> list[str]:
+def config_differences(now: Mapping[str, Any], before: Mapping[str, Any]) -> list[str]:
+    """What changed between two configurations, one phrase for each key."""
     new, old = _flat(now), _flat(before)
     changed = [key for key in new if key not in old or old[key] != new[key]]
     return [f"{key} {old[key]} → {new[key]}" if key in old else f"{key} is new" for key in changed]

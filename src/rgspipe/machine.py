@@ -27,6 +27,13 @@ def machine() -> dict[str, str | int]:
     }
 
 
+def available_memory_gib() -> float | None:
+    """Memory that programs can have without swapping; None where the system does not tell."""
+    file = Path("/proc/meminfo")
+    found = re.search(r"^MemAvailable:\s*(\d+) kB", file.read_text(), re.MULTILINE) if file.is_file() else None
+    return int(found[1]) / 2**20 if found else None
+
+
 def library_versions() -> dict[str, str]:
     """Versions of the installed libraries that results depend on."""
     installed = {}

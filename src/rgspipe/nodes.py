@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -57,6 +57,7 @@ class Making:
         indispensable: what the run ends without.
         artifacts: those that are there.
         failures: why others are not.
+        said: what the plan has said about each.
     """
 
     store: ArtifactStore
@@ -64,6 +65,7 @@ class Making:
     indispensable: set[Key]
     artifacts: dict[Key, Artifact]
     failures: dict[Key, Failure] = field(default_factory=dict)
+    said: Mapping[Key, Sequence[str]] = field(default_factory=dict)
 
     def make(self, node: Node) -> None:
         """Make a node, or keep why it cannot be made where the run can do without it."""
@@ -84,14 +86,17 @@ class Making:
 
     def _built(self, node: Node) -> Artifact:
         lists, failed = self._inputs(node)
+        inputs = {name: found[0] for name, found in lists.items() if found}
 
         def make(folder: Path) -> Mapping[str, Any]:
-            inputs = {name: found[0] for name, found in lists.items() if found}
             context = StageContext(node.config, inputs, lists, folder, failures=failed)
             node.stage.run(context)
             return context.facts
 
         log.info("%s: %s", node.stage.name, node.stage.help)
+        for remark in node.stage.remarks(node.config, inputs):
+            if remark not in self.said.get(node.key, ()):
+                log.info("  %s", remark)
         start = time.perf_counter()
         artifact, made = self.store.build(node.key, node.recipe, make, self.names[node.key])
         verb = "made" if made else "made by another process"

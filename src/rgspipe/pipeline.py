@@ -14,6 +14,7 @@ from pathlib import Path
 from rgspipe.artifacts import Artifact, ArtifactStore, Key
 from rgspipe.config import RgspipeConfig, get_value, with_changes
 from rgspipe.errors import InputError
+from rgspipe.expected_time import EarlierRuns, Expected, in_words
 from rgspipe.files import tree_digest
 from rgspipe.fingerprints import differences, fingerprint
 from rgspipe.nodes import Making, Node, indispensable
@@ -52,12 +53,17 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Step:
-    """One line of the plan: a node, whether it is there already, and if not, why not; and what its stage remarks."""
+    """One line of the plan: a node, whether it is there already, and if not, why not; and what its stage remarks.
+
+    Attributes:
+        expected: what making it will take; None where it is there or nobody knows.
+    """
 
     node: Node
     reused: bool
     reason: str
     remarks: tuple[str, ...] = ()
+    expected: Expected | None = None
 
 
 @dataclass(frozen=True)
@@ -118,6 +124,7 @@ def plan(root: Node, store: ArtifactStore) -> list[Step]:
     Nothing is listed below an artifact that is there: it holds all that it was made from.
     """
     steps: dict[Key, Step] = {}
+    earlier = EarlierRuns(store)
 
     def visit(node: Node) -> None:
         if node.key in steps:
@@ -126,7 +133,8 @@ def plan(root: Node, store: ArtifactStore) -> list[Step]:
         if not reused:
             for needed in node.inputs:
                 visit(needed)
-        steps[node.key] = Step(node, reused, "" if reused else _reason(node, store), _remarks(node, store))
+        reason, time = ("", None) if reused else (_reason(node, store), _expected(node, earlier, steps))
+        steps[node.key] = Step(node, reused, reason, _remarks(node, store), time)
 
     visit(root)
     return list(steps.values())
@@ -143,6 +151,14 @@ def _reason(node: Node, store: ArtifactStore) -> str:
     return shown + (f" and {len(causes) - SHOWN_CAUSES} more" if len(causes) > SHOWN_CAUSES else "")
 
 
+def _expected(node: Node, earlier: EarlierRuns, steps: Mapping[Key, Step]) -> Expected | None:
+    """What making a node will take. It takes another time, too, where what it is made from has other settings."""
+    found = earlier.expected(node.key, node.recipe["config"])
+    before = [steps[needed.key].expected for needed in node.inputs]
+    others = any(time is not None and not time.same for time in before)
+    return found._replace(same=False) if found and others else found
+
+
 def _remarks(node: Node, store: ArtifactStore) -> tuple[str, ...]:
     own = store.find(node.key)
     found = {needed.stage.name: store.find(needed.key) for needed in reversed(node.inputs)} if own is None else {}
@@ -153,12 +169,26 @@ def _remarks(node: Node, store: ArtifactStore) -> tuple[str, ...]:
 def describe_plan(steps: Sequence[Step]) -> str:
     """The plan as a table for people."""
     width = max(len(step.node.stage.name) for step in steps)
+    times = [str(step.expected or "") for step in steps]
+    longest = max(map(len, times))
     lines = [f"Plan for {steps[-1].node.key.scene}:"]
-    for step in steps:
-        verb = "reuse" if step.reused else "make "
-        lines.append(f"  {step.node.stage.name:<{width}}  {verb}  {step.node.key.fingerprint}  {step.reason}".rstrip())
+    for step, time in zip(steps, times, strict=True):
+        row = [step.node.stage.name.ljust(width), "reuse" if step.reused else "make ", step.node.key.fingerprint]
+        lines.append(f"  {'  '.join([*row, *([time.rjust(longest)] if longest else []), step.reason])}".rstrip())
         lines += [f"  {'':<{width}}         {remark}" for remark in step.remarks]
-    return "\n".join(lines)
+    return "\n".join([*lines, *_total(steps)])
+
+
+def _total(steps: Sequence[Step]) -> list[str]:
+    """What all that is made will take, as far as earlier runs tell."""
+    made = [step for step in steps if not step.reused]
+    known = [step.expected for step in made if step.expected]
+    if not known:
+        return []
+    unknown = dict.fromkeys(step.node.stage.name for step in made if not step.expected)
+    rest = f", and what {' and '.join(unknown)} will take" if unknown else ""
+    other = "" if all(time.same for time in known) else "; ~: with other settings"
+    return [f"Expected: {in_words(sum(time.seconds for time in known))}{rest} (from earlier runs here{other})"]
 
 
 def run(
@@ -190,7 +220,8 @@ def _run(config: RgspipeConfig, load_stage: StageLoader, overrides: Sequence[str
         _refuse_missing(steps, overrides)
     names = {step.node.key: _variant(step.node, resolver, overrides, usual) for step in steps}
     artifacts = {step.node.key: _take(step.node, store, names[step.node.key]) for step in steps if step.reused}
-    made = Making(store, names, indispensable(root), artifacts)
+    said = {step.node.key: step.remarks for step in steps}
+    made = Making(store, names, indispensable(root), artifacts, said=said)
     for step in steps:
         if not step.reused:
             made.make(step.node)

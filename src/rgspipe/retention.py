@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import shutil
 import time
 from collections.abc import Collection, Iterator, Sequence
@@ -14,6 +15,7 @@ from filelock import FileLock, Timeout
 
 from rgspipe.artifacts import LATEST, MANIFEST, ArtifactStore, Key
 from rgspipe.files import sync
+from rgspipe.fingerprints import DIGITS
 from rgspipe.unwritable import told_below
 
 #: The stage whose results are removed only where it is named.
@@ -22,8 +24,11 @@ REPORT = "report"
 #: What a folder is called while it is removed; it is no artifact any more.
 GONE = ".gone-"
 
-#: What a folder is called while an artifact is made in it.
-PARTIAL = ".partial-"
+#: What a folder is called while an artifact is made in it, and what is locked meanwhile.
+PARTIAL, LOCK = ".partial-", ".lock-"
+
+#: What artifacts are called. Whoever names a folder that is no store must not lose what else is in it.
+FINGERPRINT = re.compile(f"[0-9a-f]{{{DIGITS}}}")
 
 
 @dataclass(frozen=True)
@@ -83,7 +88,7 @@ class Choice:
 def artifact_keys(outputs: Path) -> Iterator[Key]:
     """Every folder that has the place and the name of an artifact."""
     for folder in _folders(outputs):
-        if not folder.name.startswith("."):
+        if not folder.name.startswith(PARTIAL):
             yield Key(*folder.relative_to(outputs).parts)
 
 
@@ -91,11 +96,27 @@ def stored(outputs: Path) -> list[Stored]:
     """Everything in a store, by scene, stage and fingerprint.
 
     Raises:
-        InputError: a manifest is damaged, so that nobody knows what its artifact was made from.
+        InputError: a manifest is damaged, so that nobody knows what its artifact was made from, or cannot be read.
     """
     store = ArtifactStore(outputs)
-    linked = {link.resolve() for link in outputs.glob(f"*/*/{LATEST}*") if link.is_symlink()}
-    return [_stored(store, folder, linked) for folder in _folders(outputs)]
+    with told_below(outputs):
+        linked = {link.resolve() for link in outputs.glob(f"*/*/{LATEST}*") if link.is_symlink()}
+        found = [_stored(store, folder, linked) for folder in _folders(outputs)]
+    return [one for one in found if one is not None]
+
+
+def in_the_making(outputs: Path) -> Path | None:
+    """The folder of an artifact that a process is making at this moment; None if there is none."""
+    for file in sorted(outputs.glob(f"*/*/{LOCK}*")):
+        name = file.name.removeprefix(LOCK)
+        try:
+            with _unused(file.parent, name):
+                pass
+        except Timeout:
+            return file.with_name(name)
+        except OSError:  # another user's, whose folders cannot be removed either
+            continue
+    return None
 
 
 def removable(everything: Sequence[Stored], choice: Choice) -> list[Stored]:
@@ -116,48 +137,80 @@ def removable(everything: Sequence[Stored], choice: Choice) -> list[Stored]:
 def remove(outputs: Path, gone: Collection[Stored]) -> Iterator[Stored]:
     """Remove results, the newest first, as nothing is made from these; those that were removed.
 
-    Each goes in one step, by a name that no artifact has, and is then taken apart: a kill leaves it whole, or what the
-    next call removes. One that a process is making stays.
+    Each loses its links, goes in one step, by a name that no artifact has, and is then taken apart: a kill leaves it
+    whole, or what the next call removes. One that a process is making, or removing, stays.
 
     Raises:
         InputError: there is no right to remove it.
     """
     with told_below(outputs):
         for left in outputs.glob(f"*/*/{GONE}*"):
-            shutil.rmtree(left)
+            with (
+                contextlib.suppress(Timeout),
+                _unused(left.parent, left.name.removeprefix(GONE).removeprefix(PARTIAL[1:])),
+            ):
+                _take_apart(left)
     for one in sorted(gone, key=lambda one: one.made, reverse=True):
-        with told_below(outputs), contextlib.suppress(Timeout), _unused(one):
+        with told_below(outputs), contextlib.suppress(Timeout), _unused(one.folder.parent, one.key.fingerprint):
+            if not one.folder.exists():
+                continue
+            if one.whole:
+                _unlink(one)
             away = one.folder.with_name(f"{GONE}{one.folder.name.lstrip('.')}")
             one.folder.rename(away)
-            for link in one.folder.parent.glob(f"{LATEST}*"):
-                if link.is_symlink() and link.readlink() == Path(one.key.fingerprint) and one.whole:
-                    link.unlink()
             sync(away.parent)
-            shutil.rmtree(away)
+            _take_apart(away)
             yield one
+
+
+def _unlink(one: Stored) -> None:
+    """Remove the links to an artifact; who finds it made sets them again."""
+    for link in one.folder.parent.glob(f"{LATEST}*"):
+        if link.is_symlink() and link.readlink() == Path(one.key.fingerprint):
+            link.unlink()
+
+
+def _take_apart(folder: Path) -> None:
+    if folder.exists():
+        shutil.rmtree(folder)
 
 
 def _folders(outputs: Path) -> Iterator[Path]:
     """Folders of artifacts, and of those that are in the making."""
     for folder in sorted(outputs.glob("*/*/*")):
-        hidden = folder.name.startswith(".") and not folder.name.startswith(PARTIAL)
+        named = FINGERPRINT.fullmatch(folder.name.removeprefix(PARTIAL))
         is_run = folder.relative_to(outputs).parts[0] == "runs"
-        if not is_run and not hidden and folder.is_dir() and not folder.is_symlink():
+        if named and not is_run and folder.is_dir() and not folder.is_symlink():
             yield folder
 
 
-def _stored(store: ArtifactStore, folder: Path, linked: Collection[Path]) -> Stored:
+def _stored(store: ArtifactStore, folder: Path, linked: Collection[Path]) -> Stored | None:
+    """What a folder is; None for one in the making that is an artifact, or gone, by now."""
     scene, stage, name = folder.relative_to(store.root).parts
     key = Key(scene, stage, name.removeprefix(PARTIAL))
-    size = sum(path.lstat().st_size for path in folder.rglob("*") if not path.is_dir())
     if name.startswith(PARTIAL):
-        return Stored(folder, key, size, folder.stat().st_mtime, frozenset(), linked=False, whole=False)
+        try:
+            made = folder.stat().st_mtime
+        except FileNotFoundError:
+            return None
+        return Stored(folder, key, _bytes_below(folder), made, frozenset(), linked=False, whole=False)
     artifact = store.find(key)
-    assert artifact is not None
+    if artifact is None:
+        return None
     named = artifact.manifest.get("inputs", {})
     inputs = frozenset((stage, one) for stage, prints in named.items() for one in prints)
     made = (folder / MANIFEST).stat().st_mtime
-    return Stored(folder, key, size, made, inputs, folder.resolve() in linked, whole=True)
+    return Stored(folder, key, _bytes_below(folder), made, inputs, folder.resolve() in linked, whole=True)
+
+
+def _bytes_below(folder: Path) -> int:
+    """Bytes of all files; those that a run removes meanwhile do not count."""
+    size = 0
+    for place, _, names in os.walk(folder):
+        for name in names:
+            with contextlib.suppress(FileNotFoundError):
+                size += (Path(place) / name).lstat().st_size
+    return size
 
 
 def _needed(everything: Sequence[Stored], stay: Sequence[Stored]) -> set[tuple[str, str]]:
@@ -172,13 +225,13 @@ def _needed(everything: Sequence[Stored], stay: Sequence[Stored]) -> set[tuple[s
 
 
 @contextlib.contextmanager
-def _unused(one: Stored) -> Iterator[None]:
-    """Hold the lock under which it is made.
+def _unused(folder: Path, name: str) -> Iterator[None]:
+    """Hold the lock under which the artifact of this name is made.
 
     Raises:
         Timeout: a process is making it.
     """
-    file = one.folder.parent / f".lock-{one.key.fingerprint}"
+    file = folder / f"{LOCK}{name}"
     os.close(os.open(file, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o666))
     with FileLock(file).acquire(timeout=0):
         yield

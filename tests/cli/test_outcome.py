@@ -10,7 +10,8 @@ import torch
 from fitted_lights import make_fitted
 from frozen_store import artifact
 from rgspipe.artifacts import Artifact
-from rgspipe.cli.columns import columns, percent, without_empty
+from rgspipe.cli.cells import percent
+from rgspipe.cli.columns import columns, without_empty
 from rgspipe.cli.outcome import outcome
 from rgspipe.datasets.light_file import write_lights
 from rgspipe.evaluation.tables import summary_table, target_table

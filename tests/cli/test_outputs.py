@@ -7,6 +7,7 @@ import os
 from pathlib import Path
 
 import pytest
+from filelock import FileLock
 
 import toys
 from rgspipe.cli import main
@@ -38,6 +39,36 @@ def test_results_are_listed_by_scene_and_stage(outputs: Path, capsys: pytest.Cap
     assert told[4].endswith(f"MB in {outputs}")
 
 
+def test_results_of_a_stage_are_listed_one_by_one(outputs: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["outputs", "--list", f"outputs={outputs}", "stage=grow"]) == 0
+    _, *told, _ = capsys.readouterr().out.splitlines()
+    assert {line.split()[0] for line in told} == {
+        f"cornell/grow/{one.name}" for one in outputs.glob("cornell/grow/[0-9a-f]*")
+    }
+    assert sum(line.endswith("latest") for line in told) == 1
+    assert all("MB" in line and "h ago" in line for line in told)
+
+
+def test_what_a_killed_removal_left_goes_whatever_is_chosen_next(outputs: Path) -> None:
+    left = outputs / "cornell" / "fit_light" / f".gone-{16 * 'a'}"
+    left.mkdir(parents=True)
+    assert main(["outputs", "prune", f"outputs={outputs}", "stage=fit_light"]) == 2
+    assert left.exists()
+    assert main(["outputs", "prune", f"outputs={outputs}", "stage=fit_light", "remove=true"]) == 2
+    assert not left.exists()
+
+
+def test_nothing_is_said_to_be_in_a_folder_of_something_else(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A manifest that is missed would be no reason to advise somebody to remove a folder of letters."""
+    (tmp_path / "letters" / "mother" / "2020").mkdir(parents=True)
+    for words in (["outputs"], ["outputs", "prune", "remove=true"]):
+        assert main([*words, f"outputs={tmp_path}"]) == 0
+    assert capsys.readouterr().out.startswith(f"No results in {tmp_path}.")
+    assert (tmp_path / "letters" / "mother" / "2020").exists()
+
+
 def test_nothing_goes_without_being_told_to(outputs: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["outputs", "prune", f"outputs={outputs}"]) == 0
     assert "say remove=true to do it: 3 of 6 folders" in capsys.readouterr().out
@@ -60,9 +91,23 @@ def test_nothing_goes_while_a_run_may_need_it(outputs: Path, capsys: pytest.Capt
     assert len(list(outputs.glob("cornell/*/[0-9a-f]*"))) == 6
 
 
+def test_nothing_goes_while_something_is_made_by_whomever(outputs: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with FileLock(outputs / "cornell" / "harvest" / f".lock-{16 * 'a'}"):
+        assert main(["outputs", "prune", f"outputs={outputs}", "remove=true"]) == 2
+    assert 16 * "a" in capsys.readouterr().err
+    assert len(list(outputs.glob("cornell/*/[0-9a-f]*"))) == 6
+
+
 @pytest.mark.parametrize(
     ("word", "found"),
-    [("older=3", "30d"), ("remove=yes", "remove=true"), ("spring", "prune"), ("outputs=/nowhere", "/nowhere")],
+    [
+        ("older=3", "30d"),
+        ("remove=yes", "remove=true"),
+        ("spring", "prune"),
+        ("outputs=/nowhere", "/nowhere"),
+        ("stage=grwo", "stage=grow"),
+        ("scene=x", "cornell"),
+    ],
 )
 def test_what_cannot_be_meant_is_refused(
     outputs: Path, capsys: pytest.CaptureFixture[str], word: str, found: str

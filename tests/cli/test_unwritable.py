@@ -8,7 +8,7 @@ import shlex
 import shutil
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import pytest
@@ -43,6 +43,13 @@ def read_only(store: Path, environment: Mapping[str, str], *words: str) -> subpr
 
 def as_nobody(store: Path, environment: Mapping[str, str], *words: str) -> subprocess.CompletedProcess[str]:
     """The command line with toy stages as another user, who may read everything."""
+    return run_as_nobody(store, environment, toys(store, *words))
+
+
+def run_as_nobody(
+    store: Path, environment: Mapping[str, str], command: Sequence[str]
+) -> subprocess.CompletedProcess[str]:
+    """A command as another user, who may read the store."""
     if os.geteuid() != 0:
         pytest.skip("only root may become another user")
     if shutil.which("setpriv") is None:
@@ -53,8 +60,7 @@ def as_nobody(store: Path, environment: Mapping[str, str], *words: str) -> subpr
     user = ["setpriv", f"--reuid={NOBODY}", f"--regid={NOBODY}", "--clear-groups", "--no-new-privs"]
     if subprocess.run([*user, "test", "-r", __file__], capture_output=True).returncode != 0:
         pytest.skip("other users cannot read this checkout")
-    command = [*user, *toys(store, *words)]
-    return subprocess.run(command, env=environment, cwd="/tmp", capture_output=True, text=True, timeout=120)
+    return subprocess.run([*user, *command], env=environment, cwd="/tmp", capture_output=True, text=True, timeout=120)
 
 
 OTHERS = {"read only": read_only, "another user's": as_nobody}
@@ -118,3 +124,12 @@ def test_a_full_disk_is_told(tmp_path: Path, child_environment: Mapping[str, str
     result = on_small_disk(tmp_path, "256k", script, child_environment, words)
     assert is_a_paragraph(result, "No space left on device", "outputs=FOLDER"), result.stderr
     assert ("Plan for" in result.stdout) == begun
+
+
+def test_results_of_another_user_are_not_removed(store: Path, child_environment: dict[str, str]) -> None:
+    command = [sys.executable, "-m", "toys", "outputs", "prune", f"outputs={store}", "older=0h"]
+    assert "say remove=true" in run_as_nobody(store, child_environment, command).stdout
+    result = run_as_nobody(store, child_environment, [*command, "remove=true"])
+    assert result.returncode == REFUSED and "belongs to root" in result.stderr
+    assert len(result.stderr.splitlines()) <= 6 and "Traceback" not in result.stderr
+    subprocess.run([sys.executable, "-m", "toys", "verify", f"outputs={store}"], env=child_environment, check=True)

@@ -6,6 +6,7 @@ import os
 import sys
 from collections.abc import Sequence
 
+from rgspipe.cli.completion import LINE, completed, is_question
 from rgspipe.cli.help import help_text, overview, version_text
 from rgspipe.cli.messages import EXIT_INPUT, EXIT_INTERRUPTED, EXIT_UNREAD, show_input_error
 from rgspipe.errors import InputError
@@ -55,6 +56,11 @@ def _dispatch(arguments: list[str], stage_loader: StageLoader) -> int:
     if arguments[0] == "--version":
         print(version_text())
         return 0
+    if is_question(arguments):
+        words, is_open = completed(os.environ.get(LINE, ""))
+        print("\n".join(words))
+        if not is_open:
+            return 0
     if arguments[0] == "status":
         from rgspipe.cli.runs import show_runs
 
@@ -67,6 +73,10 @@ def _dispatch(arguments: list[str], stage_loader: StageLoader) -> int:
         from rgspipe.cli.outputs import show_outputs
 
         return show_outputs(arguments[1:])
+    if arguments[0] == "doctor":
+        from rgspipe.cli.doctor import doctor
+
+        return doctor(arguments[1:])
     if arguments[0] == "view":
         from rgspipe.cli.view import view_folder
 

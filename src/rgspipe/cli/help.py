@@ -130,7 +130,9 @@ More:
   status                how the runs so far ended; status NAME shows one, status state=failed some
   view FOLDER           a frozen scene in the browser, where lamps are moved and found
   outputs               what the results take on the disk; outputs prune removes what nothing needs any more
+  doctor                whether all that is needed is here and works, and how accurate and fast it is
   verify                read every result and say which were damaged since they were made
+  --shell-completion install=bash  for eval: lets the tab key complete stages, groups and keys
   --version             of rgspipe, Python and the libraries
   --hydra-help          options of Hydra, which reads the command line
 Exit status: 0 done, 1 failed, 2 input that cannot be used."""

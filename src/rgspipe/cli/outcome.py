@@ -8,7 +8,8 @@ from collections.abc import Callable, Mapping, Sequence
 import pandas as pd
 
 from rgspipe.artifacts import Artifact
-from rgspipe.cli.columns import columns, decibels, degrees, percent, seconds, time, without_empty, words
+from rgspipe.cli.cells import decibels, degrees, percent, seconds, time, words
+from rgspipe.cli.columns import columns, without_empty
 from rgspipe.datasets.advice_file import ADVICE
 from rgspipe.datasets.covariance_file import read_covariances
 from rgspipe.datasets.json_file import read_json

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import difflib
 import re
 import time
 from collections.abc import Sequence
 from pathlib import Path
 
+from rgspipe.cli.columns import columns, without_empty
 from rgspipe.cli.runs import given_outputs
 from rgspipe.datasets.input_file import input_folder
 from rgspipe.errors import InputError
-from rgspipe.retention import Choice, Stored, removable, remove, stored
+from rgspipe.retention import Choice, Stored, in_the_making, removable, remove, stored
 from rgspipe.status import read_statuses
 
 #: Seconds of what ages are written in.
@@ -21,25 +23,35 @@ KEYS = ("outputs", "scene", "stage", "older", "remove")
 
 
 def show_outputs(arguments: Sequence[str]) -> int:
-    """List the results by scene and stage; with `prune`, list or remove those that nothing else needs.
+    """List the results by scene and stage, those of a stage that is named one by one; with `prune`, list or remove
+    those that nothing else needs.
 
     Args:
-        arguments: prune, outputs=DIR, scene=NAME, stage=NAME, older=30d (or 12h, 4w), remove=true.
+        arguments: list or prune, outputs=DIR, scene=NAME, stage=NAME, older=30d (or 12h, 4w), remove=true.
 
     Raises:
         InputError: an argument cannot be used, a manifest is damaged, or a run is going on that may need what goes.
     """
-    prune = "prune" in arguments
-    if not prune and "remove=true" in arguments:
+    words = [text.removeprefix("--") for text in arguments]
+    prune = "prune" in words
+    if not prune and "remove=true" in words:
         raise InputError("remove", expected="prune", found="a list", remedy="Say outputs prune remove=true.")
-    values = _values([text for text in arguments if text not in ("list", "prune")])
+    values = _values([text for text in words if text not in ("list", "prune")])
     outputs = input_folder(given_outputs([f"outputs={values.get('outputs', 'outputs')}"]), "the folder of results")
     choice = Choice(values.get("scene"), values.get("stage"), _seconds(values["older"]) if "older" in values else None)
+    really = values.get("remove") == "true"
+    if really:
+        list(remove(outputs, []))  # what a removal that was killed has left
     everything = stored(outputs)
-    if not prune:
-        print(_table([one for one in everything if _is_listed(choice, one)], outputs))
+    _check_names(choice, everything)
+    if prune:
+        return _prune(outputs, everything, choice, really)
+    shown = [one for one in everything if _is_listed(choice, one)]
+    if not shown:
+        print(f"No {'such ' if everything else ''}results in {outputs}.")
         return 0
-    return _prune(outputs, everything, choice, really=values.get("remove") == "true")
+    _print(shown, outputs, singly=choice.stage is not None)
+    return 0
 
 
 def _prune(outputs: Path, everything: Sequence[Stored], choice: Choice, really: bool) -> int:
@@ -50,7 +62,7 @@ def _prune(outputs: Path, everything: Sequence[Stored], choice: Choice, really: 
     if not gone:
         print(f"Nothing to remove from {outputs}: what matches is needed by other results, or led to by a latest link.")
         return 0
-    print(_table(gone, outputs))
+    _print(gone, outputs, singly=True)
     done = "Removed" if really else "Would be removed; say remove=true to do it:"
     print(f"{done} {len(gone)} of {len(everything)} folders, {_size(gone)} of {_size(everything)}.")
     return 0
@@ -58,10 +70,26 @@ def _prune(outputs: Path, everything: Sequence[Stored], choice: Choice, really: 
 
 def _check_idle(outputs: Path) -> None:
     """Refuse to take away what a run may be about to read."""
+    remedy = "Wait for it, or stop it; python -m rgspipe status shows it."
     for folder, status in read_statuses(outputs / "runs"):
         if status["state"] == "running":
-            remedy = "Wait for it, or stop it; python -m rgspipe status shows it."
             raise InputError(folder, expected="no run going on in this folder", found="one", remedy=remedy)
+    # A run may keep its status elsewhere (hydra.run.dir), and Python none.
+    if (folder := in_the_making(outputs)) is not None:
+        expected, found = "no result in the making in this folder", "a process that makes it"
+        raise InputError(folder, expected=expected, found=found, remedy=remedy)
+
+
+def _check_names(choice: Choice, everything: Sequence[Stored]) -> None:
+    """Refuse scenes and stages of which there is nothing: they are misspelt."""
+    for key, name, there in (
+        ("scene", choice.scene, {one.key.scene for one in everything}),
+        ("stage", choice.stage, {one.key.stage for one in everything}),
+    ):
+        if name is not None and there and name not in there:
+            near = difflib.get_close_matches(name, there, n=1)
+            remedy = f"Did you mean {key}={near[0]}?" if near else "Choose one of them."
+            raise InputError(key, expected=f"one of {', '.join(sorted(there))}", found=repr(name), remedy=remedy)
 
 
 def _values(arguments: Sequence[str]) -> dict[str, str]:
@@ -85,24 +113,38 @@ def _is_listed(choice: Choice, one: Stored) -> bool:
     return Choice(choice.scene, one.key.stage if choice.stage is None else choice.stage, choice.older).takes(one)
 
 
-def _table(shown: Sequence[Stored], outputs: Path) -> str:
-    """A line for each scene and stage, the largest first within its scene."""
-    groups: dict[tuple[str, str], list[Stored]] = {}
-    for one in shown:
-        groups.setdefault((one.key.scene, one.key.stage), []).append(one)
-    sizes = sorted((names[0], -_bytes(group), names) for names, group in groups.items())
-    rows = [_row(*names, groups[names]) for _, _, names in sizes]
-    titles = ("scene", "stage", "folders", "size", "newest", "")
-    widths = [max(len(row[column]) for row in [titles, *rows]) for column in range(len(titles))]
-    lines = ["  ".join(map(str.ljust, row, widths)).rstrip() for row in [titles, *rows]]
-    return "\n".join([*lines, f"{_size(shown)} in {outputs}"])
+def _print(shown: Sequence[Stored], outputs: Path, singly: bool) -> None:
+    """A line for each scene and stage, or for each folder; the largest first within its scene, or stage."""
+    if singly:
+        found = sorted(shown, key=lambda one: (one.key.scene, one.key.stage, -one.bytes))
+        rows = [["folder", "size", "made", ""], *map(_single, found)]
+    else:
+        groups: dict[tuple[str, str], list[Stored]] = {}
+        for one in shown:
+            groups.setdefault((one.key.scene, one.key.stage), []).append(one)
+        sizes = sorted((names[0], -_bytes(group), names) for names, group in groups.items())
+        titles = ["scene", "stage", "folders", "size", "newest", ""]
+        rows = [titles, *(_row(*names, groups[names]) for _, _, names in sizes)]
+    print("\n".join([*columns(without_empty(rows)), f"{_size(shown)} in {outputs}"]))
 
 
-def _row(scene: str, stage: str, group: Sequence[Stored]) -> tuple[str, ...]:
-    days = (time.time() - max(one.made for one in group)) / UNITS["d"]
+def _row(scene: str, stage: str, group: Sequence[Stored]) -> list[str]:
     unfinished = sum(not one.whole for one in group)
-    age = f"{days:.0f} days ago" if days >= 1.0 else "today"
-    return scene, stage, str(len(group)), _size(group), age, f"{unfinished} unfinished" if unfinished else ""
+    words = f"{unfinished} unfinished" if unfinished else ""
+    return [scene, stage, str(len(group)), _size(group), _age(max(one.made for one in group)), words]
+
+
+def _single(one: Stored) -> list[str]:
+    words = ("latest" if one.linked else "") if one.whole else "unfinished"
+    return [f"{one.key.scene}/{one.key.stage}/{one.folder.name}", _size([one]), _age(one.made), words]
+
+
+def _age(made: float) -> str:
+    """How long ago, in the units that `older=` takes."""
+    hours = max(0.0, time.time() - made) / UNITS["h"]
+    if hours < 1.0:
+        return "under 1h ago"
+    return f"{hours:.0f}h ago" if hours < 48.0 else f"{hours / 24.0:.0f}d ago"
 
 
 def _bytes(group: Sequence[Stored]) -> int:

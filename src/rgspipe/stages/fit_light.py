@@ -163,7 +163,6 @@ def _effects(context: StageContext) -> Effects:
     if not wanted.auto:
         return replace(wanted_effects(wanted), spots=band)
     bounds, choice = _choice(context.config, context.inputs["freeze"])
-    print("effects: " + "; ".join(choice.reasons))
     context.note(effects={"choice": asdict(choice), "bounds": asdict(bounds), "tolerance": wanted.tolerance})
     # What is looked for has its cone, even where known rigs would be rendered without.
     return replace(choice.effects, cones=True, spots=band)

@@ -1,0 +1,49 @@
+"""What a shell completes of a command line beyond what Hydra knows: commands, stages and pipelines."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from rgspipe.resources import resource_folder
+from rgspipe.stages import NAMES
+from rgspipe.status import STATES
+
+#: How a shell asks, and where it says for which line.
+FLAGS, LINE = ("-sc", "--shell-completion"), "COMP_LINE"
+
+#: Words that begin a line without a stage, and what may follow them; nothing stands for files.
+COMMANDS: Mapping[str, Sequence[str]] = {
+    "doctor": ("outputs=", "check=false"),
+    "outputs": ("list", "prune", "outputs=", "scene=", "stage=", "older=", "remove=true"),
+    "status": ("outputs=", "stage=", *(f"state={state}" for state in STATES)),
+    "verify": ("outputs=",),
+    "view": (),
+    "--help": NAMES,
+    "--version": (),
+}
+
+
+def is_question(arguments: Sequence[str]) -> bool:
+    """Whether a shell asks how a line can go on."""
+    return len(arguments) == 2 and arguments[0] in FLAGS and arguments[1].startswith("query=")
+
+
+def completed(line: str) -> tuple[list[str], bool]:
+    """What the last word of a line can become, and whether Hydra's groups and keys are to be added.
+
+    Args:
+        line: as far as it is typed, with the program's name; a blank at its end begins another word.
+    """
+    words = line.split()[1:]
+    word = "" if line.endswith(" ") or not words else words.pop()
+    if words and words[0] in COMMANDS:
+        return _those(COMMANDS[words[0]], word), False
+    key, is_key, _ = word.partition("=")
+    if is_key and key in ("stage", "pipeline"):
+        names = NAMES if key == "stage" else [path.stem for path in sorted(resource_folder("pipelines").glob("*.yaml"))]
+        return _those([f"{key}={name}" for name in names], word), False
+    return _those(["pipeline=", *([] if words else COMMANDS)], word), True
+
+
+def _those(words: Sequence[str], begin: str) -> list[str]:
+    return [word for word in words if word.startswith(begin)]
