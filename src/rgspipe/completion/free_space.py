@@ -19,6 +19,9 @@ LONGEST_SIDE = 96
 #: Most cells along a side of a grid.
 MOST_CELLS = 128
 
+#: How far rays must reach past the middle of a cell for it to be seen, in cells.
+MARGIN = 0.5
+
 
 @dataclass(frozen=True)
 class Grid:
@@ -64,24 +67,40 @@ class Grid:
         return values[tuple(index.clip(0, np.array(self.shape) - 1).T)]
 
 
-def seen_through(grid: Grid, bvh: SurfelBvh, cameras: Sequence[Camera], margin: float) -> Tensor:
-    """(X, Y, Z) bool: cells whose middles lie nearer to a camera, by `margin`, than the surface behind them.
+@dataclass(frozen=True)
+class SeenSpace:
+    """How far cameras look.
 
-    Args:
-        bvh: the surfaces; both of their sides end a ray.
-        cameras: those that saw the scene. Of large images as many pixels are traced as LONGEST_SIDE allows.
+    Attributes:
+        cameras: of images with LONGEST_SIDE pixels along a side at most.
+        reaches: for each of them (H · W,) float64, the distance at which the ray of each pixel ends.
     """
-    centers = grid.centers
-    free = torch.zeros(len(centers), dtype=torch.bool)
-    for camera in (camera.reduced(LONGEST_SIDE) for camera in cameras):
-        open_cells = (~free).nonzero()[:, 0]
-        pixel, depth = camera.project(centers[open_cells])
-        column, row = pixel.floor().long().unbind(-1)
-        framed = (depth > 0) & (column >= 0) & (column < camera.width) & (row >= 0) & (row < camera.height)
-        reach = _reach(bvh, camera)[row[framed] * camera.width + column[framed]]
-        chosen = open_cells[framed]
-        free[chosen[(centers[chosen] - camera.origin.double()).norm(dim=-1) < reach - margin]] = True
-    return free.reshape(grid.shape)
+
+    cameras: tuple[Camera, ...]
+    reaches: tuple[Tensor, ...]
+
+    @classmethod
+    def of(cls, bvh: SurfelBvh, cameras: Sequence[Camera]) -> SeenSpace:
+        """What is seen past the surfaces, both of whose sides end a ray."""
+        reduced = tuple(camera.reduced(LONGEST_SIDE) for camera in cameras)
+        return cls(reduced, tuple(_reach(bvh, camera) for camera in reduced))
+
+    def holds(self, points: Tensor, margin: float) -> Tensor:
+        """(P,) bool: points (P, 3) that lie nearer to a camera, by `margin`, than the surface behind them."""
+        free = torch.zeros(len(points), dtype=torch.bool)
+        for camera, reach in zip(self.cameras, self.reaches, strict=True):
+            unseen = (~free).nonzero()[:, 0]
+            pixel, depth = camera.project(points[unseen])
+            column, row = pixel.floor().long().unbind(-1)
+            framed = (depth > 0) & (column >= 0) & (column < camera.width) & (row >= 0) & (row < camera.height)
+            chosen = unseen[framed]
+            distance = (points[chosen] - camera.origin.double()).norm(dim=-1)
+            free[chosen[distance < reach[row[framed] * camera.width + column[framed]] - margin]] = True
+        return free
+
+    def cells(self, grid: Grid, margin: float) -> Tensor:
+        """(X, Y, Z) bool: cells whose middles were seen."""
+        return self.holds(grid.centers, margin).reshape(grid.shape)
 
 
 def _reach(bvh: SurfelBvh, camera: Camera) -> Tensor:

@@ -115,7 +115,9 @@ def train(
 
 def _closed(surfels: Surfels, views: Sequence[View], options: TrainOptions) -> Surfels:
     """With surfels on the surfaces that no view shows, if those are wanted."""
-    return with_unseen_surfaces(surfels, [view.camera for view in views]) if options.unseen else surfels
+    if not options.unseen:
+        return surfels
+    return with_unseen_surfaces(surfels, [view.camera for view in views], [view.light.position for view in views])
 
 
 def surfel_spacing(surfels: Surfels) -> float:
