@@ -55,9 +55,7 @@ class Continued:
         )
 
 
-def continued(
-    planes: Sequence[Plane], centers: np.ndarray, grid: Grid, space: SeenSpace, spacing: float
-) -> Continued:
+def continued(planes: Sequence[Plane], centers: np.ndarray, grid: Grid, space: SeenSpace, spacing: float) -> Continued:
     """What the planes of surfels become where nothing was seen, and the sides of the grid's box that they lead to.
 
     Args:
@@ -80,7 +78,8 @@ def _beyond(plane: Plane, members: cKDTree, grid: Grid, space: SeenSpace, spacin
     raster = _Raster.on_plane(normal, plane.offset, grid, spacing)
     places = raster.places
     supported = (members.query(places)[0] <= BARE * spacing).reshape(raster.shape)
-    within = grid.contains(places).reshape(raster.shape)
+    # Before the plane, as it may lie in a side of the box.
+    within = grid.contains(places + 0.5 * float(grid.cell.mean()) * normal).reshape(raster.shape)
     behind = torch.from_numpy(places - BEYOND * spacing * normal)
     pierced = space.holds(behind, 0.0).numpy().reshape(raster.shape)
     # One place wide it is the blur of an edge.
