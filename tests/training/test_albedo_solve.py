@@ -15,9 +15,9 @@ from rgspipe.training.albedo import ALBEDO_RANGE, AlbedoProblem
 from rgspipe.training.albedo_solve import Linearised, Quadratic, no_worse, pull
 from rgspipe.training.lighting import Lighting, indirect_irradiance, trace_lighting
 from rgspipe.training.likeness import graph_laplacian
-from rgspipe.training.ties import Ties
 from rgspipe.training.materials import build_frozen, fit_materials, trace_views
 from rgspipe.training.options import MaterialOptions
+from rgspipe.training.ties import Ties
 from rgspipe.training.view_model import build_view_models
 
 OPTIONS = MaterialOptions(rounds=5, gather_rays=64, patches=120, supersampling=1)

@@ -1,4 +1,4 @@
-"""What is known of surfaces that no camera saw while the albedo is solved: each is of one colour, its plane's if any."""
+"""Surfaces that no camera saw, while the albedo is solved: each is of one colour, about that of its plane."""
 
 from __future__ import annotations
 
