@@ -219,7 +219,7 @@ def bounced_light(surfels: Surfels, lamp: PointLight) -> torch.Tensor:
 
 
 def photographed_along_one_wall() -> tuple[Surfels, Surfels, list[Camera]]:
-    """A closed room, what cameras along its wall x = 0 show of it, and these: floor and ceiling near them are cut off."""
+    """A room, what cameras along its wall x = 0 show of it, and these; floor and ceiling near them are cut off."""
     room = surfels_on(inside_of_box([0.5, 0.5, 0.4], [1.0, 1.0, 0.8], WALLS), COUNT)
     places = [([0.1, y, z], [1.0, aim, 0.4]) for y, z, aim in ((0.2, 0.3, 0.1), (0.5, 0.5, 0.5), (0.8, 0.4, 0.9))]
     cameras = [camera_at(origin, target, 64, 1.1) for origin, target in places]
