@@ -36,8 +36,8 @@ log = logging.getLogger(__name__)
 #: there is no wall of a room, and may be anywhere.
 MOST_OPEN = 0.5
 
-#: Cells of the grid along the distance of two surfels, and how far rays must reach past a cell's middle, in cells.
-CELLS_PER_SPACING, MARGIN = 2.0, 0.5
+#: Cells of the grid along the distance of two surfels.
+CELLS_PER_SPACING = 2.0
 
 #: Cells between a camera or lamp and the side of the box: they stand in the room, not in its wall.
 BEHIND = 2.0
