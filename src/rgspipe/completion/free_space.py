@@ -19,9 +19,6 @@ LONGEST_SIDE = 96
 #: Most cells along a side of a grid.
 MOST_CELLS = 128
 
-#: How far rays must reach past the middle of a cell for it to be seen, in cells.
-MARGIN = 0.5
-
 
 @dataclass(frozen=True)
 class Grid:
@@ -80,10 +77,16 @@ class SeenSpace:
     reaches: tuple[Tensor, ...]
 
     @classmethod
-    def of(cls, bvh: SurfelBvh, cameras: Sequence[Camera]) -> SeenSpace:
-        """What is seen past the surfaces, both of whose sides end a ray."""
+    def of(cls, bvh: SurfelBvh, cameras: Sequence[Camera], depths: Sequence[Tensor | None] = ()) -> SeenSpace:
+        """What is seen past the surfaces, both of whose sides end a ray.
+
+        Args:
+            depths: of each camera the depth (H, W) of its photograph if it is known. A place that has no surfel, as
+                one camera alone saw it aslant, is no hole.
+        """
         reduced = tuple(camera.reduced(LONGEST_SIDE) for camera in cameras)
-        return cls(reduced, tuple(_reach(bvh, camera) for camera in reduced))
+        known = depths or [None] * len(reduced)
+        return cls(reduced, tuple(_reach(bvh, *one) for one in zip(reduced, known, strict=True)))
 
     def holds(self, points: Tensor, margin: float) -> Tensor:
         """(P,) bool: points (P, 3) that lie nearer to a camera, by `margin`, than the surface behind them."""
@@ -103,10 +106,23 @@ class SeenSpace:
         return self.holds(grid.centers, margin).reshape(grid.shape)
 
 
-def _reach(bvh: SurfelBvh, camera: Camera) -> Tensor:
+def _reach(bvh: SurfelBvh, camera: Camera, depth: Tensor | None) -> Tensor:
     """(H · W,) float64 distance at which the ray of each pixel ends; infinite where most of it ends nowhere."""
-    origins, directions, _ = camera.rays()
+    origins, directions, lengths = camera.rays()
     hits = composite(bvh, origins, directions, two_sided=True)
     covered = hits.weights.sum(dim=1)
     mean = (hits.weights * hits.depths.nan_to_num(posinf=0.0)).sum(dim=1) / covered.clamp(min=1e-6)
-    return torch.where(hits.transmittance < 0.5, mean, torch.inf).double().cpu()
+    nowhere = torch.full_like(mean.double(), torch.inf)
+    if depth is not None:
+        measured = lengths.double().reshape(-1) * _sampled(depth.double(), camera)
+        nowhere = torch.where(measured.isfinite(), measured, nowhere.to(measured.device))
+    return torch.where(hits.transmittance < 0.5, mean.double(), nowhere.to(mean.device)).cpu()
+
+
+def _sampled(depth: Tensor, camera: Camera) -> Tensor:
+    """(h · w,) what an image (H, W) has at the middles of the pixels of a camera that was reduced."""
+    rows, columns = (
+        ((torch.arange(small) + 0.5) * large / small).long()
+        for small, large in zip((camera.height, camera.width), depth.shape, strict=True)
+    )
+    return depth[rows][:, columns].reshape(-1)

@@ -15,7 +15,7 @@ import torch
 from scipy.ndimage import binary_dilation, binary_opening, label
 from scipy.spatial import cKDTree
 
-from rgspipe.completion.free_space import MARGIN, Grid, SeenSpace
+from rgspipe.completion.free_space import Grid, SeenSpace
 from rgspipe.completion.planes import Plane
 
 #: A place of a plane has a surface if a surfel is within so many distances of neighbours.
@@ -67,8 +67,7 @@ def continued(planes: Sequence[Plane], centers: np.ndarray, grid: Grid, space: S
     parts = [_beyond(plane, cKDTree(centers[plane.members.numpy()]), grid, space, spacing) for plane in planes]
     inner = Continued.joined(parts)
     known = cKDTree(np.concatenate([centers, inner.places]))
-    seen = space.cells(grid, MARGIN * float(grid.cell.mean())).numpy()
-    sides = [_side(axis, end, surfaces, known, grid, seen, spacing) for axis in range(3) for end in (0, 1)]
+    sides = [_side(axis, end, surfaces, known, grid, space, spacing) for axis in range(3) for end in (0, 1)]
     return Continued.joined([inner, *sides])
 
 
@@ -78,17 +77,14 @@ def _beyond(plane: Plane, members: cKDTree, grid: Grid, space: SeenSpace, spacin
     raster = _Raster.on_plane(normal, plane.offset, grid, spacing)
     places = raster.places
     supported = (members.query(places)[0] <= BARE * spacing).reshape(raster.shape)
-    # Before the plane, as it may lie in a side of the box.
-    within = grid.contains(places + 0.5 * float(grid.cell.mean()) * normal).reshape(raster.shape)
-    behind = torch.from_numpy(places - BEYOND * spacing * normal)
-    pierced = space.holds(behind, 0.0).numpy().reshape(raster.shape)
+    within, pierced = _within(raster, normal, grid), _crossed(raster, normal, space, spacing)
     # One place wide it is the blur of an edge.
     unknown = binary_opening(within & ~pierced | supported, np.ones((3, 3))) & ~supported
     return raster.chosen(_parts(unknown, lambda rim: supported[rim].sum() > pierced[rim].sum(), outer=True), normal)
 
 
 def _side(
-    axis: int, end: int, surfaces: cKDTree, known: cKDTree, grid: Grid, seen: np.ndarray, spacing: float
+    axis: int, end: int, surfaces: cKDTree, known: cKDTree, grid: Grid, space: SeenSpace, spacing: float
 ) -> Continued:
     """The parts of a side of the box that no camera looked through, where surfaces lead to most of their rim."""
     normal = np.zeros(3)
@@ -96,13 +92,22 @@ def _side(
     corner = grid.lower.numpy() if end == 0 else grid.upper.numpy()
     raster = _Raster.on_plane(normal, float(normal @ corner), grid, spacing)
     places = raster.places
-    inward = places + 0.5 * float(grid.cell.mean()) * normal
-    within = grid.contains(inward).reshape(raster.shape)
-    unknown = within & ~grid.at(seen, inward).reshape(raster.shape)
+    unknown = _within(raster, normal, grid) & ~_crossed(raster, normal, space, spacing)
     unknown &= (surfaces.query(places)[0] > BARE * spacing).reshape(raster.shape)
     unknown = binary_opening(unknown, np.ones((3, 3)))
     near = (known.query(places)[0] <= 2.0 * BARE * spacing).reshape(raster.shape)
     return raster.chosen(_parts(unknown, lambda rim: near[rim].mean() > 0.5, outer=False), normal)
+
+
+def _within(raster: _Raster, normal: np.ndarray, grid: Grid) -> np.ndarray:
+    """(A, B) bool: places with room of the box before them; the plane itself may lie in a side of the box."""
+    return grid.contains(raster.places + 0.5 * float(grid.cell.mean()) * normal).reshape(raster.shape)
+
+
+def _crossed(raster: _Raster, normal: np.ndarray, space: SeenSpace, spacing: float) -> np.ndarray:
+    """(A, B) bool: places behind which a camera saw something."""
+    behind = torch.from_numpy(raster.places - BEYOND * spacing * normal)
+    return space.holds(behind, 0.0).numpy().reshape(raster.shape)
 
 
 def _parts(unknown: np.ndarray, is_kept: Callable[[np.ndarray], bool], outer: bool) -> np.ndarray:

@@ -19,7 +19,7 @@ from scipy.spatial.transform import Rotation
 from skimage.measure import marching_cubes
 from torch import Tensor
 
-from rgspipe.completion.free_space import MARGIN, Grid, SeenSpace
+from rgspipe.completion.free_space import Grid, SeenSpace
 from rgspipe.completion.hidden_room import parts_in_sight, with_hidden_room
 from rgspipe.completion.planes import Plane, frame_of, planes_of
 from rgspipe.completion.structure import BARE, Continued, continued
@@ -36,8 +36,8 @@ log = logging.getLogger(__name__)
 #: there is no wall of a room, and may be anywhere.
 MOST_OPEN = 0.5
 
-#: Cells of the grid along the distance of two surfels.
-CELLS_PER_SPACING = 2.0
+#: Cells of the grid along the distance of two surfels, and how far rays must reach past a cell's middle, in cells.
+CELLS_PER_SPACING, MARGIN = 2.0, 0.5
 
 #: Cells between a camera or lamp and the side of the box: they stand in the room, not in its wall.
 BEHIND = 2.0
@@ -58,7 +58,12 @@ NEIGHBOURS, TURN = 8, 2.5
 SCALE = 0.87
 
 
-def with_unseen_surfaces(surfels: Surfels, cameras: Sequence[Camera], lamps: Sequence[Tensor] = ()) -> Surfels:
+def with_unseen_surfaces(
+    surfels: Surfels,
+    cameras: Sequence[Camera],
+    lamps: Sequence[Tensor] = (),
+    depths: Sequence[Tensor | None] = (),
+) -> Surfels:
     """The surfels and, after them, those of surfaces that no camera saw.
 
     Nothing is added to an object in empty space.
@@ -67,6 +72,7 @@ def with_unseen_surfaces(surfels: Surfels, cameras: Sequence[Camera], lamps: Seq
         surfels: N ≥ 2 of a scene that `cameras` saw.
         cameras: those that it was made from.
         lamps: (3,) places of lamps that lit it; like cameras they stand in the room, not behind its walls.
+        depths: what is known of the depth (H, W) of the cameras' photographs, for each of them.
     """
     if not cameras or len(surfels) <= NEIGHBOURS or openness(_tree(surfels), surfels) > MOST_OPEN:
         return surfels
@@ -77,7 +83,8 @@ def with_unseen_surfaces(surfels: Surfels, cameras: Sequence[Camera], lamps: Seq
     planes = [plane.turned(frame) for plane in planes]
     turned = [_camera_turned(camera, frame) for camera in cameras]
     inside = torch.stack([*(camera.origin for camera in cameras), *lamps]).double().cpu() @ frame.T
-    found = _unseen(_turned(surfels, frame), planes, turned, inside, spacing)
+    space = SeenSpace.of(_tree(_turned(surfels, frame)), turned, depths)
+    found = _unseen(_turned(surfels, frame), planes, space, inside, spacing)
     if not len(found):
         return surfels
     log.info("%d surfels close the scene where no camera saw what is there.", len(found))
@@ -86,9 +93,7 @@ def with_unseen_surfaces(surfels: Surfels, cameras: Sequence[Camera], lamps: Seq
     return replace(closed, guessed=doubts_of_guesses(closed))
 
 
-def _unseen(
-    surfels: Surfels, planes: Sequence[Plane], cameras: Sequence[Camera], inside: Tensor, spacing: float
-) -> Continued:
+def _unseen(surfels: Surfels, planes: Sequence[Plane], space: SeenSpace, inside: Tensor, spacing: float) -> Continued:
     """Where surfels are missing, in a room whose axes are x, y and z; `inside` (I, 3) are places in it."""
     centers = surfels.centers.double().cpu()
     edge, bvh = spacing / CELLS_PER_SPACING, _tree(surfels)
@@ -96,7 +101,6 @@ def _unseen(
     upper = torch.maximum(centers.amax(dim=0), inside.amax(dim=0) + BEHIND * edge)
     # Edges are looked for at the distance of surfels: finer cells would take eight times as long.
     coarse = Grid.over(lower, upper, spacing)
-    space = SeenSpace.of(bvh, cameras)
     guessed = continued(planes, centers.numpy(), coarse, space, spacing)
     guessed = guessed.chosen(_is_within(bvh, guessed, spacing))
     # What lies before an open front is no part of the room, and needs no cells.

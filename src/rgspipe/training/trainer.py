@@ -117,7 +117,8 @@ def _closed(surfels: Surfels, views: Sequence[View], options: TrainOptions) -> S
     """With surfels on the surfaces that no view shows, if those are wanted."""
     if not options.unseen:
         return surfels
-    return with_unseen_surfaces(surfels, [view.camera for view in views], [view.light.position for view in views])
+    cameras, lamps, depths = zip(*((view.camera, view.light.position, view.depth) for view in views), strict=True)
+    return with_unseen_surfaces(surfels, cameras, lamps, depths)
 
 
 def surfel_spacing(surfels: Surfels) -> float:
