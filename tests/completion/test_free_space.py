@@ -8,7 +8,7 @@ import pytest
 import torch
 
 from half_seen_room import TOP, camera_at, true_room
-from rgspipe.completion.free_space import LONGEST_SIDE, MOST_CELLS, Grid, seen_through
+from rgspipe.completion.free_space import LONGEST_SIDE, MOST_CELLS, Grid, SeenSpace
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.scene import Camera, Surfels
 from rgspipe.scene.rectangles import Rectangles, inside_of_box, rectangle, surfels_on
@@ -22,7 +22,7 @@ BOX_LOWER, BOX_UPPER = torch.tensor([0.3, 0.3, 0.0]), torch.tensor([0.7, 0.7, TO
 
 
 def free(surfels: Surfels, *cameras: Camera, grid: Grid = GRID) -> torch.Tensor:
-    return seen_through(grid, SurfelBvh(surfels), cameras, MARGIN)
+    return SeenSpace.of(SurfelBvh(surfels), cameras).cells(grid, MARGIN)
 
 
 def entry(origin: torch.Tensor, points: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:

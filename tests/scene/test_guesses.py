@@ -9,7 +9,14 @@ import pytest
 import torch
 
 from rgspipe.scene import Surfels
-from rgspipe.scene.guesses import LEAST_DOUBT, MOST, guessed_surfaces, spread_of_albedo
+from rgspipe.scene.guesses import (
+    LEAST_DOUBT,
+    MOST,
+    GuessedSurfaces,
+    doubts_of_guesses,
+    guessed_surfaces,
+    spread_of_albedo,
+)
 from rooms import closed_box
 
 
@@ -52,3 +59,29 @@ def test_the_spread_is_that_of_what_cameras_saw(box):
     half = 0.5 * math.log(4.0)
     assert float(spread_of_albedo(seen)) == pytest.approx(half, rel=0.01)  # measured 0.6931, as many on either side
     assert float(spread_of_albedo(guessed_where(seen, albedo[:, 0] > 0.5))) == LEAST_DOUBT
+
+
+def test_a_surface_that_goes_on_in_the_plane_of_others_is_expected_to_be_like_these(box):
+    floor, wall, x = box.normals[:, 2] > 0.9, box.normals[:, 0] > 0.9, box.centers[:, 0]
+    albedo = torch.full_like(box.albedo, 0.2)
+    albedo[floor] = torch.where((x[floor] < 0.0)[:, None], 0.5, 0.6).expand(-1, 3).to(albedo)
+    beyond = guessed_where(replace(box, albedo=albedo), floor & (x > 0.2) | wall)
+    expected, doubt = GuessedSurfaces.of(beyond).expected(albedo)
+    known = expected.isfinite().all(dim=1)
+    # Nothing of the wall was seen, so nothing is expected of it.
+    assert torch.equal(known, floor & (x > 0.2))
+    assert bool((expected[known] == 0.5).all())
+    seen = albedo[floor & (x <= 0.2)].mean(dim=1).log()
+    torch.testing.assert_close(doubt[known], seen.std(correction=0).expand(int(known.sum()), 1).to(doubt))
+    doubts = doubts_of_guesses(beyond)
+    assert torch.equal(doubts[known], doubt[known, 0]) and not bool(doubts[beyond.guessed == 0.0].any())
+    assert torch.equal(doubts[wall], spread_of_albedo(beyond).expand(int(wall.sum())))
+
+
+def test_a_strip_of_a_wall_tells_nothing_of_a_wall_twenty_times_as_large():
+    box = closed_box(0.05)
+    floor, x = box.normals[:, 2] > 0.9, box.centers[:, 0]
+    low = float(x[floor].min())
+    hidden = guessed_where(box, floor & (x > low + 1e-6))
+    expected, _ = GuessedSurfaces.of(hidden).expected(box.albedo)
+    assert not bool(expected.isfinite().any())

@@ -91,7 +91,7 @@ def capture_scene(
         surfels = initialise_surfels(views, surfels, seed=options.seed, where=where)
     surfels = surfels.to(torch.float32)
     if options.unseen:
-        surfels = with_unseen_surfaces(surfels, [view.camera for view in views])
+        surfels = with_unseen_surfaces(surfels, [view.camera for view in views], depths=[view.depth for view in views])
     weights = trace_views(surfels, views, options.supersampling)
     free = options.exposure == "free"
     if free:

@@ -64,30 +64,65 @@ class Grid:
         return values[tuple(index.clip(0, np.array(self.shape) - 1).T)]
 
 
-def seen_through(grid: Grid, bvh: SurfelBvh, cameras: Sequence[Camera], margin: float) -> Tensor:
-    """(X, Y, Z) bool: cells whose middles lie nearer to a camera, by `margin`, than the surface behind them.
+@dataclass(frozen=True)
+class SeenSpace:
+    """How far cameras look.
 
-    Args:
-        bvh: the surfaces; both of their sides end a ray.
-        cameras: those that saw the scene. Of large images as many pixels are traced as LONGEST_SIDE allows.
+    Attributes:
+        cameras: of images with LONGEST_SIDE pixels along a side at most.
+        reaches: for each of them (H · W,) float64, the distance at which the ray of each pixel ends.
     """
-    centers = grid.centers
-    free = torch.zeros(len(centers), dtype=torch.bool)
-    for camera in (camera.reduced(LONGEST_SIDE) for camera in cameras):
-        open_cells = (~free).nonzero()[:, 0]
-        pixel, depth = camera.project(centers[open_cells])
-        column, row = pixel.floor().long().unbind(-1)
-        framed = (depth > 0) & (column >= 0) & (column < camera.width) & (row >= 0) & (row < camera.height)
-        reach = _reach(bvh, camera)[row[framed] * camera.width + column[framed]]
-        chosen = open_cells[framed]
-        free[chosen[(centers[chosen] - camera.origin.double()).norm(dim=-1) < reach - margin]] = True
-    return free.reshape(grid.shape)
+
+    cameras: tuple[Camera, ...]
+    reaches: tuple[Tensor, ...]
+
+    @classmethod
+    def of(cls, bvh: SurfelBvh, cameras: Sequence[Camera], depths: Sequence[Tensor | None] = ()) -> SeenSpace:
+        """What is seen past the surfaces, both of whose sides end a ray.
+
+        Args:
+            depths: of each camera the depth (H, W) of its photograph if it is known. A place that has no surfel, as
+                one camera alone saw it aslant, is no hole.
+        """
+        reduced = tuple(camera.reduced(LONGEST_SIDE) for camera in cameras)
+        known = depths or [None] * len(reduced)
+        return cls(reduced, tuple(_reach(bvh, *one) for one in zip(reduced, known, strict=True)))
+
+    def holds(self, points: Tensor, margin: float) -> Tensor:
+        """(P,) bool: points (P, 3) that lie nearer to a camera, by `margin`, than the surface behind them."""
+        free = torch.zeros(len(points), dtype=torch.bool)
+        for camera, reach in zip(self.cameras, self.reaches, strict=True):
+            unseen = (~free).nonzero()[:, 0]
+            pixel, depth = camera.project(points[unseen])
+            column, row = pixel.floor().long().unbind(-1)
+            framed = (depth > 0) & (column >= 0) & (column < camera.width) & (row >= 0) & (row < camera.height)
+            chosen = unseen[framed]
+            distance = (points[chosen] - camera.origin.double()).norm(dim=-1)
+            free[chosen[distance < reach[row[framed] * camera.width + column[framed]] - margin]] = True
+        return free
+
+    def cells(self, grid: Grid, margin: float) -> Tensor:
+        """(X, Y, Z) bool: cells whose middles were seen."""
+        return self.holds(grid.centers, margin).reshape(grid.shape)
 
 
-def _reach(bvh: SurfelBvh, camera: Camera) -> Tensor:
+def _reach(bvh: SurfelBvh, camera: Camera, depth: Tensor | None) -> Tensor:
     """(H · W,) float64 distance at which the ray of each pixel ends; infinite where most of it ends nowhere."""
-    origins, directions, _ = camera.rays()
+    origins, directions, lengths = camera.rays()
     hits = composite(bvh, origins, directions, two_sided=True)
     covered = hits.weights.sum(dim=1)
     mean = (hits.weights * hits.depths.nan_to_num(posinf=0.0)).sum(dim=1) / covered.clamp(min=1e-6)
-    return torch.where(hits.transmittance < 0.5, mean, torch.inf).double().cpu()
+    nowhere = torch.full_like(mean.double(), torch.inf)
+    if depth is not None:
+        measured = lengths.double().reshape(-1) * _sampled(depth.double(), camera)
+        nowhere = torch.where(measured.isfinite(), measured, nowhere.to(measured.device))
+    return torch.where(hits.transmittance < 0.5, mean.double(), nowhere.to(mean.device)).cpu()
+
+
+def _sampled(depth: Tensor, camera: Camera) -> Tensor:
+    """(h · w,) what an image (H, W) has at the middles of the pixels of a camera that was reduced."""
+    rows, columns = (
+        ((torch.arange(small) + 0.5) * large / small).long()
+        for small, large in zip((camera.height, camera.width), depth.shape, strict=True)
+    )
+    return depth[rows][:, columns].reshape(-1)

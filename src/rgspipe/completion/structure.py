@@ -11,14 +11,19 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import torch
 from scipy.ndimage import binary_dilation, binary_opening, label
 from scipy.spatial import cKDTree
 
-from rgspipe.completion.free_space import Grid
+from rgspipe.completion.free_space import Grid, SeenSpace
 from rgspipe.completion.planes import Plane
 
 #: A place of a plane has a surface if a surfel is within so many distances of neighbours.
 BARE = 1.1
+
+#: How far behind a plane a camera must see for its ray to have crossed the plane, in distances of neighbours: rays that
+#: graze a wall from inside a room pass nearer to it than surfels are apart.
+BEYOND = 0.5
 
 
 @dataclass(frozen=True)
@@ -50,37 +55,36 @@ class Continued:
         )
 
 
-def continued(planes: Sequence[Plane], centers: np.ndarray, grid: Grid, seen: np.ndarray, spacing: float) -> Continued:
+def continued(planes: Sequence[Plane], centers: np.ndarray, grid: Grid, space: SeenSpace, spacing: float) -> Continued:
     """What the planes of surfels become where nothing was seen, and the sides of the grid's box that they lead to.
 
     Args:
         planes: of surfels at `centers` (N, 3).
         grid: its box is all that there is.
-        seen: (X, Y, Z) bool, the cells that cameras looked through.
+        space: what cameras looked through.
     """
     surfaces = cKDTree(centers)
-    parts = [_beyond(plane, cKDTree(centers[plane.members.numpy()]), grid, seen, spacing) for plane in planes]
+    parts = [_beyond(plane, cKDTree(centers[plane.members.numpy()]), grid, space, spacing) for plane in planes]
     inner = Continued.joined(parts)
     known = cKDTree(np.concatenate([centers, inner.places]))
-    sides = [_side(axis, end, surfaces, known, grid, seen, spacing) for axis in range(3) for end in (0, 1)]
+    sides = [_side(axis, end, surfaces, known, grid, space, spacing) for axis in range(3) for end in (0, 1)]
     return Continued.joined([inner, *sides])
 
 
-def _beyond(plane: Plane, members: cKDTree, grid: Grid, seen: np.ndarray, spacing: float) -> Continued:
+def _beyond(plane: Plane, members: cKDTree, grid: Grid, space: SeenSpace, spacing: float) -> Continued:
     """The places of a plane within the box that its surfels border on more than what cameras saw through does."""
     normal = plane.normal.numpy()
     raster = _Raster.on_plane(normal, plane.offset, grid, spacing)
     places = raster.places
     supported = (members.query(places)[0] <= BARE * spacing).reshape(raster.shape)
-    within = grid.contains(places).reshape(raster.shape)
-    pierced = grid.at(seen, places).reshape(raster.shape)
+    within, pierced = _within(raster, normal, grid), _crossed(raster, normal, space, spacing)
     # One place wide it is the blur of an edge.
     unknown = binary_opening(within & ~pierced | supported, np.ones((3, 3))) & ~supported
     return raster.chosen(_parts(unknown, lambda rim: supported[rim].sum() > pierced[rim].sum(), outer=True), normal)
 
 
 def _side(
-    axis: int, end: int, surfaces: cKDTree, known: cKDTree, grid: Grid, seen: np.ndarray, spacing: float
+    axis: int, end: int, surfaces: cKDTree, known: cKDTree, grid: Grid, space: SeenSpace, spacing: float
 ) -> Continued:
     """The parts of a side of the box that no camera looked through, where surfaces lead to most of their rim."""
     normal = np.zeros(3)
@@ -88,13 +92,22 @@ def _side(
     corner = grid.lower.numpy() if end == 0 else grid.upper.numpy()
     raster = _Raster.on_plane(normal, float(normal @ corner), grid, spacing)
     places = raster.places
-    inward = places + 0.5 * float(grid.cell.mean()) * normal
-    within = grid.contains(inward).reshape(raster.shape)
-    unknown = within & ~grid.at(seen, inward).reshape(raster.shape)
+    unknown = _within(raster, normal, grid) & ~_crossed(raster, normal, space, spacing)
     unknown &= (surfaces.query(places)[0] > BARE * spacing).reshape(raster.shape)
     unknown = binary_opening(unknown, np.ones((3, 3)))
     near = (known.query(places)[0] <= 2.0 * BARE * spacing).reshape(raster.shape)
     return raster.chosen(_parts(unknown, lambda rim: near[rim].mean() > 0.5, outer=False), normal)
+
+
+def _within(raster: _Raster, normal: np.ndarray, grid: Grid) -> np.ndarray:
+    """(A, B) bool: places with room of the box before them; the plane itself may lie in a side of the box."""
+    return grid.contains(raster.places + 0.5 * float(grid.cell.mean()) * normal).reshape(raster.shape)
+
+
+def _crossed(raster: _Raster, normal: np.ndarray, space: SeenSpace, spacing: float) -> np.ndarray:
+    """(A, B) bool: places behind which a camera saw something."""
+    behind = torch.from_numpy(raster.places - BEYOND * spacing * normal)
+    return space.holds(behind, 0.0).numpy().reshape(raster.shape)
 
 
 def _parts(unknown: np.ndarray, is_kept: Callable[[np.ndarray], bool], outer: bool) -> np.ndarray:

@@ -19,7 +19,7 @@ from scipy.spatial.transform import Rotation
 from skimage.measure import marching_cubes
 from torch import Tensor
 
-from rgspipe.completion.free_space import Grid, seen_through
+from rgspipe.completion.free_space import Grid, SeenSpace
 from rgspipe.completion.hidden_room import parts_in_sight, with_hidden_room
 from rgspipe.completion.planes import Plane, frame_of, planes_of
 from rgspipe.completion.structure import BARE, Continued, continued
@@ -27,7 +27,7 @@ from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.openness import openness
 from rgspipe.scene import Camera
 from rgspipe.scene.gloss import Gloss
-from rgspipe.scene.guesses import spread_of_albedo
+from rgspipe.scene.guesses import doubts_of_guesses, spread_of_albedo
 from rgspipe.scene.surfels import NO_CLIP, Surfels, quaternion_from_normal
 
 log = logging.getLogger(__name__)
@@ -39,7 +39,7 @@ MOST_OPEN = 0.5
 #: Cells of the grid along the distance of two surfels, and how far rays must reach past a cell's middle, in cells.
 CELLS_PER_SPACING, MARGIN = 2.0, 0.5
 
-#: Cells between a camera and the side of the box: a camera stands in the room, not in its wall.
+#: Cells between a camera or lamp and the side of the box: they stand in the room, not in its wall.
 BEHIND = 2.0
 
 #: Blur of the boundary, in cells: it takes the steps of the cells away.
@@ -58,7 +58,12 @@ NEIGHBOURS, TURN = 8, 2.5
 SCALE = 0.87
 
 
-def with_unseen_surfaces(surfels: Surfels, cameras: Sequence[Camera]) -> Surfels:
+def with_unseen_surfaces(
+    surfels: Surfels,
+    cameras: Sequence[Camera],
+    lamps: Sequence[Tensor] = (),
+    depths: Sequence[Tensor | None] = (),
+) -> Surfels:
     """The surfels and, after them, those of surfaces that no camera saw.
 
     Nothing is added to an object in empty space.
@@ -66,6 +71,8 @@ def with_unseen_surfaces(surfels: Surfels, cameras: Sequence[Camera]) -> Surfels
     Args:
         surfels: N ≥ 2 of a scene that `cameras` saw.
         cameras: those that it was made from.
+        lamps: (3,) places of lamps that lit it; like cameras they stand in the room, not behind its walls.
+        depths: what is known of the depth (H, W) of the cameras' photographs, for each of them.
     """
     if not cameras or len(surfels) <= NEIGHBOURS or openness(_tree(surfels), surfels) > MOST_OPEN:
         return surfels
@@ -74,31 +81,33 @@ def with_unseen_surfaces(surfels: Surfels, cameras: Sequence[Camera]) -> Surfels
     planes = planes_of(surfels, spacing)
     frame = frame_of(planes)
     planes = [plane.turned(frame) for plane in planes]
-    found = _unseen(_turned(surfels, frame), planes, [_camera_turned(camera, frame) for camera in cameras], spacing)
+    turned = [_camera_turned(camera, frame) for camera in cameras]
+    inside = torch.stack([*(camera.origin for camera in cameras), *lamps]).double().cpu() @ frame.T
+    space = SeenSpace.of(_tree(_turned(surfels, frame)), turned, depths)
+    found = _unseen(_turned(surfels, frame), planes, space, inside, spacing)
     if not len(found):
         return surfels
     log.info("%d surfels close the scene where no camera saw what is there.", len(found))
     axes = frame.numpy()
-    return _joined(surfels, found.places @ axes, found.normals @ axes, spacing)
+    closed = _joined(surfels, found.places @ axes, found.normals @ axes, spacing)
+    return replace(closed, guessed=doubts_of_guesses(closed))
 
 
-def _unseen(surfels: Surfels, planes: Sequence[Plane], cameras: Sequence[Camera], spacing: float) -> Continued:
-    """Where surfels are missing, in a room whose axes are x, y and z."""
+def _unseen(surfels: Surfels, planes: Sequence[Plane], space: SeenSpace, inside: Tensor, spacing: float) -> Continued:
+    """Where surfels are missing, in a room whose axes are x, y and z; `inside` (I, 3) are places in it."""
     centers = surfels.centers.double().cpu()
-    eyes = torch.stack([camera.origin.double().cpu() for camera in cameras])
     edge, bvh = spacing / CELLS_PER_SPACING, _tree(surfels)
-    lower = torch.minimum(centers.amin(dim=0), eyes.amin(dim=0) - BEHIND * edge)
-    upper = torch.maximum(centers.amax(dim=0), eyes.amax(dim=0) + BEHIND * edge)
+    lower = torch.minimum(centers.amin(dim=0), inside.amin(dim=0) - BEHIND * edge)
+    upper = torch.maximum(centers.amax(dim=0), inside.amax(dim=0) + BEHIND * edge)
     # Edges are looked for at the distance of surfels: finer cells would take eight times as long.
     coarse = Grid.over(lower, upper, spacing)
-    looked_through = seen_through(coarse, bvh, cameras, MARGIN * float(coarse.cell.mean()))
-    guessed = continued(planes, centers.numpy(), coarse, looked_through.numpy(), spacing)
+    guessed = continued(planes, centers.numpy(), coarse, space, spacing)
     guessed = guessed.chosen(_is_within(bvh, guessed, spacing))
     # What lies before an open front is no part of the room, and needs no cells.
     known = torch.cat([centers, torch.from_numpy(guessed.places)])
     grid = Grid.over(known.amin(dim=0), known.amax(dim=0), edge)
     cell = float(grid.cell.mean())
-    seen = seen_through(grid, bvh, cameras, MARGIN * cell)
+    seen = space.cells(grid, MARGIN * cell)
     free = seen
     while True:
         bvh = _tree(_joined(surfels, guessed.places, guessed.normals, spacing))

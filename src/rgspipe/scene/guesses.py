@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import torch
 from scipy.sparse import coo_matrix
@@ -18,23 +20,35 @@ TOGETHER, TURNED = 2.0, 0.7
 #: Surfaces that are doubted on their own, the largest; all others are doubted together, as none of them does much.
 MOST = 15
 
+#: Cosine of the turns within which surfels are of one plane, and of how much of a bent surface's normals is left.
+FLAT = 0.9
+
+#: Seen surfels in the plane of a guessed surface, over its own, from which on they tell what it is like.
+KIN = 0.1
+
 #: No guess is better than this: in white rooms whose walls are all alike, guesses were 0.05 to 0.06 off.
 LEAST_DOUBT = 0.05
 
 
 def spread_of_albedo(surfels: Surfels) -> Tensor:
     """() standard deviation of the logarithm of the albedo of all surfels that cameras saw: a guess has no other."""
-    seen = surfels.albedo[surfels.guessed == 0.0].mean(dim=1).clamp(min=1e-3)
-    return seen.log().std(correction=0).clamp(min=LEAST_DOUBT) if len(seen) else seen.new_tensor(LEAST_DOUBT)
+    return _spread(surfels.albedo[surfels.guessed == 0.0])
+
+
+def _spread(albedo: Tensor) -> Tensor:
+    """() standard deviation of the logarithm of albedo (K, 3), at least LEAST_DOUBT."""
+    grey = albedo.mean(dim=1).clamp(min=1e-3)
+    return grey.log().std(correction=0).clamp(min=LEAST_DOUBT) if len(grey) else grey.new_tensor(LEAST_DOUBT)
 
 
 def guessed_surfaces(surfels: Surfels) -> Tensor:
     """(S, N) of the surfels' type: 1 where a surfel is of a guessed surface, of S ≤ MOST + 1."""
-    own = (surfels.guessed > 0.0).nonzero()[:, 0]
+    labels = labels_of_guesses(surfels)
+    own = (labels >= 0).nonzero()[:, 0]
     marks = surfels.centers.new_zeros((0, len(surfels)))
     if not len(own):
         return marks
-    labels = _together(surfels.centers[own].double().cpu(), surfels.normals[own].double().cpu(), _spacing(surfels))
+    labels = labels[own].cpu()
     # The largest first; a stable order, so that equal ones do not depend on the machine.
     order = torch.bincount(labels).argsort(descending=True, stable=True)
     rank = torch.empty_like(order)
@@ -43,6 +57,67 @@ def guessed_surfaces(surfels: Surfels) -> Tensor:
     marks = surfels.centers.new_zeros((int(chosen.max()) + 1, len(surfels)))
     marks[chosen, own] = 1.0
     return marks
+
+
+def labels_of_guesses(surfels: Surfels) -> Tensor:
+    """(N,) int64 number of the guessed surface that a surfel belongs to; −1 for those that cameras saw."""
+    own = (surfels.guessed > 0.0).nonzero()[:, 0]
+    labels = torch.full((len(surfels),), -1, device=own.device)
+    if len(own):
+        found = _together(surfels.centers[own].double().cpu(), surfels.normals[own].double().cpu(), _spacing(surfels))
+        labels[own] = found.to(own.device)
+    return labels
+
+
+@dataclass(frozen=True)
+class GuessedSurfaces:
+    """The surfaces that no camera saw, and those that were seen whose planes they go on in.
+
+    Attributes:
+        labels: (N,) int64, as of `labels_of_guesses`.
+        kin: for each of the surfaces the surfels (K,) int64 that cameras saw in its plane; none where it is too bent,
+            or where fewer are seen than KIN of what is guessed.
+    """
+
+    labels: Tensor
+    kin: tuple[Tensor, ...]
+
+    @classmethod
+    def of(cls, surfels: Surfels) -> GuessedSurfaces:
+        labels = labels_of_guesses(surfels)
+        centers, normals, spacing = surfels.centers.double(), surfels.normals.double(), _spacing(surfels)
+        seen, kin = surfels.guessed == 0.0, []
+        for label in range(int(labels.max()) + 1):
+            own = labels == label
+            normal = normals[own].mean(dim=0)
+            flat, normal = float(normal.norm()) > FLAT, normal / normal.norm().clamp(min=1e-12)
+            height = (centers - centers[own].mean(dim=0)) @ normal
+            alike = seen & (height.abs() <= spacing) & (normals @ normal > FLAT)
+            enough = flat and int(alike.sum()) >= KIN * int(own.sum())
+            kin.append(alike.nonzero()[:, 0] if enough else labels[:0])
+        return cls(labels, tuple(kin))
+
+    def expected(self, albedo: Tensor) -> tuple[Tensor, Tensor]:
+        """(N, 3) albedo that guessed surfels should have if others have `albedo` (N, 3), the median of their kin, and
+        (N, 1) how much its logarithm is in doubt: as much as among these. NaN where there are none, and where seen."""
+        found = torch.full_like(albedo, torch.nan)
+        doubt = torch.full_like(albedo[:, :1], torch.nan)
+        for label, kin in enumerate(self.kin):
+            if len(kin):
+                own = self.labels == label
+                found[own] = albedo[kin].median(dim=0).values
+                doubt[own] = _spread(albedo[kin])
+        return found, doubt
+
+
+def doubts_of_guesses(surfels: Surfels) -> Tensor:
+    """(N,) how much the logarithm of the albedo of guessed surfels is in doubt; 0 for those that cameras saw.
+
+    Of surfaces that go on in the plane of others it is the spread of these, else that of all that was seen.
+    """
+    _, doubt = GuessedSurfaces.of(surfels).expected(surfels.albedo)
+    doubt = torch.where(doubt[:, 0].isfinite(), doubt[:, 0], spread_of_albedo(surfels))
+    return torch.where(surfels.guessed > 0.0, doubt, 0.0)
 
 
 def _spacing(surfels: Surfels) -> float:

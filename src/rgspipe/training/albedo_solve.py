@@ -1,8 +1,8 @@
 """Albedo from images: Gauss-Newton with all bounces.
 
 image_v = D_v (ρ ∘ I_v) + W_v (ρ ∘ L_v), see `view_model`, where L_v depends on ρ itself. Its derivative is exact, so a
-few rounds arrive also where light bounces ten times, and places that no image shows get the albedo that the light of
-all others calls for.
+few rounds arrive also where light bounces ten times, and surfaces that no image shows get the albedo that the light of
+all others calls for: one for each of them, as light hardly tells their parts apart.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from rgspipe.scene.surfels import Surfels
 from rgspipe.training.albedo import ALBEDO_RANGE, AlbedoPrior, AlbedoProblem, robust_weights
 from rgspipe.training.lighting import LIGHTINGS_AT_ONCE, Lighting, indirect_irradiance
 from rgspipe.training.likeness import Laplacian, graph_laplacian
+from rgspipe.training.ties import Ties
 
 #: Conjugate-gradient steps of a round; each round starts from the last one's solution.
 CG_STEPS = 6
@@ -45,14 +46,16 @@ def solve_albedo(
         transport: light between surfels; None solves as if light did not bounce.
         prior: pulls towards known albedo.
     """
-    at = Linearised.of(problem, lighting, surfels.albedo.float().clamp(*ALBEDO_RANGE), transport)
+    ties, guessed = Ties(surfels), surfels.guessed > 0.0
+    at = Linearised.of(problem, lighting, ties.started(surfels.albedo.float().clamp(*ALBEDO_RANGE)), transport)
     normals, pixel_weights = surfels.normals.float(), problem.pixel_weights
     for index in progress_bar(range(rounds), "albedo", unit="round"):
         if index > 0:
             pixel_weights = robust_weights(problem.images, problem.pixel_weights, at.renders)
-        laplacian = graph_laplacian(problem.neighbours, normals, at.albedo if index > 1 else None)
-        quadratic = Quadratic.of(at, pixel_weights, laplacian, prior)
-        at = no_worse(at, quadratic, quadratic.solution() - at.albedo)
+        laplacian = graph_laplacian(problem.neighbours, normals, at.albedo if index > 1 else None, guessed)
+        pulls = pulled_to_kin(pull(prior, at.albedo), ties, at.albedo)
+        quadratic = Quadratic.of(at, pixel_weights, laplacian, pulls)
+        at = no_worse(at, quadratic, quadratic.step(ties))
     return at.albedo, at.indirect
 
 
@@ -135,7 +138,7 @@ class Quadratic:
         smoothness: weight of the Laplacian.
         laplacian: of the likeness of neighbours.
         weight, target: (N, 1) and (N, 3), pull.
-        precondition: (N, 3) about the inverse of the diagonal.
+        diagonal: (N, 3) about that of the normal equations.
     """
 
     at: Linearised
@@ -144,29 +147,35 @@ class Quadratic:
     laplacian: Laplacian
     weight: Tensor
     target: Tensor
-    precondition: Tensor
+    diagonal: Tensor
 
     @classmethod
     def of(
-        cls, at: Linearised, pixel_weights: Sequence[Tensor], laplacian: Laplacian, prior: AlbedoPrior | None
+        cls, at: Linearised, pixel_weights: Sequence[Tensor], laplacian: Laplacian, pulls: tuple[Tensor, Tensor]
     ) -> Quadratic:
         diagonal = torch.zeros_like(at.albedo)
         for v, model in enumerate(at.problem.models):
             diagonal += model.squared(pixel_weights[v], None if at.indirect is None else at.indirect[v])
         scale = float(diagonal[diagonal > 0].median()) if bool((diagonal > 0).any()) else 1.0
-        weight, target = pull(prior, at.albedo)
+        weight, target = pulls
         weight, smooth = scale * weight, SMOOTHNESS * scale
-        precondition = 1.0 / (diagonal + weight + smooth * laplacian.diagonal()[:, None])
-        return cls(at, pixel_weights, smooth, laplacian, weight, target, precondition)
+        diagonal = diagonal + weight + smooth * laplacian.diagonal()[:, None]
+        return cls(at, pixel_weights, smooth, laplacian, weight, target, diagonal)
 
-    def solution(self) -> Tensor:
-        """(N, 3) albedo after a few conjugate-gradient steps from where it is, each channel on its own."""
+    def step(self, ties: Ties) -> Tensor:
+        """(N, 3) change of the albedo by a few conjugate-gradient steps, each channel on its own."""
         at = self.at
         missing = [image - render for image, render in zip(at.problem.images, at.renders, strict=True)]
         right = at.transposed(self._weighted(missing)) + self.weight * (self.target - at.albedo)
-        right = right - self.smoothness * (self.laplacian.matrix @ at.albedo)
-        start = torch.zeros_like(at.albedo)
-        return at.albedo + conjugate_gradients(self._normal, right, lambda x: self.precondition * x, start)
+        right = ties.summed(right - self.smoothness * (self.laplacian.matrix @ at.albedo))
+        precondition = 1.0 / ties.summed(self.diagonal)
+        found = conjugate_gradients(
+            lambda x: ties.summed(self._normal(ties.spread(x))),
+            right,
+            lambda x: precondition * x,
+            torch.zeros_like(right),
+        )
+        return ties.spread(found)
 
     def loss(self, at: Linearised) -> float:
         """What is minimised, at another albedo and its own images; float64."""
@@ -205,6 +214,13 @@ def pull(prior: AlbedoPrior | None, like: Tensor) -> tuple[Tensor, Tensor]:
         return torch.full_like(like[:, :1], PULL), torch.full_like(like, GREY)
     weight = prior.weight.to(like)[:, None]
     return PULL + weight, (PULL * GREY + weight * prior.albedo.to(like)) / (PULL + weight)
+
+
+def pulled_to_kin(pulls: tuple[Tensor, Tensor], ties: Ties, albedo: Tensor) -> tuple[Tensor, Tensor]:
+    """Weights and targets, with what is expected of guessed surfaces; PULL to GREY is that of a variance of GREY²."""
+    (weight, target), (expected, variance) = pulls, ties.expected(albedo)
+    more = PULL * GREY**2 / variance
+    return weight + more, (weight * target + more * expected) / (weight + more)
 
 
 def conjugate_gradients(

@@ -22,13 +22,22 @@ def nearest_surfels(centers: Tensor, others: Tensor) -> Tensor:
     return torch.from_numpy(cKDTree(features).query(features, k=count, workers=-1)[1].reshape(len(features), -1)[:, 1:])
 
 
-def graph_laplacian(neighbours: Tensor, normals: Tensor | None, albedo: Tensor | None) -> Laplacian:
-    """Graph Laplacian over neighbours on one surface (any if None); neighbours of another colour are let go."""
+def graph_laplacian(
+    neighbours: Tensor, normals: Tensor | None, albedo: Tensor | None, guessed: Tensor | None = None
+) -> Laplacian:
+    """Graph Laplacian over neighbours on one surface (any if None); neighbours of another colour are let go.
+
+    Args:
+        guessed: (N,) bool, surfels that no image shows: where their surface changes its colour nobody knows.
+    """
     count, degree = neighbours.shape
     row, column = torch.arange(count).repeat_interleave(degree), neighbours.reshape(-1)
     weight = torch.ones(len(row)) if normals is None else ((normals[row] * normals[column]).sum(dim=1) > 0.7).float()
     if albedo is not None:
-        weight = weight / (1.0 + ((albedo[row] - albedo[column]).abs().amax(dim=1) / ALBEDO_EDGE).square())
+        step = (albedo[row] - albedo[column]).abs().amax(dim=1)
+        if guessed is not None:
+            step = step.masked_fill(guessed[row] | guessed[column], 0.0)
+        weight = weight / (1.0 + (step / ALBEDO_EDGE).square())
     parts = (weight.numpy(), (row.numpy(), column.numpy()))
     adjacency = scipy.sparse.coo_matrix(parts, shape=(count, count)).tocsr()
     adjacency = 0.5 * (adjacency + adjacency.T)

@@ -115,7 +115,10 @@ def train(
 
 def _closed(surfels: Surfels, views: Sequence[View], options: TrainOptions) -> Surfels:
     """With surfels on the surfaces that no view shows, if those are wanted."""
-    return with_unseen_surfaces(surfels, [view.camera for view in views]) if options.unseen else surfels
+    if not options.unseen:
+        return surfels
+    cameras, lamps, depths = zip(*((view.camera, view.light.position, view.depth) for view in views), strict=True)
+    return with_unseen_surfaces(surfels, cameras, lamps, depths)
 
 
 def surfel_spacing(surfels: Surfels) -> float:
