@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from rgspipe.renderer.frozen import FrozenScene
     from rgspipe.renderer.ply import load_ply
     from rgspipe.scene import Camera, Surfels
-    from rgspipe.scene.lights import LedLight, Light, PanelLight, PointLight, SphereLight, SpotLight
+    from rgspipe.scene.lights import LedLight, Light, PanelLight, PointLight, SphereLight, SpotLight, SunLight
     from rgspipe.scene.models import CornellBox, Corridor, exact_surfels
     from rgspipe.training.trainer import Trained, TrainOptions, train
     from rgspipe.viewer.serve import Viewer, view
@@ -61,7 +61,7 @@ _HOMES = {
     "renderer.frozen": ("FrozenScene",),
     "renderer.ply": ("load_ply",),
     "scene": ("Camera", "Surfels"),
-    "scene.lights": ("LedLight", "Light", "PanelLight", "PointLight", "SphereLight", "SpotLight"),
+    "scene.lights": ("LedLight", "Light", "PanelLight", "PointLight", "SphereLight", "SpotLight", "SunLight"),
     "scene.models": ("CornellBox", "Corridor", "exact_surfels"),
     "training.trainer": ("TrainOptions", "Trained", "train"),
     "viewer.serve": ("Viewer", "view"),
@@ -92,6 +92,7 @@ __all__ = [
     "Search",
     "SphereLight",
     "SpotLight",
+    "SunLight",
     "Surfels",
     "TrackOptions",
     "TrainOptions",

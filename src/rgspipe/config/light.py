@@ -58,7 +58,7 @@ class PanelConfig(Options):
 class LightConfig(Options):
     """What is looked for."""
 
-    type: Literal["point", "spot", "led", "sphere", "panel", "auto"] = "point"
+    type: Literal["point", "spot", "led", "sphere", "panel", "sun", "auto"] = "point"
     """type of the unknown lights"""
     count: int | None = option(1, low=1, high=MOST_LIGHTS)
     """how many unknown lights; null finds out"""

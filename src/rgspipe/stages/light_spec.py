@@ -34,7 +34,7 @@ def _refuse_unknowns(config: RgspipeConfig) -> None:
     Raises:
         InputError: it is asked for others.
     """
-    points = [name for name in KINDS if not LightSpec(name).extended]
+    points = [name for name, kind in KINDS.items() if kind.shaped().in_one_point]
     asked = [
         ("light.type", " or ".join(points), config.light.type, config.light.type not in points),
         ("light.count", "a number from 1 to 8", "null", config.light.count is None),

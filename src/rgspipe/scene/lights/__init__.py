@@ -16,9 +16,12 @@ from rgspipe.scene.lights.panel import PanelLight
 from rgspipe.scene.lights.point import PointLight
 from rgspipe.scene.lights.sphere import SphereLight
 from rgspipe.scene.lights.spot import SpotLight, SpotProfile
+from rgspipe.scene.lights.sun import SunLight
 
 #: Every kind by its name.
-KINDS: dict[str, type[Light]] = {kind.kind: kind for kind in (PointLight, SpotLight, LedLight, SphereLight, PanelLight)}
+KINDS: dict[str, type[Light]] = {
+    kind.kind: kind for kind in (PointLight, SpotLight, LedLight, SphereLight, PanelLight, SunLight)
+}
 
 __all__ = [
     "KINDS",
@@ -35,6 +38,7 @@ __all__ = [
     "SphereLight",
     "SpotLight",
     "SpotProfile",
+    "SunLight",
     "as_rig",
     "check_numbers",
 ]

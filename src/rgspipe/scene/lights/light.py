@@ -102,6 +102,12 @@ class Light(ByValue, ABC):
     #: Its name in light files and settings.
     kind: ClassVar[str]
 
+    #: Whether it is infinitely far away: its position says nothing, and its light does not fall with the distance.
+    distant: ClassVar[bool] = False
+
+    #: Of its intensity.
+    unit: ClassVar[str] = "W/sr"
+
     position: Given
     intensity: Given
 
@@ -115,6 +121,24 @@ class Light(ByValue, ABC):
     def axis(self) -> Float[Tensor, " 3"] | None:
         """(3,) of unit length, along which it shines; None if it shines alike in all directions."""
         return None
+
+    @property
+    def place(self) -> Float[Tensor, " 4"]:
+        """(4,) its position in homogeneous coordinates; see `renderer.kernels.places`."""
+        return torch.cat([self.position, self.position.new_ones(1)])
+
+    def standing(self, size: float) -> Float[Tensor, " 3"]:
+        """(3,) where it stands in a scene of `size`, such that distances over the size tell lights apart."""
+        return self.position
+
+    def standing_spread(self, covariance: Any, size: float) -> Any:
+        """(3, 3) covariance of `standing`, of the rows and columns of `FitResult.covariance`."""
+        return covariance[:3, :3]
+
+    @property
+    def in_one_point(self) -> bool:
+        """Whether it stands at its position, and not at points that it is made of."""
+        return self.parts()[0] is self
 
     @property
     def shape(self) -> tuple[ShapeNumber, ...]:
