@@ -85,9 +85,11 @@ def export_lights(
             files.append(path)
             notes += said
             if text is None:
-                write_lights(path, rig, {"units": "metres, W/sr"})
+                write_lights(path, rig, {"units": "metres, W/sr; of suns W/m²"})
             else:
                 write_text(path, text)
+    if "ies" in formats:
+        notes += [f"light {n}: LM-63 has no suns; it is left out." for n, one in enumerate(rig, start=1) if one.distant]
     write_text(folder / "lamps.txt", f"{world.line()}\n\n{table(rig)}" + "".join(f"{note}\n" for note in notes))
     return LightExport(tuple(files), (world.line(), *notes))
 
@@ -98,7 +100,7 @@ def _texts(
     """Files of a format, each with its text (None for a light file) and what it does not hold."""
     if name == "ies":
         named = [(f"lamp_{number}", light) for number, light in enumerate(rig, start=1)]
-        return [(folder / f"{stem}.ies", *ies(light, stem)) for stem, light in named]
+        return [(folder / f"{stem}.ies", *ies(light, stem)) for stem, light in named if not light.distant]
     if name == "json":
         return [(folder / NAMES[name], None, [])]
     return [(folder / NAMES[name], *(blend(rig, regions) if name == "blend" else _WRITERS[name](rig)))]
