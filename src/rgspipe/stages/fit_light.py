@@ -176,8 +176,7 @@ def _choice(config: RgspipeConfig, freeze: Artifact) -> tuple[EffectBounds, Effe
     spec, band = light_spec(config), band_limit(config)
     count = spec.count or MOST_LIGHTS
     # In harmonics a spot's light leaves its cone.
-    in_cones = spec.aimed and band is None
-    kind = RigKind(0, (spec.kinds[-1].least_relative_intensity,) * count) if in_cones else RigKind(count)
+    kind = RigKind(count) if spec.aimed and band is not None else RigKind.of((spec.kinds[-1],) * count)
     bounds, choice = chosen_effects(config.effects, freeze, kind)
     return bounds, choice if band is None or not spec.aimed else _in_harmonics(choice, band)
 

@@ -264,4 +264,6 @@ def test_light_on_surfels_knows_how_it_changes_with_every_tensor(light: Light) -
         unseen = light.distant and name == "position"
         found = torch.zeros_like(expected) if unseen else leaves[name].grad.reshape(-1)
         # Measured at most 1e-5, of the falloff of a cone of 15°; of twelve or sixteen points 1e-4.
-        assert float((found - expected).norm()) <= (5e-5 if light.seed is light else 3e-4) * float(expected.norm()), name
+        assert float((found - expected).norm()) <= (5e-5 if light.seed is light else 3e-4) * float(expected.norm()), (
+            name
+        )
