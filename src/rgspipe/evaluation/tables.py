@@ -128,7 +128,8 @@ def rig_errors(estimate: LightRig, truth: LightRig, scene_size: float) -> RigErr
     """Errors of a recovered rig after the optimal matching of its lights.
 
     The position error is the worst of the matched lights, so a target counts as solved only when each
-    of its lights is; that of a light at infinity is the angle by which it is off [rad]. Lights too many or too few are not in these numbers: see `target_table`.
+    of its lights is; that of a light at infinity is the angle by which it is off [rad].
+    Lights too many or too few are not in these numbers: see `target_table`.
 
     Raises:
         ValueError: the truth has no light.

@@ -59,7 +59,7 @@ class World:
 
 
 def candela(light: Light) -> float:
-    """Luminous intensity [cd] along its axis, of a light at infinity illuminance [lx]: 683 lm/W of the luminance of its RGB."""
+    """Luminous intensity [cd] along its axis, of a sun illuminance [lx]: 683 lm/W of the luminance of its RGB."""
     return LUMENS_PER_WATT * float(light.intensity.double() @ torch.tensor(LUMINANCE, dtype=torch.float64))
 
 

@@ -96,11 +96,11 @@ class GlossyTransport:
         return (self.lobes[..., None] * self.material[0][:, None])[..., None]
 
     def directions(self, points: Tensor) -> Tensor:
-        """(…, G, 3) unit directions from the glossy surfels to points (…, 3) or places (…, 4); derivatives are finite."""
+        """(…, G, 3) unit directions from the glossy surfels to points (…, 3) or places (…, 4), with finite slopes."""
         return soft_directions(self.vectors(points), self.softening(points))
 
     def softening(self, points: Tensor) -> Tensor:
-        """(…, G) scales by which directions to points (…, 3) or places (…, 4) are softened: nothing is near infinity."""
+        """(…, G) scales by which directions to points (…, 3) or places (…, 4) are softened; 0 for infinity."""
         return homogeneous(points)[..., 3:].to(self.geometry[2]) * self.geometry[2]
 
     def light(self, transport: PatchTransport, response: RigResponse, indirect: bool = True) -> GlossyLight:

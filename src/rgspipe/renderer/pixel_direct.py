@@ -60,7 +60,7 @@ class PixelDirect:
         return on_planes(origins, directions, centers, normals, reach)
 
     def image(self, position: Tensor, passing: Tensor, slope: Tensor, origin: Tensor | None = None) -> Tensor:
-        """(P, 3, 4) radiance under a unit light in RGB at `position`, (3,) or a place (4,), and its derivative to x, y, z.
+        """(P, 3, 4) radiance under a unit light in RGB at `position`, (3,) or a place (4,), and its slopes to x, y, z.
 
         Args:
             passing, slope: `surfel_transmittance` of the light.

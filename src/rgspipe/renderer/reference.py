@@ -15,6 +15,7 @@ from torch import Tensor
 from rgspipe.renderer.kernels.composite import GRAZING, OPAQUE
 from rgspipe.renderer.kernels.irradiance import SOFTENING
 from rgspipe.renderer.kernels.pixel_light import MIDDLE_WEIGHT, NEAR, NODE, REACH, SIDE_WEIGHT
+from rgspipe.renderer.kernels.places import homogeneous
 from rgspipe.renderer.kernels.shadow import (
     COPLANAR_COSINE,
     COPLANAR_OFFSET,
@@ -22,7 +23,6 @@ from rgspipe.renderer.kernels.shadow import (
     RECEIVER_FADE,
     RECEIVER_SKIP,
 )
-from rgspipe.renderer.kernels.places import homogeneous
 from rgspipe.scene.camera import Camera
 from rgspipe.scene.surfels import Coverage, Surfels
 
@@ -93,7 +93,7 @@ def geometry_factor(positions: Tensor, centers: Tensor, normals: Tensor, scales:
     The fourth powers keep the inverse square law where it holds: its relative error is ¾(ε/|d|)⁴.
 
     Args:
-        positions: (L, 3) lights, or places (L, 4); centers, normals: (N, 3); scales: (N,) ε over SOFTENING, scene units.
+        positions: (L, 3) lights, or places (L, 4); centers, normals: (N, 3); scales: (N,) ε over SOFTENING.
 
     Returns:
         (L, N) irradiance per intensity, 1/scene unit², and its derivative (L, N, 3) towards the position.
@@ -124,7 +124,7 @@ def transmittance(surfels: Surfels, positions: Tensor) -> Tensor:
 
 
 def transmittance_at(surfels: Surfels, light: Tensor, receivers: Tensor, points: Tensor) -> Tensor:
-    """(R,) part of a light (3,), or at a place (4,), that reaches points (R, 3) on the planes of the surfels `receivers` (R,)."""
+    """(R,) part of a light (3,) or (4,) that reaches points (R, 3) on the planes of the surfels `receivers` (R,)."""
     coverage, normals, centers = surfels.coverage, surfels.normals, surfels.centers
     place = homogeneous(light)
 
