@@ -36,7 +36,7 @@ from rgspipe.stages.base import Stage, StageContext
 from rgspipe.stages.fit_capture import captured_views, known_emitters
 from rgspipe.stages.fit_extras import Named, further_files, training_cameras
 from rgspipe.stages.fit_targets import all_targets, select_targets, target_seed, used_views
-from rgspipe.stages.light_spec import light_spec
+from rgspipe.stages.light_spec import light_spec, table_files
 from rgspipe.stages.scene_effects import chosen_effects, frozen_scene, wanted_effects
 from rgspipe.stages.sources import image_stage, require_images, target_stage
 from rgspipe.stages.spoken import COMMAND_LINE
@@ -260,12 +260,12 @@ def _keys(config: RgspipeConfig) -> list[str]:
 
 def _files(config: RgspipeConfig) -> list[Path]:
     """The user's target, read now: what is wrong with it should show before a scene is trained for it."""
-    target, base = config.fit.target, config.fit.base
+    target, base, tables = config.fit.target, config.fit.base, table_files(config)
     if target is None:
         _refuse_base(base)
-        return []
+        return tables
     load_target(target, base)
-    return [*files_read(target), *([] if base is None else files_read(base))]
+    return [*tables, *files_read(target), *([] if base is None else files_read(base))]
 
 
 def _refuse_base(base: str | None) -> None:

@@ -13,14 +13,16 @@ from rgspipe.scene.lights.light import (
 )
 from rgspipe.scene.lights.nodes import Nodes
 from rgspipe.scene.lights.panel import PanelLight
+from rgspipe.scene.lights.photometry import Photometry
 from rgspipe.scene.lights.point import PointLight
+from rgspipe.scene.lights.profile import ProfileLight
 from rgspipe.scene.lights.sphere import SphereLight
 from rgspipe.scene.lights.spot import SpotLight, SpotProfile
 from rgspipe.scene.lights.sun import SunLight
 
 #: Every kind by its name.
 KINDS: dict[str, type[Light]] = {
-    kind.kind: kind for kind in (PointLight, SpotLight, LedLight, SphereLight, PanelLight, SunLight)
+    kind.kind: kind for kind in (PointLight, SpotLight, LedLight, SphereLight, PanelLight, SunLight, ProfileLight)
 }
 
 __all__ = [
@@ -32,7 +34,9 @@ __all__ = [
     "LightRig",
     "Nodes",
     "PanelLight",
+    "Photometry",
     "PointLight",
+    "ProfileLight",
     "RelativeIntensity",
     "ShapeNumber",
     "SphereLight",

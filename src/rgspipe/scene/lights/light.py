@@ -84,6 +84,10 @@ class Reader(Protocol):
 
     def number(self, key: str) -> float: ...
 
+    def numbers(self, key: str) -> Tensor:
+        """(K,) float64, a list of any length but 0."""
+        ...
+
     def choice(self, key: str, names: Sequence[str]) -> str: ...
 
 
@@ -187,9 +191,13 @@ class Light(ByValue, ABC):
         to = {"dtype": self.position.dtype, "device": self.position.device}
         return {name: torch.as_tensor(value, **to) for name, value in values.items()}
 
-    def grown(self, size: float) -> tuple[Self, ...]:
-        """Lights of this kind at its place that a fit begins with, in a scene of `size`, where its shape is free."""
+    def grown(self, size: float, free: bool) -> tuple[Self, ...]:
+        """Lights of this kind at its place that a fit begins with, in a scene of `size`, its shape known or `free`."""
         return (self,)
+
+    def in_place_of(self, found: Light) -> Self:
+        """The light where one like its `seed` was found."""
+        return self.at(found.position, found.axis)
 
     @abstractmethod
     def power(self) -> Float[Tensor, " 3"]:
