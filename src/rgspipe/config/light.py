@@ -80,8 +80,8 @@ class LightConfig(Options):
     panel: PanelConfig = PanelConfig()
     profile: ProfileConfig = ProfileConfig()
     file: str | None = None
-    """of light=profile: the measured luminaire, an IES (.ies) or EULUMDAT (.ldt) file; with none and no catalogue it shines
-    as an even surface does"""
+    """of light=profile: the measured luminaire, an IES (.ies) or EULUMDAT (.ldt) file; with none and no catalogue it
+    shines as an even surface does"""
     catalogue: str | None = None
     """of light=profile: a folder of such files, of which the one is found that explains the image best"""
 

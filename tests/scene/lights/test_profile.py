@@ -81,8 +81,7 @@ def test_all_derivatives_are_those_of_finite_differences(table: Photometry) -> N
 @every_table
 def test_first_derivatives_are_continuous(table: Photometry) -> None:
     """Across the table's angles, where one piece ends and the next begins."""
-    inner = [angle for angle in table.vertical.tolist()[1:-1]]
-    for angle in inner:
+    for angle in table.vertical.tolist()[1:-1]:
         sides = []
         for offset in (-1e-7, 1e-7):
             at = torch.tensor([angle + offset], dtype=torch.float64, requires_grad=True)
@@ -111,9 +110,9 @@ def test_a_coarse_table_is_near_a_fine_one() -> None:
     generator = torch.Generator().manual_seed(2)
     drawn = torch.rand(2, 5000, generator=generator, dtype=torch.float64)
     at = math.pi * drawn[0], 2.0 * math.pi * drawn[1]
-    fine, coarse = batwing(1.0), batwing(10.0)
-    assert fine.candela == pytest.approx(coarse.candela, rel=2e-3)
-    assert float((fine.at(*at) - coarse.at(*at)).abs().max()) < 0.01  # measured 0.004
+    fine, coarse = (table.candela * table.at(*at) for table in (batwing(1.0), batwing(10.0)))
+    error = (fine - coarse).abs() / fine.max()
+    assert float(error.max()) < 0.008 and float(error.mean()) < 0.001  # measured 0.0041 and 0.0005
 
 
 def test_how_often_it_repeats_itself_is_told() -> None:

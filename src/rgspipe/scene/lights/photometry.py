@@ -11,7 +11,6 @@ import torch
 from torch import Tensor
 
 from rgspipe.scene.by_value import ByValue
-from rgspipe.scene.shapes import Float
 
 #: Columns of intensities that differ by less than this part of the largest are alike: files are rounded.
 ALIKE = 1e-4
@@ -35,9 +34,9 @@ class Photometry(ByValue):
         ValueError: angles do not rise from 0, or numbers are missing, not finite, negative or all 0.
     """
 
-    vertical: Float[Tensor, " V"]
-    horizontal: Float[Tensor, " H"]
-    relative: Float[Tensor, "V H"]
+    vertical: Tensor
+    horizontal: Tensor
+    relative: Tensor
     candela: float = 1.0
 
     def __post_init__(self) -> None:
@@ -97,7 +96,7 @@ class Photometry(ByValue):
         return (0.5 * widths * (table + table.roll(-1, 1))).sum(dim=1, keepdim=True) / (2.0 * math.pi)
 
     @cached_property
-    def _slopes(self) -> tuple[Tensor, Tensor]:
+    def slopes(self) -> tuple[Tensor, Tensor]:
         """(V, H) derivatives towards the vertical angle, and towards the horizontal one."""
         down = monotone_slopes(self.vertical, self.relative)
         if self.round:
@@ -111,10 +110,7 @@ class Photometry(ByValue):
     def at(self, vertical: Tensor, horizontal: Tensor | None = None) -> Tensor:
         """(…,) relative intensity at angles [rad], differentiable once; of a round one the second is not looked at."""
         to = {"dtype": vertical.dtype, "device": vertical.device}
-        (table, down, around), knots = (
-            (part.to(**to) for part in (self.relative, *self._slopes)),
-            self.vertical.to(**to),
-        )
+        knots, table, down, around = (part.to(**to) for part in (self.vertical, self.relative, *self.slopes))
         row, height, (v0, v1, s0, s1) = _hermite(knots, vertical)
         if self.round:
             top, low = (part[:, 0] for part in (table, down))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any, ClassVar, Self
 
 import torch
@@ -147,9 +148,9 @@ class ProfileLight(AxialLight):
         """Of the mean around the axis: its pieces one after the other, each flat before and behind its own angles."""
         table = self.table.rounded
         share, angles = table.candela / self.table.candela, table.vertical.tolist()
-        values, slopes = (part[:, 0].tolist() for part in (table.relative, table._slopes[0]))
+        values, slopes = (part[:, 0].tolist() for part in (table.relative, table.slopes[0]))
         angle, total = maths.arccosine(cosine), share * values[0]
-        for k, (low, high) in enumerate(zip(angles[:-1], angles[1:], strict=True)):
+        for k, (low, high) in enumerate(pairwise(angles)):
             rise, one, other = values[k + 1] - values[k], (high - low) * slopes[k], (high - low) * slopes[k + 1]
             cubic = (one + other - 2.0 * rise, 3.0 * rise - 2.0 * one - other, one)
             if any(cubic):
@@ -157,10 +158,8 @@ class ProfileLight(AxialLight):
                 part = maths.add(maths.multiply(share * cubic[0], t), share * cubic[1])
                 part = maths.add(maths.multiply(part, t), share * cubic[2])
                 total = maths.add(total, maths.multiply(part, t))
-        behind = maths.greater_than(angle, angles[-1])
-        return (
-            total if values[-1] == 0.0 or angles[-1] > 3.14159 else maths.multiply(total, maths.subtract(1.0, behind))
-        )
+        within = maths.subtract(1.0, maths.greater_than(angle, angles[-1]))
+        return maths.multiply(maths.maximum(total, 0.0), within)
 
     def _frame(self, like: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """(3,) unit vectors along C0, along C90 and along the axis."""
