@@ -135,6 +135,12 @@ class _Fields:
             raise self.refusal(key, f"a number within ±{FARTHEST:g}", repr(value))
         return float(value)
 
+    def text(self, key: str) -> str:
+        value = required(self.fields, key, self.place)
+        if not isinstance(value, str):
+            raise self.refusal(key, "a text", repr(value)[:80])
+        return value
+
     def numbers(self, key: str) -> torch.Tensor:
         values = required(self.fields, key, self.place)
         if not (isinstance(values, list) and values and all(map(is_number, values))):

@@ -97,7 +97,7 @@ class _Source:
             edge = torch.tensor([0.0, float(rows[0]) * (1.0 - SAME)], dtype=torch.float64)
             rows, candela = torch.cat([edge, rows]), torch.cat([torch.zeros(2, candela.shape[1]).double(), candela])
         try:
-            return Photometry.measured(rows, turns, candela)
+            return Photometry.measured(rows, turns, candela, self.path.name)
         except ValueError as error:
             self.refuse("a table of intensities", str(error))
 

@@ -54,7 +54,7 @@ def light_line(light: Light, covariance: Sequence[Sequence[float]] | None = None
     """
     variances = None if covariance is None else [float(row[index]) for index, row in enumerate(covariance)]
     place, colour = (", ".join(f"{value:.3f}" for value in part.tolist()) for part in (light.position, light.intensity))
-    told = light.kind
+    told = light.label
     if not light.distant:
         told += f" at ({place})" + ("" if variances is None else _deviation(variances[:3], "{:.4f}"))
     if light.axis is not None:

@@ -20,7 +20,7 @@ from rgspipe.light_export.three import three
 from rgspipe.light_export.usd import usda
 from rgspipe.light_export.world import World, table
 from rgspipe.scene import Light, LightRig
-from rgspipe.scene.lights import as_rig
+from rgspipe.scene.lights import ProfileLight, as_rig
 
 Format = Literal["blend", "usda", "gltf", "mitsuba", "three", "ies", "json"]
 FORMATS: tuple[Format, ...] = get_args(Format)
@@ -90,6 +90,12 @@ def export_lights(
                 write_text(path, text)
     if "ies" in formats:
         notes += [f"light {n}: LM-63 has no suns; it is left out." for n, one in enumerate(rig, start=1) if one.distant]
+    if {*formats} - {"ies", "json"}:
+        notes += [
+            f"light {n}: the {one.label} is written as its mean around the axis; IES and JSON hold all of it."
+            for n, one in enumerate(rig, start=1)
+            if isinstance(one, ProfileLight) and not one.round
+        ]
     write_text(folder / "lamps.txt", f"{world.line()}\n\n{table(rig)}" + "".join(f"{note}\n" for note in notes))
     return LightExport(tuple(files), (world.line(), *notes))
 

@@ -84,6 +84,8 @@ class Reader(Protocol):
 
     def number(self, key: str) -> float: ...
 
+    def text(self, key: str) -> str: ...
+
     def numbers(self, key: str) -> Tensor:
         """(K,) float64, a list of any length but 0."""
         ...
@@ -138,6 +140,11 @@ class Light(ByValue, ABC):
     def standing_spread(self, covariance: Any, size: float) -> Any:
         """(3, 3) covariance of `standing`, of the rows and columns of `FitResult.covariance`."""
         return covariance[:3, :3]
+
+    @property
+    def label(self) -> str:
+        """What people call it."""
+        return self.kind
 
     @property
     def in_one_point(self) -> bool:

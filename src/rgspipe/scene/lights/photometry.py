@@ -29,6 +29,7 @@ class Photometry(ByValue):
         horizontal: (H,) rad around the axis, from 0 and below 2π; a single one where it is the same all around.
         relative: (V, H) over the largest, in [0, 1].
         candela: the largest [cd] as measured.
+        name: of the file.
 
     Raises:
         ValueError: angles do not rise from 0, or numbers are missing, not finite, negative or all 0.
@@ -38,6 +39,7 @@ class Photometry(ByValue):
     horizontal: Tensor
     relative: Tensor
     candela: float = 1.0
+    name: str = ""
 
     def __post_init__(self) -> None:
         table, limits = self.relative, ((self.vertical, math.pi + 1e-9), (self.horizontal, 2.0 * math.pi - 1e-9))
@@ -51,7 +53,7 @@ class Photometry(ByValue):
             raise ValueError("relative intensities must be from 0 to 1, which one of them is")
 
     @classmethod
-    def measured(cls, vertical: Tensor, horizontal: Tensor, candela: Tensor) -> Self:
+    def measured(cls, vertical: Tensor, horizontal: Tensor, candela: Tensor, name: str = "") -> Self:
         """Of a table of candela (V, H) over angles [rad]; along the axis, and against it, there is one intensity.
 
         Columns that are all alike are one, and those of a table that repeats itself around the axis stay.
@@ -66,7 +68,7 @@ class Photometry(ByValue):
         table = table / peak
         if bool(((table - table[:, :1]).abs() <= ALIKE).all()):
             table, horizontal = table[:, :1] / table[:, :1].max(), horizontal[:1]
-        return cls(vertical.double(), horizontal.double(), table, peak)
+        return cls(vertical.double(), horizontal.double(), table, peak, name)
 
     @property
     def round(self) -> bool:

@@ -56,6 +56,10 @@ class ProfileLight(AxialLight):
         return cls([0.0, 0.0, 0.0], 1.0, [0.0, 0.0, -1.0], turn, table or _cosine())
 
     @property
+    def label(self) -> str:
+        return f"{self.kind} {self.table.name}".strip()
+
+    @property
     def round(self) -> bool:
         """Whether it is the same all around its axis."""
         return self.averaged or self.table.round
@@ -134,14 +138,15 @@ class ProfileLight(AxialLight):
         table = self.table
         angles = {name: getattr(table, name).tolist() for name in ("vertical", "horizontal")}
         intensities = {"relative": table.relative.reshape(-1).tolist(), "candela": table.candela}
-        return super().file_fields() | angles | intensities
+        return super().file_fields() | {"luminaire": table.name} | angles | intensities
 
     @classmethod
     def from_fields(cls, position: Tensor, intensity: Tensor, reader: Reader) -> Self:
         vertical, horizontal, relative = (reader.numbers(key) for key in ("vertical", "horizontal", "relative"))
         if len(relative) != len(vertical) * len(horizontal):
             raise ValueError(f"{len(vertical)} × {len(horizontal)} relative intensities, not {len(relative)}")
-        table = Photometry(vertical, horizontal, relative.reshape(len(vertical), -1), reader.number("candela"))
+        known = reader.number("candela"), reader.text("luminaire")
+        table = Photometry(vertical, horizontal, relative.reshape(len(vertical), -1), *known)
         return cls(position, intensity, reader.direction("direction"), reader.number("turn"), table)
 
     def emission(self, maths: Any, cosine: Any) -> Any:
