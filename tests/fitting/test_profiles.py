@@ -34,9 +34,8 @@ def test_place_axis_and_turn_are_found_and_which_luminaire_it_is(room) -> None:
     """Of two: one that is not round, and one that is and nearly its mean."""
     wanted, other = table(name="wings.ies"), table((COLUMNS[0],), "round.ies")
     shape = replace(ProfileLight.shaped(0.0, other), catalogue=(wanted,))
-    views = FitViews.prepare(
-        room.frozen, room.views, lights=LightSpec("profile", shape=shape, shape_free=True), sharp=False
-    )
+    spec = LightSpec("profile", shape=shape, shape_free=True)
+    views = FitViews.prepare(room.frozen, room.views, lights=spec, sharp=False)
     truth = lamp(wanted)
     result = views.fit(views.render(truth), solver=QUICK)
     (found,) = result.lights
@@ -48,8 +47,7 @@ def test_place_axis_and_turn_are_found_and_which_luminaire_it_is(room) -> None:
 
 
 def test_the_paper_s_method_turns_none(room) -> None:
-    views = FitViews.prepare(
-        room.frozen, room.views, lights=LightSpec("profile", shape=ProfileLight.shaped(0.0, table()))
-    )
+    spec = LightSpec("profile", shape=ProfileLight.shaped(0.0, table()))
+    views = FitViews.prepare(room.frozen, room.views, lights=spec, sharp=False)
     with pytest.raises(ValueError, match="one point"):
         views.fit(views.render(lamp(table())), solver=PaperAdam())
