@@ -26,7 +26,7 @@ def in_double(surfels: Surfels) -> Surfels:
 
 
 def irradiance(surfels: Surfels, position: Tensor, shadows: bool = True) -> Tensor:
-    """(N,) irradiance of a unit point light at `position` (3,), differentiable."""
+    """(N,) irradiance of a unit light at `position` (3,), or a place (4,), differentiable."""
     return reference.unit_irradiance(surfels, position[None], shadows)[0]
 
 

@@ -13,6 +13,7 @@ import numpy as np
 import torch
 from PIL import Image
 
+from luminaire_files import COLUMNS, ies, ldt
 from ply_files import gaussian_columns, radiosity_columns, write_ply
 from rgspipe.artifacts import ArtifactStore, Key
 from rgspipe.datasets.covariance_file import covariance_fields, read_covariances
@@ -22,6 +23,7 @@ from rgspipe.datasets.gs3 import load_dataset
 from rgspipe.datasets.images import read_colour
 from rgspipe.datasets.light_file import read_ambient, read_lights, write_lights
 from rgspipe.datasets.location import open_dataset
+from rgspipe.datasets.photometric_file import read_photometry
 from rgspipe.datasets.ply import read_ply
 from rgspipe.datasets.ply_cameras import read_viewpoints
 from rgspipe.datasets.ply_options import PlyOptions
@@ -33,7 +35,7 @@ from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import Camera, PointLight, SpotLight
 from rgspipe.scene.gloss import Gloss
 from rgspipe.scene.grade import SceneGrade
-from rgspipe.scene.lights import LedLight, PanelLight, SphereLight
+from rgspipe.scene.lights import LedLight, PanelLight, ProfileLight, SphereLight, SunLight
 from rooms import closed_box
 from scan_layouts import (
     photographed,
@@ -112,9 +114,19 @@ def _extents(folder: Path) -> None:
         SphereLight(place, 1.0, 0.1),
         PanelLight(place, 1.0, [0, 0, -1], 0.2, 0.1, 0.3),
         LedLight(place, 1.0, [0, 0, -1], 2.0),
+        ProfileLight.shaped(),
+        SunLight.shaped(),
     )
     spreads = covariance_fields(len(lamps), {"covariance": [torch.eye(3)] * len(lamps)})
     write_lights(folder / "a.json", lamps, {"lights": spreads, "ambient": {"radiance": [0.1, 0.2, 0.3]}})
+
+
+def _luminaire(name: str, text: str) -> Kind:
+    def read(folder: Path) -> Numbers:
+        table = read_photometry(folder / name)
+        yield from (table.vertical, table.horizontal, table.relative, torch.tensor(table.candela))
+
+    return Kind(name, lambda folder: (folder / name).write_text(text), read)
 
 
 def _read_lights(folder: Path) -> Numbers:
@@ -235,6 +247,8 @@ KINDS: dict[str, Kind] = {
     "JPEG": _image("a.jpg", "RGB"),
     "light file": Kind("a.json", _lights, _read_lights),
     "a fit's light file": Kind("a.json", _extents, _read_lights),
+    "IES": _luminaire("a.ies", ies()),
+    "EULUMDAT": _luminaire("a.ldt", ldt(2, 4, [*COLUMNS])),
     "grade": Kind(
         "a.json",
         lambda folder: save_grade(folder / "a.json", SceneGrade(30.0, 8, 0.01, 0.1, 0.05, 0.01, 0.0, (0.1, 0.2, 0.3))),

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import torch
 
+from rgspipe.renderer.kernels.places import ways_to
 from rgspipe.scene import Camera, Light, SpotLight, look_at
 from rgspipe.scene.lights import KINDS
 
@@ -44,7 +45,7 @@ def plane_image(light: Light, subsamples: int = 16) -> np.ndarray:
     points = origins - (origins[:, 2] / directions[:, 2])[:, None] * directions
     radiance = torch.zeros((len(points), 3), dtype=torch.float64)
     for part in light.parts():
-        to_light = part.position - points
+        to_light = ways_to(part.place, points)
         irradiance = to_light[:, 2] / to_light.norm(dim=1) ** 3
         if part.axis is not None:
             irradiance = irradiance * part.relative_intensity_towards(points)

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from rgspipe.capture.options import CaptureOptions
     from rgspipe.datasets.light_file import read_ambient, read_lights, write_lights
     from rgspipe.datasets.location import load_views
+    from rgspipe.datasets.photometric_file import read_photometry
     from rgspipe.datasets.ply import PlyOptions, save_ply
     from rgspipe.datasets.surfel_file import load_surfels, save_surfels
     from rgspipe.datasets.views import View
@@ -35,7 +36,16 @@ if TYPE_CHECKING:
     from rgspipe.renderer.frozen import FrozenScene
     from rgspipe.renderer.ply import load_ply
     from rgspipe.scene import Camera, Surfels
-    from rgspipe.scene.lights import LedLight, Light, PanelLight, PointLight, SphereLight, SpotLight
+    from rgspipe.scene.lights import (
+        LedLight,
+        Light,
+        PanelLight,
+        PointLight,
+        ProfileLight,
+        SphereLight,
+        SpotLight,
+        SunLight,
+    )
     from rgspipe.scene.models import CornellBox, Corridor, exact_surfels
     from rgspipe.training.trainer import Trained, TrainOptions, train
     from rgspipe.viewer.serve import Viewer, view
@@ -61,7 +71,17 @@ _HOMES = {
     "renderer.frozen": ("FrozenScene",),
     "renderer.ply": ("load_ply",),
     "scene": ("Camera", "Surfels"),
-    "scene.lights": ("LedLight", "Light", "PanelLight", "PointLight", "SphereLight", "SpotLight"),
+    "scene.lights": (
+        "LedLight",
+        "Light",
+        "PanelLight",
+        "PointLight",
+        "ProfileLight",
+        "SphereLight",
+        "SpotLight",
+        "SunLight",
+    ),
+    "datasets.photometric_file": ("read_photometry",),
     "scene.models": ("CornellBox", "Corridor", "exact_surfels"),
     "training.trainer": ("TrainOptions", "Trained", "train"),
     "viewer.serve": ("Viewer", "view"),
@@ -89,9 +109,11 @@ __all__ = [
     "PaperAdam",
     "PlyOptions",
     "PointLight",
+    "ProfileLight",
     "Search",
     "SphereLight",
     "SpotLight",
+    "SunLight",
     "Surfels",
     "TrackOptions",
     "TrainOptions",
@@ -109,6 +131,7 @@ __all__ = [
     "load_views",
     "read_ambient",
     "read_lights",
+    "read_photometry",
     "save_ply",
     "save_png",
     "save_surfels",

@@ -33,20 +33,23 @@ def text(folder: Path, name: str, *lights: Light, **options: object) -> str:
 
 def test_every_format_is_written_for_every_kind(tmp_path: Path) -> None:
     done = export_lights(RIG, tmp_path, metres=2.0, covariances=[1e-4 * torch.eye(6).double()] * len(RIG))
-    assert {path.name for path in done.files} == {*NAMES.values(), *(f"lamp_{n}.ies" for n in range(1, len(RIG) + 1))}
+    finite = [number for number, light in enumerate(RIG, start=1) if not light.distant]
+    assert {path.name for path in done.files} == {*NAMES.values(), *(f"lamp_{n}.ies" for n in finite)}
     assert all(path.stat().st_size > 0 for path in done.files)
     # What a format does not hold is said of each light.
     assert any("the panel is left out" in line for line in done.lines)
+    assert any("LM-63 has no suns" in line for line in done.lines)
     assert "lumens" not in (tmp_path / "lamps.txt").read_text() and "683" in (tmp_path / "lamps.txt").read_text()
 
 
 @pytest.mark.parametrize("metres", [0.1, 1.0, 10.0])
 def test_a_light_file_in_metres_gives_the_same_irradiance(tmp_path: Path, metres: float) -> None:
-    """I/d² is the same in both units."""
+    """I/d² is the same in both units, and so is a sun's irradiance."""
     text(tmp_path, "json", *RIG, metres=metres)
     for light, exported in zip(RIG, rg.read_lights(tmp_path / "lamps.json"), strict=True):
         torch.testing.assert_close(exported.position, metres * light.position)
-        torch.testing.assert_close(exported.intensity / metres**2, light.intensity)
+        factor = 1.0 if light.distant else metres**2
+        torch.testing.assert_close(exported.intensity / factor, light.intensity)
     sphere = rg.read_lights(tmp_path / "lamps.json")[[*BY_KIND].index("sphere")]
     assert sphere.radius == pytest.approx(metres * BY_KIND["sphere"].radius)
 
@@ -89,6 +92,9 @@ def test_mitsuba_s_emitters_have_our_radiance_and_axes(tmp_path: Path) -> None:
     np.testing.assert_allclose(values[3], sphere.intensity / (math.pi * sphere.radius**2))
     np.testing.assert_allclose(values[4], panel.intensity / (panel.width * panel.height))
     matrices = [np.array(m.get("value").split(), dtype=float).reshape(4, 4) for m in root.iter("matrix")]
+    (sun,) = (one for one in root.iter("emitter") if one.get("type") == "directional")
+    np.testing.assert_allclose([float(sun.find("vector").get(axis)) for axis in "xyz"], AXIS)
+    np.testing.assert_allclose(values[5], BY_KIND["sun"].intensity)
     for matrix in matrices:  # spots and rectangles look along +z
         direction = matrix[:3, :3] @ [0, 0, 1]
         np.testing.assert_allclose(direction / np.linalg.norm(direction), AXIS, atol=1e-12)

@@ -11,7 +11,7 @@ import torch
 
 from rgspipe.light_export.export import export_lights
 from rgspipe.scene import Light, SpotLight
-from rgspipe.scene.lights import PanelLight, PointLight, SphereLight
+from rgspipe.scene.lights import PanelLight, PointLight, SphereLight, SunLight
 from spots_on_plane import ALBEDO, SIZE, plane_camera, plane_image
 
 mi = pytest.importorskip("mitsuba", reason="mitsuba is not installed (extra bench)")
@@ -24,6 +24,7 @@ LIGHTS = {
     "linear": SpotLight(PLACE, [0.5, 1.0, 2.0], AXIS, "linear", 0.45, 0.2),
     "sphere": SphereLight(PLACE, [0.5, 1.0, 2.0], 0.1),
     "panel": PanelLight(PLACE, [0.5, 1.0, 2.0], AXIS, 0.2, 0.1, 0.4),
+    "sun": SunLight(PLACE, [0.5, 1.0, 2.0], AXIS),
 }
 
 

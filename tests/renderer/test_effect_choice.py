@@ -24,7 +24,7 @@ from rgspipe.renderer.effect_choice import EFFECTS, RigKind, choose_effects, con
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.shadow_bound import ShadowBound, sample_lights, shadow_losses
 from rgspipe.scene import Camera, PointLight, look_at
-from rgspipe.scene.lights import SpotLight
+from rgspipe.scene.lights import SpotLight, SunLight
 from rgspipe.scene.rectangles import surfels_on
 from rgspipe.scene.surfels import NO_CLIP
 from rooms import closed_box
@@ -104,8 +104,11 @@ def test_bounds_do_not_depend_on_size_or_place(scale: float, offset: float) -> N
 
 
 def test_each_light_adds_its_shadow_and_a_spot_may_be_aimed_at_the_worst() -> None:
-    shadows = ShadowBound(point=1e-5, spot=0.5, proved=False, lights=100, uniform=80)
+    shadows = ShadowBound(point=1e-5, spot=0.5, proved=False, lights=100, uniform=80, sun=1e-3)
     bounds = replace(DARK, interreflection=1.0, shadows=shadows)
+    sun = RigKind.of((SunLight.shaped(),))
+    assert sun == RigKind(0, (), 1) and rig_bounds(bounds, sun)["shadows"] == pytest.approx(1e-3 * 4)
+    assert rig_bounds(bounds, sun)["spot cones"] == 0.0
     # Twice for the sample, twice for the light that bounces on.
     assert rig_bounds(bounds, RigKind(3))["shadows"] == pytest.approx(3 * 1e-5 * 4)
     assert rig_bounds(bounds, RigKind(1, (0.0,)))["shadows"] == pytest.approx(2.0, rel=1e-3)

@@ -20,35 +20,43 @@ from rgspipe.scene.surfels import quaternion_from_normal
 LIGHTS = torch.tensor([[0.1, 0.2, 0.3], [0.0, 0.0, 0.9], [-0.7, 0.3, -0.2]], dtype=torch.float64)
 
 
+#: Places at infinity, around the cloud.
+SUNS = torch.cat([torch.nn.functional.normalize(LIGHTS, dim=1), torch.zeros(3, 1, dtype=torch.float64)], dim=1)
+
+everywhere = pytest.mark.parametrize("lights", [LIGHTS, SUNS], ids=["near", "at infinity"])
+
+
 def slopes(function, lights: Tensor) -> Tensor:
-    """(L, N, 3) derivative of (L, N) values towards the lights, by autograd."""
-    return torch.stack([torch.func.jacfwd(lambda x: function(x[None])[0])(light) for light in lights])
+    """(L, N, 3) derivative of (L, N) values towards x, y and z of the lights, by autograd."""
+    return torch.stack([torch.func.jacfwd(lambda x: function(x[None])[0])(light) for light in lights])[..., :3]
 
 
+@everywhere
 @pytest.mark.parametrize("device", DEVICES)
-def test_transmittance_and_derivative_match_the_reference(device: str) -> None:
+def test_transmittance_and_derivative_match_the_reference(lights: Tensor, device: str) -> None:
     surfels = cloud(200, seed=0)
-    shares, found = (x.double().cpu() for x in transmittance(SurfelBvh(surfels.to(torch.float32).to(device)), LIGHTS))
-    expected = reference.transmittance(surfels, LIGHTS)
+    shares, found = (x.double().cpu() for x in transmittance(SurfelBvh(surfels.to(torch.float32).to(device)), lights))
+    expected = reference.transmittance(surfels, lights)
     # Measured 1.3e-6, and 1.0e-6 of the largest derivative.
     torch.testing.assert_close(shares, expected, atol=2e-5, rtol=0)
     partly = float(((shares > 0.01) & (shares < 0.99)).double().mean())
     assert partly > 0.1, "the lights must have penumbrae for this to prove anything"
-    exact = slopes(lambda x: reference.transmittance(surfels, x), LIGHTS)
+    exact = slopes(lambda x: reference.transmittance(surfels, x), lights)
     assert float((found - exact).abs().max()) < 2e-5 * float(exact.abs().max())
 
 
+@everywhere
 @pytest.mark.parametrize("device", DEVICES)
 @pytest.mark.parametrize("shadows", [True, False])
-def test_irradiance_and_derivative_match_the_reference(shadows: bool, device: str) -> None:
+def test_irradiance_and_derivative_match_the_reference(lights: Tensor, shadows: bool, device: str) -> None:
     surfels = cloud(200, seed=0)
     bvh = SurfelBvh(surfels.to(torch.float32).to(device))
-    irradiance, found = (x.double().cpu() for x in unit_irradiance(bvh, LIGHTS, shadows))
-    expected = reference.unit_irradiance(surfels, LIGHTS, shadows)
-    exact = slopes(lambda x: reference.unit_irradiance(surfels, x, shadows), LIGHTS)
-    # Measured 1.7e-7 and 4.1e-7 of the largest.
+    irradiance, found = (x.double().cpu() for x in unit_irradiance(bvh, lights, shadows))
+    expected = reference.unit_irradiance(surfels, lights, shadows)
+    exact = slopes(lambda x: reference.unit_irradiance(surfels, x, shadows), lights)
+    # Measured 1.7e-7 and 4.1e-7 of the largest; at infinity, where no surfel is near the light, 2.3e-5 in a penumbra.
     assert float((irradiance - expected).abs().max()) < 1e-5 * float(expected.max())
-    assert float((found - exact).abs().max()) < 2e-5 * float(exact.abs().max())
+    assert float((found - exact).abs().max()) < 1e-4 * float(exact.abs().max())
 
 
 def test_the_reference_matches_finite_differences() -> None:

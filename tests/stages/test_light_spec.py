@@ -54,7 +54,7 @@ def test_angles_become_radians_and_a_blend_stays_a_share() -> None:
         ({"light.type": "auto", "light.spot.profile": "linear", "light.spot.falloff": 40.0}, "at most 25"),
         ({"fit.method": "paper_adam", "light.count": None}, "light.count: .* 1 to 8"),
         ({"fit.method": "paper_adam", "light.type": "auto"}, "light.type: .* point or spot"),
-        ({"fit.method": "paper_adam", "light.type": "sphere"}, "light.type: .* point or spot or led with"),
+        ({"fit.method": "paper_adam", "light.type": "sphere"}, "light.type: .* point or spot or led or profile with"),
         ({"light.type": "sphere", "light.mount": "surface"}, "light.mount: .* panels"),
         ({"fit.method": "paper_adam", "light.type": "spot", "fit.shape": "free"}, "fit.shape: .* known"),
     ],

@@ -2,7 +2,7 @@
 
 Light is emitted by a point lamp, of radius 0 unless the light is a sphere, whose shader multiplies it with the light's
 profile of the angle between its axis and the direction in which the light leaves: one way for all profiles, also for
-those that Blender's own spots do not have. A panel is Blender's own rectangle.
+those that Blender's own spots do not have. A panel is Blender's own rectangle, a sun its own sun.
 """
 
 from __future__ import annotations
@@ -16,20 +16,35 @@ from mathutils import Matrix
 
 from rgspipe.scene import Light
 from rgspipe.scene.lights import WATTS_PER_INTENSITY, PanelLight, SphereLight
+from rgspipe.scene.lights.coordinates import tangents
 
 Value = bpy.types.NodeSocket | float
 
 
 def place_lamp(item: bpy.types.Object, light: Light) -> None:
     """Give `item` a lamp with the extent, the profile, the axis, the place and the intensity of `light`."""
-    before, item.data = item.data, _panel(light) if isinstance(light, PanelLight) else _bulb(light)
+    before, item.data = item.data, _lamp(light)
     if before is not None:
         bpy.data.lights.remove(before)
     peak = float(light.intensity.max())
-    watts = float(light.power().max()) / peak if isinstance(light, PanelLight) else WATTS_PER_INTENSITY
-    item.data.energy = watts * peak
+    item.data.energy = _energy(light) * peak
     item.data.color = (light.intensity / peak).tolist()
     item.matrix_world = _pose(light)
+
+
+def _lamp(light: Light) -> bpy.types.Light:
+    if light.distant:
+        lamp = bpy.data.lights.new("light", "SUN")
+        lamp.angle = 0.0
+        return lamp
+    return _panel(light) if isinstance(light, PanelLight) else _bulb(light)
+
+
+def _energy(light: Light) -> float:
+    """Blender's strength of a light of intensity 1: W, and of a sun W/m² across its light."""
+    if light.distant:
+        return 1.0
+    return float((light.power() / light.intensity).max()) if isinstance(light, PanelLight) else WATTS_PER_INTENSITY
 
 
 def _bulb(light: Light) -> bpy.types.Light:
@@ -58,6 +73,8 @@ def _pose(light: Light) -> Matrix:
     if isinstance(light, PanelLight):
         across, up = light.sides()
         pose[:3, :3] = torch.stack([across, -up, -light.axis / light.axis.norm()], dim=1)
+    elif light.distant:
+        pose[:3, :3] = torch.cat([tangents(light.axis), -light.axis[None]]).T * torch.tensor([1.0, -1.0, 1.0])
     pose[:3, 3] = light.position
     return Matrix(pose.tolist())
 

@@ -55,10 +55,18 @@ class PanelConfig(Options):
 
 
 @dataclass(frozen=True)
+class ProfileConfig(Options):
+    """How unknown measured luminaires hang, of which `light.file` or `light.catalogue` names the table."""
+
+    turn: float = option(0.0, low=-360, high=360)
+    """around the axis, degrees, where to begin: it is found, unless the luminaire is the same all around"""
+
+
+@dataclass(frozen=True)
 class LightConfig(Options):
     """What is looked for."""
 
-    type: Literal["point", "spot", "led", "sphere", "panel", "auto"] = "point"
+    type: Literal["point", "spot", "led", "sphere", "panel", "sun", "profile", "auto"] = "point"
     """type of the unknown lights"""
     count: int | None = option(1, low=1, high=MOST_LIGHTS)
     """how many unknown lights; null finds out"""
@@ -70,6 +78,12 @@ class LightConfig(Options):
     led: LedConfig = LedConfig()
     sphere: SphereConfig = SphereConfig()
     panel: PanelConfig = PanelConfig()
+    profile: ProfileConfig = ProfileConfig()
+    file: str | None = None
+    """of light=profile: the measured luminaire, an IES (.ies) or EULUMDAT (.ldt) file; with none and no catalogue it
+    shines as an even surface does"""
+    catalogue: str | None = None
+    """of light=profile: a folder of such files, of which the one is found that explains the image best"""
 
 
 @dataclass(frozen=True)

@@ -44,9 +44,9 @@ class TargetSpotConfig(Options):
 class TargetsConfig(Options):
     """Generated fit targets: sums of single lights, each of which is rendered once."""
 
-    kind: Literal["points", "spots", "mixed", "spheres", "panels", "drive"] = "points"
-    """lights of a target: points, spots, of each at least one, spheres, panels, or the headlights of a car that drives
-    around the bend of scene=corner"""
+    kind: Literal["points", "spots", "mixed", "spheres", "panels", "suns", "drive"] = "points"
+    """lights of a target: points, spots, of each at least one, spheres, panels, suns, or the headlights of a car that
+    drives around the bend of scene=corner"""
     number: int = option(40, low=1, high=100000)
     """targets; a drive has `frames`"""
     count: tuple[int, int] = option((1, 1), low=1, high=MOST_LIGHTS)
@@ -56,7 +56,7 @@ class TargetsConfig(Options):
     weakest: float = option(0.15, low=0, high=0.5)
     """least share of a light in the mean radiance of its target"""
     separation: float = option(0.1, low=0, high=10)
-    """least distance between the lights of a target, scene units"""
+    """least distance between the lights of a target, scene units; of suns rad"""
     seed: int = option(0, low=0, high=2**31 - 1)
     """draws of which lights make up a target, and of their intensities"""
     pool: int = option(60, low=1, high=100000)

@@ -135,6 +135,20 @@ class _Fields:
             raise self.refusal(key, f"a number within ±{FARTHEST:g}", repr(value))
         return float(value)
 
+    def text(self, key: str) -> str:
+        value = required(self.fields, key, self.place)
+        if not isinstance(value, str):
+            raise self.refusal(key, "a text", repr(value)[:80])
+        return value
+
+    def numbers(self, key: str) -> torch.Tensor:
+        values = required(self.fields, key, self.place)
+        if not (isinstance(values, list) and values and all(map(is_number, values))):
+            raise self.refusal(key, "a list of numbers", repr(values)[:80])
+        if max(map(abs, values)) > FARTHEST:
+            raise self.refusal(key, f"numbers within ±{FARTHEST:g}", repr(values)[:80])
+        return torch.tensor(values, dtype=torch.float64)
+
     def choice(self, key: str, names: Sequence[str]) -> str:
         value = required(self.fields, key, self.place)
         if value not in names:

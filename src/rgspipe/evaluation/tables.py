@@ -128,7 +128,8 @@ def rig_errors(estimate: LightRig, truth: LightRig, scene_size: float) -> RigErr
     """Errors of a recovered rig after the optimal matching of its lights.
 
     The position error is the worst of the matched lights, so a target counts as solved only when each
-    of its lights is. Lights too many or too few are not in these numbers: see `target_table`.
+    of its lights is; that of a light at infinity is the angle by which it is off [rad].
+    Lights too many or too few are not in these numbers: see `target_table`.
 
     Raises:
         ValueError: the truth has no light.
@@ -139,8 +140,7 @@ def rig_errors(estimate: LightRig, truth: LightRig, scene_size: float) -> RigErr
         axis = math.inf if any(light.axis is not None for light in truth) else math.nan
         shape = math.inf if any(light.shape for light in truth) else math.nan
         return RigErrors(math.inf, math.inf, axis, shape, ())
-    found = np.stack([to_array(light.position) for light in estimate])
-    wanted = np.stack([to_array(light.position) for light in truth])
+    found, wanted = (np.stack([to_array(light.standing(scene_size)) for light in rig]) for rig in (estimate, truth))
     pairs = match_positions(found, wanted)
     positions = [metrics.position_error(found[i], wanted[j], scene_size) for i, j in pairs]
     intensities = [metrics.intensity_error(estimate[i].intensity, truth[j].intensity) for i, j in pairs]
@@ -290,7 +290,9 @@ def _target_row(
             solved = metrics.success(position, limit) and len(estimate) == len(truth)
     shown = estimate[pairs[0][0]] if pairs else (estimate[0] if estimate else None)
     true_light = truth[pairs[0][1]] if pairs else (truth[0] if truth else None)
-    positions = [to_array(matrix)[:3, :3] for matrix in covariances]
+    size = scene_size if math.isfinite(scene_size) else 1.0
+    spreads = zip(estimate, covariances, strict=False)
+    positions = [to_array(light.standing_spread(matrix, size)) for light, matrix in spreads]
     shown_spread = positions[pairs[0][0] if pairs else 0] if positions else None
     return (
         {name: row[name] for name in ("target", "occlusion", "method", "views", "seconds")}
@@ -301,7 +303,7 @@ def _target_row(
         | {"psnr": _number(row.get("psnr")), "result": row.get("result", ""), "reason": row.get("reason", "")}
         | {"lights_found": len(estimate), "lights_true": len(truth) if truth else None}
         | {"position_sd": calibration.position_sd(positions, scene_size)}
-        | {"inside_95": _inside(estimate, truth, positions, pairs)}
+        | {"inside_95": _inside(estimate, truth, positions, pairs, size)}
         | _light_columns(shown, "")
         | _light_columns(true_light, "_true")
         | _variance_columns(shown_spread)
@@ -316,12 +318,16 @@ def _types_right(estimate: LightRig, truth: LightRig, pairs: Sequence[tuple[int,
 
 
 def _inside(
-    estimate: LightRig, truth: LightRig, positions: Sequence[npt.NDArray], pairs: Sequence[tuple[int, int]]
+    estimate: LightRig,
+    truth: LightRig,
+    positions: Sequence[npt.NDArray],
+    pairs: Sequence[tuple[int, int]],
+    size: float,
 ) -> bool | None:
     """Whether the true positions lie inside the 95 % regions; None where there are none, or too many or few lights."""
     if not truth or len(estimate) != len(truth) or len(positions) != len(estimate):
         return None
-    matched = [(estimate[i].position, truth[j].position, positions[i]) for i, j in pairs]
+    matched = [(estimate[i].standing(size), truth[j].standing(size), positions[i]) for i, j in pairs]
     return calibration.inside(*zip(*matched, strict=True))
 
 

@@ -111,11 +111,12 @@ class Undetermined(Finding):
 
 @dataclass(frozen=True)
 class Uncertain(Finding):
-    """Light `number` of `count` is expected to be off by `error`, a part of the scene's size."""
+    """Light `number` of `count` is expected to be off by `error`, a part of the scene's size; `distant` ones rad."""
 
     number: int
     count: int
     error: float
+    distant: bool = False
     status = FitStatus.UNDETERMINED
 
 
@@ -196,7 +197,7 @@ class MaybeAmbient(Finding):
 
 @dataclass(frozen=True)
 class NoOpening(Finding):
-    """Light from all around was allowed for, and the scene is closed: none arrives."""
+    """Light from outside was allowed for, and the scene is closed: none arrives."""
 
     status = FitStatus.CONVERGED
 

@@ -24,6 +24,8 @@ class AimedOptions(Options):
     blocks: int = option(256, low=16, high=100000)
     """all views together have about so many blocks, as there are many candidates, and what bounces is followed from
     about so many groups of patches"""
+    directions: int = option(600, low=16, high=100000)
+    """of lights at infinity: directions from which their light is tried"""
     starts: int = option(3, low=1, high=1000)
     """starts for each wanted one"""
 

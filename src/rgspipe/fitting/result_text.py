@@ -54,15 +54,18 @@ def light_line(light: Light, covariance: Sequence[Sequence[float]] | None = None
     """
     variances = None if covariance is None else [float(row[index]) for index, row in enumerate(covariance)]
     place, colour = (", ".join(f"{value:.3f}" for value in part.tolist()) for part in (light.position, light.intensity))
-    told = f"{light.kind} at ({place})"
-    told += "" if variances is None else _deviation(variances[:3], "{:.4f}")
+    told = light.label
+    if not light.distant:
+        told += f" at ({place})" + ("" if variances is None else _deviation(variances[:3], "{:.4f}"))
     if light.axis is not None:
-        told += f", axis ({', '.join(f'{value:.3f}' for value in light.axis.tolist())})"
+        told += "" if light.distant else ","
+        told += f" axis ({', '.join(f'{value:.3f}' for value in light.axis.tolist())})"
+        told += _deviation(variances[3:6], "{:.4f}") if light.distant and variances is not None else ""
     for number in light.shape:
         if number.decimals is not None:
             value = number.shown(getattr(light, number.name))
             told += f", {number.key.replace('_', ' ')} {value:.{number.decimals}f}{number.unit}"
-    told += f", RGB ({colour}) W/sr"
+    told += f", RGB ({colour}) {light.unit}"
     return told + ("" if variances is None else _deviation(variances[-3:], "{:.3f}"))
 
 

@@ -13,7 +13,7 @@ import torch
 from torch import Tensor
 
 from rgspipe.fitting.certainty.uncertainty import light_covariances
-from rgspipe.fitting.findings import Finding, LightMissing, LightSpare, MuchAmbient, Rival
+from rgspipe.fitting.findings import Finding, LightMissing, LightSpare, MuchAmbient, NoOpening, Rival
 from rgspipe.fitting.meter import Meter
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.exposure import rough_exposures
@@ -60,7 +60,8 @@ def fit_search_lm(
     candidates = [Candidates.of(problem, images, free, options.combinations) for images in coarse]
     candidates = [one for one in candidates if one.lit]
     if not candidates:
-        return _without_lights(problem, meter)
+        dark = _without_lights(problem, meter)
+        return replace(dark, findings=(*dark.findings, NoOpening())) if spec.kinds[-1].distant else dark
     refiner = Refiner.of(problem.coarsest(blocks), meter, options.limits)
     found = _search(refiner, candidates, options, spec)
     polished, best = _polished(refiner.on(problem.sharpest()), found.best, options.iterations)

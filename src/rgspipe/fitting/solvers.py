@@ -68,7 +68,7 @@ class PaperAdam(AdamOptions):
             raise ValueError("PaperAdam takes images as radiance with known exposures, lit by lamps alone: use Search")
         if views.lights.ambient:
             raise ValueError("PaperAdam knows no light from all around: use Search")
-        if views.lights.extended:
+        if views.lights.extended or not views.lights.kinds[-1].in_one_point:
             raise ValueError("PaperAdam moves lights in one point: use Search")
         problem, prior = LightProblem.create(views.prepared, images, views.effects), LightPrior.of(self.training_lights)
         return fit_paper_adam(problem, images, self, prior, self.seed, views.lights)

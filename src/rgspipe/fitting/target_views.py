@@ -19,6 +19,7 @@ from rgspipe.fitting.options import AimedOptions, LossOptions
 from rgspipe.fitting.result import FitResult
 from rgspipe.fitting.search.aimed_candidates import aimed_candidates
 from rgspipe.fitting.search.coarse import CoarseImages, coarse_images
+from rgspipe.fitting.search.distant_candidates import distant_candidates
 from rgspipe.fitting.spec import LightSpec, as_spec
 from rgspipe.renderer.ambient import ambient_radiance
 from rgspipe.renderer.dictionary import LightDictionary
@@ -115,6 +116,8 @@ class TargetViews:
         return {}
 
     def _coarse(self, kind: Light, options: AimedOptions) -> CoarseImages:
+        if kind.distant:
+            return distant_candidates(self.blocks, kind, options.directions)
         if kind.axis is None:
             return coarse_images(self.blocks, self.dictionary)
         shapes = kind.variants() if self.lights.seed.shape_free else (kind,)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -109,6 +110,9 @@ def _undetermined(found: Undetermined, spoken: Spoken) -> str:
 
 
 def _uncertain(found: Uncertain, spoken: Spoken) -> str:
+    if found.distant:
+        aim = f"the direction{_of_light(found.number, found.count)}"
+        return f"Uncertain: {aim} by {math.degrees(found.error):.0f}°; give more views, or a sharper scene."
     place = f"the position{_of_light(found.number, found.count)}"
     return f"Uncertain: {place} by {percent(found.error)} of the scene's size; give more views, or a sharper scene."
 
@@ -157,7 +161,7 @@ def _maybe_ambient(found: MaybeAmbient, spoken: Spoken) -> str:
 
 
 def _no_opening(found: NoOpening, spoken: Spoken) -> str:
-    return "The scene is closed: no light comes in from all around."
+    return "The scene is closed: no light comes in from outside."
 
 
 #: Findings that say more than their status does.

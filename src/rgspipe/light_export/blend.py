@@ -118,7 +118,10 @@ def _lamp(name: str, light: Light) -> list[str]:
     peak, colour = peak_and_colour(light)
     fields = {"use_soft_falloff": False, "shadow_soft_size": 0.0}
     kind, watts = "POINT", WATTS_PER_INTENSITY * peak
-    if isinstance(light, PanelLight):
+    if light.distant:
+        # Blender's strength of a sun is W/m² across its light.
+        kind, watts, fields = "SUN", peak, {"angle": 0.0}
+    elif isinstance(light, PanelLight):
         kind, watts = "AREA", math.pi * peak
         fields = {"shape": "RECTANGLE", "size": float(light.width), "size_y": float(light.height)}
     elif isinstance(light, SphereLight):

@@ -20,7 +20,7 @@ from rgspipe.light_export.three import three
 from rgspipe.light_export.usd import usda
 from rgspipe.light_export.world import World, table
 from rgspipe.scene import Light, LightRig
-from rgspipe.scene.lights import as_rig
+from rgspipe.scene.lights import ProfileLight, as_rig
 
 Format = Literal["blend", "usda", "gltf", "mitsuba", "three", "ies", "json"]
 FORMATS: tuple[Format, ...] = get_args(Format)
@@ -85,9 +85,17 @@ def export_lights(
             files.append(path)
             notes += said
             if text is None:
-                write_lights(path, rig, {"units": "metres, W/sr"})
+                write_lights(path, rig, {"units": "metres, W/sr; of suns W/m²"})
             else:
                 write_text(path, text)
+    if "ies" in formats:
+        notes += [f"light {n}: LM-63 has no suns; it is left out." for n, one in enumerate(rig, start=1) if one.distant]
+    if {*formats} - {"ies", "json"}:
+        notes += [
+            f"light {n}: the {one.label} is written as its mean around the axis; IES and JSON hold all of it."
+            for n, one in enumerate(rig, start=1)
+            if isinstance(one, ProfileLight) and not one.round
+        ]
     write_text(folder / "lamps.txt", f"{world.line()}\n\n{table(rig)}" + "".join(f"{note}\n" for note in notes))
     return LightExport(tuple(files), (world.line(), *notes))
 
@@ -98,7 +106,7 @@ def _texts(
     """Files of a format, each with its text (None for a light file) and what it does not hold."""
     if name == "ies":
         named = [(f"lamp_{number}", light) for number, light in enumerate(rig, start=1)]
-        return [(folder / f"{stem}.ies", *ies(light, stem)) for stem, light in named]
+        return [(folder / f"{stem}.ies", *ies(light, stem)) for stem, light in named if not light.distant]
     if name == "json":
         return [(folder / NAMES[name], None, [])]
     return [(folder / NAMES[name], *(blend(rig, regions) if name == "blend" else _WRITERS[name](rig)))]

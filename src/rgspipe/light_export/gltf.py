@@ -15,7 +15,10 @@ from rgspipe.scene.lights import PanelLight, SphereLight
 #: From axes with Z up to those with Y up.
 Y_UP = torch.tensor([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]], dtype=torch.float64)
 
-CONVENTION = f"intensity [cd] = {LUMENS_PER_WATT:g} lm/W x radiant intensity [W/sr] of the brightest channel"
+CONVENTION = (
+    f"intensity [cd] = {LUMENS_PER_WATT:g} lm/W x radiant intensity [W/sr] of the brightest channel; "
+    "of directional lights [lx] and irradiance [W/m2]"
+)
 
 
 def gltf(rig: LightRig) -> tuple[str, list[str]]:
@@ -39,7 +42,7 @@ def _light(number: int, light: Light) -> dict:
     peak, colour = peak_and_colour(light)
     fields = {"name": f"light {number}", "color": colour, "intensity": LUMENS_PER_WATT * peak}
     if not is_cone(light):
-        return fields | {"type": "point"}
+        return fields | {"type": "directional" if light.distant else "point"}
     inner, outer = cone(light)
     outer = min(outer, 0.5 * math.pi)
     return fields | {"type": "spot", "spot": {"innerConeAngle": min(inner, 0.999 * outer), "outerConeAngle": outer}}

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 
 import torch
+from torch import Tensor
 
 from rgspipe.light_export.world import candela
 from rgspipe.scene import Light
-from rgspipe.scene.lights import PanelLight, SphereLight
+from rgspipe.scene.lights import PanelLight, ProfileLight, SphereLight
 
 #: Vertical angles from straight along the axis to straight back [degrees].
 ANGLES = torch.linspace(0.0, 180.0, 361, dtype=torch.float64)
@@ -16,8 +17,8 @@ ANGLES = torch.linspace(0.0, 180.0, 361, dtype=torch.float64)
 
 def ies(light: Light, name: str) -> tuple[str, list[str]]:
     """The text of a light's file, and what it does not hold."""
-    share = torch.ones_like(ANGLES) if light.axis is None else light.relative_intensity_at(torch.deg2rad(ANGLES))
-    values = (candela(light) * share).tolist()
+    vertical, planes, shares = _table(light)
+    values = [(candela(light) * column).tolist() for column in shares]
     width, length, height = _extent(light)
     header = [
         "IESNA:LM-63-2002",
@@ -28,11 +29,23 @@ def ies(light: Light, name: str) -> tuple[str, list[str]]:
         f"[LUMINAIRE] {light.kind}",
         "TILT=NONE",
         # 1 lamp, absolute (-1 lm), multiplier, angles, type C, metres.
-        f"1 -1 1 {len(ANGLES)} 1 1 2 {width:.6g} {length:.6g} {height:.6g}",
+        f"1 -1 1 {len(vertical)} {len(planes)} 1 2 {width:.6g} {length:.6g} {height:.6g}",
         "1 1 0",
     ]
-    text = "\r\n".join([*header, _wrapped(ANGLES.tolist()), "0", _wrapped(values), ""])
+    angles = (_wrapped(part.tolist()) for part in (vertical, planes))
+    text = "\r\n".join([*header, *angles, *map(_wrapped, values), ""])
     return text, [f"{name}: colour is not in the file, only candela (luminance of the RGB)."]
+
+
+def _table(light: Light) -> tuple[Tensor, Tensor, Tensor]:
+    """Angles from the axis (V,) and around it (H,) [degrees], and relative intensities (H, V)."""
+    if isinstance(light, ProfileLight):
+        table, turn = light.table, torch.full((1,), 2.0 * math.pi).double()
+        around = [table.horizontal] if table.round else [table.horizontal, turn]
+        columns = table.relative if table.round else torch.cat([table.relative, table.relative[:, :1]], dim=1)
+        return torch.rad2deg(table.vertical), torch.rad2deg(torch.cat(around)), columns.T
+    share = torch.ones_like(ANGLES) if light.axis is None else light.relative_intensity_at(torch.deg2rad(ANGLES))
+    return ANGLES, torch.zeros(1).double(), share[None]
 
 
 def _extent(light: Light) -> tuple[float, float, float]:

@@ -17,6 +17,10 @@ def mitsuba(rig: LightRig) -> tuple[str, list[str]]:
 
 
 def _emitter(light: Light) -> str:
+    if light.distant:
+        x, y, z = light.axis.tolist()
+        along = f'<vector name="direction" x="{x!r}" y="{y!r}" z="{z!r}"/>'
+        return f'  <emitter type="directional">{along}{_rgb("irradiance", light)}</emitter>'
     x, y, z = light.position.tolist()
     if isinstance(light, SphereLight) and light.radius > 0.0:
         radiance = _rgb("radiance", light, 1.0 / (math.pi * light.radius**2))

@@ -41,16 +41,24 @@ def _objects(number: int, light: Light) -> list[dict]:
         area = light.width * light.height
         shown = {"type": "RectAreaLight", "width": light.width, "height": light.height}
         return [fields | shown | {"intensity": LUMENS_PER_WATT * peak / area}]
-    fields |= {"intensity": LUMENS_PER_WATT * peak, "distance": 0, "decay": 2}
-    if not is_cone(light):
-        return [fields | {"type": "PointLight"}]
+    fields |= {"intensity": LUMENS_PER_WATT * peak}
+    fading = {"distance": 0, "decay": 2}
+    if light.axis is None:
+        return [fields | fading | {"type": "PointLight"}]
+    target = _target(name, light)
+    if light.distant:
+        return [fields | {"type": "DirectionalLight", "target": target["uuid"]}, target]
     inner, outer = cone(light)
+    shown = {"type": "SpotLight", "angle": min(outer, 0.5 * math.pi), "penumbra": 1.0 - inner / outer}
+    return [fields | fading | shown | {"target": target["uuid"]}, target]
+
+
+def _target(name: str, light: Light) -> dict:
+    """What an aimed light looks at."""
     aim = pose(light)
     aim[:3, 3] = light.position + light.axis
-    target = {"uuid": _id(f"{name} target"), "type": "Object3D", "name": f"{name} target"}
-    target["matrix"] = aim.T.reshape(-1).tolist()
-    shown = {"type": "SpotLight", "angle": min(outer, 0.5 * math.pi), "penumbra": 1.0 - inner / outer}
-    return [fields | shown | {"target": target["uuid"]}, target]
+    known = {"uuid": _id(f"{name} target"), "type": "Object3D", "name": f"{name} target"}
+    return known | {"matrix": aim.T.reshape(-1).tolist()}
 
 
 def _notes(number: int, light: Light) -> list[str]:

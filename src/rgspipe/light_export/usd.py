@@ -30,7 +30,10 @@ def usda(rig: LightRig) -> tuple[str, list[str]]:
 
 def _light(number: int, light: Light) -> str:
     peak, colour = peak_and_colour(light)
-    if isinstance(light, PanelLight):
+    if light.distant:
+        # Of an angle of 0 the intensity is the irradiance across the light.
+        kind, radiance, own = "DistantLight", peak, {"float inputs:angle": 0.0, "bool inputs:normalize": 1}
+    elif isinstance(light, PanelLight):
         kind, radiance = "RectLight", peak / (light.width * light.height)
         own = {"float inputs:width": light.width, "float inputs:height": light.height}
     else:

@@ -33,7 +33,10 @@ class World:
         return self.metres / self.rescale
 
     def lights(self, rig: LightRig) -> LightRig:
-        """The lights in metres, where they are in the file; intensities in W/sr go with the square of a unit."""
+        """The lights in metres, where they are in the file; intensities in W/sr go with the square of a unit.
+
+        The irradiance of a sun stays: with lengths that are so many times longer, the same light arrives.
+        """
         return tuple(self._light(light) for light in rig)
 
     def _light(self, light: Light) -> Light:
@@ -44,7 +47,8 @@ class World:
             for number in light.shape
             if isinstance(number.coordinate, Length)
         }
-        return replace(light, position=position, intensity=self.unit**2 * light.intensity.double(), **sizes)
+        factor = 1.0 if light.distant else self.unit**2
+        return replace(light, position=position, intensity=factor * light.intensity.double(), **sizes)
 
     def line(self) -> str:
         """What was done, for people."""
@@ -55,7 +59,7 @@ class World:
 
 
 def candela(light: Light) -> float:
-    """Luminous intensity [cd] along its axis: 683 lm/W of the luminance of its RGB."""
+    """Luminous intensity [cd] along its axis, of a sun illuminance [lx]: 683 lm/W of the luminance of its RGB."""
     return LUMENS_PER_WATT * float(light.intensity.double() @ torch.tensor(LUMINANCE, dtype=torch.float64))
 
 
@@ -70,4 +74,7 @@ def table(rig: LightRig) -> str:
     for number, light in enumerate(rig, start=1):
         strength, power = (" ".join(f"{x:8.4g}" for x in part.tolist()) for part in (light.intensity, light.power()))
         lines.append(f"{number:5d}  {light.kind:7s} {strength}  {power}  {candela(light):10.4g}  {lumens(light):10.4g}")
-    return "\n".join([*lines, f"cd and lm: {LUMENS_PER_WATT:g} lm/W of Rec. 709 luminance.", ""])
+    lines.append(f"cd and lm: {LUMENS_PER_WATT:g} lm/W of Rec. 709 luminance.")
+    if any(light.distant for light in rig):
+        lines.append("Of a sun W/m² and lx, on a surface across its light; its power has no end.")
+    return "\n".join([*lines, ""])

@@ -96,9 +96,10 @@ def light_words(rig: LightRig) -> str:
     """Where lights are and how strong: "light at (0.10, 0.20, 0.30), 1.0 / 1.0 / 0.9 W/sr"; spots say so."""
     parts = []
     for light in rig:
-        place = ", ".join(f"{value:.2f}" for value in light.position.tolist())
+        place = ", ".join(f"{value:.2f}" for value in (light.axis if light.distant else light.position).tolist())
         strength = " / ".join(f"{value:.2f}" for value in light.intensity.tolist())
-        parts.append(f"{'light' if light.axis is None else light.kind} at ({place}), {strength} W/sr")
+        kind, where = "light" if light.axis is None else light.kind, "along" if light.distant else "at"
+        parts.append(f"{kind} {where} ({place}), {strength} {light.unit}")
     return "; ".join(parts).replace("-", "−")
 
 

@@ -39,7 +39,12 @@ def ambient_image(frozen: FrozenScene, camera: Camera | ViewWeights) -> Float[Te
     return view.image(torch.zeros_like(frozen.surfels.albedo) if radiance is None else radiance)
 
 
+def is_closed(irradiance: Tensor) -> bool:
+    """Whether nothing arrives from outside, from the surfels' irradiance (N,) under a void of radiance 1."""
+    return not len(irradiance) or float(irradiance.mean()) < LEAST_OPEN * torch.pi
+
+
 def _reflected(frozen: FrozenScene, irradiance: Tensor, interreflection: bool) -> Tensor | None:
-    if not len(irradiance) or float(irradiance.mean()) < LEAST_OPEN * torch.pi:
+    if is_closed(irradiance):
         return None
     return frozen.coloured_radiance(irradiance[:, None].expand(-1, 3), interreflection)

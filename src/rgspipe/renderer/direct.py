@@ -16,7 +16,8 @@ def unit_irradiance(bvh: SurfelBvh, positions: Tensor, shadows: bool = True) -> 
     The fourth powers keep the inverse square law where it holds: its relative error is ¾(ε/|d|)⁴.
 
     Args:
-        positions: (L, 3), scene units; float64 keeps its digits far from the origin.
+        positions: (L, 3), scene units, or places (L, 4), of which those at infinity give E = T · max(0, n·d) with d the
+            direction towards them (`kernels.places`); float64 keeps its digits far from the origin.
         shadows: whether surfels stand in the light's way (T); without, their hierarchy is not touched.
 
     Returns:

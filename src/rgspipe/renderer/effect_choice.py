@@ -22,16 +22,19 @@ class RigKind:
 
     Attributes:
         points: number of lights that shine alike in all directions.
-        spots: of every other light the smallest relative intensity in any direction.
+        spots: of every light with a profile the smallest relative intensity in any direction.
+        suns: number of lights at infinity.
     """
 
     points: int
     spots: tuple[float, ...] = ()
+    suns: int = 0
 
     @classmethod
     def of(cls, rig: LightRig) -> RigKind:
-        spots = tuple(light.least_relative_intensity for light in rig if light.axis is not None)
-        return cls(len(rig) - len(spots), spots)
+        suns = sum(light.distant for light in rig)
+        spots = tuple(one.least_relative_intensity for one in rig if one.axis is not None and not one.distant)
+        return cls(len(rig) - len(spots) - suns, spots, suns)
 
 
 @dataclass(frozen=True)
@@ -116,7 +119,7 @@ def rig_bounds(bounds: EffectBounds, rig: RigKind) -> dict[str, float]:
     counts SAMPLE_MARGIN times.
     """
     bounced = 1.0 + bounds.interreflection
-    shadow = rig.points * bounds.shadows.point + len(rig.spots) * bounds.shadows.spot
+    shadow = rig.points * bounds.shadows.point + len(rig.spots) * bounds.shadows.spot + rig.suns * bounds.shadows.sun
     return {
         "shadows": min(NO_BOUND, shadow * bounced * SAMPLE_MARGIN),
         "interreflection": bounds.interreflection,

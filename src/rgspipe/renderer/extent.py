@@ -53,7 +53,7 @@ def added(
 def parts_of(light: UnitLight, few: bool = False) -> list[Part] | None:
     """The points that a light is made of, and how they move with its numbers; None of a light in one point."""
     lights = light.light.parts(few)
-    if len(lights) == 1:
+    if light.light.in_one_point:
         return None
     places, share = light.light.places(), 1.0 / len(lights)
 

@@ -61,7 +61,7 @@ def unit_light_columns(
     slope: Tensor,
     indirect: bool = True,
 ) -> GlossyColumns:
-    """The scene under a unit white light at `position` (3,).
+    """The scene under a unit white light at `position`, (3,) or a place (4,).
 
     Args:
         transport: the diffuse bounces of the scene.
@@ -71,7 +71,7 @@ def unit_light_columns(
     lit = torch.cat([irradiance[:, None], slope], dim=1)
     radiance = gloss.surfels.albedo[:, :, None] * (lit / math.pi)[:, None]
     on_gloss = lit[gloss.glossy]
-    towards, slopes = soft_directions_and_slopes(gloss.vectors(position), gloss.geometry[2])
+    towards, slopes = soft_directions_and_slopes(gloss.vectors(position), gloss.softening(position))
     if indirect:
         emitted = _highlight_columns(gloss, towards, slopes, on_gloss)
         radiance, reflected = gloss.spread(transport, radiance, emitted)

@@ -26,6 +26,7 @@ from torch import Tensor
 
 from rgspipe.renderer.glossy import lobe_coefficients, mirrored, phong_lobe, soft_directions
 from rgspipe.renderer.glossy_operators import GlossyOperators, build_glossy_operators
+from rgspipe.renderer.kernels.places import homogeneous
 from rgspipe.renderer.rig import RigResponse
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.spherical_harmonics import coefficient_count, per_harmonic, real_harmonics
@@ -83,10 +84,11 @@ class GlossyTransport:
         return per_harmonic(lobe_coefficients(self.material[1], self.degree))
 
     def vectors(self, points: Tensor) -> Tensor:
-        """(…, G, 3) from the glossy surfels to points (…, 3)."""
+        """(…, G, 3) from the glossy surfels to points (…, 3) or places (…, 4)."""
         centers, normals, _ = self.geometry
         # The difference is taken in float64: far from the origin float32 knows neither of the two well enough.
-        return (points.to(centers.device, torch.float64)[..., None, :] - centers.double()).to(normals)
+        places = homogeneous(points).to(centers.device, torch.float64)[..., None, :]
+        return (places[..., :3] - places[..., 3:] * centers.double()).to(normals)
 
     @cached_property
     def _weights(self) -> Tensor:
@@ -94,8 +96,12 @@ class GlossyTransport:
         return (self.lobes[..., None] * self.material[0][:, None])[..., None]
 
     def directions(self, points: Tensor) -> Tensor:
-        """(…, G, 3) unit directions from the glossy surfels to points (…, 3), with a finite derivative everywhere."""
-        return soft_directions(self.vectors(points), self.geometry[2])
+        """(…, G, 3) unit directions from the glossy surfels to points (…, 3) or places (…, 4), with finite slopes."""
+        return soft_directions(self.vectors(points), self.softening(points))
+
+    def softening(self, points: Tensor) -> Tensor:
+        """(…, G) scales by which directions to points (…, 3) or places (…, 4) are softened; 0 for infinity."""
+        return homogeneous(points)[..., 3:].to(self.geometry[2]) * self.geometry[2]
 
     def light(self, transport: PatchTransport, response: RigResponse, indirect: bool = True) -> GlossyLight:
         """All light of the scene under a rig of L lights, differentiable towards their tensors.
@@ -107,7 +113,7 @@ class GlossyTransport:
         """
         coloured = response.attached()[:, :, None] * response.intensities[:, None]
         radiance = self.surfels.albedo * coloured.sum(dim=0) / math.pi
-        towards, on_gloss = self.directions(response.positions), coloured[:, self.glossy]
+        towards, on_gloss = self.directions(response.places), coloured[:, self.glossy]
         reflected = radiance.new_zeros(len(self.glossy), coefficient_count(self.degree), 3)
         if indirect:
             emitted = self.highlights(towards, on_gloss).sum(dim=0)[..., None]

@@ -11,6 +11,7 @@ from rgspipe.renderer.direct import unit_irradiance
 from rgspipe.renderer.effects import Effects
 from rgspipe.renderer.extent import added
 from rgspipe.renderer.kernels.lit_transmittance import lit_transmittance
+from rgspipe.renderer.kernels.places import homogeneous
 from rgspipe.renderer.kernels.shadow import RECEIVER_FADE, RECEIVER_SKIP
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.pixel_direct import surfel_transmittance
@@ -23,7 +24,7 @@ class LitSurfels:
     """What a light of unit intensity sends to N surfels, and how that changes when it moves.
 
     Attributes:
-        origin: (3,) where shadow rays end.
+        origin: (4,) place where shadow rays end.
         passing: (N,) transmittance of the way to each.
         slope: (N, 3) its derivative towards the light's position.
         columns: (N, 1 + D) irradiance per W/sr and its derivatives towards the light's own numbers.
@@ -43,26 +44,25 @@ def lit_surfels(bvh: SurfelBvh, light: UnitLight, effects: Effects, least: float
             shadows, which changes nothing there if it is 0; None if they all have theirs, for pixels that look beside
             the centre.
     """
-    position = light.light.position
     sent = emitted_intensity(light, bvh.surfels.centers, effects.spots)
     origin = shadow_origin(bvh, light.light)
     passing, slope = _transmittance(bvh, origin, sent, effects.shadows, least)
-    factor, factor_slope = (part[0] for part in unit_irradiance(bvh, position[None], shadows=False))
+    factor, factor_slope = (part[0] for part in unit_irradiance(bvh, light.light.place[None], shadows=False))
     moved = factor_slope * passing[:, None] + factor[:, None] * slope
     columns = attenuated(torch.cat([(factor * passing)[:, None], moved], dim=1), sent, light)
     return LitSurfels(origin, passing, slope, columns)
 
 
 def shadow_origin(bvh: SurfelBvh, light: Light) -> Tensor:
-    """(3,) where shadow rays to a light end: at its place, or so far before one that lies on a surface that surfels of
+    """(4,) place where shadow rays to a light end: its own, or so far before one that lies on a surface that surfels of
     that surface, which are nowhere quite where it is, are passed, as they are at the other end of the ray.
 
     That it moves when the light turns is left out of derivatives.
     """
     if not light.flush or not len(bvh.surfels):
-        return light.position
+        return light.place
     away = float(RECEIVER_SKIP + RECEIVER_FADE) * float(bvh.surfels.scales.detach().median())
-    return light.position + away * torch.nn.functional.normalize(light.axis, dim=0)
+    return homogeneous(light.position + away * torch.nn.functional.normalize(light.axis, dim=0))
 
 
 def lit_columns(
@@ -74,9 +74,9 @@ def lit_columns(
 
 
 def _transmittance(
-    bvh: SurfelBvh, position: Tensor, sent: RelativeIntensity | None, shadows: bool, least: float | None
+    bvh: SurfelBvh, place: Tensor, sent: RelativeIntensity | None, shadows: bool, least: float | None
 ) -> tuple[Tensor, Tensor]:
     """`LitSurfels.passing` and `LitSurfels.slope`."""
     if sent is None or least is None or not shadows:
-        return surfel_transmittance(bvh, position, shadows)
-    return lit_transmittance(bvh, position, sent.value.abs() > least)
+        return surfel_transmittance(bvh, place, shadows)
+    return lit_transmittance(bvh, place, sent.value.abs() > least)

@@ -60,11 +60,11 @@ class PixelDirect:
         return on_planes(origins, directions, centers, normals, reach)
 
     def image(self, position: Tensor, passing: Tensor, slope: Tensor, origin: Tensor | None = None) -> Tensor:
-        """(P, 3, 4) radiance under a light of 1 W/sr in RGB at `position` (3,), and its derivative towards x, y, z.
+        """(P, 3, 4) radiance under a unit light in RGB at `position`, (3,) or a place (4,), and its slopes to x, y, z.
 
         Args:
             passing, slope: `surfel_transmittance` of the light.
-            origin: (3,) where shadow rays end; at the light if None.
+            origin: (3,) or (4,) where shadow rays end; at the light if None.
         """
         own = self._own_passing(position if origin is None else origin, passing)
         return self._light.image(position, passing, slope, own)
@@ -88,7 +88,8 @@ class PixelDirect:
 
 
 def surfel_transmittance(bvh: SurfelBvh, position: Tensor, shadows: bool = True) -> tuple[Tensor, Tensor]:
-    """Transmittance (N,) of the way from a light at `position` (3,) to each surfel, and its derivative (N, 3)."""
+    """Transmittance (N,) of the way from a light at `position`, (3,) or a place (4,), to each surfel, and its
+    derivative (N, 3)."""
     if not shadows:
         count = len(bvh.surfels)
         return torch.ones(count, device=bvh.device), torch.zeros(count, 3, device=bvh.device)

@@ -15,6 +15,7 @@ from torch import Tensor
 from rgspipe.renderer.kernels.composite import GRAZING, OPAQUE
 from rgspipe.renderer.kernels.irradiance import SOFTENING
 from rgspipe.renderer.kernels.pixel_light import MIDDLE_WEIGHT, NEAR, NODE, REACH, SIDE_WEIGHT
+from rgspipe.renderer.kernels.places import homogeneous
 from rgspipe.renderer.kernels.shadow import (
     COPLANAR_COSINE,
     COPLANAR_OFFSET,
@@ -92,14 +93,15 @@ def geometry_factor(positions: Tensor, centers: Tensor, normals: Tensor, scales:
     The fourth powers keep the inverse square law where it holds: its relative error is ¾(ε/|d|)⁴.
 
     Args:
-        positions: (L, 3) lights; centers, normals: (N, 3); scales: (N,) ε over SOFTENING, scene units.
+        positions: (L, 3) lights, or places (L, 4); centers, normals: (N, 3); scales: (N,) ε over SOFTENING.
 
     Returns:
         (L, N) irradiance per intensity, 1/scene unit², and its derivative (L, N, 3) towards the position.
     """
-    d = positions[:, None] - centers
+    places = homogeneous(positions)[:, None]
+    d = places[..., :3] - places[..., 3:] * centers
     square = d.square().sum(-1)
-    inverse = (square.square() + (SOFTENING * scales).pow(4)).rsqrt()
+    inverse = (square.square() + (places[..., 3] * SOFTENING * scales).pow(4)).rsqrt()
     cube = inverse * inverse.sqrt()
     projected = (d * normals).sum(-1)
     lit = projected >= 0
@@ -109,7 +111,7 @@ def geometry_factor(positions: Tensor, centers: Tensor, normals: Tensor, scales:
 
 
 def unit_irradiance(surfels: Surfels, positions: Tensor, shadows: bool = True) -> Tensor:
-    """(L, N) irradiance of unit point lights (L, 3): `direct.unit_irradiance`."""
+    """(L, N) irradiance of unit point lights (L, 3), or at places (L, 4): `direct.unit_irradiance`."""
     scales = surfels.scales.prod(dim=1).sqrt()
     factor, _ = geometry_factor(positions, surfels.centers, surfels.normals, scales)
     return factor * transmittance(surfels, positions) if shadows else factor
@@ -122,18 +124,23 @@ def transmittance(surfels: Surfels, positions: Tensor) -> Tensor:
 
 
 def transmittance_at(surfels: Surfels, light: Tensor, receivers: Tensor, points: Tensor) -> Tensor:
-    """(R,) part of a light (3,) that reaches points (R, 3) on the planes of the surfels `receivers` (R,)."""
+    """(R,) part of a light (3,) or (4,) that reaches points (R, 3) on the planes of the surfels `receivers` (R,)."""
     coverage, normals, centers = surfels.coverage, surfels.normals, surfels.centers
+    place = homogeneous(light)
+
+    def way(at: Tensor) -> Tensor:
+        return place[:3] - place[3] * at
+
     scale, own = surfels.scales.prod(dim=1).sqrt()[receivers], normals[receivers]
     between = centers[None] - points[:, None]
     coplanar = (own @ normals.T > COPLANAR_COSINE) & (
         (between * own[:, None]).sum(-1).abs() < COPLANAR_OFFSET * scale[:, None]
     )
-    lit = ((light - points) * own).sum(dim=1) > 0.0
-    path = torch.where(lit[:, None], light - points, own)
+    lit = (way(points) * own).sum(dim=1) > 0.0
+    path = torch.where(lit[:, None], way(points), own)
     rays = path / path.norm(dim=1, keepdim=True)
     facing = rays @ normals.T
-    met = (facing.abs() > EDGE_ON) & ~coplanar & (((light - centers) * normals).sum(-1) * facing > 0.0)
+    met = (facing.abs() > EDGE_ON) & ~coplanar & ((way(centers) * normals).sum(-1) * facing > 0.0)
     depth = (between * normals).sum(-1) / torch.where(met, facing, torch.ones_like(facing))
     fade = ((depth / scale[:, None] - RECEIVER_SKIP) / RECEIVER_FADE).clamp(0.0, 1.0)
     alpha = alpha_at(surfels, depth[..., None] * rays[:, None] - between)
@@ -183,6 +190,7 @@ def direct_image(
         edges: (P,) bool.
         passing: (N,) transmittance of the way to each surfel; own_passing: (P,) of each pixel, negative where unknown.
     """
+    place = homogeneous(light)
     _, directions, lengths = camera.rays()
     rays, axes = directions * lengths[:, None], camera.camera_to_world[:3, :3].double()
     right, up = axes[:, 0] / camera.fx, axes[:, 1] / camera.fy
@@ -193,15 +201,15 @@ def direct_image(
 
     def lit(x: float, y: float) -> tuple[Tensor, Tensor]:
         seen = points_on_surfels(surfels, origin, rays[pixels] + x * right + y * up, indices, reach)
-        path = light - seen
+        path = place[:3] - place[3] * seen
         square = path.square().sum(-1)
-        soft = (square.square() + (SOFTENING * scale).pow(4)).pow(0.75)
+        soft = (square.square() + (place[3] * SOFTENING * scale).pow(4)).pow(0.75)
         return seen, (path * normals).sum(-1).clamp(min=0.0) / soft
 
     seen, value = lit(0.0, 0.0)
     away = seen - origin
     footprint = right.norm() * away.square().sum(-1) / (away * normals).sum(-1).abs()
-    near = footprint > NEAR * (light - seen).norm(dim=1)
+    near = place[3] * footprint > NEAR * (place[:3] - place[3] * seen).norm(dim=1)
     nodes = ((-float(NODE), float(SIDE_WEIGHT)), (0.0, float(MIDDLE_WEIGHT)), (float(NODE), float(SIDE_WEIGHT)))
     mean = sum(wx * wy * lit(x, y)[1] for x, wx in nodes for y, wy in nodes)
     part = torch.where(own_passing[pixels] >= 0.0, own_passing[pixels], passing[indices])

@@ -38,9 +38,9 @@ class RigResponse:
         return cls(lights, irradiance, tuple(one.columns[:, 1:] for one in lit))
 
     @property
-    def positions(self) -> Tensor:
-        """(L, 3) of the lights."""
-        return stacked(self.lights, "position")
+    def places(self) -> Tensor:
+        """(L, 4) of the lights."""
+        return stacked(self.lights, "place")
 
     @property
     def intensities(self) -> Tensor:
@@ -73,5 +73,5 @@ def rig_irradiance(bvh: SurfelBvh, rig: LightRig, effects: Effects = ALL_EFFECTS
 
 
 def stacked(lights: LightRig, field: str) -> Tensor:
-    """(L, 3) a field of all lights; gradients flow back to their tensors."""
+    """(L, …) a field of all lights; gradients flow back to their tensors."""
     return torch.stack([getattr(light, field) for light in lights]) if lights else torch.zeros(0, 3)

@@ -9,8 +9,10 @@ import torch
 from torch import Tensor
 from torch.nn.functional import normalize
 
+from rgspipe.renderer.direct import unit_irradiance
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.mutual_visibility import mutual_visibility
+from rgspipe.renderer.point_sets import fibonacci_directions
 
 #: Radius of the ball in which lights may be, over half the diagonal of the bounding box.
 BALL_RADII = 2.0
@@ -48,6 +50,7 @@ class ShadowBound:
         lights: how many were tried; with CERTAIN reached there is no need to go on.
         uniform: how many of them were drawn from the whole domain: with 95 % confidence less than 3/uniform of it
             casts larger shadows.
+        sun: `point` of lights at infinity, of UNIFORM directions all around; all of it where none was tried.
     """
 
     point: float
@@ -55,12 +58,13 @@ class ShadowBound:
     proved: bool
     lights: int
     uniform: int
+    sun: float = 1.0
 
 
 def shadow_bound(frozen: FrozenScene, seed: int) -> ShadowBound:
     """Prove that there are no shadows, or else search for the worst one."""
     if not mutual_visibility(frozen.surfels).shadow:
-        return ShadowBound(0.0, 0.0, True, 0, 0)
+        return ShadowBound(0.0, 0.0, True, 0, 0, 0.0)
     generator = torch.Generator().manual_seed(seed)
     search = _Search(frozen)
     for count, draw in ((FIRST, sample_lights), (BEHIND, _behind_occluders), (GRAZING, _grazing)):
@@ -68,17 +72,30 @@ def shadow_bound(frozen: FrozenScene, seed: int) -> ShadowBound:
     search.try_lights(sample_lights(frozen, UNIFORM, generator), uniform=True)
     for step in range(ROUNDS):
         search.try_lights(search.around_worst(0.05 * frozen.size * 0.4**step, generator), uniform=False)
-    return ShadowBound(search.point, search.spot, False, search.tried, search.uniform)
+    return ShadowBound(search.point, search.spot, False, search.tried, search.uniform, _sun_loss(frozen))
 
 
 def shadow_losses(frozen: FrozenScene, positions: Tensor) -> tuple[Tensor, Tensor]:
-    """(L,) `ShadowBound.point` and (L,) `ShadowBound.spot` of lights at (L, 3); 0 for lights that light nothing."""
+    """(L,) `ShadowBound.point` and (L,) `ShadowBound.spot` of lights at (L, 3), or places (L, 4).
+
+    0 for lights that light nothing.
+    """
     albedo = frozen.surfels.albedo.amax(dim=1)
-    lit, shadowed = (frozen.unit_irradiance(positions, shadows=on)[0] * albedo for on in (False, True))
+    lit, shadowed = (unit_irradiance(frozen.bvh, positions, shadows=on)[0] * albedo for on in (False, True))
     peak = lit.amax(dim=1)
     point = torch.where(peak > 0.0, (lit - shadowed).amax(dim=1) / peak.clamp(min=1e-30), torch.zeros_like(peak))
     loss = torch.where(lit > 0.0, 1.0 - shadowed / lit.clamp(min=1e-30), torch.zeros_like(lit))
     return point, loss.amax(dim=1)
+
+
+def _sun_loss(frozen: FrozenScene) -> float:
+    """`ShadowBound.sun`, no further than CERTAIN."""
+    towards, worst = fibonacci_directions(UNIFORM).double(), 0.0
+    for block in torch.cat([towards, towards.new_zeros(UNIFORM, 1)], dim=1).split(LIGHTS_AT_ONCE):
+        worst = max(worst, float(shadow_losses(frozen, block)[0].amax()))
+        if worst >= CERTAIN:
+            break
+    return worst
 
 
 def sample_lights(frozen: FrozenScene, count: int, generator: torch.Generator) -> Tensor:

@@ -36,7 +36,7 @@ from rgspipe.stages.base import Stage, StageContext
 from rgspipe.stages.fit_capture import captured_views, known_emitters
 from rgspipe.stages.fit_extras import Named, further_files, training_cameras
 from rgspipe.stages.fit_targets import all_targets, select_targets, target_seed, used_views
-from rgspipe.stages.light_spec import light_spec
+from rgspipe.stages.light_spec import light_spec, table_files
 from rgspipe.stages.scene_effects import chosen_effects, frozen_scene, wanted_effects
 from rgspipe.stages.sources import image_stage, require_images, target_stage
 from rgspipe.stages.spoken import COMMAND_LINE
@@ -176,8 +176,7 @@ def _choice(config: RgspipeConfig, freeze: Artifact) -> tuple[EffectBounds, Effe
     spec, band = light_spec(config), band_limit(config)
     count = spec.count or MOST_LIGHTS
     # In harmonics a spot's light leaves its cone.
-    in_cones = spec.aimed and band is None
-    kind = RigKind(0, (spec.kinds[-1].least_relative_intensity,) * count) if in_cones else RigKind(count)
+    kind = RigKind(count) if spec.aimed and band is not None else RigKind.of((spec.kinds[-1],) * count)
     bounds, choice = chosen_effects(config.effects, freeze, kind)
     return bounds, choice if band is None or not spec.aimed else _in_harmonics(choice, band)
 
@@ -261,12 +260,12 @@ def _keys(config: RgspipeConfig) -> list[str]:
 
 def _files(config: RgspipeConfig) -> list[Path]:
     """The user's target, read now: what is wrong with it should show before a scene is trained for it."""
-    target, base = config.fit.target, config.fit.base
+    target, base, tables = config.fit.target, config.fit.base, table_files(config)
     if target is None:
         _refuse_base(base)
-        return []
+        return tables
     load_target(target, base)
-    return [*files_read(target), *([] if base is None else files_read(base))]
+    return [*tables, *files_read(target), *([] if base is None else files_read(base))]
 
 
 def _refuse_base(base: str | None) -> None:

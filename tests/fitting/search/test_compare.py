@@ -87,17 +87,17 @@ def test_rigs_within_the_noise_are_equally_good(problem: LightProblem) -> None:
 
 def test_distance_of_rigs_is_that_of_the_best_matching() -> None:
     rig = [emitter_at(torch.tensor(place, dtype=torch.float64)) for place in (VISIBLE, HIDDEN)]
-    assert rig_distance(rig, rig[::-1]) == 0.0
+    assert rig_distance(rig, rig[::-1], 1.0) == 0.0
     moved = rig[0].placed(rig[0].position + torch.tensor([0.0, 0.3, 0.0]))
-    assert rig_distance(rig, [rig[1], moved]) == pytest.approx(0.3)
-    assert rig_distance(rig, rig[:1]) == float("inf")
+    assert rig_distance(rig, [rig[1], moved], 1.0) == pytest.approx(0.3)
+    assert rig_distance(rig, rig[:1], 1.0) == float("inf")
 
 
 def test_twins_are_merged_and_faint_lights_dropped(problem: LightProblem) -> None:
     three = state(problem, VISIBLE, shifted(VISIBLE, 0.01), HIDDEN)
     for strengths, kept in (((0.5, 1.0, 1.0), [1, 2]), ((0.0, 1.0, 1e-3), [1])):
         intensity = torch.tensor(strengths, dtype=torch.float64)[:, None].expand(3, 3)
-        assert worth_keeping(replace(three, intensity=intensity), BAR, MET) == kept
+        assert worth_keeping(replace(three, intensity=intensity), BAR, MET, 1.0) == kept
 
 
 def test_rigs_that_met_are_refined_once(problem: LightProblem) -> None:

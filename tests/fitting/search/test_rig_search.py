@@ -23,6 +23,6 @@ def test_lights_that_meet_by_plain_squares_are_one(room, point_light):
     place = torch.tensor(VISIBLE, dtype=torch.float64)
     apart = torch.tensor([0.6 * search.options.schedule.met * problem.views.frozen.size, 0.0, 0.0], dtype=torch.float64)
     twins = refiner.start([emitter_at(place - apart), emitter_at(place + apart)], ROBUST)
-    assert len(worth_keeping(twins, search.options.bar, 2.0 * float(apart[0]) / 1.2)) == 2
+    assert len(worth_keeping(twins, search.options.bar, 2.0 * float(apart[0]) / 1.2, 1.0)) == 2
     (found,) = search.without_twins(twins).emitters
     assert float((found.position - place).norm()) < 1e-4  # measured 3e-8

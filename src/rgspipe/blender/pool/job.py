@@ -15,8 +15,8 @@ from rgspipe.datasets.classes import LIGHT_CLASSES, LightClass
 from rgspipe.scene.lights import SpotLight, SpotProfile
 from rgspipe.scene.lights.spot_profiles import PROFILES
 
-#: What a pool holds: point lights, spots, spheres, panels, or the headlights of a car on its way.
-Kind = Literal["points", "spots", "spheres", "panels", "drive"]
+#: What a pool holds: point lights, spots, spheres, panels, suns, or the headlights of a car on its way.
+Kind = Literal["points", "spots", "spheres", "panels", "suns", "drive"]
 
 #: Lights of a car.
 HEADLIGHTS = 2

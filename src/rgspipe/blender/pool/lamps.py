@@ -10,7 +10,7 @@ import numpy as np
 import torch
 
 from rgspipe.scene import Light, PointLight
-from rgspipe.scene.lights import PanelLight, SphereLight
+from rgspipe.scene.lights import PanelLight, SphereLight, SunLight
 
 if TYPE_CHECKING:
     from rgspipe.blender.geometry import Geometry
@@ -38,12 +38,15 @@ class LampRange:
     mounted: tuple[float, float] | None = None
 
     def draw(self, rng: np.random.Generator, kind: str) -> Light:
-        """A lamp of 1 W/sr, wherever it is."""
+        """A lamp of 1 W/sr, wherever it is; a sun of 1 W/unit² in any direction."""
         if kind == "spheres":
             return SphereLight.shaped(float(rng.uniform(*self.radius)))
         if kind == "panels":
             width, height = rng.uniform(*self.side, 2).tolist()
             return PanelLight.shaped(width, height, float(rng.uniform(-0.5 * math.pi, 0.5 * math.pi)))
+        if kind == "suns":
+            towards = torch.from_numpy(rng.normal(size=3))
+            return SunLight.shaped().at(torch.zeros(3).double(), towards / towards.norm())
         return PointLight.shaped()
 
     def hung(self, lamp: Light, near: np.ndarray, geometry: Geometry, rng: np.random.Generator) -> Light | None:

@@ -24,7 +24,10 @@ from rgspipe.scene.models import Corridor
 log = logging.getLogger(__name__)
 
 #: Numbers of the random streams; part of the seed, so never renumber them.
-STREAMS = {"points": 10, "spots": 11, "drive": 12, "spheres": 13, "panels": 14}
+STREAMS = {"points": 10, "spots": 11, "drive": 12, "spheres": 13, "panels": 14, "suns": 15}
+
+#: Suns are seen, hidden and in frames as a point so many times the scene's diagonal away is.
+SUN_DISTANCE = 1e3
 
 
 @dataclass(frozen=True)
@@ -88,7 +91,7 @@ def _drive(place: _Place) -> list[tuple[int, tuple[str, Light]]]:
 
 
 def _drawn(place: _Place) -> list[tuple[int, tuple[str, Light]]]:
-    """Lights of each class in turn; a user's scene may have no place for some classes."""
+    """Lights of each class in turn; a user's scene may have no place for some classes, and suns have none for most."""
     job = place.job
     classes = [name for name in job.classes if name in place.layout.classes]
     drawn: list[tuple[int, tuple[str, Light]]] = []
@@ -98,7 +101,7 @@ def _drawn(place: _Place) -> list[tuple[int, tuple[str, Light]]]:
         light = None if occlusion in missing else _draw(place, occlusion, index)
         if light is not None:
             drawn.append((index, (occlusion, light)))
-        elif not isinstance(job.dataset.model, BlendFile):
+        elif not (isinstance(job.dataset.model, BlendFile) or job.kind == "suns"):
             raise no_room(f"a light of the class {occlusion}")
         elif occlusion not in missing:
             missing.add(occlusion)
@@ -123,7 +126,15 @@ def _draw(place: _Place, occlusion: str, index: int) -> Light | None:
 
 
 def _is_of_class(place: _Place, light: Light, occlusion: str) -> bool:
-    return is_of_class(light.position.numpy(), occlusion, place.layout.classes, place.cameras, place.geometry)
+    return is_of_class(_where(place, light), occlusion, place.layout.classes, place.cameras, place.geometry)
+
+
+def _where(place: _Place, light: Light) -> np.ndarray:
+    """(3,) its place; of a sun one far away."""
+    if not light.distant:
+        return light.position.numpy()
+    low, high = place.geometry.lo, place.geometry.hi
+    return 0.5 * (low + high) + light.standing(SUN_DISTANCE * float(np.linalg.norm(high - low))).numpy()
 
 
 def _placed(place: _Place, occlusion: str, rng: np.random.Generator) -> Light | None:
@@ -132,6 +143,8 @@ def _placed(place: _Place, occlusion: str, rng: np.random.Generator) -> Light | 
     hidden = occlusion == "occluded"
     clearance = job.dataset.hidden_light_clearance if hidden else job.dataset.light_clearance
     lamp = lamps.draw(rng, job.kind)
+    if lamp.distant:
+        return lamp
     clearance = max(clearance, lamp.radius) if isinstance(lamp, SphereLight) else clearance
     position = (place.layout.hidden_light if hidden else place.layout.light)(rng, clearance)
     if lamps.mounted is not None or job.kind == "panels":

@@ -86,7 +86,9 @@ def headlight_rigs(pool: Sequence[Light], brightness: np.ndarray) -> list[RigPla
 
 
 def unit_power(light: Light) -> float:
-    """Axial intensity [W/sr] with which `light`, of 1 W/sr, has the power of a point light of 1 W/sr."""
+    """Axial intensity [W/sr] with which `light`, of 1 W/sr, has the power of a point light of 1 W/sr; 1 of a sun."""
+    if light.distant:
+        return 1.0
     return WATTS_PER_INTENSITY / float(light.power().mean())
 
 
@@ -98,7 +100,7 @@ class _Pool:
         lights: of 1 W/sr.
         brightness: (K, 3) mean radiance of each one's images.
         units: (K,) `unit_power` of each.
-        places: (K, 3) positions.
+        places: (K, 3) positions; of suns unit vectors towards them, so that distances are angles [rad].
     """
 
     lights: Sequence[Light]
@@ -108,7 +110,7 @@ class _Pool:
 
     @classmethod
     def of(cls, lights: Sequence[Light], brightness: np.ndarray) -> _Pool:
-        places = np.array([light.position.tolist() for light in lights])
+        places = np.array([light.standing(1.0).tolist() for light in lights])
         return cls(lights, brightness, np.array([unit_power(light) for light in lights]), places)
 
     def fits(self, members: tuple[int, ...], request: RigRequest) -> bool:

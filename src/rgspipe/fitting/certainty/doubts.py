@@ -29,10 +29,10 @@ def doubts(
     options = options or CertaintyOptions()
     lights = list(enumerate(zip(rig, covariance, strict=True), start=1))
     undetermined = [_undetermined(light, matrix, number, len(rig)) for number, (light, matrix) in lights]
-    uncertain = [_uncertain(matrix, scene_size, number, len(rig), options.doubtful) for number, (_, matrix) in lights]
+    uncertain = [_uncertain(*pair, scene_size, number, len(rig), options.doubtful) for number, pair in lights]
     # The covariance of a light that stands on a surface is that of a place that it could not leave.
     limit = options.on_surface * scene_size
-    free = [(number, light) for number, (light, _) in lights if not light.flush]
+    free = [(number, light) for number, (light, _) in lights if not (light.flush or light.distant)]
     standing = [number for number, light in free if distance_to_surface(surfels, light.position) < limit]
     on_surface = [OnSurface(number, len(rig)) for number in standing]
     return [finding for finding in (*undetermined, *uncertain, *on_surface) if finding is not None]
@@ -48,9 +48,12 @@ def _undetermined(light: Light, covariance: Tensor, number: int, count: int) -> 
     return Undetermined(number, count, names) if names else None
 
 
-def _uncertain(covariance: Tensor, scene_size: float, number: int, count: int, limit: float) -> Uncertain | None:
-    error = math.sqrt(float(covariance.diagonal()[:3].sum())) / scene_size if scene_size > 0.0 else 0.0
-    return Uncertain(number, count, error) if limit < error < math.inf else None
+def _uncertain(
+    light: Light, covariance: Tensor, scene_size: float, number: int, count: int, limit: float
+) -> Uncertain | None:
+    variance = float(light.standing_spread(covariance, scene_size).diagonal().sum())
+    error = math.sqrt(variance) / scene_size if scene_size > 0.0 else 0.0
+    return Uncertain(number, count, error, light.distant) if limit < error < math.inf else None
 
 
 def distance_to_surface(surfels: Surfels, position: Tensor) -> float:

@@ -42,12 +42,12 @@ def _met(one: Sequence[Emitter], other: Sequence[Emitter], met: float, size: flo
     """Whether each light of a rig is where its counterpart is."""
     if len(one) != len(other):
         return False
-    pairs = _counterparts(one, other)
+    pairs = _counterparts(one, other, size)
     return all(a.light.kind == b.light.kind and a.distance(b, size) < met for a, b in pairs)
 
 
-def worth_keeping(state: State, bar: BarOptions, apart: float) -> list[int]:
-    """Indices of the lights that send enough of the image's energy and are `apart` from brighter ones of their kind."""
+def worth_keeping(state: State, bar: BarOptions, met: float, size: float) -> list[int]:
+    """Indices of the lights that send enough of the image's energy and did not meet brighter ones of their kind."""
     energies = light_energies(state)
     kept: list[int] = []
     for index in sorted(range(len(energies)), key=lambda k: -energies[k]):
@@ -56,7 +56,7 @@ def worth_keeping(state: State, bar: BarOptions, apart: float) -> list[int]:
             other
             for other in kept
             if state.emitters[other].light.kind == emitter.light.kind
-            and float((state.emitters[other].position - emitter.position).norm()) < apart
+            and _distance(state.emitters[other], emitter, size) < met
         ]
         if not twins and energies[index] >= bar.least_energy * sum(energies):
             kept.append(index)
@@ -99,18 +99,24 @@ def drop(problem: LightProblem, simple: State, rich: State) -> float:
     return 1.0 - after / before
 
 
-def rig_distance(one: Sequence[Emitter], other: Sequence[Emitter]) -> float:
-    """The largest distance of a light from its counterpart, scene units; infinite where the numbers differ."""
+def rig_distance(one: Sequence[Emitter], other: Sequence[Emitter], size: float) -> float:
+    """The largest distance of a light from its counterpart, over the scene's size; infinite where numbers differ."""
     if len(one) != len(other):
         return math.inf
-    return max(float((first.position - second.position).norm()) for first, second in _counterparts(one, other))
+    return max(_distance(first, second, size) for first, second in _counterparts(one, other, size))
 
 
-def _counterparts(one: Sequence[Emitter], other: Sequence[Emitter]) -> list[tuple[Emitter, Emitter]]:
+def _distance(one: Emitter, other: Emitter, size: float) -> float:
+    """Between two lights, over the scene's size; of lights at infinity rad."""
+    apart = float((one.light.standing(size) - other.light.standing(size)).norm())
+    return apart / size if size > 0.0 else 0.0
+
+
+def _counterparts(one: Sequence[Emitter], other: Sequence[Emitter], size: float) -> list[tuple[Emitter, Emitter]]:
     """The lights of one rig, each with one of another of as many lights, such that they are closest together."""
     if len(one) == 1:
         return [(one[0], other[0])]
-    first, second = (torch.stack([emitter.position for emitter in rig]).numpy() for rig in (one, other))
+    first, second = (torch.stack([emitter.light.standing(size) for emitter in rig]).numpy() for rig in (one, other))
     rows, columns = linear_sum_assignment(np.linalg.norm(first[:, None] - second[None], axis=-1))
     return [(one[row], other[column]) for row, column in zip(rows, columns, strict=True)]
 

@@ -29,7 +29,7 @@ def grown(refiner: Refiner, found: Found, spec: LightSpec, options: SearchOption
     rigs = [
         rig
         for state in distinct([found.best, *ranked(problem, near)], options.certainty.doubtful, size)
-        for sized in (kind.grown(size) if spec.shape_free else (kind,))
+        for sized in kind.grown(size, spec.shape_free)
         for rig in _rigs(refiner, state, sized, spec)
     ]
     starts = sorted((refiner.start(rig, PLAIN) for rig in rigs), key=refiner.unexplained)[:STARTS]
@@ -39,10 +39,10 @@ def grown(refiner: Refiner, found: Found, spec: LightSpec, options: SearchOption
 
 
 def _rigs(refiner: Refiner, state: State, sized: Light, spec: LightSpec) -> list[tuple[Emitter, ...]]:
-    """The rig with lights of a size in the place of points; of lights that may lie on a surface also there."""
+    """The rig with lights of a size, or a turn, in the place of points; of such as may lie on a surface also there."""
     free, rigs = spec.shape_free, []
     if not (sized.flush and spec.mounted):
-        rigs.append(tuple(Emitter.of(sized.at(one.position, one.axis), free) for one in state.emitters))
+        rigs.append(tuple(Emitter.of(sized.in_place_of(one.light), free) for one in state.emitters))
     if sized.flush:
         surfels, size = refiner.problem.views.frozen.surfels, refiner.region.size
         walls = [walls_near(surfels, one.position, size, WALLS) for one in state.emitters]

@@ -160,8 +160,7 @@ class RigSearch:
 
     def _pruned(self, state: State) -> State:
         """The rig without lights that add next to nothing or coincide with another."""
-        apart = self.options.schedule.met * self.refiner.region.size
-        kept = worth_keeping(state, self.options.bar, apart)
+        kept = worth_keeping(state, self.options.bar, self.options.schedule.met, self.refiner.region.size)
         if len(kept) == len(state.emitters) or not kept:
             return state
         fewer = self.refiner.start([state.emitters[index] for index in kept], ROBUST)

@@ -21,8 +21,8 @@ def refined_starts(
 ) -> list[State]:
     """Those of the starts that are refined to the end, by at most `iterations` steps at a time.
 
-    Points are refined under a robust loss. A spot that is a little off has all of its pool wrong, which a robust loss
-    takes for outliers; so rigs with an axis are refined by plain squares.
+    Points are refined under a robust loss. A spot that is a little off has all of its pool wrong, and a sun all that it
+    lights through a window, which a robust loss takes for outliers; so rigs with an axis are refined by plain squares.
     """
     aimed = any(emitter.axis is not None for rig in rigs for emitter in rig)
     turns, weighting = _turns(options, aimed), PLAIN if aimed else ROBUST

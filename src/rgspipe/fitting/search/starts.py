@@ -124,7 +124,7 @@ class Candidates:
         return chosen
 
     def _apart(self, one: EmitterRig, other: EmitterRig, size: float) -> bool:
-        if rig_distance(one, other) > self.options.separation * size:
+        if rig_distance(one, other, size) > self.options.separation:
             return True
         return any(a.axis is not None and _turn(a, other) < math.cos(self.coarse.spacing) for a in one)
 

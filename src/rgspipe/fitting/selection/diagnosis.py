@@ -28,7 +28,7 @@ def standing(
     problem, region = refiner.problem, refiner.region
     loss = problem.unexplained_of_lights(state.columns, state.intensity)
     grade = problem.views.frozen.grade
-    at_bound = any(region.at_bound(emitter.position) for emitter in state.emitters)
+    at_bound = any(region.at_bound(one.position) for one in state.emitters if not one.light.distant)
     return [
         *([AtBound()] if at_bound else []),
         *([PoorlyExplained(loss)] if loss > options.poorly else []),

@@ -26,8 +26,8 @@ from rgspipe.sums import average, total
 
 def rival_among(refiner: Refiner, best: State, others: Sequence[State], options: SearchOptions) -> Rival | None:
     """One of the `others` that is another answer, if there is one; those that come near are refined first."""
-    problem, apart = refiner.problem, options.certainty.doubtful * refiner.region.size
-    rivals = [state for state in others if rig_distance(state.emitters, best.emitters) > apart]
+    problem, apart, size = refiner.problem, options.certainty.doubtful, refiner.region.size
+    rivals = [state for state in others if rig_distance(state.emitters, best.emitters, size) > apart]
     if not rivals:
         return None
     rival = best_state(problem, rivals)
@@ -35,11 +35,12 @@ def rival_among(refiner: Refiner, best: State, others: Sequence[State], options:
         return None
     steps = options.schedule.steps
     one, other = (refiner.refined(state, ROBUST, 2 * steps) for state in (best, rival))
-    if rig_distance(one.emitters, other.emitters) <= apart or not equally_good(problem, one, other, options.rivals):
+    met = rig_distance(one.emitters, other.emitters, size) <= apart
+    if met or not equally_good(problem, one, other, options.rivals):
         return None
     # The answer is one of plain squares, so a rival has to be one, too.
     other = refiner.refined(other, PLAIN, steps)
-    clear = rig_distance(best.emitters, other.emitters) > apart
+    clear = rig_distance(best.emitters, other.emitters, size) > apart
     return _rival(refiner, best, other) if clear and _leaves_as_little(refiner, best, other, options.rivals) else None
 
 
@@ -62,7 +63,7 @@ def rival_elsewhere(
 
 
 def _rival(refiner: Refiner, best: State, other: State) -> Rival:
-    distance = rig_distance(best.emitters, other.emitters) / refiner.region.size
+    distance = rig_distance(best.emitters, other.emitters, refiner.region.size)
     return Rival(distance if math.isfinite(distance) else None)
 
 

@@ -27,7 +27,7 @@ def seen_with_gloss(
     """(P, 3, 1 + d) images of a unit white light in a glossy scene.
 
     Args:
-        position: (3,) of the light.
+        position: (3,) of the light, or its place (4,).
         lit: (N, 1 + d) its irradiance on surfels, the derivatives towards the position (x, y, z), and those towards
             parameters that leave the light in its place.
         interreflection: whether light that has been reflected is followed.

@@ -7,6 +7,7 @@ from torch import Tensor
 
 from rgspipe.renderer.glossy import mirrored, phong_lobe, phong_slope
 from rgspipe.renderer.glossy_transport import GlossyTransport
+from rgspipe.renderer.kernels.places import ways_to
 from rgspipe.renderer.pixel_direct import PixelDirect
 from rgspipe.renderer.pixel_lobe import only_columns
 from rgspipe.renderer.view_weights import ViewWeights
@@ -44,14 +45,15 @@ class PixelHighlights:
         self._mirrors = mirrored(eyes.float()[self._rows], self._normals)
 
     def image(self, position: Tensor, passing: Tensor, slope: Tensor) -> Tensor:
-        """(P, 3, 4) radiance of the highlights of a light of 1 W/sr in RGB at `position` (3,), and its derivatives.
+        """(P, 3, 4) radiance of the highlights of a light of 1 W/sr in RGB at `position`, (3,) or a place (4,), and
+        its derivatives.
 
         Args:
             passing, slope: `pixel_direct.surfel_transmittance` of the light.
         """
         reflectance, exponents = self._gloss.material
         direct = self._direct.operator(position, passing).matrix.values()[self._kept]
-        path = (position.to(self._direct.points) - self._direct.points).float()
+        path = ways_to(position, self._direct.points).float()
         distance = path.norm(dim=1, keepdim=True).clamp(min=1e-20)
         towards, inverse = (path / distance)[self._rows], (1.0 / distance)[self._rows]
         cosines = (towards * self._mirrors).sum(dim=1)

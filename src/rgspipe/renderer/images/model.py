@@ -113,7 +113,7 @@ class SurfelModel(ViewModel):
 
         def glossy(part: UnitLight) -> tuple[Tensor]:
             lit = lit_surfels(frozen.bvh, part, self.effects, LEAST_LIT).columns
-            return (seen_with_gloss(self.views, part.light.position, lit, bounces),)
+            return (seen_with_gloss(self.views, part.light.place, lit, bounces),)
 
         (columns,) = added(light, glossy)
         return columns

@@ -80,16 +80,16 @@ class PixelModel(ViewModel):
         lit = lit_surfels(self.views.frozen.bvh, light, self.effects, LEAST_LIT)
         columns = self._direct(light, lit)
         if self.gloss is not None and self.effects.interreflection:
-            place = light.light.position
+            place = light.light.place
             columns = columns + seen_with_gloss(self.views, place, lit.columns, True, bounced_only=True)
         return columns, lit.columns
 
     def _direct(self, light: UnitLight, lit: LitSurfels) -> Tensor:
         """(P, 3, 1 + D) direct light of a unit light."""
-        position = light.light.position
-        images = [direct.image(position, lit.passing, lit.slope, lit.origin) for direct in self.direct]
+        place = light.light.place
+        images = [direct.image(place, lit.passing, lit.slope, lit.origin) for direct in self.direct]
         for index, highlights in enumerate(self.highlights):
-            images[index] = images[index] + highlights.image(position, lit.passing, lit.slope)
+            images[index] = images[index] + highlights.image(place, lit.passing, lit.slope)
         columns = torch.cat(images)[self.views.pixels]
         if light.light.axis is None:
             return columns

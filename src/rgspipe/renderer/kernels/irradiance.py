@@ -7,6 +7,7 @@ import warp as wp
 from torch import Tensor
 
 from rgspipe.renderer.kernels.launch import as_array, as_vec3, launch
+from rgspipe.renderer.kernels.places import as_places, way_to
 from rgspipe.renderer.kernels.shadow import light_transmittance
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh, SurfelTree
 
@@ -24,7 +25,7 @@ def _irradiance(
     slab: int,
     tree: SurfelTree,
     order: wp.array(dtype=int),
-    lights: wp.array(dtype=wp.vec3),
+    lights: wp.array(dtype=wp.vec4),
     falloff: int,
     shadows: int,
     irradiance: wp.array(dtype=float),
@@ -36,15 +37,15 @@ def _irradiance(
     light = lights[item / count]
     i = item % count
     n = surfels[i].normal
-    d = light - surfels[i].center
+    d = way_to(light, surfels[i].center)
     projected = wp.dot(d, n)
     value = 1.0 - float(falloff)
     slope = wp.vec3(0.0, 0.0, 0.0)
     if projected >= 0.0:  # the derivative at a light in the plane is that towards the lit side
         square = wp.dot(d, d)
         if falloff == 1:
-            # √(|d|⁴ + ε⁴), without squares that leave float32's range.
-            softening = SOFTENING * surfels[i].scale
+            # √(|d|⁴ + ε⁴), without squares that leave float32's range; nothing is near a light at infinity.
+            softening = light[3] * SOFTENING * surfels[i].scale
             larger = wp.max(square, softening * softening)
             ratio = wp.min(square, softening * softening) / larger
             softened = larger * wp.sqrt(1.0 + ratio * ratio)
@@ -61,7 +62,7 @@ def _irradiance(
 
 
 def point_irradiance(bvh: SurfelBvh, positions: Tensor, shadows: bool) -> tuple[Tensor, Tensor]:
-    """Irradiance (L, N) of unit point lights at (L, 3) and its derivative (L, N, 3) towards their positions.
+    """Irradiance (L, N) of unit lights at (L, 3) or places (L, 4), and its derivative (L, N, 3) towards x, y and z.
 
     Without shadows the hierarchy is neither built nor read.
     """
@@ -69,7 +70,7 @@ def point_irradiance(bvh: SurfelBvh, positions: Tensor, shadows: bool) -> tuple[
 
 
 def transmittance(bvh: SurfelBvh, positions: Tensor) -> tuple[Tensor, Tensor]:
-    """Transmittance (L, N) from lights at (L, 3) to each surfel, and its derivative (L, N, 3) towards their positions.
+    """Transmittance (L, N) from lights at (L, 3) or places (L, 4) to each surfel, and its derivative (L, N, 3).
 
     Occluders are two-sided. Surfels that face away from the light get 1: their irradiance is zero by the cosine.
     """
@@ -81,7 +82,7 @@ def _launch(bvh: SurfelBvh, positions: Tensor, *, falloff: bool, shadows: bool) 
     value = torch.empty((lights, count), dtype=torch.float32, device=bvh.device)
     derivative = torch.empty((lights, count, 3), dtype=torch.float32, device=bvh.device)
     if count > 0:
-        inputs = [bvh.tree if shadows else bvh.leaves, bvh.order, as_vec3(bvh.local(positions))]
+        inputs = [bvh.tree if shadows else bvh.leaves, bvh.order, as_places(bvh, positions)]
         outputs = [as_array(value.view(-1)), as_vec3(derivative.view(-1, 3))]
         launch(_irradiance, lights * count, [*inputs, int(falloff), int(shadows), *outputs], bvh.device)
     return value, derivative

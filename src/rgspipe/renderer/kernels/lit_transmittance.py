@@ -6,7 +6,8 @@ import torch
 import warp as wp
 from torch import Tensor
 
-from rgspipe.renderer.kernels.launch import as_array, launch, vector
+from rgspipe.renderer.kernels.launch import as_array, launch
+from rgspipe.renderer.kernels.places import as_place, way_to
 from rgspipe.renderer.kernels.shadow import light_transmittance
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh, SurfelTree
 
@@ -23,13 +24,13 @@ def _lit_transmittance(
     slab: int,
     tree: SurfelTree,
     receivers: wp.array(dtype=int),
-    light: wp.vec3,
+    light: wp.vec4,
     found: wp.array(dtype=wp.vec4),
 ):
     item = wp.tid() + offset
     i = receivers[item]
     surfels = tree.records
-    d = light - surfels[i].center
+    d = way_to(light, surfels[i].center)
     passing = float(1.0)
     slope = wp.vec3(0.0, 0.0, 0.0)
     if wp.dot(d, surfels[i].normal) > 0.0 and wp.dot(d, d) > 0.0:
@@ -41,7 +42,7 @@ def lit_transmittance(bvh: SurfelBvh, position: Tensor, lit: Tensor) -> tuple[Te
     """`renderer.pixel_direct.surfel_transmittance` of the surfels that are `lit`; the others get 1, and do not change.
 
     Args:
-        position: (3,) of the light.
+        position: (3,) of the light, or its place (4,).
         lit: (N,) bool.
 
     Returns:
@@ -51,7 +52,7 @@ def lit_transmittance(bvh: SurfelBvh, position: Tensor, lit: Tensor) -> tuple[Te
     receivers = lit.to(bvh.device)[order].nonzero()[:, 0].int()
     found = torch.empty((len(receivers), 4), dtype=torch.float32, device=bvh.device)
     if len(receivers) > 0:
-        inputs = [bvh.tree, as_array(receivers), vector(bvh.local(position))]
+        inputs = [bvh.tree, as_array(receivers), as_place(bvh, position)]
         launch(_lit_transmittance, len(receivers), [*inputs, wp.from_torch(found, dtype=wp.vec4)], bvh.device)
     passing = torch.ones(len(order), device=bvh.device)
     slope = torch.zeros((len(order), 3), device=bvh.device)

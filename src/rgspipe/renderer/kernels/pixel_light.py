@@ -8,8 +8,9 @@ import torch
 import warp as wp
 from torch import Tensor
 
-from rgspipe.renderer.kernels.launch import as_array, as_vec3, launch, vector
+from rgspipe.renderer.kernels.launch import as_array, as_vec3, launch
 from rgspipe.renderer.kernels.pixel_rays import PixelRays, pixel_rays
+from rgspipe.renderer.kernels.places import as_place, way_to
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.scene.camera import Camera
 
@@ -55,14 +56,14 @@ def point_on_surfel(o: wp.vec3, d: wp.vec3, c: wp.vec3, n: wp.vec3, reach: float
 
 
 @wp.func
-def light_at(x: wp.vec3, n: wp.vec3, light: wp.vec3, softening: float):
+def light_at(x: wp.vec3, n: wp.vec3, light: wp.vec4, softening: float):
     """`direct.geometry_factor` at x, and its derivative towards the light's position."""
-    path = light - x
+    path = way_to(light, x)
     projected = wp.dot(path, n)
     lit = wp.vec4(0.0, 0.0, 0.0, 0.0)
     if projected > 0.0:
         square = wp.dot(path, path)
-        soft = softening * softening
+        soft = light[3] * softening * softening
         inverse = 1.0 / wp.sqrt(square * square + soft * soft)
         cube = inverse * wp.sqrt(inverse)
         slope = n * cube - path * (3.0 * projected * square * cube * inverse * inverse)
@@ -71,7 +72,7 @@ def light_at(x: wp.vec3, n: wp.vec3, light: wp.vec3, softening: float):
 
 
 @wp.func
-def light_on_pixel(view: PixelView, rays: PixelRays, p: int, j: int, light: wp.vec3):
+def light_on_pixel(view: PixelView, rays: PixelRays, p: int, j: int, light: wp.vec4):
     """`light_at` where pixel p looks on surfel j; its mean over the pixel's footprint beside the light."""
     d = rays.directions[p]
     c = view.centers[j]
@@ -83,7 +84,7 @@ def light_on_pixel(view: PixelView, rays: PixelRays, p: int, j: int, light: wp.v
     seen = x - rays.origin
     footprint = wp.length(rays.right) * wp.dot(seen, seen) / wp.max(wp.abs(wp.dot(seen, n)), 1.0e-30)
     lit = wp.vec4(0.0, 0.0, 0.0, 0.0)
-    if footprint <= NEAR * wp.length(light - x):
+    if light[3] * footprint <= NEAR * wp.length(way_to(light, x)):
         lit = light_at(x, n, light, softening)
     else:
         for a in range(3):
@@ -103,7 +104,7 @@ def _direct_image(
     view: PixelView,
     rays: PixelRays,
     reflectance: wp.array(dtype=wp.vec3),
-    light: wp.vec3,
+    light: wp.vec4,
     passing: wp.array(dtype=float),
     passing_slope: wp.array(dtype=wp.vec3),
     own_passing: wp.array(dtype=wp.vec4),
@@ -139,7 +140,7 @@ def _direct_entries(
     slab: int,
     view: PixelView,
     rays: PixelRays,
-    light: wp.vec3,
+    light: wp.vec4,
     passing: wp.array(dtype=float),
     own_passing: wp.array(dtype=wp.vec4),
     entries: wp.array(dtype=float),
@@ -182,14 +183,14 @@ class PixelLight:
         """(P, 3, 4) radiance under a light of 1 W/sr in RGB: its value, and its derivative towards x, y and z.
 
         Args:
-            light: (3,) position.
+            light: (3,) position, or (4,) place.
             passing: (N,) transmittance of the way to each surfel.
             passing_slope: (N, 3) its derivative towards the position.
             own_passing: (P, 4) the same two of a pixel, where they are known better than from its surfels; the
                 transmittance is negative where they are not.
         """
         image = torch.empty((self._pixels, 3, 4), dtype=torch.float32, device=self._bvh.device)
-        inputs = [self._view, self._rays, self._reflectance, vector(self._bvh.local(light))]
+        inputs = [self._view, self._rays, self._reflectance, as_place(self._bvh, light)]
         inputs += [as_array(passing.float()), as_vec3(passing_slope)]
         inputs.append(wp.from_torch(own_passing.contiguous(), dtype=wp.vec4))
         launch(_direct_image, self._pixels, [*inputs, wp.from_torch(image, dtype=wp.vec4)], self._bvh.device)
@@ -204,7 +205,7 @@ class PixelLight:
             light, passing, own_passing: as for `image`.
         """
         entries = torch.empty(self._view.columns.shape[0], dtype=torch.float32, device=self._bvh.device)
-        inputs = [self._view, self._rays, vector(self._bvh.local(light)), as_array(passing.float())]
+        inputs = [self._view, self._rays, as_place(self._bvh, light), as_array(passing.float())]
         inputs += [wp.from_torch(own_passing.contiguous(), dtype=wp.vec4), as_array(entries)]
         launch(_direct_entries, self._pixels, inputs, self._bvh.device)
         return entries

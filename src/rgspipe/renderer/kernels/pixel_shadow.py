@@ -6,9 +6,10 @@ import torch
 import warp as wp
 from torch import Tensor
 
-from rgspipe.renderer.kernels.launch import as_array, launch, vector
+from rgspipe.renderer.kernels.launch import as_array, launch
 from rgspipe.renderer.kernels.pixel_light import point_on_surfel
 from rgspipe.renderer.kernels.pixel_rays import PixelRays, pixel_rays
+from rgspipe.renderer.kernels.places import as_place, way_to
 from rgspipe.renderer.kernels.shadow import light_transmittance
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh, SurfelTree
 from rgspipe.scene.camera import Camera
@@ -26,7 +27,7 @@ def _pixel_transmittance(
     places: wp.array(dtype=wp.vec2),
     pixels: wp.array(dtype=int),
     receivers: wp.array(dtype=int),
-    light: wp.vec3,
+    light: wp.vec4,
     transmittance: wp.array(dtype=wp.vec4),
 ):
     item = wp.tid() + offset
@@ -37,7 +38,7 @@ def _pixel_transmittance(
     for k in range(places.shape[0]):
         d = rays.directions[p] + (places[k][0] - 0.5) * rays.right + (places[k][1] - 0.5) * rays.up
         at = point_on_surfel(rays.origin, d, tree.records[i].center, n, 1.0e30)
-        path = light - at
+        path = way_to(light, at)
         if wp.dot(path, n) > 0.0:
             passing, slope = light_transmittance(tree, i, at, light, path)
             total += wp.vec4(passing, slope[0], slope[1], slope[2])
@@ -52,7 +53,7 @@ def pixel_transmittance(
     Args:
         receivers: (P,) int64 surfel that stands for the surface in each pixel.
         pixels: (K,) int64 those that are computed; that of the others is −1.
-        light: (3,) position.
+        light: (3,) position, or (4,) place.
         places: (K, 2) of a pixel's shadow rays in the unit square.
     """
     transmittance = torch.full((camera.pixel_count, 4), -1.0, dtype=torch.float32, device=bvh.device)
@@ -60,7 +61,7 @@ def pixel_transmittance(
         return transmittance
     lattice = wp.from_torch(places.float().contiguous().to(bvh.device), dtype=wp.vec2)
     records = wp.to_torch(bvh.rank)[receivers.to(bvh.device)].int()
-    which = [as_array(pixels.to(bvh.device).int()), as_array(records), vector(bvh.local(light))]
+    which = [as_array(pixels.to(bvh.device).int()), as_array(records), as_place(bvh, light)]
     inputs = [bvh.tree, pixel_rays(bvh, camera), lattice, *which, wp.from_torch(transmittance, dtype=wp.vec4)]
     launch(_pixel_transmittance, len(pixels), inputs, bvh.device)
     return transmittance

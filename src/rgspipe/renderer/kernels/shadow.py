@@ -10,6 +10,7 @@ from __future__ import annotations
 import warp as wp
 
 from rgspipe.renderer.kernels.coverage import sharpened, sharpened_slope
+from rgspipe.renderer.kernels.places import way_to
 from rgspipe.renderer.kernels.surfel_bvh import SurfelRecord, SurfelTree, clip_height, surfel_alpha
 
 # Adjoints are written by hand; generating them would double the compile time.
@@ -29,6 +30,9 @@ COPLANAR_OFFSET = wp.constant(1.0)
 
 #: A ray closer to an occluder's plane than this cosine does not meet it.
 EDGE_ON = wp.constant(1.0e-6)
+
+#: Rays to a light at infinity end here.
+ENDLESS = wp.constant(1.0e30)
 
 #: Occluders that a ray holds at once; if there are more, it goes on behind the last of them.
 OCCLUDERS = wp.constant(16)
@@ -50,11 +54,14 @@ def occluder(
     receiver: int,
     at: wp.vec3,
     j: int,
-    light: wp.vec3,
+    light: wp.vec4,
     path: wp.vec3,
     distance: float,
 ):
-    """Opacity of surfel j, faded in, on the `path` from `at` to the light, and its place there, a share; or 0, 0."""
+    """Opacity of surfel j, faded in, on the `path` from `at` to the light, and its depth there; or 0, 0.
+
+    Depths are shares of the path; of the path to a light at infinity, which is a unit vector, lengths.
+    """
     alpha = float(0.0)
     depth = float(0.0)
     n = surfels[j].normal
@@ -64,7 +71,7 @@ def occluder(
         between = surfels[j].center - at
         depth = wp.dot(between, n) / facing
         fade = faded_in(depth * distance, surfels[receiver].scale)
-        if fade > 0.0 and wp.dot(light - surfels[j].center, n) * facing > 0.0:
+        if fade > 0.0 and wp.dot(way_to(light, surfels[j].center), n) * facing > 0.0:
             alpha = surfel_alpha(surfels, j, depth * path - between)
             own = surfels[receiver].normal
             if alpha <= minimum_alpha or (
@@ -132,7 +139,7 @@ def light_transmittance(
     tree: SurfelTree,
     receiver: int,
     at: wp.vec3,
-    light: wp.vec3,
+    light: wp.vec4,
     path: wp.vec3,
 ):
     """Part of a light that reaches the point `at` of a receiver along the `path` to it, and d/d(light) of it."""
@@ -144,6 +151,7 @@ def light_transmittance(
     thickness = rule.thickness / distance
     skip = RECEIVER_SKIP * surfels[receiver].scale / distance
     start = at + skip * path
+    farthest = wp.where(light[3] > 0.0, 1.0, ENDLESS)
     # The layer that is being filled.
     front = float(1.0e30)
     clear = float(1.0)
@@ -158,7 +166,7 @@ def light_transmittance(
     while more == 1:
         more = int(0)
         count = int(0)
-        reach = wp.min(1.0, last_depth + thickness) - skip
+        reach = wp.min(farthest, last_depth + thickness) - skip
         query = wp.bvh_query_ray(tree.bvh, start, path)
         j = int(0)
         while wp.bvh_query_next(query, j, reach):

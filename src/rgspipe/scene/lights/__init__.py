@@ -13,12 +13,17 @@ from rgspipe.scene.lights.light import (
 )
 from rgspipe.scene.lights.nodes import Nodes
 from rgspipe.scene.lights.panel import PanelLight
+from rgspipe.scene.lights.photometry import Photometry
 from rgspipe.scene.lights.point import PointLight
+from rgspipe.scene.lights.profile import ProfileLight
 from rgspipe.scene.lights.sphere import SphereLight
 from rgspipe.scene.lights.spot import SpotLight, SpotProfile
+from rgspipe.scene.lights.sun import SunLight
 
 #: Every kind by its name.
-KINDS: dict[str, type[Light]] = {kind.kind: kind for kind in (PointLight, SpotLight, LedLight, SphereLight, PanelLight)}
+KINDS: dict[str, type[Light]] = {
+    kind.kind: kind for kind in (PointLight, SpotLight, LedLight, SphereLight, PanelLight, SunLight, ProfileLight)
+}
 
 __all__ = [
     "KINDS",
@@ -29,12 +34,15 @@ __all__ = [
     "LightRig",
     "Nodes",
     "PanelLight",
+    "Photometry",
     "PointLight",
+    "ProfileLight",
     "RelativeIntensity",
     "ShapeNumber",
     "SphereLight",
     "SpotLight",
     "SpotProfile",
+    "SunLight",
     "as_rig",
     "check_numbers",
 ]

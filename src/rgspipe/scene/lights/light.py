@@ -84,6 +84,12 @@ class Reader(Protocol):
 
     def number(self, key: str) -> float: ...
 
+    def text(self, key: str) -> str: ...
+
+    def numbers(self, key: str) -> Tensor:
+        """(K,) float64, a list of any length but 0."""
+        ...
+
     def choice(self, key: str, names: Sequence[str]) -> str: ...
 
 
@@ -102,6 +108,12 @@ class Light(ByValue, ABC):
     #: Its name in light files and settings.
     kind: ClassVar[str]
 
+    #: Whether it is infinitely far away: its position says nothing, and its light does not fall with the distance.
+    distant: ClassVar[bool] = False
+
+    #: Of its intensity.
+    unit: ClassVar[str] = "W/sr"
+
     position: Given
     intensity: Given
 
@@ -115,6 +127,29 @@ class Light(ByValue, ABC):
     def axis(self) -> Float[Tensor, " 3"] | None:
         """(3,) of unit length, along which it shines; None if it shines alike in all directions."""
         return None
+
+    @property
+    def place(self) -> Float[Tensor, " 4"]:
+        """(4,) its position in homogeneous coordinates; see `renderer.kernels.places`."""
+        return torch.cat([self.position, self.position.new_ones(1)])
+
+    def standing(self, size: float) -> Float[Tensor, " 3"]:
+        """(3,) where it stands in a scene of `size`, such that distances over the size tell lights apart."""
+        return self.position
+
+    def standing_spread(self, covariance: Any, size: float) -> Any:
+        """(3, 3) covariance of `standing`, of the rows and columns of `FitResult.covariance`."""
+        return covariance[:3, :3]
+
+    @property
+    def label(self) -> str:
+        """What people call it."""
+        return self.kind
+
+    @property
+    def in_one_point(self) -> bool:
+        """Whether it stands at its position, and not at points that it is made of."""
+        return self.parts()[0] is self
 
     @property
     def shape(self) -> tuple[ShapeNumber, ...]:
@@ -163,9 +198,13 @@ class Light(ByValue, ABC):
         to = {"dtype": self.position.dtype, "device": self.position.device}
         return {name: torch.as_tensor(value, **to) for name, value in values.items()}
 
-    def grown(self, size: float) -> tuple[Self, ...]:
-        """Lights of this kind at its place that a fit begins with, in a scene of `size`, where its shape is free."""
+    def grown(self, size: float, free: bool) -> tuple[Self, ...]:
+        """Lights of this kind at its place that a fit begins with, in a scene of `size`, its shape known or `free`."""
         return (self,)
+
+    def in_place_of(self, found: Light) -> Self:
+        """The light where one like its `seed` was found."""
+        return self.at(found.position, found.axis)
 
     @abstractmethod
     def power(self) -> Float[Tensor, " 3"]:

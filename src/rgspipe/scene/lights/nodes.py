@@ -25,23 +25,37 @@ class FacetLight(LedLight):
 
 
 @dataclass(frozen=True)
+class ParallelLight(PointLight):
+    """A point infinitely far away: its position is the unit vector towards it, its intensity an irradiance."""
+
+    distant = True
+
+    @property
+    def place(self) -> Float[Tensor, " 4"]:
+        return torch.cat([self.position, self.position.new_zeros(1)])
+
+
+@dataclass(frozen=True)
 class Nodes:
     """The points that a light with an extent is made of; each has the same part of its intensity.
 
     Attributes:
-        positions: (Q, 3) scene units.
+        positions: (Q, 3) scene units; of points at infinity unit vectors towards them.
         direction: (3,) along which each shines with the cosine, as a piece of a surface does; None where each shines
             alike in all directions.
+        distant: whether they are infinitely far away.
     """
 
     positions: Float[Tensor, "Q 3"]
     direction: Float[Tensor, " 3"] | None = None
+    distant: bool = False
 
     def lights(self, intensity: Float[Tensor, " 3"]) -> tuple[Light, ...]:
         """A light at each, of a light of `intensity`."""
         part = intensity / len(self.positions)
         if self.direction is None:
-            return tuple(PointLight(position, part) for position in self.positions)
+            kind = ParallelLight if self.distant else PointLight
+            return tuple(kind(position, part) for position in self.positions)
         return tuple(FacetLight(position, part, self.direction, 1.0) for position in self.positions)
 
 

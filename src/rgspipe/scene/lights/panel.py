@@ -92,8 +92,8 @@ class PanelLight(AxialLight):
         offsets = places[:, :1] * values["width"] * across + places[:, 1:] * values["height"] * up
         return Nodes(values["position"] + offsets, values["direction"])
 
-    def grown(self, size: float) -> tuple[Self, ...]:
-        return tuple(replace(self, width=share * size, height=share * size) for share in SIDES)
+    def grown(self, size: float, free: bool) -> tuple[Self, ...]:
+        return tuple(replace(self, width=share * size, height=share * size) for share in SIDES) if free else (self,)
 
     @classmethod
     def from_fields(cls, position: Tensor, intensity: Tensor, reader: Reader) -> Self:

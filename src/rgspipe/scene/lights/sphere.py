@@ -57,8 +57,8 @@ class SphereLight(Light):
     def nodes(self, values: Mapping[str, Tensor], few: bool = False) -> Nodes:
         return Nodes(values["position"] + values["radius"] * ball_nodes(few).to(values["position"]))
 
-    def grown(self, size: float) -> tuple[Self, ...]:
-        return tuple(replace(self, radius=share * size) for share in RADII)
+    def grown(self, size: float, free: bool) -> tuple[Self, ...]:
+        return tuple(replace(self, radius=share * size) for share in RADII) if free else (self,)
 
     def power(self) -> Float[Tensor, " 3"]:
         return WATTS_PER_INTENSITY * self.intensity
