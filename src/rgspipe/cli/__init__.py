@@ -81,6 +81,10 @@ def _dispatch(arguments: list[str], stage_loader: StageLoader) -> int:
         from rgspipe.cli.view import view_folder
 
         return view_folder(arguments[1:])
+    if arguments[0] == "demo":
+        from rgspipe.cli.view import demo
+
+        return demo(arguments[1:])
     name = next((text.partition("=")[2] for text in arguments if text.startswith("pipeline=")), None)
     if name is not None:
         from rgspipe.cli.sequence import run_sequence

@@ -13,6 +13,7 @@ FLAGS, LINE = ("-sc", "--shell-completion"), "COMP_LINE"
 
 #: Words that begin a line without a stage, and what may follow them; nothing stands for files.
 COMMANDS: Mapping[str, Sequence[str]] = {
+    "demo": ("port=", "resolution="),
     "doctor": ("outputs=", "check=false"),
     "outputs": ("list", "prune", "outputs=", "scene=", "stage=", "older=", "remove=true"),
     "status": ("outputs=", "stage=", *(f"state={state}" for state in STATES)),

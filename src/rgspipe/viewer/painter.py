@@ -68,8 +68,9 @@ class Painter:
             session = self._session
             if not quick:
                 session.rest()
-            if quick and not session.images.knows(camera):
+            if quick and not session.images.knows(session.seen(camera)):
                 camera = self._camera(COARSE)
+            camera = session.seen(camera)
             quality = "sharp" if not quick else ("soft" if session.images.knows(camera) else "coarse")
             picture, top = session.picture(camera, quality)
         self._show(picture, top, not quick)
