@@ -14,6 +14,7 @@ from rgspipe.errors import InputError
 PAGE_KEYS = {
     "port": "of the page",
     "resolution": "pixels along the longer side of pictures at rest",
+    "address": "of this machine to listen at, if others are to look; then with a token",
 }
 
 #: What can be said beside the folder of a scene.
@@ -39,6 +40,7 @@ class Wanted:
     fit: str | None = None
     port: int = 8080
     resolution: int = 256
+    address: str = "127.0.0.1"
 
 
 def view_folder(arguments: Sequence[str]) -> int:
@@ -62,8 +64,9 @@ def view_folder(arguments: Sequence[str]) -> int:
         cases=[case],
         port=wanted.port,
         resolution=wanted.resolution,
+        address=wanted.address,
     )
-    return _serve(viewer)
+    return serve(viewer)
 
 
 def demo(arguments: Sequence[str]) -> int:
@@ -84,10 +87,11 @@ def demo(arguments: Sequence[str]) -> int:
 
     viewer = view(demo_scene(), cases=[case_in(TARGET)], **given)
     print(DEMO)
-    return _serve(viewer)
+    return serve(viewer)
 
 
-def _serve(viewer: Any) -> int:
+def serve(viewer: Any) -> int:
+    """Say where the page is, and serve it until the process is interrupted; the exit status."""
     print(f"{viewer.url}  (Ctrl-C ends it)", flush=True)
     viewer.wait()
     return 0

@@ -32,6 +32,7 @@ class Drawings:
         self._lamps: list = []
         self._frusta: list = []
         self._advised: list = []
+        self._eye: Camera | None = None
 
     def lamps(self, found: Found | None, truth: LightRig) -> None:
         """Orange regions of the lamps that were found, the search's way to them in blue, green balls at true ones."""
@@ -50,6 +51,7 @@ class Drawings:
         """A frustum for each photograph."""
         _clear(self._frusta)
         self._frusta += [self._frustum(f"/photographs/{k}", one.camera, _TAKEN) for k, one in enumerate(photographs)]
+        self._hide()
 
     def advised(self, camera: Camera | None) -> None:
         """The camera that would tell most."""
@@ -57,10 +59,14 @@ class Drawings:
         if camera is not None:
             self._advised.append(self._frustum("/advised", camera, _ADVISED))
 
-    def hide_near(self, camera: Camera) -> None:
-        """Hide the frustum of the camera that the visitor looks through."""
-        for frustum in (*self._frusta, *self._advised):
-            away = float(np.linalg.norm(frustum.position - camera.origin.numpy()))
+    def seen_from(self, camera: Camera) -> None:
+        """The visitor looks through another camera, whose own frustum is hidden."""
+        self._eye = camera
+        self._hide()
+
+    def _hide(self) -> None:
+        for frustum in (*self._frusta, *self._advised) if self._eye is not None else ():
+            away = float(np.linalg.norm(frustum.position - self._eye.origin.numpy()))
             frustum.visible = away > FRUSTUM * self._size
 
     def _way(self, index: int, way: np.ndarray) -> viser.LineSegmentsHandle:

@@ -183,7 +183,8 @@ class FitControls:
 
 def _words(found: Found) -> str:
     """What a fit says of its lamps, and which other numbers of lamps it ruled out."""
-    text = f"```\n{found.told}\n```" if found.told else ""
+    # Lamps stand in lines of their own, which begin with blanks.
+    text = "\n".join(f"- {line.strip()}" if line.startswith(" ") else f"\n{line}\n" for line in found.told.splitlines())
     if len(found.costs) > 1:
         tried = ", ".join(f"{count}: {cost:.4g}" for count, cost in sorted(found.costs.items()))
         text += f"\nCost by number of lamps: {tried}."

@@ -72,7 +72,7 @@ class Page:
         # The browser tells of its camera also where it stands still.
         if camera is not None and camera.key != self._seen:
             self._seen = camera.key
-            self._drawings.hide_near(camera)
+            self._drawings.seen_from(camera)
             self.painter.changed()
 
     def _show(self, picture: Bytes, top: float, sharp: bool) -> None:

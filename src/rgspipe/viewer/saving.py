@@ -12,6 +12,7 @@ import torch
 
 from rgspipe.evaluation.images import Bytes, png_bytes
 from rgspipe.light_export.export import export_lights
+from rgspipe.light_export.world import World
 from rgspipe.relighting.pictures import video
 from rgspipe.scene import Camera, LightRig, look_at
 from rgspipe.viewer.actions import Action, offer
@@ -41,7 +42,7 @@ class Saving:
             self._send("lights.json", path.read_bytes())
 
     def _export(self) -> None:
-        self._send("lamps.zip", exported(self._session.lights, self._visit.exhibit.metres))
+        self._send("lamps.zip", exported(self._session.lights, self._visit.exhibit.world))
 
     def _still(self) -> None:
         if (camera := self._visit.camera()) is not None:
@@ -64,11 +65,11 @@ class Saving:
         self._visit.client.send_file_download(name, content)
 
 
-def exported(lights: LightRig, metres: float) -> bytes:
+def exported(lights: LightRig, world: World) -> bytes:
     """A zip file of lamps in the formats of other programs."""
     buffer = io.BytesIO()
     with tempfile.TemporaryDirectory() as folder, zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
-        export_lights(lights, folder, metres=metres)
+        export_lights(lights, folder, world=world)
         for path in sorted(Path(folder).iterdir()):
             archive.write(path, path.name)
     return buffer.getvalue()

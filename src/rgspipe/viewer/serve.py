@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import logging
 import threading
 from collections.abc import Sequence
 from importlib.util import find_spec
@@ -12,6 +13,7 @@ from typing import TYPE_CHECKING
 import torch
 
 from rgspipe.errors import InputError
+from rgspipe.light_export.world import World
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import Camera
 from rgspipe.scene.lights import Light, as_rig
@@ -44,7 +46,8 @@ class Viewer:
 
         self.pages: dict[int, Page] = {}
         self._exhibit = exhibit
-        # viser prints the address in a frame, and another one than that which others are given.
+        # Both say where they listen, which is another address than that which others are given.
+        logging.getLogger("websockets").setLevel(logging.WARNING)
         with contextlib.redirect_stdout(io.StringIO()):
             self._server = viser.ViserServer(host=LOOPBACK, port=port, verbose=False)
         self._relay: Relay | None = None
@@ -102,8 +105,8 @@ def view(
     references: Sequence[Photograph] = (),
     port: int = 8080,
     resolution: int = 256,
-    metres: float = 1.0,
     address: str = LOOPBACK,
+    world: World | None = None,
 ) -> Viewer:
     """Show a scene in the browser, at 127.0.0.1 only; returns at once.
 
@@ -116,8 +119,8 @@ def view(
         references: further photographs, under lamps that are known.
         port: of the page; the next free one where it is taken.
         resolution: pixels along the longer side of pictures at rest, 32 to 2048.
-        metres: per scene unit, for lamps that are exported.
         address: of this machine to listen at, if others are to look: then with a token in `url`.
+        world: how scene units came about, for lamps that are exported; metres if None.
 
     Raises:
         InputError: viser is not installed, or an argument is not what it should be.
@@ -136,7 +139,7 @@ def view(
     camera = camera or (taken[0].camera if taken else first_camera(*scene.bounds))
     is_open = address not in (LOOPBACK, "localhost")
     images, finder = LampImages(scene), Finder(scene)
-    exhibit = Exhibit(images, finder, camera, rig, tuple(cases), tuple(references), resolution, metres)
+    exhibit = Exhibit(images, finder, camera, rig, tuple(cases), tuple(references), resolution, world or World())
     viewer = Viewer(exhibit, 0 if is_open else port)
     if is_open:
         viewer.open_to(address, port)

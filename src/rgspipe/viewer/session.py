@@ -39,7 +39,7 @@ class Session:
         images: of the scene.
         lights: the lamps that are on.
         case: photographs of the scene under lamps that are looked for.
-        exposure: stops; at 0 the first picture's 97th percentile is white.
+        exposure: stops; at 0 the 97th percentile of the first photograph, or else of the first picture, is white.
         shown: one of SHOWN.
         section: axis and place of a plane that cuts away what is on the camera's side of it; None for none.
         found: lamps that a search found.
@@ -145,6 +145,8 @@ class Session:
     def open(self, case: Case) -> None:
         """Look at other photographs, and at what a fit found in them."""
         self.case, self.found = case, case.found
+        if case.photographs:
+            self._gain = display_gain(case.photographs[0].image)
         if case.found is not None:
             self.change(case.found.lights)
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from rgspipe.light_export.world import World
 from rgspipe.scene import Camera, LightRig
 from rgspipe.viewer.lamp_images import LampImages
 from rgspipe.viewer.material import Case, Photograph
@@ -29,7 +30,7 @@ class Exhibit:
         cases: photographs that can be opened.
         references: photographs under lamps that are known.
         resolution: pixels along the longer side of pictures at rest.
-        metres: per scene unit.
+        world: how scene units came about, for lamps that are exported.
         turn: is held while images are made, as several visitors share the processor and what is kept of images.
     """
 
@@ -40,7 +41,7 @@ class Exhibit:
     cases: Sequence[Case] = ()
     references: Sequence[Photograph] = ()
     resolution: int = 256
-    metres: float = 1.0
+    world: World = field(default_factory=World)
     turn: threading.Lock = field(default_factory=threading.Lock)
 
     def session(self) -> Session:
