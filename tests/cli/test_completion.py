@@ -23,7 +23,7 @@ from rgspipe.stages import NAMES
         ("rgspipe outputs ", list(COMMANDS["outputs"]), False),
         ("rgspipe view ", [], False),
         ("rgspipe stage=fit", ["stage=fit_light"], False),
-        ("rgspipe scene=tutorial stage=", [f"stage={name}" for name in NAMES], False),
+        ("rgspipe scene=tutorial stage=", [*(f"stage={name}" for name in NAMES), "stage=view"], False),
         ("rgspipe pipeline=sm", ["pipeline=smoke"], False),
         ("rgspipe stage=fit_light fit.", [], True),
         ("rgspipe", ["pipeline=", *COMMANDS], True),

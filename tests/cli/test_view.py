@@ -19,8 +19,8 @@ from rooms import closed_box
 
 
 def test_a_folder_and_keys_are_understood() -> None:
-    words = ["a/b", "lights=l.json", "target=t", "fit=f", "port=0", "resolution=64"]
-    assert parsed(words) == Wanted(Path("a/b"), "l.json", "t", "f", 0, 64)
+    words = ["a/b", "lights=l.json", "target=t", "fit=f", "port=0", "resolution=64", "address=::1"]
+    assert parsed(words) == Wanted(Path("a/b"), "l.json", "t", "f", 0, 64, "::1")
     assert parsed(["a"]) == Wanted(Path("a"))
 
 

@@ -5,20 +5,14 @@ from __future__ import annotations
 import pytest
 import torch
 
-from lit_room import VISIBLE, frozen_room, room_cameras
+from lit_room import VISIBLE, room_cameras
 from rgspipe.datasets.light_file import read_lights
-from rgspipe.errors import InputError
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import PointLight
 from rgspipe.viewer.lamp_images import LampImages
-from rgspipe.viewer.session import OFFERED, Session, same_lights
+from rgspipe.viewer.session import ILLUMINANCE, IRRADIANCE, OFFERED, Session, same_lights
 
 LAMP = PointLight(list(VISIBLE), [0.6, 0.5, 0.4])
-
-
-@pytest.fixture(scope="module")
-def frozen() -> FrozenScene:
-    return frozen_room()
 
 
 @pytest.fixture
@@ -77,14 +71,14 @@ def test_lamps_come_go_and_change_their_kind(session: Session) -> None:
 def test_without_lamps_it_is_dark(frozen: FrozenScene) -> None:
     session, camera = Session(LampImages(frozen)), room_cameras(8)[0]
     assert not session.picture(camera)[0].any()
-    session.irradiance = True
+    session.shown = IRRADIANCE
     session.picture(camera)
 
 
 def test_irradiance_is_the_radiance_of_white_surfaces_times_pi(session: Session) -> None:
     camera = room_cameras(16)[0]
     radiance = session.images.image(camera, session.lights, "soft")
-    session.irradiance = True
+    session.shown = IRRADIANCE
     # All surfels have the albedo 0.6, 0.5, 0.4; float32 makes 3.0e-7 of a difference.
     expected = radiance * torch.pi / torch.tensor([0.6, 0.5, 0.4])
     assert torch.allclose(session.image(camera, "soft"), expected, rtol=1e-4, atol=1e-5)
@@ -92,30 +86,35 @@ def test_irradiance_is_the_radiance_of_white_surfaces_times_pi(session: Session)
     assert picture.shape == (16, 16, 3) and top > 0
 
 
-def test_the_lamp_of_photographs_is_found_and_taken(session: Session) -> None:
-    for camera in room_cameras(32):
-        session.photograph(camera)
-    session.replace(0, LAMP.at(LAMP.position + 0.2))
-    assert session.compared(0).shape == (32, 96, 3)
-    session.take(session.search("point"))
-    # Found 2.7e-8 off.
-    assert torch.allclose(session.lights[0].position, LAMP.position, atol=1e-3)
-    assert same_lights(session.truth, (LAMP,))
+def test_illuminance_is_that_of_the_eye(session: Session) -> None:
+    camera = room_cameras(16)[0]
+    session.shown = IRRADIANCE
+    arriving = session.image(camera, "sharp")
+    _, watts = session.picture(camera)
+    session.shown = ILLUMINANCE
+    _, lux = session.picture(camera)
+    # 683 lm/W of 0.2126 R + 0.7152 G + 0.0722 B: between the least and the largest channel's.
+    low, high = (683.0 * float(part) for part in (arriving.amin(dim=2).mean(), arriving.amax(dim=2).mean()))
+    assert low < lux * float(arriving.mean()) / watts < high
 
 
 def test_photographs_of_other_lamps_are_dropped(session: Session) -> None:
     camera = room_cameras(8)[0]
     session.photograph(camera)
     session.photograph(camera)
-    assert len(session.photographs) == 2
+    assert len(session.case.photographs) == 2
     session.add("point")
     session.photograph(camera)
-    assert len(session.photographs) == 1
+    assert len(session.case.photographs) == 1
 
 
-def test_a_search_without_photographs_is_refused(session: Session) -> None:
-    with pytest.raises(InputError, match="target=DIR"):
-        session.search()
+def test_a_photograph_is_compared_with_the_picture(session: Session) -> None:
+    taken = session.photograph(room_cameras(32)[0])
+    # Three of 32 pixels, and two gaps of 4 between them.
+    strip = session.compared(taken)
+    assert strip.shape == (32, 104, 3)
+    # Equal images differ nowhere.
+    assert (strip[:, 72:].reshape(-1, 3).max(axis=0) == 247).all()
 
 
 def test_lamps_and_a_still_are_saved(session: Session, tmp_path) -> None:

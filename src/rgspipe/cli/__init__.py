@@ -81,6 +81,14 @@ def _dispatch(arguments: list[str], stage_loader: StageLoader) -> int:
         from rgspipe.cli.view import view_folder
 
         return view_folder(arguments[1:])
+    if arguments[0] == "demo":
+        from rgspipe.cli.view import demo
+
+        return demo(arguments[1:])
+    if "stage=view" in arguments:
+        from rgspipe.cli.view_stage import view_stage
+
+        return view_stage(arguments, stage_loader)
     name = next((text.partition("=")[2] for text in arguments if text.startswith("pipeline=")), None)
     if name is not None:
         from rgspipe.cli.sequence import run_sequence

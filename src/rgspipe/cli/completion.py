@@ -13,6 +13,7 @@ FLAGS, LINE = ("-sc", "--shell-completion"), "COMP_LINE"
 
 #: Words that begin a line without a stage, and what may follow them; nothing stands for files.
 COMMANDS: Mapping[str, Sequence[str]] = {
+    "demo": ("port=", "resolution=", "address="),
     "doctor": ("outputs=", "check=false"),
     "outputs": ("list", "prune", "outputs=", "scene=", "stage=", "older=", "remove=true"),
     "status": ("outputs=", "stage=", *(f"state={state}" for state in STATES)),
@@ -40,7 +41,8 @@ def completed(line: str) -> tuple[list[str], bool]:
         return _those(COMMANDS[words[0]], word), False
     key, is_key, _ = word.partition("=")
     if is_key and key in ("stage", "pipeline"):
-        names = NAMES if key == "stage" else [path.stem for path in sorted(resource_folder("pipelines").glob("*.yaml"))]
+        pipelines = [path.stem for path in sorted(resource_folder("pipelines").glob("*.yaml"))]
+        names = (*NAMES, "view") if key == "stage" else pipelines
         return _those([f"{key}={name}" for name in names], word), False
     return _those(["pipeline=", *([] if words else COMMANDS)], word), True
 

@@ -128,7 +128,9 @@ More:
   --cfg job             show the whole configuration instead of running it
   debug.traceback=true  show tracebacks (or set RGSPIPE_TRACEBACK=1)
   status                how the runs so far ended; status NAME shows one, status state=failed some
+  demo                  a small room in the browser, in seconds: drag its lamp, and see a hidden one found
   view FOLDER           a frozen scene in the browser, where lamps are moved and found
+  stage=view            the configured scene there, with its photographs and fits; --help viewer
   outputs               what the results take on the disk; outputs prune removes what nothing needs any more
   doctor                whether all that is needed is here and works, and how accurate and fast it is
   verify                read every result and say which were damaged since they were made

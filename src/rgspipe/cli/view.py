@@ -1,28 +1,33 @@
-"""`python -m rgspipe view`: a frozen scene in the browser, where lamps are moved and found."""
+"""`python -m rgspipe view` and `demo`: a frozen scene in the browser, where lamps are moved and found."""
 
 from __future__ import annotations
 
 import difflib
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from rgspipe.datasets.covariance_file import read_covariances
-from rgspipe.datasets.gs3 import load_target
-from rgspipe.datasets.light_file import read_lights
 from rgspipe.errors import InputError
-from rgspipe.renderer.frozen import FrozenScene
-from rgspipe.viewer.serve import view
-from rgspipe.viewer.session import Found, as_photographs
 
-#: What can be said beside the folder, and what it means.
+#: Keys of every page, and what they mean.
+PAGE_KEYS = {
+    "port": "of the page",
+    "resolution": "pixels along the longer side of pictures at rest",
+    "address": "of this machine to listen at, if others are to look; then with a token",
+}
+
+#: What can be said beside the folder of a scene.
 KEYS = {
     "lights": "light file: the lamps at first",
     "target": "folder with a target: photographs of the scene under lamps that are to be found",
     "fit": "folder of a target's fit (with lights.json), whose lamps are shown with their regions",
-    "port": "of the page",
-    "resolution": "pixels along the longer side of pictures at rest",
+    **PAGE_KEYS,
 }
+
+DEMO = """\
+Drag the lamp. Then press "find it from the photographs": three photographs were taken of this room under
+another lamp, which none of them shows; it is looked for in what it lights."""
 
 
 @dataclass(frozen=True)
@@ -35,37 +40,58 @@ class Wanted:
     fit: str | None = None
     port: int = 8080
     resolution: int = 256
+    address: str = "127.0.0.1"
 
 
 def view_folder(arguments: Sequence[str]) -> int:
-    """Serve the page until the process is interrupted; the exit status.
+    """Serve the page of a scene until the process is interrupted; the exit status.
 
     Raises:
         InputError: an argument or a file cannot be used.
     """
     wanted = parsed(arguments)
-    frozen = FrozenScene.load(wanted.folder)
-    found, lights, photographs, truth = None, None, [], ()
-    if wanted.fit is not None:
-        file = Path(wanted.fit) / "lights.json"
-        found = Found(read_lights(file), read_covariances(file))
-        lights = found.lights
-    if wanted.lights is not None:
-        lights = read_lights(wanted.lights)
-    if wanted.target is not None:
-        target = load_target(Path(wanted.target))
-        photographs = as_photographs([one.camera for one in target.views], [one.image for one in target.views])
-        known = Path(wanted.target).resolve().parents[1] / "truth" / f"{target.name}.json"
-        truth = read_lights(known) if known.exists() else ()
+
+    from rgspipe.datasets.light_file import read_lights
+    from rgspipe.renderer.frozen import FrozenScene
+    from rgspipe.viewer.material import Case, case_in, found_in
+    from rgspipe.viewer.serve import view
+
+    found = None if wanted.fit is None else found_in(wanted.fit)
+    case = Case(found=found) if wanted.target is None else case_in(wanted.target, found)
     viewer = view(
-        frozen,
-        lights,
-        photographs=photographs,
-        truth=truth,
-        found=found,
+        FrozenScene.load(wanted.folder),
+        None if wanted.lights is None else read_lights(wanted.lights),
+        cases=[case],
         port=wanted.port,
         resolution=wanted.resolution,
+        address=wanted.address,
     )
+    return serve(viewer)
+
+
+def demo(arguments: Sequence[str]) -> int:
+    """Serve the page of the scene that comes with the package; the exit status.
+
+    Raises:
+        InputError: an argument cannot be used.
+    """
+    folders, given = _split(arguments, PAGE_KEYS)
+    if folders:
+        remedy = "For a scene of yours: rgspipe view FOLDER."
+        raise InputError("demo", expected="no folder: it has a scene of its own", found=folders[0], remedy=remedy)
+    print("Making the light of a small room ready …", flush=True)
+
+    from rgspipe.demo import TARGET, demo_scene
+    from rgspipe.viewer.material import case_in
+    from rgspipe.viewer.serve import view
+
+    viewer = view(demo_scene(), cases=[case_in(TARGET)], **given)
+    print(DEMO)
+    return serve(viewer)
+
+
+def serve(viewer: Any) -> int:
+    """Say where the page is, and serve it until the process is interrupted; the exit status."""
     print(f"{viewer.url}  (Ctrl-C ends it)", flush=True)
     viewer.wait()
     return 0
@@ -77,24 +103,34 @@ def parsed(arguments: Sequence[str]) -> Wanted:
     Raises:
         InputError: there is not one folder, or a key is not known.
     """
-    folders = [text for text in arguments if "=" not in text]
+    folders, given = _split(arguments, KEYS)
     if len(folders) != 1:
         found, remedy = " ".join(folders) or "none", "Say which: view outputs/cornell/freeze/latest."
         raise InputError("view", expected="the folder of one frozen scene", found=found, remedy=remedy)
-    given: dict[str, str | int] = {}
-    for text in arguments:
-        key, is_key, value = text.partition("=")
-        if not is_key:
-            continue
-        if key not in KEYS:
-            near = difflib.get_close_matches(key, KEYS, n=1)
-            remedy = f"Did you mean {near[0]}=?" if near else "Choose one of them."
-            raise InputError(key, expected=f"one of {', '.join(KEYS)}", found=text, remedy=remedy)
-        given[key] = _whole(key, value) if key in ("port", "resolution") else value
     return Wanted(Path(folders[0]), **given)
+
+
+def _split(arguments: Sequence[str], keys: Mapping[str, str]) -> tuple[list[str], dict[str, Any]]:
+    """Arguments without a key, and the values of those with one."""
+    given: dict[str, Any] = {}
+    for text in (text for text in arguments if "=" in text):
+        key, _, value = text.partition("=")
+        if key not in keys:
+            near = difflib.get_close_matches(key, keys, n=1)
+            remedy = f"Did you mean {near[0]}=?" if near else "Choose one of them."
+            raise InputError(key, expected=f"one of {', '.join(keys)}", found=text, remedy=remedy)
+        given[key] = _READERS.get(key, _text)(key, value)
+    return [text for text in arguments if "=" not in text], given
+
+
+def _text(key: str, text: str) -> str:
+    return text
 
 
 def _whole(key: str, text: str) -> int:
     if not text.isdecimal() or int(text) > 65535:
         raise InputError(key, expected="a whole number, at most 65535", found=text, remedy="Correct it.")
     return int(text)
+
+
+_READERS: dict[str, Callable[[str, str], Any]] = {"port": _whole, "resolution": _whole}

@@ -21,6 +21,7 @@ from rgspipe.config.studies import EvaluateConfig, StudyConfig
 from rgspipe.config.targets import TargetsConfig
 from rgspipe.config.track import TrackConfig
 from rgspipe.config.train import TrainConfig
+from rgspipe.config.viewer import ViewerConfig
 from rgspipe.datasets.classes import LightClass
 from rgspipe.degradation.options import Capture, ModelError, TargetCapture
 from rgspipe.options import Options, option
@@ -81,3 +82,4 @@ class RgspipeConfig(Options):
     track: TrackConfig = TrackConfig()
     targets: TargetsConfig = TargetsConfig()
     relight: RelightConfig = RelightConfig()
+    viewer: ViewerConfig = ViewerConfig()

@@ -16,6 +16,13 @@ TOP = 98.0
 def coloured(values: npt.NDArray, gain: float = 1.0) -> tuple[Bytes, float]:
     """(H, W, 3) uint8 of values (H, W), dark blue for 0; and the value of the brightest colour, `gain` times less."""
     top = (float(np.percentile(values, TOP)) or 1.0) / gain
-    levels = np.clip(values / top, 0.0, 1.0)
-    colours = matplotlib.colormaps["viridis"](levels)[..., :3]
-    return np.round(255.0 * colours).astype(np.uint8), top
+    return _colours(np.clip(values / top, 0.0, 1.0)), top
+
+
+def scale() -> Bytes:
+    """(12, 256, 3) uint8 colours from 0 to the brightest."""
+    return _colours(np.tile(np.linspace(0.0, 1.0, 256), (12, 1)))
+
+
+def _colours(levels: npt.NDArray) -> Bytes:
+    return np.round(255.0 * matplotlib.colormaps["viridis"](levels)[..., :3]).astype(np.uint8)

@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 import torch
-import viser
 
 from rgspipe.scene.lights import Light
+from rgspipe.viewer.actions import Action, by_visitor, keys, offer
 from rgspipe.viewer.cameras import axis_of, turned_to
-from rgspipe.viewer.session import OFFERED, Session
+from rgspipe.viewer.session import OFFERED
+from rgspipe.viewer.visit import Visit
 
 #: Length of a gizmo's arms and radius of the ball in it, of the scene's size.
 ARMS, BALL = 0.12, 0.012
@@ -22,35 +23,36 @@ FAINT = 1e-9
 
 
 class LampControls:
-    """Gizmos and fields that change the lamps of a session.
+    """Gizmos and fields that change the lamps of a session."""
 
-    Args:
-        client: the visitor.
-        session: whose lamps.
-        changed: is called after every change.
-    """
-
-    def __init__(self, client: viser.ClientHandle, session: Session, changed: Callable[[], None]) -> None:
-        self._client, self._session, self._changed = client, session, changed
+    def __init__(self, visit: Visit) -> None:
+        self._client, self._session, self._changed = visit.client, visit.session, visit.changed
+        client, session = visit.client, visit.session
         self._chosen, self._gizmos, self._numbers = 0, [], []
         gui = client.gui
-        self._which = gui.add_dropdown("lamp", ["none"], hint="The lamp that the fields below are about.")
-        buttons = (
-            ("add a lamp", "A lamp above the scene's middle; key N.", self.add),
-            ("remove it", "Take the chosen lamp away; key X.", self.remove),
-            ("undo", "Take the last change of lamps back; a whole drag counts as one. Key Z.", self.undo),
+        self._which = gui.add_dropdown("lamp", ["none"], hint="The lamp that the fields below are about. Key T.")
+        actions = (
+            Action("add a lamp", "N", "A lamp above the scene's middle.", self.add),
+            Action("remove it", "X", "Take the chosen lamp away.", self.remove),
+            Action("undo", "Z", "Take the last change of lamps back; a whole drag counts as one.", self.undo),
         )
-        for name, hint, action in buttons:
-            gui.add_button(name, hint=hint).on_click(lambda _, action=action: action())
-        self._kind = gui.add_dropdown("kind", list(OFFERED), hint="Point, spot, sphere or panel, at the same place.")
+        offer(client, *actions)
+        further = (
+            Action("next lamp", "T", "Choose the next lamp.", self._choose_next),
+            Action("next kind", "K", "Make the chosen lamp one of the next kind.", self._next_kind),
+        )
+        keys(client, *further)
+        self._kind = gui.add_dropdown(
+            "kind", list(OFFERED), hint="Point, spot, sphere or panel, at the same place. Key K."
+        )
         self._place = gui.add_vector3("place", (0.0, 0.0, 0.0), step=0.01, hint="Scene units; or drag the gizmo.")
         self._colour = gui.add_rgb("colour", (255, 255, 255), hint="Colour of the lamp; its brightest channel is 255.")
         self._level = gui.add_number("W/sr", 1.0, min=0.0, step=0.01, hint="Intensity of the brightest channel.")
         self._folder = gui.add_folder("shape")
-        self._which.on_update(self._by_visitor(self._choose))
-        self._kind.on_update(self._by_visitor(lambda: self._with(session.as_kind, self._kind.value)))
+        self._which.on_update(by_visitor(self._choose))
+        self._kind.on_update(by_visitor(lambda: self._with(session.as_kind, self._kind.value)))
         for field in (self._place, self._colour, self._level):
-            field.on_update(self._by_visitor(self._read))
+            field.on_update(by_visitor(self._read))
         self.refresh()
 
     def add(self) -> None:
@@ -129,7 +131,7 @@ class LampControls:
         hint = f"The lamp's {number.name.replace('_', ' ')}{' in degrees' if number.unit == '°' else ''}."
         step = 0.5 if number.unit == "°" else 0.005
         field = self._client.gui.add_number(label, round(value, 4), step=step, hint=hint)
-        field.on_update(self._by_visitor(lambda: self._shape(number, field.value)))
+        field.on_update(by_visitor(lambda: self._shape(number, field.value)))
         return field
 
     def _shape(self, number: Any, value: float) -> None:
@@ -155,6 +157,18 @@ class LampControls:
         self._chosen = self._which.options.index(self._which.value)
         self._show_fields()
 
+    def _choose_next(self) -> None:
+        if count := len(self._session.lights):
+            self._chosen = (self._chosen + 1) % count
+            self._which.value = self._which.options[self._chosen]
+            self._show_fields()
+
+    def _next_kind(self) -> None:
+        if lights := self._session.lights:
+            now = lights[self._chosen].kind
+            place = OFFERED.index(now) + 1 if now in OFFERED else 0
+            self._with(self._session.as_kind, OFFERED[place % len(OFFERED)])
+
     def _with(self, action: Callable[..., None], *given: Any) -> None:
         if self._session.lights:
             action(self._chosen, *given)
@@ -163,11 +177,6 @@ class LampControls:
     def _renew(self) -> None:
         self.refresh()
         self._changed()
-
-    @staticmethod
-    def _by_visitor(action: Callable[[], None]) -> Callable[[Any], None]:
-        """Fields also tell of values that the program gave them, which change nothing."""
-        return lambda event: action() if event.client is not None else None
 
 
 def _shown(light: Light) -> tuple[tuple[int, int, int], float]:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections import OrderedDict
-from collections.abc import Callable, Hashable
-from typing import Any, Literal
+from collections.abc import Hashable
+from typing import Literal
 
 import torch
 from torch import Tensor
@@ -18,6 +17,7 @@ from rgspipe.renderer.images.viewed_pixels import ViewedPixels
 from rgspipe.renderer.view_weights import ViewWeights
 from rgspipe.scene import Camera, LightRig
 from rgspipe.scene.lights import Light
+from rgspipe.viewer.kept import Kept
 
 #: How an image is made. `coarse`: soft, a ray a pixel; `soft`: direct light at surfels' centres; `sharp`: where pixels
 #: look, as `FrozenScene.render` and the stage relight have it.
@@ -25,29 +25,6 @@ Quality = Literal["coarse", "soft", "sharp"]
 
 #: Images of single lamps, and views, that are kept.
 KEPT_LAMPS, KEPT_VIEWS = 64, 6
-
-
-class Kept:
-    """The values that were asked for last, by key.
-
-    Args:
-        count: how many.
-    """
-
-    def __init__(self, count: int) -> None:
-        self._count = count
-        self._values: OrderedDict[Hashable, Any] = OrderedDict()
-
-    def __contains__(self, key: Hashable) -> bool:
-        return key in self._values
-
-    def get(self, key: Hashable, make: Callable[[], Any]) -> Any:
-        """The value of `key`, made where it is not kept."""
-        value = self._values.pop(key) if key in self._values else make()
-        self._values[key] = value
-        if len(self._values) > self._count:
-            self._values.popitem(last=False)
-        return value
 
 
 class LampImages:

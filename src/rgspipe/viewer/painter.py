@@ -25,6 +25,9 @@ class Painter:
         show: takes a picture, what its brightest colour stands for, and whether it is the sharp one.
         sharp: pixels along the longer side of pictures at rest.
         turn: is held while a picture is made, as several visitors share the processor and what is kept of images.
+
+    Attributes:
+        at_rest: set while the sharp picture of all that is now is shown.
     """
 
     def __init__(
@@ -36,12 +39,13 @@ class Painter:
         turn: threading.Lock,
     ) -> None:
         self._session, self._camera, self._show, self._sharp, self._turn = session, camera, show, sharp, turn
-        self._news, self._gone = threading.Event(), False
+        self._news, self._gone, self.at_rest = threading.Event(), False, threading.Event()
         self._thread = threading.Thread(target=self._paint, name="rgspipe-painter", daemon=True)
         self._thread.start()
 
     def changed(self) -> None:
         """Something is to be seen that the picture does not show."""
+        self.at_rest.clear()
         self._news.set()
 
     def stop(self) -> None:
@@ -59,6 +63,8 @@ class Painter:
             if self._gone:
                 return
             self._make(quick=False)
+            if not self._news.is_set():
+                self.at_rest.set()
 
     def _make(self, quick: bool) -> None:
         camera = self._camera(self._sharp)
@@ -68,8 +74,9 @@ class Painter:
             session = self._session
             if not quick:
                 session.rest()
-            if quick and not session.images.knows(camera):
+            if quick and not session.images.knows(session.seen(camera)):
                 camera = self._camera(COARSE)
+            camera = session.seen(camera)
             quality = "sharp" if not quick else ("soft" if session.images.knows(camera) else "coarse")
             picture, top = session.picture(camera, quality)
         self._show(picture, top, not quick)

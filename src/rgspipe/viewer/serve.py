@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
+import logging
 import threading
 from collections.abc import Sequence
 from importlib.util import find_spec
@@ -10,17 +13,21 @@ from typing import TYPE_CHECKING
 import torch
 
 from rgspipe.errors import InputError
+from rgspipe.light_export.world import World
 from rgspipe.renderer.frozen import FrozenScene
-from rgspipe.scene import Camera, LightRig
+from rgspipe.scene import Camera
 from rgspipe.scene.lights import Light, as_rig
 from rgspipe.viewer.cameras import first_camera
 from rgspipe.viewer.lamp_images import LampImages
-from rgspipe.viewer.session import Found, Photograph, Session
+from rgspipe.viewer.material import Case, Photograph
+from rgspipe.viewer.search import Finder
+from rgspipe.viewer.visit import Exhibit
 
 if TYPE_CHECKING:
     from rgspipe.viewer.page import Page
+    from rgspipe.viewer.relay import Relay
 
-#: The only address that the viewer listens at: nothing of it leaves the machine.
+#: The only address that the viewer listens at unless another is asked for: nothing of it leaves the machine.
 LOOPBACK = "127.0.0.1"
 
 
@@ -32,32 +39,36 @@ class Viewer:
         pages: of the visitors of now, by their numbers.
     """
 
-    def __init__(
-        self,
-        frozen: FrozenScene,
-        lights: LightRig,
-        photographs: Sequence[Photograph],
-        truth: LightRig,
-        found: Found | None,
-        camera: Camera,
-        port: int,
-        resolution: int,
-    ) -> None:
+    def __init__(self, exhibit: Exhibit, port: int) -> None:
         import viser
 
+        from rgspipe.viewer.picture_controls import theme
+
         self.pages: dict[int, Page] = {}
-        self._turn, self._images = threading.Lock(), LampImages(frozen)
-        self._given = lights, list(photographs), truth, found
-        self._camera, self._resolution = camera, resolution
-        self._server = viser.ViserServer(host=LOOPBACK, port=port, verbose=False)
-        # Sharing would send the page through a server of viser's makers.
-        self._server.gui.configure_theme(show_logo=False, show_share_button=False, dark_mode=True)
+        self._exhibit = exhibit
+        # Both say where they listen, which is another address than that which others are given.
+        logging.getLogger("websockets").setLevel(logging.WARNING)
+        with contextlib.redirect_stdout(io.StringIO()):
+            self._server = viser.ViserServer(host=LOOPBACK, port=port, verbose=False)
+        self._relay: Relay | None = None
+        theme(self._server.gui, dark=True)
         self._server.gui.main_panel.dock_right()
         self._server.gui.set_panel_label("rgspipe")
         self._server.scene.set_up_direction("+z")
         self._server.on_client_connect(self._welcome)
         self._server.on_client_disconnect(self._bye)
         self.url = f"http://{LOOPBACK}:{self._server.get_port()}"
+
+    def open_to(self, address: str, port: int) -> None:
+        """Let others look, at another address of this machine, with a token that `url` then has.
+
+        Raises:
+            InputError: nothing can listen there.
+        """
+        from rgspipe.viewer.relay import Relay
+
+        self._relay = Relay(address, port, self._server.get_port())
+        self.url = self._relay.url
 
     def wait(self) -> None:
         """Serve until the process is interrupted."""
@@ -68,6 +79,8 @@ class Viewer:
 
     def stop(self) -> None:
         """End the server and all pages."""
+        if self._relay is not None:
+            self._relay.stop()
         for page in list(self.pages.values()):
             page.leave()
         self._server.stop()
@@ -75,9 +88,7 @@ class Viewer:
     def _welcome(self, client) -> None:
         from rgspipe.viewer.page import Page
 
-        lights, photographs, truth, found = self._given
-        session = Session(self._images, lights, list(photographs), truth, found=found)
-        self.pages[client.client_id] = Page(client, session, self._camera, self._resolution, self._turn)
+        self.pages[client.client_id] = Page(client, self._exhibit)
 
     def _bye(self, client) -> None:
         page = self.pages.pop(client.client_id, None)
@@ -90,23 +101,26 @@ def view(
     lights: Light | Sequence[Light] | None = None,
     *,
     camera: Camera | None = None,
-    photographs: Sequence[Photograph] = (),
-    truth: Sequence[Light] = (),
-    found: Found | None = None,
+    cases: Sequence[Case] = (),
+    references: Sequence[Photograph] = (),
     port: int = 8080,
     resolution: int = 256,
+    address: str = LOOPBACK,
+    world: World | None = None,
 ) -> Viewer:
     """Show a scene in the browser, at 127.0.0.1 only; returns at once.
 
     Args:
         scene: the scene.
-        lights: the lamps at first; one above the middle if None.
+        lights: the lamps at first; if None those of the first case's fit, or one above the middle.
         camera: of the first picture; in front of the scene if None.
-        photographs: of the scene under lamps that are to be found; see `rgspipe.viewer.session.as_photographs`.
-        truth: those lamps, where they are known.
-        found: lamps that a fit found, whose regions are drawn.
+        cases: photographs of the scene under lamps that are to be found, with truth and fit where these are known; see
+            `rgspipe.viewer.material`.
+        references: further photographs, under lamps that are known.
         port: of the page; the next free one where it is taken.
         resolution: pixels along the longer side of pictures at rest, 32 to 2048.
+        address: of this machine to listen at, if others are to look: then with a token in `url`.
+        world: how scene units came about, for lamps that are exported; metres if None.
 
     Raises:
         InputError: viser is not installed, or an argument is not what it should be.
@@ -118,11 +132,15 @@ def view(
         raise InputError("scene", expected="a FrozenScene", found=found, remedy=remedy)
     if not 32 <= resolution <= 2048:
         raise InputError("resolution", expected="32 to 2048 pixels", found=str(resolution), remedy="256 is usual.")
-    if lights is None:
-        session = Session(LampImages(scene))
-        session.add()
-        lights = session.lights
-    if camera is None:
-        camera = photographs[0].camera if photographs else first_camera(*scene.bounds)
-    rig = tuple(light.to(torch.float64).detached() for light in as_rig(lights))
-    return Viewer(scene, rig, photographs, tuple(truth), found, camera, port, resolution)
+    rig = None
+    if lights is not None:
+        rig = tuple(light.to(torch.float64).detached() for light in as_rig(lights))
+    taken = [photograph for case in cases for photograph in case.photographs]
+    camera = camera or (taken[0].camera if taken else first_camera(*scene.bounds))
+    is_open = address not in (LOOPBACK, "localhost")
+    images, finder = LampImages(scene), Finder(scene)
+    exhibit = Exhibit(images, finder, camera, rig, tuple(cases), tuple(references), resolution, world or World())
+    viewer = Viewer(exhibit, 0 if is_open else port)
+    if is_open:
+        viewer.open_to(address, port)
+    return viewer

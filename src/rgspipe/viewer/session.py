@@ -1,4 +1,4 @@
-"""What one visitor of the viewer has changed: lamps, exposure and photographs, without any page."""
+"""What one visitor of the viewer has changed: lamps, picture and photographs, without any page."""
 
 from __future__ import annotations
 
@@ -6,42 +6,29 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import numpy as np
 import torch
 from torch import Tensor
 
 from rgspipe.datasets.light_file import write_lights
-from rgspipe.errors import InputError
-from rgspipe.evaluation.images import Bytes, display_gain, save_png, signed_difference, tone_map
-from rgspipe.fitting import FitResult, LightSpec, fit_lights
+from rgspipe.evaluation.images import Bytes, beside, display_gain, save_png, signed_difference, tone_map
+from rgspipe.fitting import FitResult
+from rgspipe.light_export.world import LUMENS_PER_WATT, LUMINANCE
 from rgspipe.scene import Camera, LightRig
-from rgspipe.scene.arrays import ArrayLike
 from rgspipe.scene.lights import KINDS, Light
 from rgspipe.viewer.false_colour import coloured
 from rgspipe.viewer.lamp_images import LampImages, Quality
+from rgspipe.viewer.material import Case, Found, Photograph
+from rgspipe.viewer.section import CutCamera
 
 #: Kinds of lamps that are offered.
 OFFERED = ("point", "spot", "sphere", "panel")
 
+#: What pictures show: radiance as a photograph, or what arrives on surfaces in false colours.
+PICTURE, IRRADIANCE, ILLUMINANCE = "picture", "irradiance, W/m²", "illuminance, lux"
+SHOWN = (PICTURE, IRRADIANCE, ILLUMINANCE)
+
 #: Steps that can be undone.
 STEPS = 100
-
-
-@dataclass(frozen=True, eq=False)
-class Photograph:
-    """An image (H, W, 3) of linear radiance and the camera that took it."""
-
-    name: str
-    camera: Camera
-    image: Tensor
-
-
-@dataclass(frozen=True, eq=False)
-class Found:
-    """Lamps that a search found, each with a covariance that begins with its position; none of those if not known."""
-
-    lights: LightRig
-    covariance: tuple[Tensor, ...] = ()
 
 
 @dataclass
@@ -51,19 +38,19 @@ class Session:
     Attributes:
         images: of the scene.
         lights: the lamps that are on.
-        photographs: of the scene under lamps that are looked for.
-        truth: those lamps, where they are known.
-        exposure: stops; at 0 the first picture's 97th percentile is white.
-        irradiance: whether pictures show irradiance in false colours.
-        found: lamps that a search found, with their covariances as `FitResult` has them.
+        case: photographs of the scene under lamps that are looked for.
+        exposure: stops; at 0 the 97th percentile of the first photograph, or else of the first picture, is white.
+        shown: one of SHOWN.
+        section: axis and place of a plane that cuts away what is on the camera's side of it; None for none.
+        found: lamps that a search found.
     """
 
     images: LampImages
     lights: LightRig = ()
-    photographs: list[Photograph] = field(default_factory=list)
-    truth: LightRig = ()
+    case: Case = field(default_factory=Case)
     exposure: float = 0.0
-    irradiance: bool = False
+    shown: str = PICTURE
+    section: tuple[int, float] | None = None
     found: Found | None = None
     _gain: float | None = None
     _past: list[LightRig] = field(default_factory=list)
@@ -90,6 +77,10 @@ class Session:
         self.lights, self._gesture = self._past.pop(), None
         return True
 
+    def forget(self) -> None:
+        """What was done so far cannot be undone."""
+        self._past, self._gesture = [], None
+
     def add(self, kind: str = "point") -> int:
         """A lamp above the middle of the scene, as bright as the others are on average; its index."""
         lower, upper = (corner.double().cpu() for corner in self.images.frozen.bounds)
@@ -112,16 +103,22 @@ class Session:
             index, _of_kind(kind, light.position, light.intensity, light.axis, max(self.images.frozen.size, 1e-6))
         )
 
+    def seen(self, camera: Camera) -> Camera:
+        """A camera with the section before it."""
+        return camera if self.section is None else CutCamera.of(camera, *self.section)
+
     def image(self, camera: Camera, quality: Quality = "sharp") -> Tensor:
         """(H, W, 3) linear radiance, or irradiance where that is shown."""
-        render = self.images.irradiance if self.irradiance else self.images.image
+        render = self.images.image if self.shown == PICTURE else self.images.irradiance
         return render(camera, self.lights, quality)
 
     def picture(self, camera: Camera, quality: Quality = "sharp") -> tuple[Bytes, float]:
-        """(H, W, 3) uint8 for the screen; and what its brightest colour stands for, linear units."""
+        """(H, W, 3) uint8 for the screen; and what its brightest colour stands for."""
         image = self.image(camera, quality)
-        if self.irradiance:
+        if self.shown == IRRADIANCE:
             return coloured(image.mean(dim=2).numpy(), 2.0**self.exposure)
+        if self.shown == ILLUMINANCE:
+            return coloured(LUMENS_PER_WATT * (image @ torch.tensor(LUMINANCE)).numpy(), 2.0**self.exposure)
         if self._gain is None and image.any():
             self._gain = display_gain(image)
         factor = (self._gain or 1.0) * 2.0**self.exposure
@@ -129,37 +126,33 @@ class Session:
 
     def photograph(self, camera: Camera) -> Photograph:
         """Keep what a camera sees now; the lamps of now are the truth, and others' photographs are dropped."""
-        if not same_lights(self.truth, self.lights):
-            self.photographs = []
-        taken = Photograph(
-            f"photograph {len(self.photographs)}", camera, self.images.image(camera, self.lights, "sharp")
-        )
-        self.photographs.append(taken)
-        self.truth = self.lights
+        kept = self.case.photographs if same_lights(self.case.truth, self.lights) else ()
+        image = self.images.image(camera, self.lights, "sharp")
+        taken = Photograph(f"photograph {len(kept)}", camera, image)
+        self.case = Case("taken here", (*kept, taken), self.lights)
         return taken
 
-    def compared(self, index: int) -> Bytes:
-        """A photograph, the picture of the lamps of now, and their signed difference, side by side."""
-        taken = self.photographs[index]
-        now, factor = self.images.image(taken.camera, self.lights, "sharp"), display_gain(taken.image)
-        difference = signed_difference(taken.image, now, factor)
-        return np.concatenate([tone_map(taken.image, factor), tone_map(now, factor), difference], axis=1)
+    def compared(self, photograph: Photograph) -> Bytes:
+        """A photograph, the picture from its camera, and their signed difference, side by side.
 
-    def search(self, lights: str | LightSpec = "auto") -> FitResult:
-        """Find the lights of the photographs; `take` makes them the lamps.
-
-        Raises:
-            InputError: there are no photographs.
+        The picture is that of the lamps of the photograph where these are known, else of those of now.
         """
-        if not self.photographs:
-            remedy = "Take one with the button, or start the viewer with target=DIR."
-            raise InputError("photographs", expected="at least one to find the lights of", found="none", remedy=remedy)
-        cameras, images = zip(*((taken.camera, taken.image) for taken in self.photographs), strict=True)
-        return fit_lights(self.images.frozen, list(cameras), list(images), lights=lights)
+        rig = self.lights if photograph.lights is None else photograph.lights
+        now, factor = self.images.image(photograph.camera, rig, "sharp"), display_gain(photograph.image)
+        difference = signed_difference(photograph.image, now, factor)
+        return beside([tone_map(photograph.image, factor), tone_map(now, factor), difference])
+
+    def open(self, case: Case) -> None:
+        """Look at other photographs, and at what a fit found in them."""
+        self.case, self.found = case, case.found
+        if case.photographs:
+            self._gain = display_gain(case.photographs[0].image)
+        if case.found is not None:
+            self.change(case.found.lights)
 
     def take(self, result: FitResult) -> None:
         """Make what was found the lamps."""
-        self.found = Found(result.lights, result.covariance)
+        self.found = Found.of(result)
         self.change(result.lights)
 
     def save(self, path: str | Path) -> None:
@@ -168,13 +161,7 @@ class Session:
 
     def save_still(self, path: str | Path, camera: Camera) -> None:
         """Write the sharp picture as PNG."""
-        save_png(path, self.picture(camera)[0])
-
-
-def as_photographs(cameras: Sequence[Camera], images: Sequence[ArrayLike]) -> list[Photograph]:
-    """Photographs of cameras and their images (H, W, 3)."""
-    pairs = enumerate(zip(cameras, images, strict=True))
-    return [Photograph(f"view {index}", camera, torch.as_tensor(image)) for index, (camera, image) in pairs]
+        save_png(path, self.picture(self.seen(camera))[0])
 
 
 def same_lights(one: LightRig, other: LightRig) -> bool:

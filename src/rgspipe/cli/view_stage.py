@@ -1,0 +1,114 @@
+"""`python -m rgspipe stage=view`: the configured scene in the browser, with its photographs and fits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from rgspipe.artifacts import Artifact, ArtifactStore
+from rgspipe.cli.compose import compose_config
+from rgspipe.cli.jobs import run_jobs
+from rgspipe.cli.view import serve
+from rgspipe.config import RgspipeConfig
+from rgspipe.errors import InputError
+from rgspipe.pipeline import StageLoader, resolve
+
+#: How the command is written.
+STAGE = "stage=view"
+
+
+def view_stage(overrides: Sequence[str], stage_loader: StageLoader) -> int:
+    """Make the frozen scene if it is not there, and serve its page until the process is interrupted.
+
+    It is no stage of the graph: it makes nothing. Fits are shown that were made with the same settings.
+
+    Raises:
+        InputError: an override cannot be used.
+    """
+    if any(text in ("-m", "--multirun") for text in overrides):
+        remedy = "Leave -m away: one page shows one scene."
+        raise InputError(STAGE, expected="a single run", found="a sweep", remedy=remedy)
+    rest = [text for text in overrides if text != STAGE]
+    made = _Made(rest, stage_loader)
+    if code := run_jobs([*rest, "stage=freeze"], stage_loader, multirun=False):
+        return code
+    return _serve(made)
+
+
+class _Made:
+    """What the stages have made for one configuration."""
+
+    def __init__(self, overrides: Sequence[str], stage_loader: StageLoader) -> None:
+        self._overrides, self._load = list(overrides), stage_loader
+
+    def config(self, stage: str) -> RgspipeConfig:
+        """The configuration of a stage."""
+        return compose_config([*self._overrides, f"stage={stage}"])
+
+    def find(self, stage: str) -> Artifact | None:
+        """The artifact of a stage; None where it is not made, or the scene has no such stage."""
+        config = self.config(stage)
+        try:
+            return ArtifactStore(Path(config.outputs)).find(resolve(config, self._load).key)
+        except InputError:  # A scene without images has no targets to be fitted.
+            return None
+
+
+def _serve(made: _Made) -> int:
+    from rgspipe.datasets.info import INFO
+    from rgspipe.renderer.frozen import FrozenScene
+    from rgspipe.stages.export import world_of
+    from rgspipe.viewer.serve import view
+
+    config, freeze = made.config("freeze"), made.find("freeze")
+    assert freeze is not None
+    dataset = made.find("generate_dataset")
+    world = world_of(config.export.metres, None if dataset is None else dataset.folder() / INFO)
+    page = config.viewer
+    viewer = view(
+        FrozenScene.load(freeze.folder()),
+        cases=_cases(made, config),
+        references=_references(dataset),
+        port=page.port,
+        resolution=page.resolution,
+        address=page.address,
+        world=world,
+    )
+    return serve(viewer)
+
+
+def _cases(made: _Made, config: RgspipeConfig) -> list:
+    """The targets that fits of this configuration are of, each with its truth and fit where there are any."""
+    from rgspipe.datasets.gs3 import load_target
+    from rgspipe.datasets.light_file import read_lights
+    from rgspipe.datasets.location import open_dataset
+    from rgspipe.stages.sources import target_stage
+    from rgspipe.stages.true_lights import truth_file
+    from rgspipe.viewer.material import Case, found_in
+
+    source = next((made.find(stage) for stage in target_stage(config)), None)
+    if config.fit.target is not None:
+        targets = [load_target(config.fit.target, config.fit.base)]
+    elif source is None:
+        return []
+    else:
+        targets = open_dataset(source.folder(), train=False, test=False).targets
+    fits, cases = made.find("fit_light"), []
+    for target in targets:
+        truth = truth_file(config, source, target.name)
+        folder = None if fits is None else fits.path / target.name
+        found = found_in(folder) if folder is not None and folder.is_dir() else None
+        cases.append(Case.of(target, () if truth is None else read_lights(truth), found))
+    return cases
+
+
+def _references(dataset: Artifact | None) -> list:
+    """The held-out views of the dataset, or those of training where none is held out."""
+    from rgspipe.datasets.location import open_dataset
+    from rgspipe.viewer.material import Photograph
+
+    if dataset is None:
+        return []
+    views = open_dataset(dataset.folder(), train=False, targets=False).test
+    views = views or open_dataset(dataset.folder(), test=False, targets=False).train
+    return [Photograph.of(view, view.name) for view in views]

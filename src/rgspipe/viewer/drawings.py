@@ -1,0 +1,104 @@
+"""What is drawn into a visitor's picture: cameras, regions of lamps, their truth, and the way of a search."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import viser
+
+from rgspipe.scene import Camera, LightRig
+from rgspipe.viewer.cameras import pose_of
+from rgspipe.viewer.ellipsoids import region
+from rgspipe.viewer.material import Found, Photograph
+
+#: Length of a camera's frustum, and radius of a true lamp's ball, of the scene's size.
+FRUSTUM, TRUTH = 0.06, 0.015
+
+_FOUND, _TRUE, _WAY, _TAKEN, _ADVISED = (255, 140, 0), (0, 160, 80), (90, 170, 255), (230, 230, 230), (255, 220, 60)
+
+
+class Drawings:
+    """Things in the scene of a visitor.
+
+    Args:
+        scene: the visitor's.
+        size: of the frozen scene.
+        go_to: is called with a camera whose frustum is clicked.
+    """
+
+    def __init__(self, scene: viser.SceneApi, size: float, go_to: Callable[[Camera], None]) -> None:
+        self._scene, self._size, self._go_to = scene, size, go_to
+        self._lamps: list = []
+        self._frusta: list = []
+        self._advised: list = []
+        self._eye: Camera | None = None
+
+    def lamps(self, found: Found | None, truth: LightRig) -> None:
+        """Orange regions of the lamps that were found, the search's way to them in blue, green balls at true ones."""
+        _clear(self._lamps)
+        scene, size = self._scene, self._size
+        if found is not None:
+            for index, (light, covariance) in enumerate(zip(found.lights, found.covariance, strict=False)):
+                mesh = region(light.position, covariance, size)
+                self._lamps.append(scene.add_mesh_simple(f"/found/{index}", *mesh, color=_FOUND, opacity=0.5))
+            self._lamps += [self._way(index, way) for index, way in enumerate(ways(found.path))]
+            for index, light in enumerate(truth):
+                place = tuple(light.position.tolist())
+                self._lamps.append(scene.add_icosphere(f"/truth/{index}", TRUTH * size, _TRUE, position=place))
+
+    def cameras(self, photographs: Sequence[Photograph]) -> None:
+        """A frustum for each photograph."""
+        _clear(self._frusta)
+        self._frusta += [self._frustum(f"/photographs/{k}", one.camera, _TAKEN) for k, one in enumerate(photographs)]
+        self._hide()
+
+    def advised(self, camera: Camera | None) -> None:
+        """The camera that would tell most."""
+        _clear(self._advised)
+        if camera is not None:
+            self._advised.append(self._frustum("/advised", camera, _ADVISED))
+
+    def seen_from(self, camera: Camera) -> None:
+        """The visitor looks through another camera, whose own frustum is hidden."""
+        self._eye = camera
+        self._hide()
+
+    def _hide(self) -> None:
+        for frustum in (*self._frusta, *self._advised) if self._eye is not None else ():
+            away = float(np.linalg.norm(frustum.position - self._eye.origin.numpy()))
+            frustum.visible = away > FRUSTUM * self._size
+
+    def _way(self, index: int, way: np.ndarray) -> viser.LineSegmentsHandle:
+        pairs = np.stack([way[:-1], way[1:]], axis=1)
+        return self._scene.add_line_segments(f"/way/{index}", pairs, _WAY, thickness=2.0, thickness_units="screen")
+
+    def _frustum(self, name: str, camera: Camera, colour: tuple[int, int, int]) -> viser.CameraFrustumHandle:
+        position, wxyz, fov = pose_of(camera)
+        frustum = self._scene.add_camera_frustum(
+            name,
+            fov,
+            camera.width / camera.height,
+            scale=FRUSTUM * self._size,
+            thickness=2.0,
+            thickness_units="screen",
+            color=colour,
+            wxyz=wxyz,
+            position=position,
+        )
+        frustum.on_click(lambda _: self._go_to(camera))
+        return frustum
+
+
+def ways(path: Sequence[LightRig]) -> list[np.ndarray]:
+    """(steps, 3) places of each lamp on the way of a search, as far as it had as many lamps as at its end."""
+    kept = [rig for rig in path if len(rig) == len(path[-1])] if path else []
+    if len(kept) < 2:
+        return []
+    return [np.array([rig[index].position.tolist() for rig in kept]) for index in range(len(kept[-1]))]
+
+
+def _clear(drawn: list) -> None:
+    for item in drawn:
+        item.remove()
+    drawn.clear()

@@ -1,0 +1,191 @@
+"""Photographs, and the search for the lamps in them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from rgspipe.errors import InputError
+from rgspipe.fitting import FitResult
+from rgspipe.viewer.actions import Action, by_visitor, keys, offer
+from rgspipe.viewer.around import cameras_around
+from rgspipe.viewer.drawings import Drawings
+from rgspipe.viewer.material import Found, Photograph
+from rgspipe.viewer.visit import Visit
+
+#: Position error that is asked for where advice is wanted, of the scene's size: that of `fit.wanted_accuracy`.
+WANTED = 0.003
+
+#: At most so many cameras of the dataset are asked which would tell most.
+ASKED = 24
+
+_FREE = "free"
+
+
+class FitControls:
+    """Fields and buttons of photographs.
+
+    Args:
+        visit: the visitor.
+        drawings: into the visitor's scene.
+        lamps_changed: is called where a search or another target has changed the lamps.
+        is_open: whether all that is not the main button begins unfolded.
+    """
+
+    def __init__(
+        self, visit: Visit, drawings: Drawings, lamps_changed: Callable[[], None], is_open: bool = True
+    ) -> None:
+        self._visit, self._session, self._drawings, self._lamps_changed = visit, visit.session, drawings, lamps_changed
+        self._cases = {case.name: case for case in visit.exhibit.cases}
+        self.searching, self._compared = False, -1
+        client, gui = visit.client, visit.client.gui
+        find = Action("find it from the photographs", "F", "Find lamps from the photographs alone.", self.find)
+        self._buttons = offer(client, find, chief=True)
+        self._told = gui.add_markdown("")
+        self._strip = gui.add_image(np.zeros((8, 24, 3), np.uint8), visible=False)
+        with gui.add_folder("photographs", expand_by_default=is_open):
+            self._case = gui.add_dropdown(
+                "target", [*self._cases] or ["none"], hint="Photographs under lamps that are looked for. Key O."
+            )
+            self._case.visible = len(self._cases) > 1
+            self._view = gui.add_dropdown("look from", [_FREE], hint="The camera of a photograph. Key G.")
+            self._buttons += offer(client, *self._actions())
+            self._step = gui.add_slider("step", 0, 1, 1, 1, hint="Lamps on the way of the search, which is blue.")
+        self._case.on_update(by_visitor(self._open))
+        self._view.on_update(by_visitor(self._look))
+        self._step.on_update(by_visitor(self._go_back))
+        keys(
+            client,
+            Action("next camera", "G", "Look through the camera of the next photograph.", self._next_view),
+            Action("next target", "O", "Photographs of the next target.", self._next_case),
+        )
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Show the session's photographs, and what was found in them."""
+        case, found = self._session.case, self._session.found
+        self._view.options = [_FREE, *(one.name for one in self._photographs)]
+        self._drawings.cameras(case.photographs)
+        self._drawings.lamps(found, case.truth)
+        last = 0 if found is None else len(found.path) - 1
+        self._step.visible = last > 0
+        if last > 0:
+            self._step.max = last
+            self._step.value = last
+        count = len(case.photographs)
+        self._told.content = _words(found) if found is not None else f"{count} photograph{'s' * (count != 1)}."
+
+    def find(self) -> None:
+        """Search the lamps of the photographs, and show them with their regions."""
+        self._search(lambda: self._visit.exhibit.finder.find(self._session.case.photographs))
+
+    def refit(self) -> None:
+        """The nearest lamps to those of now that explain the photographs."""
+        self._search(lambda: self._visit.exhibit.finder.refit(self._session.case.photographs, self._session.lights))
+
+    def _actions(self) -> tuple[Action, ...]:
+        return (
+            Action("refit from here", "R", "From the lamps of now, downhill: no search.", self.refit),
+            Action("which view next?", "V", "The camera that would tell most, in yellow.", self._advise),
+            Action("compare", "C", "The next photograph, picture and difference (red: too bright).", self._compare),
+            Action("take a photograph", "P", "Keep this view under the lamps of now, to look for them.", self._take),
+        )
+
+    @property
+    def _photographs(self) -> list[Photograph]:
+        return [*self._session.case.photographs, *self._visit.exhibit.references]
+
+    def _search(self, search: Callable[[], FitResult]) -> None:
+        if self.searching:
+            return
+        self.searching = True
+        for button in self._buttons:
+            button.disabled = True
+        self._told.content = "Somebody else's search goes first …" if self._visit.exhibit.finder.busy else "Searching …"
+        try:
+            self._session.take(search())
+            self._lamps_changed()
+            self.refresh()
+            self._show(0)
+        except InputError:
+            self._told.content = ""
+            raise
+        finally:
+            self.searching = False
+            for button in self._buttons:
+                button.disabled = False
+            self._visit.changed()
+
+    def _take(self) -> None:
+        camera = self._visit.camera()
+        if camera is None:
+            return
+        with self._visit.exhibit.turn:
+            self._session.photograph(camera)
+        self._session.found = None
+        self.refresh()
+        self._told.content += " Move the lamps, then find them."
+
+    def _advise(self) -> None:
+        session, taken = self._session, self._session.case.photographs
+        every = max(1, -(-len(self._visit.exhibit.references) // ASKED))
+        named = [(one.name, one.camera) for one in self._visit.exhibit.references[::every]]
+        named += cameras_around(session.images.frozen, taken[0].camera) if taken else []
+        self._told.content = "Looking through other cameras …"
+        advice = self._visit.exhibit.finder.advice(taken, session.lights, [camera for _, camera in named], WANTED)
+        self._told.content = advice.words([name for name, _ in named]) + " Click the yellow camera to look through it."
+        self._drawings.advised(named[advice.ranked[0].camera][1] if advice.ranked else None)
+
+    def _compare(self) -> None:
+        if self._photographs:
+            self._show((self._compared + 1) % len(self._photographs))
+
+    def _show(self, index: int) -> None:
+        self._compared, photograph = index, self._photographs[index]
+        with self._visit.exhibit.turn:
+            self._strip.image = self._session.compared(photograph)
+        self._strip.label = f"{photograph.name}: photograph, picture, difference"
+        self._strip.visible = True
+
+    def _look(self) -> None:
+        names = [one.name for one in self._photographs]
+        if self._view.value in names:
+            index = names.index(self._view.value)
+            self._visit.go_to(self._photographs[index].camera)
+            self._show(index)
+
+    def _next_view(self) -> None:
+        if options := self._view.options[1:]:
+            place = options.index(self._view.value) + 1 if self._view.value in options else 0
+            self._view.value = options[place % len(options)]
+            self._look()
+
+    def _open(self) -> None:
+        self._session.open(self._cases[self._case.value])
+        self._strip.visible = False
+        self._lamps_changed()
+        self.refresh()
+        self._visit.changed()
+
+    def _next_case(self) -> None:
+        if names := list(self._cases):
+            self._case.value = names[(names.index(self._case.value) + 1) % len(names)]
+            self._open()
+
+    def _go_back(self) -> None:
+        found = self._session.found
+        if found is not None:
+            self._session.change(found.path[int(self._step.value)], "step")
+            self._lamps_changed()
+            self._visit.changed()
+
+
+def _words(found: Found) -> str:
+    """What a fit says of its lamps, and which other numbers of lamps it ruled out."""
+    # Lamps stand in lines of their own, which begin with blanks.
+    text = "\n".join(f"- {line.strip()}" if line.startswith(" ") else f"\n{line}\n" for line in found.told.splitlines())
+    if len(found.costs) > 1:
+        tried = ", ".join(f"{count}: {cost:.4g}" for count, cost in sorted(found.costs.items()))
+        text += f"\nCost by number of lamps: {tried}."
+    return text

@@ -1,0 +1,122 @@
+"""What a visitor is shown beside the scene: photographs, and lamps that a fit found."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pandas as pd
+import torch
+from torch import Tensor
+
+from rgspipe.datasets.covariance_file import read_covariances
+from rgspipe.datasets.gs3 import load_target
+from rgspipe.datasets.json_file import read_json
+from rgspipe.datasets.light_file import read_lights
+from rgspipe.datasets.views import Target, View
+from rgspipe.fitting import FitResult
+from rgspipe.scene import Camera, LightRig
+from rgspipe.scene.arrays import ArrayLike
+
+
+@dataclass(frozen=True, eq=False)
+class Photograph:
+    """An image (H, W, 3) of linear radiance and the camera that took it.
+
+    Attributes:
+        mask: (H, W) the scene's share of each pixel; 1 if None.
+        lights: under which it was taken, where they are known and not looked for.
+    """
+
+    name: str
+    camera: Camera
+    image: Tensor
+    mask: Tensor | None = None
+    lights: LightRig | None = None
+
+    @classmethod
+    def of(cls, view: View, name: str) -> Photograph:
+        """A view of a dataset or target."""
+        return cls(name, view.camera, view.image, view.alpha, None if view.light is None else (view.light,))
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """Lamps that a search found.
+
+    Attributes:
+        covariance: of each, which begins with its position; none of those if not known.
+        told: what is to be thought of them.
+        costs: robust cost of the best rig of each number of lamps that was tried.
+        path: the rigs on the way, from the start that won.
+    """
+
+    lights: LightRig
+    covariance: tuple[Tensor, ...] = ()
+    told: str = ""
+    costs: Mapping[int, float] = field(default_factory=dict)
+    path: tuple[LightRig, ...] = ()
+
+    @classmethod
+    def of(cls, result: FitResult) -> Found:
+        """What a fit found."""
+        steps = tuple(step.lights for step in result.trajectory)
+        return cls(result.lights, result.covariance, repr(result), result.costs, steps)
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """Photographs under lamps that are looked for, the truth and what a fit found, as far as these are known."""
+
+    name: str = "none"
+    photographs: Sequence[Photograph] = ()
+    truth: LightRig = ()
+    found: Found | None = None
+
+    @classmethod
+    def of(cls, target: Target, truth: LightRig = (), found: Found | None = None) -> Case:
+        """A target."""
+        views = [Photograph.of(view, f"{target.name}, view {index}") for index, view in enumerate(target.views)]
+        return cls(target.name, views, truth, found)
+
+
+def as_photographs(cameras: Sequence[Camera], images: Sequence[ArrayLike]) -> list[Photograph]:
+    """Photographs of cameras and their images (H, W, 3)."""
+    pairs = enumerate(zip(cameras, images, strict=True))
+    return [Photograph(f"view {index}", camera, torch.as_tensor(image)) for index, (camera, image) in pairs]
+
+
+def case_in(target: str | Path, found: Found | None = None) -> Case:
+    """The target in a folder; its truth stands in its dataset's folder truth/ where it is known."""
+    return Case.of(load_target(target), truth_of(target), found)
+
+
+def truth_of(target: str | Path) -> LightRig:
+    """The true lamps of a target."""
+    target = Path(target).resolve()
+    known = target.parents[1] / "truth" / f"{target.name}.json"
+    return read_lights(known) if known.exists() else ()
+
+
+def found_in(fit: str | Path) -> Found:
+    """What is in the folder of a target's fit."""
+    path = Path(fit) / "lights.json"
+    lights, told = read_lights(path), read_json(path, "a fit's light file")
+    costs = {int(count): float(cost) for count, cost in told.get("costs", {}).items()}
+    words = f"{told['result']}: {told['reason']}" if "reason" in told else ""
+    return Found(lights, read_covariances(path), words, costs, _path(Path(fit) / "convergence.csv", lights))
+
+
+def _path(table: Path, lights: LightRig) -> tuple[LightRig, ...]:
+    """The rigs of the steps in a fit's convergence.csv, as far as they are of the lights that were found."""
+    if not lights or not table.exists():
+        return ()
+    endings = ["" if index == 0 else f"_{index}" for index in range(len(lights))]
+    rigs = []
+    for row in pd.read_csv(table).to_dict("records"):
+        pairs = zip(lights, endings, strict=True)
+        rig = [one.with_columns({name: row.get(name + end, math.nan) for name in one.columns()}) for one, end in pairs]
+        rigs.append(tuple(rig))
+    return tuple(rig for rig in rigs if None not in rig)

@@ -1,0 +1,87 @@
+"""How the picture is shown: exposure, false colours, a section, dark or light."""
+
+from __future__ import annotations
+
+import numpy as np
+import viser
+
+from rgspipe.viewer.actions import Action, by_visitor, keys
+from rgspipe.viewer.false_colour import scale
+from rgspipe.viewer.session import PICTURE, SHOWN
+from rgspipe.viewer.visit import Visit
+
+#: Stops of a press of a key, and of the slider at most.
+STOPS, MOST_STOPS = 0.5, 6.0
+
+#: Sections that are offered: across which axis.
+SECTIONS = ("none", "across x", "across y", "across z")
+
+
+class PictureControls:
+    """Fields of the picture."""
+
+    def __init__(self, visit: Visit) -> None:
+        self._session, self._changed = visit.session, visit.changed
+        client, gui = visit.client, visit.client.gui
+        self._exposure = gui.add_slider(
+            "exposure", -MOST_STOPS, MOST_STOPS, 0.1, 0.0, hint="Stops; 2 is four times as bright. Keys U and J."
+        )
+        self._shown = gui.add_dropdown(
+            "shows", SHOWN, hint="As a photograph, or what arrives on surfaces with all bounces, in colours. Key I."
+        )
+        self._section = gui.add_dropdown(
+            "section", SECTIONS, hint="Cut away what is on your side of a plane, to look into closed rooms. Key L."
+        )
+        self._place = gui.add_slider("section at", 0.0, 1.0, 0.01, 0.5, hint="From the lower to the upper end.")
+        self._place.visible = False
+        self._scale = gui.add_image(scale(), visible=False)
+        self._legend = gui.add_markdown("")
+        self._dark = gui.add_checkbox("dark page", True, hint="Of the page around the picture.")
+        for field in (self._exposure, self._shown, self._section, self._place):
+            field.on_update(by_visitor(self._read))
+        self._dark.on_update(by_visitor(lambda: theme(client.gui, self._dark.value)))
+        actions = (
+            Action("brighter", "U", "Half a stop brighter.", lambda: self._expose(STOPS)),
+            Action("darker", "J", "Half a stop darker.", lambda: self._expose(-STOPS)),
+            Action("next way to show", "I", "Picture, irradiance, illuminance in turn.", self._show_next),
+            Action("next section", "L", "No section, then one across each axis.", self._cut_next),
+        )
+        keys(client, *actions)
+
+    def tell(self, top: float) -> None:
+        """What the brightest colour of the picture stands for."""
+        shown = self._session.shown
+        unit = "W/(sr·m²)" if shown == PICTURE else shown.rpartition(" ")[2]
+        self._legend.content = f"Brightest colour: {top:.3g} {unit}."
+        self._scale.visible = shown != PICTURE
+
+    def _expose(self, stops: float) -> None:
+        self._exposure.value = float(np.clip(self._exposure.value + stops, -MOST_STOPS, MOST_STOPS))
+        self._read()
+
+    def _show_next(self) -> None:
+        self._shown.value = _next(SHOWN, self._shown.value)
+        self._read()
+
+    def _cut_next(self) -> None:
+        self._section.value = _next(SECTIONS, self._section.value)
+        self._read()
+
+    def _read(self) -> None:
+        session, axis = self._session, SECTIONS.index(self._section.value) - 1
+        session.exposure, session.shown = self._exposure.value, self._shown.value
+        self._place.visible = axis >= 0
+        lower, upper = (corner.double() for corner in session.images.frozen.bounds)
+        session.section = None
+        if axis >= 0:
+            session.section = axis, float(lower[axis] + self._place.value * (upper[axis] - lower[axis]))
+        self._changed()
+
+
+def theme(gui: viser.GuiApi, dark: bool) -> None:
+    """Dark or light. Without viser's button for sharing: it would send the page through a server of its makers."""
+    gui.configure_theme(show_logo=False, show_share_button=False, dark_mode=dark)
+
+
+def _next(choices: tuple[str, ...], now: str) -> str:
+    return choices[(choices.index(now) + 1) % len(choices)]

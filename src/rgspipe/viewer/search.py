@@ -1,0 +1,97 @@
+"""Searches of the page: one at a time, on a copy of the scene, so that nobody's picture waits for them."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+from dataclasses import replace
+
+from rgspipe.errors import InputError
+from rgspipe.fitting import FitResult, FitViews, LightSpec, Search
+from rgspipe.fitting.certainty.advice import ViewAdvice, suggest_views
+from rgspipe.fitting.model.emitter import Emitter
+from rgspipe.fitting.search_lm import fit_from
+from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.scene import Camera, LightRig
+from rgspipe.viewer.kept import Kept
+from rgspipe.viewer.material import Photograph
+
+#: Sets of cameras whose views are kept.
+KEPT_VIEWS = 3
+
+#: Steps of a refit.
+STEPS = 30
+
+
+class Finder:
+    """Finds lamps in photographs.
+
+    Args:
+        frozen: the scene; what fits keep of it is not shared with those who look at it.
+    """
+
+    def __init__(self, frozen: FrozenScene) -> None:
+        self._frozen, self._views, self._turn = replace(frozen), Kept(KEPT_VIEWS), threading.Lock()
+
+    @property
+    def busy(self) -> bool:
+        """Whether somebody's search is under way."""
+        return self._turn.locked()
+
+    def find(self, photographs: Sequence[Photograph], lights: str | LightSpec = "auto") -> FitResult:
+        """The lamps of photographs, from these alone.
+
+        Raises:
+            InputError: there are no photographs.
+        """
+        with self._turn:
+            return self._prepared(photographs, lights).fit(_images(photographs))
+
+    def refit(self, photographs: Sequence[Photograph], start: LightRig) -> FitResult:
+        """The lamps of photographs, as many and of those kinds that `start` has, from there downhill.
+
+        Raises:
+            InputError: there are no photographs, or no lamps to start from.
+        """
+        if not start:
+            raise InputError("lamps", expected="at least one to start from", found="none", remedy="Add a lamp first.")
+        with self._turn:
+            return self._refit(photographs, start)
+
+    def advice(
+        self, photographs: Sequence[Photograph], start: LightRig, candidates: Sequence[Camera], wanted: float
+    ) -> ViewAdvice:
+        """Which of some cameras would tell most about the lamps, from a refit of those of now.
+
+        Args:
+            wanted: position error to reach, fraction of the scene's size.
+
+        Raises:
+            InputError: there are no photographs or no lamps, or nothing explains the photographs.
+        """
+        if not start:
+            raise InputError("lamps", expected="at least one to ask about", found="none", remedy="Find them first.")
+        with self._turn:
+            result = self._refit(photographs, start)
+            if not result.lights:
+                raise InputError("lamps", expected="some light", found="none", remedy="Take a photograph with a lamp.")
+            present = [taken.camera for taken in photographs]
+            return suggest_views(self._frozen, result, present, candidates, wanted=wanted)
+
+    def _refit(self, photographs: Sequence[Photograph], start: LightRig) -> FitResult:
+        views = self._prepared(photographs, "auto")
+        problem = views.problem(views.prepared.stack_images(_images(photographs)), loss=Search().loss)
+        return fit_from(problem, [Emitter.of(light) for light in start], STEPS)
+
+    def _prepared(self, photographs: Sequence[Photograph], lights: str | LightSpec) -> FitViews:
+        if not photographs:
+            remedy = "Take one with the button, or start the viewer with target=DIR."
+            raise InputError("photographs", expected="at least one to find the lights of", found="none", remedy=remedy)
+        cameras = [taken.camera for taken in photographs]
+        masks = [taken.mask for taken in photographs] if all(one.mask is not None for one in photographs) else None
+        key = b"".join(camera.key for camera in cameras), repr(lights), masks and tuple(map(id, masks))
+        return self._views.get(key, lambda: FitViews.prepare(self._frozen, cameras, lights=lights, masks=masks))
+
+
+def _images(photographs: Sequence[Photograph]) -> list:
+    return [taken.image for taken in photographs]

@@ -1,0 +1,62 @@
+"""What is shown beside a scene is read as it was written."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pandas as pd
+import pytest
+import torch
+
+from rgspipe.datasets.light_file import write_lights
+from rgspipe.demo import TARGET
+from rgspipe.scene import PointLight, SpotLight
+from rgspipe.viewer.drawings import ways
+from rgspipe.viewer.material import case_in, found_in
+
+RIG = (PointLight([0.1, 0.2, 0.3], 1.0), SpotLight.shaped("smoothstep", 0.4, 0.1))
+
+
+def write_fit(folder: Path, steps: int) -> None:
+    write_lights(
+        folder / "lights.json", RIG, {"result": "converged", "reason": "It is.", "costs": {"1": 2.0, "2": 1.0}}
+    )
+    rows = []
+    for step in range(steps):
+        moved = [light.at(light.position + 0.1 * step) for light in RIG]
+        second = {f"{name}_1": value for name, value in moved[1].columns().items()}
+        rows.append({"step": step, "loss": 1.0} | moved[0].columns() | second)
+    pd.DataFrame(rows).to_csv(folder / "convergence.csv", index=False)
+
+
+def test_a_fit_is_read_with_its_way(tmp_path: Path) -> None:
+    write_fit(tmp_path, 4)
+    found = found_in(tmp_path)
+    assert [light.kind for light in found.lights] == ["point", "spot"]
+    assert found.told == "converged: It is." and found.costs == {1: 2.0, 2: 1.0} and found.covariance == ()
+    first, second = ways(found.path)
+    torch.testing.assert_close(torch.from_numpy(first)[:, 0], 0.1 + 0.1 * torch.arange(4).double())
+    torch.testing.assert_close(torch.from_numpy(second)[:, 2], 0.1 * torch.arange(4).double())
+
+
+@pytest.mark.parametrize("change", ["gone", "fewer lights", "not finite"])
+def test_a_way_that_cannot_be_read_is_left_out(tmp_path: Path, change: str) -> None:
+    write_fit(tmp_path, 3)
+    table = tmp_path / "convergence.csv"
+    steps = pd.read_csv(table)
+    table.unlink()
+    if change == "fewer lights":
+        steps[[name for name in steps if not name.endswith("_1")]].to_csv(table, index=False)
+    elif change == "not finite":
+        steps.assign(x=float("nan")).to_csv(table, index=False)
+    assert found_in(tmp_path).path == () and ways(()) == []
+
+
+def test_the_target_of_the_demo_is_whole() -> None:
+    case = case_in(TARGET)
+    assert len(case.photographs) == 3 and len(case.truth) == 1
+    for photograph in case.photographs:
+        assert photograph.image.shape == (128, 128, 3) and photograph.lights is None
+        # The lamp is out of sight of all of them.
+        (x, y), depth = photograph.camera.project(case.truth[0].position)
+        assert depth > 0 and 0 < x < 128 and 0 < y < 128
