@@ -9,7 +9,7 @@ TEST_WORKERS ?= 2
 ARGS ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup test test-slurm third-party crash fuzz fuzz-commands smoke reproduce scenes train-study light-study bench docs lint house
+.PHONY: help setup test test-python test-slurm third-party crash fuzz fuzz-commands smoke reproduce scenes train-study light-study bench docs lint house
 
 help:  ## this list
 	@echo "rgspipe: from images of a scene, find its lights"
@@ -19,7 +19,7 @@ help:  ## this list
 setup: $(STAMP)  ## create .venv with the pinned packages (nothing is done when it is up to date)
 
 $(STAMP): requirements.txt pyproject.toml
-	@$(PYTHON) -c 'import sys; v = sys.version_info[:2]; sys.exit(v != (3, 11) and "rgspipe needs Python 3.11, found %d.%d: make PYTHON=/path/to/python3.11 ..." % v)'
+	@$(PYTHON) -c 'import sys; v = sys.version_info[:2]; sys.exit(v != (3, 11) and "The pinned packages, with Blender, need Python 3.11, found %d.%d: make PYTHON=/path/to/python3.11 ..., or see docs/guides/install.md" % v)'
 	test -x $(VENV)/bin/python || $(PYTHON) -m venv $(VENV)
 	$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check -r requirements.txt
 	$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps -e .
@@ -28,6 +28,12 @@ $(STAMP): requirements.txt pyproject.toml
 # Bytecode is written even where it is not otherwise: tests start a hundred processes that import the package.
 test: setup  ## every test
 	PYTHONDONTWRITEBYTECODE= $(VENV)/bin/python -m pytest -q -n $(TEST_WORKERS) --dist loadfile --no-loadscope-reorder $(ARGS)
+
+PYTHON_VENV = $(VENV)-$(shell $(PYTHON) -c 'import sys; print("%d.%d" % sys.version_info[:2])')
+test-python:  ## every test with another Python and the newest packages, without bpy (PYTHON=python3.13; PACKAGES="torch==2.13.0 ...")
+	test -x $(PYTHON_VENV)/bin/python || $(PYTHON) -m venv $(PYTHON_VENV)
+	$(PYTHON_VENV)/bin/python -m pip install --quiet --disable-pip-version-check -e '.[dev]' $(PACKAGES)
+	$(PYTHON_VENV)/bin/python -m pytest -q -n $(TEST_WORKERS) --dist loadfile --no-loadscope-reorder $(ARGS)
 
 test-slurm: setup  ## sweeps on a Slurm cluster of this machine alone (Debian: apt-get install slurm-wlm munge)
 	$(VENV)/bin/python -m pytest -q -m slurm $(ARGS) tests/slurm

@@ -13,6 +13,8 @@ import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from rgspipe.blender.interpreter import HAVE_BLENDER
+
 #: Modules of distributions that are called otherwise.
 MODULES = {
     "flip-evaluator": "flip_evaluator",
@@ -63,6 +65,8 @@ class Part:
     @property
     def remedy(self) -> str:
         """The command that brings it."""
+        if self.name == "bpy":
+            return HAVE_BLENDER
         return f'{sys.executable} -m pip install "{self.name}{self.wanted}"'
 
 

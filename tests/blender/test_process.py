@@ -67,5 +67,7 @@ def test_a_folder_with_another_job_s_images_is_refused(fake_blender, tmp_path: P
 
 def test_without_bpy_the_way_out_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
-    with pytest.raises(InputError, match=r"bpy.*pip install.*scene=external"):
+    with pytest.raises(
+        InputError, match=r"Blender.*pip install.*blender\.python=.*blender\.executable=.*scene=external"
+    ):
         render_dataset(DatasetJob(), tmp_path)

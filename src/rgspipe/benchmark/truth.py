@@ -11,6 +11,7 @@ import torch
 from torch import Tensor
 
 from rgspipe.benchmark.rooms import Room
+from rgspipe.blender.options import OWN_BLENDER, BlenderOptions
 from rgspipe.blender.render_room import render_room
 from rgspipe.blender.room_job import Kind, RoomJob, image_name
 from rgspipe.datasets.exr import read_array
@@ -107,7 +108,13 @@ class Truth:
 
 
 def render_truth(
-    room: Room, folder: Path, *, resolution: int = 128, samples: int = 1024, seed: int = 0
+    room: Room,
+    folder: Path,
+    options: BlenderOptions = OWN_BLENDER,
+    *,
+    resolution: int = 128,
+    samples: int = 1024,
+    seed: int = 0,
 ) -> dict[Kind, float | None]:
     """Render `room` with Cycles into `folder`, and write what the images are into truth.json.
 
@@ -116,6 +123,7 @@ def render_truth(
     Args:
         room: what is rendered.
         folder: receives <kind>/camera_<k>_light_<l>.exr.
+        options: which Blender renders.
         resolution: width and height, pixels.
         samples: per pixel of global images; direct ones take a quarter. A multiple of 8.
         seed: of the path tracer.
@@ -124,7 +132,7 @@ def render_truth(
         by kind the least PSNR [dB] that the truth's own noise allows; None if no noise was seen.
 
     Raises:
-        InputError: bpy is not installed, or `folder` holds images of another room or with other settings.
+        InputError: there is no Blender, or `folder` holds images of another room or with other settings.
         RuntimeError: Blender died.
         ValueError: `samples` cannot be halved.
     """
@@ -142,7 +150,7 @@ def render_truth(
         seed=seed,
     )
     folder = Path(folder)
-    render_room(job, folder)
+    render_room(job, folder, options)
     facts = {"room": room.name, "resolution": resolution, "samples": samples, "direct_samples": job.direct_samples}
     facts |= {"max_bounces": MAX_BOUNCES, "seed": seed, "intensity": 1.0, "field_of_view": room.field_of_view}
     facts |= {"cameras": job.poses, "lights": job.lights}

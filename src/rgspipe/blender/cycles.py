@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import warnings
-
 import bpy
 
 from rgspipe.blender.job import RenderSettings
+from rgspipe.blender.nodes import tree_of
+from rgspipe.errors import InputError
 
 #: Width of the pixel filter [pixels] that makes a single sample fall on the pixel's centre.
 CENTER_FILTER_WIDTH = 0.01
@@ -31,10 +31,8 @@ def configure(scene: bpy.types.Scene, settings: RenderSettings) -> None:
     cycles.use_light_tree = False  # one light needs no tree: a fifth faster, the same image
     cycles.blur_glossy = 0.0
     cycles.film_exposure = 1.0
-    cycles.denoiser = "OPENIMAGEDENOISE"
-    cycles.denoising_input_passes = "RGB_ALBEDO_NORMAL"
-    cycles.denoising_prefilter = "ACCURATE"
-    cycles.denoising_use_gpu = False
+    if settings.denoise:
+        _configure_denoiser(cycles)
     _configure_output(scene, settings)
     _make_world_black(scene)
 
@@ -56,6 +54,22 @@ def use_center_sampling(scene: bpy.types.Scene) -> None:
     cycles.filter_width = CENTER_FILTER_WIDTH
 
 
+def _configure_denoiser(cycles: bpy.types.PropertyGroup) -> None:
+    try:
+        cycles.denoiser = "OPENIMAGEDENOISE"
+    except TypeError:  # its enumeration has no such value
+        raise InputError(
+            "dataset.denoise",
+            expected="false with this Blender, which was built without Open Image Denoise",
+            found="true",
+            remedy="Set it, with four times as many dataset.samples; or take a Blender from blender.org.",
+        ) from None
+    cycles.denoising_input_passes = "RGB_ALBEDO_NORMAL"
+    cycles.denoising_prefilter = "ACCURATE"
+    if bpy.app.version >= (4, 2, 0):
+        cycles.denoising_use_gpu = False
+
+
 def _configure_output(scene: bpy.types.Scene, settings: RenderSettings) -> None:
     render = scene.render
     render.resolution_x = render.resolution_y = settings.resolution
@@ -65,7 +79,8 @@ def _configure_output(scene: bpy.types.Scene, settings: RenderSettings) -> None:
     layer = scene.view_layers[0]
     layer.use_pass_z = layer.use_pass_normal = layer.use_pass_diffuse_color = True
     output = render.image_settings
-    output.media_type = "MULTI_LAYER_IMAGE"
+    if bpy.app.version >= (5, 0, 0):
+        output.media_type = "MULTI_LAYER_IMAGE"
     output.file_format = "OPEN_EXR_MULTILAYER"
     output.color_depth = "32"
     output.exr_codec = "NONE"
@@ -73,10 +88,6 @@ def _configure_output(scene: bpy.types.Scene, settings: RenderSettings) -> None:
 
 def _make_world_black(scene: bpy.types.Scene) -> None:
     world = bpy.data.worlds.new("black")
-    with warnings.catch_warnings():
-        # Blender 5 always uses nodes and says so; older ones must be told.
-        warnings.simplefilter("ignore", DeprecationWarning)
-        world.use_nodes = True
-    world.node_tree.nodes["Background"].inputs["Strength"].default_value = 0.0
+    tree_of(world).nodes["Background"].inputs["Strength"].default_value = 0.0
     world.cycles.sampling_method = "NONE"
     scene.world = world

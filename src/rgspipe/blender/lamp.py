@@ -49,7 +49,8 @@ def _energy(light: Light) -> float:
 
 def _bulb(light: Light) -> bpy.types.Light:
     lamp = bpy.data.lights.new("light", "POINT")
-    lamp.use_soft_falloff = False
+    if "use_soft_falloff" in lamp.bl_rna.properties:  # Blender 4 and later
+        lamp.use_soft_falloff = False
     lamp.shadow_soft_size = light.radius if isinstance(light, SphereLight) else 0.0
     lamp.use_nodes = True
     nodes = _Nodes(lamp.node_tree)

@@ -9,6 +9,7 @@ from pathlib import Path
 import bpy
 from cycles.osl import osl_compile
 
+from rgspipe.blender.nodes import tree_of
 from rgspipe.scene.models import Vector
 
 #: The Phong lobe of `scene/gloss.py`. Of Cycles' own nodes none is it: all follow the half vector.
@@ -115,8 +116,9 @@ def brick_material(
 
 def _empty(name: str) -> tuple[bpy.types.Material, bpy.types.NodeTree]:
     material = bpy.data.materials.new(name)
-    material.node_tree.nodes.clear()
-    return material, material.node_tree
+    tree = tree_of(material)
+    tree.nodes.clear()
+    return material, tree
 
 
 def _diffuse(tree: bpy.types.NodeTree, colour: Vector | bpy.types.NodeSocket) -> bpy.types.Node:

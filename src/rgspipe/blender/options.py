@@ -9,6 +9,22 @@ from rgspipe.options import Options, option
 
 
 @dataclass(frozen=True)
+class BlenderOptions(Options):
+    """Which Blender renders."""
+
+    python: str | None = None
+    """a Python interpreter that rgspipe is installed in with Blender's module, "rgspipe[blender]", which renders; by
+    default the one that runs"""
+    executable: str | None = None
+    """an installed Blender, which renders instead; it takes rgspipe's packages from blender.python, which has to be a
+    Python of Blender's own version"""
+
+
+#: The module in the Python that runs.
+OWN_BLENDER = BlenderOptions()
+
+
+@dataclass(frozen=True)
 class DatasetOptions(Options):
     """How images are made (unused by scene=external)."""
 

@@ -10,14 +10,17 @@ import numpy as np
 from mathutils import Matrix
 
 from rgspipe.blender import cycles
+from rgspipe.blender.exr_files import read_channels, write_channels, write_image
 from rgspipe.blender.job import RenderSettings
 from rgspipe.blender.lamp import place_lamp
 from rgspipe.blender.plan import Frame
-from rgspipe.datasets.exr import read_channels, write_channels, write_image
 from rgspipe.scene import Camera, Light
 
 #: Suffixes of the surface files beside an image, and their channels.
 SURFACE_CHANNELS = {"depth": ("Z",), "normal": ("X", "Y", "Z"), "albedo": ("R", "G", "B")}
+
+#: What Blender called its passes before version 5, and calls them now.
+RENAMED = {"DiffCol": "Diffuse Color"}
 
 #: Of Blender's camera, in its millimetres; only the ratio to the focal length matters.
 SENSOR_WIDTH = 36.0
@@ -78,7 +81,8 @@ class Studio:
         self._scene.render.filepath = str(path)
         bpy.ops.render.render(write_still=True, scene=self._scene.name)
         channels = read_channels(path)
-        return {name.split(".", 1)[1]: values for name, values in channels.items()}
+        parts = {tuple(name.split(".")[1:]): values for name, values in channels.items()}
+        return {f"{RENAMED.get(name, name)}.{channel}": values for (name, channel), values in parts.items()}
 
     def _write_surfaces(self, frame: Frame, folder: Path) -> None:
         place_camera(self._camera, frame.camera)

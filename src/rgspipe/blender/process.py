@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import logging
 import os
 import shutil
 import subprocess
-import sys
 from collections import deque
 from pathlib import Path
 
 import rgspipe
+from rgspipe.blender.interpreter import Blender
 from rgspipe.datasets.json_file import read_json
 from rgspipe.errors import InputError
 from rgspipe.files import write_json
@@ -34,22 +33,12 @@ TAIL_LINES = 15
 log = logging.getLogger(__name__)
 
 
-def require_bpy(where: str, remedy: str) -> None:
-    """Raise InputError about `where` if Blender's module is not installed."""
-    if importlib.util.find_spec("bpy") is None:
-        raise InputError(
-            where,
-            expected="Blender's Python module bpy, which renders the images",
-            found="none",
-            remedy=remedy,
-        )
-
-
-def run_blender(module: str, job: dict, name: str, folder: Path) -> None:
+def run_blender(blender: Blender, module: str, job: dict, name: str, folder: Path) -> None:
     """Have a child process render `job` into `folder`, and follow it.
 
     Args:
-        module: what Python runs, with the paths of job and folder and our own process id; see `child.serve`.
+        blender: what renders.
+        module: what it runs, with the paths of job and folder and our own process id; see `child.serve`.
         job: plain values.
         name: what the progress says is rendered.
 
@@ -62,7 +51,7 @@ def run_blender(module: str, job: dict, name: str, folder: Path) -> None:
     _claim(job, folder)
     scratch = folder / SCRATCH
     scratch.mkdir(exist_ok=True)
-    command = [sys.executable, "-u", "-m", module, str(folder / JOB_FILE), str(folder), str(os.getpid())]
+    command = blender.command(module, str(folder / JOB_FILE), str(folder), str(os.getpid()))
     with subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, text=True,
         errors="replace", env=_environment(scratch),

@@ -5,22 +5,23 @@ from __future__ import annotations
 from pathlib import Path
 
 from rgspipe.blender.child import Frames, Parent, serve
+from rgspipe.blender.interpreter import find_blender
 from rgspipe.blender.job import DatasetJob
-from rgspipe.blender.process import SCRATCH, require_bpy, run_blender
+from rgspipe.blender.options import OWN_BLENDER, BlenderOptions
+from rgspipe.blender.process import SCRATCH, run_blender
 
 
-def render_dataset(job: DatasetJob, folder: Path) -> None:
+def render_dataset(job: DatasetJob, folder: Path, options: BlenderOptions = OWN_BLENDER) -> None:
     """Render the dataset of `job` into `folder`; frames that are already there and whole are kept.
 
     May be killed at any moment and called again: the result is the same.
 
     Raises:
-        InputError: bpy is not installed, the scene cannot be used, or `folder` holds the images of another job.
+        InputError: there is no Blender, the scene cannot be used, or `folder` holds the images of another job.
         RuntimeError: Blender died; the message ends with the last lines it wrote.
     """
-    remedy = "Install it (pip install 'rgspipe[blender]'), or use scene=external with a dataset from disk."
-    require_bpy("scene", remedy)
-    run_blender(__name__, job.to_json(), job.scene, folder)
+    blender = find_blender(options, "scene", "Images that you have need none: scene=external or scene=rgbd.")
+    run_blender(blender, __name__, job.to_json(), job.scene, folder)
 
 
 def _render(content: dict, folder: Path, parent: Parent) -> None:

@@ -5,21 +5,22 @@ from __future__ import annotations
 from pathlib import Path
 
 from rgspipe.blender.child import Frames, Parent, serve
-from rgspipe.blender.process import SCRATCH, require_bpy, run_blender
+from rgspipe.blender.interpreter import find_blender
+from rgspipe.blender.options import OWN_BLENDER, BlenderOptions
+from rgspipe.blender.process import SCRATCH, run_blender
 from rgspipe.blender.room_job import RoomJob
 
 
-def render_room(job: RoomJob, folder: Path) -> None:
+def render_room(job: RoomJob, folder: Path, options: BlenderOptions = OWN_BLENDER) -> None:
     """Render the room of `job` into `folder`; images that are already there and whole are kept.
 
     May be killed at any moment and called again: the result is the same.
 
     Raises:
-        InputError: bpy is not installed, or `folder` holds the images of another job.
+        InputError: there is no Blender, or `folder` holds the images of another job.
         RuntimeError: Blender died; the message ends with the last lines it wrote.
     """
-    require_bpy("path-traced truth", "Install it: pip install 'rgspipe[blender]'.")
-    run_blender(__name__, job.to_json(), job.room, folder)
+    run_blender(find_blender(options, "path-traced truth"), __name__, job.to_json(), job.room, folder)
 
 
 def _render(content: dict, folder: Path, parent: Parent) -> None:

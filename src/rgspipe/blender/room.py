@@ -6,11 +6,11 @@ from pathlib import Path
 
 import bpy
 
+from rgspipe.blender.exr_files import write_channels
 from rgspipe.blender.materials import diffuse_material
 from rgspipe.blender.meshes import add, new_scene, polygon
 from rgspipe.blender.passes import Studio
 from rgspipe.blender.room_job import RoomFrame, RoomJob
-from rgspipe.datasets.exr import write_channels
 
 
 def build_room(job: RoomJob) -> bpy.types.Scene:

@@ -7,9 +7,12 @@ import shutil
 import textwrap
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from rgspipe import __version__
+from rgspipe.blender.interpreter import find_blender
+from rgspipe.blender.options import OWN_BLENDER, BlenderOptions
 from rgspipe.cli.messages import EXIT_FAILED
 from rgspipe.datasets.input_file import input_folder
 from rgspipe.errors import InputError
@@ -27,7 +30,7 @@ def doctor(arguments: Sequence[str]) -> int:
     """Print what is installed, what the machine has, and how accurate and fast it is; the exit status.
 
     Args:
-        arguments: outputs=DIR; check=false leaves the measurements out.
+        arguments: outputs=DIR; check=false leaves the measurements out; blender.* as for stages.
 
     Returns:
         1 if anything that is needed is broken.
@@ -35,12 +38,12 @@ def doctor(arguments: Sequence[str]) -> int:
     Raises:
         InputError: an argument cannot be used.
     """
-    outputs, checked = _parsed(arguments)
+    outputs, checked, blender = _parsed(arguments)
     if outputs.exists():
         input_folder(outputs, "the folder of results")
     host = machine()
     print(f"rgspipe {__version__}, Python {host['python']}, {host['system']}")
-    ills = _installed()
+    ills = _installed() + _blender(blender)
     if not ills:
         _print_machine()
     ills += _disk(outputs)
@@ -53,19 +56,24 @@ def doctor(arguments: Sequence[str]) -> int:
     return EXIT_FAILED
 
 
-def _parsed(arguments: Sequence[str]) -> tuple[Path, bool]:
-    outputs, checked = Path("outputs"), True
+def _parsed(arguments: Sequence[str]) -> tuple[Path, bool, BlenderOptions]:
+    outputs, checked, blender = Path("outputs"), True, BlenderOptions()
     for text in arguments:
         key, _, value = text.partition("=")
         if key == "outputs" and value:
             outputs = Path(value)
         elif key == "check" and value in ("true", "false"):
             checked = value == "true"
+        elif key in ("blender.python", "blender.executable") and value:
+            blender = replace(blender, **{key.removeprefix("blender."): value})
         else:
             raise InputError(
-                repr(text), expected="outputs=DIR or check=false", found="something else", remedy="Correct it."
+                repr(text),
+                expected="outputs=DIR, check=false, blender.python=PATH or blender.executable=PATH",
+                found="something else",
+                remedy="Correct it.",
             )
-    return outputs, checked
+    return outputs, checked, blender
 
 
 def _installed() -> list[str]:
@@ -82,6 +90,18 @@ def _installed() -> list[str]:
     found = "found" if slurm() else "not found"
     print(_wrapped(f"{found}: launcher=slurm sends the jobs of a sweep to a cluster", "  Slurm "))
     return [_ill(part) for part in parts if not part.works]
+
+
+def _blender(options: BlenderOptions) -> list[str]:
+    """Print which Blender renders, where one is named; what has to be done about it."""
+    if options == OWN_BLENDER:
+        return []
+    try:
+        found = find_blender(options, "blender")
+    except InputError as error:
+        return [str(error)]
+    print(_wrapped(f"{found.words} renders", "  "))
+    return []
 
 
 def _listed(parts: Sequence[Part]) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from rgspipe.blender.options import DatasetOptions
+from rgspipe.blender.options import BlenderOptions, DatasetOptions
 from rgspipe.capture.options import CaptureOptions
 from rgspipe.config.benchmark import BenchmarkConfig
 from rgspipe.config.effects import EffectsConfig
@@ -60,6 +60,7 @@ class RgspipeConfig(Options):
     """class of fit targets"""
     scene: SceneConfig = SceneConfig()
     dataset: DatasetOptions = DatasetOptions()
+    blender: BlenderOptions = BlenderOptions()
     capture: Capture = Capture()
     init: InitConfig = InitConfig()
     train: TrainConfig = TrainConfig()

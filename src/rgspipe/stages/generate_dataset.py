@@ -33,7 +33,7 @@ def run(context: StageContext) -> None:
         _take(context, context.inputs["import_scan"].folder())
     else:
         job = replace(dataset_job(context.config), lamps_known=context.config.scene.lamps == "known")
-        render_dataset(job, context.folder)
+        render_dataset(job, context.folder, context.config.blender)
     context.note(kind=context.config.scene.kind)
 
 

@@ -30,7 +30,7 @@ SPOTS = ("spots", "mixed", "drive")
 
 def run(context: StageContext) -> None:
     """Leave the pool's files and images; a repeated run goes on where an interrupted one ended."""
-    render_pool(pool_job(context.config), context.folder)
+    render_pool(pool_job(context.config), context.folder, context.config.blender)
     context.note(kind=context.config.targets.kind, lights=len(read_pool(context.folder)))
 
 

@@ -16,6 +16,7 @@ def run(context: StageContext) -> None:
         name: render_truth(
             ROOMS[name](),
             context.folder / name,
+            context.config.blender,
             resolution=wanted.truth_resolution,
             samples=wanted.truth_samples,
         )

@@ -5,21 +5,23 @@ from __future__ import annotations
 from pathlib import Path
 
 from rgspipe.blender.child import Frames, Parent, serve
+from rgspipe.blender.interpreter import find_blender
+from rgspipe.blender.options import OWN_BLENDER, BlenderOptions
 from rgspipe.blender.pool.job import PoolJob
-from rgspipe.blender.process import SCRATCH, require_bpy, run_blender
+from rgspipe.blender.process import SCRATCH, run_blender
 
 
-def render_pool(job: PoolJob, folder: Path) -> None:
+def render_pool(job: PoolJob, folder: Path, options: BlenderOptions = OWN_BLENDER) -> None:
     """Render the lights of `job` into `folder`; images that are already there and whole are kept.
 
     May be killed at any moment and called again: the result is the same.
 
     Raises:
-        InputError: bpy is not installed, the scene cannot be used, or `folder` holds the images of another job.
+        InputError: there is no Blender, the scene cannot be used, or `folder` holds the images of another job.
         RuntimeError: Blender died; the message ends with the last lines it wrote.
     """
-    require_bpy("fit.targets", "Install it (pip install 'rgspipe[blender]'), or use fit.targets=dataset.")
-    run_blender(__name__, job.to_json(), job.dataset.scene, folder)
+    blender = find_blender(options, "fit.targets", "The dataset's own targets need none: fit.targets=dataset.")
+    run_blender(blender, __name__, job.to_json(), job.dataset.scene, folder)
 
 
 def _render(content: dict, folder: Path, parent: Parent) -> None:
