@@ -44,3 +44,10 @@ def test_a_wall_of_which_nothing_was_seen_is_not_pulled(room):
     wall, floor = room.normals[:, 0] > 0.9, (room.normals[:, 2] > 0.9) & (room.guessed > 0.0)
     assert bool(variance[wall].isinf().all()) and bool((variance[floor] > 0.0).all())
     assert bool(expected.isfinite().all())
+
+
+def test_what_pulls_at_a_guessed_surface_counts_once(room):
+    weight = Ties(room).once(torch.full((len(room), 1), 2.0))
+    assert bool((weight[room.guessed == 0.0] == 2.0).all())
+    for surface in (room.normals[:, 0] > 0.9, (room.normals[:, 2] > 0.9) & (room.guessed > 0.0)):
+        assert float(weight[surface].sum()) == pytest.approx(2.0, rel=1e-5)  # measured 1e-7

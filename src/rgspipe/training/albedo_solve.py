@@ -219,6 +219,7 @@ def pull(prior: AlbedoPrior | None, like: Tensor) -> tuple[Tensor, Tensor]:
 def pulled_to_kin(pulls: tuple[Tensor, Tensor], ties: Ties, albedo: Tensor) -> tuple[Tensor, Tensor]:
     """Weights and targets, with what is expected of guessed surfaces; PULL to GREY is that of a variance of GREY²."""
     (weight, target), (expected, variance) = pulls, ties.expected(albedo)
+    weight = ties.once(weight)
     more = PULL * GREY**2 / variance
     return weight + more, (weight * target + more * expected) / (weight + more)
 

@@ -46,6 +46,10 @@ class Ties:
         expected, _ = self._surfaces.expected(albedo)
         return torch.where(expected.isfinite(), expected, even)
 
+    def once(self, weight: Tensor) -> Tensor:
+        """(N, 1) weights that add up to one surfel's (N, 1) over each guessed surface, which is one unknown."""
+        return weight / self.spread(self._members.to(weight))
+
     def expected(self, albedo: Tensor) -> tuple[Tensor, Tensor]:
         """(N, 3) albedo that guessed surfels should have if others have `albedo` (N, 3), and (N, 1) its variance.
 

@@ -16,6 +16,7 @@ from rgspipe.datasets.views import View
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.transport import with_albedo
 from rgspipe.renderer.view_weights import build_view_weights
+from rgspipe.scene.gloss import Gloss
 from rgspipe.scene.lights import PointLight
 from rgspipe.scene.surfels import Surfels
 from rgspipe.sums import average
@@ -94,8 +95,8 @@ def train(
         surfels, radiance, state, lights = found
         views = [replace(view, light=light) for view, light in zip(views, lights, strict=True)]
     else:
-        if options.steps == 0:
-            surfels = _closed(surfels, views, options)
+        # Before the materials: else the albedo of what is seen makes up for light that is lost where nothing is.
+        surfels = _closed(surfels, views, options, hidden=options.steps == 0)
         surfels, radiance, views = _fit_materials(surfels, views, given, options, log, "materials", prior)
         centers, state = surfels.centers, None
         for _ in range(options.photometric_rounds):
@@ -107,18 +108,26 @@ def train(
         if checkpoint is not None and state is None:
             checkpoint.save(surfels, radiance, None, log.records, [view.light for view in views])
         surfels = _refine_geometry(surfels, radiance, state, views, spacing, options, log, checkpoint, most)
-        # Before the materials: else the albedo of what is seen makes up for light that is lost where nothing is.
-        surfels = _closed(surfels, views, options)
+        surfels = _closed(_seen(surfels), views, options)
         surfels, _, views = _fit_materials(surfels, views, given, options, log, "final materials", prior)
     return Trained(surfels, tuple(log.records), tuple(views), log.stored)
 
 
-def _closed(surfels: Surfels, views: Sequence[View], options: TrainOptions) -> Surfels:
+def _closed(surfels: Surfels, views: Sequence[View], options: TrainOptions, hidden: bool = True) -> Surfels:
     """With surfels on the surfaces that no view shows, if those are wanted."""
     if not options.unseen:
         return surfels
     cameras, lamps, depths = zip(*((view.camera, view.light.position, view.depth) for view in views), strict=True)
-    return with_unseen_surfaces(surfels, cameras, lamps, depths)
+    return with_unseen_surfaces(surfels, cameras, lamps, depths, hidden=hidden)
+
+
+def _seen(surfels: Surfels) -> Surfels:
+    """Without the surfaces that no view shows."""
+    seen, gloss = surfels.guessed == 0.0, surfels.gloss
+    kept = {name: tensor[seen] for name, tensor in surfels.tensors().items()}
+    return replace(
+        surfels, **kept, gloss=None if gloss is None else Gloss(gloss.reflectance[seen], gloss.exponents[seen])
+    )
 
 
 def surfel_spacing(surfels: Surfels) -> float:
