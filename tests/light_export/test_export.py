@@ -99,7 +99,8 @@ def test_mitsuba_s_emitters_have_our_radiance_and_axes(tmp_path: Path) -> None:
         direction = matrix[:3, :3] @ [0, 0, 1]
         np.testing.assert_allclose(direction / np.linalg.norm(direction), AXIS, atol=1e-12)
         assert np.linalg.det(matrix[:3, :3]) > 0.0
-    area = 4.0 * np.linalg.norm(np.cross(matrices[-1][:3, 0], matrices[-1][:3, 1]))
+    rectangle = np.array(root.find("shape[@type='rectangle']//matrix").get("value").split(), dtype=float).reshape(4, 4)
+    area = 4.0 * np.linalg.norm(np.cross(rectangle[:3, 0], rectangle[:3, 1]))
     assert area == pytest.approx(panel.width * panel.height)
 
 

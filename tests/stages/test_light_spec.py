@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import pytest
 
+from luminaire_files import ies
 from rgspipe.config import RgspipeConfig, with_changes
 from rgspipe.config.light import LightConfig
 from rgspipe.errors import InputError
@@ -14,7 +16,7 @@ from rgspipe.options import settings
 from rgspipe.renderer.zonal_harmonics import BandLimit
 from rgspipe.scene.lights import KINDS
 from rgspipe.stages.fit_light import STAGE, band_limit
-from rgspipe.stages.light_spec import light_spec
+from rgspipe.stages.light_spec import light_spec, table_files
 
 
 def test_one_point_light_is_looked_for_by_default() -> None:
@@ -62,6 +64,24 @@ def test_angles_become_radians_and_a_blend_stays_a_share() -> None:
 def test_what_does_not_fit_together_is_refused(changes: dict, message: str) -> None:
     with pytest.raises(InputError, match=message):
         light_spec(with_changes(RgspipeConfig(stage="fit_light"), changes))
+
+
+def test_a_measured_luminaire_is_read_and_counts_among_what_a_fit_was_made_from(tmp_path: Path) -> None:
+    for name in ("a.ies", "b.ies"):
+        (tmp_path / name).write_text(ies())
+    plain = RgspipeConfig(stage="fit_light")
+    config = with_changes(plain, {"light.type": "profile", "light.file": str(tmp_path / "b.ies")})
+    assert light_spec(config).shape.table.name == "b.ies" and table_files(config) == [tmp_path / "b.ies"]
+    config = with_changes(plain, {"light.type": "profile", "light.catalogue": str(tmp_path)})
+    spec = light_spec(config)
+    assert spec.shape_free and [one.table.name for one in spec.shape.variants()] == ["a.ies", "b.ies"]
+    assert table_files(config) == [tmp_path]
+    both = {"light.file": str(tmp_path / "a.ies"), "light.catalogue": str(tmp_path)}
+    for changes, message in ((both, "null with light.file"), (both | {"light.type": "led"}, "null, but for profiles")):
+        with pytest.raises(InputError, match=message):
+            light_spec(with_changes(config, changes))
+    with pytest.raises(InputError, match="no such file"):
+        light_spec(with_changes(plain, {"light.type": "profile", "light.file": "missing.ies"}))
 
 
 def test_the_paper_s_method_takes_rigs_and_spots_of_known_number() -> None:

@@ -45,7 +45,9 @@ def cone(light: AxialLight) -> tuple[float, float]:
         return math.acos(min(1.0, edge + float(light.falloff) * (1.0 - edge))), float(light.cone_angle)
     angles = torch.linspace(0.0, 0.5 * math.pi, 1801, dtype=torch.float64)
     share = light.relative_intensity_at(angles)
-    inner, outer = (float(angles[share >= level][-1]) for level in (0.9, 0.01))
+    # Measured luminaires may be brightest to their sides, or dark below.
+    lit = (angles[share >= level * float(share.max())] for level in (0.9, 0.01))
+    inner, outer = (float(part[-1]) for part in lit)
     return inner, outer
 
 

@@ -27,6 +27,7 @@ from rgspipe.stages.base import Need, Stage, StageContext
 from rgspipe.stages.fit_capture import captured_views
 from rgspipe.stages.fit_light import Fitter
 from rgspipe.stages.fit_targets import used_views
+from rgspipe.stages.light_spec import table_files
 from rgspipe.stages.spoken import COMMAND_LINE
 
 
@@ -109,7 +110,8 @@ def _inputs(config: RgspipeConfig) -> list[Need | str]:
 
 
 def _files(config: RgspipeConfig) -> list[Path]:
-    return [] if config.track.folder is None else files_read(config.track.folder)
+    tables = table_files(config)
+    return tables if config.track.folder is None else [*tables, *files_read(config.track.folder)]
 
 
 STAGE = Stage(

@@ -26,8 +26,9 @@ log = logging.getLogger(__name__)
 #: Numbers of the random streams; part of the seed, so never renumber them.
 STREAMS = {"points": 10, "spots": 11, "drive": 12, "spheres": 13, "panels": 14, "suns": 15}
 
-#: Suns are seen, hidden and in frames as a point so many times the scene's diagonal away is.
-SUN_DISTANCE = 1e3
+#: Suns are seen, hidden and in frames as a point so many times the scene's diagonal away is: rays of Blender's tree
+#: are in float32, and from farther away miss the place that they are to end at.
+SUN_DISTANCE = 30.0
 
 
 @dataclass(frozen=True)
