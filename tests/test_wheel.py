@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
+import urllib.request
 import zipfile
 from pathlib import Path
 
@@ -36,14 +38,34 @@ def test_a_wheel_holds_code_types_settings_and_pipelines(wheel: Path) -> None:
     assert not [name for name in names if name.startswith(("tests", "docs", "examples"))]
 
 
-def test_an_unpacked_wheel_runs_from_any_folder(wheel: Path, tmp_path: Path) -> None:
-    site, elsewhere = tmp_path / "site", tmp_path / "elsewhere"
-    zipfile.ZipFile(wheel).extractall(site)
-    elsewhere.mkdir()
+@pytest.fixture(scope="module")
+def site(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The wheel, unpacked."""
+    folder = tmp_path_factory.mktemp("site")
+    zipfile.ZipFile(wheel).extractall(folder)
+    return folder
+
+
+def test_an_unpacked_wheel_runs_from_any_folder(site: Path, tmp_path: Path) -> None:
     script = "import rgspipe, sys; print(rgspipe.__file__); from rgspipe.cli import main; sys.exit(main(['--help']))"
     environment = {**os.environ, "PYTHONPATH": str(site)}
-    run = subprocess.run([sys.executable, "-c", script], cwd=elsewhere, env=environment, capture_output=True, text=True)
+    run = subprocess.run([sys.executable, "-c", script], cwd=tmp_path, env=environment, capture_output=True, text=True)
     assert run.returncode == 0, run.stderr
     assert run.stdout.startswith(str(site))
     assert "cornell" in run.stdout
-    assert not list(elsewhere.iterdir())
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.slow
+def test_the_demo_comes_along(site: Path, tmp_path: Path) -> None:
+    """6 s of processor time; nothing but the wheel is read, and nothing written where it runs."""
+    script = "import sys; from rgspipe.cli import main; sys.exit(main(['demo', 'port=0']))"
+    environment = {**os.environ, "PYTHONPATH": str(site), "OMP_NUM_THREADS": "1"}
+    command = [sys.executable, "-c", script]
+    with subprocess.Popen(command, cwd=tmp_path, env=environment, stdout=subprocess.PIPE, text=True) as process:
+        url = next((line for line in process.stdout if "Ctrl-C" in line), "").partition(" ")[0]
+        with urllib.request.urlopen(url, timeout=60) as page:
+            assert page.status == 200
+        process.send_signal(signal.SIGINT)
+        assert process.wait(timeout=60) == 0
+    assert not list(tmp_path.iterdir())

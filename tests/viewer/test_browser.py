@@ -77,7 +77,7 @@ def opened(browser, url: str, width: int, height: int):
 
 @pytest.fixture(scope="module")
 def window(viewer: Viewer, browser) -> Iterator:
-    page = opened(browser, viewer.url, 900, 700)
+    page = opened(browser, viewer.url, 640, 480)
     page.get_by_text("Brightest colour").wait_for()
     yield page
     elsewhere = [url for url in page.asked if not url.startswith((viewer.url, "data:", "blob:"))]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+
 import pytest
 import torch
 
@@ -11,6 +13,7 @@ from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import PointLight
 from rgspipe.scene.lights.sphere import SphereLight
 from rgspipe.viewer.around import cameras_around
+from rgspipe.viewer.lamp_images import LampImages
 from rgspipe.viewer.material import Photograph
 from rgspipe.viewer.search import Finder
 
@@ -43,6 +46,20 @@ def test_a_refit_keeps_the_kind(finder: Finder, photographs: list[Photograph]) -
     assert [light.kind for light in result.lights] == ["sphere"]
     # A small sphere shines as a point does, but for shadows' edges: measured 1.1e-3.
     assert torch.allclose(result.lights[0].position, LAMP.position, atol=1e-2)
+
+
+def test_pictures_are_made_while_a_search_runs(
+    finder: Finder, frozen: FrozenScene, photographs: list[Photograph]
+) -> None:
+    images, camera = LampImages(frozen), photographs[0].camera
+    alone = images.image(camera, (LAMP,), "soft")
+    search = threading.Thread(target=finder.find, args=(photographs, "point"))
+    search.start()
+    made = []
+    while search.is_alive():
+        made.append(LampImages(frozen).image(camera, (LAMP,), "soft"))
+    # Measured 21.
+    assert len(made) > 3 and all(torch.equal(image, alone) for image in made)
 
 
 def test_another_camera_is_advised(finder: Finder, frozen: FrozenScene, photographs: list[Photograph]) -> None:

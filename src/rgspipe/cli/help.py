@@ -47,6 +47,7 @@ SCENES = """\
   rgbd       a scan, with the lamps that were on unknown: scene=rgbd scene.path=DIR"""
 
 EXAMPLES = """\
+  python -m rgspipe demo                                            a small room in the browser, in seconds
   python -m rgspipe pipeline=smoke                                  the whole way, tiny, in minutes
   python -m rgspipe pipeline=reproduce                              the whole way, with a report at the end
   python -m rgspipe stage=train_surfels scene=cornell               a trained scene (and the images before it)
