@@ -58,6 +58,7 @@ def test_a_panel_is_found_with_axis_sides_and_turn(room) -> None:
     (found,) = result.lights
     errors = rig_errors(result.lights, (truth,), 1.0)
     assert isinstance(found, PanelLight) and result.status is FitStatus.CONVERGED
+    assert found == found.told
     # Measured 1.4e-8, 2e-6 degrees and 9e-8.
     assert errors.position < 1e-6 and errors.axis < 1e-4 and errors.shape < 1e-5
     assert math.isclose(float(found.power()[0] / truth.power()[0]), 1.0, rel_tol=1e-6)

@@ -110,6 +110,20 @@ class Undetermined(Finding):
 
 
 @dataclass(frozen=True)
+class RoughShape(Finding):
+    """The views hardly tell some `fields` of the shape of light `number` (from 1) of `count`.
+
+    Their standard deviations are the shares `errors` of them; of an angle, of that of one of which nothing is known.
+    """
+
+    number: int
+    count: int
+    fields: tuple[str, ...]
+    errors: tuple[float, ...]
+    status = FitStatus.UNDETERMINED
+
+
+@dataclass(frozen=True)
 class Uncertain(Finding):
     """Light `number` of `count` is expected to be off by `error`, a part of the scene's size; `distant` ones rad."""
 

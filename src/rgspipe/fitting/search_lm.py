@@ -132,12 +132,19 @@ def _polished(refiner: Refiner, best: State, iterations: int) -> tuple[Refiner, 
     Returns:
         the refiner on the problem with the exposures that were found, from here on taken as known; and the rig.
     """
-    best = refiner.refined(refiner.at(best, best.emitters), PLAIN, iterations)
+    best = refiner.refined(refiner.at(best, _told(best)), PLAIN, iterations)
+    if (told := _told(best)) != best.emitters:
+        best = refiner.at(best, told)
     problem = refiner.problem
     if problem.exposure_free:
         exposures = problem.moments(best.columns, PLAIN.at(problem, best.columns, best.intensity)).exposures
         problem = replace(problem.with_exposures(exposures), exposure_free=False)
     return refiner.on(problem), best
+
+
+def _told(state: State) -> tuple[Emitter, ...]:
+    """The lights of a rig by the numbers that results tell."""
+    return tuple(emitter.told for emitter in state.emitters)
 
 
 def _result(

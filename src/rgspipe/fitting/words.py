@@ -22,6 +22,7 @@ from rgspipe.fitting.findings import (
     OnSurface,
     PoorScene,
     Rival,
+    RoughShape,
     Uncertain,
     Undetermined,
     gravest,
@@ -105,8 +106,14 @@ def _spare(found: LightSpare, spoken: Spoken) -> str:
 
 
 def _undetermined(found: Undetermined, spoken: Spoken) -> str:
-    names = " and ".join(FIELDS.get(name, name.replace("_", " ")) for name in found.fields)
+    names = " and ".join(map(_field, found.fields))
     return f"Not determined by these views: {names}{_of_light(found.number, found.count)}."
+
+
+def _rough(found: RoughShape, spoken: Spoken) -> str:
+    errors = zip(found.fields, found.errors, strict=True)
+    names = " and ".join(f"{_field(name)} (by {percent(min(error, 1.0))})" for name, error in errors)
+    return f"Hardly determined by these views: {names}{_of_light(found.number, found.count)}."
 
 
 def _uncertain(found: Uncertain, spoken: Spoken) -> str:
@@ -170,6 +177,7 @@ _WORDS: dict[type[Finding], Callable[..., str]] = {
     Rival: _rival,
     LightSpare: _spare,
     Undetermined: _undetermined,
+    RoughShape: _rough,
     Uncertain: _uncertain,
     OnSurface: _on_surface,
     PoorScene: _poor_scene,
@@ -187,6 +195,10 @@ _WORDS: dict[type[Finding], Callable[..., str]] = {
 def percent(share: float) -> str:
     """A share in words."""
     return f"{100.0 * share:.0f} %"
+
+
+def _field(name: str) -> str:
+    return FIELDS.get(name, name.replace("_", " "))
 
 
 def _of_light(number: int, count: int) -> str:

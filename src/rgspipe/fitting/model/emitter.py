@@ -81,6 +81,12 @@ class Emitter:
         """The light with `intensity` (3,)."""
         return replace(self.light, intensity=intensity)
 
+    @property
+    def told(self) -> Emitter:
+        """The emitter by the numbers that results tell; itself where it is told by these."""
+        light = self.light.told
+        return self if light == self.light else replace(self, light=light)
+
     def placed(self, position: Tensor) -> Emitter:
         """The emitter at another place."""
         return replace(self, light=self.light.at(position))
@@ -108,8 +114,8 @@ class Emitter:
 
     def distance(self, other: Emitter, size: float) -> float:
         """The largest of the move over the scene's size, the turn of the axis and the change of the shape [rad]."""
-        movable = self.light.coordinates(shape_free=True)
-        return max(one.distance(self._value(name), other._value(name), size) for name, one in movable.items())
+        movable, same = self.light.coordinates(shape_free=True), replace(other, light=other.light.like(self.light))
+        return max(one.distance(self._value(name), same._value(name), size) for name, one in movable.items())
 
     def stretch(self, step: Tensor) -> tuple[float, float]:
         """How far a step (D,) moves over the scene's size, and how far it turns and reshapes [rad, or a parameter]."""

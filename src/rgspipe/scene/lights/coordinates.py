@@ -40,6 +40,10 @@ class Coordinate(ABC):
     def distance(self, value: Any, other: Any, size: float) -> float:
         """How far apart two values are: over the scene's size, or rad."""
 
+    def doubt(self, value: Any, deviation: float) -> float:
+        """What share of a value its standard deviation is; 0 where such a share says nothing."""
+        return 0.0
+
     def stretch(self, step: Tensor) -> tuple[float, float]:
         """How far a step (d,) moves, over the scene's size, and turns or reshapes [rad, or a parameter]."""
         return 0.0, float(step.abs().max())
@@ -241,6 +245,9 @@ class Length(Coordinate):
     def distance(self, value: float, other: float, size: float) -> float:
         return abs(value - other) / size if size > 0.0 else 0.0
 
+    def doubt(self, value: float, deviation: float) -> float:
+        return deviation / value if value > 0.0 else math.inf
+
 
 @dataclass(frozen=True)
 class Turn(Coordinate):
@@ -260,6 +267,10 @@ class Turn(Coordinate):
 
     def distance(self, value: float, other: float, size: float) -> float:
         return abs(math.remainder(value - other, self.period))
+
+    def doubt(self, value: float, deviation: float) -> float:
+        """Over the deviation of an angle of which nothing is known."""
+        return deviation / (self.period / math.sqrt(12.0))
 
 
 PLACE, AXIS, LENGTH, KNOWN = Place(), Axis(), Length(), Known()

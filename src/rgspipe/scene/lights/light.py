@@ -176,6 +176,15 @@ class Light(ByValue, ABC):
         """The light in one point that a search looks for in its stead; itself if it has no extent."""
         return self
 
+    @property
+    def told(self) -> Self:
+        """The same light by the numbers that results tell, where several sets of them mean the same."""
+        return self
+
+    def like(self, other: Light) -> Self:
+        """The same light by the numbers that are nearest to those of another of its kind."""
+        return self
+
     def nodes(self, values: Mapping[str, Tensor], few: bool = False) -> Nodes | None:
         """The points that it is made of; None if it stands in one.
 
