@@ -177,6 +177,37 @@ class MaybeOneMore(Finding):
 
 
 @dataclass(frozen=True)
+class Hangs(Finding):
+    """Light `number` (from 1) of `count`, known to hang on a surface, is `distance` scene units before it."""
+
+    number: int
+    count: int
+    distance: float
+    status = FitStatus.CONVERGED
+
+
+@dataclass(frozen=True)
+class ExtentOpen(Finding):
+    """Light `number` (from 1) of `count` is a point to these views, and may be a `kind` of up to `size` scene units."""
+
+    number: int
+    count: int
+    kind: str
+    size: float
+    status = FitStatus.CONVERGED
+
+
+@dataclass(frozen=True)
+class KindOpen(Finding):
+    """Light `number` (from 1) of `count` explains the target as well as a light of another `kind`."""
+
+    number: int
+    count: int
+    kind: str
+    status = FitStatus.CONVERGED
+
+
+@dataclass(frozen=True)
 class ExposureUnknown(Finding):
     """A single view cannot tell its exposure from the lights' intensity."""
 

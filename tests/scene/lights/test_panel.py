@@ -28,6 +28,7 @@ def corners(light: PanelLight) -> torch.Tensor:
     return light.position + 0.5 * (signs[:, :1] * light.width * across + signs[:, 1:] * light.height * up)
 
 
+@settings(deadline=None)
 @given(SIDES, SIDES, TURNS)
 def test_the_told_form_is_the_same_panel(width: float, height: float, turn: float) -> None:
     light = panel(width, height, turn)

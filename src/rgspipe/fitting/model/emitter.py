@@ -10,8 +10,9 @@ from itertools import accumulate
 import torch
 from torch import Tensor
 
+from rgspipe.fitting.model.mount import Mount
 from rgspipe.scene.lights import Light
-from rgspipe.scene.lights.coordinates import KNOWN, Coordinate, OnPlane
+from rgspipe.scene.lights.coordinates import Coordinate
 
 #: R, G and B.
 COLOURS = 3
@@ -29,13 +30,13 @@ class Emitter:
         light: float64 on the CPU; its intensity is not looked at.
         shape_free: whether its shape moves.
         softness: by how much its edge of light is widened for now [rad]; see `Light.relative_intensity`.
-        plane: (3,) float64 normal of the surface that it lies on and shines away from; None where it is free.
+        mount: the surface that it is known to hang on; None where it is free.
     """
 
     light: Light
     shape_free: bool = False
     softness: float = 0.0
-    plane: Tensor | None = None
+    mount: Mount | None = None
 
     @classmethod
     def of(cls, light: Light, shape_free: bool = False) -> Emitter:
@@ -70,7 +71,7 @@ class Emitter:
     def coordinates(self) -> dict[str, Coordinate]:
         """By the light's fields."""
         free = self.light.coordinates(self.shape_free)
-        return free if self.plane is None else free | {"position": OnPlane(self.plane), "direction": KNOWN}
+        return free if self.mount is None else free | self.mount.coordinates(self.light)
 
     @cached_property
     def parameters(self) -> int:

@@ -114,6 +114,52 @@ class OnPlane(Place):
         return tangents(self.normal).T
 
 
+@dataclass(frozen=True)
+class BeforePlane(Place):
+    """A position before a plane: along it in units of the scene's size, away from it by the logarithm.
+
+    So a lamp that hangs close to a surface keeps on its side of it, and no step takes it far away.
+
+    Attributes:
+        place, normal: (3,) float64 of the plane, the normal of unit length.
+        nearest, farthest: bounds of the distance, in parts of the scene's size.
+    """
+
+    place: Tensor
+    normal: Tensor
+    nearest: float
+    farthest: float
+
+    def units(self, value: Tensor, size: float) -> list[float]:
+        return [size, size, self._distance(value, size)]
+
+    def moved(self, value: Tensor, step: Tensor, size: float) -> Tensor:
+        grown = self._distance(value, size) * math.exp(min(max(float(step[2]), -1.0), 1.0))
+        distance = min(max(grown, self.nearest * size), self.farthest * size)
+        beside = value - ((value - self.place) @ self.normal) * self.normal
+        return beside + size * step[:2] @ tangents(self.normal) + distance * self.normal
+
+    def offset(self, value: Tensor, other: Tensor, size: float) -> Tensor:
+        return self._axes @ (other - value) / torch.tensor(self.units(value, size), dtype=torch.float64)
+
+    def stretch(self, step: Tensor) -> tuple[float, float]:
+        return float(step[:2].norm()), float(step[2].abs())
+
+    def slopes(self, value: Tensor, by: Tensor) -> Tensor:
+        return by @ self._axes.T.to(by)
+
+    def spread(self, value: Tensor) -> Tensor:
+        return self._axes.T
+
+    @property
+    def _axes(self) -> Tensor:
+        return torch.cat([tangents(self.normal), self.normal[None]])
+
+    def _distance(self, value: Tensor, size: float) -> float:
+        distance = float((value - self.place) @ self.normal)
+        return min(max(distance, self.nearest * size), self.farthest * size)
+
+
 class Known(Coordinate):
     """A vector that does not move."""
 

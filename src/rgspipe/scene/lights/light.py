@@ -167,6 +167,11 @@ class Light(ByValue, ABC):
         return False
 
     @property
+    def faces_away(self) -> bool:
+        """Whether one that hangs on a surface shines straight away from it, rather than being aimed."""
+        return False
+
+    @property
     def plain(self) -> Light:
         """The simpler light at its place that a fit tries instead; itself if there is none."""
         return self

@@ -71,6 +71,10 @@ class PanelLight(AxialLight):
         return True
 
     @property
+    def faces_away(self) -> bool:
+        return True
+
+    @property
     def seed(self) -> LedLight:
         return LedLight(self.position, self.intensity, self.direction, 1.0)
 
