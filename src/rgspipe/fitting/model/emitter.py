@@ -6,11 +6,13 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import accumulate
+from typing import ClassVar
 
 import torch
 from torch import Tensor
 
 from rgspipe.fitting.model.mount import Mount
+from rgspipe.renderer.unit_light import WHOLE, Share
 from rgspipe.scene.lights import Light
 from rgspipe.scene.lights.coordinates import Coordinate
 
@@ -32,6 +34,8 @@ class Emitter:
         softness: by how much its edge of light is widened for now [rad]; see `Light.relative_intensity`.
         mount: the surface that it is known to hang on; None where it is free.
     """
+
+    share: ClassVar[Share] = WHOLE
 
     light: Light
     shape_free: bool = False
