@@ -161,7 +161,7 @@ def _extent_open(found: ExtentOpen, spoken: Spoken) -> str:
 
 
 def _kind_open(found: KindOpen, spoken: Spoken) -> str:
-    return f"{_the_light(found.number, found.count)} may as well be a {found.kind}: these views do not tell."
+    return f"{_the_light(found.number, found.count)} may as well be of the kind {found.kind}: these views do not tell."
 
 
 def _elsewhere(found: LampElsewhere, spoken: Spoken) -> str:

@@ -25,7 +25,7 @@ from rgspipe.scene.lights.coordinates import (
 SIZE = 2.5
 BETWEEN, POSITIVE, RATIO = Between(0.02, 1.5), Positive(0.01, 1.0), Ratio(0.5, 1000.0)
 
-FOOT, UP = torch.tensor([0.3, -0.2, 0.1]).double(), torch.tensor([0.0, 0.6, 0.8]).double()
+FOOT, UP = (torch.tensor(values, dtype=torch.float64) for values in ([0.3, -0.2, 0.1], [0.0, 0.6, 0.8]))
 BEFORE = BeforePlane(FOOT, UP, 0.002, 0.15)
 
 components = st.floats(-1.0, 1.0)

@@ -24,6 +24,9 @@ from rgspipe.fitting.spec import LightSpec
 from rgspipe.scene import Light
 from rgspipe.scene.lights import LedLight, PanelLight, SphereLight, SpotLight
 
+#: From the largest sphere that has room on, so many halves of it are asked whether they would be noticed.
+HALVINGS = 6
+
 
 def told_kinds(
     refiner: Refiner, answer: State, spec: LightSpec, options: SearchOptions
@@ -73,11 +76,22 @@ class _OneLight:
         if self._worth(beam):
             tried += self._beams(answer, torch.nn.functional.normalize(beam.best, dim=0))
         best = self._chosen(tried)
-        # A sphere that nobody would notice: its signal, which goes with the fourth power of its size, does not count.
+        sized = self._unseen(answer, largest, extent.signal) if best is answer else []
+        return best, [*sized, *self._open(tried)]
+
+    def _unseen(self, answer: State, sphere: SphereLight, signal: float) -> list[Finding]:
+        """A sphere that nobody would notice, the largest of `sphere` and its halves; nothing where each would be.
+
+        Args:
+            signal: of `sphere`, see `Promise`.
+        """
         counts = self.options.bar.least / (1.0 - self.options.bar.least)
-        unseen = largest.radius * min(1.0, (counts / max(extent.signal, 1e-300)) ** 0.25)
-        open_size = [ExtentOpen(self.index + 1, len(answer.emitters), SphereLight.kind, unseen)]
-        return best, [*(open_size if best is answer else []), *self._open(tried)]
+        for _ in range(HALVINGS):
+            if signal < counts and sphere.radius > 0.0:
+                return [ExtentOpen(self.index + 1, len(answer.emitters), sphere.kind, sphere.radius)]
+            sphere = replace(sphere, radius=0.5 * sphere.radius)
+            signal = extent_promised(self.refiner, answer, self.index, sphere).signal
+        return []
 
     def _beams(self, answer: State, axis: torch.Tensor) -> list[State]:
         """Rigs with an LED along `axis` in the light's place, and with a panel where an LED is not clearly worse."""
