@@ -8,6 +8,8 @@ from pathlib import Path
 import bpy
 import numpy as np
 import torch
+from bpy_extras.object_utils import world_to_camera_view
+from mathutils import Vector
 
 from rgspipe.blender import blend
 from rgspipe.blender.geometry import FreeSpace, scene_geometry
@@ -17,6 +19,7 @@ from rgspipe.blender.meshes import add, polygon
 from rgspipe.blender.models import cornell
 from rgspipe.blender.passes import Studio
 from rgspipe.blender.plan import Frame
+from rgspipe.datasets.named_cameras import write_cameras
 from rgspipe.scene import Camera, PointLight, look_at
 from rgspipe.scene.models import CornellBox
 
@@ -87,9 +90,37 @@ def save_blends(folder: Path) -> None:
 
 def normalise(folder: Path) -> None:
     """Bounds and scale of a normalised file."""
-    scene, rescale, offset, _ = blend.open_normalised(folder / "lit.blend")
-    geometry = scene_geometry(scene)
-    np.savez(folder / "normal.npz", lo=geometry.lo, hi=geometry.hi, rescale=rescale, offset=offset)
+    found = blend.open_normalised(folder / "lit.blend")
+    geometry = scene_geometry(found.scene)
+    np.savez(folder / "normal.npz", lo=geometry.lo, hi=geometry.hi, rescale=found.rescale, offset=found.offset)
+
+
+def own_cameras(folder: Path) -> None:
+    """Cameras of a file, and where Blender itself has points of its floor in images of two sizes through each."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    _quad(scene, 4.0, 1.0, (0.5, 0.5, 0.5))
+    for index, fit in enumerate(("AUTO", "HORIZONTAL", "VERTICAL")):
+        lens = bpy.data.cameras.new(fit)
+        lens.sensor_fit, lens.shift_x, lens.shift_y, lens.lens, lens.sensor_height = fit, 0.1, -0.05, 30.0, 20.0
+        item = bpy.data.objects.new(fit, lens)
+        item.location, item.rotation_euler, item.scale = (1.0, -6.0, 4.0 + index), (1.0, 0.1, 0.2), (2.0, 2.0, 2.0)
+        scene.collection.objects.link(item)
+    flat = bpy.data.objects.new("flat", bpy.data.cameras.new("flat"))
+    flat.data.type = "ORTHO"
+    scene.collection.objects.link(flat)
+    bpy.context.view_layer.update()
+    points, pixels = np.array([[x, y, 1.0] for x in (-1.0, 0.5) for y in (-0.5, 2.0)]), {}
+    for width, height in ((64, 48), (48, 64)):
+        scene.render.resolution_x, scene.render.resolution_y = width, height
+        for item in (one for one in scene.objects if one.type == "CAMERA" and one is not flat):
+            seen = np.array([world_to_camera_view(scene, item, Vector(point)) for point in points])
+            pixels[f"{item.name} {width} {height}"] = np.stack([seen[:, 0] * width, (1 - seen[:, 1]) * height], axis=1)
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "room.blend"))
+    found = blend.open_normalised(folder / "room.blend")
+    write_cameras(folder / "cameras.json", found.cameras)
+    np.savez(folder / "pixels.npz", points=(points + found.offset) * found.rescale, **pixels)
+    (folder / "remarks.txt").write_text("\n".join(found.remarks))
 
 
 def save_house(folder: Path) -> None:
@@ -138,5 +169,5 @@ def _house_material(name: str) -> bpy.types.Material:
 
 
 if __name__ == "__main__":
-    measurements = (plane, free_space, save_blends, save_house, normalise)
+    measurements = (plane, free_space, save_blends, save_house, normalise, own_cameras)
     {measurement.__name__: measurement for measurement in measurements}[sys.argv[1]](Path(sys.argv[2]))

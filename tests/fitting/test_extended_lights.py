@@ -58,6 +58,7 @@ def test_a_panel_is_found_with_axis_sides_and_turn(room) -> None:
     (found,) = result.lights
     errors = rig_errors(result.lights, (truth,), 1.0)
     assert isinstance(found, PanelLight) and result.status is FitStatus.CONVERGED
+    assert found == found.told
     # Measured 1.4e-8, 2e-6 degrees and 9e-8.
     assert errors.position < 1e-6 and errors.axis < 1e-4 and errors.shape < 1e-5
     assert math.isclose(float(found.power()[0] / truth.power()[0]), 1.0, rel_tol=1e-6)
@@ -81,7 +82,7 @@ def test_the_answer_is_printed_written_and_read(room, tmp_path: Path) -> None:
 @pytest.mark.parametrize("mounted", [False, True], ids=["free", "mounted"])
 def test_a_panel_that_lies_in_the_ceiling_is_found(room, mounted: bool) -> None:
     truth = PanelLight([0.1, -0.2, 0.499], COLOUR, [0.0, 0.0, -1.0], 0.3, 0.15, 0.4)
-    result = fit(room, truth, LightSpec("panel", shape_free=True, mounted=mounted), sharp=True)
+    result = fit(room, truth, LightSpec("panel", shape_free=True, mount="surface" if mounted else "free"), sharp=True)
     errors = rig_errors(result.lights, (truth,), 1.0)
     assert result.status is FitStatus.CONVERGED
     # Measured 1e-8 of a free one; 1.2e-3 and 4e-3 of one on the ceiling's plane, which is 0.001 behind it.
@@ -90,9 +91,12 @@ def test_a_panel_that_lies_in_the_ceiling_is_found(room, mounted: bool) -> None:
         assert errors.axis < 1e-5 and not bool(result.covariance[0][3:6].any())
 
 
-def test_only_panels_lie_on_surfaces() -> None:
-    with pytest.raises(InputError, match="mounted"):
-        LightSpec("sphere", mounted=True)
+def test_what_lights_hang_on_is_said_by_name_and_how_far_with_it() -> None:
+    with pytest.raises(InputError, match=r"LightSpec\.mount: expected one of free, surface, ceiling"):
+        LightSpec("sphere", mount="wall")
+    for mount, distance in (("free", 0.1), ("ceiling", -0.1)):
+        with pytest.raises(InputError, match=r"LightSpec\.distance: "):
+            LightSpec("sphere", mount=mount, distance=distance)
 
 
 def test_the_paper_s_method_takes_lights_in_one_point(room) -> None:

@@ -19,6 +19,7 @@ from rgspipe.fitting.findings import (
     PoorlyExplained,
     PoorScene,
     Rival,
+    RoughShape,
     Uncertain,
     Undetermined,
     gravest,
@@ -92,6 +93,8 @@ def test_lights_are_numbered_where_there_are_several() -> None:
     assert "the position of light 2 by 15 %" in explained([Uncertain(2, 2, 0.15)])
     assert "The light stands on a surface" in explained([OnSurface(1, 1)])
     assert "Light 3 stands on a surface" in explained([OnSurface(1, 3), OnSurface(3, 3)])
+    rough = RoughShape(1, 2, ("width", "turn"), (0.24, 3.0))
+    assert "Hardly determined by these views: width (by 24 %) and turn (by 100 %) of light 1." in explained([rough])
     assert "axis and cone of light 2" in explained([Undetermined(2, 2, ("direction", "cone_angle"))])
 
 

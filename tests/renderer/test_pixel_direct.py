@@ -19,8 +19,16 @@ from rgspipe.renderer.kernels.pixel_light import PixelLight
 from rgspipe.renderer.kernels.pixel_shadow import pixel_transmittance
 from rgspipe.renderer.kernels.places import ways_to
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
-from rgspipe.renderer.pixel_direct import PixelDirect, _heaviest, surfel_transmittance
+from rgspipe.renderer.pixel_direct import (
+    LEAST_RAYS,
+    SHADOW_RAYS,
+    PixelDirect,
+    _heaviest,
+    edge_places,
+    surfel_transmittance,
+)
 from rgspipe.renderer.sparse import SparseOperator
+from rgspipe.renderer.unit_light import Share
 from rgspipe.renderer.view_weights import build_view_weights, even_places
 from rgspipe.scene import Camera, Surfels, look_at
 from rgspipe.scene.rectangles import inside_of_box, solid_box, surfels_on
@@ -186,3 +194,19 @@ def test_the_heaviest_surfel_of_a_pixel_is_the_last_of_the_largest(filled: float
         order = np.lexsort((weights, rows))
         expected = dict(zip(rows[order].tolist(), columns[order].tolist(), strict=True))
         assert _heaviest(operator).tolist() == [expected.get(row, 0) for row in range(len(counts))]
+
+
+@pytest.mark.parametrize("count", [1, 4, 12, 16])
+def test_the_points_of_a_light_share_the_shadow_rays_of_a_pixel(count: int) -> None:
+    """Together they are those of one light, or two each where that is more."""
+    parts = [edge_places(Share(index, count)) for index in range(count)]
+    assert all(len(part) >= LEAST_RAYS for part in parts)
+    together = torch.cat(parts)
+    assert len(together) == max(SHADOW_RAYS, LEAST_RAYS * count)
+    # Each column and each row of the lattice holds one.
+    for axis in (0, 1):
+        torch.testing.assert_close(together[:, axis].sort().values, _middles(len(together)))
+
+
+def _middles(count: int) -> Tensor:
+    return (torch.arange(count, dtype=torch.float64) + 0.5) / count

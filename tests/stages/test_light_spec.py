@@ -57,7 +57,8 @@ def test_angles_become_radians_and_a_blend_stays_a_share() -> None:
         ({"fit.method": "paper_adam", "light.count": None}, "light.count: .* 1 to 8"),
         ({"fit.method": "paper_adam", "light.type": "auto"}, "light.type: .* point or spot"),
         ({"fit.method": "paper_adam", "light.type": "sphere"}, "light.type: .* point or spot or led or profile with"),
-        ({"light.type": "sphere", "light.mount": "surface"}, "light.mount: .* panels"),
+        ({"light.distance": 0.1}, "light.distance: .* hung on"),
+        ({"fit.method": "paper_adam", "light.mount": "ceiling"}, "light.mount: .* free"),
         ({"fit.method": "paper_adam", "light.type": "spot", "fit.shape": "free"}, "fit.shape: .* known"),
     ],
 )

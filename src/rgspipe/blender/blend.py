@@ -7,6 +7,7 @@ number: no lights, cameras, world, compositing, animation, render settings or vi
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
@@ -14,7 +15,9 @@ import numpy as np
 from mathutils import Matrix
 
 from rgspipe.blender.left_out import left_out
+from rgspipe.blender.own_cameras import own_cameras
 from rgspipe.datasets.input_file import input_file
+from rgspipe.datasets.named_cameras import NamedCamera
 from rgspipe.errors import InputError
 
 #: Sockets by which a surface or a volume glows, by node type, and what turns them off.
@@ -26,12 +29,26 @@ GLOWING_SOCKETS = {
 }
 
 
-def open_normalised(path: str | Path) -> tuple[bpy.types.Scene, float, tuple[float, float, float], list[str]]:
+@dataclass(frozen=True)
+class Normalised:
     """A new scene with the surfaces of a .blend file, centred at the origin, longest side 1.
 
-    Returns:
-        the scene, `rescale` and `offset` by which a point x of the file became (x + offset) · rescale, and sentences
-        about what of the file is left out or not modelled.
+    Attributes:
+        scene: it.
+        rescale, offset: a point x of the file became (x + offset) · rescale.
+        remarks: sentences about what of the file is left out or not modelled.
+        cameras: the file's own, by name.
+    """
+
+    scene: bpy.types.Scene
+    rescale: float
+    offset: tuple[float, float, float]
+    remarks: list[str]
+    cameras: dict[str, NamedCamera]
+
+
+def open_normalised(path: str | Path) -> Normalised:
+    """The surfaces of a .blend file, and what of its own they were.
 
     Raises:
         InputError: no such file, not a .blend file, or one without a surface to render.
@@ -54,6 +71,7 @@ def open_normalised(path: str | Path) -> tuple[bpy.types.Scene, float, tuple[flo
     if not np.isfinite(longest) or longest <= 0:
         raise InputError(path, expected="a scene of finite size", found=f"{longest:g}", remedy="Correct its meshes.")
     rescale, offset = 1.0 / longest, -0.5 * (lo + hi)
+    cameras, others = own_cameras(source, rescale, tuple(offset.tolist()))
     scene = bpy.data.scenes.new("surfaces")
     bpy.context.window.scene = scene
     for index, (mesh, matrix) in enumerate(copies):
@@ -61,7 +79,7 @@ def open_normalised(path: str | Path) -> tuple[bpy.types.Scene, float, tuple[flo
         scene.collection.objects.link(bpy.data.objects.new(f"surface_{index}", mesh))
     remove_emission()
     bpy.context.view_layer.update()
-    return scene, rescale, tuple(offset.tolist()), remarks
+    return Normalised(scene, rescale, tuple(offset.tolist()), [*remarks, *others], cameras)
 
 
 def remove_emission() -> None:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import bpy
 
@@ -13,6 +13,7 @@ from rgspipe.blender.geometry import FreeSpace, Geometry, scene_geometry
 from rgspipe.blender.job import DatasetJob
 from rgspipe.blender.models import cornell, corner, hotdog, room, zoo
 from rgspipe.blender.models.parameters import BlendFile, kind_of
+from rgspipe.datasets.named_cameras import NamedCamera
 
 #: The scenes that are modelled here.
 MODELS = {"cornell": cornell, "corner": corner, "hotdog": hotdog, "room": room, "zoo": zoo}
@@ -28,6 +29,7 @@ class PreparedScene:
         layout: draws cameras and lights.
         rescale, offset: how the original coordinates became the scene's: (x + offset) · rescale.
         remarks: sentences about what of the original is left out or not modelled.
+        cameras: of the original, by name.
     """
 
     scene: bpy.types.Scene
@@ -36,6 +38,7 @@ class PreparedScene:
     rescale: float
     offset: tuple[float, float, float]
     remarks: Sequence[str] = ()
+    cameras: Mapping[str, NamedCamera] = field(default_factory=dict)
 
 
 def open_scene(job: DatasetJob) -> PreparedScene:
@@ -54,8 +57,8 @@ def open_scene(job: DatasetJob) -> PreparedScene:
 
 
 def _open_file(file: BlendFile, resolution: int) -> PreparedScene:
-    scene, rescale, offset, remarks = blend.open_normalised(file.path)
-    geometry = scene_geometry(scene)
+    found = blend.open_normalised(file.path)
+    geometry = scene_geometry(found.scene)
     space = FreeSpace(geometry)
     layout = RoomLayout(space, resolution) if space.is_room else ObjectLayout(space, resolution)
-    return PreparedScene(scene, geometry, layout, rescale, offset, remarks)
+    return PreparedScene(found.scene, geometry, layout, found.rescale, found.offset, found.remarks, found.cameras)

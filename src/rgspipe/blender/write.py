@@ -10,7 +10,8 @@ from rgspipe.blender.plan import Frame, Plan
 from rgspipe.blender.scenes import PreparedScene
 from rgspipe.datasets.gs3_write import frame_entry, write_info, write_target_list, write_transforms
 from rgspipe.datasets.light_file import write_lights
-from rgspipe.datasets.location import LAMPS_TRUTH
+from rgspipe.datasets.location import LAMPS_TRUTH, OWN_CAMERAS
+from rgspipe.datasets.named_cameras import write_cameras
 
 
 def write_dataset_files(job: DatasetJob, plan: Plan, prepared: PreparedScene, folder: Path) -> None:
@@ -24,6 +25,8 @@ def write_dataset_files(job: DatasetJob, plan: Plan, prepared: PreparedScene, fo
     if plan.lamps:
         write_lights(folder / LAMPS_TRUTH, plan.lamps)
     write_target_list(folder, [(target.name, target.occlusion) for target in plan.targets])
+    if prepared.cameras:
+        write_cameras(folder / OWN_CAMERAS, prepared.cameras)
     bounds = [prepared.geometry.lo.tolist(), prepared.geometry.hi.tolist()]
     write_info(folder, job.scene, bounds, prepared.rescale, list(prepared.offset))
 

@@ -70,8 +70,10 @@ class LightConfig(Options):
     """type of the unknown lights"""
     count: int | None = option(1, low=1, high=MOST_LIGHTS)
     """how many unknown lights; null finds out"""
-    mount: Literal["free", "surface"] = "free"
-    """surface: they lie on surfaces of the scene and shine away from them (panels alone), which fixes their axes"""
+    mount: Literal["free", "surface", "ceiling"] = "free"
+    """surface: they hang on surfaces of the scene; ceiling: on such as face down. Panels and LEDs shine away from it"""
+    distance: float | None = option(None, low=0, high=1e6)
+    """with a mount, how far they hang from it, scene units; by default it is found, and panels lie on it"""
     ambient: bool = False
     """whether there may be light besides, from all around through openings; its radiance is found, too"""
     spot: SpotConfig = SpotConfig()

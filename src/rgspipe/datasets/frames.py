@@ -9,13 +9,15 @@ import torch
 from torch import Tensor
 
 from rgspipe.datasets.json_file import is_number, numbers, read_json, required, shown
-from rgspipe.datasets.limits import FARTHEST, STRONGEST
+from rgspipe.datasets.limits import STRONGEST
+from rgspipe.datasets.named_cameras import read_camera
+from rgspipe.datasets.rigid_pose import check_place, rigid_pose
 from rgspipe.errors import InputError
 from rgspipe.scene import Camera
 from rgspipe.scene.lights import WATTS_PER_INTENSITY
 
-#: Largest entry of RᵀR − 1 that a rotation may have; files written in float32 reach 1e-6.
-ROTATION_TOLERANCE = 1e-4
+#: The key of a camera by its name in the scene's own file, and that of the file that lists these.
+CAMERA, CAMERAS = "camera", "cameras_path"
 
 #: Suffixes of images; names without one of them are completed.
 SUFFIXES = (".exr", ".png", ".jpg", ".jpeg")
@@ -102,7 +104,17 @@ class FrameEntry:
     def files(self) -> list[Path]:
         """All images of the frame."""
         maps = (self.depth_path, self.normal_path, self.albedo_path, self.base_path, self.mask_path, self.emitter_path)
-        return [self.image_path, *(path for path in maps if path is not None)]
+        named = [self.cameras_path] if CAMERA in self.fields else []
+        return [self.image_path, *named, *(path for path in maps if path is not None)]
+
+    @property
+    def cameras_path(self) -> Path:
+        """The file that has the frame's `camera`: the dataset's cameras.json, for one.
+
+        Raises:
+            InputError: none is named.
+        """
+        return self._path(self._text(CAMERAS, {**self.shared, **self.fields}))
 
     def camera(self, width: int, height: int) -> Camera:
         """The camera for an image of this size.
@@ -110,8 +122,10 @@ class FrameEntry:
         Raises:
             InputError: no rigid transform, no intrinsics, or intrinsics of an image of another size.
         """
-        pose = self.pose()
         self._refuse_distortion()
+        if CAMERA in self.fields:
+            return read_camera(self.cameras_path, self._text(CAMERA)).of_image(width, height)
+        pose = self.pose()
         holder = self.fields if self.fields.keys() & {"camera_intrinsics", "camera_angle_x"} else self.shared
         if "camera_intrinsics" in holder:
             return self._camera_from_intrinsics(pose, holder["camera_intrinsics"], width, height)
@@ -214,53 +228,14 @@ class FrameEntry:
         """An image by a name that may lack its suffix."""
         return self._path(name if name.lower().endswith(SUFFIXES) else name + ".exr")
 
-    def _text(self, key: str) -> str:
-        value = required(self.fields, key, self.where)
+    def _text(self, key: str, fields: dict | None = None) -> str:
+        value = required(self.fields if fields is None else fields, key, self.where)
         if not isinstance(value, str) or not value:
             raise InputError(f"{self.where}.{key}", expected="a path", found=repr(value), remedy="Correct it.")
         return value
 
     def _path(self, name: str) -> Path:
         return self.transforms_path.parent / name
-
-
-def rigid_pose(value: object, place: str) -> Tensor:
-    """A (4, 4) float64 camera-to-world transform, checked to be rigid; `place` names it in errors.
-
-    Raises:
-        InputError: not a 4 × 4 list of finite numbers, or not rigid.
-    """
-    rows = value if isinstance(value, list) else []
-    if len(rows) != 4 or not all(isinstance(row, list) and len(row) == 4 for row in rows):
-        raise InputError(place, expected="a 4 × 4 matrix", found=shown(value), remedy="Correct it.")
-    flat = [item for row in rows for item in row]
-    if not all(map(is_number, flat)):
-        raise InputError(place, expected="finite numbers", found=shown(value), remedy="Correct it.")
-    pose = torch.tensor(flat, dtype=torch.float64).reshape(4, 4)
-    rotation = pose[:3, :3]
-    error = float((rotation.T @ rotation - torch.eye(3, dtype=torch.float64)).abs().max())
-    determinant = float(torch.linalg.det(rotation))
-    bottom = torch.tensor([0.0, 0.0, 0.0, 1.0], dtype=torch.float64)
-    check_place(pose[:3, 3].tolist(), place)
-    if not error <= ROTATION_TOLERANCE or determinant < 0 or not torch.allclose(pose[3], bottom):
-        raise InputError(
-            place,
-            expected="a rigid camera-to-world transform (orthonormal rotation, determinant +1, last row 0 0 0 1)",
-            found=f"RᵀR − 1 up to {error:.2g}, determinant {determinant:.4g}, last row {pose[3].tolist()}",
-            remedy="Remove scale, shear or mirroring from the camera.",
-        )
-    return pose
-
-
-def check_place(position: list[float], place: str) -> None:
-    """Refuse coordinates that are too large to be of a scene; `place` names them in errors.
-
-    Raises:
-        InputError: one of them is beyond `FARTHEST`.
-    """
-    if max(map(abs, position)) > FARTHEST:
-        expected = f"a place within ±{FARTHEST:g}"
-        raise InputError(place, expected=expected, found=shown(position), remedy="Correct it.")
 
 
 def read_entries(path: Path, what: str) -> list[FrameEntry]:

@@ -16,6 +16,9 @@ POINTER = "dataset.json"
 #: In a dataset that was rendered under lamps that are not known: where they were.
 LAMPS_TRUTH = "truth/lamps.json"
 
+#: In a dataset of a .blend file: the file's own cameras, by name.
+OWN_CAMERAS = "cameras.json"
+
 #: What a folder of a fit target has, and one of a dataset has not.
 TARGET = "transforms.json"
 

@@ -14,9 +14,9 @@ import torch
 from torch import Tensor
 
 from rgspipe.datasets.display_image import read_display_colour
-from rgspipe.datasets.frames import rigid_pose
 from rgspipe.datasets.images import check_size, read_colour
 from rgspipe.datasets.json_file import is_number, read_json, required
+from rgspipe.datasets.rigid_pose import rigid_pose
 from rgspipe.datasets.views import Dataset, View
 from rgspipe.errors import InputError
 from rgspipe.progress import progress_bar

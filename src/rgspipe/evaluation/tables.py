@@ -91,7 +91,8 @@ class RigErrors:
         intensity: the mean intensity error of the matched lights, a fraction.
         axis: the largest angle between the axes of the true lights that have one and their matches, degrees; infinite
             where a match is of another kind, NaN where no light has an axis.
-        shape: the largest error of the first numbers of their shapes (cone angles, degrees; exponents), likewise.
+        shape: the largest error of the first numbers of their shapes and of those that are measured as these (cone
+            angles, degrees; exponents; radii; both sides of panels), likewise.
         pairs: (estimate, truth) indices of the matched lights, in the order of the truth.
     """
 
@@ -149,21 +150,22 @@ def rig_errors(estimate: LightRig, truth: LightRig, scene_size: float) -> RigErr
 
 
 def _shape_errors(pairs: Sequence[tuple[Light, Light]]) -> tuple[float, float]:
-    """The largest errors of axes [degrees] and of the first numbers of shapes of matched lights (estimate, truth)."""
+    """The largest errors of axes [degrees] and of the shapes of matched lights (estimate, truth)."""
     axes, shapes = [], []
     for found, wanted in pairs:
         alike = found.kind == wanted.kind
         if wanted.axis is not None:
             axes.append(metrics.angle_between(found.axis, wanted.axis) if alike else math.inf)
         if wanted.shape:
-            shapes.append(_first_number(found, wanted) if alike else math.inf)
+            shapes.append(_shape_error(found.like(wanted), wanted) if alike else math.inf)
     return max(axes, default=math.nan), max(shapes, default=math.nan)
 
 
-def _first_number(found: Light, wanted: Light) -> float:
-    """By how much the first number of a shape is off, a spot's cone angle for one, in its own unit."""
-    number = wanted.shape[0]
-    return abs(number.shown(getattr(found, number.name) - getattr(wanted, number.name)))
+def _shape_error(found: Light, wanted: Light) -> float:
+    """By how much the first number of a shape is off, a spot's cone angle for one, or others like it, in its unit."""
+    first, *others = wanted.shape
+    numbers = [first, *(one for one in others if one.coordinate is first.coordinate)]
+    return max(abs(one.shown(getattr(found, one.name) - getattr(wanted, one.name))) for one in numbers)
 
 
 def target_table(

@@ -110,6 +110,20 @@ class Undetermined(Finding):
 
 
 @dataclass(frozen=True)
+class RoughShape(Finding):
+    """The views hardly tell some `fields` of the shape of light `number` (from 1) of `count`.
+
+    Their standard deviations are the shares `errors` of them; of an angle, of that of one of which nothing is known.
+    """
+
+    number: int
+    count: int
+    fields: tuple[str, ...]
+    errors: tuple[float, ...]
+    status = FitStatus.UNDETERMINED
+
+
+@dataclass(frozen=True)
 class Uncertain(Finding):
     """Light `number` of `count` is expected to be off by `error`, a part of the scene's size; `distant` ones rad."""
 
@@ -159,6 +173,37 @@ class MaybeOneMore(Finding):
 
     gain: float
     wanted: float
+    status = FitStatus.CONVERGED
+
+
+@dataclass(frozen=True)
+class Hangs(Finding):
+    """Light `number` (from 1) of `count`, known to hang on a surface, is `distance` scene units before it."""
+
+    number: int
+    count: int
+    distance: float
+    status = FitStatus.CONVERGED
+
+
+@dataclass(frozen=True)
+class ExtentOpen(Finding):
+    """Light `number` (from 1) of `count` is a point to these views, and may be a `kind` of up to `size` scene units."""
+
+    number: int
+    count: int
+    kind: str
+    size: float
+    status = FitStatus.CONVERGED
+
+
+@dataclass(frozen=True)
+class KindOpen(Finding):
+    """Light `number` (from 1) of `count` explains the target as well as a light of another `kind`."""
+
+    number: int
+    count: int
+    kind: str
     status = FitStatus.CONVERGED
 
 

@@ -84,8 +84,8 @@ def fit_lights(
         scene: the scene.
         cameras: of the images, or their weights; one stands for a list of it, as of images and masks.
         images: (H, W, 3) linear radiance per camera, premultiplied by alpha.
-        lights: what is known of the lights: the name of a kind, of which there is one, or "auto" for a point or a
-            spot; or all that there is to know.
+        lights: what is known of the lights: the name of a kind, of which there is one, or "auto" for one of
+            any kind; or all that there is to know.
         solver: how, such as `Search(starts=8)` or `PaperAdam(seed=1)`; `Search()` if None.
         base: what `images` show with the lamps off, taken as they were; it is taken away from them. More can be said of
             it in `capture`.

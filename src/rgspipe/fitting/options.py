@@ -141,6 +141,8 @@ class CertaintyOptions(Options):
     doubtful: float = option(0.05, low=0, high=10)
     """a place is told where it is known within this part of the scene's size: a position whose error is expected to be
     larger is said to be in doubt, and lights that stand as far from those that were found are another answer"""
+    rough: float = option(0.15, low=0, high=10)
+    """a size of a light is told where it is known within this part of itself"""
     on_surface: float = option(0.002, low=0, high=1)
     """a light nearer to a surface than this part of the scene's size stands on it: 6 mm in a room of 3 m"""
     poorly: float = option(0.05, low=0, high=1)

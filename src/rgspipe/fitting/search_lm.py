@@ -30,10 +30,11 @@ from rgspipe.fitting.search.rig_search import RigSearch
 from rgspipe.fitting.search.starts import Candidates
 from rgspipe.fitting.search.weighting import PLAIN
 from rgspipe.fitting.selection.ambient import ambient_found, ambient_missing
-from rgspipe.fitting.selection.diagnosis import Costs, standing
+from rgspipe.fitting.selection.diagnosis import Costs, hanging, standing
+from rgspipe.fitting.selection.kinds import told_kinds
 from rgspipe.fitting.selection.number import Doubted, doubted_number, faded_light
 from rgspipe.fitting.selection.rivals import rival_among, rival_elsewhere
-from rgspipe.fitting.spec import LightSpec
+from rgspipe.fitting.spec import AUTO, LightSpec
 from rgspipe.renderer.images.blocks import view_of_blocks
 from rgspipe.renderer.images.model import ImageModel
 
@@ -56,8 +57,9 @@ def fit_search_lm(
     if problem.black:
         return dark_result(meter.seconds)
     problem = _roughly_exposed(problem, coarse)
-    free = spec.seed.shape_free
-    candidates = [Candidates.of(problem, images, free, options.combinations) for images in coarse]
+    free = [spec.seed.free(images.shapes[0]) for images in coarse]
+    pairs = zip(coarse, free, strict=True)
+    candidates = [Candidates.of(problem, images, shape_free, options.combinations) for images, shape_free in pairs]
     candidates = [one for one in candidates if one.lit]
     if not candidates:
         dark = _without_lights(problem, meter)
@@ -101,13 +103,17 @@ def _search(refiner: Refiner, candidates: Sequence[Candidates], options: SearchO
     """Search, then doubt what was found."""
     search = RigSearch(refiner, candidates, options, kinds_open=len(spec.kinds) > 1)
     found = search.unknown() if spec.count is None else search.known(spec.count)
-    found = grown(refiner, found, spec, options) if spec.extended else found
+    found = grown(refiner, found, spec, options) if spec.extended or spec.mounted else found
+    kinds: tuple[Finding, ...] = ()
+    if spec.type == AUTO:
+        best, kinds = told_kinds(refiner, found.best, spec, options)
+        found = replace(found, best=best)
     rival = rival_among(refiner, found.best, found.others, options)
     doubted = Doubted()
     if spec.count is not None:
         doubted = doubted_number(refiner, candidates, found.best, spec.count, options)
     compared = {**found.compared, **doubted.compared}
-    findings = (*([] if rival is None else [rival]), *doubted.findings)
+    findings = (*([] if rival is None else [rival]), *doubted.findings, *kinds)
     if not any(isinstance(finding, LightMissing) for finding in findings):
         costs = Costs.of(refiner, compared)
         findings = (*findings, *costs.maybe_more(len(found.best.emitters), compared, options.bar))
@@ -132,12 +138,19 @@ def _polished(refiner: Refiner, best: State, iterations: int) -> tuple[Refiner, 
     Returns:
         the refiner on the problem with the exposures that were found, from here on taken as known; and the rig.
     """
-    best = refiner.refined(refiner.at(best, best.emitters), PLAIN, iterations)
+    best = refiner.refined(refiner.at(best, _told(best)), PLAIN, iterations)
+    if (told := _told(best)) != best.emitters:
+        best = refiner.at(best, told)
     problem = refiner.problem
     if problem.exposure_free:
         exposures = problem.moments(best.columns, PLAIN.at(problem, best.columns, best.intensity)).exposures
         problem = replace(problem.with_exposures(exposures), exposure_free=False)
     return refiner.on(problem), best
+
+
+def _told(state: State) -> tuple[Emitter, ...]:
+    """The lights of a rig by the numbers that results tell."""
+    return tuple(emitter.told for emitter in state.emitters)
 
 
 def _result(
@@ -150,7 +163,7 @@ def _result(
         findings = findings if rival is None else (rival, *findings)
     return FitResult(
         lights=last.lights,
-        findings=(*standing(refiner, best, spread.calibrated, options.certainty), *findings),
+        findings=(*standing(refiner, best, spread.calibrated, options.certainty), *findings, *hanging(best)),
         loss=last.loss,
         iterations=meter.iterations,
         evaluations=meter.evaluations,

@@ -10,13 +10,17 @@ from rgspipe.fitting.options import MOST_LIGHTS
 from rgspipe.options import check_names
 from rgspipe.scene.lights import KINDS, Light
 
-#: Each light may be a point or a spot: it is a spot where that is worth it.
+#: Each light may be of any kind: of the plainest that explains it.
 AUTO = "auto"
 
-#: The kinds among which "auto" chooses, the plainest first.
-AUTO_KINDS = ("point", "spot")
+#: The kinds that "auto" searches, the plainest first, and the one whose shape can be said. What is found is then tried
+#: as the kinds that only look like these from afar, too: see `selection.kinds`.
+AUTO_KINDS, AUTO_SHAPED = ("point", "spot", "led"), "spot"
 
 TYPES = (*KINDS, AUTO)
+
+#: What lights may hang on, nothing first.
+MOUNTS = ("free", "surface", "ceiling")
 
 
 @dataclass(frozen=True)
@@ -24,13 +28,17 @@ class LightSpec:
     """The lights that are looked for.
 
     Attributes:
-        type: a kind of light by name, or "auto": each light may be a point or a spot.
+        type: a kind of light by name, or "auto": each light may be a point, a spot, an LED, a sphere or a panel, and
+            is the plainest of them that explains it.
         count: how many; None where it is not known (1 to MOST_LIGHTS).
         shape: a light of that kind ("auto": a spot), of which the shape is meant and not the place, such as
             `SpotLight.shaped("gaussian", 0.4, 0.1)`; the kind's usual one if None.
         shape_free: whether the numbers of the shape (cone angle, exponent …) are recovered, too; what `shape` says of
-            them is then only where to begin.
-        mounted: whether they lie on surfaces of the scene, and shine away from them: panels alone.
+            them is then only where to begin. With "auto" that is about spots; of other kinds they always are.
+        mount: "surface": they hang on surfaces of the scene; "ceiling": on such as face down (−z). Panels and LEDs then
+            shine straight away from them. "free": they may be anywhere.
+        distance: how far they hang from their surface, scene units; where None, panels lie on it, and of others it is
+            found.
         ambient: whether there may be light besides, from all around through openings; its radiance is recovered, too.
 
     Raises:
@@ -41,7 +49,8 @@ class LightSpec:
     count: int | None = 1
     shape: Light | None = None
     shape_free: bool = False
-    mounted: bool = False
+    mount: str = "free"
+    distance: float | None = None
     ambient: bool = False
 
     def __new__(cls, *args: Any, **values: Any) -> Self:
@@ -56,15 +65,33 @@ class LightSpec:
         kind = shaped_kind(self.type)
         if self.shape is not None and self.shape.kind != kind:
             _refuse("shape", f"a {kind}, as the type is {self.type}", self.shape, "Let type and shape agree.")
-
-        if self.mounted and not self.kinds[-1].flush:
-            _refuse("mounted", "False, but for panels", self.mounted, "Lights of other kinds stand free.")
+        if self.mount not in MOUNTS:
+            _refuse("mount", f"one of {', '.join(MOUNTS)}", self.mount, "Correct the name.")
+        if self.mounted and self.kinds[-1].distant:
+            _refuse("mount", MOUNTS[0], self.mount, f"A {self.type} hangs on nothing.")
+        if self.distance is not None and (self.mount == MOUNTS[0] or not self.distance >= 0.0):
+            remedy = "Say what they hang on (mount), or leave the distance out."
+            _refuse("distance", "None, or with a mount a number ≥ 0", self.distance, remedy)
 
     @property
     def kinds(self) -> tuple[Light, ...]:
         """A light of each kind that may be there, of the shape that it has; the plainest first."""
         names = AUTO_KINDS if self.type == AUTO else (self.type,)
-        return (*(KINDS[name].shaped() for name in names[:-1]), self.shape or KINDS[names[-1]].shaped())
+        known = {} if self.shape is None else {self.shape.kind: self.shape}
+        return tuple(known.get(name) or KINDS[name].shaped() for name in names)
+
+    def free(self, kind: Light) -> bool:
+        """Whether the shape of lights of a kind is recovered."""
+        return self.shape_free or (self.type == AUTO and kind.kind != AUTO_SHAPED)
+
+    @property
+    def mounted(self) -> bool:
+        """Whether they are known to hang on something."""
+        return self.mount != MOUNTS[0]
+
+    def distance_of(self, kind: Light) -> float | None:
+        """How far lights of a kind hang from their surface; None where that is found."""
+        return 0.0 if self.distance is None and kind.flush else self.distance
 
     @property
     def extended(self) -> bool:
@@ -105,4 +132,4 @@ def _refuse(field: str, expected: str, found: object, remedy: str) -> NoReturn:
 
 def shaped_kind(type: str) -> str:
     """The kind whose shape is that of lights of a type."""
-    return AUTO_KINDS[-1] if type == AUTO else type
+    return AUTO_SHAPED if type == AUTO else type

@@ -120,7 +120,7 @@ class TargetViews:
             return distant_candidates(self.blocks, kind, options.directions)
         if kind.axis is None:
             return coarse_images(self.blocks, self.dictionary)
-        shapes = kind.variants() if self.lights.seed.shape_free else (kind,)
+        shapes = kind.variants() if self.lights.seed.free(kind) else (kind,)
         return aimed_candidates(self.prepared, self.dictionary, shapes, options, self.effects)
 
     @cached_property

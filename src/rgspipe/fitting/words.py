@@ -9,8 +9,11 @@ from dataclasses import dataclass
 from rgspipe.fitting.findings import (
     AllStepsTaken,
     ExposureUnknown,
+    ExtentOpen,
     Finding,
     FitStatus,
+    Hangs,
+    KindOpen,
     LampElsewhere,
     LampsLeftOut,
     LightMissing,
@@ -22,6 +25,7 @@ from rgspipe.fitting.findings import (
     OnSurface,
     PoorScene,
     Rival,
+    RoughShape,
     Uncertain,
     Undetermined,
     gravest,
@@ -105,8 +109,14 @@ def _spare(found: LightSpare, spoken: Spoken) -> str:
 
 
 def _undetermined(found: Undetermined, spoken: Spoken) -> str:
-    names = " and ".join(FIELDS.get(name, name.replace("_", " ")) for name in found.fields)
+    names = " and ".join(map(_field, found.fields))
     return f"Not determined by these views: {names}{_of_light(found.number, found.count)}."
+
+
+def _rough(found: RoughShape, spoken: Spoken) -> str:
+    errors = zip(found.fields, found.errors, strict=True)
+    names = " and ".join(f"{_field(name)} (by {percent(min(error, 1.0))})" for name, error in errors)
+    return f"Hardly determined by these views: {names}{_of_light(found.number, found.count)}."
 
 
 def _uncertain(found: Uncertain, spoken: Spoken) -> str:
@@ -118,7 +128,7 @@ def _uncertain(found: Uncertain, spoken: Spoken) -> str:
 
 
 def _on_surface(found: OnSurface, spoken: Spoken) -> str:
-    which = f"Light {found.number}" if found.count > 1 else "The light"
+    which = _the_light(found.number, found.count)
     return f"{which} stands on a surface, where lights that belong elsewhere are stopped: give more views."
 
 
@@ -139,6 +149,19 @@ def _maybe(found: MaybeOneMore, spoken: Spoken) -> str:
 
 def _exposure(found: ExposureUnknown, spoken: Spoken) -> str:
     return "One view cannot tell its exposure from the lights' intensity: intensities are relative to the exposure."
+
+
+def _hangs(found: Hangs, spoken: Spoken) -> str:
+    return f"{_the_light(found.number, found.count)} hangs {found.distance:.2g} (scene units) from its surface."
+
+
+def _extent_open(found: ExtentOpen, spoken: Spoken) -> str:
+    which = _the_light(found.number, found.count)
+    return f"{which} may be a {found.kind} of up to {found.size:.2g} (scene units): these views would not show it."
+
+
+def _kind_open(found: KindOpen, spoken: Spoken) -> str:
+    return f"{_the_light(found.number, found.count)} may as well be of the kind {found.kind}: these views do not tell."
 
 
 def _elsewhere(found: LampElsewhere, spoken: Spoken) -> str:
@@ -170,12 +193,16 @@ _WORDS: dict[type[Finding], Callable[..., str]] = {
     Rival: _rival,
     LightSpare: _spare,
     Undetermined: _undetermined,
+    RoughShape: _rough,
     Uncertain: _uncertain,
     OnSurface: _on_surface,
     PoorScene: _poor_scene,
     AllStepsTaken: _all_steps,
     MaybeOneMore: _maybe,
     ExposureUnknown: _exposure,
+    Hangs: _hangs,
+    ExtentOpen: _extent_open,
+    KindOpen: _kind_open,
     LampElsewhere: _elsewhere,
     LampsLeftOut: _left_out,
     MuchAmbient: _much_ambient,
@@ -187,6 +214,14 @@ _WORDS: dict[type[Finding], Callable[..., str]] = {
 def percent(share: float) -> str:
     """A share in words."""
     return f"{100.0 * share:.0f} %"
+
+
+def _field(name: str) -> str:
+    return FIELDS.get(name, name.replace("_", " "))
+
+
+def _the_light(number: int, count: int) -> str:
+    return f"Light {number}" if count > 1 else "The light"
 
 
 def _of_light(number: int, count: int) -> str:

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 from torch.autograd.functional import jacobian
 
-from rgspipe.renderer.unit_light import UnitLight
+from rgspipe.renderer.unit_light import Share, UnitLight
 from rgspipe.scene.lights import Light
 
 
@@ -21,11 +21,13 @@ class Part:
         light: it, of the whole light's intensity.
         softness: by how much its edge of light is widened [rad].
         chain: (1 + D', 1 + D) from the columns of a unit light here to the part that it has in those of the whole.
+        share: which of them it is.
     """
 
     light: Light
     softness: float
     chain: Tensor
+    share: Share
 
     @property
     def shape_free(self) -> bool:
@@ -71,7 +73,8 @@ def parts_of(light: UnitLight, few: bool = False) -> list[Part] | None:
     value = torch.zeros_like(chains[:, :, :1])
     value[:, 0] = share
     chains = torch.cat([value, chains], dim=2)
-    return [Part(one, light.softness, chain) for one, chain in zip(lights, chains, strict=True)]
+    pairs = enumerate(zip(lights, chains, strict=True))
+    return [Part(one, light.softness, chain, Share(index, rows)) for index, (one, chain) in pairs]
 
 
 def _fields(light: Light) -> tuple[str, ...]:

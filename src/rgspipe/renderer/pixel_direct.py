@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 import torch
@@ -14,10 +14,12 @@ from rgspipe.renderer.kernels.pixel_shadow import pixel_transmittance
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.looked_at import on_planes
 from rgspipe.renderer.sparse import SparseOperator
+from rgspipe.renderer.unit_light import WHOLE, Share
 from rgspipe.renderer.view_weights import ViewWeights, even_places
 
-#: Shadow rays of a pixel that a shadow's edge crosses.
-SHADOW_RAYS = 16
+#: Shadow rays of a pixel that a shadow's edge crosses, and of each point of a light with an extent at least: their
+#: places differ, so that together they are as dense as those of a light in one point.
+SHADOW_RAYS, LEAST_RAYS = 16, 2
 
 #: A pixel whose surfels are lit by more than this and less than 1 minus this lies on a shadow's edge.
 LIT_OR_NOT = 2e-3
@@ -40,7 +42,6 @@ class PixelDirect:
         scales = bvh.surfels.scales.detach().prod(dim=1).sqrt()
         self._light = PixelLight(bvh, view.operator.matrix, view.edges, view.camera, float(SOFTENING) * scales)
         self._receivers = _heaviest(view.operator)
-        self._places = even_places(SHADOW_RAYS)
         self._plain = ~view.edges.to(bvh.device) & (view.coverage.to(bvh.device) > 0.5)
 
     @cached_property
@@ -59,14 +60,22 @@ class PixelDirect:
         reach = torch.where(self._view.edges.to(reach.device), reach, torch.full_like(reach, torch.inf))
         return on_planes(origins, directions, centers, normals, reach)
 
-    def image(self, position: Tensor, passing: Tensor, slope: Tensor, origin: Tensor | None = None) -> Tensor:
+    def image(
+        self,
+        position: Tensor,
+        passing: Tensor,
+        slope: Tensor,
+        origin: Tensor | None = None,
+        share: Share = WHOLE,
+    ) -> Tensor:
         """(P, 3, 4) radiance under a unit light in RGB at `position`, (3,) or a place (4,), and its slopes to x, y, z.
 
         Args:
             passing, slope: `surfel_transmittance` of the light.
             origin: (3,) or (4,) where shadow rays end; at the light if None.
+            share: which of the points of a light it is.
         """
-        own = self._own_passing(position if origin is None else origin, passing)
+        own = self._own_passing(position if origin is None else origin, passing, share)
         return self._light.image(position, passing, slope, own)
 
     def operator(self, position: Tensor, passing: Tensor) -> SparseOperator:
@@ -77,14 +86,21 @@ class PixelDirect:
         Args:
             passing: `surfel_transmittance` of the light.
         """
-        entries = self._light.entries(position, passing, self._own_passing(position, passing))
+        entries = self._light.entries(position, passing, self._own_passing(position, passing, WHOLE))
         return self._view.operator.with_values(entries)
 
-    def _own_passing(self, position: Tensor, passing: Tensor) -> Tensor:
+    def _own_passing(self, position: Tensor, passing: Tensor, share: Share) -> Tensor:
         """(P, 4) `own_passing` of `PixelLight.image`: of pixels on a shadow's edge."""
         lit = (self._view.operator @ passing[:, None])[:, 0] / self._view.coverage.to(self._bvh.device).clamp(min=1e-6)
         pixels = (self._plain & (lit > LIT_OR_NOT) & (lit < 1.0 - LIT_OR_NOT)).nonzero()[:, 0]
-        return pixel_transmittance(self._bvh, self._view.camera, self._receivers, pixels, position, self._places)
+        places = edge_places(share)
+        return pixel_transmittance(self._bvh, self._view.camera, self._receivers, pixels, position, places)
+
+
+@cache
+def edge_places(share: Share) -> Tensor:
+    """(K, 2) places in a pixel of the shadow rays to one of a light's points."""
+    return even_places(max(SHADOW_RAYS, LEAST_RAYS * share.count))[share.index :: share.count]
 
 
 def surfel_transmittance(bvh: SurfelBvh, position: Tensor, shadows: bool = True) -> tuple[Tensor, Tensor]:

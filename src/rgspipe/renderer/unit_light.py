@@ -5,13 +5,23 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import ClassVar, NamedTuple, Protocol
 
 import torch
 from torch import Tensor
 
 from rgspipe.renderer.zonal_harmonics import BandLimit, band_limited_intensity
 from rgspipe.scene.lights import Light, RelativeIntensity
+
+
+class Share(NamedTuple):
+    """The `index`-th of `count` points that shine together; a whole light if there is one."""
+
+    index: int = 0
+    count: int = 1
+
+
+WHOLE = Share()
 
 
 class UnitLight(Protocol):
@@ -33,6 +43,11 @@ class UnitLight(Protocol):
     @property
     def shape_free(self) -> bool:
         """Whether its shape is among the numbers."""
+        ...
+
+    @property
+    def share(self) -> Share:
+        """Which of the points of a light with an extent it is."""
         ...
 
     def slopes(self, by: Mapping[str, Tensor]) -> Tensor:
@@ -76,6 +91,8 @@ class OwnLight:
         given: the light; its tensors may require gradients, be of any float type and on any device.
         softness: by how much its edge of light is widened [rad].
     """
+
+    share: ClassVar[Share] = WHOLE
 
     given: Light
     softness: float = 0.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import torch
@@ -29,14 +30,17 @@ class Wall:
     normal: Tensor
 
 
-def walls_near(surfels: Surfels, point: Tensor, size: float, count: int) -> list[Wall]:
-    """At most `count` walls that a point (3,) is nearest to, the nearest first.
+def walls_near(surfels: Surfels, point: Tensor, size: float, count: int, facing: Tensor | None = None) -> list[Wall]:
+    """At most `count` walls that a point (3,) is nearest to, the nearest first; of those that face a way, if one (3,)
+    is given: within 45° of it.
 
     Surfels are noisy, so the plane is that of all that lie in it around the nearest one.
     """
     centers, normals = surfels.centers.double().cpu(), surfels.normals.double().cpu()
     scales = surfels.scales.double().cpu().amax(dim=1)
     distance = (centers - point).norm(dim=1)
+    if facing is not None:
+        distance = torch.where(normals @ facing.to(normals) > math.sqrt(0.5), distance, torch.inf)
     left, walls = distance < max(REACH * size, float(distance.min()) * 2.0), []
     while len(walls) < count and bool(left.any()):
         nearest = int(torch.where(left, distance, torch.inf).argmin())

@@ -29,12 +29,12 @@ def light_spec(config: RgspipeConfig) -> LightSpec:
     if isinstance(shape, ProfileLight):
         shape = _measured(light, shape)
     _refuse_tables_of_others(light, kind)
-    mounted = light.mount == "surface"
-    if mounted and not KINDS[kind].shaped().flush:
-        remedy = "Use light=panel, or light.mount=free."
-        raise InputError("light.mount", expected="free, but for panels", found="surface", remedy=remedy)
+    if light.distance is not None and light.mount == "free":
+        remedy = "Say what they hang on: light.mount=surface or ceiling."
+        found = f"{light.distance:g}"
+        raise InputError("light.distance", expected="null, as nothing is hung on", found=found, remedy=remedy)
     free = config.fit.shape == "free" or light.catalogue is not None
-    return LightSpec(light.type, light.count, shape, free, mounted, light.ambient)
+    return LightSpec(light.type, light.count, shape, free, light.mount, light.distance, light.ambient)
 
 
 def table_files(config: RgspipeConfig) -> list[Path]:
@@ -76,6 +76,7 @@ def _refuse_unknowns(config: RgspipeConfig) -> None:
         ("light.count", "a number from 1 to 8", "null", config.light.count is None),
         ("fit.shape", "known", config.fit.shape, config.fit.shape == "free"),
         ("light.ambient", "false", "true", config.light.ambient),
+        ("light.mount", "free", config.light.mount, config.light.mount != "free"),
     ]
     for key, expected, found, unknown in asked:
         if unknown:

@@ -176,5 +176,5 @@ def _fields(light: Light) -> tuple:
 def _of_kind(kind: str, position: Tensor, intensity: Tensor, axis: Tensor | None, size: float) -> Light:
     """A lamp; one that has an extent begins with the smaller of those that a fit tries."""
     light = KINDS[kind].shaped().at(position, axis, intensity)
-    grown = light.grown(size)
+    grown = light.grown(size, free=True)
     return grown[0]

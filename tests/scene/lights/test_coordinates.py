@@ -10,19 +10,40 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from torch import Tensor
 
-from rgspipe.scene.lights.coordinates import AXIS, PLACE, Between, Coordinate, Positive, Ratio, tangents
+from rgspipe.scene.lights.coordinates import (
+    AXIS,
+    PLACE,
+    BeforePlane,
+    Between,
+    Coordinate,
+    OnPlane,
+    Positive,
+    Ratio,
+    tangents,
+)
 
 SIZE = 2.5
 BETWEEN, POSITIVE, RATIO = Between(0.02, 1.5), Positive(0.01, 1.0), Ratio(0.5, 1000.0)
+
+FOOT, UP = (torch.tensor(values, dtype=torch.float64) for values in ([0.3, -0.2, 0.1], [0.0, 0.6, 0.8]))
+BEFORE = BeforePlane(FOOT, UP, 0.002, 0.15)
 
 components = st.floats(-1.0, 1.0)
 vectors = st.tuples(components, components, components).map(lambda v: torch.tensor(v, dtype=torch.float64))
 axes = vectors.filter(lambda v: float(v.norm()) > 0.1).map(lambda v: v / v.norm())
 
+
+def before(place: Tensor, distance: float) -> Tensor:
+    """A place so far before the plane of `BEFORE`."""
+    return place + (distance - (place - FOOT) @ UP) * UP
+
+
 #: A coordinate and a value that has room to move to both sides.
 inside = st.one_of(
     st.tuples(st.just(PLACE), vectors),
     st.tuples(st.just(AXIS), axes),
+    st.tuples(st.just(OnPlane(UP)), vectors),
+    st.tuples(st.just(BEFORE), st.tuples(vectors, st.floats(0.01, 0.3)).map(lambda pair: before(*pair))),
     st.tuples(st.just(BETWEEN), st.floats(0.05, 1.4)),
     st.tuples(st.just(POSITIVE), st.floats(0.02, 0.9)),
     st.tuples(st.just(RATIO), st.floats(0.6, 900.0)),
@@ -139,3 +160,10 @@ def test_a_scene_of_no_size_has_no_room_to_move_in() -> None:
     place, other = torch.zeros(3, dtype=torch.float64), torch.ones(3, dtype=torch.float64)
     assert PLACE.distance(place, other, 0.0) == 0.0
     assert PLACE.offset(place, other, 0.0).tolist() == [0.0] * 3
+
+
+@settings(deadline=None)
+@given(vectors, st.floats(0.0, 1.0), vectors)
+def test_no_step_leads_away_from_a_plane_or_behind_it(place: Tensor, distance: float, step: Tensor) -> None:
+    moved = BEFORE.moved(before(place, distance), 10.0 * step, SIZE)
+    assert 0.002 * SIZE - 1e-12 <= float((moved - FOOT) @ UP) <= 0.15 * SIZE + 1e-12

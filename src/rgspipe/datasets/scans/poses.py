@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from rgspipe.datasets.frames import check_place
 from rgspipe.datasets.input_file import input_file
 from rgspipe.datasets.json_file import MOST_BYTES, shown
+from rgspipe.datasets.rigid_pose import check_place
 from rgspipe.datasets.scans.frame import Numbers
 from rgspipe.datasets.scans.options import ScanOptions
 from rgspipe.errors import InputError

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor
 
-from rgspipe.fitting.findings import Finding, OnSurface, Uncertain, Undetermined
+from rgspipe.fitting.findings import Finding, OnSurface, RoughShape, Uncertain, Undetermined
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.options import CertaintyOptions
 from rgspipe.scene import Light, LightRig
@@ -29,13 +29,14 @@ def doubts(
     options = options or CertaintyOptions()
     lights = list(enumerate(zip(rig, covariance, strict=True), start=1))
     undetermined = [_undetermined(light, matrix, number, len(rig)) for number, (light, matrix) in lights]
+    rough = [_rough(light, matrix, number, len(rig), options.rough) for number, (light, matrix) in lights]
     uncertain = [_uncertain(*pair, scene_size, number, len(rig), options.doubtful) for number, pair in lights]
     # The covariance of a light that stands on a surface is that of a place that it could not leave.
     limit = options.on_surface * scene_size
     free = [(number, light) for number, (light, _) in lights if not (light.flush or light.distant)]
     standing = [number for number, light in free if distance_to_surface(surfels, light.position) < limit]
     on_surface = [OnSurface(number, len(rig)) for number in standing]
-    return [finding for finding in (*undetermined, *uncertain, *on_surface) if finding is not None]
+    return [finding for finding in (*undetermined, *rough, *uncertain, *on_surface) if finding is not None]
 
 
 def _undetermined(light: Light, covariance: Tensor, number: int, count: int) -> Undetermined | None:
@@ -46,6 +47,17 @@ def _undetermined(light: Light, covariance: Tensor, number: int, count: int) -> 
         rows.pop("intensity")
     names = tuple(name for name, chosen in rows.items() if bool(unknown[chosen].any()))
     return Undetermined(number, count, names) if names else None
+
+
+def _rough(light: Light, covariance: Tensor, number: int, count: int, limit: float) -> RoughShape | None:
+    emitter, deviations = Emitter.fitted(light, covariance), covariance.diagonal().sqrt()
+    rows = {name: rows.start for name, rows in emitter.rows().items() if name in emitter.coordinates}
+    shares = {
+        name: emitter.coordinates[name].doubt(getattr(light, name), float(deviations[row]))
+        for name, row in rows.items()
+    }
+    told = {name: share for name, share in shares.items() if limit < share < math.inf}
+    return RoughShape(number, count, tuple(told), tuple(told.values())) if told else None
 
 
 def _uncertain(

@@ -6,12 +6,15 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import accumulate
+from typing import ClassVar
 
 import torch
 from torch import Tensor
 
+from rgspipe.fitting.model.mount import Mount
+from rgspipe.renderer.unit_light import WHOLE, Share
 from rgspipe.scene.lights import Light
-from rgspipe.scene.lights.coordinates import KNOWN, Coordinate, OnPlane
+from rgspipe.scene.lights.coordinates import Coordinate
 
 #: R, G and B.
 COLOURS = 3
@@ -29,13 +32,15 @@ class Emitter:
         light: float64 on the CPU; its intensity is not looked at.
         shape_free: whether its shape moves.
         softness: by how much its edge of light is widened for now [rad]; see `Light.relative_intensity`.
-        plane: (3,) float64 normal of the surface that it lies on and shines away from; None where it is free.
+        mount: the surface that it is known to hang on; None where it is free.
     """
+
+    share: ClassVar[Share] = WHOLE
 
     light: Light
     shape_free: bool = False
     softness: float = 0.0
-    plane: Tensor | None = None
+    mount: Mount | None = None
 
     @classmethod
     def of(cls, light: Light, shape_free: bool = False) -> Emitter:
@@ -70,7 +75,7 @@ class Emitter:
     def coordinates(self) -> dict[str, Coordinate]:
         """By the light's fields."""
         free = self.light.coordinates(self.shape_free)
-        return free if self.plane is None else free | {"position": OnPlane(self.plane), "direction": KNOWN}
+        return free if self.mount is None else free | self.mount.coordinates(self.light)
 
     @cached_property
     def parameters(self) -> int:
@@ -80,6 +85,12 @@ class Emitter:
     def shining(self, intensity: Tensor) -> Light:
         """The light with `intensity` (3,)."""
         return replace(self.light, intensity=intensity)
+
+    @property
+    def told(self) -> Emitter:
+        """The emitter by the numbers that results tell; itself where it is told by these."""
+        light = self.light.told
+        return self if light == self.light else replace(self, light=light)
 
     def placed(self, position: Tensor) -> Emitter:
         """The emitter at another place."""
@@ -108,8 +119,8 @@ class Emitter:
 
     def distance(self, other: Emitter, size: float) -> float:
         """The largest of the move over the scene's size, the turn of the axis and the change of the shape [rad]."""
-        movable = self.light.coordinates(shape_free=True)
-        return max(one.distance(self._value(name), other._value(name), size) for name, one in movable.items())
+        movable, same = self.light.coordinates(shape_free=True), replace(other, light=other.light.like(self.light))
+        return max(one.distance(self._value(name), same._value(name), size) for name, one in movable.items())
 
     def stretch(self, step: Tensor) -> tuple[float, float]:
         """How far a step (D,) moves over the scene's size, and how far it turns and reshapes [rad, or a parameter]."""

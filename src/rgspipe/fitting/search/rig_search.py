@@ -12,6 +12,7 @@ from itertools import zip_longest
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.options import MOST_LIGHTS, SearchOptions
 from rgspipe.fitting.search.compare import best_state, distinct, drop, passed, worth_keeping
+from rgspipe.fitting.search.promise import beam_promised
 from rgspipe.fitting.search.refine import Refiner, State
 from rgspipe.fitting.search.schedule import refined_starts
 from rgspipe.fitting.search.starts import Candidates, EmitterRig
@@ -108,8 +109,13 @@ class RigSearch:
             patient: whether further starts follow while all explain little.
         """
         batches = self.options.batches if patient else 1
-        starts = [self._starts(kind, lights, previous, batches) for kind in self.candidates]
-        found = [self._refined(rigs, batches) for rigs in starts if rigs]
+        found: list[Found] = []
+        for aimed in (False, True):
+            kinds = [kind for kind in self.candidates if kind.aimed is aimed]
+            if not (found and kinds and self._beamless(found[0].best)):
+                starts = zip_longest(*(self._starts(kind, lights, previous, batches) for kind in kinds))
+                rigs = [rig for row in starts for rig in row if rig is not None]
+                found += [self._refined(rigs, batches)] if rigs else []
         if not found:
             return None
         best = found[0].best
@@ -118,6 +124,13 @@ class RigSearch:
                 best = richer.best
         best = self._with_plain_lights(best) if self.kinds_open else best
         return Found(best, tuple(state for one in found for state in one.others))
+
+    def _beamless(self, state: State) -> bool:
+        """Whether points explain the image, and no beam in the place of one promises to do so better."""
+        if self.refiner.unexplained(state) > self.options.certainty.poorly:
+            return False
+        bar, lights = self.options.bar, range(len(state.emitters))
+        return all(beam_promised(self.refiner, state, index).gain < bar.doubtful for index in lights)
 
     def _starts(self, candidates: Candidates, lights: int, previous: State | None, batches: int) -> list[EmitterRig]:
         size = self.refiner.region.size

@@ -8,7 +8,16 @@ from dataclasses import dataclass
 from torch import Tensor
 
 from rgspipe.fitting.certainty.doubts import doubts
-from rgspipe.fitting.findings import AtBound, Finding, FitStatus, MaybeOneMore, OutOfSteps, PoorlyExplained, PoorScene
+from rgspipe.fitting.findings import (
+    AtBound,
+    Finding,
+    FitStatus,
+    Hangs,
+    MaybeOneMore,
+    OutOfSteps,
+    PoorlyExplained,
+    PoorScene,
+)
 from rgspipe.fitting.options import BarOptions, CertaintyOptions
 from rgspipe.fitting.search.compare import robust_costs, wanted
 from rgspipe.fitting.search.refine import Refiner, State
@@ -35,6 +44,17 @@ def standing(
         *([PoorScene(grade.error)] if grade is not None and grade.grade is Grade.POOR else []),
         *doubts(state.lights(problem), covariance, problem.views.frozen.surfels, region.size, options),
         *([OutOfSteps()] if state.status is FitStatus.MAX_ITERATIONS else []),
+    ]
+
+
+def hanging(state: State) -> list[Finding]:
+    """How far lights hang from their surfaces, where that was found."""
+    pairs = enumerate((emitter.mount, emitter.position) for emitter in state.emitters)
+    count = len(state.emitters)
+    return [
+        Hangs(index + 1, count, mount.before(place))
+        for index, (mount, place) in pairs
+        if mount is not None and mount.distance is None
     ]
 
 

@@ -87,7 +87,7 @@ class PixelModel(ViewModel):
     def _direct(self, light: UnitLight, lit: LitSurfels) -> Tensor:
         """(P, 3, 1 + D) direct light of a unit light."""
         place = light.light.place
-        images = [direct.image(place, lit.passing, lit.slope, lit.origin) for direct in self.direct]
+        images = [direct.image(place, lit.passing, lit.slope, lit.origin, light.share) for direct in self.direct]
         for index, highlights in enumerate(self.highlights):
             images[index] = images[index] + highlights.image(place, lit.passing, lit.slope)
         columns = torch.cat(images)[self.views.pixels]

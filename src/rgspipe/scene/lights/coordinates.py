@@ -40,6 +40,10 @@ class Coordinate(ABC):
     def distance(self, value: Any, other: Any, size: float) -> float:
         """How far apart two values are: over the scene's size, or rad."""
 
+    def doubt(self, value: Any, deviation: float) -> float:
+        """What share of a value its standard deviation is; 0 where such a share says nothing."""
+        return 0.0
+
     def stretch(self, step: Tensor) -> tuple[float, float]:
         """How far a step (d,) moves, over the scene's size, and turns or reshapes [rad, or a parameter]."""
         return 0.0, float(step.abs().max())
@@ -108,6 +112,52 @@ class OnPlane(Place):
 
     def spread(self, value: Tensor) -> Tensor:
         return tangents(self.normal).T
+
+
+@dataclass(frozen=True)
+class BeforePlane(Place):
+    """A position before a plane: along it in units of the scene's size, away from it by the logarithm.
+
+    So a lamp that hangs close to a surface keeps on its side of it, and no step takes it far away.
+
+    Attributes:
+        place, normal: (3,) float64 of the plane, the normal of unit length.
+        nearest, farthest: bounds of the distance, in parts of the scene's size.
+    """
+
+    place: Tensor
+    normal: Tensor
+    nearest: float
+    farthest: float
+
+    def units(self, value: Tensor, size: float) -> list[float]:
+        return [size, size, self._distance(value, size)]
+
+    def moved(self, value: Tensor, step: Tensor, size: float) -> Tensor:
+        grown = self._distance(value, size) * math.exp(min(max(float(step[2]), -1.0), 1.0))
+        distance = min(max(grown, self.nearest * size), self.farthest * size)
+        beside = value - ((value - self.place) @ self.normal) * self.normal
+        return beside + size * step[:2] @ tangents(self.normal) + distance * self.normal
+
+    def offset(self, value: Tensor, other: Tensor, size: float) -> Tensor:
+        return self._axes @ (other - value) / torch.tensor(self.units(value, size), dtype=torch.float64)
+
+    def stretch(self, step: Tensor) -> tuple[float, float]:
+        return float(step[:2].norm()), float(step[2].abs())
+
+    def slopes(self, value: Tensor, by: Tensor) -> Tensor:
+        return by @ self._axes.T.to(by)
+
+    def spread(self, value: Tensor) -> Tensor:
+        return self._axes.T
+
+    @property
+    def _axes(self) -> Tensor:
+        return torch.cat([tangents(self.normal), self.normal[None]])
+
+    def _distance(self, value: Tensor, size: float) -> float:
+        distance = float((value - self.place) @ self.normal)
+        return min(max(distance, self.nearest * size), self.farthest * size)
 
 
 class Known(Coordinate):
@@ -241,6 +291,9 @@ class Length(Coordinate):
     def distance(self, value: float, other: float, size: float) -> float:
         return abs(value - other) / size if size > 0.0 else 0.0
 
+    def doubt(self, value: float, deviation: float) -> float:
+        return deviation / value if value > 0.0 else math.inf
+
 
 @dataclass(frozen=True)
 class Turn(Coordinate):
@@ -260,6 +313,10 @@ class Turn(Coordinate):
 
     def distance(self, value: float, other: float, size: float) -> float:
         return abs(math.remainder(value - other, self.period))
+
+    def doubt(self, value: float, deviation: float) -> float:
+        """Over the deviation of an angle of which nothing is known."""
+        return deviation / (self.period / math.sqrt(12.0))
 
 
 PLACE, AXIS, LENGTH, KNOWN = Place(), Axis(), Length(), Known()

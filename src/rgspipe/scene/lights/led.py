@@ -57,6 +57,10 @@ class LedLight(AxialLight):
         """cosᵐθ ≈ exp(−mθ²/2)."""
         return self.exponent**-0.5 if self.exponent > 0.0 else 0.0
 
+    @property
+    def faces_away(self) -> bool:
+        return True
+
     def profile_at(self, angle: Tensor, numbers: Mapping[str, Tensor], softness: float = 0.0) -> tuple[Tensor, Tensor]:
         """As cosᵐθ is nearly a Gaussian of variance 1/m, a softer one has 1/m + softness² in its place."""
         exponent = numbers["exponent"]

@@ -167,6 +167,11 @@ class Light(ByValue, ABC):
         return False
 
     @property
+    def faces_away(self) -> bool:
+        """Whether one that hangs on a surface shines straight away from it, rather than being aimed."""
+        return False
+
+    @property
     def plain(self) -> Light:
         """The simpler light at its place that a fit tries instead; itself if there is none."""
         return self
@@ -174,6 +179,15 @@ class Light(ByValue, ABC):
     @property
     def seed(self) -> Light:
         """The light in one point that a search looks for in its stead; itself if it has no extent."""
+        return self
+
+    @property
+    def told(self) -> Self:
+        """The same light by the numbers that results tell, where several sets of them mean the same."""
+        return self
+
+    def like(self, other: Light) -> Self:
+        """The same light by the numbers that are nearest to those of another of its kind."""
         return self
 
     def nodes(self, values: Mapping[str, Tensor], few: bool = False) -> Nodes | None:

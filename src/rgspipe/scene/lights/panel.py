@@ -13,7 +13,7 @@ from torch import Tensor
 from rgspipe.scene.lights.axial import AxialLight
 from rgspipe.scene.lights.coordinates import LENGTH, Turn
 from rgspipe.scene.lights.led import LedLight
-from rgspipe.scene.lights.light import Reader, ShapeNumber
+from rgspipe.scene.lights.light import Light, Reader, ShapeNumber
 from rgspipe.scene.lights.nodes import Nodes, square_nodes
 from rgspipe.scene.shapes import Float
 
@@ -34,7 +34,7 @@ class PanelLight(AxialLight):
     Its intensity along the axis is I, and falls with the cosine.
 
     Attributes:
-        width, height: sides, scene units.
+        width, height: sides, scene units; exchanged, with a quarter of a turn, they are the same panel (`told`).
         turn: angle [rad] from the x-axis to the side `width`, around the axis, where the axis points straight down
             (−z); for another axis the x-axis is taken along on the shortest way there.
 
@@ -71,8 +71,35 @@ class PanelLight(AxialLight):
         return True
 
     @property
+    def faces_away(self) -> bool:
+        return True
+
+    @property
     def seed(self) -> LedLight:
         return LedLight(self.position, self.intensity, self.direction, 1.0)
+
+    @property
+    def told(self) -> Self:
+        """With its longer side as its width, and a turn in [−π/2, π/2)."""
+        one = self if self.width >= self.height else self.exchanged
+        turn = math.remainder(one.turn, math.pi)
+        return replace(one, turn=turn - math.pi if turn >= 0.5 * math.pi else turn)
+
+    @property
+    def exchanged(self) -> Self:
+        """The same panel with width and height exchanged: a quarter of a turn on."""
+        return replace(self, width=self.height, height=self.width, turn=self.turn + 0.5 * math.pi)
+
+    def like(self, other: Light) -> Self:
+        if not isinstance(other, PanelLight):
+            return self
+        wanted = other.width * other.sides()[0]
+
+        def apart(one: PanelLight) -> float:
+            width = one.width * one.sides()[0]
+            return min(float((width - wanted).norm()), float((width + wanted).norm()))
+
+        return min(self, self.exchanged, key=apart)
 
     def profile_at(self, angle: Tensor, numbers: Mapping[str, Tensor], softness: float = 0.0) -> tuple[Tensor, Tensor]:
         """That of one of its nodes."""

@@ -1,0 +1,34 @@
+"""The cameras of a user's .blend file, in the coordinates that its surfaces are brought to."""
+
+from __future__ import annotations
+
+import bpy
+import torch
+
+from rgspipe.datasets.named_cameras import NamedCamera, Side
+
+#: What a lens is stated for, by Blender's name.
+SIDES: dict[str, Side] = {"AUTO": "longer", "HORIZONTAL": "width", "VERTICAL": "height"}
+
+
+def own_cameras(
+    scene: bpy.types.Scene, rescale: float, offset: tuple[float, float, float]
+) -> tuple[dict[str, NamedCamera], list[str]]:
+    """Its perspective cameras by name, and sentences about the others.
+
+    Args:
+        rescale, offset: a point x of the file becomes (x + offset) · rescale.
+    """
+    cameras = [item for item in scene.objects if item.type == "CAMERA"]
+    pinholes = {item.name: _camera(item, rescale, offset) for item in cameras if item.data.type == "PERSP"}
+    others = [item.name for item in cameras if item.name not in pinholes]
+    remark = f"cameras that are no perspective ones, and cannot be a target's: {', '.join(others)}"
+    return pinholes, [remark] if others else []
+
+
+def _camera(item: bpy.types.Object, rescale: float, offset: tuple[float, float, float]) -> NamedCamera:
+    pose = torch.tensor([[*row] for row in item.matrix_world.normalized()], dtype=torch.float64)
+    pose[:3, 3] = (pose[:3, 3] + torch.tensor(offset, dtype=torch.float64)) * rescale
+    lens = item.data
+    sensor = lens.sensor_height if lens.sensor_fit == "VERTICAL" else lens.sensor_width
+    return NamedCamera(pose, lens.lens / sensor, SIDES[lens.sensor_fit], (lens.shift_x, lens.shift_y))

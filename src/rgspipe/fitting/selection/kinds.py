@@ -1,0 +1,144 @@
+"""Which kind each light of an answer is, where that is open: what was found as a point or a spot beside other kinds.
+
+Kinds are compared as numbers of lights are: one with more unknowns has to lower the robust cost by `bar.least`. They
+are fitted only where the image promises enough, so that a point costs little more than where it is known to be one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import torch
+
+from rgspipe.fitting.certainty.doubts import distance_to_surface
+from rgspipe.fitting.findings import ExtentOpen, Finding, KindOpen
+from rgspipe.fitting.model.emitter import Emitter
+from rgspipe.fitting.options import SearchOptions
+from rgspipe.fitting.search.compare import drop, light_energies
+from rgspipe.fitting.search.grow import best_of_starts, laid
+from rgspipe.fitting.search.promise import Promise, beam_promised, extent_promised
+from rgspipe.fitting.search.refine import Refiner, State
+from rgspipe.fitting.selection.rivals import equally_good
+from rgspipe.fitting.spec import LightSpec
+from rgspipe.scene import Light
+from rgspipe.scene.lights import LedLight, PanelLight, SphereLight, SpotLight
+
+#: From the largest sphere that has room on, so many halves of it are asked whether they would be noticed.
+HALVINGS = 6
+
+
+def told_kinds(
+    refiner: Refiner, answer: State, spec: LightSpec, options: SearchOptions
+) -> tuple[State, tuple[Finding, ...]]:
+    """The answer with each light as the kind that explains it, and which kinds the image does not tell apart.
+
+    Args:
+        answer: of points and spots.
+    """
+    energies, findings = light_energies(answer), []
+    for index in sorted(range(len(energies)), key=lambda k: -energies[k]):
+        answer, found = _OneLight(refiner, index, spec, options).told(answer)
+        findings += found
+    return answer, tuple(findings)
+
+
+@dataclass(frozen=True)
+class _OneLight:
+    """Light `index` of rigs, of which the kind is asked."""
+
+    refiner: Refiner
+    index: int
+    spec: LightSpec
+    options: SearchOptions
+
+    def told(self, answer: State) -> tuple[State, list[Finding]]:
+        """The rig with the kind that explains the light, and what is to be said of that."""
+        light = self._emitter(answer).light
+        if light.axis is None:
+            return self._of_a_point(answer)
+        tried = [answer, *self._beams(answer, light.axis)]
+        if isinstance(light, LedLight):
+            spots = next(kind for kind in self.spec.kinds if isinstance(kind, SpotLight)).variants()
+            tried.append(self._as([one.at(light.position, light.axis) for one in spots], answer))
+        return self._chosen(tried), self._open(tried)
+
+    def _of_a_point(self, answer: State) -> tuple[State, list[Finding]]:
+        place, size = self._emitter(answer).position, self.refiner.region.size
+        spheres = [one.at(place) for one in SphereLight.shaped().grown(size, True)]
+        room = distance_to_surface(self.refiner.problem.views.frozen.surfels, place)
+        largest = replace(spheres[-1], radius=min(room, spheres[-1].radius))
+        extent = extent_promised(self.refiner, answer, self.index, largest)
+        beam = beam_promised(self.refiner, answer, self.index)
+        tried = [answer]
+        if self._worth(extent):
+            tried.append(self._as(spheres, answer))
+        if self._worth(beam):
+            tried += self._beams(answer, torch.nn.functional.normalize(beam.best, dim=0))
+        best = self._chosen(tried)
+        sized = self._unseen(answer, largest, extent.signal) if best is answer else []
+        return best, [*sized, *self._open(tried)]
+
+    def _unseen(self, answer: State, sphere: SphereLight, signal: float) -> list[Finding]:
+        """A sphere that nobody would notice, the largest of `sphere` and its halves; nothing where each would be.
+
+        Args:
+            signal: of `sphere`, see `Promise`.
+        """
+        counts = self.options.bar.least / (1.0 - self.options.bar.least)
+        for _ in range(HALVINGS):
+            if signal < counts and sphere.radius > 0.0:
+                return [ExtentOpen(self.index + 1, len(answer.emitters), sphere.kind, sphere.radius)]
+            sphere = replace(sphere, radius=0.5 * sphere.radius)
+            signal = extent_promised(self.refiner, answer, self.index, sphere).signal
+        return []
+
+    def _beams(self, answer: State, axis: torch.Tensor) -> list[State]:
+        """Rigs with an LED along `axis` in the light's place, and with a panel where an LED is not clearly worse."""
+        led = answer
+        if not isinstance(self._emitter(answer).light, LedLight):
+            place = self._emitter(answer).position
+            led = self._as([one.at(place, axis) for one in LedLight.shaped().variants()], answer)
+        if drop(self.refiner.problem, led, answer) >= self.options.bar.least:
+            return [led]
+        sizes = PanelLight.shaped().grown(self.refiner.region.size, True)
+        laid_out = [one for sized in sizes for one in laid(self.refiner, self._emitter(led), sized, self._free)]
+        return [led, self._best(led, laid_out)]
+
+    def _as(self, lights: Sequence[Light], answer: State) -> State:
+        """The best of starts as such lights, where the answer has its own."""
+        found = self._emitter(answer)
+        aimed = [replace(found, light=light) for light in lights]
+        return self._best(answer, [one for like in aimed for one in laid(self.refiner, like, like.light, self._free)])
+
+    def _best(self, state: State, emitters: Sequence[Emitter]) -> State:
+        """The rig with one of these in the light's place that explains most after some steps."""
+        before, after = state.emitters[: self.index], state.emitters[self.index + 1 :]
+        rigs = [(*before, one, *after) for one in emitters]
+        return min(best_of_starts(self.refiner, rigs, self.options.schedule.steps), key=self.refiner.unexplained)
+
+    @property
+    def _free(self) -> LightSpec:
+        return replace(self.spec, shape_free=True)
+
+    def _emitter(self, state: State) -> Emitter:
+        return state.emitters[self.index]
+
+    def _worth(self, promise: Promise) -> bool:
+        return promise.gain >= self.options.bar.doubtful
+
+    def _chosen(self, tried: Sequence[State]) -> State:
+        """The rig of the fewest unknowns to which more of them add too little; of as many, that which explains more."""
+        best, *others = sorted(tried, key=lambda state: self._emitter(state).parameters)
+        for other in others:
+            more = self._emitter(other).parameters > self._emitter(best).parameters
+            if drop(self.refiner.problem, best, other) >= (self.options.bar.least if more else 0.0):
+                best = other
+        return best
+
+    def _open(self, tried: Sequence[State]) -> list[Finding]:
+        """Kinds of a beam that explain the image as well as the one that was chosen."""
+        problem, best = self.refiner.problem, self._chosen(tried)
+        beams = [one for one in tried if one is not best and self._emitter(one).axis is not None]
+        as_good = [one for one in beams if equally_good(problem, best, one, self.options.rivals)]
+        return [KindOpen(self.index + 1, len(best.emitters), self._emitter(one).light.kind) for one in as_good]
