@@ -82,13 +82,15 @@ def write_depth(path: Path, depth: np.ndarray, steps: float) -> None:
 
 
 def write_nerfstudio(
-    root: Path, views: Sequence[View], image: str = ".exr", depth: str = ".exr", shared: dict | None = None
+    root: Path, views: Sequence[View], image: str = ".exr", depth: str | None = ".exr", shared: dict | None = None
 ) -> None:
     frames = []
     for index, view in enumerate(views):
         write_photograph(root / f"images/{index}{image}", view.image.numpy())
-        write_depth(root / f"depth/{index}{depth}", view.depth.numpy(), 1000.0)
-        files = {"file_path": f"images/{index}{image}", "depth_file_path": f"depth/{index}{depth}"}
+        files = {"file_path": f"images/{index}{image}"}
+        if depth is not None:
+            write_depth(root / f"depth/{index}{depth}", view.depth.numpy(), 1000.0)
+            files["depth_file_path"] = f"depth/{index}{depth}"
         frames.append(files | {"transform_matrix": pose_of(view).tolist()})
     camera = views[0].camera
     content = {"fl_x": camera.fx, "fl_y": camera.fy, "cx": camera.cx, "cy": camera.cy}
