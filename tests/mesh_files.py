@@ -23,9 +23,7 @@ SIDES = [
 def cuboid_triangles(box: Cuboid) -> tuple[np.ndarray, np.ndarray]:
     """(24, 3) points, four a side, and (12, 3) triangles, wound as it happens."""
     points = 0.5 * np.array(SIDES, np.float64).reshape(-1, 3) * np.array(box.size) @ box.axes + np.array(box.center)
-    faces = np.concatenate(
-        [[[4 * side, 4 * side + 1, 4 * side + 2], [4 * side, 4 * side + 2, 4 * side + 3]] for side in range(6)]
-    )
+    faces = np.array([[4 * side, 4 * side + one, 4 * side + one + 1] for side in range(6) for one in (1, 2)])
     return points, faces
 
 

@@ -25,7 +25,7 @@ from scan_layouts import write_nerfstudio
 
 BOXES = (ROOM, Cuboid(BOX_CENTER, (BOX_SIZE,) * 3))
 
-#: Reflectances of the painted room's sides, as display values, at the corners of the mesh's sides.
+#: Grey at the corners of the mesh, display values.
 GREY = np.full((48, 3), 188, np.uint8)
 
 
@@ -55,9 +55,9 @@ def test_a_mesh_and_photographs_go_all_the_way_to_the_lamp(folder: Path) -> None
     white = float((folder / "white.txt").read_text())
     error = float((lamp.position - LAMPS[0].position).norm())
     ratio = float((lamp.intensity * white / LAMPS[0].intensity).mean())
-    print("MEASURED", error, ratio)
+    # Measured: 0.0116 in a room of side 1, and 0.962.
     assert error < 0.02, error
-    assert abs(ratio - 1.0) < 0.1, ratio  # measured:
+    assert abs(ratio - 1.0) < 0.1, ratio
 
 
 def test_depth_and_colours_of_the_mesh_are_those_of_the_views(folder: Path) -> None:
@@ -79,3 +79,16 @@ def test_photographs_may_lie_elsewhere(folder: Path, tmp_path: Path) -> None:
         STAGE.files(configured(tmp_path, "import_scan"))
     moved = configured(tmp_path, "import_scan", f"scene.mesh.photographs={folder}")
     assert len(STAGE.files(moved)) == 16
+
+
+@pytest.mark.parametrize(
+    ("overrides", "words"),
+    [
+        (["scene.rgbd.axes=opencv"], r"OpenGL axes.*scene\.rgbd\.axes=opengl"),
+        (["scene.mesh.up=y"], r"mesh whose z is up.*scene\.mesh\.up=z"),
+        (["scene.mesh.unit=1000"], r"times 0\.001.*scene\.mesh\.unit=1"),
+    ],
+)
+def test_settings_that_do_not_suit_the_photographs_are_refused(folder: Path, overrides: list[str], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        pipeline.run(configured(folder, "import_scan", *overrides), load_stage)

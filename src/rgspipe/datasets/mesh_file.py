@@ -44,9 +44,13 @@ def read_mesh(path: str | Path, options: MeshOptions | None = None) -> TriangleM
         raise
     except (ValueError, IndexError, TypeError, KeyError, AttributeError, OSError) as error:
         raise _broken(path, error) from error
-    upright = options.up == "y" or (options.up == "auto" and kind in GLTF)
     scaled = np.diag([*[options.unit] * 3, 1.0])
-    return _checked(mesh.moved(scaled @ UPRIGHT if upright else scaled), path)
+    return _checked(mesh.moved(scaled @ UPRIGHT if is_y_up(path, options) else scaled), path)
+
+
+def is_y_up(path: Path, options: MeshOptions) -> bool:
+    """Whether a file is taken for one whose y points up."""
+    return options.up == "y" or (options.up == "auto" and path.suffix.lower() in GLTF)
 
 
 def _loaded(path: Path) -> Any:

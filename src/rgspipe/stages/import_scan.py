@@ -14,6 +14,7 @@ from rgspipe.datasets.scans.layouts import read_scan
 from rgspipe.errors import InputError
 from rgspipe.renderer.mesh_passes import MeshPasses
 from rgspipe.stages.base import Stage, StageContext
+from rgspipe.stages.mesh_conventions import check_mesh
 from rgspipe.stages.scan_conventions import check_scan
 from rgspipe.stages.sources import mesh_path
 
@@ -22,10 +23,13 @@ def run(context: StageContext) -> None:
     """Write a dataset without lights, whose views agree with each other, and with the mesh if there is one."""
     config, options = context.config, context.config.scene.rgbd
     scan = _scan(config)
-    passes = MeshPasses(read_mesh(mesh_path(config), config.scene.mesh)) if config.scene.kind == "mesh" else None
-    imported = import_scan(scan, options, context.folder, None if passes is None else passes.seen_by)
+    mesh = read_mesh(mesh_path(config), config.scene.mesh) if config.scene.kind == "mesh" else None
+    imported = import_scan(scan, options, context.folder, None if mesh is None else MeshPasses(mesh).seen_by)
     views = load_dataset(context.folder, targets=False).train
-    check_scan(scan, views)
+    if mesh is None:
+        check_scan(scan, views)
+    else:
+        check_mesh(scan, views, mesh, mesh_path(config), config.scene.mesh)
     print(imported.words(scan.layout))
     context.note(layout=scan.layout, frames=imported.frames, with_depth=imported.with_depth, exif=imported.exif)
 

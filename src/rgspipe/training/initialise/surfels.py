@@ -100,12 +100,10 @@ def surfels_on(
         cloud: dense points with normals towards the side that light falls on.
         seed, clips, footprint: as of `initialise_surfels`.
     """
-    spacing = estimate_spacing(cloud, count)
+    footprint, spacing = footprint or Footprint(), estimate_spacing(cloud, count)
     thinned = thin_for(cloud, count, spacing)
     centers = refit_planes(even_out(thinned, count, spacing, np.random.default_rng(seed)), thinned, spacing)
-    return _dress(
-        centers, neighbour_spacing(centers, spacing), cloud if clips else None, thinned, footprint or Footprint()
-    )
+    return _dress(centers, neighbour_spacing(centers, spacing), cloud if clips else None, thinned, footprint)
 
 
 def cloud_from_views(
