@@ -107,6 +107,11 @@ def _written(
         entry["saturated_from"] = float(limit / np.float32(exposure))
     write_image(path.with_suffix(".exr"), light / np.float32(exposure))
     passes = _measured(frame, camera, options) if surfaces is None else surfaces(camera)
+    if frame.mask is not None:
+        used = _mask(frame, camera)
+        passes = replace(passes, depth=None if passes.depth is None else np.where(used, passes.depth, np.nan))
+        write_channels(path.with_name(f"{path.name}_mask.exr"), {"A": used.astype(np.float32)})
+        entry["mask_path"] = f"./{path.parent.name}/{path.name}_mask.exr"
     share = None if passes.depth is None else float(np.isfinite(passes.depth).mean())
     kinds = _write_passes(passes if share else replace(passes, depth=None), path)
     return frame_entry(f"{path.parent.name}/{path.name}", camera, surfaces=kinds) | entry, share
@@ -119,7 +124,19 @@ def _measured(frame: ScanFrame, camera: Camera, options: ScanOptions) -> Passes:
         depth = resampled_depth(read_depth_image(frame.depth), camera, frame.depth.lens or frame.lens)
     if frame.albedo is not None:
         albedo, _ = resampled_colour(read_picture(frame.albedo, options.response).light, None, camera, frame.lens)
+    if albedo is not None and frame.material is not None:
+        material, _ = resampled_colour(read_picture(frame.material, "linear").light, None, camera, frame.lens)
+        albedo = albedo * (1.0 - np.clip(material[..., 1:2], 0.0, 1.0))
     return Passes(depth, None, albedo)
+
+
+def _mask(frame: ScanFrame, camera: Camera) -> np.ndarray:
+    """(H, W) bool: which of a camera's pixels show nothing that is masked."""
+    mask = read_picture(frame.mask, "linear").light
+    check_shape(frame.mask, mask.shape, frame.lens)
+    # What is masked is "clipped" downwards: any sample of it counts.
+    _, masked = resampled_colour(1.0 - mask, 0.5, camera, frame.lens)
+    return ~masked.any(axis=2)
 
 
 def _write_passes(passes: Passes, path: Path) -> tuple[str, ...]:
