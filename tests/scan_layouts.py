@@ -272,7 +272,5 @@ def write_dng(path: Path, levels: np.ndarray) -> None:
     tags = [(254, 4, 1, 0), (33421, 3, 2, (2, 2)), (33422, 1, 4, bytes([0, 1, 1, 2]))]
     tags += [(50706, 1, 4, bytes([1, 4, 0, 0])), (50707, 1, 4, bytes([1, 1, 0, 0])), (50708, 2, 0, "Test")]
     tags += [(50714, 3, 1, 0), (50717, 4, 1, 4095), (50778, 3, 1, 21), (50728, 5, 3, (1, 2, 1, 1, 1, 2))]
-    tags += [
-        (50721, 10, 9, tuple(value for entry in np.eye(3, dtype=int).reshape(-1).tolist() for value in (entry, 1)))
-    ]
+    tags += [(50721, 10, 9, (1, 1, *2 * (*3 * (0, 1), 1, 1)))]
     tifffile.imwrite(path, levels, photometric=32803, extratags=tags, metadata=None, compression=None)

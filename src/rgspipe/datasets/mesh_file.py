@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -55,8 +56,11 @@ def is_y_up(path: Path, options: MeshOptions) -> bool:
 
 def _loaded(path: Path) -> Any:
     try:
-        # Nothing is merged or mended: points without area do no harm, and merging would move textures.
-        return trimesh.load_scene(path, process=False, maintain_order=True)
+        # Of broken files numpy warns before they are refused.
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            # Nothing is merged or mended: points without area do no harm, and merging would move textures.
+            return trimesh.load_scene(path, process=False, maintain_order=True)
     except Exception as error:  # the library says of no format what it raises
         raise _broken(path, error) from error
 
