@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
 
-from rgspipe.capture.captured import Captured, capture_scene
+from rgspipe.capture.captured import Captured, capture_scenes
 from rgspipe.capture.lamp_file import write_lamps
 from rgspipe.capture.words import captured_words
 from rgspipe.datasets.grade_file import GRADE, save_grade
@@ -41,24 +42,32 @@ MOST_JUDGED = 12
 def run(context: StageContext) -> None:
     """Write surfels.safetensors, doubt.safetensors, lamps.json, metrics.json, grade.json and comparison.png.
 
-    The picture is of views that were left out, if there are any whose lights are known.
+    Lamps of further lightings are lamps_2.json and so on. The picture is of views that were left out, if there are any
+    whose lights are known.
     """
     memory, begin = PeakMemory(), time.perf_counter()
     folder = context.inputs["generate_dataset"].folder()
     dataset = open_dataset(folder, targets=False)
     start = load_surfels(context.inputs["init_depth"].file("surfels.safetensors"))
     views = degraded(dataset.train, context.config.capture)
-    found = capture_scene(views, start, context.config.lamps, where=dataset.root)
+    found, *others = capture_scenes(views, start, context.config.lamps, where=dataset.root)
     seconds = time.perf_counter() - begin
     save_surfels(context.folder / "surfels.safetensors", found.surfels)
     save_tensors(context.folder / "doubt.safetensors", {"log_albedo": found.doubt})
-    write_lamps(context.folder / "lamps.json", found)
-    print(captured_words(found))
+    for one in (found, *others):
+        write_lamps(context.folder / (f"lamps_{one.lighting}.json" if one.lighting else "lamps.json"), one)
+        print(f"Lighting {one.lighting}: {captured_words(one)}" if one.lighting else captured_words(one))
     frozen = FrozenScene.freeze(found.surfels, gather_rays=context.config.lamps.gather_rays)
-    metrics = _metrics(found) | _against_truth(found, dataset_root(folder) / LAMPS_TRUTH)
+    further = {one.lighting: _metrics(one) for one in others}
+    metrics = (
+        _metrics(found)
+        | ({"others": further} if further else {})
+        | _against_truth(found, dataset_root(folder) / LAMPS_TRUTH)
+    )
     held_out = _held_out(frozen, dataset.test, context.folder)
     metrics |= {} if held_out is None else held_out.summary()
-    grade = _grade(frozen, found.lamps, views, held_out)
+    own = [view for view in views if view.lighting == found.lighting]
+    grade = _grade(frozen, found.lamps, own, held_out)
     print(graded_words(grade))
     save_grade(context.folder / GRADE, grade)
     metrics |= {"surfels": len(found.surfels), "seconds": seconds, "peak_memory_mib": memory.mib()}
@@ -76,14 +85,17 @@ def _metrics(found: Captured) -> dict[str, Any]:
             "spread": certainty.spread(found.frozen.size).tolist(),
             "scale_error": certainty.scale,
             "bounced": certainty.bounced,
+            "over_even_light": found.answer.over_even,
             "compared": [
                 {"lamps": len(one.more.lamps), "gain": one.gain, "wanted": one.wanted} for one in found.answer.compared
             ],
         },
         "deviations": {name: math.sqrt(value) for name, value in vars(variances).items()},
         "albedo_doubt": float(found.doubt.median()),
+        "oddities": asdict(found.oddities),
         "pixel_error": found.measured.error,
-        "exposures": found.measured.exposures.tolist(),
+        "exposures": found.measured.cameras.gains.tolist(),
+        "vignetting": found.measured.cameras.falloff.tolist(),
         "measured": float(np.mean(found.answer.best.problem.field.weight > 0.0)),
     }
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from rgspipe.capture.refusals import OFF
 from rgspipe.config import RgspipeConfig
 from rgspipe.datasets.gs3 import load_dataset
 from rgspipe.datasets.mesh_file import read_mesh
@@ -35,7 +36,12 @@ def run(context: StageContext) -> None:
 
 
 def _scan(config: RgspipeConfig) -> Scan:
-    return read_scan(_folder(config), config.scene.rgbd, depth=config.scene.kind != "mesh")
+    """The capture, with others of the same room."""
+    options, depth = config.scene.rgbd, config.scene.kind != "mesh"
+    scan = read_scan(_folder(config), options, depth=depth)
+    for number, folder in enumerate(options.others):
+        scan = scan.joined(read_scan(folder, options, depth=False), f"{number + 2}")
+    return scan if options.lamps_off is None else scan.joined(read_scan(options.lamps_off, options, depth=False), OFF)
 
 
 def _folder(config: RgspipeConfig) -> Path:

@@ -94,6 +94,7 @@ class ScanFrame:
         albedo: a predicted map, if there is one.
         material: an image whose green channel is the part of the albedo that is a metal's and not diffuse.
         mask: an image that is 0 where the photograph is not to be used.
+        lighting: the name of the capture, where there are several.
     """
 
     image: Path
@@ -103,6 +104,7 @@ class ScanFrame:
     albedo: Path | None = None
     material: Path | None = None
     mask: Path | None = None
+    lighting: str = ""
 
     @property
     def files(self) -> list[Path]:
@@ -130,6 +132,11 @@ class Scan:
     frames: tuple[ScanFrame, ...]
     axes: str
     notes: tuple[str, ...] = ()
+
+    def joined(self, other: Scan, lighting: str) -> Scan:
+        """With the frames of another capture of the same room."""
+        frames = tuple(replace(frame, lighting=lighting) for frame in other.frames)
+        return replace(self, sources=self.sources + other.sources, frames=self.frames + frames)
 
     def thinned(self, most: int) -> Scan:
         """At most so many of the frames, evenly spaced, the first and the last among them."""

@@ -72,7 +72,8 @@ def import_scan(scan: Scan, options: ScanOptions, folder: Path, surfaces: Surfac
     pairs = list(zip(scan.frames, factors, strict=True))
     for index, (frame, factor) in enumerate(progress_bar(pairs, "reading photographs", unit="photograph")):
         entry, share = _written(frame, float(factor), options, folder / f"train/r_{index:04d}", surfaces)
-        entries.append(entry | {"source": frame.image.name})
+        lighting = {"lighting": frame.lighting} if frame.lighting else {}
+        entries.append(entry | {"source": frame.image.name} | lighting)
         known.append(share)
     write_transforms(folder / TRANSFORMS, entries)
     write_json(folder / INFO, {"version": VERSION, "depth_convention": "planar_z", "layout": scan.layout})

@@ -36,6 +36,10 @@ class ScanOptions(Options):
     fov: float | None = option(None, low=1, high=179)
     """horizontal field of view of photographs whose files do not state it (iid, interiorverse, openrooms), degrees; by
     default the layout's usual one"""
+    others: tuple[str, ...] = ()
+    """folders of further captures of the same room under other lamps, in the same layout and coordinates"""
+    lamps_off: str | None = None
+    """folder of such a capture with the lamps off: daylight, screens"""
     photograph: str | None = None
     """which one, of photographs without poses that lie in one folder (iid, interiorverse): its file's name, with or
     without suffix"""

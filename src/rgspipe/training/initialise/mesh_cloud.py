@@ -24,9 +24,9 @@ PER_SURFEL = 40
 #: How far before a surface its air is, in parts of the mesh's size, and by how much rays may end before they arrive.
 BEFORE, SLACK = 1e-4, 1e-5
 
-#: Rounds in which air spreads, and places in it that a side is seen from in each. Every second round asks neighbours
-#: only, which is how air gets into nooks.
-ROUNDS, ASKED = 12, 6
+#: Rounds in which air spreads, and places in it that a side may be seen from in each: first ones anywhere, then
+#: neighbours, which is how air gets into nooks. A round that finds less than SETTLED of the air is the last.
+ROUNDS, ASKED, SETTLED = 6, 6, 0.002
 
 Flags = NDArray[np.bool_]
 
@@ -60,18 +60,20 @@ def _in_air(mesh: TriangleMesh, places: Numbers, eyes: Numbers, rng: np.random.G
     """(P,) which places (P, 3) are in the air that the `eyes` (V, 3) are in."""
     rays, slack = MeshRays(mesh), SLACK * mesh.size
     tree, air = cKDTree(places), np.zeros(len(places), bool)
-    for turn in range(ROUNDS):
-        open_ = (~air).nonzero()[0]
-        if not len(open_) or (turn > 0 and not air.any()):
+    for _ in range(ROUNDS):
+        before = int(air.sum())
+        for beside in (False, True):
+            open_ = (~air).nonzero()[0]
+            if beside:
+                near = tree.query(places[open_], k=ASKED + 1, workers=1)[1][:, 1:].clip(max=len(places) - 1)
+                ends, counts = places[near], air[near]
+            else:
+                known = places[air] if air.any() else eyes
+                ends = known[rng.integers(len(known), size=(len(open_), ASKED))]
+                counts = np.ones(ends.shape[:2], bool)
+            air[open_] = _any_seen(rays, places[open_], ends, counts, slack)
+        if air.sum() - before <= SETTLED * before:
             break
-        if turn % 2 == 0:
-            known = eyes if turn == 0 else places[air]
-            ends = known[rng.integers(len(known), size=(len(open_), ASKED))]
-            counts = np.ones(ends.shape[:2], bool)
-        else:
-            near = tree.query(places[open_], k=ASKED + 1, workers=1)[1][:, 1:].clip(max=len(places) - 1)
-            ends, counts = places[near], air[near]
-        air[open_] = _any_seen(rays, places[open_], ends, counts, slack)
     return air
 
 
