@@ -22,11 +22,11 @@ from rgspipe.datasets.surfel_file import load_surfels, save_surfels
 from rgspipe.datasets.tensor_file import save_tensors
 from rgspipe.datasets.views import View
 from rgspipe.degradation.capture import degraded
+from rgspipe.evaluation.captured_lamps import against_truth
 from rgspipe.evaluation.grading import grade_scene, graded_words
 from rgspipe.evaluation.held_out import held_out_picture
 from rgspipe.evaluation.held_out_views import HeldOut, render_held_out
 from rgspipe.evaluation.images import save_png
-from rgspipe.evaluation.tables import match_positions
 from rgspipe.files import write_json
 from rgspipe.machine import PeakMemory
 from rgspipe.renderer.frozen import FrozenScene
@@ -62,7 +62,7 @@ def run(context: StageContext) -> None:
     metrics = (
         _metrics(found)
         | ({"others": further} if further else {})
-        | _against_truth(found, dataset_root(folder) / LAMPS_TRUTH)
+        | _against_truth(found, dataset_root(folder) / LAMPS_TRUTH, dataset.train)
     )
     held_out = _held_out(frozen, dataset.test, context.folder)
     metrics |= {} if held_out is None else held_out.summary()
@@ -100,20 +100,12 @@ def _metrics(found: Captured) -> dict[str, Any]:
     }
 
 
-def _against_truth(found: Captured, path: Path) -> dict[str, Any]:
-    """How far each lamp is from a true one, in parts of the scene's size, and its intensity over the true one's."""
+def _against_truth(found: Captured, path: Path, views: Sequence[View]) -> dict[str, Any]:
+    """How the lamps stand to those that are known to have been on, if they are."""
     if not path.exists():
         return {}
-    truth = read_lights(path)
-    pairs = match_positions(*(np.stack([light.position.numpy() for light in rig]) for rig in (found.lamps, truth)))
-    matched = [(found.lamps[own], truth[true]) for own, true in pairs]
-    return {
-        "truth": {
-            "lamps": len(truth),
-            "position_error": [float((a.position - b.position).norm()) / found.frozen.size for a, b in matched],
-            "intensity_ratio": [float(a.intensity.mean() / b.intensity.mean()) for a, b in matched],
-        }
-    }
+    truth, size = read_lights(path), found.frozen.size
+    return {"truth": against_truth(found.lamps, found.certainty.places, truth, size, views)}
 
 
 def _held_out(frozen: FrozenScene, views: Sequence[View], folder: Path) -> HeldOut | None:
