@@ -12,6 +12,7 @@ from lit_room import room_surfels
 from rgspipe.datasets.views import View
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import Camera, PointLight, Surfels, look_at
+from rgspipe.training.materials import trace_views
 
 #: Reflectance of the six sides that surfels may face.
 PAINT = torch.tensor(
@@ -55,3 +56,33 @@ def photographs(lamps: Sequence[PointLight] = LAMPS, count: int = 14, resolution
             image = frozen.render(camera, lamps)
         views.append(View(f"train/{index}", camera, image, torch.ones(resolution, resolution)))
     return views
+
+
+def radiance_under(
+    lamps: Sequence[PointLight], emission: torch.Tensor | None = None, darker: float = 1.0
+) -> torch.Tensor:
+    """(N, 3) of the painted room's surfels with all bounces, where some surfaces may glow by themselves (N, 3).
+
+    Args:
+        darker: what the paint is multiplied by.
+    """
+    frozen, albedo = frozen_room(), darker * painted_room().albedo.double().numpy()
+    irradiance, _ = frozen.unit_irradiance(torch.stack([lamp.position.double() for lamp in lamps]))
+    powers = torch.stack([lamp.intensity.double() for lamp in lamps]) / torch.pi
+    first = albedo * (irradiance.double().T @ powers).numpy() + (0.0 if emission is None else emission.double().numpy())
+    gather = frozen.gather.to_scipy().astype("float64")
+    sent = first
+    for _ in range(40):
+        sent = first + albedo * (gather @ sent)
+    return torch.from_numpy(sent).float()
+
+
+def pictures(radiance: torch.Tensor, count: int = 10, resolution: int = 40) -> list[View]:
+    """Photographs of surfels that send `radiance` (N, 3) to all sides, or (V, N, 3), to each camera its own."""
+    taken = []
+    blank = [View(f"train/{i}", c, torch.zeros(resolution, resolution, 3), torch.ones(resolution, resolution))
+             for i, c in enumerate(cameras(count, resolution))]  # fmt: skip
+    for index, (view, weights) in enumerate(zip(blank, trace_views(painted_room(), blank, 2), strict=True)):
+        image = weights.operator @ (radiance if radiance.ndim == 2 else radiance[index])
+        taken.append(replace(view, image=image.reshape(resolution, resolution, 3)))
+    return taken

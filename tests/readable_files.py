@@ -14,7 +14,9 @@ import torch
 from PIL import Image
 
 from luminaire_files import COLUMNS, ies, ldt
+from mesh_files import cuboid_triangles, quarters, textured_square, write_coloured
 from ply_files import gaussian_columns, radiosity_columns, write_ply
+from raycast import ROOM
 from rgspipe.artifacts import ArtifactStore, Key
 from rgspipe.datasets.covariance_file import covariance_fields, read_covariances
 from rgspipe.datasets.exr import read_channels, write_channels, write_image
@@ -23,6 +25,7 @@ from rgspipe.datasets.gs3 import load_dataset
 from rgspipe.datasets.images import read_colour
 from rgspipe.datasets.light_file import read_ambient, read_lights, write_lights
 from rgspipe.datasets.location import open_dataset
+from rgspipe.datasets.mesh_file import read_mesh
 from rgspipe.datasets.photometric_file import read_photometry
 from rgspipe.datasets.ply import read_ply
 from rgspipe.datasets.ply_cameras import read_viewpoints
@@ -40,7 +43,9 @@ from rooms import closed_box
 from scan_layouts import (
     photographed,
     write_colmap,
+    write_interiorverse,
     write_nerfstudio,
+    write_openrooms,
     write_polycam,
     write_replica,
     write_scannet,
@@ -204,6 +209,22 @@ def _of_scan(file: str, write: Callable[[Path], None]) -> Kind:
     return Kind(file, write, read)
 
 
+def _mesh(name: str, make: Callable[[Path], object] | None = None) -> Kind:
+    """By default a textured square."""
+
+    def read(folder: Path) -> Numbers:
+        mesh = read_mesh(folder / name)
+        weights = np.full((len(mesh), 3), 1.0 / 3.0)
+        colours = np.nan_to_num(mesh.paint.at(np.arange(len(mesh)), weights), nan=0.0)
+        return iter([torch.from_numpy(mesh.vertices[mesh.faces]), torch.from_numpy(colours)])
+
+    return Kind(name, make or (lambda folder: textured_square(quarters()).export(folder / name)), read)
+
+
+def _coloured_mesh(folder: Path) -> None:
+    write_coloured(folder / "a.ply", *cuboid_triangles(ROOM), np.full((24, 3), 99, np.uint8))
+
+
 def _colmap_map(root: Path) -> None:
     write_colmap(root, SCANNED, True, depth=False)
     path = root / "stereo/depth_maps/00.exr.geometric.bin"
@@ -279,6 +300,13 @@ KINDS: dict[str, Kind] = {
     "scan: COLMAP map": _of_scan("stereo/depth_maps/00.exr.geometric.bin", _colmap_map),
     "scan: Replica": _of_scan("traj.txt", lambda root: write_replica(root, SCANNED)),
     "scan: ScanNet": _of_scan("intrinsic/intrinsic_color.txt", lambda root: write_scannet(root, SCANNED)),
+    "scan: InteriorVerse": _of_scan("000_material.exr", lambda root: write_interiorverse(root, SCANNED[:1])),
+    "scan: OpenRooms": _of_scan("cam.txt", lambda root: write_openrooms(root, SCANNED)),
+    "scan: OpenRooms depth": _of_scan("imdepth_1.dat", lambda root: write_openrooms(root, SCANNED)),
+    "scan: Radiance picture": _of_scan("im_1.hdr", lambda root: write_openrooms(root, SCANNED)),
+    "mesh, PLY": _mesh("a.ply", _coloured_mesh),
+    "mesh, OBJ": _mesh("a.obj"),
+    "mesh, GLB": _mesh("a.glb"),
     "normals": _of_dataset("train/r_0000_normal.exr"),
     "views, lamps off": _of_lamps_off("transforms.json"),
     "image, lamps off": _of_lamps_off("off.exr"),

@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import tifffile
 import torch
 from PIL import Image
 
@@ -82,13 +83,15 @@ def write_depth(path: Path, depth: np.ndarray, steps: float) -> None:
 
 
 def write_nerfstudio(
-    root: Path, views: Sequence[View], image: str = ".exr", depth: str = ".exr", shared: dict | None = None
+    root: Path, views: Sequence[View], image: str = ".exr", depth: str | None = ".exr", shared: dict | None = None
 ) -> None:
     frames = []
     for index, view in enumerate(views):
         write_photograph(root / f"images/{index}{image}", view.image.numpy())
-        write_depth(root / f"depth/{index}{depth}", view.depth.numpy(), 1000.0)
-        files = {"file_path": f"images/{index}{image}", "depth_file_path": f"depth/{index}{depth}"}
+        files = {"file_path": f"images/{index}{image}"}
+        if depth is not None:
+            write_depth(root / f"depth/{index}{depth}", view.depth.numpy(), 1000.0)
+            files["depth_file_path"] = f"depth/{index}{depth}"
         frames.append(files | {"transform_matrix": pose_of(view).tolist()})
     camera = views[0].camera
     content = {"fl_x": camera.fx, "fl_y": camera.fy, "cx": camera.cx, "cy": camera.cy}
@@ -206,3 +209,68 @@ def write_iid(root: Path, view: View, depth_size: tuple[int, int]) -> None:
     write_image(root / "albedo.exr", 0.5 * view.image.numpy())
     depth = Image.fromarray(view.depth.numpy()).resize(depth_size, Image.Resampling.BILINEAR)
     write_depth(root / "depth.exr", 0.01 * np.asarray(depth), 1.0)
+
+
+def write_interiorverse(root: Path, views: Sequence[View]) -> None:
+    """Linear EXR with albedo of which a quarter is metal's, and depth in millimetres with a hole; material's red is not
+    looked at."""
+    root.mkdir(parents=True, exist_ok=True)
+    for index, view in enumerate(views):
+        name = root / f"{index:03d}"
+        write_image(Path(f"{name}_im.exr"), view.image.numpy())
+        write_image(Path(f"{name}_albedo.exr"), 0.8 * view.image.numpy())
+        material = np.zeros(view.image.shape, np.float32)
+        material[..., 0], material[..., 1] = 0.9, 0.25
+        write_image(Path(f"{name}_material.exr"), material)
+        depth = 1000.0 * view.depth.numpy()
+        depth[0, 0] = np.inf
+        write_channels(Path(f"{name}_depth.exr"), {"Z": depth})
+
+
+def write_openrooms(root: Path, views: Sequence[View]) -> None:
+    """Cameras from 1 on, as origin, target and up; light as Radiance pictures, packed and not in turns."""
+    root.mkdir(parents=True, exist_ok=True)
+    lines = [str(len(views))]
+    for index, view in enumerate(views):
+        pose = pose_of(view)
+        points = (pose[:3, 3], pose[:3, 3] - 2.0 * pose[:3, 2], pose[:3, 1] - 0.3 * pose[:3, 2])
+        lines += [" ".join(repr(float(value)) for value in point) for point in points]
+        write_hdr(root / f"im_{index + 1}.hdr", view.image.numpy(), packed=index % 2 == 0)
+        depth = view.depth.numpy().astype("<f4")
+        (root / f"imdepth_{index + 1}.dat").write_bytes(struct.pack("<ii", *depth.shape) + depth.tobytes())
+        write_photograph(root / f"imbaseColor_{index + 1}.png", view.image.numpy())
+    (root / "cam.txt").write_text("\n".join(lines) + "\n")
+
+
+def write_hdr(path: Path, light: np.ndarray, packed: bool) -> None:
+    """Bytes with a shared exponent; packed rows have a run of four wherever four bytes are the same."""
+    mantissa, exponent = np.frexp(light.max(axis=2))
+    scale = np.where(light.max(axis=2) > 1e-32, 256.0 * mantissa / np.maximum(light.max(axis=2), 1e-32), 0.0)
+    rows = np.concatenate([light * scale[..., None], (exponent + 128)[..., None]], axis=2).astype(np.uint8)
+    content = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n" + f"-Y {rows.shape[0]} +X {rows.shape[1]}\n".encode()
+    for row in rows:
+        if packed:
+            content += b"\x02\x02" + struct.pack(">H", len(row))
+            content += b"".join(_packed(row[:, channel].tobytes()) for channel in range(4))
+        else:
+            content += row.tobytes()
+    path.write_bytes(content)
+
+
+def _packed(values: bytes) -> bytes:
+    parts = []
+    for begin in range(0, len(values), 4):
+        four = values[begin : begin + 4]
+        same = len(set(four)) == 1
+        parts.append(bytes([128 + len(four), four[0]]) if same else bytes([len(four)]) + four)
+    return b"".join(parts)
+
+
+def write_dng(path: Path, levels: np.ndarray) -> None:
+    """Levels (H, W) below 4096 under a pattern red, green, green, blue; a neutral surface has half as much red and
+    blue as green."""
+    tags = [(254, 4, 1, 0), (33421, 3, 2, (2, 2)), (33422, 1, 4, bytes([0, 1, 1, 2]))]
+    tags += [(50706, 1, 4, bytes([1, 4, 0, 0])), (50707, 1, 4, bytes([1, 1, 0, 0])), (50708, 2, 0, "Test")]
+    tags += [(50714, 3, 1, 0), (50717, 4, 1, 4095), (50778, 3, 1, 21), (50728, 5, 3, (1, 2, 1, 1, 1, 2))]
+    tags += [(50721, 10, 9, (1, 1, *2 * (*3 * (0, 1), 1, 1)))]
+    tifffile.imwrite(path, levels, photometric=32803, extratags=tags, metadata=None, compression=None)

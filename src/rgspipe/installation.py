@@ -28,7 +28,7 @@ MODULES = {
 
 #: What there is with the extras of the package.
 EXTRAS = {
-    "blender": "renders datasets, targets and truth; images of your own need none (scene=external, rgbd)",
+    "blender": "renders datasets, targets and truth; images of your own need none (scene=external, rgbd, mesh)",
     "bench": "the path tracer that stage=benchmark compares with",
     "dev": "tests, the site of the docs, lint",
 }

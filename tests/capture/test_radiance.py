@@ -40,9 +40,23 @@ def test_it_is_that_of_the_scene() -> None:
 def test_exposures_follow_from_what_photographs_share() -> None:
     factors = torch.linspace(-0.8, 0.8, 14).exp()
     views = [replace(view, image=view.image * factor) for view, factor in zip(photographs(), factors, strict=True)]
-    found = measured_radiance(weights(), views, free_exposure=True)
-    np.testing.assert_allclose(found.exposures, factors.numpy(), rtol=0.01)  # 0.004
+    found = measured_radiance(weights(), views, exposure="free")
+    np.testing.assert_allclose(found.cameras.gains, factors.numpy()[:, None].repeat(3, 1), rtol=0.01)  # 0.004
     assert error(found) < 0.01  # 0.0056
+
+
+def test_white_balance_and_vignetting_follow_from_what_photographs_share() -> None:
+    factors = torch.stack([torch.linspace(-s, s, 14).exp() for s in (0.5, -0.2, 0.3)], dim=1)
+    views = []
+    for view, factor in zip(photographs(), factors, strict=True):
+        across = (torch.arange(64) + 0.5 - 32.0) ** 2 / (2.0 * 31.5**2)
+        radius = across[:, None] + across
+        fallen = (-0.5 * radius - 0.2 * radius**2).exp()[..., None]
+        views.append(replace(view, image=view.image * factor * fallen))
+    found = measured_radiance(weights(), views, exposure="free_colour", vignetting=True)
+    np.testing.assert_allclose(found.cameras.gains, factors.numpy(), rtol=0.05)  # 0.024
+    np.testing.assert_allclose(found.cameras.falloff, [-0.5, -0.2], atol=0.08)  # -0.533, -0.205
+    assert error(found) < 0.03  # 0.015
 
 
 def _with_stain(view: View) -> View:

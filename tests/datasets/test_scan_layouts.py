@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import struct
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -21,7 +22,9 @@ from scan_layouts import (
     photographed,
     write_colmap,
     write_iid,
+    write_interiorverse,
     write_nerfstudio,
+    write_openrooms,
     write_polycam,
     write_replica,
     write_scannet,
@@ -139,6 +142,69 @@ def test_one_photograph_with_predictions_comes_back(tmp_path: Path) -> None:
     assert any("not in metres" in note for note in made.notes)
 
 
+def test_interiorverse_comes_back_with_the_diffuse_part_of_its_albedo(tmp_path: Path) -> None:
+    root = tmp_path / "scenes_80" / "L3D"
+    write_interiorverse(root, VIEWS[:2])
+    with pytest.raises(InputError, match=r"2 \(000_im\.exr, 001_im\.exr\)"):
+        read_scan(root, ScanOptions())
+    made, (view,) = back(root, photograph="001_im")
+    assert "80°" in made.notes[0] and view.camera.fx == pytest.approx(16.0 / np.tan(np.radians(40.0)))
+    assert torch.equal(view.image, VIEWS[1].image) and view.saturated_from is None
+    assert bool(view.depth[0, 0].isnan())
+    assert float((view.depth / VIEWS[1].depth - 1.0).nan_to_num().abs().max()) < 1e-6
+    assert float((view.albedo - 0.6 * VIEWS[1].image).abs().max()) < 1e-6
+
+
+def test_openrooms_comes_back(tmp_path: Path) -> None:
+    write_openrooms(tmp_path / "scan", VIEWS)
+    made, views = back(tmp_path / "scan", fov=np.degrees(1.4))
+    assert made.with_depth == 4 and read_scan(tmp_path / "scan", ScanOptions()).layout == "openrooms"
+    pose, depth = off(views, VIEWS)
+    assert pose < 1e-12 and depth < 1e-12
+    for read, written in zip(views, VIEWS, strict=True):
+        # Eight bits of the brightest channel: half of one is 1/256 to 1/512 of it.
+        assert float((read.image - written.image).abs().max() / written.image.max()) < 1.0 / 256
+        assert float((read.albedo - written.image).abs().max()) < 2.3 * 0.5 / 255 + 1e-6
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda text: text.replace(text.splitlines()[1], "1 2"), "three finite numbers"),
+        (lambda text: "\n".join(text.splitlines()[:-1]), "three lines a camera"),
+        (lambda text: "\n".join(text.splitlines()[:7]), r"2 cameras and 4 images, the last im_4\.hdr"),
+        (lambda text: text.replace(text.splitlines()[2], text.splitlines()[1]), "camera 1"),
+    ],
+)
+def test_broken_cameras_of_openrooms_are_refused(tmp_path: Path, change: Callable, words: str) -> None:
+    write_openrooms(tmp_path, VIEWS)
+    path = tmp_path / "cam.txt"
+    path.write_text(change(path.read_text()))
+    with pytest.raises(InputError, match=words):
+        read_scan(tmp_path, ScanOptions())
+
+
+@pytest.mark.parametrize(
+    ("model", "values"),
+    [("OPENCV_FISHEYE", 8), ("RADIAL_FISHEYE", 5), ("SIMPLE_RADIAL_FISHEYE", 4)],
+)
+@pytest.mark.parametrize("binary", [False, True])
+def test_fisheye_lenses_of_colmap_are_read(tmp_path: Path, model: str, values: int, binary: bool) -> None:
+    write_colmap(tmp_path, VIEWS[:1], binary=binary)
+    focal = [20.0, 21.0] if values == 8 else [20.0]
+    numbers = [*focal, 16.0, 15.0, *np.linspace(0.1, 0.01, values - 2 - len(focal)).tolist()]
+    folder = tmp_path / "sparse/0"
+    if binary:
+        kind = {"OPENCV_FISHEYE": 5, "SIMPLE_RADIAL_FISHEYE": 8, "RADIAL_FISHEYE": 9}[model]
+        content = struct.pack(f"<QiiQQ{values}d", 1, 7, kind, SIZE, SIZE, *numbers)
+        (folder / "cameras.bin").write_bytes(content)
+    else:
+        (folder / "cameras.txt").write_text(f"7 {model} {SIZE} {SIZE} {' '.join(map(repr, numbers))}\n")
+    lens = read_scan(tmp_path, ScanOptions()).frames[0].lens
+    assert lens.fisheye and lens.bends and (lens.fx, lens.fy) == (20.0, focal[-1])
+    assert lens.radial == tuple(numbers[len(focal) + 2 :])
+
+
 def test_frames_are_spread_evenly(tmp_path: Path) -> None:
     write_nerfstudio(tmp_path / "scan", photographed(9, 8))
     scan = read_scan(tmp_path / "scan", ScanOptions(frames=3))
@@ -176,7 +242,7 @@ def test_a_model_that_is_cut_off_is_refused(tmp_path: Path, suffix: str) -> None
 def test_lenses_that_are_not_known_are_refused(tmp_path: Path) -> None:
     write_colmap(tmp_path / "a", VIEWS[:1], binary=False)
     cameras = tmp_path / "a/sparse/0/cameras.txt"
-    cameras.write_text(cameras.read_text().replace("OPENCV", "OPENCV_FISHEYE"))
+    cameras.write_text(cameras.read_text().replace("OPENCV", "THIN_PRISM_FISHEYE"))
     write_nerfstudio(tmp_path / "b", VIEWS[:1], shared={"camera_model": "EQUIRECTANGULAR"})
     for root in (tmp_path / "a", tmp_path / "b"):
         with pytest.raises(InputError, match="image_undistorter"):
@@ -210,8 +276,11 @@ def test_several_photographs_without_poses_are_refused(tmp_path: Path) -> None:
     (tmp_path / "depth.exr").rename(tmp_path / "depth/a.exr")
     assert read_scan(tmp_path, ScanOptions()).layout == "iid"
     (tmp_path / "im/b.png").write_bytes((tmp_path / "im/a.png").read_bytes())
-    with pytest.raises(InputError, match="without poses several do not go together"):
+    with pytest.raises(InputError, match=r"without poses several do not go together.*scene\.rgbd\.photograph"):
         read_scan(tmp_path, ScanOptions())
+    assert read_scan(tmp_path, ScanOptions(photograph="a")).frames[0].image.name == "a.png"
+    with pytest.raises(InputError, match=r"of the name c.*a\.png, b\.png"):
+        read_scan(tmp_path, ScanOptions(photograph="c"))
 
 
 def test_turned_photographs_and_intrinsics_of_other_ones_are_refused(tmp_path: Path) -> None:

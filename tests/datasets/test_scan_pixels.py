@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,7 +22,17 @@ from rgspipe.datasets.scans.resample import resampled_colour, resampled_depth, s
 from rgspipe.datasets.views import View
 from rgspipe.errors import InputError
 from rgspipe.scene import srgb
-from scan_layouts import lens_of, photographed, pose_of, write_depth, write_nerfstudio, write_photograph, write_wide_png
+from scan_layouts import (
+    lens_of,
+    photographed,
+    pose_of,
+    write_depth,
+    write_dng,
+    write_hdr,
+    write_nerfstudio,
+    write_photograph,
+    write_wide_png,
+)
 
 
 def imported(root: Path, **options: object) -> tuple[View, ...]:
@@ -153,3 +164,70 @@ def test_a_lens_that_folds_the_image_is_refused() -> None:
     lens = Lens(40.0, 40.0, 32.0, 32.0, 64, 64, (-30.0,))
     with pytest.raises(InputError, match="distortion"):
         straight_camera(lens, np.eye(4), 64, Path("a.png"))
+
+
+def test_masked_pixels_are_left_out_however_little_of_one_is_masked(tmp_path: Path) -> None:
+    views = photographed(3, 32)
+    write_nerfstudio(tmp_path / "scan", views)
+    levels = np.full((32, 32), 255, np.uint8)
+    levels[9, 13] = 0
+    Image.fromarray(levels).save(tmp_path / "scan/mask.png")
+    path = tmp_path / "scan/transforms.json"
+    content = json.loads(path.read_text())
+    content["frames"][0]["mask_path"] = "mask.png"
+    path.write_text(json.dumps(content))
+    read = imported(tmp_path / "scan", resolution=8)
+    expected = torch.ones(8, 8)
+    expected[2, 3] = 0.0
+    assert torch.equal(read[0].alpha, expected) and bool(read[1].alpha.all())
+    assert torch.equal(read[0].depth.isnan(), expected == 0.0)
+
+
+def test_a_fisheye_lens_is_undone(tmp_path: Path) -> None:
+    """Angles grow as θ (1 + 0.05 θ²) from the middle; beyond the crop nothing is asked."""
+    lens = Lens(30.0, 30.0, 32.0, 32.0, 64, 64, (0.05,), fisheye=True)
+    angle, turn = 0.7, 0.4
+    x, y = np.tan(angle) * np.cos(turn), np.tan(angle) * np.sin(turn)
+    column, row = lens.places(np.array([x, 0.0]), np.array([y, 0.0]))
+    far = 30.0 * angle * (1.0 + 0.05 * angle**2)
+    assert np.allclose(column, [32.0 + far * np.cos(turn), 32.0]) and np.allclose(
+        row, [32.0 + far * np.sin(turn), 32.0]
+    )
+    # A picture of the angle's tangent across, which a camera without distortion shows as a ramp.
+    rays = np.linspace(-1.9, 1.9, 4001)
+    at = lens.places(rays, np.zeros_like(rays))[0]
+    image = np.repeat(np.interp(np.arange(64) + 0.5, at, rays)[None, :, None], 64, axis=0).repeat(3, axis=2)
+    camera = straight_camera(lens, np.eye(4), 64, tmp_path)
+    found, _ = resampled_colour(image.astype(np.float32), None, camera, lens)
+    expected = (np.arange(camera.width) + 0.5 - camera.cx) / camera.fx
+    assert np.abs(found[32, 2:-2, 0] - expected[2:-2]).max() < 2e-3  # measured 9e-4, of interpolation
+
+
+def test_raw_photographs_are_read_without_a_curve_in_their_white_balance(tmp_path: Path) -> None:
+    pytest.importorskip("rawpy")
+    levels = np.full((64, 96), 500, np.uint16)
+    levels[0::2, 1::2] = levels[1::2, 0::2] = 1000
+    levels[:, 48:] *= 2
+    levels[40:] = 4095
+    write_dng(tmp_path / "a.dng", levels)
+    read = read_picture(tmp_path / "a.dng", "srgb")
+    for column, level in ((20, 1000), (80, 2000)):
+        assert np.abs(read.light[20, column] - level / 4095).max() < 1e-3
+    assert bool((read.light[50:] >= read.clipped_from).all()) and not bool((read.light[:36] >= read.clipped_from).any())
+    (tmp_path / "half.dng").write_bytes((tmp_path / "a.dng").read_bytes()[:900])
+    with pytest.raises(InputError, match=r"half\.dng.*raw photograph"):
+        read_picture(tmp_path / "half.dng", "srgb")
+
+
+@pytest.mark.parametrize("packed", [True, False])
+def test_radiance_pictures_come_back(tmp_path: Path, packed: bool) -> None:
+    light = np.random.default_rng(0).lognormal(0.0, 3.0, (5, 21, 3)).astype(np.float32)
+    light[2] = 0.25
+    write_hdr(tmp_path / "a.hdr", light, packed)
+    read = read_picture(tmp_path / "a.hdr", "srgb").light
+    assert np.abs(read - light).max(axis=2).max() / light.max() < 1 / 256
+    assert (np.abs(read - light) <= light.max(axis=2, keepdims=True) / 250).all()
+    for length in (10, 80, (tmp_path / "a.hdr").stat().st_size - 1):
+        (tmp_path / "b.hdr").write_bytes((tmp_path / "a.hdr").read_bytes()[:length])
+        with pytest.raises(InputError, match=r"b\.hdr"):
+            read_picture(tmp_path / "b.hdr", "srgb")

@@ -13,11 +13,13 @@ from torch import Tensor
 from rgspipe.capture.certainty import Certainty
 from rgspipe.capture.field import Field, Graph, Variances
 from rgspipe.capture.lamps import LampProblem
+from rgspipe.capture.oddities import Oddities
 from rgspipe.capture.options import CaptureOptions
 from rgspipe.capture.radiance import Measured, Numbers, measured_radiance
 from rgspipe.capture.received import Received
-from rgspipe.capture.refusals import check_measured, check_overlap, check_views
+from rgspipe.capture.refusals import OFF, check_lightings, check_measured, check_overlap, check_views
 from rgspipe.capture.search import Answer, found_lamps
+from rgspipe.capture.several import found_in_turns, without
 from rgspipe.completion import with_unseen_surfaces
 from rgspipe.datasets.views import View
 from rgspipe.renderer.frozen import FrozenScene
@@ -52,6 +54,8 @@ class Captured:
         measured: radiance of the surfels, and exposures of the photographs.
         answer: how the number of lamps was chosen.
         frozen: the surfels with their light transport, as the lamps were found with.
+        oddities: what is not matt, or lights itself, or cannot be.
+        lighting: the name of the lamps that were on, if there are several.
     """
 
     surfels: Surfels
@@ -61,6 +65,8 @@ class Captured:
     measured: Measured
     answer: Answer
     frozen: FrozenScene
+    oddities: Oddities
+    lighting: str = ""
 
     def __repr__(self) -> str:
         return f"Captured({self.surfels!r}, {len(self.lamps)} lamps)"
@@ -73,35 +79,66 @@ def capture_scene(
     *,
     where: str | Path = "the photographs",
 ) -> Captured:
-    """Albedo and lamps of a room from photographs that were all taken while the same unknown lamps were on.
+    """Albedo and lamps of a room from photographs that were taken while unknown lamps were on.
+
+    Of photographs under several lightings (`View.lighting`) it is the first one's; see `capture_scenes`.
+    """
+    return capture_scenes(views, surfels, options, where=where)[0]
+
+
+def capture_scenes(
+    views: Sequence[View],
+    surfels: Surfels | int,
+    options: CaptureOptions | None = None,
+    *,
+    where: str | Path = "the photographs",
+) -> list[Captured]:
+    """The same for each lighting of the photographs, which share the room's albedo.
 
     Args:
-        views: the photographs, with their cameras; their lights are not known.
+        views: the photographs, with their cameras; their lights are not known. All of one `lighting` share their
+            lamps; what those of "off" show is taken away from all others.
         surfels: the geometry, or how many to make from the depth of the views.
         options: how; the defaults if None.
         where: the dataset's folder, for errors.
 
     Raises:
-        InputError: the photographs have known lights, show nothing, are all saturated, or do not overlap; or there is
-            no depth to make surfels from.
+        InputError: the photographs have known lights, show nothing, are all saturated, or do not overlap; there is
+            no depth to make surfels from; or lamps are off in photographs of unknown exposure.
     """
     options = options or CaptureOptions()
     check_views(views, where)
+    check_lightings(views, options.exposure, where)
     if isinstance(surfels, int):
         surfels = initialise_surfels(views, surfels, seed=options.seed, where=where)
     surfels = surfels.to(torch.float32)
     if options.unseen:
         surfels = with_unseen_surfaces(surfels, [view.camera for view in views], depths=[view.depth for view in views])
     weights = trace_views(surfels, views, options.supersampling)
-    free = options.exposure == "free"
-    if free:
-        check_overlap(weights, where)
-    measured = measured_radiance(weights, views, free_exposure=free)
-    check_measured(measured.seen >= LEAST_SEEN, measured.radiance, views, where)
+    lit = _measured(weights, views, options, where)
     frozen = FrozenScene.freeze(surfels, gather_rays=options.gather_rays, seed=options.seed)
     frozen = frozen.with_dictionary(options.grid, seed=options.seed)
-    problem = _problem(frozen, measured, _predicted(weights, views, options), options.gather_rays)
-    return _captured(problem, measured, found_lamps(problem, options.count, options.most), options)
+    predicted = _predicted(weights, views, options)
+    problems = [_problem(frozen, measured, predicted, options.gather_rays) for measured in lit.values()]
+    answers = found_in_turns(problems, lambda problem: found_lamps(problem, options.count, options.most))
+    return [_captured(lit[name], answer, options, name) for name, answer in zip(lit, answers, strict=True)]
+
+
+def _measured(
+    weights: Sequence[ViewWeights], views: Sequence[View], options: CaptureOptions, where: str | Path
+) -> dict[str, Measured]:
+    """The radiance of each lighting, without what shines with the lamps off."""
+    found = {}
+    for name in dict.fromkeys(view.lighting for view in views):
+        own = [index for index, view in enumerate(views) if view.lighting == name]
+        chosen, taken = [weights[index] for index in own], [views[index] for index in own]
+        if options.exposure != "same":
+            check_overlap(chosen, where)
+        found[name] = measured_radiance(chosen, taken, exposure=options.exposure, vignetting=options.vignetting)
+        if name != OFF:
+            check_measured(found[name].seen >= LEAST_SEEN, found[name].radiance, taken, where)
+    off = found.pop(OFF, None)
+    return found if off is None else {name: without(measured, off) for name, measured in found.items()}
 
 
 def _predicted(weights: Sequence[ViewWeights], views: Sequence[View], options: CaptureOptions) -> Numbers:
@@ -125,12 +162,13 @@ def _problem(frozen: FrozenScene, measured: Measured, predicted: Numbers, rays: 
     return LampProblem(frozen, received, field, measured.radiance, predicted, pixels, rays)
 
 
-def _captured(problem: LampProblem, measured: Measured, answer: Answer, options: CaptureOptions) -> Captured:
-    best = answer.best
+def _captured(measured: Measured, answer: Answer, options: CaptureOptions, lighting: str) -> Captured:
+    best, frozen = answer.best, answer.best.problem.frozen
     albedo = torch.from_numpy(np.clip(best.problem.albedo(best.lamps), *ALBEDO_RANGE)).float()
     doubt = torch.from_numpy(best.problem.field.deviation(DRAWS, options.seed)).float()
-    surfels = problem.frozen.surfels
+    surfels = frozen.surfels
     guessed = torch.where(surfels.guessed > 0.0, doubt.clamp(min=LEAST_DOUBT), 0.0)
     surfels = replace(surfels, albedo=albedo, guessed=guessed)
     certainty = Certainty.of(best.problem, best.lamps)
-    return Captured(surfels, best.lamps.lights(), certainty, doubt, measured, answer, problem.frozen)
+    oddities = Oddities.of(best.problem, best.lamps, measured)
+    return Captured(surfels, best.lamps.lights(), certainty, doubt, measured, answer, frozen, oddities, lighting)

@@ -7,7 +7,8 @@ Tukey, with blocks as Künsch 1989 has them), beside what the likelihood knows:
 
     C = (Jᵀ Σ⁻¹ J)⁻¹ + (B − 1)/B Σ_b (θ_b − θ̄)(θ_b − θ̄)ᵀ ,
 
-and to no place better than surfels resolve light.
+beside what the model of light lacks as a whole (`capture.shared_errors`), and to no place better than surfels resolve
+light.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import numpy as np
 
 from rgspipe.capture.lamps import NUMBERS, LampProblem, Lamps
 from rgspipe.capture.radiance import Numbers
+from rgspipe.capture.shared_errors import shared_covariance
 from rgspipe.renderer.clusters import cluster_patches
 from rgspipe.scene.spacing import surfel_spacing
 
@@ -90,7 +92,8 @@ def _covariance(problem: LampProblem, lamps: Lamps) -> Numbers:
     blocks = cluster_patches(surfels.centers.double(), surfels.normals, BLOCKS, seed=0)
     found = np.stack([_numbers(problem, _without(problem, lamps, blocks == block)) for block in np.unique(blocks)])
     apart = found - found.mean(axis=0)
-    return problem.covariance(lamps) + (len(found) - 1) / len(found) * (apart.T @ apart)
+    resampled = (len(found) - 1) / len(found) * (apart.T @ apart)
+    return problem.covariance(lamps) + resampled + shared_covariance(problem, lamps, blocks)
 
 
 def _without(problem: LampProblem, lamps: Lamps, left_out: np.ndarray) -> Lamps:

@@ -106,12 +106,14 @@ class Field:
         measured: (N,) variance of each measurement by its pixels; infinite where there is none.
         trust: (N,) in [0, 1], what a measurement counts beside that: 0 for outliers.
         variances: of the scene.
+        known: (N,) precision with which the field is known from elsewhere to be 0; None for not at all.
     """
 
     graph: Graph
     measured: Numbers
     trust: Numbers
     variances: Variances
+    known: Numbers | None = None
 
     def trusted(self, trust: Numbers) -> Field:
         """With another trust (N,)."""
@@ -123,8 +125,14 @@ class Field:
         return self.trust / (self.measured + self.variances.noise)
 
     @cached_property
+    def _prior(self) -> sp.csc_matrix:
+        """(N, N) precision before the measurements."""
+        own = self.graph.precision(self.variances)
+        return own if self.known is None else (own + sp.diags(self.known)).tocsc()
+
+    @cached_property
     def _posterior(self) -> sp.linalg.SuperLU:
-        return factorised((sp.diags(self.weight) + self.graph.precision(self.variances)).tocsc())
+        return factorised((sp.diags(self.weight) + self._prior).tocsc())
 
     def whitened(self, residual: Numbers) -> Numbers:
         """Σ⁻¹ r of residuals (N, K)."""
@@ -140,7 +148,8 @@ class Field:
         rng, graph, count = np.random.default_rng(seed), self.graph, len(self.weight)
         shape = (count, samples)
         drawn = np.sqrt(self.weight)[:, None] * rng.standard_normal(shape)
-        drawn += rng.standard_normal(shape) / np.sqrt(self.variances.surface * graph.sizes)[:, None]
+        alone = 1.0 / (self.variances.surface * graph.sizes) + (0.0 if self.known is None else self.known)
+        drawn += np.sqrt(alone)[:, None] * rng.standard_normal(shape)
         edges = np.sqrt(0.5 * graph.weight / self.variances.step)[:, None]
         edges = edges * rng.standard_normal((len(graph.weight), samples))
         incidence = _incidence(graph)
@@ -150,7 +159,7 @@ class Field:
         """−2 log p of residuals (N, C) of C channels, up to a constant."""
         kept = self.weight > 0.0
         determinant = _log_determinant(self._posterior) - np.log(self.weight[kept]).sum()
-        determinant -= _log_determinant(factorised(self.graph.precision(self.variances)))
+        determinant -= _log_determinant(factorised(self._prior))
         return float((residual * self.whitened(residual)).sum() + residual.shape[1] * determinant)
 
     def fitted(self, residual: Numbers) -> Field:

@@ -16,8 +16,11 @@ class CaptureOptions(Options):
     """how many lamps were on; found if null"""
     most: int = option(4, low=1, high=8)
     """most lamps that are looked for where their number is not known"""
-    exposure: Literal["same", "free"] = "same"
-    """whether all photographs were exposed alike, or each has its own exposure, found by what they share"""
+    exposure: Literal["same", "free", "free_colour"] = "same"
+    """whether all photographs were exposed alike, or each has its own exposure, or its own white balance, too, found by
+    what they share"""
+    vignetting: bool = False
+    """whether photographs may be darker towards their corners, all alike, which is found by what they share"""
     albedo_prior: Literal["none", "dataset"] = "none"
     """what is known of the albedo: nothing, or the albedo maps of the training views, from any method and up to a scale
     of each image"""

@@ -3,7 +3,7 @@
 A diffuse surfel has one radiance in all photographs, whatever its albedo and whatever lights it. So the images are
 linear in the N radiances, with the weights W of the views, and g_v the exposures:
 
-    min over L, g of  Σ_p w_p ( I_p − g_v(p) (W L)_p )² .
+    min over L, g of  Σ_p w_p ( I_p − g_p (W L)_p )² .
 
 w_p gives little weight to what most pixels contradict (Cauchy's loss on the relative error): edges that are not quite
 where the surfels have them, gloss, people who walked by. Saturated pixels and those half outside of all surfaces do
@@ -20,16 +20,18 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
+from rgspipe.capture.exposures import Cameras, Exposure, Numbers
 from rgspipe.datasets.views import View
 from rgspipe.renderer.view_weights import ViewWeights
-
-Numbers = NDArray[np.float64]
 
 #: Pixels with less surface than this are mixed with what is behind.
 LEAST_COVERAGE = 0.9
 
 #: Weight of pixels beside edges: they say where nothing else does.
 EDGE_WEIGHT = 0.03
+
+#: Pixels, all together, with which a photograph shows a surfel.
+SHOWN = 0.3
 
 #: Surfels with a larger part of their pixels saturated are brighter than the rest of them say.
 MOST_CLIPPED = 0.3
@@ -60,42 +62,49 @@ class Measured:
         radiance: (N, 3) in the photographs' unit, above 0; what is not seen has the median.
         variance: (N,) of its logarithm, by how far pixels are off; infinite where none was seen.
         seen: (N,) pixels that show the surfel, all together.
-        exposures: (V,) factors of the photographs, of mean logarithm 0.
+        cameras: exposures, white balance and vignetting of the photographs.
         error: median relative error of a pixel.
+        apart: (N,) mean relative error of the pixels that show each surfel, outliers and all.
+        shown_by: (N,) photographs that show it.
     """
 
     radiance: Numbers
     variance: Numbers
     seen: Numbers
-    exposures: Numbers
+    cameras: Cameras
     error: float
+    apart: Numbers
+    shown_by: NDArray[np.int64]
 
 
 def measured_radiance(
-    weights: Sequence[ViewWeights], views: Sequence[View], *, free_exposure: bool = False
+    weights: Sequence[ViewWeights],
+    views: Sequence[View],
+    *,
+    exposure: Exposure = "same",
+    vignetting: bool = False,
 ) -> Measured:
     """The radiance that explains all photographs best.
 
     Args:
         weights: of the views, on the same N surfels.
         views: V ≥ 1, all under the same light.
-        free_exposure: whether each photograph has an unknown factor.
+        exposure: whether each photograph has an unknown factor, or one in each channel.
+        vignetting: whether corners may be darker, alike in all photographs.
     """
     rows = sp.vstack([view.operator.to_scipy() for view in weights], format="csr").astype(np.float64)
     image = np.concatenate([view.image.reshape(-1, 3).double().numpy() for view in views])
-    of_view = np.repeat(np.arange(len(views)), [view.camera.pixel_count for view in views])
     base = np.concatenate([_base(*pair) for pair in zip(weights, views, strict=True)])
-    exposures, robust, shown = np.ones(len(views)), np.ones(len(base)), None
+    cameras, robust, shown = Cameras.of(views, exposure, vignetting), np.ones(len(base)), None
     floor = FLOOR * np.quantile(image.mean(axis=1)[base > 0.0], 0.99) if (base > 0.0).any() else 1.0
     for _ in range(ROUNDS):
         weight = base * robust
-        if free_exposure:
-            exposures = _exposures(rows, image.mean(axis=1), of_view, weight, shown)
-        level = exposures[of_view][:, None]
-        radiance, seen, normal = _radiance(rows, image / level, weight)
-        shown = (rows @ radiance).mean(axis=1)
-        off = (image / level).mean(axis=1) - shown
-        relative = off / (shown + floor)
+        cameras = cameras.fitted(rows, image, weight, shown)
+        even = image / cameras.level
+        radiance, seen, normal = _radiance(rows, even, weight)
+        shown = rows @ radiance
+        off = (even - shown).mean(axis=1)
+        relative = off / (shown.mean(axis=1) + floor)
         error = float(np.median(np.abs(relative[base == 1.0]))) if (base == 1.0).any() else 0.0
         robust = 1.0 / (1.0 + (relative / max(OUTLIER * error, 1e-6)) ** 2)
     variance = _log_variance(rows, weight, off, normal, radiance)
@@ -104,7 +113,14 @@ def measured_radiance(
     middle = np.median(radiance[known], axis=0) if known.any() else np.ones(3)
     least = 1e-6 * np.maximum(middle, 1e-300)
     radiance = np.where(known[:, None], np.maximum(radiance, least), middle)
-    return Measured(radiance, np.where(known, variance, np.inf), seen, exposures, error)
+    apart = (rows.T @ (base * np.abs(relative))) / np.maximum(rows.T @ base, 1e-12)
+    shown_by = sum((_pixels(view) > SHOWN).astype(np.int64) for view in weights)
+    return Measured(radiance, np.where(known, variance, np.inf), seen, cameras, error, apart, shown_by)
+
+
+def _pixels(weights: ViewWeights) -> Numbers:
+    """(N,) pixels that show each surfel, all together."""
+    return np.asarray(weights.operator.to_scipy().sum(axis=0)).ravel()
 
 
 def _base(weights: ViewWeights, view: View) -> Numbers:
@@ -130,42 +146,6 @@ def _radiance(rows: sp.csr_matrix, image: Numbers, weight: Numbers) -> tuple[Num
     normal = factorised((rows.T @ weighted + sp.diags(pull)).tocsc())
     right = weighted.T @ image + pull[:, None] * mean
     return np.maximum(normal.solve(right), 0.0), seen, normal
-
-
-def _exposures(
-    rows: sp.csr_matrix, grey: Numbers, of_view: NDArray[np.intp], weight: Numbers, shown: Numbers | None
-) -> Numbers:
-    """(V,) factors by which photographs of the same surfels differ, of mean logarithm 0.
-
-    Args:
-        grey: (P,) pixels.
-        shown: (P,) what they would be without the factors; None before anything is known of it.
-    """
-    count = int(of_view.max()) + 1
-    if shown is None:
-        return _first_exposures(
-            rows, grey, sp.csr_matrix((weight, (of_view, np.arange(len(weight)))), (count, len(grey)))
-        )
-    over, under = (np.bincount(of_view, weight * values, count) for values in (grey * shown, shown**2))
-    gains = np.log(np.where(over > 0.0, over, 1.0) / np.where(over > 0.0, under, 1.0))
-    return np.exp(gains - gains.mean())
-
-
-def _first_exposures(rows: sp.csr_matrix, grey: Numbers, views: sp.csr_matrix) -> Numbers:
-    """The same by surfels' means: their logarithms l_vi are g_v + r_i, and r is eliminated.
-
-    Args:
-        views: (V, P) the pixels' weights in the row of their photograph.
-    """
-    shown = (views @ rows).toarray()
-    mean = (views @ rows.multiply(grey[:, None]).tocsr()).toarray() / np.maximum(shown, 1e-12)
-    counted = np.where((shown >= 1.0) & (mean > 0.0), shown, 0.0)
-    logs = np.log(np.where(counted > 0.0, mean, 1.0))
-    total = np.maximum(counted.sum(axis=0), 1e-12)
-    laplacian = np.diag(counted.sum(axis=1)) - (counted / total) @ counted.T
-    right = (counted * (logs - (counted * logs).sum(axis=0) / total)).sum(axis=1)
-    gains = np.linalg.lstsq(laplacian, right, rcond=1e-9)[0]
-    return np.exp(gains - gains.mean())
 
 
 def _log_variance(

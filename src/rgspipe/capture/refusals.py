@@ -9,13 +9,16 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
-from rgspipe.capture.radiance import Numbers
+from rgspipe.capture.radiance import SHOWN, Numbers
 from rgspipe.datasets.views import View
 from rgspipe.errors import InputError
 from rgspipe.renderer.view_weights import ViewWeights
 
-#: Surfels that two photographs have to share for one exposure to follow from the other, and how many pixels show one.
-SHARED, SHOWN = 10, 0.3
+#: Surfels that two photographs have to share for one exposure to follow from the other.
+SHARED = 10
+
+#: Name of the lighting in which all lamps are off.
+OFF = "off"
 
 #: Least part of the surfels that has to be measured, and to be brighter than DARK times the brightest pixel.
 LEAST_MEASURED, DARK = 0.05, 1e-4
@@ -39,6 +42,29 @@ def check_views(views: Sequence[View], where: str | Path) -> None:
             found=f"{len(lit)} of {len(views)} with a known light of their own, such as {lit[0].name}",
             remedy="Train on them instead (scene.lamps=known), or take pl_pos and pl_intensity out of "
             "transforms_train.json if they mean nothing.",
+        )
+
+
+def check_lightings(views: Sequence[View], exposure: str, where: str | Path) -> None:
+    """Refuse photographs with the lamps off that are alone, or that cannot be compared.
+
+    Raises:
+        InputError: says which.
+    """
+    names = {view.lighting for view in views}
+    if names == {OFF}:
+        raise InputError(
+            where,
+            expected="photographs with lamps on beside those with all of them off",
+            found="only the latter",
+            remedy="Add them (scene.rgbd.others), or name the lighting otherwise if something was on.",
+        )
+    if OFF in names and exposure != "same":
+        raise InputError(
+            "lamps.exposure",
+            expected="same, so that what shines with the lamps off can be taken away",
+            found=exposure,
+            remedy="Expose all photographs alike, or leave those with the lamps off out.",
         )
 
 

@@ -194,10 +194,12 @@ class Answer:
     Attributes:
         best: the lamps.
         compared: each number with the next, as far as it was asked; the last of them may not be worth it.
+        over_even: share of the squares that the lamps explain of those that light which is the same everywhere leaves.
     """
 
     best: Tried
     compared: tuple[OneMore, ...]
+    over_even: float
 
 
 def found_lamps(problem: LampProblem, count: int | None, most: int) -> Answer:
@@ -212,4 +214,18 @@ def found_lamps(problem: LampProblem, count: int | None, most: int) -> Answer:
         if count is None and (not found.worth or len(best.lamps) == most):
             break
         best = found.more
-    return Answer(best, tuple(compared))
+    return Answer(best, tuple(compared), over_even(best))
+
+
+def over_even(best: Tried) -> float:
+    """The share of what light that is the same everywhere leaves of log L that the lamps explain.
+
+    The surfels that the lamps trust, and variances that are most likely for either: paint may explain what the light
+    does not.
+    """
+    problem = best.problem
+    ones = problem.field.whitened(np.ones((len(problem.radiance), 1)))[:, 0]
+    residual = problem.target - (ones @ problem.target) / max(float(ones.sum()), 1e-300)
+    even = problem.field.fitted(residual).deviance(residual)
+    measurements = 3 * int((problem.field.weight > 0.0).sum())
+    return 1.0 - float(np.exp(min(0.0, best.deviance - even) / max(measurements, 1)))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from rgspipe.capture.captured import Captured
 from rgspipe.capture.certainty import GUESS
@@ -14,20 +14,27 @@ DISAGREE = 0.1
 #: More of the surfels than this unmeasured is worth a word.
 UNMEASURED = 0.1
 
+#: Part of the surfaces that cannot be, or that look different from different sides, and part of the light that surfaces
+#: send of their own, which are worth one.
+NOTICEABLE, GLOW = 0.03, 0.05
+
 
 def captured_words(found: Captured) -> str:
     """Sentences: the lamps, how sure they are, whether intensities and albedo are told apart, and what to doubt."""
-    return " ".join([_lamps(found), _number(found), _scale(found), *_doubts(found)])
+    return " ".join([_lamps(found), _number(found), _even(found), _scale(found), *_doubts(found)])
 
 
 def _lamps(found: Captured) -> str:
     spread = found.certainty.spread(found.frozen.size)
     one = "1 lamp was on" if len(found.lamps) == 1 else f"{len(found.lamps)} lamps were on"
     places = [
-        f"({', '.join(f'{value:.2f}' for value in lamp.position.tolist())}), {_place(part)}"
-        for lamp, part in zip(found.lamps, spread, strict=True)
+        f"{_point(lamp.position.tolist())}, {_place(part)}" for lamp, part in zip(found.lamps, spread, strict=True)
     ]
     return f"{one} in the photographs: {'; '.join(places)}."
+
+
+def _point(place: Sequence[float]) -> str:
+    return f"({', '.join(f'{value:.2f}' for value in place)})"
 
 
 def _place(part: float) -> str:
@@ -60,7 +67,37 @@ def _scale(found: Captured) -> str:
     )
 
 
+def _even(found: Captured) -> str:
+    share = found.answer.over_even
+    explains = f"{100.0 * share:.0f} % of what light that is the same everywhere leaves"
+    if share < BAR.least:
+        return f"Lamps explain no more than {explains}: the photographs do not tell that there is one."
+    return f"Lamps explain {explains}."
+
+
 def _doubts(found: Captured) -> Iterator[str]:
+    odd = found.oddities
+    if odd.impossible > NOTICEABLE:
+        yield (
+            f"{100.0 * odd.impossible:.0f} % of the surfaces would have to reflect more light than they get: light is "
+            "missing that no lamp here explains, and places are no better than that allows."
+        )
+    if odd.single > 0.5:
+        yield (
+            f"{100.0 * odd.single:.0f} % of the surfaces are in one photograph only, so that nothing checks their "
+            "depth, and gloss is taken for light."
+        )
+    if odd.glowing is not None and odd.glowing.share > GLOW:
+        yield (
+            f"Surfaces around {_point(odd.glowing.place)} send more light than falls on them, "
+            f"{100.0 * odd.glowing.share:.0f} % of all: a lamp or a window in the picture. It is counted as their own "
+            "and in no lamp above; leave them out of the depth (0 there) to have it found as a lamp."
+        )
+    if odd.shining is not None and odd.shining.share > NOTICEABLE:
+        yield (
+            f"{100.0 * odd.shining.share:.0f} % of the surfaces, such as around {_point(odd.shining.place)}, look "
+            "different from different sides: gloss, a mirror, or depth that is wrong there. They count for little."
+        )
     unmeasured = 1.0 - float((found.answer.best.problem.field.weight > 0.0).mean())
     if unmeasured > UNMEASURED:
         yield f"{100.0 * unmeasured:.0f} % of the surfaces were not measured, and are taken for what borders on them."

@@ -44,7 +44,8 @@ SCENES = """\
   zoo        a room that nobody tuned, drawn from a seed: scene=zoo scene.zoo.seed=7 scene.name=zoo_7
   blend      a Blender file of yours: scene=blend scene.path=my.blend
   external   images, cameras and lights from disk, no Blender needed: scene=external scene.path=DIR
-  rgbd       a scan, with the lamps that were on unknown: scene=rgbd scene.path=DIR"""
+  rgbd       a scan, with the lamps that were on unknown: scene=rgbd scene.path=DIR
+  mesh       a mesh and photographs of it, with the lamps unknown: scene=mesh scene.path=room.glb"""
 
 EXAMPLES = """\
   python -m rgspipe demo                                            a small room in the browser, in seconds

@@ -8,6 +8,7 @@ from typing import Literal, get_args
 
 from rgspipe.blender.options import HotdogParameters, RoomParameters, ZooParameters
 from rgspipe.datasets.input_file import input_file, input_folder
+from rgspipe.datasets.mesh_options import MeshOptions
 from rgspipe.datasets.ply_options import PlyOptions
 from rgspipe.datasets.scans.options import ScanOptions
 from rgspipe.errors import InputError
@@ -19,7 +20,7 @@ MODELLED: tuple[Modelled, ...] = get_args(Modelled)
 
 #: What `scene.path` has to be, by kind.
 PATHS = {"blend": "a .blend file", "external": "a dataset's folder", "ply": "a .ply file"}
-PATHS |= {"rgbd": "a capture's folder"}
+PATHS |= {"rgbd": "a capture's folder", "mesh": "a mesh (.ply, .obj, .glb, .gltf)"}
 
 Colour = tuple[float, float, float]
 
@@ -78,12 +79,13 @@ class CornerConfig(Options):
 class SceneConfig(Options):
     """What is looked at."""
 
-    kind: Literal[Modelled, "blend", "external", "ply", "rgbd"] = "cornell"
+    kind: Literal[Modelled, "blend", "external", "ply", "rgbd", "mesh"] = "cornell"
     """where the scene comes from"""
     name: str | None = None
     """its name under outputs/; by default that of the file or folder"""
     path: str | None = None
-    """blend, ply: the file; external: the dataset's folder; rgbd: that of a capture in another program's layout"""
+    """blend, ply, mesh: the file; external: the dataset's folder; rgbd: that of a capture in another program's
+    layout"""
     lamps: Literal["known", "unknown"] = "known"
     """known: each training view has one lamp of its own, which the dataset gives; unknown: some lamps were on in all
     training views alike, and they are found with the albedo (stage=capture_surfels)"""
@@ -94,6 +96,7 @@ class SceneConfig(Options):
     zoo: ZooParameters = ZooParameters()
     ply: PlyOptions = PlyOptions()
     rgbd: ScanOptions = ScanOptions()
+    mesh: MeshOptions = MeshOptions()
 
     @property
     def folder(self) -> str:
@@ -103,6 +106,11 @@ class SceneConfig(Options):
         if self.kind in MODELLED or self.path is None:
             return self.kind
         return Path(self.path).resolve().stem
+
+    @property
+    def is_capture(self) -> bool:
+        """Whether it is photographs in another program's layout, with measured depth or a mesh."""
+        return self.kind in ("rgbd", "mesh")
 
     def check(self) -> None:
         """Refuse names that are no folder of the scene's own."""
@@ -114,12 +122,12 @@ class SceneConfig(Options):
                 found=repr(name),
                 remedy="Set it to a name for the scene's folder.",
             )
-        if self.kind == "rgbd" and self.lamps == "known":
+        if self.is_capture and self.lamps == "known":
             raise InputError(
                 "lamps",
                 expected="unknown: no layout of a capture says where lamps were",
                 found="known",
-                remedy="Leave it away; scene=rgbd sets it.",
+                remedy=f"Leave it away; scene={self.kind} sets it.",
             )
 
     def check_path(self) -> None:

@@ -11,14 +11,15 @@ from rgspipe.fitting.options import Method
 from rgspipe.options import Options, option
 
 #: What a study is about.
-Kind = Literal["captures", "views", "robustness", "classes", "kinds", "regions", "adam", "courses", "zoo"]
+Kind = Literal["captures", "views", "robustness", "classes", "kinds", "regions", "adam", "courses", "zoo", "lamps"]
 
 #: Settings that only some kinds of study have a use for; those that are not listed here use all of them.
 UNUSED: dict[Kind, tuple[str, ...]] = {
-    "captures": ("views", "methods", "paper_adam_limit", "paper_adam_views", "zoo"),
-    **dict.fromkeys(("views", "robustness", "classes", "kinds", "regions", "adam"), ("zoo",)),
-    "courses": ("cases", "scenes", "views", "paper_adam_limit", "paper_adam_views", "zoo"),
-    "zoo": ("scenes", "paper_adam_limit", "paper_adam_views"),
+    "captures": ("views", "methods", "paper_adam_limit", "paper_adam_views", "zoo", "lightings"),
+    **dict.fromkeys(("views", "robustness", "classes", "kinds", "regions", "adam"), ("zoo", "lightings")),
+    "courses": ("cases", "scenes", "views", "paper_adam_limit", "paper_adam_views", "zoo", "lightings"),
+    "zoo": ("scenes", "paper_adam_limit", "paper_adam_views", "lightings"),
+    "lamps": ("views", "methods", "paper_adam_limit", "paper_adam_views", "zoo"),
 }
 
 
@@ -68,7 +69,7 @@ class StudyConfig(Options):
     """what it is about: captures (what becomes of a trained scene when its capture gets worse); of recovered lights
     views (how many), robustness (errors of images and model), classes (where the light is), kinds (of lights), regions
     (how often those of 95 % hold the truth) or adam (the paper's method beside ours); courses (of fits from their start
-    to their answer); zoo (rooms that nobody tuned)"""
+    to their answer); zoo (rooms that nobody tuned); lamps (that were on and unknown while a room was photographed)"""
     cases: tuple[str, ...] = ("clean",)
     """what is compared: `clean`, or overrides such as target_capture.noise=0.03, several joined by spaces, and `NAME: `
     before them where wanted"""
@@ -85,6 +86,8 @@ class StudyConfig(Options):
     paper_adam_views: tuple[int, ...] | None = option(None, low=1, high=1000)
     """numbers of views that paper_adam is run on; all if null"""
     zoo: ZooStudyConfig = ZooStudyConfig()
+    lightings: int = option(3, low=1, high=10000)
+    """captures of each case with kind=lamps, dataset.seed 0, 1, …: each draws cameras and lamps anew"""
 
     def check(self) -> None:
         """Refuse settings that the kind of study has no use for.

@@ -8,6 +8,7 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
+from rgspipe.datasets.input_file import is_plain_name
 from rgspipe.datasets.json_file import is_number, numbers, read_json, required, shown
 from rgspipe.datasets.limits import STRONGEST
 from rgspipe.datasets.named_cameras import read_camera
@@ -99,6 +100,19 @@ class FrameEntry:
             place = f"{self.where}.saturated_from"
             raise InputError(place, expected="radiance above 0", found=shown(value), remedy="Correct it.")
         return None if value is None else float(value)
+
+    @property
+    def lighting(self) -> str:
+        """The name of the lamps that were on, or nothing.
+
+        Raises:
+            InputError: it is no plain name.
+        """
+        value = self.fields.get("lighting", "")
+        if value != "" and not is_plain_name(value):
+            place = f"{self.where}.lighting"
+            raise InputError(place, expected="a plain name", found=shown(value), remedy="Correct it.")
+        return value
 
     @property
     def files(self) -> list[Path]:

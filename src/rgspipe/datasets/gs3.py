@@ -161,6 +161,7 @@ def _load_view(
         surface.normal,
         surface.albedo,
         emitters=None if entry.emitter_path is None else read_mask(entry.emitter_path, camera) >= 0.5,
+        lighting=entry.lighting,
     )
     return view if base is None else replace(view, base=read_base(base, camera, mask))
 

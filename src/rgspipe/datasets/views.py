@@ -32,6 +32,8 @@ class View:
             it holds radiance as it was.
         emitters: (H, W) bool, where the image shows lamps themselves; None where nobody said so.
         base: (H, W, 3) the same with the lamps off, in a fit target.
+        lighting: of photographs under unknown lamps, the name of those that were on: all of one name share them; "off"
+            is what was there with all of them off.
     """
 
     name: str
@@ -45,6 +47,7 @@ class View:
     saturated_from: float | None = None
     emitters: Tensor | None = None
     base: Float[Tensor, "H W 3"] | None = None
+    lighting: str = ""
 
     @property
     def saturated(self) -> Tensor:

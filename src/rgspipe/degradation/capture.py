@@ -16,7 +16,7 @@ from torch import Tensor
 
 from rgspipe.datasets.views import View
 from rgspipe.degradation.options import Capture
-from rgspipe.scene import PointLight
+from rgspipe.scene import PointLight, srgb
 
 #: Read noise of an image, as a share of its relative noise and of the image's brightest values.
 READ_NOISE = 0.1
@@ -34,7 +34,22 @@ def degraded(views: Sequence[View], capture: Capture) -> tuple[View, ...]:
     kept = range(len(views))
     if capture.views is not None and capture.views < len(views):
         kept = [round(place) for place in np.linspace(0, len(views) - 1, capture.views)]
-    return tuple(_degrade(views[index], capture, index) for index in kept)
+    taken = tuple(_degrade(views[index], capture, index) for index in kept)
+    return taken if capture.white is None else _stored(taken, capture.white)
+
+
+def _stored(views: tuple[View, ...], quantile: float) -> tuple[View, ...]:
+    """In 8 bits, clipped at one radiance for all of them."""
+    white = float(np.quantile(torch.cat([view.image.reshape(-1) for view in views]).double().numpy(), quantile))
+    if not white > 0.0:
+        return views
+    return tuple(replace(view, image=eight_bit(view.image, white), saturated_from=white) for view in views)
+
+
+def eight_bit(image: Tensor, white: float) -> Tensor:
+    """The image, clipped to [0, white] and rounded to the 256 levels of sRGB."""
+    encoded = srgb.encode((image.double() / white).clamp(0.0, 1.0).numpy())
+    return torch.from_numpy(white * srgb.decode(np.round(255.0 * encoded) / 255.0)).to(image.dtype)
 
 
 def _degrade(view: View, capture: Capture, index: int) -> View:

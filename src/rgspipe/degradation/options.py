@@ -21,6 +21,8 @@ class Capture(Options):
     """lights: standard deviation of a coordinate, scene units"""
     light_intensity_noise: float = option(0.0, low=0, high=10)
     """lights: standard deviation of the log-intensity, all channels alike"""
+    white: float | None = option(None, low=0.01, high=1)
+    """8-bit sRGB images that clip what is above this quantile of all values; by default floating point"""
     views: int | None = option(None, low=1, high=100000)
     """keep so many views, spread evenly"""
     normals: bool = True

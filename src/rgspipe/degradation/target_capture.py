@@ -12,12 +12,10 @@ from dataclasses import replace
 
 import numpy as np
 import torch
-from torch import Tensor
 
 from rgspipe.datasets.views import View
-from rgspipe.degradation.capture import degraded
+from rgspipe.degradation.capture import degraded, eight_bit
 from rgspipe.degradation.options import Capture, TargetCapture
-from rgspipe.scene import srgb
 
 
 def captured(views: Sequence[View], name: str, capture: TargetCapture) -> tuple[list[View], float | None]:
@@ -37,12 +35,6 @@ def captured(views: Sequence[View], name: str, capture: TargetCapture) -> tuple[
     if not white > 0.0:
         return taken, None
     return [replace(view, image=eight_bit(view.image, white)) for view in taken], white
-
-
-def eight_bit(image: Tensor, white: float) -> Tensor:
-    """The image, clipped to [0, white] and rounded to the 256 levels of sRGB."""
-    encoded = srgb.encode((image.double() / white).clamp(0.0, 1.0).numpy())
-    return torch.from_numpy(white * srgb.decode(np.round(255.0 * encoded) / 255.0)).to(image.dtype)
 
 
 def _exposures(count: int, stops: float, seed: int) -> list[float]:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
 
-from rgspipe.capture.captured import Captured, capture_scene
+from rgspipe.capture.captured import Captured, capture_scenes
 from rgspipe.capture.lamp_file import write_lamps
 from rgspipe.capture.words import captured_words
 from rgspipe.datasets.grade_file import GRADE, save_grade
@@ -21,11 +22,11 @@ from rgspipe.datasets.surfel_file import load_surfels, save_surfels
 from rgspipe.datasets.tensor_file import save_tensors
 from rgspipe.datasets.views import View
 from rgspipe.degradation.capture import degraded
+from rgspipe.evaluation.captured_lamps import against_truth
 from rgspipe.evaluation.grading import grade_scene, graded_words
 from rgspipe.evaluation.held_out import held_out_picture
 from rgspipe.evaluation.held_out_views import HeldOut, render_held_out
 from rgspipe.evaluation.images import save_png
-from rgspipe.evaluation.tables import match_positions
 from rgspipe.files import write_json
 from rgspipe.machine import PeakMemory
 from rgspipe.renderer.frozen import FrozenScene
@@ -41,24 +42,32 @@ MOST_JUDGED = 12
 def run(context: StageContext) -> None:
     """Write surfels.safetensors, doubt.safetensors, lamps.json, metrics.json, grade.json and comparison.png.
 
-    The picture is of views that were left out, if there are any whose lights are known.
+    Lamps of further lightings are lamps_2.json and so on. The picture is of views that were left out, if there are any
+    whose lights are known.
     """
     memory, begin = PeakMemory(), time.perf_counter()
     folder = context.inputs["generate_dataset"].folder()
     dataset = open_dataset(folder, targets=False)
     start = load_surfels(context.inputs["init_depth"].file("surfels.safetensors"))
     views = degraded(dataset.train, context.config.capture)
-    found = capture_scene(views, start, context.config.lamps, where=dataset.root)
+    found, *others = capture_scenes(views, start, context.config.lamps, where=dataset.root)
     seconds = time.perf_counter() - begin
     save_surfels(context.folder / "surfels.safetensors", found.surfels)
     save_tensors(context.folder / "doubt.safetensors", {"log_albedo": found.doubt})
-    write_lamps(context.folder / "lamps.json", found)
-    print(captured_words(found))
+    for one in (found, *others):
+        write_lamps(context.folder / (f"lamps_{one.lighting}.json" if one.lighting else "lamps.json"), one)
+        print(f"Lighting {one.lighting}: {captured_words(one)}" if one.lighting else captured_words(one))
     frozen = FrozenScene.freeze(found.surfels, gather_rays=context.config.lamps.gather_rays)
-    metrics = _metrics(found) | _against_truth(found, dataset_root(folder) / LAMPS_TRUTH)
+    further = {one.lighting: _metrics(one) for one in others}
+    metrics = (
+        _metrics(found)
+        | ({"others": further} if further else {})
+        | _against_truth(found, dataset_root(folder) / LAMPS_TRUTH, dataset.train)
+    )
     held_out = _held_out(frozen, dataset.test, context.folder)
     metrics |= {} if held_out is None else held_out.summary()
-    grade = _grade(frozen, found.lamps, views, held_out)
+    own = [view for view in views if view.lighting == found.lighting]
+    grade = _grade(frozen, found.lamps, own, held_out)
     print(graded_words(grade))
     save_grade(context.folder / GRADE, grade)
     metrics |= {"surfels": len(found.surfels), "seconds": seconds, "peak_memory_mib": memory.mib()}
@@ -76,32 +85,27 @@ def _metrics(found: Captured) -> dict[str, Any]:
             "spread": certainty.spread(found.frozen.size).tolist(),
             "scale_error": certainty.scale,
             "bounced": certainty.bounced,
+            "over_even_light": found.answer.over_even,
             "compared": [
                 {"lamps": len(one.more.lamps), "gain": one.gain, "wanted": one.wanted} for one in found.answer.compared
             ],
         },
         "deviations": {name: math.sqrt(value) for name, value in vars(variances).items()},
         "albedo_doubt": float(found.doubt.median()),
+        "oddities": asdict(found.oddities),
         "pixel_error": found.measured.error,
-        "exposures": found.measured.exposures.tolist(),
+        "exposures": found.measured.cameras.gains.tolist(),
+        "vignetting": found.measured.cameras.falloff.tolist(),
         "measured": float(np.mean(found.answer.best.problem.field.weight > 0.0)),
     }
 
 
-def _against_truth(found: Captured, path: Path) -> dict[str, Any]:
-    """How far each lamp is from a true one, in parts of the scene's size, and its intensity over the true one's."""
+def _against_truth(found: Captured, path: Path, views: Sequence[View]) -> dict[str, Any]:
+    """How the lamps stand to those that are known to have been on, if they are."""
     if not path.exists():
         return {}
-    truth = read_lights(path)
-    pairs = match_positions(*(np.stack([light.position.numpy() for light in rig]) for rig in (found.lamps, truth)))
-    matched = [(found.lamps[own], truth[true]) for own, true in pairs]
-    return {
-        "truth": {
-            "lamps": len(truth),
-            "position_error": [float((a.position - b.position).norm()) / found.frozen.size for a, b in matched],
-            "intensity_ratio": [float(a.intensity.mean() / b.intensity.mean()) for a, b in matched],
-        }
-    }
+    truth, size = read_lights(path), found.frozen.size
+    return {"truth": against_truth(found.lamps, found.certainty.places, truth, size, views)}
 
 
 def _held_out(frozen: FrozenScene, views: Sequence[View], folder: Path) -> HeldOut | None:

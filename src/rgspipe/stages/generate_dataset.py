@@ -29,7 +29,7 @@ def run(context: StageContext) -> None:
     """Leave a dataset in the stage's folder, or a pointer to one that is there, which is checked first."""
     if context.config.scene.kind == "external":
         _take(context, _existing_path(context.config, "the folder of a dataset"))
-    elif context.config.scene.kind == "rgbd":
+    elif context.config.scene.is_capture:
         _take(context, context.inputs["import_scan"].folder())
     else:
         job = replace(dataset_job(context.config), lamps_known=context.config.scene.lamps == "known")
@@ -83,7 +83,7 @@ def _existing_path(config: RgspipeConfig, what: str) -> Path:
 
 def _inputs(config: RgspipeConfig) -> tuple[str, ...]:
     require_images(config, "this stage or one before it")
-    return ("import_scan",) if config.scene.kind == "rgbd" else ()
+    return ("import_scan",) if config.scene.is_capture else ()
 
 
 def _config_keys(config: RgspipeConfig) -> tuple[str, ...]:
@@ -94,10 +94,11 @@ def _config_keys(config: RgspipeConfig) -> tuple[str, ...]:
 
 
 def _files(config: RgspipeConfig) -> tuple[Path, ...]:
-    if config.scene.kind in (*MODELLED, "rgbd") or config.scene.path is None or not Path(config.scene.path).exists():
+    scene = config.scene
+    if scene.kind not in ("external", "blend") or scene.path is None or not Path(scene.path).exists():
         return ()
-    path = Path(config.scene.path).resolve()
-    return tuple(files_read(path)) if config.scene.kind == "external" else (path,)
+    path = Path(scene.path).resolve()
+    return tuple(files_read(path)) if scene.kind == "external" else (path,)
 
 
 STAGE = Stage(

@@ -33,7 +33,7 @@ def trained_stage(config: RgspipeConfig) -> str:
 
 def has_truth(config: RgspipeConfig) -> bool:
     """Whether the scene is one that Blender renders, with passes of its true surfaces."""
-    return config.scene.kind not in ("external", "ply", "rgbd")
+    return config.scene.kind not in ("external", "ply", "rgbd", "mesh")
 
 
 def image_stage(config: RgspipeConfig) -> list[str]:
@@ -62,3 +62,15 @@ def require_images(config: RgspipeConfig, what: str) -> None:
             remedy="Freeze them (stage=freeze), fit lights in images of your own (stage=fit_light fit.target=DIR), "
             "or export them (stage=export).",
         )
+
+
+def mesh_path(config: RgspipeConfig) -> Path:
+    """The file of scene=mesh.
+
+    Raises:
+        InputError: the scene is another one, or names no file.
+    """
+    if config.scene.kind != "mesh" or config.scene.path is None:
+        found = f"scene.kind={config.scene.kind}"
+        raise InputError("scene", expected="scene=mesh", found=found, remedy="Add scene=mesh scene.path=FILE.")
+    return Path(config.scene.path).resolve()

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from rgspipe.config import RgspipeConfig
-from rgspipe.stages import study_captures, study_courses, study_lights, study_zoo
+from rgspipe.stages import study_captures, study_courses, study_lamps, study_lights, study_zoo
 from rgspipe.stages.base import Need, Stage, StageContext
 from rgspipe.stages.study_kind import StudyKind
 from rgspipe.studies import lights
@@ -15,6 +15,7 @@ from rgspipe.studies.written import write_study
 #: What `study.kind` may be.
 KINDS: Mapping[str, StudyKind] = {
     "captures": study_captures.KIND,
+    "lamps": study_lamps.KIND,
     **dict.fromkeys(lights.KINDS, study_lights.KIND),
     "courses": study_courses.KIND,
     "zoo": study_zoo.KIND,

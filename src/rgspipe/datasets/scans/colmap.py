@@ -47,7 +47,7 @@ def read(root: Path, options: ScanOptions) -> Scan:
     """The cameras of all photographs.
 
     Raises:
-        InputError: broken files, a lens that is not known, or no depth.
+        InputError: broken files, or a lens that is not known.
     """
     found = _model(root)
     if found is None:
@@ -58,15 +58,6 @@ def read(root: Path, options: ScanOptions) -> Scan:
     # The order of the file is that of registration.
     ordered = sorted(photographs, key=lambda one: one.name)
     frames = tuple(_frame(one, cameras, root, folder, images_path, options) for one in ordered)
-    if all(frame.depth is None for frame in frames):
-        raise InputError(
-            root,
-            expected="depth of the photographs: depth/NAME.png (16 bits, millimetres), depth/NAME.exr, or "
-            "stereo/depth_maps/NAME.geometric.bin",
-            found="none: a sparse model has points, no surfaces",
-            remedy="Run colmap image_undistorter and patch_match_stereo and give its workspace as scene.path; or put "
-            "depth of a sensor or of a mesh into depth/, in the unit of the model's poses.",
-        )
     unit = "lengths are in the model's own unit, which is metres only if it was scaled (scene.rgbd.pose_unit)"
     return Scan("colmap", images_path, (cameras_path, images_path), frames, options.camera_axes(AXES), (unit,))
 

@@ -18,6 +18,7 @@ from rgspipe.files import LONGEST_NAME
 
 #: Camera models by COLMAP's numbers, with how many parameters each has; of the others no lens is known here.
 MODELS = {0: ("SIMPLE_PINHOLE", 3), 1: ("PINHOLE", 4), 2: ("SIMPLE_RADIAL", 4), 3: ("RADIAL", 5), 4: ("OPENCV", 8)}
+MODELS |= {5: ("OPENCV_FISHEYE", 8), 8: ("SIMPLE_RADIAL_FISHEYE", 4), 9: ("RADIAL_FISHEYE", 5)}
 
 MOST_BYTES = 2**32
 
@@ -84,6 +85,11 @@ def _lens(path: Path, model: str, size: Sequence[int], values: Sequence[float]) 
         case "OPENCV":
             fx, fy, cx, cy, k1, k2, p1, p2 = values
             return Lens(fx, fy, cx, cy, *size, (k1, k2), (p1, p2))
+        case "SIMPLE_RADIAL_FISHEYE" | "RADIAL_FISHEYE":
+            focal, cx, cy, *radial = values
+            return Lens(focal, focal, cx, cy, *size, tuple(radial), fisheye=True)
+        case "OPENCV_FISHEYE":
+            return Lens(*values[:4], *size, tuple(values[4:]), fisheye=True)
     raise InputError(
         path,
         expected=f"cameras of the models {', '.join(name for name, _ in MODELS.values())}",

@@ -20,6 +20,7 @@ class Lens:
         width, height: of the images that these belong to, pixels.
         radial: k1, k2, …: a point at distance r from the axis (at depth 1) is seen 1 + k1 r² + k2 r⁴ + … as far out.
         tangential: p1, p2 of Brown's model, as OpenCV and COLMAP have them.
+        fisheye: whether r is the angle from the axis instead, as far out as which an undistorted point is seen.
     """
 
     fx: float
@@ -30,11 +31,12 @@ class Lens:
     height: int
     radial: tuple[float, ...] = ()
     tangential: tuple[float, float] = (0.0, 0.0)
+    fisheye: bool = False
 
     @property
     def bends(self) -> bool:
         """Whether straight lines do not stay straight."""
-        return any((*self.radial, *self.tangential))
+        return self.fisheye or any((*self.radial, *self.tangential))
 
     def resized(self, width: int, height: int) -> Lens:
         """The lens before images of another size that show the same."""
@@ -45,14 +47,22 @@ class Lens:
     def places(self, x: Numbers, y: Numbers) -> tuple[Numbers, Numbers]:
         """Columns and rows where rays (x right, y down, 1 forward) land in the image."""
         squared = x**2 + y**2
-        factor, power = np.ones_like(squared), np.ones_like(squared)
-        for coefficient in self.radial:
-            power = power * squared
-            factor = factor + coefficient * power
+        factor = self._radial(np.arctan(np.sqrt(squared)) ** 2 if self.fisheye else squared)
+        if self.fisheye:
+            radius = np.sqrt(squared)
+            factor = factor * np.divide(np.arctan(radius), radius, out=np.ones_like(radius), where=radius > 0.0)
         p1, p2 = self.tangential
         bent_x = x * factor + 2.0 * p1 * x * y + p2 * (squared + 2.0 * x**2)
         bent_y = y * factor + p1 * (squared + 2.0 * y**2) + 2.0 * p2 * x * y
         return self.fx * bent_x + self.cx, self.fy * bent_y + self.cy
+
+    def _radial(self, squared: Numbers) -> Numbers:
+        """1 + k1 r² + k2 r⁴ + …"""
+        factor, power = np.ones_like(squared), np.ones_like(squared)
+        for coefficient in self.radial:
+            power = power * squared
+            factor = factor + coefficient * power
+        return factor
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +92,9 @@ class ScanFrame:
         pose: (4, 4) float64 rigid camera-to-world transform, OpenGL axes.
         depth: measured or predicted, if there is any.
         albedo: a predicted map, if there is one.
+        material: an image whose green channel is the part of the albedo that is a metal's and not diffuse.
+        mask: an image that is 0 where the photograph is not to be used.
+        lighting: the name of the capture, where there are several.
     """
 
     image: Path
@@ -89,12 +102,15 @@ class ScanFrame:
     pose: Numbers
     depth: DepthImage | None = None
     albedo: Path | None = None
+    material: Path | None = None
+    mask: Path | None = None
+    lighting: str = ""
 
     @property
     def files(self) -> list[Path]:
         """All images of the frame."""
         depth = [] if self.depth is None else [self.depth.path, self.depth.confidence]
-        return [path for path in (self.image, *depth, self.albedo) if path is not None]
+        return [path for path in (self.image, *depth, self.albedo, self.material, self.mask) if path is not None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,6 +132,11 @@ class Scan:
     frames: tuple[ScanFrame, ...]
     axes: str
     notes: tuple[str, ...] = ()
+
+    def joined(self, other: Scan, lighting: str) -> Scan:
+        """With the frames of another capture of the same room."""
+        frames = tuple(replace(frame, lighting=lighting) for frame in other.frames)
+        return replace(self, sources=self.sources + other.sources, frames=self.frames + frames)
 
     def thinned(self, most: int) -> Scan:
         """At most so many of the frames, evenly spaced, the first and the last among them."""

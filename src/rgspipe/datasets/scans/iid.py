@@ -11,16 +11,19 @@ from pathlib import Path
 
 import numpy as np
 
-from rgspipe.datasets.scans.frame import DepthImage, Lens, Scan, ScanFrame
+from rgspipe.datasets.scans.frame import DepthImage, Scan, ScanFrame
 from rgspipe.datasets.scans.options import ScanOptions
-from rgspipe.datasets.scans.pictures import read_depth_image, size_of
+from rgspipe.datasets.scans.pictures import read_depth_image
+from rgspipe.datasets.scans.single import chosen, lens_by_field, level_pose
 from rgspipe.errors import InputError
-from rgspipe.scene import look_at
 
 #: Of the cameras.
 AXES = "opengl"
 
 WANTED = "im.png (or im/NAME.png) with albedo and depth beside it"
+
+#: Degrees that the method takes for granted.
+USUAL_FIELD = 85.0
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".exr")
 
@@ -34,14 +37,9 @@ def read(root: Path, options: ScanOptions) -> Scan:
     """The photograph with its maps.
 
     Raises:
-        InputError: there are several photographs, or no depth.
+        InputError: there are several photographs and none is named, or no depth.
     """
-    images = _images(root)
-    if len(images) != 1:
-        expected = "one photograph (im.png, or one file in im/): without poses several do not go together"
-        remedy = "Move the one that is meant into a folder of its own, with its maps."
-        raise InputError(root, expected=expected, found=f"{len(images)}", remedy=remedy)
-    image = images[0]
+    image = chosen(_images(root), root, options)
     depth = _partner(root, image, "depth")
     if depth is None:
         remedy = "Predict depth with any method, and write it as EXR beside the photograph."
@@ -50,13 +48,11 @@ def read(root: Path, options: ScanOptions) -> Scan:
     if unit is None:
         stored = read_depth_image(DepthImage(depth, 1.0))
         unit = 1.0 / float(np.nanmedian(stored)) if np.isfinite(stored).any() else 1.0
-    width, height = size_of(image)
-    focal = 0.5 * width / np.tan(np.radians(0.5 * options.fov))
-    lens = Lens(focal, focal, 0.5 * width, 0.5 * height, width, height)
-    pose = look_at([0.0, 0.0, 0.0], [0.0, 1.0, 0.0]).numpy()
-    frame = ScanFrame(image, lens, pose, DepthImage(depth, unit), _partner(root, image, "albedo"))
+    field = options.fov or USUAL_FIELD
+    lens = lens_by_field(image, field)
+    frame = ScanFrame(image, lens, level_pose(), DepthImage(depth, unit), _partner(root, image, "albedo"))
     scale = "of median depth 1, not in metres" if options.depth_unit is None else "by scene.rgbd.depth_unit"
-    notes = (f"a field of view of {options.fov:g}° is taken for granted (scene.rgbd.fov)", f"lengths are {scale}")
+    notes = (f"a field of view of {field:g}° is taken for granted (scene.rgbd.fov)", f"lengths are {scale}")
     return Scan("iid", image, (), (frame,), options.camera_axes(AXES), notes)
 
 

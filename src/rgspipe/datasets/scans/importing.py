@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +18,13 @@ from rgspipe.datasets.scans.pictures import exposure_of, read_depth_image, read_
 from rgspipe.datasets.scans.resample import resampled_colour, resampled_depth, straight_camera
 from rgspipe.files import write_json
 from rgspipe.progress import progress_bar
+from rgspipe.scene import Camera
+from rgspipe.scene.passes import Passes
 
 TRANSFORMS = "transforms_train.json"
+
+#: What a camera sees of surfaces that are known.
+Surfaces = Callable[[Camera], Passes]
 
 VERSION = 1
 
@@ -51,8 +57,11 @@ class Imported:
         return "\n".join(lines + [f"  {note}" for note in self.notes])
 
 
-def import_scan(scan: Scan, options: ScanOptions, folder: Path) -> Imported:
+def import_scan(scan: Scan, options: ScanOptions, folder: Path, surfaces: Surfaces | None = None) -> Imported:
     """Write the photographs of a capture as training views under lamps that are not known.
+
+    Args:
+        surfaces: of the room, if they are known, in the place of measured depth.
 
     Raises:
         InputError: a file is missing, broken, or of another kind than its layout says.
@@ -62,8 +71,9 @@ def import_scan(scan: Scan, options: ScanOptions, folder: Path) -> Imported:
     entries, known = [], []
     pairs = list(zip(scan.frames, factors, strict=True))
     for index, (frame, factor) in enumerate(progress_bar(pairs, "reading photographs", unit="photograph")):
-        entry, share = _written(frame, float(factor), options, folder, f"train/r_{index:04d}")
-        entries.append(entry | {"source": frame.image.name})
+        entry, share = _written(frame, float(factor), options, folder / f"train/r_{index:04d}", surfaces)
+        lighting = {"lighting": frame.lighting} if frame.lighting else {}
+        entries.append(entry | {"source": frame.image.name} | lighting)
         known.append(share)
     write_transforms(folder / TRANSFORMS, entries)
     write_json(folder / INFO, {"version": VERSION, "depth_convention": "planar_z", "layout": scan.layout})
@@ -84,9 +94,9 @@ def _exposures(scan: Scan, options: ScanOptions) -> np.ndarray | None:
 
 
 def _written(
-    frame: ScanFrame, exposure: float, options: ScanOptions, folder: Path, name: str
+    frame: ScanFrame, exposure: float, options: ScanOptions, path: Path, surfaces: Surfaces | None
 ) -> tuple[dict, float | None]:
-    """The entry of a frame whose files were written, and the part of its depth that is known, if there is any."""
+    """The entry of a frame whose files were written to `path`, and the part of its depth that is known, if any is."""
     camera = straight_camera(frame.lens, frame.pose, options.resolution, frame.image)
     picture = read_picture(frame.image, options.response)
     check_shape(frame.image, picture.light.shape, frame.lens)
@@ -96,16 +106,47 @@ def _written(
         limit = np.float32(picture.clipped_from)
         light = np.where(clipped, np.maximum(light, limit), light)
         entry["saturated_from"] = float(limit / np.float32(exposure))
-    write_image(folder / f"{name}.exr", light / np.float32(exposure))
-    surfaces, share = [], None
+    write_image(path.with_suffix(".exr"), light / np.float32(exposure))
+    passes = _measured(frame, camera, options) if surfaces is None else surfaces(camera)
+    if frame.mask is not None:
+        used = _mask(frame, camera)
+        passes = replace(passes, depth=None if passes.depth is None else np.where(used, passes.depth, np.nan))
+        write_channels(path.with_name(f"{path.name}_mask.exr"), {"A": used.astype(np.float32)})
+        entry["mask_path"] = f"./{path.parent.name}/{path.name}_mask.exr"
+    share = None if passes.depth is None else float(np.isfinite(passes.depth).mean())
+    kinds = _write_passes(passes if share else replace(passes, depth=None), path)
+    return frame_entry(f"{path.parent.name}/{path.name}", camera, surfaces=kinds) | entry, share
+
+
+def _measured(frame: ScanFrame, camera: Camera, options: ScanOptions) -> Passes:
+    """Depth and predicted albedo of a frame, as far as it has them."""
+    depth = albedo = None
     if frame.depth is not None:
         depth = resampled_depth(read_depth_image(frame.depth), camera, frame.depth.lens or frame.lens)
-        share = float(np.isfinite(depth).mean())
-    if share:
-        write_channels(folder / f"{name}_depth.exr", {"Z": depth})
-        surfaces.append("depth")
     if frame.albedo is not None:
         albedo, _ = resampled_colour(read_picture(frame.albedo, options.response).light, None, camera, frame.lens)
-        write_image(folder / f"{name}_albedo.exr", albedo)
-        surfaces.append("albedo")
-    return frame_entry(name, camera, surfaces=tuple(surfaces)) | entry, share
+    if albedo is not None and frame.material is not None:
+        material, _ = resampled_colour(read_picture(frame.material, "linear").light, None, camera, frame.lens)
+        albedo = albedo * (1.0 - np.clip(material[..., 1:2], 0.0, 1.0))
+    return Passes(depth, None, albedo)
+
+
+def _mask(frame: ScanFrame, camera: Camera) -> np.ndarray:
+    """(H, W) bool: which of a camera's pixels show nothing that is masked."""
+    mask = read_picture(frame.mask, "linear").light
+    check_shape(frame.mask, mask.shape, frame.lens)
+    # What is masked is "clipped" downwards: any sample of it counts.
+    _, masked = resampled_colour(1.0 - mask, 0.5, camera, frame.lens)
+    return ~masked.any(axis=2)
+
+
+def _write_passes(passes: Passes, path: Path) -> tuple[str, ...]:
+    """Write what there is beside an image's `path`, and say what that is."""
+    beside = {kind: path.with_name(f"{path.name}_{kind}.exr") for kind in ("depth", "normal", "albedo")}
+    if passes.depth is not None:
+        write_channels(beside["depth"], {"Z": passes.depth})
+    if passes.normal is not None:
+        write_channels(beside["normal"], dict(zip("XYZ", np.moveaxis(passes.normal, 2, 0), strict=True)))
+    if passes.albedo is not None:
+        write_image(beside["albedo"], passes.albedo)
+    return tuple(kind for kind in beside if getattr(passes, kind) is not None)

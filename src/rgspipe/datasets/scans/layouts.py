@@ -6,26 +6,38 @@ from pathlib import Path
 from types import ModuleType
 
 from rgspipe.datasets.input_file import input_folder
-from rgspipe.datasets.scans import colmap, iid, nerfstudio, polycam, replica, scannet
+from rgspipe.datasets.scans import colmap, iid, interiorverse, nerfstudio, openrooms, polycam, replica, scannet
 from rgspipe.datasets.scans.frame import Scan
 from rgspipe.datasets.scans.lens_check import check_lens
 from rgspipe.datasets.scans.options import LAYOUTS, ScanOptions
 from rgspipe.errors import InputError
 
-READERS: dict[str, ModuleType] = dict(zip(LAYOUTS, (nerfstudio, polycam, colmap, replica, scannet, iid), strict=True))
+MODULES = (nerfstudio, polycam, colmap, replica, scannet, iid, interiorverse, openrooms)
+READERS: dict[str, ModuleType] = dict(zip(LAYOUTS, MODULES, strict=True))
 
 #: Names of a folder that errors list.
 SHOWN = 12
 
 
-def read_scan(root: str | Path, options: ScanOptions) -> Scan:
+def read_scan(root: str | Path, options: ScanOptions, *, depth: bool = True) -> Scan:
     """The cameras of a capture, thinned to the frames that are wanted; no pixel has been read.
 
+    Args:
+        depth: whether some of the photographs must have depth.
+
     Raises:
-        InputError: no layout or several fit, or files of the layout are missing or broken.
+        InputError: no layout or several fit, files of the layout are missing or broken, or there is no depth.
     """
     root = input_folder(root, "the folder of a capture")
     scan = READERS[_layout(root, options)].read(root, options).thinned(options.frames)
+    if depth and all(frame.depth is None for frame in scan.frames):
+        raise InputError(
+            root,
+            expected="depth of the photographs, where the layout has it (docs/reference/capture_layouts.md)",
+            found="none: poses, and the points of a sparse model, are no surfaces",
+            remedy="Of COLMAP, run image_undistorter and patch_match_stereo and give its workspace as scene.path; else "
+            "add depth of a sensor in the unit of the poses, or give a mesh of the room: scene=mesh scene.path=FILE.",
+        )
     for frame in scan.frames:
         check_lens(frame.lens, f"{scan.stated}: intrinsics of {frame.image.name}")
         if frame.depth is not None and frame.depth.lens is not None:

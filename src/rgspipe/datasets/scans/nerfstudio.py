@@ -26,6 +26,7 @@ MILLIMETRE = 1e-3
 
 #: Models whose distortion is that of `Lens`.
 STRAIGHT = ("OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "PERSPECTIVE")
+FISHEYE = "OPENCV_FISHEYE"
 
 
 def found_in(root: Path) -> bool:
@@ -59,24 +60,26 @@ def _frame(entry: FrameEntry, scale: float, options: ScanOptions) -> ScanFrame:
         lens=_lens(entry),
         pose=placed(matrix, where, options, AXES),
         depth=_depth(entry, options),
+        mask=entry.transforms_path.parent / _text(entry, "mask_path") if "mask_path" in entry.fields else None,
     )
 
 
 def _lens(entry: FrameEntry) -> Lens:
     model = _value(entry, "camera_model", "OPENCV")
-    if model not in STRAIGHT:
+    if model not in (*STRAIGHT, FISHEYE):
         raise InputError(
             f"{entry.where}: camera_model",
-            expected=f"one of {', '.join(STRAIGHT)}",
+            expected=f"one of {', '.join((*STRAIGHT, FISHEYE))}",
             found=shown(model),
             remedy="Undistort the photographs first (colmap image_undistorter).",
         )
     width, height = (int(_positive(entry, key)) for key in ("w", "h"))
-    fx = _positive(entry, "fl_x")
+    fx, fisheye = _positive(entry, "fl_x"), model == FISHEYE
     centre = [_number(entry, key, 0.5 * size) for key, size in (("cx", width), ("cy", height))]
     radial = tuple(_number(entry, key, 0.0) for key in ("k1", "k2", "k3", "k4"))
-    tangential = (_number(entry, "p1", 0.0), _number(entry, "p2", 0.0))
-    return Lens(fx, _positive(entry, "fl_y", fx), *centre, width, height, radial, tangential)
+    # A fisheye lens has no such terms; files may hold those of another model.
+    tangential = (0.0, 0.0) if fisheye else (_number(entry, "p1", 0.0), _number(entry, "p2", 0.0))
+    return Lens(fx, _positive(entry, "fl_y", fx), *centre, width, height, radial, tangential, fisheye)
 
 
 def _depth(entry: FrameEntry, options: ScanOptions) -> DepthImage | None:

@@ -8,7 +8,7 @@ from typing import Literal, get_args
 from rgspipe.options import Options, option
 
 #: Layouts that are read.
-Layout = Literal["nerfstudio", "polycam", "colmap", "replica", "scannet", "iid"]
+Layout = Literal["nerfstudio", "polycam", "colmap", "replica", "scannet", "iid", "interiorverse", "openrooms"]
 LAYOUTS: tuple[Layout, ...] = get_args(Layout)
 
 
@@ -33,8 +33,16 @@ class ScanOptions(Options):
     """metres of 1 in a depth image, where files do not keep to their layout"""
     pose_unit: float | None = option(None, low=1e-9, high=1e9)
     """metres of 1 in the cameras' places; by default 1"""
-    fov: float = option(85.0, low=1, high=179)
-    """horizontal field of view of a photograph without a camera (iid), degrees"""
+    fov: float | None = option(None, low=1, high=179)
+    """horizontal field of view of photographs whose files do not state it (iid, interiorverse, openrooms), degrees; by
+    default the layout's usual one"""
+    others: tuple[str, ...] = ()
+    """folders of further captures of the same room under other lamps, in the same layout and coordinates"""
+    lamps_off: str | None = None
+    """folder of such a capture with the lamps off: daylight, screens"""
+    photograph: str | None = None
+    """which one, of photographs without poses that lie in one folder (iid, interiorverse): its file's name, with or
+    without suffix"""
 
     def camera_axes(self, usual: str) -> str:
         """Axes of the cameras in the files of a layout that has these."""

@@ -14,6 +14,8 @@ from rgspipe.datasets.exr import read_channels
 from rgspipe.datasets.images import NO_SURFACE, read_colour
 from rgspipe.datasets.input_file import check_pixel_count, input_file
 from rgspipe.datasets.scans.frame import DepthImage
+from rgspipe.datasets.scans.radiance_image import hdr_size, read_hdr
+from rgspipe.datasets.scans.raw_image import RAW, read_raw
 from rgspipe.errors import InputError
 from rgspipe.scene import srgb
 
@@ -42,6 +44,10 @@ def read_picture(path: Path, response: str) -> Picture:
     """
     if path.suffix.lower() == ".exr":
         return Picture(read_colour(path)[0].numpy(), None)
+    if path.suffix.lower() == ".hdr":
+        return Picture(read_hdr(path), None)
+    if path.suffix.lower() in RAW:
+        return Picture(*read_raw(path))
     if _has_wide_colours(path):
         levels, limit = _wide_colours(path), 1.0 - 0.5 / 65535.0
     else:
@@ -74,7 +80,7 @@ def read_depth_image(image: DepthImage) -> Pixels:
 
 def exposure_of(path: Path) -> float | None:
     """Shutter time × ISO / aperture², by the file's EXIF; None where it does not state all three."""
-    if path.suffix.lower() == ".exr":
+    if path.suffix.lower() in (".exr", ".hdr"):
         return None
     keys = (ExifTags.Base.ExposureTime, ExifTags.Base.ISOSpeedRatings, ExifTags.Base.FNumber)
     try:
@@ -121,6 +127,8 @@ def _stored_depth(path: Path) -> npt.NDArray[np.float64]:
     suffix = path.suffix.lower()
     if suffix == ".bin":
         return _colmap_array(path)
+    if suffix == ".dat":
+        return _openrooms_array(path)
     if suffix == ".exr":
         channels = read_channels(path)
         first = next(iter(channels.values()))
@@ -162,6 +170,18 @@ def _colmap_array(path: Path) -> npt.NDArray[np.float64]:
         return values[: width * height].reshape(height, width).astype(np.float64)
 
 
+def _openrooms_array(path: Path) -> npt.NDArray[np.float64]:
+    """(H, W) of two int32, height and width, and float32, rows first."""
+    content = input_file(path, "depth of OpenRooms").read_bytes()
+    height, width = (int(size) for size in np.frombuffer(content[:8].ljust(8, b"\0"), "<i4"))
+    check_pixel_count(path, width, height)
+    if len(content) != 8 + 4 * width * height:
+        found = f"{len(content)} bytes, where {height} × {width} pixels take {8 + 4 * width * height}"
+        raise InputError(path, expected="depth of OpenRooms", found=found, remedy="Copy it anew.")
+    with np.errstate(invalid="ignore"):
+        return np.frombuffer(content, "<f4", offset=8).reshape(height, width).astype(np.float64)
+
+
 def size_of(path: Path) -> tuple[int, int]:
     """Width and height of an image.
 
@@ -171,6 +191,8 @@ def size_of(path: Path) -> tuple[int, int]:
     if path.suffix.lower() == ".exr":
         height, width = next(iter(read_channels(path).values())).shape
         return width, height
+    if path.suffix.lower() == ".hdr":
+        return hdr_size(path)
     try:
         with Image.open(input_file(path, "an image"), formats=["PNG", "JPEG"]) as file:
             return file.size

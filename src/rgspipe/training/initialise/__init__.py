@@ -2,6 +2,6 @@
 
 from rgspipe.training.initialise.back_projection import NormalSource, see_surfaces
 from rgspipe.training.initialise.cloud import Cloud
-from rgspipe.training.initialise.surfels import Footprint, cloud_from_views, initialise_surfels
+from rgspipe.training.initialise.surfels import Footprint, cloud_from_views, initialise_surfels, surfels_on
 
-__all__ = ["Cloud", "Footprint", "NormalSource", "cloud_from_views", "initialise_surfels", "see_surfaces"]
+__all__ = ["Cloud", "Footprint", "NormalSource", "cloud_from_views", "initialise_surfels", "see_surfaces", "surfels_on"]

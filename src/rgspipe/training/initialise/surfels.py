@@ -79,7 +79,6 @@ def initialise_surfels(
     """
     if count < 1:
         raise ValueError(f"count must be at least 1, got {count}")
-    footprint = footprint or Footprint()
     cloud = cloud_from_views(views, count, normals=normals, where=where)
     if len(cloud) < count:
         raise InputError(
@@ -89,7 +88,19 @@ def initialise_surfels(
             remedy=f"Ask for at most {max(len(cloud) // 4, 1)} surfels (init.surfels), or give more views or a higher "
             "resolution.",
         )
-    spacing = estimate_spacing(cloud, count)
+    return surfels_on(cloud, count, seed=seed, clips=clips, footprint=footprint)
+
+
+def surfels_on(
+    cloud: Cloud, count: int, *, seed: int, clips: bool = True, footprint: Footprint | None = None
+) -> Surfels:
+    """`count` surfels spread evenly over the surfaces of a cloud that has at least as many points.
+
+    Args:
+        cloud: dense points with normals towards the side that light falls on.
+        seed, clips, footprint: as of `initialise_surfels`.
+    """
+    footprint, spacing = footprint or Footprint(), estimate_spacing(cloud, count)
     thinned = thin_for(cloud, count, spacing)
     centers = refit_planes(even_out(thinned, count, spacing, np.random.default_rng(seed)), thinned, spacing)
     return _dress(centers, neighbour_spacing(centers, spacing), cloud if clips else None, thinned, footprint)

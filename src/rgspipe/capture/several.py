@@ -1,0 +1,67 @@
+"""Several captures of one room under different lamps, which share its albedo; and one with the lamps off.
+
+Given the lamps of all other captures, what these measured of the albedo is known: it is Gaussian, of the precision and
+the mean
+
+    K = Σ_o D_o ,    μ = (Q + K)⁻¹ Σ_o D_o (log L_o − log ρ̂ − log d_o) ,
+
+and is to the lamps of one capture what a predicted albedo is, with its own doubt. So captures are fitted in turns, each
+beside what the others say.
+
+Light adds up: what a capture shows less what one with the lamps off shows, from the same surfaces, is what a capture of
+the lamps alone would show, whatever else shines.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from rgspipe.capture.field import factorised
+from rgspipe.capture.lamps import LampProblem
+from rgspipe.capture.radiance import Measured
+from rgspipe.capture.search import Answer, Tried
+
+#: Rounds in which each capture is fitted beside the others.
+ROUNDS = 2
+
+#: What is left once the lamps are off counts from this part of what was there: the rest is noise.
+LEAST_LEFT = 0.02
+
+
+def found_in_turns(problems: Sequence[LampProblem], search: Callable[[LampProblem], Answer]) -> list[Answer]:
+    """The lamps of each capture, beside what the others tell of the albedo."""
+    answers = [search(problem) for problem in problems]
+    for _ in range(ROUNDS if len(problems) > 1 else 0):
+        for own, problem in enumerate(problems):
+            others = [answer.best for other, answer in enumerate(answers) if other != own]
+            answers[own] = search(informed(problem, others))
+    return answers
+
+
+def informed(problem: LampProblem, others: Sequence[Tried]) -> LampProblem:
+    """The problem of one capture with what the lamps of others make of the albedo."""
+    precision, weighted = np.zeros(len(problem.radiance)), np.zeros_like(problem.radiance)
+    for other in others:
+        weight = other.problem.field.weight
+        log_albedo = np.log(other.problem.radiance) - np.log(other.problem.arriving(other.lamps))
+        precision += weight
+        weighted += weight[:, None] * (log_albedo - np.log(problem.predicted))
+    prior = problem.field.graph.precision(others[0].problem.field.variances)
+    mean = factorised((prior + sp.diags(precision)).tocsc()).solve(weighted)
+    return replace(problem, predicted=problem.predicted * np.exp(mean), field=replace(problem.field, known=precision))
+
+
+def without(capture: Measured, off: Measured) -> Measured:
+    """What is left of a capture once what shines with the lamps off is taken away; both of one exposure."""
+    left = capture.radiance - off.radiance
+    grey = np.maximum(left.mean(axis=1), 1e-300)
+    squared = capture.variance * capture.radiance.mean(axis=1) ** 2 + off.variance * off.radiance.mean(axis=1) ** 2
+    plain = (left > LEAST_LEFT * capture.radiance).all(axis=1) & np.isfinite(squared)
+    seen = np.where(plain, np.minimum(capture.seen, off.seen), 0.0)
+    middle = np.median(left[plain], axis=0) if plain.any() else np.ones(3)
+    radiance = np.where(plain[:, None], left, np.maximum(middle, 1e-300))
+    return replace(capture, radiance=radiance, variance=np.where(plain, squared / grey**2, np.inf), seen=seen)

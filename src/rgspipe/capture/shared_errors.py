@@ -1,0 +1,55 @@
+"""Errors of the model of light that a whole part of the scene shares, and what they leave unknown of the lamps.
+
+A shift δ of what is measured, log L, moves the lamps' numbers by θ = (Jᵀ Σ⁻¹ J)⁻¹ Jᵀ Σ⁻¹ δ. Two shifts are known from
+what was found itself, each in B parts of the scene that are taken for independent:
+
+- Surfaces cannot reflect more than all light. Where the lamps call for more, the model lacks light, by at least what is
+  beyond; errors of this size are everywhere, as where light is missing albedo hides it as long as it can.
+- What no camera saw sends light by an albedo that is a guess, of the deviation that surfaces of this scene have.
+
+    C = Σ_b θ_b θ_bᵀ
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from rgspipe.capture.lamps import LampProblem, Lamps
+from rgspipe.capture.radiance import Numbers
+from rgspipe.training.albedo import ALBEDO_RANGE
+
+
+def shared_covariance(problem: LampProblem, lamps: Lamps, parts: np.ndarray) -> Numbers:
+    """(6 K, 6 K) of the lamps' numbers; `parts` (N,) says which part of the scene each surfel is of."""
+    jacobian, spread = problem.jacobian(lamps), problem.covariance(lamps)
+    whitened = [problem.field.whitened(columns) for columns in jacobian]
+    shifts = [*_beyond(problem, lamps, parts), *_unseen(problem, lamps, parts)]
+    moved = [spread @ sum(part.T @ shift[:, k] for k, part in enumerate(whitened)) for shift in shifts]
+    return np.stack(moved).T @ np.stack(moved)
+
+
+def excess(problem: LampProblem, lamps: Lamps) -> Numbers:
+    """(N, 3) by how much the logarithm of the albedo is beyond what surfaces may reflect; 0 where nothing was seen."""
+    albedo = problem.albedo(lamps)
+    beyond = np.maximum(np.log(albedo / ALBEDO_RANGE[1]), 0.0)
+    return np.where((problem.field.weight > 0.0)[:, None], beyond, 0.0)
+
+
+def _beyond(problem: LampProblem, lamps: Lamps, parts: np.ndarray) -> Iterator[Numbers]:
+    """(N, 3) shifts by impossible albedo, one a part."""
+    used = problem.field.weight > 0.0
+    size = float(np.sqrt((excess(problem, lamps)[used] ** 2).mean())) if used.any() else 0.0
+    for part in np.unique(parts):
+        yield size * np.repeat((parts == part)[:, None], 3, axis=1)
+
+
+def _unseen(problem: LampProblem, lamps: Lamps, parts: np.ndarray) -> Iterator[Numbers]:
+    """(N, 3) shifts by light from surfaces that no camera saw, one a part that has any."""
+    received, arriving = problem.received, problem.arriving(lamps)
+    deviation = np.sqrt(problem.field.variances.surface)
+    sent = received.albedo * arriving[received.unseen]
+    for part in np.unique(parts[received.unseen]):
+        own = np.where((parts[received.unseen] == part)[:, None], sent, 0.0)
+        yield deviation * (received.gather[:, received.unseen] @ own) / arriving

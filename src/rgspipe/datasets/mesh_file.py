@@ -1,0 +1,172 @@
+"""Meshes of other programs: PLY, OBJ, glTF. Colours and textures become reflectance."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import trimesh
+from PIL import Image
+
+from rgspipe.datasets.input_file import check_pixel_count, input_file
+from rgspipe.datasets.limits import FARTHEST
+from rgspipe.datasets.mesh_links import FORMATS, GLTF
+from rgspipe.datasets.mesh_options import MeshOptions
+from rgspipe.errors import InputError
+from rgspipe.scene import srgb
+from rgspipe.scene.mesh import Numbers, Paint, TriangleMesh
+
+WHAT = "a triangle mesh (.ply, .obj, .glb or .gltf)"
+
+#: Bytes of a file, and triangles, beyond which no room is meant.
+MOST_BYTES, MOST_FACES = 2**31, 20_000_000
+
+#: From y up to z up, as Blender and glTF have it: (x, −z, y).
+UPRIGHT = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
+
+
+def read_mesh(path: str | Path, options: MeshOptions | None = None) -> TriangleMesh:
+    """All triangles of a file, in the world of its cameras, without those that have no area.
+
+    Raises:
+        InputError: missing or broken file, another format, no triangles, or coordinates that cannot be.
+    """
+    path, options = Path(path), options or MeshOptions()
+    kind = path.suffix.lower()
+    if kind not in FORMATS:
+        remedy = "Export it as binary PLY or GLB."
+        raise InputError(path, expected=WHAT, found=f"the suffix {path.suffix!r}", remedy=remedy)
+    content = _loaded(input_file(path, WHAT, most_bytes=MOST_BYTES))
+    try:
+        mesh = _joined([_part(*placed, linear=kind in GLTF, path=path) for placed in _placed(content)], path, content)
+    except InputError:
+        raise
+    except (ValueError, IndexError, TypeError, KeyError, AttributeError, OSError) as error:
+        raise _broken(path, error) from error
+    scaled = np.diag([*[options.unit] * 3, 1.0])
+    return _checked(mesh.moved(scaled @ UPRIGHT if is_y_up(path, options) else scaled), path)
+
+
+def is_y_up(path: Path, options: MeshOptions) -> bool:
+    """Whether a file is taken for one whose y points up."""
+    return options.up == "y" or (options.up == "auto" and path.suffix.lower() in GLTF)
+
+
+def _loaded(path: Path) -> Any:
+    try:
+        # Of broken files numpy warns before they are refused.
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            # Nothing is merged or mended: points without area do no harm, and merging would move textures.
+            return trimesh.load_scene(path, process=False, maintain_order=True)
+    except Exception as error:  # the library says of no format what it raises
+        raise _broken(path, error) from error
+
+
+def _broken(path: Path, error: BaseException) -> InputError:
+    found = f"a file that cannot be read as one ({type(error).__name__}: {str(error)[:200]})"
+    return InputError(path, expected=WHAT, found=found, remedy="Export it again.")
+
+
+def _placed(content: Any) -> list[tuple[Any, Numbers]]:
+    """The triangle meshes of a scene, each with the transform (4, 4) of its node."""
+    nodes = [content.graph[name] for name in content.graph.nodes_geometry]
+    found = [(content.geometry[name], np.asarray(matrix, np.float64)) for matrix, name in nodes]
+    return [(part, matrix) for part, matrix in found if isinstance(part, trimesh.Trimesh) and len(part.faces)]
+
+
+def _part(part: Any, matrix: Numbers, *, linear: bool, path: Path) -> TriangleMesh:
+    """One mesh, moved; `linear` says whether its vertices' colours are light, as in glTF, or display values."""
+    vertices, faces = np.asarray(part.vertices, np.float64), np.asarray(part.faces, np.int64)
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        found = f"a triangle with point {int(faces.max())} of {len(vertices)}"
+        raise InputError(path, expected="triangles between its points", found=found, remedy="Export it again.")
+    if len(faces) > MOST_FACES:
+        found = f"{len(faces)} triangles"
+        raise InputError(path, expected=f"at most {MOST_FACES}", found=found, remedy="Decimate the mesh.")
+    return TriangleMesh(vertices, faces, _paint(part, faces, linear, path)).moved(matrix)
+
+
+def _paint(part: Any, faces: np.ndarray, linear: bool, path: Path) -> Paint:
+    visual, count = part.visual, len(faces)
+    uv, none = np.zeros((count, 3, 2)), np.full(count, -1)
+    if visual.kind == "texture" and visual.uv is not None:
+        colour, image = _material(visual.material)
+        given = np.asarray(visual.uv, np.float64)
+        if image is None or given.shape != (len(part.vertices), 2) or not np.isfinite(given).all():
+            return Paint(np.broadcast_to(colour, (count, 3, 3)), uv, none)
+        white = colour if linear else np.ones(3)  # Kd beside map_Kd is what exporters leave there
+        corners = np.broadcast_to(white, (count, 3, 3))
+        return Paint(corners, given[faces], np.zeros(count, np.int64), (_texture(image, path),))
+    if visual.kind == "texture":
+        return Paint(np.broadcast_to(_material(visual.material)[0], (count, 3, 3)), uv, none)
+    if visual.kind == "vertex":
+        return Paint(_colours(visual.vertex_colors, linear)[faces], uv, none)
+    if visual.kind == "face":
+        return Paint(np.repeat(_colours(visual.face_colors, linear)[:, None], 3, axis=1), uv, none)
+    return Paint(np.full((count, 3, 3), np.nan), uv, none)
+
+
+def _colours(levels: np.ndarray, linear: bool) -> Numbers:
+    """(N, 3) linear, of (N, 3 or 4) bytes."""
+    values = np.asarray(levels)[:, :3].astype(np.float64) / 255.0
+    return values if linear else srgb.decode(values)
+
+
+def _material(material: Any) -> tuple[Numbers, Image.Image | None]:
+    """Linear colour (3,), NaN if it has none, and the image that it is times, if there is one."""
+    if isinstance(material, trimesh.visual.material.PBRMaterial):
+        level, image = material.baseColorFactor, material.baseColorTexture
+        level = np.full(3, 255) if level is None else level
+    else:
+        level, image = material.diffuse, material.image
+    colour = np.asarray(level)[:3].astype(np.float64) / 255.0
+    return colour, image
+
+
+def _texture(image: Image.Image, path: Path) -> np.ndarray:
+    """(H, W, 3) linear float32 of an image that has not been decoded yet."""
+    if image.format not in ("PNG", "JPEG"):
+        found = f"a texture in the format {image.format}"
+        raise InputError(path, expected="textures as PNG or JPEG", found=found, remedy="Convert them.")
+    check_pixel_count(path, *image.size)
+    return srgb.decode(np.asarray(image.convert("RGB"), np.float64) / 255.0).astype(np.float32)
+
+
+def _joined(parts: list[TriangleMesh], path: Path, content: Any) -> TriangleMesh:
+    if not parts:
+        points = sum(len(part.vertices) for part in content.geometry.values() if hasattr(part, "vertices"))
+        found = f"{points} points and no triangle" if points else "nothing in it"
+        remedy = "Make a surface of the points first (for example Poisson reconstruction in MeshLab)."
+        raise InputError(path, expected=WHAT, found=found, remedy=remedy)
+    points = np.cumsum([0, *(len(part.vertices) for part in parts)])
+    images = np.cumsum([0, *(len(part.paint.textures) for part in parts)])
+    textures = [
+        np.where(part.paint.texture < 0, -1, part.paint.texture + first)
+        for part, first in zip(parts, images, strict=False)
+    ]
+    paint = Paint(
+        np.concatenate([part.paint.corners for part in parts]),
+        np.concatenate([part.paint.uv for part in parts]),
+        np.concatenate(textures),
+        tuple(image for part in parts for image in part.paint.textures),
+    )
+    faces = np.concatenate([part.faces + first for part, first in zip(parts, points, strict=False)])
+    return TriangleMesh(np.concatenate([part.vertices for part in parts]), faces, paint)
+
+
+def _checked(mesh: TriangleMesh, path: Path) -> TriangleMesh:
+    """Without triangles that have no area."""
+    used = mesh.vertices[mesh.faces]
+    if not (np.isfinite(used).all() and np.abs(used).max() <= FARTHEST):
+        found = "points that are not finite, or farther away than 1e10"
+        raise InputError(path, expected="finite coordinates", found=found, remedy="Export it again.")
+    real = mesh.areas > 0.0
+    if not real.any():
+        found = f"{len(mesh)} triangles, none with an area"
+        raise InputError(path, expected=WHAT, found=found, remedy="Export it again.")
+    paint = mesh.paint
+    paint = Paint(paint.corners[real], paint.uv[real], paint.texture[real], paint.textures)
+    return TriangleMesh(mesh.vertices, mesh.faces[real], paint)

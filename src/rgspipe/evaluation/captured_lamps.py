@@ -1,0 +1,53 @@
+"""Lamps of a capture beside those that were on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import torch
+from scipy.stats import chi2
+
+from rgspipe.datasets.views import View
+from rgspipe.evaluation.tables import match_positions
+from rgspipe.scene.lights import LightRig, PointLight
+
+#: Part of truths that a region is to hold.
+REGION = 0.95
+
+
+def against_truth(
+    found: Sequence[PointLight], places: np.ndarray, truth: LightRig, size: float, views: Sequence[View]
+) -> dict[str, Any]:
+    """How far each lamp is from a true one, and whether its region holds it; JSON values, in the order of the found.
+
+    Args:
+        found: K lamps.
+        places: (K, 3, 3) their covariances, scene units².
+        truth: those that were on.
+        size: of the scene; `position_error` is in parts of it.
+        views: the photographs, which may show a lamp where their depth leaves it free.
+    """
+    pairs = match_positions(*(np.stack([light.position.numpy() for light in rig]) for rig in (found, truth)))
+    matched = [(found[own], truth[true], places[own]) for own, true in pairs]
+    return {
+        "lamps": len(truth),
+        "position_error": [float((a.position - b.position).norm()) / size for a, b, _ in matched],
+        "intensity_ratio": [float(a.intensity.mean() / b.intensity.mean()) for a, b, _ in matched],
+        "inside_95": [_inside(a, b, covariance) for a, b, covariance in matched],
+        "in_sight": [any(_shows(view, b) for view in views) for _, b, _ in matched],
+    }
+
+
+def _inside(lamp: PointLight, true: PointLight, covariance: np.ndarray) -> bool:
+    off = (lamp.position - true.position).double().numpy()
+    return bool(off @ np.linalg.solve(covariance, off) <= chi2.ppf(REGION, 3))
+
+
+def _shows(view: View, lamp: PointLight) -> bool:
+    """Whether a lamp is in the image and nothing before it; without depth, whether it is in the image."""
+    pixel, depth = view.camera.project(lamp.position.double())
+    column, row = (int(value) for value in torch.floor(pixel).tolist())
+    inside = float(depth) > 0.0 and 0 <= row < view.camera.height and 0 <= column < view.camera.width
+    return inside and (view.depth is None or not bool(view.depth[row, column] < depth))

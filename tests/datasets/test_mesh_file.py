@@ -1,0 +1,106 @@
+"""Meshes that the tests write: PLY, OBJ, GLB and glTF, with colours at their points and in textures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from mesh_files import cuboid_triangles, quarters, textured_square, write_coloured
+from raycast import BLOCK
+from rgspipe.datasets.mesh_file import UPRIGHT, read_mesh
+from rgspipe.datasets.mesh_links import mesh_files
+from rgspipe.datasets.mesh_options import MeshOptions
+from rgspipe.errors import InputError
+from rgspipe.scene import srgb
+from rgspipe.scene.mesh import TriangleMesh
+
+VERTICES, FACES = cuboid_triangles(BLOCK)
+LEVELS = np.random.default_rng(0).integers(10, 250, (len(VERTICES), 3), dtype=np.uint8)
+CENTRE = np.full((12, 3), 1.0 / 3.0)
+
+
+def middles(mesh: TriangleMesh) -> np.ndarray:
+    return mesh.points(np.arange(len(mesh)), np.full((len(mesh), 3), 1.0 / 3.0))
+
+
+@pytest.mark.parametrize("suffix", [".ply", ".obj", ".glb"])
+def test_points_and_colours_come_back(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"a{suffix}"
+    write_coloured(path, VERTICES, FACES, LEVELS)
+    mesh = read_mesh(path, MeshOptions(up="z"))
+    # OBJ has eight digits, the others float32.
+    assert np.abs(middles(mesh) - VERTICES[FACES].mean(axis=1)).max() < 1e-7
+    decode = (lambda x: x) if suffix == ".glb" else srgb.decode
+    expected = decode(LEVELS / 255.0)[FACES].mean(axis=1)
+    assert np.abs(mesh.paint.at(np.arange(12), CENTRE) - expected).max() < 1e-6
+
+
+@pytest.mark.parametrize("name", ["a.obj", "a.glb", "a.gltf"])
+def test_textures_are_where_they_belong(tmp_path: Path, name: str) -> None:
+    trimesh.Scene(textured_square(quarters())).export(tmp_path / name)
+    mesh = read_mesh(tmp_path / name, MeshOptions(up="z"))
+    shares = np.random.default_rng(1).dirichlet(np.ones(3), 200)
+    faces = np.arange(200) % 2
+    x, y = mesh.points(faces, shares)[:, :2].T
+    away = np.minimum(abs(x - 0.5), abs(y - 0.5)) > 1e-3
+    wanted = np.where(
+        y[:, None] > 0.5,
+        np.where(x[:, None] < 0.5, [200, 0, 0], [0, 200, 0]),
+        np.where(x[:, None] < 0.5, [0, 0, 200], [90, 90, 90]),
+    )
+    found = mesh.paint.at(faces, shares)
+    assert np.abs(found - srgb.decode(wanted / 255.0))[away].max() < 1e-6
+    own = {path for path in tmp_path.iterdir() if name != "a.glb" or path.name == name}
+    assert set(mesh_files(tmp_path / name)) == own, "all that was written counts for the fingerprint"
+
+
+def test_nodes_move_their_meshes_and_gltf_is_turned_upright(tmp_path: Path) -> None:
+    scene = trimesh.Scene()
+    matrix = trimesh.transformations.rotation_matrix(0.7, [1, 2, 3], [0.1, 0, 0])
+    scene.add_geometry(trimesh.Trimesh(VERTICES, FACES, process=False), transform=matrix)
+    scene.add_geometry(trimesh.Trimesh(VERTICES + 5.0, FACES, process=False))
+    scene.export(tmp_path / "a.glb")
+    mesh = read_mesh(tmp_path / "a.glb", MeshOptions(unit=0.01))
+    first = VERTICES[FACES].mean(axis=1) @ matrix[:3, :3].T + matrix[:3, 3]
+    expected = 0.01 * np.concatenate([first, VERTICES[FACES].mean(axis=1) + 5.0]) @ UPRIGHT[:3, :3].T
+    found = middles(mesh)
+    order = np.argsort(np.linalg.norm(found, axis=1) > 0.04, kind="stable")
+    assert np.abs(found[order] - expected).max() < 1e-8
+    assert not mesh.paint.known
+
+
+def test_triangles_without_area_are_left_out(tmp_path: Path) -> None:
+    faces = np.concatenate([FACES, [[0, 0, 1], [3, 3, 3]]])
+    trimesh.Trimesh(VERTICES, faces, process=False).export(tmp_path / "a.ply")
+    assert len(read_mesh(tmp_path / "a.ply")) == 12
+
+
+def test_what_is_no_mesh_is_refused_with_what_it_is(tmp_path: Path) -> None:
+    trimesh.PointCloud(VERTICES).export(tmp_path / "cloud.ply")
+    (tmp_path / "half.glb").write_bytes(b"glTF\x02\0\0\0")
+    (tmp_path / "a.fbx").touch()
+    trimesh.Trimesh(VERTICES * 1e12, FACES, process=False).export(tmp_path / "far.ply")
+    trimesh.Trimesh(np.zeros((3, 3)), [[0, 1, 2]], process=False).export(tmp_path / "flat.ply")
+    for name, words in {
+        "cloud.ply": r"24 points and no triangle.*Poisson",
+        "half.glb": "cannot be read",
+        "a.fbx": "suffix '.fbx'",
+        "none.obj": "no such file",
+        "far.ply": "farther away",
+        "flat.ply": "none with an area",
+    }.items():
+        with pytest.raises(InputError, match=words):
+            read_mesh(tmp_path / name)
+
+
+def test_textures_in_other_formats_are_not_opened(tmp_path: Path) -> None:
+    square = textured_square(quarters())
+    square.export(tmp_path / "a.obj")
+    (picture,) = tmp_path.glob("*.png")
+    quarters().save(tmp_path / "b.gif")
+    (tmp_path / "b.gif").rename(picture)
+    with pytest.raises(InputError, match="texture in the format GIF"):
+        read_mesh(tmp_path / "a.obj")
