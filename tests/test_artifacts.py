@@ -240,3 +240,18 @@ def test_the_manifest_names_no_machine(tmp_path: Path) -> None:
     text = json.dumps(dict(built(tmp_path).manifest))
     assert platform.node() not in text or len(platform.node()) < 4
     assert str(tmp_path) not in text
+
+
+@pytest.mark.parametrize("written", [(), (".scratch/half",), ("kept",)])
+def test_what_is_refused_leaves_nothing_unless_something_was_made(tmp_path: Path, written: tuple[str, ...]) -> None:
+    def refuse(folder: Path) -> Mapping[str, object]:
+        for name in written:
+            (folder / name).parent.mkdir(exist_ok=True)
+            (folder / name).write_text("x")
+        raise InputError("scene", expected="walls", found="none", remedy="Build some.")
+
+    with pytest.raises(InputError, match="walls"):
+        ArtifactStore(tmp_path).build(KEY, RECIPE, refuse)
+    left = [path.name for path in (tmp_path / "scene" / "stage").iterdir()]
+    assert sorted(left) == ([f".lock-{KEY.fingerprint}", f".partial-{KEY.fingerprint}"] if written else [])
+    assert built(tmp_path).facts == {"answer": 42}

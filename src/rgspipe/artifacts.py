@@ -201,7 +201,11 @@ class ArtifactStore:
             resumed = partial.exists()
             partial.mkdir(exist_ok=True)
             start, memory = time.perf_counter(), PeakMemory()
-            facts = make(partial)
+            try:
+                facts = make(partial)
+            except InputError:
+                _forget(partial, path.parent / f".lock-{key.fingerprint}")
+                raise
             seconds = round(time.perf_counter() - start, 3)
             made = {"seconds": seconds, "peak_memory_mib": memory.mib(), "resumed": resumed, "facts": dict(facts)}
             self._publish(key, recipe, made)
@@ -238,6 +242,15 @@ def _locked(lock_file: Path, key: Key) -> FileLock:
     except Timeout:
         log.info("%s: another process is making %s; waiting for it", key.stage, key.fingerprint)
         return lock.acquire()
+
+
+def _forget(partial: Path, lock_file: Path) -> None:
+    """Leave no trace of what was refused before anything was made of it; its lock is held."""
+    if any(path.is_file() for path in partial.rglob("*")):
+        return
+    shutil.rmtree(partial)
+    # Who waits for the lock sees that its file is gone, and takes a new one.
+    lock_file.unlink()
 
 
 def _remove_scratch(partial: Path) -> None:

@@ -105,6 +105,11 @@ def test_results_and_what_nothing_needs_are_counted(tmp_path: Path, capsys: pyte
     assert "See python -m rgspipe verify." in told(capsys)
 
 
+def test_a_blender_that_is_named_is_tried(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["doctor", "blender.executable=/no/such", f"outputs={tmp_path}", "check=false"]) == 1
+    assert "found /no/such: No such file or directory. Correct blender.executable" in told(capsys)
+
+
 @pytest.mark.parametrize("word", ["outputs=", "check=perhaps", "spring", f"outputs={__file__}"])
 def test_what_cannot_be_meant_is_refused(word: str) -> None:
     assert main(["doctor", word]) == 2

@@ -14,6 +14,7 @@ from rgspipe.pages import report
 from rgspipe.pages.gallery import make_gallery
 from rgspipe.pages.provenance import stage_record
 from rgspipe.scene import Camera, PointLight, look_at
+from rgspipe.scene.models import CornellBox, exact_surfels
 
 LIGHT = PointLight(torch.tensor([0.1, -0.2, 0.3]), torch.tensor([1.0, 1.5, 2.0]))
 #: Measures of a study besides its quality.
@@ -34,7 +35,6 @@ def make_contents() -> report.ReportContents:
     targets = pd.concat([part[0] for part in parts], ignore_index=True)
     image = np.random.default_rng(0).uniform(size=(16, 16, 3))
     png = images.png_bytes(images.comparison_strip(image, image))
-    cloud = np.random.default_rng(1).uniform(size=(500, 3))
     rows = [{"surfels": name, "light": "pixels"} | dict.fromkeys(QUALITY, 38.25) for name in ("trained", "truth")]
     quality = pd.DataFrame(rows)
     split = pd.DataFrame({"kind": KINDS, "pixels": 0.25, "error": 0.25, "psnr": 40.0, "light": "pixels"})
@@ -50,8 +50,8 @@ def make_contents() -> report.ReportContents:
         targets=targets,
         curves=pd.concat([part[1] for part in parts], ignore_index=True),
         fits=[report.Picture("search_lm, 1 view", "visible_000, median of its class", png)],
-        cloud=cloud,
-        normals=np.tile([0.0, 0.0, 1.0], (500, 1)),
+        is_measured=True,
+        surfels=exact_surfels(CornellBox(), 500),
         cameras=[plots.CameraMark((0.5, -2.0, 0.5), (0.0, 1.0, 0.0), 0.7)],
         training={"test_psnr_mean": 36.5, "seconds": 200.0, "per_view": [{"name": "test/r_0001", "psnr": 33.25}]},
         training_log=pd.DataFrame({"kind": ["albedo", "gradient"], "loss": [1.0, 0.1], "psnr": [20.0, 30.0]}),

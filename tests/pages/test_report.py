@@ -90,7 +90,6 @@ def test_an_empty_report_says_what_is_missing(fitted):
         "no pictures of single fits",
         "Nothing is known of the stages",
         "configuration is not known",
-        "Nothing is wanted of this scene",
     ):
         assert text in page.text
 

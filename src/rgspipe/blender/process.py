@@ -48,7 +48,7 @@ def run_blender(blender: Blender, module: str, job: dict, name: str, folder: Pat
     """
     folder = Path(folder).resolve()
     folder.mkdir(parents=True, exist_ok=True)
-    _claim(job, folder)
+    is_new = _claim(job, folder)
     scratch = folder / SCRATCH
     scratch.mkdir(exist_ok=True)
     command = blender.command(module, str(folder / JOB_FILE), str(folder), str(os.getpid()))
@@ -63,13 +63,15 @@ def run_blender(blender: Blender, module: str, job: dict, name: str, folder: Pat
             raise
     shutil.rmtree(scratch)
     if input_error is not None:
+        if is_new:
+            (folder / JOB_FILE).unlink()
         raise InputError(input_error.pop("where"), **input_error)
     if child.returncode != 0:
         raise RuntimeError(f"Blender {_ending(child.returncode)} while rendering {folder}. Its last lines:\n{tail}")
 
 
-def _claim(job: dict, folder: Path) -> None:
-    """Write the job into its folder, or see that it is the one that is there."""
+def _claim(job: dict, folder: Path) -> bool:
+    """Write the job into its folder, or see that it is the one that is there; whether it was written."""
     path = folder / JOB_FILE
     wanted, found = json.loads(json.dumps(job)), _claimed(path)
     if found is None:
@@ -84,6 +86,7 @@ def _claim(job: dict, folder: Path) -> None:
             found=f"another one (it differs in {', '.join(keys)})",
             remedy="Choose an empty folder, or remove this one.",
         )
+    return found is None
 
 
 def _claimed(path: Path) -> dict | None:

@@ -43,12 +43,13 @@ def doctor(arguments: Sequence[str]) -> int:
         input_folder(outputs, "the folder of results")
     host = machine()
     print(f"rgspipe {__version__}, Python {host['python']}, {host['system']}")
-    ills = _installed() + _blender(blender)
+    ills, refused = _installed(), _blender(blender)
     if not ills:
         _print_machine()
     ills += _disk(outputs)
     if checked and not ills:
         ills += _measured()
+    ills += refused
     if not ills:
         print("Everything that is needed works.")
         return 0

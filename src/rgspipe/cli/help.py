@@ -24,14 +24,14 @@ WIDTH = 100
 #: Sections of settings that steer a stage of another name.
 STAGE_SECTIONS = {
     "import_scan": ("scene",),
-    "generate_dataset": ("scene", "dataset", "capture"),
+    "generate_dataset": ("scene", "dataset", "blender", "capture"),
     "init_depth": ("init",),
     "train_surfels": ("train", "init"),
     "capture_surfels": ("lamps",),
-    "render_olat": ("targets",),
+    "render_olat": ("targets", "blender"),
     "generate_targets": ("targets",),
     "fit_light": ("fit", "light", "views", "effects"),
-    "render_truth": ("benchmark",),
+    "render_truth": ("benchmark", "blender"),
 }
 
 SCENES = """\
@@ -48,13 +48,13 @@ SCENES = """\
   mesh       a mesh and photographs of it, with the lamps unknown: scene=mesh scene.path=room.glb"""
 
 EXAMPLES = """\
-  python -m rgspipe demo                                            a small room in the browser, in seconds
-  python -m rgspipe pipeline=smoke                                  the whole way, tiny, in minutes
-  python -m rgspipe pipeline=reproduce                              the whole way, with a report at the end
-  python -m rgspipe stage=train_surfels scene=cornell               a trained scene (and the images before it)
-  python -m rgspipe stage=evaluate views=multi occlusion=occluded   lights out of sight, from three views
-  python -m rgspipe -m stage=evaluate views.count=1,2,3             a sweep: one job for each value
-  python -m rgspipe status                                          how the runs so far ended"""
+  python -m rgspipe demo                                              a small room in the browser, in seconds
+  python -m rgspipe doctor                                            whether all is well, and what is missing
+  python -m rgspipe stage=evaluate scene=tutorial occlusion=occluded  lights out of sight, in minutes
+  python -m rgspipe view outputs/tutorial/freeze/latest               that scene in the browser: move its lamps
+  python -m rgspipe pipeline=reproduce                                the whole way, with a report at the end
+  python -m rgspipe -m stage=evaluate views.count=1,2,3               a sweep: one job for each value
+  python -m rgspipe status                                            how the runs so far ended"""
 
 
 class Setting(NamedTuple):

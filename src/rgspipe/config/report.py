@@ -4,22 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rgspipe.fitting.options import Method
+from rgspipe.config.compared import ComparedFits
 from rgspipe.options import Options, option
 
 
 @dataclass(frozen=True)
-class ReportConfig(Options):
+class ReportConfig(ComparedFits):
     """What the report compares."""
 
-    truth: bool = True
-    """also recover the lights with surfels made from the true surfaces, where they are known"""
     views: tuple[int, ...] = option((1, 3), low=1, high=1000)
     """numbers of views"""
-    methods: tuple[Method, ...] = ("search_lm", "paper_adam")
-    """methods"""
-    paper_adam_limit: int | None = option(1, low=1, high=100000)
-    """targets of each class that paper_adam is run on"""
+    truth: bool = True
+    """also recover the lights with surfels made from the true surfaces, where they are known"""
 
 
 @dataclass(frozen=True)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from typing import Literal
 
+from rgspipe.config.compared import ComparedFits
 from rgspipe.config.scene import Modelled
 from rgspipe.errors import InputError
-from rgspipe.fitting.options import Method
 from rgspipe.options import Options, option
 
 #: What a study is about.
@@ -62,7 +62,7 @@ class ZooStudyConfig(Options):
 
 
 @dataclass(frozen=True)
-class StudyConfig(Options):
+class StudyConfig(ComparedFits):
     """What a study compares: cases, methods and numbers of views."""
 
     kind: Kind = "captures"
@@ -75,16 +75,6 @@ class StudyConfig(Options):
     before them where wanted"""
     scenes: tuple[Modelled, ...] = ()
     """scenes that are compared; by default the one that is configured"""
-    views: tuple[int, ...] = option((1,), low=1, high=1000)
-    """numbers of views"""
-    methods: tuple[Method, ...] = ("search_lm",)
-    """methods"""
-    limit: int | None = option(None, low=1, high=100000)
-    """targets of each class, where fit.limit does not say; all if null"""
-    paper_adam_limit: int | None = option(1, low=1, high=100000)
-    """the same for paper_adam, which takes minutes a target"""
-    paper_adam_views: tuple[int, ...] | None = option(None, low=1, high=1000)
-    """numbers of views that paper_adam is run on; all if null"""
     zoo: ZooStudyConfig = ZooStudyConfig()
     lightings: int = option(3, low=1, high=10000)
     """captures of each case with kind=lamps, dataset.seed 0, 1, …: each draws cameras and lamps anew"""

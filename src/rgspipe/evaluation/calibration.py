@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+import numpy.typing as npt
 from scipy.special import gammaincinv
 
 from rgspipe.evaluation.arrays import ArrayLike, to_array
@@ -82,6 +83,21 @@ def ellipse(covariance: ArrayLike, confidence: float = CONFIDENCE) -> tuple[floa
     values, vectors = np.linalg.eigh(matrix)
     first, second = (2.0 * np.sqrt(np.clip(values[::-1], 0.0, None) * _quantile(confidence, 3))).tolist()
     return first, second, math.degrees(math.atan2(float(vectors[1, 1]), float(vectors[0, 1])))
+
+
+def half_axes(covariance: ArrayLike, longest: float, confidence: float = CONFIDENCE) -> tuple[npt.NDArray, npt.NDArray]:
+    """Lengths (3,) of the half-axes of a region, and their directions, the columns of (3, 3).
+
+    Args:
+        covariance: (3, 3) of a position; variances that are not finite have half-axes of `longest`.
+        longest: what lengths are cut off at.
+    """
+    matrix = np.array(to_array(covariance), dtype=float)
+    unknown = ~np.isfinite(matrix.diagonal())
+    matrix[unknown] = matrix[:, unknown] = 0.0
+    matrix[unknown, unknown] = longest**2
+    values, axes = np.linalg.eigh(0.5 * (matrix + matrix.T))
+    return np.minimum(np.sqrt(np.maximum(values, 0.0) * _quantile(confidence, 3)), longest), axes
 
 
 def _quantile(share: float, coordinates: int) -> float:

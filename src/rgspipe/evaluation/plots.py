@@ -33,7 +33,14 @@ LABELS = {
     "mixed": "mixed",
     "unknown": "unclassified",
 }
-OTHER_COLOUR, OTHER_MARKER = "#666666", "D"
+#: How courses of a class are dashed.
+DASHES: dict[str, str | tuple] = {
+    "visible": "-",
+    "out_of_frame": (0, (5, 1.5)),
+    "occluded": (0, (1.5, 1)),
+    "around_corner": (0, (5, 1.2, 1.2, 1.2)),
+}
+OTHER_COLOUR, OTHER_MARKER, OTHER_DASHES = "#666666", "D", "--"
 
 INK, FAINT = "#222222", "#c9cdd2"
 #: Position errors outside this range are drawn at its ends.
@@ -167,7 +174,7 @@ def light_figure(
     facing = None if normals is None else to_array(normals)
     low, high = _extent(points, targets)
     margin = 0.05 * float((high - low).max())
-    marks = [_nearer(camera, low, high) for camera in cameras]
+    marks = [nearer(camera, low, high) for camera in cameras]
     origins = np.array([mark.origin for mark in marks]).reshape(-1, 3)
     low = np.minimum(low, origins.min(axis=0, initial=math.inf)) - margin
     high = np.maximum(high, origins.max(axis=0, initial=-math.inf)) + margin
@@ -265,7 +272,7 @@ def _curves(axis: Axes, group: pd.DataFrame, name: str, relative: bool) -> bool:
         if lines:
             drawn = True
             steps, middle = _median_curve(lines)
-            axis.plot(steps, middle, color=colour_of(occlusion), lw=2.0)
+            axis.plot(steps, middle, ls=DASHES.get(occlusion, OTHER_DASHES), color=colour_of(occlusion), lw=2.0)
     if not drawn:
         axis.text(
             0.5, 0.5, "truth unknown" if not relative else "no positive loss", transform=axis.transAxes, ha="center"
@@ -331,7 +338,7 @@ def _extent(points: npt.NDArray, targets: pd.DataFrame) -> tuple[npt.NDArray, np
     return low, np.maximum(high, low + 1e-6)
 
 
-def _nearer(camera: CameraMark, low: npt.NDArray, high: npt.NDArray) -> CameraMark:
+def nearer(camera: CameraMark, low: npt.NDArray, high: npt.NDArray) -> CameraMark:
     """The camera moved along its viewing direction until it is within `CAMERA_MARGIN` of the scene, if it can be."""
     reach = CAMERA_MARGIN * float((high - low).max())
     origin, direction = np.array(camera.origin, dtype=float), np.array(camera.direction, dtype=float)
@@ -386,7 +393,8 @@ def _lights(axis: Axes, targets: pd.DataFrame, window: npt.NDArray, across: int,
             axis.plot(*np.stack([truth, estimate]).T, "-", color=colour, lw=0.9, alpha=0.8, zorder=3)
         _region(axis, row, across, up, colour)
         axis.plot(*truth, "x", color=colour, ms=5.5, mew=1.3, zorder=4)
-        axis.plot(*estimate, "o", ms=6.0, mfc="none", mec=colour, mew=1.1, zorder=5)
+        marker = MARKERS.get(row["occlusion"], OTHER_MARKER)
+        axis.plot(*estimate, marker, ms=6.0, mfc="none", mec=colour, mew=1.1, zorder=5)
         outside += not ((estimate >= window[0]) & (estimate <= window[1])).all()
     return outside
 
@@ -409,7 +417,6 @@ def _region(axis: Axes, row: Mapping[str, object], across: int, up: int, colour:
 def _light_handles(cameras: bool) -> list[Line2D]:
     handles = [
         Line2D([], [], marker="x", ls="", color=INK, ms=5.5, mew=1.3, label="truth"),
-        Line2D([], [], marker="o", ls="", mfc="none", mec=INK, ms=6.0, label="estimate"),
         Line2D([], [], marker="o", ls="", mfc=INK, mew=0, alpha=0.25, ms=9.0, label="95 % region"),
     ]
     if cameras:
@@ -419,8 +426,9 @@ def _light_handles(cameras: bool) -> list[Line2D]:
 
 
 def _class_legend(figure: Figure, names: pd.Series, extra: Sequence[Line2D] = ()) -> None:
-    handles = [
-        Line2D([], [], color=colour_of(name), lw=2.5, label=LABELS.get(name, name)) for name in class_order(names)
-    ]
+    handles = []
+    for name in class_order(names):
+        look = {"ls": DASHES.get(name, OTHER_DASHES), "marker": MARKERS.get(name, OTHER_MARKER), "mfc": "none"}
+        handles.append(Line2D([], [], color=colour_of(name), lw=1.6, ms=6.0, label=LABELS.get(name, name), **look))
     handles += extra
-    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), fontsize=8.5)
+    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), fontsize=8.5, handlelength=3.2)

@@ -13,13 +13,16 @@ from rgspipe.evaluation.grading import graded_words
 from rgspipe.evaluation.quality_plots import split_figure
 from rgspipe.evaluation.tables import ALL
 from rgspipe.pages.gallery import Gallery, Shot
+from rgspipe.pages.glossary import GLOSSARY
 from rgspipe.pages.highlights import highlights, tiles
 from rgspipe.pages.html import MISSING, data_address, decimals, figure_address, percent, picture_address, render
 from rgspipe.pages.light_studies import LightStudy, light_studies
 from rgspipe.pages.provenance import StageRecord
 from rgspipe.pages.quality import compared_lights, quality_columns, quality_rows
 from rgspipe.pages.relit import Relighting, relightings
+from rgspipe.pages.room_view import room_view
 from rgspipe.pages.section import Section, shown_sections
+from rgspipe.scene import Surfels
 from rgspipe.scene.grade import SceneGrade
 from rgspipe.studies.capture_figure import capture_figure
 from rgspipe.studies.captures import TRUTH
@@ -51,7 +54,8 @@ class ReportContents:
         targets: rows of `target_table`.
         curves: rows of `convergence_table`.
         fits: pictures of single fits.
-        cloud, normals: (N, 3) surfel centres and normals of the frozen scene, or None.
+        is_measured: whether it is a scene of the laboratory, of which something is wanted.
+        surfels: of the frozen scene, or None.
         cameras: cameras of the targets.
         grade: of the frozen scene, where it was measured.
         training: the trainer's metrics: `test_psnr_mean`, `test_psnr_median`, `test_psnr_min`,
@@ -81,8 +85,8 @@ class ReportContents:
     targets: pd.DataFrame
     curves: pd.DataFrame
     fits: Sequence[Picture] = ()
-    cloud: Any = None
-    normals: Any = None
+    is_measured: bool = False
+    surfels: Surfels | None = None
     cameras: Sequence[plots.CameraMark] = ()
     grade: SceneGrade | None = None
     training: Mapping[str, Any] | None = None
@@ -123,7 +127,7 @@ def render_report(contents: ReportContents) -> str:
         galleries=shown_sections(contents.galleries),
         found=shown_sections(contents.sections),
         true_surfels=TRUTH,
-        goals=_goals(contents, found["psnr"], method),
+        goals=_goals(contents, found["psnr"], method) if contents.is_measured else [],
         method=method,
         training=_training_rows(contents.training),
         comparison=picture_address(contents.comparison, budget),
@@ -134,6 +138,8 @@ def render_report(contents: ReportContents) -> str:
         targets=_target_rows(contents.targets),
         fits=_grouped_fits(contents.fits, budget),
         figures=_figures(contents),
+        room=None if contents.surfels is None else room_view(contents.surfels, contents.targets, contents.cameras),
+        glossary=GLOSSARY,
         worst_views=_worst_views(contents.training),
         all_classes=ALL,
         success_limit=contents.success_limit,
@@ -251,11 +257,11 @@ def _figures(contents: ReportContents) -> dict[str, Any]:
 
 
 def _light_figures(contents: ReportContents) -> list[dict]:
-    if contents.cloud is None:
+    if contents.surfels is None:
         return []
     drawn = []
     for (method, views), group in contents.targets.groupby(["method", "views"], sort=False):
-        figure = plots.light_figure(group, contents.cloud, contents.normals, contents.cameras)
+        figure = plots.light_figure(group, contents.surfels.centers, contents.surfels.normals, contents.cameras)
         title = group_title(method, views)
         # A bitmap: thousands of dots would be far larger as drawing commands.
         drawn.append({"title": title, "source": data_address(plots.png_of(figure), "image/png")})

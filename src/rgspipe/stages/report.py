@@ -11,6 +11,7 @@ import pandas as pd
 from rgspipe.artifacts import Artifact
 from rgspipe.config import RgspipeConfig
 from rgspipe.config.core import plain
+from rgspipe.config.scene import MODELLED
 from rgspipe.datasets.grade_file import GRADE, load_grade
 from rgspipe.datasets.json_file import read_json
 from rgspipe.datasets.surfel_file import load_surfels
@@ -19,8 +20,10 @@ from rgspipe.files import write_bytes, write_json, write_text
 from rgspipe.pages import report
 from rgspipe.pages.overview import scene_summary
 from rgspipe.pages.provenance import StageRecord, stage_record
+from rgspipe.scene import Surfels
 from rgspipe.scene.grade import SceneGrade
 from rgspipe.stages.base import Need, Stage, StageContext
+from rgspipe.stages.compared_fits import fit_changes
 from rgspipe.stages.report_gallery import dataset_gallery
 from rgspipe.stages.report_relight import found_relightings, relight_files
 from rgspipe.stages.report_sections import found_galleries, found_sections, section_files
@@ -52,7 +55,7 @@ def run(context: StageContext) -> None:
 def _contents(context: StageContext) -> report.ReportContents:
     config = context.config
     # The evaluations with true surfels come last, as `_inputs` lists them.
-    every, count = context.input_lists.get("evaluate", ()), len(config.report.methods) * len(config.report.views)
+    every, count = context.input_lists.get("evaluate", ()), len(config.report.fits())
     evaluations, with_truth = every[:count], every[count:]
     judged = context.input_lists.get("judge", ())
     described = [read_json(artifact.file("metrics.json"), "what an evaluation found") for artifact in evaluations]
@@ -63,12 +66,12 @@ def _contents(context: StageContext) -> report.ReportContents:
     study, remark = found_captures(config, judged)
     return report.ReportContents(
         scene=config.scene.folder,
+        is_measured=config.scene.kind in MODELLED,
         summary=_table(evaluations, "summary.csv"),
         targets=targets,
         curves=_table(evaluations, "convergence.csv"),
         fits=_pictures(evaluations, described),
-        cloud=None if surfels is None else surfels.centers,
-        normals=None if surfels is None else surfels.normals,
+        surfels=surfels,
         cameras=_cameras(described),
         grade=_grade(context.inputs.get("freeze")),
         training=_training(trained),
@@ -125,7 +128,7 @@ def _cameras(described: Iterable[Mapping[str, Any]]) -> list[CameraMark]:
     return [CameraMark(tuple(item["origin"]), tuple(item["direction"]), item["angle"]) for item in most]
 
 
-def _surfels(freeze: Artifact | None) -> Any:
+def _surfels(freeze: Artifact | None) -> Surfels | None:
     return None if freeze is None else load_surfels(freeze.file("surfels.safetensors"))
 
 
@@ -187,12 +190,9 @@ def _notes(described: Iterable[Mapping[str, Any]]) -> list[str]:
 def _inputs(config: RgspipeConfig) -> list[Need | str]:
     """Evaluations of every method and view count, and everything before them for its provenance."""
     needs: list[Need | str] = []
-    for method in config.report.methods:
-        for views in config.report.views:
-            changes: dict[str, object] = {"fit.method": method, "views.count": views, "views.indices": None}
-            if method == "paper_adam" and config.fit.limit is None:
-                changes["fit.limit"] = config.report.paper_adam_limit
-            needs += [Need("fit_light", changes), Need("evaluate", changes)]
+    for method, views in config.report.fits():
+        changes = fit_changes(config, config.report, method, views)
+        needs += [Need("fit_light", changes), Need("evaluate", changes)]
     return [*needs, *_judgements(config), "freeze", trained_stage(config), "init_depth", "generate_dataset"]
 
 

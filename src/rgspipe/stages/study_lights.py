@@ -9,9 +9,9 @@ import pandas as pd
 
 from rgspipe.artifacts import Artifact
 from rgspipe.config import RgspipeConfig
-from rgspipe.config.studies import StudyConfig
 from rgspipe.datasets.advice_file import SUGGESTED, own_views_in_order
 from rgspipe.stages.base import Need, StageContext
+from rgspipe.stages.compared_fits import fit_changes
 from rgspipe.stages.study_cases import checked_cases, chosen_scenes
 from rgspipe.stages.study_kind import StudyKind
 from rgspipe.studies.light_figure import light_figure
@@ -71,24 +71,15 @@ def _each_cell(config: RgspipeConfig) -> Iterator[Cell]:
     wanted = config.study
     for scene, chosen in chosen_scenes(config):
         for case in checked_cases(chosen):
-            for method in wanted.methods:
-                for views in _numbers_of_views(wanted, method):
-                    foretells = wanted.kind == "views" and method == "search_lm" and views == min(wanted.views)
-                    changes = scene | _fit_changes(chosen, method, views, foretells) | case.changes
-                    yield Cell(chosen.scene.folder, case.name, changes, foretells)
-
-
-def _numbers_of_views(wanted: StudyConfig, method: str) -> tuple[int, ...]:
-    own = wanted.paper_adam_views if method == "paper_adam" else None
-    return wanted.views if own is None else own
-
-
-def _fit_changes(config: RgspipeConfig, method: str, views: int, foretells: bool) -> dict[str, object]:
-    changes: dict[str, object] = {"fit.method": method, "views.count": views, "views.indices": None}
-    limit = config.study.paper_adam_limit if method == "paper_adam" else config.study.limit
-    if config.fit.limit is None and limit is not None:
-        changes["fit.limit"] = limit
-    return changes | ({"fit.suggest_view": True} if foretells else {})
+            for method, views in wanted.fits():
+                foretells = wanted.kind == "views" and method == "search_lm" and views == min(wanted.views)
+                changes = scene | fit_changes(chosen, chosen.study, method, views) | case.changes
+                yield Cell(
+                    chosen.scene.folder,
+                    case.name,
+                    changes | ({"fit.suggest_view": True} if foretells else {}),
+                    foretells,
+                )
 
 
 def _keys(config: RgspipeConfig) -> tuple[str, ...]:

@@ -7,8 +7,7 @@ import math
 import numpy as np
 from torch import Tensor
 
-#: The 95 % quantile of χ² with three degrees of freedom.
-QUANTILE = 7.8147
+from rgspipe.evaluation.calibration import half_axes
 
 #: Smallest half-axis that is drawn, so that a region is seen at all, and largest, of the scene's size.
 LEAST, MOST = 0.004, 2.0
@@ -24,14 +23,9 @@ def region(position: Tensor, covariance: Tensor, size: float) -> tuple[np.ndarra
         covariance: (D, D), the position first; what has no finite variance is drawn as long as MOST.
         size: of the scene.
     """
-    block = covariance[:3, :3].double().numpy().copy()
-    unknown = ~np.isfinite(np.diagonal(block))
-    block[unknown] = block[:, unknown] = 0.0
-    block[unknown, unknown] = (MOST * size) ** 2
-    values, vectors = np.linalg.eigh(0.5 * (block + block.T))
-    axes = np.clip(np.sqrt(np.maximum(values, 0.0) * QUANTILE), LEAST * size, MOST * size)
+    lengths, directions = half_axes(covariance[:3, :3], MOST * size)
     points, faces = _ball()
-    return position.numpy() + (points * axes) @ vectors.T, faces
+    return position.numpy() + (points * np.maximum(lengths, LEAST * size)) @ directions.T, faces
 
 
 def _ball() -> tuple[np.ndarray, np.ndarray]:

@@ -1,0 +1,80 @@
+"""What the script of the room in three dimensions is given: places to a fraction of a millimetre, and no NaN."""
+
+from __future__ import annotations
+
+import base64
+import dataclasses
+import json
+import math
+import shutil
+
+import numpy as np
+import pytest
+
+from rgspipe.pages import report
+from rgspipe.pages.room_view import room_view
+from rgspipe.scene.models import CornellBox, exact_surfels
+
+CHROMIUM = shutil.which("chromium")
+
+SURFELS = exact_surfels(CornellBox(), 500)
+
+
+def unpacked(text: str, kind: str) -> np.ndarray:
+    return np.frombuffer(base64.b64decode(text), kind)
+
+
+def test_surfels_are_where_they_were(full_contents: report.ReportContents) -> None:
+    view = room_view(SURFELS, full_contents.targets, full_contents.cameras)
+    given, step = view["surfels"], view["surfels"]["step"]
+    places = unpacked(given["places"], "<u2").reshape(-1, 3) * step + np.array(view["low"])
+    # Half a step: measured 7.6e-6 of a room of 1.
+    assert np.abs(places - SURFELS.centers.numpy()).max() < step
+    sides = unpacked(given["sides"], "<i2").reshape(-1, 2, 3) * step
+    normals = np.cross(sides[:, 0], sides[:, 1])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    assert (normals * SURFELS.normals.numpy()).sum(axis=1).min() > 0.999
+    assert given["count"] == len(places) == len(unpacked(given["colours"], "u1")) // 3
+
+
+def test_lights_have_places_regions_and_words(full_contents: report.ReportContents) -> None:
+    targets = full_contents.targets.copy()
+    targets["var_xx"], targets["var_yy"], targets["var_zz"] = 1e-4, 4e-4, math.inf
+    targets["var_xy"] = targets["var_xz"] = targets["var_yz"] = 0.0
+    targets.loc[0, "x_true"] = math.nan
+    targets.loc[1, "var_xx"] = math.nan
+    view = room_view(SURFELS, targets, ())
+    assert [(group["method"], group["views"], len(group["lights"])) for group in view["groups"]] == [
+        ("search_lm", 1, 9),
+        ("search_lm", 3, 9),
+    ]
+    first, second, third = view["groups"][0]["lights"][:3]
+    assert first["truth"] is None and second["region"] is None
+    lengths = sorted(math.hypot(*axis) for axis in third["region"])
+    # √7.815 standard deviations; what is not known at all is as long as two rooms.
+    assert lengths[:2] == pytest.approx([0.02796, 0.05591], rel=1e-3) and lengths[2] > 1.0
+    assert json.loads(json.dumps(view, allow_nan=False)) == json.loads(json.dumps(view))
+
+
+@pytest.mark.browser
+@pytest.mark.skipif(CHROMIUM is None, reason="needs chromium (Debian: apt-get install chromium)")
+def test_it_turns_and_tells_in_a_browser(full_contents: report.ReportContents, tmp_path) -> None:
+    playwright = pytest.importorskip("playwright.sync_api")
+    path = tmp_path / "report.html"
+    path.write_text(report.render_report(dataclasses.replace(full_contents, fits=())))
+    with playwright.sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        page = browser.new_page(viewport={"width": 400, "height": 800})
+        errors = []
+        page.on("pageerror", lambda error: errors.append(str(error)))
+        page.goto(path.as_uri())
+        canvas = page.locator(".room canvas")
+        seen = canvas.evaluate("canvas => canvas.toDataURL()")
+        canvas.focus()
+        page.keyboard.press("ArrowRight")
+        page.wait_for_function("seen => document.querySelector('.room canvas').toDataURL() !== seen", arg=seen)
+        page.locator(".room select").nth(1).select_option("occluded_002")
+        assert page.locator(".room output").inner_text().startswith("occluded_002, occluded: ")
+        assert page.evaluate("document.documentElement.scrollWidth") <= 400
+        assert page.locator(".wide.more").count() > 0 and not errors
+        browser.close()
