@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rgspipe.fitting.options import SearchOptions
-from rgspipe.fitting.search.compare import best_state, drop, energy_shares, wanted
+from rgspipe.fitting.search.compare import Wanted, best_state, drop, energy_shares, wanted
 from rgspipe.fitting.search.refine import Refiner, State
 from rgspipe.fitting.search.schedule import refined_starts
 from rgspipe.fitting.search.starts import Candidates, EmitterRig
@@ -26,18 +26,18 @@ class OneMore:
     Attributes:
         simple, rich: the two rigs.
         gain: by what share the light lowers the robust cost.
-        wanted: by what share it would have to.
+        wanted: what it would have to.
     """
 
     simple: State
     rich: State
     gain: float
-    wanted: float
+    wanted: Wanted
 
     @property
     def worth(self) -> bool:
         """Whether that light is there, rather than an error of the model."""
-        return self.gain >= self.wanted
+        return self.gain >= self.wanted.share
 
 
 def one_more_light(
