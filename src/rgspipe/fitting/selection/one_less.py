@@ -59,7 +59,7 @@ def one_light_less(refiner: Refiner, answer: State, bar: BarOptions, steps: int 
     """
     energies, rich, problem = light_energies(answer), answer, refiner.problem
     for index in sorted(range(len(energies)), key=energies.__getitem__):
-        simple = refiner.refined(refiner.start(_without(answer, index), ROBUST), ROBUST, steps)
+        simple = refiner.refined(refiner.start(_without(answer, index), ROBUST, answer), ROBUST, steps)
         found = OneLess(rich, simple, index, drop(problem, simple, rich), wanted(rich, bar))
         # An answer of plain squares has a higher robust cost than it would have to have.
         if found.gain >= bar.least_faint:

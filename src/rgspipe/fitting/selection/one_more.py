@@ -59,15 +59,15 @@ def one_more_light(
     for kind in candidates:
         promise, extended = kind.promised(answer, refiner.problem, tries, refiner.region.size)
         sure = promise >= bar.least_faint
-        if promise >= bar.least and (sure or _last_share(refiner, extended[0]) >= bar.begins_faint):
+        if promise >= bar.least and (sure or _last_share(refiner, extended[0], answer) >= bar.begins_faint):
             rigs += extended
     if not rigs:
         return None
-    rich = best_state(refiner.problem, refined_starts(refiner, rigs, steps, options.schedule))
+    rich = best_state(refiner.problem, refined_starts(refiner, rigs, steps, options.schedule, answer))
     simple, rich = (refiner.refined(state, ROBUST, steps) for state in (answer, rich))
     return OneMore(simple, rich, drop(refiner.problem, simple, rich), wanted(rich, bar))
 
 
-def _last_share(refiner: Refiner, rig: EmitterRig) -> float:
+def _last_share(refiner: Refiner, rig: EmitterRig, answer: State) -> float:
     """What the last light of a rig sends of all its energy, at first sight."""
-    return energy_shares(refiner.start(rig, ROBUST))[-1]
+    return energy_shares(refiner.start(rig, ROBUST, answer))[-1]
