@@ -7,9 +7,10 @@ import torch
 
 from fitted_lights import make_fitted
 from rgspipe.datasets.views import Target, View
-from rgspipe.evaluation import images, plots, tables
+from rgspipe.evaluation import images, tables
 from rgspipe.evaluation.error_split import KINDS
 from rgspipe.evaluation.held_out import QUALITY
+from rgspipe.evaluation.light_plot import CameraMark
 from rgspipe.pages import report
 from rgspipe.pages.gallery import make_gallery
 from rgspipe.pages.provenance import stage_record
@@ -52,7 +53,7 @@ def make_contents() -> report.ReportContents:
         fits=[report.Picture("search_lm, 1 view", "visible_000, median of its class", png)],
         is_measured=True,
         surfels=exact_surfels(CornellBox(), 500),
-        cameras=[plots.CameraMark((0.5, -2.0, 0.5), (0.0, 1.0, 0.0), 0.7)],
+        cameras=[CameraMark((0.5, -2.0, 0.5), (0.0, 1.0, 0.0), 0.7)],
         training={"test_psnr_mean": 36.5, "seconds": 200.0, "per_view": [{"name": "test/r_0001", "psnr": 33.25}]},
         training_log=pd.DataFrame({"kind": ["albedo", "gradient"], "loss": [1.0, 0.1], "psnr": [20.0, 30.0]}),
         comparison=png,

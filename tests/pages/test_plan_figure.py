@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from rgspipe.evaluation.plots import CameraMark, png_of
+from rgspipe.evaluation.light_plot import CameraMark
+from rgspipe.evaluation.plots import png_of
 from rgspipe.pages.plan_figure import GUESSED, SEEN, plan_figure
 
 CAMERA = CameraMark((0.5, -2.0, 0.5), (0.0, 1.0, 0.0), 0.7)

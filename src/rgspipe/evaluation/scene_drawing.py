@@ -17,9 +17,7 @@ TRUTH = "#222222"
 
 def draw_surfaces(axis: Axes, points: npt.NDArray, normals: npt.NDArray, across: int, up: int) -> None:
     """Surfels (N, 3) that do not face the viewer, so that walls stand out as lines."""
-    kept = points[np.abs(normals[:, 3 - across - up]) < 0.7]
-    if len(kept) > plots.CLOUD_POINTS:
-        kept = kept[np.random.default_rng(0).permutation(len(kept))[: plots.CLOUD_POINTS]]
+    kept = plots.thinned(points[np.abs(normals[:, 3 - across - up]) < 0.7])
     axis.plot(kept[:, across], kept[:, up], ".", ms=1.4, color="#c4c9d0", mew=0, zorder=0)
 
 

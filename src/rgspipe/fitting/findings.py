@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 from typing import ClassVar
 
@@ -26,11 +26,14 @@ class Finding:
 
     #: What an answer is of which nothing graver holds.
     status: ClassVar[FitStatus]
+    #: The numbers of `SearchOptions` that decided that it holds, by their places there.
+    decided_by: ClassVar[tuple[str, ...]] = ()
 
     def data(self) -> dict[str, object]:
-        """Its name and numbers, as JSON holds them."""
+        """Its name and numbers, and what decided, as JSON holds them."""
         name = "".join(f"_{letter.lower()}" if letter.isupper() else letter for letter in type(self).__name__)
-        return {"finding": name.lstrip("_"), **asdict(self)}
+        decided = {"decided_by": list(self.decided_by)} if self.decided_by else {}
+        return {"finding": name.lstrip("_"), **asdict(self), **decided}
 
 
 @dataclass(frozen=True)
@@ -53,6 +56,7 @@ class PoorlyExplained(Finding):
 
     share: float
     status = FitStatus.UNEXPLAINED
+    decided_by = ("certainty.poorly",)
 
 
 @dataclass(frozen=True)
@@ -61,6 +65,7 @@ class LightMissing(Finding):
 
     count: int
     gain: float
+    decided_by: tuple[str, ...] = field(kw_only=True)
     status = FitStatus.UNEXPLAINED
 
 
@@ -83,6 +88,7 @@ class Rival(Finding):
 
     distance: float | None
     status = FitStatus.AMBIGUOUS
+    decided_by = ("rivals.deviations", "rivals.energy", "certainty.doubtful")
 
 
 @dataclass(frozen=True)
@@ -96,6 +102,7 @@ class LightSpare(Finding):
     count: int
     gain: float
     wanted: float
+    decided_by: tuple[str, ...] = field(kw_only=True)
     status = FitStatus.AMBIGUOUS
 
 
@@ -132,6 +139,7 @@ class Uncertain(Finding):
     error: float
     distant: bool = False
     status = FitStatus.UNDETERMINED
+    decided_by = ("certainty.doubtful",)
 
 
 @dataclass(frozen=True)
@@ -141,6 +149,7 @@ class OnSurface(Finding):
     number: int
     count: int
     status = FitStatus.UNDETERMINED
+    decided_by = ("certainty.on_surface",)
 
 
 @dataclass(frozen=True)
@@ -156,6 +165,7 @@ class OutOfSteps(Finding):
     """All steps were used while the loss was still falling."""
 
     status = FitStatus.MAX_ITERATIONS
+    decided_by = ("iterations",)
 
 
 @dataclass(frozen=True)
@@ -173,6 +183,7 @@ class MaybeOneMore(Finding):
 
     gain: float
     wanted: float
+    decided_by: tuple[str, ...] = field(kw_only=True)
     status = FitStatus.CONVERGED
 
 
@@ -230,6 +241,7 @@ class MuchAmbient(Finding):
 
     share: float
     status = FitStatus.CONVERGED
+    decided_by = ("bar.faint",)
 
 
 @dataclass(frozen=True)
@@ -238,6 +250,7 @@ class MaybeAmbient(Finding):
 
     gain: float
     status = FitStatus.CONVERGED
+    decided_by = ("bar.least_faint",)
 
 
 @dataclass(frozen=True)

@@ -59,14 +59,16 @@ class Spoken:
         count: a given number of lights; takes the number.
         uncounted: a number of lights that is to be found.
         ambient: light from all around besides.
+        setting: a number that steers a search; takes its place in `SearchOptions`.
     """
 
     count: Callable[[int], str]
     uncounted: str
     ambient: str
+    setting: Callable[[str], str]
 
 
-PYTHON = Spoken("LightSpec(count={})".format, "LightSpec(count=None)", "LightSpec(ambient=True)")
+PYTHON = Spoken("LightSpec(count={})".format, "LightSpec(count=None)", "LightSpec(ambient=True)", "Search.{}".format)
 
 
 def explained(findings: Sequence[Finding], spoken: Spoken = PYTHON) -> str:
@@ -87,7 +89,15 @@ def _joined(parts: Sequence[str]) -> list[str]:
 
 def _sentence(finding: Finding, spoken: Spoken) -> str:
     words = _WORDS.get(type(finding))
-    return MEANINGS[finding.status] if words is None else words(finding, spoken)
+    told = MEANINGS[finding.status] if words is None else words(finding, spoken)
+    return " ".join([told, *_decided(finding, spoken)])
+
+
+def _decided(finding: Finding, spoken: Spoken) -> list[str]:
+    """By which settings, in a sentence; none where no setting decides."""
+    names = [spoken.setting(name) for name in finding.decided_by]
+    together = [", ".join(names[:-1]), names[-1]] if len(names) > 1 else names
+    return [f"Decided by {' and '.join(together)}."] if names else []
 
 
 def _missing(found: LightMissing, spoken: Spoken) -> str:

@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 
 from rgspipe.evaluation import plots
 from rgspipe.evaluation.arrays import ArrayLike, to_array
-from rgspipe.evaluation.plots import CameraMark
+from rgspipe.evaluation.light_plot import CameraMark
 from rgspipe.evaluation.tables import class_order
 
 SEEN, GUESSED = "#c4c9d0", "#e07a52"
@@ -101,8 +101,7 @@ def _cloud(axis: Axes, points: npt.NDArray, facing: npt.NDArray | None, across: 
     along = 3 - across - up
     if facing is not None:
         points = points[np.abs(facing[:, along]) < 0.7]
-    if len(points) > plots.CLOUD_POINTS:
-        points = points[np.random.default_rng(0).permutation(len(points))[: plots.CLOUD_POINTS]]
+    points = plots.thinned(points)
     axis.plot(points[:, across], points[:, up], ".", ms=1.4, color=colour, mew=0, zorder=0)
 
 

@@ -10,6 +10,7 @@ import pandas as pd
 
 from rgspipe.evaluation import goals, metrics, plots
 from rgspipe.evaluation.grading import graded_words
+from rgspipe.evaluation.light_plot import CameraMark, light_figure
 from rgspipe.evaluation.quality_plots import split_figure
 from rgspipe.evaluation.tables import ALL
 from rgspipe.pages.gallery import Gallery, Shot
@@ -87,7 +88,7 @@ class ReportContents:
     fits: Sequence[Picture] = ()
     is_measured: bool = False
     surfels: Surfels | None = None
-    cameras: Sequence[plots.CameraMark] = ()
+    cameras: Sequence[CameraMark] = ()
     grade: SceneGrade | None = None
     training: Mapping[str, Any] | None = None
     training_log: pd.DataFrame | None = None
@@ -261,7 +262,7 @@ def _light_figures(contents: ReportContents) -> list[dict]:
         return []
     drawn = []
     for (method, views), group in contents.targets.groupby(["method", "views"], sort=False):
-        figure = plots.light_figure(group, contents.surfels.centers, contents.surfels.normals, contents.cameras)
+        figure = light_figure(group, contents.surfels.centers, contents.surfels.normals, contents.cameras)
         title = group_title(method, views)
         # A bitmap: thousands of dots would be far larger as drawing commands.
         drawn.append({"title": title, "source": data_address(plots.png_of(figure), "image/png")})

@@ -12,7 +12,8 @@ import numpy.typing as npt
 import pandas as pd
 
 from rgspipe.evaluation import calibration
-from rgspipe.evaluation.plots import CameraMark, colour_of, nearer
+from rgspipe.evaluation.light_plot import CameraMark, nearer
+from rgspipe.evaluation.plots import colour_of
 from rgspipe.evaluation.tables import VARIANCES
 from rgspipe.pages.html import label, percent
 from rgspipe.scene import Surfels

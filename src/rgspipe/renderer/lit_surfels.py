@@ -69,8 +69,15 @@ def lit_columns(
     bvh: SurfelBvh, light: UnitLight, effects: Effects, least: float | None = None, few: bool = False
 ) -> Tensor:
     """`LitSurfels.columns` (N, 1 + D) of a light that may have an extent, of few points if asked for."""
-    (columns,) = added(light, lambda part: (lit_surfels(bvh, part, effects, least).columns,), few)
-    return columns
+
+    def columns(part: UnitLight) -> tuple[Tensor]:
+        if part.light.axis is not None:
+            return (lit_surfels(bvh, part, effects, least).columns,)
+        # A light that shines alike in all directions takes one pass over the surfels.
+        irradiance, slope = unit_irradiance(bvh, part.light.place[None], effects.shadows)
+        return (torch.cat([irradiance.T, slope[0]], dim=1),)
+
+    return added(light, columns, few)[0]
 
 
 def _transmittance(

@@ -15,7 +15,7 @@ from rgspipe.config.scene import MODELLED
 from rgspipe.datasets.grade_file import GRADE, load_grade
 from rgspipe.datasets.json_file import read_json
 from rgspipe.datasets.surfel_file import load_surfels
-from rgspipe.evaluation.plots import CameraMark
+from rgspipe.evaluation.light_plot import CameraMark
 from rgspipe.files import write_bytes, write_json, write_text
 from rgspipe.pages import report
 from rgspipe.pages.overview import scene_summary

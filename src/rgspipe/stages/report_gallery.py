@@ -11,7 +11,8 @@ from rgspipe.artifacts import Artifact
 from rgspipe.datasets.light_file import read_lights
 from rgspipe.datasets.location import open_dataset
 from rgspipe.datasets.views import Dataset
-from rgspipe.evaluation.plots import CameraMark, png_of
+from rgspipe.evaluation.light_plot import CameraMark
+from rgspipe.evaluation.plots import png_of
 from rgspipe.evaluation.tables import class_order
 from rgspipe.pages.gallery import Gallery, make_gallery
 from rgspipe.pages.plan_figure import plan_figure

@@ -4,4 +4,4 @@ from __future__ import annotations
 
 from rgspipe.fitting.words import Spoken
 
-COMMAND_LINE = Spoken("light.count={}".format, "light.count=null", "light.ambient=true")
+COMMAND_LINE = Spoken("light.count={}".format, "light.count=null", "light.ambient=true", "fit.search.{}".format)

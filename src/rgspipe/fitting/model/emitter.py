@@ -98,7 +98,7 @@ class Emitter:
 
     def softened(self, softness: float) -> Emitter:
         """The emitter with another softness."""
-        return replace(self, softness=softness)
+        return self if softness == self.softness else replace(self, softness=softness)
 
     def units(self, size: float) -> Tensor:
         """(D,) natural change (scene units, rad) per unit of each parameter, in a scene of `size`."""

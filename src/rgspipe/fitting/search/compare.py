@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import torch
@@ -18,15 +19,30 @@ from rgspipe.fitting.search.weighting import ROBUST, cauchy_scale
 from rgspipe.sums import average, total
 
 
-def wanted(rich: State, bar: BarOptions) -> float:
-    """The share by which `rich` has to lower the robust cost for its lights to be there."""
+@dataclass(frozen=True)
+class Wanted:
+    """By what share a light has to lower the robust cost to be there.
+
+    Attributes:
+        share: it.
+        setting: which number of `SearchOptions` that is.
+    """
+
+    share: float
+    setting: str
+
+
+def wanted(rich: State, bar: BarOptions) -> Wanted:
+    """What is wanted of `rich` for its lights to be there."""
     energies = light_energies(rich)
-    return bar.least_faint if min(energies) < bar.faint * sum(energies) else bar.least
+    if min(energies) < bar.faint * sum(energies):
+        return Wanted(bar.least_faint, "bar.least_faint")
+    return Wanted(bar.least, "bar.least")
 
 
 def passed(problem: LightProblem, simple: State, rich: State, bar: BarOptions) -> bool:
     """Whether the light that `rich` has and `simple` has not is there."""
-    return drop(problem, simple, rich) >= wanted(rich, bar)
+    return drop(problem, simple, rich) >= wanted(rich, bar).share
 
 
 def distinct(states: Sequence[State], met: float, size: float) -> list[State]:

@@ -82,9 +82,9 @@ class Refiner:
         """The same fit's refiner on another problem: of other pixels, say."""
         return replace(self, problem=problem)
 
-    def start(self, rig: Sequence[Emitter], weighting: Weighting) -> State:
-        """The state at `rig`, with the intensities that belong to it."""
-        problem, columns = self.problem, self.columns(rig)
+    def start(self, rig: Sequence[Emitter], weighting: Weighting, known: State | None = None) -> State:
+        """The state at `rig`, with the intensities that belong to it; see `columns` for `known`."""
+        problem, columns = self.problem, self.columns(rig, known)
         weights = problem.unclipped(weighting.base(problem).square())
         state = State(tuple(rig), columns, problem.moments(columns, weights).intensity)
         return replace(state, steps=(self.step(state),))
@@ -108,14 +108,15 @@ class Refiner:
         return replace(found.value, steps=tuple(steps), status=STATUSES[found.ended])
 
     def columns(self, rig: Sequence[Emitter], known: State | None = None) -> tuple[Tensor, ...]:
-        """`LightProblem.evaluate` of each light and the known images; lights that `known` has are not made again."""
-        before = [None] * len(rig) if known is None else known.emitters
-        changed = [emitter for emitter, other in zip(rig, before, strict=True) if emitter is not other]
-        self.meter.evaluations += self.problem.renderings(changed)
-        lights = (
-            known.columns[index] if emitter is before[index] else self.problem.evaluate(emitter)
-            for index, emitter in enumerate(rig)
-        )
+        """`LightProblem.evaluate` of each light and the known images; lights that `known` has are not made again.
+
+        Args:
+            known: a state of this problem; a light of it is one that is the same object.
+        """
+        pairs = () if known is None else zip(known.emitters, known.columns, strict=False)
+        made = {id(emitter): columns for emitter, columns in pairs}
+        self.meter.evaluations += self.problem.renderings([one for one in rig if id(one) not in made])
+        lights = (made[id(one)] if id(one) in made else self.problem.evaluate(one) for one in rig)
         return (*lights, *self.problem.known_columns)
 
     def step(self, state: State) -> Step:

@@ -115,7 +115,7 @@ class RigSearch:
             if not (found and kinds and self._beamless(found[0].best)):
                 starts = zip_longest(*(self._starts(kind, lights, previous, batches) for kind in kinds))
                 rigs = [rig for row in starts for rig in row if rig is not None]
-                found += [self._refined(rigs, batches)] if rigs else []
+                found += [self._refined(rigs, batches, previous)] if rigs else []
         if not found:
             return None
         best = found[0].best
@@ -141,7 +141,7 @@ class RigSearch:
         pairs = zip_longest(candidates.extended(previous, half, size), candidates.rigs(lights, half, size))
         return [rig for pair in pairs for rig in pair if rig is not None]
 
-    def _refined(self, rigs: Sequence[EmitterRig], batches: int) -> Found:
+    def _refined(self, rigs: Sequence[EmitterRig], batches: int, previous: State | None) -> Found:
         """The best of several starts after a few steps each; of `batches` parts the next ones only if need be.
 
         Rigs that are to be compared with others have the least robust loss; else they are settled.
@@ -150,7 +150,7 @@ class RigSearch:
         refined, size = [], math.ceil(len(rigs) / batches)
         for first in range(0, len(rigs), size):
             part = rigs[first : first + size]
-            refined += refined_starts(self.refiner, part, self.options.iterations, self.options.schedule)
+            refined += refined_starts(self.refiner, part, self.options.iterations, self.options.schedule, previous)
             best = best_state(self.refiner.problem, refined) if compared else self.settled(refined)
             if self.refiner.unexplained(best) < self.options.certainty.poorly:
                 break
@@ -167,7 +167,9 @@ class RigSearch:
             if emitter.axis is not None:
                 plain = [*state.emitters]
                 plain[index] = Emitter(emitter.light.plain)
-                other = self.refiner.refined(self.refiner.start(plain, ROBUST), ROBUST, self.options.schedule.steps)
+                other = self.refiner.refined(
+                    self.refiner.start(plain, ROBUST, state), ROBUST, self.options.schedule.steps
+                )
                 state = state if drop(self.refiner.problem, other, state) >= self.options.bar.least else other
         return state
 
@@ -176,5 +178,5 @@ class RigSearch:
         kept = worth_keeping(state, self.options.bar, self.options.schedule.met, self.refiner.region.size)
         if len(kept) == len(state.emitters) or not kept:
             return state
-        fewer = self.refiner.start([state.emitters[index] for index in kept], ROBUST)
+        fewer = self.refiner.start([state.emitters[index] for index in kept], ROBUST, state)
         return self.refiner.refined(fewer, ROBUST, 2 * self.options.schedule.steps)

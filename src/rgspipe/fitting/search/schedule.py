@@ -17,17 +17,24 @@ HARD_RIM = 0.01
 
 
 def refined_starts(
-    refiner: Refiner, rigs: Sequence[EmitterRig], iterations: int, options: ScheduleOptions
+    refiner: Refiner,
+    rigs: Sequence[EmitterRig],
+    iterations: int,
+    options: ScheduleOptions,
+    known: State | None = None,
 ) -> list[State]:
     """Those of the starts that are refined to the end, by at most `iterations` steps at a time.
 
     Points are refined under a robust loss. A spot that is a little off has all of its pool wrong, and a sun all that it
     lights through a window, which a robust loss takes for outliers; so rigs with an axis are refined by plain squares.
+
+    Args:
+        known: a state from which starts may have lights; see `Refiner.columns`.
     """
     aimed = any(emitter.axis is not None for rig in rigs for emitter in rig)
     turns, weighting = _turns(options, aimed), PLAIN if aimed else ROBUST
     rim = turns[0][0]
-    states = [refiner.start(soft(rig, rim), weighting) for rig in rigs]
+    states = [refiner.start(soft(rig, rim), weighting, known) for rig in rigs]
     if aimed:
         states = _best(refiner.problem, states, options.promising, weighting)
     for turn, (softness, steps) in enumerate(turns):

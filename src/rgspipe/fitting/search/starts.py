@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import zip_longest
 
 import torch
-from torch import Tensor
 
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.options import CombinationOptions
+from rgspipe.fitting.search.apart import CandidatePlaces
 from rgspipe.fitting.search.coarse import CoarseImages
 from rgspipe.fitting.search.combinations import (
     Scored,
@@ -24,7 +24,6 @@ from rgspipe.fitting.search.combinations import (
     extensions,
     single_gains,
 )
-from rgspipe.fitting.search.compare import rig_distance
 from rgspipe.fitting.search.refine import State
 
 EmitterRig = tuple[Emitter, ...]
@@ -55,6 +54,10 @@ class Candidates:
         """Whether they have an axis."""
         return self.coarse.axes is not None
 
+    @cached_property
+    def _places(self) -> CandidatePlaces:
+        return CandidatePlaces.of(self.coarse)
+
     @property
     def lit(self) -> bool:
         """Whether any candidate explains anything."""
@@ -69,21 +72,21 @@ class Candidates:
         Of single spots those that explain most of dim and bright parts alike take turns with those of plain squares,
         which a narrow cone's pool decides.
         """
+        apart = self.options.separation * size
         if lights == 1 and not self.aimed:
             costs = candidate_costs(self.scored)
             costs = torch.where(costs < 1.0, costs, torch.inf)
             count = min(count, int(costs.isfinite().sum()))
-            apart = self.options.separation * size
             return [self.emitters([k]) for k in best_apart(costs, self.coarse.positions.cpu(), count, apart)]
         looked_at = self.options.beam * count
         combinations = best_combinations(self.scored, self.coarse.positions, lights, looked_at, self.options)
-        rigs = self._different((self.emitters(combination) for combination in combinations), count, size)
-        if lights > 1:
-            return rigs
-        bright = bright_gains(self.problem, self.coarse).topk(min(looked_at, len(self.coarse))).indices
-        pools = self._different((self.emitters([index]) for index in bright.tolist()), count, size)
-        both = [rig for pair in zip_longest(rigs, pools) for rig in pair if rig is not None]
-        return self._different(both, count, size)
+        chosen = self._places.first_apart(combinations, count, apart)
+        if lights == 1:
+            bright = bright_gains(self.problem, self.coarse).topk(min(looked_at, len(self.coarse))).indices
+            pools = self._places.first_apart([(index,) for index in bright.tolist()], count, apart)
+            both = [one for pair in zip_longest(chosen, pools) for one in pair if one is not None]
+            chosen = self._places.first_apart(both, count, apart)
+        return [self.emitters(combination) for combination in chosen]
 
     def extended(self, state: State, count: int, size: float) -> list[EmitterRig]:
         """At most `count` rigs: the lights of a refined one and one candidate more."""
@@ -110,26 +113,5 @@ class Candidates:
         return promise, self._extended(state, found, count, size)
 
     def _extended(self, state: State, found: Sequence[tuple[int, float]], count: int, size: float) -> list[EmitterRig]:
-        added = [self.emitters([index]) for index, _ in found]
-        return [(*state.emitters, *extra) for extra in self._different(added, count, size)]
-
-    def _different(self, rigs: Iterable[EmitterRig], count: int, size: float) -> list[EmitterRig]:
-        """The first `count` of `rigs` that differ from each other."""
-        chosen: list[EmitterRig] = []
-        for rig in rigs:
-            if all(self._apart(rig, other, size) for other in chosen):
-                chosen.append(rig)
-            if len(chosen) == count:
-                break
-        return chosen
-
-    def _apart(self, one: EmitterRig, other: EmitterRig, size: float) -> bool:
-        if rig_distance(one, other, size) > self.options.separation:
-            return True
-        return any(a.axis is not None and _turn(a, other) < math.cos(self.coarse.spacing) for a in one)
-
-
-def _turn(emitter: Emitter, rig: EmitterRig) -> float:
-    """The largest cosine between a light's axis and those of another rig."""
-    axes: list[Tensor] = [other.axis for other in rig if other.axis is not None]
-    return max((float(emitter.axis @ axis) for axis in axes), default=-1.0)
+        added = self._places.first_apart([(index,) for index, _ in found], count, self.options.separation * size)
+        return [(*state.emitters, *self.emitters(extra)) for extra in added]

@@ -79,4 +79,7 @@ class Costs:
         if count not in costs or count + 1 not in costs:
             return []
         gain = 1.0 - costs[count + 1] / costs[count]
-        return [MaybeOneMore(gain, wanted(compared[count + 1], bar))] if gain > bar.doubtful else []
+        if gain <= bar.doubtful:
+            return []
+        needed = wanted(compared[count + 1], bar)
+        return [MaybeOneMore(gain, needed.share, decided_by=(needed.setting, "bar.doubtful"))]

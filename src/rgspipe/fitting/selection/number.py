@@ -38,7 +38,7 @@ def doubted_number(
     more = one_more_light(refiner, candidates, best, options) if count == wanted < MOST_LIGHTS else None
     if more is not None:
         compared |= {count: more.simple, count + 1: more.rich}
-        findings += [LightMissing(count, more.gain)] if more.worth else []
+        findings += [LightMissing(count, more.gain, decided_by=(more.wanted.setting,))] if more.worth else []
     if count > 1:
         less = one_light_less(refiner, best, options.bar, options.schedule.steps // 2)
         compared |= {count - 1: less.simple, count: less.rich}

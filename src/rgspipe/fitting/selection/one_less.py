@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from rgspipe.fitting.findings import LightSpare
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.options import BarOptions
-from rgspipe.fitting.search.compare import drop, light_energies, wanted
+from rgspipe.fitting.search.compare import Wanted, drop, light_energies, wanted
 from rgspipe.fitting.search.refine import Refiner, State
 from rgspipe.fitting.search.weighting import ROBUST
 
@@ -25,24 +25,27 @@ class OneLess:
         rich, simple: the two rigs; of all rigs with one light less the first that is as good, else the last.
         index: which light was left out.
         gain: by what share it lowers the robust cost.
-        wanted: by what share it would have to.
+        wanted: what it would have to.
     """
 
     rich: State
     simple: State
     index: int
     gain: float
-    wanted: float
+    wanted: Wanted
 
     @property
     def worth(self) -> bool:
         """Whether that light is there, rather than an error of the model."""
-        return self.gain >= self.wanted
+        return self.gain >= self.wanted.share
 
     @property
     def findings(self) -> list[LightSpare]:
         """What there is to be said of the number."""
-        return [] if self.worth else [LightSpare(self.index + 1, len(self.rich.emitters), self.gain, self.wanted)]
+        if self.worth:
+            return []
+        count, share, setting = len(self.rich.emitters), self.wanted.share, self.wanted.setting
+        return [LightSpare(self.index + 1, count, self.gain, share, decided_by=(setting,))]
 
 
 def one_light_less(refiner: Refiner, answer: State, bar: BarOptions, steps: int = 3) -> OneLess:
@@ -56,7 +59,7 @@ def one_light_less(refiner: Refiner, answer: State, bar: BarOptions, steps: int 
     """
     energies, rich, problem = light_energies(answer), answer, refiner.problem
     for index in sorted(range(len(energies)), key=energies.__getitem__):
-        simple = refiner.refined(refiner.start(_without(answer, index), ROBUST), ROBUST, steps)
+        simple = refiner.refined(refiner.start(_without(answer, index), ROBUST, answer), ROBUST, steps)
         found = OneLess(rich, simple, index, drop(problem, simple, rich), wanted(rich, bar))
         # An answer of plain squares has a higher robust cost than it would have to have.
         if found.gain >= bar.least_faint:

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rgspipe.fitting.options import SearchOptions
-from rgspipe.fitting.search.compare import best_state, drop, energy_shares, wanted
+from rgspipe.fitting.search.compare import Wanted, best_state, drop, energy_shares, wanted
 from rgspipe.fitting.search.refine import Refiner, State
 from rgspipe.fitting.search.schedule import refined_starts
 from rgspipe.fitting.search.starts import Candidates, EmitterRig
@@ -26,18 +26,18 @@ class OneMore:
     Attributes:
         simple, rich: the two rigs.
         gain: by what share the light lowers the robust cost.
-        wanted: by what share it would have to.
+        wanted: what it would have to.
     """
 
     simple: State
     rich: State
     gain: float
-    wanted: float
+    wanted: Wanted
 
     @property
     def worth(self) -> bool:
         """Whether that light is there, rather than an error of the model."""
-        return self.gain >= self.wanted
+        return self.gain >= self.wanted.share
 
 
 def one_more_light(
@@ -59,15 +59,15 @@ def one_more_light(
     for kind in candidates:
         promise, extended = kind.promised(answer, refiner.problem, tries, refiner.region.size)
         sure = promise >= bar.least_faint
-        if promise >= bar.least and (sure or _last_share(refiner, extended[0]) >= bar.begins_faint):
+        if promise >= bar.least and (sure or _last_share(refiner, extended[0], answer) >= bar.begins_faint):
             rigs += extended
     if not rigs:
         return None
-    rich = best_state(refiner.problem, refined_starts(refiner, rigs, steps, options.schedule))
+    rich = best_state(refiner.problem, refined_starts(refiner, rigs, steps, options.schedule, answer))
     simple, rich = (refiner.refined(state, ROBUST, steps) for state in (answer, rich))
     return OneMore(simple, rich, drop(refiner.problem, simple, rich), wanted(rich, bar))
 
 
-def _last_share(refiner: Refiner, rig: EmitterRig) -> float:
+def _last_share(refiner: Refiner, rig: EmitterRig, answer: State) -> float:
     """What the last light of a rig sends of all its energy, at first sight."""
-    return energy_shares(refiner.start(rig, ROBUST))[-1]
+    return energy_shares(refiner.start(rig, ROBUST, answer))[-1]

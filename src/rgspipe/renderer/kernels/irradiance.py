@@ -84,5 +84,6 @@ def _launch(bvh: SurfelBvh, positions: Tensor, *, falloff: bool, shadows: bool) 
     if count > 0:
         inputs = [bvh.tree if shadows else bvh.leaves, bvh.order, as_places(bvh, positions)]
         outputs = [as_array(value.view(-1)), as_vec3(derivative.view(-1, 3))]
-        launch(_irradiance, lights * count, [*inputs, int(falloff), int(shadows), *outputs], bvh.device)
+        inputs += [int(falloff), int(shadows), *outputs]
+        launch(_irradiance, lights * count, inputs, bvh.device, even=not shadows)
     return value, derivative

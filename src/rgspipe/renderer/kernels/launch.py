@@ -85,7 +85,9 @@ def launch(
         with torch_stream(device):
             wp.launch(kernel, dim=count, inputs=[0, 0, *inputs], device=wp.device_from_torch(device))
         return
-    parts = slices(count, slabs or min(count, thread_count() * (1 if even else SLICES_PER_THREAD)))
+    threads = thread_count()
+    balanced = threads if even or threads == 1 else threads * SLICES_PER_THREAD
+    parts = slices(count, slabs or min(count, balanced))
     if len(parts) == 1:
         wp.launch(kernel, dim=count, inputs=[0, 0, *inputs], device="cpu")
         return

@@ -11,6 +11,7 @@ from torch import Tensor
 from rgspipe.renderer.kernels.composite import Hits, composite
 from rgspipe.renderer.kernels.coverage import LayerRule, sharpened, sharpened_slope
 from rgspipe.renderer.kernels.launch import as_array, as_vec3, launch
+from rgspipe.renderer.kernels.shade_gradients import quaternion_gradient, radiance_gradient
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh, SurfelRecord, clip_height
 from rgspipe.scene.surfels import Surfels
 
@@ -204,14 +205,14 @@ class _ShadeRays(torch.autograd.Function):
         softness = ctx.bvh.coverage.clip_softness
         to_radiance = None
         if ctx.needs_input_grad[3]:
-            to_radiance = _radiance_gradient(ctx.hits, ctx.rays[2], radiance, colour_gradient)
+            to_radiance = radiance_gradient(ctx.hits, ctx.rays[2], radiance, colour_gradient)
         return (
             None,
             None,
             None,
             to_radiance,
             packed[:, 0:3],
-            _quaternion_gradient(rotations, packed[:, 3:6]),
+            quaternion_gradient(rotations, packed[:, 3:6]),
             # By the scales that rays meet: those of surfels without extent are not zero there.
             packed[:, 6:8] / ctx.bvh.surfels.scales.to(scales),
             packed[:, 8],
@@ -237,33 +238,6 @@ def _surfel_gradient(
     arguments += [as_array(x) for x in (*scratch, packed, thresholds)]
     launch(_shade_adjoint, count, arguments, device, slabs=slabs)
     return packed.sum(dim=0), thresholds.sum(dim=0)
-
-
-def _radiance_gradient(hits: Hits, ray_view: Tensor, radiance: Tensor, colour_gradient: Tensor) -> Tensor:
-    """(V, N, 3) gradient towards the radiance: the weights' transpose."""
-    gradient = torch.zeros_like(radiance)
-    ray, column = torch.nonzero(hits.indices >= 0, as_tuple=True)
-    rows = ray_view.long()[ray] * radiance.shape[1] + hits.indices[ray, column].long()
-    gradient.view(-1, 3).index_add_(0, rows, hits.weights[ray, column, None] * colour_gradient[ray])
-    return gradient
-
-
-def _quaternion_gradient(quaternions: Tensor, to_rotation: Tensor) -> Tensor:
-    """Gradient towards quaternions (N, 4) from that towards world-space rotation vectors (N, 3).
-
-    A change dq of a unit quaternion q turns by ω = 2·Im(dq ⊗ q*).
-    """
-    w, x, y, z = torch.nn.functional.normalize(quaternions, dim=-1).unbind(-1)
-    gx, gy, gz = (2.0 * to_rotation).unbind(-1)
-    return torch.stack(
-        [
-            -(gx * x + gy * y + gz * z),
-            gx * w + gy * z - gz * y,
-            -gx * z + gy * w + gz * x,
-            gx * y - gy * x + gz * w,
-        ],
-        dim=-1,
-    )
 
 
 def shade_rays(

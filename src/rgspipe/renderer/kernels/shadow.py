@@ -66,18 +66,17 @@ def occluder(
     depth = float(0.0)
     n = surfels[j].normal
     facing = wp.dot(path, n)
-    if wp.abs(facing) > EDGE_ON * distance:
-        # From the receiver: the light may be so far away that rounding there is larger than the scene.
-        between = surfels[j].center - at
+    # From the receiver: the light may be so far away that rounding there is larger than the scene.
+    between = surfels[j].center - at
+    own = surfels[receiver].normal
+    scale = surfels[receiver].scale
+    coplanar = wp.dot(n, own) > COPLANAR_COSINE and wp.abs(wp.dot(between, own)) < COPLANAR_OFFSET * scale
+    if wp.abs(facing) > EDGE_ON * distance and not coplanar:
         depth = wp.dot(between, n) / facing
-        fade = faded_in(depth * distance, surfels[receiver].scale)
+        fade = faded_in(depth * distance, scale)
         if fade > 0.0 and wp.dot(way_to(light, surfels[j].center), n) * facing > 0.0:
             alpha = surfel_alpha(surfels, j, depth * path - between)
-            own = surfels[receiver].normal
-            if alpha <= minimum_alpha or (
-                wp.dot(n, own) > COPLANAR_COSINE
-                and wp.abs(wp.dot(between, own)) < COPLANAR_OFFSET * surfels[receiver].scale
-            ):
+            if alpha <= minimum_alpha:
                 alpha = float(0.0)
             alpha *= fade
     return alpha, depth
