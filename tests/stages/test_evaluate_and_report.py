@@ -244,10 +244,16 @@ def test_a_report_does_without_views_that_are_left_out_and_has_the_grade_above_t
     assert "no picture that compares" in html and "Where the squared error sits" not in html
 
 
-def test_report_needs_every_method_with_every_number_of_views(config):
-    needs = [need for need in report.STAGE.needs(config) if need.stage == "evaluate"]
-    made = {(need.changes["fit.method"], need.changes["views.count"], need.changes.get("fit.limit")) for need in needs}
-    assert made == {("search_lm", 1, None), ("search_lm", 3, None), ("paper_adam", 1, 1), ("paper_adam", 3, 1)}
+def test_report_needs_every_method_that_is_asked_for_with_every_number_of_views(config):
+    def made(wanted):
+        changes = [need.changes for need in report.STAGE.needs(wanted) if need.stage == "evaluate"]
+        return {(one["fit.method"], one["views.count"], one.get("fit.limit")) for one in changes}
+
+    ours = {("search_lm", 1, None), ("search_lm", 3, None)}
+    assert made(config) == ours
+    both = with_changes(config, {"report.methods": ("search_lm", "paper_adam")})
+    assert made(both) == ours | {("paper_adam", 1, 1), ("paper_adam", 3, 1)}
+    assert made(with_changes(both, {"report.paper_adam_views": (1,)})) == ours | {("paper_adam", 1, 1)}
     assert "fit" in report.STAGE.keys(config) and "outputs" not in report.STAGE.keys(config)
 
 
