@@ -25,6 +25,7 @@ def test_lamps_are_matched_and_measured() -> None:
     assert told["lamps"] == 2
     assert told["position_error"] == pytest.approx([0.05, 0.005])
     assert told["intensity_ratio"] == pytest.approx([1.1, 0.9])
+    assert told["stated"] == pytest.approx([3**0.5 * 0.005] * 2)
     # Ten and one standard deviations; a ball of 95 % reaches 2.8.
     assert told["inside_95"] == [False, True]
     assert told["in_sight"] == [False, True]

@@ -20,11 +20,12 @@ METRICS = {
     "truth": {
         "lamps": 2,
         "position_error": [0.004, 0.02],
+        "stated": [0.008, 0.009],
         "intensity_ratio": [0.9, 1.02],
         "inside_95": [True, False],
         "in_sight": [True, False],
     },
-    "lamps": {"number": 2, "spread": [0.008, 0.009]},
+    "lamps": {"number": 2},
     "albedo": {"relative_l1": 0.03},
     "test_psnr_mean": 34.0,
 }

@@ -26,14 +26,15 @@ def against_truth(
         found: K lamps.
         places: (K, 3, 3) their covariances, scene units².
         truth: those that were on.
-        size: of the scene; `position_error` is in parts of it.
+        size: of the scene; `position_error`, and `stated`, what the covariance says of it, are in parts of it.
         views: the photographs, which may show a lamp where their depth leaves it free.
     """
     pairs = match_positions(*(np.stack([light.position.numpy() for light in rig]) for rig in (found, truth)))
-    matched = [(found[own], truth[true], places[own]) for own, true in pairs]
+    matched = [(found[own], truth[true], places[own]) for own, true in sorted(pairs)]
     return {
         "lamps": len(truth),
         "position_error": [float((a.position - b.position).norm()) / size for a, b, _ in matched],
+        "stated": [float(np.sqrt(np.trace(covariance))) / size for _, _, covariance in matched],
         "intensity_ratio": [float(a.intensity.mean() / b.intensity.mean()) for a, b, _ in matched],
         "inside_95": [_inside(a, b, covariance) for a, b, covariance in matched],
         "in_sight": [any(_shows(view, b) for view in views) for _, b, _ in matched],

@@ -28,7 +28,7 @@ def lamp_rows(known: Mapping[str, Any], metrics: Mapping[str, Any]) -> Iterator[
             | {
                 "where": IN_SIGHT if truth["in_sight"][index] else HIDDEN,
                 "position_error": error,
-                "stated": lamps["spread"][index],
+                "stated": truth["stated"][index],
                 "intensity_error": abs(truth["intensity_ratio"][index] - 1.0),
                 "inside_95": truth["inside_95"][index],
             }
