@@ -48,8 +48,11 @@ def test_a_colour_renders_nothing_and_a_moved_lamp_is_rendered_alone(
 
 
 def test_a_drag_is_undone_as_one(session: Session) -> None:
+    session.held = True
     for step in range(1, 4):
         session.replace(0, LAMP.at(LAMP.position + 0.01 * step), "drag 0")
+        session.rest()
+    session.held = False
     session.rest()
     session.replace(0, LAMP.at(LAMP.position - 0.1), "drag 0")
     assert session.undo()

@@ -93,16 +93,22 @@ class LampControls:
             wxyz=turn,
         )
         scene.add_icosphere(f"/lamps/{index}/ball", radius=BALL * size, color=_shown(light)[0])
-        gizmo.on_update(lambda event, index=index: self._dragged(index, event.target, event.phase))
+
+        # Awaited by viser one after the other, where plain functions may overtake each other.
+        async def dragged(event: Any) -> None:
+            self._dragged(index, event.target, event.phase)
+
+        gizmo.on_update(dragged)
         return gizmo
 
     def _dragged(self, index: int, gizmo: Any, phase: str) -> None:
         if index >= len(self._session.lights):
             return
-        light = self._session.lights[index]
+        light, self._session.held = self._session.lights[index], phase != "end"
         axis = None if light.axis is None else axis_of(gizmo.wxyz)
         self._session.replace(index, light.at(torch.tensor(np.asarray(gizmo.position)).double(), axis), f"drag {index}")
         if phase == "end":
+            self._session.rest()
             self._chosen = index
             self._which.value = self._which.options[index]
             self._show_fields()

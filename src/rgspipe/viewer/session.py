@@ -43,6 +43,7 @@ class Session:
         shown: one of SHOWN.
         section: axis and place of a plane that cuts away what is on the camera's side of it; None for none.
         found: lamps that a search found.
+        held: whether a lamp is being dragged.
     """
 
     images: LampImages
@@ -52,6 +53,7 @@ class Session:
     shown: str = PICTURE
     section: tuple[int, float] | None = None
     found: Found | None = None
+    held: bool = False
     _gain: float | None = None
     _past: list[LightRig] = field(default_factory=list)
     _gesture: str | None = None
@@ -67,8 +69,9 @@ class Session:
         self.change([*self.lights[:index], light, *self.lights[index + 1 :]], gesture)
 
     def rest(self) -> None:
-        """A gesture is over."""
-        self._gesture = None
+        """Nothing has changed for a while: a gesture is over, but for a drag whose lamp is still held."""
+        if not self.held:
+            self._gesture = None
 
     def undo(self) -> bool:
         """Go back a step; whether there was any."""
