@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rgspipe.renderer.zonal_harmonics import BandLimit
-from rgspipe.scene.lights import LightRig
+from rgspipe.scene.lights import Light, LightRig
 
 
 @dataclass(frozen=True)
@@ -25,8 +25,11 @@ class Effects:
 
     def lights(self, rig: LightRig) -> LightRig:
         """The lights of a rig as these effects have them, each in one point."""
-        shaped = rig if self.cones else tuple(light.plain for light in rig)
-        return tuple(part for light in shaped for part in light.parts())
+        return tuple(part for parts in self.parts(rig) for part in parts)
+
+    def parts(self, rig: LightRig) -> list[tuple[Light, ...]]:
+        """Of each light of a rig, as these effects have it, the points that shine together."""
+        return [light.parts() for light in (rig if self.cones else [light.plain for light in rig])]
 
 
 #: All of them, exactly.

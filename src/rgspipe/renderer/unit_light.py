@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import torch
 from torch import Tensor
@@ -90,12 +90,12 @@ class OwnLight:
     Attributes:
         given: the light; its tensors may require gradients, be of any float type and on any device.
         softness: by how much its edge of light is widened [rad].
+        share: which of the points of a light with an extent it is.
     """
-
-    share: ClassVar[Share] = WHOLE
 
     given: Light
     softness: float = 0.0
+    share: Share = WHOLE
 
     @cached_property
     def light(self) -> Light:

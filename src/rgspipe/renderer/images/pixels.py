@@ -19,7 +19,7 @@ from rgspipe.renderer.kernels.lit_transmittance import LEAST_LIT
 from rgspipe.renderer.lit_surfels import LitSurfels, lit_surfels
 from rgspipe.renderer.pixel_direct import PixelDirect
 from rgspipe.renderer.rig import RigResponse
-from rgspipe.renderer.unit_light import OwnLight, UnitLight, attenuated, emitted_intensity
+from rgspipe.renderer.unit_light import OwnLight, Share, UnitLight, attenuated, emitted_intensity
 from rgspipe.scene.lights import LightRig
 
 
@@ -61,7 +61,12 @@ class PixelModel(ViewModel):
         return columns + self.views.seen(frozen.radiance(lit) - frozen.radiance(lit, indirect=False))
 
     def image(self, rig: LightRig) -> Tensor:
-        frozen, own = self.views.frozen, [OwnLight(light) for light in self.effects.lights(rig)]
+        frozen = self.views.frozen
+        own = [
+            OwnLight(part, share=Share(index, len(parts)))
+            for parts in self.effects.parts(rig)
+            for index, part in enumerate(parts)
+        ]
         lit = [lit_surfels(frozen.bvh, light, self.effects) for light in own]
         response = RigResponse.of(frozen.bvh, tuple(light.given for light in own), lit)
         image = torch.zeros((len(self.views.pixels), 3), device=frozen.device)
