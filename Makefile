@@ -43,8 +43,8 @@ third-party: setup  ## what is exported, read by Mitsuba, USD and the validator 
 	! command -v npm > /dev/null || npm install --silent --no-fund --prefix $(VENV)/npm gltf-validator@2.0.0-dev.3.10
 	$(VENV)/bin/python -m pytest -q tests/light_export $(ARGS)
 
-crash: setup  ## power cuts while the whole way is made on a tiny scene: what the next run ends with (minutes; ARGS=NUMBER of cuts)
-	$(VENV)/bin/python tests/power_cut.py $(ARGS)
+crash: setup  ## kills, power cuts, full disks while a tiny scene is made: what the next run ends with (ARGS="CASES SEED")
+	$(VENV)/bin/python tests/crash.py $(ARGS)
 
 fuzz: setup  ## damaged files of every kind that is read: each is read or refused (a minute; ARGS="CASES SEED")
 	$(VENV)/bin/python tests/fuzz.py $(ARGS)
