@@ -102,6 +102,7 @@ def point_at(link: Path, target: str) -> None:
             if not link.parent.is_dir():
                 raise
         except OSError as error:  # which names what the link was to lead to
+            temporary.unlink(missing_ok=True)
             raise OSError(error.errno, error.strerror, str(link)) from error
         else:
             break
