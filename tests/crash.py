@@ -1,7 +1,8 @@
 """Kills, power cuts, full disks while the whole way is made on a tiny scene: `make crash ARGS="CASES SEED"`.
 
 A store is disturbed again and again until it is whole, then the next one. Each must end as one that nobody disturbed,
-byte for byte but for clocks. Change no code meanwhile: other code makes other artifacts. Exit status 1 if any does not, if a run is stuck, or ends in any way but as it should.
+byte for byte but for clocks. Exit status 1 if any does not, if a run is stuck, or ends in any way but as it should.
+Change no code meanwhile: other code makes other artifacts.
 """
 
 from __future__ import annotations
