@@ -9,7 +9,7 @@ TEST_WORKERS ?= 2
 ARGS ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup test test-python test-slurm third-party crash fuzz fuzz-commands smoke reproduce scenes train-study light-study bench docs lint house
+.PHONY: help setup test test-python test-slurm third-party crash soak bits fuzz fuzz-commands smoke reproduce scenes train-study light-study bench docs lint house
 
 help:  ## this list
 	@echo "rgspipe: from images of a scene, find its lights"
@@ -43,8 +43,14 @@ third-party: setup  ## what is exported, read by Mitsuba, USD and the validator 
 	! command -v npm > /dev/null || npm install --silent --no-fund --prefix $(VENV)/npm gltf-validator@2.0.0-dev.3.10
 	$(VENV)/bin/python -m pytest -q tests/light_export $(ARGS)
 
-crash: setup  ## power cuts while the whole way is made on a tiny scene: what the next run ends with (minutes; ARGS=NUMBER of cuts)
-	$(VENV)/bin/python tests/power_cut.py $(ARGS)
+crash: setup  ## kills, power cuts, full disks while a tiny scene is made: what the next run ends with (ARGS="CASES SEED")
+	$(VENV)/bin/python tests/crash.py $(ARGS)
+
+soak: setup  ## a sweep of 200 jobs, 8 at a time, with random kills; its memory (many minutes; ARGS="JOBS KILLS SEED")
+	$(VENV)/bin/python tests/soak.py $(ARGS)
+
+bits: setup  ## training and a fit with other numbers of threads, and other instructions of the processor (minutes)
+	$(VENV)/bin/python tests/bits.py
 
 fuzz: setup  ## damaged files of every kind that is read: each is read or refused (a minute; ARGS="CASES SEED")
 	$(VENV)/bin/python tests/fuzz.py $(ARGS)

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-import random
-import signal
-import subprocess
-import sys
-import time
+import re
 from pathlib import Path
 
 import pytest
 
 import toys
-from rgspipe.artifacts import ArtifactStore, Key
+from rgspipe.artifacts import ArtifactStore
 from rgspipe.config import RgspipeConfig, with_changes
 from rgspipe.errors import InputError
 from rgspipe.pipeline import describe_plan, plan, resolve, run
@@ -64,15 +60,16 @@ def test_the_plan_says_what_it_will_take_where_that_is_known(config: RgspipeConf
         changed = with_changes(config, changes)
         return describe_plan(plan(resolve(changed, toys.load), ArtifactStore(Path(config.outputs)))).splitlines()
 
-    assert not any("0.1 s" in line for line in text({})) and "Expected" not in text({})[-1]
+    time = r"  ~[\d.]+ s"  # 0.1 s on an idle machine
+    assert not any(re.search(time, line) for line in text({})) and "Expected" not in text({})[-1]
     run(with_changes(config, {"stage": "grow", "views.count": 1}), toys.load)
     assert "Expected" in text({})[-1] and "and what harvest will take" in text({})[-1]
     run(config, toys.load)
     assert "Expected" not in text({})[-1]
     sow, *grown, harvest, total = text({"dataset.resolution": 9})[1:]
-    assert "  ~0.1 s  dataset.resolution 8 → 9" in sow and "  ~0.1 s  another grow" in harvest
-    assert all("~0.1 s" in line for line in grown)
-    assert total == "Expected: 0.1 s (from earlier runs here; ~: with other settings)"
+    assert re.search(time + r"  dataset\.resolution 8 → 9", sow) and re.search(time + "  another grow", harvest)
+    assert all(re.search(time, line) for line in grown)
+    assert re.fullmatch(r"Expected: [\d.]+ s \(from earlier runs here; ~: with other settings\)", total)
 
 
 def test_what_the_plan_could_not_remark_yet_is_said_when_a_stage_begins(
@@ -173,48 +170,3 @@ def test_a_damaged_input_is_refused_and_left_alone(config: RgspipeConfig) -> Non
     with pytest.raises(InputError, match=r"row_03\.txt"):
         run(config, toys.load)
     assert path.read_text() == "x"
-
-
-def _contents(outputs: Path) -> dict[str, bytes]:
-    files = [path for path in outputs.rglob("*") if path.is_file() and path.suffix == ".txt"]
-    return {str(path.relative_to(outputs)): path.read_bytes() for path in files if not path.is_symlink()}
-
-
-@pytest.mark.slow
-def test_killed_at_any_moment_and_run_again_ends_with_the_same_bytes(
-    config: RgspipeConfig, tmp_path: Path, child_environment: dict[str, str]
-) -> None:
-    run(config, toys.load)
-    expected = _contents(Path(config.outputs))
-    killed = tmp_path / "killed"
-    command = [sys.executable, "-c", _HARVEST, str(killed)]
-    moments = random.Random(5)
-    interrupted = 0
-    for _ in range(12):
-        process = subprocess.Popen(command, env={**child_environment, toys.PAUSE_VARIABLE: "0.3"})
-        # From the start of the process (0.2 s of imports) into its work, which pauses often.
-        time.sleep(0.2 + 0.8 * moments.random())
-        process.send_signal(signal.SIGKILL)
-        interrupted += process.wait() == -signal.SIGKILL
-        _check_published(killed)
-    assert interrupted >= 3
-    subprocess.run(command, env=child_environment, check=True)
-    found = {name: content for name, content in _contents(killed).items() if ".partial" not in name}
-    assert found == expected
-
-
-def _check_published(outputs: Path) -> None:
-    """Whatever looks like an artifact is whole."""
-    for folder in outputs.glob("cornell/*/[0-9a-f]*"):
-        if not folder.is_symlink():
-            artifact = ArtifactStore(outputs).find(Key("cornell", folder.parent.name, folder.name))
-            assert artifact is not None
-            artifact.folder()
-
-
-_HARVEST = """
-import sys, toys
-from rgspipe.config import RgspipeConfig, with_changes
-from rgspipe.pipeline import run
-run(with_changes(RgspipeConfig(), {"stage": "harvest", "outputs": sys.argv[1], "dataset.resolution": 8}), toys.load)
-"""

@@ -15,6 +15,7 @@ import time
 
 from rgspipe.cli import main
 from rgspipe.config import RgspipeConfig
+from rgspipe.datasets.reading_limits import reading_limits
 from rgspipe.errors import InputError
 from rgspipe.files import replacing, write_text
 from rgspipe.stages.base import Failure, Need, Stage, StageContext
@@ -49,6 +50,7 @@ def _grow(context: StageContext) -> None:
     total = sum(int(number) for row in rows for number in row)
     write_text(context.folder / "total.txt", f"{total * context.config.views.count}\n")
     context.note(threads=os.environ.get("OMP_NUM_THREADS"), spinning=os.environ.get("OMP_WAIT_POLICY"))
+    context.note(pixels=reading_limits().pixels)
 
 
 def _harvest(context: StageContext) -> None:

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from rgspipe.datasets.location import load_views
     from rgspipe.datasets.photometric_file import read_photometry
     from rgspipe.datasets.ply import PlyOptions, save_ply
+    from rgspipe.datasets.reading_limits import ReadingLimits, reading_within
     from rgspipe.datasets.surfel_file import load_surfels, save_surfels
     from rgspipe.datasets.views import View
     from rgspipe.errors import InputError
@@ -57,6 +58,7 @@ _HOMES = {
     "datasets.light_file": ("read_ambient", "read_lights", "write_lights"),
     "datasets.location": ("load_views",),
     "datasets.ply": ("PlyOptions", "save_ply"),
+    "datasets.reading_limits": ("ReadingLimits", "reading_within"),
     "datasets.surfel_file": ("load_surfels", "save_surfels"),
     "datasets.views": ("View",),
     "errors": ("InputError",),
@@ -110,6 +112,7 @@ __all__ = [
     "PlyOptions",
     "PointLight",
     "ProfileLight",
+    "ReadingLimits",
     "Search",
     "SphereLight",
     "SpotLight",
@@ -132,6 +135,7 @@ __all__ = [
     "read_ambient",
     "read_lights",
     "read_photometry",
+    "reading_within",
     "save_ply",
     "save_png",
     "save_surfels",

@@ -17,7 +17,7 @@ import logging
 import os
 import shutil
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -25,7 +25,7 @@ from typing import Any
 from filelock import FileLock, Timeout
 
 from rgspipe.errors import InputError
-from rgspipe.files import LONGEST_NAME, UNWRITABLE, make_folder, point_at, publish, sha256, write_json
+from rgspipe.files import LONGEST_NAME, NO_RIGHT, UNWRITABLE, make_folder, point_at, publish, sha256, write_json
 from rgspipe.machine import PeakMemory, library_versions, machine
 from rgspipe.strict_json import parse_json
 
@@ -163,11 +163,14 @@ class ArtifactStore:
 
     def point_at(self, key: Key, variant: str = "") -> None:
         """Let `latest`, or `latest-<variant>`, be this artifact; a store that cannot be written to keeps its links."""
+        self._point_at(key, variant, UNWRITABLE)
+
+    def _point_at(self, key: Key, variant: str, tolerated: Collection[int]) -> None:
         link = self.root / key.scene / key.stage / (LATEST + (f"-{variant}" if variant else ""))
         try:
             point_at(link, key.fingerprint)
         except OSError as error:
-            if error.errno not in UNWRITABLE:
+            if error.errno not in tolerated:
                 raise
             if not (link.is_symlink() and link.readlink() == Path(key.fingerprint)):
                 log.warning("%s stays as it is: %s", link, error.strerror)
@@ -195,8 +198,9 @@ class ArtifactStore:
         make_folder(path.parent)
         with _locked(path.parent / f".lock-{key.fingerprint}", key):
             if (found := self.find(key)) is not None:
-                # Who made it may have been killed before it was linked to, and may call it otherwise.
-                self.point_at(key, variant)
+                # Who made it may have been killed before it was linked to, and may call it otherwise. On a full disk
+                # the run ends, as the next one must find a reason to link to it.
+                self._point_at(key, variant, NO_RIGHT)
                 return found, False
             resumed = partial.exists()
             partial.mkdir(exist_ok=True)
@@ -209,7 +213,7 @@ class ArtifactStore:
             seconds = round(time.perf_counter() - start, 3)
             made = {"seconds": seconds, "peak_memory_mib": memory.mib(), "resumed": resumed, "facts": dict(facts)}
             self._publish(key, recipe, made)
-            self.point_at(key, variant)
+            self._point_at(key, variant, NO_RIGHT)
         artifact = self.find(key)
         assert artifact is not None
         return artifact, True
@@ -225,7 +229,7 @@ class ArtifactStore:
             **recipe,
             **made,
             "created": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
-            "libraries": library_versions(),
+            "libraries": dict(library_versions()),
             "machine": machine(),
             "files": _inventory(partial),
         }

@@ -87,13 +87,25 @@ def append_line(path: Path, line: str) -> None:
 
 
 def point_at(link: Path, target: str) -> None:
-    """Make the symbolic link `link` point at `target` (relative to its folder), in one step, also after a power cut."""
-    temporary = link.with_name(f".{secrets.token_hex(8)}")
-    temporary.symlink_to(target)
-    try:
-        temporary.replace(link)
-    finally:
+    """Make the symbolic link `link` point at `target` (relative to its folder), in one step, also after a power cut.
+
+    What a kill leaves beside it, the next call removes: links are followed by nobody while they are made, so that one
+    name for all who make them will do.
+    """
+    temporary = link.with_name(f".{link.name}.new")
+    while True:
         temporary.unlink(missing_ok=True)
+        try:
+            temporary.symlink_to(target)
+            temporary.replace(link)
+        except (FileExistsError, FileNotFoundError):  # another process makes the link at this moment
+            if not link.parent.is_dir():
+                raise
+        except OSError as error:  # which names what the link was to lead to
+            temporary.unlink(missing_ok=True)
+            raise OSError(error.errno, error.strerror, str(link)) from error
+        else:
+            break
     sync(link.parent)
 
 

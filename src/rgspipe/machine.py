@@ -10,6 +10,8 @@ import platform
 import re
 import resource
 import sys
+from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 
 LIBRARIES = ("torch", "warp-lang", "numpy", "scipy", "scikit-image", "OpenEXR", "safetensors", "bpy", "hydra-core")
@@ -34,7 +36,8 @@ def available_memory_gib() -> float | None:
     return int(found[1]) / 2**20 if found else None
 
 
-def library_versions() -> dict[str, str]:
+@cache
+def library_versions() -> Mapping[str, str]:
     """Versions of the installed libraries that results depend on."""
     installed = {}
     for name in LIBRARIES:

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from rgspipe.artifacts import Artifact, ArtifactStore, Key
 from rgspipe.config import RgspipeConfig, get_value, with_changes
+from rgspipe.datasets.reading_limits import reading_within
 from rgspipe.errors import InputError
 from rgspipe.expected_time import EarlierRuns, Expected, in_words
 from rgspipe.files import tree_digest
@@ -30,6 +31,7 @@ NO_RESULT = (
     "rgspipe.artifacts",
     "rgspipe.cli",
     "rgspipe.config",
+    "rgspipe.datasets.reading_limits",
     "rgspipe.errors",
     "rgspipe.files",
     "rgspipe.machine",
@@ -206,7 +208,7 @@ def run(
         InputError: an input cannot be used, or is missing under `upstream=require`; the store cannot be read or
             written to, or its disk is full.
     """
-    with told_below(Path(config.outputs)):
+    with told_below(Path(config.outputs)), reading_within(config.limits):
         return _run(config, load_stage, overrides, usual)
 
 

@@ -10,6 +10,7 @@ import OpenEXR
 import pytest
 
 from rgspipe.datasets.exr import read_array, read_channels, read_image, write_channels, write_image
+from rgspipe.datasets.reading_limits import ReadingLimits, reading_within
 from rgspipe.errors import InputError
 
 
@@ -122,10 +123,12 @@ def test_parts_with_the_same_channels_are_refused_and_others_joined(tmp_path: Pa
     assert set(joined) == set("RGBZ")
 
 
-def test_a_size_that_no_image_has_is_refused_by_the_header(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_size_that_no_image_has_is_refused_by_the_header(tmp_path: Path) -> None:
     write_image(tmp_path / "large.exr", _noise(8, 8, 3))
-    monkeypatch.setattr("rgspipe.datasets.input_file.MOST_PIXELS", 63)
-    with pytest.raises(InputError, match=r"large\.exr.*1 to 63 pixels.*8 × 8"):
+    with (
+        reading_within(ReadingLimits(pixels=63)),
+        pytest.raises(InputError, match=r"large\.exr.*1 to 63 pixels.*8 × 8.*limits"),
+    ):
         read_channels(tmp_path / "large.exr")
 
 

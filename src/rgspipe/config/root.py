@@ -23,6 +23,7 @@ from rgspipe.config.track import TrackConfig
 from rgspipe.config.train import TrainConfig
 from rgspipe.config.viewer import ViewerConfig
 from rgspipe.datasets.classes import LightClass
+from rgspipe.datasets.reading_limits import ReadingLimits
 from rgspipe.degradation.options import Capture, ModelError, TargetCapture
 from rgspipe.options import Options, option
 
@@ -78,6 +79,7 @@ class RgspipeConfig(Options):
     overview: OverviewConfig = OverviewConfig()
     benchmark: BenchmarkConfig = BenchmarkConfig()
     debug: DebugConfig = DebugConfig()
+    limits: ReadingLimits = ReadingLimits()
     model_error: ModelError = ModelError()
     target_capture: TargetCapture = TargetCapture()
     track: TrackConfig = TrackConfig()

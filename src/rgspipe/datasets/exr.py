@@ -8,12 +8,9 @@ import numpy as np
 import OpenEXR
 
 from rgspipe.datasets.input_file import check_pixel_count, input_file
+from rgspipe.datasets.reading_limits import reading_limits
 from rgspipe.errors import InputError
 from rgspipe.files import replacing
-
-#: Pixels of the largest image of which only a part is stored, 4096²: a file of a few bytes could claim any size, and
-#: four channels of so many pixels are read in half of a GiB.
-MOST_CROPPED = 2**24
 
 RENDER_AGAIN = "Export or render this image again."
 
@@ -76,7 +73,7 @@ def _placed(path: Path, part: OpenEXR.Part) -> dict[str, np.ndarray]:
     stored = {name: np.asarray(values, dtype=np.float32) for name, values in pixels.items()}
     if (width, height) == (columns, rows):
         return stored
-    check_pixel_count(path, columns, rows, MOST_CROPPED)
+    check_pixel_count(path, columns, rows, reading_limits().cropped_pixels)
     place = np.s_[top - upper : top - upper + height, left - first : left - first + width]
     whole = {name: np.zeros((rows, columns), np.float32) for name in stored}
     for name, values in stored.items():

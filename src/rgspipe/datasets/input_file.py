@@ -5,11 +5,12 @@ from __future__ import annotations
 import stat
 from pathlib import Path
 
+from rgspipe.datasets.reading_limits import reading_limits
 from rgspipe.errors import InputError
 from rgspipe.files import LONGEST_NAME
 
-#: Pixels of the largest image that is read; decoded, it takes 1.2 GB.
-MOST_PIXELS = 100_000_000
+#: What helps where a file is as large as it is meant to be.
+RAISE = "If it is meant to be so large: limits.* (in Python rg.reading_within)."
 
 
 def input_file(path: str | Path, expected: str, *, most_bytes: int | None = None) -> Path:
@@ -34,7 +35,7 @@ def input_file(path: str | Path, expected: str, *, most_bytes: int | None = None
         raise InputError(path, expected=expected, found=found, remedy="Check the path.")
     if most_bytes is not None and status.st_size > most_bytes:
         wanted = f"{expected} of at most {most_bytes} bytes"
-        raise InputError(path, expected=wanted, found=f"{status.st_size} bytes", remedy="Check the file.")
+        raise InputError(path, expected=wanted, found=f"{status.st_size} bytes", remedy=f"Check the file. {RAISE}")
     return Path(path)
 
 
@@ -56,18 +57,18 @@ def input_folder(path: str | Path, expected: str) -> Path:
 
 
 def check_pixel_count(path: Path, width: int, height: int, most: int | None = None) -> None:
-    """Refuse an image that has no pixels, or more than `most` (by default `MOST_PIXELS`).
+    """Refuse an image that has no pixels, or more than `most`, by default those of `ReadingLimits`.
 
     Raises:
         InputError: naming the file and its size.
     """
-    most = MOST_PIXELS if most is None else most
+    most = reading_limits().pixels if most is None else most
     if not (width >= 1 and height >= 1 and width * height <= most):
         raise InputError(
             path,
             expected=f"an image of 1 to {most} pixels",
             found=f"{width} × {height}",
-            remedy="Export the image at a smaller size.",
+            remedy=f"Export the image at a smaller size. {RAISE}",
         )
 
 

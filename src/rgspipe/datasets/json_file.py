@@ -6,11 +6,9 @@ import math
 from pathlib import Path
 
 from rgspipe.datasets.input_file import input_file
+from rgspipe.datasets.reading_limits import reading_limits
 from rgspipe.errors import InputError
 from rgspipe.strict_json import parse_json
-
-#: Bytes of the largest file that is read: cameras of 100 000 views take a tenth of it.
-MOST_BYTES = 2**28
 
 #: Characters of a value that errors show.
 LONGEST_SHOWN = 120
@@ -34,7 +32,7 @@ def read_json_value(path: str | Path, what: str) -> object:
     Raises:
         InputError: missing, no regular file, too large or not JSON.
     """
-    path = input_file(path, what, most_bytes=MOST_BYTES)
+    path = input_file(path, what, most_bytes=reading_limits().text_bytes)
     try:
         return parse_json(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from rgspipe.datasets.input_file import RAISE
+from rgspipe.datasets.reading_limits import reading_limits
 from rgspipe.errors import InputError
 
 #: Bytes of the longest header.
@@ -44,6 +46,13 @@ def check_header(path: Path) -> None:
     text = ["format", "ascii", "1.0"] in lines
     size = path.stat().st_size - len(head)
     for element in _elements(path, lines):
+        if element.count > (most := reading_limits().vertices):
+            raise InputError(
+                f"{path}: element {element.name}",
+                expected=f"at most {most} rows",
+                found=f"{element.count}",
+                remedy=f"Crop or thin it out. {RAISE}",
+            )
         # In text each number takes a digit and a separator.
         row = sum(2 if text else np.dtype(KINDS.get(kind, "u1")).itemsize for kind in element.kinds)
         if element.count * max(row, 1) > size:

@@ -12,6 +12,7 @@ from torch import Tensor
 
 from rgspipe.datasets.input_file import input_file
 from rgspipe.datasets.limits import LARGEST
+from rgspipe.datasets.reading_limits import reading_limits
 from rgspipe.errors import InputError
 from rgspipe.files import replacing
 
@@ -31,7 +32,7 @@ def load_tensors(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
     Raises:
         InputError: the file is missing or no safetensors file, or holds NaN, infinity or numbers beyond `LARGEST`.
     """
-    input_file(path, "a safetensors file")
+    input_file(path, "a safetensors file", most_bytes=reading_limits().bytes)
     tensors, note = _read(path)
     for name, tensor in tensors.items():
         if tensor.is_floating_point() and not bool((tensor.abs() <= LARGEST).all()):

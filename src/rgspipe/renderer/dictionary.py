@@ -8,6 +8,7 @@ import scipy.spatial
 import torch
 from torch import Tensor
 
+from rgspipe.errors import InputError
 from rgspipe.progress import progress_bar
 from rgspipe.renderer.direct import unit_irradiance
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
@@ -40,7 +41,7 @@ class LightDictionary:
     """Unit lights all over a scene.
 
     Attributes:
-        positions: (C, 3) float32, on the CPU.
+        positions: (C, 3) float64, on the CPU: a scene may be far from the origin.
         irradiance: (C, N) float32 on every surfel, per W/sr.
         grid, seed: what they were made with.
     """
@@ -65,13 +66,13 @@ class LightDictionary:
 
 
 def candidate_grid(lower: Tensor, upper: Tensor, grid: int, seed: int) -> Tensor:
-    """(grid³, 3) jittered points in the box from `lower` to `upper` (3,), float32."""
+    """(grid³, 3) jittered points in the box from `lower` to `upper` (3,), float64."""
     generator = torch.Generator().manual_seed(seed)
     step = (torch.arange(grid, dtype=torch.float64) + 0.5) / grid
     step = 0.5 + (step - 0.5) * (grid - 2 * INSET) / max(1, grid - 1)
     unit = torch.stack(torch.meshgrid(step, step, step, indexing="ij"), dim=-1).reshape(-1, 3)
     unit = unit + (2.0 * torch.rand(unit.shape, generator=generator, dtype=torch.float64) - 1.0) * JITTER / grid
-    return (lower + unit * (upper - lower)).float()
+    return lower + unit * (upper - lower)
 
 
 def build_dictionary(
@@ -93,18 +94,48 @@ def build_dictionary(
         grid: candidates along each axis.
         seed: of the jitter.
         shadows: whether surfels block light.
+
+    Raises:
+        InputError: the scene is so small in its unit of length that the images of unit lights cannot be compared, or so
+            far from the origin that its places cannot.
     """
+    _check_place(surroundings)
     positions = candidate_grid(surroundings.lower, surroundings.upper, grid, seed)
     positions = positions[_clear_of_surfels(bvh.surfels, positions)]
     within = len(positions)
     if surroundings.open:
         positions = torch.cat([positions, surroundings.shell_points()])
     irradiance = _irradiance(bvh, positions, shadows, shown=True)
+    _check_unit(irradiance, surroundings)
     flux = irradiance @ areas.to(irradiance)
     kept = flux > 0.0
     if within > 0:
         kept[:within] = flux[:within] > LEAST_FLUX * flux[:within].amax()
     return LightDictionary(positions[kept.cpu()], irradiance[kept], grid, seed)
+
+
+def _check_place(surroundings: Surroundings) -> None:
+    """Refuse a scene so far from the origin that float32, in which some of a search's places are, has it in one."""
+    lower, upper = surroundings.lower, surroundings.upper
+    farthest = float(torch.maximum(lower.abs(), upper.abs()).amax())
+    if torch.finfo(torch.float32).eps * farthest > 0.5 * surroundings.size:
+        raise InputError(
+            "the scene",
+            expected="coordinates of which float32 tells one end of the scene from the other",
+            found=f"a scene {surroundings.size:.2g} units large that is {farthest:.2g} from the origin",
+            remedy="Take one offset away from the places of all cameras, surfels and lights.",
+        )
+
+
+def _check_unit(irradiance: Tensor, surroundings: Surroundings) -> None:
+    """Refuse a scene in which unit lights are so bright that float32 does not hold the squares of their images."""
+    if irradiance.numel() and not bool(irradiance.amax().square().isfinite()):
+        raise InputError(
+            "the scene",
+            expected="a size in which 1 W/sr lights it by less than 1.8e19 W/m², whose square float32 can hold",
+            found=f"one {surroundings.size:.2g} units large, lit by up to {float(irradiance.amax()):.2g}",
+            remedy="Give the lengths of cameras, depth and surfels in a smaller unit, so that they are larger numbers.",
+        )
 
 
 def _irradiance(bvh: SurfelBvh, positions: Tensor, shadows: bool, shown: bool = False) -> Tensor:

@@ -55,9 +55,9 @@ class Surroundings:
         return self.middle - REACH * self.radius, self.middle + REACH * self.radius
 
     def shell_points(self) -> Tensor:
-        """(C, 3) float32 candidates around an open scene, spread evenly over shells, on each in other directions."""
+        """(C, 3) float64 candidates around an open scene, spread evenly over shells, on each in other directions."""
         shells = [
             self.middle + radius * self.radius * fibonacci_directions(DIRECTIONS + index).double()
             for index, radius in enumerate(SHELLS)
         ]
-        return torch.cat(shells).float()
+        return torch.cat(shells)

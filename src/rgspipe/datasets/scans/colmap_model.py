@@ -12,6 +12,7 @@ import numpy as np
 
 from rgspipe.datasets.input_file import input_file
 from rgspipe.datasets.json_file import shown
+from rgspipe.datasets.reading_limits import reading_limits
 from rgspipe.datasets.scans.frame import Lens, Numbers
 from rgspipe.errors import InputError
 from rgspipe.files import LONGEST_NAME
@@ -19,8 +20,6 @@ from rgspipe.files import LONGEST_NAME
 #: Camera models by COLMAP's numbers, with how many parameters each has; of the others no lens is known here.
 MODELS = {0: ("SIMPLE_PINHOLE", 3), 1: ("PINHOLE", 4), 2: ("SIMPLE_RADIAL", 4), 3: ("RADIAL", 5), 4: ("OPENCV", 8)}
 MODELS |= {5: ("OPENCV_FISHEYE", 8), 8: ("SIMPLE_RADIAL_FISHEYE", 4), 9: ("RADIAL_FISHEYE", 5)}
-
-MOST_BYTES = 2**32
 
 #: A quaternion shorter than this is none.
 LEAST_NORM = 1e-6
@@ -67,7 +66,7 @@ def read_images(path: Path) -> list[Photograph]:
 
 def _whole(path: Path, read: Callable[[Path, bytes], Parts]) -> Parts:
     try:
-        return read(path, input_file(path, "a part of a COLMAP model", most_bytes=MOST_BYTES).read_bytes())
+        return read(path, input_file(path, "a part of a COLMAP model", most_bytes=reading_limits().bytes).read_bytes())
     except InputError:
         raise
     except (struct.error, ValueError, IndexError, OverflowError) as error:

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from rgspipe.datasets.input_file import input_file
-from rgspipe.datasets.json_file import MOST_BYTES
+from rgspipe.datasets.reading_limits import reading_limits
 from rgspipe.datasets.scans.frame import DepthImage, Numbers, Scan, ScanFrame
 from rgspipe.datasets.scans.options import ScanOptions
 from rgspipe.datasets.scans.poses import placed
@@ -89,7 +89,9 @@ def _cameras(path: Path) -> list[Numbers]:
 
 def _rows(path: Path) -> Iterator[Numbers]:
     """Lines of three numbers; a first line with one is their count over three."""
-    text = input_file(path, "cameras of OpenRooms", most_bytes=MOST_BYTES).read_text("utf-8", "replace")
+    text = input_file(path, "cameras of OpenRooms", most_bytes=reading_limits().text_bytes).read_text(
+        "utf-8", "replace"
+    )
     for index, line in enumerate(line for line in text.splitlines() if line.strip()):
         try:
             values = np.array([float(word) for word in line.split()])

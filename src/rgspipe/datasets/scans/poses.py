@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from rgspipe.datasets.input_file import input_file
-from rgspipe.datasets.json_file import MOST_BYTES, shown
+from rgspipe.datasets.json_file import shown
+from rgspipe.datasets.reading_limits import reading_limits
 from rgspipe.datasets.rigid_pose import check_place
 from rgspipe.datasets.scans.frame import Numbers
 from rgspipe.datasets.scans.options import ScanOptions
@@ -109,7 +110,7 @@ def read_numbers(path: Path, count: int, what: str) -> Numbers:
     Raises:
         InputError: missing file, or other text.
     """
-    text = input_file(path, what, most_bytes=MOST_BYTES).read_text(encoding="utf-8", errors="replace")
+    text = input_file(path, what, most_bytes=reading_limits().text_bytes).read_text(encoding="utf-8", errors="replace")
     rows = [line.split() for line in text.splitlines() if line.strip()]
     try:
         values = np.array([[float(word) for word in row] for row in rows], dtype=np.float64)

@@ -51,6 +51,10 @@ def _threads() -> ThreadPoolExecutor:
     return ThreadPoolExecutor(thread_count(), thread_name_prefix="rgspipe-kernel")
 
 
+# A forked process has none of its parent's threads, and would wait for them for ever.
+os.register_at_fork(after_in_child=_threads.cache_clear)
+
+
 def slices(count: int, parts: int) -> list[tuple[int, int]]:
     """`parts` nearly equal (start, length) ranges that cover `count` items; empty ones are left out."""
     bounds = [count * k // parts for k in range(parts + 1)]
