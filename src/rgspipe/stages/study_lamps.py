@@ -64,7 +64,7 @@ def _rows(
         yield failed_row(known, captured.reason)
         return
     yield from lamp_rows(known, read_json(captured.file("metrics.json"), "the measures of a capture"))
-    if isinstance(later, Artifact):
+    if later is not None and not isinstance(later, Failure):
         yield from later_rows(known, pd.read_csv(later.file("metrics.csv")))
 
 
