@@ -34,7 +34,7 @@ FLOORS = (
     ("relighting", "studies", "benchmark", "pages", "viewer"),
     ("config",),
     ("stages",),
-    ("pipeline", "nodes"),
+    ("pipeline", "nodes", "demo", "installation"),
     ("cluster", "cli"),
     ("__main__",),
 )

@@ -25,6 +25,7 @@ INSTALLED = bool(bpy.app.binary_path)
 
 
 def read_channels(path: Path) -> dict[str, np.ndarray]:
+    """`datasets.exr.read_channels`."""
     if not INSTALLED:
         return exr.read_channels(path)
     with tempfile.NamedTemporaryFile(suffix=".npz") as arrays:
@@ -33,6 +34,7 @@ def read_channels(path: Path) -> dict[str, np.ndarray]:
 
 
 def write_channels(path: Path, channels: dict[str, np.ndarray]) -> None:
+    """`datasets.exr.write_channels`."""
     if not INSTALLED:
         exr.write_channels(path, channels)
         return
@@ -42,6 +44,7 @@ def write_channels(path: Path, channels: dict[str, np.ndarray]) -> None:
 
 
 def write_image(path: Path, image: np.ndarray, alpha: np.ndarray) -> None:
+    """`datasets.exr.write_image`: RGB (H, W, 3) and alpha (H, W)."""
     write_channels(path, {"R": image[..., 0], "G": image[..., 1], "B": image[..., 2], "A": alpha})
 
 
