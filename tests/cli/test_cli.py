@@ -39,7 +39,7 @@ def statuses(folder: Path) -> list[dict]:
 def test_without_arguments_it_says_what_it_can_do(rgspipe) -> None:
     result = rgspipe()
     assert result.returncode == 0
-    for word in ("generate_dataset", "fit_light", "cornell", "external", "pipeline=smoke"):
+    for word in ("generate_dataset", "fit_light", "cornell", "external", "pipeline=reproduce"):
         assert word in result.stdout
 
 

@@ -46,7 +46,9 @@ def test_a_damaged_pipeline_is_refused(tmp_path: Path, text: str, word: str) -> 
 def jobs(step: SequenceStep) -> list[list[str]]:
     """The overrides of each job of a step whose sweeps are plain lists of values."""
     pairs = [text.partition("=") for text in step.overrides]
-    choices = [[f"{key}={value}" for value in values.split(",")] for key, _, values in pairs]
+    choices = [
+        [f"{key}={value}" for value in (values.split(",") if step.sweep else [values])] for key, _, values in pairs
+    ]
     return [[f"stage={step.stage}", *chosen] for chosen in itertools.product(*choices)]
 
 
