@@ -24,6 +24,6 @@ def test_points_are_where_blender_has_them(in_blender: Callable[[str, Path], Non
             .of_image(int(width), int(height))
             .project(torch.from_numpy(found["points"]))
         )
-        # Measured 6e-6 of a pixel: Blender holds poses in float32.
+        # Blender holds poses in float32.
         np.testing.assert_allclose(pixels, found[name], atol=1e-4)
     assert "cannot be a target's: flat" in (tmp_path / "remarks.txt").read_text()

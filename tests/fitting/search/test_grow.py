@@ -73,7 +73,6 @@ def test_a_lamp_under_the_ceiling_is_found_with_its_distance(room) -> None:
     views = FitViews.prepare(room.frozen, room.views, lights=LightSpec(mount="ceiling"), sharp=False)
     result = views.fit(views.render(truth))
     assert result.status is FitStatus.CONVERGED and result.covariance[0].shape == (6, 6)
-    # Measured 2e-8.
     assert float((result.lights[0].position - truth.position).norm()) < 1e-5
     [hangs] = [finding for finding in result.findings if isinstance(finding, Hangs)]
     assert hangs.distance == pytest.approx(0.03, abs=1e-4) and "hangs 0.03 (scene units)" in result.reason

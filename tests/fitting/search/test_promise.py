@@ -41,7 +41,7 @@ def test_noise_promises_no_extent_and_larger_ones_have_more_of_a_signal(room) ->
     refiner, state = fitted(room, PointLight(HIDDEN, COLOUR), noise=0.02)
     place = state.emitters[0].position
     small, large = (extent_promised(refiner, state, 0, SphereLight(place, 1.0, radius)) for radius in (0.02, 0.04))
-    assert abs(large.gain) < 0.03  # measured 2e-3
+    assert abs(large.gain) < 0.03
     # Measured 3.9: between the size itself, as a hard shadow's edge has it, and the fourth power, as a smooth one has.
     assert 2.0 < large.signal / small.signal < 16.0
 
@@ -50,7 +50,7 @@ def test_noise_promises_no_extent_and_larger_ones_have_more_of_a_signal(room) ->
 def test_a_beam_promises_where_it_points_and_a_point_promises_none(room, axis: tuple[float, ...]) -> None:
     led = LedLight(VISIBLE, COLOUR, axis, 1.0)
     refiner, state = fitted(room, PointLight(VISIBLE, COLOUR), noise=0.02)
-    assert beam_promised(refiner, state, 0).gain < 0.05  # measured 0.01: four numbers of hundreds
+    assert beam_promised(refiner, state, 0).gain < 0.05
     images = [replace(led, intensity=led.intensity), PointLight(VISIBLE, COLOUR)]
     # Mostly a point, and a little of an LED besides.
     mixed = [0.2 * one + other for one, other in zip(*(room.images(light) for light in images), strict=True)]

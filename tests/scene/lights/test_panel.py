@@ -35,7 +35,7 @@ def test_the_told_form_is_the_same_panel(width: float, height: float, turn: floa
     told = light.told
     assert told.width >= told.height and -0.5 * math.pi <= told.turn < 0.5 * math.pi
     assert {told.width, told.height} == {width, height} and told.told == told
-    # Each corner of one is a corner of the other; measured at most 1.5e-15.
+    # Each corner of one is a corner of the other.
     assert float(torch.cdist(corners(light), corners(told)).amin(dim=0).max()) < 1e-13
 
 
