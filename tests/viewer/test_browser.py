@@ -158,7 +158,7 @@ def test_a_photographed_lamp_is_found_again(window, page: Page) -> None:
 
 def test_keys_do_what_buttons_do(window, page: Page) -> None:
     session = page.session
-    window.locator("canvas").first.click(position={"x": 5, "y": 5})
+    window.mouse.click(20, 450)
     window.keyboard.press("n")
     until(lambda: len(session.lights) == 2)
     for kind in ("spot", "sphere", "panel"):
@@ -183,7 +183,7 @@ def test_keys_do_what_buttons_do(window, page: Page) -> None:
 
 
 def test_lamps_are_taken_home(window, page: Page) -> None:
-    window.locator("canvas").first.click(position={"x": 5, "y": 5})
+    window.mouse.click(20, 450)
     window.keyboard.press("h")
     with window.expect_download() as download:
         window.get_by_text("lamps.zip").last.click()
