@@ -55,7 +55,8 @@ def test_further_fields_cannot_replace_the_format_s_own(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"type": "sun"}, r"lights\[0\]\.type.*point or spot"),
+        ({"type": "moon"}, r"lights\[0\]\.type.*point, spot"),
+        ({"type": "sun"}, r'lights\[0\]: expected the key "direction", found intensity'),
         ({"type": ...}, '"type"'),
         ({"position": [0, 0]}, '3 finite numbers under "position"'),
         ({"position": [0, 0, float("nan")]}, '3 finite numbers under "position"'),

@@ -19,8 +19,8 @@ from rgspipe.errors import InputError
 @pytest.mark.parametrize(
     ("declared", "words"),
     [
-        ("element vertex 1000000000\nproperty float x\n", "1000000000 rows"),
-        ("element vertex 1000000000\n", "1000000000 rows"),
+        ("element vertex 1000000000\nproperty float x\n", "found 1000000000"),
+        ("element vertex 1000000000\n", "found 1000000000"),
         ("element vertex 1\nproperty list uint float x\n", "found a list"),
         ("element face 3\nproperty list int int i\nelement vertex 1\nproperty float x\n", "found a list"),
     ],

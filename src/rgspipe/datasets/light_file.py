@@ -104,6 +104,8 @@ def _read_light(fields: dict, path: str | Path, where: str) -> Light:
         raise reader.refusal("intensity", f"W/sr from 0 to {STRONGEST:g}", str(intensity.tolist()))
     try:
         return kind.from_fields(position, intensity, reader)
+    except InputError:
+        raise
     except ValueError as error:
         where = f"{path}: {where}"
         raise InputError(where, expected=f"a {kind.kind} light", found=str(error), remedy="Correct it.") from error
