@@ -55,7 +55,7 @@ def test_further_fields_cannot_replace_the_format_s_own(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"type": "moon"}, r"lights\[0\]\.type.*point, spot"),
+        ({"type": "moon"}, r"lights\[0\]\.type.*point or spot or led"),
         ({"type": "sun"}, r'lights\[0\]: expected the key "direction", found intensity'),
         ({"type": ...}, '"type"'),
         ({"position": [0, 0]}, '3 finite numbers under "position"'),
