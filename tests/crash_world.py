@@ -16,7 +16,7 @@ import faults
 from faults import Fault
 from rgspipe.config import RgspipeConfig
 from rgspipe.errors import InputError
-from rgspipe.pipeline import StageLoader, run
+from rgspipe.pipeline import StageLoader, Usual, run
 
 #: Exit statuses of a run that was refused, and of one that failed in any other way.
 REFUSED, FAILED = 2, 1
@@ -111,7 +111,7 @@ def make_here(way: Way, folder: Path) -> None:
     former = Path.cwd()
     os.chdir(folder)
     try:
-        run(way.config, way.load_stage)
+        run(way.config, way.load_stage, usual=Usual(way.config))
     finally:
         os.chdir(former)
 
@@ -130,7 +130,7 @@ def _become(way: Way, folder: Path, told: Path, fault: Fault | None, user: User 
         if fault is not None:
             os.environ |= fault.environment()
             faults.install(fault)
-        run(way.config, way.load_stage)
+        run(way.config, way.load_stage, usual=Usual(way.config))
         status = 0
     except InputError as error:
         print(f"Error: {error}", file=sys.stderr)

@@ -29,6 +29,7 @@ MODULES = {
 #: What there is with the extras of the package.
 EXTRAS = {
     "blender": "renders datasets, targets and truth; images of your own need none (scene=external, rgbd, mesh)",
+    "raw": "photographs as a camera's sensor has them (RAW), in captures",
     "bench": "the path tracer that stage=benchmark compares with",
     "dev": "tests, the site of the docs, lint",
 }

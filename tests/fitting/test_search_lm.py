@@ -155,7 +155,9 @@ def test_images_that_do_not_fit_are_refused(room, images, message):
 
 
 def test_lights_of_no_known_kind_are_refused(room):
-    with pytest.raises(InputError, match=r"LightSpec\.type: expected one of point, spot, led, sphere, panel, auto"):
+    with pytest.raises(
+        InputError, match=r"LightSpec\.type: expected one of point, spot, led, sphere, panel, sun, profile, auto"
+    ):
         fit_lights(room.frozen, room.views[0], torch.ones(48, 48, 3), lights="lantern")
 
 

@@ -19,6 +19,7 @@ OTHERS = {
     "paper_adam_limit": None,
     "paper_adam_views": [1],
     "zoo": {"seeds": [7]},
+    "lightings": 5,
 }
 
 
@@ -34,7 +35,8 @@ def test_a_setting_that_would_do_nothing_is_refused(kind: str, name: str) -> Non
     assert "limit" in used and not set(used) & set(UNUSED[kind])
 
 
-@pytest.mark.parametrize("kind", study.KINDS)
+# Lamps that are unknown in a capture are found with it, not by fits of targets.
+@pytest.mark.parametrize("kind", [kind for kind in study.KINDS if kind != "lamps"])
 def test_every_kind_takes_few_targets_where_the_study_or_the_fit_says_so(kind: str) -> None:
     def limits(config: RgspipeConfig) -> set[object]:
         fits = [need for need in study.STAGE.needs(config) if need.stage in ("fit_light", "evaluate")]

@@ -81,7 +81,7 @@ def test_the_fits_of_fewest_views_foretell_the_others() -> None:
 
 
 def test_every_kind_that_can_be_asked_for_can_be_shown() -> None:
-    assert get_args(Kind) == tuple(study.KINDS) == ("captures", *KINDS, "courses", "zoo")
+    assert get_args(Kind) == tuple(study.KINDS) == ("captures", "lamps", *KINDS, "courses", "zoo")
 
 
 def test_a_case_has_the_last_word() -> None:

@@ -11,7 +11,7 @@ from rgspipe.errors import InputError
 from rgspipe.options import Options, option
 
 #: What a study is about.
-Kind = Literal["captures", "views", "robustness", "classes", "kinds", "regions", "adam", "courses", "zoo", "lamps"]
+Kind = Literal["captures", "lamps", "views", "robustness", "classes", "kinds", "regions", "adam", "courses", "zoo"]
 
 #: Settings that only some kinds of study have a use for; those that are not listed here use all of them.
 UNUSED: dict[Kind, tuple[str, ...]] = {

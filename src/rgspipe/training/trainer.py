@@ -117,7 +117,8 @@ def _closed(surfels: Surfels, views: Sequence[View], options: TrainOptions, hidd
     """With surfels on the surfaces that no view shows, if those are wanted."""
     if not options.unseen:
         return surfels
-    cameras, lamps, depths = zip(*((view.camera, view.light.position, view.depth) for view in views), strict=True)
+    cameras, depths = [view.camera for view in views], [view.depth for view in views]
+    lamps = [view.light.position for view in views if view.light is not None]
     return with_unseen_surfaces(surfels, cameras, lamps, depths, hidden=hidden)
 
 

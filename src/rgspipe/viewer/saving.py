@@ -62,7 +62,7 @@ class Saving:
             return self._session.picture(self._session.seen(camera), "soft")[0]
 
     def _send(self, name: str, content: bytes) -> None:
-        self._visit.client.send_file_download(name, content)
+        self._visit.client.send_file_download(name, content, save_immediately=True)
 
 
 def exported(lights: LightRig, world: World) -> bytes:
