@@ -139,11 +139,12 @@ class Room:
         return Shot(np.array(eye), aim, rng.uniform(*LENSES))
 
     def lamp(self) -> np.ndarray:
-        """A place in the room that is clear of walls and furniture."""
+        """A place in the room that is clear of walls and furniture, and not inside of a piece."""
         while True:
             low, high = np.array([*(-0.5 * SIZE[:2]), 0.0]) + CLEAR, np.array([*(0.5 * SIZE[:2]), SIZE[2]]) - CLEAR
-            place = self.rng.uniform(low, high)
-            if float(self._distances(place, fibonacci(256)).min()) > 0.5 * CLEAR:
+            place, around = self.rng.uniform(low, high), fibonacci(256)
+            is_near = float(self._distances(place, around).min()) <= 0.5 * CLEAR
+            if not is_near and not self._meets_backs(place, around):
                 return place
 
     def sees(self, eye: np.ndarray, place: np.ndarray) -> bool:
@@ -155,9 +156,17 @@ class Room:
         return self._distances(shot.eye, shot.rays()).reshape(PIXELS, PIXELS)
 
     def _distances(self, origin: np.ndarray, directions: np.ndarray) -> np.ndarray:
-        rays = mi.Ray3f(mi.Point3f(*origin.tolist()), mi.Vector3f(directions.T.astype(np.float32)))
-        hit = self.scene.ray_intersect(rays)
+        hit = self._hits(origin, directions)
         return np.where(np.array(hit.is_valid()), np.array(hit.t), np.inf)
+
+    def _meets_backs(self, origin: np.ndarray, directions: np.ndarray) -> bool:
+        hit = self._hits(origin, directions)
+        facing = np.einsum("nd,dn->n", directions, np.array(hit.n))
+        return bool((np.array(hit.is_valid()) & (facing > 0.0)).any())
+
+    def _hits(self, origin: np.ndarray, directions: np.ndarray) -> Any:
+        rays = mi.Ray3f(mi.Point3f(*origin.tolist()), mi.Vector3f(directions.T.astype(np.float32)))
+        return self.scene.ray_intersect(rays)
 
     def photograph(self, shot: Shot, lamp: np.ndarray, intensity: Sequence[float], samples: int) -> np.ndarray:
         """(H, W, 4) linear radiance, premultiplied, and alpha."""
