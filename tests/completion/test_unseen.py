@@ -249,3 +249,11 @@ def test_lamps_stand_in_the_room() -> None:
     _, seen, cameras = photographed_along_one_wall()
     nearer, farther = (with_unseen_surfaces(seen, cameras, lamps) for lamps in ([], [torch.tensor([0.02, 0.5, 0.4])]))
     assert float(nearer.centers[:, 0].min()) > 0.02 > float(farther.centers[:, 0].min())
+
+
+def test_planes_go_on_without_looking_for_hidden_room() -> None:
+    room, seen, cameras = photographed_along_one_wall()
+    closed = with_unseen_surfaces(seen, cameras, hidden=False)
+    missing = room.centers[(room.centers[:, 0] > SPACING) & (room.centers[:, 0] < 1.0 - SPACING)]
+    gap = cKDTree(closed.centers.numpy()).query(missing.numpy())[0]
+    assert float(np.quantile(gap, 0.9)) < 0.9 * SPACING

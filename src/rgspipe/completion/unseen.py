@@ -75,8 +75,8 @@ def with_unseen_surfaces(
         cameras: those that it was made from.
         lamps: (3,) places of lamps that lit it; like cameras they stand in the room, not behind its walls.
         depths: what is known of the depth (H, W) of the cameras' photographs, for each of them.
-        hidden: whether room that things hide is looked for, and closed. Without, planes go on, in a fifth of the time:
-            about as much light comes back.
+        hidden: whether room that things hide is looked for, and closed. Without, planes go on alone, which takes
+            little of the time.
     """
     if not cameras or len(surfels) <= NEIGHBOURS or openness(_tree(surfels), surfels) > MOST_OPEN:
         return surfels
