@@ -1,11 +1,11 @@
-"""Rooms of another maker: a data set with known lamps, rendered by Mitsuba, which rgspipe's own code has no part in.
+"""Scenes of another maker: a data set with known lamps, rendered by Mitsuba, which rgspipe's own code has no part in.
 
 python tools/foreign_room.py KIND FOLDER [--seed 1] [--views 40] [--samples 64]
 python -m rgspipe -m stage=evaluate scene=external scene.path=FOLDER views.count=1,3
 
-All cameras stand along one wall (of an open room, before it), so that this wall and much of its neighbours are seen by
-none. Photographs are path-traced and not denoised: their noise is that of the samples. Needs `requirements-bench.txt`
-and an LLVM library, see there. Lengths are metres, +z is up.
+All cameras stand along one wall (of an open room or around an object, before it), so that this wall and much of its
+neighbours are seen by none. Photographs are path-traced and not denoised: their noise is that of the samples. Needs
+`requirements-bench.txt` and an LLVM library, see there. Lengths are metres, +z is up.
 """
 
 from __future__ import annotations
@@ -24,16 +24,36 @@ import OpenEXR
 
 mi.set_variant("llvm_ad_rgb")
 
-#: Sides of the room, pixels along an image's side, and watts of the training lamps.
-SIZE, PIXELS, POWER = np.array([5.0, 4.0, 2.6]), 128, 60.0
+#: Pixels along an image's side, and watts of the training lamps.
+PIXELS, POWER = 128, 60.0
 
-#: Reflectance of the surfaces, and the pieces of furniture, of each kind of room.
+
+@dataclass(frozen=True)
+class Kind:
+    """What is drawn: the reflectance of the surfaces, pieces of furniture and the sides of the room [m].
+
+    Attributes:
+        open: there is no wall behind the cameras.
+        corner: a block as high as the room fills a corner of it and leaves a corridor that turns.
+        object: boxes and balls in a heap on a floor, and no walls.
+    """
+
+    albedo: tuple[float, float]
+    pieces: int
+    size: tuple[float, float, float] = (5.0, 4.0, 2.6)
+    open: bool = False
+    corner: bool = False
+    object: bool = False
+
+
 KINDS = {
-    "closed": ((0.2, 0.8), 3),
-    "open": ((0.2, 0.8), 3),
-    "white": ((0.85, 0.92), 3),
-    "dark": ((0.05, 0.25), 3),
-    "clutter": ((0.2, 0.8), 8),
+    "closed": Kind((0.2, 0.8), 3),
+    "open": Kind((0.2, 0.8), 3, open=True),
+    "white": Kind((0.85, 0.92), 3),
+    "dark": Kind((0.05, 0.25), 3),
+    "clutter": Kind((0.2, 0.8), 8),
+    "corridor": Kind((0.3, 0.8), 1, size=(5.0, 5.0, 2.6), corner=True),
+    "object": Kind((0.2, 0.8), 5, size=(2.4, 2.4, 1.6), open=True, object=True),
 }
 
 #: Horizontal fields of view [degrees], and how far from the wall behind them cameras stand [m].
@@ -86,29 +106,31 @@ class Shot:
 
 
 class Room:
-    """A room of a kind, drawn from a seed."""
+    """A scene of a kind, drawn from a seed."""
 
     def __init__(self, kind: str, seed: int) -> None:
-        self.is_open = kind == "open"
+        self.kind, self.size = KINDS[kind], np.array(KINDS[kind].size)
         self.rng = np.random.default_rng([list(KINDS).index(kind), seed])
-        (self.low, self.high), pieces = KINDS[kind]
+        self.low, self.high = self.kind.albedo
         self.shapes: dict[str, Any] = dict(self._walls())
         self.balls: list[tuple[np.ndarray, float]] = []
-        for index in range(pieces):
-            self.shapes[f"piece_{index}"] = self._piece(index)
+        if self.kind.corner:
+            self.shapes["corner"] = self._corner()
+        for index in range(self.kind.pieces):
+            self.shapes[f"piece_{index}"] = self._heaped() if self.kind.object else self._piece(index)
         self.scene = mi.load_dict({"type": "scene"} | self.shapes)
 
     def _walls(self) -> Iterator[tuple[str, Any]]:
         for axis in range(3):
             for side in (-1.0, 1.0):
-                if self.is_open and (axis, side) == (1, -1.0):
+                if (self.kind.open and (axis, side) == (1, -1.0)) or (self.kind.object and (axis, side) != (2, -1.0)):
                     continue
                 normal = np.zeros(3)
                 normal[axis] = -side
-                u, v = np.roll(np.eye(3), -axis - 1, axis=0)[:2] * (0.5 * SIZE)
+                u, v = np.roll(np.eye(3), -axis - 1, axis=0)[:2] * (0.5 * self.size)
                 v = v if np.dot(np.cross(u, v), normal) > 0.0 else -v
                 matrix = np.eye(4)
-                matrix[:3] = np.stack([u, v, normal, [0, 0, 0.5 * SIZE[2]] - 0.5 * SIZE * normal], axis=1)
+                matrix[:3] = np.stack([u, v, normal, [0, 0, 0.5 * self.size[2]] - 0.5 * self.size * normal], axis=1)
                 yield f"wall_{axis}_{side:+.0f}", self._shape("rectangle", matrix)
 
     def _piece(self, index: int) -> dict[str, Any]:
@@ -117,13 +139,31 @@ class Room:
         size = rng.uniform([0.4, 0.4, 0.4], [1.1, 0.8, highest])
         reach = 0.5 * float(np.hypot(*size[:2]))
         for _ in range(1000):
-            low, high = np.array([-0.5, -0.1]) * SIZE[:2] + reach, 0.5 * SIZE[:2] - reach
+            low, high = np.array([-0.5, -0.1]) * self.size[:2] + reach, 0.5 * self.size[:2] - reach
             place = np.array([*rng.uniform(low, high), 0.5 * size[2]])
             if all(np.linalg.norm((place - other)[:2]) > reach + far for other, far in self.balls):
                 break
         self.balls.append((place, reach))
         turn = mi.ScalarTransform4f().translate(place.tolist()).rotate([0, 0, 1], float(rng.uniform(0.0, 90.0)))
         return self._shape("cube", np.array((turn @ mi.ScalarTransform4f().scale((0.5 * size).tolist())).matrix))
+
+    def _corner(self) -> dict[str, Any]:
+        """A block that leaves a corridor along the wall x > 0, in which the cameras stand, and one along y > 0."""
+        side = self.rng.uniform(0.5, 0.65, 2) * self.size[:2]
+        middle = [*(0.5 * (side - self.size[:2])), 0.5 * self.size[2]]
+        self.balls.append((np.array(middle), 0.5 * float(np.hypot(*side))))
+        matrix = np.diag([*(0.5 * side), 0.5 * self.size[2], 1.0])
+        matrix[:3, 3] = middle
+        return self._shape("cube", matrix)
+
+    def _heaped(self) -> dict[str, Any]:
+        """A ball or a turned box of the heap in the middle; it stands on the floor, and may be sunk into others."""
+        rng, is_ball = self.rng, self.rng.random() < 0.5
+        size = np.full(3, rng.uniform(0.25, 0.6)) if is_ball else rng.uniform([0.2, 0.2, 0.2], [0.5, 0.5, 0.8])
+        place = [*rng.uniform(-0.3, 0.3, 2), 0.5 * size[2]]
+        turn = mi.ScalarTransform4f().translate(place).rotate([0, 0, 1], float(rng.uniform(0.0, 90.0)))
+        kind = "sphere" if is_ball else "cube"
+        return self._shape(kind, np.array((turn @ mi.ScalarTransform4f().scale((0.5 * size).tolist())).matrix))
 
     def _shape(self, kind: str, matrix: np.ndarray) -> dict[str, Any]:
         grey, tint = self.rng.uniform(self.low, self.high), min(0.25, self.high - self.low)
@@ -133,19 +173,24 @@ class Room:
 
     def shot(self) -> Shot:
         """A camera as somebody would hold it who stands along the wall y < 0, or before it if there is none."""
-        rng, wall = self.rng, -0.5 * SIZE[1] - (1.0 if self.is_open else 0.0)
-        eye = [rng.uniform(-0.45, 0.45) * SIZE[0], wall + rng.uniform(*STAND), rng.uniform(0.7, 2.0)]
-        aim = rng.uniform([-0.5 * SIZE[0], 0.0, 0.1], [0.5 * SIZE[0], 0.5 * SIZE[1], 2.0])
+        rng, size, wall = self.rng, self.size, -0.5 * self.size[1] - (1.0 if self.kind.open else 0.0)
+        along = (0.25, 0.45) if self.kind.corner else (-0.45, 0.45)
+        eye = [rng.uniform(*along) * size[0], wall + rng.uniform(*STAND), rng.uniform(0.7, 2.0)]
+        aim = rng.uniform([-0.5 * size[0], 0.0, 0.1], [0.5 * size[0], 0.5 * size[1], 0.8 * size[2]])
+        aim = aim * 0.3 if self.kind.object else aim
         return Shot(np.array(eye), aim, rng.uniform(*LENSES))
 
     def lamp(self) -> np.ndarray:
         """A place in the room that is clear of walls and furniture, and not inside of a piece."""
         while True:
-            low, high = np.array([*(-0.5 * SIZE[:2]), 0.0]) + CLEAR, np.array([*(0.5 * SIZE[:2]), SIZE[2]]) - CLEAR
+            low, high = np.array([*(-0.5 * self.size[:2]), 0.0]) + CLEAR, self._above() - CLEAR
             place, around = self.rng.uniform(low, high), fibonacci(256)
             is_near = float(self._distances(place, around).min()) <= 0.5 * CLEAR
             if not is_near and not self._meets_backs(place, around):
                 return place
+
+    def _above(self) -> np.ndarray:
+        return np.array([*(0.5 * self.size[:2]), self.size[2]])
 
     def sees(self, eye: np.ndarray, place: np.ndarray) -> bool:
         way = place - eye

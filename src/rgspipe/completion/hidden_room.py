@@ -8,6 +8,9 @@ missing, as at the back of a box or the floor behind it, the room ends about whe
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
+import numpy as np
 import torch
 from scipy.ndimage import binary_dilation
 from torch import Tensor
@@ -20,6 +23,9 @@ from rgspipe.renderer.point_sets import fibonacci_directions
 #: Directions in which one looks from a point, and points whose rays are cast at once.
 LOOKS, CHUNK = 64, 1024
 
+#: Of so many cells along each axis one is looked at first, and the others only where those around them differ.
+EVERY = 3
+
 
 def with_hidden_room(grid: Grid, bvh: SurfelBvh, seen: Tensor, unsure: Tensor) -> Tensor:
     """(X, Y, Z) bool: the cells that were `seen` to be free, and those of room that is connected with them.
@@ -29,12 +35,50 @@ def with_hidden_room(grid: Grid, bvh: SurfelBvh, seen: Tensor, unsure: Tensor) -
         seen: (X, Y, Z) bool.
         unsure: (X, Y, Z) bool, cells that are taken for no room: those so near to surfaces that one sees past them.
     """
-    centers = grid.centers.reshape(*grid.shape, 3)
+    centers, sparse = grid.centers.reshape(*grid.shape, 3), _Sparse.over(grid, bvh)
     free, known = seen.numpy().copy(), (seen | unsure).numpy()
     while (rim := binary_dilation(free) & ~known).any():
-        free[rim] = (part_of_fronts(bvh, centers[torch.from_numpy(rim)]) > 0.5).numpy()
+        places = centers[torch.from_numpy(rim)]
+        all_around, nowhere_around = sparse.agreed(places)
+        room, differ = all_around, ~(all_around | nowhere_around)
+        if differ.any():
+            room[differ] = (part_of_fronts(bvh, places[torch.from_numpy(differ)]) > 0.5).numpy()
+        free[rim] = room
         known |= rim
     return torch.from_numpy(free)
+
+
+@dataclass(frozen=True)
+class _Sparse:
+    """What cells EVERY apart are, each looked at when it is first asked for: in the midst of a volume all are alike.
+
+    Attributes:
+        cells: of EVERY of a finer grid's cells along each axis, and a margin around it.
+        bvh: the surfaces.
+        parts: (X, Y, Z) of fronts in sight from their middles; nan where nobody has asked.
+    """
+
+    cells: Grid
+    bvh: SurfelBvh
+    parts: np.ndarray
+
+    @classmethod
+    def over(cls, grid: Grid, bvh: SurfelBvh) -> _Sparse:
+        cell = EVERY * grid.cell
+        shape = tuple(-(-count // EVERY) + 2 for count in grid.shape)
+        return cls(Grid(grid.lower - cell, cell, shape), bvh, np.full(shape, np.nan, dtype=np.float32))
+
+    def agreed(self, places: Tensor) -> tuple[np.ndarray, np.ndarray]:
+        """Whether all eight middles around each of `places` (P, 3) are room, and whether none is; (P,) bool."""
+        cell, lower = self.cells.cell.numpy(), self.cells.lower.numpy()
+        first = np.floor((places.numpy() - lower) / cell - 0.5).astype(np.int64)
+        corners = first[:, None] + np.stack(np.meshgrid(*3 * [[0, 1]], indexing="ij"), axis=-1).reshape(1, 8, 3)
+        asked = np.unique(corners.reshape(-1, 3), axis=0)
+        new = asked[np.isnan(self.parts[tuple(asked.T)])]
+        if len(new):
+            self.parts[tuple(new.T)] = part_of_fronts(self.bvh, torch.from_numpy(lower + (new + 0.5) * cell)).numpy()
+        room = self.parts[tuple(corners.reshape(-1, 3).T)].reshape(-1, 8) > 0.5
+        return room.all(axis=1), ~room.any(axis=1)
 
 
 def part_of_fronts(bvh: SurfelBvh, points: Tensor) -> Tensor:

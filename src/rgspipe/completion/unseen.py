@@ -75,8 +75,8 @@ def with_unseen_surfaces(
         cameras: those that it was made from.
         lamps: (3,) places of lamps that lit it; like cameras they stand in the room, not behind its walls.
         depths: what is known of the depth (H, W) of the cameras' photographs, for each of them.
-        hidden: whether room that things hide is looked for, and closed. Without, planes go on alone, which takes
-            little of the time.
+        hidden: whether surfaces of room that things hide are added where no plane goes on. Without, planes go on
+            alone, which takes little of the time.
     """
     if not cameras or len(surfels) <= NEIGHBOURS or openness(_tree(surfels), surfels) > MOST_OPEN:
         return surfels
@@ -110,11 +110,9 @@ def _unseen(
     coarse = Grid.over(lower, upper, spacing)
     guessed = continued(planes, centers.numpy(), coarse, space, spacing)
     guessed = guessed.chosen(_is_within(bvh, guessed, spacing))
-    if not hidden:
-        return guessed
     # What lies before an open front is no part of the room, and needs no cells.
     known = torch.cat([centers, torch.from_numpy(guessed.places)])
-    grid = Grid.over(known.amin(dim=0), known.amax(dim=0), edge)
+    grid = Grid.over(known.amin(dim=0), known.amax(dim=0), edge if hidden else spacing)
     cell = float(grid.cell.mean())
     seen = space.cells(grid, MARGIN * cell)
     free = seen
@@ -126,6 +124,8 @@ def _unseen(
         if bounds.all():
             break
         guessed = guessed.chosen(bounds)
+    if not hidden:
+        return guessed
     places, normals = _boundary(grid, free.numpy(), seen.numpy())
     bare = tree.query(places)[0] > BARE * max(spacing, CELLS_PER_SPACING * cell)
     rest = Continued(places[bare], normals[bare])
