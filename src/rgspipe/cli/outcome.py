@@ -13,8 +13,8 @@ from rgspipe.datasets.advice_file import ADVICE
 from rgspipe.datasets.covariance_file import read_covariances
 from rgspipe.datasets.json_file import read_json
 from rgspipe.datasets.light_file import read_lights
+from rgspipe.evaluation.classes import ALL, class_order
 from rgspipe.evaluation.plots import LABELS
-from rgspipe.evaluation.tables import ALL, class_order
 from rgspipe.fitting.findings import FitStatus
 from rgspipe.fitting.result_text import ending, light_line
 from rgspipe.fitting.words import MEANINGS

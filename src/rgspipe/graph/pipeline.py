@@ -40,6 +40,7 @@ NO_RESULT = (
     "rgspipe.stages.sources",
     "rgspipe.store.artifacts",
     "rgspipe.store.files",
+    "rgspipe.store.manifest",
     "rgspipe.store.status",
     "rgspipe.store.unwritable",
     "rgspipe.store.whole_files",

@@ -26,11 +26,8 @@ from filelock import FileLock, Timeout
 
 from rgspipe.errors import InputError
 from rgspipe.machine.description import PeakMemory, library_versions, machine
-from rgspipe.store.files import LONGEST_NAME, NO_RIGHT, UNWRITABLE, make_folder, point_at, publish, sha256, write_json
-from rgspipe.store.strict_json import parse_json
-
-SCHEMA_VERSION = 1
-MANIFEST = "manifest.json"
+from rgspipe.store.files import NO_RIGHT, UNWRITABLE, make_folder, point_at, publish, sha256, write_json
+from rgspipe.store.manifest import MANIFEST, SCHEMA_VERSION, inventory, read_manifest
 
 #: What links to the newest artifacts are called, or begin with.
 LATEST = "latest"
@@ -147,7 +144,7 @@ class ArtifactStore:
         if not path.exists():
             return None
         if key not in self._known:
-            self._known[key] = Artifact(path, _read_manifest(path, key))
+            self._known[key] = Artifact(path, read_manifest(path, key.stage, key.fingerprint))
         return self._known[key]
 
     def newest(self, scene: str, stage: str) -> Artifact | None:
@@ -231,7 +228,7 @@ class ArtifactStore:
             "created": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
             "libraries": dict(library_versions()),
             "machine": machine(),
-            "files": _inventory(partial),
+            "files": inventory(partial),
         }
         write_json(partial / MANIFEST, manifest)
         publish(partial, path)
@@ -263,49 +260,3 @@ def _remove_scratch(partial: Path) -> None:
             shutil.rmtree(path)
         else:
             path.unlink(missing_ok=True)
-
-
-def _inventory(folder: Path) -> dict[str, dict[str, Any]]:
-    files = sorted(path for path in folder.rglob("*") if path.is_file() and path != folder / MANIFEST)
-    return {
-        path.relative_to(folder).as_posix(): {"sha256": sha256(path), "bytes": path.stat().st_size} for path in files
-    }
-
-
-def _is_whole(manifest: Mapping[str, Any]) -> bool:
-    """Whether a manifest has what is asked of it later."""
-    files, facts, inputs = manifest.get("files"), manifest.get("facts"), manifest.get("inputs", {})
-    if not all(isinstance(part, dict) for part in (files, facts, inputs)) or not all(map(_lies_within, files)):
-        return False
-    if not all(isinstance(prints, list) and all(isinstance(one, str) for one in prints) for prints in inputs.values()):
-        return False
-    kinds = {"bytes": int, "sha256": str}
-    return all(
-        isinstance(entry, dict) and all(isinstance(entry.get(name), kind) for name, kind in kinds.items())
-        for entry in files.values()
-    )
-
-
-def _lies_within(name: str) -> bool:
-    """Whether a name can be that of a file within a folder."""
-    parts = name.split("/")
-    return not {"", ".", ".."} & set(parts) and all(
-        len(part.encode(errors="replace")) <= LONGEST_NAME for part in parts
-    )
-
-
-def _read_manifest(folder: Path, key: Key) -> Mapping[str, Any]:
-    path = folder / MANIFEST
-    remedy = f"Remove the folder {folder} and run again: the stage will make it anew."
-    expected = f"the manifest of {key.stage} {key.fingerprint} (schema {SCHEMA_VERSION})"
-    try:
-        manifest = parse_json(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise InputError(path, expected=expected, found="no file", remedy=remedy) from None
-    except (IsADirectoryError, ValueError) as error:
-        raise InputError(path, expected=expected, found=f"damaged JSON ({error})", remedy=remedy) from None
-    if not isinstance(manifest, dict) or manifest.get("schema") != SCHEMA_VERSION:
-        raise InputError(path, expected=expected, found="another schema", remedy=remedy)
-    if (manifest.get("fingerprint"), manifest.get("stage")) != (key.fingerprint, key.stage) or not _is_whole(manifest):
-        raise InputError(path, expected=expected, found="a manifest that is not its own", remedy=remedy)
-    return manifest

@@ -13,9 +13,10 @@ from pathlib import Path
 
 from filelock import FileLock, Timeout
 
-from rgspipe.store.artifacts import LATEST, MANIFEST, ArtifactStore, Key
+from rgspipe.store.artifacts import LATEST, ArtifactStore, Key
 from rgspipe.store.files import sync
 from rgspipe.store.fingerprints import DIGITS
+from rgspipe.store.manifest import MANIFEST
 from rgspipe.store.unwritable import told_below
 
 #: The stage whose results are removed only where it is named.

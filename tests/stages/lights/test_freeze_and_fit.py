@@ -30,7 +30,8 @@ from rgspipe.scene.lights import LedLight
 from rgspipe.stages.base import StageContext
 from rgspipe.stages.lights import extras, fit_light
 from rgspipe.stages.scene import freeze
-from rgspipe.store.artifacts import MANIFEST, Artifact, ArtifactStore, Key
+from rgspipe.store.artifacts import Artifact, ArtifactStore, Key
+from rgspipe.store.manifest import MANIFEST
 from rgspipe.store.whole_files import RECORD
 
 LIGHTS = {

@@ -6,16 +6,16 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, Any, ClassVar, NoReturn, Protocol, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self
 
 import numpy as np
 import torch
 from torch import Tensor
 
-from rgspipe.errors import InputError
-from rgspipe.scene.arrays import ArrayLike, as_tensor, check_finite
+from rgspipe.scene.arrays import ArrayLike, as_tensor
 from rgspipe.scene.by_value import ByValue
 from rgspipe.scene.lights.coordinates import PLACE, Coordinate
+from rgspipe.scene.lights.shape_number import ShapeNumber
 from rgspipe.scene.shapes import Float, Given
 
 if TYPE_CHECKING:
@@ -40,35 +40,6 @@ class RelativeIntensity:
 
     value: Float[Tensor, " N"]
     by: Mapping[str, Tensor]
-
-
-@dataclass(frozen=True)
-class ShapeNumber:
-    """One number of a light's shape.
-
-    Attributes:
-        name: the light's field.
-        key: its name in light files, and for people.
-        unit: for people: "°" for angles, which fields hold in rad.
-        coordinate: how a fit moves it; None where it does not.
-        largest: what it can be at most, the others as they are.
-        decimals: with which people are told it; None where it is left to files and tables.
-    """
-
-    name: str
-    key: str
-    unit: str = ""
-    coordinate: Coordinate | None = None
-    largest: float = math.inf
-    decimals: int | None = 1
-
-    def shown(self, value: float) -> float:
-        """A value of the field in `unit`."""
-        return math.degrees(value) if self.unit == "°" else value
-
-    def natural(self, value: float) -> float:
-        """A value in `unit` as the field holds it."""
-        return math.radians(value) if self.unit == "°" else value
 
 
 class Reader(Protocol):
@@ -315,46 +286,6 @@ class Light(ByValue, ABC):
             cosine: an expression.
         """
         return None
-
-
-LightRig = tuple[Light, ...]
-
-
-def as_rig(lights: Light | Sequence[Light]) -> LightRig:
-    """A rig of several lights, or of one.
-
-    Raises:
-        InputError: something else.
-    """
-    if isinstance(lights, Light):
-        return (lights,)
-    if not isinstance(lights, Sequence) or isinstance(lights, str):
-        _refuse("lights", "a light or a list of them", lights)
-    for index, light in enumerate(lights):
-        if not isinstance(light, Light):
-            _refuse(f"lights[{index}]", "a light", light)
-    return tuple(lights)
-
-
-def check_numbers(rig: LightRig) -> None:
-    """Refuse lights that are nowhere or aim nowhere.
-
-    Raises:
-        InputError: a number is not finite, or an axis has no length.
-    """
-    remedy = "Where steps moved it there, take shorter ones."
-    for index, light in enumerate(rig):
-        for field in fields(light):
-            if isinstance(value := getattr(light, field.name), Tensor):
-                check_finite(value, f"lights[{index}].{field.name}", remedy)
-        if light.axis is not None and not bool(light.axis.any()):
-            where = f"lights[{index}].direction"
-            raise InputError(where, expected="a direction", found="(0, 0, 0)", remedy="Say where the light aims.")
-
-
-def _refuse(where: str, expected: str, found: object) -> NoReturn:
-    remedy = "Pass one, such as PointLight([0, 0, 0.3], 1.0), or the lights of a fit: result.lights."
-    raise InputError(where, expected=expected, found=type(found).__name__, remedy=remedy)
 
 
 def _colour(value: ArrayLike) -> Tensor:

@@ -13,10 +13,12 @@ from torch import Tensor
 from torch.autograd.functional import jacobian
 
 from rgspipe.scene.lights.axial import AxialLight
-from rgspipe.scene.lights.coordinates import Coordinate, Turn
-from rgspipe.scene.lights.light import Light, Reader, RelativeIntensity, ShapeNumber
+from rgspipe.scene.lights.coordinates import Coordinate
+from rgspipe.scene.lights.light import Light, Reader, RelativeIntensity
 from rgspipe.scene.lights.panel import sides
 from rgspipe.scene.lights.photometry import Photometry
+from rgspipe.scene.lights.shape_coordinates import Turn
+from rgspipe.scene.lights.shape_number import ShapeNumber
 from rgspipe.scene.shapes import Float
 
 #: Turns that a search tries, where a light is not round, of each period.

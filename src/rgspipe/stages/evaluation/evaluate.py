@@ -17,8 +17,11 @@ from rgspipe.datasets.gs3 import load_target
 from rgspipe.datasets.landscape_file import read_landscape
 from rgspipe.datasets.light_file import read_lights
 from rgspipe.datasets.location import dataset_root
-from rgspipe.evaluation import convergence, metrics, plots, tables
+from rgspipe.evaluation import convergence, metrics, plots
 from rgspipe.evaluation.landscape_plot import landscape_figure
+from rgspipe.evaluation.rig_errors import nearest_position
+from rgspipe.evaluation.summary import summary_table
+from rgspipe.evaluation.tables import exemplars, target_table
 from rgspipe.scene import Camera, LightRig, PointLight
 from rgspipe.stages.base import Stage, StageContext
 from rgspipe.stages.sources import target_stage
@@ -47,8 +50,8 @@ def run(context: StageContext) -> None:
     size = math.nan if truth.bounds is None else metrics.longest_side(truth.bounds)
 
     covariances = {name: _covariances(fit, name) for name in estimates}
-    targets = tables.target_table(results, estimates, truth.rigs, size, config.evaluate.success, covariances)
-    summary = tables.summary_table(targets, config.seed)
+    targets = target_table(results, estimates, truth.rigs, size, config.evaluate.success, covariances)
+    summary = summary_table(targets, config.seed)
     write_text(context.folder / "metrics.csv", targets.to_csv(index=False))
     write_text(context.folder / "summary.csv", summary.to_csv(index=False))
     write_text(context.folder / "convergence.csv", _curves(fit, targets, truth.rigs, size).to_csv(index=False))
@@ -111,7 +114,7 @@ def _copy_pictures(fit: Artifact, targets: pd.DataFrame, folder: Path) -> list[d
     """Copy the fit pictures of each class's median and worst target, so that a report needs no fit folder."""
     rows = targets.set_index("target")
     pictures = []
-    for occlusion, chosen in tables.exemplars(targets).items():
+    for occlusion, chosen in exemplars(targets).items():
         for kind, target in chosen.items():
             source = f"{target}/fit.png"
             if source not in fit.manifest["files"]:
@@ -128,13 +131,13 @@ def _draw_landscapes(
 ) -> list[dict[str, Any]]:
     """Draw the loss around the lights of each class's median and worst target, where the fit has worked it out."""
     pictures = []
-    for occlusion, chosen in tables.exemplars(targets).items():
+    for occlusion, chosen in exemplars(targets).items():
         for kind, target in chosen.items():
             source = f"{target}/landscape.npz"
             if source not in fit.manifest["files"]:
                 continue
             landscape, rig = read_landscape(fit.file(source)), truths.get(target, ())
-            truth = tables.nearest_position(landscape.trajectory[-1], rig)
+            truth = nearest_position(landscape.trajectory[-1], rig)
             name = f"pictures/{occlusion}_{kind}_landscape.png"
             write_bytes(folder / name, plots.png_of(landscape_figure(landscape, truth)))
             unmeasured = {"position_error": None, "psnr": None}

@@ -10,9 +10,9 @@ import pandas as pd
 from rgspipe.datasets.light_file import read_lights
 from rgspipe.datasets.location import open_dataset
 from rgspipe.datasets.views import Dataset
+from rgspipe.evaluation.classes import class_order
 from rgspipe.evaluation.light_plot import CameraMark
 from rgspipe.evaluation.plots import png_of
-from rgspipe.evaluation.tables import class_order
 from rgspipe.pages.gallery import Gallery, make_gallery
 from rgspipe.pages.plan_figure import plan_figure
 from rgspipe.scene import Camera, LightRig, Surfels

@@ -12,8 +12,9 @@ from rgspipe.machine.resources import resource_folder
 from rgspipe.pages.overview import SceneEntry, render_overview
 from rgspipe.stages.base import Stage, StageContext
 from rgspipe.stages.report.report import HELD_OUT, REPORT, SUMMARY, VIEW
-from rgspipe.store.artifacts import MANIFEST, Artifact, ArtifactStore
+from rgspipe.store.artifacts import Artifact, ArtifactStore
 from rgspipe.store.files import write_text
+from rgspipe.store.manifest import MANIFEST
 
 PAGE = "overview.html"
 

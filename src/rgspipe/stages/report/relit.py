@@ -11,7 +11,8 @@ from rgspipe.datasets.light_file import read_lights
 from rgspipe.errors import InputError
 from rgspipe.pages.gallery import light_words
 from rgspipe.pages.relit import KINDS, Relighting
-from rgspipe.store.artifacts import MANIFEST, Artifact, ArtifactStore, Key
+from rgspipe.store.artifacts import Artifact, ArtifactStore, Key
+from rgspipe.store.manifest import MANIFEST
 
 #: The stage, and the files of its artifacts that are shown: the first of the pictures that is there.
 STAGE_NAME, PICTURES = "relight", ("comparison.png", "sheet.png", "strip.png")

@@ -13,15 +13,16 @@ from rgspipe.config import RgspipeConfig
 from rgspipe.datasets.light_file import read_lights
 from rgspipe.datasets.location import open_dataset
 from rgspipe.errors import InputError
+from rgspipe.evaluation.classes import class_of
 from rgspipe.evaluation.plots import png_of
-from rgspipe.evaluation.tables import class_of
 from rgspipe.pages.gallery import Shot, light_words, picture, spread
 from rgspipe.pages.html import bare_percent, decimals, label, percent
 from rgspipe.pages.section import Section
 from rgspipe.pages.targets_figure import targets_figure
 from rgspipe.scene import LightRig, Surfels
 from rgspipe.stages.report.studies import newest_studies, study_rows
-from rgspipe.store.artifacts import MANIFEST, Artifact, ArtifactStore, Key
+from rgspipe.store.artifacts import Artifact, ArtifactStore, Key
+from rgspipe.store.manifest import MANIFEST
 
 #: Generated targets that are shown of each kind.
 SHOWN = 4

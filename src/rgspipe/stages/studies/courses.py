@@ -16,10 +16,10 @@ from rgspipe.datasets.light_file import read_lights
 from rgspipe.datasets.location import dataset_root
 from rgspipe.datasets.read_files import files_read
 from rgspipe.datasets.views import View
+from rgspipe.evaluation.classes import class_of
 from rgspipe.evaluation.markdown import markdown_table
 from rgspipe.evaluation.metrics import longest_side
 from rgspipe.evaluation.plots import png_of
-from rgspipe.evaluation.tables import class_of
 from rgspipe.fitting import FitViews
 from rgspipe.progress import progress_bar
 from rgspipe.scene import LightRig
