@@ -113,7 +113,7 @@ def _read_light(fields: dict, path: str | Path, where: str) -> Light:
 
 @dataclass(frozen=True)
 class _Fields:
-    """The fields of one light; see `rgspipe.scene.lights.light.Reader`."""
+    """The fields of one light; see `rgspipe.scene.lights.reader.Reader`."""
 
     fields: dict
     place: str

@@ -78,7 +78,10 @@ def test_a_measured_luminaire_is_read_and_counts_among_what_a_fit_was_made_from(
     assert spec.shape_free and [one.table.name for one in spec.shape.variants()] == ["a.ies", "b.ies"]
     assert table_files(config) == [tmp_path]
     both = {"light.file": str(tmp_path / "a.ies"), "light.catalogue": str(tmp_path)}
-    for changes, message in ((both, "null with light.file"), (both | {"light.type": "led"}, "null, but for profiles")):
+    for changes, message in (
+        (both, "null with light.file"),
+        (both | {"light.type": "led"}, "null, but for light=profile"),
+    ):
         with pytest.raises(InputError, match=message):
             light_spec(with_changes(config, changes))
     with pytest.raises(InputError, match="no such file"):

@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 
 from rgspipe.scene.lights.axial import AxialLight
-from rgspipe.scene.lights.light import Reader
+from rgspipe.scene.lights.reader import Reader
 from rgspipe.scene.lights.shape_coordinates import Ratio
 from rgspipe.scene.lights.shape_number import ShapeNumber
 

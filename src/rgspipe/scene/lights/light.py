@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 import torch
@@ -15,11 +15,13 @@ from torch import Tensor
 from rgspipe.scene.arrays import ArrayLike, as_tensor
 from rgspipe.scene.by_value import ByValue
 from rgspipe.scene.lights.coordinates import PLACE, Coordinate
+from rgspipe.scene.lights.reader import Reader
 from rgspipe.scene.lights.shape_number import ShapeNumber
 from rgspipe.scene.shapes import Float, Given
 
 if TYPE_CHECKING:
     from rgspipe.scene.lights.nodes import Nodes
+    from rgspipe.scene.lights.photometry import Photometry
 
 #: What tables call the components of an axis.
 AXIS_COLUMNS = ("ax", "ay", "az")
@@ -42,28 +44,6 @@ class RelativeIntensity:
     by: Mapping[str, Tensor]
 
 
-class Reader(Protocol):
-    """A light's fields in a file; what is missing or impossible is refused by name."""
-
-    def vector(self, key: str) -> Tensor:
-        """(3,) float64."""
-        ...
-
-    def direction(self, key: str) -> Tensor:
-        """(3,) float64 of unit length."""
-        ...
-
-    def number(self, key: str) -> float: ...
-
-    def text(self, key: str) -> str: ...
-
-    def numbers(self, key: str) -> Tensor:
-        """(K,) float64, a list of any length but 0."""
-        ...
-
-    def choice(self, key: str, names: Sequence[str]) -> str: ...
-
-
 @dataclass(frozen=True)
 class Light(ByValue, ABC):
     """A source of light. Lists and numpy arrays are taken for its tensors; lights of the same numbers are equal.
@@ -81,6 +61,9 @@ class Light(ByValue, ABC):
 
     #: Whether it is infinitely far away: its position says nothing, and its light does not fall with the distance.
     distant: ClassVar[bool] = False
+
+    #: Whether a table of intensities makes its shape, as that of a measured luminaire.
+    tabulated: ClassVar[bool] = False
 
     #: Of its intensity.
     unit: ClassVar[str] = "W/sr"
@@ -238,6 +221,10 @@ class Light(ByValue, ABC):
     def variants(self) -> tuple[Self, ...]:
         """Lights of this kind whose shapes differ enough for a search to try each."""
         return (self,)
+
+    def with_tables(self, table: Photometry, *others: Photometry) -> Self:
+        """The light, if it is `tabulated`, of a measured luminaire, or of one of several."""
+        raise TypeError(f"no table makes the shape of a {self.kind}")
 
     def to(self, *args: torch.dtype | torch.device | str) -> Self:
         """A copy with every tensor moved by `Tensor.to`."""

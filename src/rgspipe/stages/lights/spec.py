@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 from rgspipe.config import RgspipeConfig
@@ -11,7 +10,7 @@ from rgspipe.datasets.photometric_file import read_catalogue, read_photometry
 from rgspipe.errors import InputError
 from rgspipe.fitting import LightSpec
 from rgspipe.fitting.spec import shaped_kind
-from rgspipe.scene.lights import KINDS, ProfileLight
+from rgspipe.scene.lights import KINDS, Light
 from rgspipe.stages.lights.shape import light_shape
 
 
@@ -26,7 +25,7 @@ def light_spec(config: RgspipeConfig) -> LightSpec:
     light, kind = config.light, shaped_kind(config.light.type)
     section = getattr(light, kind, None)
     shape = None if section is None else light_shape(kind, section, f"light.{kind}")
-    if isinstance(shape, ProfileLight):
+    if shape is not None and shape.tabulated:
         shape = _measured(light, shape)
     _refuse_tables_of_others(light, kind)
     if light.distance is not None and light.mount == "free":
@@ -44,24 +43,22 @@ def table_files(config: RgspipeConfig) -> list[Path]:
     return [Path(path) for path in given]
 
 
-def _measured(light: LightConfig, shape: ProfileLight) -> ProfileLight:
+def _measured(light: LightConfig, shape: Light) -> Light:
     """The luminaire of a file, or those of a catalogue."""
     if light.file is not None and light.catalogue is not None:
         remedy = "Name one of them."
         raise InputError("light.catalogue", expected="null with light.file", found=light.catalogue, remedy=remedy)
     if light.file is not None:
-        return replace(shape, table=read_photometry(light.file))
-    if light.catalogue is None:
-        return shape
-    first, *others = read_catalogue(light.catalogue).values()
-    return replace(shape, table=first, catalogue=tuple(others))
+        return shape.with_tables(read_photometry(light.file))
+    return shape if light.catalogue is None else shape.with_tables(*read_catalogue(light.catalogue).values())
 
 
 def _refuse_tables_of_others(light: LightConfig, kind: str) -> None:
+    tabulated = [name for name, one in KINDS.items() if one.tabulated]
     for name in ("file", "catalogue"):
-        if (found := getattr(light, name)) is not None and kind != ProfileLight.kind:
-            remedy = "Use light=profile, or leave it away."
-            raise InputError(f"light.{name}", expected="null, but for profiles", found=found, remedy=remedy)
+        if (found := getattr(light, name)) is not None and kind not in tabulated:
+            expected, remedy = f"null, but for light={' or '.join(tabulated)}", "Use that, or leave it away."
+            raise InputError(f"light.{name}", expected=expected, found=found, remedy=remedy)
 
 
 def _refuse_unknowns(config: RgspipeConfig) -> None:
