@@ -24,7 +24,7 @@ from rgspipe.cli.compose import compose_config
 from rgspipe.config import RgspipeConfig
 from rgspipe.config.core import plain
 from rgspipe.errors import InputError
-from rgspipe.resources import resource_folder
+from rgspipe.machine.resources import resource_folder
 from rgspipe.stages import NAMES
 
 #: Values for any key.

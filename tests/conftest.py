@@ -13,6 +13,8 @@ from warm_start import WarmStart
 
 __all__ = ["change", "dataset"]
 
+pytest_plugins = ["cpu_times"]
+
 # Two test workers on two cores: more threads than one each only get in each other's way.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 

@@ -11,8 +11,8 @@ from pathlib import Path
 
 from crash_world import Run, User, Way
 from faults import Fault, note_settled
-from rgspipe.artifacts import ArtifactStore
-from rgspipe.retention import artifact_keys
+from rgspipe.store.artifacts import ArtifactStore
+from rgspipe.store.retention import artifact_keys
 
 #: What the notes of a store are called: what its runs have brought to the disk; of the present one how many calls it
 #: has made, at which it was disturbed, and what it said.

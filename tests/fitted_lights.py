@@ -4,7 +4,8 @@ import numpy as np
 import pandas as pd
 import torch
 
-from rgspipe.evaluation import convergence, tables
+from rgspipe.evaluation import convergence
+from rgspipe.evaluation.tables import target_table
 from rgspipe.scene import PointLight
 
 
@@ -23,5 +24,5 @@ def make_fitted(views: int, seed: int = 0, with_truth: bool = True) -> tuple[pd.
             path = true + found + np.geomspace(0.5, 1e-4, 6)[:, None]
             curve = pd.DataFrame(path, columns=list("xyz")).assign(step=range(6), loss=np.geomspace(1.0, 0.01, 6))
             courses.append(convergence.convergence_table(curve, row, truths[name], 1.0))
-    table = tables.target_table(pd.DataFrame(rows), estimates, truths, 1.0)
+    table = target_table(pd.DataFrame(rows), estimates, truths, 1.0)
     return table, pd.concat(courses, ignore_index=True)

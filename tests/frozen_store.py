@@ -11,15 +11,15 @@ import torch
 from PIL import Image
 
 from lit_room import room_cameras, room_surfels
-from rgspipe.artifacts import Artifact, ArtifactStore, Key
 from rgspipe.config import RgspipeConfig, with_changes
 from rgspipe.datasets.exr import write_image
 from rgspipe.datasets.gs3_write import frame_entry, write_transforms
 from rgspipe.datasets.light_file import write_lights
 from rgspipe.datasets.surfel_file import save_surfels
 from rgspipe.scene import LightRig, Surfels, srgb
-from rgspipe.stages import freeze
 from rgspipe.stages.base import StageContext
+from rgspipe.stages.scene import freeze
+from rgspipe.store.artifacts import Artifact, ArtifactStore, Key
 
 RESOLUTION = 32
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 
@@ -11,6 +10,7 @@ import torch
 from lit_room import room_surfels
 from rgspipe.datasets.views import View
 from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.renderer.view_weights import ViewWeights
 from rgspipe.scene import Camera, PointLight, Surfels, look_at
 from rgspipe.training.materials import trace_views
 
@@ -48,18 +48,19 @@ def cameras(count: int, resolution: int) -> list[Camera]:
     return made
 
 
-def photographs(lamps: Sequence[PointLight] = LAMPS, count: int = 14, resolution: int = 64) -> list[View]:
+@cache
+def photographs(lamps: tuple[PointLight, ...] = LAMPS, count: int = 14, resolution: int = 64) -> tuple[View, ...]:
     """Rendered with all bounces and direct light where pixels look."""
     frozen, views = frozen_room(), []
     for index, camera in enumerate(cameras(count, resolution)):
         with torch.no_grad():
             image = frozen.render(camera, lamps)
         views.append(View(f"train/{index}", camera, image, torch.ones(resolution, resolution)))
-    return views
+    return tuple(views)
 
 
 def radiance_under(
-    lamps: Sequence[PointLight], emission: torch.Tensor | None = None, darker: float = 1.0
+    lamps: tuple[PointLight, ...], emission: torch.Tensor | None = None, darker: float = 1.0
 ) -> torch.Tensor:
     """(N, 3) of the painted room's surfels with all bounces, where some surfaces may glow by themselves (N, 3).
 
@@ -80,9 +81,15 @@ def radiance_under(
 def pictures(radiance: torch.Tensor, count: int = 10, resolution: int = 40) -> list[View]:
     """Photographs of surfels that send `radiance` (N, 3) to all sides, or (V, N, 3), to each camera its own."""
     taken = []
-    blank = [View(f"train/{i}", c, torch.zeros(resolution, resolution, 3), torch.ones(resolution, resolution))
-             for i, c in enumerate(cameras(count, resolution))]  # fmt: skip
-    for index, (view, weights) in enumerate(zip(blank, trace_views(painted_room(), blank, 2), strict=True)):
+    for index, (view, weights) in enumerate(_blank(count, resolution)):
         image = weights.operator @ (radiance if radiance.ndim == 2 else radiance[index])
         taken.append(replace(view, image=image.reshape(resolution, resolution, 3)))
     return taken
+
+
+@cache
+def _blank(count: int, resolution: int) -> list[tuple[View, ViewWeights]]:
+    """Black photographs, and what of the surfels their pixels show."""
+    black, whole = torch.zeros(resolution, resolution, 3), torch.ones(resolution, resolution)
+    views = [View(f"train/{i}", camera, black, whole) for i, camera in enumerate(cameras(count, resolution))]
+    return list(zip(views, trace_views(painted_room(), views, 2), strict=True))

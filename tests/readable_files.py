@@ -17,7 +17,6 @@ from luminaire_files import COLUMNS, ies, ldt
 from mesh_files import cuboid_triangles, quarters, textured_square, write_coloured
 from ply_files import gaussian_columns, radiosity_columns, write_ply
 from raycast import ROOM
-from rgspipe.artifacts import ArtifactStore, Key
 from rgspipe.datasets.covariance_file import covariance_fields, read_covariances
 from rgspipe.datasets.exr import read_channels, write_channels, write_image
 from rgspipe.datasets.grade_file import load_grade, save_grade
@@ -39,6 +38,7 @@ from rgspipe.scene import Camera, PointLight, SpotLight
 from rgspipe.scene.gloss import Gloss
 from rgspipe.scene.grade import SceneGrade
 from rgspipe.scene.lights import LedLight, PanelLight, ProfileLight, SphereLight, SunLight
+from rgspipe.store.artifacts import ArtifactStore, Key
 from rooms import closed_box
 from scan_layouts import (
     photographed,

@@ -17,7 +17,7 @@ from power_cut import cut_power
 WRITING = """
 import os, sys
 from pathlib import Path
-from rgspipe.files import append_line, publish, write_text
+from rgspipe.store.files import append_line, publish, write_text
 root = Path(sys.argv[1])
 write_text(root / "new" / "kept.txt", "kept")
 append_line(root / "new" / "record", "kept")

@@ -63,9 +63,12 @@ def test_the_demo_comes_along(site: Path, tmp_path: Path) -> None:
     environment = {**os.environ, "PYTHONPATH": str(site), "OMP_NUM_THREADS": "1"}
     command = [sys.executable, "-c", script]
     with subprocess.Popen(command, cwd=tmp_path, env=environment, stdout=subprocess.PIPE, text=True) as process:
-        url = next((line for line in process.stdout if "Ctrl-C" in line), "").partition(" ")[0]
-        with urllib.request.urlopen(url, timeout=60) as page:
-            assert page.status == 200
-        process.send_signal(signal.SIGINT)
-        assert process.wait(timeout=60) == 0
+        try:
+            url = next((line for line in process.stdout if "Ctrl-C" in line), "").partition(" ")[0]
+            with urllib.request.urlopen(url, timeout=60) as page:
+                assert page.status == 200
+            process.send_signal(signal.SIGINT)
+            assert process.wait(timeout=60) == 0
+        finally:
+            process.kill()  # else a failure would wait for it for ever
     assert not list(tmp_path.iterdir())

@@ -17,9 +17,9 @@ from rgspipe.cli import main
 from rgspipe.config import RgspipeConfig
 from rgspipe.datasets.reading_limits import reading_limits
 from rgspipe.errors import InputError
-from rgspipe.files import replacing, write_text
 from rgspipe.stages.base import Failure, Need, Stage, StageContext
-from rgspipe.whole_files import WholeFiles
+from rgspipe.store.files import replacing, write_text
+from rgspipe.store.whole_files import WholeFiles
 
 PAUSE_VARIABLE = "TOY_PAUSE"
 

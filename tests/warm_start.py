@@ -74,8 +74,8 @@ class Command:
 
 def _serve() -> None:
     """Become each command that is read, a folder and arguments; say its process and, in the end, its status."""
-    from rgspipe.pipeline import NO_RESULT
-    from rgspipe.source_code import SourceCode
+    from rgspipe.graph.pipeline import NO_RESULT
+    from rgspipe.graph.source_code import SourceCode
     from rgspipe.stages import NAMES, load_stage
 
     importlib.import_module("torch._dynamo")  # optimisers import it when they are made

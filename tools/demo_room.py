@@ -12,15 +12,15 @@ from pathlib import Path
 
 import numpy as np
 
-from rgspipe.artifacts import Artifact, ArtifactStore
 from rgspipe.cli import main
 from rgspipe.cli.compose import compose_config
 from rgspipe.datasets.exr import read_channels, write_channels
 from rgspipe.datasets.light_file import read_lights, write_lights
 from rgspipe.demo import ROOM, TARGET
-from rgspipe.pipeline import resolve
+from rgspipe.graph.pipeline import resolve
 from rgspipe.renderer.frozen_file import SURFELS
 from rgspipe.stages import load_stage
+from rgspipe.store.artifacts import Artifact, ArtifactStore
 
 SCENE = ("scene=tutorial", "init.surfels=4000")
 

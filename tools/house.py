@@ -34,7 +34,7 @@ FLOORS = (
     ("relighting", "studies", "benchmark", "pages", "viewer"),
     ("config",),
     ("stages",),
-    ("pipeline", "nodes", "demo", "installation"),
+    ("graph", "demo"),
     ("cluster", "cli"),
     ("__main__",),
 )

@@ -13,7 +13,7 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from rgspipe.threads import settle_threads
+from rgspipe.machine.threads import settle_threads
 
 if TYPE_CHECKING:
     from rgspipe.capture.captured import Captured, capture_scene

@@ -13,7 +13,7 @@ from rgspipe.benchmark.rooms import ROOMS, Room
 from rgspipe.benchmark.scaling import scaling
 from rgspipe.benchmark.settings import Model, Setting, Workshop, sweep
 from rgspipe.benchmark.truth import Truth
-from rgspipe.stages.benchmark import preset_settings
+from rgspipe.stages.benchmark.benchmark import preset_settings
 
 SMALL = Setting(surfels=800, gather_rays=16, patches=60, resolution=16)
 

@@ -18,7 +18,7 @@ from rgspipe.datasets.exr import read_channels, write_channels
 from rgspipe.errors import InputError
 from rgspipe.evaluation.metrics import psnr
 from rgspipe.scene.rectangles import inside_of_box
-from rgspipe.whole_files import RECORD
+from rgspipe.store.whole_files import RECORD
 from tabletop import TABLETOP, lit_tabletop
 
 pytestmark = pytest.mark.skipif(importlib.util.find_spec("bpy") is None, reason="bpy is not installed")

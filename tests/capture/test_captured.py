@@ -16,7 +16,7 @@ from rgspipe.capture.lamp_file import write_lamps
 from rgspipe.capture.options import CaptureOptions
 from rgspipe.capture.words import captured_words
 from rgspipe.datasets.light_file import read_lights
-from rgspipe.evaluation.tables import match_positions
+from rgspipe.evaluation.rig_errors import match_positions
 
 OPTIONS = CaptureOptions(gather_rays=256, supersampling=2, grid=6, most=3)
 

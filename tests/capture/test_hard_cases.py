@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import torch
@@ -21,13 +22,19 @@ def captured(views: list[View]) -> Captured:
     return capture_scene(views, replace(surfels, albedo=torch.full_like(surfels.albedo, 0.5)), OPTIONS)
 
 
+@cache
+def plain() -> Captured:
+    """Of ten photographs under a lamp that none shows."""
+    return captured(pictures(radiance_under(LAMPS[:1])))
+
+
 def near(place: tuple[float, float, float], reach: float) -> torch.Tensor:
     """(N,) bool: surfels around a place."""
     return (painted_room().centers - torch.tensor(place)).norm(dim=1) < reach
 
 
 def test_a_plain_room_has_nothing_odd() -> None:
-    found = captured(pictures(radiance_under(LAMPS[:1])))
+    found = plain()
     assert float((found.lamps[0].position - LAMPS[0].position).norm()) < 0.02
     assert found.answer.over_even > 0.6
     odd = found.oddities
@@ -70,8 +77,7 @@ def test_a_mirror_is_named_with_its_place() -> None:
 
 
 def test_one_photograph_is_said_to_be_one_and_is_less_sure() -> None:
-    sent = radiance_under(LAMPS[:1])
-    found, all_of_them = captured(pictures(sent, 1, 64)), captured(pictures(sent))
+    found, all_of_them = captured(pictures(radiance_under(LAMPS[:1]), 1, 64)), plain()
     assert found.oddities.single == 1.0
     assert "in one photograph only" in captured_words(found)
     spread = [float(one.certainty.spread(one.frozen.size)[0]) for one in (found, all_of_them)]

@@ -21,6 +21,11 @@ def weights() -> tuple[ViewWeights, ...]:
     return trace_views(frozen_room().surfels, photographs(), 2)
 
 
+@cache
+def plain() -> Measured:
+    return measured_radiance(weights(), photographs())
+
+
 def truth() -> np.ndarray:
     with torch.no_grad():
         return frozen_room().radiance_of(LAMPS).double().numpy()
@@ -34,7 +39,7 @@ def error(found: Measured) -> float:
 
 
 def test_it_is_that_of_the_scene() -> None:
-    assert error(measured_radiance(weights(), photographs())) < 0.01  # 0.0055
+    assert error(plain()) < 0.01  # 0.0055
 
 
 def test_exposures_follow_from_what_photographs_share() -> None:
@@ -74,7 +79,7 @@ def test_saturated_pixels_do_not_count() -> None:
     limit = float(torch.stack([view.image for view in photographs()]).quantile(0.9))
     views = [replace(view, image=view.image.clamp(max=limit), saturated_from=limit) for view in photographs()]
     found = measured_radiance(weights(), views)
-    clipped = (truth() > 1.3 * limit).any(axis=1) & (measured_radiance(weights(), photographs()).seen > 2.0)
+    clipped = (truth() > 1.3 * limit).any(axis=1) & (plain().seen > 2.0)
     assert clipped.sum() > 20
     assert np.isinf(found.variance[clipped]).mean() > 0.9
 
@@ -86,7 +91,7 @@ def test_the_variance_is_that_of_the_error() -> None:
         for view in photographs()
     ]
     found = measured_radiance(weights(), views)
-    exact = measured_radiance(weights(), photographs())
+    exact = plain()
     seen = found.seen > 5.0
     off = np.log(found.radiance / exact.radiance).mean(axis=1)[seen]
     # The median square of a normal deviate is 0.455.

@@ -73,7 +73,6 @@ def test_what_shines_with_the_lamps_off_is_taken_away() -> None:
     (found,) = captured(*on, *off)
     error = float((found.lamps[0].position - LAMPS[0].position).norm())
     ratio = float((found.lamps[0].intensity / LAMPS[0].intensity).mean())
-    print("MEASURED off", error, ratio)
     assert error < 0.02 and abs(ratio - 1.0) < 0.06
     assert found.oddities.glowing is None or found.oddities.glowing.share < 0.02
 

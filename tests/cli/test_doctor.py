@@ -12,12 +12,12 @@ from pathlib import Path
 
 import pytest
 
-from rgspipe.artifacts import ArtifactStore, Key
 from rgspipe.cli import doctor as command
 from rgspipe.cli import main
+from rgspipe.cli.installation import Part
 from rgspipe.evaluation import self_check as check
 from rgspipe.evaluation.self_check import Figure
-from rgspipe.installation import Part
+from rgspipe.store.artifacts import ArtifactStore, Key
 
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "doctor.md"
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from rgspipe.status import read_statuses
+from rgspipe.store.status import read_statuses
 
 #: Exit status of what was stopped with Ctrl-C.
 INTERRUPTED = 130

@@ -9,16 +9,17 @@ import torch
 
 from fitted_lights import make_fitted
 from frozen_store import artifact
-from rgspipe.artifacts import Artifact
 from rgspipe.cli.cells import percent
 from rgspipe.cli.columns import columns, without_empty
 from rgspipe.cli.outcome import outcome
 from rgspipe.datasets.light_file import write_lights
-from rgspipe.evaluation.tables import summary_table, target_table
-from rgspipe.files import write_json
+from rgspipe.evaluation.summary import summary_table
+from rgspipe.evaluation.tables import target_table
 from rgspipe.fitting.findings import FitStatus
 from rgspipe.fitting.words import MEANINGS
 from rgspipe.scene import LightRig, PointLight, SpotLight
+from rgspipe.store.artifacts import Artifact
+from rgspipe.store.files import write_json
 
 
 def _vector(*values: float) -> torch.Tensor:

@@ -12,8 +12,8 @@ from filelock import FileLock
 import toys
 from rgspipe.cli import main
 from rgspipe.config import RgspipeConfig, with_changes
-from rgspipe.pipeline import run
-from rgspipe.status import process_start
+from rgspipe.graph.pipeline import run
+from rgspipe.store.status import process_start
 
 
 def harvest(outputs: Path, resolution: int) -> None:

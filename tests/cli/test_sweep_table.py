@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from rgspipe.cli.sweep_table import write_sweep_table
-from rgspipe.status import read_statuses
+from rgspipe.store.status import read_statuses
 
 
 def _job(folder: Path, number: int, state: str, *overrides: str, stage: str = "fit_light") -> tuple[Path, dict]:

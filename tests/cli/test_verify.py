@@ -10,7 +10,7 @@ import pytest
 import toys
 from rgspipe.cli import main
 from rgspipe.config import RgspipeConfig, with_changes
-from rgspipe.pipeline import run
+from rgspipe.graph.pipeline import run
 
 
 @pytest.fixture

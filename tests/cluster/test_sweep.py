@@ -11,7 +11,7 @@ import pytest
 
 from rgspipe.cluster import sweep
 from rgspipe.cluster.queue import JobState
-from rgspipe.status import RunStatus
+from rgspipe.store.status import RunStatus
 
 RUNNING, WAITING, DONE = JobState("RUNNING"), JobState("PENDING", "Priority"), JobState("COMPLETED")
 

@@ -10,7 +10,7 @@ from rgspipe.cli.compose import check_sweep, compose_config, leaves_machine
 from rgspipe.config import RgspipeConfig, get_value, with_changes
 from rgspipe.config.core import build, describe, plain
 from rgspipe.errors import InputError
-from rgspipe.resources import resource_folder
+from rgspipe.machine.resources import resource_folder
 
 CHOICES = sorted(
     (path.parent.name, path.stem) for path in resource_folder("conf").glob("*/*.yaml") if path.parent.name != "scene"

@@ -11,7 +11,7 @@ import pytest
 from rgspipe.datasets.gs3 import load_dataset, load_target
 from rgspipe.datasets.read_files import files_read
 from rgspipe.errors import InputError
-from rgspipe.files import tree_digest
+from rgspipe.store.files import tree_digest
 
 Change = Callable[[str, Callable[[dict], object]], None]
 

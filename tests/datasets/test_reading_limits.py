@@ -18,8 +18,8 @@ from rgspipe.datasets.json_file import read_json
 from rgspipe.datasets.ply_table import read_vertices, write_vertices
 from rgspipe.datasets.reading_limits import ReadingLimits, reading_limits, reading_within
 from rgspipe.datasets.tensor_file import load_tensors, save_tensors
-from rgspipe.files import write_json
-from rgspipe.pipeline import run
+from rgspipe.graph.pipeline import run
+from rgspipe.store.files import write_json
 
 #: What writes a file of a kind, what reads it, and a limit that it is beyond.
 KINDS: dict[str, tuple[Callable[[Path], object], Callable[[Path], object], dict[str, int]]] = {

@@ -14,7 +14,7 @@ from rgspipe.cli.compose import compose_config
 from rgspipe.datasets.gs3 import load_dataset
 from rgspipe.datasets.location import open_dataset
 from rgspipe.errors import InputError
-from rgspipe.pipeline import run
+from rgspipe.graph.pipeline import run
 from rgspipe.scene import look_at
 from rgspipe.stages import load_stage
 

@@ -4,7 +4,9 @@ import math
 
 import pandas as pd
 
-from rgspipe.evaluation import goals, tables
+from rgspipe.evaluation import goals
+from rgspipe.evaluation.classes import ALL
+from rgspipe.evaluation.summary import SUMMARY_COLUMNS
 
 METHOD = "search_lm"
 
@@ -14,11 +16,11 @@ def _summary(**medians: float) -> pd.DataFrame:
     rows = []
     for key, median in medians.items():
         occlusion, views = key.rsplit("_", 1)
-        row = dict.fromkeys(tables.SUMMARY_COLUMNS, math.nan) | {"method": METHOD, "views": int(views)}
+        row = dict.fromkeys(SUMMARY_COLUMNS, math.nan) | {"method": METHOD, "views": int(views)}
         row |= {"occlusion": occlusion, "count": 20, "with_truth": 20, "median_position_error": median}
         row |= {"median_low": median - 0.0002, "median_high": median + 0.0002}
         rows.append(row | {"median_seconds": 1.0, "worst_seconds": 6.0})
-    return pd.DataFrame(rows, columns=list(tables.SUMMARY_COLUMNS))
+    return pd.DataFrame(rows, columns=list(SUMMARY_COLUMNS))
 
 
 def _found(scene: str = "cornell", training: dict | None = None, **medians: float) -> dict[str, bool | None]:
@@ -53,7 +55,7 @@ def test_few_targets_neither_meet_a_goal_nor_miss_it():
 
 
 def test_a_study_of_kinds_of_lights_has_goals_of_its_own():
-    row = {"case": "two lights, 3 views", "method": METHOD, "occlusion": tables.ALL, "with_truth": 40}
+    row = {"case": "two lights, 3 views", "method": METHOD, "occlusion": ALL, "with_truth": 40}
     row |= {"position": 0.0033, "position_low": 0.0024, "position_high": 0.0043}
     other = row | {"case": "two lights, 3 views, true scene", "position_low": 0.9}
     found = goals.goals("void", _summary(), None, METHOD, pd.DataFrame([row, other]))

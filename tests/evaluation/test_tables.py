@@ -7,7 +7,9 @@ import pandas as pd
 import pytest
 import torch
 
-from rgspipe.evaluation import convergence, tables
+from rgspipe.evaluation import convergence
+from rgspipe.evaluation.summary import SUMMARY_COLUMNS, summary_table
+from rgspipe.evaluation.tables import TARGET_COLUMNS, VARIANCES, exemplars, target_table
 from rgspipe.scene import PointLight, SpotLight
 
 
@@ -25,61 +27,31 @@ def _results(names: list[tuple[str, str]], **more: object) -> pd.DataFrame:
     return pd.DataFrame(rows).assign(seconds=2.0, psnr=30.0, result="converged", reason="small step", **more)
 
 
-def test_lights_are_matched_by_the_smallest_sum_of_distances():
-    truth = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [5.0, 0.0, 0.0]]
-    estimate = [[5.1, 0.0, 0.0], [0.9, 0.0, 0.0], [0.6, 0.0, 0.0]]
-    # Greedily, truth 0 would be left with what is far away.
-    assert tables.match_positions(estimate, truth) == ((2, 0), (1, 1), (0, 2))
-    assert tables.match_positions(estimate[:1], truth) == ((0, 2),)
-    assert tables.match_positions([[math.nan] * 3, [0.0, 0.0, 0.0]], [[0.1, 0.0, 0.0]]) == ((1, 0),)
-
-
-def test_rig_error_is_that_of_its_worst_light():
-    truth = (_light(0, 0, 0), _light(1, 0, 0, 2.0))
-    estimate = (_light(1, 0.3, 0, 2.2), _light(0, 0.1, 0))
-    errors = tables.rig_errors(estimate, truth, 2.0)
-    assert errors.position == pytest.approx(0.15)
-    assert errors.intensity == pytest.approx(0.05, abs=1e-6)  # float32 intensities: measured 3e-8 off
-    assert errors.pairs == ((1, 0), (0, 1))
-    assert tables.rig_errors((), truth, 2.0).position == math.inf
-
-
-def test_spots_are_judged_by_their_axes_and_cones_too():
-    truth = (_spot(0.0, (0, 0, 1), 0.5), _light(1, 0, 0))
-    found = (_light(1, 0, 0), _spot(0.1, (0, 1, 1), 0.4))
-    errors = tables.rig_errors(found, truth, 1.0)
-    assert errors.axis == pytest.approx(45.0) and errors.shape == pytest.approx(math.degrees(0.1), abs=1e-6)
-    # A point light in the place of a spot has no axis; among point lights there is none to judge.
-    assert tables.rig_errors((_light(0, 0, 0), _light(1, 0, 0)), truth, 1.0).axis == math.inf
-    assert math.isnan(tables.rig_errors((_light(1, 0, 0),), (_light(1, 0, 0),), 1.0).axis)
-    assert tables.rig_errors((), truth, 1.0).shape == math.inf
-
-
 def test_the_number_of_lights_is_targets():
     truths = {name: (_light(0, 0, 0),) for name in "ab"}
     estimates = {"a": (_light(0, 0, 0),), "b": (_light(0, 0, 0), _light(1, 1, 1))}
-    table = tables.target_table(_results([("a", "visible"), ("b", "visible")]), estimates, truths, 1.0)
+    table = target_table(_results([("a", "visible"), ("b", "visible")]), estimates, truths, 1.0)
     assert table["count_right"].tolist() == [True, False]
-    assert tables.summary_table(table, seed=0)["count_rate"].tolist() == [0.5, 0.5]
+    assert summary_table(table, seed=0)["count_rate"].tolist() == [0.5, 0.5]
 
 
 def test_the_types_of_lights_are_judged_where_their_number_is_right():
     rig = (_spot(0.0, (0, 0, 1), 0.5), _light(1, 0, 0))
     found = {"a": rig[::-1], "b": (_light(0, 0, 0), _spot(1.0, (0, 0, 1), 0.5)), "c": rig[:1], "d": rig}
     results = _results([(name, "visible") for name in found])
-    table = tables.target_table(results, found, dict.fromkeys("abc", rig), 1.0)
+    table = target_table(results, found, dict.fromkeys("abc", rig), 1.0)
     # "b" has a spot and a point, but each in the place of the other; of "d" the truth is not known.
     assert table["types_right"].tolist()[:3] == [True, False, False] and pd.isna(table["types_right"][3])
     assert table["count_right"].tolist()[:3] == [True, True, False]
-    assert tables.summary_table(table, seed=0)["types_rate"].tolist() == pytest.approx([1 / 3, 1 / 3])
+    assert summary_table(table, seed=0)["types_rate"].tolist() == pytest.approx([1 / 3, 1 / 3])
 
 
 def test_target_table_holds_errors_verdicts_and_both_positions():
     results = _results([("a", "visible"), ("b", "occluded"), ("c", "occluded"), ("d", "visible")])
     estimates = {"a": (_light(0.5, 0.5, 0.51, 1.1),), "b": (_light(0.5, 0.5, 0.9),), "d": (_light(0, 0, 0),)}
     truths = {name: (_light(0.5, 0.5, 0.5),) for name in "abc"}
-    table = tables.target_table(results, estimates, truths, 2.0).set_index("target")
-    assert list(table.reset_index().columns) == list(tables.TARGET_COLUMNS)
+    table = target_table(results, estimates, truths, 2.0).set_index("target")
+    assert list(table.reset_index().columns) == list(TARGET_COLUMNS)
     assert table.loc["a", "position_error"] == pytest.approx(0.005, abs=1e-7)
     assert table.loc["a", "intensity_error"] == pytest.approx(0.1, abs=1e-6)
     assert bool(table.loc["a", "success"]) and not bool(table.loc["b", "success"])
@@ -91,12 +63,12 @@ def test_target_table_holds_errors_verdicts_and_both_positions():
 
 def test_a_light_too_many_is_no_success():
     truths = {"a": (_light(0, 0, 0),)}
-    table = tables.target_table(_results([("a", "visible")]), {"a": (_light(0, 0, 0), _light(1, 1, 1))}, truths, 1.0)
+    table = target_table(_results([("a", "visible")]), {"a": (_light(0, 0, 0), _light(1, 1, 1))}, truths, 1.0)
     assert table["position_error"].iloc[0] == 0.0 and not bool(table["success"].iloc[0])
 
 
 def test_an_unknown_scene_size_leaves_intensity_errors():
-    table = tables.target_table(
+    table = target_table(
         _results([("a", "visible")]), {"a": (_light(0, 0, 0, 2.0),)}, {"a": (_light(1, 0, 0),)}, math.nan
     )
     assert math.isnan(table["position_error"].iloc[0]) and table["intensity_error"].iloc[0] == pytest.approx(1.0)
@@ -104,7 +76,7 @@ def test_an_unknown_scene_size_leaves_intensity_errors():
 
 def test_results_without_a_needed_column_are_refused():
     with pytest.raises(ValueError, match="seconds"):
-        tables.target_table(_results([("a", "visible")]).drop(columns="seconds"), {}, {}, 1.0)
+        target_table(_results([("a", "visible")]).drop(columns="seconds"), {}, {}, 1.0)
 
 
 def _targets() -> pd.DataFrame:
@@ -114,12 +86,12 @@ def _targets() -> pd.DataFrame:
     estimates = {
         name: (_light(error, 0, 0),) for (name, _), error in zip(names, errors, strict=True) if math.isfinite(error)
     }
-    return tables.target_table(_results(names), estimates, truths, 1.0)
+    return target_table(_results(names), estimates, truths, 1.0)
 
 
 def test_summary_has_medians_worst_and_rates_per_class_and_over_all():
-    summary = tables.summary_table(_targets(), seed=3)
-    assert list(summary.columns) == list(tables.SUMMARY_COLUMNS)
+    summary = summary_table(_targets(), seed=3)
+    assert list(summary.columns) == list(SUMMARY_COLUMNS)
     assert summary["occlusion"].tolist() == ["visible", "occluded", "all"]
     rows = summary.set_index("occlusion")
     assert rows.loc["visible", "median_position_error"] == pytest.approx(0.003, abs=1e-8)
@@ -130,25 +102,25 @@ def test_summary_has_medians_worst_and_rates_per_class_and_over_all():
     assert rows.loc["occluded", "median_position_error"] == math.inf  # one of two fits failed
     assert rows.loc["all", ["count", "with_truth"]].tolist() == [8, 7]
     assert rows.loc["all", "median_seconds"] == 2.0
-    pd.testing.assert_frame_equal(summary, tables.summary_table(_targets(), seed=3))
+    pd.testing.assert_frame_equal(summary, summary_table(_targets(), seed=3))
 
 
 def test_summary_without_truth_or_without_targets():
-    unknown = tables.summary_table(tables.target_table(_results([("a", "unknown")]), {}, {}, 1.0), seed=0)
+    unknown = summary_table(target_table(_results([("a", "unknown")]), {}, {}, 1.0), seed=0)
     assert unknown["with_truth"].tolist() == [0, 0] and unknown["success_rate"].isna().all()
     assert unknown["median_psnr"].tolist() == [30.0, 30.0]
-    empty = tables.target_table(_results([("a", "visible")]).iloc[:0], {}, {}, 1.0)
-    assert tables.summary_table(empty, seed=0).empty and tables.exemplars(empty) == {}
+    empty = target_table(_results([("a", "visible")]).iloc[:0], {}, {}, 1.0)
+    assert summary_table(empty, seed=0).empty and exemplars(empty) == {}
 
 
 def test_exemplars_are_the_median_and_the_worst_of_each_class():
-    chosen = tables.exemplars(_targets())
+    chosen = exemplars(_targets())
     assert chosen == {"visible": {"median": "v2", "worst": "v4"}, "occluded": {"median": "o0", "worst": "o1"}}
 
 
 def test_exemplars_without_truth_go_by_psnr():
     results = _results([("a", "unknown"), ("b", "unknown"), ("c", "unknown")]).assign(psnr=[20.0, 40.0, 30.0])
-    chosen = tables.exemplars(tables.target_table(results, {}, {}, 1.0))
+    chosen = exemplars(target_table(results, {}, {}, 1.0))
     assert chosen == {"unknown": {"median": "c", "worst": "a"}}
 
 
@@ -172,16 +144,11 @@ def test_regions_are_judged_where_truth_and_covariance_are_known():
     estimates = {name: (_light(0.02, 0, 0),) for name, _ in names} | {"many": (_light(0, 0, 0), _light(1, 1, 1))}
     spread = np.diag([1e-4, 4e-4, 4e-4, 1.0])
     covariances = {"in": [spread], "out": [0.1 * spread], "many": [spread, spread]}
-    table = tables.target_table(_results(names), estimates, truths, 2.0, covariances=covariances).set_index("target")
+    table = target_table(_results(names), estimates, truths, 2.0, covariances=covariances).set_index("target")
     assert table.loc[["in", "out"], "inside_95"].tolist() == [True, False]
     assert table.loc[["silent", "many"], "inside_95"].isna().all()
     assert table.loc["in", "position_sd"] == pytest.approx(0.5 * math.sqrt(9e-4))
-    assert table.loc["in", list(tables.VARIANCES)].tolist() == pytest.approx([1e-4, 0, 0, 4e-4, 0, 4e-4])
-    assert math.isnan(table.loc["silent", "position_sd"]) and table.loc["silent", list(tables.VARIANCES)].isna().all()
-    summary = tables.summary_table(table.reset_index(), seed=0, resamples=0).set_index("occlusion")
+    assert table.loc["in", list(VARIANCES)].tolist() == pytest.approx([1e-4, 0, 0, 4e-4, 0, 4e-4])
+    assert math.isnan(table.loc["silent", "position_sd"]) and table.loc["silent", list(VARIANCES)].isna().all()
+    summary = summary_table(table.reset_index(), seed=0, resamples=0).set_index("occlusion")
     assert summary.loc["visible", "inside_95"] == pytest.approx(0.5)
-
-
-def test_the_nearest_of_several_lights_is_found():
-    assert tables.nearest_position([1.0, 0.9, 1.0], (_light(0, 0, 0), _light(1, 1, 1))).tolist() == [1.0, 1.0, 1.0]
-    assert tables.nearest_position([1.0, 0.9, 1.0], ()) is None

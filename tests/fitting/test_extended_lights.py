@@ -11,7 +11,7 @@ import torch
 from lit_room import HIDDEN, VISIBLE
 from rgspipe.datasets.light_file import read_lights
 from rgspipe.errors import InputError
-from rgspipe.evaluation.tables import rig_errors
+from rgspipe.evaluation.rig_errors import rig_errors
 from rgspipe.fitting import FitResult, FitStatus, FitViews, LightSpec, PaperAdam
 from rgspipe.scene import Light
 from rgspipe.scene.lights import PanelLight, PointLight, SphereLight

@@ -10,7 +10,7 @@ import torch
 
 from lit_room import HIDDEN, VISIBLE
 from rgspipe.datasets.light_file import read_lights
-from rgspipe.evaluation.tables import rig_errors
+from rgspipe.evaluation.rig_errors import rig_errors
 from rgspipe.fitting import FitResult, FitStatus, FitViews, LightSpec, PaperAdam, fit_lights
 from rgspipe.fitting.tracking.frame import FrameStatus
 from rgspipe.fitting.tracking.track import track_lights

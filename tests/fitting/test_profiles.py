@@ -10,7 +10,7 @@ import torch
 
 from lit_room import VISIBLE
 from luminaire_files import COLUMNS
-from rgspipe.evaluation.tables import rig_errors
+from rgspipe.evaluation.rig_errors import rig_errors
 from rgspipe.fitting import FitStatus, FitViews, LightSpec, PaperAdam, Search
 from rgspipe.fitting.options import AimedOptions
 from rgspipe.scene.lights import Photometry, ProfileLight

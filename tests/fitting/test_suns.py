@@ -11,7 +11,7 @@ import torch
 from lit_room import VISIBLE, frozen_cube
 from open_room import frozen_open_room, open_room_cameras
 from rgspipe.datasets.light_file import read_lights
-from rgspipe.evaluation.tables import rig_errors
+from rgspipe.evaluation.rig_errors import rig_errors
 from rgspipe.fitting import FitResult, FitStatus, FitViews, LightSpec, PaperAdam
 from rgspipe.fitting.findings import NoOpening
 from rgspipe.scene import Camera, PointLight

@@ -7,10 +7,11 @@ import torch
 
 from fitted_lights import make_fitted
 from rgspipe.datasets.views import Target, View
-from rgspipe.evaluation import images, tables
+from rgspipe.evaluation import images
 from rgspipe.evaluation.error_split import KINDS
 from rgspipe.evaluation.held_out import QUALITY
 from rgspipe.evaluation.light_plot import CameraMark
+from rgspipe.evaluation.summary import summary_table
 from rgspipe.pages import report
 from rgspipe.pages.gallery import make_gallery
 from rgspipe.pages.provenance import stage_record
@@ -47,7 +48,7 @@ def make_contents() -> report.ReportContents:
     manifest = {"fingerprint": "0123abcd", "seconds": 3.25, "peak_memory_mib": 640, "libraries": {"torch": "2.13.0"}}
     return report.ReportContents(
         scene="cornell",
-        summary=tables.summary_table(targets, seed=0, resamples=200),
+        summary=summary_table(targets, seed=0, resamples=200),
         targets=targets,
         curves=pd.concat([part[1] for part in parts], ignore_index=True),
         fits=[report.Picture("search_lm, 1 view", "visible_000, median of its class", png)],
@@ -61,7 +62,7 @@ def make_contents() -> report.ReportContents:
         split=split,
         gallery=make_gallery(views, 2, targets_seen, {"visible_000": (LIGHT,)}, {"visible_000": 0.0123}, png),
         study=study,
-        true_summary=tables.summary_table(make_fitted(1, seed=1)[0], seed=0, resamples=0),
+        true_summary=summary_table(make_fitted(1, seed=1)[0], seed=0, resamples=0),
         configuration='{"scene": {"name": "<cornell>"}}',
         stages=[stage_record("freeze", manifest)],
         notes=["One note."],

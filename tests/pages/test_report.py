@@ -7,15 +7,17 @@ import numpy as np
 import pandas as pd
 
 from html_page import Page
-from rgspipe.evaluation import images, tables
+from rgspipe.evaluation import images
+from rgspipe.evaluation.summary import summary_table
+from rgspipe.evaluation.tables import target_table
 from rgspipe.pages import html as shared
 from rgspipe.pages import report
 from rgspipe.pages.provenance import stage_record
 
 
 def _empty(fitted) -> report.ReportContents:
-    table = tables.target_table(fitted(1)[0].iloc[:0], {}, {}, 1.0)
-    return report.ReportContents("void", tables.summary_table(table, 0), table, fitted(1)[1].iloc[:0])
+    table = target_table(fitted(1)[0].iloc[:0], {}, {}, 1.0)
+    return report.ReportContents("void", summary_table(table, 0), table, fitted(1)[1].iloc[:0])
 
 
 def test_a_report_refers_to_nothing_outside_itself(full_report):
@@ -69,7 +71,7 @@ def test_right_numbers_and_types_are_shown_where_they_were_sought(full_contents)
     targets = full_contents.targets.copy()
     targets.loc[0, ["types_right", "success"]] = [False, True]
     targets.loc[1, ["count_right", "types_right", "success", "lights_found"]] = [False, False, False, 2]
-    told = dataclasses.replace(full_contents, targets=targets, summary=tables.summary_table(targets, 0, 0))
+    told = dataclasses.replace(full_contents, targets=targets, summary=summary_table(targets, 0, 0))
     page = Page(report.render_report(told)).text
     assert "yes, wrong type" in page and "no: 2 found, 1 there" in page and "Right" not in page
     page = Page(report.render_report(dataclasses.replace(told, number_sought=True, types_sought=True))).text
@@ -96,7 +98,7 @@ def test_an_empty_report_says_what_is_missing(fitted):
 
 def test_unknown_truth_is_stated_and_shown_as_a_dash(fitted):
     targets, curves = fitted(1, with_truth=False)
-    summary = tables.summary_table(targets, 0)
+    summary = summary_table(targets, 0)
     page = Page(
         report.render_report(dataclasses.replace(_empty(fitted), summary=summary, targets=targets, curves=curves))
     )
@@ -107,7 +109,7 @@ def test_unknown_truth_is_stated_and_shown_as_a_dash(fitted):
 def test_failed_fits_are_shown_as_infinitely_far_away(fitted):
     targets, curves = fitted(1)
     targets.loc[0, ["position_error", "intensity_error"]] = math.inf
-    summary = tables.summary_table(targets, 0)
+    summary = summary_table(targets, 0)
     page = Page(
         report.render_report(dataclasses.replace(_empty(fitted), summary=summary, targets=targets, curves=curves))
     )

@@ -19,7 +19,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rgspipe.status import RunStatus
+from rgspipe.store.status import RunStatus
 from slurm.cluster import missing_programs, slurm_cluster
 from slurm.room import LIGHTS, write_room
 

@@ -12,8 +12,8 @@ import pytest
 import rgspipe
 from rgspipe.config import RgspipeConfig, get_value, with_changes
 from rgspipe.errors import InputError
-from rgspipe.pipeline import NO_RESULT
-from rgspipe.source_code import SourceCode
+from rgspipe.graph.pipeline import NO_RESULT
+from rgspipe.graph.source_code import SourceCode
 from rgspipe.stages import NAMES, load_stage, stage_summary
 
 PACKAGE = Path(rgspipe.__file__).parent
@@ -21,12 +21,12 @@ PACKAGE = Path(rgspipe.__file__).parent
 #: Some modules that stages reach by ways of their own: within functions, by another process, through another stage.
 REACHED = {
     "generate_dataset": ("blender.child", "blender.passes", "blender.models.hotdog", "datasets.exr"),
-    "render_olat": ("blender.pool.plan", "blender.cameras", "stages.generate_dataset"),
+    "render_olat": ("blender.pool.plan", "blender.cameras", "stages.images.generate_dataset"),
     "render_truth": ("blender.room", "benchmark.rooms"),
     "benchmark": ("benchmark.mitsuba_worker", "blender.room", "renderer.kernels.shadow"),
     "train_surfels": ("training.trainer", "scene.camera", "optim.ssim"),
     "fit_light": ("fitting.fit", "renderer.kernels.composite", "renderer.frozen_file"),
-    "track": ("stages.fit_light", "fitting.tracking.track"),
+    "track": ("stages.lights.fit_light", "fitting.tracking.track"),
     "report": ("pages", "pages.html"),
 }
 
@@ -61,11 +61,12 @@ def test_a_stage_is_complete(name: str) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_change_of_any_code_behind_a_result_rebuilds_it(name: str, source_code: SourceCode) -> None:
-    assert load_stage(name).run.__module__ == f"rgspipe.stages.{name}"
-    found = {module.removeprefix("rgspipe.") for module in source_code.fingerprints(f"rgspipe.stages.{name}")}
+    module = load_stage(name).run.__module__
+    assert module.removeprefix("rgspipe.stages.").split(".")[1:] == [name]
+    found = {module.removeprefix("rgspipe.") for module in source_code.fingerprints(module)}
     assert found.issuperset(REACHED.get(name, ()))
     assert found.isdisjoint(NOT_REACHED.get(name, ()))
-    assert found.isdisjoint({"config", "errors", "pipeline"})
+    assert found.isdisjoint({"config", "errors", "graph.pipeline"})
 
 
 def test_packages_do_nothing_on_the_way_to_their_modules() -> None:

@@ -14,7 +14,7 @@ import torch
 
 from painted_room import LIGHT, painted_box, painted_views
 from rgspipe.errors import InputError
-from rgspipe.machine import peak_memory_now_mib, reset_peak_memory
+from rgspipe.machine.description import peak_memory_now_mib, reset_peak_memory
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.training.materials import fit_materials
 from rgspipe.training.operator_store import MIB, OperatorStore, PagedOperator

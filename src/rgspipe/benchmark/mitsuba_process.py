@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 import rgspipe
-from rgspipe.files import write_json
+from rgspipe.store.files import write_json
 
 #: LLVM versions below crash on processors with AVX-512.
 OLDEST_LLVM = 16

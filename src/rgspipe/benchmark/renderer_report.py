@@ -26,8 +26,8 @@ from rgspipe.benchmark.settings import Setting, Workshop, sweep
 from rgspipe.benchmark.truth import Truth
 from rgspipe.evaluation.plots import png_of, svg_bytes
 from rgspipe.evaluation.timing import load_average
-from rgspipe.files import write_bytes, write_json, write_text
-from rgspipe.whole_files import WholeFiles
+from rgspipe.store.files import write_bytes, write_json, write_text
+from rgspipe.store.whole_files import WholeFiles
 
 #: Surfels of the comparison of gather operators, whose reference has thousands of rays a surfel.
 GATHER_SURFELS, GATHER_RAYS = 2_500, (32, 128, 512)

@@ -11,7 +11,7 @@ import torch
 
 from rgspipe.benchmark.rooms import Room
 from rgspipe.evaluation.timing import measure
-from rgspipe.machine import peak_memory_now_mib, reset_peak_memory
+from rgspipe.machine.description import peak_memory_now_mib, reset_peak_memory
 from rgspipe.progress import progress_bar
 from rgspipe.renderer.clusters import cluster_patches
 from rgspipe.renderer.direct import unit_irradiance

@@ -14,7 +14,7 @@ from torch import Tensor
 from rgspipe.errors import InputError
 from rgspipe.evaluation import metrics
 from rgspipe.evaluation.markdown import markdown_table
-from rgspipe.evaluation.tables import rig_errors
+from rgspipe.evaluation.rig_errors import rig_errors
 from rgspipe.fitting import FitStatus, FitViews, Search
 from rgspipe.options import Options, settings
 from rgspipe.progress import progress_bar

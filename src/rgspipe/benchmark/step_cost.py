@@ -11,7 +11,7 @@ from torch import Tensor
 from rgspipe.benchmark.settings import Model
 from rgspipe.evaluation.timing import median_ms
 from rgspipe.fitting.model.emitter import Emitter
-from rgspipe.machine import peak_memory_now_mib, reset_peak_memory
+from rgspipe.machine.description import peak_memory_now_mib, reset_peak_memory
 from rgspipe.scene import PointLight
 
 

@@ -18,7 +18,7 @@ from rgspipe.datasets.exr import read_array
 from rgspipe.datasets.json_file import read_json, required
 from rgspipe.errors import InputError
 from rgspipe.evaluation.metrics import peak, psnr
-from rgspipe.files import write_json
+from rgspipe.store.files import write_json
 
 KINDS: tuple[Kind, ...] = ("direct", "global")
 

@@ -15,7 +15,7 @@ from typing import Generic, Protocol, TypeVar
 
 from rgspipe.blender.process import MESSAGE_PREFIX
 from rgspipe.errors import InputError
-from rgspipe.whole_files import WholeFiles
+from rgspipe.store.whole_files import WholeFiles
 
 #: Linux: prctl option by which a process is killed when its parent dies.
 PR_SET_PDEATHSIG = 1

@@ -14,9 +14,9 @@ import rgspipe
 from rgspipe.blender.interpreter import Blender
 from rgspipe.datasets.json_file import read_json
 from rgspipe.errors import InputError
-from rgspipe.files import write_json
 from rgspipe.progress import progress_bar
-from rgspipe.whole_files import WholeFiles
+from rgspipe.store.files import write_json
+from rgspipe.store.whole_files import WholeFiles
 
 #: Prefix of the lines on the child's stdout that are messages; the rest is Blender's own talk.
 MESSAGE_PREFIX = "@rgspipe "

@@ -55,17 +55,26 @@ class Received:
         columns = [self.spread(self.seen[:, channel : channel + 1], channel) for channel in range(3)]
         return np.concatenate(columns, axis=1)
 
+    @cached_property
+    def _among_unseen(self) -> sp.csr_matrix:
+        """(U, U) F_uu."""
+        return self.gather[self.unseen][:, self.unseen]
+
+    @cached_property
+    def _from_unseen(self) -> sp.csr_matrix:
+        """(N, U) F_·u."""
+        return self.gather[:, self.unseen]
+
     def spread(self, arriving: Numbers, channel: int | None = None) -> Numbers:
         """(N, K) T e of `arriving` (N, K), with what returns from the unseen; grey if `channel` is None."""
         if not len(self.unseen):
             return arriving
         albedo = self.albedo.mean(axis=1) if channel is None else self.albedo[:, channel]
-        within = self.gather[self.unseen][:, self.unseen]
         first = arriving[self.unseen]
         sent = albedo[:, None] * first
         for _ in range(BOUNCES):
-            sent = albedo[:, None] * (first + within @ sent)
-        return arriving + self.gather[:, self.unseen] @ sent
+            sent = albedo[:, None] * (first + self._among_unseen @ sent)
+        return arriving + self._from_unseen @ sent
 
     def spread_colours(self, arriving: Numbers) -> Numbers:
         """(N, K, 3) `spread` in each channel."""

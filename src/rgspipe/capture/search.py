@@ -18,6 +18,7 @@ from rgspipe.capture.doubts import model_variance, trust
 from rgspipe.capture.lamps import DARK, LampProblem, Lamps
 from rgspipe.capture.radiance import Numbers
 from rgspipe.fitting.options import BarOptions
+from rgspipe.fitting.search.apart import CandidatePlaces
 from rgspipe.training.albedo import ALBEDO_RANGE
 
 #: Candidates that are refined, and least distance of two of them in parts of the scene's size.
@@ -86,25 +87,15 @@ def ranked(problem: LampProblem, candidates: Candidates, known: Lamps | None) ->
 def with_one_more(problem: LampProblem, candidates: Candidates, known: Lamps | None) -> Lamps:
     """The best lamps found that are one more than `known`."""
     costs, logs = ranked(problem, candidates, known)
+    ranking, standing = [(int(index),) for index in np.argsort(costs)], CandidatePlaces(candidates.places, None, 0.0)
     found = []
-    for index in _best_apart(costs, candidates.places, APART * problem.size):
+    for (index,) in standing.first_apart(ranking, TRIES, APART * problem.size):
         place, log = candidates.places[index][None], np.full((1, 3), logs[index])
         places = place if known is None else np.concatenate([known.places, place])
         gains = log if known is None else np.concatenate([known.logs, log])
         lamps = problem.refined(problem.lamps(places, gains), FIRST)
         found.append((problem.cost(lamps), lamps))
     return problem.refined(min(found, key=lambda pair: pair[0])[1], LAST)
-
-
-def _best_apart(costs: Numbers, places: Numbers, apart: float) -> list[int]:
-    """The TRIES candidates of least cost that are apart from each other."""
-    chosen: list[int] = []
-    for index in np.argsort(costs):
-        if all(np.linalg.norm(places[index] - places[other]) > apart for other in chosen):
-            chosen.append(int(index))
-        if len(chosen) == TRIES:
-            break
-    return chosen
 
 
 def settled(problem: LampProblem, lamps: Lamps) -> Tried:

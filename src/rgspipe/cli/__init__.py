@@ -10,7 +10,7 @@ from rgspipe.cli.completion import LINE, completed, is_question
 from rgspipe.cli.help import help_text, overview, version_text
 from rgspipe.cli.messages import EXIT_INPUT, EXIT_INTERRUPTED, EXIT_UNREAD, show_input_error
 from rgspipe.errors import InputError
-from rgspipe.pipeline import StageLoader
+from rgspipe.graph.pipeline import StageLoader
 from rgspipe.stages import load_stage
 
 __all__ = ["main"]

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from rgspipe.resources import resource_folder
+from rgspipe.machine.resources import resource_folder
 from rgspipe.stages import NAMES
-from rgspipe.status import STATES
+from rgspipe.store.status import STATES
 
 #: How a shell asks, and where it says for which line.
 FLAGS, LINE = ("-sc", "--shell-completion"), "COMP_LINE"

@@ -21,11 +21,11 @@ from omegaconf.errors import OmegaConfBaseException
 from rgspipe.config import RgspipeConfig
 from rgspipe.config.core import build, plain, unknown_key
 from rgspipe.errors import InputError
-from rgspipe.files import LONGEST_NAME
-from rgspipe.pipeline import Usual
-from rgspipe.resources import resource_folder
+from rgspipe.graph.pipeline import Usual
+from rgspipe.graph.variants import plain_overrides
+from rgspipe.machine.resources import resource_folder
 from rgspipe.stages import NAMES, load_stage
-from rgspipe.variants import plain_overrides
+from rgspipe.store.files import LONGEST_NAME
 
 CONFIG_NAME = "config"
 HYDRA_VERSION_BASE = "1.3"

@@ -13,11 +13,11 @@ from pathlib import Path
 from rgspipe import __version__
 from rgspipe.blender.interpreter import find_blender
 from rgspipe.blender.options import OWN_BLENDER, BlenderOptions
+from rgspipe.cli.installation import EXTRAS, Part, needed_parts, optional_parts, slurm
 from rgspipe.cli.messages import EXIT_FAILED
 from rgspipe.datasets.input_file import input_folder
 from rgspipe.errors import InputError
-from rgspipe.installation import EXTRAS, Part, needed_parts, optional_parts, slurm
-from rgspipe.machine import available_memory_gib, machine
+from rgspipe.machine.description import available_memory_gib, machine
 
 #: Columns of what is printed.
 WIDTH = 100
@@ -162,7 +162,7 @@ def _disk(outputs: Path) -> list[str]:
 
 
 def _results(outputs: Path) -> str:
-    from rgspipe.retention import Choice, removable, stored
+    from rgspipe.store.retention import Choice, removable, stored
 
     try:
         everything = stored(outputs)

@@ -13,9 +13,9 @@ from rgspipe import __version__
 from rgspipe.config import RgspipeConfig
 from rgspipe.config.core import describe
 from rgspipe.errors import InputError
-from rgspipe.machine import library_versions
+from rgspipe.machine.description import library_versions
+from rgspipe.machine.resources import resource_folder
 from rgspipe.options import shown
-from rgspipe.resources import resource_folder
 from rgspipe.stages import NAMES, stage_summary, stage_text
 
 #: Columns of what is printed.

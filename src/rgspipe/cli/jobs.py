@@ -14,7 +14,6 @@ from hydra.core.hydra_config import HydraConfig
 from hydra.types import RunMode
 from omegaconf import DictConfig
 
-from rgspipe.artifacts import Artifact
 from rgspipe.cli.compose import (
     CONFIG_NAME,
     HYDRA_VERSION_BASE,
@@ -31,10 +30,11 @@ from rgspipe.cli.compose import (
 from rgspipe.cli.messages import EXIT_FAILED, EXIT_INPUT, EXIT_INTERRUPTED, show_failure, show_input_error
 from rgspipe.cli.sweep_table import write_sweep_table
 from rgspipe.errors import InputError
-from rgspipe.files import NO_RIGHT
-from rgspipe.pipeline import StageLoader, Usual, run
+from rgspipe.graph.pipeline import StageLoader, Usual, run
 from rgspipe.stages import load_stage
-from rgspipe.status import RunStatus, read_status, read_statuses, record_stopped
+from rgspipe.store.artifacts import Artifact
+from rgspipe.store.files import NO_RIGHT
+from rgspipe.store.status import RunStatus, read_status, read_statuses, record_stopped
 
 #: What a run writes about itself: its configuration and how it ended.
 RUN_BYTES = 2**16

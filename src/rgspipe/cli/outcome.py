@@ -7,18 +7,18 @@ from collections.abc import Callable, Mapping, Sequence
 
 import pandas as pd
 
-from rgspipe.artifacts import Artifact
 from rgspipe.cli.cells import decibels, degrees, percent, seconds, time, words
 from rgspipe.cli.columns import columns, without_empty
 from rgspipe.datasets.advice_file import ADVICE
 from rgspipe.datasets.covariance_file import read_covariances
 from rgspipe.datasets.json_file import read_json
 from rgspipe.datasets.light_file import read_lights
+from rgspipe.evaluation.classes import ALL, class_order
 from rgspipe.evaluation.plots import LABELS
-from rgspipe.evaluation.tables import ALL, class_order
 from rgspipe.fitting.findings import FitStatus
 from rgspipe.fitting.result_text import ending, light_line
 from rgspipe.fitting.words import MEANINGS
+from rgspipe.store.artifacts import Artifact
 
 #: Exposures that differ by less from 1 are those that were known.
 KNOWN_EXPOSURE = 1e-9

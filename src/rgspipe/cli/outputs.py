@@ -12,8 +12,8 @@ from rgspipe.cli.columns import columns, without_empty
 from rgspipe.cli.runs import given_outputs
 from rgspipe.datasets.input_file import input_folder
 from rgspipe.errors import InputError
-from rgspipe.retention import Choice, Stored, in_the_making, removable, remove, stored
-from rgspipe.status import read_statuses
+from rgspipe.store.retention import Choice, Stored, in_the_making, removable, remove, stored
+from rgspipe.store.status import read_statuses
 
 #: Seconds of what ages are written in.
 UNITS = {"h": 3600, "d": 86400, "w": 7 * 86400}

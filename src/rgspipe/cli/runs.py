@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from rgspipe.errors import InputError
-from rgspipe.status import read_statuses
+from rgspipe.store.status import read_statuses
 
 #: Characters of a reason in the list.
 REASON = 120

@@ -19,8 +19,8 @@ from rgspipe.cli.jobs import new_run_folder, quoted
 from rgspipe.cli.messages import EXIT_FAILED
 from rgspipe.datasets.input_file import input_file
 from rgspipe.errors import InputError
-from rgspipe.resources import resource_folder
-from rgspipe.status import read_statuses
+from rgspipe.machine.resources import resource_folder
+from rgspipe.store.status import read_statuses
 
 #: What each step of a pipeline is run with.
 RGSPIPE = (sys.executable, "-m", "rgspipe")

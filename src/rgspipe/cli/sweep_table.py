@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from rgspipe.files import write_text
+from rgspipe.store.files import write_text
 
 TABLE = "table.csv"
 

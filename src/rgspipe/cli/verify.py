@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from rgspipe.artifacts import Artifact, ArtifactStore
 from rgspipe.cli.messages import EXIT_INPUT, show_input_error
 from rgspipe.cli.runs import given_outputs
 from rgspipe.datasets.input_file import input_folder
 from rgspipe.errors import InputError
 from rgspipe.progress import progress_bar
-from rgspipe.retention import artifact_keys
+from rgspipe.store.artifacts import Artifact, ArtifactStore
+from rgspipe.store.retention import artifact_keys
 
 
 def verify(arguments: Sequence[str]) -> int:

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from rgspipe.artifacts import Artifact, ArtifactStore
 from rgspipe.cli.compose import compose_config
 from rgspipe.cli.jobs import run_jobs
 from rgspipe.cli.view import serve
 from rgspipe.config import RgspipeConfig
 from rgspipe.errors import InputError
-from rgspipe.pipeline import StageLoader, resolve
+from rgspipe.graph.pipeline import StageLoader, resolve
+from rgspipe.store.artifacts import Artifact, ArtifactStore
 
 #: How the command is written.
 STAGE = "stage=view"
@@ -57,7 +57,7 @@ class _Made:
 def _serve(made: _Made) -> int:
     from rgspipe.datasets.info import INFO
     from rgspipe.renderer.frozen import FrozenScene
-    from rgspipe.stages.export import world_of
+    from rgspipe.stages.scene.export import world_of
     from rgspipe.viewer.serve import view
 
     config, freeze = made.config("freeze"), made.find("freeze")
@@ -83,7 +83,7 @@ def _cases(made: _Made, config: RgspipeConfig) -> list:
     from rgspipe.datasets.light_file import read_lights
     from rgspipe.datasets.location import open_dataset
     from rgspipe.stages.sources import target_stage
-    from rgspipe.stages.true_lights import truth_file
+    from rgspipe.stages.targets.true_lights import truth_file
     from rgspipe.viewer.material import Case, found_in
 
     source = next((made.find(stage) for stage in target_stage(config)), None)

@@ -15,7 +15,7 @@ from rgspipe.cluster.job import SweepJob
 from rgspipe.cluster.options import SlurmOptions
 from rgspipe.cluster.queue import cancel
 from rgspipe.errors import InputError
-from rgspipe.files import make_folder, point_at
+from rgspipe.store.files import make_folder, point_at
 
 #: Folder of a sweep with Slurm's script and the jobs' output.
 LOGS = "slurm"

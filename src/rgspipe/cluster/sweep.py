@@ -17,7 +17,7 @@ from rgspipe.cluster.job import SweepJob, SweepTask
 from rgspipe.cluster.options import SlurmOptions
 from rgspipe.cluster.queue import FORGOTTEN, JobState, cancel, job_states, require_slurm
 from rgspipe.cluster.submit import LOG_LINK, remove_parcels, submit
-from rgspipe.status import STATUS, read_status, record_killed
+from rgspipe.store.status import STATUS, read_status, record_killed
 
 __all__ = ["SweepTask", "run_sweep"]
 

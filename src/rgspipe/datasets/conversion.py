@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rgspipe.files import write_json
+from rgspipe.store.files import write_json
 
 VERSION = 1
 

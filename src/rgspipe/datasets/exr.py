@@ -10,7 +10,7 @@ import OpenEXR
 from rgspipe.datasets.input_file import check_pixel_count, input_file
 from rgspipe.datasets.reading_limits import reading_limits
 from rgspipe.errors import InputError
-from rgspipe.files import replacing
+from rgspipe.store.files import replacing
 
 RENDER_AGAIN = "Export or render this image again."
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from rgspipe.datasets.json_file import is_number, read_json
 from rgspipe.errors import InputError
-from rgspipe.files import write_json
 from rgspipe.scene.grade import SceneGrade
+from rgspipe.store.files import write_json
 
 GRADE = "grade.json"
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rgspipe.files import write_json
 from rgspipe.scene import Camera, PointLight
 from rgspipe.scene.lights import WATTS_PER_INTENSITY
+from rgspipe.store.files import write_json
 
 INFO_VERSION = 1
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from rgspipe.datasets.reading_limits import reading_limits
 from rgspipe.errors import InputError
-from rgspipe.files import LONGEST_NAME
+from rgspipe.store.files import LONGEST_NAME
 
 #: What helps where a file is as large as it is meant to be.
 RAISE = "If it is meant to be so large: limits.* (in Python rg.reading_within)."

@@ -8,7 +8,7 @@ from pathlib import Path
 from rgspipe.datasets.input_file import input_file
 from rgspipe.datasets.reading_limits import reading_limits
 from rgspipe.errors import InputError
-from rgspipe.strict_json import parse_json
+from rgspipe.store.strict_json import parse_json
 
 #: Characters of a value that errors show.
 LONGEST_SHOWN = 120

@@ -12,8 +12,8 @@ from torch import Tensor
 from rgspipe.datasets.json_file import is_number, numbers, read_json, required, shown
 from rgspipe.datasets.limits import FARTHEST, STRONGEST
 from rgspipe.errors import InputError
-from rgspipe.files import write_json
 from rgspipe.scene.lights import KINDS, Light, LightRig
+from rgspipe.store.files import write_json
 
 VERSION = 1
 
@@ -113,7 +113,7 @@ def _read_light(fields: dict, path: str | Path, where: str) -> Light:
 
 @dataclass(frozen=True)
 class _Fields:
-    """The fields of one light; see `rgspipe.scene.lights.light.Reader`."""
+    """The fields of one light; see `rgspipe.scene.lights.reader.Reader`."""
 
     fields: dict
     place: str

@@ -9,7 +9,7 @@ from rgspipe.datasets.gs3 import load_dataset, load_target
 from rgspipe.datasets.json_file import read_json, required
 from rgspipe.datasets.views import Dataset, View
 from rgspipe.errors import InputError
-from rgspipe.files import write_json
+from rgspipe.store.files import write_json
 
 POINTER = "dataset.json"
 

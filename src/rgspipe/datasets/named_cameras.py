@@ -12,8 +12,8 @@ from torch import Tensor
 from rgspipe.datasets.json_file import numbers, read_json, required, shown
 from rgspipe.datasets.rigid_pose import rigid_pose
 from rgspipe.errors import InputError
-from rgspipe.files import write_json
 from rgspipe.scene import Camera
+from rgspipe.store.files import write_json
 
 VERSION = 1
 

@@ -27,7 +27,7 @@ from rgspipe.scene import srgb
 from rgspipe.scene.gloss import Gloss
 from rgspipe.scene.spacing import inferred_coverage
 from rgspipe.scene.surfels import NO_CLIP, Coverage, Surfels, quaternion_to_axes
-from rgspipe.strict_json import parse_json
+from rgspipe.store.strict_json import parse_json
 
 #: The comment that marks our files, followed by JSON.
 MARK = "rgspipe-surfels"

@@ -12,7 +12,7 @@ from plyfile import PlyData, PlyElement, PlyListProperty, PlyParseError
 from rgspipe.datasets.input_file import input_file
 from rgspipe.datasets.ply_header import check_header
 from rgspipe.errors import InputError
-from rgspipe.files import replacing
+from rgspipe.store.files import replacing
 
 ELEMENT = "vertex"
 

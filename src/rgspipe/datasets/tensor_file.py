@@ -14,7 +14,7 @@ from rgspipe.datasets.input_file import input_file
 from rgspipe.datasets.limits import LARGEST
 from rgspipe.datasets.reading_limits import reading_limits
 from rgspipe.errors import InputError
-from rgspipe.files import replacing
+from rgspipe.store.files import replacing
 
 MAKE_AGAIN = "Remove it and run the stage that makes it again."
 

@@ -10,7 +10,7 @@ import torch
 from scipy.stats import chi2
 
 from rgspipe.datasets.views import View
-from rgspipe.evaluation.tables import match_positions
+from rgspipe.evaluation.rig_errors import match_positions
 from rgspipe.scene.lights import LightRig, PointLight
 
 #: Part of truths that a region is to hold.

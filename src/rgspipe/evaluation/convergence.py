@@ -11,7 +11,7 @@ import numpy.typing as npt
 import pandas as pd
 
 from rgspipe.evaluation.arrays import to_array
-from rgspipe.evaluation.tables import match_positions
+from rgspipe.evaluation.rig_errors import match_positions
 from rgspipe.scene import LightRig
 
 COLUMNS = ("target", "occlusion", "method", "views", "step", "seconds", "loss", "position_error")

@@ -17,12 +17,12 @@ from rgspipe.datasets.json_file import read_json
 from rgspipe.datasets.light_file import read_lights
 from rgspipe.evaluation.images import Bytes, line_of_text, progress_strip, save_png, stack
 from rgspipe.evaluation.metrics import psnr
-from rgspipe.files import publish, write_bytes, write_text
 from rgspipe.fitting.fit import FitViews
 from rgspipe.fitting.in_sight.lamp import Mask, left_out
 from rgspipe.fitting.result import FitResult, Step
 from rgspipe.fitting.words import PYTHON, Spoken
 from rgspipe.scene import LightRig
+from rgspipe.store.files import publish, write_bytes, write_text
 
 #: What the light file says beside the lights, and results.csv repeats.
 FIELDS = ("loss", "iterations", "evaluations", "lights_tried", "seconds", "psnr", "result", "reason")

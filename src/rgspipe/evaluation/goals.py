@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import pandas as pd
 
-from rgspipe.evaluation.tables import ALL
+from rgspipe.evaluation.classes import ALL
 
 #: Held-out views of two trainings differ by about so much, dB; a time may be longer by this factor.
 PSNR_NOISE, SLOWER = 0.1, 1.05

@@ -13,8 +13,8 @@ from PIL import Image, ImageDraw
 
 from rgspipe.errors import InputError
 from rgspipe.evaluation.arrays import ArrayLike, to_array
-from rgspipe.files import write_bytes
 from rgspipe.scene import srgb
+from rgspipe.store.files import write_bytes
 
 Bytes = npt.NDArray[np.uint8]
 

@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from rgspipe.evaluation import metrics
-from rgspipe.evaluation.tables import class_order
+from rgspipe.evaluation.classes import class_order
 
 #: Colours that stay apart with colour blindness and in grey; markers say the same once more.
 COLOURS = {"visible": "#0072B2", "out_of_frame": "#E69F00", "occluded": "#6A1B4D", "around_corner": "#2DB58A"}

@@ -14,8 +14,8 @@ from matplotlib.lines import Line2D
 
 from rgspipe.evaluation import metrics, plots
 from rgspipe.evaluation.arrays import ArrayLike, to_array
+from rgspipe.evaluation.rig_errors import match_positions
 from rgspipe.evaluation.scene_drawing import PANELS, TRUTH, draw_surfaces, frame_panel, window
-from rgspipe.evaluation.tables import match_positions
 from rgspipe.fitting.tracking.frame import TrackedFrame
 from rgspipe.scene import Light, LightRig
 

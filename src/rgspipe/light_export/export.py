@@ -11,7 +11,6 @@ from torch import Tensor
 
 from rgspipe.datasets.light_file import write_lights
 from rgspipe.errors import InputError
-from rgspipe.files import write_text
 from rgspipe.light_export.blend import blend
 from rgspipe.light_export.gltf import gltf
 from rgspipe.light_export.ies import ies
@@ -21,6 +20,7 @@ from rgspipe.light_export.usd import usda
 from rgspipe.light_export.world import World, table
 from rgspipe.scene import Light, LightRig
 from rgspipe.scene.lights import ProfileLight, as_rig
+from rgspipe.store.files import write_text
 
 Format = Literal["blend", "usda", "gltf", "mitsuba", "three", "ies", "json"]
 FORMATS: tuple[Format, ...] = get_args(Format)

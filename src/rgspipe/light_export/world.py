@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import torch
 
 from rgspipe.scene import Light, LightRig
-from rgspipe.scene.lights.coordinates import Length
+from rgspipe.scene.lights.shape_coordinates import Length
 
 #: Luminous flux of a watt [lm/W], and the weights of R, G and B in it (Rec. 709): the convention of glTF and Blender.
 LUMENS_PER_WATT, LUMINANCE = 683.0, (0.2126, 0.7152, 0.0722)

@@ -7,7 +7,7 @@ from functools import lru_cache
 import torch
 from torch import Tensor
 
-from rgspipe.sums import average
+from rgspipe.machine.sums import average
 
 #: Gaussian window: width in pixels and standard deviation.
 WINDOW, SIGMA = 11, 1.5

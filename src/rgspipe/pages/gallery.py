@@ -9,7 +9,7 @@ import numpy as np
 
 from rgspipe.datasets.views import Target, View
 from rgspipe.evaluation import images
-from rgspipe.evaluation.tables import class_order
+from rgspipe.evaluation.classes import class_order
 from rgspipe.pages.html import label
 from rgspipe.scene import LightRig
 

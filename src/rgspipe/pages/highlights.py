@@ -9,7 +9,7 @@ from typing import Any
 import pandas as pd
 
 from rgspipe.evaluation import goals
-from rgspipe.evaluation.tables import ALL
+from rgspipe.evaluation.classes import ALL
 from rgspipe.pages.html import decimals, percent
 
 #: Columns of a quality table that are highlights.

@@ -12,7 +12,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from rgspipe.evaluation import goals, images, plots
-from rgspipe.evaluation.tables import ALL
+from rgspipe.evaluation.classes import ALL
 
 #: Pixels of the page that an inch of a figure takes at most, so that letters have one size in all of them.
 INCH = 106

@@ -9,7 +9,7 @@ from typing import Any
 import pandas as pd
 
 from rgspipe.evaluation import goals
-from rgspipe.evaluation.tables import ALL
+from rgspipe.evaluation.classes import ALL
 from rgspipe.pages.highlights import NAMES, highlights
 from rgspipe.pages.html import picture_address, render
 from rgspipe.pages.quality import compared_lights

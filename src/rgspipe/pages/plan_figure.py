@@ -13,8 +13,8 @@ from matplotlib.lines import Line2D
 
 from rgspipe.evaluation import plots
 from rgspipe.evaluation.arrays import ArrayLike, to_array
+from rgspipe.evaluation.classes import class_order
 from rgspipe.evaluation.light_plot import CameraMark
-from rgspipe.evaluation.tables import class_order
 
 SEEN, GUESSED = "#c4c9d0", "#e07a52"
 TRAIN_CAMERA, TRAIN_LIGHT, TARGET_CAMERA = "#8a9099", "#c79a00", "#222222"

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from rgspipe.fingerprints import fingerprint
 from rgspipe.pages.html import MISSING
+from rgspipe.store.fingerprints import fingerprint
 
 
 @dataclass(frozen=True)

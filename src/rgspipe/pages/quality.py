@@ -6,8 +6,8 @@ from typing import Any
 
 import pandas as pd
 
+from rgspipe.evaluation.classes import ALL, class_order
 from rgspipe.evaluation.held_out import SURFELS
-from rgspipe.evaluation.tables import ALL, class_order
 
 #: Rows of the quality table: column, words, factor, unit and digits.
 _ROWS = (

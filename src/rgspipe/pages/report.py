@@ -9,10 +9,10 @@ from typing import Any
 import pandas as pd
 
 from rgspipe.evaluation import goals, metrics, plots
+from rgspipe.evaluation.classes import ALL
 from rgspipe.evaluation.grading import graded_words
 from rgspipe.evaluation.light_plot import CameraMark, light_figure
 from rgspipe.evaluation.quality_plots import split_figure
-from rgspipe.evaluation.tables import ALL
 from rgspipe.pages.gallery import Gallery, Shot
 from rgspipe.pages.glossary import GLOSSARY
 from rgspipe.pages.highlights import highlights, tiles

@@ -7,6 +7,7 @@ import math
 import torch
 from torch import Tensor
 
+from rgspipe.machine.sums import average
 from rgspipe.progress import progress_bar
 from rgspipe.renderer.gather import LIFT, RAYS_AT_ONCE
 from rgspipe.renderer.kernels.composite import composite
@@ -16,7 +17,6 @@ from rgspipe.renderer.rays import SURFACE_SHARE
 from rgspipe.renderer.transport import PatchTransport
 from rgspipe.renderer.view_weights import nearest_hit
 from rgspipe.scene.surfels import Surfels
-from rgspipe.sums import average
 
 #: Surfels that look around, and rays of each: the share is known to a few percent, in milliseconds.
 LOOKING, RAYS = 256, 32

@@ -1,4 +1,4 @@
-"""The stages, in the order of the way from images to lights: one module each, with a `STAGE`, imported when it runs."""
+"""The stages: one module each, with a `STAGE`, in a room with what helps it alone; imported when it runs."""
 
 from __future__ import annotations
 
@@ -10,31 +10,30 @@ from pathlib import Path
 from rgspipe.errors import InputError
 from rgspipe.stages.base import Need, Stage, StageContext
 
-__all__ = ["NAMES", "Need", "Stage", "StageContext", "load_stage", "stage_summary"]
+__all__ = ["NAMES", "ROOMS", "Need", "Stage", "StageContext", "load_stage", "stage_summary"]
 
-NAMES = (
-    "import_scan",
-    "generate_dataset",
-    "init_depth",
-    "train_surfels",
-    "capture_surfels",
-    "true_surfels",
-    "import_ply",
-    "freeze",
-    "export",
-    "render_olat",
-    "generate_targets",
-    "fit_light",
-    "track",
-    "relight",
-    "judge",
-    "evaluate",
-    "study",
-    "report",
-    "overview",
-    "render_truth",
-    "benchmark",
-)
+#: The stages by their rooms, in the order of the way from images to lights.
+ROOMS = {
+    "images": ("import_scan", "generate_dataset"),
+    "scene": (
+        "init_depth",
+        "train_surfels",
+        "capture_surfels",
+        "true_surfels",
+        "import_ply",
+        "freeze",
+        "export",
+    ),
+    "targets": ("render_olat", "generate_targets"),
+    "lights": ("fit_light", "track"),
+    "relight": ("relight",),
+    "evaluation": ("judge", "evaluate"),
+    "studies": ("study",),
+    "report": ("report", "overview"),
+    "benchmark": ("render_truth", "benchmark"),
+}
+
+NAMES = tuple(name for names in ROOMS.values() for name in names)
 
 
 def load_stage(name: str) -> Stage:
@@ -47,7 +46,7 @@ def load_stage(name: str) -> Stage:
         near = difflib.get_close_matches(name, NAMES, n=1)
         remedy = f"Did you mean stage={near[0]}?" if near else "Choose one of them: stage=NAME."
         raise InputError("stage", expected=f"one of {', '.join(NAMES)}", found=repr(name), remedy=remedy)
-    return importlib.import_module(f"{__name__}.{name}").STAGE
+    return importlib.import_module(f"{__name__}.{_room(name)}.{name}").STAGE
 
 
 def stage_summary(name: str) -> str:
@@ -58,6 +57,11 @@ def stage_summary(name: str) -> str:
 
 def stage_text(name: str) -> str:
     """A stage module's docstring, read without importing it (and torch with it)."""
-    source = Path(__file__).with_name(f"{name}.py")
-    text = ast.get_docstring(ast.parse(source.read_text(encoding="utf-8"))) if source.is_file() else None
-    return text or ""
+    if name not in NAMES:
+        return ""
+    source = Path(__file__).parent / _room(name) / f"{name}.py"
+    return ast.get_docstring(ast.parse(source.read_text(encoding="utf-8"))) or ""
+
+
+def _room(name: str) -> str:
+    return next(room for room, names in ROOMS.items() if name in names)

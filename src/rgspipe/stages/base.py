@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from rgspipe.artifacts import Artifact
 from rgspipe.config import RgspipeConfig
+from rgspipe.store.artifacts import Artifact
 
 
 @dataclass(frozen=True)

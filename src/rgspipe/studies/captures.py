@@ -7,8 +7,8 @@ from typing import Any
 
 import pandas as pd
 
+from rgspipe.evaluation.classes import ALL, class_order
 from rgspipe.evaluation.held_out import QUALITY
-from rgspipe.evaluation.tables import ALL, class_order
 
 #: The case in which nothing differs.
 CLEAN = "clean"

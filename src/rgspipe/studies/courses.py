@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from rgspipe.evaluation.convergence import light_suffix, light_suffixes
-from rgspipe.evaluation.tables import rig_errors
+from rgspipe.evaluation.rig_errors import rig_errors
 from rgspipe.scene import Light, LightRig
 from rgspipe.scene.lights.light import AXIS_COLUMNS
 

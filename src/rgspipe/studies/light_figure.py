@@ -14,8 +14,8 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from rgspipe.evaluation import metrics
+from rgspipe.evaluation.classes import ALL, class_order
 from rgspipe.evaluation.plots import INK, LABELS, STYLE
-from rgspipe.evaluation.tables import ALL, class_order
 from rgspipe.studies.light_table import TOGETHER
 from rgspipe.studies.lights import several, without_repeats
 

@@ -8,10 +8,10 @@ from typing import Any
 
 import pandas as pd
 
+from rgspipe.evaluation.classes import ALL
 from rgspipe.evaluation.goals import percent
 from rgspipe.evaluation.markdown import markdown_lines
 from rgspipe.evaluation.plots import LABELS
-from rgspipe.evaluation.tables import ALL
 from rgspipe.studies.lights import STATUSES, several, without_repeats
 
 Row = dict[str, Any]

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from rgspipe.evaluation import metrics
-from rgspipe.evaluation.tables import ALL, class_order
+from rgspipe.evaluation.classes import ALL, class_order
 
 #: What is studied.
 KINDS = ("views", "robustness", "classes", "kinds", "regions", "adam")

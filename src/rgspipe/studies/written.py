@@ -10,7 +10,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from rgspipe.evaluation.plots import png_of
-from rgspipe.files import write_bytes, write_text
+from rgspipe.store.files import write_bytes, write_text
 
 TABLE, TEXT, FIGURE = "study.csv", "study.md", "study.png"
 

@@ -10,8 +10,9 @@ from typing import Any
 
 import pandas as pd
 
+from rgspipe.evaluation.classes import ALL, class_order
 from rgspipe.evaluation.metrics import RESAMPLES
-from rgspipe.evaluation.tables import ALL, TARGET_COLUMNS, class_order
+from rgspipe.evaluation.tables import TARGET_COLUMNS
 from rgspipe.scene.grade import Grade
 from rgspipe.studies.lights import figures, silent
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from torch import Tensor
 
-from rgspipe.sums import average
+from rgspipe.machine.sums import average
 
 #: Decay of the first and the second moment.
 FAST, SLOW = 0.9, 0.98

@@ -10,8 +10,8 @@ import scipy.sparse.linalg
 import torch
 from torch import Tensor
 
+from rgspipe.machine.sums import average
 from rgspipe.scene.surfels import Surfels
-from rgspipe.sums import average
 from rgspipe.training.albedo import ALBEDO_RANGE, AlbedoPrior
 from rgspipe.training.albedo_solve import SMOOTHNESS, conjugate_gradients, pull
 from rgspipe.training.gloss_model import EXPONENT_RANGE, GlossLight, GlossView, Reflection

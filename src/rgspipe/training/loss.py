@@ -7,8 +7,8 @@ import math
 import torch
 from torch import Tensor
 
+from rgspipe.machine.sums import average
 from rgspipe.optim.ssim import ssim_map
-from rgspipe.sums import average
 from rgspipe.training.options import LossOptions
 
 

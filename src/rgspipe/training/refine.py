@@ -10,13 +10,13 @@ from statistics import fmean
 import torch
 from torch import Tensor
 
+from rgspipe.machine.sums import average
 from rgspipe.progress import progress_bar
 from rgspipe.renderer.kernels.composite import composite
 from rgspipe.renderer.kernels.shade import shade_rays
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.scene.camera import Camera
 from rgspipe.scene.surfels import Surfels
-from rgspipe.sums import average
 from rgspipe.training.adam import adam_direction
 from rgspipe.training.loss import image_loss
 from rgspipe.training.options import RefineOptions

@@ -8,9 +8,9 @@ import torch
 from scipy.spatial import cKDTree
 from torch import Tensor
 
+from rgspipe.machine.sums import average
 from rgspipe.renderer.kernels.composite import Hits
 from rgspipe.scene.surfels import Surfels
-from rgspipe.sums import average
 
 #: Neighbours of a surfel.
 NEIGHBOURS = 8

@@ -13,13 +13,13 @@ from torch import Tensor
 
 from rgspipe.completion import with_unseen_surfaces
 from rgspipe.datasets.views import View
+from rgspipe.machine.sums import average
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.transport import with_albedo
 from rgspipe.renderer.view_weights import build_view_weights
 from rgspipe.scene.gloss import Gloss
 from rgspipe.scene.lights import PointLight
 from rgspipe.scene.surfels import Surfels
-from rgspipe.sums import average
 from rgspipe.training.checkpoint import Checkpoint
 from rgspipe.training.density import redistributed, surfel_errors
 from rgspipe.training.gloss import gloss_radiance

@@ -16,7 +16,7 @@ from rgspipe.blender.pool.render_pool import render_pool
 from rgspipe.errors import InputError
 from rgspipe.scene import SpotLight
 from rgspipe.scene.models import Corridor
-from rgspipe.whole_files import RECORD
+from rgspipe.store.whole_files import RECORD
 
 CLASSES = ("visible", "out_of_frame", "occluded", "around_corner")
 DATASET = DatasetJob(scene="corner", model=Corridor(), resolution=16, samples=4, seed=2)

@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from lit_room import HIDDEN, VISIBLE
-from rgspipe.evaluation.tables import rig_errors
+from rgspipe.evaluation.rig_errors import rig_errors
 from rgspipe.fitting import FitResult, FitStatus, FitViews, LightSpec
 from rgspipe.fitting.findings import ExtentOpen, KindOpen
 from rgspipe.fitting.solvers import Search

@@ -10,17 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from torch import Tensor
 
-from rgspipe.scene.lights.coordinates import (
-    AXIS,
-    PLACE,
-    BeforePlane,
-    Between,
-    Coordinate,
-    OnPlane,
-    Positive,
-    Ratio,
-    tangents,
-)
+from rgspipe.scene.lights.coordinates import AXIS, PLACE, BeforePlane, Coordinate, OnPlane, tangents
+from rgspipe.scene.lights.shape_coordinates import Between, Positive, Ratio
 
 SIZE = 2.5
 BETWEEN, POSITIVE, RATIO = Between(0.02, 1.5), Positive(0.01, 1.0), Ratio(0.5, 1000.0)

@@ -9,7 +9,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rgspipe.evaluation.tables import rig_errors
+from rgspipe.evaluation.rig_errors import rig_errors
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.scene.lights import PanelLight, SphereLight
 

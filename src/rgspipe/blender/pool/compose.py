@@ -12,8 +12,8 @@ from rgspipe.blender.pool.rigs import RigPlan
 from rgspipe.datasets.exr import write_image
 from rgspipe.datasets.gs3_write import write_target_list
 from rgspipe.datasets.light_file import write_lights
-from rgspipe.files import write_bytes
 from rgspipe.progress import progress_bar
+from rgspipe.store.files import write_bytes
 
 
 def write_targets(pool_folder: Path, pool: Sequence[PooledLight], rigs: Sequence[RigPlan], folder: Path) -> None:

@@ -15,7 +15,7 @@ from rgspipe.datasets.json_file import shown
 from rgspipe.datasets.reading_limits import reading_limits
 from rgspipe.datasets.scans.frame import Lens, Numbers
 from rgspipe.errors import InputError
-from rgspipe.files import LONGEST_NAME
+from rgspipe.store.files import LONGEST_NAME
 
 #: Camera models by COLMAP's numbers, with how many parameters each has; of the others no lens is known here.
 MODELS = {0: ("SIMPLE_PINHOLE", 3), 1: ("PINHOLE", 4), 2: ("SIMPLE_RADIAL", 4), 3: ("RADIAL", 5), 4: ("OPENCV", 8)}

@@ -16,10 +16,10 @@ from rgspipe.datasets.scans.lens_check import check_shape
 from rgspipe.datasets.scans.options import ScanOptions
 from rgspipe.datasets.scans.pictures import exposure_of, read_depth_image, read_picture
 from rgspipe.datasets.scans.resample import resampled_colour, resampled_depth, straight_camera
-from rgspipe.files import write_json
 from rgspipe.progress import progress_bar
 from rgspipe.scene import Camera
 from rgspipe.scene.passes import Passes
+from rgspipe.store.files import write_json
 
 TRANSFORMS = "transforms_train.json"
 

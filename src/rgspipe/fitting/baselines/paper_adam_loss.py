@@ -10,13 +10,13 @@ from torch import Tensor
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.views import PreparedViews
 from rgspipe.fitting.search.schedule import soft
+from rgspipe.machine.sums import average
 from rgspipe.optim.ssim_reference import SsimReference
 from rgspipe.renderer.effects import Effects
 from rgspipe.renderer.lit_surfels import lit_surfels
 from rgspipe.renderer.rig import RigResponse
 from rgspipe.renderer.unit_light import OwnLight
 from rgspipe.scene import Light, LightRig
-from rgspipe.sums import average
 
 
 @dataclass(frozen=True)

@@ -16,10 +16,10 @@ from rgspipe.fitting.model.known_images import KnownImage
 from rgspipe.fitting.model.moments import Moments, moments
 from rgspipe.fitting.model.views import PreparedViews
 from rgspipe.fitting.options import LossOptions
+from rgspipe.machine.sums import average, total
 from rgspipe.renderer.effects import ALL_EFFECTS, Effects
 from rgspipe.renderer.images.model import ImageModel, SurfelModel
 from rgspipe.renderer.sparse import SparseOperator
-from rgspipe.sums import average, total
 
 #: Images in float32 are wrong by less than this part of a pixel, so a share ROUNDING² of the energy says nothing.
 #: True lights leave up to 4e-13, measured, and how much differs from one processor to another.

@@ -17,7 +17,7 @@ from rgspipe.fitting.model.nonnegative import nonnegative
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.options import CombinationOptions
 from rgspipe.fitting.search.coarse import CoarseImages
-from rgspipe.sums import total
+from rgspipe.machine.sums import total
 
 #: A candidate of which known images leave less than this share, squared, is one of them: it explains nothing.
 LEAST_LEFT = 1e-4

@@ -16,7 +16,7 @@ from rgspipe.fitting.model.problem import ROUNDING, LightProblem
 from rgspipe.fitting.options import BarOptions
 from rgspipe.fitting.search.refine import State
 from rgspipe.fitting.search.weighting import ROBUST, cauchy_scale
-from rgspipe.sums import average, total
+from rgspipe.machine.sums import average, total
 
 
 @dataclass(frozen=True)

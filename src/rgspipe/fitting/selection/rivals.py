@@ -21,7 +21,7 @@ from rgspipe.fitting.search.compare import (
 )
 from rgspipe.fitting.search.refine import Refiner, State
 from rgspipe.fitting.search.weighting import PLAIN, ROBUST
-from rgspipe.sums import average, total
+from rgspipe.machine.sums import average, total
 
 
 def rival_among(refiner: Refiner, best: State, others: Sequence[State], options: SearchOptions) -> Rival | None:

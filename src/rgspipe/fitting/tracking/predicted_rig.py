@@ -15,8 +15,8 @@ from rgspipe.fitting.search.refine import Refiner, State
 from rgspipe.fitting.search.starts import EmitterRig
 from rgspipe.fitting.search.weighting import PLAIN
 from rgspipe.fitting.tracking.motion import Motion, offset, turns
+from rgspipe.machine.sums import total
 from rgspipe.optim.levenberg_marquardt import NormalEquations
-from rgspipe.sums import total
 
 
 @dataclass(frozen=True)

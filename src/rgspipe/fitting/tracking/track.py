@@ -23,10 +23,10 @@ from rgspipe.fitting.tracking.frame import FrameStatus, TrackedFrame, frame_cost
 from rgspipe.fitting.tracking.frame_fit import Followed, follow, observed
 from rgspipe.fitting.tracking.motion import Motion
 from rgspipe.fitting.tracking.twins import split_lights
+from rgspipe.machine.sums import total
 from rgspipe.progress import progress_bar
 from rgspipe.scene import LightRig
 from rgspipe.scene.arrays import ArrayLike, as_list
-from rgspipe.sums import total
 
 
 def track_lights(

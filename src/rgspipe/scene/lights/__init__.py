@@ -2,20 +2,14 @@
 
 from rgspipe.scene.lights.axial import AxialLight
 from rgspipe.scene.lights.led import LedLight
-from rgspipe.scene.lights.light import (
-    WATTS_PER_INTENSITY,
-    Light,
-    LightRig,
-    RelativeIntensity,
-    ShapeNumber,
-    as_rig,
-    check_numbers,
-)
+from rgspipe.scene.lights.light import WATTS_PER_INTENSITY, Light, RelativeIntensity
 from rgspipe.scene.lights.nodes import Nodes
 from rgspipe.scene.lights.panel import PanelLight
 from rgspipe.scene.lights.photometry import Photometry
 from rgspipe.scene.lights.point import PointLight
 from rgspipe.scene.lights.profile import ProfileLight
+from rgspipe.scene.lights.rig import LightRig, as_rig, check_numbers
+from rgspipe.scene.lights.shape_number import ShapeNumber
 from rgspipe.scene.lights.sphere import SphereLight
 from rgspipe.scene.lights.spot import SpotLight, SpotProfile
 from rgspipe.scene.lights.sun import SunLight

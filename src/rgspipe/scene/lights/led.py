@@ -11,8 +11,9 @@ import torch
 from torch import Tensor
 
 from rgspipe.scene.lights.axial import AxialLight
-from rgspipe.scene.lights.coordinates import Ratio
-from rgspipe.scene.lights.light import Reader, ShapeNumber
+from rgspipe.scene.lights.reader import Reader
+from rgspipe.scene.lights.shape_coordinates import Ratio
+from rgspipe.scene.lights.shape_number import ShapeNumber
 
 #: A free exponent stays between these: from nearly the whole half-space to a beam of 2° (standard deviation).
 EXPONENT = Ratio(0.5, 1000.0)

@@ -4,22 +4,24 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, Any, ClassVar, NoReturn, Protocol, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 import torch
 from torch import Tensor
 
-from rgspipe.errors import InputError
-from rgspipe.scene.arrays import ArrayLike, as_tensor, check_finite
+from rgspipe.scene.arrays import ArrayLike, as_tensor
 from rgspipe.scene.by_value import ByValue
 from rgspipe.scene.lights.coordinates import PLACE, Coordinate
+from rgspipe.scene.lights.reader import Reader
+from rgspipe.scene.lights.shape_number import ShapeNumber
 from rgspipe.scene.shapes import Float, Given
 
 if TYPE_CHECKING:
     from rgspipe.scene.lights.nodes import Nodes
+    from rgspipe.scene.lights.photometry import Photometry
 
 #: What tables call the components of an axis.
 AXIS_COLUMNS = ("ax", "ay", "az")
@@ -43,57 +45,6 @@ class RelativeIntensity:
 
 
 @dataclass(frozen=True)
-class ShapeNumber:
-    """One number of a light's shape.
-
-    Attributes:
-        name: the light's field.
-        key: its name in light files, and for people.
-        unit: for people: "°" for angles, which fields hold in rad.
-        coordinate: how a fit moves it; None where it does not.
-        largest: what it can be at most, the others as they are.
-        decimals: with which people are told it; None where it is left to files and tables.
-    """
-
-    name: str
-    key: str
-    unit: str = ""
-    coordinate: Coordinate | None = None
-    largest: float = math.inf
-    decimals: int | None = 1
-
-    def shown(self, value: float) -> float:
-        """A value of the field in `unit`."""
-        return math.degrees(value) if self.unit == "°" else value
-
-    def natural(self, value: float) -> float:
-        """A value in `unit` as the field holds it."""
-        return math.radians(value) if self.unit == "°" else value
-
-
-class Reader(Protocol):
-    """A light's fields in a file; what is missing or impossible is refused by name."""
-
-    def vector(self, key: str) -> Tensor:
-        """(3,) float64."""
-        ...
-
-    def direction(self, key: str) -> Tensor:
-        """(3,) float64 of unit length."""
-        ...
-
-    def number(self, key: str) -> float: ...
-
-    def text(self, key: str) -> str: ...
-
-    def numbers(self, key: str) -> Tensor:
-        """(K,) float64, a list of any length but 0."""
-        ...
-
-    def choice(self, key: str, names: Sequence[str]) -> str: ...
-
-
-@dataclass(frozen=True)
 class Light(ByValue, ABC):
     """A source of light. Lists and numpy arrays are taken for its tensors; lights of the same numbers are equal.
 
@@ -110,6 +61,9 @@ class Light(ByValue, ABC):
 
     #: Whether it is infinitely far away: its position says nothing, and its light does not fall with the distance.
     distant: ClassVar[bool] = False
+
+    #: Whether a table of intensities makes its shape, as that of a measured luminaire.
+    tabulated: ClassVar[bool] = False
 
     #: Of its intensity.
     unit: ClassVar[str] = "W/sr"
@@ -268,6 +222,10 @@ class Light(ByValue, ABC):
         """Lights of this kind whose shapes differ enough for a search to try each."""
         return (self,)
 
+    def with_tables(self, table: Photometry, *others: Photometry) -> Self:
+        """The light, if it is `tabulated`, of a measured luminaire, or of one of several."""
+        raise TypeError(f"no table makes the shape of a {self.kind}")
+
     def to(self, *args: torch.dtype | torch.device | str) -> Self:
         """A copy with every tensor moved by `Tensor.to`."""
         values = {field.name: getattr(self, field.name) for field in fields(self)}
@@ -315,46 +273,6 @@ class Light(ByValue, ABC):
             cosine: an expression.
         """
         return None
-
-
-LightRig = tuple[Light, ...]
-
-
-def as_rig(lights: Light | Sequence[Light]) -> LightRig:
-    """A rig of several lights, or of one.
-
-    Raises:
-        InputError: something else.
-    """
-    if isinstance(lights, Light):
-        return (lights,)
-    if not isinstance(lights, Sequence) or isinstance(lights, str):
-        _refuse("lights", "a light or a list of them", lights)
-    for index, light in enumerate(lights):
-        if not isinstance(light, Light):
-            _refuse(f"lights[{index}]", "a light", light)
-    return tuple(lights)
-
-
-def check_numbers(rig: LightRig) -> None:
-    """Refuse lights that are nowhere or aim nowhere.
-
-    Raises:
-        InputError: a number is not finite, or an axis has no length.
-    """
-    remedy = "Where steps moved it there, take shorter ones."
-    for index, light in enumerate(rig):
-        for field in fields(light):
-            if isinstance(value := getattr(light, field.name), Tensor):
-                check_finite(value, f"lights[{index}].{field.name}", remedy)
-        if light.axis is not None and not bool(light.axis.any()):
-            where = f"lights[{index}].direction"
-            raise InputError(where, expected="a direction", found="(0, 0, 0)", remedy="Say where the light aims.")
-
-
-def _refuse(where: str, expected: str, found: object) -> NoReturn:
-    remedy = "Pass one, such as PointLight([0, 0, 0.3], 1.0), or the lights of a fit: result.lights."
-    raise InputError(where, expected=expected, found=type(found).__name__, remedy=remedy)
 
 
 def _colour(value: ArrayLike) -> Tensor:

@@ -11,10 +11,12 @@ import torch
 from torch import Tensor
 
 from rgspipe.scene.lights.axial import AxialLight
-from rgspipe.scene.lights.coordinates import LENGTH, Turn
 from rgspipe.scene.lights.led import LedLight
-from rgspipe.scene.lights.light import Light, Reader, ShapeNumber
+from rgspipe.scene.lights.light import Light
 from rgspipe.scene.lights.nodes import Nodes, square_nodes
+from rgspipe.scene.lights.reader import Reader
+from rgspipe.scene.lights.shape_coordinates import LENGTH, Turn
+from rgspipe.scene.lights.shape_number import ShapeNumber
 from rgspipe.scene.shapes import Float
 
 #: Nodes along each side.

@@ -7,7 +7,8 @@ from typing import ClassVar, Self
 
 from torch import Tensor
 
-from rgspipe.scene.lights.light import WATTS_PER_INTENSITY, Light, Reader
+from rgspipe.scene.lights.light import WATTS_PER_INTENSITY, Light
+from rgspipe.scene.lights.reader import Reader
 from rgspipe.scene.shapes import Float
 
 

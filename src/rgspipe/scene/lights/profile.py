@@ -13,10 +13,13 @@ from torch import Tensor
 from torch.autograd.functional import jacobian
 
 from rgspipe.scene.lights.axial import AxialLight
-from rgspipe.scene.lights.coordinates import Coordinate, Turn
-from rgspipe.scene.lights.light import Light, Reader, RelativeIntensity, ShapeNumber
+from rgspipe.scene.lights.coordinates import Coordinate
+from rgspipe.scene.lights.light import Light, RelativeIntensity
 from rgspipe.scene.lights.panel import sides
 from rgspipe.scene.lights.photometry import Photometry
+from rgspipe.scene.lights.reader import Reader
+from rgspipe.scene.lights.shape_coordinates import Turn
+from rgspipe.scene.lights.shape_number import ShapeNumber
 from rgspipe.scene.shapes import Float
 
 #: Turns that a search tries, where a light is not round, of each period.
@@ -45,6 +48,7 @@ class ProfileLight(AxialLight):
     """
 
     kind: ClassVar[str] = "profile"
+    tabulated: ClassVar[bool] = True
 
     turn: float
     table: Photometry
@@ -75,6 +79,9 @@ class ProfileLight(AxialLight):
     @property
     def seed(self) -> Self:
         return self if self.round else replace(self, averaged=True)
+
+    def with_tables(self, table: Photometry, *others: Photometry) -> Self:
+        return replace(self, table=table, catalogue=others)
 
     def variants(self) -> tuple[Self, ...]:
         tables = (self.table, *self.catalogue)

@@ -8,10 +8,12 @@ from typing import ClassVar, Self
 
 from torch import Tensor
 
-from rgspipe.scene.lights.coordinates import LENGTH
-from rgspipe.scene.lights.light import WATTS_PER_INTENSITY, Light, Reader, ShapeNumber
+from rgspipe.scene.lights.light import WATTS_PER_INTENSITY, Light
 from rgspipe.scene.lights.nodes import Nodes, ball_nodes
 from rgspipe.scene.lights.point import PointLight
+from rgspipe.scene.lights.reader import Reader
+from rgspipe.scene.lights.shape_coordinates import LENGTH
+from rgspipe.scene.lights.shape_number import ShapeNumber
 from rgspipe.scene.shapes import Float
 
 #: Radii that a fit begins with, in parts of the scene's size: where the radius is 0, nothing tells which way it goes.

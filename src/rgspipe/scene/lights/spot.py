@@ -11,8 +11,9 @@ import torch
 from torch import Tensor
 
 from rgspipe.scene.lights.axial import AxialLight
-from rgspipe.scene.lights.coordinates import Between, Positive
-from rgspipe.scene.lights.light import Reader, ShapeNumber
+from rgspipe.scene.lights.reader import Reader
+from rgspipe.scene.lights.shape_coordinates import Between, Positive
+from rgspipe.scene.lights.shape_number import ShapeNumber
 from rgspipe.scene.lights.spot_profiles import PROFILES, Profile, softened
 
 SpotProfile = Literal["gaussian", "smoothstep", "linear"]

@@ -11,8 +11,9 @@ import torch
 from torch import Tensor
 
 from rgspipe.scene.lights.coordinates import AXIS, KNOWN, Coordinate
-from rgspipe.scene.lights.light import Light, Reader
+from rgspipe.scene.lights.light import Light
 from rgspipe.scene.lights.nodes import Nodes
+from rgspipe.scene.lights.reader import Reader
 from rgspipe.scene.shapes import Float, Given
 
 

@@ -1,0 +1,285 @@
+"""The stage graph: what a stage needs, which of it is there, and making what is missing.
+
+Every fingerprint follows from the configuration, the code and the foreign files, so the whole plan is known before
+anything is made.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from rgspipe.config import RgspipeConfig, get_value, with_changes
+from rgspipe.datasets.reading_limits import reading_within
+from rgspipe.errors import InputError
+from rgspipe.graph.expected_time import EarlierRuns, Expected, in_words
+from rgspipe.graph.nodes import Making, Node, indispensable
+from rgspipe.graph.source_code import SourceCode
+from rgspipe.graph.variants import variant_name
+from rgspipe.stages.base import Stage
+from rgspipe.store.artifacts import Artifact, ArtifactStore, Key
+from rgspipe.store.files import tree_digest
+from rgspipe.store.fingerprints import differences, fingerprint
+from rgspipe.store.unwritable import told_below
+
+StageLoader = Callable[[str], Stage]
+
+#: Code that runs stages and talks to people: it decides over no result but by what the configuration and inputs are.
+NO_RESULT = (
+    "rgspipe.cli",
+    "rgspipe.config",
+    "rgspipe.datasets.reading_limits",
+    "rgspipe.errors",
+    "rgspipe.graph",
+    "rgspipe.machine.description",
+    "rgspipe.options",
+    "rgspipe.progress",
+    "rgspipe.stages.base",
+    "rgspipe.stages.sources",
+    "rgspipe.store.artifacts",
+    "rgspipe.store.files",
+    "rgspipe.store.manifest",
+    "rgspipe.store.status",
+    "rgspipe.store.unwritable",
+    "rgspipe.store.whole_files",
+)
+
+#: At most this many causes are named for one stage in the plan.
+SHOWN_CAUSES = 3
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Step:
+    """One line of the plan: a node, whether it is there already, and if not, why not; and what its stage remarks.
+
+    Attributes:
+        expected: what making it will take; None where it is there or nobody knows.
+    """
+
+    node: Node
+    reused: bool
+    reason: str
+    remarks: tuple[str, ...] = ()
+    expected: Expected | None = None
+
+
+@dataclass(frozen=True)
+class Usual:
+    """What a command would make if nothing varied; see `variants`.
+
+    Attributes:
+        config: its configuration.
+        swept: keys and groups of which a sweep tries several values.
+    """
+
+    config: RgspipeConfig
+    swept: frozenset[str] = frozenset()
+
+
+@dataclass
+class _Resolver:
+    """Builds the graph; every module and foreign file is read once."""
+
+    load_stage: StageLoader
+    code: SourceCode = field(default_factory=lambda: SourceCode(NO_RESULT))
+    files: dict[str, str] = field(default_factory=dict)
+
+    def resolve(self, name: str, config: RgspipeConfig, changes: Mapping[str, object]) -> Node:
+        stage = self.load_stage(name)
+        needs = stage.needs(config)
+        inputs = tuple(
+            self.resolve(need.stage, with_changes(config, need.changes), {**changes, **need.changes}) for need in needs
+        )
+        recipe = {
+            "config": {key: get_value(config, key) for key in sorted(stage.keys(config))},
+            "inputs": _input_fingerprints(inputs),
+            "foreign": {str(path): self._file(path) for path in stage.files(config)},
+            "code": self.code.fingerprints(stage.run.__module__),
+        }
+        key = Key(config.scene.folder, stage.name, fingerprint({"stage": stage.name, **recipe}))
+        return Node(stage, config, changes, key, recipe, inputs, tuple(need.may_fail for need in needs))
+
+    def _file(self, path: Path) -> str:
+        if str(path) not in self.files:
+            self.files[str(path)] = tree_digest(path)
+        return self.files[str(path)]
+
+
+def _input_fingerprints(inputs: Sequence[Node]) -> dict[str, list[str]]:
+    names = dict.fromkeys(node.stage.name for node in inputs)
+    return {name: [node.key.fingerprint for node in inputs if node.stage.name == name] for name in names}
+
+
+def resolve(config: RgspipeConfig, load_stage: StageLoader) -> Node:
+    """The graph that ends in `config.stage`."""
+    return _Resolver(load_stage).resolve(config.stage, config, {})
+
+
+def plan(root: Node, store: ArtifactStore) -> list[Step]:
+    """What has to be made and what is reused for `root`, inputs first.
+
+    Nothing is listed below an artifact that is there: it holds all that it was made from.
+    """
+    steps: dict[Key, Step] = {}
+    earlier = EarlierRuns(store)
+
+    def visit(node: Node) -> None:
+        if node.key in steps:
+            return
+        reused = store.find(node.key) is not None
+        if not reused:
+            for needed in node.inputs:
+                visit(needed)
+        reason, time = ("", None) if reused else (_reason(node, store), _expected(node, earlier, steps))
+        steps[node.key] = Step(node, reused, reason, _remarks(node, store), time)
+
+    visit(root)
+    return list(steps.values())
+
+
+def _reason(node: Node, store: ArtifactStore) -> str:
+    if store.partial(node.key).exists():
+        return "goes on where it was interrupted"
+    newest = store.newest(node.key.scene, node.key.stage)
+    if newest is None:
+        return "not made yet"
+    causes = differences(node.recipe, newest.manifest)
+    shown = ", ".join(causes[:SHOWN_CAUSES]) or "the one that was made is gone"
+    return shown + (f" and {len(causes) - SHOWN_CAUSES} more" if len(causes) > SHOWN_CAUSES else "")
+
+
+def _expected(node: Node, earlier: EarlierRuns, steps: Mapping[Key, Step]) -> Expected | None:
+    """What making a node will take. It takes another time, too, where what it is made from has other settings."""
+    found = earlier.expected(node.key, node.recipe["config"])
+    before = [steps[needed.key].expected for needed in node.inputs]
+    others = any(time is not None and not time.same for time in before)
+    return found._replace(same=False) if found and others else found
+
+
+def _remarks(node: Node, store: ArtifactStore) -> tuple[str, ...]:
+    own = store.find(node.key)
+    found = {needed.stage.name: store.find(needed.key) for needed in reversed(node.inputs)} if own is None else {}
+    made = {name: artifact for name, artifact in {**found, node.stage.name: own}.items() if artifact is not None}
+    return tuple(node.stage.remarks(node.config, made))
+
+
+def describe_plan(steps: Sequence[Step]) -> str:
+    """The plan as a table for people."""
+    width = max(len(step.node.stage.name) for step in steps)
+    times = [str(step.expected or "") for step in steps]
+    longest = max(map(len, times))
+    lines = [f"Plan for {steps[-1].node.key.scene}:"]
+    for step, time in zip(steps, times, strict=True):
+        row = [step.node.stage.name.ljust(width), "reuse" if step.reused else "make ", step.node.key.fingerprint]
+        lines.append(f"  {'  '.join([*row, *([time.rjust(longest)] if longest else []), step.reason])}".rstrip())
+        lines += [f"  {'':<{width}}         {remark}" for remark in step.remarks]
+    return "\n".join([*lines, *_total(steps)])
+
+
+def _total(steps: Sequence[Step]) -> list[str]:
+    """What all that is made will take, as far as earlier runs tell."""
+    made = [step for step in steps if not step.reused]
+    known = [step.expected for step in made if step.expected]
+    if not known:
+        return []
+    unknown = dict.fromkeys(step.node.stage.name for step in made if not step.expected)
+    rest = f", and what {' and '.join(unknown)} will take" if unknown else ""
+    other = "" if all(time.same for time in known) else "; ~: with other settings"
+    return [f"Expected: {in_words(sum(time.seconds for time in known))}{rest} (from earlier runs here{other})"]
+
+
+def run(
+    config: RgspipeConfig, load_stage: StageLoader, overrides: Sequence[str] = (), usual: Usual | None = None
+) -> Artifact:
+    """Make `config.stage`, and before it what is missing of its inputs; reuse what is there.
+
+    Args:
+        config: the whole configuration, checked.
+        load_stage: gives a stage by name.
+        overrides: the command line's overrides, for the commands that messages suggest, and for names of variants.
+        usual: what is called `latest`; None calls everything so.
+
+    Raises:
+        InputError: an input cannot be used, or is missing under `upstream=require`; the store cannot be read or
+            written to, or its disk is full.
+    """
+    with told_below(Path(config.outputs)), reading_within(config.limits):
+        return _run(config, load_stage, overrides, usual)
+
+
+def _run(config: RgspipeConfig, load_stage: StageLoader, overrides: Sequence[str], usual: Usual | None) -> Artifact:
+    store = ArtifactStore(Path(config.outputs))
+    resolver = _Resolver(load_stage)
+    root = resolver.resolve(config.stage, config, {})
+    steps = plan(root, store)
+    log.info(describe_plan(steps))
+    if config.upstream == "require":
+        _refuse_missing(steps, overrides)
+    names = {step.node.key: _variant(step.node, resolver, overrides, usual) for step in steps}
+    artifacts = {step.node.key: _take(step.node, store, names[step.node.key]) for step in steps if step.reused}
+    said = {step.node.key: step.remarks for step in steps}
+    made = Making(store, names, indispensable(root), artifacts, said=said)
+    for step in steps:
+        if not step.reused:
+            made.make(step.node)
+    return artifacts[root.key]
+
+
+def _variant(node: Node, resolver: _Resolver, overrides: Sequence[str], usual: Usual | None) -> str:
+    """What tells a node from the one that is called `latest`; empty for that one."""
+    if usual is None:
+        return ""
+    try:
+        plain = resolver.resolve(node.stage.name, usual.config, {})
+    except InputError:  # what varies cannot be left away, so no variant is plainer than the others
+        return ""
+    if plain.key == node.key:
+        return ""
+    changes = {key: _as_override(value) for key, value in node.changes.items()}
+    return variant_name(overrides, usual.swept, changes, _keys(node))
+
+
+def _keys(node: Node) -> set[str]:
+    """What a node and all behind it depend on."""
+    return set(node.recipe["config"]).union(*map(_keys, node.inputs))
+
+
+def _take(node: Node, store: ArtifactStore, variant: str) -> Artifact:
+    artifact = store.find(node.key)
+    assert artifact is not None
+    artifact.check_sizes()
+    store.point_at(node.key, variant)
+    return artifact
+
+
+def _refuse_missing(steps: Sequence[Step], overrides: Sequence[str]) -> None:
+    missing = [step.node for step in steps[:-1] if not step.reused]
+    if not missing:
+        return
+    command = command_for(missing[-1], overrides)
+    raise InputError(
+        f"upstream=require: {missing[-1].stage.name}",
+        expected=f"its artifact {missing[-1].key.fingerprint} for this configuration",
+        found="none",
+        remedy=f"Make it with `{command}`, or leave upstream=require away.",
+    )
+
+
+def command_for(node: Node, overrides: Sequence[str]) -> str:
+    """The command that makes a node, in a run that was started with `overrides`."""
+    own = {"stage", "upstream", *node.changes}
+    kept = [text for text in overrides if text.split("=")[0].lstrip("+~") not in own]
+    changed = [f"{key}={_as_override(value)}" for key, value in node.changes.items()]
+    return " ".join(["python -m rgspipe", f"stage={node.stage.name}", *kept, *changed])
+
+
+def _as_override(value: object) -> str:
+    if value is None:
+        return "null"
+    if isinstance(value, list | tuple):
+        return f"[{','.join(map(_as_override, value))}]"
+    return str(value).lower() if isinstance(value, bool) else str(value)

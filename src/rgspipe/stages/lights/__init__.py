@@ -1,0 +1,1 @@
+"""The lights of targets: found in single images, or followed through a sequence."""

@@ -1,0 +1,137 @@
+"""Follow moving lights through a sequence of fit targets: a car's headlights, a lamp that is carried."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import torch
+
+from rgspipe.config import RgspipeConfig
+from rgspipe.datasets.light_file import read_lights, write_lights
+from rgspipe.datasets.location import dataset_root, open_dataset
+from rgspipe.datasets.read_files import files_read
+from rgspipe.datasets.views import Target
+from rgspipe.errors import InputError
+from rgspipe.evaluation.plots import png_of
+from rgspipe.evaluation.track_table import track_figure, track_table
+from rgspipe.fitting.fit import FitViews
+from rgspipe.fitting.model.capture import ImageCapture
+from rgspipe.fitting.tracking.frame import FrameStatus
+from rgspipe.fitting.tracking.track import track_lights
+from rgspipe.fitting.words import explained
+from rgspipe.scene import LightRig
+from rgspipe.stages.base import Need, Stage, StageContext
+from rgspipe.stages.lights.capture import KEYS as CAPTURE_KEYS
+from rgspipe.stages.lights.capture import captured_views
+from rgspipe.stages.lights.fit_light import Fitter
+from rgspipe.stages.lights.spec import table_files
+from rgspipe.stages.lights.spoken import COMMAND_LINE
+from rgspipe.stages.lights.targets import used_views
+from rgspipe.store.files import write_bytes, write_text
+
+
+def run(context: StageContext) -> None:
+    """Write track.csv, a light file per frame under frames/, and track.png; an interrupted run begins again."""
+    config = context.config
+    folder = _folder(context)
+    targets = open_dataset(folder, train=False, test=False).targets
+    if not targets:
+        raise InputError(
+            folder, expected="targets/ with the frames", found="none", remedy="Give a folder with targets/<frame>/."
+        )
+    fitter = Fitter.create(context)
+    views, frames, captures = _frames(fitter, targets, config)
+    track = track_lights(views, frames, options=config.track, search=fitter.solver(), capture=captures)
+    names = [target.name for target in targets]
+    truths, surfels = _truths(dataset_root(folder), names), views.prepared.frozen.surfels
+    table = track_table(track, names, truths, views.prepared.frozen.size)
+    write_text(context.folder / "track.csv", table.to_csv(index=False))
+    for name, frame in zip(names, track, strict=True):
+        told = {
+            "status": str(frame.status),
+            "result": str(frame.result.status),
+            "reason": explained(frame.result.findings, COMMAND_LINE),
+        }
+        write_lights(context.folder / "frames" / f"{name}.json", frame.result.lights, told)
+    origins = torch.stack([view.camera.origin for view in views.prepared.views])
+    figure = track_figure(table, truths, surfels.centers, surfels.normals, origins)
+    write_bytes(context.folder / "track.png", png_of(figure))
+    statuses = {str(status): sum(frame.status == status for frame in track) for status in FrameStatus}
+    context.note(frames=len(track), **statuses)
+
+
+def _frames(
+    fitter: Fitter, targets: Sequence[Target], config: RgspipeConfig
+) -> tuple[FitViews, list[list[torch.Tensor]], list[ImageCapture]]:
+    """The views that all frames share, the images of each frame, and how they were taken.
+
+    Raises:
+        InputError: the cameras or masks of two frames differ.
+    """
+    frames, captures, prepared = [], [], None
+    for target in targets:
+        views, capture = captured_views(used_views(target, config), target.name, config)
+        own = fitter.prepare(views)
+        prepared = prepared or own
+        if own is not prepared:
+            raise InputError(
+                f"target {target.name}",
+                expected=f"the cameras and masks of the first frame, {targets[0].name}",
+                found="others",
+                remedy="Follow frames of fixed cameras.",
+            )
+        frames.append([view.image for view in views])
+        captures.append(capture)
+    return prepared, frames, captures
+
+
+def _truths(root: Path, names: Sequence[str]) -> list[LightRig]:
+    """The true lights of every frame; none where one is not known."""
+    files = [root / "truth" / f"{name}.json" for name in names]
+    return [read_lights(path) for path in files] if all(path.exists() for path in files) else []
+
+
+def _folder(context: StageContext) -> Path:
+    folder = context.config.track.folder
+    return context.inputs["generate_targets"].folder() if folder is None else Path(folder)
+
+
+def _inputs(config: RgspipeConfig) -> list[Need | str]:
+    if config.fit.method != "search_lm":
+        raise InputError(
+            "fit.method",
+            expected="search_lm with stage=track",
+            found=config.fit.method,
+            remedy="Follow lights with fit=search_lm.",
+        )
+    sequence = [] if config.track.folder is not None else [Need("generate_targets", {"targets.kind": "drive"})]
+    return ["freeze", *sequence]
+
+
+def _files(config: RgspipeConfig) -> list[Path]:
+    tables = table_files(config)
+    return tables if config.track.folder is None else [*tables, *files_read(config.track.folder)]
+
+
+STAGE = Stage(
+    name="track",
+    help="follow moving lights through a sequence of fit targets",
+    run=run,
+    inputs=_inputs,
+    config_keys=(
+        "track",
+        "seed",
+        "effects",
+        "light",
+        "fit.search",
+        "fit.shape",
+        "fit.spot_basis",
+        "fit.sh_degree",
+        "fit.sh_mirrored",
+        "views.count",
+        "views.indices",
+        *CAPTURE_KEYS,
+    ),
+    files=_files,
+)

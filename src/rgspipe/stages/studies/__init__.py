@@ -1,0 +1,1 @@
+"""Studies: one stage, and for each kind of study what its rows are and what it asks for."""

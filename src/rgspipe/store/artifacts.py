@@ -1,0 +1,262 @@
+"""The artifact store: what a stage made, published whole or not at all, and verified when it is read.
+
+    <root>/<scene>/<stage>/<fingerprint>/              an artifact: its files and manifest.json
+    <root>/<scene>/<stage>/latest                      link to the newest one
+    <root>/<scene>/<stage>/latest-<settings>           link to the newest one of a variant; see `variants`
+    <root>/<scene>/<stage>/.partial-<fingerprint>/     an artifact in the making
+    <root>/<scene>/<stage>/.lock-<fingerprint>         held while it is made
+
+A process that is killed leaves at most a partial folder, which the next run of the same recipe finds and goes on
+with. The lock belongs to the operating system, so it ends with its holder however that ends.
+"""
+
+from __future__ import annotations
+
+import datetime
+import logging
+import os
+import shutil
+import time
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from filelock import FileLock, Timeout
+
+from rgspipe.errors import InputError
+from rgspipe.machine.description import PeakMemory, library_versions, machine
+from rgspipe.store.files import NO_RIGHT, UNWRITABLE, make_folder, point_at, publish, sha256, write_json
+from rgspipe.store.manifest import MANIFEST, SCHEMA_VERSION, inventory, read_manifest
+
+#: What links to the newest artifacts are called, or begin with.
+LATEST = "latest"
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Key:
+    """Where an artifact belongs."""
+
+    scene: str
+    stage: str
+    fingerprint: str
+
+
+@dataclass(frozen=True)
+class Artifact:
+    """A published artifact. Read its files through `file` or `folder`, which verify them first.
+
+    Attributes:
+        path: its folder.
+        manifest: what manifest.json says: config, inputs, code, libraries, machine, seconds, files, facts.
+    """
+
+    path: Path
+    manifest: Mapping[str, Any]
+    _verified: set[str] = field(default_factory=set, repr=False, compare=False)
+
+    @property
+    def stage(self) -> str:
+        """The stage that made it."""
+        return self.manifest["stage"]
+
+    @property
+    def fingerprint(self) -> str:
+        """What identifies it among the artifacts of its stage."""
+        return self.manifest["fingerprint"]
+
+    @property
+    def facts(self) -> Mapping[str, Any]:
+        """What the stage noted about it."""
+        return self.manifest["facts"]
+
+    def file(self, name: str) -> Path:
+        """The path of one file, verified against its checksum the first time it is asked for.
+
+        Raises:
+            InputError: the file is missing, truncated or changed.
+            ValueError: the artifact never had such a file.
+        """
+        if name not in self.manifest["files"]:
+            raise ValueError(f"{self.stage} made no {name}; it made {', '.join(self.manifest['files'])}")
+        path = self.path / name
+        if name not in self._verified:
+            self._verify(path, self.manifest["files"][name])
+            self._verified.add(name)
+        return path
+
+    def folder(self) -> Path:
+        """The artifact's folder, after every file in it has been verified."""
+        for name in self.manifest["files"]:
+            self.file(name)
+        return self.path
+
+    def check_sizes(self) -> None:
+        """See that every file is there and as long as it was written; reads none of them.
+
+        Raises:
+            InputError: one is missing, or was cut off.
+        """
+        for name, entry in self.manifest["files"].items():
+            self._check_size(self.path / name, entry)
+
+    def _verify(self, path: Path, entry: Mapping[str, Any]) -> None:
+        self._check_size(path, entry)
+        if sha256(path) != entry["sha256"]:
+            raise self._damaged(path, entry, "other content (its checksum differs)")
+
+    def _check_size(self, path: Path, entry: Mapping[str, Any]) -> None:
+        if not path.is_file():
+            raise self._damaged(path, entry, "no file")
+        if (size := path.stat().st_size) != entry["bytes"]:
+            raise self._damaged(path, entry, f"{size} bytes")
+
+    def _damaged(self, path: Path, entry: Mapping[str, Any], found: str) -> InputError:
+        expected = f"the {entry['bytes']} bytes that {self.stage} wrote"
+        remedy = f"Remove the folder {self.path} and run again: the stage will make it anew."
+        return InputError(path, expected=expected, found=found, remedy=remedy)
+
+
+@dataclass(frozen=True)
+class ArtifactStore:
+    """All artifacts below one folder. One store serves a process, so that each file is verified once."""
+
+    root: Path
+    _known: dict[Key, Artifact] = field(default_factory=dict, repr=False, compare=False)
+
+    def path(self, key: Key) -> Path:
+        """The folder of an artifact, made or not."""
+        return self.root / key.scene / key.stage / key.fingerprint
+
+    def partial(self, key: Key) -> Path:
+        """The folder in which it is made."""
+        return self.root / key.scene / key.stage / f".partial-{key.fingerprint}"
+
+    def find(self, key: Key) -> Artifact | None:
+        """The published artifact, or None.
+
+        Raises:
+            InputError: there is a folder, but its manifest is missing or not its own.
+        """
+        path = self.path(key)
+        if not path.exists():
+            return None
+        if key not in self._known:
+            self._known[key] = Artifact(path, read_manifest(path, key.stage, key.fingerprint))
+        return self._known[key]
+
+    def newest(self, scene: str, stage: str) -> Artifact | None:
+        """The artifact of a stage that was made or asked for last, or None if it cannot be read or there is none."""
+        links = [link for link in (self.root / scene / stage).glob(f"{LATEST}*") if link.is_symlink() and link.exists()]
+        if not links:
+            return None
+        last = max(links, key=lambda link: link.lstat().st_mtime_ns)
+        try:
+            return self.find(Key(scene, stage, last.resolve().name))
+        except InputError:
+            return None
+
+    def point_at(self, key: Key, variant: str = "") -> None:
+        """Let `latest`, or `latest-<variant>`, be this artifact; a store that cannot be written to keeps its links."""
+        self._point_at(key, variant, UNWRITABLE)
+
+    def _point_at(self, key: Key, variant: str, tolerated: Collection[int]) -> None:
+        link = self.root / key.scene / key.stage / (LATEST + (f"-{variant}" if variant else ""))
+        try:
+            point_at(link, key.fingerprint)
+        except OSError as error:
+            if error.errno not in tolerated:
+                raise
+            if not (link.is_symlink() and link.readlink() == Path(key.fingerprint)):
+                log.warning("%s stays as it is: %s", link, error.strerror)
+
+    def build(
+        self,
+        key: Key,
+        recipe: Mapping[str, Any],
+        make: Callable[[Path], Mapping[str, Any]],
+        variant: str = "",
+    ) -> tuple[Artifact, bool]:
+        """Make an artifact and publish it, or wait for the process that is making it and take its result.
+
+        Args:
+            key: where it belongs.
+            recipe: what identifies it; goes into the manifest as it is.
+            make: writes the files into the folder it is given and returns facts for the manifest. The folder may
+                hold files of an earlier, interrupted attempt. Names that start with a dot are not published.
+            variant: what `latest-<variant>` is called; empty for `latest`.
+
+        Returns:
+            the artifact, and whether this call made it.
+        """
+        path, partial = self.path(key), self.partial(key)
+        make_folder(path.parent)
+        with _locked(path.parent / f".lock-{key.fingerprint}", key):
+            if (found := self.find(key)) is not None:
+                # Who made it may have been killed before it was linked to, and may call it otherwise. On a full disk
+                # the run ends, as the next one must find a reason to link to it.
+                self._point_at(key, variant, NO_RIGHT)
+                return found, False
+            resumed = partial.exists()
+            partial.mkdir(exist_ok=True)
+            start, memory = time.perf_counter(), PeakMemory()
+            try:
+                facts = make(partial)
+            except InputError:
+                _forget(partial, path.parent / f".lock-{key.fingerprint}")
+                raise
+            seconds = round(time.perf_counter() - start, 3)
+            made = {"seconds": seconds, "peak_memory_mib": memory.mib(), "resumed": resumed, "facts": dict(facts)}
+            self._publish(key, recipe, made)
+            self._point_at(key, variant, NO_RIGHT)
+        artifact = self.find(key)
+        assert artifact is not None
+        return artifact, True
+
+    def _publish(self, key: Key, recipe: Mapping[str, Any], made: Mapping[str, Any]) -> None:
+        path, partial = self.path(key), self.partial(key)
+        _remove_scratch(partial)
+        manifest = {
+            "schema": SCHEMA_VERSION,
+            "scene": key.scene,
+            "stage": key.stage,
+            "fingerprint": key.fingerprint,
+            **recipe,
+            **made,
+            "created": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+            "libraries": dict(library_versions()),
+            "machine": machine(),
+            "files": inventory(partial),
+        }
+        write_json(partial / MANIFEST, manifest)
+        publish(partial, path)
+
+
+def _locked(lock_file: Path, key: Key) -> FileLock:
+    # The umask says who else may hold it: whoever may write to the folder of a group must be able to.
+    os.close(os.open(lock_file, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o666))
+    lock = FileLock(lock_file)
+    try:
+        return lock.acquire(timeout=0)
+    except Timeout:
+        log.info("%s: another process is making %s; waiting for it", key.stage, key.fingerprint)
+        return lock.acquire()
+
+
+def _forget(partial: Path, lock_file: Path) -> None:
+    """Leave no trace of what was refused before anything was made of it; its lock is held."""
+    if any(path.is_file() for path in partial.rglob("*")):
+        return
+    shutil.rmtree(partial)
+    # Who waits for the lock sees that its file is gone, and takes a new one.
+    lock_file.unlink()
+
+
+def _remove_scratch(partial: Path) -> None:
+    for path in [path for path in partial.rglob(".*") if path.exists()]:
+        if path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path)
+        else:
+            path.unlink(missing_ok=True)

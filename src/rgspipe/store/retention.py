@@ -1,0 +1,238 @@
+"""What is in a store, what of it other results need, and how the rest is removed."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import shutil
+import time
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from filelock import FileLock, Timeout
+
+from rgspipe.store.artifacts import LATEST, ArtifactStore, Key
+from rgspipe.store.files import sync
+from rgspipe.store.fingerprints import DIGITS
+from rgspipe.store.manifest import MANIFEST
+from rgspipe.store.unwritable import told_below
+
+#: The stage whose results are removed only where it is named.
+REPORT = "report"
+
+#: What a folder is called while it is removed; it is no artifact any more.
+GONE = ".gone-"
+
+#: What a folder is called while an artifact is made in it, and what is locked meanwhile.
+PARTIAL, LOCK = ".partial-", ".lock-"
+
+#: What artifacts are called. Whoever names a folder that is no store must not lose what else is in it.
+FINGERPRINT = re.compile(f"[0-9a-f]{{{DIGITS}}}")
+
+
+@dataclass(frozen=True)
+class Stored:
+    """A folder of a store: an artifact, or what an interrupted run left of one.
+
+    Attributes:
+        folder: where it is.
+        key: what it is, or was to be.
+        bytes: of all of its files.
+        made: seconds since the epoch.
+        inputs: stages and fingerprints of what it was made from.
+        linked: whether `latest`, or another such link, points to it.
+        whole: whether it is an artifact.
+    """
+
+    folder: Path
+    key: Key
+    bytes: int
+    made: float
+    inputs: frozenset[tuple[str, str]]
+    linked: bool
+    whole: bool
+
+    @property
+    def name(self) -> tuple[str, str]:
+        """What those that were made from it call it."""
+        return self.key.stage, self.key.fingerprint
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Which results are wanted: all that match what is given.
+
+    Attributes:
+        scene, stage: of these alone; None for any.
+        older: seconds since they were made, at least; None for any.
+    """
+
+    scene: str | None = None
+    stage: str | None = None
+    older: float | None = None
+
+    @property
+    def is_open(self) -> bool:
+        """Whether it leaves open which."""
+        return self == Choice()
+
+    def takes(self, one: Stored) -> bool:
+        """Whether a result matches. Reports do only where their stage is named."""
+        if one.key.stage == REPORT and self.stage != REPORT:
+            return False
+        named = self.scene in (None, one.key.scene) and self.stage in (None, one.key.stage)
+        return named and (self.older is None or time.time() - one.made >= self.older)
+
+
+def artifact_keys(outputs: Path) -> Iterator[Key]:
+    """Every folder that has the place and the name of an artifact."""
+    for folder in _folders(outputs):
+        if not folder.name.startswith(PARTIAL):
+            yield Key(*folder.relative_to(outputs).parts)
+
+
+def stored(outputs: Path) -> list[Stored]:
+    """Everything in a store, by scene, stage and fingerprint.
+
+    Raises:
+        InputError: a manifest is damaged, so that nobody knows what its artifact was made from, or cannot be read.
+    """
+    store = ArtifactStore(outputs)
+    with told_below(outputs):
+        linked = {link.resolve() for link in outputs.glob(f"*/*/{LATEST}*") if link.is_symlink()}
+        found = [_stored(store, folder, linked) for folder in _folders(outputs)]
+    return [one for one in found if one is not None]
+
+
+def in_the_making(outputs: Path) -> Path | None:
+    """The folder of an artifact that a process is making at this moment; None if there is none."""
+    for file in sorted(outputs.glob(f"*/*/{LOCK}*")):
+        name = file.name.removeprefix(LOCK)
+        try:
+            with _unused(file.parent, name):
+                pass
+        except Timeout:
+            return file.with_name(name)
+        except OSError:  # another user's, whose folders cannot be removed either
+            continue
+    return None
+
+
+def removable(everything: Sequence[Stored], choice: Choice) -> list[Stored]:
+    """What goes: what was chosen and nothing that stays needs.
+
+    Where it is left open which, those go that no `latest` leads to and no report was made from, and what interrupted
+    runs left.
+    """
+    if choice.is_open:
+        chosen = [one for one in everything if choice.takes(one) and not one.linked]
+    else:
+        chosen = [one for one in everything if choice.takes(one)]
+    asked = {one.folder for one in chosen}
+    needed = _needed(everything, [one for one in everything if one.folder not in asked])
+    return [one for one in chosen if one.name not in needed or not one.whole]
+
+
+def remove(outputs: Path, gone: Collection[Stored]) -> Iterator[Stored]:
+    """Remove results, the newest first, as nothing is made from these; those that were removed.
+
+    Each loses its links, goes in one step, by a name that no artifact has, and is then taken apart: a kill leaves it
+    whole, or what the next call removes. One that a process is making, or removing, stays.
+
+    Raises:
+        InputError: there is no right to remove it.
+    """
+    with told_below(outputs):
+        for left in outputs.glob(f"*/*/{GONE}*"):
+            with (
+                contextlib.suppress(Timeout),
+                _unused(left.parent, left.name.removeprefix(GONE).removeprefix(PARTIAL[1:])),
+            ):
+                _take_apart(left)
+    for one in sorted(gone, key=lambda one: one.made, reverse=True):
+        with told_below(outputs), contextlib.suppress(Timeout), _unused(one.folder.parent, one.key.fingerprint):
+            if not one.folder.exists():
+                continue
+            if one.whole:
+                _unlink(one)
+            away = one.folder.with_name(f"{GONE}{one.folder.name.lstrip('.')}")
+            one.folder.rename(away)
+            sync(away.parent)
+            _take_apart(away)
+            yield one
+
+
+def _unlink(one: Stored) -> None:
+    """Remove the links to an artifact; who finds it made sets them again."""
+    for link in one.folder.parent.glob(f"{LATEST}*"):
+        if link.is_symlink() and link.readlink() == Path(one.key.fingerprint):
+            link.unlink()
+
+
+def _take_apart(folder: Path) -> None:
+    if folder.exists():
+        shutil.rmtree(folder)
+
+
+def _folders(outputs: Path) -> Iterator[Path]:
+    """Folders of artifacts, and of those that are in the making."""
+    for folder in sorted(outputs.glob("*/*/*")):
+        named = FINGERPRINT.fullmatch(folder.name.removeprefix(PARTIAL))
+        is_run = folder.relative_to(outputs).parts[0] == "runs"
+        if named and not is_run and folder.is_dir() and not folder.is_symlink():
+            yield folder
+
+
+def _stored(store: ArtifactStore, folder: Path, linked: Collection[Path]) -> Stored | None:
+    """What a folder is; None for one in the making that is an artifact, or gone, by now."""
+    scene, stage, name = folder.relative_to(store.root).parts
+    key = Key(scene, stage, name.removeprefix(PARTIAL))
+    if name.startswith(PARTIAL):
+        try:
+            made = folder.stat().st_mtime
+        except FileNotFoundError:
+            return None
+        return Stored(folder, key, _bytes_below(folder), made, frozenset(), linked=False, whole=False)
+    artifact = store.find(key)
+    if artifact is None:
+        return None
+    named = artifact.manifest.get("inputs", {})
+    inputs = frozenset((stage, one) for stage, prints in named.items() for one in prints)
+    made = (folder / MANIFEST).stat().st_mtime
+    return Stored(folder, key, _bytes_below(folder), made, inputs, folder.resolve() in linked, whole=True)
+
+
+def _bytes_below(folder: Path) -> int:
+    """Bytes of all files; those that a run removes meanwhile do not count."""
+    size = 0
+    for place, _, names in os.walk(folder):
+        for name in names:
+            with contextlib.suppress(FileNotFoundError):
+                size += (Path(place) / name).lstat().st_size
+    return size
+
+
+def _needed(everything: Sequence[Stored], stay: Sequence[Stored]) -> set[tuple[str, str]]:
+    """Names of what those that stay were made from, and of what these were made from, and so on."""
+    inputs = {one.name: one.inputs for one in everything if one.whole}
+    found: set[tuple[str, str]] = set()
+    new = {name for one in stay for name in one.inputs}
+    while new:
+        found |= new
+        new = {name for one in new for name in inputs.get(one, ())} - found
+    return found
+
+
+@contextlib.contextmanager
+def _unused(folder: Path, name: str) -> Iterator[None]:
+    """Hold the lock under which the artifact of this name is made.
+
+    Raises:
+        Timeout: a process is making it.
+    """
+    file = folder / f"{LOCK}{name}"
+    os.close(os.open(file, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o666))
+    with FileLock(file).acquire(timeout=0):
+        yield

@@ -1,0 +1,172 @@
+"""The stage graph on small real stages: what is made, reused, refused, and why."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from pathlib import Path
+
+import pytest
+
+import toys
+from rgspipe.config import RgspipeConfig, with_changes
+from rgspipe.errors import InputError
+from rgspipe.graph.pipeline import describe_plan, plan, resolve, run
+from rgspipe.store.artifacts import ArtifactStore
+
+
+@pytest.fixture
+def config(tmp_path: Path) -> RgspipeConfig:
+    return with_changes(
+        RgspipeConfig(), {"stage": "harvest", "outputs": str(tmp_path / "outputs"), "dataset.resolution": 8}
+    )
+
+
+def planned(config: RgspipeConfig) -> list[tuple[str, bool, str]]:
+    steps = plan(resolve(config, toys.load), ArtifactStore(Path(config.outputs)))
+    return [(step.node.stage.name, step.reused, step.reason) for step in steps]
+
+
+def test_a_stage_makes_what_it_needs_and_nothing_twice(config: RgspipeConfig) -> None:
+    assert [name for name, _, _ in planned(config)] == ["sow", "grow", "grow", "harvest"]
+    artifact = run(config, toys.load)
+    # 0 + … + 31 = 496, once and three times.
+    assert artifact.file("totals.txt").read_text() == "496\n1488\n"
+    assert planned(config) == [("harvest", True, "")]
+    assert run(config, toys.load).manifest == artifact.manifest
+    log = Path(config.outputs) / "cornell" / "sow" / "made.log"
+    assert len(log.read_text().splitlines()) == 1
+
+
+def test_the_plan_says_why(config: RgspipeConfig) -> None:
+    assert planned(config)[0] == ("sow", False, "not made yet")
+    run(config, toys.load)
+    changed = with_changes(config, {"dataset.resolution": 9})
+    assert planned(changed)[0] == ("sow", False, "dataset.resolution 8 → 9")
+    assert planned(changed)[-1] == ("harvest", False, "another grow")
+    more = with_changes(config, {"report.views": [1, 2]})
+    assert planned(more) == [
+        ("grow", True, ""),
+        ("sow", True, ""),
+        ("grow", False, "views.count 3 → 2"),
+        ("harvest", False, "another grow"),
+    ]
+    text = describe_plan(plan(resolve(more, toys.load), ArtifactStore(Path(config.outputs))))
+    assert "reuse" in text and "make" in text and "views.count 3 → 2" in text
+
+
+def test_the_plan_says_what_it_will_take_where_that_is_known(config: RgspipeConfig) -> None:
+    def text(changes: dict[str, object]) -> list[str]:
+        changed = with_changes(config, changes)
+        return describe_plan(plan(resolve(changed, toys.load), ArtifactStore(Path(config.outputs)))).splitlines()
+
+    time = r"  ~[\d.]+ s"  # 0.1 s on an idle machine
+    assert not any(re.search(time, line) for line in text({})) and "Expected" not in text({})[-1]
+    run(with_changes(config, {"stage": "grow", "views.count": 1}), toys.load)
+    assert "Expected" in text({})[-1] and "and what harvest will take" in text({})[-1]
+    run(config, toys.load)
+    assert "Expected" not in text({})[-1]
+    sow, *grown, harvest, total = text({"dataset.resolution": 9})[1:]
+    assert re.search(time + r"  dataset\.resolution 8 → 9", sow) and re.search(time + "  another grow", harvest)
+    assert all(re.search(time, line) for line in grown)
+    assert re.fullmatch(r"Expected: [\d.]+ s \(from earlier runs here; ~: with other settings\)", total)
+
+
+def test_what_the_plan_could_not_remark_yet_is_said_when_a_stage_begins(
+    config: RgspipeConfig, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level("INFO")
+    stage = dataclasses.replace(
+        toys.HARVEST, remarks=lambda config, made: ["always.", f"of {' '.join(made) or 'none'}."]
+    )
+    load = {**toys.STAGES, "harvest": stage}.__getitem__
+    run(config, load)
+    said = "\n".join(record.getMessage() for record in caplog.records)
+    assert [said.count(remark) for remark in ("always.", "of none.", "of grow.")] == [1, 1, 1]
+    caplog.clear()
+    run(with_changes(config, {"report.views": [1]}), load)
+    said = "\n".join(record.getMessage() for record in caplog.records)
+    assert [said.count(remark) for remark in ("always.", "of none.", "of grow.")] == [1, 0, 1]
+
+
+def test_stages_remark_on_what_is_made_already(config: RgspipeConfig) -> None:
+    """Below their lines in the plan: nothing yet, then of the inputs, then of the artifact itself."""
+    stage = dataclasses.replace(toys.HARVEST, remarks=lambda config, made: [f"made: {' '.join(sorted(made))}."])
+    load = {**toys.STAGES, "harvest": stage}.__getitem__
+
+    def last_lines() -> list[str]:
+        store = ArtifactStore(Path(config.outputs))
+        lines = [line.strip() for line in describe_plan(plan(resolve(config, load), store)).splitlines()]
+        return lines[
+            (begin := next(place for place, line in enumerate(lines) if line.startswith("harvest"))) : begin + 2
+        ]
+
+    assert last_lines()[0].startswith("harvest  make") and last_lines()[1] == "made: ."
+    run(with_changes(config, {"stage": "grow", "views.count": 1}), load)
+    assert last_lines()[1] == "made: grow."
+    run(config, load)
+    assert last_lines()[0].startswith("harvest  reuse") and last_lines()[1] == "made: harvest."
+
+
+@pytest.mark.parametrize("stage", ["harvest", "grow"])
+def test_a_file_that_was_cut_off_after_it_was_made_is_told_where_it_is_reused(
+    config: RgspipeConfig, stage: str
+) -> None:
+    artifact = run(config, toys.load)
+    made = artifact.path if stage == "harvest" else next((artifact.path.parents[1] / "grow").glob("[0-9a-f]*"))
+    file = next(made.glob("total*.txt"))
+    file.write_bytes(b"")
+    wanted = config if stage == "harvest" else with_changes(config, {"report.views": [1, 2, 3]})
+    with pytest.raises(InputError, match=r"bytes that \w+ wrote, found 0 bytes\. Remove the folder") as caught:
+        run(wanted, toys.load)
+    assert caught.value.where == str(file)
+
+
+def test_a_link_that_was_lost_is_made_again(config: RgspipeConfig) -> None:
+    artifact = run(config, toys.load)
+    link = artifact.path.parent / "latest"
+    link.unlink()
+    run(config, toys.load)
+    assert link.resolve() == artifact.path.resolve()
+
+
+def test_keys_that_do_not_matter_do_not_rebuild(config: RgspipeConfig) -> None:
+    run(config, toys.load)
+    other = with_changes(config, {"seed": 7, "debug.traceback": True, "train.steps": 3})
+    assert planned(other) == [("harvest", True, "")]
+
+
+def test_require_refuses_and_names_the_command(config: RgspipeConfig) -> None:
+    strict = with_changes(config, {"upstream": "require"})
+    with pytest.raises(InputError) as caught:
+        run(strict, toys.load, ["stage=harvest", "upstream=require", "dataset.resolution=8"])
+    message = str(caught.value)
+    assert "grow" in message
+    assert "`python -m rgspipe stage=grow dataset.resolution=8 views.count=3`" in message
+    assert not (Path(config.outputs) / "cornell" / "sow").exists()
+    run(config, toys.load)
+    assert run(strict, toys.load).stage == "harvest"
+
+
+def test_foreign_files_count_by_content(config: RgspipeConfig, tmp_path: Path) -> None:
+    source = tmp_path / "foreign"
+    source.mkdir()
+    (source / "a.txt").write_text("1")
+    stage = dataclasses.replace(toys.SOW, files=lambda config: [source])
+    load = {**toys.STAGES, "sow": stage}.__getitem__
+    before = resolve(config, load).key
+    assert resolve(config, load).key == before
+    run(config, load)
+    (source / "a.txt").write_text("2")
+    assert resolve(config, load).key != before
+    steps = plan(resolve(config, load), ArtifactStore(Path(config.outputs)))
+    assert steps[0].reason == f"the files in {source} changed"
+
+
+def test_a_damaged_input_is_refused_and_left_alone(config: RgspipeConfig) -> None:
+    run(with_changes(config, {"stage": "sow"}), toys.load)
+    path = next((Path(config.outputs) / "cornell" / "sow" / "latest").resolve().glob("row_03.txt"))
+    path.write_text("x")
+    with pytest.raises(InputError, match=r"row_03\.txt"):
+        run(config, toys.load)
+    assert path.read_text() == "x"

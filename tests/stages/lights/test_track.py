@@ -1,0 +1,66 @@
+"""stage=track on a light that moves through a small room."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pandas as pd
+import pytest
+import torch
+from PIL import Image
+
+from frozen_store import RESOLUTION, artifact, frozen_artifact, write_targets
+from lit_room import room_cameras
+from rgspipe.config import RgspipeConfig, with_changes
+from rgspipe.datasets.light_file import read_lights
+from rgspipe.errors import InputError
+from rgspipe.fitting import FitViews
+from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.scene import PointLight
+from rgspipe.stages.base import StageContext
+from rgspipe.stages.lights import track
+
+
+def test_a_track_is_written_and_compared_with_the_truth(tmp_path: Path) -> None:
+    freeze = frozen_artifact(tmp_path / "store")
+    places = [(0.1 - 0.06 * k, -0.25 + 0.05 * k, 0.3) for k in range(3)]
+    lights = [PointLight(torch.tensor(place, dtype=torch.float64), torch.ones(3).double()) for place in places]
+    views = FitViews.prepare(FrozenScene.load(freeze.folder()), room_cameras(RESOLUTION), sharp=True)
+    names = [f"rig_{k:04d}" for k in range(3)]
+    images = {name: views.render(light) for name, light in zip(names, lights, strict=True)}
+    truths = {name: (light,) for name, light in zip(names, lights, strict=True)}
+    targets = artifact(tmp_path / "store", "generate_targets", lambda folder: write_targets(folder, images, truths))
+    config = with_changes(RgspipeConfig(stage="track"), {"views.count": 2})
+    (tmp_path / "out").mkdir()
+    context = StageContext(config, {"freeze": freeze, "generate_targets": targets}, {}, tmp_path / "out")
+    track.run(context)
+    table = pd.read_csv(tmp_path / "out" / "track.csv")
+    assert sorted(table["status"])[:1] == ["searched"] and table["target"].tolist() == names
+    assert set(table["status"]) <= {"searched", "tracked", "traced_back"}
+    assert table["position_sd"].max() < 1e-2
+    assert table["position_error"].max() < 1e-3 and table["intensity_error"].max() < 1e-2
+    for name, place in zip(names, places, strict=True):
+        (light,) = read_lights(tmp_path / "out" / "frames" / f"{name}.json")
+        assert float((light.position - torch.tensor(place, dtype=torch.float64)).norm()) < 1e-3
+    with Image.open(tmp_path / "out" / "track.png") as picture:
+        assert min(picture.size) > 300
+    json.dumps(context.facts, allow_nan=False)
+    assert context.facts["searched"] == 1 and context.facts["tracked"] + context.facts["traced_back"] == 2
+
+
+def test_the_published_method_does_not_track() -> None:
+    config = with_changes(RgspipeConfig(stage="track"), {"fit.method": "paper_adam"})
+    with pytest.raises(InputError, match=r"fit\.method"):
+        track.STAGE.needs(config)
+
+
+def test_images_elsewhere_are_among_the_files_of_a_track(dataset: Path, change: Callable, tmp_path: Path) -> None:
+    """An image outside of `track.folder` that changes must not leave the finished track in use."""
+    outside = tmp_path / "elsewhere.exr"
+    shutil.move(dataset / "targets/one/view_0.exr", outside)
+    change("targets/one/transforms.json", lambda content: content["frames"][0].update(file_path=str(outside)))
+    config = with_changes(RgspipeConfig(stage="track"), {"track.folder": str(dataset)})
+    assert outside in track.STAGE.files(config)

@@ -1,0 +1,57 @@
+"""stage=export export.lights: lights for other programs, where they are in the scene's own file."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import pytest
+import torch
+
+from rgspipe.cli.compose import compose_config
+from rgspipe.config import RgspipeConfig
+from rgspipe.datasets.light_file import read_lights, write_lights
+from rgspipe.errors import InputError
+from rgspipe.graph.pipeline import resolve, run
+from rgspipe.scene import PointLight
+from rgspipe.stages import load_stage
+from rgspipe.stages.scene.export import world_of
+
+LIGHT = PointLight(torch.tensor([0.1, -0.25, 0.3]).double(), torch.tensor([1.0, 2.0, 0.5]).double())
+
+
+def configured(root: Path, *overrides: str) -> RgspipeConfig:
+    return compose_config(["stage=export", "scene=cornell", f"outputs={root / 'out'}", *overrides])
+
+
+def test_lights_are_exported_without_the_scene_being_made(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    write_lights(tmp_path / "light.json", (LIGHT,), {"lights": [{"covariance": (1e-4 * torch.eye(6)).tolist()}]})
+    wanted = [f"export.light={tmp_path / 'light.json'}", "export.lights=[json,blend,gltf]", "export.metres=2.5"]
+    artifact = run(configured(tmp_path, *wanted), load_stage)
+    assert {path.name for path in (tmp_path / "out" / "cornell").iterdir()} == {"export"}
+    (light,) = read_lights(artifact.file("lamps.json"))
+    torch.testing.assert_close(light.position, 2.5 * LIGHT.position)
+    torch.testing.assert_close(light.intensity, 2.5**2 * LIGHT.intensity)
+    assert 'region("light 1 (95 %)"' in artifact.file("lamps_blender.py").read_text()
+    assert "a scene unit is 2.5 m" in capsys.readouterr().out
+
+
+def test_lights_without_a_file_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"export\.light"):
+        resolve(configured(tmp_path, "export.lights=[json]"), load_stage)
+    with pytest.raises(InputError, match=r"export\.lights"):
+        configured(tmp_path, "export.lights=[fbx]")
+
+
+def test_a_blend_s_own_coordinates_come_back(tmp_path: Path) -> None:
+    """dataset_info.json says how they became the scene's: (x + offset) · rescale."""
+    info = tmp_path / "dataset_info.json"
+    info.write_text(json.dumps({"version": 1, "rescale": 0.2, "offset": [1.0, 2.0, -3.0]}))
+    world = world_of(1.0, info)
+    there = torch.tensor([4.0, -1.0, 2.5]).double()
+    scene = PointLight((there + torch.tensor([1.0, 2.0, -3.0]).double()) * 0.2, 100.0 / (4.0 * math.pi) * 0.2**2)
+    (light,) = world.lights((scene,))
+    torch.testing.assert_close(light.position, there)
+    assert float(light.power()[0]) == pytest.approx(100.0)
+    assert world_of(2.0, None).unit == 2.0

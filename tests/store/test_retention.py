@@ -1,0 +1,157 @@
+"""What may be removed from a store: nothing that stays needs it, and a kill leaves nothing half there."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from filelock import FileLock
+
+from rgspipe.errors import InputError
+from rgspipe.store.artifacts import ArtifactStore, Key
+from rgspipe.store.retention import Choice, Stored, artifact_keys, in_the_making, removable, remove, stored
+
+
+def full(name: str) -> str:
+    """The fingerprint that tests call by its first two digits."""
+    return f"{name:f<16}"
+
+
+def put(root: Path, stage: str, name: str, scene: str = "room", **inputs: str) -> Key:
+    """An artifact that was made from others."""
+    key = Key(scene, stage, full(name))
+    recipe = {"config": {}, "inputs": {stage: [full(one)] for stage, one in inputs.items()}, "foreign": {}, "code": {}}
+    ArtifactStore(root).build(key, recipe, lambda folder: {"bytes": (folder / "a").write_bytes(b"12345")})
+    return key
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Path:
+    """Two scenes that were trained, of which the first was fitted to twice, and a report of the first of these fits."""
+    put(tmp_path, "train", "a1")
+    put(tmp_path, "fit", "b1", train="a1")
+    put(tmp_path, "report", "c1", fit="b1")
+    put(tmp_path, "fit", "b2", train="a1")
+    put(tmp_path, "fit", "b3", train="a1")
+    put(tmp_path, "train", "a2", scene="hall")
+    return tmp_path
+
+
+def names(chosen: list[Stored]) -> set[str]:
+    return {one.key.fingerprint[:2] for one in chosen}
+
+
+def test_what_no_link_leads_to_and_no_report_needs_goes(store: Path) -> None:
+    """b3 is the latest fit, b1 is in the report, and a1 is what both were made from."""
+    assert names(removable(stored(store), Choice())) == {"b2"}
+
+
+@pytest.mark.parametrize(
+    ("choice", "gone"),
+    [
+        (Choice(stage="fit"), {"b2", "b3"}),  # b1 is in the report
+        (Choice(stage="train"), {"a2"}),  # fits stay, so what they were made from does
+        (Choice(scene="hall"), {"a2"}),
+        (Choice(scene="room"), {"b2", "b3"}),
+        (Choice(stage="report"), {"c1"}),
+        (Choice(older=3600.0), set()),
+        (Choice(scene="room", older=0.0), {"b2", "b3"}),
+    ],
+)
+def test_what_was_chosen_goes_unless_what_stays_needs_it(store: Path, choice: Choice, gone: set[str]) -> None:
+    assert names(removable(stored(store), choice)) == gone
+
+
+def test_what_goes_takes_its_links_along_and_the_rest_is_whole(store: Path) -> None:
+    everything = stored(store)
+    assert sum(one.bytes for one in everything) > 30  # their manifests count
+    gone = list(remove(store, removable(everything, Choice(stage="fit"))))
+    assert names(gone) == {"b2", "b3"}
+    assert not (store / "room" / "fit" / "latest").is_symlink() and (store / "room" / "train" / "latest").exists()
+    kept = list(artifact_keys(store))
+    assert {key.fingerprint[:2] for key in kept} == {"a1", "b1", "c1", "a2"}
+    for key in kept:
+        ArtifactStore(store).find(key).folder()
+
+
+def test_a_removal_that_was_killed_ends_with_the_next(store: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def killed(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched, pytest.raises(KeyboardInterrupt):
+        patched.setattr(shutil, "rmtree", killed)
+        list(remove(store, removable(stored(store), Choice())))
+    assert (store / "room" / "fit" / f".gone-{full('b2')}" / "a").exists()
+    assert names(stored(store)) == {"a1", "b1", "b3", "c1", "a2"}
+    assert list(remove(store, [])) == []
+    assert not (store / "room" / "fit" / f".gone-{full('b2')}").exists()
+
+
+@pytest.mark.parametrize("step", range(8))
+def test_a_kill_at_any_step_leaves_whole_results_and_links_that_lead_somewhere(
+    store: Path, step: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """b3 and b2 go: the lock of each, its links, its name, its files."""
+    steps = 0
+
+    def counted(function: Callable[..., Any]) -> Callable[..., Any]:
+        def call(*given: Any, **named: Any) -> Any:
+            nonlocal steps
+            steps += 1
+            if steps > step:
+                raise KeyboardInterrupt
+            return function(*given, **named)
+
+        return call
+
+    with monkeypatch.context() as patched, contextlib.suppress(KeyboardInterrupt):
+        for owner, name in ((Path, "unlink"), (Path, "rename"), (os, "open"), (shutil, "rmtree")):
+            patched.setattr(owner, name, counted(getattr(owner, name)))
+        list(remove(store, removable(stored(store), Choice(stage="fit"))))
+    assert steps > step
+    for key in artifact_keys(store):
+        ArtifactStore(store).find(key).folder()
+    assert all(link.exists() for link in store.glob("*/*/latest*"))
+    list(remove(store, removable(stored(store), Choice(stage="fit"))))
+    assert names(stored(store)) == {"a1", "b1", "c1", "a2"}
+    assert not list(store.glob("*/*/.gone-*"))
+
+
+def test_what_another_process_removes_is_no_mistake(store: Path) -> None:
+    chosen = removable(stored(store), Choice(stage="fit"))
+    assert names(list(remove(store, chosen))) == {"b2", "b3"}
+    assert list(remove(store, chosen)) == []
+
+
+def test_a_process_that_makes_something_is_seen(store: Path) -> None:
+    assert in_the_making(store) is None
+    with FileLock(store / "room" / "fit" / f".lock-{full('b9')}"):
+        assert in_the_making(store) == store / "room" / "fit" / full("b9")
+
+
+def test_other_folders_are_no_results(tmp_path: Path) -> None:
+    (tmp_path / "letters" / "mother" / "2020").mkdir(parents=True)
+    assert stored(tmp_path) == [] and list(artifact_keys(tmp_path)) == []
+
+
+def test_what_interrupted_runs_left_goes_unless_a_process_is_at_it(store: Path) -> None:
+    partial = store / "room" / "fit" / f".partial-{full('b9')}"
+    partial.mkdir()
+    (partial / "half").write_bytes(b"123")
+    chosen = removable(stored(store), Choice())
+    assert names(chosen) == {"b2", "b9"}
+    with FileLock(store / "room" / "fit" / f".lock-{full('b9')}"):
+        assert names(list(remove(store, chosen))) == {"b2"}
+    assert partial.exists()
+    assert names(list(remove(store, removable(stored(store), Choice())))) == {"b9"}
+
+
+def test_a_damaged_manifest_is_named_as_nobody_knows_what_it_needs(store: Path) -> None:
+    (store / "room" / "report" / full("c1") / "manifest.json").write_text("{")
+    with pytest.raises(InputError, match=r"manifest\.json"):
+        stored(store)
