@@ -163,7 +163,9 @@ def _is_within(bvh: SurfelBvh, guessed: Continued, spacing: float) -> np.ndarray
 
 def _bounds_room(guessed: Continued, grid: Grid, free: np.ndarray, spacing: float) -> np.ndarray:
     """(G,) bool: the guessed places with room before them and none behind."""
-    before, behind = (guessed.places + side * spacing * guessed.normals for side in (1.0, -1.0))
+    # As far as it takes for the cell's middle to be no longer NEAR.
+    step = NEAR * spacing + float(grid.cell.mean())
+    before, behind = (guessed.places + side * step * guessed.normals for side in (1.0, -1.0))
     return grid.at(free, before) & ~(grid.at(free, behind) & grid.contains(behind))
 
 
