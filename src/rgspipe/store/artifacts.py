@@ -26,7 +26,16 @@ from filelock import FileLock, Timeout
 
 from rgspipe.errors import InputError
 from rgspipe.machine.description import PeakMemory, library_versions, machine
-from rgspipe.store.files import NO_RIGHT, UNWRITABLE, make_folder, point_at, publish, sha256, write_json
+from rgspipe.store.files import (
+    NO_RIGHT,
+    UNWRITABLE,
+    make_folder,
+    point_at,
+    publish,
+    sha256,
+    unfinished_links,
+    write_json,
+)
 from rgspipe.store.manifest import MANIFEST, SCHEMA_VERSION, inventory, read_manifest
 
 #: What links to the newest artifacts are called, or begin with.
@@ -161,6 +170,16 @@ class ArtifactStore:
     def point_at(self, key: Key, variant: str = "") -> None:
         """Let `latest`, or `latest-<variant>`, be this artifact; a store that cannot be written to keeps its links."""
         self._point_at(key, variant, UNWRITABLE)
+
+    def remove_unfinished_links(self) -> None:
+        """Remove what kills have left of links, also in stages that nobody asks for again; what cannot go stays."""
+        for stage in self.root.glob("*/*"):
+            for link in unfinished_links(stage, LATEST):
+                try:
+                    link.unlink(missing_ok=True)
+                except OSError as error:
+                    if error.errno not in UNWRITABLE:
+                        raise
 
     def _point_at(self, key: Key, variant: str, tolerated: Collection[int]) -> None:
         link = self.root / key.scene / key.stage / (LATEST + (f"-{variant}" if variant else ""))

@@ -24,6 +24,9 @@ LONGEST_STEM = 40
 #: The longest name of a file or folder that is taken, bytes: file systems take 255, and one in the making is longer.
 LONGEST_NAME = 200
 
+#: What the name of a link ends with while it is made.
+UNFINISHED = ".new"
+
 
 @contextlib.contextmanager
 def replacing(path: str | Path) -> Iterator[Path]:
@@ -89,10 +92,10 @@ def append_line(path: Path, line: str) -> None:
 def point_at(link: Path, target: str) -> None:
     """Make the symbolic link `link` point at `target` (relative to its folder), in one step, also after a power cut.
 
-    What a kill leaves beside it, the next call removes: links are followed by nobody while they are made, so that one
-    name for all who make them will do.
+    What a kill leaves beside it, the next call removes, and so may anybody at any time (`unfinished_links`): links are
+    followed by nobody while they are made, so that one name for all who make them will do.
     """
-    temporary = link.with_name(f".{link.name}.new")
+    temporary = link.with_name(f".{link.name}{UNFINISHED}")
     while True:
         temporary.unlink(missing_ok=True)
         try:
@@ -107,6 +110,11 @@ def point_at(link: Path, target: str) -> None:
         else:
             break
     sync(link.parent)
+
+
+def unfinished_links(folder: Path, name: str) -> Iterator[Path]:
+    """What kills have left of links whose names begin with `name`; what is being made at this moment is among it."""
+    return (path for path in folder.glob(f".{name}*{UNFINISHED}") if path.is_symlink())
 
 
 def make_folder(folder: Path) -> None:
