@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 from rgspipe.cli.completion import LINE, completed, is_question
 from rgspipe.cli.help import help_text, overview, version_text
@@ -107,7 +108,7 @@ def _dispatch(arguments: list[str], stage_loader: StageLoader) -> int:
 def _check_working_folder() -> None:
     """Refuse to work in a folder that was removed: nothing can be found from there, and some libraries do not load."""
     try:
-        os.getcwd()
+        Path.cwd()
     except OSError as error:
         raise InputError(
             "working folder",

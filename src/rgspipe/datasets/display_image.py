@@ -9,6 +9,7 @@ import numpy as np
 from PIL import ExifTags, Image, UnidentifiedImageError
 
 from rgspipe.datasets.input_file import check_pixel_count, input_file
+from rgspipe.datasets.reading_limits import timed
 from rgspipe.errors import InputError
 from rgspipe.scene import srgb
 
@@ -28,6 +29,7 @@ COLOUR_ROUNDING = 1.5
 LARGEST_LEVEL = {np.dtype(np.uint8): 255.0, np.dtype(np.uint16): 65535.0}
 
 
+@timed
 def read_display(path: Path) -> tuple[np.ndarray, np.ndarray | None]:
     """Values (H, W, 1 or 3) float32 in [0, 1] as they are stored, palettes resolved, and alpha (H, W), if there is any.
 

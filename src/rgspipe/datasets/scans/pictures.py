@@ -13,6 +13,7 @@ from rgspipe.datasets.display_image import COLOUR_TYPE, COLOURED, DEPTH, read_di
 from rgspipe.datasets.exr import read_channels
 from rgspipe.datasets.images import NO_SURFACE, read_colour
 from rgspipe.datasets.input_file import check_pixel_count, input_file
+from rgspipe.datasets.reading_limits import reading_limits, timed
 from rgspipe.datasets.scans.frame import DepthImage
 from rgspipe.datasets.scans.radiance_image import hdr_size, read_hdr
 from rgspipe.datasets.scans.raw_image import RAW, read_raw
@@ -123,6 +124,7 @@ def _bytes(path: Path, order: str) -> npt.NDArray[np.float64]:
         return np.asarray(file).astype(np.float64)
 
 
+@timed
 def _stored_depth(path: Path) -> npt.NDArray[np.float64]:
     suffix = path.suffix.lower()
     if suffix == ".bin":
@@ -156,7 +158,7 @@ def _confidence(path: Path) -> Pixels:
 
 def _colmap_array(path: Path) -> npt.NDArray[np.float64]:
     """(H, W) of "width&height&channels&" and float32, rows first."""
-    content = input_file(path, "a depth map of COLMAP").read_bytes()
+    content = input_file(path, "a depth map of COLMAP", most_bytes=reading_limits().image_bytes).read_bytes()
     parts = content[:64].split(b"&", 3)
     try:
         width, height, channels = (int(part) for part in parts[:3])
@@ -172,7 +174,7 @@ def _colmap_array(path: Path) -> npt.NDArray[np.float64]:
 
 def _openrooms_array(path: Path) -> npt.NDArray[np.float64]:
     """(H, W) of two int32, height and width, and float32, rows first."""
-    content = input_file(path, "depth of OpenRooms").read_bytes()
+    content = input_file(path, "depth of OpenRooms", most_bytes=reading_limits().image_bytes).read_bytes()
     height, width = (int(size) for size in np.frombuffer(content[:8].ljust(8, b"\0"), "<i4"))
     check_pixel_count(path, width, height)
     if len(content) != 8 + 4 * width * height:
