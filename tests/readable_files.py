@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import shutil
 import tempfile
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,7 @@ from rgspipe.datasets.images import read_colour
 from rgspipe.datasets.light_file import read_ambient, read_lights, write_lights
 from rgspipe.datasets.location import open_dataset
 from rgspipe.datasets.mesh_file import read_mesh
+from rgspipe.datasets.named_cameras import NamedCamera, read_camera, write_cameras
 from rgspipe.datasets.photometric_file import read_photometry
 from rgspipe.datasets.ply import read_ply
 from rgspipe.datasets.ply_cameras import read_viewpoints
@@ -32,6 +34,7 @@ from rgspipe.datasets.ply_options import PlyOptions
 from rgspipe.datasets.scans.importing import import_scan
 from rgspipe.datasets.scans.layouts import read_scan
 from rgspipe.datasets.scans.options import ScanOptions
+from rgspipe.datasets.scans.raw_image import read_raw
 from rgspipe.datasets.surfel_file import load_surfels, save_surfels
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import Camera, PointLight, SpotLight
@@ -43,6 +46,8 @@ from rooms import closed_box
 from scan_layouts import (
     photographed,
     write_colmap,
+    write_dng,
+    write_iid,
     write_interiorverse,
     write_nerfstudio,
     write_openrooms,
@@ -221,6 +226,23 @@ def _mesh(name: str, make: Callable[[Path], object] | None = None) -> Kind:
     return Kind(name, make or (lambda folder: textured_square(quarters()).export(folder / name)), read)
 
 
+def _beside_mesh(mesh: str, file: str) -> Kind:
+    """A file that the mesh of a textured square names."""
+    return replace(_mesh(mesh), file=file)
+
+
+def _named_camera(folder: Path) -> Numbers:
+    camera = read_camera(folder / "cameras.json", "Door").of_image(4, 3)
+    return iter([camera.camera_to_world, torch.tensor([camera.fx, camera.fy, camera.cx, camera.cy])])
+
+
+def _replica_lens(root: Path) -> None:
+    write_replica(root, SCANNED)
+    view = SCANNED[0].camera
+    numbers = {"w": view.width, "h": view.height, "fx": view.fx, "fy": view.fy, "cx": view.cx, "cy": view.cy}
+    (root / "cam_params.json").write_text(json.dumps({"camera": {**numbers, "scale": 6553.5}}))
+
+
 def _coloured_mesh(folder: Path) -> None:
     write_coloured(folder / "a.ply", *cuboid_triangles(ROOM), np.full((24, 3), 99, np.uint8))
 
@@ -304,9 +326,16 @@ KINDS: dict[str, Kind] = {
     "scan: OpenRooms": _of_scan("cam.txt", lambda root: write_openrooms(root, SCANNED)),
     "scan: OpenRooms depth": _of_scan("imdepth_1.dat", lambda root: write_openrooms(root, SCANNED)),
     "scan: Radiance picture": _of_scan("im_1.hdr", lambda root: write_openrooms(root, SCANNED)),
+    "scan: Radiance, plain": _of_scan("im_2.hdr", lambda root: write_openrooms(root, SCANNED)),
+    "scan: Replica, lens": _of_scan("cam_params.json", _replica_lens),
+    "scan: one image": _of_scan("depth.exr", lambda root: write_iid(root, SCANNED[0], (8, 8))),
     "mesh, PLY": _mesh("a.ply", _coloured_mesh),
     "mesh, OBJ": _mesh("a.obj"),
     "mesh, GLB": _mesh("a.glb"),
+    "mesh, glTF": _mesh("a.gltf"),
+    "mesh, materials": _beside_mesh("a.obj", "material.mtl"),
+    "mesh, buffer": _beside_mesh("a.gltf", "gltf_buffer_0.bin"),
+    "mesh, texture": _beside_mesh("a.obj", "material_0.png"),
     "normals": _of_dataset("train/r_0000_normal.exr"),
     "views, lamps off": _of_lamps_off("transforms.json"),
     "image, lamps off": _of_lamps_off("off.exr"),
@@ -316,8 +345,20 @@ KINDS: dict[str, Kind] = {
     "cameras of a PLY": Kind(
         "cameras.json", _viewpoints, lambda folder: iter(read_viewpoints(folder / "cameras.json"))
     ),
+    "cameras by name": Kind(
+        "cameras.json",
+        lambda folder: write_cameras(folder / "cameras.json", {"Door": NamedCamera(torch.eye(4).double(), 1.2)}),
+        _named_camera,
+    ),
     "manifest": Kind("room/freeze/aa/manifest.json", _artifact, _read_artifact),
 }
+
+if importlib.util.find_spec("rawpy") is not None:
+    KINDS["raw photograph"] = Kind(
+        "a.dng",
+        lambda folder: write_dng(folder / "a.dng", np.full((32, 32), 999, np.uint16)),
+        lambda folder: iter([torch.from_numpy(read_raw(folder / "a.dng")[0])]),
+    )
 
 
 def fresh(kind: Kind, folder: Path) -> bytes:
