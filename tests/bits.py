@@ -66,6 +66,7 @@ def swept_otherwise() -> list[str]:
     words = [f"{key}={value}" for key, value in {**TINY, "stage": "fit_light", "occlusion": "visible"}.items()]
     ways = {"plain": ["seed=0"], "sweep": ["-m", "seed=0,1", "hydra.launcher.n_jobs=2"]}
     environment = {name: value for name, value in os.environ.items() if name != "OMP_NUM_THREADS"}
+    environment["PYTHONPATH"] = PATH
     found = {}
     with tempfile.TemporaryDirectory() as place:
         for name, given in ways.items():
