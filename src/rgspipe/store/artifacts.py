@@ -15,7 +15,6 @@ from __future__ import annotations
 import datetime
 import logging
 import os
-import shutil
 import time
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
@@ -32,6 +31,7 @@ from rgspipe.store.files import (
     make_folder,
     point_at,
     publish,
+    remove_tree,
     sha256,
     unfinished_links,
     write_json,
@@ -268,7 +268,7 @@ def _forget(partial: Path, lock_file: Path) -> None:
     """Leave no trace of what was refused before anything was made of it; its lock is held."""
     if any(path.is_file() for path in partial.rglob("*")):
         return
-    shutil.rmtree(partial)
+    remove_tree(partial)
     # Who waits for the lock sees that its file is gone, and takes a new one.
     lock_file.unlink()
 
@@ -276,6 +276,6 @@ def _forget(partial: Path, lock_file: Path) -> None:
 def _remove_scratch(partial: Path) -> None:
     for path in [path for path in partial.rglob(".*") if path.exists()]:
         if path.is_dir() and not path.is_symlink():
-            shutil.rmtree(path)
+            remove_tree(path)
         else:
             path.unlink(missing_ok=True)

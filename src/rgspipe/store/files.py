@@ -8,6 +8,7 @@ import hashlib
 import json
 import os
 import secrets
+import shutil
 import stat
 from collections.abc import Iterator
 from pathlib import Path
@@ -123,6 +124,21 @@ def make_folder(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for place in missing:
         sync(place.parent)
+
+
+def remove_tree(folder: Path) -> None:
+    """Remove a folder with all that is in it, if it is there.
+
+    Raises:
+        OSError: something cannot be removed; names the folder, where the library has a name without one.
+    """
+    try:
+        shutil.rmtree(folder)
+    except FileNotFoundError:  # gone, or another process removes it at this moment
+        if folder.exists():
+            raise
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(folder)) from error
 
 
 def publish(partial: Path, folder: Path) -> None:
