@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from PIL import ExifTags, Image
 
-from rgspipe.datasets.display_image import COLOUR_TYPE, COLOURED, DEPTH, read_display, saturated_from
+from rgspipe.datasets.display_image import COLOUR_TYPE, COLOURED, DAMAGED, DEPTH, read_display, saturated_from
 from rgspipe.datasets.exr import read_channels
 from rgspipe.datasets.images import NO_SURFACE, read_colour
 from rgspipe.datasets.input_file import check_pixel_count, input_file
@@ -86,11 +86,12 @@ def exposure_of(path: Path) -> float | None:
     keys = (ExifTags.Base.ExposureTime, ExifTags.Base.ISOSpeedRatings, ExifTags.Base.FNumber)
     try:
         with Image.open(input_file(path, "a photograph"), formats=["JPEG", "PNG"]) as file:
+            check_pixel_count(path, *file.size)  # of a PNG all pixels are decoded for it
             stated = file.getexif().get_ifd(ExifTags.IFD.Exif)
         shutter, sensitivity, aperture = (float(np.ravel(stated.get(key, 0))[0]) for key in keys)
     except InputError:
         raise
-    except (OSError, SyntaxError, TypeError, ValueError, ZeroDivisionError):
+    except (*DAMAGED, TypeError, ZeroDivisionError):
         # Whether its pixels can be read is asked elsewhere.
         return None
     return shutter * sensitivity / aperture**2 if min(shutter, sensitivity, aperture) > 0.0 else None
@@ -111,7 +112,7 @@ def _wide_colours(path: Path) -> Pixels:
         upper, lower = (_bytes(path, order) for order in ("B", "L"))
     except InputError:
         raise
-    except (OSError, SyntaxError, ValueError, MemoryError) as error:
+    except DAMAGED as error:
         found = f"an unreadable file ({error})"
         raise InputError(path, expected="a whole PNG image", found=found, remedy="Export it again.") from error
     return ((256.0 * upper + lower)[..., :3] / 65535.0).astype(np.float32)
@@ -198,6 +199,6 @@ def size_of(path: Path) -> tuple[int, int]:
     try:
         with Image.open(input_file(path, "an image"), formats=["PNG", "JPEG"]) as file:
             return file.size
-    except (OSError, SyntaxError, ValueError) as error:
+    except DAMAGED as error:
         found = f"an unreadable file ({error})"
         raise InputError(path, expected="a PNG or JPEG image", found=found, remedy="Export it again.") from error
