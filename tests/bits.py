@@ -1,6 +1,7 @@
 """What a training and a fit come to with other numbers of threads, and with other instructions: `make bits`.
 
-For 1, 2 and 4 threads every bit must be the same. Other instructions round otherwise, which training makes larger; what
+For 1, 2 and 4 threads every bit must be the same, and so what a plain run makes and what a sweep of two jobs at once
+does. Other instructions round otherwise, which training makes larger; what
 is said of the light must be the same, and its place to a ten thousandth of the room.
 """
 
@@ -9,8 +10,11 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import tempfile
 from collections.abc import Mapping
 from pathlib import Path
+
+from whole_way import TINY, end_state
 
 #: Trains a toy room on images of 96 x 96, freezes it and finds a light; prints what is said, where the light is, and
 #: every bit of what comes out.
@@ -43,22 +47,43 @@ INSTRUCTIONS = (
     *({"MKL_CBWR": name} for name in ("COMPATIBLE", "AVX2")),
 )
 
+PATH = os.pathsep.join(str(Path(__file__).parents[1] / name) for name in ("src", "tests"))
+
 #: How far apart lights may be, as a share of the room, whose side is 1.
 APART = 1e-4
 
 
 def outcome(changes: Mapping[str, str]) -> list[str]:
     """The lines of the program in a changed environment."""
-    path = os.pathsep.join(str(Path(__file__).parents[1] / name) for name in ("src", "tests"))
-    environment = os.environ | {"PYTHONPATH": path, **changes}
+    environment = os.environ | {"PYTHONPATH": PATH, **changes}
     run = subprocess.run([sys.executable, "-c", PROGRAM], env=environment, capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stderr
     return run.stdout.splitlines()
 
 
+def swept_otherwise() -> list[str]:
+    """What a sweep of two jobs at once makes otherwise than a plain run, which has all threads to itself."""
+    words = [f"{key}={value}" for key, value in {**TINY, "stage": "fit_light", "occlusion": "visible"}.items()]
+    ways = {"plain": ["seed=0"], "sweep": ["-m", "seed=0,1", "hydra.launcher.n_jobs=2"]}
+    environment = {name: value for name, value in os.environ.items() if name != "OMP_NUM_THREADS"}
+    environment["PYTHONPATH"] = PATH
+    found = {}
+    with tempfile.TemporaryDirectory() as place:
+        for name, given in ways.items():
+            folder = Path(place, name)
+            command = [sys.executable, "-m", "rgspipe", *words, *given, f"outputs={folder}"]
+            subprocess.run(
+                command, cwd=place, env=environment | {"PYTHONPATH": PATH}, stdout=subprocess.DEVNULL, check=True
+            )
+            found[name] = {path: what for path, what in end_state(folder).items() if not what.startswith("leads to")}
+    return sorted(name for name, what in found["plain"].items() if found["sweep"].get(name) != what)
+
+
 def main() -> int:
     """Compare with one thread; the exit status."""
-    expected, wrong = outcome(THREADS[0]), 0
+    other = swept_otherwise()
+    print(f"a sweep and a plain run: {'every bit is the same' if not other else ', '.join(other)}", flush=True)
+    expected, wrong = outcome(THREADS[0]), int(bool(other))
     status, *place = expected[0].split()
     print(f"{THREADS[0]}: {status} at {', '.join(place)}", flush=True)
     for changes in (*THREADS[1:], *INSTRUCTIONS):

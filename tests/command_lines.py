@@ -11,6 +11,7 @@ import dataclasses
 import math
 import os
 import random
+import re
 import subprocess
 import sys
 import tempfile
@@ -119,7 +120,7 @@ def composed(seed: int, index: int) -> tuple[str, str]:
 def _helps(error: InputError, words: Sequence[str]) -> bool:
     """Whether an error is one paragraph with a remedy that names something of the command line, or what is missing."""
     text = str(error)
-    names = {part for word in words for part in word.lstrip("+~").partition("=")[0].split(".")}
+    names = {part for word in words for part in re.split("[.@:]", word.lstrip("+~").partition("=")[0])}
     names |= {"stage", *map(repr, words)}
     return bool(error.remedy) and "\n" not in text and any(name and name in text for name in names)
 

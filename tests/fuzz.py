@@ -1,7 +1,8 @@
 """Mutants of every kind of file that is read, as many as are asked for: `make fuzz ARGS="CASES SEED"`.
 
-Each worker may have 1 GiB more than it begins with, and each mutant 5 s. What is neither read, with finite numbers,
-nor refused by an error that names the file is kept in fuzz_found/ with what happened. Exit status 1 if anything was.
+Each worker may have 1 GiB more than it begins with, and each mutant 5 s of its processor, or a minute of waiting. What
+is neither read, with finite numbers, nor refused by an error that names the file is kept in fuzz_found/ with what
+happened. Exit status 1 if anything was.
 """
 
 from __future__ import annotations
@@ -28,8 +29,9 @@ from readable_files import KINDS, fresh
 from rgspipe.errors import InputError
 from rgspipe.progress import progress_bar
 
-#: Seconds of a mutant, and memory of a worker beyond what it begins with.
-LONGEST, MEMORY = 5, 2**30
+#: Seconds of the processor for a mutant, seconds by the clock where other programs run, and memory of a worker beyond
+#: what it begins with.
+LONGEST, PATIENCE, MEMORY = 5, 60, 2**30
 
 #: Mutants that a worker reads at a time.
 BATCH = 250
@@ -61,11 +63,12 @@ def _limited() -> None:
     torch.set_num_threads(1)
     begun = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (begun + MEMORY, resource.RLIM_INFINITY))
-    signal.signal(signal.SIGALRM, _too_long)
+    for number in (signal.SIGALRM, signal.SIGPROF):
+        signal.signal(number, _too_long)
 
 
 def _too_long(number: int, frame: FrameType | None) -> None:
-    raise TimeoutError(f"longer than {LONGEST} s")
+    raise TimeoutError(f"longer than {LONGEST} s of the processor, or {PATIENCE} s")
 
 
 def _batch(name: str, seed: int, first: int, count: int) -> Counter[str]:
@@ -88,7 +91,8 @@ def _mutants(content: bytes, name: str, seed: int, first: int, count: int) -> It
 def _outcome(name: str, folder: Path, mutant: bytes) -> str:
     """read, refused or fell; what fell is kept."""
     kind = KINDS[name]
-    signal.alarm(LONGEST)
+    signal.alarm(PATIENCE)
+    signal.setitimer(signal.ITIMER_PROF, LONGEST)
     try:
         if all(bool(tensor.isfinite().all()) for tensor in kind.read(folder)):
             return "read"
@@ -101,6 +105,7 @@ def _outcome(name: str, folder: Path, mutant: bytes) -> str:
         story = traceback.format_exc()
     finally:
         signal.alarm(0)
+        signal.setitimer(signal.ITIMER_PROF, 0)
     FOUND.mkdir(exist_ok=True)
     stem = f"{re.sub('[^a-z0-9]+', '_', name.lower())}_{time.monotonic_ns()}"
     (FOUND / f"{stem}.txt").write_text(story)

@@ -9,6 +9,8 @@ import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from faults import note_settled
+
 Event = Mapping[str, object]
 
 
@@ -29,6 +31,9 @@ def cut_power(root: Path, log: Path, chance: random.Random | None = None) -> lis
         if not settled and (chance is None or chance.random() < 0.5):
             path.write_bytes(b"")
             lost.append(path)
+    # Whatever is left is on the disk: the next cut takes none of it.
+    log.write_bytes(b"")
+    note_settled(str(log), (path for path in root.rglob("*") if path.is_file() and not path.is_symlink()))
     return lost
 
 

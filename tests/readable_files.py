@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import json
 import shutil
-import tempfile
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,21 +16,19 @@ from luminaire_files import COLUMNS, ies, ldt
 from mesh_files import cuboid_triangles, quarters, textured_square, write_coloured
 from ply_files import gaussian_columns, radiosity_columns, write_ply
 from raycast import ROOM
+from readable_captures import CAPTURES, Kind, Numbers
 from rgspipe.datasets.covariance_file import covariance_fields, read_covariances
 from rgspipe.datasets.exr import read_channels, write_channels, write_image
 from rgspipe.datasets.grade_file import load_grade, save_grade
-from rgspipe.datasets.gs3 import load_dataset
 from rgspipe.datasets.images import read_colour
 from rgspipe.datasets.light_file import read_ambient, read_lights, write_lights
 from rgspipe.datasets.location import open_dataset
 from rgspipe.datasets.mesh_file import read_mesh
+from rgspipe.datasets.named_cameras import NamedCamera, read_camera, write_cameras
 from rgspipe.datasets.photometric_file import read_photometry
 from rgspipe.datasets.ply import read_ply
 from rgspipe.datasets.ply_cameras import read_viewpoints
 from rgspipe.datasets.ply_options import PlyOptions
-from rgspipe.datasets.scans.importing import import_scan
-from rgspipe.datasets.scans.layouts import read_scan
-from rgspipe.datasets.scans.options import ScanOptions
 from rgspipe.datasets.surfel_file import load_surfels, save_surfels
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import Camera, PointLight, SpotLight
@@ -40,38 +37,7 @@ from rgspipe.scene.grade import SceneGrade
 from rgspipe.scene.lights import LedLight, PanelLight, ProfileLight, SphereLight, SunLight
 from rgspipe.store.artifacts import ArtifactStore, Key
 from rooms import closed_box
-from scan_layouts import (
-    photographed,
-    write_colmap,
-    write_interiorverse,
-    write_nerfstudio,
-    write_openrooms,
-    write_polycam,
-    write_replica,
-    write_scannet,
-)
 from tiny_dataset import HEIGHT, WIDTH, tiny_camera, write_tiny_dataset
-
-#: What a reader makes of a folder: all of its numbers.
-Numbers = Iterator[torch.Tensor]
-
-#: Photographs of a capture.
-SCANNED = photographed(2, 8)
-
-
-@dataclass(frozen=True)
-class Kind:
-    """A kind of file.
-
-    Attributes:
-        file: the one that is changed, in the folder.
-        make: writes it, and what belongs to it, into an empty folder.
-        read: reads the folder.
-    """
-
-    file: str
-    make: Callable[[Path], object]
-    read: Callable[[Path], Numbers]
 
 
 def _image(name: str, mode: str) -> Kind:
@@ -196,19 +162,6 @@ def _of_dataset(name: str) -> Kind:
     return Kind(name, write_tiny_dataset, _read_dataset)
 
 
-def _of_scan(file: str, write: Callable[[Path], None]) -> Kind:
-    """A file of a capture of two photographs, which is imported."""
-
-    def read(folder: Path) -> Numbers:
-        options = ScanOptions(resolution=8)
-        with tempfile.TemporaryDirectory(dir=folder.parent) as made:
-            import_scan(read_scan(folder, options), options, Path(made))
-            views = load_dataset(made, targets=False).train
-        return iter([view.image for view in views] + [view.camera.camera_to_world for view in views])
-
-    return Kind(file, write, read)
-
-
 def _mesh(name: str, make: Callable[[Path], object] | None = None) -> Kind:
     """By default a textured square."""
 
@@ -221,15 +174,18 @@ def _mesh(name: str, make: Callable[[Path], object] | None = None) -> Kind:
     return Kind(name, make or (lambda folder: textured_square(quarters()).export(folder / name)), read)
 
 
+def _beside_mesh(mesh: str, file: str) -> Kind:
+    """A file that the mesh of a textured square names."""
+    return replace(_mesh(mesh), file=file)
+
+
+def _named_camera(folder: Path) -> Numbers:
+    camera = read_camera(folder / "cameras.json", "Door").of_image(4, 3)
+    return iter([camera.camera_to_world, torch.tensor([camera.fx, camera.fy, camera.cx, camera.cy])])
+
+
 def _coloured_mesh(folder: Path) -> None:
     write_coloured(folder / "a.ply", *cuboid_triangles(ROOM), np.full((24, 3), 99, np.uint8))
-
-
-def _colmap_map(root: Path) -> None:
-    write_colmap(root, SCANNED, True, depth=False)
-    path = root / "stereo/depth_maps/00.exr.geometric.bin"
-    path.parent.mkdir(parents=True)
-    path.write_bytes(b"8&8&1&" + SCANNED[0].depth.numpy().astype("<f4").tobytes())
 
 
 def _of_lamps_off(name: str) -> Kind:
@@ -253,6 +209,7 @@ def _ply(columns: Callable[[], dict], text: bool = False) -> Kind:
 
 
 KINDS: dict[str, Kind] = {
+    **CAPTURES,
     "EXR": Kind(
         "a.exr",
         lambda folder: write_image(folder / "a.exr", np.ones((8, 8, 3)), np.ones((8, 8))),
@@ -288,25 +245,13 @@ KINDS: dict[str, Kind] = {
     "targets.json": _of_dataset("targets/targets.json"),
     "a target's views": _of_dataset("targets/one/transforms.json"),
     "depth": _of_dataset("train/r_0000_depth.exr"),
-    "scan: nerfstudio": _of_scan("transforms.json", lambda root: write_nerfstudio(root, SCANNED, ".png", ".png")),
-    "scan: wide PNG": _of_scan("images/0.16.png", lambda root: write_nerfstudio(root, SCANNED, ".16.png", ".png")),
-    "scan: depth": _of_scan("depth/0.png", lambda root: write_nerfstudio(root, SCANNED, ".png", ".png")),
-    "scan: Polycam": _of_scan(
-        "keyframes/corrected_cameras/1000.json", lambda root: write_polycam(root, *2 * [SCANNED])
-    ),
-    "scan: COLMAP cameras": _of_scan("sparse/0/cameras.bin", lambda root: write_colmap(root, SCANNED, True)),
-    "scan: COLMAP images": _of_scan("sparse/0/images.bin", lambda root: write_colmap(root, SCANNED, True)),
-    "scan: COLMAP text": _of_scan("sparse/0/images.txt", lambda root: write_colmap(root, SCANNED, False)),
-    "scan: COLMAP map": _of_scan("stereo/depth_maps/00.exr.geometric.bin", _colmap_map),
-    "scan: Replica": _of_scan("traj.txt", lambda root: write_replica(root, SCANNED)),
-    "scan: ScanNet": _of_scan("intrinsic/intrinsic_color.txt", lambda root: write_scannet(root, SCANNED)),
-    "scan: InteriorVerse": _of_scan("000_material.exr", lambda root: write_interiorverse(root, SCANNED[:1])),
-    "scan: OpenRooms": _of_scan("cam.txt", lambda root: write_openrooms(root, SCANNED)),
-    "scan: OpenRooms depth": _of_scan("imdepth_1.dat", lambda root: write_openrooms(root, SCANNED)),
-    "scan: Radiance picture": _of_scan("im_1.hdr", lambda root: write_openrooms(root, SCANNED)),
     "mesh, PLY": _mesh("a.ply", _coloured_mesh),
     "mesh, OBJ": _mesh("a.obj"),
     "mesh, GLB": _mesh("a.glb"),
+    "mesh, glTF": _mesh("a.gltf"),
+    "mesh, materials": _beside_mesh("a.obj", "material.mtl"),
+    "mesh, buffer": _beside_mesh("a.gltf", "gltf_buffer_0.bin"),
+    "mesh, texture": _beside_mesh("a.obj", "material_0.png"),
     "normals": _of_dataset("train/r_0000_normal.exr"),
     "views, lamps off": _of_lamps_off("transforms.json"),
     "image, lamps off": _of_lamps_off("off.exr"),
@@ -315,6 +260,11 @@ KINDS: dict[str, Kind] = {
     "TensoIR, normals": _of_tensoir("normal.png"),
     "cameras of a PLY": Kind(
         "cameras.json", _viewpoints, lambda folder: iter(read_viewpoints(folder / "cameras.json"))
+    ),
+    "cameras by name": Kind(
+        "cameras.json",
+        lambda folder: write_cameras(folder / "cameras.json", {"Door": NamedCamera(torch.eye(4).double(), 1.2)}),
+        _named_camera,
     ),
     "manifest": Kind("room/freeze/aa/manifest.json", _artifact, _read_artifact),
 }

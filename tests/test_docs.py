@@ -76,6 +76,19 @@ def test_code_that_is_named_exists(page: Path) -> None:
     assert missing == []
 
 
+def test_tests_that_are_named_exist() -> None:
+    """In a cell, a name without a file is of the file before it."""
+    text, missing = (DOCS / "laboratory" / "attacks.md").read_text(), []
+    for cell in re.findall(r"\| ([^|\n]+) \|$", text, re.MULTILINE):
+        content = ""
+        for path, name in re.findall(r"`(?:([a-z_/]+\.py))?(?:::)?(test_[a-z0-9_]+)?`", cell):
+            file = ROOT / "tests" / path
+            content = file.read_text() if path and file.is_file() else "" if path else content
+            if not content or (name and f"def {name}(" not in content):
+                missing.append(f"{path}::{name}")
+    assert missing == []
+
+
 def test_values_of_thresholds_are_those_of_the_code() -> None:
     page = (DOCS / "guides" / "doubtful_answers.md").read_text()
     fields = FIELD.findall(page)

@@ -170,6 +170,12 @@ REFUSED: dict[str, tuple[Callable[[rg.FrozenScene, Tensor], object], str, str, s
     "channels first": (lambda s, i: fit(s, i.permute(2, 0, 1)), "images[0]", "shape (3, 40, 48)", "channels last"),
     "levels of a PNG": (lambda s, i: fit(s, rg.tone_map(i)), "images[0]", "0 to 255", "srgb.decode"),
     "an image of NaN": (lambda s, i: fit(s, i * math.nan), "images[0]", "NaN", "again"),
+    "a pixel of -10": (
+        lambda s, i: fit(s, i.clone().index_put_((torch.tensor(3), torch.tensor(5)), torch.tensor(-10.0))),
+        "images[0]",
+        "-10",
+        "again",
+    ),
     "an image too few": (
         lambda s, i: rg.fit_lights(s, [CAMERA, CAMERA], [i]),
         "images",

@@ -63,3 +63,8 @@ def test_what_was_not_may_stay(cut, seed: int) -> None:
     assert left.keys() <= {*KEPT, "former.txt", "lost.txt", "renamed.txt"}
     # Names are lost from the last one on.
     assert left["former.txt"] == "kept" or "renamed.txt" in left
+
+
+def test_what_is_left_after_one_outlasts_the_next(cut) -> None:
+    left = cut(random.Random(0))
+    assert cut(None) == left

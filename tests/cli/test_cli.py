@@ -43,7 +43,7 @@ def test_without_arguments_it_says_what_it_can_do(rgspipe) -> None:
         assert word in result.stdout
 
 
-@pytest.mark.parametrize("arguments", [[], ["--help"], ["--help", "fit"]])
+@pytest.mark.parametrize("arguments", [[], ["--help"], ["--help", "fit"], ["status"]])
 def test_nobody_need_read_on(arguments: list[str], tmp_path: Path, child_environment: dict[str, str]) -> None:
     """As with `rgspipe --help | head -1`: no traceback, also where the output is shorter than a pipe holds."""
     command = [sys.executable, "-m", "rgspipe", *arguments]

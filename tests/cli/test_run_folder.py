@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from rgspipe.cli import main
 from rgspipe.cli.jobs import new_run_folder, run_jobs
 from rgspipe.errors import InputError
 from rgspipe.stages import load_stage
@@ -52,3 +53,14 @@ def test_a_launcher_that_is_no_name_is_refused() -> None:
     """Whether runs leave the machine is asked before anything is composed."""
     with pytest.raises(InputError, match="launcher=NAME"):
         run_jobs(["stage=freeze", "launcher=null"], load_stage, multirun=False)
+
+
+@pytest.mark.parametrize("words", [["stage=freeze"], ["-m", "stage=freeze", "seed=1,2"], ["status"], ["demo"]])
+def test_a_working_folder_that_was_removed_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], words: list[str]
+) -> None:
+    gone = tmp_path / "gone"
+    gone.mkdir()
+    monkeypatch.chdir(gone)
+    gone.rmdir()
+    assert main(words) == 2 and "working folder: expected one that is there" in capsys.readouterr().err

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import struct
+import zlib
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,7 +19,7 @@ from rgspipe.datasets.scans.frame import DepthImage, Lens
 from rgspipe.datasets.scans.importing import import_scan
 from rgspipe.datasets.scans.layouts import read_scan
 from rgspipe.datasets.scans.options import ScanOptions
-from rgspipe.datasets.scans.pictures import exposure_of, read_depth_image, read_picture
+from rgspipe.datasets.scans.pictures import exposure_of, read_depth_image, read_picture, size_of
 from rgspipe.datasets.scans.resample import resampled_colour, resampled_depth, straight_camera
 from rgspipe.datasets.views import View
 from rgspipe.errors import InputError
@@ -217,6 +219,22 @@ def test_raw_photographs_are_read_without_a_curve_in_their_white_balance(tmp_pat
     (tmp_path / "half.dng").write_bytes((tmp_path / "a.dng").read_bytes()[:900])
     with pytest.raises(InputError, match=r"half\.dng.*raw photograph"):
         read_picture(tmp_path / "half.dng", "srgb")
+
+
+@pytest.mark.parametrize("side", [13_000, 60_000])
+def test_a_photograph_that_claims_a_huge_size_is_never_decoded(tmp_path: Path, side: int) -> None:
+    """Pillow refuses the larger one itself; of a PNG it decodes all pixels to get to what EXIF says."""
+    path = tmp_path / "bomb.png"
+    Image.new("RGB", (8, 8)).save(path)
+    content = bytearray(path.read_bytes())
+    content[16:24] = struct.pack(">II", side, side)
+    content[29:33] = struct.pack(">I", zlib.crc32(content[12:29]))
+    path.write_bytes(content)
+    for read in (exposure_of, size_of, lambda path: read_picture(path, "srgb")):
+        try:
+            assert read(path) in (None, (side, side))
+        except InputError as error:
+            assert "bomb.png" in str(error)
 
 
 @pytest.mark.parametrize("packed", [True, False])

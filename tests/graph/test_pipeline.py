@@ -130,6 +130,17 @@ def test_a_link_that_was_lost_is_made_again(config: RgspipeConfig) -> None:
     assert link.resolve() == artifact.path.resolve()
 
 
+def test_a_link_in_the_making_that_a_kill_left_is_removed_where_no_stage_is_asked_for(config: RgspipeConfig) -> None:
+    """One that could not be removed when its stage was reused; since then, only what was made from it is asked for."""
+    artifact = run(config, toys.load)
+    stage = artifact.path.parents[1] / "sow"
+    (stage / ".latest.new").symlink_to("nowhere")
+    (stage / ".latest-seed=1.new").symlink_to("nowhere")
+    before = (stage / "latest").readlink()
+    run(config, toys.load)
+    assert not list(stage.glob(".latest*")) and (stage / "latest").readlink() == before
+
+
 def test_keys_that_do_not_matter_do_not_rebuild(config: RgspipeConfig) -> None:
     run(config, toys.load)
     other = with_changes(config, {"seed": 7, "debug.traceback": True, "train.steps": 3})

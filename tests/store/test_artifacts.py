@@ -84,7 +84,11 @@ def test_a_damaged_file_is_refused_by_name(tmp_path: Path, word: str) -> None:
     assert ArtifactStore(tmp_path).find(KEY).file("note.txt").is_file()
 
 
-@pytest.mark.parametrize("content", [None, "{", "[]", "{}", '{"schema": 1, "fingerprint": "other", "files": {}}'])
+#: A manifest of another artifact.
+OTHER = '{"schema": 1, "fingerprint": "other", "files": {}}'
+
+
+@pytest.mark.parametrize("content", [None, "{", "[]", "{}", "[" * 100_000, "9" * 5000, OTHER])
 def test_a_damaged_manifest_is_refused_by_name(tmp_path: Path, content: str | None) -> None:
     path = built(tmp_path).path / "manifest.json"
     path.unlink() if content is None else path.write_text(content)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import ast
+import errno
 import os
+import re
 import secrets
 import sys
 from collections.abc import Callable
@@ -18,7 +20,16 @@ from rgspipe.datasets.exr import write_channels
 from rgspipe.datasets.ply_table import write_vertices
 from rgspipe.datasets.tensor_file import save_tensors
 from rgspipe.evaluation.images import save_png
-from rgspipe.store.files import append_line, point_at, publish, replacing, write_bytes, write_json, write_text
+from rgspipe.store.files import (
+    append_line,
+    point_at,
+    publish,
+    remove_tree,
+    replacing,
+    write_bytes,
+    write_json,
+    write_text,
+)
 from small_disk import on_small_disk
 
 #: Every kind of file that is written, some of them by libraries that take a path.
@@ -214,6 +225,21 @@ def test_a_full_disk_is_told_by_name(tmp_path: Path, child_environment: dict[str
         tmp_path, "64k", '"$1" -c "$2" "$3"', child_environment, [sys.executable, FILLING, str(tmp_path)]
     )
     assert done.returncode == 0 and done.stdout.count("told") == len(WRITERS) - 1, done.stderr
+
+
+def test_a_folder_that_cannot_be_removed_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The library has the name alone of what is in it, which nobody can find."""
+
+    def refused(*_: object, **__: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "a.txt")
+
+    write_text(tmp_path / "below" / "a.txt", "one")
+    with monkeypatch.context() as patch, pytest.raises(OSError, match=re.escape(str(tmp_path / "below"))) as caught:
+        patch.setattr(os, "unlink", refused)
+        remove_tree(tmp_path / "below")
+    assert caught.value.errno == errno.ENOSPC
+    remove_tree(tmp_path / "below")
+    assert not list(tmp_path.iterdir())
 
 
 def test_nothing_is_written_in_any_other_way() -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import logging
 import os
-import shutil
 import subprocess
 from collections import deque
 from pathlib import Path
@@ -15,7 +14,7 @@ from rgspipe.blender.interpreter import Blender
 from rgspipe.datasets.json_file import read_json
 from rgspipe.errors import InputError
 from rgspipe.progress import progress_bar
-from rgspipe.store.files import write_json
+from rgspipe.store.files import remove_tree, write_json
 from rgspipe.store.whole_files import WholeFiles
 
 #: Prefix of the lines on the child's stdout that are messages; the rest is Blender's own talk.
@@ -61,7 +60,7 @@ def run_blender(blender: Blender, module: str, job: dict, name: str, folder: Pat
         except BaseException:
             child.kill()
             raise
-    shutil.rmtree(scratch)
+    remove_tree(scratch)
     if input_error is not None:
         if is_new:
             (folder / JOB_FILE).unlink()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 from rgspipe.cli.completion import LINE, completed, is_question
 from rgspipe.cli.help import help_text, overview, version_text
@@ -61,6 +62,7 @@ def _dispatch(arguments: list[str], stage_loader: StageLoader) -> int:
         print("\n".join(words))
         if not is_open:
             return 0
+    _check_working_folder()
     if arguments[0] == "status":
         from rgspipe.cli.runs import show_runs
 
@@ -101,3 +103,16 @@ def _dispatch(arguments: list[str], stage_loader: StageLoader) -> int:
         return run_hydra(arguments, stage_loader)
     overrides = [text for text in arguments if text not in MULTIRUN_FLAGS]
     return run_jobs(overrides, stage_loader, multirun=len(overrides) < len(arguments))
+
+
+def _check_working_folder() -> None:
+    """Refuse to work in a folder that was removed: nothing can be found from there, and some libraries do not load."""
+    try:
+        Path.cwd()
+    except OSError as error:
+        raise InputError(
+            "working folder",
+            expected="one that is there",
+            found=f"one that was removed ({error.strerror})",
+            remedy="Go to another one (cd).",
+        ) from error

@@ -9,6 +9,7 @@ import numpy as np
 from PIL import ExifTags, Image, UnidentifiedImageError
 
 from rgspipe.datasets.input_file import check_pixel_count, input_file
+from rgspipe.datasets.reading_limits import timed
 from rgspipe.errors import InputError
 from rgspipe.scene import srgb
 
@@ -28,6 +29,11 @@ COLOUR_ROUNDING = 1.5
 LARGEST_LEVEL = {np.dtype(np.uint8): 255.0, np.dtype(np.uint16): 65535.0}
 
 
+#: What Pillow raises of damaged files, and of those that claim more pixels than it decodes.
+DAMAGED = (OSError, SyntaxError, ValueError, MemoryError, Image.DecompressionBombError)
+
+
+@timed
 def read_display(path: Path) -> tuple[np.ndarray, np.ndarray | None]:
     """Values (H, W, 1 or 3) float32 in [0, 1] as they are stored, palettes resolved, and alpha (H, W), if there is any.
 
@@ -95,9 +101,7 @@ def _levels(path: Path, kind: str) -> np.ndarray:
         raise _refusal(
             path, f"a {kind} image, as its name says", "an unreadable file: another format, or damaged"
         ) from error
-    except Image.DecompressionBombError as error:
-        raise _refusal(path, "an image of a size that can be decoded", str(error)) from error
-    except (OSError, SyntaxError, ValueError, MemoryError) as error:  # what Pillow raises for damaged files
+    except DAMAGED as error:
         raise _refusal(path, "a whole PNG or OpenEXR image", f"an unreadable file ({error})") from error
 
 

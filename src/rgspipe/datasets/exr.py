@@ -8,13 +8,14 @@ import numpy as np
 import OpenEXR
 
 from rgspipe.datasets.input_file import check_pixel_count, input_file
-from rgspipe.datasets.reading_limits import reading_limits
+from rgspipe.datasets.reading_limits import reading_limits, timed
 from rgspipe.errors import InputError
 from rgspipe.store.files import replacing
 
 RENDER_AGAIN = "Export or render this image again."
 
 
+@timed
 def read_channels(path: str | Path) -> dict[str, np.ndarray]:
     """All channels of an EXR file over its display window: {name: (H, W) float32}, 0 outside of its data window.
 

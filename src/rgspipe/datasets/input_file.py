@@ -5,12 +5,9 @@ from __future__ import annotations
 import stat
 from pathlib import Path
 
-from rgspipe.datasets.reading_limits import reading_limits
+from rgspipe.datasets.reading_limits import RAISE, reading_limits
 from rgspipe.errors import InputError
 from rgspipe.store.files import LONGEST_NAME
-
-#: What helps where a file is as large as it is meant to be.
-RAISE = "If it is meant to be so large: limits.* (in Python rg.reading_within)."
 
 
 def input_file(path: str | Path, expected: str, *, most_bytes: int | None = None) -> Path:

@@ -6,7 +6,7 @@ import math
 from pathlib import Path
 
 from rgspipe.datasets.input_file import input_file
-from rgspipe.datasets.reading_limits import reading_limits
+from rgspipe.datasets.reading_limits import reading_limits, timed
 from rgspipe.errors import InputError
 from rgspipe.store.strict_json import parse_json
 
@@ -26,6 +26,7 @@ def read_json(path: str | Path, what: str) -> dict:
     return content
 
 
+@timed
 def read_json_value(path: str | Path, what: str) -> object:
     """What is in a JSON file, strictly: no key twice, no integer that a double cannot hold.
 

@@ -14,19 +14,18 @@ from rgspipe.datasets.input_file import check_pixel_count, input_file
 from rgspipe.datasets.limits import FARTHEST
 from rgspipe.datasets.mesh_links import FORMATS, GLTF
 from rgspipe.datasets.mesh_options import MeshOptions
+from rgspipe.datasets.reading_limits import RAISE, reading_limits, timed
 from rgspipe.errors import InputError
 from rgspipe.scene import srgb
 from rgspipe.scene.mesh import Numbers, Paint, TriangleMesh
 
 WHAT = "a triangle mesh (.ply, .obj, .glb or .gltf)"
 
-#: Bytes of a file, and triangles, beyond which no room is meant.
-MOST_BYTES, MOST_FACES = 2**31, 20_000_000
-
 #: From y up to z up, as Blender and glTF have it: (x, −z, y).
 UPRIGHT = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
 
 
+@timed
 def read_mesh(path: str | Path, options: MeshOptions | None = None) -> TriangleMesh:
     """All triangles of a file, in the world of its cameras, without those that have no area.
 
@@ -38,7 +37,7 @@ def read_mesh(path: str | Path, options: MeshOptions | None = None) -> TriangleM
     if kind not in FORMATS:
         remedy = "Export it as binary PLY or GLB."
         raise InputError(path, expected=WHAT, found=f"the suffix {path.suffix!r}", remedy=remedy)
-    content = _loaded(input_file(path, WHAT, most_bytes=MOST_BYTES))
+    content = _loaded(input_file(path, WHAT, most_bytes=reading_limits().bytes))
     try:
         mesh = _joined([_part(*placed, linear=kind in GLTF, path=path) for placed in _placed(content)], path, content)
     except InputError:
@@ -83,9 +82,9 @@ def _part(part: Any, matrix: Numbers, *, linear: bool, path: Path) -> TriangleMe
     if faces.min() < 0 or faces.max() >= len(vertices):
         found = f"a triangle with point {int(faces.max())} of {len(vertices)}"
         raise InputError(path, expected="triangles between its points", found=found, remedy="Export it again.")
-    if len(faces) > MOST_FACES:
-        found = f"{len(faces)} triangles"
-        raise InputError(path, expected=f"at most {MOST_FACES}", found=found, remedy="Decimate the mesh.")
+    if len(faces) > (most := reading_limits().vertices):
+        found, remedy = f"{len(faces)} triangles", f"Decimate the mesh. {RAISE}"
+        raise InputError(path, expected=f"at most {most} triangles", found=found, remedy=remedy)
     return TriangleMesh(vertices, faces, _paint(part, faces, linear, path)).moved(matrix)
 
 

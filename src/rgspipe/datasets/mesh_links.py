@@ -7,7 +7,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from urllib.parse import unquote
 
+from rgspipe.datasets.input_file import input_file
 from rgspipe.datasets.json_file import read_json
+from rgspipe.datasets.reading_limits import reading_limits
 
 #: Suffixes of meshes, and those of glTF.
 GLTF = (".glb", ".gltf")
@@ -31,7 +33,9 @@ def mesh_files(path: Path) -> list[Path]:
 
 
 def _named(path: Path) -> list[str]:
-    content = path.read_bytes() if path.is_file() else b""
+    if not path.is_file():
+        return []
+    content = input_file(path, "a mesh or its materials", most_bytes=reading_limits().bytes).read_bytes()
     return [name.decode(errors="replace") for name in NAMED.findall(content)]
 
 

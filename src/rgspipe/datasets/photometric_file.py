@@ -12,11 +12,12 @@ from typing import NoReturn
 import torch
 
 from rgspipe.datasets.input_file import input_file, input_folder
+from rgspipe.datasets.reading_limits import reading_limits, timed
 from rgspipe.errors import InputError
 from rgspipe.scene.lights import Photometry
 
-#: What no luminaire's file is larger than, nor its table.
-MOST_BYTES, MOST_ANGLES = 2**24, 2000
+#: Angles of the finest table, along and across: what no luminaire has.
+MOST_ANGLES = 2000
 
 #: The largest candela, far beyond a lighthouse's.
 BRIGHTEST = 1e15
@@ -31,6 +32,7 @@ TYPES = {1: "C", 2: "B", 3: "A"}
 HEADER, LAMP_LINES, RATIOS = 13, 6, 10
 
 
+@timed
 def read_photometry(path: str | Path) -> Photometry:
     """The table of a luminaire, by the ending of its name: .ies or .ldt.
 
@@ -41,7 +43,9 @@ def read_photometry(path: str | Path) -> Photometry:
     reader = READERS.get(path.suffix.lower())
     if reader is None:
         _refuse(path, " or ".join(READERS), path.suffix or "no ending", "Name a measured luminaire's file.")
-    text = input_file(path, "a measured luminaire", most_bytes=MOST_BYTES).read_bytes().decode("latin-1")
+    text = (
+        input_file(path, "a measured luminaire", most_bytes=reading_limits().text_bytes).read_bytes().decode("latin-1")
+    )
     return reader(_Source(path, text.removeprefix("ï»¿").replace("\r\n", "\n").replace("\r", "\n")))
 
 

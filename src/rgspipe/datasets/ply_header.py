@@ -7,8 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rgspipe.datasets.input_file import RAISE
-from rgspipe.datasets.reading_limits import reading_limits
+from rgspipe.datasets.reading_limits import RAISE, reading_limits
 from rgspipe.errors import InputError
 
 #: Bytes of the longest header.

@@ -11,6 +11,7 @@ from plyfile import PlyData, PlyElement, PlyListProperty, PlyParseError
 
 from rgspipe.datasets.input_file import input_file
 from rgspipe.datasets.ply_header import check_header
+from rgspipe.datasets.reading_limits import timed
 from rgspipe.errors import InputError
 from rgspipe.store.files import replacing
 
@@ -104,6 +105,7 @@ class VertexTable:
         return InputError(where, expected=expected, found=found, remedy=remedy)
 
 
+@timed
 def read_vertices(path: str | Path) -> VertexTable:
     """The vertices of a PLY file, ASCII or binary; binary values stay on the disk until they are asked for.
 

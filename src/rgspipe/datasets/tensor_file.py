@@ -12,7 +12,7 @@ from torch import Tensor
 
 from rgspipe.datasets.input_file import input_file
 from rgspipe.datasets.limits import LARGEST
-from rgspipe.datasets.reading_limits import reading_limits
+from rgspipe.datasets.reading_limits import reading_limits, timed
 from rgspipe.errors import InputError
 from rgspipe.store.files import replacing
 
@@ -26,6 +26,7 @@ def save_tensors(path: Path, tensors: dict[str, Tensor], note: dict[str, Any] | 
         safetensors.torch.save_file(whole, temporary, metadata={"note": json.dumps(note or {}, sort_keys=True)})
 
 
+@timed
 def load_tensors(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
     """The tensors and the note of `save_tensors`.
 

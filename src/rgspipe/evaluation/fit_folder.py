@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -22,7 +21,7 @@ from rgspipe.fitting.in_sight.lamp import Mask, left_out
 from rgspipe.fitting.result import FitResult, Step
 from rgspipe.fitting.words import PYTHON, Spoken
 from rgspipe.scene import LightRig
-from rgspipe.store.files import publish, write_bytes, write_text
+from rgspipe.store.files import publish, remove_tree, write_bytes, write_text
 
 #: What the light file says beside the lights, and results.csv repeats.
 FIELDS = ("loss", "iterations", "evaluations", "lights_tried", "seconds", "psnr", "result", "reason")
@@ -50,7 +49,7 @@ def write_result(
     that was looked for or given: it stands in all images of the fit, and in fit.png by itself beside the target.
     """
     partial = folder.with_name(f".{folder.name}.partial")
-    shutil.rmtree(partial, ignore_errors=True)
+    remove_tree(partial)
     partial.mkdir(parents=True)
     shown = [_with(views.render(rig), there) for rig in _milestones(result)]
     final = shown[-1]
@@ -64,7 +63,7 @@ def write_result(
         write_image(partial / _numbered("final", index, "exr"), image.cpu().numpy())
     for name, content in (further or {}).items():
         write_bytes(partial / name, content)
-    shutil.rmtree(folder, ignore_errors=True)
+    remove_tree(folder)
     publish(partial, folder)
 
 

@@ -219,6 +219,7 @@ def _run(config: RgspipeConfig, load_stage: StageLoader, overrides: Sequence[str
     log.info(describe_plan(steps))
     if config.upstream == "require":
         _refuse_missing(steps, overrides)
+    store.remove_unfinished_links()
     names = {step.node.key: _variant(step.node, resolver, overrides, usual) for step in steps}
     artifacts = {step.node.key: _take(step.node, store, names[step.node.key]) for step in steps if step.reused}
     said = {step.node.key: step.remarks for step in steps}

@@ -116,7 +116,7 @@ def sample_lights(frozen: FrozenScene, count: int, generator: torch.Generator) -
 def clear_of_surfels(frozen: FrozenScene, positions: Tensor) -> Tensor:
     """(L,) whether the nearest surfel to each position (L, 3) is farther than CLEARANCE of its scales."""
     scales = frozen.surfels.scales.double().prod(dim=1).sqrt().clamp(min=1e-30)
-    centers = frozen.surfels.centers.double()
+    centers = frozen.bvh.surfels.centers.double()
     blocks = positions.to(centers).split(LIGHTS_AT_ONCE)
     return torch.cat([(torch.cdist(block, centers) / scales).amin(dim=1) > CLEARANCE for block in blocks]).cpu()
 

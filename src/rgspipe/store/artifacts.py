@@ -15,7 +15,6 @@ from __future__ import annotations
 import datetime
 import logging
 import os
-import shutil
 import time
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
@@ -26,7 +25,17 @@ from filelock import FileLock, Timeout
 
 from rgspipe.errors import InputError
 from rgspipe.machine.description import PeakMemory, library_versions, machine
-from rgspipe.store.files import NO_RIGHT, UNWRITABLE, make_folder, point_at, publish, sha256, write_json
+from rgspipe.store.files import (
+    NO_RIGHT,
+    UNWRITABLE,
+    make_folder,
+    point_at,
+    publish,
+    remove_tree,
+    sha256,
+    unfinished_links,
+    write_json,
+)
 from rgspipe.store.manifest import MANIFEST, SCHEMA_VERSION, inventory, read_manifest
 
 #: What links to the newest artifacts are called, or begin with.
@@ -162,6 +171,16 @@ class ArtifactStore:
         """Let `latest`, or `latest-<variant>`, be this artifact; a store that cannot be written to keeps its links."""
         self._point_at(key, variant, UNWRITABLE)
 
+    def remove_unfinished_links(self) -> None:
+        """Remove what kills have left of links, also in stages that nobody asks for again; what cannot go stays."""
+        for stage in self.root.glob("*/*"):
+            for link in unfinished_links(stage, LATEST):
+                try:
+                    link.unlink(missing_ok=True)
+                except OSError as error:
+                    if error.errno not in UNWRITABLE:
+                        raise
+
     def _point_at(self, key: Key, variant: str, tolerated: Collection[int]) -> None:
         link = self.root / key.scene / key.stage / (LATEST + (f"-{variant}" if variant else ""))
         try:
@@ -249,7 +268,7 @@ def _forget(partial: Path, lock_file: Path) -> None:
     """Leave no trace of what was refused before anything was made of it; its lock is held."""
     if any(path.is_file() for path in partial.rglob("*")):
         return
-    shutil.rmtree(partial)
+    remove_tree(partial)
     # Who waits for the lock sees that its file is gone, and takes a new one.
     lock_file.unlink()
 
@@ -257,6 +276,6 @@ def _forget(partial: Path, lock_file: Path) -> None:
 def _remove_scratch(partial: Path) -> None:
     for path in [path for path in partial.rglob(".*") if path.exists()]:
         if path.is_dir() and not path.is_symlink():
-            shutil.rmtree(path)
+            remove_tree(path)
         else:
             path.unlink(missing_ok=True)

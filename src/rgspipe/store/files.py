@@ -8,6 +8,7 @@ import hashlib
 import json
 import os
 import secrets
+import shutil
 import stat
 from collections.abc import Iterator
 from pathlib import Path
@@ -23,6 +24,9 @@ LONGEST_STEM = 40
 
 #: The longest name of a file or folder that is taken, bytes: file systems take 255, and one in the making is longer.
 LONGEST_NAME = 200
+
+#: What the name of a link ends with while it is made.
+UNFINISHED = ".new"
 
 
 @contextlib.contextmanager
@@ -89,10 +93,10 @@ def append_line(path: Path, line: str) -> None:
 def point_at(link: Path, target: str) -> None:
     """Make the symbolic link `link` point at `target` (relative to its folder), in one step, also after a power cut.
 
-    What a kill leaves beside it, the next call removes: links are followed by nobody while they are made, so that one
-    name for all who make them will do.
+    What a kill leaves beside it, the next call removes, and so may anybody at any time (`unfinished_links`): links are
+    followed by nobody while they are made, so that one name for all who make them will do.
     """
-    temporary = link.with_name(f".{link.name}.new")
+    temporary = link.with_name(f".{link.name}{UNFINISHED}")
     while True:
         temporary.unlink(missing_ok=True)
         try:
@@ -109,12 +113,32 @@ def point_at(link: Path, target: str) -> None:
     sync(link.parent)
 
 
+def unfinished_links(folder: Path, name: str) -> Iterator[Path]:
+    """What kills have left of links whose names begin with `name`; what is being made at this moment is among it."""
+    return (path for path in folder.glob(f".{name}*{UNFINISHED}") if path.is_symlink())
+
+
 def make_folder(folder: Path) -> None:
     """Make a folder, and those above it, where they are not there, so that they outlast a power cut."""
     missing = [place for place in (folder, *folder.parents) if not place.exists()]
     folder.mkdir(parents=True, exist_ok=True)
     for place in missing:
         sync(place.parent)
+
+
+def remove_tree(folder: Path) -> None:
+    """Remove a folder with all that is in it, if it is there.
+
+    Raises:
+        OSError: something cannot be removed; names the folder, where the library has a name without one.
+    """
+    try:
+        shutil.rmtree(folder)
+    except FileNotFoundError:  # gone, or another process removes it at this moment
+        if folder.exists():
+            raise
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(folder)) from error
 
 
 def publish(partial: Path, folder: Path) -> None:

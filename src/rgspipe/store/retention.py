@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import os
 import re
-import shutil
 import time
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
@@ -14,7 +13,7 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 
 from rgspipe.store.artifacts import LATEST, ArtifactStore, Key
-from rgspipe.store.files import sync
+from rgspipe.store.files import remove_tree, sync
 from rgspipe.store.fingerprints import DIGITS
 from rgspipe.store.manifest import MANIFEST
 from rgspipe.store.unwritable import told_below
@@ -150,7 +149,7 @@ def remove(outputs: Path, gone: Collection[Stored]) -> Iterator[Stored]:
                 contextlib.suppress(Timeout),
                 _unused(left.parent, left.name.removeprefix(GONE).removeprefix(PARTIAL[1:])),
             ):
-                _take_apart(left)
+                remove_tree(left)
     for one in sorted(gone, key=lambda one: one.made, reverse=True):
         with told_below(outputs), contextlib.suppress(Timeout), _unused(one.folder.parent, one.key.fingerprint):
             if not one.folder.exists():
@@ -160,7 +159,7 @@ def remove(outputs: Path, gone: Collection[Stored]) -> Iterator[Stored]:
             away = one.folder.with_name(f"{GONE}{one.folder.name.lstrip('.')}")
             one.folder.rename(away)
             sync(away.parent)
-            _take_apart(away)
+            remove_tree(away)
             yield one
 
 
@@ -169,11 +168,6 @@ def _unlink(one: Stored) -> None:
     for link in one.folder.parent.glob(f"{LATEST}*"):
         if link.is_symlink() and link.readlink() == Path(one.key.fingerprint):
             link.unlink()
-
-
-def _take_apart(folder: Path) -> None:
-    if folder.exists():
-        shutil.rmtree(folder)
 
 
 def _folders(outputs: Path) -> Iterator[Path]:

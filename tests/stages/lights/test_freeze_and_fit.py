@@ -94,10 +94,16 @@ def inputs(tmp_path_factory) -> dict[str, Artifact]:
 
 
 def _fit(inputs: dict[str, Artifact], folder: Path, **changes: object) -> pd.DataFrame:
+    return _noted(inputs, folder, **changes)[0]
+
+
+def _noted(inputs: dict[str, Artifact], folder: Path, **changes: object) -> tuple[pd.DataFrame, dict[str, object]]:
+    """The table, and what the stage noted."""
     folder.mkdir(exist_ok=True)
     config = with_changes(RgspipeConfig(stage="fit_light"), {key.replace("__", "."): v for key, v in changes.items()})
-    fit_light.run(StageContext(config, inputs, {}, folder))
-    return pd.read_csv(folder / "results.csv")
+    context = StageContext(config, inputs, {}, folder)
+    fit_light.run(context)
+    return pd.read_csv(folder / "results.csv"), context.facts
 
 
 def test_fits_every_target_and_writes_all_of_its_files(inputs, tmp_path):
@@ -166,13 +172,14 @@ def test_goes_on_after_an_interruption(inputs, tmp_path):
 
 
 def test_a_target_whose_files_were_emptied_by_a_power_cut_is_fitted_again(inputs, tmp_path, caplog):
-    before = _fit(inputs, tmp_path)
+    before, noted = _noted(inputs, tmp_path)
     kept, cut = (tmp_path / name / "lights.json" for name in ("visible_000", "occluded_000"))
     stamp = kept.stat().st_mtime_ns
     cut.write_bytes(b"")
     (tmp_path / "results.csv").unlink()
-    again = _fit(inputs, tmp_path)
+    again, noted_again = _noted(inputs, tmp_path)
     pd.testing.assert_frame_equal(again.drop(columns="seconds"), before.drop(columns="seconds"))
+    assert noted_again == noted
     assert kept.stat().st_mtime_ns == stamp and cut.stat().st_size > 0
     told = [record.message for record in caplog.records if "made again" in record.message]
     assert len(told) == 1 and str(cut.parent) in told[0]

@@ -12,7 +12,7 @@ import numpy as np
 
 from rgspipe.datasets.input_file import input_file
 from rgspipe.datasets.json_file import shown
-from rgspipe.datasets.reading_limits import reading_limits
+from rgspipe.datasets.reading_limits import reading_limits, timed
 from rgspipe.datasets.scans.frame import Lens, Numbers
 from rgspipe.errors import InputError
 from rgspipe.store.files import LONGEST_NAME
@@ -64,6 +64,7 @@ def read_images(path: Path) -> list[Photograph]:
     return photographs
 
 
+@timed
 def _whole(path: Path, read: Callable[[Path, bytes], Parts]) -> Parts:
     try:
         return read(path, input_file(path, "a part of a COLMAP model", most_bytes=reading_limits().bytes).read_bytes())

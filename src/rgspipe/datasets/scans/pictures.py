@@ -9,10 +9,11 @@ import numpy as np
 import numpy.typing as npt
 from PIL import ExifTags, Image
 
-from rgspipe.datasets.display_image import COLOUR_TYPE, COLOURED, DEPTH, read_display, saturated_from
+from rgspipe.datasets.display_image import COLOUR_TYPE, COLOURED, DAMAGED, DEPTH, read_display, saturated_from
 from rgspipe.datasets.exr import read_channels
 from rgspipe.datasets.images import NO_SURFACE, read_colour
 from rgspipe.datasets.input_file import check_pixel_count, input_file
+from rgspipe.datasets.reading_limits import reading_limits, timed
 from rgspipe.datasets.scans.frame import DepthImage
 from rgspipe.datasets.scans.radiance_image import hdr_size, read_hdr
 from rgspipe.datasets.scans.raw_image import RAW, read_raw
@@ -85,11 +86,12 @@ def exposure_of(path: Path) -> float | None:
     keys = (ExifTags.Base.ExposureTime, ExifTags.Base.ISOSpeedRatings, ExifTags.Base.FNumber)
     try:
         with Image.open(input_file(path, "a photograph"), formats=["JPEG", "PNG"]) as file:
+            check_pixel_count(path, *file.size)  # of a PNG all pixels are decoded for it
             stated = file.getexif().get_ifd(ExifTags.IFD.Exif)
         shutter, sensitivity, aperture = (float(np.ravel(stated.get(key, 0))[0]) for key in keys)
     except InputError:
         raise
-    except (OSError, SyntaxError, TypeError, ValueError, ZeroDivisionError):
+    except (*DAMAGED, TypeError, ZeroDivisionError):
         # Whether its pixels can be read is asked elsewhere.
         return None
     return shutter * sensitivity / aperture**2 if min(shutter, sensitivity, aperture) > 0.0 else None
@@ -110,7 +112,7 @@ def _wide_colours(path: Path) -> Pixels:
         upper, lower = (_bytes(path, order) for order in ("B", "L"))
     except InputError:
         raise
-    except (OSError, SyntaxError, ValueError, MemoryError) as error:
+    except DAMAGED as error:
         found = f"an unreadable file ({error})"
         raise InputError(path, expected="a whole PNG image", found=found, remedy="Export it again.") from error
     return ((256.0 * upper + lower)[..., :3] / 65535.0).astype(np.float32)
@@ -123,6 +125,7 @@ def _bytes(path: Path, order: str) -> npt.NDArray[np.float64]:
         return np.asarray(file).astype(np.float64)
 
 
+@timed
 def _stored_depth(path: Path) -> npt.NDArray[np.float64]:
     suffix = path.suffix.lower()
     if suffix == ".bin":
@@ -156,7 +159,7 @@ def _confidence(path: Path) -> Pixels:
 
 def _colmap_array(path: Path) -> npt.NDArray[np.float64]:
     """(H, W) of "width&height&channels&" and float32, rows first."""
-    content = input_file(path, "a depth map of COLMAP").read_bytes()
+    content = input_file(path, "a depth map of COLMAP", most_bytes=reading_limits().image_bytes).read_bytes()
     parts = content[:64].split(b"&", 3)
     try:
         width, height, channels = (int(part) for part in parts[:3])
@@ -172,7 +175,7 @@ def _colmap_array(path: Path) -> npt.NDArray[np.float64]:
 
 def _openrooms_array(path: Path) -> npt.NDArray[np.float64]:
     """(H, W) of two int32, height and width, and float32, rows first."""
-    content = input_file(path, "depth of OpenRooms").read_bytes()
+    content = input_file(path, "depth of OpenRooms", most_bytes=reading_limits().image_bytes).read_bytes()
     height, width = (int(size) for size in np.frombuffer(content[:8].ljust(8, b"\0"), "<i4"))
     check_pixel_count(path, width, height)
     if len(content) != 8 + 4 * width * height:
@@ -196,6 +199,6 @@ def size_of(path: Path) -> tuple[int, int]:
     try:
         with Image.open(input_file(path, "an image"), formats=["PNG", "JPEG"]) as file:
             return file.size
-    except (OSError, SyntaxError, ValueError) as error:
+    except DAMAGED as error:
         found = f"an unreadable file ({error})"
         raise InputError(path, expected="a PNG or JPEG image", found=found, remedy="Export it again.") from error

@@ -8,7 +8,7 @@ import numpy as np
 
 from rgspipe.datasets.input_file import input_file
 from rgspipe.datasets.json_file import shown
-from rgspipe.datasets.reading_limits import reading_limits
+from rgspipe.datasets.reading_limits import reading_limits, timed
 from rgspipe.datasets.rigid_pose import check_place
 from rgspipe.datasets.scans.frame import Numbers
 from rgspipe.datasets.scans.options import ScanOptions
@@ -104,6 +104,7 @@ def matrix_of(value: object, where: str | Path) -> Numbers:
     return matrix
 
 
+@timed
 def read_numbers(path: Path, count: int, what: str) -> Numbers:
     """(N, count) numbers of a text file, `count` a line.
 

@@ -9,12 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from rgspipe.datasets.input_file import check_pixel_count, input_file
+from rgspipe.datasets.reading_limits import HEADER_BYTES, reading_limits, timed
 from rgspipe.errors import InputError
 
 WHAT = "a Radiance picture (.hdr)"
-
-#: Bytes of a header, and of a file.
-MOST_HEADER, MOST_BYTES = 65536, 2**31
 
 #: Rows from the top and columns from the left, which is what all write.
 SIZE = re.compile(rb"\n\n-Y (\d{1,6}) \+X (\d{1,6})\n")
@@ -32,6 +30,7 @@ def hdr_size(path: Path) -> tuple[int, int]:
     return _header(path, _content(path))[:2]
 
 
+@timed
 def read_hdr(path: Path) -> npt.NDArray[np.float32]:
     """(H, W, 3) linear light.
 
@@ -52,12 +51,12 @@ def read_hdr(path: Path) -> npt.NDArray[np.float32]:
 
 
 def _content(path: Path) -> bytes:
-    return input_file(path, WHAT, most_bytes=MOST_BYTES).read_bytes()
+    return input_file(path, WHAT, most_bytes=reading_limits().image_bytes).read_bytes()
 
 
 def _header(path: Path, content: bytes) -> tuple[int, int, int]:
     """Width, height, and where pixels begin."""
-    head = content[:MOST_HEADER]
+    head = content[:HEADER_BYTES]
     size = SIZE.search(head)
     if not head.startswith(b"#?") or size is None or b"32-bit_rle_rgbe" not in head[: size.start()]:
         found = "another format, or rows in another order than from the top"

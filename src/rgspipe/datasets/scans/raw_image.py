@@ -8,25 +8,25 @@ import numpy as np
 import numpy.typing as npt
 
 from rgspipe.datasets.input_file import check_pixel_count, input_file
+from rgspipe.datasets.reading_limits import reading_limits, timed
 from rgspipe.errors import InputError
 
 #: Suffixes of the common makers' files.
 RAW = (".dng", ".cr2", ".cr3", ".nef", ".arw", ".orf", ".rw2", ".raf", ".pef")
-
-MOST_BYTES = 2**30
 
 #: Part of the largest value from which on a pixel counts as clipped: interpolation between the sensor's colours blurs
 #: what is.
 CLIPPED = 0.98
 
 
+@timed
 def read_raw(path: Path) -> tuple[npt.NDArray[np.float32], float]:
     """(H, W, 3) linear light in the camera's white balance, and from where on it is clipped.
 
     Raises:
         InputError: missing or broken file, too many pixels, or LibRaw is not installed.
     """
-    input_file(path, "a raw photograph", most_bytes=MOST_BYTES)
+    input_file(path, "a raw photograph", most_bytes=reading_limits().image_bytes)
     try:
         import rawpy
     except ImportError:

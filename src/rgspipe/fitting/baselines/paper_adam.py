@@ -134,7 +134,7 @@ def _result(problem: LightProblem, descent: _Descent, stalled: bool) -> FitResul
     spread = light_covariances(problem, state)
     findings = [
         *([AtBound()] if descent.ball.at_bound(rig.positions.detach()) else []),
-        *doubts(last.lights, spread.calibrated, problem.views.frozen.surfels, problem.views.frozen.size),
+        *doubts(last.lights, spread.calibrated, problem.views.frozen.bvh.surfels, problem.views.frozen.size),
         *([] if stalled else [_all_steps(descent)]),
     ]
     return FitResult(

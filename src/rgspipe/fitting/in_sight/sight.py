@@ -45,12 +45,14 @@ def sights(views: PreparedViews) -> tuple[Sight, ...]:
 
 def _sight(views: PreparedViews, view: ViewWeights, index: int) -> Sight:
     surfels, size = views.frozen.surfels, (view.camera.height, view.camera.width)
-    values = torch.cat([surfels.albedo.float().mean(dim=1, keepdim=True), surfels.centers.float()], dim=1)
+    # From the camera, as float32 keeps no digits of what is far from the origin.
+    away = (views.frozen.bvh.surfels.centers - view.camera.origin.to(surfels.centers.device)).float()
+    values = torch.cat([surfels.albedo.float().mean(dim=1, keepdim=True), away], dim=1)
     coverage = view.coverage.double().cpu()
     seen = (view.operator @ values).double().cpu() / coverage.clamp(min=LEAST_SHARE)[:, None]
     mask = views.masks[index].reshape(-1).double().cpu()
     surface = (coverage > LEAST_SHARE) & (mask >= LEAST_SHARE)
-    distance = (seen[:, 1:] - view.camera.origin).norm(dim=1)
+    distance = seen[:, 1:].norm(dim=1)
     stacked = (surface, seen[:, 0].clamp(min=DARKEST), distance, pixel_angles(view.camera))
     return Sight(view.camera, *(part.reshape(size).numpy() for part in stacked))
 

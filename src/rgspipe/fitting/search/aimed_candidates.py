@@ -40,10 +40,11 @@ def aimed_candidates(
     side = max(6, round(math.sqrt(options.blocks / len(views.views))))
     model = block_model(views, side, effects)
     lit = _lit_by_points(views, dictionary, model, options.blocks)
-    directions, spacing = fibonacci_directions(options.axes).to(lit.places), neighbour_angle(options.axes)
+    directions, spacing = fibonacci_directions(options.axes).to(lit.direct), neighbour_angle(options.axes)
     images, positions, axes, kinds = [], [], [], []
     for index in progress_bar(range(len(dictionary)), "aimed candidates", unit="place"):
-        angle = angle_from_axis(directions[:, None], lit.places - dictionary.positions[index].to(lit.places))
+        away = (lit.places - dictionary.positions[index].to(lit.places)).to(directions)
+        angle = angle_from_axis(directions[:, None], away)
         seen = torch.cat([_aimed_seen(shape, angle, lit, index, spacing / 3.0) for shape in shapes])
         images.append(seen)
         positions.append(dictionary.positions[index].expand(len(seen), 3))
@@ -59,7 +60,7 @@ class _LitByPoints:
     """What unit point lights at C places light, of which lights with an axis there let parts through.
 
     Attributes:
-        places: (B + K, 3) float32 mean place of what each block sees, and of each group of patches.
+        places: (B + K, 3) float64 mean place of what each block sees, and of each group of patches.
         direct: (C, B, 3) direct coarse images.
         grouped: (C, K, 3) direct radiosity of the groups' patches, added up.
         bounced: (3, B, K) what blocks see of that after bounces; None without interreflection.
@@ -87,19 +88,24 @@ def _lit_by_points(views: PreparedViews, dictionary: LightDictionary, model: Blo
 
 def _groups(frozen: FrozenScene, count: int) -> tuple[Tensor, Tensor]:
     """Compact groups of the frozen scene's patches: which they hold, 1 or 0, (K, patches), and mean places (K, 3)."""
-    average, surfels = frozen.transport.average, frozen.surfels
-    centers, normals = average @ surfels.centers.float(), average @ surfels.normals.float()
+    average, middle = frozen.transport.average, frozen.bvh.middle
+    centers, normals = average @ _from_middle(frozen), average @ frozen.surfels.normals.float()
     labels = torch.from_numpy(cluster_patches(centers, normals, count, seed=0)).long()
     groups = torch.nn.functional.one_hot(labels).T.to(centers)
-    return groups, (groups @ centers) / groups.sum(dim=1, keepdim=True)
+    return groups, (groups @ centers) / groups.sum(dim=1, keepdim=True) + middle
+
+
+def _from_middle(frozen: FrozenScene) -> Tensor:
+    """(N, 3) float32 centres of surfels from the scene's middle: from the origin, far scenes would lose digits."""
+    return frozen.bvh.local(frozen.bvh.surfels.centers)
 
 
 def _seen_places(frozen: FrozenScene, model: BlockModel) -> Tensor:
-    """(B, 3) float32 mean place of what each block sees."""
-    centers = frozen.surfels.centers.float()
+    """(B, 3) float64 mean place of what each block sees."""
+    centers = _from_middle(frozen)
     total = torch.from_numpy(model.weights @ centers.cpu().numpy()).to(centers)
     weight = torch.from_numpy(model.weights.sum(axis=1)).to(centers).clamp(min=1e-12)
-    return total / weight.reshape(-1, 1)
+    return total / weight.reshape(-1, 1) + frozen.bvh.middle
 
 
 def _aimed_seen(shape: AxialLight, angle: Tensor, lit: _LitByPoints, index: int, softness: float) -> Tensor:

@@ -42,7 +42,7 @@ def standing(
         *([AtBound()] if at_bound else []),
         *([PoorlyExplained(loss)] if loss > options.poorly else []),
         *([PoorScene(grade.error)] if grade is not None and grade.grade is Grade.POOR else []),
-        *doubts(state.lights(problem), covariance, problem.views.frozen.surfels, region.size, options),
+        *doubts(state.lights(problem), covariance, problem.views.frozen.bvh.surfels, region.size, options),
         *([OutOfSteps()] if state.status is FitStatus.MAX_ITERATIONS else []),
     ]
 

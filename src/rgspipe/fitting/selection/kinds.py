@@ -66,7 +66,7 @@ class _OneLight:
     def _of_a_point(self, answer: State) -> tuple[State, list[Finding]]:
         place, size = self._emitter(answer).position, self.refiner.region.size
         spheres = [one.at(place) for one in SphereLight.shaped().grown(size, True)]
-        room = distance_to_surface(self.refiner.problem.views.frozen.surfels, place)
+        room = distance_to_surface(self.refiner.problem.views.frozen.bvh.surfels, place)
         largest = replace(spheres[-1], radius=min(room, spheres[-1].radius))
         extent = extent_promised(self.refiner, answer, self.index, largest)
         beam = beam_promised(self.refiner, answer, self.index)

@@ -55,7 +55,7 @@ def run(context: StageContext) -> None:
             whole.add(folder)
         rows.append(_row(context, target))
     write_text(context.folder / "results.csv", pd.DataFrame(rows).to_csv(index=False))
-    context.note(targets=len(targets), view_sets=len(fitter.prepared))
+    context.note(targets=len(targets))
 
 
 @dataclass
