@@ -30,6 +30,7 @@ from rgspipe.scene.surfels import Surfels
 from rgspipe.training.albedo import ALBEDO_RANGE
 from rgspipe.training.initialise import initialise_surfels
 from rgspipe.training.materials import trace_views
+from rgspipe.training.operator_store import OperatorStore
 from rgspipe.training.prior import albedo_prior
 
 #: Albedo of surfaces of which nothing is known.
@@ -114,7 +115,7 @@ def capture_scenes(
     surfels = surfels.to(torch.float32)
     if options.unseen:
         surfels = with_unseen_surfaces(surfels, [view.camera for view in views], depths=[view.depth for view in views])
-    weights = trace_views(surfels, views, options.supersampling)
+    weights = trace_views(surfels, views, options.supersampling, OperatorStore(options.memory_mib))
     lit = _measured(weights, views, options, where)
     frozen = FrozenScene.freeze(surfels, gather_rays=options.gather_rays, seed=options.seed)
     frozen = frozen.with_dictionary(options.grid, seed=options.seed)

@@ -32,5 +32,7 @@ class CaptureOptions(Options):
     """rays per edge pixel in view weights, squared"""
     grid: int = option(8, low=2, high=32)
     """candidates for lamps along each axis"""
+    memory_mib: float = option(4096.0, low=0, high=1e9)
+    """memory [MiB] for what photographs see; what is beyond it is read from a file, with the same results"""
     seed: int = option(0, low=0, high=2**31 - 1)
     """draws of rays and candidates"""
