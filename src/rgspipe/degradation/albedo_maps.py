@@ -1,4 +1,4 @@
-"""Albedo maps as methods predict them from photographs: wrong alike wherever a surface is seen, each of its own scale."""
+"""Albedo maps as methods predict them from photographs: wrong alike wherever a surface is seen, each of a scale."""
 
 from __future__ import annotations
 
