@@ -17,7 +17,7 @@ from rgspipe.capture.oddities import Oddities
 from rgspipe.capture.options import CaptureOptions
 from rgspipe.capture.radiance import Measured, Numbers, measured_radiance
 from rgspipe.capture.received import Received
-from rgspipe.capture.refusals import OFF, check_lightings, check_measured, check_overlap, check_views
+from rgspipe.capture.refusals import OFF, check_brackets, check_lightings, check_measured, check_overlap, check_views
 from rgspipe.capture.search import Answer, found_lamps
 from rgspipe.capture.several import found_in_turns, without
 from rgspipe.completion import with_unseen_surfaces
@@ -135,7 +135,12 @@ def _measured(
         chosen, taken = [weights[index] for index in own], [views[index] for index in own]
         if options.exposure != "same":
             check_overlap(chosen, where)
-        found[name] = measured_radiance(chosen, taken, exposure=options.exposure, vignetting=options.vignetting)
+        bent = options.response == "free"
+        if bent:
+            check_brackets(taken, options.exposure)
+        found[name] = measured_radiance(
+            chosen, taken, exposure=options.exposure, vignetting=options.vignetting, bent=bent
+        )
         if name != OFF:
             check_measured(found[name].seen >= LEAST_SEEN, found[name].radiance, taken, where)
     off = found.pop(OFF, None)

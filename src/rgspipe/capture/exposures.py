@@ -1,4 +1,4 @@
-"""What cameras did to the light: exposures, white balance and vignetting, by what photographs share.
+"""What cameras did to the light: exposures, white balance, vignetting and curve, by what photographs share.
 
     I_p = g_vc exp(a r² + b r⁴) (W L)_pc
 
@@ -8,7 +8,7 @@ over the pixels of photograph v that show surfel i all of them are linear,
 
     l_vi = g_v + a r²_vi + b r⁴_vi + log L_i ,
 
-and log L_i is eliminated.
+and log L_i is eliminated. A curve of the camera's own (`capture.response`) comes before either.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from typing import Literal
 import numpy as np
 
 from rgspipe.capture.photographs import Numbers, Photograph
+from rgspipe.capture.response import Response
 
 Exposure = Literal["same", "free", "free_colour"]
 
@@ -35,22 +36,29 @@ class Cameras:
         exposure, vignetting: what is not known.
         gains: (V, 3) g, of mean logarithm 0 in each channel.
         falloff: (2,) a, b.
+        response: the curve; None where images are linear as they were decoded.
     """
 
     exposure: Exposure
     vignetting: bool
     gains: Numbers
     falloff: Numbers
+    response: Response | None = None
 
     @classmethod
-    def of(cls, count: int, exposure: Exposure, vignetting: bool) -> Cameras:
-        """All alike, before anything is known."""
-        return cls(exposure, vignetting, np.ones((count, 3)), np.zeros(2))
+    def of(cls, count: int, exposure: Exposure, vignetting: bool, bent: bool = False) -> Cameras:
+        """All alike, before anything is known; `bent` ones have a curve of their own."""
+        curve = Response.as_decoded() if bent else None
+        return cls(exposure, vignetting, np.ones((count, 3)), np.zeros(2), curve)
 
     def even(self, photographs: Sequence[Photograph]) -> Iterator[Numbers]:
         """(P, 3) of each photograph what it would show under factors of 1."""
         for photograph, gains in zip(photographs, self.gains, strict=True):
-            yield photograph.image / (gains * self._corner(photograph))
+            yield self._light(photograph) / (gains * self._corner(photograph))
+
+    def _light(self, photograph: Photograph) -> Numbers:
+        """(P, 3) as the curve has it."""
+        return photograph.image if self.response is None else self.response.light(photograph)
 
     def _corner(self, photograph: Photograph) -> Numbers:
         """(P, 1) what the lens leaves of the light."""
@@ -69,10 +77,13 @@ class Cameras:
             radiance: (N, 3) of the surfels; None before anything is known of it.
         """
         cameras = self
+        if self.response is not None:
+            cameras, radiance = replace(self, response=self.response.fitted(photographs, weights)), None
         if self.vignetting:
-            means = _Means.of(photographs, (photograph.image.mean(axis=1) for photograph in photographs), weights)
+            grey = (cameras._light(photograph).mean(axis=1) for photograph in photographs)
+            means = _Means.of(photographs, grey, weights)
             falloff = means.factors(_powers(photographs, weights), free=self.exposure != "same")[1]
-            cameras, radiance = replace(self, falloff=falloff), None
+            cameras, radiance = replace(cameras, falloff=falloff), None
         if self.exposure == "same":
             return cameras
         return replace(cameras, gains=cameras._gains(photographs, weights, radiance))
@@ -86,7 +97,7 @@ class Cameras:
         over, under = np.zeros_like(self.gains), np.zeros_like(self.gains)
         for index, (photograph, weight) in enumerate(zip(photographs, weights, strict=True)):
             light = self._seen_as_one(photograph.rows @ radiance)
-            pixels = self._seen_as_one(photograph.image / self._corner(photograph))
+            pixels = self._seen_as_one(self._light(photograph) / self._corner(photograph))
             over[index], under[index] = weight @ (pixels * light), weight @ light**2
         gains = np.log(np.where(over > 0.0, over, 1.0) / np.where(over > 0.0, under, 1.0))
         return np.exp(gains - gains.mean(axis=0))
@@ -94,7 +105,8 @@ class Cameras:
     def _first_gains(self, photographs: Sequence[Photograph], weights: Sequence[Numbers], channel: int) -> Numbers:
         """(V,) factors of a channel by the surfels that photographs share."""
         pixels = (
-            self._seen_as_one(photograph.image / self._corner(photograph))[:, channel] for photograph in photographs
+            self._seen_as_one(self._light(photograph) / self._corner(photograph))[:, channel]
+            for photograph in photographs
         )
         return _Means.of(photographs, pixels, weights).factors([], free=True)[0]
 

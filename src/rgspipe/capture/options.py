@@ -21,6 +21,9 @@ class CaptureOptions(Options):
     what they share"""
     vignetting: bool = False
     """whether photographs may be darker towards their corners, all alike, which is found by what they share"""
+    response: Literal["known", "free"] = "known"
+    """whether images of 8 or 16 bits were decoded by their camera's own curve, or that curve is found by photographs of
+    exposures that are known and differ"""
     albedo_prior: Literal["none", "dataset"] = "none"
     """what is known of the albedo: nothing, or the albedo maps of the training views, from any method and up to a scale
     of each image"""

@@ -75,6 +75,7 @@ def measured_radiance(
     *,
     exposure: Exposure = "same",
     vignetting: bool = False,
+    bent: bool = False,
 ) -> Measured:
     """The radiance that explains all photographs best.
 
@@ -83,9 +84,10 @@ def measured_radiance(
         views: V ≥ 1, all under the same light.
         exposure: whether each photograph has an unknown factor, or one in each channel.
         vignetting: whether corners may be darker, alike in all photographs.
+        bent: whether the camera's curve may be another than that by which they were decoded.
     """
     photographs = [Photograph.of(*pair) for pair in zip(weights, views, strict=True)]
-    cameras, radiance = Cameras.of(len(views), exposure, vignetting), None
+    cameras, radiance = Cameras.of(len(views), exposure, vignetting, bent), None
     counted, floor = [photograph.base for photograph in photographs], _floor(photographs)
     for _ in range(ROUNDS):
         cameras = cameras.fitted(photographs, counted, radiance)
