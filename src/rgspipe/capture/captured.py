@@ -15,7 +15,9 @@ from rgspipe.capture.field import Field, Graph, Variances
 from rgspipe.capture.lamps import LampProblem
 from rgspipe.capture.oddities import Oddities
 from rgspipe.capture.options import CaptureOptions
-from rgspipe.capture.radiance import Measured, Numbers, measured_radiance
+from rgspipe.capture.photographs import Numbers
+from rgspipe.capture.prediction import Prediction
+from rgspipe.capture.radiance import Measured, measured_radiance
 from rgspipe.capture.received import Received
 from rgspipe.capture.refusals import OFF, check_brackets, check_lightings, check_measured, check_overlap, check_views
 from rgspipe.capture.search import Answer, found_lamps
@@ -120,7 +122,8 @@ def capture_scenes(
     frozen = FrozenScene.freeze(surfels, gather_rays=options.gather_rays, seed=options.seed)
     frozen = frozen.with_dictionary(options.grid, seed=options.seed)
     predicted = _predicted(weights, views, options)
-    problems = [_problem(frozen, measured, predicted, options.gather_rays) for measured in lit.values()]
+    graph = Graph.of(frozen.surfels, predicted)
+    problems = [_problem(frozen, measured, predicted, graph, options) for measured in lit.values()]
     answers = found_in_turns(problems, lambda problem: found_lamps(problem, options.count, options.most))
     return [_captured(lit[name], answer, options, name) for name, answer in zip(lit, answers, strict=True)]
 
@@ -159,13 +162,19 @@ def _predicted(weights: Sequence[ViewWeights], views: Sequence[View], options: C
     return np.where(known[:, None], albedo, middle)
 
 
-def _problem(frozen: FrozenScene, measured: Measured, predicted: Numbers, rays: int) -> LampProblem:
+def _problem(
+    frozen: FrozenScene, measured: Measured, predicted: Numbers, graph: Graph, options: CaptureOptions
+) -> LampProblem:
     gather = frozen.gather.to_scipy().astype(np.float64).tocsr()
     seen = measured.seen >= LEAST_SEEN
-    received = Received.of(gather, measured.radiance, seen, predicted)
+    prediction = None if options.albedo_prior == "none" else Prediction.of(predicted, graph)
+    # A surface's paint is taken for even until there are lamps to ask.
+    expected = predicted if prediction is None else prediction.with_shares(1.0, 0.0)
+    received = Received.of(gather, measured.radiance, seen, expected)
     pixels = np.where(seen, measured.variance, np.inf)
-    field = Field(Graph.of(frozen.surfels, predicted), pixels, seen.astype(np.float64), Variances())
-    return LampProblem(frozen, received, field, measured.radiance, predicted, pixels, rays)
+    field = Field(graph, pixels, seen.astype(np.float64), Variances())
+    rays = options.gather_rays
+    return LampProblem(frozen, received, field, measured.radiance, expected, pixels, rays, prediction)
 
 
 def _captured(measured: Measured, answer: Answer, options: CaptureOptions, lighting: str) -> Captured:

@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
-from rgspipe.capture.radiance import SHOWN, Numbers
+from rgspipe.capture.photographs import SHOWN, Numbers
 from rgspipe.datasets.views import View
 from rgspipe.errors import InputError
 from rgspipe.renderer.view_weights import ViewWeights
