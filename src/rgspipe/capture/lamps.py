@@ -19,8 +19,8 @@ import torch
 from torch import Tensor
 
 from rgspipe.capture.field import Field
-from rgspipe.capture.prediction import Prediction
 from rgspipe.capture.photographs import Numbers
+from rgspipe.capture.prediction import Prediction
 from rgspipe.capture.received import Received
 from rgspipe.optim.levenberg_marquardt import NormalEquations, least_squares, within
 from rgspipe.renderer.frozen import FrozenScene
