@@ -30,7 +30,7 @@ def named(lighting: str, views: list[View]) -> list[View]:
 def test_what_others_measured_is_a_prior_of_the_field() -> None:
     """Against the dense joint distribution of two captures of a chain of surfels."""
     count, rng = 30, np.random.default_rng(0)
-    graph = Graph(np.arange(count - 1), np.arange(1, count), np.ones(count - 1), np.full(count, float(count)))
+    graph = Graph(np.arange(count - 1), np.arange(1, count), np.ones(count - 1), np.zeros(count, dtype=np.int64))
     weights, residuals = rng.uniform(1.0, 50.0, (2, count)), rng.normal(size=(2, count))
     prior = graph.precision(Variances()).toarray()
     joint = np.kron(np.ones((2, 2)), np.linalg.inv(prior)) + np.diag(1.0 / weights.reshape(-1))

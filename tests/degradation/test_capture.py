@@ -103,3 +103,22 @@ def test_passes_can_be_dropped(views: list[View]) -> None:
     (view,) = degraded(views[:1], Capture(normals=False, albedo=False))
     assert view.normal is None and view.albedo is None
     assert view.depth is views[0].depth
+
+
+def test_exposures_have_their_spread_and_no_common_factor(views: list[View]) -> None:
+    taken = degraded([views[0]] * 400, Capture(exposure=0.5))
+    stops = torch.stack([one.image.mean() / views[0].image.mean() for one in taken]).log2()
+    assert float(stops.std()) == pytest.approx(0.5, rel=0.1)  # measured 0.99
+    assert abs(float(stops.mean())) < 1e-6
+
+
+def test_predicted_albedo_is_wrong_alike_in_all_views_but_for_a_scale_of_each(views: list[View]) -> None:
+    """The error of a place is one, whichever view shows it: here, of the same view twice, only the scale differs."""
+    views = [replace(view, albedo=torch.full_like(view.image, 0.4)) for view in views]
+    first, second = degraded([views[0], views[0]], Capture(albedo_error=0.1))
+    off = [torch.log(one.albedo / views[0].albedo).reshape(-1, 3) for one in (first, second)]
+    assert float((off[0] - off[1]).std(dim=0).amax()) < 1e-5
+    assert float((off[0] - off[1]).mean().abs()) > 0.01  # measured 0.13
+    many = torch.cat([torch.log(one.albedo / 0.4).reshape(-1, 3) for one in degraded(views, Capture(albedo_error=0.1))])
+    assert float(many.std()) == pytest.approx(0.1 * 2**0.5, rel=0.4)
+    assert degraded(views[:1], Capture(albedo_error=0.1))[0].image is views[0].image

@@ -15,9 +15,11 @@ from rgspipe.capture.field import Field, Graph, Variances
 from rgspipe.capture.lamps import LampProblem
 from rgspipe.capture.oddities import Oddities
 from rgspipe.capture.options import CaptureOptions
-from rgspipe.capture.radiance import Measured, Numbers, measured_radiance
+from rgspipe.capture.photographs import Numbers
+from rgspipe.capture.prediction import Prediction
+from rgspipe.capture.radiance import Measured, measured_radiance
 from rgspipe.capture.received import Received
-from rgspipe.capture.refusals import OFF, check_lightings, check_measured, check_overlap, check_views
+from rgspipe.capture.refusals import OFF, check_brackets, check_lightings, check_measured, check_overlap, check_views
 from rgspipe.capture.search import Answer, found_lamps
 from rgspipe.capture.several import found_in_turns, without
 from rgspipe.completion import with_unseen_surfaces
@@ -30,6 +32,7 @@ from rgspipe.scene.surfels import Surfels
 from rgspipe.training.albedo import ALBEDO_RANGE
 from rgspipe.training.initialise import initialise_surfels
 from rgspipe.training.materials import trace_views
+from rgspipe.training.operator_store import OperatorStore
 from rgspipe.training.prior import albedo_prior
 
 #: Albedo of surfaces of which nothing is known.
@@ -114,12 +117,13 @@ def capture_scenes(
     surfels = surfels.to(torch.float32)
     if options.unseen:
         surfels = with_unseen_surfaces(surfels, [view.camera for view in views], depths=[view.depth for view in views])
-    weights = trace_views(surfels, views, options.supersampling)
+    weights = trace_views(surfels, views, options.supersampling, OperatorStore(options.memory_mib))
     lit = _measured(weights, views, options, where)
     frozen = FrozenScene.freeze(surfels, gather_rays=options.gather_rays, seed=options.seed)
     frozen = frozen.with_dictionary(options.grid, seed=options.seed)
     predicted = _predicted(weights, views, options)
-    problems = [_problem(frozen, measured, predicted, options.gather_rays) for measured in lit.values()]
+    graph = Graph.of(frozen.surfels, predicted)
+    problems = [_problem(frozen, measured, predicted, graph, options) for measured in lit.values()]
     answers = found_in_turns(problems, lambda problem: found_lamps(problem, options.count, options.most))
     return [_captured(lit[name], answer, options, name) for name, answer in zip(lit, answers, strict=True)]
 
@@ -134,7 +138,12 @@ def _measured(
         chosen, taken = [weights[index] for index in own], [views[index] for index in own]
         if options.exposure != "same":
             check_overlap(chosen, where)
-        found[name] = measured_radiance(chosen, taken, exposure=options.exposure, vignetting=options.vignetting)
+        bent = options.response == "free"
+        if bent:
+            check_brackets(taken, options.exposure)
+        found[name] = measured_radiance(
+            chosen, taken, exposure=options.exposure, vignetting=options.vignetting, bent=bent
+        )
         if name != OFF:
             check_measured(found[name].seen >= LEAST_SEEN, found[name].radiance, taken, where)
     off = found.pop(OFF, None)
@@ -153,13 +162,19 @@ def _predicted(weights: Sequence[ViewWeights], views: Sequence[View], options: C
     return np.where(known[:, None], albedo, middle)
 
 
-def _problem(frozen: FrozenScene, measured: Measured, predicted: Numbers, rays: int) -> LampProblem:
+def _problem(
+    frozen: FrozenScene, measured: Measured, predicted: Numbers, graph: Graph, options: CaptureOptions
+) -> LampProblem:
     gather = frozen.gather.to_scipy().astype(np.float64).tocsr()
     seen = measured.seen >= LEAST_SEEN
-    received = Received.of(gather, measured.radiance, seen, predicted)
+    prediction = None if options.albedo_prior == "none" else Prediction.of(predicted, graph)
+    # A surface's paint is taken for even until there are lamps to ask.
+    expected = predicted if prediction is None else prediction.with_shares(1.0, 0.0)
+    received = Received.of(gather, measured.radiance, seen, expected)
     pixels = np.where(seen, measured.variance, np.inf)
-    field = Field(Graph.of(frozen.surfels, predicted), pixels, seen.astype(np.float64), Variances())
-    return LampProblem(frozen, received, field, measured.radiance, predicted, pixels, rays)
+    field = Field(graph, pixels, seen.astype(np.float64), Variances())
+    rays = options.gather_rays
+    return LampProblem(frozen, received, field, measured.radiance, expected, pixels, rays, prediction)
 
 
 def _captured(measured: Measured, answer: Answer, options: CaptureOptions, lighting: str) -> Captured:

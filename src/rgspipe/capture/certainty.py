@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rgspipe.capture.lamps import NUMBERS, LampProblem, Lamps
-from rgspipe.capture.radiance import Numbers
+from rgspipe.capture.photographs import Numbers
 from rgspipe.capture.shared_errors import shared_covariance
 from rgspipe.renderer.clusters import cluster_patches
 from rgspipe.scene.spacing import surfel_spacing

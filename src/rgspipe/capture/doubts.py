@@ -17,7 +17,7 @@ import torch
 
 from rgspipe.capture.field import Field, Graph
 from rgspipe.capture.lamps import LampProblem, Lamps
-from rgspipe.capture.radiance import Numbers
+from rgspipe.capture.photographs import Numbers
 
 #: Degrees of freedom of Student's t.
 FREEDOM = 4.0

@@ -1,4 +1,4 @@
-"""What cameras did to the light: exposures, white balance and vignetting, by what photographs share.
+"""What cameras did to the light: exposures, white balance, vignetting and curve, by what photographs share.
 
     I_p = g_vc exp(a r² + b r⁴) (W L)_pc
 
@@ -8,23 +8,20 @@ over the pixels of photograph v that show surfel i all of them are linear,
 
     l_vi = g_v + a r²_vi + b r⁴_vi + log L_i ,
 
-and log L_i is eliminated.
+and log L_i is eliminated. A curve of the camera's own (`capture.response`) comes before either.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Literal
 
 import numpy as np
-import scipy.sparse as sp
-from numpy.typing import NDArray
 
-from rgspipe.datasets.views import View
+from rgspipe.capture.photographs import Numbers, Photograph
+from rgspipe.capture.response import Response
 
-Numbers = NDArray[np.float64]
 Exposure = Literal["same", "free", "free_colour"]
 
 #: Powers of r² in the vignetting.
@@ -33,94 +30,107 @@ POWERS = (1, 2)
 
 @dataclass(frozen=True, eq=False)
 class Cameras:
-    """Factors of V photographs with P pixels, and what of them is free.
+    """Factors of V photographs, and what of them is free.
 
     Attributes:
-        of_view: (P,) photograph of each pixel.
-        radius: (P,) r².
         exposure, vignetting: what is not known.
         gains: (V, 3) g, of mean logarithm 0 in each channel.
         falloff: (2,) a, b.
+        response: the curve; None where images are linear as they were decoded.
     """
 
-    of_view: NDArray[np.intp]
-    radius: Numbers
     exposure: Exposure
     vignetting: bool
     gains: Numbers
     falloff: Numbers
+    response: Response | None = None
 
     @classmethod
-    def of(cls, views: Sequence[View], exposure: Exposure, vignetting: bool) -> Cameras:
-        """All alike, before anything is known."""
-        of_view = np.repeat(np.arange(len(views)), [view.camera.pixel_count for view in views])
-        radius = np.concatenate([_squared_radius(view) for view in views])
-        return cls(of_view, radius, exposure, vignetting, np.ones((len(views), 3)), np.zeros(2))
+    def of(cls, count: int, exposure: Exposure, vignetting: bool, bent: bool = False) -> Cameras:
+        """All alike, before anything is known; `bent` ones have a curve of their own."""
+        curve = Response.as_decoded() if bent else None
+        return cls(exposure, vignetting, np.ones((count, 3)), np.zeros(2), curve)
 
-    @cached_property
-    def level(self) -> Numbers:
-        """(P, 3) what light is multiplied by."""
-        return self.gains[self.of_view] * self._corner[:, None]
+    def even(self, photographs: Sequence[Photograph]) -> Iterator[Numbers]:
+        """(P, 3) of each photograph what it would show under factors of 1."""
+        for photograph, gains in zip(photographs, self.gains, strict=True):
+            yield self._light(photograph) / (gains * self._corner(photograph))
 
-    @property
-    def _corner(self) -> Numbers:
-        return np.exp(sum(part * self.radius**power for part, power in zip(self.falloff, POWERS, strict=True)))
+    def _light(self, photograph: Photograph) -> Numbers:
+        """(P, 3) as the curve has it."""
+        return photograph.image if self.response is None else self.response.light(photograph)
 
-    def fitted(self, rows: sp.csr_matrix, image: Numbers, weight: Numbers, shown: Numbers | None) -> Cameras:
+    def _corner(self, photograph: Photograph) -> Numbers:
+        """(P, 1) what the lens leaves of the light."""
+        if not self.vignetting:
+            return np.ones((1, 1))
+        squared = photograph.squared_radius
+        return np.exp(sum(part * squared**power for part, power in zip(self.falloff, POWERS, strict=True)))[:, None]
+
+    def fitted(
+        self, photographs: Sequence[Photograph], weights: Sequence[Numbers], radiance: Numbers | None
+    ) -> Cameras:
         """With the factors that photographs call for.
 
         Args:
-            rows: (P, N) view weights.
-            image: (P, 3) pixels.
-            weight: (P,) theirs.
-            shown: (P, 3) what they would be under factors of 1; None before anything is known of it.
+            weights: (P,) of the pixels of each.
+            radiance: (N, 3) of the surfels; None before anything is known of it.
         """
         cameras = self
+        if self.response is not None:
+            cameras, radiance = replace(self, response=self.response.fitted(photographs, weights)), None
         if self.vignetting:
-            means = _Means.of(rows, image.mean(axis=1), self.of_view, weight)
-            falloff = means.factors(self._powers(rows, weight), free=self.exposure != "same")[1]
-            cameras, shown = replace(self, falloff=falloff), None
+            grey = (cameras._light(photograph).mean(axis=1) for photograph in photographs)
+            means = _Means.of(photographs, grey, weights)
+            falloff = means.factors(_powers(photographs, weights), free=self.exposure != "same")[1]
+            cameras, radiance = replace(cameras, falloff=falloff), None
         if self.exposure == "same":
             return cameras
-        even = image / cameras._corner[:, None]
-        if self.exposure == "free":
-            even, shown = even.mean(axis=1, keepdims=True), None if shown is None else shown.mean(axis=1, keepdims=True)
-        gains = [cameras._gains(rows, even, weight, shown, channel) for channel in range(even.shape[1])]
-        return replace(cameras, gains=np.broadcast_to(np.stack(gains, axis=1), self.gains.shape))
+        return replace(cameras, gains=cameras._gains(photographs, weights, radiance))
 
     def _gains(
-        self, rows: sp.csr_matrix, even: Numbers, weight: Numbers, shown: Numbers | None, channel: int
+        self, photographs: Sequence[Photograph], weights: Sequence[Numbers], radiance: Numbers | None
     ) -> Numbers:
-        """(V,) factors of one channel of pixels (P, C)."""
-        pixels, count = even[:, channel], len(self.gains)
-        if shown is None:
-            return _Means.of(rows, pixels, self.of_view, weight).factors([], free=True)[0]
-        light = shown[:, channel]
-        over, under = (np.bincount(self.of_view, weight * values, count) for values in (pixels * light, light**2))
+        """(V, 3) factors."""
+        if radiance is None:
+            return np.stack([self._first_gains(photographs, weights, channel) for channel in range(3)], axis=1)
+        over, under = np.zeros_like(self.gains), np.zeros_like(self.gains)
+        for index, (photograph, weight) in enumerate(zip(photographs, weights, strict=True)):
+            light = self._seen_as_one(photograph.rows @ radiance)
+            pixels = self._seen_as_one(self._light(photograph) / self._corner(photograph))
+            over[index], under[index] = weight @ (pixels * light), weight @ light**2
         gains = np.log(np.where(over > 0.0, over, 1.0) / np.where(over > 0.0, under, 1.0))
-        return np.exp(gains - gains.mean())
+        return np.exp(gains - gains.mean(axis=0))
 
-    def _powers(self, rows: sp.csr_matrix, weight: Numbers) -> list[Numbers]:
-        """(V, N) means of each power of r² over the pixels that show a surfel."""
-        return [_mean(rows, self.radius**power, self.of_view, weight) for power in POWERS]
+    def _first_gains(self, photographs: Sequence[Photograph], weights: Sequence[Numbers], channel: int) -> Numbers:
+        """(V,) factors of a channel by the surfels that photographs share."""
+        pixels = (
+            self._seen_as_one(self._light(photograph) / self._corner(photograph))[:, channel]
+            for photograph in photographs
+        )
+        return _Means.of(photographs, pixels, weights).factors([], free=True)[0]
 
-
-def _squared_radius(view: View) -> Numbers:
-    camera = view.camera
-    x, y = np.meshgrid(np.arange(camera.width) + 0.5 - camera.cx, np.arange(camera.height) + 0.5 - camera.cy)
-    squared = (x**2 + y**2).reshape(-1)
-    return squared / squared.max()
-
-
-def _mean(rows: sp.csr_matrix, values: Numbers, of_view: NDArray[np.intp], weight: Numbers) -> Numbers:
-    """(V, N) means of values (P,) over the pixels of each photograph that show each surfel."""
-    views = _by_view(of_view, weight)
-    return (views @ rows.multiply(values[:, None]).tocsr()).toarray() / np.maximum((views @ rows).toarray(), 1e-12)
+    def _seen_as_one(self, colours: Numbers) -> Numbers:
+        """(P, 3) colours, grey where all channels have one factor."""
+        if self.exposure == "free_colour":
+            return colours
+        return np.repeat(colours.mean(axis=1, keepdims=True), 3, axis=1)
 
 
-def _by_view(of_view: NDArray[np.intp], weight: Numbers) -> sp.csr_matrix:
-    """(V, P) the pixels' weights in the row of their photograph."""
-    return sp.csr_matrix((weight, (of_view, np.arange(len(weight)))), (int(of_view.max()) + 1, len(of_view)))
+def _powers(photographs: Sequence[Photograph], weights: Sequence[Numbers]) -> list[Numbers]:
+    """(V, N) means of each power of r² over the pixels that show a surfel."""
+    pairs = list(zip(photographs, weights, strict=True))
+    return [
+        np.stack([_mean(photograph, photograph.squared_radius**power, weight)[0] for photograph, weight in pairs])
+        for power in POWERS
+    ]
+
+
+def _mean(photograph: Photograph, values: Numbers, weight: Numbers) -> tuple[Numbers, Numbers]:
+    """(N,) means of values (P,) over the pixels that show each surfel, and (N,) how many do."""
+    back = photograph.rows.T
+    shown = back @ weight
+    return (back @ (weight * values)) / np.maximum(shown, 1e-12), shown
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,9 +146,10 @@ class _Means:
     counted: Numbers
 
     @classmethod
-    def of(cls, rows: sp.csr_matrix, grey: Numbers, of_view: NDArray[np.intp], weight: Numbers) -> _Means:
-        shown = (_by_view(of_view, weight) @ rows).toarray()
-        mean = _mean(rows, grey, of_view, weight)
+    def of(cls, photographs: Sequence[Photograph], pixels: Iterable[Numbers], weights: Sequence[Numbers]) -> _Means:
+        """By `pixels` (P,) of each photograph."""
+        parts = (_mean(*one) for one in zip(photographs, pixels, weights, strict=True))
+        mean, shown = (np.stack(part) for part in zip(*parts, strict=True))
         counted = np.where((shown >= 1.0) & (mean > 0.0), shown, 0.0)
         return cls(np.log(np.where(counted > 0.0, mean, 1.0)), counted)
 

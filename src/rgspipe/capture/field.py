@@ -24,7 +24,8 @@ import scipy.sparse as sp
 from scipy.optimize import minimize
 from scipy.sparse.csgraph import connected_components
 
-from rgspipe.capture.radiance import Numbers, factorised
+from rgspipe.capture.photographs import Numbers
+from rgspipe.capture.radiance import factorised
 from rgspipe.scene.spacing import surfel_spacing
 from rgspipe.scene.surfels import Surfels
 from rgspipe.training.regularise import find_neighbours
@@ -61,13 +62,13 @@ class Graph:
     Attributes:
         first, second: (E,) int64 surfels.
         weight: (E,) in [0, 1].
-        sizes: (N,) surfels of the surface that each is of.
+        surfaces: (N,) int, number of the surface that each surfel is of.
     """
 
     first: np.ndarray
     second: np.ndarray
     weight: Numbers
-    sizes: Numbers
+    surfaces: np.ndarray
 
     @classmethod
     def of(cls, surfels: Surfels, predicted: Numbers) -> Graph:
@@ -81,7 +82,12 @@ class Graph:
         joined, count = weight > APART, len(surfels)
         adjacency = sp.coo_matrix((weight[joined], (first[joined], second[joined])), (count, count))
         labels = connected_components(adjacency, directed=False)[1]
-        return cls(first, second, weight, np.bincount(labels)[labels].astype(np.float64))
+        return cls(first, second, weight, labels)
+
+    @cached_property
+    def sizes(self) -> Numbers:
+        """(N,) surfels of the surface that each is of."""
+        return np.bincount(self.surfaces)[self.surfaces].astype(np.float64)
 
     @cached_property
     def laplacian(self) -> sp.csc_matrix:

@@ -11,7 +11,7 @@ the lamps, in parts of the scene's size, and the logarithms of their intensities
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -19,7 +19,8 @@ import torch
 from torch import Tensor
 
 from rgspipe.capture.field import Field
-from rgspipe.capture.radiance import Numbers
+from rgspipe.capture.photographs import Numbers
+from rgspipe.capture.prediction import Prediction
 from rgspipe.capture.received import Received
 from rgspipe.optim.levenberg_marquardt import NormalEquations, least_squares, within
 from rgspipe.renderer.frozen import FrozenScene
@@ -85,9 +86,10 @@ class LampProblem:
         received: what they send each other.
         field: the field that is eliminated.
         radiance: (N, 3) L.
-        predicted: (N, 3) ρ̂.
+        predicted: (N, 3) ρ̂, as far as it is believed.
         pixels: (N,) variance of log L by the pixels alone; infinite where none shows the surfel.
         rays: of the gather, from each surfel.
+        prediction: what ρ̂ comes from; None where it is not asked how much of it is believed.
     """
 
     frozen: FrozenScene
@@ -97,6 +99,7 @@ class LampProblem:
     predicted: Numbers
     pixels: Numbers
     rays: int
+    prediction: Prediction | None = None
 
     @cached_property
     def target(self) -> Numbers:
@@ -131,6 +134,13 @@ class LampProblem:
     def residual(self, lamps: Lamps | None) -> Numbers:
         """(N, 3) r."""
         return self.target - np.log(self.arriving(lamps))
+
+    def with_belief(self, lamps: Lamps) -> LampProblem:
+        """With as much of the prediction as belongs to the lamps."""
+        if self.prediction is None:
+            return self
+        log_albedo = np.log(self.radiance) - np.log(self.arriving(lamps))
+        return replace(self, predicted=self.prediction.believed(self.field, log_albedo))
 
     def albedo(self, lamps: Lamps) -> Numbers:
         """(N, 3) the albedo that is most likely under the lamps, also of what was not seen; any number above 0."""

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from rgspipe.capture.lamps import LampProblem, Lamps
-from rgspipe.capture.radiance import Measured, Numbers
+from rgspipe.capture.photographs import Numbers
+from rgspipe.capture.radiance import Measured
 from rgspipe.capture.shared_errors import excess
 
 #: Surfaces that send this many times the light that falls on them glow, whatever errors the gather has.

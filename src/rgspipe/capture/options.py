@@ -21,6 +21,9 @@ class CaptureOptions(Options):
     what they share"""
     vignetting: bool = False
     """whether photographs may be darker towards their corners, all alike, which is found by what they share"""
+    response: Literal["known", "free"] = "known"
+    """whether images of 8 or 16 bits were decoded by their camera's own curve, or that curve is found by photographs of
+    exposures that are known and differ"""
     albedo_prior: Literal["none", "dataset"] = "none"
     """what is known of the albedo: nothing, or the albedo maps of the training views, from any method and up to a scale
     of each image"""
@@ -32,5 +35,7 @@ class CaptureOptions(Options):
     """rays per edge pixel in view weights, squared"""
     grid: int = option(8, low=2, high=32)
     """candidates for lamps along each axis"""
+    memory_mib: float = option(4096.0, low=0, high=1e9)
+    """memory [MiB] for what photographs see; what is beyond it is read from a file, with the same results"""
     seed: int = option(0, low=0, high=2**31 - 1)
     """draws of rays and candidates"""

@@ -20,18 +20,10 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
-from rgspipe.capture.exposures import Cameras, Exposure, Numbers
+from rgspipe.capture.exposures import Cameras, Exposure
+from rgspipe.capture.photographs import SHOWN, Numbers, Photograph
 from rgspipe.datasets.views import View
 from rgspipe.renderer.view_weights import ViewWeights
-
-#: Pixels with less surface than this are mixed with what is behind.
-LEAST_COVERAGE = 0.9
-
-#: Weight of pixels beside edges: they say where nothing else does.
-EDGE_WEIGHT = 0.03
-
-#: Pixels, all together, with which a photograph shows a surfel.
-SHOWN = 0.3
 
 #: Surfels with a larger part of their pixels saturated are brighter than the rest of them say.
 MOST_CLIPPED = 0.3
@@ -83,6 +75,7 @@ def measured_radiance(
     *,
     exposure: Exposure = "same",
     vignetting: bool = False,
+    bent: bool = False,
 ) -> Measured:
     """The radiance that explains all photographs best.
 
@@ -91,31 +84,67 @@ def measured_radiance(
         views: V ≥ 1, all under the same light.
         exposure: whether each photograph has an unknown factor, or one in each channel.
         vignetting: whether corners may be darker, alike in all photographs.
+        bent: whether the camera's curve may be another than that by which they were decoded.
     """
-    rows = sp.vstack([view.operator.to_scipy() for view in weights], format="csr").astype(np.float64)
-    image = np.concatenate([view.image.reshape(-1, 3).double().numpy() for view in views])
-    base = np.concatenate([_base(*pair) for pair in zip(weights, views, strict=True)])
-    cameras, robust, shown = Cameras.of(views, exposure, vignetting), np.ones(len(base)), None
-    floor = FLOOR * np.quantile(image.mean(axis=1)[base > 0.0], 0.99) if (base > 0.0).any() else 1.0
+    photographs = [Photograph.of(*pair) for pair in zip(weights, views, strict=True)]
+    cameras, radiance = Cameras.of(len(views), exposure, vignetting, bent), None
+    counted, floor = [photograph.base for photograph in photographs], _floor(photographs)
     for _ in range(ROUNDS):
-        weight = base * robust
-        cameras = cameras.fitted(rows, image, weight, shown)
-        even = image / cameras.level
-        radiance, seen, normal = _radiance(rows, even, weight)
-        shown = rows @ radiance
-        off = (even - shown).mean(axis=1)
-        relative = off / (shown.mean(axis=1) + floor)
-        error = float(np.median(np.abs(relative[base == 1.0]))) if (base == 1.0).any() else 0.0
-        robust = 1.0 / (1.0 + (relative / max(OUTLIER * error, 1e-6)) ** 2)
-    variance = _log_variance(rows, weight, off, normal, radiance)
-    seen = np.where(_clipped(rows, views) > MOST_CLIPPED, 0.0, seen)
+        cameras = cameras.fitted(photographs, counted, radiance)
+        radiance, seen, normal = _radiance(photographs, cameras, counted)
+        off, relative = _errors(photographs, cameras, radiance, floor)
+        error = _typical(photographs, relative)
+        latest, counted = (
+            counted,
+            [
+                photograph.base / (1.0 + (part / max(OUTLIER * error, 1e-6)) ** 2)
+                for photograph, part in zip(photographs, relative, strict=True)
+            ],
+        )
+    variance = _log_variance(photographs, latest, off, normal, radiance)
+    seen = np.where(_clipped(photographs) > MOST_CLIPPED, 0.0, seen)
     known = seen > 0.0
     middle = np.median(radiance[known], axis=0) if known.any() else np.ones(3)
     least = 1e-6 * np.maximum(middle, 1e-300)
     radiance = np.where(known[:, None], np.maximum(radiance, least), middle)
-    apart = (rows.T @ (base * np.abs(relative))) / np.maximum(rows.T @ base, 1e-12)
     shown_by = sum((_pixels(view) > SHOWN).astype(np.int64) for view in weights)
-    return Measured(radiance, np.where(known, variance, np.inf), seen, cameras, error, apart, shown_by)
+    variance = np.where(known, variance, np.inf)
+    return Measured(radiance, variance, seen, cameras, error, _apart(photographs, relative), shown_by)
+
+
+def _floor(photographs: Sequence[Photograph]) -> float:
+    """Radiance that is added before errors are relative."""
+    grey = np.concatenate([photograph.image.mean(axis=1)[photograph.base > 0.0] for photograph in photographs])
+    return FLOOR * float(np.quantile(grey, 0.99)) if len(grey) else 1.0
+
+
+def _errors(
+    photographs: Sequence[Photograph], cameras: Cameras, radiance: Numbers, floor: float
+) -> tuple[list[NDArray[np.float32]], list[NDArray[np.float32]]]:
+    """(P,) of each photograph how far pixels are off, and the same in parts of what they should be."""
+    off, relative = [], []
+    for photograph, even in zip(photographs, cameras.even(photographs), strict=True):
+        shown = photograph.rows @ radiance
+        apart = (even - shown).mean(axis=1)
+        off.append(apart.astype(np.float32))
+        relative.append((apart / (shown.mean(axis=1) + floor)).astype(np.float32))
+    return off, relative
+
+
+def _typical(photographs: Sequence[Photograph], relative: Sequence[NDArray[np.float32]]) -> float:
+    """The median of relative errors (P,) of plain pixels."""
+    plain = [np.abs(part[photograph.base == 1.0]) for photograph, part in zip(photographs, relative, strict=True)]
+    every = np.concatenate(plain)
+    return float(np.median(every)) if len(every) else 0.0
+
+
+def _apart(photographs: Sequence[Photograph], relative: Sequence[NDArray[np.float32]]) -> Numbers:
+    """(N,) mean of relative errors (P,) over the pixels that show each surfel."""
+    off, shown = 0.0, 0.0
+    for photograph, part in zip(photographs, relative, strict=True):
+        back = photograph.rows.T
+        off, shown = off + back @ (photograph.base * np.abs(part)), shown + back @ photograph.base
+    return off / np.maximum(shown, 1e-12)
 
 
 def _pixels(weights: ViewWeights) -> Numbers:
@@ -123,38 +152,46 @@ def _pixels(weights: ViewWeights) -> Numbers:
     return np.asarray(weights.operator.to_scipy().sum(axis=0)).ravel()
 
 
-def _base(weights: ViewWeights, view: View) -> Numbers:
-    """(P,) what pixels count before they are looked at."""
-    whole = (weights.coverage >= LEAST_COVERAGE).cpu() & ~view.saturated.any(dim=-1).reshape(-1)
-    whole &= view.alpha.reshape(-1) >= LEAST_COVERAGE
-    edges = weights.edges.cpu()
-    return np.where(edges.numpy(), EDGE_WEIGHT, 1.0) * whole.double().numpy()
-
-
-def _clipped(rows: sp.csr_matrix, views: Sequence[View]) -> Numbers:
+def _clipped(photographs: Sequence[Photograph]) -> Numbers:
     """(N,) part of the pixels of each surfel that are saturated."""
-    saturated = np.concatenate([view.saturated.any(dim=-1).reshape(-1).double().numpy() for view in views])
-    return (rows.T @ saturated) / np.maximum(np.asarray(rows.sum(axis=0)).ravel(), 1e-12)
+    saturated, shown = 0.0, 0.0
+    for photograph in photographs:
+        rows = photograph.rows
+        saturated = saturated + rows.T @ photograph.saturated
+        shown = shown + np.asarray(rows.sum(axis=0)).ravel()
+    return saturated / np.maximum(shown, 1e-12)
 
 
-def _radiance(rows: sp.csr_matrix, image: Numbers, weight: Numbers) -> tuple[Numbers, Numbers, sp.linalg.SuperLU]:
+def _radiance(
+    photographs: Sequence[Photograph], cameras: Cameras, weights: Sequence[Numbers]
+) -> tuple[Numbers, Numbers, sp.linalg.SuperLU]:
     """(N, 3) radiance, (N,) how much of the pixels shows each surfel, and the normal equations."""
-    weighted = rows.multiply(weight[:, None]).tocsr()
-    seen = np.asarray(weighted.sum(axis=0)).ravel()
-    mean = (weighted.T @ image) / np.maximum(seen, 1e-12)[:, None]
+    seen, right, matrix = 0.0, 0.0, 0.0
+    for photograph, even, weight in zip(photographs, cameras.even(photographs), weights, strict=True):
+        rows = photograph.rows
+        weighted = rows.multiply(weight[:, None].astype(np.float64)).tocsr()
+        seen = seen + np.asarray(weighted.sum(axis=0)).ravel()
+        right = right + weighted.T @ even
+        matrix = matrix + rows.T @ weighted
     pull = PULL * seen + 1e-9
-    normal = factorised((rows.T @ weighted + sp.diags(pull)).tocsc())
-    right = weighted.T @ image + pull[:, None] * mean
-    return np.maximum(normal.solve(right), 0.0), seen, normal
+    normal = factorised((matrix + sp.diags(pull)).tocsc())
+    mean = right / np.maximum(seen, 1e-12)[:, None]
+    return np.maximum(normal.solve(right + pull[:, None] * mean), 0.0), seen, normal
 
 
 def _log_variance(
-    rows: sp.csr_matrix, weight: Numbers, off: Numbers, normal: sp.linalg.SuperLU, radiance: Numbers
+    photographs: Sequence[Photograph],
+    weights: Sequence[Numbers],
+    off: Sequence[NDArray[np.float32]],
+    normal: sp.linalg.SuperLU,
+    radiance: Numbers,
 ) -> Numbers:
-    """(N,) variance of the logarithm of the radiance, by draws of what pixels are `off` (P,) by."""
-    rng = np.random.default_rng(0)
-    noise = (weight * off)[:, None] * rng.standard_normal((len(off), DRAWS))
-    squared = (normal.solve(rows.T @ noise) ** 2).mean(axis=1)
+    """(N,) variance of the logarithm of the radiance, by draws of the signs of what pixels are `off` (P,) by."""
+    rng, drawn = np.random.default_rng(0), 0.0
+    for photograph, weight, part in zip(photographs, weights, off, strict=True):
+        signs = 2.0 * rng.integers(0, 2, (len(part), DRAWS), dtype=np.int8) - 1.0
+        drawn = drawn + photograph.rows.T @ ((weight * part)[:, None] * signs)
+    squared = (normal.solve(drawn) ** 2).mean(axis=1)
     grey = radiance.mean(axis=1)
     return np.where(grey > 0.0, squared / np.where(grey > 0.0, grey, 1.0) ** 2, np.inf)
 

@@ -17,7 +17,7 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
-from rgspipe.capture.radiance import Numbers
+from rgspipe.capture.photographs import Numbers
 
 #: Bounces among surfels that no camera saw.
 BOUNCES = 8

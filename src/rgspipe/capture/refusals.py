@@ -9,13 +9,16 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
-from rgspipe.capture.radiance import SHOWN, Numbers
+from rgspipe.capture.photographs import SHOWN, Numbers
 from rgspipe.datasets.views import View
 from rgspipe.errors import InputError
 from rgspipe.renderer.view_weights import ViewWeights
 
 #: Surfels that two photographs have to share for one exposure to follow from the other.
 SHARED = 10
+
+#: Exposures that differ by this factor, one stop, less rounding, tell a curve.
+BRACKET = 1.9
 
 #: Name of the lighting in which all lamps are off.
 OFF = "off"
@@ -65,6 +68,31 @@ def check_lightings(views: Sequence[View], exposure: str, where: str | Path) -> 
             expected="same, so that what shines with the lamps off can be taken away",
             found=exposure,
             remedy="Expose all photographs alike, or leave those with the lamps off out.",
+        )
+
+
+def check_brackets(views: Sequence[View], exposure: str) -> None:
+    """Refuse photographs that tell nothing of their camera's curve.
+
+    Raises:
+        InputError: exposures are not known, or do not differ, or images have no levels.
+    """
+    whites = np.array([np.nan if view.saturated_from is None else view.saturated_from for view in views])
+    found = None
+    if exposure != "same":
+        found = f"lamps.exposure={exposure}: of unknown exposures a curve is known only up to a power"
+    elif np.isnan(whites).any():
+        found = "images that do not say what white is, as floating point"
+    elif whites.max() < BRACKET * whites.min():
+        found = f"exposures that differ by a factor of {whites.max() / whites.min():.2f} at most"
+    if found is not None:
+        raise InputError(
+            "lamps.response",
+            expected="photographs in 8 or 16 bits whose exposures are known (EXIF), and differ by a stop or more: the "
+            "same surfaces at other levels are what a curve is told by",
+            found=found,
+            remedy="Photograph some views at two exposures, with shutter, aperture and ISO in the files, or leave "
+            "lamps.response=known.",
         )
 
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from rgspipe.capture.doubts import model_variance, trust
 from rgspipe.capture.lamps import DARK, LampProblem, Lamps
-from rgspipe.capture.radiance import Numbers
+from rgspipe.capture.photographs import Numbers
 from rgspipe.fitting.options import BarOptions
 from rgspipe.fitting.search.apart import CandidatePlaces
 from rgspipe.training.albedo import ALBEDO_RANGE
@@ -112,6 +112,7 @@ def weighed(problem: LampProblem, lamps: Lamps | None) -> LampProblem:
     problem = replace(problem, field=replace(problem.field, measured=measured))
     if lamps is None:
         return problem
+    problem = problem.with_belief(lamps)
     albedo = np.clip(problem.albedo(lamps), *ALBEDO_RANGE)
     problem = replace(problem, received=problem.received.with_albedo(albedo))
     residual = problem.residual(problem.lamps(lamps.places, lamps.logs))

@@ -52,7 +52,8 @@ def informed(problem: LampProblem, others: Sequence[Tried]) -> LampProblem:
         weighted += weight[:, None] * (log_albedo - np.log(problem.predicted))
     prior = problem.field.graph.precision(others[0].problem.field.variances)
     mean = factorised((prior + sp.diags(precision)).tocsc()).solve(weighted)
-    return replace(problem, predicted=problem.predicted * np.exp(mean), field=replace(problem.field, known=precision))
+    predicted = problem.predicted * np.exp(mean)
+    return replace(problem, predicted=predicted, field=replace(problem.field, known=precision), prediction=None)
 
 
 def without(capture: Measured, off: Measured) -> Measured:

@@ -17,7 +17,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from rgspipe.capture.lamps import LampProblem, Lamps
-from rgspipe.capture.radiance import Numbers
+from rgspipe.capture.photographs import Numbers
 from rgspipe.training.albedo import ALBEDO_RANGE
 
 

@@ -77,7 +77,7 @@ class StudyConfig(ComparedFits):
     """scenes that are compared; by default the one that is configured"""
     zoo: ZooStudyConfig = ZooStudyConfig()
     lightings: int = option(3, low=1, high=10000)
-    """captures of each case with kind=lamps, dataset.seed 0, 1, …: each draws cameras and lamps anew"""
+    """captures of each case with kind=lamps, from dataset.seed on: each number draws cameras and lamps anew"""
 
     def check(self) -> None:
         """Refuse settings that the kind of study has no use for.

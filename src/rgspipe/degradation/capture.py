@@ -15,6 +15,7 @@ from scipy.ndimage import gaussian_filter
 from torch import Tensor
 
 from rgspipe.datasets.views import View
+from rgspipe.degradation.albedo_maps import with_predicted_albedo
 from rgspipe.degradation.options import Capture
 from rgspipe.scene import PointLight, srgb
 
@@ -34,7 +35,10 @@ def degraded(views: Sequence[View], capture: Capture) -> tuple[View, ...]:
     kept = range(len(views))
     if capture.views is not None and capture.views < len(views):
         kept = [round(place) for place in np.linspace(0, len(views) - 1, capture.views)]
-    taken = tuple(_degrade(views[index], capture, index) for index in kept)
+    if capture.albedo_error > 0:
+        views = with_predicted_albedo(views, capture.albedo_error, capture.seed)
+    factors = exposures(len(views), capture.exposure, capture.seed)
+    taken = tuple(_degrade(_exposed(views[index], factors[index]), capture, index) for index in kept)
     return taken if capture.white is None else _stored(taken, capture.white)
 
 
@@ -50,6 +54,16 @@ def eight_bit(image: Tensor, white: float) -> Tensor:
     """The image, clipped to [0, white] and rounded to the 256 levels of sRGB."""
     encoded = srgb.encode((image.double() / white).clamp(0.0, 1.0).numpy())
     return torch.from_numpy(white * srgb.decode(np.round(255.0 * encoded) / 255.0)).to(image.dtype)
+
+
+def exposures(count: int, stops: float, seed: int) -> list[float]:
+    """A factor a view, of mean logarithm 0: what all have in common no photograph tells."""
+    drawn = np.random.default_rng([seed, 4]).standard_normal(count)
+    return np.exp2(stops * (drawn - drawn.mean())).tolist()
+
+
+def _exposed(view: View, factor: float) -> View:
+    return view if factor == 1.0 else replace(view, image=factor * view.image)
 
 
 def _degrade(view: View, capture: Capture, index: int) -> View:

@@ -21,8 +21,13 @@ class Capture(Options):
     """lights: standard deviation of a coordinate, scene units"""
     light_intensity_noise: float = option(0.0, low=0, high=10)
     """lights: standard deviation of the log-intensity, all channels alike"""
+    exposure: float = option(0.0, low=0, high=10)
+    """images: standard deviation of each one's exposure about the mean of all, in stops (factors of two)"""
     white: float | None = option(None, low=0.01, high=1)
     """8-bit sRGB images that clip what is above this quantile of all values; by default floating point"""
+    albedo_error: float = option(0.0, low=0, high=2)
+    """albedo maps: standard deviation of the log-error, smooth over 0.15 of the scene and alike in all images, and that
+    of each image's own scale"""
     views: int | None = option(None, low=1, high=100000)
     """keep so many views, spread evenly"""
     normals: bool = True

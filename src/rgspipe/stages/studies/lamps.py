@@ -72,7 +72,7 @@ def _cells(config: RgspipeConfig) -> Iterator[tuple[str, str, int, dict[str, obj
     """(scene, case, lighting, configuration changes) of every capture."""
     for scene, chosen in chosen_scenes(config):
         for case in checked_cases(chosen):
-            for lighting in range(config.study.lightings):
+            for lighting in range(config.dataset.seed, config.dataset.seed + config.study.lightings):
                 own = {"scene.lamps": "unknown", "dataset.seed": lighting}
                 yield chosen.scene.folder, case.name, lighting, scene | own | case.changes
 

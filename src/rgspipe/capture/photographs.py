@@ -1,0 +1,70 @@
+"""Photographs as equations in the radiance of surfels, one after the other: together they may not fit into memory."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from rgspipe.datasets.views import View
+from rgspipe.renderer.sparse import SparseOperator
+from rgspipe.renderer.view_weights import ViewWeights
+
+Numbers = NDArray[np.float64]
+
+#: Pixels with less surface than this are mixed with what is behind.
+LEAST_COVERAGE = 0.9
+
+#: Weight of pixels beside edges: they say where nothing else does.
+EDGE_WEIGHT = 0.03
+
+#: Pixels, all together, with which a photograph shows a surfel.
+SHOWN = 0.3
+
+
+@dataclass(frozen=True, eq=False)
+class Photograph:
+    """P pixels that are sums of the radiance of N surfels.
+
+    Attributes:
+        operator: (P, N) view weights.
+        view: what was photographed.
+        base: (P,) what pixels count before they are looked at: nothing where they are saturated or half outside of all
+            surfaces.
+    """
+
+    operator: SparseOperator
+    view: View
+    base: NDArray[np.float32]
+
+    @classmethod
+    def of(cls, weights: ViewWeights, view: View) -> Photograph:
+        whole = (weights.coverage >= LEAST_COVERAGE).cpu() & ~view.saturated.any(dim=-1).reshape(-1)
+        whole &= view.alpha.reshape(-1) >= LEAST_COVERAGE
+        base = np.where(weights.edges.cpu().numpy(), EDGE_WEIGHT, 1.0) * whole.numpy()
+        return cls(weights.operator, view, base.astype(np.float32))
+
+    @property
+    def rows(self) -> sp.csr_matrix:
+        """(P, N) W, float64."""
+        return self.operator.to_scipy().astype(np.float64)
+
+    @property
+    def image(self) -> Numbers:
+        """(P, 3) linear radiance."""
+        return self.view.image.reshape(-1, 3).double().numpy()
+
+    @property
+    def squared_radius(self) -> Numbers:
+        """(P,) squared distance from the principal point, 1 in the farthest corner."""
+        camera = self.view.camera
+        x, y = np.meshgrid(np.arange(camera.width) + 0.5 - camera.cx, np.arange(camera.height) + 0.5 - camera.cy)
+        squared = (x**2 + y**2).reshape(-1)
+        return squared / squared.max()
+
+    @property
+    def saturated(self) -> Numbers:
+        """(P,) 1 where a channel is saturated."""
+        return self.view.saturated.any(dim=-1).reshape(-1).double().numpy()
