@@ -10,7 +10,7 @@ import torch
 
 from rgspipe.renderer.kernels.places import ways_to
 from rgspipe.scene import Camera, Light, SpotLight, look_at
-from rgspipe.scene.lights import KINDS
+from rgspipe.scene.lights import KINDS, Photometry, ProfileLight
 
 POSITION, INTENSITY = [0.1, -0.2, 0.9], [0.5, 1.0, 2.0]
 ALBEDO = (0.2, 0.5, 0.8)
@@ -30,6 +30,16 @@ def plane_lights() -> dict[str, Light]:
     spots = {name: SpotLight.shaped(name, *angles) for name, angles in profiles.items()}
     place, intensity = (torch.tensor(values, dtype=torch.float64) for values in (POSITION, INTENSITY))
     return {name: shape.at(place, axis, intensity) for name, shape in (narrow | spots).items()}
+
+
+def lopsided_luminaire() -> ProfileLight:
+    """A smooth beam that no turn around its axis leaves as it is, in the place of the others."""
+    down = torch.linspace(0.0, math.pi, 73, dtype=torch.float64)[:, None]
+    around = torch.arange(48, dtype=torch.float64) * (2.0 * math.pi / 48)
+    sideways = 0.6 * torch.cos(around) + 0.3 * torch.sin(2.0 * around + 0.5)
+    table = Photometry.measured(down[:, 0], around, torch.exp(-down.square() * (1.5 + torch.tanh(down) * sideways)))
+    like = plane_lights()["led"]
+    return ProfileLight(like.position, like.intensity, like.direction, 0.7, table)
 
 
 def hard_spots() -> dict[str, SpotLight]:

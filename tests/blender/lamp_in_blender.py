@@ -16,7 +16,7 @@ from rgspipe.blender.meshes import add, polygon
 from rgspipe.blender.passes import Studio
 from rgspipe.blender.plan import Frame
 from rgspipe.scene import Light, PointLight, SpotLight
-from spots_on_plane import ALBEDO, SIZE, hard_spots, plane_camera, plane_lights
+from spots_on_plane import ALBEDO, SIZE, hard_spots, lopsided_luminaire, plane_camera, plane_lights
 
 SAMPLES = 1024
 
@@ -41,7 +41,7 @@ def main(folder: Path) -> None:
     add(bpy.context.scene, polygon("plane", corners), diffuse_material("plane", ALBEDO))
     studio = Studio(bpy.context.scene, RenderSettings(SIZE, SAMPLES, denoise=False, max_bounces=0), folder)
     lights = plane_lights()
-    for name, light in (lights | hard_spots()).items():
+    for name, light in (lights | hard_spots() | {"luminaire": lopsided_luminaire()}).items():
         _render(studio, name, light, folder)
     _render(studio, "again", lights["point"], folder)
     spot = lights["smoothstep"]

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from rgspipe.datasets.exr import read_image
-from spots_on_plane import hard_spots, plane_image, plane_lights
+from spots_on_plane import hard_spots, lopsided_luminaire, plane_image, plane_lights
 
 pytestmark = [
     pytest.mark.slow,
@@ -45,6 +45,13 @@ def test_cycles_renders_hard_edges(rendered: Path, name: str) -> None:
     # Only pixels that the edge crosses differ: measured at most 0.012 of the brightest pixel, and 8e-4 of the mean.
     np.testing.assert_allclose(image, expected, atol=2e-2 * expected.max())
     assert abs(image.mean() / expected.mean() - 1.0) < 2e-3
+
+
+def test_cycles_reads_a_measured_luminaire_as_we_do(rendered: Path) -> None:
+    """With an interpolation of its own, between angles 2.5° and 7.5° apart."""
+    image, expected = read_image(rendered / "luminaire.exr")[0], plane_image(lopsided_luminaire())
+    assert np.abs(image / expected - 1.0).max() < 1e-2
+    assert abs(image.mean() / expected.mean() - 1.0) < 2e-4
 
 
 def test_our_smoothstep_is_blender_s_spot(rendered: Path) -> None:

@@ -12,7 +12,7 @@ from rgspipe.evaluation.timing import median_ms
 from rgspipe.renderer.direct import unit_irradiance
 from rgspipe.renderer.kernels.composite import composite
 from rgspipe.renderer.kernels.launch import thread_count
-from rgspipe.renderer.kernels.shadow import RECEIVER_SKIP
+from rgspipe.renderer.kernels.receiver import RECEIVER_SKIP
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh, footprint_reach
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.scene import Camera

@@ -2,21 +2,31 @@
 
 Light is emitted by a point lamp, of radius 0 unless the light is a sphere, whose shader multiplies it with the light's
 profile of the angle between its axis and the direction in which the light leaves: one way for all profiles, also for
-those that Blender's own spots do not have. A panel is Blender's own rectangle, a sun its own sun.
+those that Blender's own spots do not have. A measured luminaire is a file of LM-63 to Cycles, which interpolates it in
+its own way. A panel is Blender's own rectangle, a sun its own sun.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 
 import bpy
 import torch
 from mathutils import Matrix
 
+from rgspipe.light_export.ies import ies
+from rgspipe.light_export.world import candela
 from rgspipe.scene import Light
-from rgspipe.scene.lights import WATTS_PER_INTENSITY, PanelLight, SphereLight
+from rgspipe.scene.lights import WATTS_PER_INTENSITY, PanelLight, ProfileLight, SphereLight
 from rgspipe.scene.lights.coordinates import tangents
+
+#: What Cycles makes of a candela in a file of LM-63: 4π over the 177.83 lm/W of daylight.
+CYCLES_CANDELA = 0.0706650768394
+
+#: The text of a measured luminaire, for Cycles.
+TABLE = "luminaire"
 
 Value = bpy.types.NodeSocket | float
 
@@ -57,9 +67,29 @@ def _bulb(light: Light) -> bpy.types.Light:
     emission, output = nodes.add("ShaderNodeEmission"), nodes.add("ShaderNodeOutputLight")
     nodes.tree.links.new(emission.outputs["Emission"], output.inputs["Surface"])
     if light.axis is not None:
-        relative = light.emission(_Maths(nodes), nodes.cosine(light.axis.tolist()))
+        measured = isinstance(light, ProfileLight)
+        relative = (
+            _table(nodes, light) if measured else light.emission(_Maths(nodes), nodes.cosine(light.axis.tolist()))
+        )
         nodes.tree.links.new(relative, emission.inputs["Strength"])
     return lamp
+
+
+def _table(nodes: _Nodes, light: ProfileLight) -> bpy.types.NodeSocket:
+    """Relative intensity of a measured luminaire, as Cycles reads its table."""
+    if TABLE in bpy.data.texts:
+        bpy.data.texts.remove(bpy.data.texts[TABLE])
+    unit, node = replace(light, intensity=torch.ones(3).double()), nodes.add("ShaderNodeTexIES")
+    node.mode, node.ies = "INTERNAL", bpy.data.texts.new(TABLE)
+    node.ies.write(ies(unit, TABLE)[0])
+    node.inputs["Strength"].default_value = 1.0 / (CYCLES_CANDELA * candela(unit))
+    # Cycles counts angles from −z, and around it from −y towards −x.
+    across, up, axis = (-part for part in light.frame())
+    vector = nodes.add("ShaderNodeCombineXYZ")
+    for name, part in (("X", up), ("Y", across), ("Z", axis)):
+        nodes.tree.links.new(nodes.cosine(part.tolist()), vector.inputs[name])
+    nodes.tree.links.new(vector.outputs["Vector"], node.inputs["Vector"])
+    return node.outputs["Fac"]
 
 
 def _panel(light: PanelLight) -> bpy.types.Light:

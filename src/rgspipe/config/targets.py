@@ -44,9 +44,9 @@ class TargetSpotConfig(Options):
 class TargetsConfig(Options):
     """Generated fit targets: sums of single lights, each of which is rendered once."""
 
-    kind: Literal["points", "spots", "mixed", "spheres", "panels", "suns", "drive"] = "points"
-    """lights of a target: points, spots, of each at least one, spheres, panels, suns, or the headlights of a car that
-    drives around the bend of scene=corner"""
+    kind: Literal["points", "spots", "mixed", "spheres", "panels", "suns", "leds", "profiles", "drive"] = "points"
+    """lights of a target: points, spots, of each at least one, spheres, panels, suns, LEDs, measured luminaires, or the
+    headlights of a car that drives around the bend of scene=corner"""
     number: int = option(40, low=1, high=100000)
     """targets; a drive has `frames`"""
     count: tuple[int, int] = option((1, 1), low=1, high=MOST_LIGHTS)
@@ -81,11 +81,15 @@ class TargetsConfig(Options):
     """least and largest radius of spheres, scene units"""
     side: tuple[float, float] = option((0.1, 0.3), low=0.001, high=10)
     """least and largest side of panels, scene units"""
+    exponent: tuple[float, float] = option((1.0, 16.0), low=0, high=1000)
+    """least and largest exponent of LEDs"""
+    luminaires: str | None = None
+    """of profiles: a measured luminaire (.ies or .ldt), or a folder of them, which the pool's lights take in turn"""
     mounted: tuple[float, float] | None = option(None, low=0.0001, high=1)
     """least and largest distance between a lamp and the surface that it hangs on, scene units; null for lamps that hang
     free. Panels always lie on a surface: without this, 0.002 before it"""
 
     def check(self) -> None:
         """Refuse ranges that end before they begin."""
-        for name in ("radius", "side", "mounted"):
+        for name in ("radius", "side", "exponent", "mounted"):
             check_order(name, getattr(self, name))

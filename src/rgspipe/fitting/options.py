@@ -109,7 +109,7 @@ class RivalOptions(Options):
 
 @dataclass(frozen=True)
 class LossOptions(Options):
-    """How much pixels count while rigs are searched and compared; the answer is polished by plain squares."""
+    """How much pixels count while rigs are searched and compared, and how the answer is polished."""
 
     floor: float = option(0.05, low=1e-6, high=1)
     """of weights 1/(y + floor · mean y): pixels darker than this share of the mean count no more than it does"""
@@ -117,6 +117,9 @@ class LossOptions(Options):
     """what a model of a scene is wrong by, relative to a pixel: rounding that is larger counts, too"""
     medians: float = option(3.0, low=0.1, high=1000)
     """residuals beyond this many medians lose their weight (Cauchy loss)"""
+    polish: Literal["squares", "relative"] = "squares"
+    """the answer is polished by plain squares, whose bright pixels tell the most of the lights, or by squares over the
+    pixel's brightness: where paint is uneven, errors are larger the brighter a pixel is"""
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from rgspipe.renderer.effects import Effects
 from rgspipe.renderer.extent import added
 from rgspipe.renderer.kernels.lit_transmittance import lit_transmittance
 from rgspipe.renderer.kernels.places import homogeneous
-from rgspipe.renderer.kernels.shadow import RECEIVER_FADE, RECEIVER_SKIP
+from rgspipe.renderer.kernels.receiver import RECEIVER_FADE, RECEIVER_SKIP
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.pixel_direct import surfel_transmittance
 from rgspipe.renderer.unit_light import UnitLight, attenuated, emitted_intensity

@@ -15,7 +15,7 @@ import torch
 from torch import Tensor
 
 from rgspipe.renderer.gather import LIFT, build_gather
-from rgspipe.renderer.kernels.shadow import COPLANAR_COSINE, COPLANAR_OFFSET
+from rgspipe.renderer.kernels.receiver import COPLANAR_COSINE, COPLANAR_OFFSET
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh, usable_scales
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.scene.surfels import Surfels

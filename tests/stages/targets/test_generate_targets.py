@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import pytest
 import torch
 
+from luminaire_files import ies
 from rgspipe.blender.pool.job import SpotRange
 from rgspipe.blender.pool.pool_file import PooledLight, write_pool
 from rgspipe.config import RgspipeConfig, with_changes
@@ -126,6 +127,15 @@ def test_targets_of_another_number_need_no_other_pool() -> None:
     assert "targets.spot" in render_olat.STAGE.keys(spots) and "targets.spot" not in render_olat.STAGE.keys(few)
 
 
+def test_luminaires_of_a_folder_are_named_by_their_content(tmp_path: Path) -> None:
+    for name in ("b.ies", "a.ies"):
+        (tmp_path / name).write_text(ies())
+    config = _config(targets__kind="profiles", targets__luminaires=str(tmp_path))
+    files = [tmp_path.resolve() / name for name in ("a.ies", "b.ies")]
+    assert render_olat.pool_job(config).lamps.luminaires == tuple(map(str, files))
+    assert list(render_olat.STAGE.files(config)) == files and not render_olat.STAGE.files(_config())
+
+
 def _values(stage, config: RgspipeConfig) -> list:
     section = config.targets
     return [getattr(section, key.split(".")[1]) for key in stage.keys(config) if key.startswith("targets.")]
@@ -156,6 +166,11 @@ def test_angles_are_given_in_degrees_and_blends_as_they_are() -> None:
         ({"targets__count": [3, 2]}, r"targets\.count.*3 to 2"),
         ({"targets__count": [1, 4], "targets__pool": 3}, r"targets\.count.*at most the 3 lights"),
         ({"targets__count": [4, 4], "targets__weakest": 0.3}, r"targets\.weakest.*below 0\.25"),
+        ({"targets__kind": "profiles", "stage": "render_olat"}, r"targets\.luminaires.*null.*\.ies"),
+        (
+            {"targets__kind": "profiles", "targets__luminaires": "none.ies", "stage": "render_olat"},
+            r"none\.ies.*luminaire",
+        ),
         ({"targets__kind": "mixed", "stage": "render_olat"}, r"targets\.kind.*mixed.*stage=generate_targets"),
     ],
 )

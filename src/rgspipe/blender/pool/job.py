@@ -15,8 +15,8 @@ from rgspipe.datasets.classes import LIGHT_CLASSES, LightClass
 from rgspipe.scene.lights import SpotLight, SpotProfile
 from rgspipe.scene.lights.spot_profiles import PROFILES
 
-#: What a pool holds: point lights, spots, spheres, panels, suns, or the headlights of a car on its way.
-Kind = Literal["points", "spots", "spheres", "panels", "suns", "drive"]
+#: What a pool holds: lights of one kind (profiles: measured luminaires), or the headlights of a car on its way.
+Kind = Literal["points", "spots", "spheres", "panels", "suns", "leds", "profiles", "drive"]
 
 #: Lights of a car.
 HEADLIGHTS = 2
@@ -69,7 +69,7 @@ class PoolJob:
         classes: where points and spots are, in turn; those that the scene has none of are left out.
         spot: the profile of spots and headlights; a drive takes the least of its ranges.
         views: cameras that see every light.
-        lamps: the sizes of spheres and panels, and how near to surfaces lights are.
+        lamps: what other kinds are like, and how near to surfaces lights are.
         cameras: where they are; by default the scene's own (`pool_cameras`).
     """
 

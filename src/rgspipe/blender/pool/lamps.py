@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import torch
 
+from rgspipe.datasets.photometric_file import read_photometry
 from rgspipe.scene import Light, PointLight
-from rgspipe.scene.lights import PanelLight, SphereLight, SunLight
+from rgspipe.scene.lights import LedLight, PanelLight, ProfileLight, SphereLight, SunLight
 
 if TYPE_CHECKING:
     from rgspipe.blender.geometry import Geometry
@@ -29,6 +30,8 @@ class LampRange:
     Attributes:
         radius: least and largest, of spheres.
         side: the same, of panels' sides.
+        exponent: the same, of LEDs.
+        luminaires: files of measured luminaires, which lights take in turn.
         mounted: least and largest distance from the surface that a lamp hangs on; None where lamps hang free. Panels
             always lie on a surface, FLUSH before it where this is None.
     """
@@ -36,9 +39,11 @@ class LampRange:
     radius: tuple[float, float] = (0.02, 0.08)
     side: tuple[float, float] = (0.1, 0.3)
     mounted: tuple[float, float] | None = None
+    exponent: tuple[float, float] = (1.0, 16.0)
+    luminaires: tuple[str, ...] = ()
 
-    def draw(self, rng: np.random.Generator, kind: str) -> Light:
-        """A lamp of 1 W/sr, wherever it is; a sun of 1 W/unit² in any direction."""
+    def draw(self, rng: np.random.Generator, kind: str, index: int) -> Light:
+        """The `index`-th lamp of 1 W/sr, wherever it is; a sun of 1 W/unit² in any direction."""
         if kind == "spheres":
             return SphereLight.shaped(float(rng.uniform(*self.radius)))
         if kind == "panels":
@@ -47,6 +52,11 @@ class LampRange:
         if kind == "suns":
             towards = torch.from_numpy(rng.normal(size=3))
             return SunLight.shaped().at(torch.zeros(3).double(), towards / towards.norm())
+        if kind == "leds":
+            return LedLight.shaped(float(rng.uniform(*self.exponent)))
+        if kind == "profiles":
+            table = read_photometry(self.luminaires[index % len(self.luminaires)])
+            return ProfileLight.shaped(float(rng.uniform(-math.pi, math.pi)), table)
         return PointLight.shaped()
 
     def hung(self, lamp: Light, near: np.ndarray, geometry: Geometry, rng: np.random.Generator) -> Light | None:

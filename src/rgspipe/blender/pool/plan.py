@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
+from torch import Tensor
 
 from rgspipe.blender.cameras import MAX_DRAWS, Layout, no_room
 from rgspipe.blender.geometry import Geometry
@@ -17,14 +18,14 @@ from rgspipe.blender.pool.cameras import pool_cameras
 from rgspipe.blender.pool.drive import headlights
 from rgspipe.blender.pool.job import PoolJob
 from rgspipe.blender.targets import classify, is_around_corner, is_of_class
-from rgspipe.scene import Camera, Light, SpotLight
-from rgspipe.scene.lights import SphereLight
+from rgspipe.scene import Camera, Light
+from rgspipe.scene.lights import AxialLight, SphereLight
 from rgspipe.scene.models import Corridor
 
 log = logging.getLogger(__name__)
 
 #: Numbers of the random streams; part of the seed, so never renumber them.
-STREAMS = {"points": 10, "spots": 11, "drive": 12, "spheres": 13, "panels": 14, "suns": 15}
+STREAMS = {"points": 10, "spots": 11, "drive": 12, "spheres": 13, "panels": 14, "suns": 15, "leds": 16, "profiles": 17}
 
 #: Suns are seen, hidden and in frames as a point so many times the scene's diagonal away is: rays of Blender's tree
 #: are in float32, and from farther away miss the place that they are to end at.
@@ -117,10 +118,11 @@ def _draw(place: _Place, occlusion: str, index: int) -> Light | None:
     job = place.job
     rng = np.random.default_rng([job.dataset.seed, STREAMS[job.kind], index, 0])
     for _ in range(MAX_DRAWS // 4):
-        light = _placed(place, occlusion, rng)
+        light = _placed(place, occlusion, rng, index)
         if light is None or not _is_of_class(place, light, occlusion):
             continue
-        light = _spot(place, occlusion, light.position.numpy(), rng) if job.kind == "spots" else light
+        shape = job.spot.draw(rng) if job.kind == "spots" else light
+        light = _aimed(place, occlusion, shape, light.position, rng) if _needs_aim(shape, job) else light
         if light is not None:
             return light
     return None
@@ -138,12 +140,17 @@ def _where(place: _Place, light: Light) -> np.ndarray:
     return 0.5 * (low + high) + light.standing(SUN_DISTANCE * float(np.linalg.norm(high - low))).numpy()
 
 
-def _placed(place: _Place, occlusion: str, rng: np.random.Generator) -> Light | None:
+def _needs_aim(light: Light, job: PoolJob) -> bool:
+    """Whether nothing says yet where it looks, as a surface that it hangs on does."""
+    return isinstance(light, AxialLight) and job.lamps.mounted is None
+
+
+def _placed(place: _Place, occlusion: str, rng: np.random.Generator, index: int) -> Light | None:
     """A light of 1 W/sr somewhere in the scene, or on one of its surfaces; None if it does not fit there."""
     job, lamps = place.job, place.job.lamps
     hidden = occlusion == "occluded"
     clearance = job.dataset.hidden_light_clearance if hidden else job.dataset.light_clearance
-    lamp = lamps.draw(rng, job.kind)
+    lamp = lamps.draw(rng, job.kind, index)
     if lamp.distant:
         return lamp
     clearance = max(clearance, lamp.radius) if isinstance(lamp, SphereLight) else clearance
@@ -153,16 +160,16 @@ def _placed(place: _Place, occlusion: str, rng: np.random.Generator) -> Light | 
     return lamp.at(torch.from_numpy(position))
 
 
-def _spot(place: _Place, occlusion: str, position: np.ndarray, rng: np.random.Generator) -> SpotLight | None:
-    """A spot at `position` that lights enough; None if it can not be aimed so."""
-    shape = place.job.spot.draw(rng)
+def _aimed(
+    place: _Place, occlusion: str, shape: AxialLight, position: Tensor, rng: np.random.Generator
+) -> AxialLight | None:
+    """A light like `shape` at `position` (3,) that lights enough; None if it can not be aimed so."""
+    at = position.numpy()
     if occlusion == "around_corner":
-        axis = aim_at_relay(rng, position, place.seen, place.geometry)
+        axis = aim_at_relay(rng, at, place.seen, place.geometry)
     else:
-        axis = aim_at_seen(rng, position, shape, place.seen, place.geometry)
-    if axis is None:
-        return None
-    return shape.at(torch.from_numpy(position), torch.from_numpy(axis))
+        axis = aim_at_seen(rng, at, shape, place.seen, place.geometry)
+    return None if axis is None else shape.at(position, torch.from_numpy(axis))
 
 
 def _class_of(place: _Place, position: np.ndarray) -> str:

@@ -20,7 +20,8 @@ class Weighting:
 
     def base(self, problem: LightProblem) -> Tensor:
         """(P, 1) weights before the loss."""
-        return problem.relative_weights() if self.relative else torch.ones_like(problem.target[:, :1])
+        relative = self.relative or problem.loss.polish == "relative"
+        return problem.relative_weights() if relative else torch.ones_like(problem.target[:, :1])
 
     def squared(self, base: Tensor, residual: Tensor, scale: float) -> Tensor:
         """(P, 1) or (P, 3) squared weights of iteratively reweighted least squares."""
@@ -45,7 +46,7 @@ class Weighting:
 
 
 #: The search forgives what the model gets wrong near edges and counts dim pixels; the polish uses plain squares, whose
-#: bright pixels tell the most about the lights.
+#: bright pixels tell the most about the lights, unless `LossOptions.polish` says that errors grow with brightness.
 ROBUST, PLAIN = Weighting(relative=True, robust=True), Weighting(relative=False, robust=False)
 
 

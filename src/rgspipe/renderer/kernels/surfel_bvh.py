@@ -11,6 +11,7 @@ from torch import Tensor
 
 from rgspipe.renderer.kernels.coverage import LayerRule, layer_rule
 from rgspipe.renderer.kernels.launch import as_array, as_vec3, torch_stream
+from rgspipe.renderer.kernels.receiver import ray_starts
 from rgspipe.scene.surfels import Surfels
 
 # Adjoints are written by hand; generating them would double the compile time.
@@ -44,6 +45,7 @@ class SurfelTree:
 
     bvh: wp.uint64
     records: wp.array(dtype=SurfelRecord)
+    starts: wp.array(dtype=float)  # `ray_starts` of each record; of none without a hierarchy
     rule: LayerRule
 
 
@@ -110,16 +112,22 @@ class SurfelBvh:
     @cached_property
     def tree(self) -> SurfelTree:
         """What kernels cast rays at; the hierarchy is built when it is asked for. There must be surfels."""
-        return self._tree(self._hierarchy.id)
+        return self._tree(self._hierarchy.id, self._starts)
 
     @cached_property
     def leaves(self) -> SurfelTree:
         """The same without a hierarchy, for kernels that cast no ray."""
-        return self._tree(0)
+        return self._tree(0, torch.empty(0, device=self.device))
 
-    def _tree(self, bvh: int) -> SurfelTree:
+    @cached_property
+    def _starts(self) -> Tensor:
+        order = wp.to_torch(self.order).long()
+        normals, scales = self.surfels.normals[order], self.surfels.scales[order].prod(dim=1).sqrt()
+        return ray_starts(self._hierarchy, self.local(self.surfels.centers)[order], normals, scales)
+
+    def _tree(self, bvh: int, starts: Tensor) -> SurfelTree:
         tree = SurfelTree()
-        tree.bvh, tree.records, tree.rule = bvh, self.records, self.rule
+        tree.bvh, tree.records, tree.starts, tree.rule = bvh, self.records, as_array(starts), self.rule
         return tree
 
     def local(self, points: Tensor) -> Tensor:

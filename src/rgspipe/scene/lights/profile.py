@@ -117,7 +117,7 @@ class ProfileLight(AxialLight):
         if self.round:
             return super().relative_intensity_towards(points)
         towards = points - self.position.to(points)
-        return self._around(torch.stack([towards @ axis for axis in self._frame(points)], dim=1))
+        return self._around(torch.stack([towards @ axis.to(points) for axis in self.frame()], dim=1))
 
     def relative_intensity(
         self, points: Float[Tensor, "N 3"], *, softness: float = 0.0, shape_free: bool = False
@@ -126,7 +126,7 @@ class ProfileLight(AxialLight):
             found = super().relative_intensity(points, softness=softness, shape_free=shape_free)
             return RelativeIntensity(found.value, {"turn": torch.zeros_like(found.value), **found.by})
         towards = (points.double() - self.position.detach().to(points.device, torch.float64)).float()
-        frame = torch.stack(self._frame(towards)).detach()
+        frame = torch.stack(self.frame()).to(towards).detach()
         local = (towards @ frame.T).requires_grad_()
         with torch.enable_grad():
             value = self._around(local)
@@ -140,6 +140,11 @@ class ProfileLight(AxialLight):
     def least_relative_intensity(self) -> float:
         reaches_round = float(self.table.vertical[-1]) > math.pi - 1e-9
         return float(self.table.relative.min()) if reaches_round else 0.0
+
+    def frame(self) -> tuple[Float[Tensor, " 3"], Float[Tensor, " 3"], Float[Tensor, " 3"]]:
+        """Unit vectors along C0, along C90 and along the axis, float64."""
+        axis = torch.nn.functional.normalize(self.direction.double(), dim=0)
+        return (*sides(axis, torch.as_tensor(self.turn, dtype=torch.float64)), axis)
 
     def file_fields(self) -> dict[str, object]:
         table = self.table
@@ -172,12 +177,6 @@ class ProfileLight(AxialLight):
                 total = maths.add(total, maths.multiply(part, t))
         within = maths.subtract(1.0, maths.greater_than(angle, angles[-1]))
         return maths.multiply(maths.maximum(total, 0.0), within)
-
-    def _frame(self, like: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """(3,) unit vectors along C0, along C90 and along the axis."""
-        axis = torch.nn.functional.normalize(self.direction.double(), dim=0)
-        across, up = sides(axis, torch.as_tensor(self.turn, dtype=torch.float64))
-        return across.to(like), up.to(like), axis.to(like)
 
     def _around(self, local: Tensor) -> Tensor:
         """(N,) relative intensity towards (N, 3) in the light's own frame."""

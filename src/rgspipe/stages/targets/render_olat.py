@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 from rgspipe.blender.fixed_view import FixedView
 from rgspipe.blender.pool.job import PoolJob, SpotRange
@@ -13,6 +14,7 @@ from rgspipe.blender.pool.render_pool import render_pool
 from rgspipe.config import RgspipeConfig
 from rgspipe.config.scene import MODELLED
 from rgspipe.config.targets import TargetsConfig, TargetSpotConfig
+from rgspipe.datasets.photometric_file import read_catalogue, read_photometry
 from rgspipe.errors import InputError
 from rgspipe.scene import SpotLight
 from rgspipe.scene.lights.spot_profiles import PROFILES
@@ -63,7 +65,7 @@ def pool_job(config: RgspipeConfig) -> PoolJob:
         spot_range(wanted.spot) if wanted.kind in SPOTS else SpotRange(),
         wanted.views,
         fixed_views(wanted),
-        LampRange(wanted.radius, wanted.side, wanted.mounted),
+        LampRange(wanted.radius, wanted.side, wanted.mounted, wanted.exponent, luminaires(wanted)),
     )
 
 
@@ -144,8 +146,35 @@ def fixed_views(targets: TargetsConfig) -> tuple[FixedView, ...]:
     return tuple(FixedView(tuple(row[:3]), tuple(row[3:6]), row[6]) for row in rows)
 
 
+def luminaires(targets: TargetsConfig) -> tuple[str, ...]:
+    """The files of measured luminaires that profiles have; none of other kinds.
+
+    Raises:
+        InputError: none is named, or one cannot be read.
+    """
+    if targets.kind != "profiles":
+        return ()
+    if targets.luminaires is None:
+        raise InputError(
+            "targets.luminaires",
+            expected="a measured luminaire's file, or a folder of them, with targets.kind=profiles",
+            found="null",
+            remedy="Name an IES (.ies) or EULUMDAT (.ldt) file.",
+        )
+    path = Path(targets.luminaires).resolve()
+    if not path.is_dir():
+        read_photometry(path)
+        return (str(path),)
+    return tuple(str(path / name) for name in read_catalogue(path))
+
+
+def _files(config: RgspipeConfig) -> tuple[Path, ...]:
+    return (*DATASET.files(config), *map(Path, luminaires(config.targets)))
+
+
 def _inputs(config: RgspipeConfig) -> tuple[()]:
     check_scene(config)
+    luminaires(config.targets)
     spot_range(config.targets.spot)
     fixed_views(config.targets)
     return ()
@@ -157,7 +186,7 @@ def _keys(config: RgspipeConfig) -> list[str]:
     wanted = ["kind", "views", "resolution", "samples", "pool_seed"]
     wanted += ["frames"] if config.targets.kind == "drive" else ["pool", "classes"]
     wanted += ["spot"] if config.targets.kind in SPOTS else []
-    wanted += {"spheres": ["radius"], "panels": ["side"]}.get(config.targets.kind, [])
+    wanted += {"spheres": ["radius"], "panels": ["side"], "leds": ["exponent"]}.get(config.targets.kind, [])
     # Named only where they are set: else they say nothing that the scene and the dataset's keys do not.
     wanted += [name for name in ("cameras", "max_bounces", "mounted") if getattr(config.targets, name) is not None]
     return [*scene, *quality, *(f"targets.{name}" for name in wanted)]
@@ -169,5 +198,5 @@ STAGE = Stage(
     run=run,
     inputs=_inputs,
     config_keys=_keys,
-    files=DATASET.files,
+    files=_files,
 )
