@@ -39,12 +39,12 @@ def test_shading_is_not_believed_where_the_light_has_it_otherwise() -> None:
     prediction = Prediction.of(np.exp(paint() + shading()), graph())
     noise = 0.02 * np.random.default_rng(0).standard_normal((COUNT, 3))
     found = np.log(prediction.believed(field(), paint() + noise))
-    assert np.abs(found - found[np.arange(COUNT) // 40 * 40]).max() < 0.02
+    assert np.abs(found - found[np.arange(COUNT) // 40 * 40]).max() < 0.02  # 0.0147
     off = (found - paint())[::40]
-    assert np.abs(off - off.mean()).max() < 0.1
+    assert np.abs(off - off.mean()).max() < 0.1  # 0.068
 
 
 def test_texture_is_believed_where_the_light_has_it_too() -> None:
     prediction = Prediction.of(np.exp(paint() + shading()), graph())
     found = np.log(prediction.believed(field(), paint() + shading()))
-    np.testing.assert_allclose(found, paint() + shading(), atol=0.02)
+    np.testing.assert_allclose(found, paint() + shading(), atol=0.02)  # 5e-16

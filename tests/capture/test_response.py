@@ -52,8 +52,8 @@ def uneven(views: list[View], *, bent: bool) -> float:
 
 
 def test_light_is_measured_through_a_curve_that_nobody_knows() -> None:
-    assert uneven(taken(), bent=True) < 0.02
-    assert uneven(taken(), bent=False) > 0.1
+    assert uneven(taken(), bent=True) < 0.02  # 0.0084
+    assert uneven(taken(), bent=False) > 0.1  # 0.157
 
 
 def test_a_curve_that_was_known_stays() -> None:
@@ -61,7 +61,7 @@ def test_a_curve_that_was_known_stays() -> None:
     white = 2.0 * float(torch.stack([view.image for view in views]).max())
     views = [replace(view, saturated_from=white / EXPOSURES[index % 3]) for index, view in enumerate(views)]
     curve = measured_radiance(weights(), views, bent=True).cameras.response
-    assert np.abs(curve.logs[2:] - curve.logs[2:].mean()).max() < 0.05, curve.logs
+    assert np.abs(curve.logs[2:] - curve.logs[2:].mean()).max() < 0.05, curve.logs  # 0.0078
 
 
 @pytest.mark.parametrize(
