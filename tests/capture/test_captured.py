@@ -88,3 +88,12 @@ def test_a_given_number_is_not_asked() -> None:
     assert len(alone.lamps) == 1
     assert "Their number was given" in captured_words(alone)
     assert float((alone.lamps[0].position - LAMPS[0].position).norm()) < 0.01
+
+
+def test_light_that_lamps_and_paint_leave_unexplained_is_told() -> None:
+    assert "unexplained" not in captured_words(found())
+    best = found().answer.best
+    field = replace(best.problem.field, variances=replace(best.problem.field.variances, noise=0.3**2))
+    worse = replace(best, problem=replace(best.problem, field=field))
+    words = captured_words(replace(found(), answer=replace(found().answer, best=worse)))
+    assert "leave 30 % of a surface's light unexplained" in words

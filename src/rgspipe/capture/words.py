@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 
 from rgspipe.capture.captured import Captured
 from rgspipe.capture.certainty import GUESS
 from rgspipe.capture.search import BAR
 
-#: Photographs whose pixels disagree by more than this, in the middle, are not of one diffuse scene.
+#: Photographs whose pixels disagree by more than this, in the middle, are not of one diffuse scene; nor are surfaces
+#: that lamps and paint explain worse.
 DISAGREE = 0.1
 
 #: More of the surfels than this unmeasured is worth a word.
@@ -101,6 +103,13 @@ def _doubts(found: Captured) -> Iterator[str]:
     unmeasured = 1.0 - float((found.answer.best.problem.field.weight > 0.0).mean())
     if unmeasured > UNMEASURED:
         yield f"{100.0 * unmeasured:.0f} % of the surfaces were not measured, and are taken for what borders on them."
+    noise = math.sqrt(found.answer.best.problem.field.variances.noise)
+    if noise > DISAGREE:
+        yield (
+            f"Lamps and paint leave {100.0 * noise:.0f} % of a surface's light unexplained: detail that surfels are "
+            "too coarse for (init.surfels), gloss, or depth and poses that are off. Lamps may be missing, and places "
+            "worse than is said."
+        )
     if found.measured.error > DISAGREE:
         yield (
             f"Photographs disagree by {100.0 * found.measured.error:.0f} % about the same surfaces: gloss, other "
