@@ -50,8 +50,9 @@ def test_cycles_renders_hard_edges(rendered: Path, name: str) -> None:
 def test_cycles_reads_a_measured_luminaire_as_we_do(rendered: Path) -> None:
     """With an interpolation of its own, between angles 2.5° and 7.5° apart."""
     image, expected = read_image(rendered / "luminaire.exr")[0], plane_image(lopsided_luminaire())
-    assert np.abs(image / expected - 1.0).max() < 1e-2
-    assert abs(image.mean() / expected.mean() - 1.0) < 2e-4
+    # Measured 1.6e-3, and 2.4e-6 of the mean.
+    assert np.abs(image / expected - 1.0).max() < 5e-3
+    assert abs(image.mean() / expected.mean() - 1.0) < 1e-4
 
 
 def test_our_smoothstep_is_blender_s_spot(rendered: Path) -> None:

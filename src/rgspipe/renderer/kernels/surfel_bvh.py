@@ -122,7 +122,7 @@ class SurfelBvh:
     @cached_property
     def _starts(self) -> Tensor:
         order = wp.to_torch(self.order).long()
-        normals, scales = self.surfels.normals[order], self.surfels.scales[order].prod(dim=1).sqrt()
+        normals, scales = self.surfels.normals[order], self.surfels.scales[order].prod(dim=1).sqrt().float()
         return ray_starts(self._hierarchy, self.local(self.surfels.centers)[order], normals, scales)
 
     def _tree(self, bvh: int, starts: Tensor) -> SurfelTree:
