@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -17,6 +19,7 @@ from rgspipe.scene import Light
 from rgspipe.scene.lights import PanelLight, PointLight, SphereLight
 
 COLOUR = [1.0, 2.0, 0.5]
+SPHERE = LightSpec("sphere", shape_free=True)
 
 
 def fit(room, truth: Light, spec: LightSpec, sharp: bool = False) -> FitResult:
@@ -24,11 +27,16 @@ def fit(room, truth: Light, spec: LightSpec, sharp: bool = False) -> FitResult:
     return views.fit(views.render(truth))
 
 
+@pytest.fixture(scope="module")
+def fitted_sphere(room) -> Callable[[tuple[float, ...], float], FitResult]:
+    """Of a place and radius, fitted once."""
+    return cache(lambda place, radius: fit(room, SphereLight(place, COLOUR, radius), SPHERE))
+
+
 @pytest.mark.parametrize("place", [VISIBLE, HIDDEN], ids=["visible", "hidden"])
 @pytest.mark.parametrize("radius", [0.03, 0.08])
-def test_place_and_radius_of_a_sphere_are_found(room, place: tuple[float, ...], radius: float) -> None:
-    truth = SphereLight(place, COLOUR, radius)
-    result = fit(room, truth, LightSpec("sphere", shape_free=True))
+def test_place_and_radius_of_a_sphere_are_found(fitted_sphere, place: tuple[float, ...], radius: float) -> None:
+    truth, result = SphereLight(place, COLOUR, radius), fitted_sphere(place, radius)
     errors = rig_errors(result.lights, (truth,), 1.0)
     assert isinstance(result.lights[0], SphereLight) and result.status is FitStatus.CONVERGED
     # Measured at most 3.4e-5, 4.5e-5 and 7e-4: a small one in sight, whose size changes next to nothing.
@@ -45,7 +53,7 @@ def test_a_known_radius_stays(room) -> None:
 
 def test_a_point_is_a_sphere_without_a_radius(room) -> None:
     truth = PointLight(HIDDEN, COLOUR)
-    result = fit(room, truth, LightSpec("sphere", shape_free=True))
+    result = fit(room, truth, SPHERE)
     # The loss is flat towards a radius of 0, so steps end before the middle is quite there: measured 3e-5 and 1.6e-4,
     # where the stated error is 6e-4.
     assert result.lights[0].radius < 0.02
@@ -66,14 +74,14 @@ def test_a_panel_is_found_with_axis_sides_and_turn(room) -> None:
 
 def test_sharp_images_find_them_as_well(room) -> None:
     truth = SphereLight(VISIBLE, COLOUR, 0.06)
-    result = fit(room, truth, LightSpec("sphere", shape_free=True), sharp=True)
+    result = fit(room, truth, SPHERE, sharp=True)
     errors = rig_errors(result.lights, (truth,), 1.0)
     assert errors.position < 1e-6 and errors.shape < 1e-5  # measured 8e-9 and 1.3e-8
 
 
-def test_the_answer_is_printed_written_and_read(room, tmp_path: Path) -> None:
-    result = fit(room, SphereLight(HIDDEN, COLOUR, 0.06), LightSpec("sphere", shape_free=True))
-    assert "sphere at (" in str(result) and "radius 0.06" in str(result)
+def test_the_answer_is_printed_written_and_read(fitted_sphere, tmp_path: Path) -> None:
+    result = fitted_sphere(HIDDEN, 0.08)
+    assert "sphere at (" in str(result) and "radius 0.08" in str(result)
     result.save(tmp_path / "lights.json")
     (read,) = read_lights(tmp_path / "lights.json")
     assert read.columns() == result.lights[0].columns()
