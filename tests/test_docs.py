@@ -82,7 +82,7 @@ def test_tests_that_are_named_exist() -> None:
     for cell in re.findall(r"\| ([^|\n]+) \|$", text, re.MULTILINE):
         content = ""
         for path, name in re.findall(r"`(?:([a-z_/]+\.py))?(?:::)?(test_[a-z0-9_]+)?`", cell):
-            file = ROOT / "tests" / path
+            file = ROOT / path
             content = file.read_text() if path and file.is_file() else "" if path else content
             if not content or (name and f"def {name}(" not in content):
                 missing.append(f"{path}::{name}")
