@@ -46,7 +46,7 @@ third-party: setup  ## what is exported, read by Mitsuba, USD and the validator 
 crash: setup  ## kills, power cuts, full disks while a tiny scene is made: what the next run ends with (ARGS="CASES SEED")
 	$(VENV)/bin/python tests/crash.py $(ARGS)
 
-soak: setup  ## a sweep of 200 jobs, 8 at a time, with random kills; its memory (many minutes; ARGS="JOBS KILLS SEED")
+soak: setup  ## a sweep of 200 jobs, 8 at a time, with random kills; its memory (many minutes; ARGS="JOBS KILLS SEED [slurm]")
 	$(VENV)/bin/python tests/soak.py $(ARGS)
 
 bits: setup  ## training and a fit with other numbers of threads, and other instructions of the processor (minutes)

@@ -1,7 +1,8 @@
-"""A long sweep with random kills on one tiny scene: `make soak ARGS="JOBS KILLS SEED"`.
+"""A long sweep with random kills on one tiny scene: `make soak ARGS="JOBS KILLS SEED [slurm]"`.
 
 The sweep is made undisturbed, then once more while all of it, or one of its workers, is killed now and then. Both must
 end alike, byte for byte but for clocks, and the memory of driver and workers must not grow with the number of jobs.
+With `slurm` the jobs go to a cluster of this machine, which goes on with them when the driver is killed.
 """
 
 from __future__ import annotations
@@ -14,14 +15,21 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from slurm.cluster import slurm_cluster
 from whole_way import TINY, differences, end_state
 
 #: Jobs at a time.
 AT_ONCE = 8
+
+#: How jobs are started.
+LAUNCHERS = {
+    "local": [f"hydra.launcher.n_jobs={AT_ONCE}"],
+    "slurm": ["hydra/launcher=slurm", "hydra.launcher.cpus_per_task=1", "hydra.launcher.poll_s=0.3"],
+}
 
 #: Memory of the last third of a sweep over that of the second one, from which on it grows.
 GROWN = 1.1
@@ -34,39 +42,44 @@ SOURCE = Path(__file__).resolve().parents[1] / "src"
 
 @dataclass
 class Sweep:
-    """A sweep that is going on, and the memory of its processes."""
+    """A sweep that is going on in a folder, and the memory of its processes."""
 
+    folder: Path
     process: subprocess.Popen[bytes]
     driver: list[int] = field(default_factory=list)
     worker: list[int] = field(default_factory=list)
 
     @classmethod
-    def start(cls, folder: Path, jobs: int) -> Sweep:
+    def start(cls, folder: Path, jobs: int, launcher: Sequence[str], environment: Mapping[str, str]) -> Sweep:
         arguments = [f"{key}={value}" for key, value in {**TINY, "stage": "fit_light", "occlusion": "visible"}.items()]
         command = [sys.executable, "-m", "rgspipe", "-m", *arguments, f"seed=range({jobs})"]
         folder.mkdir(exist_ok=True)
         with (folder / "told").open("ab") as told:
             process = subprocess.Popen(
-                [*command, f"hydra.launcher.n_jobs={AT_ONCE}"], cwd=folder, stdin=subprocess.DEVNULL, stdout=told,
-                stderr=told, env={**os.environ, "PYTHONPATH": str(SOURCE)}, start_new_session=True,
+                [*command, *launcher], cwd=folder, stdin=subprocess.DEVNULL, stdout=told, stderr=told,
+                env={**environment, "PYTHONPATH": str(SOURCE)}, start_new_session=True,
             )  # fmt: skip
-        return cls(process)
+        return cls(folder, process)
 
     def watch(self, until: Callable[[], bool] = lambda: False) -> int | None:
         """Note its memory until it ends, or something happens; its exit status, if it has ended."""
         while (status := self.process.poll()) is None and not until():
-            workers = [resident(child) for child in descendants(self.process.pid)]
+            workers = [resident(worker) for worker in self.workers()]
             self.driver.append(resident(self.process.pid))
             self.worker.append(max(workers, default=0))
             time.sleep(PAUSE)
         return status
 
+    def workers(self) -> list[int]:
+        """All of its processes but the one that drives it."""
+        return [one for one in processes(self.folder.resolve()) if one != self.process.pid]
+
     def kill(self, draw: random.Random) -> None:
         """Kill all of it, or one of the processes that it has started."""
-        children = list(descendants(self.process.pid))
+        workers = self.workers()
         with contextlib.suppress(ProcessLookupError):
-            if children and draw.random() < 0.5:
-                os.kill(draw.choice(children), signal.SIGKILL)
+            if workers and draw.random() < 0.5:
+                os.kill(draw.choice(workers), signal.SIGKILL)
                 self.watch()
             else:
                 os.killpg(self.process.pid, signal.SIGKILL)
@@ -75,12 +88,14 @@ class Sweep:
             os.killpg(self.process.pid, signal.SIGKILL)
 
 
-def descendants(pid: int) -> Iterator[int]:
-    """Processes that a process has started, and those that these have."""
-    with contextlib.suppress(OSError):
-        for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split():
-            yield int(child)
-            yield from descendants(int(child))
+def processes(folder: Path) -> list[int]:
+    """Processes that run in a folder, whoever has started them."""
+    found = []
+    for place in Path("/proc").glob("[0-9]*/cwd"):
+        with contextlib.suppress(OSError):
+            if place.readlink() == folder:
+                found.append(int(place.parent.name))
+    return sorted(found)
 
 
 def resident(pid: int) -> int:
@@ -97,24 +112,26 @@ def growth(values: list[int]) -> float:
     return (sum(last) / len(last)) / max(1.0, sum(second) / len(second))
 
 
-def main(jobs: int, kills: int, seed: int) -> int:
+def main(jobs: int, kills: int, seed: int, where: str) -> int:
     """Make the sweep twice; the exit status."""
-    draw = random.Random(seed)
-    with tempfile.TemporaryDirectory() as place:
+    draw, launcher = random.Random(seed), LAUNCHERS[where]
+    with contextlib.ExitStack() as stack:
+        environment = stack.enter_context(slurm_cluster(AT_ONCE)) if where == "slurm" else dict(os.environ)
+        place = stack.enter_context(tempfile.TemporaryDirectory())
         calm, wild = Path(place, "calm"), Path(place, "wild")
-        begin, sweep = time.monotonic(), Sweep.start(calm, jobs)
+        begin, sweep = time.monotonic(), Sweep.start(calm, jobs, launcher, environment)
         ended = [sweep.watch()]
         whole = time.monotonic() - begin
         for name, values in (("driver", sweep.driver), ("largest worker", sweep.worker)):
             print(f"{name}: {max(values) / 2**20:.0f} MiB, last third over second one {growth(values):.3f}", flush=True)
         for number in range(kills):
             end = time.monotonic() + draw.uniform(0.0, 2.0 * whole / max(kills, 1))
-            other = Sweep.start(wild, jobs)
+            other = Sweep.start(wild, jobs, launcher, environment)
             if other.watch(lambda end=end: time.monotonic() > end) is None:
                 other.kill(draw)
             made = len(list(wild.glob("outputs/*/fit_light/[0-9a-f]*")))
             print(f"kill {number + 1}: {made} of {jobs} fits are made", flush=True)
-        ended.append(Sweep.start(wild, jobs).watch())
+        ended.append(Sweep.start(wild, jobs, launcher, environment).watch())
         other = differences(end_state(wild / "outputs"), end_state(calm / "outputs"))
         told = (wild / "told").read_text(errors="replace")[-2000:]
     print(f"{jobs} jobs, {AT_ONCE} at a time, {kills} kills: ended with {ended}, other results: {other or 'none'}")
@@ -124,5 +141,6 @@ def main(jobs: int, kills: int, seed: int) -> int:
 
 
 if __name__ == "__main__":
-    given = [int(text) for text in sys.argv[1:]]
-    sys.exit(main(*(given + [200, 20, 0][len(given) :])))
+    places = [text for text in sys.argv[1:] if text in LAUNCHERS]
+    given = [int(text) for text in sys.argv[1:] if text not in LAUNCHERS]
+    sys.exit(main(*(given + [200, 20, 0][len(given) :]), *(places or ["local"])))

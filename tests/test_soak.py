@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
+from pathlib import Path
 
-from soak import GROWN, descendants, growth, resident
+from soak import GROWN, growth, processes, resident
 
 
 def test_memory_that_rises_with_every_job_is_told_from_memory_that_does_not() -> None:
@@ -15,11 +15,12 @@ def test_memory_that_rises_with_every_job_is_told_from_memory_that_does_not() ->
     assert growth([*begun, *range(500, 1100, 100)]) > GROWN
 
 
-def test_memory_of_processes_that_a_process_has_started() -> None:
+def test_memory_of_the_processes_that_run_in_a_folder(tmp_path: Path) -> None:
     program = "import subprocess, sys; subprocess.run([sys.executable, '-c', 'print(0, flush=True); input()'])"
-    with subprocess.Popen([sys.executable, "-c", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+    command = [sys.executable, "-c", program]
+    with subprocess.Popen(command, cwd=tmp_path, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
         assert process.stdout is not None and process.stdout.readline() == b"0\n"
-        (child,) = descendants(process.pid)
-        assert resident(child) > 2**20 and process.pid in descendants(os.getpid())
+        first, second = processes(tmp_path.resolve())
+        assert process.pid in (first, second) and min(resident(first), resident(second)) > 2**20
         process.communicate(b"\n")
-    assert resident(process.pid) == 0 and not list(descendants(process.pid))
+    assert resident(process.pid) == 0 and not processes(tmp_path.resolve())
