@@ -8,6 +8,7 @@ import subprocess
 import sys
 import urllib.request
 import zipfile
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -62,7 +63,11 @@ def test_the_demo_comes_along(site: Path, tmp_path: Path) -> None:
     script = "import sys; from rgspipe.cli import main; sys.exit(main(['demo', 'port=0']))"
     environment = {**os.environ, "PYTHONPATH": str(site), "OMP_NUM_THREADS": "1"}
     command = [sys.executable, "-c", script]
-    with subprocess.Popen(command, cwd=tmp_path, env=environment, stdout=subprocess.PIPE, text=True) as process:
+    # What runs in the background of a shell ignores interrupts, and so would its children.
+    heeds = partial(signal.signal, signal.SIGINT, signal.default_int_handler)
+    with subprocess.Popen(
+        command, cwd=tmp_path, env=environment, stdout=subprocess.PIPE, text=True, preexec_fn=heeds
+    ) as process:
         try:
             url = next((line for line in process.stdout if "Ctrl-C" in line), "").partition(" ")[0]
             with urllib.request.urlopen(url, timeout=60) as page:

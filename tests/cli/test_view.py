@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import urllib.request
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -44,7 +45,9 @@ def test_a_page_is_served_until_it_is_interrupted(tmp_path: Path) -> None:
     FrozenScene.freeze(closed_box(0.5).to(torch.float32)).save(tmp_path / "box")
     command = [sys.executable, "-m", "rgspipe", "view", str(tmp_path / "box"), "port=0"]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "OMP_NUM_THREADS": "1"}
-    with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True) as process:
+    # What runs in the background of a shell ignores interrupts, and so would its children.
+    heeds = partial(signal.signal, signal.SIGINT, signal.default_int_handler)
+    with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True, preexec_fn=heeds) as process:
         url = next((line for line in process.stdout if "Ctrl-C" in line), "").partition(" ")[0]
         assert url.startswith("http://127.0.0.1:")
         with urllib.request.urlopen(url, timeout=30) as page:

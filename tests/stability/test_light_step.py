@@ -48,10 +48,12 @@ def compare(
     within,
     log_intensity: float | None = None,
     smooth: bool = True,
+    least: float = 0.0,
 ) -> None:
     """Columns of a Levenberg-Marquardt step; loss and gradients of an Adam step.
 
     Args:
+        least: radiance, and its change over the size of the scene, that errors are compared with where all are less.
         log_intensity: by default that which makes radiance near 1 in a scene of this size.
         smooth: whether surfels are wide enough for float32 to place a ray within them.
     """
@@ -61,8 +63,8 @@ def compare(
     found = SurfelModel(views, Effects()).columns(emitter_at(position))
     expected = step.columns(position)
     # Measured at most 8e-6 and 3e-6; 5e-4 of the derivative with needles.
-    within("image", found[..., 0] * unit[0], expected[..., 0] * unit[0], 2e-5)
-    within("columns", found[..., 1:] * unit[1:], expected[..., 1:] * unit[1:], 2e-5 if smooth else 1e-3)
+    within("image", found[..., 0] * unit[0], expected[..., 0] * unit[0], 2e-5, least=least)
+    within("columns", found[..., 1:] * unit[1:], expected[..., 1:] * unit[1:], 2e-5 if smooth else 1e-3, least=least)
 
     exponent = torch.full((3,), 2.0 * math.log(size) if log_intensity is None else log_intensity).double()
     with torch.no_grad():
@@ -104,7 +106,8 @@ def test_sixteen_orders_of_magnitude_in_one_image(kept: Frozen) -> None:
 @pytest.mark.parametrize("light", LIGHTS)
 def test_a_light_in_a_hard_place(kept: Frozen, light: str, within) -> None:
     scene = scene_of_light(light)
-    compare(all_pixels(kept, scene), scene, LIGHTS[light], within)
+    # What gets out of a solid, 6e-5 where a lamp in the open makes about 1, is a difference of numbers near 1.
+    compare(all_pixels(kept, scene), scene, LIGHTS[light], within, least=1e-3 if light == "inside a solid" else 0.0)
 
 
 @pytest.mark.parametrize("name", CAMERAS)
