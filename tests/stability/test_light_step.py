@@ -53,7 +53,7 @@ def compare(
     """Columns of a Levenberg-Marquardt step; loss and gradients of an Adam step.
 
     Args:
-        least: radiance, and its change over the size of the scene, that errors are compared with where all are less.
+        least: radiance that errors of the image are compared with where all of it is less.
         log_intensity: by default that which makes radiance near 1 in a scene of this size.
         smooth: whether surfels are wide enough for float32 to place a ray within them.
     """
@@ -62,9 +62,10 @@ def compare(
     unit = torch.tensor([size**2, size**3, size**3, size**3], dtype=torch.float64)
     found = SurfelModel(views, Effects()).columns(emitter_at(position))
     expected = step.columns(position)
-    # Measured at most 8e-6 and 3e-6; 5e-4 of the derivative with needles.
+    # Measured at most 8e-6 and 3e-6; of the derivative 3e-5 in a solid, where rays meet surfels aslant and near by, and
+    # 5e-4 with needles.
     within("image", found[..., 0] * unit[0], expected[..., 0] * unit[0], 2e-5, least=least)
-    within("columns", found[..., 1:] * unit[1:], expected[..., 1:] * unit[1:], 2e-5 if smooth else 1e-3, least=least)
+    within("columns", found[..., 1:] * unit[1:], expected[..., 1:] * unit[1:], 5e-5 if smooth else 1e-3)
 
     exponent = torch.full((3,), 2.0 * math.log(size) if log_intensity is None else log_intensity).double()
     with torch.no_grad():
