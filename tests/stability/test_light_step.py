@@ -48,14 +48,15 @@ def compare(
     within,
     log_intensity: float | None = None,
     smooth: bool = True,
-    least: float = 0.0,
+    dim: bool = False,
 ) -> None:
     """Columns of a Levenberg-Marquardt step; loss and gradients of an Adam step.
 
     Args:
-        least: radiance that errors of the image are compared with where all of it is less.
         log_intensity: by default that which makes radiance near 1 in a scene of this size.
         smooth: whether surfels are wide enough for float32 to place a ray within them.
+        dim: whether next to no light gets out: errors of the image are compared with 1e-3, and the gradient of the loss
+            is as uncertain as the image is.
     """
     step = DoubleStep.of(views.frozen, scene.build(), views.operator.matrix)
     size, position = scene.size, scene.at(light)
@@ -64,7 +65,7 @@ def compare(
     expected = step.columns(position)
     # Measured at most 8e-6 and 3e-6; of the derivative 3e-5 in a solid, where rays meet surfels aslant and near by, and
     # 5e-4 with needles.
-    within("image", found[..., 0] * unit[0], expected[..., 0] * unit[0], 2e-5, least=least)
+    within("image", found[..., 0] * unit[0], expected[..., 0] * unit[0], 2e-5, least=1e-3 if dim else 0.0)
     within("columns", found[..., 1:] * unit[1:], expected[..., 1:] * unit[1:], 5e-5 if smooth else 1e-3)
 
     exponent = torch.full((3,), 2.0 * math.log(size) if log_intensity is None else log_intensity).double()
@@ -82,8 +83,9 @@ def compare(
         loss.backward()
         results.append((loss[None], *(leaf.grad for leaf in leaves)))
     for name, single, double in zip(("loss", "position", "log_intensity"), *results, strict=True):
-        # Measured at most 8e-6, 4e-4 with needles. 1 − SSIM cannot be nearer to 0 than float32 is to 1.
-        within(name, single, double, 5e-5 if smooth else 1e-3, least=1.0 if name == "loss" else 0.0)
+        # Measured at most 8e-6, 1e-4 in a solid, 4e-4 with needles. 1 − SSIM is not nearer to 0 than float32 is to 1.
+        bound = (2e-4 if dim else 5e-5) if smooth else 1e-3
+        within(name, single, double, bound, least=1.0 if name == "loss" else 0.0)
 
 
 @pytest.mark.parametrize("name", [name for name in SCENES if name not in DEEP])
@@ -108,7 +110,7 @@ def test_sixteen_orders_of_magnitude_in_one_image(kept: Frozen) -> None:
 def test_a_light_in_a_hard_place(kept: Frozen, light: str, within) -> None:
     scene = scene_of_light(light)
     # What gets out of a solid, 6e-5 where a lamp in the open makes about 1, is a difference of numbers near 1.
-    compare(all_pixels(kept, scene), scene, LIGHTS[light], within, least=1e-3 if light == "inside a solid" else 0.0)
+    compare(all_pixels(kept, scene), scene, LIGHTS[light], within, dim=light == "inside a solid")
 
 
 @pytest.mark.parametrize("name", CAMERAS)
