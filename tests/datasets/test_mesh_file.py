@@ -104,3 +104,16 @@ def test_textures_in_other_formats_are_not_opened(tmp_path: Path) -> None:
     (tmp_path / "b.gif").rename(picture)
     with pytest.raises(InputError, match="texture in the format GIF"):
         read_mesh(tmp_path / "a.obj")
+
+
+def test_a_broken_texture_is_refused(tmp_path: Path) -> None:
+    """Pillow says SyntaxError of a chunk whose length was changed, which is no error of the library's reader."""
+    square = textured_square(quarters())
+    square.export(tmp_path / "a.obj")
+    (picture,) = tmp_path.glob("*.png")
+    content = bytearray(picture.read_bytes())
+    start = content.index(b"IDAT")
+    content[start - 4 : start] = (4).to_bytes(4, "big")
+    picture.write_bytes(content)
+    with pytest.raises(InputError, match="whole textures"):
+        read_mesh(tmp_path / "a.obj")

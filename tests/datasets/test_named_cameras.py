@@ -78,6 +78,7 @@ def test_a_camera_that_is_not_there_is_said_with_those_that_are(
         ("focal", -1.0, "above 0"),
         ("side", "depth", "one of longer"),
         ("shift", [0.0], "2 finite"),
+        ("shift", [0.0, 1e308], "at most 1e"),
         ("focal", None, "focal"),
     ],
 )

@@ -119,6 +119,17 @@ def test_replica_comes_back(tmp_path: Path) -> None:
     assert all(float((a.image - b.image).abs().median()) < 0.02 for a, b in zip(views, VIEWS, strict=True))
 
 
+@pytest.mark.parametrize("scale", [0.0, -1.0])
+def test_steps_of_depth_that_cannot_be_are_refused_where_they_stand(tmp_path: Path, scale: float) -> None:
+    write_replica(tmp_path / "scans/room0", VIEWS)
+    path = tmp_path / "scans/cam_params.json"
+    content = json.loads(path.read_text())
+    content["camera"]["scale"] = scale
+    path.write_text(json.dumps(content))
+    with pytest.raises(InputError, match=r"cam_params.json: camera.scale: .*above 0"):
+        read_scan(tmp_path / "scans/room0", ScanOptions())
+
+
 def test_scannet_comes_back_without_lost_frames_and_with_depth_of_its_own_lens(tmp_path: Path) -> None:
     write_scannet(tmp_path / "scan", VIEWS)
     made, views = back(tmp_path / "scan")

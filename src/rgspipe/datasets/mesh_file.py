@@ -10,6 +10,7 @@ import numpy as np
 import trimesh
 from PIL import Image
 
+from rgspipe.datasets.display_image import DAMAGED
 from rgspipe.datasets.input_file import check_pixel_count, input_file
 from rgspipe.datasets.limits import FARTHEST
 from rgspipe.datasets.mesh_links import FORMATS, GLTF
@@ -131,7 +132,12 @@ def _texture(image: Image.Image, path: Path) -> np.ndarray:
         found = f"a texture in the format {image.format}"
         raise InputError(path, expected="textures as PNG or JPEG", found=found, remedy="Convert them.")
     check_pixel_count(path, *image.size)
-    return srgb.decode(np.asarray(image.convert("RGB"), np.float64) / 255.0).astype(np.float32)
+    try:
+        levels = np.asarray(image.convert("RGB"), np.float64)
+    except DAMAGED as cause:
+        remedy = "Write the texture again."
+        raise InputError(path, expected="whole textures", found=f"a broken one: {cause}", remedy=remedy) from cause
+    return srgb.decode(levels / 255.0).astype(np.float32)
 
 
 def _joined(parts: list[TriangleMesh], path: Path, content: Any) -> TriangleMesh:

@@ -10,6 +10,7 @@ from typing import Literal, get_args
 from torch import Tensor
 
 from rgspipe.datasets.json_file import numbers, read_json, required, shown
+from rgspipe.datasets.limits import LARGEST
 from rgspipe.datasets.rigid_pose import rigid_pose
 from rgspipe.errors import InputError
 from rgspipe.scene import Camera
@@ -77,4 +78,7 @@ def read_camera(path: Path, name: str) -> NamedCamera:
     if focal <= 0.0 or side not in get_args(Side):
         expected = f'"focal" above 0 and "side" one of {", ".join(get_args(Side))}'
         raise InputError(place, expected=expected, found=f"{focal:g}, {shown(side)}", remedy="Correct them.")
+    if max(abs(value) for value in (focal, *shift)) > LARGEST:
+        expected, found = f'"focal" and "shift" of at most {LARGEST:g}', f"{focal:g}, {shift[0]:g}, {shift[1]:g}"
+        raise InputError(place, expected=expected, found=found, remedy="Correct them.")
     return NamedCamera(pose, focal, side, (shift[0], shift[1]))

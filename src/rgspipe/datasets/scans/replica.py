@@ -58,6 +58,10 @@ def _camera(path: Path | None) -> tuple[Lens, float]:
     if not isinstance(content, dict):
         raise InputError(where, expected='"camera": {…}', found=repr(content), remedy="Correct it.")
     values = {key: numbers([required(content, key, where)], 1, where, key)[0] for key in USUAL}
+    if values["scale"] <= 0.0:
+        expected, found = "steps of depth a metre, above 0", f"{values['scale']:g}"
+        remedy = "Correct it: Replica's own is 6553.5."
+        raise InputError(f"{where}: camera.scale", expected=expected, found=found, remedy=remedy)
     # Pixel centres are whole numbers there.
     centre = values["cx"] + 0.5, values["cy"] + 0.5
     return Lens(values["fx"], values["fy"], *centre, int(values["w"]), int(values["h"])), values["scale"]
