@@ -47,7 +47,7 @@ class DatasetOptions(Options):
     denoise: bool = True
     """denoise the colour images"""
     max_bounces: int = option(128, low=0, high=1024)
-    """bounces of a path; n lose albedo^(n + 1) of the light: with 12 a fifth of that in a white room"""
+    """bounces of a path; n lose up to albedo^(n + 1) of a closed room's light: 12 about 15 % where walls are 0.88"""
     seed: int = option(0, low=0, high=2**31 - 1)
     """draws of cameras and lights; each frame draws from its own stream, and does not depend on how many there are"""
 

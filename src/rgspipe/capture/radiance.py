@@ -94,13 +94,8 @@ def measured_radiance(
         radiance, seen, normal = _radiance(photographs, cameras, counted)
         off, relative = _errors(photographs, cameras, radiance, floor)
         error = _typical(photographs, relative)
-        latest, counted = (
-            counted,
-            [
-                photograph.base / (1.0 + (part / max(OUTLIER * error, 1e-6)) ** 2)
-                for photograph, part in zip(photographs, relative, strict=True)
-            ],
-        )
+        latest, limit = counted, max(OUTLIER * error, 1e-6)
+        counted = [one.base / (1.0 + (part / limit) ** 2) for one, part in zip(photographs, relative, strict=True)]
     variance = _log_variance(photographs, latest, off, normal, radiance)
     seen = np.where(_clipped(photographs) > MOST_CLIPPED, 0.0, seen)
     known = seen > 0.0
