@@ -6,6 +6,8 @@ from dataclasses import fields, replace
 
 import torch
 
+from rgspipe.renderer.kernels.composite import composite
+from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.scene import Camera, Surfels, look_at
 from rgspipe.scene.rectangles import Rectangles, inside_of_box, solid_box, surfels_on
 
@@ -47,6 +49,16 @@ def without_back(surfels: Surfels) -> Surfels:
 
 def only(surfels: Surfels, kept: torch.Tensor | slice) -> Surfels:
     return replace(surfels, **{name: tensor[kept] for name, tensor in surfels.tensors().items()})
+
+
+def seen_by(cameras: list[Camera], surfels: Surfels) -> Surfels:
+    """Those of the surfels that the cameras see."""
+    shown, tree = torch.zeros(len(surfels)), SurfelBvh(surfels)
+    for camera in cameras:
+        origins, directions, _ = camera.rays()
+        hits = composite(tree, origins, directions, two_sided=True)
+        shown.index_add_(0, hits.indices.long().clamp(min=0).reshape(-1), hits.weights.reshape(-1))
+    return only(surfels, shown > 0.5)
 
 
 def cameras_in_front(resolution: int = 64) -> list[Camera]:

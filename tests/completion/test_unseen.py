@@ -24,14 +24,13 @@ from half_seen_room import (
     cameras_in_front,
     only,
     rows,
+    seen_by,
     true_room,
     without_back,
 )
 from rgspipe.completion import with_unseen_surfaces
 from rgspipe.renderer.effects import Effects
 from rgspipe.renderer.frozen import FrozenScene
-from rgspipe.renderer.kernels.composite import composite
-from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.scene import Camera, PointLight, Surfels
 from rgspipe.scene.gloss import Gloss
 from rgspipe.scene.rectangles import inside_of_box, rectangle, surfels_on
@@ -106,14 +105,7 @@ def photographed_from_one_side() -> tuple[Surfels, list[Camera]]:
         camera_at([0.9, y, z], [0.0, 1.0 - y, t], 64, 1.0)
         for y, z, t in ((0.1, 0.2, 0.9), (0.1, 0.8, 0.1), (0.9, 0.2, 0.9), (0.9, 0.8, 0.1), (0.5, 0.5, 0.5))
     ]
-    room = true_room(3000)
-    shown = torch.zeros(len(room))
-    tree = SurfelBvh(room)
-    for camera in cameras:
-        origins, directions, _ = camera.rays()
-        hits = composite(tree, origins, directions, two_sided=True)
-        shown.index_add_(0, hits.indices.long().clamp(min=0).reshape(-1), hits.weights.reshape(-1))
-    return only(room, shown > 0.5), cameras
+    return seen_by(cameras, true_room(3000)), cameras
 
 
 def turned(surfels: Surfels, cameras: list[Camera]) -> tuple[Surfels, list[Camera], torch.Tensor]:

@@ -1,0 +1,197 @@
+"""Faces of things that nobody saw, behind edges that somebody did.
+
+Where a flat surface ends in sight, rays past the edge cross its plane. If nothing is seen where another face would join
+it there, this face exists all the same: a thing has another side. It begins at the edge, stands across the surface, and
+goes back from it as long as no camera looked through where it would be, to whatever it meets there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from scipy.ndimage import binary_closing, binary_opening, label
+from scipy.spatial import cKDTree
+
+from rgspipe.completion.free_space import Grid, SeenSpace
+from rgspipe.completion.planes import Plane
+from rgspipe.completion.rasters import ACROSS, BARE, BEYOND, Continued, Raster, Sheet, are_near
+
+#: Fewest places along an edge: what a side of the smallest plane has.
+SHORTEST = 4
+
+#: Where an edge is, in distances of surfels past the last one; and how far from it surfels tell that.
+PAST, AROUND = 0.5, 2.0
+
+#: Other faces end a face so many distances of surfels before they cross it.
+CUT = 0.75
+
+#: Planes touch where surfels of theirs are within so many distances of each other.
+TOUCHING = 3.0
+
+#: Half the sine of twice the angle within which two edges are taken for one direction: 3°.
+SAME = 0.052
+
+#: Part of the edge's surfels before the last ones, as single ones stand past it.
+LAST = 0.9
+
+
+@dataclass(frozen=True)
+class _Edge:
+    """Where a sheet ends in sight.
+
+    Attributes:
+        places: (E, 3) along it, one distance of neighbours apart.
+        outward: (3,) unit, in the sheet: the normal of the face behind it.
+        inward: (3,) unit, back from the sheet.
+        seen: how many of the places were seen to be one.
+        sheet: that ends.
+    """
+
+    places: np.ndarray
+    outward: np.ndarray
+    inward: np.ndarray
+    seen: int
+    sheet: Sheet
+
+
+def hidden_faces(
+    planes: Sequence[Plane], centers: np.ndarray, grid: Grid, space: SeenSpace, spacing: float
+) -> list[Continued]:
+    """For each of the planes the faces behind its edges.
+
+    Args:
+        planes: of surfels at `centers` (N, 3).
+        grid: its box is all that there is.
+        space: what cameras looked through.
+    """
+    edges = []
+    for plane, ways in zip(planes, _ways(planes, centers, spacing), strict=True):
+        sheets = [Sheet.of(plane, centers, grid, space, spacing, along) for along in ways]
+        edges += _longest(edge for sheet in sheets for edge in _edges(sheet))
+    # First each as if there were no others, then up to these.
+    whole = [_face(edge, centers, grid, space, []) for edge in edges]
+    faces = [_face(edge, centers, grid, space, [*whole[:i], *whole[i + 1 :]]) for i, edge in enumerate(edges)]
+    faces = _once(faces, spacing)
+    return [
+        Continued.joined([face for face, edge in zip(faces, edges, strict=True) if edge.sheet.plane is plane])
+        for plane in planes
+    ]
+
+
+def _once(faces: Sequence[Continued], spacing: float) -> list[Continued]:
+    """The same without places that a larger face has, too: several edges of a thing lead to one face."""
+    left, taken = list(faces), Continued.joined([])
+    for index in sorted(range(len(faces)), key=lambda one: -len(faces[one])):
+        if len(own := faces[index]):
+            alike = taken.places[taken.normals @ own.normals[0] > ACROSS]
+            left[index] = own.chosen(~are_near(alike, own.places, spacing))
+            taken = Continued.joined([taken, left[index]])
+    return left
+
+
+def _ways(planes: Sequence[Plane], centers: np.ndarray, spacing: float) -> Iterator[list[np.ndarray]]:
+    """For each plane how its edges may run: as the room does, and along the planes that it touches."""
+    trees = [cKDTree(centers[plane.members.numpy()]) for plane in planes]
+    for plane, tree in zip(planes, trees, strict=True):
+        normal, found = plane.normal.numpy(), [_unit(Raster.along_room(plane.normal.numpy()))]
+        for other, near in zip(planes, trees, strict=True):
+            along = np.cross(normal, other.normal.numpy())
+            length = float(np.linalg.norm(along))
+            if length**2 < 1.0 - ACROSS**2 or not tree.count_neighbors(near, TOUCHING * spacing):
+                continue
+            along = along / length
+            # Edges that are at right angles are found with the same raster.
+            turns = [abs(float(np.linalg.norm(np.cross(along, one)) * (along @ one))) for one in found]
+            if min(turns) > SAME:
+                found.append(along)
+        yield found
+
+
+def _unit(vector: np.ndarray) -> np.ndarray:
+    return vector / np.linalg.norm(vector)
+
+
+def _longest(edges: Iterable[_Edge]) -> list[_Edge]:
+    """Those that are not, for the most part, along a longer one that is turned a little."""
+    kept: list[_Edge] = []
+    for edge in sorted(edges, key=lambda one: -one.seen):
+        alike = [other.places for other in kept if float(other.outward @ edge.outward) > ACROSS]
+        reach = AROUND * edge.sheet.raster.spacing
+        if not alike or are_near(np.concatenate(alike), edge.places, reach).mean() < 0.5:
+            kept.append(edge)
+    return kept
+
+
+def _edges(sheet: Sheet) -> Iterator[_Edge]:
+    """All straight ones along the axes of its raster."""
+    for axis in (0, 1):
+        for sign in (1, -1):
+            yield from _edges_towards(sheet, axis, sign)
+
+
+def _edges_towards(sheet: Sheet, axis: int, sign: int) -> Iterator[_Edge]:
+    """Those past which places are crossed along an axis of the raster, with or against it."""
+
+    def turned(values: np.ndarray) -> np.ndarray:
+        return (values if axis == 1 else np.swapaxes(values, 0, 1))[:, ::sign]
+
+    supported, crossed = turned(sheet.supported), turned(sheet.crossed & ~sheet.supported)
+    goes_on = supported | turned(sheet.unknown)
+    ends = supported & ~_next(supported, 1) & (_next(crossed, 1) | _next(crossed, 2))
+    places = turned(sheet.raster.places.reshape(*sheet.raster.shape, 3))
+    along, outward = sheet.raster.axes[1 - axis], sign * sheet.raster.axes[axis]
+    # An edge that falls between two columns ends in both.
+    while (pairs := ends[:, :-1].sum(axis=0) + ends[:, 1:].sum(axis=0)).size and pairs.max() >= SHORTEST:
+        column = int(pairs.argmax())
+        labels, count = label(binary_closing(ends[:, column : column + 2].any(axis=1), np.ones(3)))
+        ends[:, column : column + 2] = False
+        for run in (np.flatnonzero(labels == index) for index in range(1, count + 1)):
+            past = _past(sheet, places[run, column], along, outward) if len(run) >= SHORTEST else None
+            if past is not None:
+                rows = _reach(run, goes_on[:, column])
+                yield _Edge(places[rows, column] + past * outward, outward, -sheet.raster.normal, len(run), sheet)
+
+
+def _next(values: np.ndarray, steps: int) -> np.ndarray:
+    """`values` (R, C) that are so many columns further; False past the last."""
+    return np.pad(values, ((0, 0), (0, steps)))[:, steps:]
+
+
+def _past(sheet: Sheet, places: np.ndarray, along: np.ndarray, outward: np.ndarray) -> float | None:
+    """How far past places (E, 3) near an edge this is, as surfels beside it tell; None where there are none."""
+    spacing, offset = sheet.raster.spacing, sheet.centers @ outward - float(places[0] @ outward)
+    row, rows = sheet.centers @ along, places @ along
+    beside = (np.abs(offset) < AROUND * spacing) & (row > rows.min() - spacing) & (row < rows.max() + spacing)
+    return float(np.quantile(offset[beside], LAST)) + PAST * spacing if beside.any() else None
+
+
+def _reach(run: np.ndarray, goes_on: np.ndarray) -> np.ndarray:
+    """The rows of a run, and those before and after it along which the surface goes on, seen or not."""
+    labels, _ = label(goes_on | np.isin(np.arange(len(goes_on)), run))
+    return np.flatnonzero(labels == labels[run[0]])
+
+
+def _face(edge: _Edge, centers: np.ndarray, grid: Grid, space: SeenSpace, others: Sequence[Continued]) -> Continued:
+    """The places of the face behind an edge, up to what it meets: surfaces, `others` that are not along it, or the box.
+
+    Where a camera looked through it before it met anything there is none: what was seen through a door is no inside.
+    """
+    spacing = edge.sheet.raster.spacing
+    steps = np.arange(0.5, np.linalg.norm((grid.upper - grid.lower).numpy()) / spacing) * spacing
+    places = (edge.places[:, None] + steps[:, None] * edge.inward).reshape(-1, 3)
+    shape = (len(edge.places), len(steps))
+    obstacles = np.delete(centers, edge.sheet.plane.members.numpy(), axis=0)
+    met = ~grid.contains(places) | are_near(obstacles, places, BARE * spacing)
+    across = [other.places for other in others if len(other) and abs(float(other.normals[0] @ edge.outward)) < ACROSS]
+    if across:
+        met |= are_near(np.concatenate(across), places, CUT * spacing)
+    seen_through = space.holds(torch.from_numpy(places - BEYOND * spacing * edge.outward), 0.0).numpy()
+    stops, ends = (met | seen_through).reshape(shape), met.reshape(shape)
+    first = np.where(stops.any(axis=1), stops.argmax(axis=1), len(steps))
+    is_met = ends[np.arange(shape[0]), first.clip(max=len(steps) - 1)]
+    kept = (np.arange(len(steps)) < first[:, None]) & is_met[:, None]
+    kept = binary_opening(kept, np.ones((3, 3)))
+    return Continued(places[kept.reshape(-1)], np.broadcast_to(edge.outward, (int(kept.sum()), 3)).copy())

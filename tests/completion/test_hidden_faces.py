@@ -1,0 +1,81 @@
+"""Faces that nobody saw, behind edges that somebody did."""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from scipy.spatial import cKDTree
+
+from half_seen_room import camera_at, only, seen_by
+from rgspipe.completion import with_unseen_surfaces
+from rgspipe.scene import Camera, Surfels
+from rgspipe.scene.rectangles import Rectangles, inside_of_box, rectangle, surfels_on
+
+GREY = [0.6, 0.6, 0.6]
+
+#: Distance of the surfels of rooms.
+SPACING = 1.0 / 30.0
+
+
+def room_of(shape: Rectangles) -> Surfels:
+    return surfels_on(shape, round(float(shape.areas.sum()) / SPACING**2))
+
+
+def corridor() -> tuple[Surfels, list[Camera]]:
+    """A block fills the corner x < 0.5, y < 0.6 of a room; the cameras stand in the leg beside it, along y = 0."""
+    sides = rectangle([0.5, 0.0, 0.0], [0.0, 0.6, 0.0], [0.0, 0.0, 0.5], GREY)
+    sides += rectangle([0.0, 0.6, 0.0], [0.0, 0.0, 0.5], [0.5, 0.0, 0.0], GREY)
+    room = room_of(inside_of_box([0.5, 0.5, 0.25], [1.0, 1.0, 0.5], GREY) + sides)
+    x, y, _ = room.centers.unbind(1)
+    places = [(0.6, 0.06, 0.2, 0.7), (0.75, 0.04, 0.3, 0.4), (0.9, 0.08, 0.15, 0.3), (0.93, 0.05, 0.35, 0.6)]
+    cameras = [camera_at([x, y, z], [aim, 1.0, 0.25], 64, 1.2) for x, y, z, aim in places]
+    return only(room, ~((x < 0.499) & (y < 0.599))), cameras
+
+
+def at_hidden_side(surfels: Surfels) -> torch.Tensor:
+    """(N,) bool: surfels on the block's side y = 0.6."""
+    return ((surfels.centers[:, 1] - 0.6).abs() < 1e-6) & (surfels.normals[:, 1] > 0.9)
+
+
+def test_a_corner_that_cameras_look_around_has_another_side() -> None:
+    """And there is no floor under it."""
+    room, cameras = corridor()
+    seen = seen_by(cameras, room)
+    # Discs stand past the edge by half of their size: that much of the other side is seen.
+    assert int(at_hidden_side(seen).sum()) <= 15  # measured 15, the first row
+    seen, hidden = only(seen, ~at_hidden_side(seen)), room.centers[at_hidden_side(room)]
+    closed = with_unseen_surfaces(seen, cameras)
+    added = closed.centers[len(seen) :]
+    # No camera saw where the other leg ends.
+    reached = hidden[hidden[:, 0] > seen.centers[:, 0].min()]
+    gap, _ = cKDTree(closed.centers.numpy()).query(reached.numpy())
+    inside = (added[:, 0] < 0.5 - SPACING) & (added[:, 1] < 0.6 - SPACING)
+    print(
+        "gap", len(reached), np.quantile(gap, [0.5, 0.9, 1.0]) / SPACING, "inside", int(inside.sum()), "of", len(added)
+    )
+
+
+def two_rooms() -> tuple[Surfels, list[Camera]]:
+    """A wall at 0.94 < x < 1 with a door in its middle, 0.4 high; the cameras stand in the room x < 0.94."""
+    shape = inside_of_box([0.47, 0.5, 0.25], [0.94, 1.0, 0.5], GREY) + inside_of_box(
+        [1.5, 0.5, 0.25], [1.0, 1.0, 0.5], GREY
+    )
+    jambs = rectangle([0.94, 0.4, 0.0], [0.0, 0.0, 0.4], [0.06, 0.0, 0.0], GREY)
+    jambs += rectangle([0.94, 0.6, 0.0], [0.06, 0.0, 0.0], [0.0, 0.0, 0.4], GREY)
+    room = room_of(shape + jambs + rectangle([0.94, 0.4, 0.0], [0.06, 0.0, 0.0], [0.0, 0.2, 0.0], GREY))
+    x, y, z = room.centers.unbind(1)
+    door = ((x - 0.97).abs() < 0.0301) & (y > 0.4 + 1e-6) & (y < 0.6 - 1e-6) & (z < 0.4) & (z > 1e-6)
+    places = [(0.1, 0.2, 0.3), (0.3, 0.8, 0.2), (0.6, 0.5, 0.3), (0.7, 0.15, 0.25), (0.7, 0.85, 0.25)]
+    return only(room, ~door), [camera_at([x, y, z], [1.0, 0.5, 0.22], 64, 1.3) for x, y, z in places]
+
+
+def test_what_is_seen_through_a_door_is_no_inside() -> None:
+    """The wall beside the door has no faces that go on into the room behind it."""
+    room, cameras = two_rooms()
+    seen = seen_by(cameras, room)
+    closed = with_unseen_surfaces(seen, cameras)
+    added = closed.centers[len(seen) :]
+    off, _ = cKDTree(room.centers.numpy()).query(added.numpy())
+    print(
+        "off", len(added), np.quantile(off, [0.5, 0.9, 0.98, 1.0]) / SPACING, added[torch.from_numpy(off > 3 * SPACING)]
+    )
