@@ -50,9 +50,9 @@ def test_a_corner_that_cameras_look_around_has_another_side() -> None:
     reached = hidden[hidden[:, 0] > seen.centers[:, 0].min()]
     gap, _ = cKDTree(closed.centers.numpy()).query(reached.numpy())
     inside = (added[:, 0] < 0.5 - SPACING) & (added[:, 1] < 0.6 - SPACING)
-    print(
-        "gap", len(reached), np.quantile(gap, [0.5, 0.9, 1.0]) / SPACING, "inside", int(inside.sum()), "of", len(added)
-    )
+    assert float(np.median(gap)) < 0.1 * SPACING  # measured 4e-15; 1.66 distances without such faces
+    assert float(gap.max()) < 1.1 * SPACING  # measured 1.00; 4.0 without
+    assert not bool(inside.any())  # measured 0 of 1261; 141 without
 
 
 def two_rooms() -> tuple[Surfels, list[Camera]]:
@@ -76,6 +76,5 @@ def test_what_is_seen_through_a_door_is_no_inside() -> None:
     closed = with_unseen_surfaces(seen, cameras)
     added = closed.centers[len(seen) :]
     off, _ = cKDTree(room.centers.numpy()).query(added.numpy())
-    print(
-        "off", len(added), np.quantile(off, [0.5, 0.9, 0.98, 1.0]) / SPACING, added[torch.from_numpy(off > 3 * SPACING)]
-    )
+    # Measured 0.40 for nine tenths, 2.00 at most.
+    assert float(np.quantile(off, 0.9)) < 0.5 * SPACING and float(off.max()) < 2.1 * SPACING
