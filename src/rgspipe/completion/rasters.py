@@ -108,9 +108,9 @@ class Raster:
         behind = torch.from_numpy(self.places - BEYOND * self.spacing * self.normal)
         return space.holds(behind, 0.0).numpy().reshape(self.shape)
 
-    def near(self, tree: cKDTree, reach: float) -> np.ndarray:
-        """(A, B) bool: places within `reach` distances of a point of the tree."""
-        return np.isfinite(tree.query(self.places, distance_upper_bound=reach * self.spacing)[0]).reshape(self.shape)
+    def near(self, points: np.ndarray, reach: float) -> np.ndarray:
+        """(A, B) bool: places within `reach` distances of one of `points` (K, 3)."""
+        return are_near(points, self.places, reach * self.spacing).reshape(self.shape)
 
 
 @dataclass(frozen=True)
@@ -146,7 +146,7 @@ class Sheet:
         """Of a plane of surfels among those at `centers` (N, 3); its places follow `along` (3,), or else the room."""
         raster = Raster.on_plane(plane.normal.numpy(), plane.offset, grid, spacing, along)
         own = centers[plane.members.numpy()]
-        return cls(plane, raster, own, raster.near(cKDTree(own), BARE), raster.within(grid), raster.crossed(space))
+        return cls(plane, raster, own, raster.near(own, BARE), raster.within(grid), raster.crossed(space))
 
     @property
     def unknown(self) -> np.ndarray:

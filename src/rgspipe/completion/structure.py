@@ -13,12 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import binary_dilation, binary_opening, label
-from scipy.spatial import cKDTree
 
 from rgspipe.completion.free_space import Grid, SeenSpace
 from rgspipe.completion.hidden_faces import hidden_faces
 from rgspipe.completion.planes import Plane
-from rgspipe.completion.rasters import ACROSS, BARE, Continued, Raster, Sheet, are_near
+from rgspipe.completion.rasters import ACROSS, BARE, Continued, Raster, Sheet
 
 
 def continued(planes: Sequence[Plane], centers: np.ndarray, grid: Grid, space: SeenSpace, spacing: float) -> Continued:
@@ -29,15 +28,14 @@ def continued(planes: Sequence[Plane], centers: np.ndarray, grid: Grid, space: S
         grid: its box is all that there is.
         space: what cameras looked through.
     """
-    surfaces = cKDTree(centers)
     sheets = [Sheet.of(plane, centers, grid, space, spacing) for plane in planes]
     faces = hidden_faces(planes, centers, grid, space, spacing)
     thing = [_whole(sheet) for sheet, own in zip(sheets, faces, strict=True) if len(own)]
     solids = Solids(Continued.joined([*faces, *thing]))
     inner = Continued.joined([*(_beyond(sheet, solids) for sheet in sheets), *faces])
-    known = cKDTree(np.concatenate([centers, inner.places]))
+    known = np.concatenate([centers, inner.places])
     ends = [(axis, end) for axis in range(3) for end in (0, 1)]
-    sides = [_side(axis, end, surfaces, known, solids, grid, space, spacing) for axis, end in ends]
+    sides = [_side(axis, end, centers, known, solids, grid, space, spacing) for axis, end in ends]
     return Continued.joined([inner, *sides])
 
 
@@ -50,7 +48,7 @@ class Solids:
     def through(self, raster: Raster) -> np.ndarray:
         """(A, B) bool: the places of a raster near bounds that are not along it, none of which ends before it."""
         across = np.abs(self.bounds.normals @ raster.normal) < ACROSS
-        return are_near(self.bounds.places[across], raster.places, 2.0 * BARE * raster.spacing).reshape(raster.shape)
+        return raster.near(self.bounds.places[across], 2.0 * BARE)
 
 
 def _whole(sheet: Sheet) -> Continued:
@@ -72,8 +70,8 @@ def _beyond(sheet: Sheet, solids: Solids) -> Continued:
 def _side(
     axis: int,
     end: int,
-    surfaces: cKDTree,
-    known: cKDTree,
+    surfaces: np.ndarray,
+    known: np.ndarray,
     solids: Solids,
     grid: Grid,
     space: SeenSpace,
