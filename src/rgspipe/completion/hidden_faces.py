@@ -25,6 +25,9 @@ SHORTEST = 4
 #: Where an edge is, in distances of surfels past the last one; and how far from it surfels tell that.
 PAST, AROUND = 0.5, 2.0
 
+#: So many distances of surfels behind an edge a face is not seen through: pixels are as wide as surfels.
+GRAZED = 2.0
+
 #: Other faces end a face so many distances of surfels before they cross it.
 CUT = 0.75
 
@@ -189,7 +192,10 @@ def _face(edge: _Edge, centers: np.ndarray, grid: Grid, space: SeenSpace, others
     if across:
         met |= are_near(np.concatenate(across), places, CUT * spacing)
     seen_through = space.holds(torch.from_numpy(places - BEYOND * spacing * edge.outward), 0.0).numpy()
-    stops, ends = (met | seen_through).reshape(shape), met.reshape(shape)
+    # Rays that graze the edge are taken to pass behind it.
+    seen_through = seen_through.reshape(shape) & (steps > GRAZED * spacing)
+    ends = met.reshape(shape)
+    stops = ends | seen_through
     first = np.where(stops.any(axis=1), stops.argmax(axis=1), len(steps))
     is_met = ends[np.arange(shape[0]), first.clip(max=len(steps) - 1)]
     kept = (np.arange(len(steps)) < first[:, None]) & is_met[:, None]

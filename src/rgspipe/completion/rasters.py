@@ -14,6 +14,9 @@ from rgspipe.completion.planes import Plane
 #: A place of a plane has a surface if a surfel is within so many distances of neighbours.
 BARE = 1.1
 
+#: Neighbours that a surfel has at the distance of neighbours.
+AROUND = 4
+
 #: Cosine of the angle from which on two surfaces are along each other.
 ACROSS = 0.7
 
@@ -146,7 +149,10 @@ class Sheet:
         """Of a plane of surfels among those at `centers` (N, 3); its places follow `along` (3,), or else the room."""
         raster = Raster.on_plane(plane.normal.numpy(), plane.offset, grid, spacing, along)
         own = centers[plane.members.numpy()]
-        return cls(plane, raster, own, raster.near(own, BARE), raster.within(grid), raster.crossed(space))
+        # Where surfels are farther apart than elsewhere there are no holes between them.
+        apart = max(spacing, float(np.median(cKDTree(own).query(own, k=AROUND + 1)[0][:, AROUND])))
+        supported = raster.near(own, BARE * apart / spacing)
+        return cls(plane, raster, own, supported, raster.within(grid), raster.crossed(space))
 
     @property
     def unknown(self) -> np.ndarray:

@@ -20,19 +20,24 @@ from rgspipe.completion.planes import Plane
 from rgspipe.completion.rasters import ACROSS, BARE, Continued, Raster, Sheet
 
 
-def continued(planes: Sequence[Plane], centers: np.ndarray, grid: Grid, space: SeenSpace, spacing: float) -> Continued:
+def continued(
+    planes: Sequence[Plane], centers: np.ndarray, grid: Grid, space: SeenSpace, spacing: float, *, is_room: bool
+) -> Continued:
     """What the planes of surfels become where nothing was seen, and the sides of the grid's box that they lead to.
 
     Args:
         planes: of surfels at `centers` (N, 3).
         grid: its box is all that there is.
         space: what cameras looked through.
+        is_room: whether there may be walls at the box's sides.
     """
     sheets = [Sheet.of(plane, centers, grid, space, spacing) for plane in planes]
     faces = hidden_faces(planes, centers, grid, space, spacing)
     thing = [_whole(sheet) for sheet, own in zip(sheets, faces, strict=True) if len(own)]
     solids = Solids(Continued.joined([*faces, *thing]))
     inner = Continued.joined([*(_beyond(sheet, solids) for sheet in sheets), *faces])
+    if not is_room:
+        return inner
     known = np.concatenate([centers, inner.places])
     ends = [(axis, end) for axis in range(3) for end in (0, 1)]
     sides = [_side(axis, end, centers, known, solids, grid, space, spacing) for axis, end in ends]

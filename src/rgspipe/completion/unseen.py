@@ -23,6 +23,7 @@ from rgspipe.completion.free_space import Grid, SeenSpace
 from rgspipe.completion.hidden_room import parts_in_sight, with_hidden_room
 from rgspipe.completion.planes import Plane, frame_of, planes_of
 from rgspipe.completion.rasters import BARE, Continued
+from rgspipe.completion.revolved import gone_around
 from rgspipe.completion.structure import continued
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.openness import openness
@@ -69,7 +70,7 @@ def with_unseen_surfaces(
 ) -> Surfels:
     """The surfels and, after them, those of surfaces that no camera saw.
 
-    Nothing is added to an object in empty space.
+    Objects in empty space get the sides that things must have, and no walls.
 
     Args:
         surfels: N ≥ 2 of a scene that `cameras` saw.
@@ -79,8 +80,9 @@ def with_unseen_surfaces(
         hidden: whether surfaces of room that things hide are added where no plane goes on. Without, planes go on
             alone, which takes little of the time.
     """
-    if not cameras or len(surfels) <= NEIGHBOURS or openness(_tree(surfels), surfels) > MOST_OPEN:
+    if not cameras or len(surfels) <= NEIGHBOURS:
         return surfels
+    is_room = openness(_tree(surfels), surfels) <= MOST_OPEN
     centers = surfels.centers.double().cpu().numpy()
     spacing = float(np.median(cKDTree(centers).query(centers, k=2)[0][:, 1]))
     planes = planes_of(surfels, spacing)
@@ -89,7 +91,7 @@ def with_unseen_surfaces(
     turned = [_camera_turned(camera, frame) for camera in cameras]
     inside = torch.stack([*(camera.origin for camera in cameras), *lamps]).double().cpu() @ frame.T
     space = SeenSpace.of(_tree(_turned(surfels, frame)), turned, depths)
-    found = _unseen(_turned(surfels, frame), planes, space, inside, spacing, hidden)
+    found = _unseen(_turned(surfels, frame), planes, space, inside, spacing, hidden, is_room)
     if not len(found):
         return surfels
     if hidden:
@@ -100,7 +102,13 @@ def with_unseen_surfaces(
 
 
 def _unseen(
-    surfels: Surfels, planes: Sequence[Plane], space: SeenSpace, inside: Tensor, spacing: float, hidden: bool
+    surfels: Surfels,
+    planes: Sequence[Plane],
+    space: SeenSpace,
+    inside: Tensor,
+    spacing: float,
+    hidden: bool,
+    is_room: bool,
 ) -> Continued:
     """Where surfels are missing, in a room whose axes are x, y and z; `inside` (I, 3) are places in it."""
     centers = surfels.centers.double().cpu()
@@ -109,8 +117,16 @@ def _unseen(
     upper = torch.maximum(centers.amax(dim=0), inside.amax(dim=0) + BEHIND * edge)
     # Edges are looked for at the distance of surfels: finer cells would take eight times as long.
     coarse = Grid.over(lower, upper, spacing)
-    guessed = continued(planes, centers.numpy(), coarse, space, spacing)
+    around, bent = gone_around(centers.numpy(), surfels.normals.double().cpu().numpy(), space, spacing)
+    planes = [plane for plane in planes if np.isin(plane.members.numpy(), bent).mean() < 0.5]
+    flat = continued(planes, centers.numpy(), coarse, space, spacing, is_room=is_room)
+    guessed = Continued.joined([flat, around])
+    if not is_room:
+        # Behind things one sees their backs as long as these are open.
+        bvh = _tree(_joined(surfels, guessed.places, guessed.normals, spacing))
     guessed = guessed.chosen(_is_within(bvh, guessed, spacing))
+    if not is_room:
+        return guessed
     # What lies before an open front is no part of the room, and needs no cells.
     known = torch.cat([centers, torch.from_numpy(guessed.places)])
     grid = Grid.over(known.amin(dim=0), known.amax(dim=0), edge if hidden else spacing)
