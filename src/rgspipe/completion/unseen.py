@@ -89,9 +89,13 @@ def with_unseen_surfaces(
     frame = frame_of(planes)
     planes = [plane.turned(frame) for plane in planes]
     turned = [_camera_turned(camera, frame) for camera in cameras]
-    inside = torch.stack([*(camera.origin for camera in cameras), *lamps]).double().cpu() @ frame.T
-    space = SeenSpace.of(_tree(_turned(surfels, frame)), turned, depths)
-    found = _unseen(_turned(surfels, frame), planes, space, inside, spacing, hidden, is_room)
+    along = _turned(surfels, frame)
+    space = SeenSpace.of(_tree(along), turned, depths)
+    if is_room:
+        inside = torch.stack([*(camera.origin for camera in cameras), *lamps]).double().cpu() @ frame.T
+        found = _unseen_of_room(along, planes, space, inside, spacing, hidden)
+    else:
+        found = _unseen_of_object(along, planes, space, spacing)
     if not len(found):
         return surfels
     if hidden:
@@ -101,32 +105,27 @@ def with_unseen_surfaces(
     return replace(closed, guessed=doubts_of_guesses(closed))
 
 
-def _unseen(
-    surfels: Surfels,
-    planes: Sequence[Plane],
-    space: SeenSpace,
-    inside: Tensor,
-    spacing: float,
-    hidden: bool,
-    is_room: bool,
+def _unseen_of_object(surfels: Surfels, planes: Sequence[Plane], space: SeenSpace, spacing: float) -> Continued:
+    """Where surfels of things in the open are missing, as far as their shape tells it."""
+    centers = surfels.centers.double().cpu()
+    grid = Grid.over(centers.amin(dim=0), centers.amax(dim=0), spacing)
+    guessed = _shapes(surfels, planes, space, grid, spacing, is_room=False)
+    # Behind things one sees their backs as long as these are open.
+    whole = _tree(_joined(surfels, guessed.places, guessed.normals, spacing))
+    return guessed.chosen(_is_within(whole, guessed, spacing))
+
+
+def _unseen_of_room(
+    surfels: Surfels, planes: Sequence[Plane], space: SeenSpace, inside: Tensor, spacing: float, hidden: bool
 ) -> Continued:
     """Where surfels are missing, in a room whose axes are x, y and z; `inside` (I, 3) are places in it."""
     centers = surfels.centers.double().cpu()
-    edge, bvh = spacing / CELLS_PER_SPACING, _tree(surfels)
+    edge = spacing / CELLS_PER_SPACING
     lower = torch.minimum(centers.amin(dim=0), inside.amin(dim=0) - BEHIND * edge)
     upper = torch.maximum(centers.amax(dim=0), inside.amax(dim=0) + BEHIND * edge)
     # Edges are looked for at the distance of surfels: finer cells would take eight times as long.
-    coarse = Grid.over(lower, upper, spacing)
-    around, bent = gone_around(centers.numpy(), surfels.normals.double().cpu().numpy(), space, spacing)
-    planes = [plane for plane in planes if np.isin(plane.members.numpy(), bent).mean() < 0.5]
-    flat = continued(planes, centers.numpy(), coarse, space, spacing, is_room=is_room)
-    guessed = Continued.joined([flat, around])
-    if not is_room:
-        # Behind things one sees their backs as long as these are open.
-        bvh = _tree(_joined(surfels, guessed.places, guessed.normals, spacing))
-    guessed = guessed.chosen(_is_within(bvh, guessed, spacing))
-    if not is_room:
-        return guessed
+    guessed = _shapes(surfels, planes, space, Grid.over(lower, upper, spacing), spacing, is_room=True)
+    guessed = guessed.chosen(_is_within(_tree(surfels), guessed, spacing))
     # What lies before an open front is no part of the room, and needs no cells.
     known = torch.cat([centers, torch.from_numpy(guessed.places)])
     grid = Grid.over(known.amin(dim=0), known.amax(dim=0), edge if hidden else spacing)
@@ -148,6 +147,16 @@ def _unseen(
     rest = Continued(places[bare], normals[bare])
     rest = rest.chosen(_is_solid(bvh, rest.places - CELLS_PER_SPACING * cell * rest.normals))
     return Continued.joined([guessed, rest.chosen(_apart(rest.places, spacing))])
+
+
+def _shapes(
+    surfels: Surfels, planes: Sequence[Plane], space: SeenSpace, grid: Grid, spacing: float, *, is_room: bool
+) -> Continued:
+    """What flat surfaces and round things become where nothing was seen."""
+    centers, normals = (part.double().cpu().numpy() for part in (surfels.centers, surfels.normals))
+    around, bent = gone_around(centers, normals, space, spacing)
+    flat = [plane for plane in planes if np.isin(plane.members.numpy(), bent).mean() < 0.5]
+    return Continued.joined([continued(flat, centers, grid, space, spacing, is_room=is_room), around])
 
 
 def _turned(surfels: Surfels, frame: Tensor) -> Surfels:
