@@ -208,6 +208,8 @@ REFUSED: dict[str, tuple[Callable[[rg.FrozenScene, Tensor], object], str, str, s
     "a number of lights": (lambda s, i: fit(s, i, lights=2), "lights", "int", "count=2"),
     "a misspelt field": (lambda s, i: rg.LightSpec(cnt=2), "LightSpec.cnt", "no such", "mean count?"),
     "no lights": (lambda s, i: rg.LightSpec(count=0), "LightSpec.count", "0", "counted"),
+    "a number in quotes": (lambda s, i: rg.LightSpec(count="2"), "LightSpec.count", "'2'", "counted"),
+    "half a light": (lambda s, i: rg.LightSpec(count=1.5), "LightSpec.count", "1.5", "counted"),
     "a solver's name": (lambda s, i: fit(s, i, solver="paper_adam"), "solver", "'paper_adam'", "Pass such"),
     "a solver's class": (lambda s, i: fit(s, i, solver=rg.Search), "solver", "Search", "Pass such"),
     "a threshold out of range": (
@@ -264,6 +266,12 @@ REFUSED: dict[str, tuple[Callable[[rg.FrozenScene, Tensor], object], str, str, s
     ),
     "a folder without a scene": (lambda s, i: rg.FrozenScene.load("/"), "/", "neither", "freeze/latest"),
     "a folder for a light file": (lambda s, i: rg.write_lights("/", [LIGHT]), "/", "a folder", "lights.json"),
+    "a light nowhere for a file": (
+        lambda s, i: rg.write_lights("x.json", rg.PointLight([0, 0, math.nan], 1)),
+        "lights[0].position",
+        "NaN",
+        "steps",
+    ),
     "a folder that is not there": (lambda s, i: rg.FrozenScene.load("nowhere"), "nowhere", "no such folder", "Freeze"),
     "a file that is not there": (lambda s, i: rg.Surfels.from_ply("no.ply"), "no.ply", "no such file", "path"),
     "radiance for a picture": (lambda s, i: rg.save_png("x.png", i), "pixels", "float32", "tone_map"),

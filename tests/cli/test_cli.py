@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 import rgspipe as rg
+from rgspipe.cli.help import help_text
 
 REFUSED, UNREAD = 2, 141
 
@@ -88,6 +89,11 @@ def test_a_stage_is_explained_and_the_version_told(rgspipe) -> None:
     assert "stage=fit_light" in shown and "--help fit" in shown
     told = rgspipe("--version").stdout
     assert told.startswith(f"rgspipe {rg.__version__}") and "torch" in told and "Python 3." in told
+
+
+@pytest.mark.parametrize("topic", ["blend", "scene=blend"])
+def test_a_choice_is_explained(topic: str) -> None:
+    assert help_text([topic]).startswith("scene=blend sets\n  # A Blender file of yours")
 
 
 @pytest.mark.parametrize(

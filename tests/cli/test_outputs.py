@@ -58,6 +58,14 @@ def test_what_a_killed_removal_left_goes_whatever_is_chosen_next(outputs: Path) 
     assert not left.exists()
 
 
+def test_before_the_first_run_there_is_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["outputs"]) == 0 and capsys.readouterr().out == "No results in outputs.\n"
+    assert main(["outputs", "outputs=nowhere"]) == 2
+
+
 def test_nothing_is_said_to_be_in_a_folder_of_something_else(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -133,7 +133,7 @@ NAN_MATRIX = [[float("nan"), 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
         (_frame(transform_matrix="eye"), r"transform_matrix.*4 × 4"),
         (_frame(transform_matrix=NAN_MATRIX), r"transform_matrix.*finite"),
         (_frame(transform_matrix=_matrix(1, 1, 1.01)), r"transform_matrix.*rigid.*up to 0\.02"),
-        (_frame(transform_matrix=_matrix(1, 1, -1)), r"transform_matrix.*determinant -1"),
+        (_frame(transform_matrix=_matrix(1, 1, -1)), r"transform_matrix.*determinant −1"),
         (_frame(transform_matrix=_matrix(1, 1, 1, bottom=2)), r"transform_matrix.*last row"),
         (_frame(camera_intrinsics=...), 'camera_angle_x.*or "camera_intrinsics".*neither'),
         (_frame(camera_intrinsics=[3, 2, 5]), '4 finite numbers under "camera_intrinsics"'),

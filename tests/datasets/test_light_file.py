@@ -38,6 +38,12 @@ def test_a_mixed_rig_comes_back_exactly(tmp_path: Path, profile: str) -> None:
     assert (read.profile, read.cone_angle, read.falloff) == (profile, 0.5, 0.1)
 
 
+def test_one_light_is_a_list_of_it(tmp_path: Path) -> None:
+    write_lights(tmp_path / "lights.json", PointLight([0.1, 0.2, 0.3], 2.0))
+    (light,) = read_lights(tmp_path / "lights.json")
+    assert light.position.tolist() == [0.1, 0.2, 0.3]
+
+
 def test_further_fields_are_written_and_ignored_by_the_reader(tmp_path: Path) -> None:
     path = tmp_path / "lights.json"
     write_lights(path, (_point(),), {"loss": 0.5, "lights": [{"covariance": [[1.0]]}]})

@@ -44,6 +44,12 @@ def test_a_result_reads_like_a_sentence_and_a_list() -> None:
     assert "±" not in light_line(NEAR)
 
 
+def test_a_faint_light_is_not_told_as_none() -> None:
+    """Images have any unit: those of a camera's own may be a millionth of the scene's."""
+    faint = light_line(PointLight([0.1, 0.2, 0.3], [6e-7, 8e-7, 0.0]), torch.full((6, 6), 1e-14).tolist())
+    assert faint.endswith("RGB (6.00e-07, 8.00e-07, 0.00e+00) W/sr ± 1.00e-07")
+
+
 def test_a_notebook_shows_the_same_as_a_list() -> None:
     page = result((NEAR,))._repr_html_()
     assert page.startswith("<b>1 light, undetermined after 1.2 s</b><ul><li>point at (0.100,")

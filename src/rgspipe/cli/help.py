@@ -7,7 +7,7 @@ import platform
 import textwrap
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, NoReturn
 
 from rgspipe import __version__
 from rgspipe.config import RgspipeConfig
@@ -117,7 +117,7 @@ Stages (--help STAGE says what one does; python -m rgspipe lists all, with scene
 
 Pipelines, several stages in a row (pipeline=NAME): {pipelines}
 
-Groups of settings (--help GROUP):
+Groups of settings (--help GROUP, --help CHOICE):
 {_groups()}
 
 Sections of keys (--help SECTION lists them with units, ranges and defaults, --help fit.target one):
@@ -178,15 +178,27 @@ def _stage(name: str) -> str:
 def _topic(topic: str) -> str:
     every = [setting for settings in sections().values() for setting in settings]
     rows = [setting for setting in every if setting.key == topic or setting.key.startswith(f"{topic}.")]
-    if not rows and topic not in groups() and topic not in NAMES:
-        names = [setting.key for setting in every]
-        near = difflib.get_close_matches(topic, [*names, *NAMES, *(name.partition(".")[0] for name in names)], n=1)
-        remedy = f"Did you mean {near[0]}?" if near else "python -m rgspipe --help lists them."
-        raise InputError(
-            f"--help {topic}", expected="a stage, a section, a key or a group", found="none", remedy=remedy
-        )
     lines = [_stage(topic)] if topic in NAMES else []
     lines += [f"{topic}={_choices(groups()[topic])}"] if topic in groups() else []
+    if not lines and not rows:
+        lines = _chosen(topic) or _refuse(topic, [setting.key for setting in every])
     width = max((len(setting.key) for setting in rows), default=0)
     lines += [f"  {setting.key:<{width}}  {setting.meaning}; default {setting.default}" for setting in rows]
     return "\n".join(lines)
+
+
+def _chosen(topic: str) -> list[str]:
+    """What each choice of this name ("blend", "scene=blend") sets, and where its settings are listed."""
+    named = [(group, path) for group, files in groups().items() for path in files]
+    chosen = [(group, path) for group, path in named if topic in (path.stem, f"{group}={path.stem}")]
+    texts = [(f"{group}={path.stem} sets", path.read_text(encoding="utf-8").strip(), group) for group, path in chosen]
+    return [f"{head}\n{textwrap.indent(text, '  ')}\n  --help {group}" for head, text, group in texts]
+
+
+def _refuse(topic: str, keys: Sequence[str]) -> NoReturn:
+    choices = [path.stem for files in groups().values() for path in files]
+    known = [*choices, *keys, *NAMES, *(key.partition(".")[0] for key in keys)]
+    near = difflib.get_close_matches(topic, known, n=1)
+    remedy = f"Did you mean {near[0]}?" if near else "python -m rgspipe --help lists them."
+    expected = "a stage, a section, a key, a group or a choice of one"
+    raise InputError(f"--help {topic}", expected=expected, found="none", remedy=remedy)

@@ -37,7 +37,11 @@ def show_outputs(arguments: Sequence[str]) -> int:
     if not prune and "remove=true" in words:
         raise InputError("remove", expected="prune", found="a list", remedy="Say outputs prune remove=true.")
     values = _values([text for text in words if text not in ("list", "prune")])
-    outputs = input_folder(given_outputs([f"outputs={values.get('outputs', 'outputs')}"]), "the folder of results")
+    outputs = given_outputs([f"outputs={values.get('outputs', 'outputs')}"])
+    if "outputs" not in values and not outputs.exists():
+        print(f"No results in {outputs}.")
+        return 0
+    input_folder(outputs, "the folder of results")
     choice = Choice(values.get("scene"), values.get("stage"), _seconds(values["older"]) if "older" in values else None)
     really = values.get("remove") == "true"
     if really:

@@ -12,7 +12,7 @@ from torch import Tensor
 from rgspipe.datasets.json_file import is_number, numbers, read_json, required, shown
 from rgspipe.datasets.limits import FARTHEST, STRONGEST
 from rgspipe.errors import InputError
-from rgspipe.scene.lights import KINDS, Light, LightRig
+from rgspipe.scene.lights import KINDS, Light, LightRig, as_rig, check_numbers
 from rgspipe.store.files import write_json
 
 VERSION = 1
@@ -62,23 +62,23 @@ def read_ambient(path: str | Path) -> Tensor | None:
     return torch.tensor(radiance, dtype=torch.float64)
 
 
-def write_lights(path: str | Path, rig: LightRig, extra: dict | None = None) -> None:
-    """Write a rig; `extra` holds further top-level fields, its "lights" a list of further fields per light.
+def write_lights(path: str | Path, lights: Light | Sequence[Light], extra: dict | None = None) -> None:
+    """Write lights; `extra` holds further top-level fields, its "lights" a list of further fields per light.
 
     Raises:
-        InputError: `path` is a folder.
+        InputError: `path` is a folder, or `lights` are none, or have numbers that are not finite.
         ValueError: `extra` would overwrite a field of the format.
     """
     if Path(path).is_dir():
         raise InputError(path, expected="the name of a file", found="a folder", remedy="Add one: lights.json in it.")
+    rig = as_rig(lights)
+    check_numbers(rig)
     extra = dict(extra or {})
     further = extra.pop("lights", [{}] * len(rig))
     if len(further) != len(rig):
         raise ValueError(f'extra["lights"] must have {len(rig)} entries, got {len(further)}')
-    lights = []
-    for light, fields in zip(rig, further, strict=True):
-        lights.append(_merged(_light_fields(light), fields))
-    write_json(Path(path), _merged({"version": VERSION, "lights": lights}, extra))
+    entries = [_merged(_light_fields(light), fields) for light, fields in zip(rig, further, strict=True)]
+    write_json(Path(path), _merged({"version": VERSION, "lights": entries}, extra))
 
 
 def _merged(fields: dict, further: dict) -> dict:

@@ -8,9 +8,7 @@ from torch import Tensor
 from rgspipe.datasets.json_file import is_number, shown
 from rgspipe.datasets.limits import FARTHEST
 from rgspipe.errors import InputError
-
-#: Largest entry of RᵀR − 1 that a rotation may have; files written in float32 reach 1e-6.
-ROTATION_TOLERANCE = 1e-4
+from rgspipe.scene.rigid import check_rigid
 
 
 def rigid_pose(value: object, place: str) -> Tensor:
@@ -26,18 +24,8 @@ def rigid_pose(value: object, place: str) -> Tensor:
     if not all(map(is_number, flat)):
         raise InputError(place, expected="finite numbers", found=shown(value), remedy="Correct it.")
     pose = torch.tensor(flat, dtype=torch.float64).reshape(4, 4)
-    rotation = pose[:3, :3]
-    error = float((rotation.T @ rotation - torch.eye(3, dtype=torch.float64)).abs().max())
-    determinant = float(torch.linalg.det(rotation))
-    bottom = torch.tensor([0.0, 0.0, 0.0, 1.0], dtype=torch.float64)
     check_place(pose[:3, 3].tolist(), place)
-    if not error <= ROTATION_TOLERANCE or determinant < 0 or not torch.allclose(pose[3], bottom):
-        raise InputError(
-            place,
-            expected="a rigid camera-to-world transform (orthonormal rotation, determinant +1, last row 0 0 0 1)",
-            found=f"RᵀR − 1 up to {error:.2g}, determinant {determinant:.4g}, last row {pose[3].tolist()}",
-            remedy="Remove scale, shear or mirroring from the camera.",
-        )
+    check_rigid(pose.numpy(), place)
     return pose
 
 

@@ -27,6 +27,9 @@ def as_html(headline: str, lines: Sequence[str], reason: str) -> str:
 #: How fits ended, where the name of the status alone is no phrase.
 ENDS = {FitStatus.MAX_ITERATIONS: "out of iterations", FitStatus.AT_BOUND: "stopped at the bound"}
 
+#: Below this, three decimals do not tell a strength.
+SMALL = 0.01
+
 
 def headline(count: int, status: FitStatus, seconds: float) -> str:
     """How many lights, how the fit ended, and what it took: "2 lights, converged in 1.4 s"."""
@@ -53,7 +56,9 @@ def light_line(light: Light, covariance: Sequence[Sequence[float]] | None = None
         covariance: as `FitResult.covariance` has it; deviations are the root of the mean variance of a coordinate.
     """
     variances = None if covariance is None else [float(row[index]) for index, row in enumerate(covariance)]
-    place, colour = (", ".join(f"{value:.3f}" for value in part.tolist()) for part in (light.position, light.intensity))
+    place = ", ".join(f"{value:.3f}" for value in light.position.tolist())
+    form = _strength_form(light.intensity)
+    colour = ", ".join(map(form.format, light.intensity.tolist()))
     told = light.label
     if not light.distant:
         told += f" at ({place})" + ("" if variances is None else _deviation(variances[:3], "{:.4f}"))
@@ -66,7 +71,7 @@ def light_line(light: Light, covariance: Sequence[Sequence[float]] | None = None
             value = number.shown(getattr(light, number.name))
             told += f", {number.key.replace('_', ' ')} {value:.{number.decimals}f}{number.unit}"
     told += f", RGB ({colour}) {light.unit}"
-    return told + ("" if variances is None else _deviation(variances[-3:], "{:.3f}"))
+    return told + ("" if variances is None else _deviation(variances[-3:], form))
 
 
 def ambient_line(ambient: Strength) -> str:
@@ -80,8 +85,14 @@ def base_line(scale: Strength) -> str:
 
 
 def _strength_words(strength: Strength) -> str:
-    colour = ", ".join(f"{value:.3f}" for value in strength.value.tolist())
-    return f"RGB ({colour}){_deviation(strength.covariance.diagonal().tolist(), '{:.3f}')}"
+    form = _strength_form(strength.value)
+    colour = ", ".join(map(form.format, strength.value.tolist()))
+    return f"RGB ({colour}){_deviation(strength.covariance.diagonal().tolist(), form)}"
+
+
+def _strength_form(value: Tensor) -> str:
+    """How strengths are written: images have any unit, and in some of them 0.001 is a lot."""
+    return "{:.2e}" if 0.0 < float(value.abs().max()) < SMALL else "{:.3f}"
 
 
 def _share_words(strength: Strength) -> str:

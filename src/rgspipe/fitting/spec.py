@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from numbers import Integral
 from typing import Any, NoReturn, Self
 
 from rgspipe.errors import InputError
@@ -60,8 +61,8 @@ class LightSpec:
     def __post_init__(self) -> None:
         if self.type not in TYPES:
             _refuse("type", f"one of {', '.join(TYPES)}", self.type, "Correct the name.")
-        if self.count is not None and not 1 <= self.count <= MOST_LIGHTS:
-            _refuse("count", f"None or 1 to {MOST_LIGHTS}", self.count, "None has them counted.")
+        if self.count is not None and not (isinstance(self.count, Integral) and 1 <= self.count <= MOST_LIGHTS):
+            _refuse("count", f"None or a whole number from 1 to {MOST_LIGHTS}", self.count, "None has them counted.")
         kind = shaped_kind(self.type)
         if self.shape is not None and self.shape.kind != kind:
             _refuse("shape", f"a {kind}, as the type is {self.type}", self.shape, "Let type and shape agree.")

@@ -11,6 +11,7 @@ from torch import Tensor
 from rgspipe.errors import InputError
 from rgspipe.scene.arrays import ArrayLike, as_tensor, check_finite
 from rgspipe.scene.by_value import ByValue
+from rgspipe.scene.rigid import check_rigid
 from rgspipe.scene.shapes import Float, Given
 
 
@@ -25,6 +26,9 @@ class Camera(ByValue):
         fx, fy: focal lengths in pixels.
         cx, cy: principal point in pixels.
         width, height: image size in pixels.
+
+    Raises:
+        InputError: the transform is not rigid, a focal length not positive, or a size not a whole number of pixels.
     """
 
     camera_to_world: Given
@@ -38,7 +42,10 @@ class Camera(ByValue):
     def __post_init__(self) -> None:
         pose = as_tensor(self.camera_to_world, "camera_to_world", (4, 4), torch.float64)
         check_finite(pose, "camera_to_world", "Check where the camera stands and where it looks.")
+        check_rigid(pose.detach().cpu().numpy(), "camera_to_world")
         object.__setattr__(self, "camera_to_world", pose)
+        for name in ("fx", "fy"):
+            _check_focal_length(name, getattr(self, name))
         for name in ("width", "height"):
             object.__setattr__(self, name, _pixels(name, getattr(self, name)))
 
@@ -149,6 +156,17 @@ class Camera(ByValue):
         x = self.cx + self.fx * local[..., 0] * scale
         y = self.cy - self.fy * local[..., 1] * scale
         return torch.stack([x, y], dim=-1), depth
+
+
+def _check_focal_length(name: str, length: float) -> None:
+    """Refuse a focal length that no pinhole has.
+
+    Raises:
+        InputError: it is not positive and finite.
+    """
+    if not 0.0 < length < math.inf:
+        found, remedy = f"{length}", "Axes with another sign belong into camera_to_world."
+        raise InputError(name, expected="a focal length in pixels, above 0", found=found, remedy=remedy)
 
 
 def _pixels(name: str, count: float) -> int:

@@ -13,6 +13,7 @@ from rgspipe.datasets.rigid_pose import check_place
 from rgspipe.datasets.scans.frame import Numbers
 from rgspipe.datasets.scans.options import ScanOptions
 from rgspipe.errors import InputError
+from rgspipe.scene.rigid import check_rigid
 
 #: Largest entry of RᵀR − 1; some programs write four digits.
 RIGID = 1e-2
@@ -31,9 +32,11 @@ def placed(matrix: Numbers, where: str | Path, options: ScanOptions, axes: str) 
         axes: the layout's, "opengl" or "opencv".
 
     Raises:
-        InputError: it is no rigid transform; says what else it may be.
+        InputError: it is not finite, or no rigid transform; says what else it may be.
     """
-    check_rigid(matrix, where)
+    if not np.isfinite(matrix).all():
+        raise InputError(where, expected="finite numbers", found=shown(matrix.tolist()), remedy="Leave the frame out.")
+    check_rigid(matrix, where, RIGID)
     pose = matrix @ FLIP if options.camera_axes(axes) == "opencv" else matrix.copy()
     # Few digits leave a rotation that is none; the nearest one is.
     left, _, right = np.linalg.svd(pose[:3, :3])
@@ -41,38 +44,6 @@ def placed(matrix: Numbers, where: str | Path, options: ScanOptions, axes: str) 
     pose[:3, 3] *= 1.0 if options.pose_unit is None else options.pose_unit
     check_place(pose[:3, 3].tolist(), str(where))
     return pose
-
-
-def check_rigid(matrix: Numbers, where: str | Path) -> None:
-    """Refuse what is no camera-to-world transform, and say what it looks like.
-
-    Raises:
-        InputError: not finite, transposed, scaled, or mirrored.
-    """
-    expected = "a rigid camera-to-world transform (orthonormal rotation, determinant +1, last row 0 0 0 1)"
-    if not np.isfinite(matrix).all():
-        raise InputError(where, expected="finite numbers", found=shown(matrix.tolist()), remedy="Leave the frame out.")
-    last = np.array([0.0, 0.0, 0.0, 1.0])
-    if not np.allclose(matrix[3], last):
-        transposed = np.allclose(matrix[:, 3], last)
-        found = "a transposed matrix: columns in the place of rows" if transposed else f"last row {matrix[3].tolist()}"
-        raise InputError(where, expected=expected, found=found, remedy="Write the matrix row by row.")
-    rotation = matrix[:3, :3]
-    with np.errstate(over="ignore", invalid="ignore"):
-        determinant = float(np.linalg.det(rotation))
-        error = float(np.abs(rotation.T @ rotation - np.eye(3)).max())
-    if not error <= RIGID:
-        found = f"RᵀR − 1 up to {error:.2g}, determinant {determinant:.3g}"
-        raise InputError(where, expected=expected, found=found, remedy="Take scale and shear out of the rotation.")
-    if determinant < 0.0:
-        raise InputError(
-            where,
-            expected=expected,
-            found="determinant −1: a mirrored room, which comes of rows that were exchanged or of one axis with "
-            "another sign",
-            remedy="Put the rows in their order (Polycam's third row goes first), or change the sign of two axes "
-            "of the camera (y and z), not of one.",
-        )
 
 
 def from_quaternion(quaternion: Numbers) -> Numbers:

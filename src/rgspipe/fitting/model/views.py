@@ -124,7 +124,9 @@ def prepare_views(
             "target",
             expected=f"at least {LEAST_PIXELS} pixels that show the scene away from edges",
             found=f"{len(pixels)} of {sum(v.camera.pixel_count for v in views)}",
-            remedy="Check the masks and cameras; with mask_edges off, pixels on edges count, too.",
+            remedy="Check the masks, and that cameras are in the scene's coordinates and look along −z, with +y up "
+            "(from OpenCV, change the sign of their second and third column). With mask_edges off, pixels on edges "
+            "count, too.",
         )
     rows = [
         view.operator.to_scipy()[chosen.cpu().numpy().nonzero()[0]] for view, chosen in zip(views, trusted, strict=True)
