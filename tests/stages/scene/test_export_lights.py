@@ -55,3 +55,30 @@ def test_a_blend_s_own_coordinates_come_back(tmp_path: Path) -> None:
     torch.testing.assert_close(light.position, there)
     assert float(light.power()[0]) == pytest.approx(100.0)
     assert world_of(2.0, None).unit == 2.0
+
+
+def test_lights_of_a_fit_are_put_where_its_own_dataset_says(tmp_path: Path) -> None:
+    """Also where the configuration is of another dataset, or of another scene: neither is made."""
+    scene = tmp_path / "room"
+    made(scene / "generate_dataset" / ("a" * 16), {})
+    (scene / "generate_dataset" / ("a" * 16) / "dataset_info.json").write_text(
+        json.dumps({"version": 1, "rescale": 0.2, "offset": [1.0, 2.0, -3.0]})
+    )
+    made(scene / "freeze" / ("b" * 16), {"generate_dataset": ["a" * 16]})
+    made(scene / "track" / ("c" * 16), {"freeze": ["b" * 16], "generate_targets": ["d" * 16]})
+    (scene / "track" / "latest").symlink_to("c" * 16)
+    write_lights(scene / "track" / ("c" * 16) / "lights.json", LIGHT)
+    light = scene / "track" / "latest" / "lights.json"
+    blend = ["scene=blend", f"scene.path={tmp_path / 'room.blend'}"]
+    (tmp_path / "room.blend").write_bytes(b"")
+    for other in (blend, []):
+        artifact = run(configured(tmp_path, *other, f"export.light={light}", "export.lights=[json]"), load_stage)
+        (found,) = read_lights(artifact.file("lamps.json"))
+        torch.testing.assert_close(found.position, LIGHT.position / 0.2 - torch.tensor([1.0, 2.0, -3.0]).double())
+
+
+def made(folder: Path, inputs: dict) -> None:
+    """A folder of a store with nothing but its manifest."""
+    folder.mkdir(parents=True)
+    manifest = {"schema": 1, "stage": folder.parent.name, "fingerprint": folder.name, "inputs": inputs}
+    (folder / "manifest.json").write_text(json.dumps({**manifest, "files": {}, "facts": {}}))

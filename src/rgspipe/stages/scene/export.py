@@ -18,6 +18,7 @@ from rgspipe.light_export.world import World
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.frozen_file import SURFELS
 from rgspipe.stages.base import Stage, StageContext
+from rgspipe.stages.scene.light_origin import origin_of
 from rgspipe.stages.sources import surfel_stage
 
 
@@ -45,7 +46,8 @@ def _lights(context: StageContext) -> None:
     """The lights of export.light for other programs, where they are in the file that the scene was made from."""
     config, path = context.config, context.config.export.light
     dataset = context.inputs.get("generate_dataset")
-    world = world_of(config.export.metres, None if dataset is None else dataset.folder() / INFO)
+    info = origin_of(Path(path)) if dataset is None else dataset.folder() / INFO
+    world = world_of(config.export.metres, info)
     rig = read_lights(path)
     done = export_lights(rig, context.folder, config.export.lights, world=world, covariances=read_covariances(path))
     print("\n".join(done.lines))
@@ -67,7 +69,8 @@ def _inputs(config: RgspipeConfig) -> list[str]:
         if config.export.light is None:
             remedy = "Name the light file of a fit: export.light=outputs/…/lights.json."
             raise InputError("export.light", expected="a light file for export.lights", found="null", remedy=remedy)
-        return ["generate_dataset"] if config.scene.kind == "blend" else []
+        known = config.scene.kind != "blend" or origin_of(Path(config.export.light)) is not None
+        return [] if known else ["generate_dataset"]
     return [surfel_stage(config) if config.export.light is None else "freeze"]
 
 
@@ -76,7 +79,9 @@ def _files(config: RgspipeConfig) -> list[Path]:
     if config.export.light is None:
         return []
     read_lights(config.export.light)
-    return [Path(config.export.light)]
+    light = Path(config.export.light)
+    origin = origin_of(light) if config.export.lights is not None else None
+    return [light] if origin is None else [light, origin]
 
 
 STAGE = Stage(
