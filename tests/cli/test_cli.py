@@ -10,6 +10,8 @@ from pathlib import Path
 import pytest
 
 import rgspipe as rg
+from rgspipe.cli import main
+from rgspipe.cli.commands import COMMANDS
 from rgspipe.cli.help import help_text
 
 REFUSED, UNREAD = 2, 141
@@ -89,6 +91,15 @@ def test_a_stage_is_explained_and_the_version_told(rgspipe) -> None:
     assert "stage=fit_light" in shown and "--help fit" in shown
     told = rgspipe("--version").stdout
     assert told.startswith(f"rgspipe {rg.__version__}") and "torch" in told and "Python 3." in told
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_command_says_how_it_is_written(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([command, "--help"]) == 0
+    told = capsys.readouterr().out
+    assert told.startswith(f"rgspipe {command}") and told.strip() == help_text([command])
+    assert max(map(len, told.splitlines())) <= 120
+    assert callable(COMMANDS[command].load())
 
 
 @pytest.mark.parametrize("topic", ["blend", "scene=blend"])

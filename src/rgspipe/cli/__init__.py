@@ -7,6 +7,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from rgspipe.cli.commands import COMMANDS
 from rgspipe.cli.completion import LINE, completed, is_question
 from rgspipe.cli.help import help_text, overview, version_text
 from rgspipe.cli.messages import EXIT_INPUT, EXIT_INTERRUPTED, EXIT_UNREAD, show_input_error
@@ -17,6 +18,8 @@ from rgspipe.stages import load_stage
 __all__ = ["main"]
 
 MULTIRUN_FLAGS = ("-m", "--multirun")
+
+ASKS_FOR_HELP = ("-h", "--help", "help")
 
 
 def main(arguments: Sequence[str] | None = None, stage_loader: StageLoader = load_stage) -> int:
@@ -51,8 +54,11 @@ def _dispatch(arguments: list[str], stage_loader: StageLoader) -> int:
     if not arguments:
         print(overview())
         return 0
-    if arguments[0] in ("-h", "--help", "help"):
+    if arguments[0] in ASKS_FOR_HELP:
         print(help_text(arguments[1:]))
+        return 0
+    if arguments[0] in COMMANDS and any(text in ASKS_FOR_HELP for text in arguments[1:]):
+        print(COMMANDS[arguments[0]].text)
         return 0
     if arguments[0] == "--version":
         print(version_text())
@@ -63,30 +69,8 @@ def _dispatch(arguments: list[str], stage_loader: StageLoader) -> int:
         if not is_open:
             return 0
     _check_working_folder()
-    if arguments[0] == "status":
-        from rgspipe.cli.runs import show_runs
-
-        return show_runs(arguments[1:])
-    if arguments[0] == "verify":
-        from rgspipe.cli.verify import verify
-
-        return verify(arguments[1:])
-    if arguments[0] == "outputs":
-        from rgspipe.cli.outputs import show_outputs
-
-        return show_outputs(arguments[1:])
-    if arguments[0] == "doctor":
-        from rgspipe.cli.doctor import doctor
-
-        return doctor(arguments[1:])
-    if arguments[0] == "view":
-        from rgspipe.cli.view import view_folder
-
-        return view_folder(arguments[1:])
-    if arguments[0] == "demo":
-        from rgspipe.cli.view import demo
-
-        return demo(arguments[1:])
+    if arguments[0] in COMMANDS:
+        return COMMANDS[arguments[0]].load()(arguments[1:])
     if "stage=view" in arguments:
         from rgspipe.cli.view_stage import view_stage
 

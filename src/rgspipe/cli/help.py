@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import NamedTuple, NoReturn
 
 from rgspipe import __version__
+from rgspipe.cli.commands import COMMANDS
 from rgspipe.config import RgspipeConfig
 from rgspipe.config.core import describe
 from rgspipe.errors import InputError
@@ -176,6 +177,8 @@ def _stage(name: str) -> str:
 
 
 def _topic(topic: str) -> str:
+    if topic in COMMANDS:
+        return COMMANDS[topic].text
     every = [setting for settings in sections().values() for setting in settings]
     rows = [setting for setting in every if setting.key == topic or setting.key.startswith(f"{topic}.")]
     lines = [_stage(topic)] if topic in NAMES else []
@@ -197,8 +200,8 @@ def _chosen(topic: str) -> list[str]:
 
 def _refuse(topic: str, keys: Sequence[str]) -> NoReturn:
     choices = [path.stem for files in groups().values() for path in files]
-    known = [*choices, *keys, *NAMES, *(key.partition(".")[0] for key in keys)]
+    known = [*COMMANDS, *choices, *keys, *NAMES, *(key.partition(".")[0] for key in keys)]
     near = difflib.get_close_matches(topic, known, n=1)
     remedy = f"Did you mean {near[0]}?" if near else "python -m rgspipe --help lists them."
-    expected = "a stage, a section, a key, a group or a choice of one"
+    expected = "a stage, a section, a key, a group, a choice of one, or a command"
     raise InputError(f"--help {topic}", expected=expected, found="none", remedy=remedy)
