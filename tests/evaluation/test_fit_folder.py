@@ -45,6 +45,22 @@ def test_a_rig_with_a_spot_is_written_whole(tmp_path: Path) -> None:
     assert "ax" not in curve.columns and content["psnr"] > 100.0
 
 
+def test_what_a_camera_clipped_is_no_error_of_the_fit(tmp_path: Path) -> None:
+    """The render of the true light is brighter there, which the photograph cannot tell from right."""
+    views = FitViews.prepare(frozen_room(), room_cameras(8)[:1], mask_edges=False, sharp=False)
+    light = PointLight(torch.tensor([0.1, -0.25, 0.2], dtype=torch.float64), torch.ones(3, dtype=torch.float64))
+    (image,) = views.render(light)
+    limit = float(image.median())
+    result = FitResult((light,), (), 0.1, 1, 4, 1, 0.3, (torch.eye(6).double(),), (Step(0.1, (light,), 0.0),))
+    clipped, saturated = [image.clamp(max=limit)], [image >= limit]
+    write_result(tmp_path / "told", result, views, clipped, saturated=saturated)
+    write_result(tmp_path / "untold", result, views, clipped)
+    psnrs = [read_result(tmp_path / name)["psnr"] for name in ("told", "untold")]
+    assert psnrs[0] == 200.0 and psnrs[1] < 20.0  # 200.0 and 4.7 dB
+    final = [(tmp_path / name / "final.exr").read_bytes() for name in ("told", "untold")]
+    assert final[0] == final[1]
+
+
 def test_lamps_in_sight_are_outlined_written_and_not_judged(tmp_path: Path) -> None:
     views = FitViews.prepare(frozen_room(), room_cameras(16)[:2], mask_edges=False, sharp=False)
     light = PointLight(torch.tensor([0.1, -0.25, 0.2], dtype=torch.float64), torch.ones(3, dtype=torch.float64))

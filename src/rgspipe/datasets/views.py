@@ -58,12 +58,19 @@ class View:
 
     def as_photographed(self, rendered: Float[Tensor, "H W 3"]) -> Float[Tensor, "H W 3"]:
         """A render (H, W, 3) that is the image wherever that is saturated and the render at least as bright."""
-        return torch.where(self.saturated & (rendered >= self.image), self.image, rendered)
+        return as_photographed(rendered, self.image, self.saturated)
 
     def __repr__(self) -> str:
         known = [name for name in ("light", "depth", "normal", "albedo") if getattr(self, name) is not None]
         size = f"{self.camera.width} × {self.camera.height}"
         return f"View({self.name!r}, {size}{''.join(f', {name}' for name in known)})"
+
+
+def as_photographed(
+    rendered: Float[Tensor, "H W 3"], image: Float[Tensor, "H W 3"], saturated: Tensor
+) -> Float[Tensor, "H W 3"]:
+    """A render that is the image wherever that is `saturated`, (H, W, 3) bool, and the render at least as bright."""
+    return torch.where(saturated & (rendered >= image), image, rendered)
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from torch import Tensor
 from rgspipe.datasets.exr import write_image
 from rgspipe.datasets.json_file import read_json
 from rgspipe.datasets.light_file import read_lights
+from rgspipe.datasets.views import as_photographed
 from rgspipe.evaluation.images import Bytes, line_of_text, progress_strip, save_png, stack
 from rgspipe.evaluation.metrics import psnr
 from rgspipe.fitting.fit import FitViews
@@ -39,6 +40,7 @@ def write_result(
     further: Mapping[str, bytes] | None = None,
     spoken: Spoken = PYTHON,
     there: Sequence[Tensor] | None = None,
+    saturated: Sequence[Tensor] | None = None,
 ) -> None:
     """Write lights.json, convergence.csv, fit.png and final.exr; `folder` appears when it is whole, in place of any.
 
@@ -47,14 +49,16 @@ def write_result(
     are outlined in fit.png, and emitters.png, emitters_1.png and so on are their masks. `further` holds more files by
     name; settings in the reason are named as `spoken` has them. `there` is what every view shows besides the lights, if
     that was looked for or given: it stands in all images of the fit, and in fit.png by itself beside the target.
+    Where targets are `saturated`, (H, W, 3) bool a view, fit.png and the PSNR take renders as the camera would have.
     """
     partial = folder.with_name(f".{folder.name}.partial")
     remove_tree(partial)
     partial.mkdir(parents=True)
     shown = [_with(views.render(rig), there) for rig in _milestones(result)]
     final = shown[-1]
+    shown = [_photographed(images, targets, saturated) for images in shown]
     masks = left_out(result.lamps, [image.shape[:2] for image in final]) if result.lamps else None
-    result.save(partial / "lights.json", spoken, psnr=_psnr(final, targets, masks))
+    result.save(partial / "lights.json", spoken, psnr=_psnr(shown[-1], targets, masks))
     _write_convergence(partial / "convergence.csv", result.trajectory)
     save_png(partial / "fit.png", _picture(targets, [*([there] if there else []), *shown], masks))
     for index, mask in enumerate(masks or ()):
@@ -70,6 +74,16 @@ def write_result(
 def _with(images: Sequence[Tensor], there: Sequence[Tensor] | None) -> list[Tensor]:
     """Images of lights with what is there besides."""
     return [image + other.to(image) for image, other in zip(images, there, strict=True)] if there else [*images]
+
+
+def _photographed(
+    images: Sequence[Tensor], targets: Sequence[Tensor], saturated: Sequence[Tensor] | None
+) -> Sequence[Tensor]:
+    """Renders as a camera that clips as the targets' did would have taken them."""
+    if saturated is None:
+        return images
+    cpu = [image.detach().cpu() for image in images]
+    return [as_photographed(*one) for one in zip(cpu, targets, saturated, strict=True)]
 
 
 def read_result(folder: Path) -> dict[str, object]:

@@ -145,7 +145,7 @@ def suggest_views(
 
 def _clips(result: FitResult, capture: ImageCapture, present: int, count: int) -> Tensor:
     """(count,) radiance from which on each view is saturated, in the exposure of the first one."""
-    limit = math.inf if capture.clip is None else capture.saturated * capture.clip
+    limit = math.inf if capture.saturated_from is None else capture.saturated_from
     clips = torch.full((count,), limit, dtype=torch.float64)
     if result.exposures:
         clips[:present] /= torch.tensor(result.exposures, dtype=torch.float64)

@@ -57,6 +57,11 @@ class ImageCapture:
     saturated: float = SATURATED
     base: BaseImages | None = None
 
+    @property
+    def saturated_from(self) -> float | None:
+        """Radiance from which on a value is saturated; None where none is."""
+        return None if self.clip is None else self.saturated * self.clip
+
     def __post_init__(self) -> None:
         if self.exposure_free and self.base is not None and self.base.scale_free:
             raise InputError(

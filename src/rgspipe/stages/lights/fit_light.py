@@ -98,7 +98,9 @@ class Fitter:
         images = [image / exposure for image, exposure in zip(taken, exposures, strict=True)]
         there = prepared.there_anyway(result, capture)
         there = there and [image / exposure for image, exposure in zip(there, exposures, strict=True)]
-        write_result(folder / target.name, result, prepared, images, further, COMMAND_LINE, there)
+        limit = capture.saturated_from
+        saturated = None if limit is None else [image >= limit for image in taken]
+        write_result(folder / target.name, result, prepared, images, further, COMMAND_LINE, there, saturated)
 
     def solver(self, seed: int = 0) -> Solver:
         """The method that is configured; `seed` is that of a target."""
