@@ -26,7 +26,7 @@ from rgspipe.stages.report.relit import found_relightings, relight_files
 from rgspipe.stages.report.sections import found_galleries, found_sections, section_files
 from rgspipe.stages.report.studies import found_captures, found_light_studies, study_files
 from rgspipe.stages.sources import has_truth, trained_stage
-from rgspipe.stages.studies.compared_fits import fit_changes
+from rgspipe.stages.studies.compared_fits import at_most, fit_changes, fits_of
 from rgspipe.store.artifacts import Artifact
 from rgspipe.store.files import write_bytes, write_json, write_text
 
@@ -55,7 +55,7 @@ def run(context: StageContext) -> None:
 def _contents(context: StageContext) -> report.ReportContents:
     config = context.config
     # The evaluations with true surfels come last, as `_inputs` lists them.
-    every, count = context.input_lists.get("evaluate", ()), len(config.report.fits())
+    every, count = context.input_lists.get("evaluate", ()), len(fits_of(config, config.report))
     evaluations, with_truth = every[:count], every[count:]
     judged = context.input_lists.get("judge", ())
     described = [read_json(artifact.file("metrics.json"), "what an evaluation found") for artifact in evaluations]
@@ -190,7 +190,7 @@ def _notes(described: Iterable[Mapping[str, Any]]) -> list[str]:
 def _inputs(config: RgspipeConfig) -> list[Need | str]:
     """Evaluations of every method and view count, and everything before them for its provenance."""
     needs: list[Need | str] = []
-    for method, views in config.report.fits():
+    for method, views in fits_of(config, config.report):
         changes = fit_changes(config, config.report, method, views)
         needs += [Need("fit_light", changes), Need("evaluate", changes)]
     return [*needs, *_judgements(config), "freeze", trained_stage(config), "init_depth", "generate_dataset"]
@@ -203,7 +203,8 @@ def _judgements(config: RgspipeConfig) -> list[Need | str]:
     if not (config.report.truth and has_truth(config)):
         return ["judge"]
     truth: dict[str, object] = {"freeze.surfels": "truth"}
-    lights = truth | {"fit.method": "search_lm", "views.count": config.report.views[0], "views.indices": None}
+    views = at_most(config, config.report.views[0])
+    lights = truth | {"fit.method": "search_lm", "views.count": views, "views.indices": None}
     return ["judge", Need("judge", truth), Need("evaluate", lights)]
 
 

@@ -2,9 +2,32 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from rgspipe.config import RgspipeConfig
 from rgspipe.config.compared import ComparedFits
+from rgspipe.datasets.frames import read_entries
 from rgspipe.fitting.options import Method
+
+
+def fits_of(config: RgspipeConfig, wanted: ComparedFits) -> list[tuple[Method, int]]:
+    """Each method with each of its numbers of views, as far as the target has so many.
+
+    Raises:
+        InputError: a target of the user's own cannot be read.
+    """
+    return list(dict.fromkeys((method, at_most(config, views)) for method, views in wanted.fits()))
+
+
+def at_most(config: RgspipeConfig, views: int) -> int:
+    """A number of views, or all that a target of the user's own has, if these are fewer.
+
+    Raises:
+        InputError: that target cannot be read.
+    """
+    if config.fit.target is None:
+        return views
+    return min(views, len(read_entries(Path(config.fit.target) / "transforms.json", "the cameras of a fit target")))
 
 
 def fit_changes(config: RgspipeConfig, wanted: ComparedFits, method: Method, views: int) -> dict[str, object]:
