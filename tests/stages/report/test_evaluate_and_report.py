@@ -258,12 +258,14 @@ def test_report_needs_every_method_that_is_asked_for_with_every_number_of_views(
     assert "fit" in report.STAGE.keys(config) and "outputs" not in report.STAGE.keys(config)
 
 
-def test_a_report_asks_for_no_more_views_than_a_target_of_the_user_s_own_has(config, tmp_path):
+def test_a_report_asks_for_no_more_views_than_targets_have(config, tmp_path):
     """Where it did, the report of a target with two images ended in an error about a key that nobody had set."""
     frame = {"file_path": "view.exr", "transform_matrix": np.eye(4).tolist(), "camera_angle_x": 0.7}
     (tmp_path / "transforms.json").write_text(json.dumps({"frames": [frame, frame]}))
     own = with_changes(config, {"fit.target": str(tmp_path)})
-    assert {need.changes["views.count"] for need in report.STAGE.needs(own) if need.stage == "evaluate"} == {1, 2}
+    few = with_changes(config, {"dataset.target_views": 2})
+    for one in (own, few):
+        assert {need.changes["views.count"] for need in report.STAGE.needs(one) if need.stage == "evaluate"} == {1, 2}
 
 
 def _copy(source: Path, folder: Path) -> None:

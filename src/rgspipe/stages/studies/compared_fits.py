@@ -8,6 +8,7 @@ from rgspipe.config import RgspipeConfig
 from rgspipe.config.compared import ComparedFits
 from rgspipe.datasets.frames import read_entries
 from rgspipe.fitting.options import Method
+from rgspipe.stages.sources import has_truth
 
 
 def fits_of(config: RgspipeConfig, wanted: ComparedFits) -> list[tuple[Method, int]]:
@@ -20,13 +21,14 @@ def fits_of(config: RgspipeConfig, wanted: ComparedFits) -> list[tuple[Method, i
 
 
 def at_most(config: RgspipeConfig, views: int) -> int:
-    """A number of views, or all that a target of the user's own has, if these are fewer.
+    """A number of views, or all that targets have, if these are fewer and known before anything is made.
 
     Raises:
-        InputError: that target cannot be read.
+        InputError: a target of the user's own cannot be read.
     """
     if config.fit.target is None:
-        return views
+        rendered = has_truth(config) and config.fit.targets != "generated"
+        return min(views, config.dataset.target_views) if rendered else views
     return min(views, len(read_entries(Path(config.fit.target) / "transforms.json", "the cameras of a fit target")))
 
 
