@@ -184,6 +184,6 @@ def _captured(measured: Measured, answer: Answer, options: CaptureOptions, light
     surfels = frozen.surfels
     guessed = torch.where(surfels.guessed > 0.0, doubt.clamp(min=LEAST_DOUBT), 0.0)
     surfels = replace(surfels, albedo=albedo, guessed=guessed)
-    certainty = Certainty.of(best.problem, best.lamps)
+    certainty = Certainty.of(answer)
     oddities = Oddities.of(best.problem, best.lamps, measured)
     return Captured(surfels, best.lamps.lights(), certainty, doubt, measured, answer, frozen, oddities, lighting)

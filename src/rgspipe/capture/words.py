@@ -29,8 +29,10 @@ def captured_words(found: Captured) -> str:
 def _lamps(found: Captured) -> str:
     spread = found.certainty.spread(found.frozen.size)
     one = "1 lamp was on" if len(found.lamps) == 1 else f"{len(found.lamps)} lamps were on"
+    guesses = (spread > GUESS) | (found.answer.over_even < BAR.least)
     places = [
-        f"{_point(lamp.position.tolist())}, {_place(part)}" for lamp, part in zip(found.lamps, spread, strict=True)
+        f"{_point(lamp.position.tolist())}, {_place(part, guess)}"
+        for lamp, part, guess in zip(found.lamps, spread, guesses, strict=True)
     ]
     return f"{one} in the photographs: {'; '.join(places)}."
 
@@ -39,9 +41,9 @@ def _point(place: Sequence[float]) -> str:
     return f"({', '.join(f'{value:.2f}' for value in place)})"
 
 
-def _place(part: float) -> str:
+def _place(part: float, guess: bool) -> str:
     sure = f"known to {100.0 * part:.1f} % of the scene's size"
-    return f"a guess, {sure}" if part > GUESS else sure
+    return f"a guess, {sure}" if guess else sure
 
 
 def _number(found: Captured) -> str:
