@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterator, Sequence
 
 from rgspipe.capture.captured import Captured
-from rgspipe.capture.certainty import GUESS
 from rgspipe.capture.search import BAR
 
 #: Photographs whose pixels disagree by more than this, in the middle, are not of one diffuse scene; nor are surfaces
@@ -29,10 +28,9 @@ def captured_words(found: Captured) -> str:
 def _lamps(found: Captured) -> str:
     spread = found.certainty.spread(found.frozen.size)
     one = "1 lamp was on" if len(found.lamps) == 1 else f"{len(found.lamps)} lamps were on"
-    guesses = (spread > GUESS) | (found.answer.over_even < BAR.least)
     places = [
         f"{_point(lamp.position.tolist())}, {_place(part, guess)}"
-        for lamp, part, guess in zip(found.lamps, spread, guesses, strict=True)
+        for lamp, part, guess in zip(found.lamps, spread, found.guesses, strict=True)
     ]
     return f"{one} in the photographs: {'; '.join(places)}."
 
