@@ -73,8 +73,7 @@ class Captured:
 
     @property
     def guesses(self) -> np.ndarray:
-        """(K,) bool: lamps whose place is little sure, or all of them where they explain next to nothing that light which
-        is the same everywhere does not."""
+        """(K,) bool: lamps whose place is little sure, or all where light that is the same everywhere does as well."""
         return (self.certainty.spread(self.frozen.size) > GUESS) | (self.answer.over_even < BAR.least)
 
     def __repr__(self) -> str:
