@@ -18,6 +18,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from rgspipe.capture.doubts import FREEDOM
 from rgspipe.capture.lamps import LampProblem, Lamps
 from rgspipe.capture.photographs import Numbers
 from rgspipe.capture.search import Candidates
@@ -55,7 +56,9 @@ def _missing(problem: LampProblem, lamps: Lamps) -> Numbers:
     spread = Candidates.of(problem).shares / problem.arriving(lamps).mean(axis=1)[:, None]
     size = np.sqrt((spread[used] ** 2).mean(axis=0))
     shining = size > 0.0
-    shifts = np.sqrt(problem.field.variances.noise) * spread[:, shining] / size[shining]
+    # The variance of Student's t, of which the noise is the scale.
+    unexplained = problem.field.variances.noise * FREEDOM / (FREEDOM - 2.0)
+    shifts = np.sqrt(unexplained) * spread[:, shining] / size[shining]
     return shifts / np.sqrt(max(int(shining.sum()), 1))
 
 
