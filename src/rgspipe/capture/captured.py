@@ -10,7 +10,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from rgspipe.capture.certainty import Certainty
+from rgspipe.capture.certainty import GUESS, Certainty
 from rgspipe.capture.field import Field, Graph, Variances
 from rgspipe.capture.lamps import LampProblem
 from rgspipe.capture.oddities import Oddities
@@ -20,7 +20,7 @@ from rgspipe.capture.prediction import Prediction
 from rgspipe.capture.radiance import Measured, measured_radiance
 from rgspipe.capture.received import Received
 from rgspipe.capture.refusals import OFF, check_brackets, check_lightings, check_measured, check_overlap, check_views
-from rgspipe.capture.search import Answer, found_lamps
+from rgspipe.capture.search import BAR, Answer, found_lamps
 from rgspipe.capture.several import found_in_turns, without
 from rgspipe.completion import with_unseen_surfaces
 from rgspipe.datasets.views import View
@@ -70,6 +70,11 @@ class Captured:
     frozen: FrozenScene
     oddities: Oddities
     lighting: str = ""
+
+    @property
+    def guesses(self) -> np.ndarray:
+        """(K,) bool: lamps whose place is little sure, or all where light that is the same everywhere does as well."""
+        return (self.certainty.spread(self.frozen.size) > GUESS) | (self.answer.over_even < BAR.least)
 
     def __repr__(self) -> str:
         return f"Captured({self.surfels!r}, {len(self.lamps)} lamps)"
@@ -184,6 +189,6 @@ def _captured(measured: Measured, answer: Answer, options: CaptureOptions, light
     surfels = frozen.surfels
     guessed = torch.where(surfels.guessed > 0.0, doubt.clamp(min=LEAST_DOUBT), 0.0)
     surfels = replace(surfels, albedo=albedo, guessed=guessed)
-    certainty = Certainty.of(best.problem, best.lamps)
+    certainty = Certainty.of(answer)
     oddities = Oddities.of(best.problem, best.lamps, measured)
     return Captured(surfels, best.lamps.lights(), certainty, doubt, measured, answer, frozen, oddities, lighting)

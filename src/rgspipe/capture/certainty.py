@@ -7,8 +7,9 @@ Tukey, with blocks as Künsch 1989 has them), beside what the likelihood knows:
 
     C = (Jᵀ Σ⁻¹ J)⁻¹ + (B − 1)/B Σ_b (θ_b − θ̄)(θ_b − θ̄)ᵀ ,
 
-beside what the model of light lacks as a whole (`capture.shared_errors`), and to no place better than surfels resolve
-light.
+beside what the model of light lacks as a whole (`capture.shared_errors`), what the lamps would move by if the one more
+that was not believed were there after all, as far as it came towards being believed, and to no place better than
+surfels resolve light.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import numpy as np
 
 from rgspipe.capture.lamps import NUMBERS, LampProblem, Lamps
 from rgspipe.capture.photographs import Numbers
+from rgspipe.capture.search import Answer
 from rgspipe.capture.shared_errors import shared_covariance
 from rgspipe.renderer.clusters import cluster_patches
 from rgspipe.scene.spacing import surfel_spacing
@@ -54,9 +56,10 @@ class Certainty:
     bounced: float
 
     @classmethod
-    def of(cls, problem: LampProblem, lamps: Lamps) -> Certainty:
+    def of(cls, answer: Answer) -> Certainty:
         """Of lamps as they were fitted."""
-        covariance = _covariance(problem, lamps)
+        problem, lamps = answer.best.problem, answer.best.lamps
+        covariance = _covariance(problem, lamps) + _number_covariance(problem, answer)
         count, size = len(lamps), problem.size
         numbers = covariance.reshape(count, NUMBERS, count, NUMBERS)
         own = numbers[np.arange(count), :, np.arange(count)]
@@ -94,6 +97,17 @@ def _covariance(problem: LampProblem, lamps: Lamps) -> Numbers:
     apart = found - found.mean(axis=0)
     resampled = (len(found) - 1) / len(found) * (apart.T @ apart)
     return problem.covariance(lamps) + resampled + shared_covariance(problem, lamps, blocks)
+
+
+def _number_covariance(problem: LampProblem, answer: Answer) -> Numbers:
+    """(6 K, 6 K) of the lamps' numbers, by one more lamp that was not believed."""
+    lamps = answer.best.lamps
+    last = answer.compared[-1] if answer.compared else None
+    if last is None or len(last.fewer.lamps) < len(lamps):
+        return np.zeros((NUMBERS * len(lamps),) * 2)
+    beside = last.more.lamps.at(range(len(lamps)))
+    moved = _numbers(problem, beside) - _numbers(problem, lamps)
+    return min(1.0, max(0.0, last.gain) / last.wanted) * np.outer(moved, moved)
 
 
 def _without(problem: LampProblem, lamps: Lamps, left_out: np.ndarray) -> Lamps:

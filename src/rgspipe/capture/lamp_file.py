@@ -7,7 +7,6 @@ from pathlib import Path
 import torch
 
 from rgspipe.capture.captured import Captured
-from rgspipe.capture.certainty import GUESS
 from rgspipe.datasets.covariance_file import covariance_fields
 from rgspipe.datasets.light_file import write_lights
 
@@ -17,9 +16,8 @@ def write_lamps(path: Path, found: Captured) -> None:
     certainty = found.certainty
     covariances = [torch.from_numpy(covariance) for covariance in certainty.places]
     lamps = covariance_fields(len(found.lamps), {"covariance": covariances})
-    spread = certainty.spread(found.frozen.size).tolist()
-    for fields, gains, part in zip(lamps, certainty.gains.tolist(), spread, strict=True):
-        fields |= {"intensity_error": gains, "guess": part > GUESS}
+    for fields, gains, guess in zip(lamps, certainty.gains.tolist(), found.guesses.tolist(), strict=True):
+        fields |= {"intensity_error": gains, "guess": guess}
     extra = {
         "lights": lamps,
         "scale_error": certainty.scale,

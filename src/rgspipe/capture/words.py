@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterator, Sequence
 
 from rgspipe.capture.captured import Captured
-from rgspipe.capture.certainty import GUESS
 from rgspipe.capture.search import BAR
 
 #: Photographs whose pixels disagree by more than this, in the middle, are not of one diffuse scene; nor are surfaces
@@ -30,7 +29,8 @@ def _lamps(found: Captured) -> str:
     spread = found.certainty.spread(found.frozen.size)
     one = "1 lamp was on" if len(found.lamps) == 1 else f"{len(found.lamps)} lamps were on"
     places = [
-        f"{_point(lamp.position.tolist())}, {_place(part)}" for lamp, part in zip(found.lamps, spread, strict=True)
+        f"{_point(lamp.position.tolist())}, {_place(part, guess)}"
+        for lamp, part, guess in zip(found.lamps, spread, found.guesses, strict=True)
     ]
     return f"{one} in the photographs: {'; '.join(places)}."
 
@@ -39,9 +39,9 @@ def _point(place: Sequence[float]) -> str:
     return f"({', '.join(f'{value:.2f}' for value in place)})"
 
 
-def _place(part: float) -> str:
+def _place(part: float, guess: bool) -> str:
     sure = f"known to {100.0 * part:.1f} % of the scene's size"
-    return f"a guess, {sure}" if part > GUESS else sure
+    return f"a guess, {sure}" if guess else sure
 
 
 def _number(found: Captured) -> str:

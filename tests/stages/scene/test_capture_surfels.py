@@ -19,8 +19,9 @@ from rgspipe.datasets.gs3_write import frame_entry, write_transforms
 from rgspipe.datasets.light_file import read_lights, write_lights
 from rgspipe.datasets.location import LAMPS_TRUTH
 from rgspipe.datasets.surfel_file import load_surfels, save_surfels
+from rgspipe.options import settings
 from rgspipe.stages.base import StageContext
-from rgspipe.stages.scene.capture_surfels import STAGE
+from rgspipe.stages.scene.capture_surfels import NO_RESULT, STAGE
 from rgspipe.stages.scene.freeze import STAGE as FREEZE
 from rgspipe.stages.sources import surfel_stage
 
@@ -33,6 +34,11 @@ def test_the_scene_comes_from_this_stage_where_lamps_are_unknown() -> None:
     assert surfel_stage(with_changes(config, {"freeze.surfels": "truth"})) == "true_surfels"
     assert [need.stage for need in FREEZE.needs(config)] == ["capture_surfels"]
     assert [need.stage for need in FREEZE.needs(RgspipeConfig())] == ["train_surfels"]
+
+
+def test_a_capture_made_with_other_memory_is_the_same_one() -> None:
+    left_out = {f"lamps.{setting.name}" for setting in settings(CaptureOptions)} - set(STAGE.keys(RgspipeConfig()))
+    assert left_out == {f"lamps.{name}" for name in NO_RESULT} == {"lamps.memory_mib"}
 
 
 @pytest.fixture(scope="module")

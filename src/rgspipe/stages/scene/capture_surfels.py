@@ -14,6 +14,7 @@ import torch
 
 from rgspipe.capture.captured import Captured, capture_scenes
 from rgspipe.capture.lamp_file import write_lamps
+from rgspipe.capture.options import CaptureOptions
 from rgspipe.capture.words import captured_words
 from rgspipe.datasets.grade_file import GRADE, save_grade
 from rgspipe.datasets.light_file import read_lights
@@ -28,6 +29,7 @@ from rgspipe.evaluation.held_out import held_out_picture
 from rgspipe.evaluation.held_out_views import HeldOut, render_held_out
 from rgspipe.evaluation.images import save_png
 from rgspipe.machine.description import PeakMemory
+from rgspipe.options import settings
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene.grade import SceneGrade
 from rgspipe.scene.lights import LightRig
@@ -37,6 +39,9 @@ from rgspipe.training.albedo import ALBEDO_RANGE
 
 #: Photographs that a scene is graded by.
 MOST_JUDGED = 12
+
+#: Settings that change how lamps are found, but not what is found.
+NO_RESULT = ("memory_mib",)
 
 
 def run(context: StageContext) -> None:
@@ -137,5 +142,5 @@ STAGE = Stage(
     help="finds albedo and lamps of photographs under lamps that nobody measured (scene.lamps=unknown)",
     run=run,
     inputs=lambda config: ["init_depth", "generate_dataset"],
-    config_keys=("lamps", "capture"),
+    config_keys=(*(f"lamps.{key.name}" for key in settings(CaptureOptions) if key.name not in NO_RESULT), "capture"),
 )
