@@ -35,6 +35,7 @@ from rgspipe.fitting.selection.diagnosis import Costs, hanging, standing
 from rgspipe.fitting.selection.kinds import told_kinds
 from rgspipe.fitting.selection.number import Doubted, doubted_number, faded_light
 from rgspipe.fitting.selection.rivals import equally_good, rival_among, rival_elsewhere, rival_polished
+from rgspipe.fitting.selection.tables import tables_open, told_tables
 from rgspipe.fitting.spec import AUTO, LightSpec
 from rgspipe.renderer.images.blocks import view_of_blocks
 from rgspipe.renderer.images.model import ImageModel
@@ -122,11 +123,12 @@ def _search(refiner: Refiner, candidates: Sequence[Candidates], options: SearchO
     if spec.type == AUTO:
         best, kinds = told_kinds(refiner, found.best, spec, options)
         found = replace(found, best=best)
-    best, beside = settled_beside(refiner, found.best, options)
+    best, tables = told_tables(refiner, found.best, spec, options)
+    best, beside = settled_beside(refiner, best, options)
     if best is not found.best:
         found = replace(found, best=best, compared={**found.compared, len(best.emitters): best})
     rival = rival_among(refiner, best, found.others, options)
-    others = [other for other in beside if equally_good(refiner.problem, best, other, options.rivals)]
+    others = [other for other in (*tables, *beside) if equally_good(refiner.problem, best, other, options.rivals)]
     others += [] if rival is None else [rival]
     doubted = Doubted()
     if spec.count is not None:
@@ -184,7 +186,7 @@ def _result(
     spread = light_covariances(problem, best, options.certainty)
     rival = rival_polished(refiner, best, others, spread.calibrated, options)
     rival = rival or rival_elsewhere(refiner, best, spread.calibrated, options)
-    findings = findings if rival is None else (rival, *findings)
+    findings = (*([] if rival is None else [rival]), *findings, *tables_open(refiner, best, others, options))
     return FitResult(
         lights=last.lights,
         findings=(*standing(refiner, best, spread.calibrated, options.certainty), *findings, *hanging(best)),

@@ -59,7 +59,7 @@ def _met(one: Sequence[Emitter], other: Sequence[Emitter], met: float, size: flo
     if len(one) != len(other):
         return False
     pairs = counterparts(one, other, size)
-    return all(a.light.kind == b.light.kind and a.distance(b, size) < met for a, b in pairs)
+    return all(a.light.same_sort(b.light) and a.distance(b, size) < met for a, b in pairs)
 
 
 def worth_keeping(state: State, bar: BarOptions, met: float, size: float) -> list[int]:

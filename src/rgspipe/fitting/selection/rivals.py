@@ -67,7 +67,7 @@ def rival_polished(
         if clear or not _regions_hold(best, other, covariance, size):
             # They may have found other exposures.
             other = refiner.start(other.emitters, PLAIN, other)
-            if _as_good(refiner, best, other, options.rivals):
+            if as_good(refiner, best, other, options.rivals):
                 return _rival(refiner, best, other)
     return None
 
@@ -84,7 +84,7 @@ def rival_elsewhere(
         covariance: of each light, see `FitResult.covariance`; infinite where nothing is determined.
     """
     for other in _moved(refiner, best, covariance, options):
-        if _as_good(refiner, best, other, options.rivals):
+        if as_good(refiner, best, other, options.rivals):
             return _rival(refiner, best, other)
     return None
 
@@ -116,7 +116,7 @@ def _moved(refiner: Refiner, best: State, covariance: Sequence[Tensor], options:
                     yield refiner.start(rig, PLAIN)
 
 
-def _as_good(refiner: Refiner, best: State, other: State, options: RivalOptions) -> bool:
+def as_good(refiner: Refiner, best: State, other: State, options: RivalOptions) -> bool:
     """Whether `other` explains the target as well as `best` by either loss."""
     return equally_good(refiner.problem, best, other, options) and _leaves_as_little(refiner, best, other, options)
 
