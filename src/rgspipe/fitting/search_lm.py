@@ -34,7 +34,7 @@ from rgspipe.fitting.selection.ambient import ambient_found, ambient_missing
 from rgspipe.fitting.selection.diagnosis import Costs, hanging, standing
 from rgspipe.fitting.selection.kinds import told_kinds
 from rgspipe.fitting.selection.number import Doubted, doubted_number, faded_light
-from rgspipe.fitting.selection.rivals import equally_good, rival_among, rival_elsewhere, rival_polished
+from rgspipe.fitting.selection.rivals import leaves_as_little, rival_among, rival_elsewhere, rival_polished
 from rgspipe.fitting.selection.tables import tables_open, told_tables
 from rgspipe.fitting.spec import AUTO, LightSpec
 from rgspipe.renderer.images.blocks import view_of_blocks
@@ -105,7 +105,7 @@ class _Searched:
         best: the rig that was chosen.
         findings: what was found out on the way.
         compared: by number of lights the rigs that were compared.
-        others: rigs that explain as much, as far as blocks tell.
+        others: rigs that explain about as much, as far as blocks tell.
     """
 
     best: State
@@ -128,7 +128,8 @@ def _search(refiner: Refiner, candidates: Sequence[Candidates], options: SearchO
     if best is not found.best:
         found = replace(found, best=best, compared={**found.compared, len(best.emitters): best})
     rival = rival_among(refiner, best, found.others, options)
-    others = [other for other in (*tables, *beside) if equally_good(refiner.problem, best, other, options.rivals)]
+    # Blocks err at shadows' edges: what leaves about as little there is left to the pixels.
+    others = [other for other in (*tables, *beside) if leaves_as_little(refiner, best, other, options.rivals)]
     others += [] if rival is None else [rival]
     doubted = Doubted()
     if spec.count is not None:

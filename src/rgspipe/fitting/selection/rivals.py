@@ -44,7 +44,7 @@ def rival_among(refiner: Refiner, best: State, others: Sequence[State], options:
     # The answer is one of plain squares, so a rival has to be one, too.
     other = refiner.refined(other, PLAIN, steps)
     clear = rig_distance(best.emitters, other.emitters, size) > apart
-    return other if clear and _leaves_as_little(refiner, best, other, options.rivals) else None
+    return other if clear and leaves_as_little(refiner, best, other, options.rivals) else None
 
 
 def rival_polished(
@@ -118,10 +118,10 @@ def _moved(refiner: Refiner, best: State, covariance: Sequence[Tensor], options:
 
 def as_good(refiner: Refiner, best: State, other: State, options: RivalOptions) -> bool:
     """Whether `other` explains the target as well as `best` by either loss."""
-    return equally_good(refiner.problem, best, other, options) and _leaves_as_little(refiner, best, other, options)
+    return equally_good(refiner.problem, best, other, options) and leaves_as_little(refiner, best, other, options)
 
 
-def _leaves_as_little(refiner: Refiner, best: State, other: State, options: RivalOptions) -> bool:
+def leaves_as_little(refiner: Refiner, best: State, other: State, options: RivalOptions) -> bool:
     """Whether `other` leaves about as little of the energy unexplained as `best`, or nothing but rounding."""
     return refiner.unexplained(other) <= options.energy * max(refiner.unexplained(best), ROUNDING**2)
 
