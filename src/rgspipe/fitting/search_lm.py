@@ -71,6 +71,8 @@ def fit_search_lm(
     # Which of those that blocks do not tell apart is the answer, pixels say.
     every = [_polished(refiner.on(problem.sharpest()), one, options.iterations) for one in (found.best, *found.others)]
     (polished, best), *rivals = sorted(every, key=lambda pair: pair[0].unexplained(pair[1]))
+    best, beside = settled_beside(polished, best, options, refiner)
+    others = [*(state for _, state in rivals), *beside]
     if not bool((best.intensity[: len(best.emitters)] > 0).any()):
         return _without_lights(polished.problem, meter)
     findings = found.findings
@@ -83,7 +85,7 @@ def fit_search_lm(
         findings = (*findings, *ambient_found(polished.problem, best, options.bar))
     else:
         findings = (*findings, *ambient_missing(refiner, candidates, found.best, findings, options))
-    return _result(polished, best, findings, Costs.of(refiner, found.compared), options, [state for _, state in rivals])
+    return _result(polished, best, findings, Costs.of(refiner, found.compared), options, others)
 
 
 def fit_from(

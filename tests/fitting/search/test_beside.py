@@ -35,6 +35,14 @@ def test_no_minimum_is_beside_the_truth(refiner: Refiner) -> None:
     assert best is true and beside == () and refiner.meter.evaluations == 17 and refiner.meter.iterations == 0
 
 
+def test_pixels_are_asked_only_where_blocks_do_not_tell(refiner: Refiner) -> None:
+    """Beside the truth everything leaves many times as much: two steps on blocks, and none on pixels."""
+    true = refiner.start([emitter_at(torch.tensor(VISIBLE, dtype=torch.float64))], PLAIN)
+    before = refiner.meter.evaluations
+    assert settled_beside(refiner, true, OPTIONS, blocks=refiner) == (true, ())
+    assert refiner.meter.evaluations - before == 3  # The answer on blocks, once, and a step on either side.
+
+
 def test_what_is_no_minimum_is_left(refiner: Refiner) -> None:
     off = refiner.start([emitter_at(torch.tensor(VISIBLE, dtype=torch.float64) + 0.05)], PLAIN)
     best, *_ = minima_beside(refiner, off, OPTIONS)

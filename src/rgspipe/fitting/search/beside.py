@@ -7,11 +7,13 @@ refined from there.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import torch
 from torch import Tensor
 
+from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.options import SearchOptions
 from rgspipe.fitting.search.compare import distinct
 from rgspipe.fitting.search.moves import moved_rig
@@ -19,32 +21,51 @@ from rgspipe.fitting.search.refine import Refiner, State
 from rgspipe.fitting.search.weighting import PLAIN
 
 
-def minima_beside(refiner: Refiner, answer: State, options: SearchOptions) -> list[State]:
-    """The answer, and the minima of plain squares beside it that are not on their way to it; best first."""
-    steps, met, size = options.schedule.steps, options.schedule.met, refiner.region.size
-    found = [answer, *(refiner.refined(start, PLAIN, steps) for start in _starts(refiner, answer, options))]
-    return sorted(distinct(found, met, size), key=refiner.unexplained)
+def settled_beside(
+    refiner: Refiner, answer: State, options: SearchOptions, blocks: Refiner | None = None
+) -> tuple[State, tuple[State, ...]]:
+    """The least minimum that is reached from the answer by going to ever better ones beside, and those beside it.
 
-
-def settled_beside(refiner: Refiner, answer: State, options: SearchOptions) -> tuple[State, tuple[State, ...]]:
-    """The least minimum that is reached from the answer by going to ever better ones beside, and those beside it."""
-    best, *others = minima_beside(refiner, answer, options)
+    Args:
+        blocks: on the blocks of the same fit, if `refiner` is on pixels, which take long: they are asked only as far as
+            blocks leave about as little as at the answer.
+    """
+    best, *others = minima_beside(refiner, answer, options, blocks)
     if best is answer:
         return answer, tuple(others)
-    return settled_beside(refiner, best, options)
+    return settled_beside(refiner, best, options, blocks)
 
 
-def _starts(refiner: Refiner, answer: State, options: SearchOptions) -> Iterator[State]:
-    """On either side of the answer the best place of those behind a rise of the loss."""
+def minima_beside(
+    refiner: Refiner, answer: State, options: SearchOptions, blocks: Refiner | None = None
+) -> list[State]:
+    """The answer, and the minima of plain squares beside it that are not on their way to it; best first."""
+    met, size = options.schedule.met, refiner.region.size
+    steps = options.schedule.steps if blocks is None else options.iterations
     direction = _least_sure(refiner, answer)
-    count = round(options.combinations.separation / options.schedule.met)
+    found = [answer]
     for side in (1.0, -1.0):
-        steps = side * options.schedule.met * torch.arange(1, count + 1).double()
-        rigs = [moved_rig(answer.emitters, step * direction, refiner.region) for step in steps]
+        rigs = _walk(refiner, answer, side * direction, options, blocks)
         walked = [refiner.start(rig, PLAIN, answer) for rig in rigs]
         behind = _behind_a_rise([refiner.unexplained(state) for state in (answer, *walked)])
         if behind:
-            yield walked[behind - 1]
+            found.append(refiner.refined(walked[behind - 1], PLAIN, steps))
+    return sorted(distinct(found, met, size), key=refiner.unexplained)
+
+
+def _walk(
+    refiner: Refiner, answer: State, direction: Tensor, options: SearchOptions, blocks: Refiner | None
+) -> Iterator[tuple[Emitter, ...]]:
+    """The lights moved along a direction in steps, as far as starts are apart, or blocks leave about as little."""
+    step = options.schedule.met
+    most = math.inf
+    if blocks is not None:
+        most = options.rivals.energy * blocks.unexplained(blocks.start(answer.emitters, PLAIN))
+    for count in range(1, 1 + round(options.combinations.separation / step)):
+        rig = moved_rig(answer.emitters, count * step * direction, refiner.region)
+        if blocks is not None and blocks.unexplained(blocks.start(rig, PLAIN)) > most:
+            return
+        yield rig
 
 
 def _behind_a_rise(losses: list[float]) -> int:
