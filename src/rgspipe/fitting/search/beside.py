@@ -8,16 +8,17 @@ refined from there.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from itertools import takewhile
 
 import torch
 from torch import Tensor
 
-from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.options import SearchOptions
 from rgspipe.fitting.search.compare import distinct
 from rgspipe.fitting.search.moves import moved_rig
 from rgspipe.fitting.search.refine import Refiner, State
+from rgspipe.fitting.search.starts import EmitterRig
 from rgspipe.fitting.search.weighting import PLAIN
 
 
@@ -42,10 +43,14 @@ def minima_beside(
     """The answer, and the minima of plain squares beside it that are not on their way to it; best first."""
     met, size = options.schedule.met, refiner.region.size
     steps = options.schedule.steps if blocks is None else options.iterations
-    direction = _least_sure(refiner, answer)
+    direction, most = _least_sure(refiner, answer), math.inf
+    if blocks is not None:
+        most = options.rivals.energy * _left_of(blocks, answer.emitters)
     found = [answer]
     for side in (1.0, -1.0):
-        rigs = _walk(refiner, answer, side * direction, options, blocks)
+        rigs: Iterable[EmitterRig] = _walk(refiner, answer, side * direction, options)
+        if blocks is not None:
+            rigs = takewhile(lambda rig: _left_of(blocks, rig) <= most, rigs)
         walked = [refiner.start(rig, PLAIN, answer) for rig in rigs]
         behind = _behind_a_rise([refiner.unexplained(state) for state in (answer, *walked)])
         if behind:
@@ -53,19 +58,15 @@ def minima_beside(
     return sorted(distinct(found, met, size), key=refiner.unexplained)
 
 
-def _walk(
-    refiner: Refiner, answer: State, direction: Tensor, options: SearchOptions, blocks: Refiner | None
-) -> Iterator[tuple[Emitter, ...]]:
-    """The lights moved along a direction in steps, as far as starts are apart, or blocks leave about as little."""
+def _left_of(blocks: Refiner, rig: EmitterRig) -> float:
+    return blocks.unexplained(blocks.start(rig, PLAIN))
+
+
+def _walk(refiner: Refiner, answer: State, direction: Tensor, options: SearchOptions) -> Iterator[EmitterRig]:
+    """The lights moved along a direction in steps, as far as starts are apart."""
     step = options.schedule.met
-    most = math.inf
-    if blocks is not None:
-        most = options.rivals.energy * blocks.unexplained(blocks.start(answer.emitters, PLAIN))
     for count in range(1, 1 + round(options.combinations.separation / step)):
-        rig = moved_rig(answer.emitters, count * step * direction, refiner.region)
-        if blocks is not None and blocks.unexplained(blocks.start(rig, PLAIN)) > most:
-            return
-        yield rig
+        yield moved_rig(answer.emitters, count * step * direction, refiner.region)
 
 
 def _behind_a_rise(losses: list[float]) -> int:
