@@ -61,6 +61,13 @@ def test_a_sun_through_an_opening_is_found() -> None:
     assert result.status is FitStatus.CONVERGED and math.degrees(error) < 1e-3
 
 
+def test_a_sun_that_draws_nearly_the_shadow_of_another_is_found() -> None:
+    """Two minima 2.6° apart, nearer than starts are, in the plane through the edge that shadows come from."""
+    views = FitViews.prepare(frozen_open_room(), open_room_cameras(40)[:2], lights="sun")
+    result, error = fitted(views, sun(0.66, 0.16, 0.74))
+    assert result.status is FitStatus.CONVERGED and error < 1e-6  # measured 6e-9
+
+
 def test_no_sun_comes_into_a_closed_room(room) -> None:
     views = FitViews.prepare(room.frozen, room.views, lights="sun", sharp=False)
     result = views.fit(views.render(PointLight(VISIBLE, COLOUR)))

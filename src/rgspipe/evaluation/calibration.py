@@ -1,4 +1,4 @@
-"""Whether the regions that fits state hold the truth as often as they should."""
+"""The regions that fits state, as they are drawn and put into tables."""
 
 from __future__ import annotations
 
@@ -7,52 +7,9 @@ from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
-from scipy.special import gammaincinv
 
 from rgspipe.evaluation.arrays import ArrayLike, to_array
-
-#: The share of the cases in which a region should hold the truth.
-CONFIDENCE = 0.95
-
-
-def squared_distance(estimate: ArrayLike, truth: ArrayLike, covariance: ArrayLike) -> tuple[float, int]:
-    """(e − t)ᵀ C⁻¹ (e − t), Mahalanobis' squared distance, and over how many coordinates.
-
-    Coordinates with an infinite variance say nothing and are left out.
-
-    Args:
-        estimate, truth: (d,).
-        covariance: (d, d) symmetric, without NaN; infinite variances have covariances of zero.
-
-    Returns:
-        The squared distance, inf where the covariance allows no deviation along the one that there is; and d less the
-        infinite variances.
-    """
-    matrix = to_array(covariance)
-    known = np.isfinite(matrix.diagonal())
-    deviation = (to_array(estimate) - to_array(truth))[known]
-    if not np.isfinite(deviation).all():
-        return math.inf, int(known.sum())
-    values, vectors = np.linalg.eigh(matrix[np.ix_(known, known)])
-    along = vectors.T @ deviation
-    if np.any((values <= 0.0) & (along != 0.0)):
-        return math.inf, int(known.sum())
-    return float(np.sum(along[values > 0.0] ** 2 / values[values > 0.0])), int(known.sum())
-
-
-def inside(
-    estimates: Sequence[ArrayLike],
-    truths: Sequence[ArrayLike],
-    covariances: Sequence[ArrayLike],
-    confidence: float = CONFIDENCE,
-) -> bool:
-    """Whether all true positions (3,) lie inside the regions around the recovered ones.
-
-    Of several lights each region is widened such that all of them together hold with `confidence` (Šidák).
-    """
-    each = confidence ** (1.0 / max(1, len(estimates)))
-    found = [squared_distance(*parts) for parts in zip(estimates, truths, covariances, strict=True)]
-    return all(known == 0 or distance <= _quantile(each, known) for distance, known in found)
+from rgspipe.fitting.certainty.regions import CONFIDENCE, quantile
 
 
 def position_sd(covariances: Sequence[ArrayLike], scene_size: float) -> float:
@@ -81,7 +38,7 @@ def ellipse(covariance: ArrayLike, confidence: float = CONFIDENCE) -> tuple[floa
     if not np.isfinite(matrix).all():
         return None
     values, vectors = np.linalg.eigh(matrix)
-    first, second = (2.0 * np.sqrt(np.clip(values[::-1], 0.0, None) * _quantile(confidence, 3))).tolist()
+    first, second = (2.0 * np.sqrt(np.clip(values[::-1], 0.0, None) * quantile(confidence, 3))).tolist()
     return first, second, math.degrees(math.atan2(float(vectors[1, 1]), float(vectors[0, 1])))
 
 
@@ -97,12 +54,4 @@ def half_axes(covariance: ArrayLike, longest: float, confidence: float = CONFIDE
     matrix[unknown] = matrix[:, unknown] = 0.0
     matrix[unknown, unknown] = longest**2
     values, axes = np.linalg.eigh(0.5 * (matrix + matrix.T))
-    return np.minimum(np.sqrt(np.maximum(values, 0.0) * _quantile(confidence, 3)), longest), axes
-
-
-def _quantile(share: float, coordinates: int) -> float:
-    """The squared distance that χ² over so many coordinates stays within in this share of the cases.
-
-    By its definition: scipy.stats, which has it by name, is slow to import.
-    """
-    return float(2.0 * gammaincinv(0.5 * coordinates, share))
+    return np.minimum(np.sqrt(np.maximum(values, 0.0) * quantile(confidence, 3)), longest), axes

@@ -13,6 +13,7 @@ from rgspipe.evaluation import calibration, metrics
 from rgspipe.evaluation.arrays import ArrayLike, to_array
 from rgspipe.evaluation.classes import class_of, class_order
 from rgspipe.evaluation.rig_errors import rig_errors
+from rgspipe.fitting.certainty.regions import inside
 from rgspipe.scene import LightRig
 
 #: The upper triangle of the covariance of the position that is shown, scene units².
@@ -185,7 +186,7 @@ def _inside(
     if not truth or len(estimate) != len(truth) or len(positions) != len(estimate):
         return None
     matched = [(estimate[i].standing(size), truth[j].standing(size), positions[i]) for i, j in pairs]
-    return calibration.inside(*zip(*matched, strict=True))
+    return inside(*zip(*matched, strict=True))
 
 
 def _variance_columns(matrix: npt.NDArray | None) -> dict[str, float]:

@@ -13,7 +13,7 @@ import torch
 from torch import Tensor
 
 from rgspipe.fitting.certainty.uncertainty import light_covariances
-from rgspipe.fitting.findings import Finding, LightMissing, LightSpare, MuchAmbient, NoOpening, Rival
+from rgspipe.fitting.findings import Finding, LightMissing, LightSpare, MuchAmbient, NoOpening
 from rgspipe.fitting.meter import Meter
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.exposure import rough_exposures
@@ -22,6 +22,7 @@ from rgspipe.fitting.model.moments import moments
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.options import SearchOptions
 from rgspipe.fitting.result import FitResult, dark_result
+from rgspipe.fitting.search.beside import settled_beside
 from rgspipe.fitting.search.coarse import CoarseImages
 from rgspipe.fitting.search.compare import column_energies
 from rgspipe.fitting.search.grow import grown
@@ -33,7 +34,8 @@ from rgspipe.fitting.selection.ambient import ambient_found, ambient_missing
 from rgspipe.fitting.selection.diagnosis import Costs, hanging, standing
 from rgspipe.fitting.selection.kinds import told_kinds
 from rgspipe.fitting.selection.number import Doubted, doubted_number, faded_light
-from rgspipe.fitting.selection.rivals import rival_among, rival_elsewhere
+from rgspipe.fitting.selection.rivals import leaves_as_little, rival_among, rival_elsewhere, rival_polished
+from rgspipe.fitting.selection.tables import tables_open, told_tables
 from rgspipe.fitting.spec import AUTO, LightSpec
 from rgspipe.renderer.images.blocks import view_of_blocks
 from rgspipe.renderer.images.model import ImageModel
@@ -66,17 +68,24 @@ def fit_search_lm(
         return replace(dark, findings=(*dark.findings, NoOpening())) if spec.kinds[-1].distant else dark
     refiner = Refiner.of(problem.coarsest(blocks), meter, options.limits)
     found = _search(refiner, candidates, options, spec)
-    polished, best = _polished(refiner.on(problem.sharpest()), found.best, options.iterations)
+    # Which of those that blocks do not tell apart is the answer, pixels say.
+    every = [_polished(refiner.on(problem.sharpest()), one, options.iterations) for one in (found.best, *found.others)]
+    (polished, best), *rivals = sorted(every, key=lambda pair: pair[0].unexplained(pair[1]))
+    best, beside = settled_beside(polished, best, options, refiner)
+    others = [*(state for _, state in rivals), *beside]
     if not bool((best.intensity[: len(best.emitters)] > 0).any()):
         return _without_lights(polished.problem, meter)
     findings = found.findings
+    if polished.unexplained(best) < options.bar.noticeable:
+        # What blocks miss there is what they do not see: shadows' edges.
+        findings = [one for one in findings if not isinstance(one, LightMissing)]
     if spec.count is not None and not any(isinstance(finding, LightSpare) for finding in findings):
         findings = (*findings, *faded_light(refiner, best, options))
     if spec.ambient:
         findings = (*findings, *ambient_found(polished.problem, best, options.bar))
     else:
         findings = (*findings, *ambient_missing(refiner, candidates, found.best, findings, options))
-    return _result(polished, best, findings, Costs.of(refiner, found.compared), options)
+    return _result(polished, best, findings, Costs.of(refiner, found.compared), options, others)
 
 
 def fit_from(
@@ -92,11 +101,19 @@ def fit_from(
 
 @dataclass(frozen=True)
 class _Searched:
-    """The rig that was chosen, what was found out on the way, and the rigs that were compared."""
+    """What a search ends with.
+
+    Attributes:
+        best: the rig that was chosen.
+        findings: what was found out on the way.
+        compared: by number of lights the rigs that were compared.
+        others: rigs that explain about as much, as far as blocks tell.
+    """
 
     best: State
     findings: tuple[Finding, ...]
     compared: Mapping[int, State]
+    others: tuple[State, ...]
 
 
 def _search(refiner: Refiner, candidates: Sequence[Candidates], options: SearchOptions, spec: LightSpec) -> _Searched:
@@ -108,16 +125,23 @@ def _search(refiner: Refiner, candidates: Sequence[Candidates], options: SearchO
     if spec.type == AUTO:
         best, kinds = told_kinds(refiner, found.best, spec, options)
         found = replace(found, best=best)
-    rival = rival_among(refiner, found.best, found.others, options)
+    best, tables = told_tables(refiner, found.best, spec, options)
+    best, beside = settled_beside(refiner, best, options)
+    if best is not found.best:
+        found = replace(found, best=best, compared={**found.compared, len(best.emitters): best})
+    rival = rival_among(refiner, best, found.others, options)
+    # Blocks err at shadows' edges: what leaves about as little there is left to the pixels.
+    others = [other for other in (*tables, *beside) if leaves_as_little(refiner, best, other, options.rivals)]
+    others += [] if rival is None else [rival]
     doubted = Doubted()
     if spec.count is not None:
         doubted = doubted_number(refiner, candidates, found.best, spec.count, options)
     compared = {**found.compared, **doubted.compared}
-    findings = (*([] if rival is None else [rival]), *doubted.findings, *kinds)
+    findings = (*doubted.findings, *kinds)
     if not any(isinstance(finding, LightMissing) for finding in findings):
         costs = Costs.of(refiner, compared)
         findings = (*findings, *costs.maybe_more(len(found.best.emitters), compared, options.bar))
-    return _Searched(found.best, findings, compared)
+    return _Searched(best, findings, compared, tuple(others))
 
 
 def _roughly_exposed(problem: LightProblem, coarse: Sequence[CoarseImages]) -> LightProblem:
@@ -154,13 +178,18 @@ def _told(state: State) -> tuple[Emitter, ...]:
 
 
 def _result(
-    refiner: Refiner, best: State, findings: Sequence[Finding], costs: Costs, options: SearchOptions
+    refiner: Refiner,
+    best: State,
+    findings: Sequence[Finding],
+    costs: Costs,
+    options: SearchOptions,
+    others: Sequence[State] = (),
 ) -> FitResult:
     problem, meter, last = refiner.problem, refiner.meter, refiner.step(best)
     spread = light_covariances(problem, best, options.certainty)
-    if not any(isinstance(finding, Rival) for finding in findings):
-        rival = rival_elsewhere(refiner, best, spread.calibrated, options)
-        findings = findings if rival is None else (rival, *findings)
+    rival = rival_polished(refiner, best, others, spread.calibrated, options)
+    rival = rival or rival_elsewhere(refiner, best, spread.calibrated, options)
+    findings = (*([] if rival is None else [rival]), *findings, *tables_open(refiner, best, others, options))
     return FitResult(
         lights=last.lights,
         findings=(*standing(refiner, best, spread.calibrated, options.certainty), *findings, *hanging(best)),

@@ -13,7 +13,7 @@ from rgspipe.fitting.options import BarOptions, RivalOptions, ScheduleOptions, S
 from rgspipe.fitting.search.compare import drop
 from rgspipe.fitting.search.refine import Refiner, State
 from rgspipe.fitting.search.weighting import ROBUST
-from rgspipe.fitting.selection.rivals import equally_good, rival_among, rival_elsewhere
+from rgspipe.fitting.selection.rivals import equally_good, rival_among, rival_elsewhere, rival_polished
 
 
 def refiner_of(room, point_light) -> Refiner:
@@ -68,4 +68,18 @@ def test_rivals_of_another_number_have_no_distance(room, point_light) -> None:
     one = placed(refiner, 0.02)
     two = refiner.start([emitter_at(torch.tensor(VISIBLE, dtype=torch.float64) + by) for by in (0.02, 0.1)], ROBUST)
     assert rival_among(refiner, one, [one], LENIENT) is None
-    assert rival_among(refiner, one, [one, two], LENIENT) == Rival(None)
+    rival = rival_among(refiner, one, [one, two], LENIENT)
+    assert rival is not None and len(rival.emitters) == 2
+    assert rival_polished(refiner, one, [rival], [torch.eye(6).double()], LENIENT) == Rival(None)
+
+
+def test_a_near_rival_is_one_where_the_region_does_not_hold_it(room, point_light) -> None:
+    """Nearer than lights that are clearly apart, and farther than those on their way to one place."""
+    refiner = refiner_of(room, point_light)
+    off, near, met = (placed(refiner, by) for by in (0.02, 0.04, 0.021))
+    for deviation, rival in ((0.001, Rival(0.02 * 3.0**0.5 / refiner.region.size)), (0.1, None)):
+        covariance = [deviation**2 * torch.eye(6, dtype=torch.float64)]
+        found = rival_polished(refiner, off, [near], covariance, LENIENT)
+        assert (found is None) == (rival is None)
+        assert found is None or found.distance == pytest.approx(rival.distance, rel=1e-6)
+        assert rival_polished(refiner, off, [met], covariance, LENIENT) is None

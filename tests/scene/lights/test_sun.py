@@ -9,6 +9,7 @@ import pytest
 import torch
 
 from lit_room import frozen_cube
+from rgspipe.fitting.certainty.regions import inside
 from rgspipe.light_export.world import World
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.rig import rig_irradiance
@@ -60,3 +61,21 @@ def test_its_image_is_that_of_a_point_far_away(glossy: bool) -> None:
 def test_its_irradiance_is_the_same_in_metres() -> None:
     (found,) = World(metres=10.0).lights((SunLight([1.0, 0.0, 0.0], COLOUR, AXIS),))
     assert torch.equal(found.intensity, COLOUR) and found.position.tolist() == [10.0, 0.0, 0.0]
+
+
+def test_its_region_holds_directions_as_far_off_as_it_says() -> None:
+    """Directions lie on a sphere, and not on the plane in which they spread."""
+    side = torch.linalg.cross(AXIS, torch.tensor([0.0, 0.0, 1.0], dtype=torch.float64))
+    side = side / side.norm()
+    across = torch.eye(3, dtype=torch.float64) - torch.outer(AXIS, AXIS)
+    sun = SunLight([0.0, 0.0, 0.0], COLOUR, AXIS)
+    for deviation in (1e-4, 0.03, 0.3):
+        covariance = torch.zeros(9, 9, dtype=torch.float64)
+        covariance[3:6, 3:6] = deviation**2 * across
+        for times, held in ((1.5, True), (3.5, False)):
+            angle = times * deviation
+            other = replace(sun, direction=math.cos(angle) * AXIS + math.sin(angle) * side)
+            places = [one.standing(2.0) for one in (sun, other)]
+            assert inside(places[:1], places[1:], [sun.standing_spread(covariance, 2.0)]) == held
+    covariance[3:6, 3:6] = torch.diag(torch.full((3,), math.inf))
+    assert not bool(torch.isnan(sun.standing_spread(covariance, 2.0)).any())

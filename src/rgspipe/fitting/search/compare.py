@@ -58,8 +58,8 @@ def _met(one: Sequence[Emitter], other: Sequence[Emitter], met: float, size: flo
     """Whether each light of a rig is where its counterpart is."""
     if len(one) != len(other):
         return False
-    pairs = _counterparts(one, other, size)
-    return all(a.light.kind == b.light.kind and a.distance(b, size) < met for a, b in pairs)
+    pairs = counterparts(one, other, size)
+    return all(a.light.same_sort(b.light) and a.distance(b, size) < met for a, b in pairs)
 
 
 def worth_keeping(state: State, bar: BarOptions, met: float, size: float) -> list[int]:
@@ -119,7 +119,7 @@ def rig_distance(one: Sequence[Emitter], other: Sequence[Emitter], size: float) 
     """The largest distance of a light from its counterpart, over the scene's size; infinite where numbers differ."""
     if len(one) != len(other):
         return math.inf
-    return max(_distance(first, second, size) for first, second in _counterparts(one, other, size))
+    return max(_distance(first, second, size) for first, second in counterparts(one, other, size))
 
 
 def _distance(one: Emitter, other: Emitter, size: float) -> float:
@@ -128,7 +128,7 @@ def _distance(one: Emitter, other: Emitter, size: float) -> float:
     return apart / size if size > 0.0 else 0.0
 
 
-def _counterparts(one: Sequence[Emitter], other: Sequence[Emitter], size: float) -> list[tuple[Emitter, Emitter]]:
+def counterparts(one: Sequence[Emitter], other: Sequence[Emitter], size: float) -> list[tuple[Emitter, Emitter]]:
     """The lights of one rig, each with one of another of as many lights, such that they are closest together."""
     if len(one) == 1:
         return [(one[0], other[0])]

@@ -127,6 +127,10 @@ class Refiner:
         """`LightProblem.unexplained`."""
         return self.problem.unexplained(state.columns, state.intensity)
 
+    def normal(self, state: State, weighting: Weighting) -> NormalEquations:
+        """What a step from `state` would solve, in the parameters of all lights."""
+        return _ProjectedRig(self, weighting).around(state).normal
+
     def weights(self, state: State, weighting: Weighting) -> Tensor:
         """Squared weights of reweighted least squares at the state's residual."""
         return weighting.at(self.problem, state.columns, state.intensity)

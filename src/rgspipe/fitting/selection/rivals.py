@@ -8,11 +8,14 @@ from collections.abc import Iterator, Sequence
 import torch
 from torch import Tensor
 
+from rgspipe.fitting.certainty.regions import inside
 from rgspipe.fitting.findings import Rival
 from rgspipe.fitting.model.problem import ROUNDING, LightProblem
 from rgspipe.fitting.options import RivalOptions, SearchOptions
 from rgspipe.fitting.search.compare import (
     best_state,
+    counterparts,
+    distinct,
     drop,
     energy_shares,
     rig_distance,
@@ -24,8 +27,8 @@ from rgspipe.fitting.search.weighting import PLAIN, ROBUST
 from rgspipe.machine.sums import average, total
 
 
-def rival_among(refiner: Refiner, best: State, others: Sequence[State], options: SearchOptions) -> Rival | None:
-    """One of the `others` that is another answer, if there is one; those that come near are refined first."""
+def rival_among(refiner: Refiner, best: State, others: Sequence[State], options: SearchOptions) -> State | None:
+    """One of the `others` that may be another answer, if there is one; those that come near are refined first."""
     problem, apart, size = refiner.problem, options.certainty.doubtful, refiner.region.size
     rivals = [state for state in others if rig_distance(state.emitters, best.emitters, size) > apart]
     if not rivals:
@@ -41,7 +44,32 @@ def rival_among(refiner: Refiner, best: State, others: Sequence[State], options:
     # The answer is one of plain squares, so a rival has to be one, too.
     other = refiner.refined(other, PLAIN, steps)
     clear = rig_distance(best.emitters, other.emitters, size) > apart
-    return _rival(refiner, best, other) if clear and _leaves_as_little(refiner, best, other, options.rivals) else None
+    return other if clear and leaves_as_little(refiner, best, other, options.rivals) else None
+
+
+def rival_polished(
+    refiner: Refiner, best: State, others: Sequence[State], covariance: Sequence[Tensor], options: SearchOptions
+) -> Rival | None:
+    """The nearest of other minima that explains as much as an answer, clearly apart or not held by its regions.
+
+    A covariance knows of one minimum. Another that explains as much is another answer, however near, unless the regions
+    of the first are wide enough for both.
+
+    Args:
+        refiner: on the problem that the answer was polished on.
+        others: polished on all pixels, too.
+        covariance: of each light of the answer, see `FitResult.covariance`.
+    """
+    size = refiner.region.size
+    _, *apart = distinct([best, *others], options.schedule.met, size)
+    for other in sorted(apart, key=lambda state: rig_distance(best.emitters, state.emitters, size)):
+        clear = rig_distance(best.emitters, other.emitters, size) > options.certainty.doubtful
+        if clear or not _regions_hold(best, other, covariance, size):
+            # They may have found other exposures.
+            other = refiner.start(other.emitters, PLAIN, other)
+            if as_good(refiner, best, other, options.rivals):
+                return _rival(refiner, best, other)
+    return None
 
 
 def rival_elsewhere(
@@ -55,11 +83,19 @@ def rival_elsewhere(
         refiner: on the problem that the answer was polished on.
         covariance: of each light, see `FitResult.covariance`; infinite where nothing is determined.
     """
-    rivals = options.rivals
     for other in _moved(refiner, best, covariance, options):
-        if equally_good(refiner.problem, best, other, rivals) and _leaves_as_little(refiner, best, other, rivals):
+        if as_good(refiner, best, other, options.rivals):
             return _rival(refiner, best, other)
     return None
+
+
+def _regions_hold(best: State, other: State, covariance: Sequence[Tensor], size: float) -> bool:
+    """Whether the regions around the lights of an answer hold those of another rig."""
+    one, two = zip(*counterparts(best.emitters, other.emitters, size), strict=True)
+    order = [next(k for k, emitter in enumerate(best.emitters) if emitter is first) for first in one]
+    spreads = [first.light.standing_spread(covariance[k], size) for first, k in zip(one, order, strict=True)]
+    places = ([emitter.light.standing(size) for emitter in rig] for rig in (one, two))
+    return inside(*places, spreads)
 
 
 def _rival(refiner: Refiner, best: State, other: State) -> Rival:
@@ -80,7 +116,12 @@ def _moved(refiner: Refiner, best: State, covariance: Sequence[Tensor], options:
                     yield refiner.start(rig, PLAIN)
 
 
-def _leaves_as_little(refiner: Refiner, best: State, other: State, options: RivalOptions) -> bool:
+def as_good(refiner: Refiner, best: State, other: State, options: RivalOptions) -> bool:
+    """Whether `other` explains the target as well as `best` by either loss."""
+    return equally_good(refiner.problem, best, other, options) and leaves_as_little(refiner, best, other, options)
+
+
+def leaves_as_little(refiner: Refiner, best: State, other: State, options: RivalOptions) -> bool:
     """Whether `other` leaves about as little of the energy unexplained as `best`, or nothing but rounding."""
     return refiner.unexplained(other) <= options.energy * max(refiner.unexplained(best), ROUNDING**2)
 

@@ -144,6 +144,10 @@ class Light(ByValue, ABC):
         """The same light by the numbers that are nearest to those of another of its kind."""
         return self
 
+    def same_sort(self, other: Light) -> bool:
+        """Whether one becomes the other by moving: lights of other kinds, and other measured luminaires, do not."""
+        return self.kind == other.kind
+
     def nodes(self, values: Mapping[str, Tensor], few: bool = False) -> Nodes | None:
         """The points that it is made of; None if it stands in one.
 

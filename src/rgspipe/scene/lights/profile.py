@@ -96,6 +96,9 @@ class ProfileLight(AxialLight):
         placed = super().in_place_of(found)
         return replace(placed, table=found.table) if isinstance(found, ProfileLight) else placed
 
+    def same_sort(self, other: Light) -> bool:
+        return isinstance(other, ProfileLight) and (self.table is other.table or self.table == other.table)
+
     def coordinates(self, shape_free: bool = False) -> dict[str, Coordinate]:
         """The turn is a part of how it hangs, and always looked for."""
         return super().coordinates(shape_free=True)

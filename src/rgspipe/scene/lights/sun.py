@@ -47,7 +47,14 @@ class SunLight(Light):
         return -size * torch.nn.functional.normalize(self.direction, dim=0)
 
     def standing_spread(self, covariance: Any, size: float) -> Any:
-        return size**2 * covariance[3:6, 3:6]
+        """Directions lie on a sphere, so one that is off by an angle e stands e²/2 short of the plane that touches."""
+        spread = torch.as_tensor(covariance, dtype=torch.float64)[3:6, 3:6]
+        if not bool(torch.isfinite(spread).all()):
+            return size**2 * spread
+        # The mean of (e²/2)² where both parts of e are normal.
+        short = 0.25 * (spread.trace().square() + 2.0 * (spread @ spread).trace())
+        axis = torch.nn.functional.normalize(self.direction.to(spread), dim=0)
+        return size**2 * (spread + short * torch.outer(axis, axis))
 
     def nodes(self, values: Mapping[str, Tensor], few: bool = False) -> Nodes:
         return Nodes(-torch.nn.functional.normalize(values["direction"], dim=0)[None], distant=True)
