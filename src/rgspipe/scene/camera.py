@@ -44,10 +44,10 @@ class Camera(ByValue):
         check_finite(pose, "camera_to_world", "Check where the camera stands and where it looks.")
         check_rigid(pose.detach().cpu().numpy(), "camera_to_world")
         object.__setattr__(self, "camera_to_world", pose)
-        for name in ("fx", "fy"):
-            _check_focal_length(name, getattr(self, name))
         for name in ("width", "height"):
             object.__setattr__(self, name, _pixels(name, getattr(self, name)))
+        for name in ("fx", "fy"):
+            _check_focal_length(name, getattr(self, name))
 
     @classmethod
     def look_at(

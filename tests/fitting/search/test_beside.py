@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 import torch
 
 from emitters import emitter_at
 from lit_room import VISIBLE
+from rgspipe.fitting.findings import FitStatus
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.options import SearchOptions
 from rgspipe.fitting.search.beside import _behind_a_rise, minima_beside, settled_beside
@@ -29,7 +32,9 @@ def refiner(room, point_light) -> Refiner:
 
 
 def test_no_minimum_is_beside_the_truth(refiner: Refiner) -> None:
-    true = refiner.start([emitter_at(torch.tensor(VISIBLE, dtype=torch.float64))], PLAIN)
+    true = replace(
+        refiner.start([emitter_at(torch.tensor(VISIBLE, dtype=torch.float64))], PLAIN), status=FitStatus.CONVERGED
+    )
     best, beside = settled_beside(refiner, true, OPTIONS)
     # Eight places on either side, and no descent.
     assert best is true and beside == () and refiner.meter.evaluations == 17 and refiner.meter.iterations == 0
@@ -37,7 +42,9 @@ def test_no_minimum_is_beside_the_truth(refiner: Refiner) -> None:
 
 def test_pixels_are_asked_only_where_blocks_do_not_tell(refiner: Refiner) -> None:
     """Beside the truth everything leaves many times as much: two steps on blocks, and none on pixels."""
-    true = refiner.start([emitter_at(torch.tensor(VISIBLE, dtype=torch.float64))], PLAIN)
+    true = replace(
+        refiner.start([emitter_at(torch.tensor(VISIBLE, dtype=torch.float64))], PLAIN), status=FitStatus.CONVERGED
+    )
     before = refiner.meter.evaluations
     assert settled_beside(refiner, true, OPTIONS, blocks=refiner) == (true, ())
     assert refiner.meter.evaluations - before == 3  # The answer on blocks, once, and a step on either side.
@@ -45,5 +52,6 @@ def test_pixels_are_asked_only_where_blocks_do_not_tell(refiner: Refiner) -> Non
 
 def test_what_is_no_minimum_is_left(refiner: Refiner) -> None:
     off = refiner.start([emitter_at(torch.tensor(VISIBLE, dtype=torch.float64) + 0.05)], PLAIN)
+    assert settled_beside(refiner, off, OPTIONS) == (off, ())  # its steps ran out, so that it is none
     best, *_ = minima_beside(refiner, off, OPTIONS)
     assert refiner.unexplained(best) < 1e-6 * refiner.unexplained(off)  # measured 6e-13

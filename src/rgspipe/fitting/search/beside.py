@@ -14,6 +14,7 @@ from itertools import takewhile
 import torch
 from torch import Tensor
 
+from rgspipe.fitting.findings import FitStatus
 from rgspipe.fitting.options import SearchOptions
 from rgspipe.fitting.search.compare import distinct
 from rgspipe.fitting.search.moves import moved_rig
@@ -31,6 +32,8 @@ def settled_beside(
         blocks: on the blocks of the same fit, if `refiner` is on pixels, which take long: they are asked only as far as
             blocks leave about as little as at the answer.
     """
+    if answer.status is FitStatus.MAX_ITERATIONS:  # what is no minimum has none beside it
+        return answer, ()
     best, *others = minima_beside(refiner, answer, options, blocks)
     if best is answer:
         return answer, tuple(others)
