@@ -16,8 +16,7 @@ from scipy.ndimage import binary_closing, binary_opening, label
 from scipy.spatial import cKDTree
 
 from rgspipe.completion.free_space import Grid, SeenSpace
-from rgspipe.completion.planes import Plane
-from rgspipe.completion.rasters import ACROSS, BARE, BEYOND, Continued, Raster, Sheet, are_near
+from rgspipe.completion.rasters import ACROSS, BARE, BEYOND, Continued, Sheet, are_near
 
 #: Fewest places along an edge: what a side of the smallest plane has.
 SHORTEST = 4
@@ -60,28 +59,77 @@ class _Edge:
     sheet: Sheet
 
 
+@dataclass(frozen=True)
+class _WayBack:
+    """What is met on the way back from an edge.
+
+    Attributes:
+        edge: of E places, from each of which it goes D steps.
+        places: (E · D, 3).
+        met: (E, D) bool, surfaces, or the end of the box.
+        seen_through: (E, D) bool, a camera saw something behind.
+    """
+
+    edge: _Edge
+    places: np.ndarray
+    met: np.ndarray
+    seen_through: np.ndarray
+
+    @classmethod
+    def of(cls, edge: _Edge, centers: np.ndarray, grid: Grid, space: SeenSpace) -> _WayBack:
+        spacing = edge.sheet.raster.spacing
+        steps = np.arange(0.5, np.linalg.norm((grid.upper - grid.lower).numpy()) / spacing) * spacing
+        places = (edge.places[:, None] + steps[:, None] * edge.inward).reshape(-1, 3)
+        others = np.delete(centers, edge.sheet.plane.members.numpy(), axis=0)
+        met = ~grid.contains(places) | are_near(others, places, BARE * spacing)
+        behind = torch.from_numpy(places - BEYOND * spacing * edge.outward)
+        seen_through = space.holds(behind, 0.0).numpy().reshape(len(edge.places), len(steps))
+        # Rays that graze the edge are taken to pass behind it.
+        return cls(edge, places, met.reshape(seen_through.shape), seen_through & (steps > GRAZED * spacing))
+
+    def face(self, others: Sequence[Continued]) -> Continued:
+        """The places of the face behind the edge, up to what it meets, as `others` that are not along it.
+
+        Where a camera looked through it before it met anything there is none: what was seen through a door is no
+        inside.
+        """
+        outward, met = self.edge.outward, self.met
+        across = [other.places for other in others if len(other) and abs(float(other.normals[0] @ outward)) < ACROSS]
+        if across:
+            near = are_near(np.concatenate(across), self.places, CUT * self.edge.sheet.raster.spacing)
+            met = met | near.reshape(met.shape)
+        stops, steps = met | self.seen_through, met.shape[1]
+        first = np.where(stops.any(axis=1), stops.argmax(axis=1), steps)
+        is_met = met[np.arange(len(met)), first.clip(max=steps - 1)]
+        kept = binary_opening((np.arange(steps) < first[:, None]) & is_met[:, None], np.ones((3, 3))).reshape(-1)
+        return Continued(self.places[kept], np.broadcast_to(outward, (int(kept.sum()), 3)).copy())
+
+
 def hidden_faces(
-    planes: Sequence[Plane], centers: np.ndarray, grid: Grid, space: SeenSpace, spacing: float
+    sheets: Sequence[Sheet], centers: np.ndarray, grid: Grid, space: SeenSpace, spacing: float
 ) -> list[Continued]:
-    """For each of the planes the faces behind its edges.
+    """For each of the sheets the faces behind its edges.
 
     Args:
-        planes: of surfels at `centers` (N, 3).
+        sheets: of surfels at `centers` (N, 3), their places along the room.
         grid: its box is all that there is.
         space: what cameras looked through.
     """
-    edges = []
-    for plane, ways in zip(planes, _ways(planes, centers, spacing), strict=True):
-        sheets = [Sheet.of(plane, centers, grid, space, spacing, along) for along in ways]
-        edges += _longest(edge for sheet in sheets for edge in _edges(sheet))
-    # First each as if there were no others, then up to these.
-    whole = [_face(edge, centers, grid, space, []) for edge in edges]
-    faces = [_face(edge, centers, grid, space, [*whole[:i], *whole[i + 1 :]]) for i, edge in enumerate(edges)]
-    faces = _once(faces, spacing)
-    return [
-        Continued.joined([face for face, edge in zip(faces, edges, strict=True) if edge.sheet.plane is plane])
-        for plane in planes
+    ways = _ways(sheets, spacing)
+    turned = [
+        [Sheet.of(sheet.plane, centers, grid, space, spacing, along) for along in other]
+        for sheet, other in zip(sheets, ways, strict=True)
     ]
+    edges = [
+        _longest(edge for one in (sheet, *more) for edge in _edges(one))
+        for sheet, more in zip(sheets, turned, strict=True)
+    ]
+    ways_back = [_WayBack.of(edge, centers, grid, space) for own in edges for edge in own]
+    # First each as if there were no others, then up to these.
+    whole = [way.face([]) for way in ways_back]
+    faces = _once([way.face([*whole[:i], *whole[i + 1 :]]) for i, way in enumerate(ways_back)], spacing)
+    rest = iter(faces)
+    return [Continued.joined([next(rest) for _ in own]) for own in edges]
 
 
 def _once(faces: Sequence[Continued], spacing: float) -> list[Continued]:
@@ -95,26 +143,23 @@ def _once(faces: Sequence[Continued], spacing: float) -> list[Continued]:
     return left
 
 
-def _ways(planes: Sequence[Plane], centers: np.ndarray, spacing: float) -> Iterator[list[np.ndarray]]:
-    """For each plane how its edges may run: as the room does, and along the planes that it touches."""
-    trees = [cKDTree(centers[plane.members.numpy()]) for plane in planes]
-    for plane, tree in zip(planes, trees, strict=True):
-        normal, found = plane.normal.numpy(), [_unit(Raster.along_room(plane.normal.numpy()))]
-        for other, near in zip(planes, trees, strict=True):
-            along = np.cross(normal, other.normal.numpy())
+def _ways(sheets: Sequence[Sheet], spacing: float) -> list[list[np.ndarray]]:
+    """For each sheet how its edges may run besides along its rows and across: as the planes do that it touches."""
+    trees, found = [cKDTree(sheet.centers) for sheet in sheets], []
+    for sheet, tree in zip(sheets, trees, strict=True):
+        known = [sheet.raster.axes[0]]
+        for other, near in zip(sheets, trees, strict=True):
+            along = np.cross(sheet.raster.normal, other.raster.normal)
             length = float(np.linalg.norm(along))
             if length**2 < 1.0 - ACROSS**2 or not tree.count_neighbors(near, TOUCHING * spacing):
                 continue
             along = along / length
             # Edges that are at right angles are found with the same raster.
-            turns = [abs(float(np.linalg.norm(np.cross(along, one)) * (along @ one))) for one in found]
+            turns = [abs(float(np.linalg.norm(np.cross(along, one)) * (along @ one))) for one in known]
             if min(turns) > SAME:
-                found.append(along)
-        yield found
-
-
-def _unit(vector: np.ndarray) -> np.ndarray:
-    return vector / np.linalg.norm(vector)
+                known.append(along)
+        found.append(known[1:])
+    return found
 
 
 def _longest(edges: Iterable[_Edge]) -> list[_Edge]:
@@ -175,29 +220,3 @@ def _reach(run: np.ndarray, goes_on: np.ndarray) -> np.ndarray:
     """The rows of a run, and those before and after it along which the surface goes on, seen or not."""
     labels, _ = label(goes_on | np.isin(np.arange(len(goes_on)), run))
     return np.flatnonzero(labels == labels[run[0]])
-
-
-def _face(edge: _Edge, centers: np.ndarray, grid: Grid, space: SeenSpace, others: Sequence[Continued]) -> Continued:
-    """The places of the face behind an edge, up to what it meets: surfaces, `others` that are not along it, or the box.
-
-    Where a camera looked through it before it met anything there is none: what was seen through a door is no inside.
-    """
-    spacing = edge.sheet.raster.spacing
-    steps = np.arange(0.5, np.linalg.norm((grid.upper - grid.lower).numpy()) / spacing) * spacing
-    places = (edge.places[:, None] + steps[:, None] * edge.inward).reshape(-1, 3)
-    shape = (len(edge.places), len(steps))
-    obstacles = np.delete(centers, edge.sheet.plane.members.numpy(), axis=0)
-    met = ~grid.contains(places) | are_near(obstacles, places, BARE * spacing)
-    across = [other.places for other in others if len(other) and abs(float(other.normals[0] @ edge.outward)) < ACROSS]
-    if across:
-        met |= are_near(np.concatenate(across), places, CUT * spacing)
-    seen_through = space.holds(torch.from_numpy(places - BEYOND * spacing * edge.outward), 0.0).numpy()
-    # Rays that graze the edge are taken to pass behind it.
-    seen_through = seen_through.reshape(shape) & (steps > GRAZED * spacing)
-    ends = met.reshape(shape)
-    stops = ends | seen_through
-    first = np.where(stops.any(axis=1), stops.argmax(axis=1), len(steps))
-    is_met = ends[np.arange(shape[0]), first.clip(max=len(steps) - 1)]
-    kept = (np.arange(len(steps)) < first[:, None]) & is_met[:, None]
-    kept = binary_opening(kept, np.ones((3, 3)))
-    return Continued(places[kept.reshape(-1)], np.broadcast_to(edge.outward, (int(kept.sum()), 3)).copy())

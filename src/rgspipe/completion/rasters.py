@@ -15,7 +15,7 @@ from rgspipe.completion.planes import Plane
 BARE = 1.1
 
 #: Neighbours that a surfel has at the distance of neighbours.
-AROUND = 4
+NEIGHBOURS = 4
 
 #: Cosine of the angle from which on two surfaces are along each other.
 ACROSS = 0.7
@@ -72,18 +72,12 @@ class Raster:
     normal: np.ndarray
     spacing: float
 
-    @staticmethod
-    def along_room(normal: np.ndarray) -> np.ndarray:
-        """(3,) the room's axis that lies in a plane best."""
-        axis = np.eye(3)[np.abs(normal).argmin()]
-        return axis - (axis @ normal) * normal
-
     @classmethod
     def on_plane(
         cls, normal: np.ndarray, offset: float, grid: Grid, spacing: float, along: np.ndarray | None = None
     ) -> Raster:
         """Over all of a box; rows follow `along` (3,), or else the room's axis that lies in the plane best."""
-        along = Raster.along_room(normal) if along is None else along
+        along = np.eye(3)[np.abs(normal).argmin()] if along is None else along
         u = along - (along @ normal) * normal
         u /= np.linalg.norm(u)
         v = np.cross(normal, u)
@@ -150,7 +144,7 @@ class Sheet:
         raster = Raster.on_plane(plane.normal.numpy(), plane.offset, grid, spacing, along)
         own = centers[plane.members.numpy()]
         # Where surfels are farther apart than elsewhere there are no holes between them.
-        apart = max(spacing, float(np.median(cKDTree(own).query(own, k=AROUND + 1)[0][:, AROUND])))
+        apart = max(spacing, float(np.median(cKDTree(own).query(own, k=NEIGHBOURS + 1)[0][:, NEIGHBOURS])))
         supported = raster.near(own, BARE * apart / spacing)
         return cls(plane, raster, own, supported, raster.within(grid), raster.crossed(space))
 

@@ -27,7 +27,7 @@ TRIED, PARTNERS, FAR = 128, 4, 8.0
 ASKEW, APART = math.radians(10.0), math.radians(20.0)
 
 #: Sectors around an axis, and how many of them in a row must have surfels: of a box, whose sides have normals through
-#: its middle, too, no three have.
+#: its middle, too, no more than three have.
 SECTORS, ROUND = 24, 5
 
 #: Fewest surfels in each of these sectors, and fewest of a thing: less is no shape.
@@ -66,7 +66,7 @@ class Revolved:
         for height, radius, (out, up) in zip(self.heights, self.radii, self.slopes, strict=True):
             turns = np.linspace(0.0, 2.0 * np.pi, max(3, round(2.0 * np.pi * radius / spacing)), endpoint=False)
             ring = np.stack([np.cos(turns), np.sin(turns)], axis=1)
-            level = np.full((len(ring), 1), 1.0)
+            level = np.ones((len(ring), 1))
             places = np.hstack([self.axis + radius * ring, height * level])
             parts.append(Continued(places, np.hstack([out * ring, up * level])))
         return Continued.joined(parts)
@@ -215,12 +215,12 @@ def _profiled(
     known = np.unique(level)
     radii = np.interp(np.arange(len(levels)), known, [np.median(radius[level == one]) for one in known])
     kept = np.abs(radius - radii[level]) < OFF * spacing
+    if (ball := _ball(centers[members[kept]], normals[members[kept]], axis, spacing)) is not None:
+        return Revolved(axis, members[kept], *ball)
     # What touches a thing stands on one side of it.
     _, sector = _around(centers[members], normals[members], axis, np.inf)
     sectors = np.array([len(np.unique(sector[kept & (level == one)])) for one in range(len(levels))])
     told = np.flatnonzero(sectors >= TOLD)
-    if (ball := _ball(centers[members[kept]], normals[members[kept]], axis, spacing)) is not None:
-        return Revolved(axis, members[kept], *ball)
     first, last = (told[0], told[-1] + 1) if len(told) else (0, 0)
     slope = np.gradient(radii, levels) if len(levels) > 1 else np.zeros(len(levels))
     slopes = np.stack([np.ones(len(levels)), -slope], axis=1)

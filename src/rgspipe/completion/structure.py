@@ -32,7 +32,7 @@ def continued(
         is_room: whether there may be walls at the box's sides.
     """
     sheets = [Sheet.of(plane, centers, grid, space, spacing) for plane in planes]
-    faces = hidden_faces(planes, centers, grid, space, spacing)
+    faces = hidden_faces(sheets, centers, grid, space, spacing)
     thing = [_whole(sheet) for sheet, own in zip(sheets, faces, strict=True) if len(own)]
     solids = Solids(Continued.joined([*faces, *thing]))
     inner = Continued.joined([*(_beyond(sheet, solids) for sheet in sheets), *faces])
