@@ -152,7 +152,7 @@ def process(seed: int, index: int) -> tuple[str, str]:
     if ended.returncode == 0 and "Traceback" not in told:
         return "done", ""
     # Options that Hydra does not have are refused by argparse, with a small e.
-    if ended.returncode == 2 and "Traceback" not in told and "rror: " in told:
+    if ended.returncode == 2 and "Traceback" not in told and "rror:" in told:
         return "refused", ""
     return "fell", f"{words} {extra}\nexit status {ended.returncode}\n{told[-2000:]}"
 

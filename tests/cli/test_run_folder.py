@@ -49,10 +49,11 @@ def test_no_job_at_once_is_refused() -> None:
         run_jobs(["stage=freeze", "seed=1,2", "hydra.launcher.n_jobs=0"], load_stage, multirun=True)
 
 
-def test_a_launcher_that_is_no_name_is_refused() -> None:
-    """Whether runs leave the machine is asked before anything is composed."""
+@pytest.mark.parametrize("word", ["launcher=null", "+launcher=17"])
+def test_a_launcher_that_is_no_name_is_refused(word: str) -> None:
+    """Whether runs leave the machine, and which keys there are, is asked before anything is composed."""
     with pytest.raises(InputError, match="launcher=NAME"):
-        run_jobs(["stage=freeze", "launcher=null"], load_stage, multirun=False)
+        run_jobs(["stage=freeze", word], load_stage, multirun=False)
 
 
 @pytest.mark.parametrize("words", [["stage=freeze"], ["-m", "stage=freeze", "seed=1,2"], ["status"], ["demo"]])

@@ -90,9 +90,10 @@ def compose_config(overrides: Sequence[str]) -> RgspipeConfig:
         InputError: an override is misspelt, of the wrong type or out of range.
     """
     parsed = _parse(overrides)
-    _check_keys(parsed)
     _check_single(parsed)
+    # Before the keys: which of them exist depends on the launcher that is chosen.
     _check_choices(parsed)
+    _check_keys(parsed)
     try:
         return typed(_compose(overrides))
     except (HydraException, OmegaConfBaseException) as error:
@@ -171,7 +172,7 @@ def _parse(overrides: Sequence[str]) -> list[Override]:
             parsed += OverridesParser.create().parse_overrides([text])
         except OverrideParseException:
             raise InputError(
-                repr(text),
+                repr(_shown(text)),
                 expected="key=value",
                 found="text that does not parse",
                 remedy="Quote values with special characters, such as key='\"a b\"'; lists are written [1,2].",
@@ -244,12 +245,15 @@ def _check_choices(overrides: Iterable[Override]) -> None:
         key = override.key_or_group
         folder = resource_folder("conf") / key
         is_group = key.startswith("hydra/") or ("." not in key and folder.is_dir())
-        if not is_group or _may_be_name(override.value()):
+        if not is_group or override.is_delete() or _may_be_name(override.value()):
             continue
         options = ", ".join(sorted(path.stem for path in folder.glob("*.yaml"))) or "those that Hydra has"
-        found = (override.input_line or "").partition("=")[2]
-        found = found if len(found) <= LONGEST_NAME else f"{found[:LONGEST_NAME]}…"
+        found = _shown((override.input_line or "").partition("=")[2])
         raise InputError(key, expected=f"one of {options}", found=found, remedy=f"Choose one: {key}=NAME.")
+
+
+def _shown(text: str) -> str:
+    return text if len(text) <= LONGEST_NAME else f"{text[:LONGEST_NAME]}…"
 
 
 def _may_be_name(value: object) -> bool:
