@@ -140,7 +140,8 @@ NAN_MATRIX = [[float("nan"), 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
         (_frame(camera_intrinsics=[3, 2, -5, 5]), "focal lengths above 0"),
         (_frame(camera_intrinsics=[64, 64, 100, 100]), r"r_0000\.exr.*principal point.*6 × 4"),
         (_frame(w=128, h=128), r'r_0000\.exr.*"w": 128.*6 × 4'),
-        (_frame(camera_intrinsics=..., camera_angle_x=4), "camera_angle_x.*between 0 and π"),
+        (_frame(camera_intrinsics=..., camera_angle_x=4), "camera_angle_x.*between 1e-06 and π"),
+        (_frame(camera_intrinsics=..., camera_angle_x=1e-320), "camera_angle_x.*between 1e-06 and π"),
         (_frame(pl_pos=[0, 0, 1e308]), r"pl_pos.*within"),
         (_frame(pl_intensity=1e308), r"pl_intensity.*up to"),
         (

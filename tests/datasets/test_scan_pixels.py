@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import struct
+import tracemalloc
 import zlib
 from dataclasses import replace
 from pathlib import Path
@@ -127,6 +128,18 @@ def test_smaller_images_are_means_and_depth_of_planes_stays_in_them() -> None:
     miss = np.abs(depth / coarse.depth.numpy() - 1.0)
     # Within faces a median of 16 pixels is the middle of the plane: measured 2e-5; edges are the rest.
     assert np.quantile(miss, 0.9) < 1e-4
+
+
+def test_an_image_of_one_row_costs_what_its_pixels_cost() -> None:
+    """30 000 columns become 8: 3750² samples in each pixel, as many rows as columns, took gigabytes."""
+    wide = Lens(30_000.0, 30_000.0, 15_000.0, 0.5, 30_000, 1)
+    depth = np.full((1, 30_000), 2.0, np.float32)
+    tracemalloc.start()
+    found = resampled_depth(depth, straight_camera(wide, np.eye(4), 8, Path("wide.png")), wide)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert found.shape == (1, 8) and np.all(found == 2.0)
+    assert peak < 2**29  # Measured: 234 MiB.
 
 
 def test_lines_that_a_lens_bends_are_straight_again() -> None:

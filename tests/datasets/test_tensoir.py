@@ -89,6 +89,7 @@ def test_the_folder_is_taken_and_training_on_it_says_what_is_missing(tensoir: Pa
         ({"cam_transform_mat": ",".join(["1"] * 16)}, "cam_transform_mat: expected a rigid"),
         ({"cam_transform_mat": None}, "cam_transform_mat"),
         ({"cam_angle_x": 4.0}, "cam_angle_x"),
+        ({"cam_angle_x": 1e-320}, "cam_angle_x"),
         ({"imw": 800}, "imw: expected 6"),
     ],
 )

@@ -8,6 +8,7 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
+from rgspipe.datasets.field_of_view import camera_of_angle
 from rgspipe.datasets.input_file import is_plain_name
 from rgspipe.datasets.json_file import is_number, numbers, read_json, required, shown
 from rgspipe.datasets.limits import STRONGEST
@@ -150,11 +151,7 @@ class FrameEntry:
                 found="neither",
                 remedy="Add one of them.",
             )
-        angle = holder["camera_angle_x"]
-        if not is_number(angle) or not 0 < angle < torch.pi:
-            place = f"{self.where}: camera_angle_x"
-            raise InputError(place, expected="radians between 0 and π", found=repr(angle), remedy="Correct it.")
-        return Camera.from_field_of_view(pose, float(angle), width, height)
+        return camera_of_angle(pose, holder["camera_angle_x"], width, height, f"{self.where}: camera_angle_x")
 
     def _refuse_distortion(self) -> None:
         """Images of lenses that bend straight lines are not of the cameras that are known here."""

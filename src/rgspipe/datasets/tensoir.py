@@ -14,8 +14,9 @@ import torch
 from torch import Tensor
 
 from rgspipe.datasets.display_image import read_display_colour
+from rgspipe.datasets.field_of_view import camera_of_angle
 from rgspipe.datasets.images import check_size, read_colour
-from rgspipe.datasets.json_file import is_number, read_json, required
+from rgspipe.datasets.json_file import read_json, required
 from rgspipe.datasets.rigid_pose import rigid_pose
 from rgspipe.datasets.views import Dataset, View
 from rgspipe.errors import InputError
@@ -106,16 +107,13 @@ def _camera(path: Path, image: Tensor) -> Camera:
         raise InputError(place, expected="16 numbers with commas", found=repr(text)[:120], remedy="Correct it.")
     pose = rigid_pose([values[row : row + 4] for row in range(0, 16, 4)], place)
     angle = required(content, "cam_angle_x", path)
-    if not is_number(angle) or not 0 < angle < torch.pi:
-        place = f"{path}: cam_angle_x"
-        raise InputError(place, expected="radians between 0 and π", found=repr(angle), remedy="Correct it.")
     height, width = image.shape[:2]
     for key, found in (("imw", width), ("imh", height)):
         stated = content.get(key, found)
         if stated != found:
             remedy = "Correct it, or export the image at this size."
             raise InputError(f"{path}: {key}", expected=f"{found}, as the image has", found=repr(stated), remedy=remedy)
-    return Camera.from_field_of_view(pose, float(angle), width, height)
+    return camera_of_angle(pose, angle, width, height, f"{path}: cam_angle_x")
 
 
 def _albedo(path: Path, camera: Camera) -> Tensor:

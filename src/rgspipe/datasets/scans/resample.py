@@ -69,16 +69,23 @@ def resampled_depth(depth: npt.NDArray[np.float32], camera: Camera, lens: Lens) 
 
 
 def _samples(camera: Camera, lens: Lens) -> Iterator[tuple[slice, Numbers, Numbers]]:
-    """By rows of the camera, where (R, W, s²) places in its pixels are in the lens's image, as dense as that is."""
-    s = max(1, int(np.ceil(max(lens.width / camera.width, lens.height / camera.height) - 1e-9)))
-    step = (np.arange(s) + 0.5) / s
-    down, across = (part.reshape(-1) for part in np.meshgrid(step, step, indexing="ij"))
+    """By rows of the camera, where (R, W, S) places in its pixels are in the lens's image, as dense as that is."""
+    counts = [max(1, int(np.ceil(ratio - 1e-9))) for ratio in (lens.height / camera.height, lens.width / camera.width)]
+    # As dense both ways as the denser one, but that an image of one row is not looked at in as many rows as columns.
+    most = MOST_SAMPLES // (camera.width * max(counts))
+    steps = [min(max(counts), max(count, most)) for count in counts]
+    down, across = (part.reshape(-1) for part in np.meshgrid(*map(_within, steps), indexing="ij"))
     x = (np.arange(camera.width)[:, None] + across - camera.cx) / camera.fx
-    height = max(1, MOST_SAMPLES // (camera.width * s * s))
+    height = max(1, MOST_SAMPLES // (camera.width * len(across)))
     for first in range(0, camera.height, height):
         rows = slice(first, min(first + height, camera.height))
         y = (np.arange(rows.start, rows.stop)[:, None, None] + down - camera.cy) / camera.fy
         yield rows, *lens.places(*np.broadcast_arrays(x[None], y))
+
+
+def _within(count: int) -> Numbers:
+    """(s,) so many places evenly within a pixel."""
+    return (np.arange(count) + 0.5) / count
 
 
 def _corners(

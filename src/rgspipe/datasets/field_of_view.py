@@ -1,0 +1,30 @@
+"""Cameras that files describe by their field of view."""
+
+from __future__ import annotations
+
+import math
+
+from torch import Tensor
+
+from rgspipe.datasets.json_file import is_number, shown
+from rgspipe.errors import InputError
+from rgspipe.scene import Camera
+
+#: Radians across the narrowest image: telescopes see a hundred times as much, and focal lengths stay finite.
+NARROWEST = 1e-6
+
+
+def camera_of_angle(pose: Tensor, angle: object, width: int, height: int, place: str) -> Camera:
+    """A camera with square pixels and `angle` radians across its width.
+
+    Args:
+        pose: (4, 4) camera to world.
+        place: file and key of the angle.
+
+    Raises:
+        InputError: no lens has this angle.
+    """
+    if not is_number(angle) or not NARROWEST <= angle < math.pi:
+        expected = f"radians between {NARROWEST:g} and π"
+        raise InputError(place, expected=expected, found=shown(angle), remedy="Correct it.")
+    return Camera.from_field_of_view(pose, float(angle), width, height)
