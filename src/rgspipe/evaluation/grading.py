@@ -117,7 +117,7 @@ def graded_words(grade: SceneGrade) -> str:
     told = [words for size, words in sorted(parts, reverse=True) if size >= LEAST]
     if grade.lamp_error is not None:
         off = f"{100.0 * grade.lamp_error:.1f} % off"
-        told.insert(0, f"{grade.lamps} known lamps are found {off} from one view each")
+        told.insert(0, f"{grade.lamps} known lamps are found {off}, each from one view")
     reasons = "; ".join(told)
     error = f"lights are expected to be {100.0 * grade.error:.1f} % of its size off"
     words = f"The scene is {grade.grade}: {error}" + (f" ({reasons})." if reasons else ".")
