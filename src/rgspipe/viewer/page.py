@@ -9,6 +9,7 @@ import viser
 from rgspipe.evaluation.images import Bytes
 from rgspipe.scene import Camera
 from rgspipe.viewer.cameras import camera_of, pose_of
+from rgspipe.viewer.drawing_controls import DrawingControls
 from rgspipe.viewer.drawings import Drawings
 from rgspipe.viewer.fit_controls import FitControls
 from rgspipe.viewer.lamp_controls import LampControls
@@ -46,6 +47,8 @@ class Page:
             self.lamps = LampControls(visit)
         with gui.add_folder("picture", expand_by_default=wide):
             self.picture = PictureControls(visit)
+        with gui.add_folder("drawn", expand_by_default=False):
+            DrawingControls(client, self._drawings)
         with gui.add_folder("save", expand_by_default=False):
             Saving(visit)
         self._go_to(exhibit.camera)
