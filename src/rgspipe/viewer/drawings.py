@@ -19,9 +19,9 @@ FRUSTUM, TRUTH, OTHER = 0.06, 0.015, 0.009
 #: What can be hidden together: by the name of its node a label and a line of help.
 KINDS = {
     "found": ("regions", "Where found lamps are with 95 % probability, in orange."),
-    "others": ("alternatives", "Lamps that the search weighed and ruled out (grey) or could not (red), and why."),
-    "way": ("way", "The way of the search, in blue."),
-    "truth": ("truth", "True places of the lamps where they are known, in green."),
+    "others": ("alternatives", "Lamps that the search ruled out (grey) or could not (red); their numbers are listed."),
+    "way": ("way of search", "From its start to the lamps that were found, in blue."),
+    "truth": ("true lamps", "True places of the lamps where they are known, in green."),
     "cameras": ("cameras", "Of the photographs."),
 }
 
@@ -59,7 +59,7 @@ class Drawings:
                 mesh = region(light.position, covariance, size)
                 self._lamps.append(scene.add_mesh_simple(f"/found/{index}", *mesh, color=_FOUND, opacity=0.5))
             self._lamps += [self._way(index, way) for index, way in enumerate(ways(found.path))]
-            for index, other in enumerate(found.alternatives):
+            for index, other in enumerate(found.alternatives, start=1):
                 self._lamps += self._other(index, other)
             for index, light in enumerate(truth):
                 place = tuple(light.position.tolist())
@@ -88,17 +88,17 @@ class Drawings:
             frustum.visible = away > FRUSTUM * self._size
 
     def _other(self, number: int, other: ToldAlternative) -> list:
-        """Balls at the lamps of an alternative; what speaks against it stands at the first one."""
+        """Balls at the lamps of an alternative, and the number under which it is told."""
         colour = _RULED_OUT if other.ruled_out else _OPEN
         places = [tuple(light.position.tolist()) for light in other.lights if not light.distant]
         names = [f"/others/{number}/{index}" for index in range(len(places))]
         pairs = zip(names, places, strict=True)
         balls = [self._scene.add_icosphere(name, OTHER * self._size, colour, position=place) for name, place in pairs]
-        words = [
-            self._scene.add_label(f"/others/{number}/told", other.told, position=place, anchor="bottom-center")
-            for place in places[:1]
+        labels = [
+            self._scene.add_label(f"{name}/number", str(number), anchor="bottom-left", font_screen_scale=0.8)
+            for name in names
         ]
-        return [*balls, *words]
+        return [*balls, *labels]
 
     def _way(self, index: int, way: np.ndarray) -> viser.LineSegmentsHandle:
         pairs = np.stack([way[:-1], way[1:]], axis=1)

@@ -182,10 +182,13 @@ class FitControls:
 
 
 def _words(found: Found) -> str:
-    """What a fit says of its lamps, and which other numbers of lamps it ruled out."""
+    """What a fit says of its lamps, and what it weighed them against, by the numbers in the picture."""
     # Lamps stand in lines of their own, which begin with blanks.
     text = "\n".join(f"- {line.strip()}" if line.startswith(" ") else f"\n{line}\n" for line in found.told.splitlines())
     if len(found.costs) > 1:
         tried = ", ".join(f"{count}: {cost:.4g}" for count, cost in sorted(found.costs.items()))
         text += f"\nCost by number of lamps: {tried}."
+    if found.alternatives:
+        others = (f"{number}. {one.told}" for number, one in enumerate(found.alternatives, start=1))
+        text += "\n\nWeighed against:\n\n" + "\n".join(others)
     return text
