@@ -176,6 +176,11 @@ def test_keys_do_what_buttons_do(window, page: Page) -> None:
     until(lambda: session.section is None)
     window.keyboard.press("u")
     until(lambda: session.exposure == 0.5)
+    for digit, node in enumerate(page.drawings.kinds.values(), start=1):
+        window.keyboard.press(str(digit))
+        until(lambda node=node: not node.visible)
+        window.keyboard.press(str(digit))
+        until(lambda node=node: node.visible)
     before = page.camera(64).origin
     window.keyboard.down("w")
     until(lambda: not torch.allclose(page.camera(64).origin, before, atol=1e-3))

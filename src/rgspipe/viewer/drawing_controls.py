@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from functools import partial
 
 import viser
 
@@ -14,18 +14,16 @@ class DrawingControls:
     """A box to tick for each kind; digits do the same."""
 
     def __init__(self, client: viser.ClientHandle, drawings: Drawings) -> None:
-        self._drawings = drawings
         for digit, (kind, (label, hint)) in enumerate(KINDS.items(), start=1):
-            box = client.gui.add_checkbox(label, True, hint=f"{hint} Key {digit}.")
-            box.on_update(by_visitor(self._shown(kind, box)))
-            keys(client, Action(f"show or hide: {label}", str(digit), hint, self._turned(kind, box)))
+            box, node = client.gui.add_checkbox(label, True, hint=f"{hint} Key {digit}."), drawings.kinds[kind]
+            box.on_update(by_visitor(partial(_take, box, node)))
+            keys(client, Action(f"show or hide: {label}", str(digit), hint, partial(_turn, box, node)))
 
-    def _shown(self, kind: str, box: viser.GuiInputHandle[bool]) -> Callable[[], None]:
-        return lambda: self._drawings.show(kind, box.value)
 
-    def _turned(self, kind: str, box: viser.GuiInputHandle[bool]) -> Callable[[], None]:
-        def turn() -> None:
-            box.value = not box.value
-            self._drawings.show(kind, box.value)
+def _take(box: viser.GuiInputHandle[bool], node: viser.SceneNodeHandle) -> None:
+    node.visible = box.value
 
-        return turn
+
+def _turn(box: viser.GuiInputHandle[bool], node: viser.SceneNodeHandle) -> None:
+    box.value = not box.value
+    _take(box, node)

@@ -36,19 +36,18 @@ class Drawings:
         scene: the visitor's.
         size: of the frozen scene.
         go_to: is called with a camera whose frustum is clicked.
+
+    Attributes:
+        kinds: a node for each of KINDS, with what is of it below; hidden, it hides that.
     """
 
     def __init__(self, scene: viser.SceneApi, size: float, go_to: Callable[[Camera], None]) -> None:
         self._scene, self._size, self._go_to = scene, size, go_to
-        self._kinds = {kind: scene.add_frame(f"/{kind}", show_axes=False) for kind in KINDS}
+        self.kinds = {kind: scene.add_frame(f"/{kind}", show_axes=False) for kind in KINDS}
         self._lamps: list = []
         self._frusta: list = []
         self._advised: list = []
         self._eye: Camera | None = None
-
-    def show(self, kind: str, visible: bool) -> None:
-        """Show or hide what is of one of KINDS."""
-        self._kinds[kind].visible = visible
 
     def lamps(self, found: Found | None, truth: LightRig) -> None:
         """Regions of the lamps that were found, the way to them, what they were weighed against, and true lamps."""
@@ -94,11 +93,9 @@ class Drawings:
         names = [f"/others/{number}/{index}" for index in range(len(places))]
         pairs = zip(names, places, strict=True)
         balls = [self._scene.add_icosphere(name, OTHER * self._size, colour, position=place) for name, place in pairs]
-        labels = [
+        for name in names:  # goes with its ball
             self._scene.add_label(f"{name}/number", str(number), anchor="bottom-left", font_screen_scale=0.8)
-            for name in names
-        ]
-        return [*balls, *labels]
+        return balls
 
     def _way(self, index: int, way: np.ndarray) -> viser.LineSegmentsHandle:
         pairs = np.stack([way[:-1], way[1:]], axis=1)
