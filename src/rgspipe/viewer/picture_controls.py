@@ -13,6 +13,9 @@ from rgspipe.viewer.visit import Visit
 #: Stops of a press of a key, and of the slider at most.
 STOPS, MOST_STOPS = 0.5, 6.0
 
+#: By what part of the scene a press of a key moves the section.
+SHIFT = 0.05
+
 #: Sections that are offered: across which axis.
 SECTIONS = ("none", "across x", "across y", "across z")
 
@@ -33,7 +36,9 @@ class PictureControls:
         self._section = gui.add_dropdown(
             "section", SECTIONS, hint="Cut away what is on your side of a plane, to look into closed rooms. Key L."
         )
-        self._place = gui.add_slider("section at", 0.0, 1.0, 0.01, 0.5, hint="From the lower to the upper end.")
+        self._place = gui.add_slider(
+            "section at", 0.0, 1.0, 0.01, 0.5, hint="From the lower to the upper end. Keys 6, 7."
+        )
         self._place.visible = False
         self._scale = gui.add_image(scale(), visible=False)
         self._legend = gui.add_markdown("")
@@ -46,6 +51,8 @@ class PictureControls:
             Action("darker", "J", "Half a stop darker.", lambda: self._expose(-STOPS)),
             Action("next way to show", "I", "Picture, irradiance, illuminance in turn.", self._show_next),
             Action("next section", "L", "No section, then one across each axis.", self._cut_next),
+            Action("section down", "6", "Move the section towards the lower end.", lambda: self._shift(-SHIFT)),
+            Action("section up", "7", "Move the section towards the upper end.", lambda: self._shift(SHIFT)),
             Action("dark or light page", "0", "Of the page around the picture.", self._turn_page),
         )
         keys(client, *actions)
@@ -67,6 +74,10 @@ class PictureControls:
 
     def _cut_next(self) -> None:
         self._section.value = _next(SECTIONS, self._section.value)
+        self._read()
+
+    def _shift(self, part: float) -> None:
+        self._place.value = float(np.clip(self._place.value + part, 0.0, 1.0))
         self._read()
 
     def _turn_page(self) -> None:
