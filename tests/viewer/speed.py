@@ -24,6 +24,9 @@ from rgspipe.viewer.session import Session
 
 REPEATS = 15
 
+#: How far a lamp is dragged between two pictures, scene units.
+MOVED = 0.002
+
 
 def main() -> None:
     """Print medians at 256 by 256 pixels, from what is changed to the bytes that are sent, and of a search."""
@@ -36,7 +39,7 @@ def main() -> None:
     _tell("made and frozen" if made else "loaded", [_since(began)])
     _tell("first picture", [_picture(session, camera, "sharp")])
     for quality in ("soft", "sharp"):
-        _tell(f"lamp moved, {quality}", [_picture(session, camera, quality) for _ in range(REPEATS + 1)][1:])
+        _tell(f"lamp moved, {quality}", [_picture(session, camera, quality, MOVED) for _ in range(REPEATS + 1)][1:])
     around = [one for _, one in cameras_around(session.images.frozen, camera)]
     _tell("camera moved, coarse", [_picture(session, one.resized(COARSE), "coarse") for one in around])
     _tell("camera at rest, sharp", [_picture(session, one, "sharp") for one in around])
@@ -45,10 +48,10 @@ def main() -> None:
     _tell_memory()
 
 
-def _picture(session: Session, camera: rg.Camera, quality: str) -> tuple[float, float]:
-    """Seconds, and seconds of the processor, from a lamp that is moved to a picture."""
+def _picture(session: Session, camera: rg.Camera, quality: str, moved: float = 0.0) -> tuple[float, float]:
+    """Seconds, and seconds of the processor, from a lamp that is moved so far to a picture."""
     light, began = session.lights[0], _now()
-    session.replace(0, light.at(light.position + 0.002), "drag")
+    session.replace(0, light.at(light.position + moved), "drag")
     picture, _ = session.picture(camera, quality)
     Image.fromarray(picture).save(io.BytesIO(), format="PNG" if quality == "sharp" else "JPEG", quality=80)
     return _since(began)
