@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 import torch
 
+from rgspipe.datasets.alternatives_file import read_alternatives
 from rgspipe.datasets.covariance_file import read_covariances
 from rgspipe.datasets.light_file import read_lights
+from rgspipe.fitting.alternative import Alternative
 from rgspipe.fitting.findings import FitStatus, Undetermined
 from rgspipe.fitting.result import FitResult, dark_result
 from rgspipe.fitting.result_text import headline, light_line
@@ -57,8 +60,11 @@ def test_a_notebook_shows_the_same_as_a_list() -> None:
 
 
 def test_a_saved_result_is_a_light_file_with_its_uncertainty(tmp_path: Path) -> None:
-    found = result()
+    found = replace(result(), alternatives=(Alternative((NEAR,), 3.0, 2.0, -1, True),))
     found.save(tmp_path / "lights.json", psnr=41.5)
+    [other] = read_alternatives(tmp_path / "lights.json")
+    assert (other.told, other.ruled_out) == ("1 light: 3 times the cost.", True)
+    assert torch.equal(other.lights[0].position, NEAR.position)
     for light, again in zip(found.lights, read_lights(tmp_path / "lights.json"), strict=True):
         assert torch.equal(light.position, again.position) and torch.equal(light.intensity, again.intensity)
     for matrix, again in zip(found.covariance, read_covariances(tmp_path / "lights.json"), strict=True):

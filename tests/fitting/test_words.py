@@ -8,6 +8,7 @@ from operator import attrgetter
 
 import pytest
 
+from rgspipe.fitting.alternative import Alternative
 from rgspipe.fitting.findings import (
     AtBound,
     Finding,
@@ -26,7 +27,8 @@ from rgspipe.fitting.findings import (
     gravest,
 )
 from rgspipe.fitting.options import SearchOptions
-from rgspipe.fitting.words import MEANINGS, Spoken, explained
+from rgspipe.fitting.words import MEANINGS, Spoken, explained, told_alternative
+from rgspipe.scene import PointLight
 
 DOUBT = Undetermined(1, 1, ("intensity",))
 BAR = ("bar.least",)
@@ -137,3 +139,21 @@ def test_what_decides_are_numbers_of_the_search() -> None:
     for name in named:
         assert isinstance(attrgetter(name)(options), float | int), name
     assert len(named) >= 7
+
+
+@pytest.mark.parametrize(
+    ("count", "cost", "left", "more", "ruled_out", "told"),
+    [
+        (1, 1.5, 3.24, 0, True, "3.2 times as much unexplained."),
+        (1, 1.5, 1.1, 0, True, "1.5 times the cost."),
+        (1, 1.0, 1.1, 0, False, "Explains the target as well: another answer."),
+        (2, 0.96, 0.9, 1, True, "2 lights lower the cost by 4 %, too little to count."),
+        (2, 1.2, 0.9, 1, True, "2 lights do not lower the cost."),
+        (2, 0.2, 0.1, 1, False, "2 lights lower the cost by 80 %."),
+        (1, 12345.0, 1e9, -1, True, "1 light: more than 10000 times the cost."),
+        (2, 1.1, 1.2, -1, False, "2 lights: 1.1 times the cost, too little to rule them out."),
+    ],
+)
+def test_what_speaks_against_an_alternative_is_a_sentence(count, cost, left, more, ruled_out, told) -> None:
+    rig = (PointLight([0.0, 0.0, 0.0], 1.0),) * count
+    assert told_alternative(Alternative(rig, cost, left, more, ruled_out)) == told

@@ -11,8 +11,10 @@ import shutil
 import numpy as np
 import pytest
 
+from rgspipe.datasets.alternatives_file import ToldAlternative
 from rgspipe.pages import report
 from rgspipe.pages.room_view import room_view
+from rgspipe.scene import PointLight
 from rgspipe.scene.models import CornellBox, exact_surfels
 
 CHROMIUM = shutil.which("chromium")
@@ -53,7 +55,16 @@ def test_lights_have_places_regions_and_words(full_contents: report.ReportConten
     lengths = sorted(math.hypot(*axis) for axis in third["region"])
     # √7.815 standard deviations; what is not known at all is as long as two rooms.
     assert lengths[:2] == pytest.approx([0.02796, 0.05591], rel=1e-3) and lengths[2] > 1.0
+    assert first["others"] == []
     assert json.loads(json.dumps(view, allow_nan=False)) == json.loads(json.dumps(view))
+
+
+def test_alternatives_stand_with_the_target_of_their_fit(full_contents: report.ReportContents) -> None:
+    others = {("search_lm", 3, "occluded_002"): [ToldAlternative((PointLight([0.1, 0.2, 0.3], 1.0),), "Why.", True)]}
+    view = room_view(SURFELS, full_contents.targets, (), others)
+    [one] = [light for group in view["groups"] for light in group["lights"] if light["others"]]
+    assert one["target"] == "occluded_002" and view["groups"][1]["views"] == 3
+    assert one["others"] == [{"places": [[0.1, 0.2, 0.3]], "told": "Why.", "ruled_out": True}]
 
 
 @pytest.mark.browser
@@ -61,7 +72,9 @@ def test_lights_have_places_regions_and_words(full_contents: report.ReportConten
 def test_it_turns_and_tells_in_a_browser(full_contents: report.ReportContents, tmp_path) -> None:
     playwright = pytest.importorskip("playwright.sync_api")
     path = tmp_path / "report.html"
-    path.write_text(report.render_report(dataclasses.replace(full_contents, fits=())))
+    place = SURFELS.centers.double().mean(dim=0).tolist()
+    others = {("search_lm", 1, "occluded_002"): [ToldAlternative((PointLight(place, 1.0),), "9 times the cost.", True)]}
+    path.write_text(report.render_report(dataclasses.replace(full_contents, fits=(), alternatives=others)))
     with playwright.sync_playwright() as driver:
         browser = driver.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
         page = browser.new_page(viewport={"width": 400, "height": 800})
@@ -75,6 +88,13 @@ def test_it_turns_and_tells_in_a_browser(full_contents: report.ReportContents, t
         page.wait_for_function("seen => document.querySelector('.room canvas').toDataURL() !== seen", arg=seen)
         page.locator(".room select").nth(1).select_option("occluded_002")
         assert page.locator(".room output").inner_text().startswith("occluded_002, occluded: ")
+        # Beside its own light, at the middle of the room, which is turned around it.
+        canvas.hover(position={"x": 0.5 * canvas.bounding_box()["width"], "y": 0.5 * canvas.bounding_box()["height"]})
+        ruled_out = "occluded_002, occluded: ruled out: 9 times the cost."
+        page.wait_for_function("told => document.querySelector('.room output').textContent === told", arg=ruled_out)
+        before = canvas.evaluate("canvas => canvas.toDataURL()")
+        page.locator(".room input").nth(1).uncheck()
+        page.wait_for_function("seen => document.querySelector('.room canvas').toDataURL() !== seen", arg=before)
         assert page.evaluate("document.documentElement.scrollWidth") <= 400
         assert page.locator(".wide.more").count() > 0 and not errors
         browser.close()

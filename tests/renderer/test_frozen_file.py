@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import replace
 
 import pytest
@@ -53,6 +54,20 @@ def test_a_fit_does_not_need_the_gather(scene, folder):
 def test_a_scene_with_few_bounces_is_not_stored(scene, tmp_path):
     with pytest.raises(ValueError, match="all bounces"):
         replace(scene, transport=with_bounces(scene.transport, 2)).save(tmp_path)
+
+
+def test_a_pickled_scene_comes_back_as_from_disk(scene):
+    def sent(one):
+        return pickle.loads(pickle.dumps(one))  # noqa: S301
+
+    found = sent(scene)
+    assert torch.equal(found.gather.matrix.values(), scene.gather.matrix.values())
+    assert torch.equal(found.centers, scene.centers.double())
+    assert torch.equal(found.candidates.irradiance, scene.candidates.irradiance)
+    # What was not there to be sent is not made: a fit does without the gather.
+    assert sent(replace(scene, gather=None)).gather is None
+    with pytest.raises(ValueError, match="pickle it first"):
+        sent(scene.with_solver("gather"))
 
 
 @pytest.fixture(scope="module")

@@ -20,7 +20,7 @@ from rgspipe.scene import Camera, PointLight
 from rgspipe.viewer.lamp_controls import ARMS
 from rgspipe.viewer.page import Page
 from rgspipe.viewer.serve import Viewer, view
-from rgspipe.viewer.session import ILLUMINANCE, IRRADIANCE, PICTURE
+from rgspipe.viewer.session import ILLUMINANCE, IRRADIANCE, PICTURE, same_lights
 
 CHROMIUM = shutil.which("chromium")
 
@@ -151,6 +151,9 @@ def test_a_photographed_lamp_is_found_again(window, page: Page) -> None:
         until(lambda: session.found is not None and not page.fit.searching)
         assert torch.allclose(session.lights[0].position, LAMP.position, atol=1e-2)
         assert torch.equal(session.case.truth[0].position, LAMP.position)
+        window.mouse.click(20, 450)
+        window.keyboard.press("8")
+        until(lambda: same_lights(session.lights, session.found.path[-2]))
         session.found = None
         session.change([LAMP.at(LAMP.position - 0.1)])
     assert session.undo()
@@ -171,11 +174,19 @@ def test_keys_do_what_buttons_do(window, page: Page) -> None:
         until(lambda shown=shown: session.shown == shown)
     window.keyboard.press("l")
     until(lambda: session.section is not None and session.section[0] == 0)
+    before = session.section[1]
+    window.keyboard.press("7")
+    until(lambda: session.section[1] > before)
     for _ in range(3):
         window.keyboard.press("l")
     until(lambda: session.section is None)
     window.keyboard.press("u")
     until(lambda: session.exposure == 0.5)
+    for digit, node in enumerate(page.drawings.kinds.values(), start=1):
+        window.keyboard.press(str(digit))
+        until(lambda node=node: not node.visible)
+        window.keyboard.press(str(digit))
+        until(lambda node=node: node.visible)
     before = page.camera(64).origin
     window.keyboard.down("w")
     until(lambda: not torch.allclose(page.camera(64).origin, before, atol=1e-3))

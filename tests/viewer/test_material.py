@@ -18,9 +18,10 @@ RIG = (PointLight([0.1, 0.2, 0.3], 1.0), SpotLight.shaped("smoothstep", 0.4, 0.1
 
 
 def write_fit(folder: Path, steps: int) -> None:
-    write_lights(
-        folder / "lights.json", RIG, {"result": "converged", "reason": "It is.", "costs": {"1": 2.0, "2": 1.0}}
-    )
+    light = {"type": "point", "position": [0.5, 0.2, 0.3], "intensity": [1.0, 1.0, 1.0]}
+    others = [{"lights": [light], "told": "2 times the cost.", "ruled_out": True}]
+    told = {"result": "converged", "reason": "It is.", "costs": {"1": 2.0, "2": 1.0}, "alternatives": others}
+    write_lights(folder / "lights.json", RIG, told)
     rows = []
     for step in range(steps):
         moved = [light.at(light.position + 0.1 * step) for light in RIG]
@@ -34,6 +35,9 @@ def test_a_fit_is_read_with_its_way(tmp_path: Path) -> None:
     found = found_in(tmp_path)
     assert [light.kind for light in found.lights] == ["point", "spot"]
     assert found.told == "converged: It is." and found.costs == {1: 2.0, 2: 1.0} and found.covariance == ()
+    assert [(one.told, one.ruled_out, len(one.lights)) for one in found.alternatives] == [
+        ("2 times the cost.", True, 1)
+    ]
     first, second = ways(found.path)
     torch.testing.assert_close(torch.from_numpy(first)[:, 0], 0.1 + 0.1 * torch.arange(4).double())
     torch.testing.assert_close(torch.from_numpy(second)[:, 2], 0.1 * torch.arange(4).double())

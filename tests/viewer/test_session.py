@@ -8,6 +8,7 @@ import torch
 from lit_room import VISIBLE, room_cameras
 from rgspipe.datasets.light_file import read_lights
 from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.renderer.images.model import SurfelModel
 from rgspipe.scene import PointLight
 from rgspipe.viewer.lamp_images import LampImages
 from rgspipe.viewer.session import ILLUMINANCE, IRRADIANCE, OFFERED, Session, same_lights
@@ -45,6 +46,20 @@ def test_a_colour_renders_nothing_and_a_moved_lamp_is_rendered_alone(
     session.replace(0, LAMP.at(LAMP.position + 0.01))
     session.image(camera, "soft")
     assert len(rendered) == 3
+
+
+def test_a_camera_that_moves_is_traced_and_nothing_is_lit_again(
+    session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    one, other = room_cameras(16)[:2]
+    session.image(one, "soft")
+    monkeypatch.setattr(SurfelModel, "lit", lambda *given: pytest.fail("lit again"))
+    seen = session.image(other, "coarse")
+    session.shown = IRRADIANCE
+    session.image(other, "soft")
+    monkeypatch.undo()
+    fresh = Session(LampImages(session.images.frozen), session.lights)
+    assert torch.equal(seen, fresh.image(other, "coarse"))
 
 
 def test_a_drag_is_undone_as_one(session: Session) -> None:

@@ -89,14 +89,43 @@ def _target_info(folder: Path, place: Path) -> DatasetInfo | None:
     return read_info(place.parent.parent) if own is None and place.parent.name == "targets" else own
 
 
-def _load_targets(root: Path) -> tuple[Target, ...]:
-    folder = root / "targets"
+@dataclass(frozen=True)
+class TargetFolder:
+    """A fit target whose images were not read.
+
+    Attributes:
+        views: how many it has.
+    """
+
+    name: str
+    occlusion: str
+    views: int
+
+    @classmethod
+    def of(cls, folder: str | Path) -> TargetFolder:
+        """What `load_target` would read.
+
+        Raises:
+            InputError: it has no frames, or they are broken.
+        """
+        place = Path(folder).resolve()
+        entries = read_entries(place / "transforms.json", "the cameras of a fit target")
+        return cls(place.name, _listed_targets(place.parent).get(place.name, "unknown"), len(entries))
+
+
+def target_folders(root: str | Path) -> list[Path]:
+    """The folders of the fit targets of the dataset in `root`, as `load_dataset` reads them."""
+    folder = Path(root) / "targets"
     if not folder.is_dir():
-        return ()
+        return []
     listed = _listed_targets(folder)
     there = (path.name for path in folder.iterdir() if path.is_dir() and not path.name.startswith("."))
     names: Iterable[str] = listed or sorted(there)
-    return tuple(load_target(folder / name) for name in progress_bar(list(names), "reading targets", unit="target"))
+    return [folder / name for name in names]
+
+
+def _load_targets(root: Path) -> tuple[Target, ...]:
+    return tuple(load_target(folder) for folder in progress_bar(target_folders(root), "reading targets", unit="target"))
 
 
 def _listed_targets(folder: Path) -> dict[str, str]:

@@ -36,10 +36,22 @@ def read_lights(path: str | Path) -> LightRig:
         raise InputError(
             path, expected=f'"version": {VERSION}', found=repr(version), remedy="Use the release that wrote this file."
         )
-    lights = required(content, "lights", path)
+    return lights_in(content, path)
+
+
+def lights_in(content: dict, place: str | Path) -> LightRig:
+    """The lights of an object that has a list of them, float64.
+
+    Args:
+        place: of the object, for errors.
+
+    Raises:
+        InputError: there is no list, or unknown types, missing or impossible values are in it.
+    """
+    lights = required(content, "lights", place)
     if not isinstance(lights, list) or not all(isinstance(light, dict) for light in lights):
-        raise InputError(path, expected='a list of objects under "lights"', found=repr(lights)[:120], remedy="Fix it.")
-    return tuple(_read_light(light, path, f"lights[{index}]") for index, light in enumerate(lights))
+        raise InputError(place, expected='a list of objects under "lights"', found=repr(lights)[:120], remedy="Fix it.")
+    return tuple(_read_light(light, place, f"lights[{index}]") for index, light in enumerate(lights))
 
 
 def read_ambient(path: str | Path) -> Tensor | None:
@@ -77,7 +89,7 @@ def write_lights(path: str | Path, lights: Light | Sequence[Light], extra: dict 
     further = extra.pop("lights", [{}] * len(rig))
     if len(further) != len(rig):
         raise ValueError(f'extra["lights"] must have {len(rig)} entries, got {len(further)}')
-    entries = [_merged(_light_fields(light), fields) for light, fields in zip(rig, further, strict=True)]
+    entries = [_merged(light_fields(light), fields) for light, fields in zip(rig, further, strict=True)]
     write_json(Path(path), _merged({"version": VERSION, "lights": entries}, extra))
 
 
@@ -88,7 +100,8 @@ def _merged(fields: dict, further: dict) -> dict:
     return fields | further
 
 
-def _light_fields(light: Light) -> dict:
+def light_fields(light: Light) -> dict:
+    """A light as a light file has it."""
     fields = {"type": light.kind}
     fields |= {name: getattr(light, name).double().tolist() for name in ("position", "intensity")}
     return fields | light.file_fields()

@@ -8,13 +8,15 @@ from pathlib import Path
 
 from torch import Tensor
 
+from rgspipe.datasets.alternatives_file import ALTERNATIVES
 from rgspipe.datasets.covariance_file import covariance_fields
-from rgspipe.datasets.light_file import AMBIENT, RADIANCE, write_lights
+from rgspipe.datasets.light_file import AMBIENT, RADIANCE, light_fields, write_lights
+from rgspipe.fitting.alternative import Alternative
 from rgspipe.fitting.findings import Dark, Finding, FitStatus, gravest
 from rgspipe.fitting.in_sight.lamp import LampInSight
 from rgspipe.fitting.model.known_images import Strength
 from rgspipe.fitting.result_text import ambient_line, as_html, as_text, base_line, headline, light_lines
-from rgspipe.fitting.words import PYTHON, Spoken, explained
+from rgspipe.fitting.words import PYTHON, Spoken, explained, told_alternative
 from rgspipe.scene import LightRig
 from rgspipe.scene.shapes import Float
 
@@ -69,6 +71,7 @@ class FitResult:
         ambient: the radiance that comes from all around through openings; None where no such light was looked for, or
             none can arrive.
         base_scale: how many times images with the lamps off are in the target; None where that was known.
+        alternatives: what the answer was weighed against, the least bad one first.
     """
 
     lights: LightRig
@@ -86,6 +89,7 @@ class FitResult:
     lamps: tuple[LampInSight, ...] = ()
     ambient: Strength | None = None
     base_scale: Strength | None = None
+    alternatives: tuple[Alternative, ...] = ()
 
     @property
     def status(self) -> FitStatus:
@@ -132,6 +136,7 @@ class FitResult:
             "findings": [finding.data() for finding in self.findings],
             "exposures": list(self.exposures),
             "emitters": [lamp.data() for lamp in self.lamps],
+            ALTERNATIVES: [_alternative_fields(one) for one in self.alternatives],
             **({} if self.ambient is None else {AMBIENT: _strength_fields(self.ambient, RADIANCE)}),
             **({} if self.base_scale is None else {"base_scale": _strength_fields(self.base_scale, "factor")}),
             "lights": covariance_fields(
@@ -145,6 +150,12 @@ def _strength_fields(strength: Strength, name: str) -> dict[str, object]:
     """For a light file: the value by `name`, how sure it is, and its share of the light."""
     [spread] = covariance_fields(1, {"covariance": (strength.covariance,)})
     return {name: strength.value.tolist(), **spread, "share": strength.share}
+
+
+def _alternative_fields(one: Alternative) -> dict[str, object]:
+    """For a light file: the lights, and what speaks against them in numbers and words."""
+    numbers = {"cost": one.cost, "left": one.left, "ruled_out": one.ruled_out}
+    return {"lights": [light_fields(light) for light in one.lights], **numbers, "told": told_alternative(one)}
 
 
 def dark_result(seconds: float) -> FitResult:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import torch
 from torch import Tensor
 
+from rgspipe.fitting.alternative import Alternative
 from rgspipe.fitting.certainty.uncertainty import light_covariances
 from rgspipe.fitting.findings import Finding, LightMissing, LightSpare, MuchAmbient, NoOpening
 from rgspipe.fitting.meter import Meter
@@ -30,11 +31,18 @@ from rgspipe.fitting.search.refine import Refiner, State
 from rgspipe.fitting.search.rig_search import RigSearch
 from rgspipe.fitting.search.starts import Candidates
 from rgspipe.fitting.search.weighting import PLAIN
+from rgspipe.fitting.selection.alternatives import least_bad, still_apart, weighed
 from rgspipe.fitting.selection.ambient import ambient_found, ambient_missing
 from rgspipe.fitting.selection.diagnosis import Costs, hanging, standing
 from rgspipe.fitting.selection.kinds import told_kinds
 from rgspipe.fitting.selection.number import Doubted, doubted_number, faded_light
-from rgspipe.fitting.selection.rivals import leaves_as_little, rival_among, rival_elsewhere, rival_polished
+from rgspipe.fitting.selection.rivals import (
+    leaves_as_little,
+    rival_among,
+    rival_elsewhere,
+    rival_polished,
+    told_rival,
+)
 from rgspipe.fitting.selection.tables import tables_open, told_tables
 from rgspipe.fitting.spec import AUTO, LightSpec
 from rgspipe.renderer.images.blocks import view_of_blocks
@@ -85,7 +93,7 @@ def fit_search_lm(
         findings = (*findings, *ambient_found(polished.problem, best, options.bar))
     else:
         findings = (*findings, *ambient_missing(refiner, candidates, found.best, findings, options))
-    return _result(polished, best, findings, Costs.of(refiner, found.compared), options, others)
+    return _result(polished, best, findings, Costs.of(refiner, found.compared), options, others, found.weighed)
 
 
 def fit_from(
@@ -108,12 +116,14 @@ class _Searched:
         findings: what was found out on the way.
         compared: by number of lights the rigs that were compared.
         others: rigs that explain about as much, as far as blocks tell.
+        weighed: those that blocks rule out.
     """
 
     best: State
     findings: tuple[Finding, ...]
     compared: Mapping[int, State]
     others: tuple[State, ...]
+    weighed: Sequence[Alternative]
 
 
 def _search(refiner: Refiner, candidates: Sequence[Candidates], options: SearchOptions, spec: LightSpec) -> _Searched:
@@ -141,7 +151,10 @@ def _search(refiner: Refiner, candidates: Sequence[Candidates], options: SearchO
     if not any(isinstance(finding, LightMissing) for finding in findings):
         costs = Costs.of(refiner, compared)
         findings = (*findings, *costs.maybe_more(len(found.best.emitters), compared, options.bar))
-    return _Searched(best, findings, compared, tuple(others))
+    told = weighed(refiner, best, [*found.others, *tables, *beside, *compared.values()], findings, options)
+    # What leaves about as little was looked at again: it is another answer on all pixels, or none.
+    told = [one for one in told if one.more or one.ruled_out]
+    return _Searched(best, findings, compared, tuple(others), told)
 
 
 def _roughly_exposed(problem: LightProblem, coarse: Sequence[CoarseImages]) -> LightProblem:
@@ -184,12 +197,19 @@ def _result(
     costs: Costs,
     options: SearchOptions,
     others: Sequence[State] = (),
+    earlier: Sequence[Alternative] = (),
 ) -> FitResult:
     problem, meter, last = refiner.problem, refiner.meter, refiner.step(best)
     spread = light_covariances(problem, best, options.certainty)
+    # They may have found other exposures.
+    others = [refiner.start(other.emitters, PLAIN, other) for other in others]
     rival = rival_polished(refiner, best, others, spread.calibrated, options)
     rival = rival or rival_elsewhere(refiner, best, spread.calibrated, options)
-    findings = (*([] if rival is None else [rival]), *findings, *tables_open(refiner, best, others, options))
+    rivals = [] if rival is None else [rival]
+    told = weighed(refiner, best, [*rivals, *others], findings, options)
+    told += still_apart(refiner, best, earlier, told, options.certainty.doubtful)
+    open_tables = tables_open(refiner, best, others, options)
+    findings = (*(told_rival(refiner, best, other) for other in rivals), *findings, *open_tables)
     return FitResult(
         lights=last.lights,
         findings=(*standing(refiner, best, spread.calibrated, options.certainty), *findings, *hanging(best)),
@@ -203,6 +223,7 @@ def _result(
         costs=costs.by_count,
         exposures=tuple(problem.exposures.tolist()),
         noise_covariance=spread.noise,
+        alternatives=tuple(least_bad(told)),
         **_strengths(problem, best, spread.known),
     )
 

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from rgspipe.fitting.alternative import Alternative
 from rgspipe.fitting.findings import (
     AllStepsTaken,
     ExposureUnknown,
@@ -80,6 +81,25 @@ def explained(findings: Sequence[Finding], spoken: Spoken = PYTHON) -> str:
     if not told or told[0].status is FitStatus.CONVERGED or status is FitStatus.UNDETERMINED:
         parts.insert(0, MEANINGS[status])
     return " ".join(_joined(parts))
+
+
+def told_alternative(one: Alternative) -> str:
+    """What speaks against lights that an answer was weighed against, in a sentence."""
+    if one.more > 0:
+        if one.cost > 0.995:
+            return f"{len(one.lights)} lights do not lower the cost."
+        gain = f"{len(one.lights)} lights lower the cost by {percent(1.0 - one.cost)}"
+        return f"{gain}{', too little to count' if one.ruled_out else ''}."
+    if one.more < 0:
+        fewer = f"{len(one.lights)} light{'s' * (len(one.lights) > 1)}: {_times(one.cost)} the cost"
+        return f"{fewer}{'' if one.ruled_out else ', too little to rule them out'}."
+    if not one.ruled_out:
+        return "Explains the target as well: another answer."
+    return f"{_times(one.left)} as much unexplained." if one.left >= one.cost else f"{_times(one.cost)} the cost."
+
+
+def _times(ratio: float) -> str:
+    return f"{ratio:.2g} times" if ratio < 100.0 else f"{ratio:.0f} times" if ratio < 1e4 else "more than 10000 times"
 
 
 def _joined(parts: Sequence[str]) -> list[str]:

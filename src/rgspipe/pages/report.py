@@ -21,7 +21,7 @@ from rgspipe.pages.light_studies import LightStudy, light_studies
 from rgspipe.pages.provenance import StageRecord
 from rgspipe.pages.quality import compared_lights, quality_columns, quality_rows
 from rgspipe.pages.relit import Relighting, relightings
-from rgspipe.pages.room_view import room_view
+from rgspipe.pages.room_view import Alternatives, room_view
 from rgspipe.pages.section import Section, shown_sections
 from rgspipe.scene import Surfels
 from rgspipe.scene.grade import SceneGrade
@@ -58,6 +58,7 @@ class ReportContents:
         is_measured: whether it is a scene of the laboratory, of which something is wanted.
         surfels: of the frozen scene, or None.
         cameras: cameras of the targets.
+        alternatives: what fits weighed against their answers.
         grade: of the frozen scene, where it was measured.
         training: the trainer's metrics: `test_psnr_mean`, `test_psnr_median`, `test_psnr_min`,
             `test_psnr_off_edges_mean`, `direct_only_psnr` [dB], `surfels`, `seconds`, `per_view`.
@@ -89,6 +90,7 @@ class ReportContents:
     is_measured: bool = False
     surfels: Surfels | None = None
     cameras: Sequence[CameraMark] = ()
+    alternatives: Alternatives = field(default_factory=dict)
     grade: SceneGrade | None = None
     training: Mapping[str, Any] | None = None
     training_log: pd.DataFrame | None = None
@@ -139,12 +141,18 @@ def render_report(contents: ReportContents) -> str:
         targets=_target_rows(contents.targets),
         fits=_grouped_fits(contents.fits, budget),
         figures=_figures(contents),
-        room=None if contents.surfels is None else room_view(contents.surfels, contents.targets, contents.cameras),
+        room=_room(contents),
         glossary=GLOSSARY,
         worst_views=_worst_views(contents.training),
         all_classes=ALL,
         success_limit=contents.success_limit,
     )
+
+
+def _room(contents: ReportContents) -> dict[str, Any] | None:
+    if contents.surfels is None:
+        return None
+    return room_view(contents.surfels, contents.targets, contents.cameras, contents.alternatives)
 
 
 def _goals(contents: ReportContents, psnr: float | None, method: str) -> list[goals.Goal]:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import base64
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
+from rgspipe.datasets.alternatives_file import ToldAlternative
 from rgspipe.evaluation import calibration
 from rgspipe.evaluation.light_plot import CameraMark, nearer
 from rgspipe.evaluation.plots import colour_of
@@ -28,16 +29,22 @@ REACH = 1.6
 #: The longest half-axis of a region that is drawn, of the scene's size: it is cut off, not left out.
 LONGEST = 2.0
 
+#: What fits weighed against their answers, by method, number of views and target.
+Alternatives: TypeAlias = Mapping[tuple[str, int, str], Sequence[ToldAlternative]]
+
 #: Places are whole numbers up to this between the corners of the scene.
 STEPS = 65535
 
 
-def room_view(surfels: Surfels, targets: pd.DataFrame, cameras: Sequence[CameraMark]) -> dict[str, Any]:
+def room_view(
+    surfels: Surfels, targets: pd.DataFrame, cameras: Sequence[CameraMark], alternatives: Alternatives | None = None
+) -> dict[str, Any]:
     """Surfels, cameras and, by method and number of views, lights with their regions, as JSON has them.
 
     Args:
         targets: rows of `target_table`.
     """
+    others = alternatives or {}
     centers = surfels.centers.double().numpy()
     low, high = centers.min(axis=0), centers.max(axis=0)
     size = float((high - low).max())
@@ -47,7 +54,14 @@ def room_view(surfels: Surfels, targets: pd.DataFrame, cameras: Sequence[CameraM
         "surfels": _surfels(surfels, low, size),
         "cameras": [vars(nearer(mark, low, high)) for mark in cameras],
         "groups": [
-            {"method": method, "views": int(views), "lights": [_light(row, size) for row in group.to_dict("records")]}
+            {
+                "method": method,
+                "views": int(views),
+                "lights": [
+                    _light(row, size) | {"others": [*map(_other, others.get((method, int(views), row["target"]), ()))]}
+                    for row in group.to_dict("records")
+                ],
+            }
             for (method, views), group in targets.groupby(["method", "views"], sort=False)
         ],
     }
@@ -87,6 +101,11 @@ def _light(row: Mapping[str, Any], size: float) -> dict[str, Any]:
         "region": _region(row, size),
         "error": None if error is None or pd.isna(error) else percent(error),
     }
+
+
+def _other(one: ToldAlternative) -> dict[str, Any]:
+    places = [light.position.tolist() for light in one.lights if not light.distant]
+    return {"places": places, "told": one.told, "ruled_out": one.ruled_out}
 
 
 def _place(row: Mapping[str, Any], suffix: str) -> list[float] | None:

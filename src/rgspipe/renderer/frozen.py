@@ -18,6 +18,7 @@ from rgspipe.renderer.dictionary import GRID, LightDictionary, build_dictionary
 from rgspipe.renderer.direct import unit_irradiance
 from rgspipe.renderer.effects import ALL_EFFECTS, Effects
 from rgspipe.renderer.frozen_file import load_parts, save_parts
+from rgspipe.renderer.frozen_pickle import pickled
 from rgspipe.renderer.glossy_transport import GlossyLight, GlossyTransport, build_glossy_transport
 from rgspipe.renderer.images.model import SurfelModel
 from rgspipe.renderer.images.pixels import PixelModel
@@ -128,6 +129,9 @@ class FrozenScene:
             grade=self.grade,
         )
 
+    def __reduce__(self) -> tuple:
+        return pickled(self)
+
     def __repr__(self) -> str:
         return f"FrozenScene({self.surfels!r}, {self.transport.average.shape[0]} patches, size {self.size:.3g})"
 
@@ -141,16 +145,11 @@ class FrozenScene:
         device = torch.device(device)
         if device.type == self.device.type and device.index in (None, self.device.index):
             return self
-        candidates = self.__dict__.get("dictionary", self.candidates)
         parts = {"gather": self.gather, "solver": self.solver, "gloss": self.gloss, "centers": self.centers}
-        return FrozenScene(
-            self.surfels.to(device),
-            self.areas.to(device),
-            transport=self.transport.to(device),
-            candidates=None if candidates is None else candidates.to(device),
-            grade=self.grade,
-            **{name: None if part is None else part.to(device) for name, part in parts.items()},
-        )
+        parts["candidates"] = self.__dict__.get("dictionary", self.candidates)
+        moved = {name: None if part is None else part.to(device) for name, part in parts.items()}
+        surfels, areas, transport = self.surfels.to(device), self.areas.to(device), self.transport.to(device)
+        return FrozenScene(surfels, areas, transport=transport, grade=self.grade, **moved)
 
     @cached_property
     def bvh(self) -> SurfelBvh:
@@ -194,8 +193,8 @@ class FrozenScene:
 
     def candidates_with(self, shadows: bool) -> LightDictionary:
         """The dictionary, or one like it for lights that nothing stands in the way of."""
-        found = self.dictionary
-        return found if shadows else self.with_dictionary(found.grid, seed=found.seed, shadows=False).dictionary
+        own = self.dictionary
+        return own if shadows else self.with_dictionary(own.grid, seed=own.seed, shadows=False).dictionary
 
     def with_dictionary(self, grid: int = GRID, *, seed: int = 0, shadows: bool = True) -> FrozenScene:
         """The same scene with a dictionary of its own; see `build_dictionary`."""
@@ -282,11 +281,9 @@ class FrozenScene:
         view, rig = self._recent.weights(camera), as_rig(lights)
         check_numbers(rig)
         pixels = ViewedPixels.every(self, [view])
-        if sharp:
-            image = PixelModel.of(pixels, effects, (self._recent.direct(view),)).image(rig)
-        else:
-            image = SurfelModel(pixels, effects).image(rig)
-        return pixels.split(image)[0]
+        direct = (self._recent.direct(view),) if sharp else None
+        model = SurfelModel(pixels, effects) if direct is None else PixelModel.of(pixels, effects, direct)
+        return pixels.split(model.image(rig))[0]
 
     def glossy_light(self, rig: LightRig, effects: Effects = ALL_EFFECTS) -> GlossyLight:
         """The light of a scene with gloss under `rig`, to be seen from anywhere; differentiable like `radiance_of`.

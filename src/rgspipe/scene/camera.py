@@ -14,6 +14,12 @@ from rgspipe.scene.by_value import ByValue
 from rgspipe.scene.rigid import check_rigid
 from rgspipe.scene.shapes import Float, Given
 
+#: What to check where a camera sees nothing.
+AXES = (
+    "cameras are in the scene's coordinates and look along −z, with +y up (from OpenCV, change the sign of their "
+    "second and third column)"
+)
+
 
 @dataclass(frozen=True)
 class Camera(ByValue):

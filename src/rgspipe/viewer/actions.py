@@ -9,6 +9,10 @@ import viser
 
 from rgspipe.errors import InputError
 
+#: Of buttons beside the main one: white words on it are read on dark and light pages (contrast 8.2). On light ones
+#: viser's own grey looks as if they were disabled.
+BESIDE = (73, 80, 87)
+
 
 @dataclass(frozen=True)
 class Action:
@@ -28,7 +32,7 @@ class Action:
 def offer(client: viser.ClientHandle, *actions: Action, chief: bool = False) -> list[viser.GuiButtonHandle]:
     """A button and a key for each; the buttons, of a brighter colour where they are what a visitor is here for."""
     keys(client, *actions)
-    colour, gui = None if chief else "gray", client.gui
+    colour, gui = None if chief else BESIDE, client.gui
     hints = [f"{action.help} Key {action.key}." for action in actions]
     buttons = [gui.add_button(one.name, hint=hint, color=colour) for one, hint in zip(actions, hints, strict=True)]
     for action, button in zip(actions, buttons, strict=True):

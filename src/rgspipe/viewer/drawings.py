@@ -1,4 +1,4 @@
-"""What is drawn into a visitor's picture: cameras, regions of lamps, their truth, and the way of a search."""
+"""What is drawn into a visitor's picture: cameras, regions of lamps, their truth, and what a search came by."""
 
 from __future__ import annotations
 
@@ -7,15 +7,26 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import viser
 
+from rgspipe.datasets.alternatives_file import ToldAlternative
 from rgspipe.scene import Camera, LightRig
 from rgspipe.viewer.cameras import pose_of
 from rgspipe.viewer.ellipsoids import region
 from rgspipe.viewer.material import Found, Photograph
 
-#: Length of a camera's frustum, and radius of a true lamp's ball, of the scene's size.
-FRUSTUM, TRUTH = 0.06, 0.015
+#: Length of a camera's frustum, and radius of the balls of true lamps and of alternatives, of the scene's size.
+FRUSTUM, TRUTH, OTHER = 0.06, 0.015, 0.009
+
+#: What can be hidden together: by the name of its node a label and a line of help.
+KINDS = {
+    "found": ("regions", "Where found lamps are with 95 % probability, in orange."),
+    "others": ("alternatives", "Lamps that the search ruled out (grey) or could not (red); their numbers are listed."),
+    "way": ("way of search", "From its start to the lamps that were found, in blue."),
+    "truth": ("true lamps", "True places of the lamps where they are known, in green."),
+    "cameras": ("cameras", "Of the photographs."),
+}
 
 _FOUND, _TRUE, _WAY, _TAKEN, _ADVISED = (255, 140, 0), (0, 160, 80), (90, 170, 255), (230, 230, 230), (255, 220, 60)
+_RULED_OUT, _OPEN = (150, 150, 160), (220, 60, 60)
 
 
 class Drawings:
@@ -25,17 +36,21 @@ class Drawings:
         scene: the visitor's.
         size: of the frozen scene.
         go_to: is called with a camera whose frustum is clicked.
+
+    Attributes:
+        kinds: a node for each of KINDS, with what is of it below; hidden, it hides that.
     """
 
     def __init__(self, scene: viser.SceneApi, size: float, go_to: Callable[[Camera], None]) -> None:
         self._scene, self._size, self._go_to = scene, size, go_to
+        self.kinds = {kind: scene.add_frame(f"/{kind}", show_axes=False) for kind in KINDS}
         self._lamps: list = []
         self._frusta: list = []
         self._advised: list = []
         self._eye: Camera | None = None
 
     def lamps(self, found: Found | None, truth: LightRig) -> None:
-        """Orange regions of the lamps that were found, the search's way to them in blue, green balls at true ones."""
+        """Regions of the lamps that were found, the way to them, what they were weighed against, and true lamps."""
         _clear(self._lamps)
         scene, size = self._scene, self._size
         if found is not None:
@@ -43,6 +58,8 @@ class Drawings:
                 mesh = region(light.position, covariance, size)
                 self._lamps.append(scene.add_mesh_simple(f"/found/{index}", *mesh, color=_FOUND, opacity=0.5))
             self._lamps += [self._way(index, way) for index, way in enumerate(ways(found.path))]
+            for index, other in enumerate(found.alternatives, start=1):
+                self._lamps += self._other(index, other)
             for index, light in enumerate(truth):
                 place = tuple(light.position.tolist())
                 self._lamps.append(scene.add_icosphere(f"/truth/{index}", TRUTH * size, _TRUE, position=place))
@@ -50,14 +67,14 @@ class Drawings:
     def cameras(self, photographs: Sequence[Photograph]) -> None:
         """A frustum for each photograph."""
         _clear(self._frusta)
-        self._frusta += [self._frustum(f"/photographs/{k}", one.camera, _TAKEN) for k, one in enumerate(photographs)]
+        self._frusta += [self._frustum(f"/cameras/{k}", one.camera, _TAKEN) for k, one in enumerate(photographs)]
         self._hide()
 
     def advised(self, camera: Camera | None) -> None:
         """The camera that would tell most."""
         _clear(self._advised)
         if camera is not None:
-            self._advised.append(self._frustum("/advised", camera, _ADVISED))
+            self._advised.append(self._frustum("/cameras/advised", camera, _ADVISED))
 
     def seen_from(self, camera: Camera) -> None:
         """The visitor looks through another camera, whose own frustum is hidden."""
@@ -68,6 +85,17 @@ class Drawings:
         for frustum in (*self._frusta, *self._advised) if self._eye is not None else ():
             away = float(np.linalg.norm(frustum.position - self._eye.origin.numpy()))
             frustum.visible = away > FRUSTUM * self._size
+
+    def _other(self, number: int, other: ToldAlternative) -> list:
+        """Balls at the lamps of an alternative, and the number under which it is told."""
+        colour = _RULED_OUT if other.ruled_out else _OPEN
+        places = [tuple(light.position.tolist()) for light in other.lights if not light.distant]
+        names = [f"/others/{number}/{index}" for index in range(len(places))]
+        pairs = zip(names, places, strict=True)
+        balls = [self._scene.add_icosphere(name, OTHER * self._size, colour, position=place) for name, place in pairs]
+        for name in names:  # goes with its ball
+            self._scene.add_label(f"{name}/number", str(number), anchor="bottom-left", font_screen_scale=0.8)
+        return balls
 
     def _way(self, index: int, way: np.ndarray) -> viser.LineSegmentsHandle:
         pairs = np.stack([way[:-1], way[1:]], axis=1)

@@ -51,7 +51,7 @@ class FitControls:
             self._case.visible = len(self._cases) > 1
             self._view = gui.add_dropdown("look from", [_FREE], hint="The camera of a photograph. Key G.")
             self._buttons += offer(client, *self._actions())
-            self._step = gui.add_slider("step", 0, 1, 1, 1, hint="Lamps on the way of the search, which is blue.")
+            self._step = gui.add_slider("step", 0, 1, 1, 1, hint="Lamps on the way of the search. Keys 8, 9.")
         self._case.on_update(by_visitor(self._open))
         self._view.on_update(by_visitor(self._look))
         self._step.on_update(by_visitor(self._go_back))
@@ -59,6 +59,8 @@ class FitControls:
             client,
             Action("next camera", "G", "Look through the camera of the next photograph.", self._next_view),
             Action("next target", "O", "Photographs of the next target.", self._next_case),
+            Action("step back", "8", "The lamps one step earlier on the way of the search.", lambda: self._walk(-1)),
+            Action("step on", "9", "The lamps one step later.", lambda: self._walk(1)),
         )
         self.refresh()
 
@@ -173,6 +175,11 @@ class FitControls:
             self._case.value = names[(names.index(self._case.value) + 1) % len(names)]
             self._open()
 
+    def _walk(self, steps: int) -> None:
+        if self._step.visible:
+            self._step.value = min(max(int(self._step.value) + steps, 0), int(self._step.max))
+            self._go_back()
+
     def _go_back(self) -> None:
         found = self._session.found
         if found is not None:
@@ -182,10 +189,13 @@ class FitControls:
 
 
 def _words(found: Found) -> str:
-    """What a fit says of its lamps, and which other numbers of lamps it ruled out."""
+    """What a fit says of its lamps, and what it weighed them against, by the numbers in the picture."""
     # Lamps stand in lines of their own, which begin with blanks.
     text = "\n".join(f"- {line.strip()}" if line.startswith(" ") else f"\n{line}\n" for line in found.told.splitlines())
     if len(found.costs) > 1:
         tried = ", ".join(f"{count}: {cost:.4g}" for count, cost in sorted(found.costs.items()))
         text += f"\nCost by number of lamps: {tried}."
+    if found.alternatives:
+        others = (f"{number}. {one.told}" for number, one in enumerate(found.alternatives, start=1))
+        text += "\n\nWeighed against:\n\n" + "\n".join(others)
     return text

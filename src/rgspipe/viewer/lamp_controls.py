@@ -45,13 +45,15 @@ class LampControls:
         self._kind = gui.add_dropdown(
             "kind", list(OFFERED), hint="Point, spot, sphere or panel, at the same place. Key K."
         )
-        self._place = gui.add_vector3("place", (0.0, 0.0, 0.0), step=0.01, hint="Scene units; or drag the gizmo.")
+        # Three fields and not one of three, in which numbers are cut off on a narrow page.
+        hint = "Of the lamp, scene units; or drag the gizmo."
+        self._place = [gui.add_number(axis, 0.0, step=0.01, hint=hint) for axis in "xyz"]
         self._colour = gui.add_rgb("colour", (255, 255, 255), hint="Colour of the lamp; its brightest channel is 255.")
         self._level = gui.add_number("W/sr", 1.0, min=0.0, step=0.01, hint="Intensity of the brightest channel.")
         self._folder = gui.add_folder("shape")
         self._which.on_update(by_visitor(self._choose))
         self._kind.on_update(by_visitor(lambda: self._with(session.as_kind, self._kind.value)))
-        for field in (self._place, self._colour, self._level):
+        for field in (*self._place, self._colour, self._level):
             field.on_update(by_visitor(self._read))
         self.refresh()
 
@@ -120,13 +122,14 @@ class LampControls:
         self._numbers = []
         lights = self._session.lights
         self._folder.visible = bool(lights) and bool(lights[self._chosen].shape)
-        for field in (self._kind, self._place, self._colour, self._level):
+        for field in (self._kind, *self._place, self._colour, self._level):
             field.disabled = not lights
         if not lights:
             return
         light = lights[self._chosen]
         self._kind.value = light.kind if light.kind in OFFERED else OFFERED[0]
-        self._place.value = tuple(round(x, 4) for x in light.position.tolist())
+        for field, value in zip(self._place, light.position.tolist(), strict=True):
+            field.value = round(value, 4)
         self._colour.value, self._level.value = _shown(light)
         with self._folder:
             self._numbers = [self._number(light, number) for number in light.shape]
@@ -153,7 +156,7 @@ class LampControls:
         light = self._session.lights[self._chosen]
         colour = torch.tensor(self._colour.value).double() / 255.0
         intensity = colour / colour.amax().clamp(min=1.0 / 255.0) * max(self._level.value, 0.0)
-        place = torch.tensor(self._place.value).double()
+        place = torch.tensor([field.value for field in self._place], dtype=torch.float64)
         self._session.replace(self._chosen, light.at(place, None, intensity), f"fields {self._chosen}")
         gizmo = self._gizmos[self._chosen]
         gizmo.position = tuple(place.tolist())

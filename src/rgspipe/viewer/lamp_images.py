@@ -11,7 +11,7 @@ from torch import Tensor
 
 from rgspipe.renderer.effects import ALL_EFFECTS
 from rgspipe.renderer.frozen import FrozenScene
-from rgspipe.renderer.images.model import SurfelModel, ViewModel
+from rgspipe.renderer.images.model import Lit, SurfelModel, ViewModel
 from rgspipe.renderer.images.pixels import PixelModel
 from rgspipe.renderer.images.viewed_pixels import ViewedPixels
 from rgspipe.renderer.view_weights import ViewWeights
@@ -23,15 +23,17 @@ from rgspipe.viewer.kept import Kept
 #: look, as `FrozenScene.render` and the stage relight have it.
 Quality = Literal["coarse", "soft", "sharp"]
 
-#: Images of single lamps, and views, that are kept.
-KEPT_LAMPS, KEPT_VIEWS = 64, 6
+#: Pixels of single lamps' images that are kept, 12 bytes each: 200 MB. Pixels of views, some 200 bytes each (measured
+#: at 512²): 400 MB. Lamps whose light on the surfels is kept, 12 bytes a surfel.
+IMAGE_PIXELS, VIEW_PIXELS, LIT = 2**24, 2**21, 16
 
 
 class LampImages:
     """Images of a scene, each a sum over lamps.
 
     An image is linear in every lamp's intensity: with U_l what a camera sees of lamp l at 1 W/sr, it is Σ_l I_l U_l. So
-    a change of colour or power renders nothing, and of several lamps only the one that moves is rendered.
+    a change of colour or power renders nothing, and of several lamps only the one that moves is rendered. What a lamp
+    makes of the surfels is the same from everywhere, so that a camera that moves is only traced.
 
     Args:
         frozen: the scene.
@@ -39,7 +41,10 @@ class LampImages:
 
     def __init__(self, frozen: FrozenScene) -> None:
         self.frozen = frozen
-        self._units, self._weights, self._models = Kept(KEPT_LAMPS), Kept(KEPT_VIEWS), Kept(KEPT_VIEWS)
+        self._units: Kept[Tensor] = Kept(IMAGE_PIXELS, lambda image: image[..., 0].numel())
+        self._weights: Kept[ViewWeights] = Kept(VIEW_PIXELS, lambda view: view.camera.pixel_count)
+        self._models: Kept[ViewModel] = Kept(VIEW_PIXELS, lambda model: len(model.views.pixels))
+        self._lit: Kept[Lit] = Kept(LIT)
 
     def knows(self, camera: Camera) -> bool:
         """Whether the camera was traced already for images that are not coarse."""
@@ -57,27 +62,43 @@ class LampImages:
 
         The radiance of diffuse surfels times π over their albedo; 0 where there is no surface.
         """
-        view, surfels = self._view(camera, quality == "coarse"), self.frozen.surfels
-        arriving = torch.zeros_like(surfels.albedo)
-        if rig:
-            arriving = self.frozen.radiance_of(rig).detach() * math.pi / surfels.albedo.clamp(min=1e-3)
-        return (view.operator @ arriving.float()).reshape(camera.height, camera.width, 3).cpu()
+        model, albedo = self._model(camera, "coarse" if quality == "coarse" else "soft"), self.frozen.surfels.albedo
+        radiance = torch.zeros_like(albedo)
+        for light in rig:
+            lit = self._lit_by(model, _white(light))
+            radiance += light.intensity.to(albedo) * (lit if isinstance(lit, Tensor) else lit.radiance)
+        arriving = radiance * math.pi / albedo.clamp(min=1e-3)
+        return (model.views.operator @ arriving).reshape(camera.height, camera.width, 3).cpu()
 
     def _unit_image(self, camera: Camera, light: Light, quality: Quality) -> Tensor:
-        white = light.at(light.position, None, torch.ones(3, dtype=torch.float64))
+        white = _white(light)
         return self._units.get((camera.key, quality, _told(white)), lambda: self._rendered(camera, white, quality))
 
     def _rendered(self, camera: Camera, light: Light, quality: Quality) -> Tensor:
-        model = self._models.get((camera.key, quality), lambda: self._model(camera, quality))
-        return model.views.split(model.image((light,)))[0].detach().cpu()
+        model = self._model(camera, quality)
+        soft = isinstance(model, SurfelModel)
+        image = model.seen(self._lit_by(model, light)) if soft else model.image((light,))
+        return model.views.split(image)[0].detach().cpu()
+
+    def _lit_by(self, model: SurfelModel, light: Light) -> Lit:
+        with torch.no_grad():
+            return self._lit.get(_told(light), lambda: model.lit((light,)))
 
     def _model(self, camera: Camera, quality: Quality) -> ViewModel:
+        return self._models.get((camera.key, quality), lambda: self._made(camera, quality))
+
+    def _made(self, camera: Camera, quality: Quality) -> ViewModel:
         views = ViewedPixels.every(self.frozen, [self._view(camera, quality == "coarse")])
         return (PixelModel if quality == "sharp" else SurfelModel).of(views, ALL_EFFECTS)
 
     def _view(self, camera: Camera, coarse: bool) -> ViewWeights:
         rays = {"supersampling": 1} if coarse else {}
         return self._weights.get((camera.key, coarse), lambda: self.frozen.view(camera, **rays))
+
+
+def _white(light: Light) -> Light:
+    """The lamp at 1 W/sr."""
+    return light.at(light.position, None, torch.ones(3, dtype=torch.float64))
 
 
 def _told(light: Light) -> Hashable:

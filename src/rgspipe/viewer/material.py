@@ -11,12 +11,14 @@ import pandas as pd
 import torch
 from torch import Tensor
 
+from rgspipe.datasets.alternatives_file import ToldAlternative, read_alternatives
 from rgspipe.datasets.covariance_file import read_covariances
 from rgspipe.datasets.gs3 import load_target
 from rgspipe.datasets.json_file import read_json
 from rgspipe.datasets.light_file import read_lights
 from rgspipe.datasets.views import Target, View
 from rgspipe.fitting import FitResult
+from rgspipe.fitting.words import told_alternative
 from rgspipe.scene import Camera, LightRig
 from rgspipe.scene.arrays import ArrayLike
 
@@ -51,6 +53,7 @@ class Found:
         told: what is to be thought of them.
         costs: robust cost of the best rig of each number of lamps that was tried.
         path: the rigs on the way, from the start that won.
+        alternatives: what they were weighed against.
     """
 
     lights: LightRig
@@ -58,12 +61,14 @@ class Found:
     told: str = ""
     costs: Mapping[int, float] = field(default_factory=dict)
     path: tuple[LightRig, ...] = ()
+    alternatives: tuple[ToldAlternative, ...] = ()
 
     @classmethod
     def of(cls, result: FitResult) -> Found:
         """What a fit found."""
         steps = tuple(step.lights for step in result.trajectory)
-        return cls(result.lights, result.covariance, repr(result), result.costs, steps)
+        others = (ToldAlternative(one.lights, told_alternative(one), one.ruled_out) for one in result.alternatives)
+        return cls(result.lights, result.covariance, repr(result), result.costs, steps, tuple(others))
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +111,8 @@ def found_in(fit: str | Path) -> Found:
     lights, told = read_lights(path), read_json(path, "a fit's light file")
     costs = {int(count): float(cost) for count, cost in told.get("costs", {}).items()}
     words = f"{told['result']}: {told['reason']}" if "reason" in told else ""
-    return Found(lights, read_covariances(path), words, costs, _path(Path(fit) / "convergence.csv", lights))
+    steps = _path(Path(fit) / "convergence.csv", lights)
+    return Found(lights, read_covariances(path), words, costs, steps, read_alternatives(path))
 
 
 def _path(table: Path, lights: LightRig) -> tuple[LightRig, ...]:

@@ -9,6 +9,7 @@ import viser
 from rgspipe.evaluation.images import Bytes
 from rgspipe.scene import Camera
 from rgspipe.viewer.cameras import camera_of, pose_of
+from rgspipe.viewer.drawing_controls import DrawingControls
 from rgspipe.viewer.drawings import Drawings
 from rgspipe.viewer.fit_controls import FitControls
 from rgspipe.viewer.lamp_controls import LampControls
@@ -36,16 +37,18 @@ class Page:
         self._client, self._resolution, self._seen = client, exhibit.resolution, b""
         self.session = exhibit.session()
         self.painter = Painter(self.session, self.camera, self._show, exhibit.resolution, exhibit.turn)
-        self._drawings = Drawings(client.scene, exhibit.images.frozen.size, self._go_to)
+        self.drawings = Drawings(client.scene, exhibit.images.frozen.size, self._go_to)
         visit = Visit(client, self.session, exhibit, self._here, self._go_to, self.painter.changed)
         gui, wide = client.gui, client.camera.image_width >= NARROW
         if wide:
             gui.add_markdown(_HELP)
-        self.fit = FitControls(visit, self._drawings, lambda: self.lamps.refresh(), is_open=wide)
+        self.fit = FitControls(visit, self.drawings, lambda: self.lamps.refresh(), is_open=wide)
         with gui.add_folder("lamps", expand_by_default=wide):
             self.lamps = LampControls(visit)
         with gui.add_folder("picture", expand_by_default=wide):
             self.picture = PictureControls(visit)
+        with gui.add_folder("drawn", expand_by_default=False):
+            DrawingControls(client, self.drawings)
         with gui.add_folder("save", expand_by_default=False):
             Saving(visit)
         self._go_to(exhibit.camera)
@@ -72,7 +75,7 @@ class Page:
         # The browser tells of its camera also where it stands still.
         if camera is not None and camera.key != self._seen:
             self._seen = camera.key
-            self._drawings.seen_from(camera)
+            self.drawings.seen_from(camera)
             self.painter.changed()
 
     def _show(self, picture: Bytes, top: float, sharp: bool) -> None:

@@ -13,6 +13,9 @@ from rgspipe.viewer.visit import Visit
 #: Stops of a press of a key, and of the slider at most.
 STOPS, MOST_STOPS = 0.5, 6.0
 
+#: By what part of the scene a press of a key moves the section.
+SHIFT = 0.05
+
 #: Sections that are offered: across which axis.
 SECTIONS = ("none", "across x", "across y", "across z")
 
@@ -23,6 +26,7 @@ class PictureControls:
     def __init__(self, visit: Visit) -> None:
         self._session, self._changed = visit.session, visit.changed
         client, gui = visit.client, visit.client.gui
+        self._gui = gui
         self._exposure = gui.add_slider(
             "exposure", -MOST_STOPS, MOST_STOPS, 0.1, 0.0, hint="Stops; 2 is four times as bright. Keys U and J."
         )
@@ -32,19 +36,24 @@ class PictureControls:
         self._section = gui.add_dropdown(
             "section", SECTIONS, hint="Cut away what is on your side of a plane, to look into closed rooms. Key L."
         )
-        self._place = gui.add_slider("section at", 0.0, 1.0, 0.01, 0.5, hint="From the lower to the upper end.")
+        self._place = gui.add_slider(
+            "section at", 0.0, 1.0, 0.01, 0.5, hint="From the lower to the upper end. Keys 6, 7."
+        )
         self._place.visible = False
         self._scale = gui.add_image(scale(), visible=False)
         self._legend = gui.add_markdown("")
-        self._dark = gui.add_checkbox("dark page", True, hint="Of the page around the picture.")
+        self._dark = gui.add_checkbox("dark page", True, hint="Of the page around the picture. Key 0.")
         for field in (self._exposure, self._shown, self._section, self._place):
             field.on_update(by_visitor(self._read))
-        self._dark.on_update(by_visitor(lambda: theme(client.gui, self._dark.value)))
+        self._dark.on_update(by_visitor(self._paint_page))
         actions = (
             Action("brighter", "U", "Half a stop brighter.", lambda: self._expose(STOPS)),
             Action("darker", "J", "Half a stop darker.", lambda: self._expose(-STOPS)),
             Action("next way to show", "I", "Picture, irradiance, illuminance in turn.", self._show_next),
             Action("next section", "L", "No section, then one across each axis.", self._cut_next),
+            Action("section down", "6", "Move the section towards the lower end.", lambda: self._shift(-SHIFT)),
+            Action("section up", "7", "Move the section towards the upper end.", lambda: self._shift(SHIFT)),
+            Action("dark or light page", "0", "Of the page around the picture.", self._turn_page),
         )
         keys(client, *actions)
 
@@ -66,6 +75,17 @@ class PictureControls:
     def _cut_next(self) -> None:
         self._section.value = _next(SECTIONS, self._section.value)
         self._read()
+
+    def _shift(self, part: float) -> None:
+        self._place.value = float(np.clip(self._place.value + part, 0.0, 1.0))
+        self._read()
+
+    def _turn_page(self) -> None:
+        self._dark.value = not self._dark.value
+        self._paint_page()
+
+    def _paint_page(self) -> None:
+        theme(self._gui, self._dark.value)
 
     def _read(self) -> None:
         session, axis = self._session, SECTIONS.index(self._section.value) - 1

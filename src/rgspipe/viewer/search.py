@@ -31,7 +31,8 @@ class Finder:
     """
 
     def __init__(self, frozen: FrozenScene) -> None:
-        self._frozen, self._views, self._turn = replace(frozen), Kept(KEPT_VIEWS), threading.Lock()
+        self._frozen, self._turn = replace(frozen), threading.Lock()
+        self._views: Kept[FitViews] = Kept(KEPT_VIEWS)
 
     @property
     def busy(self) -> bool:

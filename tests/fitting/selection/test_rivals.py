@@ -5,24 +5,11 @@ from __future__ import annotations
 import pytest
 import torch
 
-from emitters import emitter_at
-from lit_room import VISIBLE
+from emitters import placed, refiner_of
 from rgspipe.fitting.findings import Rival
-from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.options import BarOptions, RivalOptions, ScheduleOptions, SearchOptions
 from rgspipe.fitting.search.compare import drop
-from rgspipe.fitting.search.refine import Refiner, State
-from rgspipe.fitting.search.weighting import ROBUST
-from rgspipe.fitting.selection.rivals import equally_good, rival_among, rival_elsewhere, rival_polished
-
-
-def refiner_of(room, point_light) -> Refiner:
-    images = room.images(point_light(VISIBLE))
-    return Refiner.of(LightProblem.create(room.one.prepared, room.one.prepared.stack_images(images)))
-
-
-def placed(refiner: Refiner, by: float) -> State:
-    return refiner.start([emitter_at(torch.tensor(VISIBLE, dtype=torch.float64) + by)], ROBUST)
+from rgspipe.fitting.selection.rivals import equally_good, rival_among, rival_elsewhere, rival_polished, told_rival
 
 
 def test_rigs_that_leave_only_rounding_are_equally_good(room, point_light) -> None:
@@ -60,26 +47,28 @@ def test_a_rival_says_how_far_it_is(room, point_light) -> None:
     off, unknown = placed(refiner, 0.02), torch.diag(torch.tensor([torch.inf] * 3 + [1.0] * 3, dtype=torch.float64))
     found = rival_elsewhere(refiner, off, [unknown], LENIENT)
     # A light is moved so far, unless the edge of the room stops it.
-    assert found is not None and found.distance == pytest.approx(LENIENT.certainty.doubtful, rel=1e-9)
+    assert found is not None
+    assert told_rival(refiner, off, found).distance == pytest.approx(LENIENT.certainty.doubtful, rel=1e-9)
 
 
 def test_rivals_of_another_number_have_no_distance(room, point_light) -> None:
     refiner = refiner_of(room, point_light)
     one = placed(refiner, 0.02)
-    two = refiner.start([emitter_at(torch.tensor(VISIBLE, dtype=torch.float64) + by) for by in (0.02, 0.1)], ROBUST)
+    two = placed(refiner, 0.02, 0.1)
     assert rival_among(refiner, one, [one], LENIENT) is None
     rival = rival_among(refiner, one, [one, two], LENIENT)
     assert rival is not None and len(rival.emitters) == 2
-    assert rival_polished(refiner, one, [rival], [torch.eye(6).double()], LENIENT) == Rival(None)
+    assert rival_polished(refiner, one, [rival], [torch.eye(6).double()], LENIENT) is rival
+    assert told_rival(refiner, one, rival) == Rival(None)
 
 
 def test_a_near_rival_is_one_where_the_region_does_not_hold_it(room, point_light) -> None:
     """Nearer than lights that are clearly apart, and farther than those on their way to one place."""
     refiner = refiner_of(room, point_light)
     off, near, met = (placed(refiner, by) for by in (0.02, 0.04, 0.021))
-    for deviation, rival in ((0.001, Rival(0.02 * 3.0**0.5 / refiner.region.size)), (0.1, None)):
+    for deviation, rival in ((0.001, near), (0.1, None)):
         covariance = [deviation**2 * torch.eye(6, dtype=torch.float64)]
-        found = rival_polished(refiner, off, [near], covariance, LENIENT)
-        assert (found is None) == (rival is None)
-        assert found is None or found.distance == pytest.approx(rival.distance, rel=1e-6)
+        assert rival_polished(refiner, off, [near], covariance, LENIENT) is rival
         assert rival_polished(refiner, off, [met], covariance, LENIENT) is None
+    distance = told_rival(refiner, off, near).distance
+    assert distance == pytest.approx(0.02 * 3.0**0.5 / refiner.region.size, rel=1e-6)

@@ -18,6 +18,7 @@ from rgspipe.renderer.images.viewed_pixels import ViewedPixels
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.view_weights import ViewWeights
 from rgspipe.scene.arrays import REMEDY, ArrayLike, as_tensor, check_finite, check_radiance
+from rgspipe.scene.camera import AXES
 from rgspipe.scene.guesses import guessed_surfaces
 
 #: Pixels of which less than this is the scene's, by what surfels cover or by their mask, show something else.
@@ -124,9 +125,7 @@ def prepare_views(
             "target",
             expected=f"at least {LEAST_PIXELS} pixels that show the scene away from edges",
             found=f"{len(pixels)} of {sum(v.camera.pixel_count for v in views)}",
-            remedy="Check the masks, and that cameras are in the scene's coordinates and look along −z, with +y up "
-            "(from OpenCV, change the sign of their second and third column). With mask_edges off, pixels on edges "
-            "count, too.",
+            remedy=f"Check the masks, and that {AXES}. With mask_edges off, pixels on edges count, too.",
         )
     rows = [
         view.operator.to_scipy()[chosen.cpu().numpy().nonzero()[0]] for view, chosen in zip(views, trusted, strict=True)

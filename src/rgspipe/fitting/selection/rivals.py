@@ -49,7 +49,7 @@ def rival_among(refiner: Refiner, best: State, others: Sequence[State], options:
 
 def rival_polished(
     refiner: Refiner, best: State, others: Sequence[State], covariance: Sequence[Tensor], options: SearchOptions
-) -> Rival | None:
+) -> State | None:
     """The nearest of other minima that explains as much as an answer, clearly apart or not held by its regions.
 
     A covariance knows of one minimum. Another that explains as much is another answer, however near, unless the regions
@@ -57,24 +57,22 @@ def rival_polished(
 
     Args:
         refiner: on the problem that the answer was polished on.
-        others: polished on all pixels, too.
+        others: polished on all pixels, too, with the exposures of the answer.
         covariance: of each light of the answer, see `FitResult.covariance`.
     """
     size = refiner.region.size
     _, *apart = distinct([best, *others], options.schedule.met, size)
     for other in sorted(apart, key=lambda state: rig_distance(best.emitters, state.emitters, size)):
         clear = rig_distance(best.emitters, other.emitters, size) > options.certainty.doubtful
-        if clear or not _regions_hold(best, other, covariance, size):
-            # They may have found other exposures.
-            other = refiner.start(other.emitters, PLAIN, other)
-            if as_good(refiner, best, other, options.rivals):
-                return _rival(refiner, best, other)
+        told = clear or not _regions_hold(best, other, covariance, size)
+        if told and as_good(refiner, best, other, options.rivals):
+            return other
     return None
 
 
 def rival_elsewhere(
     refiner: Refiner, best: State, covariance: Sequence[Tensor], options: SearchOptions
-) -> Rival | None:
+) -> State | None:
     """The rig with a light whose place is not determined, if it explains as much from a clearly different one.
 
     A search meets such rivals only by chance: where its starts end in a valley without a floor is up to the last bits.
@@ -85,7 +83,7 @@ def rival_elsewhere(
     """
     for other in _moved(refiner, best, covariance, options):
         if as_good(refiner, best, other, options.rivals):
-            return _rival(refiner, best, other)
+            return other
     return None
 
 
@@ -98,7 +96,8 @@ def _regions_hold(best: State, other: State, covariance: Sequence[Tensor], size:
     return inside(*places, spreads)
 
 
-def _rival(refiner: Refiner, best: State, other: State) -> Rival:
+def told_rival(refiner: Refiner, best: State, other: State) -> Rival:
+    """That `other` explains as much as an answer."""
     distance = rig_distance(best.emitters, other.emitters, refiner.region.size)
     return Rival(distance if math.isfinite(distance) else None)
 

@@ -74,7 +74,7 @@ for (const box of document.querySelectorAll(".room")) {
   const lamp = (pen, at, light) => {
     const scale = canvas.width / canvas.clientWidth || 1, page = dark.matches && !printing ? "#13171b" : "#fff";
     pen.strokeStyle = pen.fillStyle = light.colour; pen.lineWidth = 1.2 * scale;
-    if (light.region && light.found) region(pen, at, light);
+    if (shown("regions") && light.region && light.found) region(pen, at, light);
     const found = light.found && at(light.found), truth = light.truth && at(light.truth);
     if (found && truth) { pen.lineWidth = 2 * scale; path(pen, [found, truth]); pen.stroke(); }
     if (truth) {
@@ -90,6 +90,18 @@ for (const box of document.querySelectorAll(".room")) {
     spots.push({ x: found[0] / scale, y: found[1] / scale, light });
   };
 
+  // What a fit weighed against its answer.
+  const other = (pen, at, light, { places, told, ruled_out }) => {
+    const scale = canvas.width / canvas.clientWidth || 1, r = 3.5 * scale;
+    for (const place of places) {
+      const [x, y] = at(place);
+      pen.fillStyle = ruled_out ? "#8a8f98" : "#d0343c"; pen.strokeStyle = ink(); pen.lineWidth = scale;
+      pen.fillRect(x - r, y - r, 2 * r, 2 * r); pen.strokeRect(x - r, y - r, 2 * r, 2 * r);
+      spots.push({ x: x / scale, y: y / scale, light, told: `${ruled_out ? "ruled out" : "not ruled out"}: ${told}` });
+    }
+  };
+  const shown = (kind) => box.querySelector(`input[data-kind=${kind}]`).checked;
+
   const draw = () => {
     const scale = devicePixelRatio || 1;
     canvas.width = canvas.clientWidth * scale; canvas.height = canvas.clientHeight * scale;
@@ -98,10 +110,14 @@ for (const box of document.querySelectorAll(".room")) {
     surfels(pen, at);
     pen.lineWidth = 1.2 * scale;
     for (const one of data.cameras) camera(pen, at, one);
-    for (const light of lamps()) if (!target.value || light.target === target.value) lamp(pen, at, light);
+    for (const light of lamps()) if (!target.value || light.target === target.value) {
+      if (target.value && shown("others")) for (const one of light.others) other(pen, at, light, one);
+      lamp(pen, at, light);
+    }
   };
   const lamps = () => data.groups[fits.value]?.lights ?? [];
-  const say = (light) => { said.textContent = light ? `${light.target}, ${light.label}: ${light.error ? light.error + " of the scene from the truth" : "truth not known"}` : "\u00a0"; };
+  const error = (light) => (light.error ? `${light.error} of the scene from the truth` : "truth not known");
+  const say = (light, told) => { said.textContent = light ? `${light.target}, ${light.label}: ${told ?? error(light)}` : "\u00a0"; };
   const fill = () => {
     const names = [...new Set(lamps().map((light) => light.target))];
     target.replaceChildren(new Option(`all ${names.length} targets`, ""), ...names.map((name) => new Option(name, name)));
@@ -121,12 +137,13 @@ for (const box of document.querySelectorAll(".room")) {
   canvas.addEventListener("pointermove", (event) => {
     if (event.buttons) turn(event.movementX / 140, event.movementY / 140);
     const near = (spot) => Math.hypot(spot.x - event.offsetX, spot.y - event.offsetY);
-    const found = spots.filter((spot) => near(spot) < 14).sort((one, other) => near(one) - near(other))[0]?.light ?? null;
-    if (found !== chosen) say((chosen = found));
+    const found = spots.filter((spot) => near(spot) < 14).sort((one, other) => near(one) - near(other))[0] ?? null;
+    if (found !== chosen) { chosen = found; say(found?.light, found?.told); }
   });
   canvas.addEventListener("wheel", (event) => { if (event.ctrlKey) { zoom(Math.exp(-event.deltaY / 300)); event.preventDefault(); } }, { passive: false });
   fits.replaceChildren(...data.groups.map((group, i) => new Option(`${group.method}, ${group.views} view${group.views === 1 ? "" : "s"}`, i)));
   fits.addEventListener("change", () => { fill(); say(null); soon(); });
+  box.querySelectorAll("input").forEach((input) => input.addEventListener("change", soon));
   target.addEventListener("change", () => { say(lamps().find((light) => light.target === target.value)); soon(); });
   dark.addEventListener("change", soon);
   addEventListener("beforeprint", () => { printing = true; draw(); });

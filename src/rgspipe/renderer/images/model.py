@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import Self, TypeAlias
 
 import torch
 from torch import Tensor
 
 from rgspipe.renderer.effects import Effects
 from rgspipe.renderer.extent import added
-from rgspipe.renderer.glossy_transport import GlossyTransport
+from rgspipe.renderer.glossy_transport import GlossyLight, GlossyTransport
 from rgspipe.renderer.images.glossy import seen_light, seen_with_gloss
 from rgspipe.renderer.images.viewed_pixels import ViewedPixels
 from rgspipe.renderer.kernels.lit_transmittance import LEAST_LIT
@@ -19,6 +19,9 @@ from rgspipe.renderer.lit_surfels import lit_columns, lit_surfels
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.unit_light import UnitLight
 from rgspipe.scene.lights import LightRig
+
+#: The light of a scene: (N, 3) outgoing radiance of diffuse surfels, or what gloss needs besides.
+Lit: TypeAlias = Tensor | GlossyLight
 
 
 class ImageModel(ABC):
@@ -119,7 +122,13 @@ class SurfelModel(ViewModel):
         return columns
 
     def image(self, rig: LightRig) -> Tensor:
+        return self.seen(self.lit(rig))
+
+    def lit(self, rig: LightRig) -> Lit:
+        """The light of the scene under a rig, from wherever it is looked at."""
         frozen = self.views.frozen
-        if self.gloss is None:
-            return self.views.operator @ frozen.radiance_of(rig, self.effects)
-        return seen_light(self.views, frozen.glossy_light(rig, self.effects))
+        return (frozen.radiance_of if self.gloss is None else frozen.glossy_light)(rig, self.effects)
+
+    def seen(self, lit: Lit) -> Tensor:
+        """(P, 3) what the pixels see of it."""
+        return self.views.operator @ lit if isinstance(lit, Tensor) else seen_light(self.views, lit)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from typing import TypeVar
@@ -10,7 +11,7 @@ from rgspipe.errors import InputError
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.pixel_direct import PixelDirect
 from rgspipe.renderer.view_weights import ViewWeights, build_view_weights
-from rgspipe.scene.camera import Camera
+from rgspipe.scene.camera import AXES, Camera
 
 #: Cameras that are kept.
 KEPT = 4
@@ -31,7 +32,7 @@ class RecentViews:
         self._direct: OrderedDict[Hashable, tuple[ViewWeights, PixelDirect]] = OrderedDict()
 
     def weights(self, camera: Camera | ViewWeights) -> ViewWeights:
-        """The camera's image as a linear function of the radiance.
+        """The camera's image as a linear function of the radiance; warns of a camera that sees nothing of the scene.
 
         Raises:
             InputError: it is no camera.
@@ -41,7 +42,16 @@ class RecentViews:
         if not isinstance(camera, Camera):
             found, remedy = type(camera).__name__, "Camera.look_at makes one; of several, render one after the other."
             raise InputError("camera", expected="a Camera", found=found, remedy=remedy)
-        return _kept(self._weights, camera.key, lambda: build_view_weights(self._bvh, camera))
+        return _kept(self._weights, camera.key, lambda: self._traced(camera))
+
+    def _traced(self, camera: Camera) -> ViewWeights:
+        view = build_view_weights(self._bvh, camera)
+        if not bool(view.coverage.any()):
+            # Told of the line that calls `FrozenScene.render`.
+            warnings.warn(
+                f"The camera sees nothing of the scene: its picture is black. Check that {AXES}.", stacklevel=6
+            )
+        return view
 
     def direct(self, view: ViewWeights) -> PixelDirect:
         """Direct light where the view's pixels look."""

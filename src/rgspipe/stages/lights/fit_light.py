@@ -35,7 +35,14 @@ from rgspipe.stages.lights.capture import captured_views, known_emitters
 from rgspipe.stages.lights.extras import Named, further_files, training_cameras
 from rgspipe.stages.lights.spec import light_spec, table_files
 from rgspipe.stages.lights.spoken import COMMAND_LINE
-from rgspipe.stages.lights.targets import all_targets, select_targets, target_seed, used_views
+from rgspipe.stages.lights.targets import (
+    all_targets,
+    known_targets,
+    select_targets,
+    target_seed,
+    used_indices,
+    used_views,
+)
 from rgspipe.stages.scene.effects import chosen_effects, frozen_scene, wanted_effects
 from rgspipe.stages.sources import image_stage, require_images, target_stage
 from rgspipe.store.artifacts import Artifact
@@ -262,6 +269,8 @@ def _keys(config: RgspipeConfig) -> list[str]:
 
 def _files(config: RgspipeConfig) -> list[Path]:
     """The user's target, read now: what is wrong with it should show before a scene is trained for it."""
+    for known in known_targets(config):
+        used_indices(known.name, known.views, config)
     target, base, tables = config.fit.target, config.fit.base, table_files(config)
     if target is None:
         _refuse_base(base)

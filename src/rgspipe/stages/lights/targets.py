@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Sequence
+from typing import Protocol, TypeVar
 
 from rgspipe.config import RgspipeConfig
-from rgspipe.datasets.gs3 import load_target
+from rgspipe.datasets.gs3 import TargetFolder, load_target, target_folders
 from rgspipe.datasets.location import open_dataset
 from rgspipe.datasets.views import Target, View
 from rgspipe.errors import InputError
@@ -25,7 +26,28 @@ def all_targets(context: StageContext) -> Sequence[Target]:
     return open_dataset(context.inputs[stage].folder(), train=False, test=False).targets
 
 
-def select_targets(targets: Sequence[Target], config: RgspipeConfig) -> list[Target]:
+def known_targets(config: RgspipeConfig) -> list[TargetFolder]:
+    """The targets that lie on disk before anything is made: the user's own, or those of a dataset that was there.
+
+    Raises:
+        InputError: their cameras cannot be read, or none is of the wanted class.
+    """
+    if config.fit.target is not None:
+        return [TargetFolder.of(config.fit.target)]
+    if config.scene.kind != "external" or config.fit.targets == "generated" or config.scene.path is None:
+        return []
+    return select_targets([TargetFolder.of(folder) for folder in target_folders(config.scene.path)], config)
+
+
+class _Classed(Protocol):
+    @property
+    def occlusion(self) -> str: ...
+
+
+_Target = TypeVar("_Target", bound=_Classed)
+
+
+def select_targets(targets: Sequence[_Target], config: RgspipeConfig) -> list[_Target]:
     """The targets of the wanted class, at most `fit.limit` of each.
 
     Raises:
@@ -33,7 +55,7 @@ def select_targets(targets: Sequence[Target], config: RgspipeConfig) -> list[Tar
     """
     if config.fit.target is not None:
         return list(targets)
-    chosen: list[Target] = []
+    chosen: list[_Target] = []
     for target in targets:
         before = sum(other.occlusion == target.occlusion for other in chosen)
         wanted = config.occlusion in ("all", target.occlusion)
@@ -56,16 +78,25 @@ def used_views(target: Target, config: RgspipeConfig) -> list[View]:
     Raises:
         InputError: the target has fewer.
     """
+    return [target.views[index] for index in used_indices(target.name, len(target.views), config)]
+
+
+def used_indices(target: str, views: int, config: RgspipeConfig) -> list[int]:
+    """Which views of a target that has so many the configuration asks for.
+
+    Raises:
+        InputError: the target has fewer.
+    """
     indices = config.views.indices if config.views.indices is not None else list(range(config.views.count))
-    if max(indices) >= len(target.views) or len(set(indices)) < len(indices):
+    if max(indices) >= views or len(set(indices)) < len(indices):
         key = "views.count" if config.views.indices is None else "views.indices"
         raise InputError(
             key,
-            expected=f"different cameras of the {len(target.views)} that target {target.name} has",
+            expected=f"different cameras of the {views} that target {target} has",
             found=str(config.views.count if config.views.indices is None else indices),
             remedy="Ask for fewer views, or add images to the target.",
         )
-    return [target.views[index] for index in indices]
+    return list(indices)
 
 
 def target_seed(target: Target, config: RgspipeConfig) -> int:

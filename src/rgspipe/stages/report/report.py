@@ -11,6 +11,7 @@ import pandas as pd
 from rgspipe.config import RgspipeConfig
 from rgspipe.config.core import plain
 from rgspipe.config.scene import MODELLED
+from rgspipe.datasets.alternatives_file import ToldAlternative, read_alternatives
 from rgspipe.datasets.grade_file import GRADE, load_grade
 from rgspipe.datasets.json_file import read_json
 from rgspipe.datasets.surfel_file import load_surfels
@@ -73,6 +74,7 @@ def _contents(context: StageContext) -> report.ReportContents:
         fits=_pictures(evaluations, described),
         surfels=surfels,
         cameras=_cameras(described),
+        alternatives=_alternatives(context.input_lists.get("fit_light", ()), described),
         grade=_grade(context.inputs.get("freeze")),
         training=_training(trained),
         training_log=_optional_table(trained, "training.csv"),
@@ -126,6 +128,18 @@ def _cameras(described: Iterable[Mapping[str, Any]]) -> list[CameraMark]:
     """The cameras of the evaluation with the most views."""
     most = max((content["cameras"] for content in described), key=len, default=[])
     return [CameraMark(tuple(item["origin"]), tuple(item["direction"]), item["angle"]) for item in most]
+
+
+def _alternatives(
+    fits: Iterable[Artifact], described: Iterable[Mapping[str, Any]]
+) -> dict[tuple[str, int, str], Sequence[ToldAlternative]]:
+    """What every fit weighed against its answer, by method, number of views and target."""
+    found = {}
+    for fit, content in zip(fits, described, strict=False):
+        for row in content["summary"][:1]:
+            for name in (name for name in fit.manifest["files"] if name.endswith("/lights.json")):
+                found[row["method"], int(row["views"]), name.partition("/")[0]] = read_alternatives(fit.file(name))
+    return found
 
 
 def _surfels(freeze: Artifact | None) -> Surfels | None:

@@ -2,34 +2,31 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from rgspipe.config import RgspipeConfig
 from rgspipe.config.compared import ComparedFits
-from rgspipe.datasets.frames import read_entries
 from rgspipe.fitting.options import Method
+from rgspipe.stages.lights.targets import known_targets
 from rgspipe.stages.sources import has_truth
 
 
 def fits_of(config: RgspipeConfig, wanted: ComparedFits) -> list[tuple[Method, int]]:
-    """Each method with each of its numbers of views, as far as the target has so many.
+    """Each method with each of its numbers of views, as far as targets have so many.
 
     Raises:
-        InputError: a target of the user's own cannot be read.
+        InputError: see `at_most`.
     """
     return list(dict.fromkeys((method, at_most(config, views)) for method, views in wanted.fits()))
 
 
 def at_most(config: RgspipeConfig, views: int) -> int:
-    """A number of views, or all that targets have, if these are fewer and known before anything is made.
+    """A number of views, or all that every target has, if these are fewer and known before anything is made.
 
     Raises:
-        InputError: a target of the user's own cannot be read.
+        InputError: targets that are on disk cannot be read, or none is of the wanted class.
     """
-    if config.fit.target is None:
-        rendered = has_truth(config) and config.fit.targets != "generated"
-        return min(views, config.dataset.target_views) if rendered else views
-    return min(views, len(read_entries(Path(config.fit.target) / "transforms.json", "the cameras of a fit target")))
+    rendered = config.fit.target is None and config.fit.targets != "generated" and has_truth(config)
+    counts = [config.dataset.target_views] if rendered else [target.views for target in known_targets(config)]
+    return min([views, *counts])
 
 
 def fit_changes(config: RgspipeConfig, wanted: ComparedFits, method: Method, views: int) -> dict[str, object]:
