@@ -30,7 +30,6 @@ TINY = {
     "freeze.dictionary_grid": 3,
     "report.views": "[1]",
     "fit.search.starts": 1,
-    "fit.search.batches": 1,
     "fit.search.iterations": 2,
     "fit.adam.epochs": 1,
     "fit.adam.steps": 4,

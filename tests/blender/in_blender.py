@@ -1,4 +1,4 @@
-"""Measurements that need bpy, run by the tests in a process of its own: `in_blender.py NAME FOLDER`."""
+"""Measurements that need bpy, run by the tests in a process of its own: `in_blender.py FOLDER NAME…`."""
 
 from __future__ import annotations
 
@@ -169,5 +169,6 @@ def _house_material(name: str) -> bpy.types.Material:
 
 
 if __name__ == "__main__":
-    measurements = (plane, free_space, save_blends, save_house, normalise, own_cameras)
-    {measurement.__name__: measurement for measurement in measurements}[sys.argv[1]](Path(sys.argv[2]))
+    measurements = {one.__name__: one for one in (plane, free_space, save_blends, save_house, normalise, own_cameras)}
+    for name in sys.argv[2:]:
+        measurements[name](Path(sys.argv[1]))

@@ -1,4 +1,4 @@
-"""Measurements of the modelled scenes, run by the tests in a process of its own: `models_in_blender.py NAME FOLDER`."""
+"""Measurements of the modelled scenes, run by tests in a process of its own: `models_in_blender.py FOLDER NAME…`."""
 
 from __future__ import annotations
 
@@ -37,7 +37,9 @@ SCENES: dict[str, Model] = {
 
 
 def scenes(folder: Path) -> None:
-    """Bounds, objects, cameras, lights and targets of every scene."""
+    """Bounds, objects, cameras, lights and targets of every scene, in a folder of their own."""
+    folder = folder / "scenes"
+    folder.mkdir()
     for name, model in SCENES.items():
         job = DatasetJob(scene=name, model=model, train_views=12, test_views=1, targets_per_class=2, resolution=16)
         (folder / f"{name}.json").write_text(json.dumps(_describe(job)))
@@ -133,6 +135,6 @@ def _frame(name: str, origin: tuple, light: tuple, resolution: int, angle: float
 
 
 if __name__ == "__main__":
-    measurements = {"scenes": scenes, "normals": normals, "plain_hotdog": plain_hotdog}
-    measurements |= {"patterns": patterns, "glossy": glossy}
-    measurements[sys.argv[1]](Path(sys.argv[2]))
+    measurements = {one.__name__: one for one in (scenes, normals, plain_hotdog, patterns, glossy)}
+    for name in sys.argv[2:]:
+        measurements[name](Path(sys.argv[1]))

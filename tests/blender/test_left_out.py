@@ -19,7 +19,7 @@ SMALL = {"train_views": 1, "test_views": 1, "targets_per_class": 0, "resolution"
 @pytest.fixture(scope="module")
 def files(in_blender: Callable[..., None], tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("house")
-    in_blender("save_house", folder)
+    in_blender(folder, "save_house")
     return folder
 
 

@@ -13,8 +13,15 @@ import torch
 from rgspipe.datasets.exr import read_channels, read_image
 from rgspipe.scene import Camera, look_at
 
-Run = Callable[[str, Path], None]
 pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def measured(in_blender: Callable[..., None], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What in_blender.py leaves of its plane and of free space."""
+    folder = tmp_path_factory.mktemp("measured")
+    in_blender(folder, "plane", "free_space")
+    return folder
 
 
 def _plane_view(height: float) -> tuple[Camera, np.ndarray]:
@@ -33,39 +40,36 @@ def _expected(points: np.ndarray, height: float) -> np.ndarray:
     return (np.array([0.2, 0.5, 0.8]) / math.pi * irradiance).reshape(16, 16, 64, 3).mean(axis=2)
 
 
-def test_cycles_measures_radiance_depth_and_normals(in_blender: Run, tmp_path: Path) -> None:
-    in_blender("plane", tmp_path)
+def test_cycles_measures_radiance_depth_and_normals(measured: Path) -> None:
     for name, side in (("above", 1.0), ("below", -1.0)):
         _, points = _plane_view(1.5 * side)
-        image, alpha = read_image(tmp_path / f"{name}.exr")
+        image, alpha = read_image(measured / f"{name}.exr")
         expected = _expected(points, 0.9 * side)
         # 2048 samples inside a pixel against 64 subpixels: measured 2.9e-4 at worst, 1.3e-5 for the mean.
         np.testing.assert_allclose(image, expected, rtol=1e-3)
         assert abs(image.mean() / expected.mean() - 1) < 1e-4
         assert (alpha == 1).all()
-        normal = np.stack([read_channels(tmp_path / f"{name}_normal.exr")[axis] for axis in "XYZ"], axis=-1)
+        normal = np.stack([read_channels(measured / f"{name}_normal.exr")[axis] for axis in "XYZ"], axis=-1)
         np.testing.assert_array_equal(normal, np.broadcast_to([0, 0, side], (16, 16, 3)))
-        albedo = np.stack([read_channels(tmp_path / f"{name}_albedo.exr")[channel] for channel in "RGB"], axis=-1)
+        albedo = np.stack([read_channels(measured / f"{name}_albedo.exr")[channel] for channel in "RGB"], axis=-1)
         np.testing.assert_allclose(
             albedo, np.broadcast_to([0.2, 0.5, 0.8], (16, 16, 3)), rtol=5e-4
         )  # measured 2.4e-4: half
 
 
-def test_depth_is_planar_at_pixel_centres(in_blender: Run, tmp_path: Path) -> None:
-    in_blender("plane", tmp_path)
+def test_depth_is_planar_at_pixel_centres(measured: Path) -> None:
     camera, _ = _plane_view(1.5)
     origins, directions, lengths = camera.rays()
     expected = (-origins[:, 2] / directions[:, 2] / lengths).reshape(16, 16).numpy()
     # The filter is 0.01 pixel wide: measured 3.4e-7.
-    np.testing.assert_allclose(read_channels(tmp_path / "above_depth.exr")["Z"], expected, rtol=1e-5)
+    np.testing.assert_allclose(read_channels(measured / "above_depth.exr")["Z"], expected, rtol=1e-5)
     for suffix in ("", "_depth", "_normal", "_albedo"):
-        first, again = ((tmp_path / f"{name}{suffix}.exr").read_bytes() for name in ("above", "again"))
+        first, again = ((measured / f"{name}{suffix}.exr").read_bytes() for name in ("above", "again"))
         assert first == again, "the same frame, rendered again after another one, must be the same file"
 
 
-def test_solids_are_not_free_and_closed_rooms_are(in_blender: Run, tmp_path: Path) -> None:
-    in_blender("free_space", tmp_path)
-    found = np.load(tmp_path / "free.npz")
+def test_solids_are_not_free_and_closed_rooms_are(measured: Path) -> None:
+    found = np.load(measured / "free.npz")
     assert found["cornell"].tolist() == [True, False, True, True]
     assert found["closed"].tolist() == [True, False]
     assert found["is_room"]

@@ -17,19 +17,23 @@ from rgspipe.scene.models import CornellBox, Corridor
 
 pytestmark = pytest.mark.slow
 
-Run = Callable[..., None]
-SCRIPT = "models_in_blender.py"
 CORNERS = {"corner": 0.32, "narrow_corner": 0.28, "wide_corner": 0.36}
 ZOO = ("zoo_standing", "zoo_one_side", "zoo_open")
 ALL = ("cornell", "hotdog", "room", *CORNERS)
 
 
 @pytest.fixture(scope="module")
-def found(in_blender: Run, tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict]:
+def measured(in_blender: Callable[..., None], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What models_in_blender.py leaves: of each scene in `scenes`, of the rest beside."""
+    folder = tmp_path_factory.mktemp("models")
+    in_blender(folder, "scenes", "normals", "plain_hotdog", "patterns", "glossy", script="models_in_blender.py")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def found(measured: Path) -> dict[str, dict]:
     """What was measured of each scene."""
-    folder = tmp_path_factory.mktemp("scenes")
-    in_blender("scenes", folder, SCRIPT)
-    return {path.stem: json.loads(path.read_text()) for path in folder.glob("*.json")}
+    return {path.stem: json.loads(path.read_text()) for path in (measured / "scenes").glob("*.json")}
 
 
 @pytest.mark.parametrize("name", [*ALL, *ZOO])
@@ -120,19 +124,17 @@ def test_the_same_seed_gives_the_same_scene(found: dict) -> None:
     assert found["other_seed"]["cameras"] != found["corner"]["cameras"]
 
 
-def test_smooth_normals_are_those_of_the_faces(in_blender: Run, tmp_path: Path) -> None:
-    in_blender("normals", tmp_path, SCRIPT)
-    for scene, turns in json.loads((tmp_path / "normals.json").read_text()).items():
+def test_smooth_normals_are_those_of_the_faces(measured: Path) -> None:
+    for scene, turns in json.loads((measured / "normals.json").read_text()).items():
         for name, turn in turns.items():
             # Degrees, mean over the surface: measured 2.1 for the sauce, whose line is two pixels wide, 1.2 elsewhere.
             assert turn < (2.5 if name == "sauce" else 1.5), f"{scene}: {name}"
 
 
-def test_the_hot_dog_has_alpha_and_the_colours_it_was_given(in_blender: Run, tmp_path: Path) -> None:
-    in_blender("plain_hotdog", tmp_path, SCRIPT)
-    image, alpha = read_image(tmp_path / "hotdog.exr")
-    albedo = np.stack([read_channels(tmp_path / "hotdog_albedo.exr")[channel] for channel in "RGB"], axis=-1)
-    depth = read_channels(tmp_path / "hotdog_depth.exr")["Z"]
+def test_the_hot_dog_has_alpha_and_the_colours_it_was_given(measured: Path) -> None:
+    image, alpha = read_image(measured / "hotdog.exr")
+    albedo = np.stack([read_channels(measured / "hotdog_albedo.exr")[channel] for channel in "RGB"], axis=-1)
+    depth = read_channels(measured / "hotdog_depth.exr")["Z"]
     assert 0.2 < (alpha > 0.99).mean() < 0.8 and (alpha < 0.01).mean() > 0.2
     assert (image[alpha < 0.01] == 0).all()
     there = depth < 100
@@ -147,22 +149,20 @@ def test_the_hot_dog_has_alpha_and_the_colours_it_was_given(in_blender: Run, tmp
     assert set(distance.argmin(axis=1)) == set(range(len(colours)))
 
 
-def test_patterns_repeat_as_they_are_told(in_blender: Run, tmp_path: Path) -> None:
-    in_blender("patterns", tmp_path, SCRIPT)
+def test_patterns_repeat_as_they_are_told(measured: Path) -> None:
     x, y = _seen_from_above()
     first, second = np.array([0.1, 0.2, 0.3]), np.array([0.7, 0.6, 0.5])
     cell = np.floor(x / 0.25) + np.floor(y / 0.25)
     inside = (np.abs(x / 0.25 - np.round(x / 0.25)) > 0.02) & (np.abs(y / 0.25 - np.round(y / 0.25)) > 0.02)
     expected = np.where((cell % 2 == 1)[..., None], first, second)
-    np.testing.assert_allclose(_albedo(tmp_path / "checker_albedo.exr")[inside], expected[inside], atol=5e-4)
-    stripes = _albedo(tmp_path / "stripes_albedo.exr")
+    np.testing.assert_allclose(_albedo(measured / "checker_albedo.exr")[inside], expected[inside], atol=5e-4)
+    stripes = _albedo(measured / "stripes_albedo.exr")
     share = 0.5 - 0.5 * np.cos(2 * np.pi * x / 0.25 + _phase(x, stripes[..., 0]))
     expected = first + np.clip((share - 0.25) / 0.5, 0, 1)[..., None] * (second - first)
     np.testing.assert_allclose(stripes, expected, atol=5e-3)  # the phase is found to 1°, worth 3e-3 here
 
 
-def test_a_glossy_material_is_the_lobe_of_the_model(in_blender: Run, tmp_path: Path) -> None:
-    in_blender("glossy", tmp_path, SCRIPT)
+def test_a_glossy_material_is_the_lobe_of_the_model(measured: Path) -> None:
     camera = Camera.from_field_of_view(look_at(torch.tensor([0.5, -1.2, 0.9]), torch.zeros(3)), 0.7, 16, 16)
     origins, directions, _ = camera.rays(subsamples=8)
     points = (origins + (-origins[:, 2] / directions[:, 2])[:, None] * directions).numpy()
@@ -172,14 +172,14 @@ def test_a_glossy_material_is_the_lobe_of_the_model(in_blender: Run, tmp_path: P
     irradiance = to_light[:, 2] / distance**2
     cosine = np.maximum(0.0, (to_light * [1, 1, -1] * directions.numpy()).sum(axis=1))
     lobe = (0.3 * 22 / (2 * math.pi) * cosine**20 * irradiance).reshape(16, 16, 64).mean(axis=2)
-    images = {name: read_image(tmp_path / f"{name}.exr")[0] for name in ("glossy", "matte")}
+    images = {name: read_image(measured / f"{name}.exr")[0] for name in ("glossy", "matte")}
     for channel, albedo in enumerate((0.4, 0.3, 0.2)):
         # 512 samples inside a pixel against 64 subpixels: measured 1.3e-3 for both.
         diffuse = (albedo / math.pi * irradiance).reshape(16, 16, 64).mean(axis=2)
         np.testing.assert_allclose(images["matte"][..., channel], diffuse, rtol=4e-3)
         np.testing.assert_allclose(images["glossy"][..., channel], diffuse + lobe, rtol=4e-3)
     assert lobe.max() > 3 * diffuse.max()
-    np.testing.assert_array_equal(_albedo(tmp_path / "glossy_albedo.exr"), _albedo(tmp_path / "matte_albedo.exr"))
+    np.testing.assert_array_equal(_albedo(measured / "glossy_albedo.exr"), _albedo(measured / "matte_albedo.exr"))
 
 
 def _albedo(path: Path) -> np.ndarray:

@@ -11,9 +11,9 @@ import torch
 from rgspipe.datasets.named_cameras import read_camera
 
 
-def test_points_are_where_blender_has_them(in_blender: Callable[[str, Path], None], tmp_path: Path) -> None:
+def test_points_are_where_blender_has_them(in_blender: Callable[..., None], tmp_path: Path) -> None:
     """For every way to state a lens, shifted, through cameras that are turned and scaled, of images of two shapes."""
-    in_blender("own_cameras", tmp_path)
+    in_blender(tmp_path, "own_cameras")
     found = np.load(tmp_path / "pixels.npz")
     seen = [name for name in found.files if name != "points"]
     assert len(seen) == 6

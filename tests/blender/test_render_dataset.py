@@ -7,6 +7,7 @@ import importlib.util
 import json
 import math
 import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -37,6 +38,9 @@ pytestmark = [
 JOB = DatasetJob(train_views=6, test_views=1, targets_per_class=2, target_views=2, resolution=16, samples=4, seed=3)
 FRAMES = 6 + 1 + 3 * 2 * 2
 
+#: The first two of its photographs, and nothing else.
+SHORT = replace(JOB, train_views=2, test_views=0, targets_per_class=0)
+
 
 @pytest.fixture(scope="module")
 def rendered(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -44,6 +48,20 @@ def rendered(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("rendered")
     render_dataset(JOB, folder)
     return folder
+
+
+@pytest.fixture(scope="module")
+def short(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The dataset of SHORT."""
+    folder = tmp_path_factory.mktemp("short")
+    render_dataset(SHORT, folder)
+    return folder
+
+
+@pytest.fixture
+def copied(short: Path, tmp_path: Path) -> Path:
+    """That dataset in a folder of the test's own, files as old as they were."""
+    return Path(shutil.copytree(short, tmp_path / "copied"))
 
 
 @pytest.fixture(scope="module")
@@ -106,40 +124,36 @@ def test_a_target_does_not_give_its_light_away(rendered: Path) -> None:
         assert "pl_" not in path.read_text() and "position" not in path.read_text()
 
 
-def test_frames_do_not_depend_on_how_many_there_are(rendered: Path, tmp_path: Path) -> None:
-    render_dataset(replace(JOB, train_views=2, test_views=0, targets_per_class=0), tmp_path)
-    digests = _digests(tmp_path)
+def test_frames_do_not_depend_on_how_many_there_are(rendered: Path, short: Path) -> None:
+    digests = _digests(short)
     same = {
         name: digest for name, digest in _digests(rendered).items() if name.startswith(("train/r_0000", "train/r_0001"))
     }
     assert len(same) == 8 and same.items() <= digests.items()
 
 
-def test_damage_is_repaired_and_the_rest_is_kept(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    render_dataset(replace(JOB, train_views=2, test_views=0, targets_per_class=0), tmp_path)
-    before = _digests(tmp_path)
-    kept = tmp_path / "train/r_0001.exr"
+def test_damage_is_repaired_and_the_rest_is_kept(copied: Path, caplog: pytest.LogCaptureFixture) -> None:
+    before = _digests(copied)
+    kept = copied / "train/r_0001.exr"
     stamp = kept.stat().st_mtime_ns
-    cut = tmp_path / "train/r_0000.exr"
+    cut = copied / "train/r_0000.exr"
     # Whole images in the wrong place can be read, so that reading is no proof.
     cut.write_bytes(kept.read_bytes())
-    (tmp_path / "train/r_0000_depth.exr").write_bytes(b"")
-    (tmp_path / "transforms_train.json").unlink()
-    render_dataset(replace(JOB, train_views=2, test_views=0, targets_per_class=0), tmp_path)
-    assert _digests(tmp_path) == before
+    (copied / "train/r_0000_depth.exr").write_bytes(b"")
+    (copied / "transforms_train.json").unlink()
+    render_dataset(SHORT, copied)
+    assert _digests(copied) == before
     assert kept.stat().st_mtime_ns == stamp
     assert [record.message for record in caplog.records] == [
         "1 of the frames that lie there are not as they were written: rendered again"
     ]
 
 
-def test_where_the_job_was_cut_off_all_is_rendered_again(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    job = replace(JOB, train_views=1, test_views=0, targets_per_class=0)
-    render_dataset(job, tmp_path)
-    before, stamp = _digests(tmp_path), (tmp_path / "train/r_0000.exr").stat().st_mtime_ns
-    (tmp_path / "job.json").write_text("")
-    render_dataset(job, tmp_path)
-    assert _digests(tmp_path) == before and (tmp_path / "train/r_0000.exr").stat().st_mtime_ns > stamp
+def test_where_the_job_was_cut_off_all_is_rendered_again(copied: Path, caplog: pytest.LogCaptureFixture) -> None:
+    before, stamp = _digests(copied), (copied / "train/r_0000.exr").stat().st_mtime_ns
+    (copied / "job.json").write_text("")
+    render_dataset(SHORT, copied)
+    assert _digests(copied) == before and (copied / "train/r_0000.exr").stat().st_mtime_ns > stamp
     assert "job.json cannot be read" in caplog.records[0].message
 
 
@@ -192,8 +206,8 @@ def test_killed_at_any_moment_it_goes_on_and_ends_the_same(
     assert _digests(tmp_path) == _digests(rendered)
 
 
-def test_a_blend_file_is_stripped_of_all_that_glows(in_blender: Callable[[str, Path], None], tmp_path: Path) -> None:
-    in_blender("save_blends", tmp_path)
+def test_a_blend_file_is_stripped_of_all_that_glows(in_blender: Callable[..., None], tmp_path: Path) -> None:
+    in_blender(tmp_path, "save_blends", "normalise")
     job = replace(JOB, train_views=2, test_views=1, targets_per_class=0)
     for name in ("bare", "lit"):
         render_dataset(replace(job, model=BlendFile(str(tmp_path / f"{name}.blend"))), tmp_path / name)
@@ -201,7 +215,6 @@ def test_a_blend_file_is_stripped_of_all_that_glows(in_blender: Callable[[str, P
     assert {name for name in bare if bare[name] != lit[name]} == {"job.json"}
     images = [view.image for view in load_dataset(tmp_path / "lit").train]
     assert all(image.max() > 0 for image in images)
-    in_blender("normalise", tmp_path)
     found = np.load(tmp_path / "normal.npz")
     np.testing.assert_allclose(found["hi"] - found["lo"], [1.0, 1.0, 2.5 / 8], atol=1e-6)  # measured 6e-8
     np.testing.assert_allclose(found["hi"] + found["lo"], 0, atol=1e-6)

@@ -13,6 +13,7 @@ from rgspipe.capture.lamps import LampProblem, Lamps
 from rgspipe.capture.received import Received
 
 
+@cache
 def gather() -> np.ndarray:
     return frozen_room().gather.to_scipy().astype(np.float64).tocsr()
 
@@ -37,6 +38,7 @@ def unseen() -> np.ndarray:
     return (centers[:, 0] > 0.05) & (centers[:, 2] < -0.1)
 
 
+@cache
 def problem() -> LampProblem:
     frozen = frozen_room()
     albedo = frozen.surfels.albedo.double().numpy()

@@ -25,11 +25,18 @@ def toys(folder: Path, *words: str) -> list[str]:
     return [sys.executable, "-m", "toys", f"outputs={folder}", "dataset.resolution=8", *words]
 
 
-@pytest.fixture
-def store(tmp_path: Path, child_environment: Mapping[str, str]) -> Path:
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory, child_environment: Mapping[str, str]) -> Path:
     """A store in which the stage `grow` is made."""
-    subprocess.run(toys(tmp_path / "outputs", "stage=grow"), env=child_environment, check=True, capture_output=True)
-    return tmp_path / "outputs"
+    outputs = tmp_path_factory.mktemp("made") / "outputs"
+    subprocess.run(toys(outputs, "stage=grow"), env=child_environment, check=True, capture_output=True)
+    return outputs
+
+
+@pytest.fixture
+def store(made: Path, tmp_path: Path) -> Path:
+    """That store, for one test to spoil."""
+    return Path(shutil.copytree(made, tmp_path / "outputs", symlinks=True))
 
 
 def read_only(store: Path, environment: Mapping[str, str], *words: str) -> subprocess.CompletedProcess[str]:

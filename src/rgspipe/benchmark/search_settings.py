@@ -16,7 +16,7 @@ from rgspipe.evaluation import metrics
 from rgspipe.evaluation.markdown import markdown_table
 from rgspipe.evaluation.rig_errors import rig_errors
 from rgspipe.fitting import FitStatus, FitViews, Search
-from rgspipe.options import Options, settings
+from rgspipe.options import Options, check_names, settings
 from rgspipe.progress import progress_bar
 from rgspipe.scene import Light, LightRig
 
@@ -51,14 +51,21 @@ class KnownTarget:
     views: FitViews
 
 
-def search_table(targets: Sequence[KnownTarget], size: float) -> pd.DataFrame:
+def search_table(
+    targets: Sequence[KnownTarget], size: float, usual: Search | None = None, names: Sequence[str] | None = None
+) -> pd.DataFrame:
     """One row for the settings as they are, and one for each number halved and doubled.
 
     Args:
         size: the scene's, for errors as shares of it.
+        usual: the settings as they are.
+        names: of the numbers, or of sections of them; all by default.
+
+    Raises:
+        InputError: there is no such number.
     """
-    usual = Search()
-    tried = [("as it is", "", usual), *varied(usual)]
+    usual = usual or Search()
+    tried = [("as it is", "", usual), *varied(usual, names)]
     rows = [
         {"setting": name, "value": value, **_outcome(targets, options, size)}
         for name, value, options in progress_bar(tried, "settings of the search", unit="setting")
@@ -66,9 +73,16 @@ def search_table(targets: Sequence[KnownTarget], size: float) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def varied(options: Search) -> Iterator[tuple[str, str, Search]]:
-    """Each number of the options, nested ones by dotted names, halved and doubled where its range allows that."""
-    for name in numbers(type(options)):
+def varied(options: Search, names: Sequence[str] | None = None) -> Iterator[tuple[str, str, Search]]:
+    """Each number of the options, nested ones by dotted names, halved and doubled where its range allows that.
+
+    Args:
+        names: of the numbers, or of sections of them; all by default.
+
+    Raises:
+        InputError: there is no such number.
+    """
+    for name in _chosen(list(numbers(type(options))), names):
         value = _get(options, name)
         for factor in FACTORS:
             changed = _scaled(value, factor)
@@ -129,6 +143,13 @@ def numbers(options: type[Options], prefix: str = "") -> Iterator[str]:
             yield from numbers(setting.section, f"{prefix}{setting.name}.")
         elif setting.type in (int, float):
             yield f"{prefix}{setting.name}"
+
+
+def _chosen(every: Sequence[str], names: Sequence[str] | None) -> list[str]:
+    """Those of all numbers that are named, or whose section is."""
+    sections = {name.rpartition(".")[0] for name in every} - {""}
+    check_names(names or (), [*every, *sorted(sections)])
+    return [name for name in every if names is None or name in names or name.rpartition(".")[0] in names]
 
 
 def _get(options: Options, name: str) -> Any:

@@ -6,6 +6,7 @@ import difflib
 import itertools
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -53,6 +54,7 @@ SLURM_LAUNCHER = "hydra_plugins.rgspipe_slurm.SlurmLauncher"
 CHECKED_VALUES = 50
 
 
+@cache
 def register_schema() -> None:
     """Let the files under conf/ extend the defaults. Hydra composes plain values; `typed` knows what they may be."""
     ConfigStore.instance().store(name="schema", node=plain(RgspipeConfig()), provider="rgspipe")

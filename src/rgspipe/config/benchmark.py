@@ -18,6 +18,9 @@ class BenchmarkConfig(Options):
     steers a search is worth: fits with it halved and doubled"""
     targets: int = option(4, low=1, high=1000)
     """with kind=search: single lights of each class; as many pairs and threes of unknown number; and a spot a light"""
+    settings: tuple[str, ...] | None = None
+    """with kind=search: which numbers of fit.search are halved and doubled, by name or by section (starts, bar.least,
+    bar); by default all, and with [] none: targets are fitted as fit.search is, and no more"""
     repetitions: int = option(20, low=1, high=100000)
     """runs of each measured step"""
     rooms: tuple[RoomName, ...] = get_args(RoomName)

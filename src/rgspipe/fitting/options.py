@@ -36,11 +36,10 @@ class CombinationOptions(Options):
 
     separation: float = option(0.16, low=0, high=10)
     """starts stand so far apart, a part of the scene's size, or their axes differ by more than neighbouring ones do"""
-    all_pairs: int = option(900, low=0, high=100000)
-    """up to this many candidates all pairs are tried"""
     beam: int = option(24, low=1, high=10000)
     """combinations that are kept while lights are added one by one, candidates for each of them that are tried with
-    exact intensities, and combinations that are looked at for each wanted one, as neighbours are much alike"""
+    exact intensities, and combinations that are looked at for each wanted one, as neighbours are much alike. Up to its
+    square of candidates all pairs are tried"""
 
 
 @dataclass(frozen=True)
@@ -88,11 +87,14 @@ class BarOptions(Options):
     much has no rival"""
     least_energy: float = option(0.01, low=0, high=1)
     """a light with less than this share of the image's energy is none, where the number is open, and nobody asks where
-    else it could be"""
+    else it could be. An answer that leaves less than such a light would, squared, misses none: that is rounding, or
+    noise"""
     begins_faint: float = option(0.03, low=0, high=1)
     """a candidate that begins with less than this share of the energy promises as much as a faint light has to lower"""
-    noticeable: float = option(1e-4, low=0, high=1)
-    """an answer that leaves less than this share of the blocks' energy misses no light: that is rounding, or noise"""
+
+    def unnoticed(self, unexplained: float) -> bool:
+        """Whether what an answer leaves of the squares of the blocks is less than any light would."""
+        return unexplained < self.least_energy**2
 
 
 @dataclass(frozen=True)
@@ -162,10 +164,9 @@ class SearchOptions(Options):
     """How `search_lm` searches: a dictionary with closed-form intensity, then Levenberg-Marquardt."""
 
     starts: int = option(4, low=1, high=4096)
-    """best candidates that are refined; half as many where something is only tried beside an answer"""
-    batches: int = option(4, low=1, high=1000)
-    """a number of lights that is known is searched from up to so many times the wanted starts, until the best one
-    leaves less unexplained than an answer may (`certainty.poorly`)"""
+    """best candidates that are refined; half as many where something is only tried beside an answer. A number of lights
+    that is known is searched from up to so many times as many, until the best one leaves less unexplained than an
+    answer may (`certainty.poorly`)"""
     iterations: int = option(30, low=1, high=10000)
     """most Levenberg-Marquardt steps of the final refinement"""
     aimed: AimedOptions = AimedOptions()
@@ -206,8 +207,6 @@ class AdamOptions(StartOptions):
     """learning rate of spots' axes"""
     ssim_weight: float = option(0.2, low=0, high=1)
     """λ, the share of structural similarity in the loss"""
-    patience: int | None = option(None, low=1, high=100000)
-    """stop after so many epochs without a lower loss; by default never"""
 
 
 @dataclass(frozen=True)

@@ -84,7 +84,7 @@ def fit_search_lm(
     if not bool((best.intensity[: len(best.emitters)] > 0).any()):
         return _without_lights(polished.problem, meter)
     findings = found.findings
-    if polished.unexplained(best) < options.bar.noticeable:
+    if options.bar.unnoticed(polished.unexplained(best)):
         # What blocks miss there is what they do not see: shadows' edges.
         findings = [one for one in findings if not isinstance(one, LightMissing)]
     if spec.count is not None and not any(isinstance(finding, LightSpare) for finding in findings):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import torch
 from torch import Tensor
@@ -11,6 +11,7 @@ from torch import Tensor
 from rgspipe.errors import InputError
 from rgspipe.scene.arrays import ArrayLike, as_tensor, check_finite
 from rgspipe.scene.by_value import ByValue
+from rgspipe.scene.pinhole import Pinhole
 from rgspipe.scene.rigid import check_rigid
 from rgspipe.scene.shapes import Float, Given
 
@@ -22,7 +23,14 @@ AXES = (
 
 
 @dataclass(frozen=True)
-class Camera(ByValue):
+class _Pose:
+    """Where a camera stands and how it is turned; apart, so that it is the first that a camera is given."""
+
+    camera_to_world: Given
+
+
+@dataclass(frozen=True)
+class Camera(ByValue, Pinhole, _Pose):
     """A pinhole camera with OpenGL axes: it looks along its −z, +y is up, +x is right.
 
     Pixel (column x, row y) has its centre at (x + 0.5, y + 0.5); row 0 is the top of the image.
@@ -36,14 +44,6 @@ class Camera(ByValue):
     Raises:
         InputError: the transform is not rigid, a focal length not positive, or a size not a whole number of pixels.
     """
-
-    camera_to_world: Given
-    fx: float
-    fy: float
-    cx: float
-    cy: float
-    width: int
-    height: int
 
     def __post_init__(self) -> None:
         pose = as_tensor(self.camera_to_world, "camera_to_world", (4, 4), torch.float64)
@@ -105,17 +105,7 @@ class Camera(ByValue):
 
     def resized(self, width: int, height: int | None = None) -> Camera:
         """The same view in images of another size; without a height as high as the width asks for, rounded."""
-        height = max(1, round(self.height * width / self.width)) if height is None else height
-        across, down = width / self.width, height / self.height
-        return replace(
-            self,
-            fx=self.fx * across,
-            fy=self.fy * down,
-            cx=self.cx * across,
-            cy=self.cy * down,
-            width=width,
-            height=height,
-        )
+        return super().resized(width, max(1, round(self.height * width / self.width)) if height is None else height)
 
     def reduced(self, longest_side: int) -> Camera:
         """The same view with at most `longest_side` pixels along the longer side, at least one along the other."""

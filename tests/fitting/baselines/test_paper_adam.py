@@ -13,7 +13,6 @@ from lit_room import VISIBLE
 from rgspipe.fitting import FitStatus, PaperAdam
 from rgspipe.fitting.baselines.paper_adam_loss import AdamLoss, MovingRig
 from rgspipe.fitting.baselines.paper_adam_start import Ball, LightPrior, draw_start, light_ball
-from rgspipe.fitting.findings import AllStepsTaken
 from rgspipe.fitting.options import StartOptions
 from rgspipe.optim.ssim import WINDOW, ssim, ssim_map
 from rgspipe.renderer.effects import Effects
@@ -152,13 +151,6 @@ def test_the_intensity_is_split_over_the_lights_and_axes_point_inwards_or_anywhe
     # The ball's middle has no direction to itself.
     middle = LightPrior(ball.center.expand(3, 3), torch.ones(3, 3).double())
     assert float(draw_start(ball, 1.0, middle, StartOptions(), 0).axes.norm()) == pytest.approx(1.0)
-
-
-def test_patience_stops_early(room, point_light):
-    light = point_light(VISIBLE)
-    still = PaperAdam(epochs=10, steps=3, position_rate=0.0, intensity_rate=0.0, patience=2)
-    result = room.one.fit(room.images(light), solver=still)
-    assert not any(isinstance(finding, AllStepsTaken) for finding in result.findings) and result.iterations < 10
 
 
 def test_black_target_and_dark_start_stay_finite(room, point_light):

@@ -8,27 +8,21 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from rgspipe.scene.pinhole import Pinhole
+
 Numbers = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Lens:
-    """A pinhole in front of which lines may bend. Pixel (column x, row y) has its centre at (x + 0.5, y + 0.5).
+class Lens(Pinhole):
+    """A pinhole in front of which lines may bend.
 
     Attributes:
-        fx, fy, cx, cy: focal lengths and principal point, pixels.
-        width, height: of the images that these belong to, pixels.
         radial: k1, k2, …: a point at distance r from the axis (at depth 1) is seen 1 + k1 r² + k2 r⁴ + … as far out.
         tangential: p1, p2 of Brown's model, as OpenCV and COLMAP have them.
         fisheye: whether r is the angle from the axis instead, as far out as which an undistorted point is seen.
     """
 
-    fx: float
-    fy: float
-    cx: float
-    cy: float
-    width: int
-    height: int
     radial: tuple[float, ...] = ()
     tangential: tuple[float, float] = (0.0, 0.0)
     fisheye: bool = False
@@ -37,12 +31,6 @@ class Lens:
     def bends(self) -> bool:
         """Whether straight lines do not stay straight."""
         return self.fisheye or any((*self.radial, *self.tangential))
-
-    def resized(self, width: int, height: int) -> Lens:
-        """The lens before images of another size that show the same."""
-        across, down = width / self.width, height / self.height
-        focal = {"fx": self.fx * across, "fy": self.fy * down, "cx": self.cx * across, "cy": self.cy * down}
-        return replace(self, **focal, width=width, height=height)
 
     def places(self, x: Numbers, y: Numbers) -> tuple[Numbers, Numbers]:
         """Columns and rows where rays (x right, y down, 1 forward) land in the image."""

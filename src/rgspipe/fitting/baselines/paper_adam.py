@@ -58,7 +58,8 @@ def fit_paper_adam(
     if problem.black:
         return dark_result(meter.seconds)
     descent = _Descent.create(problem, target, options, prior, seed, spec, meter)
-    return _result(problem, descent, descent.run())
+    descent.run()
+    return _result(problem, descent)
 
 
 @dataclass
@@ -91,21 +92,18 @@ class _Descent:
         loss = AdamLoss(problem.views, target, options.ssim_weight, problem.model.effects)
         return cls(loss, options, ball, rig, meter, [])
 
-    def run(self) -> bool:
-        """All steps; each one's loss is that of its own lights. Whether the loss stalled before the last one."""
+    def run(self) -> None:
+        """All steps; each one's loss is that of its own lights."""
         options, optimiser = self.options, self._optimiser()
-        for index in progress_bar(range(options.epochs * options.steps), "Adam", unit="step"):
+        for _ in progress_bar(range(options.epochs * options.steps), "Adam", unit="step"):
             optimiser.zero_grad()
             loss = self.loss(self.rig)
             self._record(loss)
-            if _stalled(self.steps, index, options):
-                return True
             loss.backward()
             optimiser.step()
             self._bound()
         with torch.no_grad():
             self._record(self.loss(self.rig))
-        return False
 
     def _optimiser(self) -> torch.optim.Adam:
         options, rig = self.options, self.rig
@@ -126,7 +124,7 @@ class _Descent:
             rig.axes.copy_(torch.nn.functional.normalize(rig.axes, dim=1))
 
 
-def _result(problem: LightProblem, descent: _Descent, stalled: bool) -> FitResult:
+def _result(problem: LightProblem, descent: _Descent) -> FitResult:
     rig, last = descent.rig, descent.steps[-1]
     emitters = rig.emitters()
     intensities = torch.stack([light.intensity for light in last.lights])
@@ -135,7 +133,7 @@ def _result(problem: LightProblem, descent: _Descent, stalled: bool) -> FitResul
     findings = [
         *([AtBound()] if descent.ball.at_bound(rig.positions.detach()) else []),
         *doubts(last.lights, spread.calibrated, problem.views.frozen.bvh.surfels, problem.views.frozen.size),
-        *([] if stalled else [_all_steps(descent)]),
+        _all_steps(descent),
     ]
     return FitResult(
         lights=last.lights,
@@ -156,11 +154,3 @@ def _all_steps(descent: _Descent) -> AllStepsTaken:
     losses = [step.loss for step in descent.steps]
     before = losses[-min(len(losses), descent.options.steps + 1)]
     return AllStepsTaken(len(losses) - 1, losses[-1] / before - 1.0 if before > 0.0 else 0.0)
-
-
-def _stalled(steps: list[Step], index: int, options: AdamOptions) -> bool:
-    """Whether the last `patience` epochs brought no lower loss."""
-    if options.patience is None or index < options.patience * options.steps or index == 0:
-        return False
-    recent = options.patience * options.steps
-    return min(step.loss for step in steps[-recent:]) >= min(step.loss for step in steps[:-recent])

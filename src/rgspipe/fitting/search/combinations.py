@@ -194,7 +194,7 @@ def best_combinations(
 ) -> list[tuple[int, ...]]:
     """Combinations of `lights` candidates that explain the target best, at most `count` of them, best first.
 
-    All pairs are tried of up to `all_pairs` candidates; of more, the best candidates of all places are extended by one.
+    All pairs are tried of up to `beam`² candidates; of more, the best candidates of all places are extended by one.
     So are pairs for more lights; in the end every light of the best ones may be another candidate.
 
     Args:
@@ -204,7 +204,7 @@ def best_combinations(
     order = single_gains(scored).argsort(descending=True, stable=True).tolist()
     if lights == 1:
         return [(index,) for index in order[:count]]
-    exhaustive = len(order) <= options.all_pairs
+    exhaustive = len(order) <= options.beam**2
     beam: list[tuple[int, ...]] = [(index,) for index in _best_of_each_place(order, positions, options.beam)]
     if exhaustive:
         beam = list(best_pairs(scored, count if lights == 2 else options.beam))

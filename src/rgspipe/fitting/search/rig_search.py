@@ -108,7 +108,7 @@ class RigSearch:
             previous: a refined rig of one light fewer, to grow from.
             patient: whether further starts follow while all explain little.
         """
-        batches = self.options.batches if patient else 1
+        batches = self.options.starts if patient else 1
         found: list[Found] = []
         for aimed in (False, True):
             kinds = [kind for kind in self.candidates if kind.aimed is aimed]

@@ -53,7 +53,7 @@ def one_more_light(
         candidates: of each kind of light.
     """
     bar, steps, tries = options.bar, options.schedule.steps, max(1, options.starts // 2)
-    if refiner.unexplained(answer) < bar.noticeable:
+    if bar.unnoticed(refiner.unexplained(answer)):
         return None
     rigs: list[EmitterRig] = []
     for kind in candidates:

@@ -31,6 +31,7 @@ from rgspipe.machine.resources import resource_folder
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import Camera, LightRig, look_at
 from rgspipe.stages.base import Need, Stage, StageContext
+from rgspipe.stages.lights.fit_light import search_of
 from rgspipe.stages.sources import require_images
 from rgspipe.stages.targets.true_lights import scene_bounds, truth_file
 from rgspipe.store.artifacts import Artifact
@@ -99,7 +100,8 @@ def _search(context: StageContext) -> None:
     dataset = context.inputs["generate_dataset"]
     bounds, _ = scene_bounds(dataset, context.inputs["freeze"])
     targets = _known_targets(context, frozen, dataset)
-    table = search_table(targets, longest_side(bounds))
+    config = context.config
+    table = search_table(targets, longest_side(bounds), search_of(config.fit.search), config.benchmark.settings)
     write_text(context.folder / "search.csv", table.to_csv(index=False))
     text = search_markdown(table)
     write_text(context.folder / "search.md", text)
@@ -161,7 +163,7 @@ def _keys(config: RgspipeConfig) -> tuple[str, ...]:
     if config.benchmark.kind == "fit":
         return ("benchmark.kind", "benchmark.repetitions")
     if config.benchmark.kind == "search":
-        return ("benchmark.kind", "benchmark.targets", "effects.at_pixels")
+        return ("benchmark.kind", "benchmark.targets", "benchmark.settings", "fit.search", "effects.at_pixels")
     return ("benchmark",)
 
 

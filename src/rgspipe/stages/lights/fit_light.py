@@ -114,9 +114,8 @@ class Fitter:
         config = self.config.fit
         if config.method == "paper_adam":
             return PaperAdam(**_given(config.adam, AdamOptions), training_lights=self.training_lights, seed=seed)
-        differences = config.method == "finite_differences"
-        options = _given(config.search, SearchOptions)
-        return Search(**options, derivatives="differences" if differences else "analytic")
+        search = search_of(config.search)
+        return replace(search, derivatives="differences") if config.method == "finite_differences" else search
 
     def _other_cameras(self, target: Target, used: Sequence[View]) -> list[Named]:
         """Cameras that could be added to a fit: the target's own others, and those of the training views."""
@@ -159,6 +158,11 @@ def _require_fit(frozen: FrozenScene, config: RgspipeConfig, artifact: Artifact)
             found=graded_words(grade).removesuffix("."),
             remedy="Mend the scene, or set fit.poor_scene=true to fit nevertheless; answers will say so.",
         )
+
+
+def search_of(options: SearchOptions) -> Search:
+    """The search that is configured."""
+    return Search(**_given(options, SearchOptions))
 
 
 def _given(options: Options, kind: type[Options]) -> dict[str, object]:
