@@ -19,7 +19,10 @@ from rgspipe.fitting.search.compare import drop, light_energies
 from rgspipe.fitting.search.grow import best_of_starts, laid
 from rgspipe.fitting.search.promise import Promise, beam_promised, extent_promised
 from rgspipe.fitting.search.refine import Refiner, State
+from rgspipe.fitting.search.starts import Candidates
+from rgspipe.fitting.selection.far import far_or_near
 from rgspipe.fitting.selection.rivals import equally_good
+from rgspipe.fitting.selection.tables import with_tables
 from rgspipe.fitting.spec import LightSpec
 from rgspipe.scene import Light
 from rgspipe.scene.lights import LedLight, PanelLight, SphereLight, SpotLight
@@ -29,18 +32,23 @@ HALVINGS = 6
 
 
 def told_kinds(
-    refiner: Refiner, answer: State, spec: LightSpec, options: SearchOptions
-) -> tuple[State, tuple[Finding, ...]]:
+    refiner: Refiner, candidates: Sequence[Candidates], answer: State, spec: LightSpec, options: SearchOptions
+) -> tuple[State, tuple[Finding, ...], tuple[State, ...]]:
     """The answer with each light as the kind that explains it, and which kinds the image does not tell apart.
 
     Args:
-        answer: of points and spots.
+        candidates: of the kinds that were searched.
+        answer: of lights of these.
+
+    Returns:
+        the answer, what is to be said of it, and rigs with other measured luminaires in the place of those that it has.
     """
-    energies, findings = light_energies(answer), []
+    energies, findings, others = light_energies(answer), [], []
     for index in sorted(range(len(energies)), key=lambda k: -energies[k]):
-        answer, found = _OneLight(refiner, index, spec, options).told(answer)
+        answer, found, tables = _OneLight(refiner, candidates, index, spec, options).told(answer)
         findings += found
-    return answer, tuple(findings)
+        others += tables
+    return answer, tuple(findings), tuple(others)
 
 
 @dataclass(frozen=True)
@@ -48,36 +56,60 @@ class _OneLight:
     """Light `index` of rigs, of which the kind is asked."""
 
     refiner: Refiner
+    candidates: Sequence[Candidates]
     index: int
     spec: LightSpec
     options: SearchOptions
 
-    def told(self, answer: State) -> tuple[State, list[Finding]]:
-        """The rig with the kind that explains the light, and what is to be said of that."""
-        light = self._emitter(answer).light
+    def told(self, answer: State) -> tuple[State, list[Finding], list[State]]:
+        """The rig with the kind that explains the light, what is to be said of that, and rigs with other tables."""
+        light, extent = self._emitter(answer).light, None
+        tried = [answer, *far_or_near(self.refiner, self.candidates, answer, self.index, self.options)]
         if light.axis is None:
-            return self._of_a_point(answer)
-        tried = [answer, *self._beams(answer, light.axis)]
-        if isinstance(light, LedLight):
-            spots = next(kind for kind in self.spec.kinds if isinstance(kind, SpotLight)).variants()
-            tried.append(self._as([one.at(light.position, light.axis) for one in spots], answer))
-        return self._chosen(tried), self._open(tried)
+            extent = self._extent(answer)
+            tried += self._instead_of_point(answer, *extent)
+        elif not light.distant:
+            tried += self._instead_of_beam(answer, light)
+        tables = self._tables(tried)
+        tried += tables[:1]
+        best = self._chosen(tried)
+        sized = [] if extent is None or best is not answer else self._unseen(answer, extent[0], extent[1].signal)
+        return best, [*sized, *self._open(tried)], tables[1:] if best in tables[:1] else []
 
-    def _of_a_point(self, answer: State) -> tuple[State, list[Finding]]:
+    def _extent(self, answer: State) -> tuple[SphereLight, Promise]:
+        """The largest sphere that has room in the light's place, and what it promises."""
         place, size = self._emitter(answer).position, self.refiner.region.size
-        spheres = [one.at(place) for one in SphereLight.shaped().grown(size, True)]
+        sphere = SphereLight.shaped().grown(size, True)[-1].at(place)
         room = distance_to_surface(self.refiner.problem.views.frozen.bvh.surfels, place)
-        largest = replace(spheres[-1], radius=min(room, spheres[-1].radius))
-        extent = extent_promised(self.refiner, answer, self.index, largest)
-        beam = beam_promised(self.refiner, answer, self.index)
-        tried = [answer]
+        largest = replace(sphere, radius=min(room, sphere.radius))
+        return largest, extent_promised(self.refiner, answer, self.index, largest)
+
+    def _instead_of_point(self, answer: State, sphere: SphereLight, extent: Promise) -> list[State]:
+        """Rigs with a sphere and with beams in the light's place, where they promise enough."""
+        tried, beam = [], beam_promised(self.refiner, answer, self.index)
         if self._worth(extent):
+            spheres = sphere.grown(self.refiner.region.size, True)
             tried.append(self._as(spheres, answer))
         if self._worth(beam):
             tried += self._beams(answer, torch.nn.functional.normalize(beam.best, dim=0))
-        best = self._chosen(tried)
-        sized = self._unseen(answer, largest, extent.signal) if best is answer else []
-        return best, [*sized, *self._open(tried)]
+        return tried
+
+    def _instead_of_beam(self, answer: State, light: Light) -> list[State]:
+        """Rigs with another beam in the light's place."""
+        tried = self._beams(answer, light.axis)
+        if isinstance(light, LedLight):
+            spots = next(kind for kind in self.spec.kinds if isinstance(kind, SpotLight)).variants()
+            tried.append(self._as([one.at(light.position, light.axis) for one in spots], answer))
+        return tried
+
+    def _tables(self, tried: Sequence[State]) -> list[State]:
+        """Rigs with measured luminaires where the best of the beams that were tried is; best first."""
+        beams = [one for one in tried if self._emitter(one).axis is not None and not self._emitter(one).light.distant]
+        if not (beams and self.spec.tables):
+            return []
+        best = min(beams, key=self.refiner.unexplained)
+        found = with_tables(self.refiner, best, self.index, self.spec.tables, self.options)
+        return sorted(found, key=self.refiner.unexplained)
 
     def _unseen(self, answer: State, sphere: SphereLight, signal: float) -> list[Finding]:
         """A sphere that nobody would notice, the largest of `sphere` and its halves; nothing where each would be.
@@ -137,8 +169,9 @@ class _OneLight:
         return best
 
     def _open(self, tried: Sequence[State]) -> list[Finding]:
-        """Kinds of a beam that explain the image as well as the one that was chosen."""
+        """Kinds that explain the image as well as the one that was chosen, of such as are told by how light falls."""
         problem, best = self.refiner.problem, self._chosen(tried)
-        beams = [one for one in tried if one is not best and self._emitter(one).axis is not None]
-        as_good = [one for one in beams if equally_good(problem, best, one, self.options.rivals)]
-        return [KindOpen(self.index + 1, len(best.emitters), self._emitter(one).light.kind) for one in as_good]
+        distant = self._emitter(best).light.distant
+        others = [one for one in tried if one is not best and (distant or self._emitter(one).axis is not None)]
+        as_good = [one for one in others if equally_good(problem, best, one, self.options.rivals)]
+        return [KindOpen(self.index + 1, len(best.emitters), self._emitter(one).light.label) for one in as_good]
