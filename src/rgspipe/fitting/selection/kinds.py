@@ -24,6 +24,7 @@ from rgspipe.fitting.selection.far import far_or_near
 from rgspipe.fitting.selection.rivals import equally_good
 from rgspipe.fitting.selection.tables import with_tables
 from rgspipe.fitting.spec import LightSpec
+from rgspipe.renderer.looked_at import surface_ahead
 from rgspipe.scene import Light
 from rgspipe.scene.lights import LedLight, PanelLight, SphereLight, SpotLight
 
@@ -126,16 +127,24 @@ class _OneLight:
         return []
 
     def _beams(self, answer: State, axis: torch.Tensor) -> list[State]:
-        """Rigs with an LED along `axis` in the light's place, and with a panel where an LED is not clearly worse."""
+        """Rigs with an LED along `axis` in the light's place, and with a panel: there, if an LED is not clearly worse,
+        and where the beam ends.
+        """
         led = answer
         if not isinstance(self._emitter(answer).light, LedLight):
             place = self._emitter(answer).position
             led = self._as([one.at(place, axis) for one in LedLight.shaped().variants()], answer)
-        if drop(self.refiner.problem, led, answer) >= self.options.bar.least:
-            return [led]
+        alike = drop(self.refiner.problem, led, answer) < self.options.bar.least
+        beam = self._emitter(led if self._emitter(answer).axis is None else answer)
+        seeds = [*([self._emitter(led)] if alike else []), *self._lit_by(beam)]
         sizes = PanelLight.shaped().grown(self.refiner.region.size, True)
-        laid_out = [one for sized in sizes for one in laid(self.refiner, self._emitter(led), sized, self._free)]
-        return [led, self._best(led, laid_out)]
+        panels = [one for seed in seeds for sized in sizes for one in laid(self.refiner, seed, sized, self._free)]
+        return [led, self._best(led, panels)] if panels else [led]
+
+    def _lit_by(self, beam: Emitter) -> list[Emitter]:
+        """An LED where a beam meets a surface: what it lights there shines as a panel would that lies in its place."""
+        met = surface_ahead(self.refiner.problem.views.frozen.bvh, beam.position, beam.axis)
+        return [] if met is None else [Emitter.of(LedLight(met[0], 1.0, met[1], 1.0))]
 
     def _as(self, lights: Sequence[Light], answer: State) -> State:
         """The best of starts as such lights, where the answer has its own."""
