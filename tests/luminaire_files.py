@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import torch
 from torch import Tensor
 
@@ -32,6 +34,13 @@ def ldt(symmetry: int, planes: int, columns: list[list[float]], flux: float = 20
 
 def angles(step: float, last: float) -> Tensor:
     return torch.deg2rad(torch.arange(0.0, last + 1e-9, step, dtype=torch.float64))
+
+
+def photometry(columns: tuple = COLUMNS, name: str = "") -> Photometry:
+    """The table of such a file; its planes are even around the axis."""
+    vertical = torch.deg2rad(torch.tensor([0.0, 45.0, 90.0], dtype=torch.float64))
+    horizontal = 2.0 * math.pi / len(columns) * torch.arange(len(columns), dtype=torch.float64)
+    return Photometry.measured(vertical, horizontal, torch.tensor(columns, dtype=torch.float64).T, name)
 
 
 def jump() -> Photometry:

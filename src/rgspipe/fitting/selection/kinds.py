@@ -78,12 +78,13 @@ class _OneLight:
         return best, [*sized, *self._open(tried)], tables[1:] if best in tables[:1] else []
 
     def _extent(self, answer: State) -> tuple[SphereLight, Promise]:
-        """The largest sphere that has room in the light's place, and what it promises."""
-        place, size = self._emitter(answer).position, self.refiner.region.size
-        sphere = SphereLight.shaped().grown(size, True)[-1].at(place)
-        room = distance_to_surface(self.refiner.problem.views.frozen.bvh.surfels, place)
-        largest = replace(sphere, radius=min(room, sphere.radius))
-        return largest, extent_promised(self.refiner, answer, self.index, largest)
+        """The largest sphere that a fit begins with and that has room in the light's place, and what it promises."""
+        sphere = SphereLight.shaped().grown(self.refiner.region.size, True)[-1].at(self._emitter(answer).position)
+        sphere = replace(sphere, radius=min(self._room(sphere), sphere.radius))
+        return sphere, extent_promised(self.refiner, answer, self.index, sphere)
+
+    def _room(self, light: Light) -> float:
+        return distance_to_surface(self.refiner.problem.views.frozen.bvh.surfels, light.position)
 
     def _instead_of_point(self, answer: State, sphere: SphereLight, extent: Promise) -> list[State]:
         """Rigs with a sphere and with beams in the light's place, where they promise enough."""
@@ -119,12 +120,23 @@ class _OneLight:
             signal: of `sphere`, see `Promise`.
         """
         counts = self.options.bar.least / (1.0 - self.options.bar.least)
+        if signal < counts:
+            # Images change with the square of a small radius, and S with its fourth power.
+            radius = min(self._room(sphere), sphere.radius * (counts / max(signal, 1e-300)) ** 0.25)
+            larger = replace(sphere, radius=radius)
+            seen = radius > sphere.radius and self._signal(answer, larger) >= counts
+            return [self._may_be(answer, sphere if seen else larger)] if radius > 0.0 else []
         for _ in range(HALVINGS):
-            if signal < counts and sphere.radius > 0.0:
-                return [ExtentOpen(self.index + 1, len(answer.emitters), sphere.kind, sphere.radius)]
             sphere = replace(sphere, radius=0.5 * sphere.radius)
-            signal = extent_promised(self.refiner, answer, self.index, sphere).signal
+            if self._signal(answer, sphere) < counts:
+                return [self._may_be(answer, sphere)]
         return []
+
+    def _signal(self, answer: State, sphere: SphereLight) -> float:
+        return extent_promised(self.refiner, answer, self.index, sphere).signal
+
+    def _may_be(self, answer: State, sphere: SphereLight) -> Finding:
+        return ExtentOpen(self.index + 1, len(answer.emitters), sphere.kind, sphere.radius)
 
     def _beams(self, answer: State, axis: torch.Tensor) -> list[State]:
         """Rigs with an LED along `axis` in the light's place, and with a panel: there, if an LED is not clearly worse,
@@ -183,4 +195,5 @@ class _OneLight:
         distant = self._emitter(best).light.distant
         others = [one for one in tried if one is not best and (distant or self._emitter(one).axis is not None)]
         as_good = [one for one in others if equally_good(problem, best, one, self.options.rivals)]
-        return [KindOpen(self.index + 1, len(best.emitters), self._emitter(one).light.label) for one in as_good]
+        labels = dict.fromkeys(self._emitter(one).light.label for one in as_good)
+        return [KindOpen(self.index + 1, len(best.emitters), label) for label in labels]
