@@ -6,6 +6,7 @@ are fitted only where the image promises enough, so that a point costs little mo
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -27,9 +28,6 @@ from rgspipe.fitting.spec import LightSpec
 from rgspipe.renderer.looked_at import surface_ahead
 from rgspipe.scene import Light
 from rgspipe.scene.lights import LedLight, PanelLight, SphereLight, SpotLight
-
-#: From the largest sphere that has room on, so many halves of it are asked whether they would be noticed.
-HALVINGS = 6
 
 
 def told_kinds(
@@ -74,7 +72,7 @@ class _OneLight:
         tables = self._tables(tried)
         tried += tables[:1]
         best = self._chosen(tried)
-        sized = [] if extent is None or best is not answer else self._unseen(answer, extent[0], extent[1].signal)
+        sized = [] if extent is None or best is not answer else self._may_be(answer, *extent)
         return best, [*sized, *self._open(tried)], tables[1:] if best in tables[:1] else []
 
     def _extent(self, answer: State) -> tuple[SphereLight, Promise]:
@@ -113,30 +111,17 @@ class _OneLight:
         found = with_tables(self.refiner, best, self.index, self.spec.tables, self.options)
         return sorted(found, key=self.refiner.unexplained)
 
-    def _unseen(self, answer: State, sphere: SphereLight, signal: float) -> list[Finding]:
-        """A sphere that nobody would notice, the largest of `sphere` and its halves; nothing where each would be.
+    def _may_be(self, answer: State, sphere: SphereLight, extent: Promise) -> list[Finding]:
+        """The largest sphere that does not raise the cost by what counts over that of a point; nothing if it is none.
 
-        Args:
-            signal: of `sphere`, see `Promise`.
+        Images change by t D, t the square of a small radius over that of `sphere`. The cost, C with the point, rises by
+        t² S − 2 t g, and g / S is the best t.
         """
-        counts = self.options.bar.least / (1.0 - self.options.bar.least)
-        if signal < counts:
-            # Images change with the square of a small radius, and S with its fourth power.
-            radius = min(self._room(sphere), sphere.radius * (counts / max(signal, 1e-300)) ** 0.25)
-            larger = replace(sphere, radius=radius)
-            seen = radius > sphere.radius and self._signal(answer, larger) >= counts
-            return [self._may_be(answer, sphere if seen else larger)] if radius > 0.0 else []
-        for _ in range(HALVINGS):
-            sphere = replace(sphere, radius=0.5 * sphere.radius)
-            if self._signal(answer, sphere) < counts:
-                return [self._may_be(answer, sphere)]
-        return []
-
-    def _signal(self, answer: State, sphere: SphereLight) -> float:
-        return extent_promised(self.refiner, answer, self.index, sphere).signal
-
-    def _may_be(self, answer: State, sphere: SphereLight) -> Finding:
-        return ExtentOpen(self.index + 1, len(answer.emitters), sphere.kind, sphere.radius)
+        counts, best = self.options.bar.least / (1.0 - self.options.bar.least), float(extent.best)
+        most = best + math.sqrt(best**2 + counts / max(extent.signal, 1e-300))
+        radius = min(self._room(sphere), sphere.radius * math.sqrt(most))
+        told = radius > self.options.certainty.on_surface * self.refiner.region.size
+        return [ExtentOpen(self.index + 1, len(answer.emitters), sphere.kind, radius)] if told else []
 
     def _beams(self, answer: State, axis: torch.Tensor) -> list[State]:
         """Rigs with an LED along `axis` in the light's place, and with a panel: there, if an LED is not clearly worse,
