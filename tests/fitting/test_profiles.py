@@ -9,7 +9,7 @@ import pytest
 import torch
 
 from lit_room import VISIBLE
-from luminaire_files import COLUMNS
+from luminaire_files import COLUMNS, photometry
 from rgspipe.evaluation.rig_errors import rig_errors
 from rgspipe.fitting import FitStatus, FitViews, LightSpec, PaperAdam, Search
 from rgspipe.fitting.options import AimedOptions
@@ -19,12 +19,6 @@ from rgspipe.scene.lights import Photometry, ProfileLight
 QUICK = Search(aimed=AimedOptions(axes=30, blocks=64))
 
 
-def table(columns: tuple = COLUMNS, name: str = "") -> Photometry:
-    vertical = torch.deg2rad(torch.tensor([0.0, 45.0, 90.0], dtype=torch.float64))
-    horizontal = 2.0 * math.pi / len(columns) * torch.arange(len(columns), dtype=torch.float64)
-    return Photometry.measured(vertical, horizontal, torch.tensor(columns, dtype=torch.float64).T, name)
-
-
 def lamp(measured: Photometry) -> ProfileLight:
     axis = torch.nn.functional.normalize(torch.tensor([0.1, 0.2, -1.0], dtype=torch.float64), dim=0)
     return ProfileLight(VISIBLE, [1.0, 2.0, 0.5], axis, 0.6, measured)
@@ -32,7 +26,7 @@ def lamp(measured: Photometry) -> ProfileLight:
 
 def test_place_axis_and_turn_are_found_and_which_luminaire_it_is(room) -> None:
     """Of two: one that is not round, and one that is and nearly its mean."""
-    wanted, other = table(name="wings.ies"), table((COLUMNS[0],), "round.ies")
+    wanted, other = photometry(name="wings.ies"), photometry((COLUMNS[0],), "round.ies")
     shape = replace(ProfileLight.shaped(0.0, other), catalogue=(wanted,))
     spec = LightSpec("profile", shape=shape, shape_free=True)
     views = FitViews.prepare(room.frozen, room.views, lights=spec, sharp=False)
@@ -47,7 +41,7 @@ def test_place_axis_and_turn_are_found_and_which_luminaire_it_is(room) -> None:
 
 
 def test_the_paper_s_method_turns_none(room) -> None:
-    spec = LightSpec("profile", shape=ProfileLight.shaped(0.0, table()))
+    spec = LightSpec("profile", shape=ProfileLight.shaped(0.0, photometry()))
     views = FitViews.prepare(room.frozen, room.views, lights=spec, sharp=False)
     with pytest.raises(ValueError, match="one point"):
-        views.fit(views.render(lamp(table())), solver=PaperAdam())
+        views.fit(views.render(lamp(photometry())), solver=PaperAdam())

@@ -83,9 +83,9 @@ class LightConfig(Options):
     profile: ProfileConfig = ProfileConfig()
     file: str | None = None
     """of light=profile: the measured luminaire, an IES (.ies) or EULUMDAT (.ldt) file; with none and no catalogue it
-    shines as an even surface does"""
+    shines as an even surface does. With light=auto lights may be it"""
     catalogue: str | None = None
-    """of light=profile: a folder of such files, of which the one is found that explains the image best"""
+    """of light=profile or auto: a folder of such files, of which the one is found that explains the image best"""
 
 
 @dataclass(frozen=True)

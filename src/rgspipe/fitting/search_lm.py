@@ -131,11 +131,11 @@ def _search(refiner: Refiner, candidates: Sequence[Candidates], options: SearchO
     search = RigSearch(refiner, candidates, options, kinds_open=len(spec.kinds) > 1)
     found = search.unknown() if spec.count is None else search.known(spec.count)
     found = grown(refiner, found, spec, options) if spec.extended or spec.mounted else found
-    kinds: tuple[Finding, ...] = ()
+    best, kinds = found.best, ()
     if spec.type == AUTO:
-        best, kinds = told_kinds(refiner, found.best, spec, options)
-        found = replace(found, best=best)
-    best, tables = told_tables(refiner, found.best, spec, options)
+        best, kinds, tables = told_kinds(refiner, candidates, best, spec, options)
+    else:
+        best, tables = told_tables(refiner, best, spec, options)
     best, beside = settled_beside(refiner, best, options)
     if best is not found.best:
         found = replace(found, best=best, compared={**found.compared, len(best.emitters): best})

@@ -9,14 +9,14 @@ from typing import Any, NoReturn, Self
 from rgspipe.errors import InputError
 from rgspipe.fitting.options import MOST_LIGHTS
 from rgspipe.options import check_names
-from rgspipe.scene.lights import KINDS, Light
+from rgspipe.scene.lights import KINDS, Light, Photometry, ProfileLight
 
 #: Each light may be of any kind: of the plainest that explains it.
 AUTO = "auto"
 
 #: The kinds that "auto" searches, the plainest first, and the one whose shape can be said. What is found is then tried
 #: as the kinds that only look like these from afar, too: see `selection.kinds`.
-AUTO_KINDS, AUTO_SHAPED = ("point", "spot", "led"), "spot"
+AUTO_KINDS, AUTO_SHAPED = ("point", "sun", "spot", "led"), "spot"
 
 TYPES = (*KINDS, AUTO)
 
@@ -29,8 +29,8 @@ class LightSpec:
     """The lights that are looked for.
 
     Attributes:
-        type: a kind of light by name, or "auto": each light may be a point, a spot, an LED, a sphere or a panel, and
-            is the plainest of them that explains it.
+        type: a kind of light by name, or "auto": each light may be a point, a spot, an LED, a sphere or a panel, a sun
+            if the scene has an opening, or one of `luminaires`, and is the plainest of them that explains it.
         count: how many; None where it is not known (1 to MOST_LIGHTS).
         shape: a light of that kind ("auto": a spot), of which the shape is meant and not the place, such as
             `SpotLight.shaped("gaussian", 0.4, 0.1)`; the kind's usual one if None.
@@ -41,9 +41,11 @@ class LightSpec:
         distance: how far they hang from their surface, scene units; where None, panels lie on it, and of others it is
             found.
         ambient: whether there may be light besides, from all around through openings; its radiance is recovered, too.
+        luminaires: tables of measured luminaires that lights may have where the type is "auto"; those of "profile" are
+            a part of its shape.
 
     Raises:
-        InputError: an unknown field or type, a count out of range, or a shape of another kind.
+        InputError: an unknown field or type, a count out of range, a shape of another kind, or luminaires of one.
     """
 
     type: str = "point"
@@ -53,6 +55,7 @@ class LightSpec:
     mount: str = "free"
     distance: float | None = None
     ambient: bool = False
+    luminaires: tuple[Photometry, ...] = ()
 
     def __new__(cls, *args: Any, **values: Any) -> Self:
         check_names(values, [item.name for item in fields(cls)], "LightSpec")
@@ -66,6 +69,9 @@ class LightSpec:
         kind = shaped_kind(self.type)
         if self.shape is not None and self.shape.kind != kind:
             _refuse("shape", f"a {kind}, as the type is {self.type}", self.shape, "Let type and shape agree.")
+        if self.luminaires and self.type != AUTO:
+            remedy = 'Put the tables of a "profile" into its shape.'
+            _refuse("luminaires", f"none, as the type is {self.type}", f"{len(self.luminaires)} tables", remedy)
         if self.mount not in MOUNTS:
             _refuse("mount", f"one of {', '.join(MOUNTS)}", self.mount, "Correct the name.")
         if self.mounted and self.kinds[-1].distant:
@@ -77,9 +83,21 @@ class LightSpec:
     @property
     def kinds(self) -> tuple[Light, ...]:
         """A light of each kind that may be there, of the shape that it has; the plainest first."""
-        names = AUTO_KINDS if self.type == AUTO else (self.type,)
+        names = self._auto_kinds if self.type == AUTO else (self.type,)
         known = {} if self.shape is None else {self.shape.kind: self.shape}
         return tuple(known.get(name) or KINDS[name].shaped() for name in names)
+
+    @property
+    def _auto_kinds(self) -> tuple[str, ...]:
+        return tuple(name for name in AUTO_KINDS if not (self.mounted and KINDS[name].distant))
+
+    @property
+    def tables(self) -> tuple[ProfileLight, ...]:
+        """A light of each measured luminaire that is to be told from others."""
+        if self.luminaires:
+            return ProfileLight.shaped().with_tables(*self.luminaires).variants()
+        kind = self.kinds[-1]
+        return kind.variants() if isinstance(kind, ProfileLight) and self.shape_free else ()
 
     def free(self, kind: Light) -> bool:
         """Whether the shape of lights of a kind is recovered."""

@@ -39,6 +39,11 @@ def ambient_image(frozen: FrozenScene, camera: Camera | ViewWeights) -> Float[Te
     return view.image(torch.zeros_like(frozen.surfels.albedo) if radiance is None else radiance)
 
 
+def lets_light_in(frozen: FrozenScene) -> bool:
+    """Whether anything arrives from outside; rays are cast only where the operators see an opening, if but a back."""
+    return not (is_closed(rough_void_irradiance(frozen.transport)) or is_closed(frozen.void_irradiance))
+
+
 def is_closed(irradiance: Tensor) -> bool:
     """Whether nothing arrives from outside, from the surfels' irradiance (N,) under a void of radiance 1."""
     return not len(irradiance) or float(irradiance.mean()) < LEAST_OPEN * torch.pi

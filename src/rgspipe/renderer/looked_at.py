@@ -1,8 +1,12 @@
-"""Where rays of pixels meet the planes of the surfels that they see."""
+"""Where rays meet the planes of the surfels that they see."""
 
 from __future__ import annotations
 
 from torch import Tensor, where
+
+from rgspipe.renderer.kernels.composite import composite
+from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
+from rgspipe.renderer.rays import SURFACE_SHARE
 
 
 def on_planes(origin: Tensor, directions: Tensor, centers: Tensor, normals: Tensor, reach: Tensor) -> Tensor:
@@ -19,3 +23,14 @@ def on_planes(origin: Tensor, directions: Tensor, centers: Tensor, normals: Tens
     beside = origin + along * directions - centers
     factor = (reach[:, None] / beside.norm(dim=-1, keepdim=True).clamp(min=1e-30)).clamp(max=1.0)
     return where(grazing, centers, centers + beside * factor)
+
+
+def surface_ahead(bvh: SurfelBvh, origin: Tensor, direction: Tensor) -> tuple[Tensor, Tensor] | None:
+    """(3,) float64 place where a ray meets the front of a surface, and (3,) its normal there; None if it meets none."""
+    hits = composite(bvh, origin[None], direction[None])
+    if float(hits.transmittance) > 1.0 - SURFACE_SHARE:
+        return None
+    met = int(hits.indices[0, hits.weights[0].argmax()])
+    center, normal = (one[met].double().cpu() for one in (bvh.surfels.centers, bvh.surfels.normals))
+    along = ((center - origin) @ normal) / (direction @ normal)
+    return origin + along * direction, normal

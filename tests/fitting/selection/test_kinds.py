@@ -6,15 +6,21 @@ import pytest
 import torch
 
 from lit_room import HIDDEN, VISIBLE
+from luminaire_files import photometry
 from rgspipe.evaluation.rig_errors import rig_errors
 from rgspipe.fitting import FitResult, FitStatus, FitViews, LightSpec
 from rgspipe.fitting.findings import ExtentOpen, KindOpen
+from rgspipe.fitting.model.emitter import Emitter
+from rgspipe.fitting.model.problem import LightProblem
+from rgspipe.fitting.search.refine import Refiner
+from rgspipe.fitting.search.weighting import PLAIN
+from rgspipe.fitting.selection.kinds import told_kinds
 from rgspipe.fitting.solvers import Search
 from rgspipe.fitting.words import explained
 from rgspipe.scene import Light
-from rgspipe.scene.lights import LedLight, PanelLight, PointLight, SphereLight
+from rgspipe.scene.lights import LedLight, PanelLight, PointLight, ProfileLight, SphereLight, SpotLight
 
-COLOUR, AXIS = [1.0, 2.0, 0.5], [0.0976, 0.1952, -0.9759]
+COLOUR, AXIS, WINGS = [1.0, 2.0, 0.5], [0.0976, 0.1952, -0.9759], photometry(name="wings.ies")
 
 #: Few beams are enough for lights that are none, and ready sooner; with so few a panel was taken for an LED.
 FEW = Search(aimed={"axes": 30, "blocks": 64, "starts": 2})
@@ -30,6 +36,12 @@ def fit(views: FitViews, truth: Light, noise: float = 0.0, solver: Search = FEW)
     generator, images = torch.Generator().manual_seed(0), views.render(truth)
     noisy = [one + noise * one.mean() * torch.randn(one.shape, generator=generator) for one in images]
     return views.fit(noisy, solver=solver)
+
+
+def on_pixels(room, truth: Light) -> Refiner:
+    """On images of two views."""
+    images = [room.frozen.render(view, (truth,), sharp=False) for view in room.views]
+    return Refiner.of(LightProblem.create(room.two.prepared, room.two.prepared.stack_images(images)))
 
 
 @pytest.mark.parametrize(
@@ -71,3 +83,28 @@ def test_a_point_is_not_searched_as_a_beam(room, views: FitViews) -> None:
 def test_the_words_name_kind_and_size() -> None:
     told = explained([ExtentOpen(1, 1, "sphere", 0.034), KindOpen(2, 2, "led")])
     assert "The light may be a sphere of up to 0.034" in told and "Light 2 may as well be of the kind led" in told
+
+
+def test_a_beam_that_ends_on_a_ceiling_may_be_a_panel_in_it(room) -> None:
+    """From a spot that lights the ceiling as the panel does."""
+    truth = PanelLight([0.1, -0.2, 0.499], COLOUR, [0.0, 0.0, -1.0], 0.3, 0.15, 0.4)
+    refiner = on_pixels(room, truth)
+    spot = SpotLight([0.1, -0.2, 0.1], COLOUR, [0.0, 0.0, 1.0], "smoothstep", 0.4, 0.15)
+    answer = refiner.refined(refiner.start([Emitter.of(spot, shape_free=True)], PLAIN), PLAIN, 4)
+    best, _, _ = told_kinds(refiner, (), answer, LightSpec("auto", shape_free=True), Search())
+    (found,) = best.emitters
+    assert found.light.kind == "panel" and float((found.position - truth.position).norm()) < 0.02
+
+
+@pytest.mark.parametrize(
+    "truth",
+    [ProfileLight(VISIBLE, COLOUR, AXIS, 0.6, WINGS), LedLight(VISIBLE, COLOUR, AXIS, 6.0)],
+    ids=lambda light: light.kind,
+)
+def test_a_measured_luminaire_is_told_from_a_beam(room, truth: Light) -> None:
+    refiner = on_pixels(room, truth)
+    start = refiner.start([Emitter.of(LedLight(VISIBLE, COLOUR, AXIS, 2.0), shape_free=True)], PLAIN)
+    spec = LightSpec("auto", shape_free=True, luminaires=(WINGS,))
+    best, findings, _ = told_kinds(refiner, (), refiner.refined(start, PLAIN, 8), spec, Search())
+    assert best.emitters[0].light.label == truth.label and findings == ()
+    assert refiner.unexplained(best) < 1e-10  # measured 1.5e-14

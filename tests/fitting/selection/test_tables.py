@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import pytest
 import torch
 
 from lit_room import VISIBLE
-from luminaire_files import COLUMNS
+from luminaire_files import COLUMNS, photometry
 from rgspipe.fitting import LightSpec
 from rgspipe.fitting.findings import KindOpen
 from rgspipe.fitting.model.emitter import Emitter
@@ -25,13 +24,11 @@ AXIS = torch.nn.functional.normalize(torch.tensor([0.1, 0.2, -1.0], dtype=torch.
 OPTIONS = SearchOptions(schedule=ScheduleOptions(steps=8))
 
 
-def table(columns: tuple, name: str) -> Photometry:
-    vertical = torch.deg2rad(torch.tensor([0.0, 45.0, 90.0], dtype=torch.float64))
-    horizontal = 2.0 * math.pi / len(columns) * torch.arange(len(columns), dtype=torch.float64)
-    return Photometry.measured(vertical, horizontal, torch.tensor(columns, dtype=torch.float64).T, name)
-
-
-WINGS, TWIN, ROUND = table(COLUMNS, "wings.ies"), table(COLUMNS, "twin.ies"), table((COLUMNS[0],), "round.ies")
+WINGS, TWIN, ROUND = (
+    photometry(COLUMNS, "wings.ies"),
+    photometry(COLUMNS, "twin.ies"),
+    photometry((COLUMNS[0],), "round.ies"),
+)
 
 
 def lamp(measured: Photometry, off: float = 0.0, turn: float = 0.6) -> ProfileLight:

@@ -9,6 +9,7 @@ import pytest
 import torch
 from torch import Tensor
 
+from luminaire_files import angles, jump
 from rgspipe.renderer.point_sets import fibonacci_directions
 from rgspipe.scene.lights import Photometry, ProfileLight
 
@@ -16,24 +17,11 @@ AXIS = torch.nn.functional.normalize(torch.tensor([0.5, 0.3, -0.8], dtype=torch.
 PLACE = torch.tensor([0.1, 0.2, 0.3], dtype=torch.float64)
 
 
-def angles(step: float, last: float) -> Tensor:
-    return torch.deg2rad(torch.arange(0.0, last + 1e-9, step, dtype=torch.float64))
-
-
 def batwing(step: float = 10.0) -> Photometry:
     """Brighter to two sides than below, and a little upwards."""
     vertical, horizontal = angles(step, 180.0), angles(45.0, 315.0)
     wings = 1.2 + torch.cos(2.0 * horizontal)[None] * torch.sin(vertical)[:, None] ** 2
     return Photometry.measured(vertical, horizontal, 100.0 * (1.1 + torch.cos(vertical)[:, None]) * wings)
-
-
-def jump() -> Photometry:
-    """A beam that ends between two angles, to one side only."""
-    vertical, horizontal = angles(5.0, 90.0), angles(90.0, 270.0)
-    lit = (vertical[:, None] < 0.5) & (horizontal[None] < 3.0)
-    table = torch.where(lit, 1000.0, 1.0).double()
-    table[0] = 500.0
-    return Photometry.measured(vertical, horizontal, table)
 
 
 def lamp(table: Photometry) -> ProfileLight:

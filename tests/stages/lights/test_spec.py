@@ -11,6 +11,7 @@ from luminaire_files import ies
 from rgspipe.config import RgspipeConfig, with_changes
 from rgspipe.config.light import LightConfig
 from rgspipe.errors import InputError
+from rgspipe.fitting import LightSpec
 from rgspipe.fitting.spec import TYPES
 from rgspipe.options import settings
 from rgspipe.renderer.zonal_harmonics import BandLimit
@@ -80,12 +81,28 @@ def test_a_measured_luminaire_is_read_and_counts_among_what_a_fit_was_made_from(
     both = {"light.file": str(tmp_path / "a.ies"), "light.catalogue": str(tmp_path)}
     for changes, message in (
         (both, "null with light.file"),
-        (both | {"light.type": "led"}, "null, but for light=profile"),
+        (both | {"light.type": "led"}, "null, but for light=profile or auto"),
     ):
         with pytest.raises(InputError, match=message):
             light_spec(with_changes(config, changes))
     with pytest.raises(InputError, match="no such file"):
         light_spec(with_changes(plain, {"light.type": "profile", "light.file": "missing.ies"}))
+
+
+def test_lights_of_any_kind_may_be_measured_luminaires(tmp_path: Path) -> None:
+    """Known cones stay known: it is not they that a catalogue leaves open."""
+    for name in ("a.ies", "b.ies"):
+        (tmp_path / name).write_text(ies())
+    config = with_changes(RgspipeConfig(stage="fit_light"), {"light.type": "auto", "light.catalogue": str(tmp_path)})
+    spec = light_spec(config)
+    assert not spec.shape_free and [light.table.name for light in spec.tables] == ["a.ies", "b.ies"]
+    with pytest.raises(InputError, match=r"LightSpec\.luminaires: expected none, as the type is led"):
+        LightSpec("led", luminaires=spec.luminaires)
+
+
+def test_what_hangs_on_a_surface_is_no_sun() -> None:
+    assert "sun" in [kind.kind for kind in LightSpec("auto").kinds]
+    assert "sun" not in [kind.kind for kind in LightSpec("auto", mount="ceiling").kinds]
 
 
 def test_the_paper_s_method_takes_rigs_and_spots_of_known_number() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import torch
 
 from rgspipe.fitting.search.coarse import CoarseImages
-from rgspipe.renderer.ambient import is_closed
+from rgspipe.renderer.ambient import lets_light_in
 from rgspipe.renderer.dictionary import BATCH
 from rgspipe.renderer.direct import unit_irradiance
 from rgspipe.renderer.images.blocks import BlockModel
@@ -21,8 +21,9 @@ def distant_candidates(model: BlockModel, shape: Light, count: int) -> CoarseIma
     frozen, shadows = model.frozen, model.effects.shadows
     axes = fibonacci_directions(count).double()
     places = torch.cat([-axes, axes.new_zeros(count, 1)], dim=1)
-    lit = torch.cat([unit_irradiance(frozen.bvh, block, shadows)[0] for block in places.split(BATCH)])
-    lit = torch.zeros_like(lit) if shadows and is_closed(frozen.void_irradiance) else lit
+    lit = axes.new_zeros(count, len(frozen.surfels), dtype=torch.float32)
+    if not shadows or lets_light_in(frozen):
+        lit = torch.cat([unit_irradiance(frozen.bvh, block, shadows)[0] for block in places.split(BATCH)])
     images = model.seen(lit.T).permute(2, 0, 1).contiguous()
     standing = frozen.surroundings.middle - frozen.size * axes
     return CoarseImages(model.average, model.counts, images, standing, (shape,), axes, None, neighbour_angle(count))

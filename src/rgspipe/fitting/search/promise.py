@@ -15,7 +15,7 @@ import torch
 from torch import Tensor
 
 from rgspipe.fitting.model.emitter import Emitter
-from rgspipe.fitting.model.problem import ROUNDING
+from rgspipe.fitting.model.problem import ROUNDING, LightProblem
 from rgspipe.fitting.search.refine import Refiner, State
 from rgspipe.fitting.search.weighting import ROBUST
 from rgspipe.scene import Light
@@ -49,10 +49,20 @@ def promised(refiner: Refiner, state: State, index: int, changes: Sequence[Tenso
     matrix, direction = moments.parameter_system()
     added = _last_of(columns, index, len(changes))
     left, gains = _beside(matrix, direction, added)
-    rounding = ROUNDING**2 * float((weights.double() * problem.target.double().square()).sum())
-    cost = max(moments.cost, rounding, 1e-300)
+    cost = _no_less_than_rounding(moments.cost, problem, weights)
     best = torch.linalg.pinv(left, rtol=RANK, hermitian=True) @ gains
     return Promise(float(gains @ best) / cost, float(left.sum()) / cost, best)
+
+
+def comes_near(refiner: Refiner, answer: State, other: State, least: float) -> bool:
+    """Whether a full step from `other` leaves so little, to first order, that the answer's is not less by `least`."""
+    weights, problem = refiner.weights(answer, ROBUST), refiner.problem
+    left = _no_less_than_rounding(problem.moments(answer.columns, weights).cost, problem, weights)
+    moments = problem.moments(other.columns, weights)
+    matrix, direction = moments.parameter_system()
+    scale = _scale(matrix)
+    fall = (direction / scale) @ _inverse(matrix, scale) @ (direction / scale)
+    return (1.0 - least) * (moments.cost - float(fall)) <= left
 
 
 def beam_promised(refiner: Refiner, state: State, index: int) -> Promise:
@@ -88,7 +98,21 @@ def _last_of(columns: Sequence[Tensor], index: int, count: int) -> Tensor:
 def _beside(matrix: Tensor, direction: Tensor, added: Tensor) -> tuple[Tensor, Tensor]:
     """Normal equations of the `added` parameters, with what the others can do taken out."""
     own, cross = matrix[~added][:, ~added], matrix[added][:, ~added]
-    scale = own.diagonal().clamp(min=1e-300).sqrt()
-    inverse = torch.linalg.pinv(own / scale[:, None] / scale[None, :], rtol=RANK, hermitian=True)
-    taken = (cross / scale) @ inverse
+    scale = _scale(own)
+    taken = (cross / scale) @ _inverse(own, scale)
     return matrix[added][:, added] - taken @ (cross / scale).T, direction[added] - taken @ (direction[~added] / scale)
+
+
+def _scale(matrix: Tensor) -> Tensor:
+    """What parameters are divided by so that all of them have as much information."""
+    return matrix.diagonal().clamp(min=1e-300).sqrt()
+
+
+def _inverse(matrix: Tensor, scale: Tensor) -> Tensor:
+    """Of the scaled matrix, without directions of which nothing is known."""
+    return torch.linalg.pinv(matrix / scale[:, None] / scale[None, :], rtol=RANK, hermitian=True)
+
+
+def _no_less_than_rounding(cost: float, problem: LightProblem, weights: Tensor) -> float:
+    """A squared error, which rounding alone makes as large as this."""
+    return max(cost, ROUNDING**2 * float((weights.double() * problem.target.double().square()).sum()), 1e-300)

@@ -164,7 +164,7 @@ class RigSearch:
     def _with_plain_lights(self, state: State) -> State:
         """The rig with plain lights in the place of those whose shapes explain too little."""
         for index, emitter in enumerate(state.emitters):
-            if emitter.axis is not None:
+            if emitter.light.plain is not emitter.light:
                 plain = [*state.emitters]
                 plain[index] = Emitter(emitter.light.plain)
                 other = self.refiner.refined(

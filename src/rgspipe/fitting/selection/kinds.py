@@ -6,6 +6,7 @@ are fitted only where the image promises enough, so that a point costs little mo
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -19,28 +20,34 @@ from rgspipe.fitting.search.compare import drop, light_energies
 from rgspipe.fitting.search.grow import best_of_starts, laid
 from rgspipe.fitting.search.promise import Promise, beam_promised, extent_promised
 from rgspipe.fitting.search.refine import Refiner, State
+from rgspipe.fitting.search.starts import Candidates
+from rgspipe.fitting.selection.far import far_or_near
 from rgspipe.fitting.selection.rivals import equally_good
+from rgspipe.fitting.selection.tables import with_tables
 from rgspipe.fitting.spec import LightSpec
+from rgspipe.renderer.looked_at import surface_ahead
 from rgspipe.scene import Light
 from rgspipe.scene.lights import LedLight, PanelLight, SphereLight, SpotLight
 
-#: From the largest sphere that has room on, so many halves of it are asked whether they would be noticed.
-HALVINGS = 6
-
 
 def told_kinds(
-    refiner: Refiner, answer: State, spec: LightSpec, options: SearchOptions
-) -> tuple[State, tuple[Finding, ...]]:
+    refiner: Refiner, candidates: Sequence[Candidates], answer: State, spec: LightSpec, options: SearchOptions
+) -> tuple[State, tuple[Finding, ...], tuple[State, ...]]:
     """The answer with each light as the kind that explains it, and which kinds the image does not tell apart.
 
     Args:
-        answer: of points and spots.
+        candidates: of the kinds that were searched.
+        answer: of lights of these.
+
+    Returns:
+        the answer, what is to be said of it, and rigs with other measured luminaires in the place of those that it has.
     """
-    energies, findings = light_energies(answer), []
+    energies, findings, others = light_energies(answer), [], []
     for index in sorted(range(len(energies)), key=lambda k: -energies[k]):
-        answer, found = _OneLight(refiner, index, spec, options).told(answer)
+        answer, found, tables = _OneLight(refiner, candidates, index, spec, options).told(answer)
         findings += found
-    return answer, tuple(findings)
+        others += tables
+    return answer, tuple(findings), tuple(others)
 
 
 @dataclass(frozen=True)
@@ -48,62 +55,93 @@ class _OneLight:
     """Light `index` of rigs, of which the kind is asked."""
 
     refiner: Refiner
+    candidates: Sequence[Candidates]
     index: int
     spec: LightSpec
     options: SearchOptions
 
-    def told(self, answer: State) -> tuple[State, list[Finding]]:
-        """The rig with the kind that explains the light, and what is to be said of that."""
-        light = self._emitter(answer).light
+    def told(self, answer: State) -> tuple[State, list[Finding], list[State]]:
+        """The rig with the kind that explains the light, what is to be said of that, and rigs with other tables."""
+        light, extent = self._emitter(answer).light, None
+        tried = [answer, *far_or_near(self.refiner, self.candidates, answer, self.index, self.options)]
         if light.axis is None:
-            return self._of_a_point(answer)
-        tried = [answer, *self._beams(answer, light.axis)]
-        if isinstance(light, LedLight):
-            spots = next(kind for kind in self.spec.kinds if isinstance(kind, SpotLight)).variants()
-            tried.append(self._as([one.at(light.position, light.axis) for one in spots], answer))
-        return self._chosen(tried), self._open(tried)
+            extent = self._extent(answer)
+            tried += self._instead_of_point(answer, *extent)
+        elif not light.distant:
+            tried += self._instead_of_beam(answer, light)
+        tables = self._tables(tried)
+        tried += tables[:1]
+        best = self._chosen(tried)
+        sized = [] if extent is None or best is not answer else self._may_be(answer, *extent)
+        return best, [*sized, *self._open(tried)], tables[1:] if best in tables[:1] else []
 
-    def _of_a_point(self, answer: State) -> tuple[State, list[Finding]]:
-        place, size = self._emitter(answer).position, self.refiner.region.size
-        spheres = [one.at(place) for one in SphereLight.shaped().grown(size, True)]
-        room = distance_to_surface(self.refiner.problem.views.frozen.bvh.surfels, place)
-        largest = replace(spheres[-1], radius=min(room, spheres[-1].radius))
-        extent = extent_promised(self.refiner, answer, self.index, largest)
-        beam = beam_promised(self.refiner, answer, self.index)
-        tried = [answer]
+    def _extent(self, answer: State) -> tuple[SphereLight, Promise]:
+        """The largest sphere that a fit begins with and that has room in the light's place, and what it promises."""
+        sphere = SphereLight.shaped().grown(self.refiner.region.size, True)[-1].at(self._emitter(answer).position)
+        sphere = replace(sphere, radius=min(self._room(sphere), sphere.radius))
+        return sphere, extent_promised(self.refiner, answer, self.index, sphere)
+
+    def _room(self, light: Light) -> float:
+        return distance_to_surface(self.refiner.problem.views.frozen.bvh.surfels, light.position)
+
+    def _instead_of_point(self, answer: State, sphere: SphereLight, extent: Promise) -> list[State]:
+        """Rigs with a sphere and with beams in the light's place, where they promise enough."""
+        tried, beam = [], beam_promised(self.refiner, answer, self.index)
         if self._worth(extent):
+            spheres = sphere.grown(self.refiner.region.size, True)
             tried.append(self._as(spheres, answer))
         if self._worth(beam):
             tried += self._beams(answer, torch.nn.functional.normalize(beam.best, dim=0))
-        best = self._chosen(tried)
-        sized = self._unseen(answer, largest, extent.signal) if best is answer else []
-        return best, [*sized, *self._open(tried)]
+        return tried
 
-    def _unseen(self, answer: State, sphere: SphereLight, signal: float) -> list[Finding]:
-        """A sphere that nobody would notice, the largest of `sphere` and its halves; nothing where each would be.
+    def _instead_of_beam(self, answer: State, light: Light) -> list[State]:
+        """Rigs with another beam in the light's place."""
+        tried = self._beams(answer, light.axis)
+        if isinstance(light, LedLight):
+            spots = next(kind for kind in self.spec.kinds if isinstance(kind, SpotLight)).variants()
+            tried.append(self._as([one.at(light.position, light.axis) for one in spots], answer))
+        return tried
 
-        Args:
-            signal: of `sphere`, see `Promise`.
+    def _tables(self, tried: Sequence[State]) -> list[State]:
+        """Rigs with measured luminaires where the best of the beams that were tried is; best first."""
+        beams = [one for one in tried if self._emitter(one).axis is not None and not self._emitter(one).light.distant]
+        if not (beams and self.spec.tables):
+            return []
+        best = min(beams, key=self.refiner.unexplained)
+        found = with_tables(self.refiner, best, self.index, self.spec.tables, self.options)
+        return sorted(found, key=self.refiner.unexplained)
+
+    def _may_be(self, answer: State, sphere: SphereLight, extent: Promise) -> list[Finding]:
+        """The largest sphere that does not raise the cost by what counts over that of a point; nothing if it is none.
+
+        Images change by t D, t the square of a small radius over that of `sphere`. The cost, C with the point, rises by
+        t² S − 2 t g, and g / S is the best t.
         """
-        counts = self.options.bar.least / (1.0 - self.options.bar.least)
-        for _ in range(HALVINGS):
-            if signal < counts and sphere.radius > 0.0:
-                return [ExtentOpen(self.index + 1, len(answer.emitters), sphere.kind, sphere.radius)]
-            sphere = replace(sphere, radius=0.5 * sphere.radius)
-            signal = extent_promised(self.refiner, answer, self.index, sphere).signal
-        return []
+        counts, best = self.options.bar.least / (1.0 - self.options.bar.least), float(extent.best)
+        most = best + math.sqrt(best**2 + counts / max(extent.signal, 1e-300))
+        radius = min(self._room(sphere), sphere.radius * math.sqrt(most))
+        told = radius > self.options.certainty.on_surface * self.refiner.region.size
+        return [ExtentOpen(self.index + 1, len(answer.emitters), sphere.kind, radius)] if told else []
 
     def _beams(self, answer: State, axis: torch.Tensor) -> list[State]:
-        """Rigs with an LED along `axis` in the light's place, and with a panel where an LED is not clearly worse."""
+        """Rigs with an LED along `axis` in the light's place, and with a panel: there, if an LED is not clearly worse,
+        and where the beam ends.
+        """
         led = answer
         if not isinstance(self._emitter(answer).light, LedLight):
             place = self._emitter(answer).position
             led = self._as([one.at(place, axis) for one in LedLight.shaped().variants()], answer)
-        if drop(self.refiner.problem, led, answer) >= self.options.bar.least:
-            return [led]
+        alike = drop(self.refiner.problem, led, answer) < self.options.bar.least
+        beam = self._emitter(led if self._emitter(answer).axis is None else answer)
+        seeds = [*([self._emitter(led)] if alike else []), *self._lit_by(beam)]
         sizes = PanelLight.shaped().grown(self.refiner.region.size, True)
-        laid_out = [one for sized in sizes for one in laid(self.refiner, self._emitter(led), sized, self._free)]
-        return [led, self._best(led, laid_out)]
+        panels = [one for seed in seeds for sized in sizes for one in laid(self.refiner, seed, sized, self._free)]
+        return [led, self._best(led, panels)] if panels else [led]
+
+    def _lit_by(self, beam: Emitter) -> list[Emitter]:
+        """An LED where a beam meets a surface: what it lights there shines as a panel would that lies in its place."""
+        met = surface_ahead(self.refiner.problem.views.frozen.bvh, beam.position, beam.axis)
+        return [] if met is None else [Emitter.of(LedLight(met[0], 1.0, met[1], 1.0))]
 
     def _as(self, lights: Sequence[Light], answer: State) -> State:
         """The best of starts as such lights, where the answer has its own."""
@@ -137,8 +175,10 @@ class _OneLight:
         return best
 
     def _open(self, tried: Sequence[State]) -> list[Finding]:
-        """Kinds of a beam that explain the image as well as the one that was chosen."""
+        """Kinds that explain the image as well as the one that was chosen, of such as are told by how light falls."""
         problem, best = self.refiner.problem, self._chosen(tried)
-        beams = [one for one in tried if one is not best and self._emitter(one).axis is not None]
-        as_good = [one for one in beams if equally_good(problem, best, one, self.options.rivals)]
-        return [KindOpen(self.index + 1, len(best.emitters), self._emitter(one).light.kind) for one in as_good]
+        distant = self._emitter(best).light.distant
+        others = [one for one in tried if one is not best and (distant or self._emitter(one).axis is not None)]
+        as_good = [one for one in others if equally_good(problem, best, one, self.options.rivals)]
+        labels = dict.fromkeys(self._emitter(one).light.label for one in as_good)
+        return [KindOpen(self.index + 1, len(best.emitters), label) for label in labels]

@@ -33,17 +33,23 @@ def told_tables(
     Args:
         answer: of lights that have one table of the catalogue each.
     """
-    kind, others = spec.kinds[-1], []
-    tables = kind.variants() if kind.tabulated and spec.shape_free else ()
+    tables, others = spec.tables, []
     if len(tables) < 2:
         return answer, ()
     energies = light_energies(answer)
     for index in sorted(range(len(energies)), key=lambda k: -energies[k]):
-        rigs = list(_replaced(refiner, answer, index, tables))
-        refined = refined_starts(refiner, rigs, options.iterations, options.schedule, answer)
+        refined = with_tables(refiner, answer, index, tables, options)
         answer, *worse = sorted([answer, *refined], key=refiner.unexplained)
         others += worse
     return answer, tuple(others)
+
+
+def with_tables(
+    refiner: Refiner, answer: State, index: int, tables: Sequence[Light], options: SearchOptions
+) -> list[State]:
+    """Refined rigs with every other table in the place of the light `index`, which has an axis."""
+    rigs = list(_replaced(refiner, answer, index, tables))
+    return refined_starts(refiner, rigs, options.iterations, options.schedule, answer)
 
 
 def tables_open(

@@ -9,8 +9,8 @@ from rgspipe.config.light import LightConfig
 from rgspipe.datasets.photometric_file import read_catalogue, read_photometry
 from rgspipe.errors import InputError
 from rgspipe.fitting import LightSpec
-from rgspipe.fitting.spec import shaped_kind
-from rgspipe.scene.lights import KINDS, Light
+from rgspipe.fitting.spec import AUTO, shaped_kind
+from rgspipe.scene.lights import KINDS, Photometry
 from rgspipe.stages.lights.shape import light_shape
 
 
@@ -23,17 +23,19 @@ def light_spec(config: RgspipeConfig) -> LightSpec:
     if config.fit.method == "paper_adam":
         _refuse_unknowns(config)
     light, kind = config.light, shaped_kind(config.light.type)
-    section = getattr(light, kind, None)
+    _refuse_tables_of_others(light)
+    section, tables = getattr(light, kind, None), _tables(light)
     shape = None if section is None else light_shape(kind, section, f"light.{kind}")
-    if shape is not None and shape.tabulated:
-        shape = _measured(light, shape)
-    _refuse_tables_of_others(light, kind)
+    tabulated = shape is not None and shape.tabulated
+    if shape is not None and tabulated and tables:
+        shape = shape.with_tables(*tables)
     if light.distance is not None and light.mount == "free":
         remedy = "Say what they hang on: light.mount=surface or ceiling."
         found = f"{light.distance:g}"
         raise InputError("light.distance", expected="null, as nothing is hung on", found=found, remedy=remedy)
-    free = config.fit.shape == "free" or light.catalogue is not None
-    return LightSpec(light.type, light.count, shape, free, light.mount, light.distance, light.ambient)
+    free = config.fit.shape == "free" or (tabulated and light.catalogue is not None)
+    luminaires = () if tabulated else tables
+    return LightSpec(light.type, light.count, shape, free, light.mount, light.distance, light.ambient, luminaires)
 
 
 def table_files(config: RgspipeConfig) -> list[Path]:
@@ -43,21 +45,21 @@ def table_files(config: RgspipeConfig) -> list[Path]:
     return [Path(path) for path in given]
 
 
-def _measured(light: LightConfig, shape: Light) -> Light:
-    """The luminaire of a file, or those of a catalogue."""
+def _tables(light: LightConfig) -> tuple[Photometry, ...]:
+    """That of a file, or those of a catalogue; none if neither is named."""
     if light.file is not None and light.catalogue is not None:
         remedy = "Name one of them."
         raise InputError("light.catalogue", expected="null with light.file", found=light.catalogue, remedy=remedy)
     if light.file is not None:
-        return shape.with_tables(read_photometry(light.file))
-    return shape if light.catalogue is None else shape.with_tables(*read_catalogue(light.catalogue).values())
+        return (read_photometry(light.file),)
+    return () if light.catalogue is None else tuple(read_catalogue(light.catalogue).values())
 
 
-def _refuse_tables_of_others(light: LightConfig, kind: str) -> None:
-    tabulated = [name for name, one in KINDS.items() if one.tabulated]
+def _refuse_tables_of_others(light: LightConfig) -> None:
+    types = [*(name for name, one in KINDS.items() if one.tabulated), AUTO]
     for name in ("file", "catalogue"):
-        if (found := getattr(light, name)) is not None and kind not in tabulated:
-            expected, remedy = f"null, but for light={' or '.join(tabulated)}", "Use that, or leave it away."
+        if (found := getattr(light, name)) is not None and light.type not in types:
+            expected, remedy = f"null, but for light={' or '.join(types)}", "Use one of these, or leave it away."
             raise InputError(f"light.{name}", expected=expected, found=found, remedy=remedy)
 
 
