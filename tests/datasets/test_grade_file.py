@@ -14,15 +14,8 @@ from rgspipe.scene.grade import SceneGrade
 
 @pytest.mark.parametrize(("psnr", "place"), [(None, None), (31.5, (0.5, -1.0, 2.0))])
 def test_a_grade_comes_back(tmp_path: Path, psnr: float | None, place: tuple[float, float, float] | None) -> None:
-    grade = SceneGrade(psnr, 8, 0.02, 0.1, 0.05, 0.01, 0.0, place, lamp_error=psnr and 0.003, lamps=8)
+    grade = SceneGrade(psnr, 8, 0.02, 0.1, 0.05, 0.01, 0.0, place)
     save_grade(tmp_path / "grade.json", grade)
-    assert load_grade(tmp_path / "grade.json") == grade
-
-
-def test_a_scene_that_was_graded_before_lamps_were_asked_for_is_read(tmp_path: Path) -> None:
-    grade = SceneGrade(31.5, 8, 0.02, 0.1, 0.05, 0.01, 0.0)
-    content = {name: value for name, value in grade.data().items() if not name.startswith("lamp")}
-    (tmp_path / "grade.json").write_text(json.dumps(content))
     assert load_grade(tmp_path / "grade.json") == grade
 
 

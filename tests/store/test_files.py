@@ -50,6 +50,7 @@ MOMENTARY = {
     "benchmark/mitsuba_process.py": "what a parent hands to its worker, in a temporary folder",
     "renderer/kernels/launch.py": "the null device",
     "machine/description.py": "a switch of the kernel",
+    "renderer/frozen_pickle.py": "what one process hands to another, in a temporary folder",
     "store/files.py": "the one way itself",
 }
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import MISSING, fields
+from dataclasses import fields
 from pathlib import Path
 
 from rgspipe.datasets.json_file import is_number, read_json
@@ -28,13 +28,12 @@ def load_grade(path: Path) -> SceneGrade:
         InputError: no such file, no JSON, or a number is missing or impossible.
     """
     content = read_json(path, "the grade of a scene")
-    # Scenes that were graded before a number was known do without it.
-    names = [field.name for field in fields(SceneGrade) if field.name in content or field.default is MISSING]
+    names = [field.name for field in fields(SceneGrade)]
     unknown = [name for name in names if name not in content or not _is_known(name, content[name])]
     if unknown:
         expected, found = f"the numbers {', '.join(names)}", f"{', '.join(unknown)} missing, no number or too large"
         raise InputError(path, expected=expected, found=found, remedy="Train the scene again.")
-    place = content.get("unseen_at")
+    place = content["unseen_at"]
     values = {name: content[name] for name in names} | {"unseen_at": None if place is None else tuple(place)}
     return SceneGrade(**values)
 
@@ -42,7 +41,7 @@ def load_grade(path: Path) -> SceneGrade:
 def _is_known(name: str, value: object) -> bool:
     """Whether a grade may have this value under this name."""
     if value is None:
-        return name in ("psnr", "unseen_at", "lamp_error")
+        return name in ("psnr", "unseen_at")
     if name == "unseen_at":
         return isinstance(value, list) and len(value) == 3 and all(is_number(part) for part in value)
     return is_number(value) and -LARGEST < value < LARGEST

@@ -114,19 +114,13 @@ def graded_words(grade: SceneGrade) -> str:
         (grade.missing, f"{_percent(grade.missing)} of what surfaces look at was seen by no camera and is left open"),
         (grade.at_bound, f"the albedo of {_percent(grade.at_bound)} is as high as it may be, as if light were missing"),
     ]
-    told = [words for size, words in sorted(parts, reverse=True) if size >= LEAST]
-    if grade.lamp_error is not None:
-        off = f"{100.0 * grade.lamp_error:.1f} % off"
-        told.insert(0, f"{grade.lamps} known lamps are found {off}, each from one view")
-    reasons = "; ".join(told)
-    error = f"lights are expected to be {100.0 * grade.error:.1f} % of its size off"
+    reasons = "; ".join(words for size, words in sorted(parts, reverse=True) if size >= LEAST)
+    error = f"lights found by bounced light are expected to be {100.0 * grade.error:.1f} % of its size off"
     words = f"The scene is {grade.grade}: {error}" + (f" ({reasons})." if reasons else ".")
     return words if grade.grade is Grade.GOOD else f"{words} {_advice(grade)}"
 
 
 def _advice(grade: SceneGrade) -> str:
-    if grade.error > grade.bounced_error:
-        return "Take several photographs of lamps that you look for: one of them leaves much open here."
     if grade.residual >= max(grade.doubt, grade.missing, grade.at_bound):
         return "Check poses, lamps and exposure of the training images, or train longer."
     if grade.unseen_at is None:

@@ -5,45 +5,65 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+import pandas as pd
+
 from rgspipe.datasets.views import View
-from rgspipe.fitting import FitStatus, FitViews, ImageCapture, Search
+from rgspipe.errors import InputError
+from rgspipe.fitting import FitResult, FitStatus, FitViews, ImageCapture, Search
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.search_lm import fit_from
 from rgspipe.progress import progress_bar
 from rgspipe.renderer.frozen import FrozenScene
-from rgspipe.scene.lights import PointLight
-
-#: Lamps that are asked for at most: with so many their mean square is known to a factor of 2.3 (χ², 95 %).
-MOST_LAMPS = 12
 
 #: Steps of a fit that begins at the lamp.
 STEPS = 30
 
+#: Columns of `known_lamps`.
+COLUMNS = ("name", "error", "stated", "result")
 
-def error_of_known_lamps(frozen: FrozenScene, views: Sequence[View]) -> tuple[float | None, int]:
-    """Root mean square position error of lamps that are found, in parts of the scene's size, and of how many.
 
-    Each lamp is looked for in the one view that it lights, from its true place downhill, so that what is measured is
-    where the scene's errors put the minimum, and not the search. Lamps of which a fit says itself that it does not know
-    do not count. None where no lamp is left.
+def known_lamps(frozen: FrozenScene, views: Sequence[View]) -> pd.DataFrame:
+    """What becomes of the lamps of views, each looked for in the one view that it lights.
+
+    A fit goes from the lamp's true place downhill, so that what is measured is where the errors of the scene put the
+    minimum, and not the search. Views without a lamp, and those that show nothing of the scene, are left out.
 
     Args:
-        views: with their lamps, best ones that the scene was not trained on.
+        views: best ones that the scene was not trained on, which would flatter it.
+
+    Returns:
+        `name` of the view, `error` of the position and the one that the fit `stated`, in parts of the scene's size, and
+        the `result` that it states; no row for images that are black.
     """
-    lit = [view for view in views if view.light is not None]
-    chosen = lit[:: math.ceil(len(lit) / MOST_LAMPS)] if lit else []
-    asked = [_error(frozen, view) for view in progress_bar(chosen, "known lamps", unit="view")]
-    errors = [error for error in asked if error is not None]
-    return (math.hypot(*errors) / math.sqrt(len(errors)) if errors else None), len(errors)
+    rows = []
+    for view in progress_bar([view for view in views if view.light is not None], "known lamps", unit="view"):
+        found = _found(frozen, view)
+        if found is not None and found.lights:
+            away = float((found.lights[0].position - view.light.position.to(found.lights[0].position)).norm())
+            stated = math.sqrt(float(found.covariance[0].diagonal()[:3].sum()))
+            rows.append((view.name, away / frozen.size, stated / frozen.size, str(found.status)))
+    return pd.DataFrame(rows, columns=list(COLUMNS))
 
 
-def _error(frozen: FrozenScene, view: View) -> float | None:
-    """Of one lamp; None where the fit does not claim to have found it."""
-    assert isinstance(view.light, PointLight)
-    prepared = FitViews.prepare(frozen, [view.camera], masks=[view.alpha])
-    capture = ImageCapture(clip=view.saturated_from)
-    problem = prepared.problem(prepared.prepared.stack_images([view.image]), capture, Search().loss)
-    result = fit_from(problem, [Emitter.of(view.light)], STEPS)
-    if result.status is not FitStatus.CONVERGED:
+def told_lamps(lamps: pd.DataFrame) -> str:
+    """A sentence on rows of `known_lamps`: of those that fits claim to have found, how far off they are."""
+    claimed = lamps[lamps["result"] == FitStatus.CONVERGED]
+    if not len(claimed):
+        return "judge: no lamp of the views that were left out is found, each from one view"
+    spread = math.sqrt(float(claimed["error"].pow(2).mean()))
+    worst = claimed.loc[claimed["error"].idxmax()]
+    return (
+        f"judge: {len(claimed)} of {len(lamps)} lamps of views that were left out are found, each from one view, "
+        f"{100.0 * spread:.1f} % of the scene off (root mean square; {100.0 * worst['error']:.1f} % in {worst['name']})"
+    )
+
+
+def _found(frozen: FrozenScene, view: View) -> FitResult | None:
+    """The lamp of a view; None if the view shows too little of the scene."""
+    try:
+        views = FitViews.prepare(frozen, [view.camera], masks=[view.alpha])
+    except InputError:
         return None
-    return float((result.lights[0].position - view.light.position.to(result.lights[0].position)).norm()) / frozen.size
+    capture = ImageCapture(clip=view.saturated_from)
+    problem = views.problem(views.prepared.stack_images([view.image]), capture, Search().loss)
+    return fit_from(problem, [Emitter.of(view.light)], STEPS)

@@ -36,9 +36,6 @@ class SceneGrade:
         missing: of what surfaces look at, the part where nothing is and where no camera saw that nothing is.
         at_bound: area of the surfels whose albedo is as high as it may be, as if light were missing.
         unseen_at: (x, y, z) around which most of what is guessed or missing lies, scene units; None where nothing is.
-        lamp_error: root mean square position error, in parts of the scene's size, of lamps whose places are known and
-            that fits claim to have found, each from one view; None where no lamp was asked for.
-        lamps: how many they are.
     """
 
     psnr: float | None
@@ -49,25 +46,15 @@ class SceneGrade:
     missing: float
     at_bound: float
     unseen_at: tuple[float, float, float] | None = None
-    lamp_error: float | None = None
-    lamps: int = 0
-
-    @property
-    def bounced_error(self) -> float:
-        """What the errors of the light make of the position of a light that is found by what bounces, likewise."""
-        return ERROR_PER_LIGHT * math.hypot(self.residual, self.doubt, self.missing, self.at_bound)
 
     @property
     def error(self) -> float:
-        """Expected position error of a light, in parts of the scene's size: as measured, but no less than expected."""
-        return max(self.bounced_error, self.lamp_error or 0.0)
+        """Expected position error of a light that is found by what bounces, in parts of the scene's size."""
+        return ERROR_PER_LIGHT * math.hypot(self.residual, self.doubt, self.missing, self.at_bound)
 
     @property
     def grade(self) -> Grade:
-        """Poor, and refused, by the light alone: a lamp that is hard to find makes a scene no worse than fair."""
-        if self.bounced_error > FAIR:
-            return Grade.POOR
-        return Grade.GOOD if self.error <= GOOD else Grade.FAIR
+        return Grade.GOOD if self.error <= GOOD else Grade.FAIR if self.error <= FAIR else Grade.POOR
 
     def data(self) -> dict[str, object]:
         """As JSON holds it."""

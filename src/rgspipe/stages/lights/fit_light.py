@@ -273,14 +273,15 @@ def _keys(config: RgspipeConfig) -> list[str]:
 
 def _files(config: RgspipeConfig) -> list[Path]:
     """The user's target, read now: what is wrong with it should show before a scene is trained for it."""
-    for known in known_targets(config):
-        used_indices(known.name, known.views, config)
     target, base, tables = config.fit.target, config.fit.base, table_files(config)
     if target is None:
         _refuse_base(base)
-        return tables
-    load_target(target, base)
-    return [*tables, *files_read(target), *([] if base is None else files_read(base))]
+    else:
+        load_target(target, base)
+    for known in known_targets(config):
+        used_indices(known.name, known.views, config)
+    read = [folder for folder in (target, base) if folder is not None]
+    return [*tables, *(path for folder in read for path in files_read(folder))]
 
 
 def _refuse_base(base: str | None) -> None:

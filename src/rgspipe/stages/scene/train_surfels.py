@@ -23,17 +23,15 @@ from rgspipe.evaluation.grading import grade_scene, graded_words
 from rgspipe.evaluation.held_out import held_out_picture
 from rgspipe.evaluation.held_out_views import render_held_out
 from rgspipe.evaluation.images import save_png
-from rgspipe.evaluation.known_lamps import error_of_known_lamps
 from rgspipe.machine.description import PeakMemory
 from rgspipe.options import settings
-from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene.gloss import Gloss
 from rgspipe.scene.grade import SceneGrade
 from rgspipe.stages.base import Stage, StageContext
 from rgspipe.store.files import write_json, write_text
 from rgspipe.training.albedo import ALBEDO_RANGE
 from rgspipe.training.checkpoint import Checkpoint
-from rgspipe.training.materials import fit_materials
+from rgspipe.training.materials import build_frozen, fit_materials
 from rgspipe.training.operator_store import OperatorStore
 from rgspipe.training.options import TrainOptions
 from rgspipe.training.prior import prior_from_maps
@@ -90,8 +88,7 @@ def _judged(
 
     Where no view was left out there are no measures, and the grade is of views that the scene was trained on.
     """
-    rays = {"gather_rays": options.gather_rays, "patches": options.patches, "seed": options.seed}
-    frozen = FrozenScene.freeze(trained.surfels, **rays)
+    frozen = build_frozen(trained.surfels, options)
     views = left_out or trained.views[:: math.ceil(len(trained.views) / MOST_JUDGED)]
     judged = render_held_out(
         trained.surfels,
@@ -106,8 +103,6 @@ def _judged(
     truths = [view.image for view in judged.views]
     cameras = [view.camera for view in trained.views]
     grade = grade_scene(frozen, judged.images, truths, cameras=cameras, psnr=psnr, highest_albedo=ALBEDO_RANGE[1])
-    lamp_error, lamps = error_of_known_lamps(frozen, judged.views)
-    grade = replace(grade, lamp_error=lamp_error, lamps=lamps)
     if not left_out:
         return {}, grade
     picture = held_out_picture(judged.views, judged.images, judged.psnr, judged.albedo)
