@@ -13,9 +13,10 @@ from pathlib import Path
 import pytest
 import torch
 
-from rgspipe.cli.view import Wanted, parsed
+from rgspipe.cli.view import Wanted, parsed, serve
 from rgspipe.errors import InputError
 from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.viewer.serve import view
 from rooms import closed_box
 
 
@@ -54,3 +55,15 @@ def test_a_page_is_served_until_it_is_interrupted(tmp_path: Path) -> None:
             assert page.status == 200 and b"<html" in page.read().lower()
         process.send_signal(signal.SIGINT)
         assert process.wait(timeout=30) == 0
+
+
+def test_an_interrupt_before_the_wait_begins_ends_it_as_well(monkeypatch: pytest.MonkeyPatch) -> None:
+    viewer = view(FrozenScene.freeze(closed_box(0.5).to(torch.float32)), port=0)
+    stopped = []
+
+    def interrupted() -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(viewer, "wait", interrupted)
+    monkeypatch.setattr(viewer, "stop", lambda stop=viewer.stop: stopped.append(stop()))
+    assert serve(viewer) == 0 and stopped == [None]

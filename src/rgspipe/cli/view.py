@@ -92,8 +92,12 @@ def demo(arguments: Sequence[str]) -> int:
 
 def serve(viewer: Any) -> int:
     """Say where the page is, and serve it until the process is interrupted; the exit status."""
-    print(f"{viewer.url}  (Ctrl-C ends it)", flush=True)
-    viewer.wait()
+    try:
+        print(f"{viewer.url}  (Ctrl-C ends it)", flush=True)
+        viewer.wait()
+    except KeyboardInterrupt:
+        # Whoever reads the line may be faster than the wait begins.
+        viewer.stop()
     return 0
 
 
