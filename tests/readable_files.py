@@ -17,11 +17,12 @@ from mesh_files import cuboid_triangles, quarters, textured_square, write_colour
 from ply_files import gaussian_columns, radiosity_columns, write_ply
 from raycast import ROOM
 from readable_captures import CAPTURES, Kind, Numbers
+from rgspipe.datasets.alternatives_file import ALTERNATIVES, read_alternatives
 from rgspipe.datasets.covariance_file import covariance_fields, read_covariances
 from rgspipe.datasets.exr import read_channels, write_channels, write_image
 from rgspipe.datasets.grade_file import load_grade, save_grade
 from rgspipe.datasets.images import read_colour
-from rgspipe.datasets.light_file import read_ambient, read_lights, write_lights
+from rgspipe.datasets.light_file import light_fields, read_ambient, read_lights, write_lights
 from rgspipe.datasets.location import open_dataset
 from rgspipe.datasets.mesh_file import read_mesh
 from rgspipe.datasets.named_cameras import NamedCamera, read_camera, write_cameras
@@ -79,7 +80,7 @@ def _lights(folder: Path) -> None:
 
 
 def _extents(folder: Path) -> None:
-    """Lights with a shape, and the light from all around, as a fit writes them."""
+    """Lights with a shape, the light from all around, and what was weighed against them, as a fit writes them."""
     place = [0.0, 0.0, 1.0]
     lamps = (
         SphereLight(place, 1.0, 0.1),
@@ -89,7 +90,9 @@ def _extents(folder: Path) -> None:
         SunLight.shaped(),
     )
     spreads = covariance_fields(len(lamps), {"covariance": [torch.eye(3)] * len(lamps)})
-    write_lights(folder / "a.json", lamps, {"lights": spreads, "ambient": {"radiance": [0.1, 0.2, 0.3]}})
+    other = {"lights": [light_fields(lamps[0])], "told": "Twice the cost.", "ruled_out": True}
+    further = {"lights": spreads, "ambient": {"radiance": [0.1, 0.2, 0.3]}, ALTERNATIVES: [other]}
+    write_lights(folder / "a.json", lamps, further)
 
 
 def _luminaire(name: str, text: str) -> Kind:
@@ -101,7 +104,8 @@ def _luminaire(name: str, text: str) -> Kind:
 
 
 def _read_lights(folder: Path) -> Numbers:
-    for light in read_lights(folder / "a.json"):
+    others = [light for one in read_alternatives(folder / "a.json") for light in one.lights]
+    for light in [*read_lights(folder / "a.json"), *others]:
         numbers = (value for value in light.file_fields().values() if not isinstance(value, str))
         yield from (light.position, light.intensity, *(torch.as_tensor(value) for value in numbers))
     ambient = read_ambient(folder / "a.json")

@@ -8,7 +8,23 @@ import pytest
 import torch
 from torch import Tensor
 
+from double_precision import DoubleTransport
+from hard_cases import room
+from rgspipe.renderer.frozen import FrozenScene
+
 Within = Callable[..., None]
+
+
+@pytest.fixture(scope="module")
+def frozen() -> FrozenScene:
+    """The small room of the hard cases."""
+    return FrozenScene.freeze(room(), gather_rays=16, patches=20, seed=0)
+
+
+@pytest.fixture(scope="module")
+def double(frozen: FrozenScene) -> DoubleTransport:
+    """Its transport in float64."""
+    return DoubleTransport.of(frozen)
 
 
 @pytest.fixture

@@ -32,16 +32,6 @@ LAMPS: dict[str, Light] = {
 }
 
 
-@pytest.fixture(scope="module")
-def frozen() -> FrozenScene:
-    return FrozenScene.freeze(room(), gather_rays=16, patches=20, seed=0)
-
-
-@pytest.fixture(scope="module")
-def double(frozen: FrozenScene) -> DoubleTransport:
-    return DoubleTransport.of(frozen)
-
-
 def with_leaves(light: Light) -> tuple[Light, dict[str, Tensor]]:
     """The light with its place, axis and sizes as float64 leaves, and these."""
     names = [one.name for one in fields(light) if one.name in ("position", "direction")]
@@ -77,7 +67,11 @@ def test_a_hard_lamp(frozen: FrozenScene, double: DoubleTransport, name: str, wi
     for radiance in (found, expected):
         weights = torch.rand(radiance.shape, generator=torch.Generator().manual_seed(2))
         (radiance * weights.to(radiance)).sum().backward()
+    # The slope towards a radius of 0 is 0: what rounding leaves of it is next to nothing beside that of the place.
+    slope = leaves["position"].grad
+    least = 0.0 if slope is None else float(slope.abs().max()) * 1e-6
     for key, leaf in leaves.items():
         if leaf.grad is not None:  # a sun has no place
             # Measured at most 2e-5; 8e-3 where surfels are edge-on, at the kink of the cosine, with a slope to a side.
-            within(key, found_leaves[key].grad, leaf.grad, 3e-2 if name == "a panel seen edge-on" else 1e-4)
+            bound = 3e-2 if name == "a panel seen edge-on" else 1e-4
+            within(key, found_leaves[key].grad, leaf.grad, bound, least=least)

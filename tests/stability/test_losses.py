@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 import double_precision
-from hard_cases import INSIDE, a_few, camera, room
+from hard_cases import INSIDE, a_few, camera
 from rgspipe.errors import InputError
 from rgspipe.fitting import FitViews
 from rgspipe.fitting.baselines.paper_adam_loss import AdamLoss, MovingRig
@@ -19,11 +19,6 @@ from rgspipe.optim.ssim import ssim
 from rgspipe.renderer.effects import Effects
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import PointLight
-
-
-@pytest.fixture(scope="module")
-def frozen() -> FrozenScene:
-    return FrozenScene.freeze(room(), gather_rays=16, patches=20, seed=0)
 
 
 @pytest.fixture(scope="module")

@@ -16,16 +16,6 @@ from rgspipe.scene import SpotLight
 PLACES = [name for name in LIGHTS if name != "inside a solid"]
 
 
-@pytest.fixture(scope="module")
-def frozen() -> FrozenScene:
-    return FrozenScene.freeze(room(), gather_rays=16, patches=20, seed=0)
-
-
-@pytest.fixture(scope="module")
-def double(frozen: FrozenScene) -> DoubleTransport:
-    return DoubleTransport.of(frozen)
-
-
 def leaves_of(light: SpotLight, dtype: torch.dtype = torch.float64) -> dict[str, Tensor]:
     """Position, axis and log-intensity to differentiate towards."""
     values = {"position": light.position, "axis": light.direction, "log_intensity": light.intensity.log()}

@@ -21,6 +21,7 @@ from omegaconf.errors import OmegaConfBaseException
 
 from rgspipe.config import RgspipeConfig
 from rgspipe.config.core import build, plain, unknown_key
+from rgspipe.datasets.json_file import shown
 from rgspipe.errors import InputError
 from rgspipe.graph.pipeline import Usual
 from rgspipe.graph.variants import plain_overrides
@@ -174,7 +175,7 @@ def _parse(overrides: Sequence[str]) -> list[Override]:
             parsed += OverridesParser.create().parse_overrides([text])
         except OverrideParseException:
             raise InputError(
-                repr(_shown(text)),
+                shown(text),
                 expected="key=value",
                 found="text that does not parse",
                 remedy="Quote values with special characters, such as key='\"a b\"'; lists are written [1,2].",
@@ -250,12 +251,8 @@ def _check_choices(overrides: Iterable[Override]) -> None:
         if not is_group or override.is_delete() or _may_be_name(override.value()):
             continue
         options = ", ".join(sorted(path.stem for path in folder.glob("*.yaml"))) or "those that Hydra has"
-        found = _shown((override.input_line or "").partition("=")[2])
+        found = shown((override.input_line or "").partition("=")[2])
         raise InputError(key, expected=f"one of {options}", found=found, remedy=f"Choose one: {key}=NAME.")
-
-
-def _shown(text: str) -> str:
-    return text if len(text) <= LONGEST_NAME else f"{text[:LONGEST_NAME]}…"
 
 
 def _may_be_name(value: object) -> bool:

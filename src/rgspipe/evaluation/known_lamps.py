@@ -9,14 +9,11 @@ import pandas as pd
 
 from rgspipe.datasets.views import View
 from rgspipe.errors import InputError
-from rgspipe.fitting import FitResult, FitStatus, FitViews, ImageCapture, Search
-from rgspipe.fitting.model.emitter import Emitter
-from rgspipe.fitting.search_lm import fit_from
+from rgspipe.evaluation.calibration import position_sd
+from rgspipe.evaluation.metrics import position_error
+from rgspipe.fitting import FitResult, FitStatus, FitViews, ImageCapture
 from rgspipe.progress import progress_bar
 from rgspipe.renderer.frozen import FrozenScene
-
-#: Steps of a fit that begins at the lamp.
-STEPS = 30
 
 #: Columns of `known_lamps`.
 COLUMNS = ("name", "error", "stated", "result")
@@ -39,9 +36,9 @@ def known_lamps(frozen: FrozenScene, views: Sequence[View]) -> pd.DataFrame:
     for view in progress_bar([view for view in views if view.light is not None], "known lamps", unit="view"):
         found = _found(frozen, view)
         if found is not None and found.lights:
-            away = float((found.lights[0].position - view.light.position.to(found.lights[0].position)).norm())
-            stated = math.sqrt(float(found.covariance[0].diagonal()[:3].sum()))
-            rows.append((view.name, away / frozen.size, stated / frozen.size, str(found.status)))
+            error = position_error(found.lights[0].position, view.light.position, frozen.size)
+            stated = position_sd(found.covariance[:1], frozen.size)
+            rows.append((view.name, error, stated, str(found.status)))
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 
@@ -64,6 +61,4 @@ def _found(frozen: FrozenScene, view: View) -> FitResult | None:
         views = FitViews.prepare(frozen, [view.camera], masks=[view.alpha])
     except InputError:
         return None
-    capture = ImageCapture(clip=view.saturated_from)
-    problem = views.problem(views.prepared.stack_images([view.image]), capture, Search().loss)
-    return fit_from(problem, [Emitter.of(view.light)], STEPS)
+    return views.refit(view.image, (view.light,), ImageCapture(clip=view.saturated_from))

@@ -9,12 +9,15 @@ from typing import TypeAlias
 from rgspipe.errors import InputError
 from rgspipe.fitting.in_sight.search import fit_on_lookout, fit_without
 from rgspipe.fitting.model.capture import BaseImages, ImageCapture
+from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.result import FitResult
+from rgspipe.fitting.search_lm import fit_from
 from rgspipe.fitting.solvers import Search, Solver
 from rgspipe.fitting.spec import LightSpec
 from rgspipe.fitting.target_views import Cameras, TargetViews
 from rgspipe.renderer.effects import ALL_EFFECTS, Effects
 from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.scene import LightRig
 from rgspipe.scene.arrays import ArrayLike, as_list
 
 #: What is known of lamps in sight: their pixels, that there are none, or nothing.
@@ -58,6 +61,13 @@ class FitViews(TargetViews):
             raise InputError("emitters", expected='"auto", masks or None', found=repr(emitters), remedy="Choose one.")
         # The published method has no way to look twice.
         return fit_on_lookout(self, stacked, capture, fit) if isinstance(solver, Search) else fit(self)
+
+    def refit(
+        self, images: Sequence[ArrayLike] | ArrayLike, start: LightRig, capture: ImageCapture | None = None
+    ) -> FitResult:
+        """The lights of one image a view, as many and of those kinds that `start` has, from there downhill."""
+        stacked = self.prepared.stack_images(as_list(images, axes=3))
+        return fit_from(self.problem(stacked, capture, Search().loss), [Emitter.of(light) for light in start])
 
 
 def fit_lights(

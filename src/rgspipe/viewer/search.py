@@ -7,10 +7,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from rgspipe.errors import InputError
-from rgspipe.fitting import FitResult, FitViews, LightSpec, Search
+from rgspipe.fitting import FitResult, FitViews, LightSpec
 from rgspipe.fitting.certainty.advice import ViewAdvice, suggest_views
-from rgspipe.fitting.model.emitter import Emitter
-from rgspipe.fitting.search_lm import fit_from
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import Camera, LightRig
 from rgspipe.viewer.kept import Kept
@@ -18,9 +16,6 @@ from rgspipe.viewer.material import Photograph
 
 #: Sets of cameras whose views are kept.
 KEPT_VIEWS = 3
-
-#: Steps of a refit.
-STEPS = 30
 
 
 class Finder:
@@ -80,9 +75,7 @@ class Finder:
             return suggest_views(self._frozen, result, present, candidates, wanted=wanted)
 
     def _refit(self, photographs: Sequence[Photograph], start: LightRig) -> FitResult:
-        views = self._prepared(photographs, "auto")
-        problem = views.problem(views.prepared.stack_images(_images(photographs)), loss=Search().loss)
-        return fit_from(problem, [Emitter.of(light) for light in start], STEPS)
+        return self._prepared(photographs, "auto").refit(_images(photographs), start)
 
     def _prepared(self, photographs: Sequence[Photograph], lights: str | LightSpec) -> FitViews:
         if not photographs:

@@ -35,14 +35,7 @@ from rgspipe.stages.lights.capture import captured_views, known_emitters
 from rgspipe.stages.lights.extras import Named, further_files, training_cameras
 from rgspipe.stages.lights.spec import light_spec, table_files
 from rgspipe.stages.lights.spoken import COMMAND_LINE
-from rgspipe.stages.lights.targets import (
-    all_targets,
-    known_targets,
-    select_targets,
-    target_seed,
-    used_indices,
-    used_views,
-)
+from rgspipe.stages.lights.targets import all_targets, require_views, select_targets, target_seed, used_views
 from rgspipe.stages.scene.effects import chosen_effects, frozen_scene, wanted_effects
 from rgspipe.stages.sources import image_stage, require_images, target_stage
 from rgspipe.store.artifacts import Artifact
@@ -278,8 +271,7 @@ def _files(config: RgspipeConfig) -> list[Path]:
         _refuse_base(base)
     else:
         load_target(target, base)
-    for known in known_targets(config):
-        used_indices(known.name, known.views, config)
+    require_views(config)
     read = [folder for folder in (target, base) if folder is not None]
     return [*tables, *(path for folder in read for path in files_read(folder))]
 

@@ -39,6 +39,16 @@ def known_targets(config: RgspipeConfig) -> list[TargetFolder]:
     return select_targets([TargetFolder.of(folder) for folder in target_folders(config.scene.path)], config)
 
 
+def require_views(config: RgspipeConfig) -> None:
+    """Refuse, before anything is made, to fit more views than targets have that lie on disk.
+
+    Raises:
+        InputError: see `known_targets`, or a target has fewer.
+    """
+    for target in known_targets(config):
+        used_indices(target.name, target.views, config)
+
+
 class _Classed(Protocol):
     @property
     def occlusion(self) -> str: ...
