@@ -1,8 +1,8 @@
 """What a training and a fit come to with other numbers of threads, and with other instructions: `make bits`.
 
 For 1, 2 and 4 threads every bit must be the same, and so what a plain run makes and what a sweep of two jobs at once
-does. Other instructions round otherwise, which training makes larger; what
-is said of the light must be the same, and its place to a ten thousandth of the room.
+does; with MKL_CBWR, where it is STRICT. Other instructions round otherwise, which training makes larger; what is said
+of the light must be the same, and its place to a ten thousandth of the room.
 """
 
 from __future__ import annotations
@@ -46,6 +46,8 @@ INSTRUCTIONS = (
     *({"ATEN_CPU_CAPABILITY": name} for name in ("default", "avx2", "avx512")),
     *({"MKL_CBWR": name} for name in ("COMPATIBLE", "AVX2")),
 )
+#: What MKL_CBWR may be for bits to be those of any number of threads (`machine/threads.py`); others are in the recipe.
+STRICT = ("AUTO,STRICT", "AVX2,STRICT", "AVX512,STRICT")
 
 PATH = os.pathsep.join(str(Path(__file__).parents[1] / name) for name in ("src", "tests"))
 
@@ -98,6 +100,11 @@ def main() -> int:
         bits = "every bit is the same" if found == expected else f"{apart:.1e} of the room apart"
         print(f"{changes}: {other}, {bits}{'' if right else '  WRONG'}", flush=True)
         wrong += not right
+    for name in STRICT:
+        one, four = (outcome({"MKL_CBWR": name, "OMP_NUM_THREADS": count}) for count in ("1", "4"))
+        bits = "every bit is the same" if one == four else "bits differ  WRONG"
+        print(f"MKL_CBWR={name}, one thread and four: {bits}", flush=True)
+        wrong += one != four
     return 1 if wrong else 0
 
 

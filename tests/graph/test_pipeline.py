@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 
 import pytest
+import torch
 
 import toys
 from rgspipe.config import RgspipeConfig, with_changes
@@ -145,6 +146,25 @@ def test_keys_that_do_not_matter_do_not_rebuild(config: RgspipeConfig) -> None:
     run(config, toys.load)
     other = with_changes(config, {"seed": 7, "debug.traceback": True, "train.steps": 3})
     assert planned(other) == [("harvest", True, "")]
+
+
+def test_another_number_of_threads_makes_another_result_where_bits_depend_on_it(
+    config: RgspipeConfig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run(config, toys.load)
+    monkeypatch.setenv("MKL_CBWR", "AVX2,STRICT")
+    assert planned(config) == [("harvest", True, "")]
+    monkeypatch.setenv("MKL_CBWR", "AVX2")
+    threads = torch.get_num_threads()
+    assert planned(config)[0] == (
+        "sow",
+        False,
+        f"sums of any number of threads → of {threads} threads with MKL_CBWR=AVX2",
+    )
+    other = run(config, toys.load)
+    assert planned(config) == [("harvest", True, "")]
+    monkeypatch.delenv("MKL_CBWR")
+    assert run(config, toys.load).fingerprint != other.fingerprint
 
 
 def test_require_refuses_and_names_the_command(config: RgspipeConfig) -> None:

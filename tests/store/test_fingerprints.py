@@ -11,7 +11,8 @@ def test_key_order_does_not_matter_and_values_do() -> None:
 
 
 def test_differences_are_told_in_words() -> None:
-    before = {"config": {"a": {"b": 1, "c": 2}}, "inputs": {"x": ["1"]}, "foreign": {}, "code": {"m": "1"}}
-    now = {"config": {"a": {"b": 5, "c": 2}}, "inputs": {"x": ["2"]}, "foreign": {}, "code": {"m": "2"}}
-    assert differences(now, before) == ["a.b 1 → 5", "the code of m changed", "another x"]
+    same = {"foreign": {}}
+    before = {"config": {"a": {"b": 1, "c": 2}}, "inputs": {"x": ["1"]}, "code": {"m": "1"}, "sums": "of one", **same}
+    now = {"config": {"a": {"b": 5, "c": 2}}, "inputs": {"x": ["2"]}, "code": {"m": "2"}, "sums": "of two", **same}
+    assert differences(now, before) == ["a.b 1 → 5", "the code of m changed", "another x", "sums of one → of two"]
     assert differences(now, now) == []

@@ -25,7 +25,7 @@ class Node:
         config: the configuration it is made with.
         changes: how that differs from the configuration of the run.
         key: where it belongs.
-        recipe: the config values, inputs, foreign files and code behind its fingerprint.
+        recipe: the config values, inputs, foreign files, code and order of sums behind its fingerprint.
         inputs: the artifacts it is made from.
         may_fail: for each of the inputs, whether it is made without that one where it cannot be had.
     """

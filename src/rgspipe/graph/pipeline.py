@@ -18,6 +18,7 @@ from rgspipe.graph.expected_time import EarlierRuns, Expected, in_words
 from rgspipe.graph.nodes import Making, Node, indispensable
 from rgspipe.graph.source_code import SourceCode
 from rgspipe.graph.variants import variant_name
+from rgspipe.machine.threads import order_of_sums
 from rgspipe.stages.base import Stage
 from rgspipe.store.artifacts import Artifact, ArtifactStore, Key
 from rgspipe.store.files import tree_digest
@@ -99,6 +100,7 @@ class _Resolver:
             "inputs": _input_fingerprints(inputs),
             "foreign": {str(path): self._file(path) for path in stage.files(config)},
             "code": self.code.fingerprints(stage.run.__module__),
+            "sums": order_of_sums(),
         }
         key = Key(config.scene.folder, stage.name, fingerprint({"stage": stage.name, **recipe}))
         return Node(stage, config, changes, key, recipe, inputs, tuple(need.may_fail for need in needs))

@@ -1,4 +1,4 @@
-"""What identifies a result: the values, inputs, foreign files and code that it depends on."""
+"""What identifies a result: the values, inputs, foreign files and code that it depends on, and the order of sums."""
 
 from __future__ import annotations
 
@@ -25,6 +25,8 @@ def differences(now: Mapping[str, Any], before: Mapping[str, Any]) -> list[str]:
         phrases += [text.format(name) for name, digest in now[kind].items() if old.get(name) != digest]
     old = before.get("inputs", {})
     phrases += [f"another {name}" for name, prints in now["inputs"].items() if old.get(name) != prints]
+    if now["sums"] != before.get("sums", now["sums"]):
+        phrases.append(f"sums {before['sums']} → {now['sums']}")
     return phrases
 
 
