@@ -151,6 +151,7 @@ def test_keys_that_do_not_matter_do_not_rebuild(config: RgspipeConfig) -> None:
 def test_another_number_of_threads_makes_another_result_where_bits_depend_on_it(
     config: RgspipeConfig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.delenv("MKL_CBWR", raising=False)
     run(config, toys.load)
     monkeypatch.setenv("MKL_CBWR", "AVX2,STRICT")
     assert planned(config) == [("harvest", True, "")]
