@@ -10,7 +10,15 @@ import torch
 
 from lit_room import HIDDEN, VISIBLE
 from rgspipe.fitting.certainty.doubts import doubts
-from rgspipe.fitting.certainty.uncertainty import inflated, light_covariances, sandwich, surface_cells, whitener
+from rgspipe.fitting.certainty import uncertainty
+from rgspipe.fitting.certainty.uncertainty import (
+    inflated,
+    light_covariances,
+    sandwich,
+    shrunk,
+    surface_cells,
+    whitener,
+)
 from rgspipe.fitting.findings import Undetermined
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.moments import group_moments, information, scores
@@ -23,13 +31,13 @@ from rgspipe.scene import PointLight
 CHI_SQUARE_95 = 7.815
 
 
-def _coverage(correlated: float, trials: int = 400) -> tuple[float, float]:
+def _coverage(correlated: float, trials: int = 400, cells: int = 60) -> tuple[float, float]:
     """How often the 95 % regions of `sandwich` and of plain least squares hold the truth of a linear problem.
 
-    60 cells of 20 numbers; each cell has an error of its own, `correlated` times as large as the noise.
+    Cells of 20 numbers; each cell has an error of its own, `correlated` times as large as the noise.
     """
     generator = torch.Generator().manual_seed(3)
-    cells, size, unknowns = 60, 20, 3
+    size, unknowns = 20, 3
     inside = torch.zeros(2)
     for _ in range(trials):
         own = torch.randn(cells, 1, unknowns, generator=generator, dtype=torch.float64)
@@ -53,13 +61,36 @@ def _coverage(correlated: float, trials: int = 400) -> tuple[float, float]:
 
 def test_the_sandwich_covers_as_stated_where_cells_share_errors_and_plain_noise_does_not():
     model, plain = _coverage(correlated=1.0)
-    assert 0.91 < model < 0.985  # measured 0.9225; 95 % ± 1.1 % expected of many cells
+    assert 0.91 < model < 0.985  # measured 0.945; 95 % ± 1.1 % expected of many cells
     assert plain < 0.6  # measured 0.185
 
 
 def test_without_shared_errors_the_sandwich_is_hardly_wider_than_the_noise():
     model, plain = _coverage(correlated=0.0)
     assert 0.92 < plain < 0.98 and plain <= model < 0.995  # measured 0.955 and 0.97
+
+
+def test_few_cells_hold_the_truth_nearly_as_often_as_many(monkeypatch):
+    few, _ = _coverage(correlated=1.0, cells=8)
+    monkeypatch.setattr(uncertainty, "shrunk", lambda moves: moves.T @ moves)
+    unshrunk, _ = _coverage(correlated=1.0, cells=8)
+    assert few > 0.87 and unshrunk < 0.83  # measured 0.905 and 0.79
+
+
+def test_shrinking_keeps_the_sum_of_variances_and_what_many_cells_say():
+    generator = torch.Generator().manual_seed(5)
+    scales = torch.tensor([3.0, 1.0, 0.1, 1.0], dtype=torch.float64)
+    for cells, least, most in ((3, 0.5, 1.0), (3000, 0.0, 0.01)):
+        moves = torch.randn(cells, 4, generator=generator, dtype=torch.float64) * scales / math.sqrt(cells)
+        spread, found = moves.T @ moves, shrunk(moves)
+        assert float(found.trace()) == pytest.approx(float(spread.trace()))
+        alike = spread.trace() / 4.0 * torch.eye(4, dtype=torch.float64)
+        each = torch.einsum("ki,kj->kij", moves, moves) * cells
+        chance = float((each - spread).square().sum()) / cells**2
+        share = min(1.0, chance / float((spread - alike).square().sum()))
+        torch.testing.assert_close(found, (1.0 - share) * spread + share * alike)
+        assert least <= share <= most  # measured 0.58 and 0.0014
+    torch.testing.assert_close(shrunk(torch.zeros(0, 2, dtype=torch.float64)), torch.zeros(2, 2, dtype=torch.float64))
 
 
 def test_group_moments_give_the_evidence_of_an_explicit_jacobian():

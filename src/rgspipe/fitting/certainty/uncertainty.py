@@ -3,13 +3,16 @@
 With J the derivatives of the image towards the n unknowns x (parameters of all lights and their intensities), r the
 residual and H = Σ JᵀJ, the covariance is
 
-    H^{-½} (σ² I + κ² (V − σ² I)₊ + U) H^{-½} ,     V = Σ_k d_k d_kᵀ ,     d_k = (I − G_k)⁻¹ H^{-½} s_k
+    H^{-½} (σ² I + κ² (V − σ² I)₊ + U) H^{-½} ,     V = (1 − α) S + α tr(S)/n I ,
+    S = Σ_k d_k d_kᵀ ,     d_k = (I − G_k)⁻¹ H^{-½} s_k
 
-σ² is the residual's variance: what the noise alone leaves uncertain. V is the sandwich estimate over cells k of the
+σ² is the residual's variance: what the noise alone leaves uncertain. S is the sandwich estimate over cells k of the
 surface (Huber 1967, White 1980, clustered as by Liang and Zeger 1986): s_k = Σ Jᵀr over the pixels of all views that
 look at the cell, so an error of the model counts once, however many pixels and views show it. G_k = H^{-½} H_k H^{-½}
 is the share of the evidence that the cell gives; with it d_k is how the answer moves when the cell is left out (the
-jackknife, Bell and McCaffrey 2002). ( )₊ keeps eigenvalues above zero, so that the noise is a lower bound. κ makes up
+jackknife, Bell and McCaffrey 2002). A few cells tell nearly all of that, so S is too small in some directions and too
+large in others; V pulls it towards errors that are alike in all of them, as far as the cells' differences call for
+(α of Ledoit and Wolf 2004). ( )₊ keeps eigenvalues above zero, so that the noise is a lower bound. κ makes up
 for what the residual cannot show, as the fit has explained it away; it was chosen on fits with known truth. U is what
 surfaces that no camera saw leave uncertain, as their albedo is guessed (`certainty.guesses`).
 """
@@ -128,7 +131,7 @@ def whitener(matrix: Tensor) -> tuple[Tensor, Tensor]:
 
 
 def sandwich(root: Tensor, cells: Tensor, cell_scores: Tensor, largest_share: float) -> Tensor:
-    """(m, m) V: the spread of the answer when one cell after the other is left out, in whitened unknowns.
+    """(m, m) V: the spread of the answer when one cell after the other is left out, in whitened unknowns, shrunk.
 
     Args:
         root: (n, m) of `whitener`, for the sum of all cells.
@@ -139,8 +142,23 @@ def sandwich(root: Tensor, cells: Tensor, cell_scores: Tensor, largest_share: fl
     shares, vectors = torch.linalg.eigh(root.T @ cells @ root)
     amplified = 1.0 / (1.0 - shares.clamp(min=0.0, max=largest_share))
     turned = torch.einsum("kij,ki->kj", vectors, cell_scores @ root)
-    moves = torch.einsum("kij,kj->ki", vectors, amplified * turned)
-    return moves.T @ moves
+    return shrunk(torch.einsum("kij,kj->ki", vectors, amplified * turned))
+
+
+def shrunk(moves: Tensor) -> Tensor:
+    """(m, m) (1 − α) S + α tr(S)/m I of S = Σ_k d_k d_kᵀ for `moves` (K, m), the d_k; it keeps the trace.
+
+    α is the share of what sets S apart from errors that are alike in all directions that chance alone would bring, by
+    how much the cells differ: Ledoit and Wolf 2004, "A well-conditioned estimator for large-dimensional covariance
+    matrices", equation 14, of K vectors √K d_k. Without any cell it is zero.
+    """
+    spread, unknowns = moves.T @ moves, max(1, moves.shape[1])
+    alike = spread.trace() / unknowns * torch.eye(moves.shape[1], dtype=moves.dtype, device=moves.device)
+    apart = (spread - alike).square().sum()
+    # Σ_k ‖K d_k d_kᵀ − S‖² / K², without the (K, m, m) matrices.
+    chance = moves.square().sum(dim=1).square().sum() - spread.square().sum() / max(1, len(moves))
+    share = (chance / apart).clamp(max=1.0) if bool(apart > 0.0) else 1.0
+    return (1.0 - share) * spread + share * alike
 
 
 def inflated(model: Tensor, noise: float, inflation: float) -> Tensor:
