@@ -9,8 +9,8 @@ import pytest
 import torch
 
 from lit_room import HIDDEN, VISIBLE
-from rgspipe.fitting.certainty.doubts import doubts
 from rgspipe.fitting.certainty import uncertainty
+from rgspipe.fitting.certainty.doubts import doubts
 from rgspipe.fitting.certainty.uncertainty import (
     inflated,
     light_covariances,
