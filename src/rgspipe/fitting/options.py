@@ -140,7 +140,7 @@ class CertaintyOptions(Options):
 
     cell: float = option(0.2, low=1e-3, high=10)
     """errors of the model are shared within cells of this part of the scene's size"""
-    inflation: float = option(3.5, low=0, high=1000)
+    inflation: float = option(3.0, low=0, high=1000)
     """κ: by what factor, in standard deviations, errors of the model are larger than the residual shows. The 95 %
     quantile of what it takes to hold the truth, over half of the targets of one trained scene; measured on others"""
     doubtful: float = option(0.05, low=0, high=10)
