@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from rgspipe.machine.resources import resource_folder
+from rgspipe.cli.help import PAGES, pipelines
 from rgspipe.stages import NAMES
 from rgspipe.store.status import STATES
 
@@ -19,7 +19,7 @@ COMMANDS: Mapping[str, Sequence[str]] = {
     "status": ("outputs=", "stage=", *(f"state={state}" for state in STATES)),
     "verify": ("outputs=",),
     "view": (),
-    "--help": NAMES,
+    "--help": (*PAGES, *NAMES),
     "--version": (),
 }
 
@@ -41,8 +41,7 @@ def completed(line: str) -> tuple[list[str], bool]:
         return _those(COMMANDS[words[0]], word), False
     key, is_key, _ = word.partition("=")
     if is_key and key in ("stage", "pipeline"):
-        pipelines = [path.stem for path in sorted(resource_folder("pipelines").glob("*.yaml"))]
-        names = (*NAMES, "view") if key == "stage" else pipelines
+        names = (*NAMES, "view") if key == "stage" else pipelines()
         return _those([f"{key}={name}" for name in names], word), False
     return _those(["pipeline=", *([] if words else COMMANDS)], word), True
 
