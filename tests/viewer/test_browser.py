@@ -17,7 +17,9 @@ from PIL import Image
 from lit_room import VISIBLE
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import Camera, PointLight
+from rgspipe.scene.lights import KINDS
 from rgspipe.viewer.lamp_controls import ARMS
+from rgspipe.viewer.lamp_numbers import RGB, numbers_of
 from rgspipe.viewer.page import Page
 from rgspipe.viewer.serve import Viewer, view
 from rgspipe.viewer.session import ILLUMINANCE, IRRADIANCE, PICTURE, same_lights
@@ -81,7 +83,7 @@ def window(viewer: Viewer, browser) -> Iterator:
     page.get_by_text("Brightest colour").wait_for()
     yield page
     elsewhere = [url for url in page.asked if not url.startswith((viewer.url, "data:", "blob:"))]
-    assert page.told == [] and elsewhere == [], "nothing goes wrong, and nothing leaves the machine"
+    assert (page.told, elsewhere) == ([], []), "nothing goes wrong, and nothing leaves the machine"
 
 
 @pytest.fixture
@@ -191,6 +193,28 @@ def test_keys_do_what_buttons_do(window, page: Page) -> None:
     window.keyboard.down("w")
     until(lambda: not torch.allclose(page.camera(64).origin, before, atol=1e-3))
     window.keyboard.up("w")
+
+
+def test_keys_change_every_number_of_a_lamp(window, page: Page) -> None:
+    session = page.session
+    window.mouse.click(20, 450)
+    session.change([KINDS["spot"].shaped().at(LAMP.position, torch.tensor([0.6, 0.0, -0.8]), LAMP.intensity)])
+    page.lamps.refresh()
+    for number in numbers_of(session.lights[0], session.images.frozen.size):
+        before = number.of(session.lights[0])
+        until(lambda label=number.label: window.get_by_text(f"▸ {_told(label)}", exact=True).count() == 1)
+        window.keyboard.press("PageDown")
+        until(lambda number=number, before=before: number.of(session.lights[0]) < before)
+        window.keyboard.press("z")
+        until(lambda number=number, before=before: number.of(session.lights[0]) == before)
+        window.keyboard.press("End")
+    session.change([LAMP])
+    page.lamps.refresh()
+
+
+def _told(label: str) -> str:
+    """Channels are those of one field."""
+    return f"colour: {label}" if label in RGB else label
 
 
 def test_lamps_are_taken_home(window, page: Page) -> None:
