@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import torch
 
+from rgspipe.scene import Camera
 from rgspipe.scene.lights import Light
 from rgspipe.viewer.actions import Action, by_visitor, keys, offer
 from rgspipe.viewer.cameras import axis_of, turned_to
@@ -27,6 +28,7 @@ class LampControls:
         self._client, self._session, self._changed = visit.client, visit.session, visit.changed
         client, session = visit.client, visit.session
         self._chosen, self._gizmos = 0, []
+        self._eye: Camera | None = None
         gui = client.gui
         self._which = gui.add_dropdown("lamp", ["none"], hint="The lamp that the fields below are about. Key T.")
         actions = (
@@ -62,6 +64,13 @@ class LampControls:
         if self._session.undo():
             self._renew()
 
+    def seen_from(self, camera: Camera) -> None:
+        """The visitor looks through another camera: a gizmo that it stands in would hide the picture."""
+        self._eye = camera
+        for gizmo in self._gizmos:
+            away = float(np.linalg.norm(np.asarray(gizmo.position) - camera.origin.numpy()))
+            gizmo.visible = away > ARMS * self._session.images.frozen.size
+
     def refresh(self) -> None:
         """Show the session's lamps, as after a search."""
         for gizmo in self._gizmos:
@@ -72,6 +81,8 @@ class LampControls:
         self._which.options = names
         self._which.value = names[self._chosen]
         self._gizmos = [self._gizmo(index, light) for index, light in enumerate(lights)]
+        if self._eye is not None:
+            self.seen_from(self._eye)
         self._show_fields()
 
     def _gizmo(self, index: int, light: Light) -> Any:
