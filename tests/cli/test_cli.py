@@ -12,7 +12,7 @@ import pytest
 import rgspipe as rg
 from rgspipe.cli import main
 from rgspipe.cli.commands import COMMANDS
-from rgspipe.cli.help import PAGES, groups, help_text, sections
+from rgspipe.cli.help import PAGES, help_text, topics
 from rgspipe.stages import NAMES
 
 REFUSED, UNREAD = 2, 141
@@ -80,16 +80,15 @@ def test_help_explains_stages_scenes_groups_and_keys_without_torch(rgspipe) -> N
     assert subprocess.run([sys.executable, "-c", code], capture_output=True).returncode == 0
 
 
-@pytest.mark.parametrize("topics", [(), *((page,) for page in PAGES), ("fit_light",), *((name,) for name in COMMANDS)])
-def test_help_fits_a_screen(topics: tuple[str, ...]) -> None:
+@pytest.mark.parametrize("asked", [(), *((page,) for page in PAGES), ("fit_light",), *((name,) for name in COMMANDS)])
+def test_help_fits_a_screen(asked: tuple[str, ...]) -> None:
     """As a terminal opens: 80 columns and 24 lines, of which one is the next prompt's."""
-    shown = help_text(topics).splitlines()
+    shown = help_text(asked).splitlines()
     assert len(shown) <= 23 and max(map(len, shown)) <= 80
 
 
 def test_no_line_of_help_is_wider_than_a_terminal() -> None:
-    topics = [*NAMES, *filter(None, sections()), *groups()]
-    assert [line for line in help_text(topics).splitlines() if len(line) > 80] == []
+    assert [line for line in help_text(list(topics())).splitlines() if len(line) > 80] == []
 
 
 def test_a_stage_is_explained_and_the_version_told(rgspipe) -> None:

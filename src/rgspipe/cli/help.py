@@ -121,6 +121,11 @@ def groups() -> dict[str, list[Path]]:
     return {folder.name: sorted(folder.glob("*.yaml")) for folder in folders}
 
 
+def topics() -> dict[str, None]:
+    """What `--help` can be asked about, in order and each once; single keys and choices apart."""
+    return dict.fromkeys([*PAGES, *COMMANDS, *NAMES, *groups(), *filter(None, sections())])
+
+
 def pipelines() -> list[str]:
     """Their names."""
     return [path.stem for path in sorted(resource_folder("pipelines").glob("*.yaml"))]
