@@ -218,6 +218,14 @@ def _told(label: str) -> str:
     return f"colour: {label}" if label in RGB else label
 
 
+def test_a_gizmo_that_the_camera_stands_in_is_hidden(page: Page) -> None:
+    for aside, shown in ((0.5 * ARMS, False), (2.0 * ARMS, True)):
+        eye = LAMP.position - torch.tensor([aside * page.session.images.frozen.size, 0.0, 0.0])
+        page._go_to(Camera.look_at(eye, LAMP.position + 0.1))
+        until(lambda shown=shown: page.lamps._gizmos[0].visible == shown)
+    page._go_to(CAMERA)
+
+
 def test_lamps_are_taken_home(window, page: Page) -> None:
     window.mouse.click(20, 450)
     with window.expect_download() as download:
