@@ -9,7 +9,7 @@ from pathlib import Path
 import yaml
 
 import rgspipe
-from rgspipe.cli.help import Setting, groups, help_text, overview, sections
+from rgspipe.cli.help import PAGES, Setting, groups, help_text, sections
 from rgspipe.options import Options
 from rgspipe.options import settings as option_fields
 
@@ -36,8 +36,8 @@ def choices() -> str:
 
 
 def help_page() -> str:
-    """What the command prints alone, and with --help."""
-    return f"```text\n{overview()}\n\n{help_text()}\n```"
+    """What `--help` prints, and the pages that it leads to."""
+    return "\n\n".join(f"```text\n{text}\n```" for text in (help_text(), *map(help_text, zip(PAGES))))
 
 
 def api() -> str:

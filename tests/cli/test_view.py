@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
@@ -13,8 +14,9 @@ from pathlib import Path
 import pytest
 import torch
 
-from rgspipe.cli.view import Wanted, parsed, serve
+from rgspipe.cli.view import Wanted, parsed, serve, view_folder
 from rgspipe.errors import InputError
+from rgspipe.light_export.world import World
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.viewer.serve import view
 from rooms import closed_box
@@ -55,6 +57,32 @@ def test_a_page_is_served_until_it_is_interrupted(tmp_path: Path) -> None:
             assert page.status == 200 and b"<html" in page.read().lower()
         process.send_signal(signal.SIGINT)
         assert process.wait(timeout=30) == 0
+
+
+def test_lamps_are_exported_to_where_they_are_in_the_scene_s_own_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for stage, inputs in (("generate_dataset", {}), ("freeze", {"generate_dataset": ["aa"]})):
+        folder = tmp_path / "room" / stage / "aa"
+        folder.mkdir(parents=True)
+        told = {"schema": 1, "stage": stage, "fingerprint": "aa", "inputs": inputs, "files": {}, "facts": {}}
+        (folder / "manifest.json").write_text(json.dumps(told))
+    info = tmp_path / "room" / "generate_dataset" / "aa" / "dataset_info.json"
+    info.write_text(json.dumps({"version": 1, "rescale": 0.25, "offset": [1.0, 2.0, -3.0]}))
+    given = {}
+    monkeypatch.setattr(FrozenScene, "load", lambda folder: None)
+    monkeypatch.setattr("rgspipe.viewer.serve.view", lambda *_, **words: given.update(words) or Served())
+    assert view_folder([str(folder)]) == 0
+    assert given["world"] == World(1.0, 0.25, (1.0, 2.0, -3.0))
+
+
+class Served:
+    """A page that nobody waits for."""
+
+    url = "http://127.0.0.1:1"
+
+    def wait(self) -> None:
+        pass
 
 
 def test_an_interrupt_before_the_wait_begins_ends_it_as_well(monkeypatch: pytest.MonkeyPatch) -> None:

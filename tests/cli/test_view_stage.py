@@ -31,11 +31,13 @@ def test_a_fit_of_it_is_shown_where_there_is_one(tmp_path: Path, monkeypatch: py
     made = _Made([f"outputs={tmp_path}", f"fit.target={TARGET}"], load_stage)
     lights = read_lights(ROOM / "truth" / "hidden.json")
     (tmp_path / TARGET.name).mkdir()
-    write_lights(tmp_path / TARGET.name / "lights.json", lights, {"result": "converged", "reason": "So it is."})
+    write_lights(
+        tmp_path / TARGET.name / "lights.json", lights, {"result": "converged", "reason": "So it is.", "seconds": 1.0}
+    )
 
     class Fits:
         path = tmp_path
 
     monkeypatch.setattr(made, "find", lambda stage: Fits() if stage == "fit_light" else None)
     [case] = _cases(made, made.config("freeze"))
-    assert case.found is not None and case.found.lights == lights and case.found.told == "converged: So it is."
+    assert case.found is not None and case.found.lights == lights and case.found.told.endswith("\nSo it is.")

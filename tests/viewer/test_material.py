@@ -20,7 +20,13 @@ RIG = (PointLight([0.1, 0.2, 0.3], 1.0), SpotLight.shaped("smoothstep", 0.4, 0.1
 def write_fit(folder: Path, steps: int) -> None:
     light = {"type": "point", "position": [0.5, 0.2, 0.3], "intensity": [1.0, 1.0, 1.0]}
     others = [{"lights": [light], "told": "2 times the cost.", "ruled_out": True}]
-    told = {"result": "converged", "reason": "It is.", "costs": {"1": 2.0, "2": 1.0}, "alternatives": others}
+    told = {
+        "result": "converged",
+        "reason": "It is.",
+        "seconds": 2.0,
+        "costs": {"1": 2.0, "2": 1.0},
+        "alternatives": others,
+    }
     write_lights(folder / "lights.json", RIG, told)
     rows = []
     for step in range(steps):
@@ -34,7 +40,8 @@ def test_a_fit_is_read_with_its_way(tmp_path: Path) -> None:
     write_fit(tmp_path, 4)
     found = found_in(tmp_path)
     assert [light.kind for light in found.lights] == ["point", "spot"]
-    assert found.told == "converged: It is." and found.costs == {1: 2.0, 2: 1.0} and found.covariance == ()
+    assert found.told.startswith("2 lights, converged in 2 s\n  point at (") and found.told.endswith("\nIt is.")
+    assert found.costs == {1: 2.0, 2: 1.0} and found.covariance == ()
     assert [(one.told, one.ruled_out, len(one.lights)) for one in found.alternatives] == [
         ("2 times the cost.", True, 1)
     ]

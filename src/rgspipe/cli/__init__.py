@@ -9,7 +9,7 @@ from pathlib import Path
 
 from rgspipe.cli.commands import COMMANDS
 from rgspipe.cli.completion import LINE, completed, is_question
-from rgspipe.cli.help import help_text, overview, version_text
+from rgspipe.cli.help import help_text, version_text
 from rgspipe.cli.messages import EXIT_INPUT, EXIT_INTERRUPTED, EXIT_UNREAD, show_input_error
 from rgspipe.errors import InputError
 from rgspipe.graph.pipeline import StageLoader
@@ -51,10 +51,7 @@ def main(arguments: Sequence[str] | None = None, stage_loader: StageLoader = loa
 
 
 def _dispatch(arguments: list[str], stage_loader: StageLoader) -> int:
-    if not arguments:
-        print(overview())
-        return 0
-    if arguments[0] in ASKS_FOR_HELP:
+    if not arguments or arguments[0] in ASKS_FOR_HELP:
         print(help_text(arguments[1:]))
         return 0
     if arguments[0] in COMMANDS and any(text in ASKS_FOR_HELP for text in arguments[1:]):

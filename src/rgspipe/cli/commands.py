@@ -15,51 +15,65 @@ class Command(NamedTuple):
     Attributes:
         module: in rgspipe.cli.
         function: takes the arguments after the name, and returns the exit status.
-        text: how it is written, and what can be said.
+        summary: what it does, in a line.
+        usage: how it is written, and below that what can be said.
     """
 
     module: str
     function: str
-    text: str
+    summary: str
+    usage: str
+
+    @property
+    def text(self) -> str:
+        """What `--help` says of it."""
+        written, _, rest = self.usage.partition("\n\n")
+        return f"{written}\n\n{self.summary}\n{rest}".rstrip()
 
     def load(self) -> Callable[[Sequence[str]], int]:
         return getattr(import_module(f"rgspipe.cli.{self.module}"), self.function)
 
 
+_PAGE = """\
+  port        of the page
+  resolution  pixels along the longer side of pictures at rest
+  address     of this machine to listen at, if others are to look; then with a
+              token"""
+
 COMMANDS = {
     "demo": Command(
         "view",
         "demo",
-        """\
+        "A small room in the browser: drag its lamp, see a hidden one found.",
+        f"""\
 rgspipe demo [port=8080] [resolution=256] [address=127.0.0.1]
 
-A small room in the browser that comes with the package: drag its lamp, and see a hidden one found.
-  port        of the page
-  resolution  pixels along the longer side of pictures at rest
-  address     of this machine to listen at, if others are to look; then with a token""",
+{_PAGE}""",
     ),
     "view": Command(
         "view",
         "view_folder",
-        """\
-rgspipe view FOLDER [lights=FILE] [target=DIR] [fit=DIR] [port=8080] [resolution=256] [address=127.0.0.1]
+        "A frozen scene in the browser, where lamps are moved and found.",
+        f"""\
+rgspipe view FOLDER [lights=FILE] [target=DIR] [fit=DIR]
+             [port=8080] [resolution=256] [address=127.0.0.1]
 
-A frozen scene in the browser, where lamps are moved and found; outputs/<scene>/freeze/latest is one.
+  FOLDER      outputs/<scene>/freeze/latest, for example
   lights      light file: the lamps at first
-  target      folder with photographs of the scene under lamps that are to be found
-  fit         folder of a target's fit (with lights.json), whose lamps are shown with their regions
-  port        of the page
-  resolution  pixels along the longer side of pictures at rest
-  address     of this machine to listen at, if others are to look; then with a token
+  target      folder with photographs of the scene under lamps that are to be
+              found
+  fit         folder of a target's fit (with lights.json), whose lamps are shown
+              with their regions
+{_PAGE}
 stage=view shows the configured scene with its photographs and fits instead.""",
     ),
     "status": Command(
         "runs",
         "show_runs",
+        "How the runs so far ended, and why those that failed did.",
         f"""\
 rgspipe status [RUN] [state=STATE] [KEY=VALUE …] [outputs=DIR]
 
-How the runs so far ended, and why those that failed did.
   RUN        the name of a run: all that is known of it
   state      one of {", ".join(STATES)}
   KEY=VALUE  those that were started with this, such as stage=fit_light""",
@@ -67,29 +81,32 @@ How the runs so far ended, and why those that failed did.
     "outputs": Command(
         "outputs",
         "show_outputs",
+        "What results take on the disk; removes what nothing needs any more.",
         """\
-rgspipe outputs [prune] [scene=NAME] [stage=NAME] [older=30d] [remove=true] [outputs=DIR]
+rgspipe outputs [prune] [scene=NAME] [stage=NAME] [older=30d] [remove=true]
+                [outputs=DIR]
 
-What the results take on the disk. With prune: what nothing needs any more, removed where remove=true is said.
-  scene, stage  of these alone; results of a stage that is named are listed one by one
+  prune         list what nothing needs any more; remove=true removes it
+  scene, stage  of these alone; results of a stage that is named are listed one
+                by one
   older         at least so old: 12h, 30d, 4w""",
     ),
     "doctor": Command(
         "doctor",
         "doctor",
+        "Whether all that is needed is here, and how accurate and fast it is.",
         """\
-rgspipe doctor [check=false] [outputs=DIR] [blender.executable=PATH] [blender.python=PATH]
+rgspipe doctor [check=false] [outputs=DIR]
+               [blender.executable=PATH] [blender.python=PATH]
 
-Whether all that is needed is here and works, what more there could be, how accurate and fast it is.
   check       false leaves the measurements out, which take half a minute
   blender.…   the Blender that is to render, which is tried""",
     ),
     "verify": Command(
         "verify",
         "verify",
+        "Reads every result, and says which were damaged since then.",
         """\
-rgspipe verify [outputs=DIR]
-
-Reads every result and says which were damaged since they were made.""",
+rgspipe verify [outputs=DIR]""",
     ),
 }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from rgspipe.machine.resources import resource_folder
+from rgspipe.cli.help import pipelines, topics
 from rgspipe.stages import NAMES
 from rgspipe.store.status import STATES
 
@@ -18,8 +18,8 @@ COMMANDS: Mapping[str, Sequence[str]] = {
     "outputs": ("list", "prune", "outputs=", "scene=", "stage=", "older=", "remove=true"),
     "status": ("outputs=", "stage=", *(f"state={state}" for state in STATES)),
     "verify": ("outputs=",),
-    "view": (),
-    "--help": NAMES,
+    "view": ("lights=", "target=", "fit=", "port=", "resolution=", "address="),
+    "--help": (),
     "--version": (),
 }
 
@@ -37,12 +37,15 @@ def completed(line: str) -> tuple[list[str], bool]:
     """
     words = line.split()[1:]
     word = "" if line.endswith(" ") or not words else words.pop()
+    if words == ["view"]:  # its folder
+        return [], False
+    if words[:1] == ["--help"]:
+        return _those(list(topics()), word), False
     if words and words[0] in COMMANDS:
         return _those(COMMANDS[words[0]], word), False
     key, is_key, _ = word.partition("=")
     if is_key and key in ("stage", "pipeline"):
-        pipelines = [path.stem for path in sorted(resource_folder("pipelines").glob("*.yaml"))]
-        names = (*NAMES, "view") if key == "stage" else pipelines
+        names = (*NAMES, "view") if key == "stage" else pipelines()
         return _those([f"{key}={name}" for name in names], word), False
     return _those(["pipeline=", *([] if words else COMMANDS)], word), True
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import platform
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple, NoReturn
 
@@ -19,8 +19,8 @@ from rgspipe.machine.resources import resource_folder
 from rgspipe.options import shown
 from rgspipe.stages import NAMES, stage_summary, stage_text
 
-#: Columns of what is printed.
-WIDTH = 100
+#: Columns of what is printed: those of a terminal as it opens.
+WIDTH = 80
 
 #: Sections of settings that steer a stage of another name.
 STAGE_SECTIONS = {
@@ -35,27 +35,67 @@ STAGE_SECTIONS = {
     "render_truth": ("benchmark", "blender"),
 }
 
-SCENES = """\
-  cornell    a Cornell box with two boxes, modelled and rendered with Blender; scene.cornell.* sets its measures
-  cornell_glossy  the same with glossy boxes
-  tutorial   the same with few images, in a few minutes
-  corner     a closed corridor around a corner; targets with the light in the other leg (occlusion=around_corner)
-  hotdog     a hot dog on a plate: curved and textured, in empty space
-  room       a closed room with furniture, textured
-  zoo        a room that nobody tuned, drawn from a seed: scene=zoo scene.zoo.seed=7 scene.name=zoo_7
-  blend      a Blender file of yours: scene=blend scene.path=my.blend
-  external   images, cameras and lights from disk, no Blender needed: scene=external scene.path=DIR
-  rgbd       a scan, with the lamps that were on unknown: scene=rgbd scene.path=DIR
-  mesh       a mesh and photographs of it, with the lamps unknown: scene=mesh scene.path=room.glb"""
+FRONT = """\
+rgspipe: from images of a scene, find its lights.
 
-EXAMPLES = """\
-  python -m rgspipe demo                                              a small room in the browser, in seconds
-  python -m rgspipe doctor                                            whether all is well, and what is missing
-  python -m rgspipe stage=evaluate scene=tutorial occlusion=occluded  lights out of sight, in minutes
-  python -m rgspipe view outputs/tutorial/freeze/latest               that scene in the browser: move its lamps
-  python -m rgspipe pipeline=reproduce                                the whole way, with a report at the end
-  python -m rgspipe -m stage=evaluate views.count=1,2,3               a sweep: one job for each value
-  python -m rgspipe status                                            how the runs so far ended"""
+  rgspipe demo                    a small room in the browser, in seconds
+  rgspipe doctor                  whether all is well, and what is missing
+  rgspipe stage=evaluate scene=tutorial occlusion=occluded
+                                  lights out of sight, in minutes
+  rgspipe view outputs/tutorial/freeze/latest
+                                  that scene in the browser: move its lamps
+  rgspipe status                  how the runs so far ended
+
+In general: rgspipe stage=NAME [scene=NAME] [GROUP=CHOICE …] [KEY=VALUE …]
+What a stage needs is made first; results: outputs/<scene>/<stage>/latest.
+
+rgspipe --help stages     what can be made, in the order in which it is needed
+        --help scenes     scenes of ours; a .blend file, photographs, scans
+        --help groups     settings by choice: light=spot, accuracy=draft
+        --help keys       all other settings, in sections
+        --help commands   what there is beside stages
+        --help options    sweeps, pipelines, a cluster, tracebacks, the tab key
+        --help NAME       one stage, group, choice, section, key or command"""
+
+SCENES = """\
+Scenes: scene=NAME, cornell if nothing is said
+
+  cornell         a Cornell box with two boxes, modelled and rendered with
+                  Blender; scene.cornell.* sets its measures
+  cornell_glossy  the same with glossy boxes
+  tutorial        the same with few images, in a few minutes
+  corner          a closed corridor around a corner; targets with the light in
+                  the other leg (occlusion=around_corner)
+  hotdog          a hot dog on a plate: curved and textured, in empty space
+  room            a closed room with furniture, textured
+  zoo             a room that nobody tuned, drawn from a seed:
+                  scene=zoo scene.zoo.seed=7 scene.name=zoo_7
+  blend           a Blender file of yours: scene=blend scene.path=my.blend
+  external        images, cameras and lights from disk, no Blender needed:
+                  scene=external scene.path=DIR
+  rgbd            a scan, with the lamps that were on unknown:
+                  scene=rgbd scene.path=DIR
+  mesh            a mesh and photographs of it, with the lamps unknown:
+                  scene=mesh scene.path=room.glb
+  ply             surfels from a PLY file: scene=ply scene.path=surfels.ply"""
+
+OPTIONS = """\
+Options, anywhere on the line
+
+  pipeline=NAME             {pipelines}
+  upstream=require          refuse, instead of making, missing inputs
+  -m KEY=A,B                sweep: a job for each value
+  hydra.launcher.n_jobs=K   K jobs of a sweep at once
+  launcher=slurm            the jobs of a sweep on a Slurm cluster;
+                            hydra.launcher.partition=NAME and so on
+  --cfg job                 show the whole configuration instead of running it
+  debug.traceback=true      show tracebacks (or set RGSPIPE_TRACEBACK=1)
+  --shell-completion install=bash
+                            for eval: the tab key completes stages and keys
+  --version                 of rgspipe, Python and the libraries
+  --hydra-help              options of Hydra, which reads the command line
+
+Exit status: 0 done, 1 failed, 2 input that cannot be used, 130 interrupted."""
 
 
 class Setting(NamedTuple):
@@ -81,66 +121,23 @@ def groups() -> dict[str, list[Path]]:
     return {folder.name: sorted(folder.glob("*.yaml")) for folder in folders}
 
 
-def overview() -> str:
-    """What a newcomer needs to know to start."""
-    return f"""\
-rgspipe: from images of a scene, find its lights.
+def topics() -> dict[str, None]:
+    """What `--help` can be asked about, in order and each once; single keys and choices apart."""
+    return dict.fromkeys([*PAGES, *COMMANDS, *NAMES, *groups(), *filter(None, sections())])
 
-It learns a scene of Gaussian surfels from images with known lights, freezes it with its global illumination,
-and then finds unknown lights from one or a few images, also when they are out of sight.
 
-Stages, each of which makes what it needs of those before it (stage=NAME):
-{_stages()}
-
-Scenes (scene=NAME, cornell if nothing is said):
-{SCENES}
-
-First commands:
-{EXAMPLES}
-
-Results are in outputs/<scene>/<stage>/latest. Keys and groups: python -m rgspipe --help"""
+def pipelines() -> list[str]:
+    """Their names."""
+    return [path.stem for path in sorted(resource_folder("pipelines").glob("*.yaml"))]
 
 
 def help_text(topics: Sequence[str] = ()) -> str:
-    """What there is to set, on a screen; or a stage, or the keys of one section or group.
+    """What to begin with, on a screen; or a page, a stage, a command, or the keys of one section or group.
 
     Raises:
-        InputError: there is no such section.
+        InputError: there is no such topic.
     """
-    if topics:
-        return "\n\n".join(_topic(topic) for topic in topics)
-    pipelines = ", ".join(path.stem for path in sorted(resource_folder("pipelines").glob("*.yaml")))
-    return f"""\
-python -m rgspipe [-m] stage=NAME [scene=NAME] [GROUP=CHOICE …] [KEY=VALUE …]
-
-Stages (--help STAGE says what one does; python -m rgspipe lists all, with scenes and first commands):
-{_wrapped(", ".join(NAMES), "  ")}
-
-Pipelines, several stages in a row (pipeline=NAME): {pipelines}
-
-Groups of settings (--help GROUP, --help CHOICE):
-{_groups()}
-
-Sections of keys (--help SECTION lists them with units, ranges and defaults, --help fit.target one):
-{_wrapped(", ".join(name for name in sections() if name), "  ")}
-
-More:
-  upstream=require      refuse, instead of making, missing inputs
-  -m                    sweep over comma-separated values; hydra.launcher.n_jobs=K jobs at once
-  launcher=slurm        the jobs of a sweep on a Slurm cluster; hydra.launcher.partition=NAME and so on
-  --cfg job             show the whole configuration instead of running it
-  debug.traceback=true  show tracebacks (or set RGSPIPE_TRACEBACK=1)
-  status                how the runs so far ended; status NAME shows one, status state=failed some
-  demo                  a small room in the browser, in seconds: drag its lamp, and see a hidden one found
-  view FOLDER           a frozen scene in the browser, where lamps are moved and found
-  stage=view            the configured scene there, with its photographs and fits; --help viewer
-  outputs               what the results take on the disk; outputs prune removes what nothing needs any more
-  doctor                whether all that is needed is here and works, and how accurate and fast it is
-  verify                read every result and say which were damaged since they were made
-  --shell-completion install=bash  for eval: lets the tab key complete stages, groups and keys
-  --version             of rgspipe, Python and the libraries
-  --hydra-help          options of Hydra, which reads the command line
-Exit status: 0 done, 1 failed, 2 input that cannot be used."""
+    return "\n\n".join(map(_topic, topics)) if topics else FRONT
 
 
 def version_text() -> str:
@@ -150,11 +147,41 @@ def version_text() -> str:
 
 
 def _stages() -> str:
-    return "\n".join(f"  {name:<17} {_shortened(stage_summary(name), WIDTH - 20)}".rstrip() for name in NAMES)
+    summaries = {name: stage_summary(name) for name in NAMES} | {"view": "Show the scene in the browser."}
+    rows = (f"  {name:<17} {_shortened(text, WIDTH - 20)}" for name, text in summaries.items())
+    return "\n".join(["Stages: stage=NAME; --help NAME says more", *rows])
 
 
 def _groups() -> str:
-    return "\n".join(_wrapped(_choices(files), f"  {name:<11} ") for name, files in groups().items())
+    rows = (_wrapped(_choices(files), f"  {name:<11} ") for name, files in groups().items())
+    return "\n".join(["Settings by choice: GROUP=CHOICE; --help GROUP or --help CHOICE says more", "", *rows])
+
+
+def _keys() -> str:
+    names = _wrapped(", ".join(name for name in sections() if name), "  ")
+    head = "Sections of keys; --help SECTION lists them with units, ranges and defaults"
+    alone = f"Keys without a section: {', '.join(row.key for row in sections()[''])}"
+    return "\n".join([head, "", names, "", _wrapped(alone, "")])
+
+
+def _commands() -> str:
+    rows = (f"  {name:<9} {command.summary}" for name, command in COMMANDS.items())
+    return "\n".join(["Commands: rgspipe NAME; --help NAME says more", "", *rows])
+
+
+def _options() -> str:
+    return OPTIONS.format(pipelines=_wrapped(f"several stages in a row: {', '.join(pipelines())}", " " * 28).lstrip())
+
+
+#: Pages that the first one leads to.
+PAGES: dict[str, Callable[[], str]] = {
+    "stages": _stages,
+    "scenes": lambda: SCENES,
+    "groups": _groups,
+    "keys": _keys,
+    "commands": _commands,
+    "options": _options,
+}
 
 
 def _choices(files: Sequence[Path]) -> str:
@@ -171,23 +198,30 @@ def _shortened(text: str, width: int) -> str:
 
 def _stage(name: str) -> str:
     """What a stage does, and where what steers it is explained."""
-    text = stage_text(name)
+    text = "\n\n".join(_wrapped(paragraph, "") for paragraph in stage_text(name).split("\n\n"))
     keys = [f"  --help {section}" for section in sections() if section and section in STAGE_SECTIONS.get(name, ())]
     return "\n".join([f"stage={name}", "", text, *(["", "Its settings:", *keys] if keys else [])])
 
 
 def _topic(topic: str) -> str:
+    if topic in PAGES:
+        return PAGES[topic]()
     if topic in COMMANDS:
         return COMMANDS[topic].text
     every = [setting for settings in sections().values() for setting in settings]
     rows = [setting for setting in every if setting.key == topic or setting.key.startswith(f"{topic}.")]
     lines = [_stage(topic)] if topic in NAMES else []
-    lines += [f"{topic}={_choices(groups()[topic])}"] if topic in groups() else []
+    lines += (
+        [f"{topic}={_wrapped(_choices(groups()[topic]), ' ' * (len(topic) + 1)).lstrip()}"] if topic in groups() else []
+    )
     if not lines and not rows:
         lines = _chosen(topic) or _refuse(topic, [setting.key for setting in every])
-    width = max((len(setting.key) for setting in rows), default=0)
-    lines += [f"  {setting.key:<{width}}  {setting.meaning}; default {setting.default}" for setting in rows]
-    return "\n".join(lines)
+    return "\n".join([*lines, *map(_setting, rows)])
+
+
+def _setting(setting: Setting) -> str:
+    """A key with its default, as it can be typed, and below it what it means."""
+    return "\n".join([f"  {setting.key}={setting.default}", _wrapped(setting.meaning, " " * 6)])
 
 
 def _chosen(topic: str) -> list[str]:
@@ -200,8 +234,8 @@ def _chosen(topic: str) -> list[str]:
 
 def _refuse(topic: str, keys: Sequence[str]) -> NoReturn:
     choices = [path.stem for files in groups().values() for path in files]
-    known = [*COMMANDS, *choices, *keys, *NAMES, *(key.partition(".")[0] for key in keys)]
+    known = [*PAGES, *COMMANDS, *choices, *keys, *NAMES, *(key.partition(".")[0] for key in keys)]
     near = difflib.get_close_matches(topic, known, n=1)
-    remedy = f"Did you mean {near[0]}?" if near else "python -m rgspipe --help lists them."
-    expected = "a stage, a section, a key, a group, a choice of one, or a command"
+    remedy = f"Did you mean {near[0]}?" if near else "rgspipe --help leads to them."
+    expected = "a page, a stage, a section, a key, a group, a choice of one, or a command"
     raise InputError(f"--help {topic}", expected=expected, found="none", remedy=remedy)

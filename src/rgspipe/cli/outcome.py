@@ -39,7 +39,8 @@ def _fits(artifact: Artifact) -> list[str]:
     if len(results) > FEW:
         return [*columns(_fit_rows(results)), f"Lights: {artifact.path}/<target>/lights.json"]
     lines = [line for row in results.to_dict("records") for line in _fit(artifact, row)]
-    return [*lines, f"Lights: {artifact.path}/<target>/lights.json, pictures: fit.png beside them"]
+    where = results["target"].iloc[0] if len(results) == 1 else "<target>"
+    return [*lines, f"Lights: {artifact.path}/{where}/lights.json, pictures: fit.png beside them"]
 
 
 def _fit(artifact: Artifact, row: Row) -> list[str]:

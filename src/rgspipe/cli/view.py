@@ -53,6 +53,9 @@ def view_folder(arguments: Sequence[str]) -> int:
 
     from rgspipe.datasets.light_file import read_lights
     from rgspipe.renderer.frozen import FrozenScene
+    from rgspipe.renderer.frozen_file import SURFELS
+    from rgspipe.stages.scene.export import world_of
+    from rgspipe.stages.scene.light_origin import origin_of
     from rgspipe.viewer.material import Case, case_in, found_in
     from rgspipe.viewer.serve import view
 
@@ -65,6 +68,7 @@ def view_folder(arguments: Sequence[str]) -> int:
         port=wanted.port,
         resolution=wanted.resolution,
         address=wanted.address,
+        world=world_of(1.0, origin_of(wanted.folder / SURFELS)),
     )
     return serve(viewer)
 

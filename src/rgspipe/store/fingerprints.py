@@ -7,6 +7,8 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
+from rgspipe.options import shown
+
 #: Hexadecimal digits of a fingerprint; 64 bits are plenty for the artifacts of one folder.
 DIGITS = 16
 
@@ -31,10 +33,10 @@ def differences(now: Mapping[str, Any], before: Mapping[str, Any]) -> list[str]:
 
 
 def config_differences(now: Mapping[str, Any], before: Mapping[str, Any]) -> list[str]:
-    """What changed between two configurations, one phrase for each key."""
+    """What changed between two configurations, one phrase for each key, in the words of the command line."""
     new, old = _flat(now), _flat(before)
     changed = [key for key in new if key not in old or old[key] != new[key]]
-    return [f"{key} {old[key]} → {new[key]}" if key in old else f"{key} is new" for key in changed]
+    return [f"{key} {shown(old[key])} → {shown(new[key])}" if key in old else f"{key} is new" for key in changed]
 
 
 def _flat(values: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:

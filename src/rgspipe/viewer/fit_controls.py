@@ -40,7 +40,12 @@ class FitControls:
         self._cases = {case.name: case for case in visit.exhibit.cases}
         self.searching, self._compared = False, -1
         client, gui = visit.client, visit.client.gui
-        find = Action("find it from the photographs", "F", "Find lamps from the photographs alone.", self.find)
+        find = Action(
+            "find it from the photographs",
+            "F",
+            "Find lamps, and how many there are, from the photographs alone.",
+            self.find,
+        )
         self._buttons = offer(client, find, chief=True)
         self._told = gui.add_markdown("")
         self._strip = gui.add_image(np.zeros((8, 24, 3), np.uint8), visible=False)

@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import torch
 
+from rgspipe.scene import Camera
 from rgspipe.scene.lights import Light
 from rgspipe.viewer.actions import Action, by_visitor, keys, offer
 from rgspipe.viewer.cameras import axis_of, turned_to
+from rgspipe.viewer.lamp_fields import LampFields
+from rgspipe.viewer.lamp_numbers import colour_of
 from rgspipe.viewer.session import OFFERED
 from rgspipe.viewer.visit import Visit
 
 #: Length of a gizmo's arms and radius of the ball in it, of the scene's size.
 ARMS, BALL = 0.12, 0.012
-
-#: Weakest level of a lamp that its colour can still be told at, W/sr.
-FAINT = 1e-9
 
 
 class LampControls:
@@ -28,7 +27,8 @@ class LampControls:
     def __init__(self, visit: Visit) -> None:
         self._client, self._session, self._changed = visit.client, visit.session, visit.changed
         client, session = visit.client, visit.session
-        self._chosen, self._gizmos, self._numbers = 0, [], []
+        self._chosen, self._gizmos = 0, []
+        self._eye: Camera | None = None
         gui = client.gui
         self._which = gui.add_dropdown("lamp", ["none"], hint="The lamp that the fields below are about. Key T.")
         actions = (
@@ -45,16 +45,9 @@ class LampControls:
         self._kind = gui.add_dropdown(
             "kind", list(OFFERED), hint="Point, spot, sphere or panel, at the same place. Key K."
         )
-        # Three fields and not one of three, in which numbers are cut off on a narrow page.
-        hint = "Of the lamp, scene units; or drag the gizmo."
-        self._place = [gui.add_number(axis, 0.0, step=0.01, hint=hint) for axis in "xyz"]
-        self._colour = gui.add_rgb("colour", (255, 255, 255), hint="Colour of the lamp; its brightest channel is 255.")
-        self._level = gui.add_number("W/sr", 1.0, min=0.0, step=0.01, hint="Intensity of the brightest channel.")
-        self._folder = gui.add_folder("shape")
+        self._fields = LampFields(client, session.images.frozen.size, self._edited)
         self._which.on_update(by_visitor(self._choose))
         self._kind.on_update(by_visitor(lambda: self._with(session.as_kind, self._kind.value)))
-        for field in (*self._place, self._colour, self._level):
-            field.on_update(by_visitor(self._read))
         self.refresh()
 
     def add(self) -> None:
@@ -71,6 +64,13 @@ class LampControls:
         if self._session.undo():
             self._renew()
 
+    def seen_from(self, camera: Camera) -> None:
+        """The visitor looks through another camera: a gizmo that it stands in would hide the picture."""
+        self._eye = camera
+        for gizmo in self._gizmos:
+            away = float(np.linalg.norm(np.asarray(gizmo.position) - camera.origin.numpy()))
+            gizmo.visible = away > ARMS * self._session.images.frozen.size
+
     def refresh(self) -> None:
         """Show the session's lamps, as after a search."""
         for gizmo in self._gizmos:
@@ -81,20 +81,21 @@ class LampControls:
         self._which.options = names
         self._which.value = names[self._chosen]
         self._gizmos = [self._gizmo(index, light) for index, light in enumerate(lights)]
+        if self._eye is not None:
+            self.seen_from(self._eye)
         self._show_fields()
 
     def _gizmo(self, index: int, light: Light) -> Any:
         size, scene = self._session.images.frozen.size, self._client.scene
-        turn = (1.0, 0.0, 0.0, 0.0) if light.axis is None else turned_to(light.axis)
         gizmo = scene.add_transform_controls(
             f"/lamps/{index}",
             scale=ARMS * size,
             disable_rotations=light.axis is None,
             depth_test=False,
             position=tuple(light.position.tolist()),
-            wxyz=turn,
+            wxyz=_turn(light),
         )
-        scene.add_icosphere(f"/lamps/{index}/ball", radius=BALL * size, color=_shown(light)[0])
+        scene.add_icosphere(f"/lamps/{index}/ball", radius=BALL * size, color=colour_of(light))
 
         # Awaited by viser one after the other, where plain functions may overtake each other.
         async def dragged(event: Any) -> None:
@@ -117,49 +118,17 @@ class LampControls:
         self._changed()
 
     def _show_fields(self) -> None:
-        for number in self._numbers:
-            number.remove()
-        self._numbers = []
         lights = self._session.lights
-        self._folder.visible = bool(lights) and bool(lights[self._chosen].shape)
-        for field in (self._kind, *self._place, self._colour, self._level):
-            field.disabled = not lights
-        if not lights:
-            return
-        light = lights[self._chosen]
-        self._kind.value = light.kind if light.kind in OFFERED else OFFERED[0]
-        for field, value in zip(self._place, light.position.tolist(), strict=True):
-            field.value = round(value, 4)
-        self._colour.value, self._level.value = _shown(light)
-        with self._folder:
-            self._numbers = [self._number(light, number) for number in light.shape]
+        self._kind.disabled = not lights
+        light = lights[self._chosen] if lights else None
+        if light is not None:
+            self._kind.value = light.kind if light.kind in OFFERED else OFFERED[0]
+        self._fields.show(light)
 
-    def _number(self, light: Light, number: Any) -> Any:
-        value = number.shown(float(getattr(light, number.name)))
-        label = number.name.replace("_", " ") + (f" {number.unit}" if number.unit else "")
-        hint = f"The lamp's {number.name.replace('_', ' ')}{' in degrees' if number.unit == '°' else ''}."
-        step = 0.5 if number.unit == "°" else 0.005
-        field = self._client.gui.add_number(label, round(value, 4), step=step, hint=hint)
-        field.on_update(by_visitor(lambda: self._shape(number, field.value)))
-        return field
-
-    def _shape(self, number: Any, value: float) -> None:
-        light = self._session.lights[self._chosen]
-        try:
-            changed = light.changed(number.name, number.natural(value))
-        except ValueError:  # a number on the way to the one that is meant, such as -, or an impossible one
-            return
-        self._session.replace(self._chosen, changed, f"{number.name} {self._chosen}")
-        self._changed()
-
-    def _read(self) -> None:
-        light = self._session.lights[self._chosen]
-        colour = torch.tensor(self._colour.value).double() / 255.0
-        intensity = colour / colour.amax().clamp(min=1.0 / 255.0) * max(self._level.value, 0.0)
-        place = torch.tensor([field.value for field in self._place], dtype=torch.float64)
-        self._session.replace(self._chosen, light.at(place, None, intensity), f"fields {self._chosen}")
+    def _edited(self, light: Light, what: str) -> None:
+        self._session.replace(self._chosen, light, f"{what} {self._chosen}")
         gizmo = self._gizmos[self._chosen]
-        gizmo.position = tuple(place.tolist())
+        gizmo.position, gizmo.wxyz = tuple(light.position.tolist()), _turn(light)
         self._changed()
 
     def _choose(self) -> None:
@@ -188,10 +157,6 @@ class LampControls:
         self._changed()
 
 
-def _shown(light: Light) -> tuple[tuple[int, int, int], float]:
-    """A lamp's colour in bytes, the brightest channel 255, and that channel's intensity."""
-    level = float(light.intensity.amax())
-    if not (level > FAINT and math.isfinite(level)):
-        return (255, 255, 255), max(level, 0.0)
-    red, green, blue = (round(255.0 * x / level) for x in light.intensity.tolist())
-    return (red, green, blue), level
+def _turn(light: Light) -> np.ndarray:
+    """wxyz of a lamp's gizmo."""
+    return np.array([1.0, 0.0, 0.0, 0.0]) if light.axis is None else turned_to(light.axis)

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 import torch
@@ -18,6 +19,8 @@ from rgspipe.datasets.json_file import read_json
 from rgspipe.datasets.light_file import read_lights
 from rgspipe.datasets.views import Target, View
 from rgspipe.fitting import FitResult
+from rgspipe.fitting.findings import FitStatus
+from rgspipe.fitting.result_text import as_text, headline, light_lines
 from rgspipe.fitting.words import told_alternative
 from rgspipe.scene import Camera, LightRig
 from rgspipe.scene.arrays import ArrayLike
@@ -110,9 +113,16 @@ def found_in(fit: str | Path) -> Found:
     path = Path(fit) / "lights.json"
     lights, told = read_lights(path), read_json(path, "a fit's light file")
     costs = {int(count): float(cost) for count, cost in told.get("costs", {}).items()}
-    words = f"{told['result']}: {told['reason']}" if "reason" in told else ""
+    covariances = read_covariances(path)
+    words = _words(told, lights, covariances) if {"result", "reason", "seconds"} <= told.keys() else ""
     steps = _path(Path(fit) / "convergence.csv", lights)
-    return Found(lights, read_covariances(path), words, costs, steps, read_alternatives(path))
+    return Found(lights, covariances, words, costs, steps, read_alternatives(path))
+
+
+def _words(told: Mapping[str, Any], lights: LightRig, covariances: Sequence[Tensor]) -> str:
+    """As the fit itself told it."""
+    head = headline(len(lights), FitStatus(told["result"]), float(told["seconds"]))
+    return as_text(head, light_lines(lights, covariances), told["reason"])
 
 
 def _path(table: Path, lights: LightRig) -> tuple[LightRig, ...]:

@@ -76,6 +76,7 @@ class Page:
         if camera is not None and camera.key != self._seen:
             self._seen = camera.key
             self.drawings.seen_from(camera)
+            self.lamps.seen_from(camera)
             self.painter.changed()
 
     def _show(self, picture: Bytes, top: float, sharp: bool) -> None:

@@ -53,9 +53,13 @@ class Saving:
     def _video(self) -> None:
         if (camera := self._visit.camera()) is None:
             return
+        told = self._visit.client.add_notification(
+            "swing.webp", "Making the video …", loading=True, auto_close_seconds=None
+        )
         lower, upper = (corner.double().cpu() for corner in self._session.images.frozen.bounds)
         frames = [self._frame(one) for one in swing(camera, 0.5 * (lower + upper))]
         self._send("swing.webp", video(frames, SECONDS))
+        told.remove()
 
     def _frame(self, camera: Camera) -> Bytes:
         with self._turn:  # Between two frames others have their turn.

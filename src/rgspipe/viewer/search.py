@@ -14,6 +14,9 @@ from rgspipe.scene import Camera, LightRig
 from rgspipe.viewer.kept import Kept
 from rgspipe.viewer.material import Photograph
 
+#: What is looked for where nothing is said: lamps of any kind, and of any number up to that which searches try.
+ANY = LightSpec("auto", count=None)
+
 #: Sets of cameras whose views are kept.
 KEPT_VIEWS = 3
 
@@ -34,8 +37,8 @@ class Finder:
         """Whether somebody's search is under way."""
         return self._turn.locked()
 
-    def find(self, photographs: Sequence[Photograph], lights: str | LightSpec = "auto") -> FitResult:
-        """The lamps of photographs, from these alone.
+    def find(self, photographs: Sequence[Photograph], lights: str | LightSpec = ANY) -> FitResult:
+        """The lamps of photographs, from these alone, and how many there are.
 
         Raises:
             InputError: there are no photographs.

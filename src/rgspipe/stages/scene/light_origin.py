@@ -1,4 +1,4 @@
-"""Which dataset a light file was found in, and with it where the scene's own coordinates are."""
+"""Which dataset a light file or a scene was made from, and with it where the scene's own coordinates are."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from rgspipe.datasets.info import INFO
 from rgspipe.store.manifest import MANIFEST, read_manifest
 
 
-def origin_of(light: Path) -> Path | None:
-    """The dataset_info.json of the dataset that the result with this light file was made from.
+def origin_of(file: Path) -> Path | None:
+    """The dataset_info.json of the dataset that the result with this file, such as a fit's lights, was made from.
 
     The configuration at hand may be of another dataset, which would put the lights elsewhere, or of one that is yet to
     be rendered.
@@ -20,7 +20,7 @@ def origin_of(light: Path) -> Path | None:
     Raises:
         InputError: a manifest on the way is damaged.
     """
-    folders = [folder for folder in light.resolve().parents if (folder / MANIFEST).exists()]
+    folders = [folder for folder in file.resolve().parents if (folder / MANIFEST).exists()]
     return _dataset_info(folders[0]) if folders else None
 
 
