@@ -42,7 +42,7 @@ UNSEEN = SHAPE.at(
 
 PAIR = (
     point(-0.331, -0.211, 0.241, intensity=(1.3, 0.5, 1.0)),
-    point(-0.017, -0.272, 0.188, intensity=(0.5, 1.0, 1.2)),
+    point(-0.1, -0.1, 0.2, intensity=(0.5, 1.0, 1.2)),
 )
 
 UNEXPLAINED, AMBIGUOUS, UNDETERMINED = FitStatus.UNEXPLAINED, FitStatus.AMBIGUOUS, FitStatus.UNDETERMINED
