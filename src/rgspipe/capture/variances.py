@@ -39,7 +39,7 @@ FOLLOWED = 0.95
 LEAST_FREE = 1e-3
 
 #: Least variance that surfaces have in common: by rays and surfels light is not known better than to half a percent.
-#: Believed to 0.04 %, one surfel half behind an edge took a whole box of a painted room with it, 28 % off.
+#: Believed to 0.04 %, the box in a painted room came out 28 % off.
 LEAST = 0.005**2
 
 
