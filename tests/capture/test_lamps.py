@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -11,6 +12,7 @@ from photographed_room import LAMPS, frozen_room
 from rgspipe.capture.field import Field, Graph, Variances
 from rgspipe.capture.lamps import LampProblem, Lamps
 from rgspipe.capture.received import Received
+from rgspipe.capture.search import Candidates, looked_for_again
 
 
 @cache
@@ -100,3 +102,14 @@ def test_lamps_are_found_from_nearby() -> None:
     found = made.refined(start, 30)
     assert made.cost(found) < 0.1 * made.cost(start)
     assert np.linalg.norm(found.places - true_lamps(made).places, axis=1).max() < 0.003  # 5e-4 of the room
+
+
+def test_a_lamp_in_a_wrong_place_is_found_again_beside_the_others() -> None:
+    made = problem()
+    made = replace(made, frozen=made.frozen.with_dictionary(4, seed=0))
+    places = true_lamps(made).places.copy()
+    places[1] *= -1.0
+    stuck = made.refined(made.lamps(places, true_lamps(made).logs - 1.0), 25)
+    found = looked_for_again(made, Candidates.of(made), stuck)
+    assert made.cost(found) < 0.1 * made.cost(stuck)
+    assert np.linalg.norm(found.places - true_lamps(made).places, axis=1).max() < 0.003

@@ -1,12 +1,11 @@
-"""Where the model of light cannot be trusted: noise of the gather, edges of shadows, and whatever else is off.
+"""Where the model of light cannot be trusted: noise of the gather, and edges of shadows.
 
 Beside what pixels say, a measurement of a surfel's albedo has the variance, of its logarithm,
 
     ( Σ_k (a_k e_k°)² Var_j T_kj + (Σ_j F_ij L_j² − (F L)_i²) / R ) / d_i² :
 
 the transmittance T_k of a lamp varies by so much over the surfel and its neighbours, e_k° what it would send without
-shadows, and R rays of the gather have met radiance that varies by so much. Errors that nothing foretells are taken
-for draws of Student's t (Lange, Little and Taylor 1989): each surfel is judged by what all others say of it.
+shadows, and R rays of the gather have met radiance that varies by so much.
 """
 
 from __future__ import annotations
@@ -15,15 +14,9 @@ import numpy as np
 import scipy.sparse as sp
 import torch
 
-from rgspipe.capture.field import Field, Graph
+from rgspipe.capture.field import Graph
 from rgspipe.capture.lamps import LampProblem, Lamps
 from rgspipe.capture.photographs import Numbers
-
-#: Degrees of freedom of Student's t.
-FREEDOM = 4.0
-
-#: Draws of the field for what all others say of a surfel.
-DRAWS = 32
 
 #: Neighbours count fully for the variation of shadows above this weight.
 BESIDE = 0.2
@@ -59,14 +52,3 @@ def _variation(graph: Graph, values: Numbers, counted: np.ndarray) -> Numbers:
     number = np.asarray(beside.sum(axis=1)).ravel()
     mean = (beside @ values) / number
     return np.maximum((beside @ values**2) / number - mean**2, 0.0)
-
-
-def trust(field: Field, residual: Numbers, seed: int = 0) -> Numbers:
-    """(N,) what the measurements with residuals (N, C) count beside their variance, by what all others say of them."""
-    known = np.isfinite(field.measured)
-    plain = field.trusted(known.astype(np.float64))
-    explained = np.minimum(field.weight * field.deviation(DRAWS, seed) ** 2, 0.95)
-    left = residual - field.mean(residual)
-    # The field follows what it is given: without a surfel's own part it would be further off.
-    squared = plain.weight * (left**2).mean(axis=1) / (1.0 - explained)
-    return np.where(known, (FREEDOM + 1.0) / (FREEDOM + squared), 0.0)

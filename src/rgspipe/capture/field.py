@@ -3,15 +3,15 @@
 Each surfel's log-albedo is z = m + s, with m what was predicted (or grey) and s a Gaussian field that differs little
 between neighbours of one surface:
 
-    s ~ N(0, Q⁻¹) ,    Q = λ Σ_(i,j) w_ij (e_i − e_j)(e_i − e_j)ᵀ + diag(1 / (τ² n_i)) ,
+    s ~ N(0, Q⁻¹) ,    Q = λ Σ_(i,j) w_ij / √(h_i h_j) (e_i − e_j)(e_i − e_j)ᵀ + diag(1 / (τ² n_i)) ,
 
-n_i the surfels of i's surface, so that the mean of a surface has the variance τ². What is measured of it, r = z − m +
-noise with the variances v_i + σ², then has the covariance Σ = diag(v + σ²) + Q⁻¹, and
+n_i the surfels of i's surface, so that the mean of a surface has the variance τ², and h_i how rough that surface is
+beside the others. What is measured of it, r = z − m + noise with the variances v_i + σ² g_i, g_i the grain of the
+surface, then has the covariance Σ = diag(v + σ² g) + Q⁻¹, and
 
-    −2 log p(r) = rᵀ Σ⁻¹ r + log det Σ ,     Σ⁻¹ = D − D (D + Q)⁻¹ D ,    D = diag(1/(v + σ²))
+    −2 log p(r) = rᵀ Σ⁻¹ r + log det Σ ,     Σ⁻¹ = D − D (D + Q)⁻¹ D ,    D = diag(1/(v + σ² g))
 
-with one sparse factorisation. λ, τ and σ are those that make the measured r most likely (Patterson and Thompson 1971):
-variances of the scene, none of them chosen.
+with one sparse factorisation. λ, τ, σ, h and g are found by what was measured (`capture.variances`).
 """
 
 from __future__ import annotations
@@ -21,7 +21,6 @@ from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.optimize import minimize
 from scipy.sparse.csgraph import connected_components
 
 from rgspipe.capture.photographs import Numbers
@@ -36,9 +35,6 @@ APART = 0.05
 #: Difference of two predicted log-albedos at which neighbours count half as one surface.
 PAINT = 0.15
 
-#: Steps of the search for the variances; each is two factorisations.
-VARIANCE_STEPS = 45
-
 
 @dataclass(frozen=True)
 class Variances:
@@ -47,7 +43,8 @@ class Variances:
     Attributes:
         step: variance of the difference of neighbours on one surface, 1/λ.
         surface: of the mean of a surface, τ².
-        noise: of a measurement beside what its pixels say, σ²: errors of the gather and of the geometry.
+        noise: of a measurement beside what its pixels say, σ²: errors of the gather and of the geometry, and texture
+            that is finer than surfels.
     """
 
     step: float = 0.03**2
@@ -89,18 +86,17 @@ class Graph:
         """(N,) surfels of the surface that each is of."""
         return np.bincount(self.surfaces)[self.surfaces].astype(np.float64)
 
-    @cached_property
-    def laplacian(self) -> sp.csc_matrix:
-        """(N, N) Σ w (e_i − e_j)(e_i − e_j)ᵀ."""
-        count = len(self.sizes)
-        one_way = sp.coo_matrix((0.5 * self.weight, (self.first, self.second)), (count, count))
+    def precision(self, variances: Variances, rough: Numbers | None = None) -> sp.csc_matrix:
+        """(N, N) Q, of surfaces that are as `rough` (S,) as that; all alike if None."""
+        count, weight = len(self.sizes), self.weight
+        if rough is not None:
+            own = rough[self.surfaces]
+            weight = weight / np.sqrt(own[self.first] * own[self.second])
+        one_way = sp.coo_matrix((0.5 * weight, (self.first, self.second)), (count, count))
         both = (one_way + one_way.T).tocsc()
-        return (sp.diags(np.asarray(both.sum(axis=1)).ravel()) - both).tocsc()
-
-    def precision(self, variances: Variances) -> sp.csc_matrix:
-        """(N, N) Q."""
+        laplacian = sp.diags(np.asarray(both.sum(axis=1)).ravel()) - both
         alone = sp.diags(1.0 / (variances.surface * self.sizes))
-        return (self.laplacian / variances.step + alone).tocsc()
+        return (laplacian / variances.step + alone).tocsc()
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,6 +109,7 @@ class Field:
         trust: (N,) in [0, 1], what a measurement counts beside that: 0 for outliers.
         variances: of the scene.
         known: (N,) precision with which the field is known from elsewhere to be 0; None for not at all.
+        rough, grain: (S,) h and g of each surface; None where all are alike.
     """
 
     graph: Graph
@@ -120,21 +117,33 @@ class Field:
     trust: Numbers
     variances: Variances
     known: Numbers | None = None
+    rough: Numbers | None = None
+    grain: Numbers | None = None
 
     def trusted(self, trust: Numbers) -> Field:
         """With another trust (N,)."""
         return replace(self, trust=trust)
 
     @cached_property
+    def noise(self) -> Numbers:
+        """(N,) σ² g."""
+        grain = 1.0 if self.grain is None else self.grain[self.graph.surfaces]
+        return self.variances.noise * grain * np.ones(len(self.measured))
+
+    @cached_property
     def weight(self) -> Numbers:
         """(N,) diagonal of D."""
-        return self.trust / (self.measured + self.variances.noise)
+        return self.trust / (self.measured + self.noise)
+
+    @cached_property
+    def precision(self) -> sp.csc_matrix:
+        """(N, N) Q."""
+        return self.graph.precision(self.variances, self.rough)
 
     @cached_property
     def _prior(self) -> sp.csc_matrix:
         """(N, N) precision before the measurements."""
-        own = self.graph.precision(self.variances)
-        return own if self.known is None else (own + sp.diags(self.known)).tocsc()
+        return self.precision if self.known is None else (self.precision + sp.diags(self.known)).tocsc()
 
     @cached_property
     def _posterior(self) -> sp.linalg.SuperLU:
@@ -149,17 +158,16 @@ class Field:
         """(N, K) the field that is most likely after residuals (N, K)."""
         return self._posterior.solve(self.weight[:, None] * residual)
 
+    def draws(self, samples: int, seed: int) -> Numbers:
+        """(N, samples) the field beside its mean, as it may be after the measurements."""
+        factors, rng = self._posterior, np.random.default_rng(seed)
+        # With D + Q = P' L U P and U = diag(U) L', what has this covariance is P' L √diag(U) times white noise.
+        white = np.sqrt(factors.U.diagonal())[:, None] * rng.standard_normal((len(self.trust), samples))
+        return factors.solve((factors.L @ white)[factors.perm_r])
+
     def deviation(self, samples: int, seed: int) -> Numbers:
         """(N,) standard deviation of the field after the measurements, by draws of it."""
-        rng, graph, count = np.random.default_rng(seed), self.graph, len(self.weight)
-        shape = (count, samples)
-        drawn = np.sqrt(self.weight)[:, None] * rng.standard_normal(shape)
-        alone = 1.0 / (self.variances.surface * graph.sizes) + (0.0 if self.known is None else self.known)
-        drawn += np.sqrt(alone)[:, None] * rng.standard_normal(shape)
-        edges = np.sqrt(0.5 * graph.weight / self.variances.step)[:, None]
-        edges = edges * rng.standard_normal((len(graph.weight), samples))
-        incidence = _incidence(graph)
-        return self._posterior.solve(drawn + incidence.T @ edges).std(axis=1)
+        return self.draws(samples, seed).std(axis=1)
 
     def deviance(self, residual: Numbers) -> float:
         """−2 log p of residuals (N, C) of C channels, up to a constant."""
@@ -167,28 +175,6 @@ class Field:
         determinant = _log_determinant(self._posterior) - np.log(self.weight[kept]).sum()
         determinant -= _log_determinant(factorised(self._prior))
         return float((residual * self.whitened(residual)).sum() + residual.shape[1] * determinant)
-
-    def fitted(self, residual: Numbers) -> Field:
-        """With the variances that make residuals (N, C) most likely."""
-        now = self.variances
-        start = np.log([now.step, now.surface, now.noise])
-
-        def deviance(logs: Numbers) -> float:
-            step, surface, noise = np.exp(np.clip(logs, np.log(1e-8), np.log(1e2)))
-            return replace(self, variances=Variances(step, surface, noise)).deviance(residual)
-
-        options = {"maxfev": VARIANCE_STEPS, "initial_simplex": start + np.vstack([np.zeros(3), 1.5 * np.eye(3)])}
-        found = minimize(deviance, start, method="Nelder-Mead", options=options)
-        step, surface, noise = np.exp(np.clip(found.x, np.log(1e-8), np.log(1e2))).tolist()
-        return replace(self, variances=Variances(step, surface, noise))
-
-
-def _incidence(graph: Graph) -> sp.csr_matrix:
-    """(E, N) e_i − e_j of each pair."""
-    edges, count = np.arange(len(graph.first)), len(graph.sizes)
-    ones = np.ones(len(edges))
-    rows, columns = np.concatenate([edges, edges]), np.concatenate([graph.first, graph.second])
-    return sp.csr_matrix((np.concatenate([ones, -ones]), (rows, columns)), (len(edges), count))
 
 
 def _log_determinant(factors: sp.linalg.SuperLU) -> float:

@@ -14,9 +14,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rgspipe.capture.doubts import model_variance, trust
+from rgspipe.capture.doubts import model_variance
 from rgspipe.capture.lamps import DARK, LampProblem, Lamps
 from rgspipe.capture.photographs import Numbers
+from rgspipe.capture.variances import with_likely_variances
 from rgspipe.fitting.options import BarOptions
 from rgspipe.fitting.search.apart import CandidatePlaces
 from rgspipe.training.albedo import ALBEDO_RANGE
@@ -98,12 +99,23 @@ def with_one_more(problem: LampProblem, candidates: Candidates, known: Lamps | N
     return problem.refined(min(found, key=lambda pair: pair[0])[1], LAST)
 
 
-def settled(problem: LampProblem, lamps: Lamps) -> Tried:
+def settled(problem: LampProblem, candidates: Candidates, lamps: Lamps) -> Tried:
     """With variances, outliers and unseen albedo that belong to the lamps, and lamps that belong to these."""
-    for _ in range(ROUNDS):
+    for left in reversed(range(ROUNDS)):
         problem = weighed(problem, lamps)
         lamps = problem.refined(problem.lamps(lamps.places, lamps.logs), LAST)
+        if left == 1 and len(lamps) > 1:
+            lamps = looked_for_again(problem, candidates, lamps)
     return Tried.of(problem, lamps)
+
+
+def looked_for_again(problem: LampProblem, candidates: Candidates, lamps: Lamps) -> Lamps:
+    """Each lamp in the place that is best beside the others: it was found by variances of a room without it."""
+    for own in range(len(lamps)):
+        others = [other for other in range(len(lamps)) if other != own]
+        again = with_one_more(problem, candidates, lamps.at(others)).at(np.argsort([*others, own]).tolist())
+        lamps = min(lamps, again, key=problem.cost)
+    return lamps
 
 
 def weighed(problem: LampProblem, lamps: Lamps | None) -> LampProblem:
@@ -116,8 +128,7 @@ def weighed(problem: LampProblem, lamps: Lamps | None) -> LampProblem:
     albedo = np.clip(problem.albedo(lamps), *ALBEDO_RANGE)
     problem = replace(problem, received=problem.received.with_albedo(albedo))
     residual = problem.residual(problem.lamps(lamps.places, lamps.logs))
-    field = problem.field.fitted(residual)
-    return replace(problem, field=field.trusted(trust(field, residual)))
+    return replace(problem, field=with_likely_variances(problem.field, residual, trusting=True))
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +149,7 @@ class Tried:
     def of(cls, problem: LampProblem, lamps: Lamps) -> Tried:
         """With the variances as they are most likely."""
         residual = problem.residual(lamps)
-        field = problem.field.fitted(residual)
+        field = with_likely_variances(problem.field, residual)
         return cls(replace(problem, field=field), lamps, field.deviance(residual))
 
 
@@ -173,7 +184,7 @@ class OneMore:
 
 def one_more(candidates: Candidates, fewer: Tried) -> OneMore:
     """The best lamps found that are one more than `fewer`."""
-    more = settled(fewer.problem, with_one_more(fewer.problem, candidates, fewer.lamps))
+    more = settled(fewer.problem, candidates, with_one_more(fewer.problem, candidates, fewer.lamps))
     again = more.problem.lamps(fewer.lamps.places, fewer.lamps.logs)
     less = Tried.of(more.problem, more.problem.refined(again, LAST))
     return OneMore.between(less, more)
@@ -198,7 +209,7 @@ def found_lamps(problem: LampProblem, count: int | None, most: int) -> Answer:
     """So many lamps, or as many as what was measured calls for, one to `most`."""
     problem = weighed(problem, None)
     candidates = Candidates.of(problem)
-    best = settled(problem, with_one_more(problem, candidates, None))
+    best = settled(problem, candidates, with_one_more(problem, candidates, None))
     compared: list[OneMore] = []
     while count is None or len(best.lamps) < count:
         found = one_more(candidates, best)
@@ -218,6 +229,6 @@ def over_even(best: Tried) -> float:
     problem = best.problem
     ones = problem.field.whitened(np.ones((len(problem.radiance), 1)))[:, 0]
     residual = problem.target - (ones @ problem.target) / max(float(ones.sum()), 1e-300)
-    even = problem.field.fitted(residual).deviance(residual)
+    even = with_likely_variances(problem.field, residual).deviance(residual)
     measurements = 3 * int((problem.field.weight > 0.0).sum())
     return 1.0 - float(np.exp(min(0.0, best.deviance - even) / max(measurements, 1)))

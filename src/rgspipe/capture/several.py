@@ -50,10 +50,11 @@ def informed(problem: LampProblem, others: Sequence[Tried]) -> LampProblem:
         log_albedo = np.log(other.problem.radiance) - np.log(other.problem.arriving(other.lamps))
         precision += weight
         weighted += weight[:, None] * (log_albedo - np.log(problem.predicted))
-    prior = problem.field.graph.precision(others[0].problem.field.variances)
-    mean = factorised((prior + sp.diags(precision)).tocsc()).solve(weighted)
+    known = others[0].problem.field
+    mean = factorised((known.precision + sp.diags(precision)).tocsc()).solve(weighted)
     predicted = problem.predicted * np.exp(mean)
-    return replace(problem, predicted=predicted, field=replace(problem.field, known=precision), prediction=None)
+    field = replace(problem.field, variances=known.variances, rough=known.rough, known=precision)
+    return replace(problem, predicted=predicted, field=field, prediction=None)
 
 
 def without(capture: Measured, off: Measured) -> Measured:
