@@ -66,4 +66,5 @@ def without(capture: Measured, off: Measured) -> Measured:
     seen = np.where(plain, np.minimum(capture.seen, off.seen), 0.0)
     middle = np.median(left[plain], axis=0) if plain.any() else np.ones(3)
     radiance = np.where(plain[:, None], left, np.maximum(middle, 1e-300))
-    return replace(capture, radiance=radiance, variance=np.where(plain, squared / grey**2, np.inf), seen=seen)
+    variance = np.divide(squared, grey**2, out=np.full_like(squared, np.inf), where=plain)
+    return replace(capture, radiance=radiance, variance=variance, seen=seen)

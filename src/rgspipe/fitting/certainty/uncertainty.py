@@ -150,7 +150,7 @@ def shrunk(moves: Tensor) -> Tensor:
 
     α is the share of what sets S apart from errors that are alike in all directions that chance alone would bring, by
     how much the cells differ: Ledoit and Wolf 2004, "A well-conditioned estimator for large-dimensional covariance
-    matrices", equation 14, of K vectors √K d_k. Without any cell it is zero.
+    matrices", of K vectors √K d_k. Without any cell it is zero.
     """
     spread, unknowns = moves.T @ moves, max(1, moves.shape[1])
     alike = spread.trace() / unknowns * torch.eye(moves.shape[1], dtype=moves.dtype, device=moves.device)
