@@ -48,7 +48,8 @@ def site(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_an_unpacked_wheel_runs_from_any_folder(site: Path, tmp_path: Path) -> None:
-    script = "import rgspipe, sys; print(rgspipe.__file__); from rgspipe.cli import main; sys.exit(main(['--help', 'scenes']))"
+    call = "from rgspipe.cli import main; sys.exit(main(['--help', 'scenes']))"
+    script = f"import rgspipe, sys; print(rgspipe.__file__); {call}"
     environment = {**os.environ, "PYTHONPATH": str(site)}
     run = subprocess.run([sys.executable, "-c", script], cwd=tmp_path, env=environment, capture_output=True, text=True)
     assert run.returncode == 0, run.stderr
