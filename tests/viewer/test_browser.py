@@ -65,9 +65,10 @@ def browser() -> Iterator:
         made.close()
 
 
-def opened(browser, url: str, width: int, height: int):
-    """A page, with what it was told to log and what it asked for."""
-    page = browser.new_page(viewport={"width": width, "height": height}, accept_downloads=True)
+def opened(browser, url: str, width: int, height: int, dots: float = 1.0):
+    """A page with so many dots a pixel, what it was told to log and what it asked for."""
+    size = {"width": width, "height": height}
+    page = browser.new_page(viewport=size, device_scale_factor=dots, accept_downloads=True)
     page.set_default_timeout(1e3 * PATIENCE)
     page.told, page.asked = [], []
     page.on("console", lambda message: page.told.append(message.text) if message.type == "error" else None)
@@ -200,7 +201,7 @@ def test_keys_change_every_number_of_a_lamp(window, page: Page) -> None:
     session = page.session
     window.mouse.click(20, 450)
     session.change([KINDS["spot"].shaped().at(LAMP.position, torch.tensor([0.6, 0.0, -0.8]), LAMP.intensity)])
-    page.lamps.refresh()
+    page.actions.do("refresh", page.lamps.refresh).result()
     for number in numbers_of(session.lights[0], session.images.frozen.size):
         before = number.of(session.lights[0])
         until(lambda label=number.label: window.get_by_text(f"▸ {_told(label)}", exact=True).count() == 1)
@@ -210,7 +211,7 @@ def test_keys_change_every_number_of_a_lamp(window, page: Page) -> None:
         until(lambda number=number, before=before: number.of(session.lights[0]) == before)
         window.keyboard.press("End")
     session.change([LAMP])
-    page.lamps.refresh()
+    page.actions.do("refresh", page.lamps.refresh).result()
 
 
 def _told(label: str) -> str:
@@ -278,12 +279,20 @@ def test_two_visitors_have_a_session_each(viewer: Viewer, browser, window, page:
     until(lambda: len(viewer.pages) == 1)
 
 
-@pytest.mark.parametrize("dark", [True, False])
-def test_on_a_narrow_page_the_picture_has_most_of_it(viewer: Viewer, browser, dark: bool) -> None:
-    page = opened(browser, viewer.url + ("?darkMode" if dark else ""), 400, 800)
+def test_fields_are_open_where_the_browser_draws_few_dots(viewer: Viewer, browser) -> None:
+    # As browsers do on slow machines: 480 dots of 640 pixels.
+    page = opened(browser, f"{viewer.url}?fixedDpr=0.75", 640, 480)
+    page.get_by_text("Brightest colour").wait_for()
+    page.close()
+
+
+@pytest.mark.parametrize(("dark", "dots"), [(True, 1.0), (False, 3.0)])
+def test_on_a_narrow_page_the_picture_has_most_of_it(viewer: Viewer, browser, dark: bool, dots: float) -> None:
+    page = opened(browser, viewer.url + ("?darkMode" if dark else ""), 400, 800, dots)
     sheet = page.get_by_text("photographs", exact=True).first.bounding_box()
     # The fields are folded: measured 575 of 800.
     assert sheet["y"] > 0.6 * 800
+    assert not page.get_by_role("button", name="add a lamp").is_visible()
     assert page.evaluate("document.documentElement.scrollWidth") <= 400
     assert page.told == []
     page.close()

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import Future
+from typing import Any
 
 import numpy as np
 
-from rgspipe.errors import InputError
 from rgspipe.fitting import FitResult
-from rgspipe.viewer.actions import Action, by_visitor, keys, offer
+from rgspipe.viewer.actions import Action
 from rgspipe.viewer.around import cameras_around
 from rgspipe.viewer.drawings import Drawings
 from rgspipe.viewer.material import Found, Photograph
@@ -39,14 +40,14 @@ class FitControls:
         self._visit, self._session, self._drawings, self._lamps_changed = visit, visit.session, drawings, lamps_changed
         self._cases = {case.name: case for case in visit.exhibit.cases}
         self.searching, self._compared = False, -1
-        client, gui = visit.client, visit.client.gui
+        actions, gui = visit.actions, visit.client.gui
         find = Action(
             "find it from the photographs",
             "F",
             "Find lamps, and how many there are, from the photographs alone.",
             self.find,
         )
-        self._buttons = offer(client, find, chief=True)
+        self._buttons = actions.offer(find, chief=True)
         self._told = gui.add_markdown("")
         self._strip = gui.add_image(np.zeros((8, 24, 3), np.uint8), visible=False)
         with gui.add_folder("photographs", expand_by_default=is_open):
@@ -55,13 +56,11 @@ class FitControls:
             )
             self._case.visible = len(self._cases) > 1
             self._view = gui.add_dropdown("look from", [_FREE], hint="The camera of a photograph. Key G.")
-            self._buttons += offer(client, *self._actions())
+            self._buttons += actions.offer(*self._offered())
             self._step = gui.add_slider("step", 0, 1, 1, 1, hint="Lamps on the way of the search. Keys 8, 9.")
-        self._case.on_update(by_visitor(self._open))
-        self._view.on_update(by_visitor(self._look))
-        self._step.on_update(by_visitor(self._go_back))
-        keys(
-            client,
+        for field, changed in ((self._case, self._open), (self._view, self._look), (self._step, self._go_back)):
+            actions.field(field, changed)
+        actions.keys(
             Action("next camera", "G", "Look through the camera of the next photograph.", self._next_view),
             Action("next target", "O", "Photographs of the next target.", self._next_case),
             Action("step back", "8", "The lamps one step earlier on the way of the search.", lambda: self._walk(-1)),
@@ -85,13 +84,15 @@ class FitControls:
 
     def find(self) -> None:
         """Search the lamps of the photographs, and show them with their regions."""
-        self._search(lambda: self._visit.exhibit.finder.find(self._session.case.photographs))
+        photographs = self._session.case.photographs
+        self._search(lambda: self._visit.exhibit.finder.find(photographs))
 
     def refit(self) -> None:
         """The nearest lamps to those of now that explain the photographs."""
-        self._search(lambda: self._visit.exhibit.finder.refit(self._session.case.photographs, self._session.lights))
+        photographs, lights = self._session.case.photographs, self._session.lights
+        self._search(lambda: self._visit.exhibit.finder.refit(photographs, lights))
 
-    def _actions(self) -> tuple[Action, ...]:
+    def _offered(self) -> tuple[Action, ...]:
         return (
             Action("refit from here", "R", "From the lamps of now, downhill: no search.", self.refit),
             Action("which view next?", "V", "The camera that would tell most, in yellow.", self._advise),
@@ -110,19 +111,25 @@ class FitControls:
         for button in self._buttons:
             button.disabled = True
         self._told.content = "Somebody else's search goes first …" if self._visit.exhibit.finder.busy else "Searching …"
+        self._visit.actions.beside("find it", search, self._found)
+
+    def _found(self, ended: Future) -> None:
+        self.searching = False
+        for button in self._buttons:
+            button.disabled = False
+        self._session.take(self._result(ended))
+        self._lamps_changed()
+        self.refresh()
+        self._show(0)
+        self._visit.changed()
+
+    def _result(self, ended: Future) -> Any:
+        """What was worked out beside; where that failed, nothing is said to be under way any more."""
         try:
-            self._session.take(search())
-            self._lamps_changed()
-            self.refresh()
-            self._show(0)
-        except InputError:
+            return ended.result()
+        except Exception:
             self._told.content = ""
             raise
-        finally:
-            self.searching = False
-            for button in self._buttons:
-                button.disabled = False
-            self._visit.changed()
 
     def _take(self) -> None:
         camera = self._visit.camera()
@@ -140,9 +147,15 @@ class FitControls:
         named = [(one.name, one.camera) for one in self._visit.exhibit.references[::every]]
         named += cameras_around(session.images.frozen, taken[0].camera) if taken else []
         self._told.content = "Looking through other cameras …"
-        advice = self._visit.exhibit.finder.advice(taken, session.lights, [camera for _, camera in named], WANTED)
-        self._told.content = advice.words([name for name, _ in named]) + " Click the yellow camera to look through it."
-        self._drawings.advised(named[advice.ranked[0].camera][1] if advice.ranked else None)
+        finder, lights, cameras = self._visit.exhibit.finder, session.lights, [camera for _, camera in named]
+
+        def advised(ended: Future) -> None:
+            advice = self._result(ended)
+            words = advice.words([name for name, _ in named])
+            self._told.content = f"{words} Click the yellow camera to look through it."
+            self._drawings.advised(named[advice.ranked[0].camera][1] if advice.ranked else None)
+
+        self._visit.actions.beside("which view next?", lambda: finder.advice(taken, lights, cameras, WANTED), advised)
 
     def _compare(self) -> None:
         if self._photographs:

@@ -10,7 +10,7 @@ import torch
 
 from rgspipe.scene import Camera
 from rgspipe.scene.lights import Light
-from rgspipe.viewer.actions import Action, by_visitor, keys, offer
+from rgspipe.viewer.actions import Action
 from rgspipe.viewer.cameras import axis_of, turned_to
 from rgspipe.viewer.lamp_fields import LampFields
 from rgspipe.viewer.lamp_numbers import colour_of
@@ -26,28 +26,27 @@ class LampControls:
 
     def __init__(self, visit: Visit) -> None:
         self._client, self._session, self._changed = visit.client, visit.session, visit.changed
-        client, session = visit.client, visit.session
+        self._actions, session, gui = visit.actions, visit.session, visit.client.gui
         self._chosen, self._gizmos = 0, []
         self._eye: Camera | None = None
-        gui = client.gui
         self._which = gui.add_dropdown("lamp", ["none"], hint="The lamp that the fields below are about. Key T.")
         actions = (
             Action("add a lamp", "N", "A lamp above the scene's middle.", self.add),
             Action("remove it", "X", "Take the chosen lamp away.", self.remove),
             Action("undo", "Z", "Take the last change of lamps back; a whole drag counts as one.", self.undo),
         )
-        offer(client, *actions)
+        visit.actions.offer(*actions)
         further = (
             Action("next lamp", "T", "Choose the next lamp.", self._choose_next),
             Action("next kind", "K", "Make the chosen lamp one of the next kind.", self._next_kind),
         )
-        keys(client, *further)
+        visit.actions.keys(*further)
         self._kind = gui.add_dropdown(
             "kind", list(OFFERED), hint="Point, spot, sphere or panel, at the same place. Key K."
         )
-        self._fields = LampFields(client, session.images.frozen.size, self._edited)
-        self._which.on_update(by_visitor(self._choose))
-        self._kind.on_update(by_visitor(lambda: self._with(session.as_kind, self._kind.value)))
+        self._fields = LampFields(gui, visit.actions, session.images.frozen.size, self._edited)
+        visit.actions.field(self._which, self._choose)
+        visit.actions.field(self._kind, lambda: self._with(session.as_kind, self._kind.value))
         self.refresh()
 
     def add(self) -> None:
@@ -97,9 +96,9 @@ class LampControls:
         )
         scene.add_icosphere(f"/lamps/{index}/ball", radius=BALL * size, color=colour_of(light))
 
-        # Awaited by viser one after the other, where plain functions may overtake each other.
         async def dragged(event: Any) -> None:
-            self._dragged(index, event.target, event.phase)
+            phase = event.phase
+            self._actions.do("drag", lambda: self._dragged(index, gizmo, phase))
 
         gizmo.on_update(dragged)
         return gizmo

@@ -8,7 +8,7 @@ from typing import Any
 import viser
 
 from rgspipe.scene.lights import Light
-from rgspipe.viewer.actions import Action, by_visitor, keys
+from rgspipe.viewer.actions import Action, Actions
 from rgspipe.viewer.lamp_numbers import RGB, Number, colour_of, numbers_of, with_colour
 
 #: Before the label of the number that keys change.
@@ -22,20 +22,20 @@ class LampFields:
     """Fields of a lamp, below those that were there before.
 
     Args:
-        client: the visitor.
+        gui: of the visitor's page.
+        actions: what the visitor can do.
         size: of the scene.
         take: is called with the lamp as it is now, and the name of what was changed.
     """
 
-    def __init__(self, client: viser.ClientHandle, size: float, take: Callable[[Light, str], None]) -> None:
-        self._gui, self._size, self._take = client.gui, size, take
-        self._folder = client.gui.add_folder("this lamp")
+    def __init__(self, gui: viser.GuiApi, actions: Actions, size: float, take: Callable[[Light, str], None]) -> None:
+        self._gui, self._actions, self._size, self._take = gui, actions, size, take
+        self._folder = gui.add_folder("this lamp")
         self._light: Light | None = None
         self._numbers: list[Number] = []
         self._fields: dict[str, Any] = {}
         self._chosen = 0
-        keys(
-            client,
+        actions.keys(
             Action("next number", "end", "Choose the next number of the lamp; it is marked.", lambda: self._walk(1)),
             Action("number before", "home", "Choose the number of the lamp before.", lambda: self._walk(-1)),
             Action("more", "pageup", "Raise the chosen number of the lamp.", lambda: self._step(1)),
@@ -78,12 +78,12 @@ class LampFields:
     def _colour(self) -> Any:
         hint = f"Colour of the lamp; its brightest channel is 255. {_KEYS}"
         field = self._gui.add_rgb(_COLOUR, (255, 255, 255), hint=hint)
-        field.on_update(by_visitor(lambda: self._changed(with_colour(self._light, field.value), _COLOUR)))
+        self._actions.field(field, lambda: self._changed(with_colour(self._light, field.value), _COLOUR))
         return field
 
     def _number(self, label: str, hint: str) -> Any:
         field = self._gui.add_number(label, 0.0, hint=f"{hint} {_KEYS}")
-        field.on_update(by_visitor(lambda: self._set(label, field.value)))
+        self._actions.field(field, lambda: self._set(label, field.value))
         return field
 
     def _set(self, label: str, value: float) -> None:

@@ -8,6 +8,7 @@ import viser
 
 from rgspipe.evaluation.images import Bytes
 from rgspipe.scene import Camera
+from rgspipe.viewer.actions import Actions
 from rgspipe.viewer.cameras import camera_of, pose_of
 from rgspipe.viewer.drawing_controls import DrawingControls
 from rgspipe.viewer.drawings import Drawings
@@ -24,9 +25,6 @@ MOVING = 80
 #: From this cosine on a view along the vertical keeps its own way of being up.
 STEEP = 0.95
 
-#: Pages with fewer pixels across have their fields below the picture, and begin with them folded.
-NARROW = 577
-
 _HELP = "Drag a lamp by its arrows. Mouse: turn, move, zoom; **W A S D Q E** fly. **Ctrl-K** lists all keys."
 
 
@@ -38,8 +36,11 @@ class Page:
         self.session = exhibit.session()
         self.painter = Painter(self.session, self.camera, self._show, exhibit.resolution, exhibit.turn)
         self.drawings = Drawings(client.scene, exhibit.images.frozen.size, self._go_to)
-        visit = Visit(client, self.session, exhibit, self._here, self._go_to, self.painter.changed)
-        gui, wide = client.gui, client.camera.image_width >= NARROW
+        self.actions = Actions(client)
+        visit = Visit(client, self.session, exhibit, self.actions, self._here, self._go_to, self.painter.changed)
+        # A page that stands upright, as on a phone, begins with its fields folded, since they lie over the picture. Its
+        # pixels do not tell: browsers count several to a point on phones, and draw fewer where drawing is slow.
+        gui, wide = client.gui, client.camera.image_width >= client.camera.image_height
         if wide:
             gui.add_markdown(_HELP)
         self.fit = FitControls(visit, self.drawings, lambda: self.lamps.refresh(), is_open=wide)
@@ -48,11 +49,11 @@ class Page:
         with gui.add_folder("picture", expand_by_default=wide):
             self.picture = PictureControls(visit)
         with gui.add_folder("drawn", expand_by_default=False):
-            DrawingControls(client, self.drawings)
+            DrawingControls(gui, self.actions, self.drawings)
         with gui.add_folder("save", expand_by_default=False):
             Saving(visit)
         self._go_to(exhibit.camera)
-        client.camera.on_update(lambda _: self._moved())
+        client.camera.on_update(self._moved)
         self.painter.changed()
 
     def camera(self, longest: int) -> Camera | None:
@@ -66,18 +67,22 @@ class Page:
     def leave(self) -> None:
         """The visitor is gone."""
         self.painter.stop()
+        self.actions.stop()
 
     def _here(self) -> Camera | None:
         return self.camera(self._resolution)
 
-    def _moved(self) -> None:
+    async def _moved(self, _: viser.CameraHandle) -> None:
         camera = self._here()
         # The browser tells of its camera also where it stands still.
         if camera is not None and camera.key != self._seen:
             self._seen = camera.key
-            self.drawings.seen_from(camera)
-            self.lamps.seen_from(camera)
             self.painter.changed()
+            self.actions.do("look", lambda: self._look(camera))
+
+    def _look(self, camera: Camera) -> None:
+        self.drawings.seen_from(camera)
+        self.lamps.seen_from(camera)
 
     def _show(self, picture: Bytes, top: float, sharp: bool) -> None:
         scene = self._client.scene

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import viser
 
-from rgspipe.viewer.actions import Action, by_visitor, keys
+from rgspipe.viewer.actions import Action
 from rgspipe.viewer.false_colour import scale
 from rgspipe.viewer.session import PICTURE, SHOWN
 from rgspipe.viewer.visit import Visit
@@ -25,8 +25,7 @@ class PictureControls:
 
     def __init__(self, visit: Visit) -> None:
         self._session, self._changed = visit.session, visit.changed
-        client, gui = visit.client, visit.client.gui
-        self._gui = gui
+        self._gui = gui = visit.client.gui
         self._exposure = gui.add_slider(
             "exposure", -MOST_STOPS, MOST_STOPS, 0.1, 0.0, hint="Stops; 2 is four times as bright. Keys U and J."
         )
@@ -44,8 +43,8 @@ class PictureControls:
         self._legend = gui.add_markdown("")
         self._dark = gui.add_checkbox("dark page", True, hint="Of the page around the picture. Key 0.")
         for field in (self._exposure, self._shown, self._section, self._place):
-            field.on_update(by_visitor(self._read))
-        self._dark.on_update(by_visitor(self._paint_page))
+            visit.actions.field(field, self._read)
+        visit.actions.field(self._dark, self._paint_page)
         actions = (
             Action("brighter", "U", "Half a stop brighter.", lambda: self._expose(STOPS)),
             Action("darker", "J", "Half a stop darker.", lambda: self._expose(-STOPS)),
@@ -55,7 +54,7 @@ class PictureControls:
             Action("section up", "7", "Move the section towards the upper end.", lambda: self._shift(SHIFT)),
             Action("dark or light page", "0", "Of the page around the picture.", self._turn_page),
         )
-        keys(client, *actions)
+        visit.actions.keys(*actions)
 
     def tell(self, top: float) -> None:
         """What the brightest colour of the picture stands for."""

@@ -6,6 +6,7 @@ import io
 import math
 import tempfile
 import zipfile
+from concurrent.futures import Future
 from pathlib import Path
 
 import torch
@@ -15,7 +16,7 @@ from rgspipe.light_export.export import export_lights
 from rgspipe.light_export.world import World
 from rgspipe.relighting.pictures import video
 from rgspipe.scene import Camera, LightRig, look_at
-from rgspipe.viewer.actions import Action, offer
+from rgspipe.viewer.actions import Action
 from rgspipe.viewer.visit import Visit
 
 #: Frames of a turntable, its length in seconds, and how far to each side it swings, degrees.
@@ -33,7 +34,7 @@ class Saving:
             Action("still.png", "M", "Save the sharp picture.", self._still),
             Action("swing.webp", "Y", "Save a video in which the camera swings around what it looks at.", self._video),
         )
-        offer(visit.client, *actions)
+        visit.actions.offer(*actions)
 
     def _lights(self) -> None:
         with tempfile.TemporaryDirectory() as folder:
@@ -57,9 +58,15 @@ class Saving:
             "swing.webp", "Making the video …", loading=True, auto_close_seconds=None
         )
         lower, upper = (corner.double().cpu() for corner in self._session.images.frozen.bounds)
-        frames = [self._frame(one) for one in swing(camera, 0.5 * (lower + upper))]
-        self._send("swing.webp", video(frames, SECONDS))
-        told.remove()
+
+        def made() -> bytes:
+            return video([self._frame(one) for one in swing(camera, 0.5 * (lower + upper))], SECONDS)
+
+        def take(ended: Future) -> None:
+            told.remove()
+            self._send("swing.webp", ended.result())
+
+        self._visit.actions.beside("swing.webp", made, take)
 
     def _frame(self, camera: Camera) -> Bytes:
         with self._turn:  # Between two frames others have their turn.

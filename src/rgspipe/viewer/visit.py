@@ -17,6 +17,8 @@ from rgspipe.viewer.session import Session
 if TYPE_CHECKING:
     import viser
 
+    from rgspipe.viewer.actions import Actions
+
 
 @dataclass(frozen=True)
 class Exhibit:
@@ -64,6 +66,7 @@ class Visit:
         client: the browser.
         session: of this visitor alone.
         exhibit: what all are shown.
+        actions: offers what can be done, and does it.
         camera: the visitor's, for a picture at rest; None before the browser told.
         go_to: looks through a camera.
         changed: something is to be seen that the picture does not show.
@@ -72,6 +75,7 @@ class Visit:
     client: viser.ClientHandle
     session: Session
     exhibit: Exhibit
+    actions: Actions
     camera: Callable[[], Camera | None]
     go_to: Callable[[Camera], None]
     changed: Callable[[], None]
