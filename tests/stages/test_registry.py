@@ -32,7 +32,7 @@ REACHED = {
 
 #: Some that they must not be made again for.
 NOT_REACHED = {
-    "freeze": ("fitting.fit", "training.trainer"),
+    "freeze": ("training.trainer", "fitting.tracking.track"),
     "fit_light": ("blender.passes", "training.trainer", "fitting.tracking.track"),
     "train_surfels": ("fitting.fit",),
     "generate_dataset": ("blender.room", "blender.pool.plan"),

@@ -265,7 +265,7 @@ def _composition_error(error: Exception, overrides: Sequence[str]) -> InputError
     known = _known_keys(_parse(overrides))
     for override in _parse(overrides):
         if override.key_or_group not in known and not override.key_or_group.startswith(FREE_SECTIONS):
-            return unknown_key(override.key_or_group, known)
+            return unknown_key(override.key_or_group or repr(override.input_line), known)
     return InputError(
         "the command line",
         expected="overrides that fit the configuration",

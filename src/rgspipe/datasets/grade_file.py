@@ -7,10 +7,13 @@ from pathlib import Path
 
 from rgspipe.datasets.json_file import is_number, read_json
 from rgspipe.errors import InputError
-from rgspipe.scene.grade import SceneGrade
+from rgspipe.scene.grade import KnownLamps, SceneGrade
 from rgspipe.store.files import write_json
 
 GRADE = "grade.json"
+
+#: What scenes that were asked for lamps have beside the other numbers.
+_LAMPS = "lamps"
 
 #: No number of a grade but its place is as large: PSNR is in decibels, the others are parts of the light.
 LARGEST = 1e6
@@ -28,14 +31,29 @@ def load_grade(path: Path) -> SceneGrade:
         InputError: no such file, no JSON, or a number is missing or impossible.
     """
     content = read_json(path, "the grade of a scene")
-    names = [field.name for field in fields(SceneGrade)]
+    names = [field.name for field in fields(SceneGrade) if field.name != _LAMPS]
     unknown = [name for name in names if name not in content or not _is_known(name, content[name])]
     if unknown:
         expected, found = f"the numbers {', '.join(names)}", f"{', '.join(unknown)} missing, no number or too large"
         raise InputError(path, expected=expected, found=found, remedy="Train the scene again.")
     place = content["unseen_at"]
     values = {name: content[name] for name in names} | {"unseen_at": None if place is None else tuple(place)}
-    return SceneGrade(**values)
+    return SceneGrade(**values, lamps=_lamps(path, content.get(_LAMPS)))
+
+
+def _lamps(path: Path, content: object) -> KnownLamps | None:
+    if content is None:
+        return None
+    names = [field.name for field in fields(KnownLamps)]
+    possible = isinstance(content, dict) and all(
+        is_number(content.get(name)) and 0.0 <= content[name] < LARGEST
+        for name in names
+        if name != "error" or content.get(name) is not None
+    )
+    if not possible or content["excess"] < 1.0:
+        expected = f"{', '.join(names)} of known lamps: no negative number, the last of 1 or more"
+        raise InputError(path, expected=expected, found=str(content)[:80], remedy="Freeze the scene again.")
+    return KnownLamps(int(content["asked"]), content.get("error"), float(content["excess"]))
 
 
 def _is_known(name: str, value: object) -> bool:

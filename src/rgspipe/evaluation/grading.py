@@ -12,7 +12,7 @@ from rgspipe.evaluation.arrays import ArrayLike, to_array
 from rgspipe.evaluation.escaped_light import escaped_light
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene.camera import Camera
-from rgspipe.scene.grade import Grade, SceneGrade
+from rgspipe.scene.grade import Grade, KnownLamps, SceneGrade
 
 #: Pixels along the side of a block whose error is one. Edges of things are errors of a pixel or two, and move no light
 #: that is found by what bounces. Blocks half and twice as large find 1.30 and 0.75 times as much error in a trained
@@ -114,13 +114,23 @@ def graded_words(grade: SceneGrade) -> str:
         (grade.missing, f"{_percent(grade.missing)} of what surfaces look at was seen by no camera and is left open"),
         (grade.at_bound, f"the albedo of {_percent(grade.at_bound)} is as high as it may be, as if light were missing"),
     ]
-    reasons = "; ".join(words for size, words in sorted(parts, reverse=True) if size >= LEAST)
+    reasons = "; ".join([words for size, words in sorted(parts, reverse=True) if size >= LEAST] + _lamps(grade.lamps))
     error = f"lights found by bounced light are expected to be {100.0 * grade.error:.1f} % of its size off"
     words = f"The scene is {grade.grade}: {error}" + (f" ({reasons})." if reasons else ".")
     return words if grade.grade is Grade.GOOD else f"{words} {_advice(grade)}"
 
 
+def _lamps(lamps: KnownLamps | None) -> list[str]:
+    if lamps is None:
+        return []
+    found = [] if lamps.error is None else [f"known lamps are found {100.0 * lamps.error:.1f} % off"]
+    widened = [f"regions are {lamps.excess:.1f} times as wide, as they left known lamps out"]
+    return found + (widened if lamps.excess > 1.0 else [])
+
+
 def _advice(grade: SceneGrade) -> str:
+    if grade.error > grade.light_error:
+        return "Its light looks right, and yet lamps that are known are found elsewhere: take more photographs of it."
     if grade.residual >= max(grade.doubt, grade.missing, grade.at_bound):
         return "Check poses, lamps and exposure of the training images, or train longer."
     if grade.unseen_at is None:

@@ -24,8 +24,25 @@ class Grade(StrEnum):
 
 
 @dataclass(frozen=True)
+class KnownLamps:
+    """What a scene found of lamps whose places are known; `evaluation.known_lamps` asks for them.
+
+    Attributes:
+        asked: how many lamps there were.
+        error: of the positions of those that fits claim to have found, in parts of the scene's size (root mean
+            square); None if there are none.
+        excess: times that the half-axes of regions have to be as long to hold the places of lamps as often as they
+            say; 1 where they are long enough.
+    """
+
+    asked: int
+    error: float | None
+    excess: float
+
+
+@dataclass(frozen=True)
 class SceneGrade:
-    """What is known of a scene's errors. All but `psnr`, `views` and `unseen_at` are parts of the light.
+    """What is known of a scene's errors. Numbers from `residual` to `at_bound` are parts of the light.
 
     Attributes:
         psnr: mean over the views that were left out of training, dB; None where none was.
@@ -36,6 +53,7 @@ class SceneGrade:
         missing: of what surfaces look at, the part where nothing is and where no camera saw that nothing is.
         at_bound: area of the surfels whose albedo is as high as it may be, as if light were missing.
         unseen_at: (x, y, z) around which most of what is guessed or missing lies, scene units; None where nothing is.
+        lamps: what was found of lamps that are known; None before any is asked for.
     """
 
     psnr: float | None
@@ -46,15 +64,30 @@ class SceneGrade:
     missing: float
     at_bound: float
     unseen_at: tuple[float, float, float] | None = None
+    lamps: KnownLamps | None = None
+
+    @property
+    def light_error(self) -> float:
+        """Position error that the errors of the light let expect, in parts of the scene's size."""
+        return ERROR_PER_LIGHT * math.hypot(self.residual, self.doubt, self.missing, self.at_bound)
 
     @property
     def error(self) -> float:
         """Expected position error of a light that is found by what bounces, in parts of the scene's size."""
-        return ERROR_PER_LIGHT * math.hypot(self.residual, self.doubt, self.missing, self.at_bound)
+        found = 0.0 if self.lamps is None or self.lamps.error is None else self.lamps.error
+        return max(self.light_error, found)
 
     @property
     def grade(self) -> Grade:
-        return Grade.GOOD if self.error <= GOOD else Grade.FAIR if self.error <= FAIR else Grade.POOR
+        """Lamps that were found in the wrong place make a scene fair: where others are found, regions tell."""
+        if self.light_error > FAIR:
+            return Grade.POOR
+        return Grade.GOOD if self.error <= GOOD else Grade.FAIR
+
+    @property
+    def excess(self) -> float:
+        """That of the lamps that are known; 1 where none was asked for."""
+        return 1.0 if self.lamps is None else self.lamps.excess
 
     def data(self) -> dict[str, object]:
         """As JSON holds it."""

@@ -156,6 +156,25 @@ def test_a_grade_goes_with_the_surfels_to_the_frozen_scene(tmp_path):
     surfels = {"train_surfels": _build(tmp_path / "store", "train_surfels", trained)}
     freeze.run(StageContext(config, surfels, {}, tmp_path / "frozen"))
     assert FrozenScene.load(tmp_path / "frozen").grade == grade
+    images = {"generate_dataset": _build(tmp_path / "store", "generate_dataset", _write_left_out)}
+    for most in (2, 0):
+        folder = tmp_path / f"asked_{most}"
+        folder.mkdir()
+        asked = with_changes(config, {"freeze.known_lamps": most})
+        freeze.run(StageContext(asked, surfels | images, {}, folder))
+        lamps = FrozenScene.load(folder).grade.lamps
+        assert (lamps and lamps.asked) == (most or None) and (folder / freeze.LAMPS).exists() == bool(most)
+
+
+def _write_left_out(folder: Path) -> None:
+    """Three views that training did not see, each with a lamp that is known."""
+    frozen, camera = frozen_room(), room_cameras(32)[0]
+    lamps = [_light((0.1 * k, -0.1 * k, 0.2), (1.0, 1.0, 1.0)) for k in range(3)]
+    (folder / "test").mkdir()
+    for k, lamp in enumerate(lamps):
+        write_image(folder / "test" / f"r_{k}.exr", frozen.render(camera, lamp).detach().numpy())
+    entries = [frame_entry(f"./test/r_{k}", camera, lamp) for k, lamp in enumerate(lamps)]
+    write_transforms(folder / "transforms_test.json", entries)
 
 
 def test_goes_on_after_an_interruption(inputs, tmp_path):

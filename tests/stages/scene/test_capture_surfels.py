@@ -33,7 +33,7 @@ def test_the_scene_comes_from_this_stage_where_lamps_are_unknown() -> None:
     assert surfel_stage(config) == "capture_surfels"
     assert surfel_stage(with_changes(config, {"freeze.surfels": "truth"})) == "true_surfels"
     assert [need.stage for need in FREEZE.needs(config)] == ["capture_surfels"]
-    assert [need.stage for need in FREEZE.needs(RgspipeConfig())] == ["train_surfels"]
+    assert [need.stage for need in FREEZE.needs(RgspipeConfig())] == ["train_surfels", "generate_dataset"]
 
 
 def test_a_capture_made_with_other_memory_is_the_same_one() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
@@ -17,7 +18,7 @@ from rgspipe.datasets.gs3_write import frame_entry, write_transforms
 from rgspipe.datasets.surfel_file import save_surfels
 from rgspipe.errors import InputError
 from rgspipe.scene import Camera, look_at
-from rgspipe.scene.grade import SceneGrade
+from rgspipe.scene.grade import KnownLamps, SceneGrade
 from rgspipe.stages.base import Failure, StageContext
 from rgspipe.stages.studies import study
 from rgspipe.stages.studies.zoo import STAGES
@@ -35,7 +36,7 @@ def _config(*overrides: str) -> RgspipeConfig:
 
 def test_every_room_is_rendered_trained_and_fitted_as_its_seed_says() -> None:
     needs = study.STAGE.needs(_config())
-    assert [need.stage for need in needs[:3]] == list(STAGES) and len(needs) == 2 * 2 * 3
+    assert [need.stage for need in needs[:4]] == list(STAGES) and len(needs) == 2 * 2 * 4
     assert all(need.may_fail for need in needs)
     first, last = needs[0].changes, needs[-1].changes
     assert (first["scene.zoo.seed"], first["scene.name"], last["scene.name"]) == (4, "zoo_4", "zoo_7")
@@ -83,10 +84,10 @@ def _artifact(root: Path, stage: str, views: int) -> Artifact:
             write_transforms(folder / "transforms_train.json", [frame_entry("train/r_0000", camera)])
         elif stage == "train_surfels":
             save_surfels(folder / "surfels.safetensors", room_surfels())
-            save_grade(
-                folder / GRADE, SceneGrade(33.0, 4, residual=0.04, guessed=0.25, doubt=0.03, at_bound=0.0, missing=0.0)
-            )
             (folder / "metrics.json").write_text(json.dumps({"test_psnr_mean": 33.0, "seconds": 80.0}))
+        elif stage == "freeze":
+            grade = SceneGrade(33.0, 4, residual=0.04, guessed=0.25, doubt=0.03, at_bound=0.0, missing=0.0)
+            save_grade(folder / GRADE, replace(grade, lamps=KnownLamps(19, 0.015, 1.2)))
         else:
             (folder / "metrics.csv").write_text(ROWS.format(views=views))
         return {}
@@ -100,7 +101,7 @@ def test_a_room_that_failed_is_a_row_with_its_reason(tmp_path: Path) -> None:
     # Room 7 was rendered, and its training failed.
     lists["generate_dataset"] += lists["generate_dataset"]
     lost = dict.fromkeys((2, 3), Failure("train_surfels", "the loss is NaN"))
-    failures = {"train_surfels": lost, "evaluate": lost}
+    failures = dict.fromkeys(STAGES[1:], lost)
     (tmp_path / "out").mkdir()
     inputs = {stage: found[0] for stage, found in lists.items()}
     study.run(StageContext(_config(), inputs, lists, tmp_path / "out", failures=failures))
@@ -109,7 +110,7 @@ def test_a_room_that_failed_is_a_row_with_its_reason(tmp_path: Path) -> None:
     good, failed = table[table["seed"] == 4], table[table["seed"] == 7]
     assert good["silent"].tolist() == [False, True] * 2 and good["success"].tolist() == [True, False] * 2
     assert set(good["lens"]) == {90.0} and set(good["held_out_psnr"]) == {33.0} and set(good["unseen"]) == {0.0}
-    assert set(good["grade"]) == {"good"} and good["grade_error"].tolist() == pytest.approx([0.005] * 4)
+    assert set(good["grade"]) == {"fair"} and good["grade_error"].tolist() == pytest.approx([0.015] * 4)
     assert set(good["guessed"]) == {0.25} and failed["grade"].isna().all()
     assert set(failed["reason"]) == {"the loss is NaN"} and set(failed["failed_in"]) == {"train_surfels"}
     assert failed["lens"].tolist() == [90.0] * 6 and failed["held_out_psnr"].isna().all()

@@ -3,7 +3,7 @@
 With J the derivatives of the image towards the n unknowns x (parameters of all lights and their intensities), r the
 residual and H = Σ JᵀJ, the covariance is
 
-    H^{-½} (σ² I + κ² (V − σ² I)₊ + U) H^{-½} ,     V = (1 − α) S + α tr(S)/n I ,
+    ε² H^{-½} (σ² I + κ² (V − σ² I)₊ + U) H^{-½} ,     V = (1 − α) S + α tr(S)/n I ,
     S = Σ_k d_k d_kᵀ ,     d_k = (I − G_k)⁻¹ H^{-½} s_k
 
 σ² is the residual's variance: what the noise alone leaves uncertain. S is the sandwich estimate over cells k of the
@@ -14,7 +14,8 @@ jackknife, Bell and McCaffrey 2002). A few cells tell nearly all of that, so S i
 large in others; V pulls it towards errors that are alike in all of them, as far as the cells' differences call for
 (α of Ledoit and Wolf 2004). ( )₊ keeps eigenvalues above zero, so that the noise is a lower bound. κ makes up
 for what the residual cannot show, as the fit has explained it away; it was chosen on fits with known truth. U is what
-surfaces that no camera saw leave uncertain, as their albedo is guessed (`certainty.guesses`).
+surfaces that no camera saw leave uncertain, as their albedo is guessed (`certainty.guesses`). ε ≥ 1 is the scene's own
+excess: lamps whose places are known lay so far outside of their regions (`evaluation.known_lamps`).
 """
 
 from __future__ import annotations
@@ -113,7 +114,10 @@ def _joint(
     root, unknown = whitener(cells.sum(dim=0))
     model = inflated(sandwich(root, cells, cell_scores, options.largest_share), noise, options.inflation)
     guessed = guess_scores(problem, state, weights) @ root
-    return (root @ (model + guessed.T @ guessed) @ root.T, unknown), (noise * root @ root.T, unknown)
+    grade = problem.views.frozen.grade
+    excess = 1.0 if grade is None else grade.excess
+    calibrated = excess**2 * root @ (model + guessed.T @ guessed) @ root.T
+    return (calibrated, unknown), (noise * root @ root.T, unknown)
 
 
 def whitener(matrix: Tensor) -> tuple[Tensor, Tensor]:

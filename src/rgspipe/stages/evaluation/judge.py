@@ -9,7 +9,6 @@ from rgspipe.datasets.location import open_dataset
 from rgspipe.evaluation.held_out import MEASURES, QUALITY, held_out_picture
 from rgspipe.evaluation.images import save_png
 from rgspipe.evaluation.judgement import kinds_of_views, render_views
-from rgspipe.evaluation.known_lamps import COLUMNS, known_lamps, told_lamps
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.stages.base import Need, Stage, StageContext
 from rgspipe.stages.sources import has_truth, require_images
@@ -23,12 +22,12 @@ SPLIT = ["surfels", "light", "kind", "pixels", "error", "psnr"]
 
 
 def run(context: StageContext) -> None:
-    """Write quality.csv, split.csv, views.csv, lamps.csv, comparison.png, typical.png; empty tables without views."""
+    """Write quality.csv, split.csv, views.csv, comparison.png, typical.png; empty tables without views."""
     require_images(context.config, "held-out views")
     views = open_dataset(context.inputs["generate_dataset"].folder(), train=False, targets=False).test
     if not views:
         print(NOTHING)
-        columns = (["surfels", "light", *QUALITY], SPLIT, ["name", *MEASURES], COLUMNS)
+        columns = (["surfels", "light", *QUALITY], SPLIT, ["name", *MEASURES])
         _write_tables(context, *(pd.DataFrame(columns=list(names)) for names in columns))
         return
     scenes = [FrozenScene.load(artifact.folder()) for artifact in context.input_lists["freeze"]]
@@ -40,9 +39,7 @@ def run(context: StageContext) -> None:
     quality.insert(0, "surfels", surfels)
     split = pd.DataFrame(columns=SPLIT) if kinds is None else renders.split(kinds).assign(surfels=surfels)[SPLIT]
     table = renders.table("pixels")
-    lamps = known_lamps(scenes[0], views)
-    print(told_lamps(lamps))
-    _write_tables(context, quality, split, table, lamps)
+    _write_tables(context, quality, split, table)
     picture = held_out_picture(views, renders.images["pixels"], table["psnr"], renders.albedo)
     save_png(context.folder / "comparison.png", picture)
     save_png(context.folder / "typical.png", renders.typical("pixels"))
@@ -50,7 +47,7 @@ def run(context: StageContext) -> None:
 
 
 def _write_tables(context: StageContext, *tables: pd.DataFrame) -> None:
-    for name, table in zip(("quality", "split", "views", "lamps"), tables, strict=True):
+    for name, table in zip(("quality", "split", "views"), tables, strict=True):
         write_text(context.folder / f"{name}.csv", table.to_csv(index=False))
 
 
@@ -61,7 +58,7 @@ def _inputs(config: RgspipeConfig) -> list[Need | str]:
 
 STAGE = Stage(
     name="judge",
-    help="held-out views of the frozen scene: PSNR, SSIM, FLIP, albedo, where the error sits, and their lamps found",
+    help="held-out views of the frozen scene: PSNR, SSIM, FLIP, albedo, where the error sits",
     run=run,
     inputs=_inputs,
     config_keys=("freeze.surfels",),

@@ -34,7 +34,7 @@ SUMMARY = "summary.csv"
 CLASSES = ("visible", "out_of_frame", "occluded")
 
 #: The stages that a cell needs one artifact of each of.
-STAGES = ("generate_dataset", "train_surfels", "evaluate")
+STAGES = ("generate_dataset", "train_surfels", "freeze", "evaluate")
 
 
 @dataclass(frozen=True)
@@ -63,11 +63,10 @@ def _gather(context: StageContext) -> Study:
     return Study(table, page(table, figures), zoo_figure(table), beside)
 
 
-def _rows(
-    cell: Cell, dataset: Artifact | Failure, trained: Artifact | Failure, evaluated: Artifact | Failure
-) -> list[Row]:
+def _rows(cell: Cell, *made: Artifact | Failure) -> list[Row]:
     """The fits of a cell, or why there are none."""
-    room = _properties(cell, dataset, trained)
+    *scene, evaluated = made
+    room = _properties(cell, *scene)
     if isinstance(evaluated, Artifact):
         return fit_rows(room, pd.read_csv(evaluated.file("metrics.csv"), dtype=TYPES))
     config = cell.config
@@ -76,7 +75,9 @@ def _rows(
     )
 
 
-def _properties(cell: Cell, dataset: Artifact | Failure, trained: Artifact | Failure) -> dict[str, Any]:
+def _properties(
+    cell: Cell, dataset: Artifact | Failure, trained: Artifact | Failure, frozen: Artifact | Failure
+) -> dict[str, Any]:
     """What a room is like, how it was photographed and trained; None for what is not known."""
     config, room = cell.config, _room(cell.config.scene.zoo)
     known = {"seed": cell.seed, "part": part_of(cell.seed), "case": cell.case} | room_properties(room)
@@ -88,6 +89,9 @@ def _properties(cell: Cell, dataset: Artifact | Failure, trained: Artifact | Fai
         known |= camera_properties(room, [entry.camera(size, size) for entry in entries])
     if isinstance(trained, Artifact):
         known |= _training(trained)
+    if isinstance(frozen, Artifact):
+        grade = load_grade(frozen.file(GRADE))
+        known |= {"grade": str(grade.grade), "grade_error": grade.error, "guessed": grade.guessed}
     return known
 
 
@@ -98,15 +102,11 @@ def _room(zoo: ZooParameters) -> ZooRoom:
 def _training(trained: Artifact) -> dict[str, Any]:
     metrics = read_json(trained.file("metrics.json"), "the measures of a training")
     surfels = load_surfels(trained.file("surfels.safetensors"))
-    grade = load_grade(trained.file(GRADE))
     return {
         "unseen": share_unseen(surfels),
         "surfels": len(surfels),
         "held_out_psnr": metrics.get("test_psnr_mean"),
         "training_seconds": metrics["seconds"],
-        "grade": str(grade.grade),
-        "grade_error": grade.error,
-        "guessed": grade.guessed,
     }
 
 
