@@ -69,7 +69,8 @@ def _asked(context: StageContext, frozen: FrozenScene, grade: SceneGrade) -> Sce
     views = open_dataset(images.folder(), train=False, targets=False).test
     known = [view for view in views if view.light is not None]
     # Spread over all of them, as neighbours may be alike.
-    lamps = known_lamps(frozen, known[:: max(1, -(-len(known) // most))])
+    count = min(most, len(known))
+    lamps = known_lamps(frozen, [known[index * len(known) // count] for index in range(count)])
     if not len(lamps):
         return grade
     write_text(context.folder / LAMPS, lamps.to_csv(index=False))
