@@ -21,6 +21,6 @@ class FreezeConfig(Options):
     dictionary_grid: int = option(8, low=2, high=64)
     """candidate lights along each axis of the room"""
     known_lamps: int = option(19, low=0, high=1000)
-    """at most so many lamps of held-out views (of large ones fewer) are asked for, and regions widened if these leave them out; 0 for none"""
+    """at most so many lamps of held-out views are asked for, to widen regions that leave them out; 0 for none"""
     seed: int = option(0, low=0, high=2**31 - 1)
     """draws of rays"""
