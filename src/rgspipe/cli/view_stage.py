@@ -30,7 +30,7 @@ def view_stage(overrides: Sequence[str], stage_loader: StageLoader) -> int:
         raise InputError(STAGE, expected="a single run", found="a sweep", remedy=remedy)
     rest = [text for text in overrides if text != STAGE]
     made = _Made(rest, stage_loader)
-    if code := run_jobs([*rest, "stage=freeze"], stage_loader, multirun=False):
+    if code := run_jobs([*rest, "stage=freeze"], stage_loader, multirun=False, leads_on=False):
         return code
     return _serve(made)
 

@@ -1,0 +1,91 @@
+"""What a run leads on to: every stage, by what its configuration and result say."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+import rgspipe
+from frozen_store import artifact
+from rgspipe.config import RgspipeConfig, with_changes
+from rgspipe.stages import NAMES
+from rgspipe.stages.following import FOLLOWING, Following, following
+from rgspipe.store.artifacts import Artifact
+from rgspipe.store.files import write_text
+
+#: A file of each stage that is led on to a file.
+FILES = ("track.png", "sheet.png", "study.png", "accuracy.md", "surfels.ply", "report.html", "overview.html")
+
+
+def _led(tmp_path: Path, stage: str, result: str = "converged", **changes: object) -> Following:
+    """What follows a stage whose fits ended with `result`; `changes` by key, with __ for the dot."""
+
+    def make(folder: Path) -> None:
+        write_text(folder / "results.csv", f"target,result\na,converged\nb,{result}\n")
+        for name in FILES:
+            write_text(folder / name, "")
+
+    made: Artifact = artifact(tmp_path, stage, make)
+    named = {key.replace("__", "."): value for key, value in changes.items()}
+    return following(with_changes(RgspipeConfig(stage=stage), named), made)
+
+
+@pytest.mark.parametrize("stage", NAMES)
+def test_every_stage_leads_to_another_one_or_to_a_file_that_it_makes(stage: str, tmp_path: Path) -> None:
+    found = _led(tmp_path, stage)
+    assert (found.stage in (*NAMES, "view")) != bool(found.file)
+    assert found.stage != stage
+    sources = (path for path in Path(rgspipe.__file__).parent.rglob("*.py") if path.stem != "following")
+    assert not found.file or any(found.file in path.read_text() for path in sources)
+
+
+def test_no_stage_is_told_of_that_there_is_none() -> None:
+    assert FOLLOWING.keys() == set(NAMES)
+
+
+def test_a_stage_of_elsewhere_leads_nowhere(tmp_path: Path) -> None:
+    assert _led(tmp_path, "sow") is None
+
+
+@pytest.mark.parametrize(
+    ("stage", "changes", "result", "next_stage"),
+    [
+        ("generate_dataset", {}, "", "train_surfels"),
+        ("generate_dataset", {"scene__lamps": "unknown"}, "", "capture_surfels"),
+        ("freeze", {}, "", "evaluate"),
+        ("freeze", {"scene__kind": "blend", "scene__path": "a.blend", "dataset__targets_per_class": 0}, "", "view"),
+        ("freeze", {"fit__target": "evening"}, "", "fit_light"),
+        ("freeze", {"scene__kind": "ply", "scene__path": "a.ply"}, "", "view"),
+        ("fit_light", {}, "ambiguous", "evaluate"),
+        ("fit_light", {"fit__target": "evening"}, "converged", "view"),
+        ("fit_light", {"fit__target": "evening"}, "ambiguous", "fit_light"),
+        ("fit_light", {"fit__target": "evening", "fit__suggest_view": True}, "ambiguous", "view"),
+        ("fit_light", {"fit__target": "evening", "fit__truth": "true.json"}, "converged", "evaluate"),
+        ("generate_targets", {"targets__kind": "drive"}, "", "track"),
+    ],
+)
+def test_what_follows_is_what_there_is_to_do(
+    stage: str, changes: dict[str, object], result: str, next_stage: str, tmp_path: Path
+) -> None:
+    assert _led(tmp_path, stage, result, **changes).stage == next_stage
+
+
+def test_a_scene_from_disk_is_asked_for_its_targets_and_their_truth(tmp_path: Path) -> None:
+    disk = {"scene__kind": "external", "scene__path": str(tmp_path / "own")}
+    (tmp_path / "own").mkdir()
+    assert _led(tmp_path, "freeze", **disk).stage == "view"
+    (tmp_path / "own" / "targets").mkdir()
+    assert _led(tmp_path, "freeze", **disk).stage == "fit_light"
+    (tmp_path / "own" / "truth").mkdir()
+    assert _led(tmp_path, "freeze", **disk).stage == "evaluate"
+
+
+def test_true_surfaces_are_looked_at_with_the_setting_that_has_them_frozen(tmp_path: Path) -> None:
+    assert _led(tmp_path, "true_surfels").changes == {"freeze.surfels": "truth"}
+
+
+def test_purposes_are_said_before_a_colon(tmp_path: Path) -> None:
+    for stage in NAMES:
+        assert re.fullmatch(r"[a-z].*[a-z]", _led(tmp_path, stage).purpose)
