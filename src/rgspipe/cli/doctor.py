@@ -13,6 +13,7 @@ from pathlib import Path
 from rgspipe import __version__
 from rgspipe.blender.interpreter import find_blender
 from rgspipe.blender.options import OWN_BLENDER, BlenderOptions
+from rgspipe.cli.arguments import refused
 from rgspipe.cli.installation import EXTRAS, Part, needed_parts, optional_parts, slurm
 from rgspipe.cli.messages import EXIT_FAILED
 from rgspipe.datasets.input_file import input_folder
@@ -68,12 +69,8 @@ def _parsed(arguments: Sequence[str]) -> tuple[Path, bool, BlenderOptions]:
         elif key in ("blender.python", "blender.executable") and value:
             blender = replace(blender, **{key.removeprefix("blender."): value})
         else:
-            raise InputError(
-                repr(text),
-                expected="outputs=DIR, check=false, blender.python=PATH or blender.executable=PATH",
-                found="something else",
-                remedy="Correct it.",
-            )
+            expected = "outputs=DIR, check=false, blender.python=PATH or blender.executable=PATH"
+            raise refused(text, expected, "doctor")
     return outputs, checked, blender
 
 
