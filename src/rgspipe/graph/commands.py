@@ -37,7 +37,12 @@ def command(stage: str, overrides: Sequence[str], changes: Mapping[str, object] 
     own = {"stage", "upstream", *changes}
     kept = [text for text in overrides if text.split("=")[0].lstrip("+~") not in own]
     changed = [f"{key}={as_override(value)}" for key, value in changes.items()]
-    return shlex.join([*program(), f"stage={stage}", *kept, *changed])
+    return typed(f"stage={stage}", *kept, *changed)
+
+
+def typed(*words: str) -> str:
+    """This program with arguments, quoted for a shell."""
+    return shlex.join([*program(), *words])
 
 
 def as_override(value: object) -> str:
