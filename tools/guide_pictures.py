@@ -190,7 +190,7 @@ def photographs(_: FrozenScene) -> Bytes:
     painted = replace(scene, surfels=replace(scene.surfels, albedo=found.surfels.albedo[: len(scene.surfels)]))
     gain, middle = display_gain(torch.cat(images)), len(images) // 2
     albedo = tone_map(scene.view(cameras[middle]).image(painted.surfels.albedo), ALBEDO_GAIN)
-    figure = Figure(figsize=(8.4, 2.3), dpi=100, layout="constrained")
+    figure = Figure(figsize=(8.4, 2.5), dpi=100, layout="constrained")
     places = figure.subplots(1, 4)
     shown = [tone_map(images[index], gain) for index in (0, middle)]
     titles = ("a photograph", "another one", "its albedo, as found", "lamps, from above")
