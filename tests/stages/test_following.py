@@ -82,6 +82,13 @@ def test_a_scene_from_disk_is_asked_for_its_targets_and_their_truth(tmp_path: Pa
     assert _led(tmp_path, "freeze", **disk).stage == "evaluate"
 
 
+def test_a_capture_leads_to_its_lamps(tmp_path: Path) -> None:
+    scan = {"scene__kind": "rgbd", "scene__path": "scan", "scene__lamps": "unknown"}
+    captured, frozen = (_led(tmp_path, stage, **scan) for stage in ("capture_surfels", "freeze"))
+    assert captured.stage == frozen.stage == "view"
+    assert "see its lamps" in captured.purpose and "see" not in frozen.purpose
+
+
 def test_true_surfaces_are_looked_at_with_the_setting_that_has_them_frozen(tmp_path: Path) -> None:
     assert _led(tmp_path, "true_surfels").changes == {"freeze.surfels": "truth"}
 

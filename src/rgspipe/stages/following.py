@@ -49,7 +49,7 @@ def _find(config: RgspipeConfig, made: Artifact) -> Following:
     """The lamps of targets, where a scene has some; else there is the scene to look at."""
     changes = {"freeze.surfels": "truth"} if made.stage == "true_surfels" else {}
     if not _has(config, "targets"):
-        return LOOK
+        return FOUND if made.stage == "capture_surfels" else LOOK
     return _compare(changes) if _has(config, "truth") else Following("to find the lamps of its targets", "fit_light")
 
 
