@@ -17,7 +17,7 @@ result = rg.fit_lights(room.scene, room.camera, image, lights=rg.LightSpec("poin
 print(result)
 least = min(result.costs)
 print(f"What each number of lights leaves of what {least} leaves:")
-print({count: f"{cost / result.costs[least]:.2g}" for count, cost in result.costs.items()})
+print({count: f"{cost / result.costs[least]:.0%}" for count, cost in result.costs.items()})
 
 # A wrong number is noticed: one too few leaves light unexplained, one too many explains nothing more.
 for count in (1, 3):

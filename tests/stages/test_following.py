@@ -10,20 +10,26 @@ import pytest
 import rgspipe
 from frozen_store import artifact
 from rgspipe.config import RgspipeConfig, with_changes
+from rgspipe.fitting.findings import Finding, LightMissing, LightSpare
 from rgspipe.stages import NAMES
 from rgspipe.stages.following import FOLLOWING, Following, following
 from rgspipe.store.artifacts import Artifact
-from rgspipe.store.files import write_text
+from rgspipe.store.files import write_json, write_text
 
 #: A file of each stage that is led on to a file.
 FILES = ("track.png", "sheet.png", "study.png", "accuracy.md", "surfels.ply", "report.html", "overview.html")
 
 
-def _led(tmp_path: Path, stage: str, result: str = "converged", **changes: object) -> Following:
-    """What follows a stage whose fits ended with `result`; `changes` by key, with __ for the dot."""
+def _led(
+    tmp_path: Path, stage: str, result: str = "converged", finding: str = "on_surface", **changes: object
+) -> Following:
+    """What follows a stage one of whose fits ended with `result`; `changes` by key, with __ for the dot."""
 
     def make(folder: Path) -> None:
-        write_text(folder / "results.csv", f"target,result\na,converged\nb,{result}\n")
+        write_text(folder / "results.csv", "target\na\nb\n")
+        for name, found in (("a", []), ("b", [{"finding": finding}])):
+            told = {"result": result if found else "converged", "findings": found}
+            write_json(folder / name / "lights.json", told)
         for name in FILES:
             write_text(folder / name, "")
 
@@ -72,6 +78,14 @@ def test_what_follows_is_what_there_is_to_do(
     assert _led(tmp_path, stage, result, **changes).stage == next_stage
 
 
+@pytest.mark.parametrize("finding", [LightSpare(1, 2, 0.1, 0.5, decided_by=()), LightMissing(1, 0.9, decided_by=())])
+def test_a_number_that_is_doubted_is_to_be_found(finding: Finding, tmp_path: Path) -> None:
+    status, name = str(finding.status), finding.data()["finding"]
+    given, open_ = ({"fit__target": "evening", "light__count": count} for count in (2, None))
+    assert _led(tmp_path, "fit_light", status, name, **given).changes == {"light.count": None}
+    assert _led(tmp_path, "fit_light", status, name, **open_).changes != {"light.count": None}
+
+
 def test_a_scene_from_disk_is_asked_for_its_targets_and_their_truth(tmp_path: Path) -> None:
     disk = {"scene__kind": "external", "scene__path": str(tmp_path / "own")}
     (tmp_path / "own").mkdir()
@@ -87,6 +101,11 @@ def test_a_capture_leads_to_its_lamps(tmp_path: Path) -> None:
     captured, frozen = (_led(tmp_path, stage, **scan) for stage in ("capture_surfels", "freeze"))
     assert captured.stage == frozen.stage == "view"
     assert "see its lamps" in captured.purpose and "see" not in frozen.purpose
+
+
+def test_without_a_picture_the_folder_is_looked_at(tmp_path: Path) -> None:
+    made = artifact(tmp_path, "relight", lambda folder: write_text(folder / "relight.csv", ""))
+    assert following(RgspipeConfig(stage="relight"), made) == Following("look at")
 
 
 def test_true_surfaces_are_looked_at_with_the_setting_that_has_them_frozen(tmp_path: Path) -> None:

@@ -6,12 +6,13 @@ It stands here and not in the stages' own modules because their code counts: oth
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from rgspipe.config import RgspipeConfig
+from rgspipe.datasets.json_file import read_json
 from rgspipe.stages.sources import has_truth, trained_stage
 from rgspipe.store.artifacts import Artifact
 
@@ -24,7 +25,7 @@ class Following:
         purpose: what it is for, such as "to see its lamps in the browser".
         stage: that is run for it, as this run was but for `changes`; None where a file is opened.
         changes: values by dotted key.
-        file: of this run's result.
+        file: of this run's result; empty for the folder.
     """
 
     purpose: str
@@ -32,6 +33,9 @@ class Following:
     changes: Mapping[str, object] | None = None
     file: str = ""
 
+
+#: What a fit found out that doubts the number of lamps, and how one ended that further views could help.
+NUMBER, OPEN = ("light_missing", "light_spare"), ("ambiguous", "undetermined")
 
 #: What comes next, from the configuration of a run and the artifact that it has made.
 Choice = Callable[[RgspipeConfig, Artifact], Following]
@@ -66,15 +70,19 @@ def _generated(config: RgspipeConfig, made: Artifact) -> Following:
 def _fitted(config: RgspipeConfig, made: Artifact) -> Following:
     if _has(config, "truth"):
         return Following("to compare them with the truth", "evaluate")
-    if not config.fit.suggest_view and _in_doubt(made):
+    told = list(_told(made))
+    if config.light.count is not None and any(one["finding"] in NUMBER for fit in told for one in fit["findings"]):
+        return Following("to have the lamps counted", "fit_light", {"light.count": None})
+    if not config.fit.suggest_view and any(fit["result"] in OPEN for fit in told):
         return Following("to hear which further view would help most", "fit_light", {"fit.suggest_view": True})
     return FOUND
 
 
-def _in_doubt(made: Artifact) -> bool:
-    """Whether further views could help any of a fit's answers."""
+def _told(made: Artifact) -> Iterator[dict[str, Any]]:
+    """What the fit of each target said."""
     with made.file("results.csv").open(encoding="utf-8", newline="") as table:
-        return any(row["result"] in ("ambiguous", "undetermined") for row in csv.DictReader(table))
+        names = [row["target"] for row in csv.DictReader(table)]
+    return (read_json(made.file(f"{name}/lights.json"), "a fit's light file") for name in names)
 
 
 def _has(config: RgspipeConfig, what: Literal["targets", "truth"]) -> bool:
@@ -93,10 +101,10 @@ def _exported(config: RgspipeConfig, made: Artifact) -> Following:
 
 
 def _picture(*names: str) -> Choice:
-    """The first of these files that there is."""
+    """The first of these files that there is, or the folder."""
 
     def choose(config: RgspipeConfig, made: Artifact) -> Following:
-        return Following("look at", file=next(name for name in names if name in made.manifest["files"]))
+        return Following("look at", file=next((name for name in names if name in made.manifest["files"]), ""))
 
     return choose
 
