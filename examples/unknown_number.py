@@ -15,7 +15,9 @@ image = room.scene.render(room.camera, truth)
 
 result = rg.fit_lights(room.scene, room.camera, image, lights=rg.LightSpec("point", count=None))
 print(result)
-print("What each number of lights leaves:", {count: round(cost, 2) for count, cost in result.costs.items()})
+least = min(result.costs)
+print(f"What each number of lights leaves of what {least} leaves:")
+print({count: f"{cost / result.costs[least]:.0%}" for count, cost in result.costs.items()})
 
 # A wrong number is noticed: one too few leaves light unexplained, one too many explains nothing more.
 for count in (1, 3):

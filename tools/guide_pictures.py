@@ -1,15 +1,20 @@
-"""Make the pictures of the guides that need no training: `python tools/guide_pictures.py [NAME …]`, a minute or two.
+"""Make the pictures of the guides that need no training: `python tools/guide_pictures.py [NAME …]`, some minutes.
 
 All are of the small room that comes with the package. NAME is one of PICTURES; all of them if none is named.
 """
 
 from __future__ import annotations
 
+import math
+import subprocess
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
+import pandas as pd
 import torch
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -17,17 +22,30 @@ from matplotlib.patches import Ellipse
 from PIL import Image
 
 import rgspipe as rg
+from rgspipe.cli import main
+from rgspipe.datasets.exr import read_image
 from rgspipe.datasets.gs3 import load_target
 from rgspipe.datasets.light_file import read_lights
-from rgspipe.demo import ROOM, TARGET, demo_scene
+from rgspipe.demo import GATHER_RAYS, PATCHES, ROOM, TARGET, demo_scene
 from rgspipe.evaluation.calibration import half_axes
 from rgspipe.evaluation.images import Bytes, beside, display_gain, signed_difference, stack, tone_map
 from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.scene import LightRig
 
 IMAGES = Path(__file__).resolve().parents[1] / "docs" / "images"
 
 #: Pixels along a side of a panel.
 SIDE = 160
+
+#: What the guide on sweeps varies.
+SWEPT = ("views.count=1,3", "target_capture.noise=0,0.1,0.3,1")
+
+#: The room that is captured: its surfels, pixels along a side of its photographs, and the lamps that are on in them.
+SMALL, COARSE = 1500, 48
+TWO_LAMPS = (rg.PointLight([-0.25, -0.1, 0.3], [0.5, 0.42, 0.3]), rg.PointLight([0.3, 0.3, 0.1], [0.12, 0.16, 0.2]))
+
+#: How bright albedo is shown: white is no white page.
+ALBEDO_GAIN = 0.7
 
 #: A camera in front of the room's open side, and those of a walk around what it holds.
 FRONT = ((0.0, -1.5, 0.05), (0.0, 0.0, 0.0))
@@ -42,8 +60,8 @@ WALK = (
 WALK_LAMPS = ((-0.3, -0.5, 0.2), (0.3, -0.3, 0.35), (0.1, -0.6, -0.3), (-0.15, -0.1, 0.4))
 
 
-def camera(eye: Sequence[float], aim: Sequence[float], degrees: float = 40.0) -> rg.Camera:
-    return rg.Camera.look_at(list(eye), list(aim), fov_degrees=degrees, width=SIDE, height=SIDE)
+def camera(eye: Sequence[float], aim: Sequence[float], degrees: float = 40.0, side: int = SIDE) -> rg.Camera:
+    return rg.Camera.look_at(list(eye), list(aim), fov_degrees=degrees, width=side, height=side)
 
 
 def captures(scene: FrozenScene) -> Bytes:
@@ -97,20 +115,19 @@ def regions(scene: FrozenScene) -> Bytes:
         cameras, images = zip(*((one.camera, one.image) for one in target.views[:views]), strict=True)
         result = rg.fit_lights(scene, list(cameras), list(images), lights=rg.LightSpec("point", count=count))
         axes.set_title(f"{title}:\n{result.status.replace('_', ' ')}", fontsize=9)
-        _from_above(axes, scene, result, truth)
-    canvas = FigureCanvasAgg(figure)
-    canvas.draw()
-    return np.ascontiguousarray(np.asarray(canvas.buffer_rgba())[..., :3])
+        _from_above(axes, scene, result.lights, result.covariance, truth)
+    return drawn(figure)
 
 
-def _from_above(axes, scene: FrozenScene, result: rg.FitResult, truth) -> None:
+def _from_above(axes, scene: FrozenScene, lights: LightRig, covariances, truth: LightRig) -> None:
+    """The room without floor and ceiling, lamps with their regions, and crosses where they are in truth."""
     places, albedo = scene.surfels.centers.numpy(), scene.surfels.albedo.numpy()
     low = np.abs(places[:, 2]) < 0.45  # neither floor nor ceiling
     axes.scatter(places[low, 0], places[low, 1], s=1.0, c=albedo[low].clip(0.0, 0.9), linewidths=0)
-    for light, covariance in zip(result.lights, result.covariance, strict=True):
+    for light, covariance in zip(lights, covariances, strict=True):
         # The shadow of the ellipsoid on the plane: its covariance is the part of x and y.
         flat = torch.zeros(3, 3, dtype=torch.float64)
-        flat[:2, :2] = covariance[:2, :2]
+        flat[:2, :2] = torch.as_tensor(covariance)[:2, :2]
         lengths, turns = half_axes(flat, scene.size)
         first, second = np.argsort(lengths)[::-1][:2]
         degrees = float(np.degrees(np.arctan2(turns[1, first], turns[0, first])))
@@ -122,16 +139,131 @@ def _from_above(axes, scene: FrozenScene, result: rg.FitResult, truth) -> None:
     axes.set(aspect="equal", xlim=(-0.6, 0.6), ylim=(-0.6, 0.6), xticks=[-0.5, 0, 0.5], yticks=[-0.5, 0, 0.5])
 
 
+def exported(scene: FrozenScene) -> Bytes:
+    """The target whose lamp is hidden, Blender under the lamp that was found and exported, and the difference."""
+    target = load_target(TARGET)
+    cameras, images = zip(*((one.camera, one.image) for one in target.views), strict=True)
+    found = rg.fit_lights(scene, list(cameras), list(images))
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        rg.export_lights(found.lights, folder, ["blend"], covariances=found.covariance)
+        path = folder / "rendered.exr"
+        program = Path(__file__).with_name("render_exported.py")
+        subprocess.run([sys.executable, str(program), str(folder / "lamps_blender.py"), str(path)], check=True)
+        rendered = torch.as_tensor(read_image(path)[0])
+    gain = display_gain(images[0])
+    shown = [tone_map(image, gain) for image in (images[0], rendered)]
+    return beside([*shown, signed_difference(images[0], rendered, gain)])
+
+
+def scan(scene: FrozenScene) -> Bytes:
+    """What a scan gives: photographs of a walk under one lamp, and below them their depth (near: bright)."""
+    lamp, cameras = rg.PointLight([0.1, -0.1, 0.35], 0.6), [camera(*look) for look in WALK]
+    images = [scene.render(one, lamp) for one in cameras]
+    gain = display_gain(torch.cat(images))
+    depths = torch.cat([_depth(scene, one) for one in cameras])
+    nearness = (depths.max() - depths) / (depths.max() - depths[depths > 0.0].min())
+    grey = (255.0 * nearness * (depths > 0.0)).byte().expand(-1, -1, 3).split(SIDE)
+    return stack([beside([tone_map(image, gain) for image in images]), beside([one.numpy() for one in grey])])
+
+
+def _depth(scene: FrozenScene, one: rg.Camera) -> torch.Tensor:
+    """(H, W, 1) planar depth; 0 where there is no surface."""
+    pose = one.camera_to_world
+    ahead = -(scene.surfels.centers.double() - pose[:3, 3]) @ pose[:3, 2]
+    return scene.view(one).image(ahead.float()[:, None])
+
+
+def photographs(_: FrozenScene) -> Bytes:
+    """Photographs under two lamps that nobody measured; the albedo that was found with them, and they from above.
+
+    They are of the same room, but of few surfels whose albedo is known, as captures take minutes of many.
+    """
+    scene = FrozenScene.freeze(rg.exact_surfels(rg.CornellBox(), SMALL), gather_rays=64, patches=200)
+    cameras = [camera(*look, 48.0, COARSE) for look in _half_around()]
+    images = [scene.render(one, TWO_LAMPS) for one in cameras]
+    pairs = enumerate(zip(cameras, images, strict=True))
+    views = [rg.View(f"view {k}", *pair, torch.ones(COARSE, COARSE)) for k, pair in pairs]
+    unknown = replace(scene.surfels, albedo=torch.full_like(scene.surfels.albedo, 0.5))
+    found = rg.capture_scene(views, unknown, rg.CaptureOptions(gather_rays=64))
+    # What closes the room where no camera saw it stands behind the surfels that were given.
+    painted = replace(scene, surfels=replace(scene.surfels, albedo=found.surfels.albedo[: len(scene.surfels)]))
+    gain, middle = display_gain(torch.cat(images)), len(images) // 2
+    albedo = tone_map(scene.view(cameras[middle]).image(painted.surfels.albedo), ALBEDO_GAIN)
+    figure = Figure(figsize=(8.4, 2.5), dpi=100, layout="constrained")
+    places = figure.subplots(1, 4)
+    shown = [tone_map(images[index], gain) for index in (0, middle)]
+    titles = ("a photograph", "another one", "its albedo, as found", "lamps, from above")
+    for axes, title, picture in zip(places, titles, (*shown, albedo, None), strict=True):
+        axes.set_title(title, fontsize=9)
+        if picture is not None:
+            axes.imshow(picture)
+            axes.set_axis_off()
+    _from_above(places[-1], painted, found.lamps, found.certainty.places, TWO_LAMPS)
+    return drawn(figure)
+
+
+def _half_around() -> Iterator[tuple[tuple[float, float, float], tuple[float, float, float]]]:
+    """Eight places on half a circle in front of the room, and what is looked at from there."""
+    for k in range(8):
+        angle = math.radians(-50.0 + 100.0 * k / 7)
+        eye = 1.25 * math.sin(angle), 0.1 - 1.3 * math.cos(angle), (-0.2, 0.25, 0.0)[k % 3]
+        yield eye, (0.05 * math.sin(3 * k), 0.0, -0.05)
+
+
+def ply(scene: FrozenScene) -> Bytes:
+    """What a PLY file holds: the albedo, or the light of a lamp; and the file read back, under another lamp."""
+    view, lamp = camera(*FRONT), rg.PointLight([0.1, -0.1, 0.3], 0.6)
+    with TemporaryDirectory() as name:
+        path = Path(name) / "surfels.ply"
+        rg.save_ply(path, scene.surfels)
+        read, _ = rg.load_ply(path)
+    back = FrozenScene.freeze(read, gather_rays=GATHER_RAYS, patches=PATCHES)
+    seen = scene.view(view)
+    lit = [seen.image(scene.radiance_of((lamp,))), back.render(view, rg.PointLight([-0.3, 0.28, -0.1], 0.6))]
+    return beside([tone_map(seen.image(scene.surfels.albedo), ALBEDO_GAIN), *map(tone_map, lit)])
+
+
+def sweep(scene: FrozenScene) -> Bytes:
+    """What the guide's sweep of the demo's target finds: errors of the hidden lamp over noise, by views."""
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        rg.save_ply(folder / "room.ply", scene.surfels)
+        words = [f"scene.path={folder / 'room.ply'}", f"outputs={folder / 'outputs'}", f"fit.target={TARGET}"]
+        words += [f"fit.truth={ROOM / 'truth' / TARGET.name}.json", "scene=ply", "launcher=basic"]
+        words += [f"freeze.gather_rays={GATHER_RAYS}", f"freeze.patches={PATCHES}"]
+        if main(["-m", "stage=evaluate", *words, *SWEPT]):
+            sys.exit("the sweep failed")
+        [path] = folder.glob("outputs/runs/*_sweep/table.csv")
+        table = pd.read_csv(path)
+    errors = table.pivot(index="target_capture.noise", columns="views.count", values="position_error")
+    figure = Figure(figsize=(4.2, 2.6), dpi=100, layout="constrained")
+    axes = figure.add_subplot()
+    (100.0 * errors).plot(ax=axes, marker="o", ylim=(0.0, None), ylabel="position error, % of the room")
+    return drawn(figure)
+
+
+def drawn(figure: Figure) -> Bytes:
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    return np.ascontiguousarray(np.asarray(canvas.buffer_rgba())[..., :3])
+
+
 PICTURES: dict[str, Callable[[FrozenScene], Bytes]] = {
     "captures": captures,
     "other_light": other_light,
     "target_classes": target_classes,
     "gradients": gradients,
     "regions": regions,
+    "exported": exported,
+    "photographs": photographs,
+    "ply": ply,
+    "scan": scan,
+    "sweep": sweep,
 }
 
 #: Of lines and letters, which are kept as they are.
-DRAWN = ("regions",)
+DRAWN = ("photographs", "regions", "sweep")
 
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@ from rgspipe.cli import main
 from rgspipe.cli.commands import COMMANDS
 from rgspipe.cli.help import PAGES, help_text, topics
 from rgspipe.stages import NAMES
+from rgspipe.store.status import RunStatus
 
 REFUSED, UNREAD = 2, 141
 
@@ -106,6 +107,38 @@ def test_a_command_says_how_it_is_written(command: str, capsys: pytest.CaptureFi
     assert callable(COMMANDS[command].load())
 
 
+@pytest.mark.parametrize(
+    ("line", "meant"),
+    [
+        ("status stae=done", "state="),
+        ("status state=don", "state=done"),
+        ("status scen=tutorial", "scene="),
+        ("status output=here", "outputs="),
+        ("outputs prun", "prune"),
+        ("outputs stge=freeze", "stage="),
+        ("doctor chek=false", "check="),
+        ("verify output=here", "outputs="),
+        ("view prot=80", "port="),
+    ],
+)
+def test_a_misspelt_argument_of_a_command_is_told_with_what_it_may_have_meant(
+    line: str, meant: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(line.split()) == REFUSED
+    assert f"Did you mean {meant}?" in capsys.readouterr().err.replace("\n", " ")
+
+
+def test_runs_are_asked_for_by_keys_that_only_they_know(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["status", "toy.key=1"]) == REFUSED
+    RunStatus.start(tmp_path / "outputs" / "runs" / "one", "grow", ["+toy.key=1"])
+    capsys.readouterr()
+    assert main(["status", "+toy.key=1"]) == 0 and "one" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize("topic", ["blend", "scene=blend"])
 def test_a_choice_is_explained(topic: str) -> None:
     assert help_text([topic]).startswith("scene=blend sets\n  # A Blender file of yours")
@@ -119,6 +152,8 @@ def test_a_choice_is_explained(topic: str) -> None:
         (["-m", "stage=freeze", "seed=1,x"], "seed"),
         (["pipeline=smok"], "pipeline=smoke"),
         (["--help", "fot"], "fit"),
+        (["docter"], "Did you mean doctor?"),
+        (["fit_ligth"], "Did you mean stage=fit_light?"),
     ],
 )
 def test_a_mistake_is_one_paragraph_and_leaves_nothing(

@@ -10,17 +10,17 @@ from pathlib import Path
 
 import pytest
 
-from rgspipe.cli.completion import COMMANDS, completed
+from rgspipe.cli.completion import FIRST, completed
 from rgspipe.stages import NAMES
 
 
 @pytest.mark.parametrize(
     ("line", "words", "is_open"),
     [
-        ("rgspipe ", ["pipeline=", *COMMANDS], True),
+        ("rgspipe ", ["pipeline=", *FIRST], True),
         ("rgspipe st", ["status"], True),
         ("rgspipe outputs pr", ["prune"], False),
-        ("rgspipe outputs ", list(COMMANDS["outputs"]), False),
+        ("rgspipe outputs ", list(FIRST["outputs"]), False),
         ("rgspipe view ", [], False),
         ("rgspipe view FOLDER ta", ["target="], False),
         ("rgspipe --help sce", ["scenes", "scene"], False),
@@ -29,8 +29,8 @@ from rgspipe.stages import NAMES
         ("rgspipe scene=tutorial stage=", [*(f"stage={name}" for name in NAMES), "stage=view"], False),
         ("rgspipe pipeline=sm", ["pipeline=smoke"], False),
         ("rgspipe stage=fit_light fit.", [], True),
-        ("rgspipe", ["pipeline=", *COMMANDS], True),
-        ("", ["pipeline=", *COMMANDS], True),
+        ("rgspipe", ["pipeline=", *FIRST], True),
+        ("", ["pipeline=", *FIRST], True),
     ],
 )
 def test_commands_stages_and_pipelines_are_known(line: str, words: list[str], is_open: bool) -> None:

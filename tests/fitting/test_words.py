@@ -27,7 +27,7 @@ from rgspipe.fitting.findings import (
     gravest,
 )
 from rgspipe.fitting.options import SearchOptions
-from rgspipe.fitting.words import MEANINGS, Spoken, explained, told_alternative
+from rgspipe.fitting.words import MEANINGS, Spoken, explained, told_alternative, told_costs
 from rgspipe.scene import PointLight
 
 DOUBT = Undetermined(1, 1, ("intensity",))
@@ -157,3 +157,17 @@ def test_what_decides_are_numbers_of_the_search() -> None:
 def test_what_speaks_against_an_alternative_is_a_sentence(count, cost, left, more, ruled_out, told) -> None:
     rig = (PointLight([0.0, 0.0, 0.0], 1.0),) * count
     assert told_alternative(Alternative(rig, cost, left, more, ruled_out)) == told
+
+
+@pytest.mark.parametrize(
+    ("costs", "told"),
+    [
+        ({}, ""),
+        ({2: 0.3}, ""),
+        ({2: 0.02, 1: 0.2}, "Left unexplained with 1 light: 100 %; with 2 lights 10 %."),
+        ({2: 0.4, 3: 0.392, 4: 0.6}, "Left unexplained with 2 lights: 100 %; with 3 lights 98 %; with 4 lights 150 %."),
+        ({1: 0.0, 2: 0.0}, "Left unexplained with 1 light: 100 %; with 2 lights as much."),
+    ],
+)
+def test_what_numbers_of_lights_leave_is_told_in_per_cent(costs, told) -> None:
+    assert told_costs(costs) == told

@@ -32,6 +32,8 @@ def test_a_run_is_running_then_done(tmp_path: Path) -> None:
     values = read_status(tmp_path / "run")
     assert (values["state"], values["pid"]) == ("running", os.getpid())
     assert values["command"] == "python -m rgspipe stage=freeze seed=1"
+    quoted = RunStatus.start(tmp_path / "quoted", "freeze", ["views.indices=[0,1]"]).values["command"]
+    assert quoted == "python -m rgspipe 'views.indices=[0,1]'"  # a shell would take it for names of files
     status.done(Path("outputs/x"))
     values = read_status(tmp_path / "run")
     assert (values["state"], values["result"], values["exit_code"]) == ("done", "outputs/x", 0)

@@ -17,12 +17,14 @@ class Command(NamedTuple):
         function: takes the arguments after the name, and returns the exit status.
         summary: what it does, in a line.
         usage: how it is written, and below that what can be said.
+        words: what may follow its name, as far as a shell can complete it.
     """
 
     module: str
     function: str
     summary: str
     usage: str
+    words: tuple[str, ...]
 
     @property
     def text(self) -> str:
@@ -33,6 +35,8 @@ class Command(NamedTuple):
     def load(self) -> Callable[[Sequence[str]], int]:
         return getattr(import_module(f"rgspipe.cli.{self.module}"), self.function)
 
+
+_PAGE_WORDS = ("port=", "resolution=", "address=")
 
 _PAGE = """\
   port        of the page
@@ -49,6 +53,7 @@ COMMANDS = {
 rgspipe demo [port=8080] [resolution=256] [address=127.0.0.1]
 
 {_PAGE}""",
+        _PAGE_WORDS,
     ),
     "view": Command(
         "view",
@@ -66,6 +71,7 @@ rgspipe view FOLDER [lights=FILE] [target=DIR] [fit=DIR]
               with their regions
 {_PAGE}
 stage=view shows the configured scene with its photographs and fits instead.""",
+        ("lights=", "target=", "fit=", *_PAGE_WORDS),
     ),
     "status": Command(
         "runs",
@@ -77,6 +83,7 @@ rgspipe status [RUN] [state=STATE] [KEY=VALUE …] [outputs=DIR]
   RUN        the name of a run: all that is known of it
   state      one of {", ".join(STATES)}
   KEY=VALUE  those that were started with this, such as stage=fit_light""",
+        ("outputs=", "stage=", *(f"state={state}" for state in STATES)),
     ),
     "outputs": Command(
         "outputs",
@@ -90,6 +97,7 @@ rgspipe outputs [prune] [scene=NAME] [stage=NAME] [older=30d] [remove=true]
   scene, stage  of these alone; results of a stage that is named are listed one
                 by one
   older         at least so old: 12h, 30d, 4w""",
+        ("list", "prune", "outputs=", "scene=", "stage=", "older=", "remove=true"),
     ),
     "doctor": Command(
         "doctor",
@@ -101,6 +109,7 @@ rgspipe doctor [check=false] [outputs=DIR]
 
   check       false leaves the measurements out, which take half a minute
   blender.…   the Blender that is to render, which is tried""",
+        ("outputs=", "check=false", "blender.executable=", "blender.python="),
     ),
     "verify": Command(
         "verify",
@@ -108,5 +117,6 @@ rgspipe doctor [check=false] [outputs=DIR]
         "Reads every result, and says which were damaged since then.",
         """\
 rgspipe verify [outputs=DIR]""",
+        ("outputs=",),
     ),
 }

@@ -4,21 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from rgspipe.cli.commands import COMMANDS
 from rgspipe.cli.help import pipelines, topics
 from rgspipe.stages import NAMES
-from rgspipe.store.status import STATES
 
 #: How a shell asks, and where it says for which line.
 FLAGS, LINE = ("-sc", "--shell-completion"), "COMP_LINE"
 
 #: Words that begin a line without a stage, and what may follow them; nothing stands for files.
-COMMANDS: Mapping[str, Sequence[str]] = {
-    "demo": ("port=", "resolution=", "address="),
-    "doctor": ("outputs=", "check=false"),
-    "outputs": ("list", "prune", "outputs=", "scene=", "stage=", "older=", "remove=true"),
-    "status": ("outputs=", "stage=", *(f"state={state}" for state in STATES)),
-    "verify": ("outputs=",),
-    "view": ("lights=", "target=", "fit=", "port=", "resolution=", "address="),
+FIRST: Mapping[str, Sequence[str]] = {
+    **{name: command.words for name, command in COMMANDS.items()},
     "--help": (),
     "--version": (),
 }
@@ -41,13 +36,13 @@ def completed(line: str) -> tuple[list[str], bool]:
         return [], False
     if words[:1] == ["--help"]:
         return _those(list(topics()), word), False
-    if words and words[0] in COMMANDS:
-        return _those(COMMANDS[words[0]], word), False
+    if words and words[0] in FIRST:
+        return _those(FIRST[words[0]], word), False
     key, is_key, _ = word.partition("=")
     if is_key and key in ("stage", "pipeline"):
         names = (*NAMES, "view") if key == "stage" else pipelines()
         return _those([f"{key}={name}" for name in names], word), False
-    return _those(["pipeline=", *([] if words else COMMANDS)], word), True
+    return _those(["pipeline=", *([] if words else FIRST)], word), True
 
 
 def _those(words: Sequence[str], begin: str) -> list[str]:

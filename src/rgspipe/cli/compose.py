@@ -19,6 +19,7 @@ from hydra.errors import HydraException, MissingConfigException, OverrideParseEx
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
+from rgspipe.cli.commands import COMMANDS
 from rgspipe.config import RgspipeConfig
 from rgspipe.config.core import build, plain, unknown_key
 from rgspipe.datasets.json_file import shown
@@ -167,8 +168,10 @@ def _compose(overrides: Sequence[str], hydra: bool = False) -> DictConfig:
 def _parse(overrides: Sequence[str]) -> list[Override]:
     for text in overrides:
         if "=" not in text and not text.startswith("~"):
-            remedy = f"Did you mean stage={text}?" if text in NAMES else "See python -m rgspipe --help."
-            raise InputError(repr(text), expected="key=value", found="no '='", remedy=remedy)
+            near = difflib.get_close_matches(text, [*COMMANDS, *NAMES], n=1)
+            named = [name if name in COMMANDS else f"stage={name}" for name in near]
+            remedy = f"Did you mean {named[0]}?" if named else "See python -m rgspipe --help."
+            raise InputError(repr(text), expected="a command or key=value", found="neither", remedy=remedy)
     parsed = []
     for text in overrides:
         try:

@@ -13,10 +13,12 @@ from pathlib import Path
 from rgspipe import __version__
 from rgspipe.blender.interpreter import find_blender
 from rgspipe.blender.options import OWN_BLENDER, BlenderOptions
+from rgspipe.cli.arguments import refused
 from rgspipe.cli.installation import EXTRAS, Part, needed_parts, optional_parts, slurm
 from rgspipe.cli.messages import EXIT_FAILED
 from rgspipe.datasets.input_file import input_folder
 from rgspipe.errors import InputError
+from rgspipe.graph.commands import typed
 from rgspipe.machine.description import available_memory_gib, machine
 
 #: Columns of what is printed.
@@ -51,7 +53,7 @@ def doctor(arguments: Sequence[str]) -> int:
         ills += _measured()
     ills += refused
     if not ills:
-        print("Everything that is needed works.")
+        print(f"Everything that is needed works.\nNext, to see it find a lamp: {typed('demo')}")
         return 0
     print("\n".join(["To do:", *(_wrapped(ill, "  - ") for ill in ills)]))
     return EXIT_FAILED
@@ -68,12 +70,8 @@ def _parsed(arguments: Sequence[str]) -> tuple[Path, bool, BlenderOptions]:
         elif key in ("blender.python", "blender.executable") and value:
             blender = replace(blender, **{key.removeprefix("blender."): value})
         else:
-            raise InputError(
-                repr(text),
-                expected="outputs=DIR, check=false, blender.python=PATH or blender.executable=PATH",
-                found="something else",
-                remedy="Correct it.",
-            )
+            expected = "outputs=DIR, check=false, blender.python=PATH or blender.executable=PATH"
+            raise refused(text, expected, "doctor")
     return outputs, checked, blender
 
 
@@ -138,14 +136,18 @@ def _print_machine() -> None:
     threads = torch.get_num_threads()
     free = available_memory_gib()
     room = f"{host['memory_gib']} GiB of memory" + ("" if free is None else f", {free:.0f} free")
-    print(f"Machine: {host['processor']}, {cores} cores, {threads} threads, {room}")
+    print(f"Machine: {host['processor']}, {_counted(cores, 'core')}, {_counted(threads, 'thread')}, {room}")
     if threads < cores:
-        print(_wrapped(f"{cores - threads} cores stay idle: unset OMP_NUM_THREADS to have them all.", "  "))
+        print(_wrapped(f"{threads} of {cores} cores work: unset OMP_NUM_THREADS to have them all.", "  "))
     if torch.cuda.is_available():
         print(f"CUDA: {torch.cuda.get_device_name()}; in Python scene.to('cuda'). Stages run on the CPU.")
     else:
         why = "torch is built without it" if torch.version.cuda is None else "no device or no driver"
         print(_wrapped(f"none ({why}). In Python scene.to('cuda') would use it; stages need none.", "CUDA: "))
+
+
+def _counted(count: int, what: str) -> str:
+    return f"{count} {what}{'s' * (count != 1)}"
 
 
 def _disk(outputs: Path) -> list[str]:

@@ -29,10 +29,13 @@ from rgspipe.cli.compose import (
 )
 from rgspipe.cli.messages import EXIT_FAILED, EXIT_INPUT, EXIT_INTERRUPTED, show_failure, show_input_error
 from rgspipe.cli.sweep_table import write_sweep_table
+from rgspipe.config import RgspipeConfig
 from rgspipe.errors import InputError
+from rgspipe.graph.commands import command
 from rgspipe.graph.pipeline import StageLoader, Usual, run
 from rgspipe.stages import load_stage
-from rgspipe.store.artifacts import Artifact
+from rgspipe.stages.following import following
+from rgspipe.store.artifacts import Artifact, ArtifactStore, Key
 from rgspipe.store.files import NO_RIGHT
 from rgspipe.store.status import RunStatus, read_status, read_statuses, record_stopped
 
@@ -43,10 +46,14 @@ RUN_BYTES = 2**16
 TOLD = ("fit_light", "track", "evaluate")
 
 
-def run_jobs(overrides: Sequence[str], stage_loader: StageLoader, multirun: bool) -> int:
+def run_jobs(overrides: Sequence[str], stage_loader: StageLoader, multirun: bool, leads_on: bool = True) -> int:
     """Run one configuration, or all of a sweep.
 
     Launchers are for sweeps, so that with launcher=slurm even a single run is one: of one job, on the cluster.
+
+    Args:
+        leads_on: whether a single run ends with what usually comes next. One whose folder is given is a step of
+            something larger, as in a pipeline, and does not.
 
     Raises:
         InputError: an override cannot be used; nothing was started.
@@ -57,6 +64,7 @@ def run_jobs(overrides: Sequence[str], stage_loader: StageLoader, multirun: bool
         check_stage(config.stage)
     mode = "sweep" if multirun else "run"
     folder = given_folder(overrides, mode) or given_folder(overrides, "run")
+    leads_on &= folder is None
     if folder is None:
         what = "sweep" if multirun else config.stage
         folder = new_run_folder(Path(config.outputs), what, elsewhere=not leaves_machine(overrides))
@@ -75,7 +83,10 @@ def run_jobs(overrides: Sequence[str], stage_loader: StageLoader, multirun: bool
     if multirun:
         return _sweep_summary(folder, code)
     status = read_status(folder)
-    return max(code, EXIT_FAILED if status is None else int(status.get("exit_code", EXIT_FAILED)))
+    code = max(code, EXIT_FAILED if status is None else int(status.get("exit_code", EXIT_FAILED)))
+    if leads_on and code == 0:
+        _lead_on(config, Path(status["result"]), overrides)
+    return code
 
 
 def run_hydra(arguments: Sequence[str], stage_loader: StageLoader, usual: Usual | None = None) -> int:
@@ -199,6 +210,15 @@ def _outcome(artifact: Artifact) -> list[str]:
     from rgspipe.cli.outcome import outcome
 
     return outcome(artifact)
+
+
+def _lead_on(config: RgspipeConfig, result: Path, overrides: Sequence[str]) -> None:
+    """Print what usually comes after a run, with the command or the file for it."""
+    made = ArtifactStore(Path(config.outputs)).find(Key(config.scene.folder, config.stage, result.name))
+    found = None if made is None else following(config, made)
+    if found is not None:
+        what = command(found.stage, overrides, found.changes) if found.stage else result / found.file
+        print(f"Next, {found.purpose}: {what}")
 
 
 def _sweep_summary(folder: Path, code: int) -> int:

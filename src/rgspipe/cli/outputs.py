@@ -8,8 +8,8 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
+from rgspipe.cli.arguments import refused
 from rgspipe.cli.columns import columns, without_empty
-from rgspipe.cli.runs import given_outputs
 from rgspipe.datasets.input_file import input_folder
 from rgspipe.errors import InputError
 from rgspipe.store.retention import Choice, Stored, in_the_making, removable, remove, stored
@@ -37,7 +37,7 @@ def show_outputs(arguments: Sequence[str]) -> int:
     if not prune and "remove=true" in words:
         raise InputError("remove", expected="prune", found="a list", remedy="Say outputs prune remove=true.")
     values = _values([text for text in words if text not in ("list", "prune")])
-    outputs = given_outputs([f"outputs={values.get('outputs', 'outputs')}"])
+    outputs = Path(values.get("outputs", "outputs"))
     if "outputs" not in values and not outputs.exists():
         print(f"No results in {outputs}.")
         return 0
@@ -101,7 +101,7 @@ def _values(arguments: Sequence[str]) -> dict[str, str]:
         key, is_key, value = text.partition("=")
         if key not in KEYS or not is_key or (key == "remove" and value not in ("true", "false")):
             expected = "list, prune, outputs=DIR, scene=NAME, stage=NAME, older=30d or remove=true"
-            raise InputError(repr(text), expected=expected, found="something else", remedy="Correct it.")
+            raise refused(text, expected, "outputs")
     return {text.partition("=")[0]: text.partition("=")[2] for text in arguments}
 
 

@@ -7,8 +7,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from rgspipe.cli.arguments import meant, refused
+from rgspipe.cli.help import groups, sections
 from rgspipe.errors import InputError
-from rgspipe.store.status import read_statuses
+from rgspipe.store.status import STATES, read_statuses
+
+#: What runs are told apart by beside what they were started with.
+_KEYS = ("state", "stage", "outputs")
 
 #: Characters of a reason in the list.
 REASON = 120
@@ -20,8 +25,11 @@ def show_runs(arguments: Sequence[str]) -> int:
     Args:
         arguments: outputs=DIR, state=STATE, any override that runs were started with, such as stage=fit_light, or the
             name of a run.
+
+    Raises:
+        InputError: there is no such run, no such state, or no such key.
     """
-    outputs = given_outputs([text for text in arguments if text.startswith("outputs=")])
+    outputs = _given_outputs(arguments)
     wanted = [text for text in arguments if not text.startswith("outputs=")]
     names = [text for text in wanted if "=" not in text]
     runs = [(str(folder.relative_to(outputs / "runs")), status) for folder, status in read_statuses(outputs / "runs")]
@@ -29,13 +37,29 @@ def show_runs(arguments: Sequence[str]) -> int:
         near = difflib.get_close_matches(unknown[0], [name for name, _ in runs], n=1, cutoff=0.3)
         remedy = f"Did you mean {near[0]}?" if near else "python -m rgspipe status lists them."
         raise InputError(unknown[0], expected=f"the name of a run in {outputs / 'runs'}", found="none", remedy=remedy)
+    asked = [text for text in wanted if "=" in text]
+    _check_keys(asked, [status for _, status in runs])
     chosen = [(name, status) for name, status in runs if not names or name in names]
-    chosen = [(name, status) for name, status in chosen if all(_has(status, text) for text in wanted if "=" in text)]
+    chosen = [(name, status) for name, status in chosen if all(_has(status, text) for text in asked)]
     for name, status in chosen:
         print("\n".join([_line(name, status), *(_details(status) if names else _reason(status))]))
     if not chosen:
         print(f"No {'such ' if runs else ''}runs in {outputs / 'runs'}.")
     return 0
+
+
+def _check_keys(asked: Sequence[str], statuses: Sequence[Mapping[str, Any]]) -> None:
+    """Refuse keys that no run can have been started with, and states that no run can be in: they are misspelt."""
+    states = {*STATES, *(status["state"] for status in statuses)}
+    used = [text.partition("=")[0].lstrip("+~") for status in statuses for text in status["overrides"]]
+    known = {*_KEYS, *used, *groups(), *(setting.key for settings in sections().values() for setting in settings)}
+    for text in asked:
+        key, _, value = text.partition("=")
+        if key == "state" and value not in states:
+            raise refused(text, f"one of {', '.join(STATES)}", "status")
+        if key.lstrip("+~") not in known:
+            remedy = meant(text, [f"{name}=" for name in (*_KEYS, *known)]) or "rgspipe --help status says more."
+            raise InputError(key, expected="a key that runs are started with, or state", found="none", remedy=remedy)
 
 
 def _has(status: Mapping[str, Any], wanted: str) -> bool:
@@ -60,15 +84,18 @@ def _details(status: Mapping[str, Any]) -> list[str]:
     return [f"  {word:<8} {status[key]}" for key, word in shown.items() if status.get(key)]
 
 
-def given_outputs(arguments: Sequence[str]) -> Path:
-    """The folder of results that a command about what is there already names, or the usual one.
+def given_outputs(arguments: Sequence[str], command: str) -> Path:
+    """The folder of results that a command names which takes nothing else, or the usual one.
 
     Raises:
         InputError: it names something else.
     """
-    outputs = Path("outputs")
     for text in arguments:
         if not text.startswith("outputs="):
-            raise InputError(repr(text), expected="outputs=DIR", found="something else", remedy="Leave it away.")
-        outputs = Path(text.partition("=")[2])
-    return outputs
+            raise refused(text, "outputs=DIR", command)
+    return _given_outputs(arguments)
+
+
+def _given_outputs(arguments: Sequence[str]) -> Path:
+    given = [text.partition("=")[2] for text in arguments if text.startswith("outputs=")]
+    return Path(given[-1] if given else "outputs")

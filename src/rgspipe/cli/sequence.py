@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import shlex
 import signal
 import subprocess
 import sys
@@ -94,7 +95,7 @@ def run_sequence(name: str, extra: Sequence[str], program: Sequence[str] = RGSPI
     for number, step in enumerate(steps, 1):
         run_folder = folder / f"{number:02d}_{step.stage}"
         command = [*(["-m"] if step.sweep else []), f"stage={step.stage}", *step.overrides, *extra]
-        print(f"[{number}/{len(steps)}] python -m rgspipe {' '.join(command)}", flush=True)
+        print(f"[{number}/{len(steps)}] python -m rgspipe {shlex.join(command)}", flush=True)
         begin = time.perf_counter()
         key = "hydra.sweep.dir" if step.sweep else "hydra.run.dir"
         code = _run([*program, *command, f"{key}={quoted(run_folder)}"])

@@ -19,7 +19,7 @@ def verify(arguments: Sequence[str]) -> int:
     Returns:
         the exit status: 2 if any is.
     """
-    outputs = input_folder(given_outputs(arguments), "the folder of results")
+    outputs = input_folder(given_outputs(arguments, "verify"), "the folder of results")
     keys = list(artifact_keys(outputs))
     whole: list[Artifact] = []
     for key in progress_bar(keys, "reading", unit="artifact"):

@@ -13,7 +13,7 @@ class Alternative:
 
     Attributes:
         lights: the rig, float64.
-        cost: their robust cost, over that of the answer.
+        cost: their robust cost, over the least where the answer stands.
         left: the energy that they leave unexplained, over what the answer leaves.
         more: how many more of them there are than lights of the answer; below 0 fewer.
         ruled_out: whether the answer is clearly the better one; else it is another answer.

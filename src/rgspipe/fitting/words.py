@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from rgspipe.fitting.alternative import Alternative
@@ -91,11 +91,29 @@ def told_alternative(one: Alternative) -> str:
         gain = f"{len(one.lights)} lights lower the cost by {percent(1.0 - one.cost)}"
         return f"{gain}{', too little to count' if one.ruled_out else ''}."
     if one.more < 0:
-        fewer = f"{len(one.lights)} light{'s' * (len(one.lights) > 1)}: {_times(one.cost)} the cost"
+        fewer = f"{_lights(len(one.lights))}: {_times(one.cost)} the cost"
         return f"{fewer}{'' if one.ruled_out else ', too little to rule them out'}."
     if not one.ruled_out:
         return "Explains the target as well: another answer."
     return f"{_times(one.left)} as much unexplained." if one.left >= one.cost else f"{_times(one.cost)} the cost."
+
+
+def told_costs(costs: Mapping[int, float]) -> str:
+    """What each number of lights leaves unexplained, as the robust cost counts it, in a sentence; empty of one number.
+
+    Args:
+        costs: by number of lights, see `FitResult.costs`.
+    """
+    if len(costs) < 2:
+        return ""
+    (fewest, most), *others = sorted(costs.items())
+    first = f"Left unexplained with {_lights(fewest)}: 100 %"
+    shares = (f"with {_lights(count)} {percent(cost / most) if most > 0.0 else 'as much'}" for count, cost in others)
+    return f"{'; '.join([first, *shares])}."
+
+
+def _lights(count: int) -> str:
+    return f"{count} light{'s' * (count > 1)}"
 
 
 def _times(ratio: float) -> str:

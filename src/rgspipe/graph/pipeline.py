@@ -14,6 +14,7 @@ from pathlib import Path
 from rgspipe.config import RgspipeConfig, get_value, with_changes
 from rgspipe.datasets.reading_limits import reading_within
 from rgspipe.errors import InputError
+from rgspipe.graph.commands import as_override, command
 from rgspipe.graph.expected_time import EarlierRuns, Expected, in_words
 from rgspipe.graph.nodes import Making, Node, indispensable
 from rgspipe.graph.source_code import SourceCode
@@ -242,7 +243,7 @@ def _variant(node: Node, resolver: _Resolver, overrides: Sequence[str], usual: U
         return ""
     if plain.key == node.key:
         return ""
-    changes = {key: _as_override(value) for key, value in node.changes.items()}
+    changes = {key: as_override(value) for key, value in node.changes.items()}
     return variant_name(overrides, usual.swept, changes, _keys(node))
 
 
@@ -263,26 +264,10 @@ def _refuse_missing(steps: Sequence[Step], overrides: Sequence[str]) -> None:
     missing = [step.node for step in steps[:-1] if not step.reused]
     if not missing:
         return
-    command = command_for(missing[-1], overrides)
+    wanted = command(missing[-1].stage.name, overrides, missing[-1].changes)
     raise InputError(
         f"upstream=require: {missing[-1].stage.name}",
         expected=f"its artifact {missing[-1].key.fingerprint} for this configuration",
         found="none",
-        remedy=f"Make it with `{command}`, or leave upstream=require away.",
+        remedy=f"Make it with `{wanted}`, or leave upstream=require away.",
     )
-
-
-def command_for(node: Node, overrides: Sequence[str]) -> str:
-    """The command that makes a node, in a run that was started with `overrides`."""
-    own = {"stage", "upstream", *node.changes}
-    kept = [text for text in overrides if text.split("=")[0].lstrip("+~") not in own]
-    changed = [f"{key}={_as_override(value)}" for key, value in node.changes.items()]
-    return " ".join(["python -m rgspipe", f"stage={node.stage.name}", *kept, *changed])
-
-
-def _as_override(value: object) -> str:
-    if value is None:
-        return "null"
-    if isinstance(value, list | tuple):
-        return f"[{','.join(map(_as_override, value))}]"
-    return str(value).lower() if isinstance(value, bool) else str(value)

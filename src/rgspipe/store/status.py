@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime
 import logging
 import os
+import shlex
 import socket
 import time
 import traceback
@@ -43,6 +44,11 @@ TYPES: Mapping[str, type | tuple[type, ...]] = {
 }
 
 log = logging.getLogger(__name__)
+
+
+def _command(overrides: Sequence[str]) -> str:
+    """How a run is started again, quoted for a shell."""
+    return shlex.join(["python", "-m", "rgspipe", *overrides])
 
 
 def _now() -> str:
@@ -87,7 +93,7 @@ class RunStatus:
             "state": "running",
             "stage": stage,
             "overrides": list(overrides),
-            "command": " ".join(["python -m rgspipe", *overrides]),
+            "command": _command(overrides),
             "host": socket.gethostname(),
             "pid": os.getpid(),
             "process_start": process_start(os.getpid()),
@@ -162,8 +168,7 @@ def _is_status(values: object) -> bool:
 def record_killed(folder: Path, overrides: Sequence[str], error: str) -> dict[str, Any]:
     """Say for a run that could not say so itself, whether it had started or not, that it was killed, and by what."""
     folder.mkdir(parents=True, exist_ok=True)
-    command = " ".join(["python -m rgspipe", *overrides])
-    values = read_status(folder) or {"stage": "", "overrides": list(overrides), "command": command}
+    values = read_status(folder) or {"stage": "", "overrides": list(overrides), "command": _command(overrides)}
     values |= {"state": "killed", "ended": _now(), "error": error, "exit_code": 1}
     write_json(folder / STATUS, values)
     return values

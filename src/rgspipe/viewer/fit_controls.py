@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from rgspipe.fitting import FitResult
+from rgspipe.fitting.words import told_costs
 from rgspipe.viewer.actions import Action
 from rgspipe.viewer.around import cameras_around
 from rgspipe.viewer.drawings import Drawings
@@ -210,9 +211,7 @@ def _words(found: Found) -> str:
     """What a fit says of its lamps, and what it weighed them against, by the numbers in the picture."""
     # Lamps stand in lines of their own, which begin with blanks.
     text = "\n".join(f"- {line.strip()}" if line.startswith(" ") else f"\n{line}\n" for line in found.told.splitlines())
-    if len(found.costs) > 1:
-        tried = ", ".join(f"{count}: {cost:.4g}" for count, cost in sorted(found.costs.items()))
-        text += f"\nCost by number of lamps: {tried}."
+    text += f"\n{told_costs(found.costs)}"
     if found.alternatives:
         others = (f"{number}. {one.told}" for number, one in enumerate(found.alternatives, start=1))
         text += "\n\nWeighed against:\n\n" + "\n".join(others)

@@ -9,6 +9,7 @@ from lit_room import VISIBLE
 from rgspipe.fitting import LightSpec, fit_lights
 from rgspipe.fitting.findings import LightMissing, LightSpare, Rival
 from rgspipe.fitting.options import RivalOptions, SearchOptions
+from rgspipe.fitting.search.compare import robust_costs
 from rgspipe.fitting.selection.alternatives import still_apart, weighed
 
 OPTIONS = SearchOptions()
@@ -23,6 +24,15 @@ def test_lights_elsewhere_are_told_once_and_by_how_much_worse_they_are(room, poi
     # A light off by 0.15 leaves a thousand times what one off by 0.001 does, and more.
     assert one.ruled_out and one.more == 0 and one.left > 1000 and one.cost > 1
     assert one.left == refiner.unexplained(far) / refiner.unexplained(answer)
+
+
+def test_costs_are_over_the_least_where_the_answer_stands(room, point_light) -> None:
+    """What was refined robustly there may have a lower one than an answer by squares."""
+    refiner = refiner_of(room, point_light)
+    answer, better, far = (placed(refiner, by) for by in (0.01, 0.001, 0.15))
+    [one], [alone] = (weighed(refiner, answer, others, (), OPTIONS) for others in ([better, far], [far]))
+    least, cost = robust_costs(refiner.problem, [better, far])
+    assert one.cost == cost / least > 2.0 * alone.cost  # measured 24.7 and 11.5
 
 
 def test_what_is_as_good_is_not_ruled_out(room, point_light) -> None:

@@ -27,11 +27,15 @@ def weighed(
         findings: what was found out about the number of lights.
     """
     problem, apart, size = refiner.problem, options.certainty.doubtful, refiner.region.size
-    clear = [state for state in others if rig_distance(state.emitters, answer.emitters, size) > apart]
+    distances = [rig_distance(state.emitters, answer.emitters, size) for state in others]
+    clear = [state for state, distance in zip(others, distances, strict=True) if distance > apart]
+    # An answer by squares has not the least robust cost in its place: another number would look better than it is.
+    alike = [answer, *(state for state, distance in zip(others, distances, strict=True) if distance <= apart)]
     clear = distinct(sorted(clear, key=refiner.unexplained), apart, size)
     if not clear:
         return []
-    least, *costs = robust_costs(problem, [answer, *clear])
+    every = robust_costs(problem, [*alike, *clear])
+    least, costs = min(every[: len(alike)]), every[len(alike) :]
     left = max(refiner.unexplained(answer), ROUNDING**2)
     found = [
         Alternative(
