@@ -164,9 +164,9 @@ def test_what_speaks_against_an_alternative_is_a_sentence(count, cost, left, mor
     [
         ({}, ""),
         ({2: 0.3}, ""),
-        ({2: 0.02, 1: 0.2}, "Left unexplained with 1 light: 100 %; with 2 lights 10 %."),
-        ({2: 0.4, 3: 0.392, 4: 0.6}, "Left unexplained with 2 lights: 100 %; with 3 lights 98 %; with 4 lights 150 %."),
-        ({1: 0.0, 2: 0.0}, "Left unexplained with 1 light: 100 %; with 2 lights as much."),
+        ({2: 0.02, 1: 0.2}, "Of what 1 light leaves unexplained, 2 leave 10 %."),
+        ({2: 0.4, 3: 0.392, 4: 0.6}, "Of what 2 lights leave unexplained, 3 leave 98 %, 4 leave 150 %."),
+        ({1: 0.0, 2: 0.0}, "Of what 1 light leaves unexplained, 2 leave all of it."),
     ],
 )
 def test_what_numbers_of_lights_leave_is_told_in_per_cent(costs, told) -> None:

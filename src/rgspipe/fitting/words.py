@@ -107,9 +107,8 @@ def told_costs(costs: Mapping[int, float]) -> str:
     if len(costs) < 2:
         return ""
     (fewest, most), *others = sorted(costs.items())
-    first = f"Left unexplained with {_lights(fewest)}: 100 %"
-    shares = (f"with {_lights(count)} {percent(cost / most) if most > 0.0 else 'as much'}" for count, cost in others)
-    return f"{'; '.join([first, *shares])}."
+    shares = (f"{count} leave {percent(cost / most) if most > 0.0 else 'all of it'}" for count, cost in others)
+    return f"Of what {_lights(fewest)} leave{'s' * (fewest == 1)} unexplained, {', '.join(shares)}."
 
 
 def _lights(count: int) -> str:
