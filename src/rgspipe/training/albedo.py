@@ -10,11 +10,15 @@ from torch import Tensor
 
 from rgspipe.datasets.views import View
 from rgspipe.scene.surfels import Surfels
+from rgspipe.training.levels import levels
 from rgspipe.training.likeness import nearest_surfels
 from rgspipe.training.view_model import ViewModel
 
 #: Albedo stays within these: below is numerically black, above rooms that never darken.
 ALBEDO_RANGE = (0.005, 0.98)
+
+#: Part of a view's level below which pixels count as dark: their errors are absolute.
+DARK = 0.1
 
 #: Pixels with less surface than this say nothing of it.
 MINIMUM_COVERAGE = 0.3
@@ -43,46 +47,65 @@ class AlbedoProblem:
     Attributes:
         models: of V views.
         images: V images (pixels, 3).
+        levels: V scalars that errors are measured against.
         pixel_weights: V weights (pixels,) of squared errors: relative in bright pixels, absolute in dark.
         neighbours: (N, 6) nearest surfels by position and normal.
     """
 
     models: Sequence[ViewModel]
     images: Sequence[Tensor]
+    levels: Sequence[Tensor]
     pixel_weights: Sequence[Tensor]
     neighbours: Tensor
 
     @classmethod
     def build(cls, surfels: Surfels, models: Sequence[ViewModel], views: Sequence[View]) -> AlbedoProblem:
         images = [view.image.reshape(-1, 3).float() for view in views]
-        pairs = zip(views, models, strict=True)
-        pixel_weights = [pixel_weight(view, model.weights.coverage) for view, model in pairs]
-        return cls(models, images, pixel_weights, nearest_surfels(surfels.centers, surfels.normals))
+        albedo = surfels.albedo.float().clamp(*ALBEDO_RANGE)
+        scales = levels(images, [model.image(albedo, None) for model in models])
+        parts = zip(views, models, scales, strict=True)
+        pixel_weights = [pixel_weight(view, model.weights.coverage, scale) for view, model, scale in parts]
+        return cls(models, images, scales, pixel_weights, nearest_surfels(surfels.centers, surfels.normals))
 
     def render(self, v: int, albedo: Tensor, indirect: Tensor | None) -> Tensor:
         """(pixels, 3) view v under `indirect` (V, N, 3)."""
         return self.models[v].image(albedo, None if indirect is None else indirect[v])
 
 
-def pixel_weight(view: View, coverage: Tensor) -> Tensor:
-    """(P,) weights; none where surfels and photograph disagree on what is covered, which is for the geometry, and
-    none where the photograph is saturated."""
+def pixel_weight(view: View, coverage: Tensor, scale: Tensor) -> Tensor:
+    """(P,) weights of errors that are measured against the level `scale`.
+
+    None where surfels and photograph disagree on what is covered, which is for the geometry, and none where the
+    photograph is saturated.
+    """
     image, alpha = view.image.reshape(-1, 3).float(), view.alpha.reshape(-1).float()
-    peak = torch.quantile(image, 0.99).clamp(min=1e-12)
-    weight = 1.0 / (image.mean(dim=1) / peak + 0.1) / peak.square()
+    weight = 1.0 / (image.mean(dim=1) / scale + DARK) / scale.square()
     trusted = (coverage >= MINIMUM_COVERAGE) & ((alpha - coverage).abs() <= COVERAGE_MISMATCH)
     trusted &= ~view.saturated.reshape(-1, 3).any(dim=1)
     return torch.where(trusted, weight, torch.zeros_like(weight))
 
 
-def robust_weights(images: Sequence[Tensor], weights: Sequence[Tensor], renders: Sequence[Tensor]) -> list[Tensor]:
-    """Pixel weights with those that fit badly (shadow edges, occlusions) weighing less."""
-    return [_robust(*view) for view in zip(images, weights, renders, strict=True)]
+def robust_weights(
+    images: Sequence[Tensor], scales: Sequence[Tensor], weights: Sequence[Tensor], renders: Sequence[Tensor]
+) -> list[Tensor]:
+    """Pixel weights with those that fit badly weighing less: pixels of a view (shadow edges, occlusions), and views as
+    a whole (a lamp that something unseen shades)."""
+    errors = [_relative(*view) for view in zip(images, scales, renders, strict=True)]
+    typical = [_typical(error[weight > 0]) for error, weight in zip(errors, weights, strict=True)]
+    usual = _typical(torch.stack(typical)) if typical else torch.tensor(1.0)
+    parts = zip(weights, errors, typical, strict=True)
+    return [weight * _less(error, own) * _less(own, usual) for weight, error, own in parts]
 
 
-def _robust(image: Tensor, weight: Tensor, render: Tensor) -> Tensor:
-    error = (render - image).abs().mean(dim=1)
-    relative = error / (image.mean(dim=1) + 0.1 * torch.quantile(image, 0.99)).clamp(min=1e-12)
-    used = weight > 0
-    typical = 3.0 * relative[used].median() + 1e-4 if bool(used.any()) else torch.tensor(1.0)
-    return weight / (1.0 + (relative / typical).square())
+def _relative(image: Tensor, scale: Tensor, render: Tensor) -> Tensor:
+    """(P,) errors of pixels over what they show."""
+    return (render - image).abs().mean(dim=1) / (image.mean(dim=1) + DARK * scale)
+
+
+def _typical(errors: Tensor) -> Tensor:
+    """Errors that are larger are few."""
+    return 3.0 * errors.median() + 1e-4 if len(errors) else torch.tensor(1.0)
+
+
+def _less(error: Tensor, typical: Tensor) -> Tensor:
+    return 1.0 / (1.0 + (error / typical).square())

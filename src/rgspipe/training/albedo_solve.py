@@ -51,7 +51,7 @@ def solve_albedo(
     normals, pixel_weights = surfels.normals.float(), problem.pixel_weights
     for index in progress_bar(range(rounds), "albedo", unit="round"):
         if index > 0:
-            pixel_weights = robust_weights(problem.images, problem.pixel_weights, at.renders)
+            pixel_weights = robust_weights(problem.images, problem.levels, problem.pixel_weights, at.renders)
         laplacian = graph_laplacian(problem.neighbours, normals, at.albedo if index > 1 else None, guessed)
         pulls = pulled_to_kin(pull(prior, at.albedo), ties, at.albedo)
         quadratic = Quadratic.of(at, pixel_weights, laplacian, pulls)

@@ -11,6 +11,7 @@ from torch import Tensor
 from rgspipe.datasets.views import View
 from rgspipe.renderer.view_weights import ViewWeights
 from rgspipe.scene.surfels import NO_CLIP, Surfels
+from rgspipe.training.levels import level
 
 #: A surfel's halves stand this many of its scales from its centre, and are this much shorter along the split. Their
 #: sum differs least from the whole near these (variance along the split: 0.6² + 0.8² = 1).
@@ -22,7 +23,7 @@ SPLIT_SHARE, FAINTEST = 0.03, 0.03
 
 
 def surfel_errors(weights: Iterable[ViewWeights], radiance: Tensor, views: Sequence[View]) -> Tensor:
-    """(N,) squared error of all views, each in units of its peak, shared out by the surfels' weights in the pixels.
+    """(N,) squared error of all views, each in units of its level, shared out by the surfels' weights in the pixels.
 
     A saturated pixel has none where the render is at least as bright.
 
@@ -33,9 +34,8 @@ def surfel_errors(weights: Iterable[ViewWeights], radiance: Tensor, views: Seque
     total = torch.zeros(radiance.shape[1])
     for weight, shown, view in zip(weights, radiance, views, strict=True):
         image = view.image.float()
-        peak = torch.quantile(image, 0.995).clamp(min=1e-12)
         render = view.as_photographed((weight.operator @ shown).reshape(image.shape))
-        error = ((render - image) / peak).square().mean(dim=2).reshape(-1, 1)
+        error = ((render - image) / level(image, render)).square().mean(dim=2).reshape(-1, 1)
         total += (weight.operator.transposed @ error)[:, 0]
     return total
 

@@ -121,7 +121,8 @@ def fit_gloss(
         chosen, at = reflection_of(start)
     if len(chosen) == 0:
         return None
-    solved = _solve(scene, GlossProblem.build(start, scene.models, problem.images, chosen, prior), at, weights, rounds)
+    pixels = problem.levels, weights
+    solved = _solve(scene, GlossProblem.build(start, scene.models, problem.images, chosen, prior), at, pixels, rounds)
     surfels = _without_faint(replace(start, albedo=solved.albedo), chosen, solved)
     return render_gloss(scene, surfels) if len(surfels.gloss.glossy) else None
 
@@ -158,16 +159,21 @@ def reflection_of(surfels: Surfels) -> tuple[Tensor, Reflection]:
 
 
 def _solve(
-    scene: GlossScene, problem: GlossProblem, at: Reflection, pixel_weights: Sequence[Tensor], rounds: int
+    scene: GlossScene,
+    problem: GlossProblem,
+    at: Reflection,
+    pixels: tuple[Sequence[Tensor], Sequence[Tensor]],
+    rounds: int,
 ) -> Reflection:
+    """`pixels` are the levels of views and the weights of their pixels."""
     flat, bounces, mixing = scene.highlights(problem.chosen), scene.bounces(problem.chosen), Mixing(DAMPING)
-    known = bool((at.specular > 0.0).any())
+    known, (scales, pixel_weights) = bool((at.specular > 0.0).any()), pixels
     for index in progress_bar(range(rounds), "gloss", unit="round"):
         light = scene.light(bounces, flat, at)
         weights = pixel_weights
         if known or index > 1:
             # Not before lobes stand: without them highlights are what fits badly.
-            weights = robust_weights(problem.images, pixel_weights, problem.images_of(light, at))
+            weights = robust_weights(problem.images, scales, pixel_weights, problem.images_of(light, at))
         found = problem.step(light, at, weights, exponents=known or index > 0)
         albedo = mixing.next(at.albedo, found.albedo).clamp(*ALBEDO_RANGE)
         specular = torch.minimum(found.specular, 1.0 - albedo[problem.chosen])

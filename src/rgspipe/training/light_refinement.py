@@ -29,6 +29,7 @@ from rgspipe.renderer.transport import PatchTransport
 from rgspipe.renderer.view_weights import ViewWeights
 from rgspipe.scene.lights import PointLight
 from rgspipe.training.albedo import pixel_weight
+from rgspipe.training.levels import peak
 
 #: Steps of a light; each at most so long, in scene sizes and in log-intensity.
 STEPS, LONGEST, STRONGEST = 4, 0.03, 0.2
@@ -88,7 +89,7 @@ class _OneLight:
         centers = bvh.surfels.centers
         self.size = float((centers.amax(dim=0) - centers.amin(dim=0)).amax())
         self.start = self.seen(PointLight(view.light.position.double(), view.light.intensity.double()))
-        trust = torch.where(weight.edges, torch.zeros(()), pixel_weight(view, weight.coverage))
+        trust = torch.where(weight.edges, torch.zeros(()), pixel_weight(view, weight.coverage, peak(self.image)))
         self.weights = self._robust(trust) if bool((trust > 0.0).any()) else trust
 
     def refined(self) -> PointLight:

@@ -23,6 +23,7 @@ from torch import Tensor
 
 from rgspipe.renderer.view_weights import ViewWeights
 from rgspipe.scene.surfels import Surfels
+from rgspipe.training.levels import level
 from rgspipe.training.parameters import tilted
 from rgspipe.training.regularise import Neighbours
 from rgspipe.training.shading import SurfelLight, geometry_factor, softening_lengths
@@ -125,7 +126,7 @@ def shading_of_view(
     surfels: Surfels, view: ViewWeights, image: Tensor, light: SurfelLight
 ) -> tuple[scipy.sparse.csr_matrix, np.ndarray, np.ndarray]:
     """Derivative (Q, 3N) of the Q pixels that tell normals towards turns about u, about v and log-albedo; their
-    residuals (Q,) and weights (Q,). Radiance is the mean of the channels in units of the view's peak."""
+    residuals (Q,) and weights (Q,). Radiance is the mean of the channels in units of the view's level."""
     operator = view.operator.to_scipy()
     lit = (operator @ light.transmittance.double().numpy()) / np.maximum(view.coverage.double().numpy(), 1e-6)
     pixels = np.flatnonzero(~view.edges.numpy() & (view.coverage.numpy() > 0.5) & (lit > LIT))
@@ -139,12 +140,14 @@ def shading_of_view(
     seen_at = o + (((centers - o) * normals).sum(dim=1) / safe)[:, None] * d
     path = light.position - seen_at
     softening = softening_lengths(surfels)[j]
-    peak = float(torch.quantile(image, 0.995).clamp(min=1e-12))
-    weight = torch.from_numpy(rows.data).to(centers) / peak
+    weight = torch.from_numpy(rows.data).to(centers)
     # Mean over the channels of ρ I/π and of ρ G.
     strength = (surfels.albedo @ light.intensity)[j] / (3.0 * math.pi) * light.transmittance[j] * weight
     ambient = (surfels.albedo * light.indirect).mean(dim=1)[j] * weight
     predicted = strength * geometry_factor(path, normals, softening) + ambient
+    shown = np.bincount(rows.row, predicted.double().numpy(), len(pixels))
+    against = float(level(image, torch.from_numpy(shown) if len(pixels) else torch.zeros(1)))
+    strength, predicted, shown = strength / against, predicted / against, shown / against
     facing = ((path * normals).sum(dim=1) > 0.0) & (across.abs() > GRAZING)
     slope = _slope(path, normals, softening, d / safe[:, None], centers - seen_at)
     slope = torch.where(facing, strength, torch.zeros_like(strength))[:, None] * slope
@@ -154,8 +157,8 @@ def shading_of_view(
     columns = np.concatenate([rows.col, rows.col + len(surfels), rows.col + 2 * len(surfels)])
     shape = (len(pixels), 3 * len(surfels))
     jacobian = scipy.sparse.csr_matrix((values.double().numpy(), (np.tile(rows.row, 3), columns)), shape=shape)
-    seen = image[torch.from_numpy(pixels)].double().mean(dim=1).numpy() / peak
-    residual = seen - np.bincount(rows.row, predicted.double().numpy(), len(pixels))
+    seen = image[torch.from_numpy(pixels)].double().mean(dim=1).numpy() / against
+    residual = seen - shown
     return jacobian, residual, _trust(residual, seen)
 
 

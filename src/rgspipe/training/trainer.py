@@ -25,6 +25,7 @@ from rgspipe.training.density import redistributed, surfel_errors
 from rgspipe.training.gloss import gloss_radiance
 from rgspipe.training.gloss_light import operators_from
 from rgspipe.training.initialise import Footprint, initialise_surfels
+from rgspipe.training.levels import level
 from rgspipe.training.light_refinement import refine_lights
 from rgspipe.training.lighting import total_irradiance, trace_lighting
 from rgspipe.training.materials import Materials, PriorOf, build_frozen, each_view, fit_materials
@@ -241,12 +242,12 @@ def refine_views(surfels: Surfels, views: Sequence[View], radiance: Tensor) -> l
     bvh = SurfelBvh(surfels)
     lights = surfel_lights(surfels, [view.light for view in views], radiance / surfels.albedo.clamp(min=1e-6))
     found = []
-    for view, light in zip(views, lights, strict=True):
+    for view, light, shown in zip(views, lights, radiance, strict=True):
         image, alpha = view.image.reshape(-1, 3).float(), view.alpha.reshape(-1).float()
-        edges = build_view_weights(bvh, view.camera, supersampling=1).edges
-        peak = float(torch.quantile(image, 0.995).clamp(min=1e-12))
+        weights = build_view_weights(bvh, view.camera, supersampling=1)
+        against = float(level(image, weights.operator @ shown.float()))
         saturated = None if view.saturated_from is None else view.saturated.reshape(-1, 3)
-        found.append(RefineView(view.camera, image, alpha, light, edges, peak, saturated))
+        found.append(RefineView(view.camera, image, alpha, light, weights.edges, against, saturated))
     return found
 
 
