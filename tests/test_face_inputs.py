@@ -272,6 +272,12 @@ REFUSED: dict[str, tuple[Callable[[rg.FrozenScene, Tensor], object], str, str, s
         "NaN",
         "steps",
     ),
+    "radiance that single precision does not hold": (
+        lambda s, i: fit(s, i.double() * 1e40),
+        "images[0]",
+        "infinity",
+        "Make it again",
+    ),
     "a folder that is not there": (lambda s, i: rg.FrozenScene.load("nowhere"), "nowhere", "no such folder", "Freeze"),
     "a file that is not there": (lambda s, i: rg.Surfels.from_ply("no.ply"), "no.ply", "no such file", "path"),
     "radiance for a picture": (lambda s, i: rg.save_png("x.png", i), "pixels", "float32", "tone_map"),

@@ -61,6 +61,16 @@ def test_nobody_need_read_on(arguments: list[str], tmp_path: Path, child_environ
     assert started.wait() == UNREAD
 
 
+@pytest.mark.parametrize("closed", ["1", "2"])
+def test_nobody_need_have_opened_what_is_written_to(
+    tmp_path: Path, child_environment: dict[str, str], closed: str
+) -> None:
+    command = f'"$0" -m rgspipe status {closed}>&-'
+    shell = ["sh", "-c", command, sys.executable]
+    ended = subprocess.run(shell, cwd=tmp_path, env=child_environment, capture_output=True, text=True, check=False)
+    assert ended.returncode == 0 and "Traceback" not in ended.stdout + ended.stderr
+
+
 def test_a_terminal_may_know_ascii_alone(rgspipe) -> None:
     result = rgspipe("--help", "fit", PYTHONIOENCODING="ascii", PYTHONUTF8="0", LC_ALL="C")
     assert (result.returncode, result.stderr) == (0, "") and result.stdout.isascii()

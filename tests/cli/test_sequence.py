@@ -29,6 +29,8 @@ def test_every_step_of_the_shipped_pipelines_composes(name: str) -> None:
     ("text", "word"),
     [
         ("steps: [", "YAML"),
+        ("steps: [2001-99-99]", "YAML"),
+        (f"steps: [{'9' * 5000}]", "YAML"),
         ("[1]", "steps"),
         ("steps: []", "steps"),
         ("steps: [{overrides: []}]", "step 1"),

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+import os
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +13,7 @@ import trimesh
 
 from mesh_files import cuboid_triangles, quarters, textured_square, write_coloured
 from raycast import BLOCK
-from rgspipe.datasets.mesh_file import UPRIGHT, read_mesh
+from rgspipe.datasets.mesh_file import UPRIGHT, OwnFiles, read_mesh
 from rgspipe.datasets.mesh_links import mesh_files
 from rgspipe.datasets.mesh_options import MeshOptions
 from rgspipe.errors import InputError
@@ -117,3 +120,43 @@ def test_a_broken_texture_is_refused(tmp_path: Path) -> None:
     picture.write_bytes(content)
     with pytest.raises(InputError, match="whole textures"):
         read_mesh(tmp_path / "a.obj")
+
+
+def linked(folder: Path, kind: str) -> tuple[Path, Path]:
+    """A textured square, and its texture in a file of its own beside it."""
+    square = textured_square(quarters())
+    if kind == "obj":  # whose lines end with a carriage return alone
+        square.export(folder / "a.obj")
+        (materials,) = folder.glob("*.mtl")
+        materials.write_bytes(materials.read_bytes().replace(b"\n", b"\r"))
+        (picture,) = folder.glob("*.png")
+        return folder / "a.obj", picture
+    quarters().save(folder / "t.png")
+    if kind == "ply":
+        square.export(folder / "a.ply")
+        content = (folder / "a.ply").read_bytes()
+        (folder / "a.ply").write_bytes(content.replace(b"\nelement", b"\ncomment TextureFile t.png\nelement", 1))
+        return folder / "a.ply", folder / "t.png"
+    text = json.dumps({"asset": {"version": "2.0"}, "images": [{"uri": "t.png"}]}).encode().ljust(80)
+    header = b"glTF" + struct.pack("<II", 2, 20 + len(text)) + struct.pack("<I", len(text)) + b"JSON"
+    (folder / "a.glb").write_bytes(header + text)
+    return folder / "a.glb", folder / "t.png"
+
+
+@pytest.mark.parametrize("kind", ["obj", "ply", "glb"])
+def test_what_a_mesh_names_counts_for_the_fingerprint_and_is_no_pipe(tmp_path: Path, kind: str) -> None:
+    path, picture = linked(tmp_path, kind)
+    assert picture in mesh_files(path)
+    picture.unlink()
+    os.mkfifo(picture)
+    with pytest.raises(InputError, match="pipe"):
+        read_mesh(path)
+
+
+def test_no_file_is_opened_that_a_mesh_does_not_name(tmp_path: Path) -> None:
+    path, picture = linked(tmp_path, "ply")
+    (tmp_path / "other.png").write_bytes(picture.read_bytes())
+    own = OwnFiles(path)
+    assert own.get("t.png") == picture.read_bytes()
+    with pytest.raises(FileNotFoundError):
+        own.get("other.png")

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import torch
 from PIL import ExifTags, Image
+from PIL.TiffImagePlugin import IFDRational
 
 from raycast import BLOCK, ROOM, cast, room_views
 from rgspipe.datasets.gs3 import load_dataset
@@ -20,7 +21,7 @@ from rgspipe.datasets.scans.frame import DepthImage, Lens
 from rgspipe.datasets.scans.importing import import_scan
 from rgspipe.datasets.scans.layouts import read_scan
 from rgspipe.datasets.scans.options import ScanOptions
-from rgspipe.datasets.scans.pictures import exposure_of, read_depth_image, read_picture, size_of
+from rgspipe.datasets.scans.pictures import _colmap_array, exposure_of, read_depth_image, read_picture, size_of
 from rgspipe.datasets.scans.resample import resampled_colour, resampled_depth, straight_camera
 from rgspipe.datasets.views import View
 from rgspipe.errors import InputError
@@ -262,3 +263,20 @@ def test_radiance_pictures_come_back(tmp_path: Path, packed: bool) -> None:
         (tmp_path / "b.hdr").write_bytes((tmp_path / "a.hdr").read_bytes()[:length])
         with pytest.raises(InputError, match=r"b\.hdr"):
             read_picture(tmp_path / "b.hdr", "srgb")
+
+
+@pytest.mark.parametrize("number", [IFDRational(0, 0), float("inf"), 0.0])
+def test_an_exposure_that_cannot_be_is_not_stated(tmp_path: Path, number: object) -> None:
+    """Lenses without electronics may state an f-number of 0/0."""
+    exif = Image.Exif()
+    base = ExifTags.Base
+    exif.get_ifd(ExifTags.IFD.Exif).update({base.ExposureTime: 0.01, base.FNumber: number, base.ISOSpeedRatings: 200})
+    Image.fromarray(np.zeros((8, 8, 3), np.uint8)).save(tmp_path / "a.jpg", exif=exif)
+    assert exposure_of(tmp_path / "a.jpg") is None
+
+
+@pytest.mark.parametrize("channels", [0, -1])
+def test_depth_of_colmap_without_a_channel_is_refused(tmp_path: Path, channels: int) -> None:
+    (tmp_path / "a.bin").write_bytes(b"4&4&%d&" % channels + bytes(64))
+    with pytest.raises(InputError, match="channels"):
+        _colmap_array(tmp_path / "a.bin")

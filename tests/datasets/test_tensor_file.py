@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 import pytest
+import safetensors.torch
 import torch
 
 from rgspipe.datasets.tensor_file import load_tensors, save_tensors
@@ -37,4 +38,17 @@ def test_tensors_and_note_come_back(tmp_path: Path) -> None:
 def test_numbers_that_no_scene_has_are_refused(tmp_path: Path, value: float) -> None:
     save_tensors(tmp_path / "a.safetensors", {"x": torch.tensor([1.0, value]), "y": torch.ones(1)})
     with pytest.raises(InputError, match=r"a\.safetensors.*finite x"):
+        load_tensors(tmp_path / "a.safetensors")
+
+
+def test_types_that_no_scene_has_are_refused(tmp_path: Path) -> None:
+    save_tensors(tmp_path / "a.safetensors", {"x": torch.ones(2).to(torch.float8_e4m3fn)})
+    with pytest.raises(InputError, match=r"x of torch\.float8"):
+        load_tensors(tmp_path / "a.safetensors")
+
+
+@pytest.mark.parametrize("note", ["1", "null", "[", '{"a": 1, "a": 2}'])
+def test_a_note_is_a_strict_json_object(tmp_path: Path, note: str) -> None:
+    safetensors.torch.save_file({"x": torch.ones(1)}, tmp_path / "a.safetensors", metadata={"note": note})
+    with pytest.raises(InputError, match=r"a\.safetensors"):
         load_tensors(tmp_path / "a.safetensors")

@@ -77,6 +77,8 @@ def test_jobs_are_listed_in_their_order(tmp_path: Path) -> None:
         RunStatus.start(tmp_path / "sweep" / str(number), "freeze", [])
     assert [folder.name for folder, _ in read_statuses(tmp_path)] == ["1", "9", "10"]
     assert read_status(tmp_path) is None
+    RunStatus.start(tmp_path / "sweep" / "²", "freeze", [])
+    assert len(read_statuses(tmp_path)) == 4
 
 
 def test_a_run_on_another_machine_is_believed(tmp_path: Path) -> None:

@@ -30,6 +30,9 @@ def main(arguments: Sequence[str] | None = None, stage_loader: StageLoader = loa
         stage_loader: gives a stage by name.
     """
     arguments = list(sys.argv[1:] if arguments is None else arguments)
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:  # closed by who started us: what is said goes nowhere
+            setattr(sys, name, Path(os.devnull).open("w", encoding="utf-8"))  # noqa: SIM115
     for stream in (sys.stdout, sys.stderr):
         # A terminal that knows ASCII alone shows the rest as escapes.
         stream.reconfigure(errors="backslashreplace")

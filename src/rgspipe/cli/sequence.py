@@ -58,7 +58,7 @@ def load_sequence(name: str) -> list[SequenceStep]:
         raise InputError("pipeline", expected=f"one of {', '.join(names)}", found=repr(name), remedy=remedy)
     try:
         data = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (yaml.YAMLError, UnicodeDecodeError, RecursionError) as error:
+    except (yaml.YAMLError, ValueError, RecursionError) as error:  # also of dates and numbers that cannot be
         found = " ".join(str(error).split())
         raise InputError(path, expected="YAML", found=found, remedy="Correct the file.") from None
     steps = data.get("steps") if isinstance(data, dict) else None

@@ -5,15 +5,17 @@ from __future__ import annotations
 import warnings
 from pathlib import Path
 from typing import Any
+from urllib.parse import unquote
 
 import numpy as np
 import trimesh
+import trimesh.resolvers
 from PIL import Image
 
 from rgspipe.datasets.display_image import DAMAGED
 from rgspipe.datasets.input_file import check_pixel_count, input_file
 from rgspipe.datasets.limits import FARTHEST
-from rgspipe.datasets.mesh_links import FORMATS, GLTF
+from rgspipe.datasets.mesh_links import FORMATS, GLTF, mesh_files
 from rgspipe.datasets.mesh_options import MeshOptions
 from rgspipe.datasets.reading_limits import RAISE, reading_limits, timed
 from rgspipe.errors import InputError
@@ -54,13 +56,39 @@ def is_y_up(path: Path, options: MeshOptions) -> bool:
     return options.up == "y" or (options.up == "auto" and path.suffix.lower() in GLTF)
 
 
+class OwnFiles(trimesh.resolvers.FilePathResolver):
+    """Gives those who decode a mesh the files that belong to it, and no others: only they are in fingerprints."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(str(path))
+        self._folder, self._own = path.parent, {file.resolve() for file in mesh_files(path)}
+
+    def namespaced(self, namespace: str) -> OwnFiles:
+        """No folder has files of its own."""
+        return self
+
+    def get(self, key: str) -> bytes:
+        """The content of a file beside the mesh.
+
+        Raises:
+            FileNotFoundError: there is none, or the mesh does not name it.
+            InputError: a pipe, a device, or too large.
+        """
+        path = (self._folder / unquote(key.strip())).resolve()
+        if path not in self._own:
+            raise FileNotFoundError(key)
+        return input_file(path, "a file of a mesh", most_bytes=reading_limits().bytes).read_bytes()
+
+
 def _loaded(path: Path) -> Any:
     try:
         # Of broken files numpy warns before they are refused.
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             # Nothing is merged or mended: points without area do no harm, and merging would move textures.
-            return trimesh.load_scene(path, process=False, maintain_order=True)
+            return trimesh.load_scene(path, resolver=OwnFiles(path), process=False, maintain_order=True)
+    except InputError:
+        raise
     except Exception as error:  # the library says of no format what it raises
         raise _broken(path, error) from error
 

@@ -9,7 +9,6 @@ that they stand for are in the model's cfg_args. A surfel's opacity at (u, v) st
 from __future__ import annotations
 
 import ast
-import math
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
@@ -18,6 +17,7 @@ from scipy.special import expit
 
 from rgspipe.datasets.conversion import Loss, loss
 from rgspipe.datasets.input_file import input_file
+from rgspipe.datasets.json_file import shown
 from rgspipe.datasets.opacity_profile import FittedProfiles, fit_profiles, smoothstep
 from rgspipe.datasets.ply_gaussians import Discs, exponentials, unit_quaternions
 from rgspipe.datasets.ply_options import PlyOptions
@@ -34,6 +34,9 @@ CONFIG, LEVELS_UP = "cfg_args", 3
 
 #: Bytes of the largest cfg_args that is read.
 MOST_BYTES = 2**20
+
+#: No number of cfg_args that matters is as large.
+LARGEST_RANGE = 1e6
 
 
 @dataclass(frozen=True)
@@ -129,8 +132,13 @@ def _parse_ranges(path: Path) -> Ranges:
     except (OSError, ValueError, SyntaxError, RecursionError, MemoryError) as cause:
         raise error from cause
     for name, value in found.items():
-        if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value < math.inf:
-            raise InputError(f"{path}: {name}", expected="a number from 0 on", found=repr(value), remedy="Correct it.")
+        if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= LARGEST_RANGE:
+            raise InputError(
+                f"{path}: {name}",
+                expected=f"a number from 0 to {LARGEST_RANGE:g}",
+                found=shown(value),
+                remedy="Correct it.",
+            )
     return replace(Ranges(), **found)
 
 

@@ -8,13 +8,18 @@ from typing import Any
 
 import safetensors
 import safetensors.torch
+import torch
 from torch import Tensor
 
 from rgspipe.datasets.input_file import input_file
+from rgspipe.datasets.json_file import parse_json, shown
 from rgspipe.datasets.limits import LARGEST
 from rgspipe.datasets.reading_limits import reading_limits, timed
 from rgspipe.errors import InputError
 from rgspipe.store.files import replacing
+
+#: Types of the numbers of tensors.
+DTYPES = (torch.float32, torch.float64, torch.int32, torch.int64, torch.uint8, torch.bool)
 
 MAKE_AGAIN = "Remove it and run the stage that makes it again."
 
@@ -50,7 +55,13 @@ def _read(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
     try:
         with safetensors.safe_open(path, framework="pt") as file:
             note = (file.metadata() or {}).get("note", "{}")
-            return {name: file.get_tensor(name) for name in file.keys()}, json.loads(note)  # noqa: SIM118
+            tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
+        note = parse_json(note)
+        if not isinstance(note, dict):
+            raise ValueError(f"a note that is no JSON object but {shown(note)}")
+        if unusual := [f"{name} of {tensor.dtype}" for name, tensor in tensors.items() if tensor.dtype not in DTYPES]:
+            raise ValueError(unusual[0])
+        return tensors, note
     except (OSError, safetensors.SafetensorError, ValueError, RecursionError) as error:
         raise InputError(
             path,

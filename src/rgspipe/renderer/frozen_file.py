@@ -12,6 +12,7 @@ import torch
 from torch import Tensor
 
 from rgspipe.datasets.grade_file import GRADE, load_grade, save_grade
+from rgspipe.datasets.json_file import shown
 from rgspipe.datasets.surfel_file import load_surfels, save_surfels
 from rgspipe.datasets.tensor_file import load_tensors, save_tensors
 from rgspipe.errors import InputError
@@ -22,6 +23,9 @@ from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.transport import PatchTransport
 from rgspipe.scene.grade import SceneGrade
 from rgspipe.scene.surfels import Surfels
+
+#: Tensors of places, which are as exact as they are stored.
+EXACT = ("centers", "positions")
 
 SURFELS, GATHER, TRANSPORT, GLOSS, DICTIONARY = (
     f"{name}.safetensors" for name in ("surfels", "gather", "transport", "gloss", "dictionary")
@@ -100,7 +104,7 @@ def _load_transport(path: Path, albedo: Tensor) -> tuple[Tensor, Tensor, PatchTr
     """Areas, exact centres and patch transport."""
     tensors, _ = _load(path, {"inverse", "areas", "centers"}, ("average", "gather"))
     areas, centers, inverse = tensors["areas"], tensors["centers"], tensors["inverse"]
-    count, patches = len(albedo), inverse.shape[-1]
+    count, patches = len(albedo), inverse.shape[-1] if inverse.dim() else 0
     _require(path, "areas", areas.shape, (count,))
     _require(path, "centers", centers.shape, (count, 3))
     _require(path, "inverse", inverse.shape, (3, patches, patches))
@@ -149,7 +153,9 @@ def _load_dictionary(path: Path, count: int) -> LightDictionary:
     _require(path, "irradiance", irradiance.shape, (positions.shape[0], count))
     _require_range(path, {"positions": positions})
     _require_range(path, {"irradiance": irradiance}, 0.0)
-    made_with = {name: int(note[name]) for name in ("grid", "seed") if name in note}
+    made_with = {name: note[name] for name in ("grid", "seed") if name in note}
+    if odd := [f"{name} {shown(value)}" for name, value in made_with.items() if type(value) is not int]:
+        raise InputError(path, expected="whole numbers as grid and seed", found=odd[0], remedy=MAKE_AGAIN)
     return LightDictionary(positions, irradiance, **made_with)
 
 
@@ -160,7 +166,9 @@ def _load(path: Path, names: set[str], operators: tuple[str, ...]) -> tuple[dict
     if set(tensors) != wanted:
         listed = ", ".join(sorted(tensors)) or "none"
         raise InputError(path, expected=f"the tensors {', '.join(sorted(wanted))}", found=listed, remedy=MAKE_AGAIN)
-    return tensors, note
+    # Operators are of single precision.
+    single = {name: one.float() for name, one in tensors.items() if one.dtype == torch.float64 and name not in EXACT}
+    return tensors | single, note
 
 
 def _operator(path: Path, tensors: dict[str, Tensor], name: str, shape: tuple[int, int]) -> SparseOperator:

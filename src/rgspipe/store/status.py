@@ -190,4 +190,4 @@ def read_statuses(root: Path) -> list[tuple[Path, dict[str, Any]]]:
 
 
 def _by_number(folder: Path) -> tuple[tuple[int, str], ...]:
-    return tuple((int(part) if part.isdigit() else -1, part) for part in folder.parts)
+    return tuple((int(part) if part.isdecimal() else -1, part) for part in folder.parts)

@@ -55,7 +55,7 @@ def read(root: Path, options: ScanOptions) -> Scan:
 
 
 def _images(root: Path) -> list[Path]:
-    return [path for path in sorted(root.glob("*_im.exr")) if path.name.split("_")[0].isdigit()]
+    return [path for path in sorted(root.glob("*_im.exr")) if path.name.split("_")[0].isdecimal()]
 
 
 def _beside(image: Path, kind: str) -> Path | None:

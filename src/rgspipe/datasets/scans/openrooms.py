@@ -70,7 +70,7 @@ def _images(root: Path) -> list[Path]:
     """By number; of an image in both formats the one that holds light."""
     found = {}
     for suffix in (".png", ".hdr"):
-        found |= {_number(path): path for path in root.glob(f"im_*{suffix}") if path.stem[3:].isdigit()}
+        found |= {_number(path): path for path in root.glob(f"im_*{suffix}") if path.stem[3:].isdecimal()}
     return [found[number] for number in sorted(found) if number >= 1]
 
 

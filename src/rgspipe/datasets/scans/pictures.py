@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -87,14 +88,15 @@ def exposure_of(path: Path) -> float | None:
     try:
         with Image.open(input_file(path, "a photograph"), formats=["JPEG", "PNG"]) as file:
             check_pixel_count(path, *file.size)  # of a PNG all pixels are decoded for it
-            stated = file.getexif().get_ifd(ExifTags.IFD.Exif)
-        shutter, sensitivity, aperture = (float(np.ravel(stated.get(key, 0))[0]) for key in keys)
+            tags = file.getexif().get_ifd(ExifTags.IFD.Exif)
+        shutter, sensitivity, aperture = (float(np.ravel(tags.get(key, 0))[0]) for key in keys)
     except InputError:
         raise
     except (*DAMAGED, TypeError, ZeroDivisionError):
         # Whether its pixels can be read is asked elsewhere.
         return None
-    return shutter * sensitivity / aperture**2 if min(shutter, sensitivity, aperture) > 0.0 else None
+    stated = all(0.0 < value < math.inf for value in (shutter, sensitivity, aperture))
+    return shutter * sensitivity / aperture**2 if stated else None
 
 
 def _has_wide_colours(path: Path) -> bool:
@@ -165,6 +167,8 @@ def _colmap_array(path: Path) -> npt.NDArray[np.float64]:
         width, height, channels = (int(part) for part in parts[:3])
         start = sum(len(part) + 1 for part in parts[:3])
         check_pixel_count(path, width, height)
+        if channels < 1:
+            raise ValueError(f"{channels} channels")
         values = np.frombuffer(content, "<f4", width * height * channels, start)
     except (ValueError, IndexError) as error:
         found = f"other bytes ({error})"

@@ -36,7 +36,7 @@ def read(root: Path, options: ScanOptions) -> Scan:
         InputError: no frames, broken files, or poses that are not rigid.
     """
     images = sorted(
-        (path for path in (root / "color").iterdir() if path.suffix.lower() in FORMATS and path.stem.isdigit()),
+        (path for path in (root / "color").iterdir() if path.suffix.lower() in FORMATS and path.stem.isdecimal()),
         key=lambda path: int(path.stem),
     )
     poses = [read_numbers(root / "pose" / f"{image.stem}.txt", 4, "a camera-to-world matrix") for image in images]

@@ -162,7 +162,8 @@ def _one_each(
             )
         size = (view.camera.height, view.camera.width, *channels)
         tensor = as_tensor(value, where, size, remedy=IMAGE_REMEDY if channels else REMEDY)
-        check_finite(tensor, where, "Make it again.")
+        # As fits take it: single precision holds less.
+        check_finite(tensor.float(), where, "Make it again.")
         checked.append(tensor)
     return checked
 
