@@ -62,9 +62,7 @@ def test_nobody_need_read_on(arguments: list[str], tmp_path: Path, child_environ
 
 
 @pytest.mark.parametrize("closed", ["1", "2"])
-def test_nobody_need_have_opened_what_is_written_to(
-    tmp_path: Path, child_environment: dict[str, str], closed: str
-) -> None:
+def test_what_is_said_may_be_closed(tmp_path: Path, child_environment: dict[str, str], closed: str) -> None:
     command = f'"$0" -m rgspipe status {closed}>&-'
     shell = ["sh", "-c", command, sys.executable]
     ended = subprocess.run(shell, cwd=tmp_path, env=child_environment, capture_output=True, text=True, check=False)
