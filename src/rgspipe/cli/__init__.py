@@ -32,7 +32,7 @@ def main(arguments: Sequence[str] | None = None, stage_loader: StageLoader = loa
     arguments = list(sys.argv[1:] if arguments is None else arguments)
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:  # closed by who started us: what is said goes nowhere
-            setattr(sys, name, Path(os.devnull).open("w", encoding="utf-8"))  # noqa: SIM115
+            setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_WRONLY), "w", encoding="utf-8"))
     for stream in (sys.stdout, sys.stderr):
         # A terminal that knows ASCII alone shows the rest as escapes.
         stream.reconfigure(errors="backslashreplace")
