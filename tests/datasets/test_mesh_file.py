@@ -160,3 +160,12 @@ def test_no_file_is_opened_that_a_mesh_does_not_name(tmp_path: Path) -> None:
     assert own.get("t.png") == picture.read_bytes()
     with pytest.raises(FileNotFoundError):
         own.get("other.png")
+
+
+def test_a_texture_of_an_obj_may_have_a_percent_sign_in_its_name(tmp_path: Path) -> None:
+    path, picture = linked(tmp_path, "obj")
+    (materials,) = tmp_path.glob("*.mtl")
+    materials.write_bytes(materials.read_bytes().replace(picture.name.encode(), b"a%20b.png"))
+    content = picture.read_bytes()
+    picture.rename(tmp_path / "a%20b.png")
+    assert OwnFiles(path).get("a%20b.png") == content

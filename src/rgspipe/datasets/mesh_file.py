@@ -74,10 +74,12 @@ class OwnFiles(trimesh.resolvers.FilePathResolver):
             FileNotFoundError: there is none, or the mesh does not name it.
             InputError: a pipe, a device, or too large.
         """
-        path = (self._folder / unquote(key.strip())).resolve()
-        if path not in self._own:
+        # In glTF names are escaped as in addresses, in other formats they stand as they are.
+        named = [(self._folder / name).resolve() for name in (key.strip(), unquote(key.strip()))]
+        own = [path for path in named if path in self._own]
+        if not own:
             raise FileNotFoundError(key)
-        return input_file(path, "a file of a mesh", most_bytes=reading_limits().bytes).read_bytes()
+        return input_file(own[0], "a file of a mesh", most_bytes=reading_limits().bytes).read_bytes()
 
 
 def _loaded(path: Path) -> Any:
