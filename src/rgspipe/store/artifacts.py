@@ -26,11 +26,13 @@ from filelock import FileLock, Timeout
 from rgspipe.errors import InputError
 from rgspipe.machine.description import PeakMemory, library_versions, machine
 from rgspipe.store.files import (
+    IN_THE_WAY,
     NO_RIGHT,
     UNWRITABLE,
     make_folder,
     point_at,
     publish,
+    remove_at_once,
     remove_tree,
     sha256,
     unfinished_links,
@@ -156,6 +158,22 @@ class ArtifactStore:
             self._known[key] = Artifact(path, read_manifest(path, key.stage, key.fingerprint))
         return self._known[key]
 
+    def usable(self, key: Key) -> Artifact | None:
+        """The published artifact if its manifest is its own and every file is as long as it was written, else None.
+
+        One that is not is made again; `damage` says what is wrong with it.
+        """
+        return None if self.damage(key) else self.find(key)
+
+    def damage(self, key: Key) -> InputError | None:
+        """What keeps the published artifact from being used, without reading its files; None if nothing does."""
+        try:
+            if (artifact := self.find(key)) is not None:
+                artifact.check_sizes()
+        except InputError as error:
+            return error
+        return None
+
     def newest(self, scene: str, stage: str) -> Artifact | None:
         """The artifact of a stage that was made or asked for last, or None if it cannot be read or there is none."""
         links = [link for link in (self.root / scene / stage).glob(f"{LATEST}*") if link.is_symlink() and link.exists()]
@@ -186,7 +204,7 @@ class ArtifactStore:
         try:
             point_at(link, key.fingerprint)
         except OSError as error:
-            if error.errno not in tolerated:
+            if error.errno not in (*tolerated, *IN_THE_WAY):
                 raise
             if not (link.is_symlink() and link.readlink() == Path(key.fingerprint)):
                 log.warning("%s stays as it is: %s", link, error.strerror)
@@ -213,6 +231,10 @@ class ArtifactStore:
         path, partial = self.path(key), self.partial(key)
         make_folder(path.parent)
         with _locked(path.parent / f".lock-{key.fingerprint}", key):
+            if (damage := self.damage(key)) is not None:
+                log.warning("%s: %s: made again", damage.where, damage.found)
+                remove_at_once(path)
+                self._known.pop(key, None)
             if (found := self.find(key)) is not None:
                 # Who made it may have been killed before it was linked to, and may call it otherwise. On a full disk
                 # the run ends, as the next one must find a reason to link to it.

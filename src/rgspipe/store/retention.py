@@ -13,16 +13,13 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 
 from rgspipe.store.artifacts import LATEST, ArtifactStore, Key
-from rgspipe.store.files import remove_tree, sync
+from rgspipe.store.files import GONE, remove_at_once, remove_tree
 from rgspipe.store.fingerprints import DIGITS
 from rgspipe.store.manifest import MANIFEST
 from rgspipe.store.unwritable import told_below
 
 #: The stage whose results are removed only where it is named.
 REPORT = "report"
-
-#: What a folder is called while it is removed; it is no artifact any more.
-GONE = ".gone-"
 
 #: What a folder is called while an artifact is made in it, and what is locked meanwhile.
 PARTIAL, LOCK = ".partial-", ".lock-"
@@ -156,10 +153,7 @@ def remove(outputs: Path, gone: Collection[Stored]) -> Iterator[Stored]:
                 continue
             if one.whole:
                 _unlink(one)
-            away = one.folder.with_name(f"{GONE}{one.folder.name.lstrip('.')}")
-            one.folder.rename(away)
-            sync(away.parent)
-            remove_tree(away)
+            remove_at_once(one.folder)
             yield one
 
 
