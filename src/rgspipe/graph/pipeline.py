@@ -42,6 +42,7 @@ NO_RESULT = (
     "rgspipe.stages.sources",
     "rgspipe.store.artifacts",
     "rgspipe.store.files",
+    "rgspipe.store.locks",
     "rgspipe.store.manifest",
     "rgspipe.store.status",
     "rgspipe.store.unwritable",

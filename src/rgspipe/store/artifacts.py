@@ -21,8 +21,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from filelock import FileLock, Timeout
-
 from rgspipe.errors import InputError
 from rgspipe.machine.description import PeakMemory, library_versions, machine
 from rgspipe.store.files import (
@@ -38,6 +36,7 @@ from rgspipe.store.files import (
     unfinished_links,
     write_json,
 )
+from rgspipe.store.locks import lock_file, locked
 from rgspipe.store.manifest import MANIFEST, SCHEMA_VERSION, inventory, read_manifest
 
 #: What links to the newest artifacts are called, or begin with.
@@ -121,7 +120,7 @@ class Artifact:
     def _check_size(self, path: Path, entry: Mapping[str, Any]) -> None:
         if not path.is_file():
             raise self._damaged(path, entry, "no file")
-        if (size := path.stat().st_size) != entry["bytes"]:
+        if path.stat().st_size != entry["bytes"] and (size := _size_now(path)) != entry["bytes"]:
             raise self._damaged(path, entry, f"{size} bytes")
 
     def _damaged(self, path: Path, entry: Mapping[str, Any], found: str) -> InputError:
@@ -230,7 +229,7 @@ class ArtifactStore:
         """
         path, partial = self.path(key), self.partial(key)
         make_folder(path.parent)
-        with _locked(path.parent / f".lock-{key.fingerprint}", key):
+        with locked(path.parent, key.fingerprint):
             if (damage := self.damage(key)) is not None:
                 log.warning("%s: %s: made again", damage.where, damage.found)
                 remove_at_once(path)
@@ -246,7 +245,7 @@ class ArtifactStore:
             try:
                 facts = make(partial)
             except InputError:
-                _forget(partial, path.parent / f".lock-{key.fingerprint}")
+                _forget(partial, lock_file(path.parent, key.fingerprint))
                 raise
             seconds = round(time.perf_counter() - start, 3)
             made = {"seconds": seconds, "peak_memory_mib": memory.mib(), "resumed": resumed, "facts": dict(facts)}
@@ -275,24 +274,19 @@ class ArtifactStore:
         publish(partial, path)
 
 
-def _locked(lock_file: Path, key: Key) -> FileLock:
-    # The umask says who else may hold it: whoever may write to the folder of a group must be able to.
-    os.close(os.open(lock_file, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o666))
-    lock = FileLock(lock_file)
-    try:
-        return lock.acquire(timeout=0)
-    except Timeout:
-        log.info("%s: another process is making %s; waiting for it", key.stage, key.fingerprint)
-        return lock.acquire()
+def _size_now(path: Path) -> int:
+    """How long a file is; a network file system may have remembered it from when it was written, until it is opened."""
+    with path.open("rb") as stream:
+        return os.fstat(stream.fileno()).st_size
 
 
-def _forget(partial: Path, lock_file: Path) -> None:
+def _forget(partial: Path, lock: Path) -> None:
     """Leave no trace of what was refused before anything was made of it; its lock is held."""
     if any(path.is_file() for path in partial.rglob("*")):
         return
     remove_tree(partial)
     # Who waits for the lock sees that its file is gone, and takes a new one.
-    lock_file.unlink()
+    lock.unlink()
 
 
 def _remove_scratch(partial: Path) -> None:
