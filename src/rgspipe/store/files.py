@@ -150,17 +150,18 @@ def remove_tree(folder: Path) -> None:
 def remove_at_once(folder: Path) -> None:
     """Remove a folder, or a file in its place, in one step, then take it apart: a kill leaves it whole or gone.
 
-    What is left of it is called `.gone-` and its name.
+    What is left of a folder is called `.gone-` and its name.
     """
-    away = folder.with_name(f"{GONE}{folder.name.lstrip('.')}")
-    if away.exists():  # an earlier kill left it
-        remove_tree(away)
-    folder.rename(away)
-    sync(away.parent)
-    if away.is_dir() and not away.is_symlink():
+    if folder.is_dir() and not folder.is_symlink():
+        away = folder.with_name(f"{GONE}{folder.name.lstrip('.')}")
+        if away.exists():  # an earlier kill left it
+            remove_tree(away)
+        folder.rename(away)
+        sync(away.parent)
         remove_tree(away)
     else:
-        away.unlink()
+        folder.unlink()
+        sync(folder.parent)
 
 
 def publish(partial: Path, folder: Path) -> None:
