@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import json
+import os
 import re
 import shutil
 from collections.abc import Callable
@@ -16,6 +18,7 @@ from rgspipe.config import RgspipeConfig, with_changes
 from rgspipe.errors import InputError
 from rgspipe.graph.pipeline import describe_plan, plan, resolve, run
 from rgspipe.store.artifacts import ArtifactStore
+from rgspipe.store.retention import Choice, removable, remove, stored
 
 
 @pytest.fixture
@@ -190,7 +193,7 @@ def test_foreign_files_count_by_content(config: RgspipeConfig, tmp_path: Path) -
         ("row_03.txt", Path.unlink, "no file"),
         ("manifest.json", lambda path: path.write_text(""), "damaged JSON"),
         ("manifest.json", Path.unlink, "no file"),
-        ("", lambda path: (shutil.rmtree(path), path.write_text("")), "damaged JSON"),
+        ("", lambda path: (shutil.rmtree(path), path.write_text("")), "no file"),
     ],
     ids=["emptied", "removed", "manifest emptied", "manifest removed", "a file in place of the folder"],
 )
@@ -211,6 +214,110 @@ def test_what_is_damaged_is_made_again_and_that_is_said(
     assert any(word in record.message and "made again" in record.message for record in caplog.records)
     assert run(config, toys.load).manifest == whole.manifest
     assert not list(folder.parent.glob(".gone-*"))
+
+
+def test_what_is_set_aside_loses_nothing_and_goes_with_the_next_prune(config: RgspipeConfig) -> None:
+    """What somebody put there, too."""
+    sow = with_changes(config, {"stage": "sow"})
+    folder = run(sow, toys.load).path
+    (folder / "notes.txt").write_text("mine")
+    (folder / "row_03.txt").unlink()
+    for number in (1, 2):
+        run(sow, toys.load)
+        aside = folder.with_name(f".damaged-{number}-{folder.name}")
+        assert aside.is_dir()
+        (folder / "row_03.txt").unlink()
+    assert (folder.with_name(f".damaged-1-{folder.name}") / "notes.txt").read_text() == "mine"
+    run(sow, toys.load)
+    outputs = Path(config.outputs)
+    gone = list(remove(outputs, removable(stored(outputs), Choice())))
+    assert sorted(one.folder.name[:9] for one in gone) == [".damaged-"] * 3
+    assert [path.name for path in folder.parent.glob(".damaged*")] == [] and folder.exists()
+
+
+@pytest.mark.parametrize(
+    ("change", "word"),
+    [
+        ({"schema": 2}, "another schema"),
+        ({"stage": "grow"}, "not its own"),
+        ({"config": None}, "not its own"),
+        ({"code": None}, "not its own"),
+    ],
+)
+def test_what_another_version_made_is_neither_used_nor_touched(
+    config: RgspipeConfig, change: dict[str, object], word: str
+) -> None:
+    sow = with_changes(config, {"stage": "sow"})
+    folder = run(sow, toys.load).path
+    manifest = json.loads((folder / "manifest.json").read_text()) | change
+    (folder / "manifest.json").write_text(json.dumps(manifest))
+    with pytest.raises(InputError, match=rf"manifest\.json.*{word}"):
+        run(sow, toys.load)
+    run(with_changes(sow, {"dataset.resolution": 9}), toys.load)  # compares its settings with what is there
+    assert json.loads((folder / "manifest.json").read_text()) == manifest
+
+
+def _dangling(path: Path) -> None:
+    shutil.rmtree(path) if path.is_dir() else path.unlink()
+    path.symlink_to("/nowhere/at/all")
+
+
+@pytest.mark.parametrize("name", ["", "row_03.txt"], ids=["of the result", "of a file in it"])
+def test_a_link_that_leads_nowhere_is_told(config: RgspipeConfig, name: str) -> None:
+    """As of results that were moved to a disk which is not mounted."""
+    sow = with_changes(config, {"stage": "sow"})
+    folder = run(sow, toys.load).path
+    _dangling(folder / name)
+    for _ in range(2):
+        with pytest.raises(InputError, match="link that leads nowhere"):
+            run(sow, toys.load)
+    assert (folder / name).is_symlink()
+    assert not list(folder.parent.glob(".partial-*"))
+
+
+@pytest.mark.parametrize(
+    ("place", "put"),
+    [
+        ("..", lambda path: path.symlink_to("/nowhere")),
+        ("..", lambda path: path.write_text("")),
+        ("../..", lambda path: path.write_text("")),
+        (".partial-", lambda path: path.write_text("")),
+        (".partial-", lambda path: path.symlink_to(path.parents[2])),
+        (".lock-", Path.mkdir),
+        (".lock-", lambda path: path.symlink_to(path.name)),
+    ],
+    ids=[
+        "stage: dangling",
+        "stage: file",
+        "scene: file",
+        "partial: file",
+        "partial: link",
+        "lock: folder",
+        "lock: loop",
+    ],
+)
+def test_what_lies_in_the_way_is_named_and_stays(
+    config: RgspipeConfig, place: str, put: Callable[[Path], object]
+) -> None:
+    sow = with_changes(config, {"stage": "sow"})
+    folder = ArtifactStore(Path(config.outputs)).path(resolve(sow, toys.load).key)
+    path = {"..": folder.parent, "../..": folder.parents[1]}.get(place) or folder.with_name(place + folder.name)
+    path.parent.mkdir(parents=True)
+    put(path)
+    for _ in range(2):
+        with pytest.raises(InputError, match=re.escape(str(path))):
+            run(sow, toys.load)
+    assert os.path.lexists(path)
+    assert not folder.exists()
+
+
+def test_a_manifest_that_is_a_pipe_is_not_waited_for(config: RgspipeConfig) -> None:
+    sow = with_changes(config, {"stage": "sow"})
+    path = run(sow, toys.load).path / "manifest.json"
+    path.unlink()
+    os.mkfifo(path)
+    with pytest.raises(InputError, match="no regular file"):
+        run(sow, toys.load)
 
 
 def test_content_that_changed_is_refused_when_it_is_read(config: RgspipeConfig) -> None:

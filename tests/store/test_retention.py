@@ -92,6 +92,37 @@ def test_a_removal_that_was_killed_ends_with_the_next(store: Path, monkeypatch: 
     assert not (store / "room" / "fit" / f".gone-{full('b2')}").exists()
 
 
+@pytest.mark.parametrize("name", [".gone-fishing", ".gone-", f"runs/{full('b2')}", "thesis", ".damaged-goods"])
+def test_what_is_not_called_as_results_are_stays(tmp_path: Path, name: str) -> None:
+    """Whoever names a folder that is no store, such as their home."""
+    file = tmp_path / "projects" / "work" / name / "chapter.tex"
+    if name.startswith("runs"):
+        file = tmp_path / name.replace("/", "/today/.gone-") / "chapter.tex"
+    file.parent.mkdir(parents=True)
+    file.write_text("x")
+    assert list(remove(tmp_path, removable(stored(tmp_path), Choice()))) == []
+    assert file.read_text() == "x"
+    assert not list(tmp_path.rglob(".lock-*"))
+
+
+def test_a_stage_without_links_keeps_what_it_has(store: Path) -> None:
+    """As in a store that was copied without them."""
+    for link in list(store.glob("*/*/latest*")):
+        link.unlink()
+    assert removable(stored(store), Choice()) == []
+    assert names(removable(stored(store), Choice(stage="fit"))) == {"b2", "b3"}
+
+
+@pytest.mark.parametrize(
+    "put_there", [lambda path: path.write_text("x"), lambda path: path.symlink_to("/nowhere")], ids=["file", "link"]
+)
+def test_whatever_a_removal_left_goes(store: Path, put_there: Callable[[Path], object]) -> None:
+    left = store / "room" / "fit" / f".gone-{full('b2')}"
+    put_there(left)
+    assert names(list(remove(store, removable(stored(store), Choice())))) == {"b2"}
+    assert not os.path.lexists(left)
+
+
 @pytest.mark.parametrize("step", range(8))
 def test_a_kill_at_any_step_leaves_whole_results_and_links_that_lead_somewhere(
     store: Path, step: int, monkeypatch: pytest.MonkeyPatch

@@ -44,6 +44,7 @@ NO_RESULT = (
     "rgspipe.store.files",
     "rgspipe.store.locks",
     "rgspipe.store.manifest",
+    "rgspipe.store.partial",
     "rgspipe.store.status",
     "rgspipe.store.unwritable",
     "rgspipe.store.whole_files",

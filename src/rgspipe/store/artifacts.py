@@ -24,20 +24,20 @@ from typing import Any
 from rgspipe.errors import InputError
 from rgspipe.machine.description import PeakMemory, library_versions, machine
 from rgspipe.store.files import (
-    IN_THE_WAY,
     NO_RIGHT,
+    OCCUPIED,
     UNWRITABLE,
     make_folder,
     point_at,
     publish,
-    remove_at_once,
-    remove_tree,
+    set_aside,
     sha256,
     unfinished_links,
     write_json,
 )
 from rgspipe.store.locks import lock_file, locked
-from rgspipe.store.manifest import MANIFEST, SCHEMA_VERSION, inventory, read_manifest
+from rgspipe.store.manifest import MANIFEST, SCHEMA_VERSION, DamagedError, inventory, read_manifest
+from rgspipe.store.partial import PARTIAL, begin, forget, remove_scratch
 
 #: What links to the newest artifacts are called, or begin with.
 LATEST = "latest"
@@ -118,15 +118,19 @@ class Artifact:
             raise self._damaged(path, entry, "other content (its checksum differs)")
 
     def _check_size(self, path: Path, entry: Mapping[str, Any]) -> None:
+        if path.is_symlink() and not path.exists():
+            where = f"a link that leads nowhere ({path.readlink()})"
+            remedy = f"See that the place it leads to is there, or remove {self.path}."
+            raise InputError(path, expected=f"a file of {self.stage}", found=where, remedy=remedy)
         if not path.is_file():
             raise self._damaged(path, entry, "no file")
         if path.stat().st_size != entry["bytes"] and (size := _size_now(path)) != entry["bytes"]:
             raise self._damaged(path, entry, f"{size} bytes")
 
-    def _damaged(self, path: Path, entry: Mapping[str, Any], found: str) -> InputError:
+    def _damaged(self, path: Path, entry: Mapping[str, Any], found: str) -> DamagedError:
         expected = f"the {entry['bytes']} bytes that {self.stage} wrote"
         remedy = f"Remove the folder {self.path} and run again: the stage will make it anew."
-        return InputError(path, expected=expected, found=found, remedy=remedy)
+        return DamagedError(path, expected=expected, found=found, remedy=remedy)
 
 
 @dataclass(frozen=True)
@@ -142,7 +146,7 @@ class ArtifactStore:
 
     def partial(self, key: Key) -> Path:
         """The folder in which it is made."""
-        return self.root / key.scene / key.stage / f".partial-{key.fingerprint}"
+        return self.root / key.scene / key.stage / f"{PARTIAL}{key.fingerprint}"
 
     def find(self, key: Key) -> Artifact | None:
         """The published artifact, or None.
@@ -151,6 +155,9 @@ class ArtifactStore:
             InputError: there is a folder, but its manifest is missing or not its own.
         """
         path = self.path(key)
+        if path.is_symlink() and not path.exists():
+            found, remedy = f"a link that leads nowhere ({path.readlink()})", "Mount its disk, or remove the link."
+            raise InputError(path, expected=f"a result of {key.stage}", found=found, remedy=remedy)
         if not path.exists():
             return None
         if key not in self._known:
@@ -158,18 +165,21 @@ class ArtifactStore:
         return self._known[key]
 
     def usable(self, key: Key) -> Artifact | None:
-        """The published artifact if its manifest is its own and every file is as long as it was written, else None.
+        """The published artifact if every file is there and as long as it was written, else None.
 
-        One that is not is made again; `damage` says what is wrong with it.
+        One that is not is set aside and made again; `damage` says what is wrong with it.
+
+        Raises:
+            InputError: what lies there is none of this store's: another version's, or a link that leads nowhere.
         """
         return None if self.damage(key) else self.find(key)
 
-    def damage(self, key: Key) -> InputError | None:
-        """What keeps the published artifact from being used, without reading its files; None if nothing does."""
+    def damage(self, key: Key) -> DamagedError | None:
+        """What of the published artifact is not as it was written, without reading its files; None if all is."""
         try:
             if (artifact := self.find(key)) is not None:
                 artifact.check_sizes()
-        except InputError as error:
+        except DamagedError as error:
             return error
         return None
 
@@ -203,7 +213,7 @@ class ArtifactStore:
         try:
             point_at(link, key.fingerprint)
         except OSError as error:
-            if error.errno not in (*tolerated, *IN_THE_WAY):
+            if error.errno not in (*tolerated, *OCCUPIED):
                 raise
             if not (link.is_symlink() and link.readlink() == Path(key.fingerprint)):
                 log.warning("%s stays as it is: %s", link, error.strerror)
@@ -231,21 +241,19 @@ class ArtifactStore:
         make_folder(path.parent)
         with locked(path.parent, key.fingerprint):
             if (damage := self.damage(key)) is not None:
-                log.warning("%s: %s: made again", damage.where, damage.found)
-                remove_at_once(path)
+                log.warning("%s: %s: made again; what is left is in %s", damage.where, damage.found, set_aside(path))
                 self._known.pop(key, None)
             if (found := self.find(key)) is not None:
                 # Who made it may have been killed before it was linked to, and may call it otherwise. On a full disk
                 # the run ends, as the next one must find a reason to link to it.
                 self._point_at(key, variant, NO_RIGHT)
                 return found, False
-            resumed = partial.exists()
-            partial.mkdir(exist_ok=True)
+            resumed = begin(partial)
             start, memory = time.perf_counter(), PeakMemory()
             try:
                 facts = make(partial)
             except InputError:
-                _forget(partial, lock_file(path.parent, key.fingerprint))
+                forget(partial, lock_file(path.parent, key.fingerprint))
                 raise
             seconds = round(time.perf_counter() - start, 3)
             made = {"seconds": seconds, "peak_memory_mib": memory.mib(), "resumed": resumed, "facts": dict(facts)}
@@ -257,7 +265,7 @@ class ArtifactStore:
 
     def _publish(self, key: Key, recipe: Mapping[str, Any], made: Mapping[str, Any]) -> None:
         path, partial = self.path(key), self.partial(key)
-        _remove_scratch(partial)
+        remove_scratch(partial)
         manifest = {
             "schema": SCHEMA_VERSION,
             "scene": key.scene,
@@ -278,20 +286,3 @@ def _size_now(path: Path) -> int:
     """How long a file is; a network file system may have remembered it from when it was written, until it is opened."""
     with path.open("rb") as stream:
         return os.fstat(stream.fileno()).st_size
-
-
-def _forget(partial: Path, lock: Path) -> None:
-    """Leave no trace of what was refused before anything was made of it; its lock is held."""
-    if any(path.is_file() for path in partial.rglob("*")):
-        return
-    remove_tree(partial)
-    # Who waits for the lock sees that its file is gone, and takes a new one.
-    lock.unlink()
-
-
-def _remove_scratch(partial: Path) -> None:
-    for path in [path for path in partial.rglob(".*") if path.exists()]:
-        if path.is_dir() and not path.is_symlink():
-            remove_tree(path)
-        else:
-            path.unlink(missing_ok=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import hashlib
+import itertools
 import json
 import os
 import secrets
@@ -19,8 +20,8 @@ NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 NO_RIGHT = (errno.EROFS, errno.EACCES, errno.EPERM)
 UNWRITABLE = NO_ROOM + NO_RIGHT
 
-#: Why a link cannot be made where there is room and the right to: a folder has its name.
-IN_THE_WAY = (errno.EISDIR, errno.ENOTEMPTY)
+#: Why a file, folder or link cannot be made where there is room and the right to: something else has its name.
+OCCUPIED = (errno.EISDIR, errno.ENOTDIR, errno.ENOTEMPTY, errno.EEXIST, errno.ELOOP)
 
 #: Characters of a file's name that the one it is written under repeats: names may have 255 bytes.
 LONGEST_STEM = 40
@@ -30,6 +31,9 @@ LONGEST_NAME = 200
 
 #: What a folder's name begins with while it is removed, so that nobody takes it for what it was.
 GONE = ".gone-"
+
+#: What the name of a damaged artifact begins with that was set aside; a number follows.
+ASIDE = ".damaged-"
 
 #: What the name of a link ends with while it is made.
 UNFINISHED = ".new"
@@ -148,20 +152,33 @@ def remove_tree(folder: Path) -> None:
 
 
 def remove_at_once(folder: Path) -> None:
-    """Remove a folder, or a file in its place, in one step, then take it apart: a kill leaves it whole or gone.
+    """Remove a folder in one step, then take it apart: a kill leaves it whole or gone.
 
-    What is left of a folder is called `.gone-` and its name.
+    What is left of it is called `.gone-` and its name.
     """
-    if folder.is_dir() and not folder.is_symlink():
-        away = folder.with_name(f"{GONE}{folder.name.lstrip('.')}")
-        if away.exists():  # an earlier kill left it
-            remove_tree(away)
-        folder.rename(away)
-        sync(away.parent)
-        remove_tree(away)
+    away = folder.with_name(f"{GONE}{folder.name.lstrip('.')}")
+    remove_any(away)
+    folder.rename(away)
+    sync(away.parent)
+    remove_any(away)
+
+
+def set_aside(path: Path) -> Path:
+    """Give what lies somewhere a name by which nobody takes it for what it was; its new place."""
+    number = itertools.count(1)
+    while os.path.lexists(away := path.with_name(f"{ASIDE}{next(number)}-{path.name}")):
+        pass
+    path.rename(away)
+    sync(away.parent)
+    return away
+
+
+def remove_any(path: Path) -> None:
+    """Remove what has a name, if anything has: a folder with all that is in it, a link but not what it leads to."""
+    if path.is_dir() and not path.is_symlink():
+        remove_tree(path)
     else:
-        folder.unlink()
-        sync(folder.parent)
+        path.unlink(missing_ok=True)
 
 
 def publish(partial: Path, folder: Path) -> None:

@@ -14,21 +14,28 @@ SCHEMA_VERSION = 1
 MANIFEST = "manifest.json"
 
 
+class DamagedError(InputError):
+    """What was published and is not as it was written: a file that is gone, cut off, or emptied."""
+
+
 def read_manifest(folder: Path, stage: str, fingerprint: str) -> Mapping[str, Any]:
     """What the manifest in a folder says.
 
     Raises:
-        InputError: it is missing, damaged, or that of another artifact.
+        DamagedError: it is gone, or no JSON.
+        InputError: it is that of another artifact, or of another version of rgspipe.
     """
     path = folder / MANIFEST
     remedy = f"Remove the folder {folder} and run again: the stage will make it anew."
     expected = f"the manifest of {stage} {fingerprint} (schema {SCHEMA_VERSION})"
+    if path.exists() and not path.is_file():
+        raise InputError(path, expected=expected, found="no regular file", remedy=remedy)
     try:
         manifest = parse_json(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise InputError(path, expected=expected, found="no file", remedy=remedy) from None
-    except (IsADirectoryError, NotADirectoryError, ValueError) as error:
-        raise InputError(path, expected=expected, found=f"damaged JSON ({error})", remedy=remedy) from None
+    except (FileNotFoundError, NotADirectoryError):
+        raise DamagedError(path, expected=expected, found="no file", remedy=remedy) from None
+    except ValueError as error:
+        raise DamagedError(path, expected=expected, found=f"damaged JSON ({error})", remedy=remedy) from None
     if not isinstance(manifest, dict) or manifest.get("schema") != SCHEMA_VERSION:
         raise InputError(path, expected=expected, found="another schema", remedy=remedy)
     if (manifest.get("fingerprint"), manifest.get("stage")) != (fingerprint, stage) or not _is_whole(manifest):
@@ -47,7 +54,8 @@ def inventory(folder: Path) -> dict[str, dict[str, Any]]:
 def _is_whole(manifest: Mapping[str, Any]) -> bool:
     """Whether a manifest has what is asked of it later."""
     files, facts, inputs = manifest.get("files"), manifest.get("facts"), manifest.get("inputs", {})
-    if not all(isinstance(part, dict) for part in (files, facts, inputs)) or not all(map(_lies_within, files)):
+    recipe = [manifest.get(name, {}) for name in ("config", "code", "foreign")]
+    if not all(isinstance(part, dict) for part in (files, facts, inputs, *recipe)) or not all(map(_lies_within, files)):
         return False
     if not all(isinstance(prints, list) and all(isinstance(one, str) for one in prints) for prints in inputs.values()):
         return False

@@ -13,20 +13,21 @@ from pathlib import Path
 from filelock import Timeout
 
 from rgspipe.store.artifacts import LATEST, ArtifactStore, Key
-from rgspipe.store.files import GONE, remove_at_once, remove_tree
+from rgspipe.store.files import ASIDE, GONE, remove_any, remove_at_once
 from rgspipe.store.fingerprints import DIGITS
 from rgspipe.store.locks import LOCK, locked_if_free
 from rgspipe.store.manifest import MANIFEST
+from rgspipe.store.partial import PARTIAL
 from rgspipe.store.unwritable import told_below
 
 #: The stage whose results are removed only where it is named.
 REPORT = "report"
 
-#: What a folder is called while an artifact is made in it.
-PARTIAL = ".partial-"
-
-#: What artifacts are called. Whoever names a folder that is no store must not lose what else is in it.
-FINGERPRINT = re.compile(f"[0-9a-f]{{{DIGITS}}}")
+#: What artifacts are called, those in the making, damaged ones that were set aside, and what is left of a removal.
+#: Whoever names a folder that is no store must not lose what else is in it.
+UNFINISHED = rf"(?:{re.escape(PARTIAL)}|{re.escape(ASIDE)}\d+-)"
+NAME = re.compile(rf"({UNFINISHED})?([0-9a-f]{{{DIGITS}}})")
+LEFT = re.compile(rf"{re.escape(GONE)}(?:partial-|damaged-\d+-)?([0-9a-f]{{{DIGITS}}})")
 
 
 @dataclass(frozen=True)
@@ -85,9 +86,9 @@ class Choice:
 
 def artifact_keys(outputs: Path) -> Iterator[Key]:
     """Every folder that has the place and the name of an artifact."""
-    for folder in _folders(outputs):
-        if not folder.name.startswith(PARTIAL):
-            yield Key(*folder.relative_to(outputs).parts)
+    for _, is_artifact, key in _folders(outputs):
+        if is_artifact:
+            yield key
 
 
 def stored(outputs: Path) -> list[Stored]:
@@ -99,7 +100,7 @@ def stored(outputs: Path) -> list[Stored]:
     store = ArtifactStore(outputs)
     with told_below(outputs):
         linked = {link.resolve() for link in outputs.glob(f"*/*/{LATEST}*") if link.is_symlink()}
-        found = [_stored(store, folder, linked) for folder in _folders(outputs)]
+        found = [_stored(store, *one, linked) for one in _folders(outputs)]
     return [one for one in found if one is not None]
 
 
@@ -121,10 +122,16 @@ def removable(everything: Sequence[Stored], choice: Choice) -> list[Stored]:
     """What goes: what was chosen and nothing that stays needs.
 
     Where it is left open which, those go that no `latest` leads to and no report was made from, and what interrupted
-    runs left.
+    runs left. A stage without any such link, as in a store that was copied without them, keeps all of its results:
+    nobody knows which are those of today.
     """
     if choice.is_open:
-        chosen = [one for one in everything if choice.takes(one) and not one.linked]
+        known = {(one.key.scene, one.key.stage) for one in everything if one.linked}
+        chosen = [
+            one
+            for one in everything
+            if choice.takes(one) and not one.linked and (not one.whole or (one.key.scene, one.key.stage) in known)
+        ]
     else:
         chosen = [one for one in everything if choice.takes(one)]
     asked = {one.folder for one in chosen}
@@ -142,12 +149,9 @@ def remove(outputs: Path, gone: Collection[Stored]) -> Iterator[Stored]:
         InputError: there is no right to remove it.
     """
     with told_below(outputs):
-        for left in outputs.glob(f"*/*/{GONE}*"):
-            with (
-                contextlib.suppress(Timeout),
-                locked_if_free(left.parent, left.name.removeprefix(GONE).removeprefix(PARTIAL[1:])),
-            ):
-                remove_tree(left)
+        for left, name in _named(outputs, LEFT):
+            with contextlib.suppress(Timeout), locked_if_free(left.parent, name[1]):
+                remove_any(left)
     for one in sorted(gone, key=lambda one: one.made, reverse=True):
         with told_below(outputs), contextlib.suppress(Timeout), locked_if_free(one.folder.parent, one.key.fingerprint):
             if not one.folder.exists():
@@ -165,20 +169,24 @@ def _unlink(one: Stored) -> None:
             link.unlink()
 
 
-def _folders(outputs: Path) -> Iterator[Path]:
-    """Folders of artifacts, and of those that are in the making."""
-    for folder in sorted(outputs.glob("*/*/*")):
-        named = FINGERPRINT.fullmatch(folder.name.removeprefix(PARTIAL))
-        is_run = folder.relative_to(outputs).parts[0] == "runs"
-        if named and not is_run and folder.is_dir() and not folder.is_symlink():
-            yield folder
+def _named(outputs: Path, pattern: re.Pattern[str]) -> Iterator[tuple[Path, re.Match[str]]]:
+    """What is called so in the place of an artifact, and how its name fits."""
+    for path in sorted(outputs.glob("*/*/*")):
+        if (name := pattern.fullmatch(path.name)) and path.relative_to(outputs).parts[0] != "runs":
+            yield path, name
 
 
-def _stored(store: ArtifactStore, folder: Path, linked: Collection[Path]) -> Stored | None:
+def _folders(outputs: Path) -> Iterator[tuple[Path, bool, Key]]:
+    """Folders of artifacts, in the making, and set aside; whether it is an artifact, and of which key."""
+    for folder, name in _named(outputs, NAME):
+        if folder.is_dir() and not folder.is_symlink():
+            scene, stage, _ = folder.relative_to(outputs).parts
+            yield folder, name[1] is None, Key(scene, stage, name[2])
+
+
+def _stored(store: ArtifactStore, folder: Path, is_artifact: bool, key: Key, linked: Collection[Path]) -> Stored | None:
     """What a folder is; None for one in the making that is an artifact, or gone, by now."""
-    scene, stage, name = folder.relative_to(store.root).parts
-    key = Key(scene, stage, name.removeprefix(PARTIAL))
-    if name.startswith(PARTIAL):
+    if not is_artifact:
         try:
             made = folder.stat().st_mtime
         except FileNotFoundError:

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from rgspipe.errors import InputError
-from rgspipe.store.files import NO_ROOM, UNWRITABLE, told_number
+from rgspipe.store.files import NO_ROOM, OCCUPIED, UNWRITABLE, told_number
 
 
 @contextlib.contextmanager
@@ -40,6 +40,13 @@ def refusal(where: str, path: Path, number: int) -> InputError:
             remedy="Free some, or give a folder on another disk: outputs=FOLDER. "
             "What is done is kept, and the next run goes on from there.",
         )
+    if number in OCCUPIED:
+        return InputError(
+            where,
+            expected="folders of results, and nothing else by their names",
+            found=f"{path}: {os.strerror(number)}",
+            remedy="See what it is, and remove or rename it.",
+        )
     return InputError(
         where,
         expected="a folder that can be read and written to",
@@ -55,7 +62,7 @@ def _number(error: Exception, root: Path) -> int | None:
         # Words of a library or of another process, and a stream that is written to, name no file.
         return number if number in NO_ROOM else None
     path = Path(os.fsdecode(error.filename)).absolute()
-    return number if number in UNWRITABLE and path.is_relative_to(root.absolute()) else None
+    return number if number in UNWRITABLE + OCCUPIED and path.is_relative_to(root.absolute()) else None
 
 
 def _owner(path: Path) -> str:
