@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -16,7 +17,8 @@ from rgspipe.stages.images.generate_dataset import STAGE
 
 pytest.importorskip("bpy")
 
-#: A cube with a texture beside the file, a cube of a library with a texture of its own, tiles, and a packed texture.
+#: A cube with a texture beside the file, a cube of a library with a texture of its own, tiles, a packed texture, empty
+#: geometry nodes, and a measured lamp in a group of nodes.
 WRITE = """
 import sys
 from pathlib import Path
@@ -53,13 +55,21 @@ tiles = texture("tile.1001.png")
 tiles.source = "TILED"
 tiles.filepath = str(folder / "tile.<UDIM>.png")
 cube(tiles)
+bpy.context.object.modifiers.new("nodes", "NODES").node_group = bpy.data.node_groups.new("empty", "GeometryNodeTree")
+group = bpy.data.node_groups.new("beam", "ShaderNodeTree")
+measured = group.nodes.new("ShaderNodeTexIES")
+measured.mode, measured.filepath = "EXTERNAL", "//lamp.ies"
+(folder / "lamp.ies").write_text("IESNA")
+bpy.ops.object.light_add(type="POINT")
+bpy.context.object.data.use_nodes = True
+bpy.context.object.data.node_tree.nodes.new("ShaderNodeGroup").node_tree = group
 with bpy.data.libraries.load(str(folder / "library.blend"), link=True) as (there, wanted):
     wanted.objects = ["lent"]
 bpy.context.scene.collection.objects.link(wanted.objects[0])
 bpy.ops.wm.save_as_mainfile(filepath=str(folder / "room.blend"), relative_remap=True)
 """
 
-NAMED = {"library.blend", "of_library.png", "own.png", "tile.1001.png", "tile.1002.png"}
+NAMED = {"lamp.ies", "library.blend", "of_library.png", "own.png", "tile.1001.png", "tile.1002.png"}
 
 
 @pytest.fixture(scope="module")
@@ -72,10 +82,12 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def room(written: Path, tmp_path: Path) -> Path:
-    """A copy to change, in another place: the names in it are relative."""
+    """A copy to change, in another place, by whose name nothing must be guided: the names in the file are relative."""
+    folder = tmp_path / "[new] room*"
+    folder.mkdir()
     for path in written.iterdir():
-        (tmp_path / path.name).write_bytes(path.read_bytes())
-    return tmp_path / "room.blend"
+        (folder / path.name).write_bytes(path.read_bytes())
+    return folder / "room.blend"
 
 
 def _config(path: Path) -> RgspipeConfig:
@@ -120,6 +132,28 @@ def test_a_folder_counts_below_that_of_the_file_alone(room: Path, tmp_path_facto
     assert texture in blend_links(room).missing
     texture.symlink_to(tmp_path_factory.mktemp("elsewhere"), target_is_directory=True)
     assert {path.name for path in blend_links(room).files[1:]} == NAMED - {"own.png"}
+
+
+@pytest.mark.parametrize("name", ["x" * 300 + ".png", "loop.png"])
+def test_names_that_cannot_be_are_told_as_missing(room: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    (room.parent / "loop.png").symlink_to("loop.png")
+    named = [(str(room.parent / name), False), (str(room.parent / name), True)]
+    monkeypatch.setattr("rgspipe.datasets.blend_links._traced_once", lambda *_: (named, ""))
+    links = blend_links(room)
+    assert links.files == (room,)
+    assert [path.name for path in links.missing] == [name]
+
+
+def test_the_copy_of_a_compressed_file_is_removed(
+    room: Path, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scratch = tmp_path_factory.mktemp("scratch")
+    monkeypatch.setattr(tempfile, "tempdir", str(scratch))
+    for patience in (60.0, 0.15):
+        monkeypatch.setattr("rgspipe.datasets.blend_links.PATIENCE", patience)
+        os.utime(room.parent / "library.blend", (patience, patience))
+        blend_links(room.parent / "library.blend")
+        assert not list(scratch.iterdir())
 
 
 @pytest.mark.parametrize("part", [slice(0, 3000), slice(100, None), slice(0, 0)], ids=["cut off", "no head", "empty"])

@@ -7,19 +7,24 @@ follow without end. Blender itself is not needed.
 from __future__ import annotations
 
 import functools
+import glob
 import json
 import os
+import re
 import subprocess
 import sys
+import tempfile
 from dataclasses import dataclass
 from pathlib import Path
-
-from blender_asset_tracer.trace.file_sequence import expand_sequence
+from string import digits
 
 from rgspipe.datasets.input_file import input_file
 
 #: Seconds in which one file must have been traced. A file of 500 kB takes 0.3.
 PATIENCE = 60.0
+
+#: What stands for the number of a tile in the name of an image.
+TILES = re.compile("<UDIM>|<UVTILE>")
 
 
 @dataclass(frozen=True)
@@ -30,7 +35,7 @@ class BlendLinks:
         files: itself, and what is there. A folder, such as the cache of a simulation, counts with all that is in it
             where it lies below that of the file.
         missing: what is not there.
-        unknown: by file, why it cannot be told what it names.
+        unknown: by file, why not all that it names can be told.
     """
 
     files: tuple[Path, ...]
@@ -51,7 +56,7 @@ def blend_links(path: Path) -> BlendLinks:
         if why:
             unknown[place] = why
         for name in names:
-            if not name.exists():
+            if not _is_there(name):
                 missing[name] = None
             elif name not in found and _counts(name, path):
                 found[name] = None
@@ -59,36 +64,44 @@ def blend_links(path: Path) -> BlendLinks:
     return BlendLinks(tuple(found), tuple(missing), unknown)
 
 
+def _is_there(name: Path) -> bool:
+    """Whether there is something that may be read: not in another user's folder, nor by a name that cannot be."""
+    return os.access(name, os.R_OK)
+
+
 def _counts(name: Path, path: Path) -> bool:
     return path.parent in name.parents if name.is_dir() else bool(input_file(name, f"a file that {path} names"))
 
 
 def _traced(path: Path) -> tuple[list[Path], str]:
-    """What one file names, or why that cannot be told."""
+    """What one file names, and why not all of that can be told."""
     status = path.stat()
-    traced = _traced_once(path, status.st_mtime_ns, status.st_size)
-    if isinstance(traced, str):
-        return [], traced
-    return [one.resolve() for name, sequence in traced for one in _members(Path(name), sequence)], ""
+    names, why = _traced_once(path, status.st_mtime_ns, status.st_size)
+    # Unlike `Path.resolve` this takes links that lead in circles.
+    return [Path(os.path.realpath(one)) for name, sequence in names for one in _members(Path(name), sequence)], why
 
 
 def _members(name: Path, sequence: bool) -> list[Path]:
     """The tiles or frames that are there, or the name itself; a folder is not opened, wherever it lies."""
-    if not sequence or name.is_dir():
+    tiled = TILES.search(name.name) is not None
+    if not sequence or not (tiled or _is_there(name)) or name.is_dir() or not _is_there(name.parent):
         return [name]
-    try:
-        return list(expand_sequence(name)) or [name]
-    except OSError:  # not there
-        return [name]
+    if tiled:
+        pattern = "*".join(glob.escape(part) for part in TILES.split(name.name))
+    else:
+        pattern = f"{glob.escape(name.stem.rstrip(digits))}*{glob.escape(name.suffix)}"
+    return sorted(name.parent.glob(pattern)) or [name]
 
 
 @functools.lru_cache(maxsize=64)
-def _traced_once(path: Path, changed: int, size: int) -> list[tuple[str, bool]] | str:
+def _traced_once(path: Path, changed: int, size: int) -> tuple[list[tuple[str, bool]], str]:
     """As it was when it was changed last; plans ask again and again."""
     command = [sys.executable, "-m", "rgspipe.datasets.blend_trace", str(path)]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-    try:
-        done = subprocess.run(command, env=environment, capture_output=True, timeout=PATIENCE)
-    except subprocess.TimeoutExpired:
-        return f"it takes more than {PATIENCE:.0f} s"
-    return json.loads(done.stdout) if done.returncode == 0 else f"its reader ended with status {done.returncode}"
+    # Of a compressed file it makes a copy, which it cannot remove where it is stopped.
+    with tempfile.TemporaryDirectory(prefix="rgspipe_blend_") as scratch:
+        try:
+            done = subprocess.run(command, env=environment | {"TMPDIR": scratch}, capture_output=True, timeout=PATIENCE)
+        except subprocess.TimeoutExpired:
+            return [], f"it takes more than {PATIENCE:.0f} s"
+    return json.loads(done.stdout) if done.returncode == 0 else ([], f"its reader ended with status {done.returncode}")

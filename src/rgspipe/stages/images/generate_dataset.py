@@ -113,7 +113,7 @@ def _remarks(config: RgspipeConfig, made: Mapping[str, Artifact]) -> tuple[str, 
         return ()
     links = blend_links(Path(config.scene.path or ""))
     remarks = [
-        f"which files {path} names cannot be told ({why}): pack them, or changes of them go unnoticed"
+        f"not all files that {path} names can be told ({why}): pack them, or changes of them go unnoticed"
         for path, why in links.unknown.items()
     ]
     names = [f'"{path}"' for path in links.missing]
