@@ -103,7 +103,7 @@ class _Resolver:
             "code": self.code.fingerprints(stage.run.__module__),
             "sums": order_of_sums(),
         }
-        key = Key(config.scene.folder, stage.name, fingerprint({"stage": stage.name, **recipe}))
+        key = Key(stage.place(config), stage.name, fingerprint({"stage": stage.name, **recipe}))
         return Node(stage, config, changes, key, recipe, inputs, tuple(need.may_fail for need in needs))
 
     def _file(self, path: Path) -> str:
