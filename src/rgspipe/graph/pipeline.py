@@ -191,7 +191,7 @@ def _total(steps: Sequence[Step]) -> list[str]:
         return []
     unknown = dict.fromkeys(step.node.stage.name for step in made if not step.expected)
     rest = f", and what {' and '.join(unknown)} will take" if unknown else ""
-    other = "" if all(time.same for time in known) else "; ~: with other settings"
+    other = "" if all(time.same for time in known) else "; ~: with other settings, or in other scenes"
     return [f"Expected: {in_words(sum(time.seconds for time in known))}{rest} (from earlier runs here{other})"]
 
 
