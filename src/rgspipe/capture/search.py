@@ -42,7 +42,7 @@ BAR = BarOptions()
 #: Rounds in which outliers, variances and the albedo of the unseen follow from the lamps and these from them.
 ROUNDS = 3
 
-#: Is told how many starts have been refined.
+#: Is told of each refinement.
 Told = Callable[[int], object]
 
 
@@ -91,7 +91,7 @@ def ranked(problem: LampProblem, candidates: Candidates, known: Lamps | None) ->
 
 
 def with_one_more(problem: LampProblem, candidates: Candidates, known: Lamps | None, told: Told) -> Lamps:
-    """The best lamps found that are one more than `known`; TRIES starts at most."""
+    """The best lamps found that are one more than `known`; TRIES + 1 refinements at most."""
     costs, logs = ranked(problem, candidates, known)
     ranking, standing = [(int(index),) for index in np.argsort(costs)], CandidatePlaces(candidates.places, None, 0.0)
     found = []
@@ -102,7 +102,9 @@ def with_one_more(problem: LampProblem, candidates: Candidates, known: Lamps | N
         lamps = problem.refined(problem.lamps(places, gains), FIRST)
         found.append((problem.cost(lamps), lamps))
         told(1)
-    return problem.refined(min(found, key=lambda pair: pair[0])[1], LAST)
+    best = problem.refined(min(found, key=lambda pair: pair[0])[1], LAST)
+    told(1)
+    return best
 
 
 def settled(problem: LampProblem, candidates: Candidates, lamps: Lamps, told: Told) -> Tried:
@@ -110,6 +112,7 @@ def settled(problem: LampProblem, candidates: Candidates, lamps: Lamps, told: To
     for left in reversed(range(ROUNDS)):
         problem = weighed(problem, lamps)
         lamps = problem.refined(problem.lamps(lamps.places, lamps.logs), LAST)
+        told(1)
         if left == 1 and len(lamps) > 1:
             lamps = looked_for_again(problem, candidates, lamps, told)
     return Tried.of(problem, lamps)
@@ -192,7 +195,7 @@ def best_with_one_more(problem: LampProblem, candidates: Candidates, known: Lamp
     """The best lamps found that are one more than `known`, settled, while a progress line stands."""
     number = 1 if known is None else len(known) + 1
     looks = 1 if known is None else 1 + number
-    with progress_bar([], f"looking for lamp {number}", looks * TRIES, unit="start") as bar:
+    with progress_bar([], f"looking for lamp {number}", looks * (TRIES + 1) + ROUNDS, unit="step") as bar:
         lamps = with_one_more(problem, candidates, known, bar.update)
         return settled(problem, candidates, lamps, bar.update)
 
