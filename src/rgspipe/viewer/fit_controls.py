@@ -103,7 +103,10 @@ class FitControls:
 
     @property
     def _photographs(self) -> list[Photograph]:
-        return [*self._session.case.photographs, *self._visit.exhibit.references]
+        """Those of the case and the references, each once: browsers refuse a list that offers one name twice."""
+        own = self._session.case.photographs
+        names = {one.name for one in own}
+        return [*own, *(one for one in self._visit.exhibit.references if one.name not in names)]
 
     def _search(self, search: Callable[[], FitResult]) -> None:
         if self.searching:
