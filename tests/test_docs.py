@@ -89,6 +89,13 @@ def test_tests_that_are_named_exist() -> None:
     assert missing == []
 
 
+def test_pages_that_code_and_examples_name_exist() -> None:
+    files = [path for room in ("src", "examples", "tools", "conf", "pipelines") for path in (ROOT / room).rglob("*.*")]
+    texts = [path.read_text() for path in files if path.suffix in (".py", ".ipynb", ".md", ".yaml")]
+    named = {name for text in texts for name in re.findall(r"docs/[\w/]+\.md", text)}
+    assert len(named) > 5 and not [name for name in named if not (ROOT / name).is_file()]
+
+
 def test_values_of_thresholds_are_those_of_the_code() -> None:
     page = (DOCS / "guides" / "doubtful_answers.md").read_text()
     fields = FIELD.findall(page)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 
 import rgspipe as rg
 from rgspipe.datasets.exr import write_channels, write_image
@@ -49,12 +50,12 @@ def blocks(page: str) -> list[str]:
     return BLOCK.findall((ROOT / page).read_text())
 
 
-def photographs(scene: rg.FrozenScene, root: Path) -> None:
-    """A small dataset with depth, in which a lamp stands elsewhere in each image."""
+def photographs(scene: rg.FrozenScene, root: Path, known: bool = True) -> None:
+    """A small dataset with depth, in which a lamp stands elsewhere in each image; or one and the same, not known."""
     entries = []
     for index, x in enumerate((-0.3, -0.1, 0.1, 0.3)):
         camera = rg.Camera.look_at([x, -1.5, 0.05], [0, 0, 0], width=SIDE, height=SIDE)
-        view, light = scene.view(camera), rg.PointLight([-x, -0.3, 0.2], 1.0)
+        view, light = scene.view(camera), rg.PointLight([-x if known else 0.1, -0.3, 0.2], 1.0)
         coverage = view.coverage.reshape(SIDE, SIDE)
         _, depth = camera.project(scene.surfels.centers)
         depth = view.image(depth.float()[:, None].expand(-1, 3).contiguous())[:, :, 0] / coverage.clamp(min=0.1)
@@ -62,7 +63,7 @@ def photographs(scene: rg.FrozenScene, root: Path) -> None:
         name = f"train/r_{index:04}"
         write_image(root / f"{name}.exr", scene.render(view, light).numpy(), np.ones((SIDE, SIDE)))
         write_channels(root / f"{name}_depth.exr", {"Z": depth.numpy()})
-        entries.append(frame_entry(name, camera, light, ("depth",)))
+        entries.append(frame_entry(name, camera, light if known else None, ("depth",)))
     write_transforms(root / "transforms_train.json", entries)
     write_info(root, "room", [[-0.5] * 3, [0.5] * 3], 1.0, [0.0] * 3)
 
@@ -104,3 +105,12 @@ def test_the_tutorial_runs(folder: Path, scene: rg.FrozenScene, capsys) -> None:
     assert len(names["scene"].surfels) == len(names["trained"].surfels) >= 2000
     made = {path.name for path in folder.iterdir()}
     assert made == {"outputs", "my_room", "my_scene", "lights.json", "seen.png"}
+
+
+@pytest.mark.slow
+def test_a_capture_runs_as_the_guide_says(folder: Path, scene: rg.FrozenScene, capsys) -> None:
+    photographs(scene, folder / "my_room", known=False)
+    page = "docs/guides/photographs.md"
+    names = run([block.replace("5000", "600") for block in blocks(page)], page)
+    assert capsys.readouterr().out.startswith("(PointLight(")
+    assert torch.equal(names["scene"].surfels.albedo, names["found"].surfels.albedo)

@@ -8,15 +8,18 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+import pytest
 import torch
 
 from photographed_room import LAMPS, painted_room, photographs
+from rgspipe.capture import search
 from rgspipe.capture.captured import Captured, capture_scene
 from rgspipe.capture.lamp_file import write_lamps
 from rgspipe.capture.options import CaptureOptions
 from rgspipe.capture.words import captured_words
 from rgspipe.datasets.light_file import read_lights
 from rgspipe.evaluation.rig_errors import match_positions
+from rgspipe.progress import progress_bar
 
 OPTIONS = CaptureOptions(gather_rays=256, supersampling=2, grid=6, most=3)
 
@@ -44,6 +47,16 @@ def test_both_lamps_are_found_and_no_third() -> None:
     distances, ratios = errors(found())
     assert distances.max() < 0.008, distances  # 0.0050
     assert np.abs(ratios - 1.0).max() < 0.05, ratios  # 0.005
+
+
+def test_the_search_tells_how_far_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    bars = []
+    monkeypatch.setattr(
+        search, "progress_bar", lambda *given, **named: bars.append(progress_bar(*given, **named)) or bars[-1]
+    )
+    search.found_lamps(found().answer.best.problem, 2, 3)
+    assert [bar.desc for bar in bars] == ["looking for lamp 1", "looking for lamp 2"]
+    assert [bar.n for bar in bars] == [bar.total for bar in bars] == [9, 21]
 
 
 def test_the_albedo_is_that_of_the_paint() -> None:

@@ -101,6 +101,9 @@ def test_nothing_goes_while_a_run_may_need_it(outputs: Path, capsys: pytest.Capt
 
 def test_nothing_goes_while_something_is_made_by_whomever(outputs: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with FileLock(outputs / "cornell" / "harvest" / f".lock-{16 * 'a'}"):
+        assert main(["outputs", "prune", f"outputs={outputs}"]) == 0
+        told = capsys.readouterr().out.splitlines()[-1]
+        assert told.startswith("That is refused for now: ") and 16 * "a" in told
         assert main(["outputs", "prune", f"outputs={outputs}", "remove=true"]) == 2
     assert 16 * "a" in capsys.readouterr().err
     assert len(list(outputs.glob("cornell/*/[0-9a-f]*"))) == 6

@@ -103,3 +103,16 @@ def test_steps_run_in_order_and_their_results_and_times_are_told(
     assert run_sequence("bad.yaml", [], TOYS) == 1
     told = capfd.readouterr()
     assert "Step 1 (break) failed" in told.err and "[2/2]" not in told.out
+
+
+@pytest.mark.slow
+def test_a_pipeline_ends_with_what_comes_after_its_last_step(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.yaml").write_text('steps: [{stage: overview, overrides: ["seed=1,2"], sweep: true}]')
+    assert run_sequence("mine.yaml", ["outputs=here"]) == 0
+    first, second, last = capfd.readouterr().out.splitlines()[-3:]
+    folder = first.removeprefix("Result: ")
+    assert folder.startswith("here/scenes/overview/") and second == first
+    assert last == f"Next, open in a browser: {folder}/overview.html" and Path(folder, "overview.html").is_file()

@@ -48,6 +48,14 @@ def test_runs_with_other_settings_count_where_there_are_none_with_the_same(tmp_p
     assert str(expected(tmp_path)) == "~30 s"
 
 
+def test_other_scenes_tell_where_a_scene_has_no_runs_of_its_own(tmp_path: Path) -> None:
+    put(tmp_path, 1, 30.0)
+    runs = EarlierRuns(ArtifactStore(tmp_path))
+    assert runs.expected(Key("ro[o]m", "fit", 16 * "f"), SETTINGS) == Expected(30.0, same=False)
+    assert runs.expected(Key("room", "fit", 16 * "f"), SETTINGS) == Expected(30.0, same=True)
+    assert runs.expected(Key("hall", "train", 16 * "f"), SETTINGS) is None
+
+
 @pytest.mark.parametrize(
     "more",
     [

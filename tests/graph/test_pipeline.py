@@ -75,7 +75,9 @@ def test_the_plan_says_what_it_will_take_where_that_is_known(config: RgspipeConf
     sow, *grown, harvest, total = text({"dataset.resolution": 9})[1:]
     assert re.search(time + r"  dataset\.resolution 8 → 9", sow) and re.search(time + "  another grow", harvest)
     assert all(re.search(time, line) for line in grown)
-    assert re.fullmatch(r"Expected: [\d.]+ s \(from earlier runs here; ~: with other settings\)", total)
+    assert re.fullmatch(
+        r"Expected: [\d.]+ s \(from earlier runs here; ~: with other settings, .* other scenes\)", total
+    )
 
 
 def test_what_the_plan_could_not_remark_yet_is_said_when_a_stage_begins(

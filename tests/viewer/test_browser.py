@@ -20,6 +20,7 @@ from rgspipe.scene import Camera, PointLight
 from rgspipe.scene.lights import KINDS
 from rgspipe.viewer.lamp_controls import ARMS
 from rgspipe.viewer.lamp_numbers import RGB, numbers_of
+from rgspipe.viewer.material import Photograph
 from rgspipe.viewer.page import Page
 from rgspipe.viewer.saving import FRAMES
 from rgspipe.viewer.serve import Viewer, view
@@ -50,7 +51,9 @@ PATIENCE = 300.0
 
 @pytest.fixture(scope="module")
 def viewer(frozen: FrozenScene) -> Iterator[Viewer]:
-    made = view(frozen, LAMP, camera=CAMERA, port=8190, resolution=64)
+    # It has the name that the visitor's own photograph is going to have, and is offered no more then.
+    reference = Photograph("photograph 0", CAMERA, frozen.render(CAMERA, LAMP))
+    made = view(frozen, LAMP, camera=CAMERA, references=[reference], port=8190, resolution=64)
     yield made
     made.stop()
 
@@ -75,7 +78,7 @@ def opened(browser, url: str, width: int, height: int, dots: float = 1.0):
     page.on("pageerror", lambda error: page.told.append(str(error)))
     page.on("request", lambda request: page.asked.append(request.url))
     page.goto(url)
-    page.get_by_text("find it from the photographs").wait_for()
+    page.get_by_text("There are no photographs to find lamps in.").wait_for()
     return page
 
 
@@ -145,6 +148,7 @@ def test_a_lamp_is_dragged_and_the_picture_is_that_of_the_scene(viewer: Viewer, 
 
 def test_a_photographed_lamp_is_found_again(window, page: Page) -> None:
     session = page.session
+    assert not window.get_by_text("find it from the photographs").is_visible()
     window.get_by_role("button", name="take a photograph").click()
     until(lambda: len(session.case.photographs) == 1)
     window.locator("input[inputmode=decimal]").first.fill("0.2")

@@ -10,6 +10,7 @@ their squares is worth −n log(1 − g) of −2 log p.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,6 +21,7 @@ from rgspipe.capture.photographs import Numbers
 from rgspipe.capture.variances import with_likely_variances
 from rgspipe.fitting.options import BarOptions
 from rgspipe.fitting.search.apart import CandidatePlaces
+from rgspipe.progress import progress_bar
 from rgspipe.training.albedo import ALBEDO_RANGE
 
 #: Candidates that are refined, and least distance of two of them in parts of the scene's size.
@@ -39,6 +41,9 @@ BAR = BarOptions()
 
 #: Rounds in which outliers, variances and the albedo of the unseen follow from the lamps and these from them.
 ROUNDS = 3
+
+#: Is told of each refinement.
+Told = Callable[[int], object]
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,8 +90,8 @@ def ranked(problem: LampProblem, candidates: Candidates, known: Lamps | None) ->
     return np.concatenate(costs), np.concatenate(logs)
 
 
-def with_one_more(problem: LampProblem, candidates: Candidates, known: Lamps | None) -> Lamps:
-    """The best lamps found that are one more than `known`."""
+def with_one_more(problem: LampProblem, candidates: Candidates, known: Lamps | None, told: Told) -> Lamps:
+    """The best lamps found that are one more than `known`; TRIES + 1 refinements at most."""
     costs, logs = ranked(problem, candidates, known)
     ranking, standing = [(int(index),) for index in np.argsort(costs)], CandidatePlaces(candidates.places, None, 0.0)
     found = []
@@ -96,24 +101,28 @@ def with_one_more(problem: LampProblem, candidates: Candidates, known: Lamps | N
         gains = log if known is None else np.concatenate([known.logs, log])
         lamps = problem.refined(problem.lamps(places, gains), FIRST)
         found.append((problem.cost(lamps), lamps))
-    return problem.refined(min(found, key=lambda pair: pair[0])[1], LAST)
+        told(1)
+    best = problem.refined(min(found, key=lambda pair: pair[0])[1], LAST)
+    told(1)
+    return best
 
 
-def settled(problem: LampProblem, candidates: Candidates, lamps: Lamps) -> Tried:
+def settled(problem: LampProblem, candidates: Candidates, lamps: Lamps, told: Told) -> Tried:
     """With variances, outliers and unseen albedo that belong to the lamps, and lamps that belong to these."""
     for left in reversed(range(ROUNDS)):
         problem = weighed(problem, lamps)
         lamps = problem.refined(problem.lamps(lamps.places, lamps.logs), LAST)
+        told(1)
         if left == 1 and len(lamps) > 1:
-            lamps = looked_for_again(problem, candidates, lamps)
+            lamps = looked_for_again(problem, candidates, lamps, told)
     return Tried.of(problem, lamps)
 
 
-def looked_for_again(problem: LampProblem, candidates: Candidates, lamps: Lamps) -> Lamps:
+def looked_for_again(problem: LampProblem, candidates: Candidates, lamps: Lamps, told: Told) -> Lamps:
     """Each lamp in the place that is best beside the others: it was found by variances of a room without it."""
     for own in range(len(lamps)):
         others = [other for other in range(len(lamps)) if other != own]
-        again = with_one_more(problem, candidates, lamps.at(others)).at(np.argsort([*others, own]).tolist())
+        again = with_one_more(problem, candidates, lamps.at(others), told).at(np.argsort([*others, own]).tolist())
         lamps = min(lamps, again, key=problem.cost)
     return lamps
 
@@ -182,9 +191,18 @@ class OneMore:
         return self.gain >= self.wanted
 
 
+def best_with_one_more(problem: LampProblem, candidates: Candidates, known: Lamps | None) -> Tried:
+    """The best lamps found that are one more than `known`, settled, while a progress line stands."""
+    number = 1 if known is None else len(known) + 1
+    looks = 1 if known is None else 1 + number
+    with progress_bar([], f"looking for lamp {number}", looks * (TRIES + 1) + ROUNDS, unit="step") as bar:
+        lamps = with_one_more(problem, candidates, known, bar.update)
+        return settled(problem, candidates, lamps, bar.update)
+
+
 def one_more(candidates: Candidates, fewer: Tried) -> OneMore:
     """The best lamps found that are one more than `fewer`."""
-    more = settled(fewer.problem, candidates, with_one_more(fewer.problem, candidates, fewer.lamps))
+    more = best_with_one_more(fewer.problem, candidates, fewer.lamps)
     again = more.problem.lamps(fewer.lamps.places, fewer.lamps.logs)
     less = Tried.of(more.problem, more.problem.refined(again, LAST))
     return OneMore.between(less, more)
@@ -209,7 +227,7 @@ def found_lamps(problem: LampProblem, count: int | None, most: int) -> Answer:
     """So many lamps, or as many as what was measured calls for, one to `most`."""
     problem = weighed(problem, None)
     candidates = Candidates.of(problem)
-    best = settled(problem, candidates, with_one_more(problem, candidates, None))
+    best = best_with_one_more(problem, candidates, None)
     compared: list[OneMore] = []
     while count is None or len(best.lamps) < count:
         found = one_more(candidates, best)

@@ -93,7 +93,8 @@ rgspipe status [RUN] [state=STATE] [KEY=VALUE …] [outputs=DIR]
 rgspipe outputs [prune] [scene=NAME] [stage=NAME] [older=30d] [remove=true]
                 [outputs=DIR]
 
-  prune         list what nothing needs any more; remove=true removes it
+  prune         list what nothing needs any more; with scene, stage or older all
+                that matches, the latest results, too; remove=true removes it
   scene, stage  of these alone; results of a stage that is named are listed one
                 by one
   older         at least so old: 12h, 30d, 4w""",

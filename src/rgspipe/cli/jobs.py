@@ -85,7 +85,7 @@ def run_jobs(overrides: Sequence[str], stage_loader: StageLoader, multirun: bool
     status = read_status(folder)
     code = max(code, EXIT_FAILED if status is None else int(status.get("exit_code", EXIT_FAILED)))
     if leads_on and code == 0:
-        _lead_on(config, Path(status["result"]), overrides)
+        lead_on(config, Path(status["result"]), overrides)
     return code
 
 
@@ -216,9 +216,10 @@ def _outcome(artifact: Artifact) -> list[str]:
     return outcome(artifact)
 
 
-def _lead_on(config: RgspipeConfig, result: Path, overrides: Sequence[str]) -> None:
+def lead_on(config: RgspipeConfig, result: Path, overrides: Sequence[str]) -> None:
     """Print what usually comes after a run, with the command or the file for it."""
-    made = ArtifactStore(Path(config.outputs)).find(Key(config.scene.folder, config.stage, result.name))
+    key = Key(result.parts[-3], config.stage, result.name)
+    made = ArtifactStore(Path(config.outputs)).find(key)
     found = None if made is None else following(config, made)
     if found is not None:
         what = command(found.stage, overrides, found.changes) if found.stage else result / found.file

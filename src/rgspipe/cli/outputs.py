@@ -59,9 +59,10 @@ def show_outputs(arguments: Sequence[str]) -> int:
 
 
 def _prune(outputs: Path, everything: Sequence[Stored], choice: Choice, really: bool) -> int:
-    gone = removable(everything, choice)
+    gone, busy = removable(everything, choice), _busy(outputs)
     if really:
-        _check_idle(outputs)
+        if busy is not None:
+            raise busy
         gone = list(remove(outputs, gone))
     if not gone:
         print(f"Nothing to remove from {outputs}: what matches is needed by other results, or led to by a latest link.")
@@ -69,19 +70,22 @@ def _prune(outputs: Path, everything: Sequence[Stored], choice: Choice, really: 
     _print(gone, outputs, singly=True)
     done = "Removed" if really else "Would be removed; say remove=true to do it:"
     print(f"{done} {len(gone)} of {len(everything)} folders, {_size(gone)} of {_size(everything)}.")
+    if busy is not None:
+        print(f"That is refused for now: {busy}")
     return 0
 
 
-def _check_idle(outputs: Path) -> None:
-    """Refuse to take away what a run may be about to read."""
+def _busy(outputs: Path) -> InputError | None:
+    """Why nothing may be taken away: a run may be about to read it."""
     remedy = "Wait for it, or stop it; python -m rgspipe status shows it."
     for folder, status in read_statuses(outputs / "runs"):
         if status["state"] == "running":
-            raise InputError(folder, expected="no run going on in this folder", found="one", remedy=remedy)
+            return InputError(folder, expected="no run going on in this folder", found="one", remedy=remedy)
     # A run may keep its status elsewhere (hydra.run.dir), and Python none.
     if (folder := in_the_making(outputs)) is not None:
         expected, found = "no result in the making in this folder", "a process that makes it"
-        raise InputError(folder, expected=expected, found=found, remedy=remedy)
+        return InputError(folder, expected=expected, found=found, remedy=remedy)
+    return None
 
 
 def _check_names(choice: Choice, everything: Sequence[Stored]) -> None:

@@ -16,8 +16,8 @@ from typing import Any
 
 import yaml
 
-from rgspipe.cli.compose import leaves_machine
-from rgspipe.cli.jobs import new_run_folder, quoted
+from rgspipe.cli.compose import compose_config, leaves_machine
+from rgspipe.cli.jobs import lead_on, new_run_folder, quoted
 from rgspipe.cli.messages import EXIT_FAILED
 from rgspipe.datasets.input_file import input_file
 from rgspipe.errors import InputError
@@ -82,7 +82,7 @@ def _step(path: Path, number: int, item: Any) -> SequenceStep:
 
 
 def run_sequence(name: str, extra: Sequence[str], program: Sequence[str] = RGSPIPE) -> int:
-    """Run a pipeline's commands and say where its results are; stops at the first that fails.
+    """Run a pipeline's commands, say where its results are and what usually comes next; stops at the first that fails.
 
     Args:
         name: a file under pipelines/, or the path of one.
@@ -92,7 +92,7 @@ def run_sequence(name: str, extra: Sequence[str], program: Sequence[str] = RGSPI
     steps = load_sequence(name)
     outputs = Path(next((text.partition("=")[2] for text in extra if text.startswith("outputs=")), "outputs"))
     folder = new_run_folder(outputs, f"pipeline-{Path(name).stem}", elsewhere=not leaves_machine(extra))
-    start, seconds, results = time.perf_counter(), [], []
+    start, seconds, jobs = time.perf_counter(), [], []
     for number, step in enumerate(steps, 1):
         run_folder = folder / f"{number:02d}_{step.stage}"
         command = [*(["-m"] if step.sweep else []), f"stage={step.stage}", *step.overrides, *extra]
@@ -104,8 +104,12 @@ def run_sequence(name: str, extra: Sequence[str], program: Sequence[str] = RGSPI
         if code != 0:
             print(f"Step {number} ({step.stage}) failed; see {run_folder}. What is done is kept.", file=sys.stderr)
             return code if code > 0 else EXIT_FAILED
-        results = [Path(status["result"]) for _, status in read_statuses(run_folder)]
-    _print_summary(steps, seconds, time.perf_counter() - start, results)
+        jobs = [status for _, status in read_statuses(run_folder)]
+    _print_summary(steps, seconds, time.perf_counter() - start)
+    for status in jobs:
+        print(f"Result: {status['result']}")
+    for status in jobs[-1:]:
+        lead_on(compose_config(status["overrides"]), Path(status["result"]), status["overrides"])
     return 0
 
 
@@ -123,10 +127,7 @@ def _run(command: Sequence[str]) -> int:
             raise
 
 
-def _print_summary(steps: Sequence[SequenceStep], seconds: Sequence[float], total: float, results: list[Path]) -> None:
+def _print_summary(steps: Sequence[SequenceStep], seconds: Sequence[float], total: float) -> None:
     for step, one in zip(steps, seconds, strict=True):
         print(f"  {one:8.1f} s  {step.stage} {' '.join(step.overrides)}".rstrip())
     print(f"  {total:8.1f} s  in all")
-    for result in results:
-        page = result / "report.html"
-        print(f"Report: {page}" if page.is_file() else f"Result: {result}")

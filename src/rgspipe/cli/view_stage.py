@@ -9,7 +9,6 @@ from rgspipe.cli.compose import compose_config
 from rgspipe.cli.jobs import run_jobs
 from rgspipe.cli.view import serve
 from rgspipe.config import RgspipeConfig
-from rgspipe.datasets.json_file import read_json
 from rgspipe.errors import InputError
 from rgspipe.graph.pipeline import StageLoader, resolve
 from rgspipe.store.artifacts import Artifact, ArtifactStore
@@ -56,6 +55,7 @@ class _Made:
 
 
 def _serve(made: _Made) -> int:
+    from rgspipe.cli.view_capture import captured
     from rgspipe.datasets.info import INFO
     from rgspipe.renderer.frozen import FrozenScene
     from rgspipe.stages.scene.export import world_of
@@ -68,7 +68,7 @@ def _serve(made: _Made) -> int:
     page = config.viewer
     viewer = view(
         FrozenScene.load(freeze.folder()),
-        cases=[*_cases(made, config), *_captured(made)],
+        cases=[*_cases(made, config), *captured(made.find, config)],
         references=_references(dataset),
         port=page.port,
         resolution=page.resolution,
@@ -101,22 +101,6 @@ def _cases(made: _Made, config: RgspipeConfig) -> list:
         found = found_in(folder) if folder is not None and folder.is_dir() else None
         cases.append(Case.of(target, () if truth is None else read_lights(truth), found))
     return cases
-
-
-def _captured(made: _Made) -> list:
-    """The lamps that a capture found beside the albedo, if the scene is one.
-
-    Its photographs are none of the case: their exposures may differ, which a search on the page takes for known.
-    """
-    from rgspipe.datasets.covariance_file import read_covariances
-    from rgspipe.datasets.light_file import read_lights
-    from rgspipe.viewer.material import Case, Found
-
-    capture = made.find("capture_surfels") if made.config("freeze").scene.lamps == "unknown" else None
-    if capture is None:
-        return []
-    path, measured = capture.file("lamps.json"), read_json(capture.file("metrics.json"), "the measures of a capture")
-    return [Case("capture", found=Found(read_lights(path), read_covariances(path), measured["words"]))]
 
 
 def _references(dataset: Artifact | None) -> list:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal, get_args
 
-#: Classes that a light can be asked for in; see docs/conventions.md.
+#: Classes that a light can be asked for in; see docs/reference/conventions.md.
 LightClass = Literal["visible", "out_of_frame", "occluded", "around_corner"]
 LIGHT_CLASSES: tuple[LightClass, ...] = get_args(LightClass)
 

@@ -24,6 +24,10 @@ CAMERA, CAMERAS = "camera", "cameras_path"
 #: Suffixes of images; names without one of them are completed.
 SUFFIXES = (".exr", ".png", ".jpg", ".jpeg")
 
+#: A principal point off the middle by more than ELSEWHERE of the half width, and by as much of the half height within
+#: ALIKE, is that of an image of another size: lenses are off by some hundredths, and rarely by as much both ways.
+ELSEWHERE, ALIKE = 0.1, 0.02
+
 #: Coefficients of lens distortion, as COLMAP and nerfstudio name them.
 DISTORTION = ("k1", "k2", "k3", "k4", "p1", "p2")
 
@@ -220,6 +224,14 @@ class FrameEntry:
                 expected=f"an image whose middle is near the principal point ({cx:g}, {cy:g}) of {place}",
                 found=f"{width} × {height} pixels",
                 remedy="Use intrinsics [cx, cy, fx, fy] of this image size.",
+            )
+        across, down, stated = 2.0 * cx / width, 2.0 * cy / height, self.fields.keys() | self.shared.keys()
+        if not {"w", "h"} <= stated and abs(across - down) < ALIKE and abs(across - 1.0) > ELSEWHERE:
+            raise InputError(
+                place,
+                expected=f"those of an image of {width} × {height} pixels, as {self.image_path.name} is",
+                found=f"the middle of one of {2.0 * cx:g} × {2.0 * cy:g}",
+                remedy='Scale them to this size; of an image that is cropped like that, state its size ("w", "h").',
             )
         return Camera(pose, fx, fy, cx, cy, width, height)
 

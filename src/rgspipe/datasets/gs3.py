@@ -53,7 +53,8 @@ def load_dataset(root: str | Path, *, train: bool = True, test: bool = True, tar
 
 def load_split(root: Path, split: str, info: DatasetInfo | None) -> tuple[View, ...]:
     """The views of transforms_<split>.json, each with its light; without lights where no frame names one."""
-    entries = read_entries(root / f"transforms_{split}.json", f"the cameras and lights of the {split} views")
+    what = f"the cameras and lights of the {split} views, laid out as docs/guides/your_own_scene.md says"
+    entries = read_entries(root / f"transforms_{split}.json", what)
     lit = any(entry.names_light for entry in entries)
     reading = progress_bar(entries, f"reading {split} views", unit="view")
     return with_saturation(entries, [_load_view(entry, root, info, light=lit, depth=True) for entry in reading])

@@ -18,7 +18,7 @@ def frame_entry(
 
     Args:
         file_path: the image, relative to the folder of the transforms file, without suffix.
-        camera: written as [cx, cy, fx, fy] and a camera-to-world matrix with OpenGL axes.
+        camera: written as [cx, cy, fx, fy], the size of its image and a camera-to-world matrix with OpenGL axes.
         light: written as position and Blender watts, 4π times W/sr.
         surfaces: which of "depth", "normal", "albedo" stand beside the image.
     """
@@ -27,6 +27,8 @@ def frame_entry(
         "file_ext": ".exr",
         "transform_matrix": camera.camera_to_world.tolist(),
         "camera_intrinsics": [camera.cx, camera.cy, camera.fx, camera.fy],
+        "w": camera.width,
+        "h": camera.height,
     }
     if light is not None:
         entry["pl_pos"] = light.position.tolist()

@@ -5,6 +5,9 @@ from __future__ import annotations
 import statistics
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from glob import escape
+from itertools import islice
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from rgspipe.errors import InputError
@@ -27,7 +30,8 @@ class Expected(NamedTuple):
 
     Attributes:
         seconds: the median of the last runs.
-        same: whether these had the same settings; otherwise they are those with the fewest others.
+        same: whether these had the same settings; otherwise they are those with the fewest others, of other scenes
+            where the scene has none.
     """
 
     seconds: float
@@ -39,40 +43,45 @@ class Expected(NamedTuple):
 
 @dataclass(frozen=True)
 class EarlierRuns:
-    """What the results in a store were made in, on this machine; each stage of a scene is read once."""
+    """What the results in a store were made in, on this machine; each stage of a scene, or of all, is read once."""
 
     store: ArtifactStore
-    _known: dict[tuple[str, str], list[Mapping[str, Any]]] = field(default_factory=dict, repr=False, compare=False)
+    _known: dict[tuple[str | None, str], list[Mapping[str, Any]]] = field(
+        default_factory=dict, repr=False, compare=False
+    )
 
     def expected(self, key: Key, config: Mapping[str, Any]) -> Expected | None:
-        """What making an artifact is expected to take; None where its stage was never made for its scene here.
+        """What making an artifact is expected to take; None where its stage was never made here.
 
         Args:
             key: of the artifact.
             config: the settings that it depends on.
         """
-        runs = [(len(config_differences(config, made["config"])), made["seconds"]) for made in self._runs(key)]
+        own = self._runs(key.scene, key.stage)
+        made = own or self._runs(None, key.stage)
+        runs = [(len(config_differences(config, one["config"])), one["seconds"]) for one in made]
         if not runs:
             return None
         fewest = min(others for others, _ in runs)
         last = [seconds for others, seconds in runs if others == fewest][:COUNTED]
-        return Expected(float(statistics.median(last)), fewest == 0)
+        return Expected(float(statistics.median(last)), bool(own) and fewest == 0)
 
-    def _runs(self, key: Key) -> list[Mapping[str, Any]]:
-        """Manifests of the last runs, the newest first."""
-        place = key.scene, key.stage
+    def _runs(self, scene: str | None, stage: str) -> list[Mapping[str, Any]]:
+        """Manifests of the last runs, the newest first; those of all scenes where `scene` is None."""
+        place = scene, stage
         if place not in self._known:
             here = machine()
-            made = [manifest for manifest in self._manifests(key) if _is_of(manifest, here)]
-            self._known[place] = sorted(made, key=lambda one: str(one.get("created", "")), reverse=True)[:LOOKED_AT]
+            made = islice((one for one in self._manifests(scene, stage) if _is_of(one, here)), LOOKED_AT)
+            self._known[place] = sorted(made, key=lambda one: str(one.get("created", "")), reverse=True)
         return self._known[place]
 
-    def _manifests(self, key: Key) -> Iterator[Mapping[str, Any]]:
-        for folder in (self.store.root / key.scene / key.stage).glob("[!.]*"):
-            if folder.is_symlink():
-                continue
+    def _manifests(self, scene: str | None, stage: str) -> Iterator[Mapping[str, Any]]:
+        """Of a stage's results, about the newest first."""
+        found = self.store.root.glob(f"{'*' if scene is None else escape(scene)}/{escape(stage)}/[!.]*")
+        folders = [folder for folder in found if not folder.is_symlink()]
+        for folder in sorted(folders, key=_changed, reverse=True):
             try:
-                artifact = self.store.find(Key(key.scene, key.stage, folder.name))
+                artifact = self.store.find(Key(folder.parts[-3], stage, folder.name))
             except (InputError, OSError):  # what is wrong with it is told where it is needed
                 continue
             if artifact is not None:
@@ -86,6 +95,13 @@ def in_words(seconds: float) -> str:
     if seconds < 120.0:
         return f"{seconds:.0f} s"
     return f"{seconds / 60.0:.0f} min" if seconds < 7200.0 else f"{seconds / 3600.0:.1f} h"
+
+
+def _changed(folder: Path) -> float:
+    try:
+        return folder.stat().st_mtime
+    except OSError:  # removed meanwhile
+        return 0.0
 
 
 def _is_of(manifest: Mapping[str, Any], here: Mapping[str, str | int]) -> bool:

@@ -105,7 +105,7 @@ class _Resolver:
             "code": self.code.fingerprints(stage.run.__module__),
             "sums": order_of_sums(),
         }
-        key = Key(config.scene.folder, stage.name, fingerprint({"stage": stage.name, **recipe}))
+        key = Key(stage.place(config), stage.name, fingerprint({"stage": stage.name, **recipe}))
         return Node(stage, config, changes, key, recipe, inputs, tuple(need.may_fail for need in needs))
 
     def _file(self, path: Path) -> str:
@@ -195,7 +195,7 @@ def _total(steps: Sequence[Step]) -> list[str]:
         return []
     unknown = dict.fromkeys(step.node.stage.name for step in made if not step.expected)
     rest = f", and what {' and '.join(unknown)} will take" if unknown else ""
-    other = "" if all(time.same for time in known) else "; ~: with other settings"
+    other = "" if all(time.same for time in known) else "; ~: with other settings, or in other scenes"
     return [f"Expected: {in_words(sum(time.seconds for time in known))}{rest} (from earlier runs here{other})"]
 
 

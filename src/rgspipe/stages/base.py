@@ -10,6 +10,9 @@ from typing import Any
 from rgspipe.config import RgspipeConfig
 from rgspipe.store.artifacts import Artifact
 
+#: Folder under outputs/ of what is of several scenes.
+SCENES = "scenes"
+
 
 @dataclass(frozen=True)
 class Need:
@@ -100,6 +103,7 @@ class Stage:
         files: files and folders outside the store that the result depends on; their content counts.
         remarks: lines that the plan shows below the stage, from the configuration and, by stage, the artifact itself
             where it is reused, or else those of its inputs that are made already.
+        of_scenes: whether it is of no single scene; its results then lie under outputs/scenes/.
     """
 
     name: str
@@ -109,6 +113,11 @@ class Stage:
     config_keys: Sequence[str] | Callable[[RgspipeConfig], Sequence[str]] = ()
     files: Callable[[RgspipeConfig], Sequence[Path]] = _nothing
     remarks: Callable[[RgspipeConfig, Mapping[str, Artifact]], Sequence[str]] = _no_remarks
+    of_scenes: bool = False
+
+    def place(self, config: RgspipeConfig) -> str:
+        """The folder under outputs/ that its results lie in."""
+        return SCENES if self.of_scenes else config.scene.folder
 
     def needs(self, config: RgspipeConfig) -> tuple[Need, ...]:
         """The inputs for a configuration."""

@@ -58,7 +58,7 @@ def trace_lighting(bvh: SurfelBvh, views: Sequence[View]) -> Lighting:
     missing = [view.name for view in views if view.light is None]
     if missing:
         found = f"none in {len(missing)} of {len(views)} views ({', '.join(missing[:5])})"
-        remedy = "Views of a fit target have none: train on those of a dataset."
+        remedy = "Train on views of a dataset; capture_scene takes photographs under lamps that nobody measured."
         raise InputError("the training views", expected="the light of each", found=found, remedy=remedy)
     positions = torch.stack([view.light.position for view in views])
     intensity = torch.stack([view.light.intensity for view in views]).float()

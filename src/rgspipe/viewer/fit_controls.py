@@ -13,7 +13,7 @@ from rgspipe.fitting.words import told_costs
 from rgspipe.viewer.actions import Action
 from rgspipe.viewer.around import cameras_around
 from rgspipe.viewer.drawings import Drawings
-from rgspipe.viewer.material import Found, Photograph
+from rgspipe.viewer.material import Case, Found, Photograph
 from rgspipe.viewer.visit import Visit
 
 #: Position error that is asked for where advice is wanted, of the scene's size: that of `fit.wanted_accuracy`.
@@ -48,7 +48,7 @@ class FitControls:
             "Find lamps, and how many there are, from the photographs alone.",
             self.find,
         )
-        self._buttons = actions.offer(find, chief=True)
+        [self._find] = self._buttons = actions.offer(find, chief=True)
         self._told = gui.add_markdown("")
         self._strip = gui.add_image(np.zeros((8, 24, 3), np.uint8), visible=False)
         with gui.add_folder("photographs", expand_by_default=is_open):
@@ -80,8 +80,8 @@ class FitControls:
         if last > 0:
             self._step.max = last
             self._step.value = last
-        count = len(case.photographs)
-        self._told.content = _words(found) if found is not None else f"{count} photograph{'s' * (count != 1)}."
+        self._find.visible = bool(case.photographs)
+        self._told.content = _told(case, found)
 
     def find(self) -> None:
         """Search the lamps of the photographs, and show them with their regions."""
@@ -103,7 +103,10 @@ class FitControls:
 
     @property
     def _photographs(self) -> list[Photograph]:
-        return [*self._session.case.photographs, *self._visit.exhibit.references]
+        """Those of the case and the references, each once: browsers refuse a list that offers one name twice."""
+        own = self._session.case.photographs
+        names = {one.name for one in own}
+        return [*own, *(one for one in self._visit.exhibit.references if one.name not in names)]
 
     def _search(self, search: Callable[[], FitResult]) -> None:
         if self.searching:
@@ -205,6 +208,15 @@ class FitControls:
             self._session.change(found.path[int(self._step.value)], "step")
             self._lamps_changed()
             self._visit.changed()
+
+
+def _told(case: Case, found: Found | None) -> str:
+    """What was found, or how many photographs there are to find lamps in, or why there are none."""
+    if not case.photographs:
+        why = f"{case.lacking} Take one of this view: **P**."
+        return why if found is None else f"{_words(found)}\n\n{why}"
+    count = len(case.photographs)
+    return _words(found) if found is not None else f"{count} photograph{'s' * (count != 1)}."
 
 
 def _words(found: Found) -> str:

@@ -31,7 +31,7 @@ class Photograph:
     """An image (H, W, 3) of linear radiance and the camera that took it.
 
     Attributes:
-        mask: (H, W) the scene's share of each pixel; 1 if None.
+        mask: (H, W) the scene's share of each pixel, 0 where that tells too little of it; 1 if None.
         lights: under which it was taken, where they are known and not looked for.
     """
 
@@ -43,8 +43,9 @@ class Photograph:
 
     @classmethod
     def of(cls, view: View, name: str) -> Photograph:
-        """A view of a dataset or target."""
-        return cls(name, view.camera, view.image, view.alpha, None if view.light is None else (view.light,))
+        """A view of a dataset or target; what is saturated in it is not searched for lamps."""
+        mask = torch.where(view.saturated.any(dim=-1), 0.0, view.alpha)
+        return cls(name, view.camera, view.image, mask, None if view.light is None else (view.light,))
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,12 +77,17 @@ class Found:
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """Photographs under lamps that are looked for, the truth and what a fit found, as far as these are known."""
+    """Photographs under lamps that are looked for, the truth and what a fit found, as far as these are known.
+
+    Attributes:
+        lacking: why there are no photographs, in a sentence.
+    """
 
     name: str = "none"
     photographs: Sequence[Photograph] = ()
     truth: LightRig = ()
     found: Found | None = None
+    lacking: str = "There are no photographs to find lamps in."
 
     @classmethod
     def of(cls, target: Target, truth: LightRig = (), found: Found | None = None) -> Case:

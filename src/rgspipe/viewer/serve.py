@@ -6,6 +6,7 @@ import contextlib
 import io
 import logging
 import threading
+import warnings
 from collections.abc import Sequence
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
@@ -48,7 +49,9 @@ class Viewer:
         self._exhibit = exhibit
         # Both say where they listen, which is another address than that which others are given.
         logging.getLogger("websockets").setLevel(logging.WARNING)
-        with contextlib.redirect_stdout(io.StringIO()):
+        # Who leaves does not wait for the picture in the making.
+        warnings.filterwarnings("ignore", r"Queued a \w+ on a closed connection", UserWarning)
+        with _unsaid():
             self._server = viser.ViserServer(host=LOOPBACK, port=port, verbose=False)
         self._relay: Relay | None = None
         theme(self._server.gui, dark=True)
@@ -83,7 +86,8 @@ class Viewer:
             self._relay.stop()
         for page in list(self.pages.values()):
             page.leave()
-        self._server.stop()
+        with _unsaid():
+            self._server.stop()
 
     def _welcome(self, client) -> None:
         from rgspipe.viewer.page import Page
@@ -96,6 +100,11 @@ class Viewer:
         page = self.pages.pop(client.client_id, None)
         if page is not None:
             page.leave()
+
+
+def _unsaid() -> contextlib.redirect_stdout:
+    """What viser prints of itself is not for people who asked for a scene."""
+    return contextlib.redirect_stdout(io.StringIO())
 
 
 def view(

@@ -69,7 +69,8 @@ def _layout(root: Path, options: ScanOptions) -> str:
         root,
         expected=f"a capture in one of these layouts: {wanted}",
         found=_listed(root),
-        remedy="Correct scene.path: it is the folder that holds these. A dataset in our own layout is scene=external.",
+        remedy="Correct scene.path: it is the folder that holds these. A dataset in our own layout is scene=external. "
+        "Photographs alone need poses and depth first, such as COLMAP's: see docs/guides/photographs.md.",
     )
 
 

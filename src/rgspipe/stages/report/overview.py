@@ -65,4 +65,5 @@ STAGE = Stage(
     run=run,
     config_keys=("overview",),
     files=_manifests,
+    of_scenes=True,
 )
