@@ -105,7 +105,7 @@ def test_textures_in_other_formats_are_not_opened(tmp_path: Path) -> None:
     (picture,) = tmp_path.glob("*.png")
     quarters().save(tmp_path / "b.gif")
     (tmp_path / "b.gif").rename(picture)
-    with pytest.raises(InputError, match="texture in the format GIF"):
+    with pytest.raises(InputError, match="texture in another format"):
         read_mesh(tmp_path / "a.obj")
 
 
@@ -158,14 +158,5 @@ def test_no_file_is_opened_that_a_mesh_does_not_name(tmp_path: Path) -> None:
     (tmp_path / "other.png").write_bytes(picture.read_bytes())
     own = OwnFiles(path)
     assert own.get("t.png") == picture.read_bytes()
-    with pytest.raises(FileNotFoundError):
+    with pytest.raises(InputError, match=r"another file, 'other\.png'"):
         own.get("other.png")
-
-
-def test_a_texture_of_an_obj_may_have_a_percent_sign_in_its_name(tmp_path: Path) -> None:
-    path, picture = linked(tmp_path, "obj")
-    (materials,) = tmp_path.glob("*.mtl")
-    materials.write_bytes(materials.read_bytes().replace(picture.name.encode(), b"a%20b.png"))
-    content = picture.read_bytes()
-    picture.rename(tmp_path / "a%20b.png")
-    assert OwnFiles(path).get("a%20b.png") == content

@@ -19,8 +19,10 @@ def input_file(path: str | Path, expected: str, *, most_bytes: int | None = None
         most_bytes: the size from which on no such file is meant.
 
     Raises:
-        InputError: no such file, something else than a regular file, a name that cannot be, or too large.
+        InputError: no such file, something else than a regular file, a name that cannot be or that cannot be written
+            down, or too large.
     """
+    _check_name(path, expected)
     try:
         status = Path(path).stat()
     except FileNotFoundError:
@@ -40,8 +42,9 @@ def input_folder(path: str | Path, expected: str) -> Path:
     """`path`, found to be a folder.
 
     Raises:
-        InputError: no such folder, a file or anything else, or a name that cannot be.
+        InputError: no such folder, a file or anything else, or a name that cannot be or that cannot be written down.
     """
+    _check_name(path, expected)
     try:
         found = "a file" if stat.S_ISREG(mode := Path(path).stat().st_mode) else "a pipe or a device"
     except FileNotFoundError:
@@ -51,6 +54,24 @@ def input_folder(path: str | Path, expected: str) -> Path:
     if not stat.S_ISDIR(mode):
         raise InputError(path, expected=expected, found=found, remedy="Check the path.")
     return Path(path)
+
+
+def _check_name(path: str | Path, expected: str) -> None:
+    """Refuse a name that is no text: neither JSON nor a terminal can say it, and no result can be told to be of it."""
+    try:
+        str(path).encode()
+    except UnicodeEncodeError:
+        remedy = "Rename it: its name has bytes that are no text in UTF-8, such as umlauts of an old archive."
+        found = "a name that is no text in UTF-8"
+        raise InputError(path, expected=expected, found=found, remedy=remedy) from None
+
+
+def is_there(path: Path) -> bool:
+    """Whether there is anything of this name, which may be none that a file can have."""
+    try:
+        return path.exists()
+    except (OSError, ValueError):
+        return False
 
 
 def check_pixel_count(path: Path, width: int, height: int, most: int | None = None) -> None:

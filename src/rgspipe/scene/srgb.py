@@ -12,6 +12,12 @@ def decode(encoded: NDArray) -> NDArray:
     return np.sign(encoded) * np.where(size <= 0.04045, size / 12.92, ((size + 0.055) / 1.055) ** 2.4)
 
 
+def decode_levels(levels: NDArray[np.unsignedinteger]) -> NDArray[np.float32]:
+    """Linear float32 values of levels that are stored in 8 or 16 bits, the highest of which is 1: looked up."""
+    most = int(np.iinfo(levels.dtype).max)
+    return np.take(decode(np.arange(most + 1) / most).astype(np.float32), levels)
+
+
 def encode(linear: NDArray) -> NDArray:
     """sRGB values of linear values; odd about 0."""
     size = np.abs(linear)
