@@ -19,7 +19,7 @@ from luminaire_files import ies
 from mesh_files import cuboid_triangles, quarters, textured_square, write_coloured
 from raycast import ROOM
 from rgspipe.config import RgspipeConfig, with_changes
-from rgspipe.datasets.display_image import read_display
+from rgspipe.datasets.display_image import read_levels
 from rgspipe.datasets.json_file import read_json
 from rgspipe.datasets.mesh_file import read_mesh
 from rgspipe.datasets.photometric_file import read_photometry
@@ -37,7 +37,7 @@ COLOURS = np.full((24, 3), 99, np.uint8)
 
 #: What writes a file of a kind, what reads it, and a limit that it is beyond.
 KINDS: dict[str, tuple[Callable[[Path], object], Callable[[Path], object], dict[str, int]]] = {
-    "a.png": (lambda path: Image.new("L", (8, 8)).save(path), read_display, {"pixels": 63}),
+    "a.png": (lambda path: Image.new("L", (8, 8)).save(path), read_levels, {"pixels": 63}),
     "a.json": (lambda path: write_json(path, {"a": "b" * 100}), lambda path: read_json(path, "a"), {"text_bytes": 100}),
     "a.ply": (lambda path: write_vertices(path, {"x": np.arange(9.0)}, []), read_vertices, {"vertices": 8}),
     "a.obj": (lambda path: textured_square(quarters()).export(path), read_mesh, {"bytes": 20}),

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import warnings
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 from PIL import ExifTags, Image, UnidentifiedImageError
 
 from rgspipe.datasets.input_file import check_pixel_count, input_file
 from rgspipe.datasets.reading_limits import timed
 from rgspipe.errors import InputError
 from rgspipe.scene import srgb
+
+Pixels = npt.NDArray[np.float32]
 
 #: What a file may be, by its suffix. Pillow would start Ghostscript for an EPS image by another name.
 FORMATS = {".png": "PNG", ".jpg": "JPEG", ".jpeg": "JPEG"}
@@ -26,16 +33,61 @@ DEPTH, COLOUR_TYPE, COLOURED = 24, 25, (2, 4, 6)
 #: colour are rounded, and these go into blue 1.77 times.
 COLOUR_ROUNDING = 1.5
 
-LARGEST_LEVEL = {np.dtype(np.uint8): 255.0, np.dtype(np.uint16): 65535.0}
-
-
 #: What Pillow raises of damaged files, and of those that claim more pixels than it decodes.
 DAMAGED = (OSError, SyntaxError, ValueError, MemoryError, Image.DecompressionBombError)
 
 
+@contextlib.contextmanager
+def opened(source: Path | io.BytesIO, path: Path, formats: Sequence[str]) -> Iterator[Image.Image]:
+    """An image of one of these formats, by its header: pixels are decoded when they are asked for.
+
+    Raises:
+        InputError: more pixels than are read; names `path`.
+        OSError, SyntaxError, ValueError: another format, or a broken file; see DAMAGED.
+    """
+    with warnings.catch_warnings():
+        # Pillow only warns of sizes from half of those on that it refuses; the limit here is our own.
+        warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+        with Image.open(source, formats=formats) as file:
+            check_pixel_count(path, *file.size)
+            yield file
+
+
+@dataclass(frozen=True, eq=False)
+class Levels:
+    """What a PNG or JPEG stores, palettes resolved.
+
+    Attributes:
+        levels: (H, W, 1 or 3) uint8 or uint16.
+        opaque: (H, W) of the same type, if it has alpha.
+    """
+
+    levels: np.ndarray
+    opaque: np.ndarray | None
+
+    @property
+    def values(self) -> Pixels:
+        """(H, W, 1 or 3) in [0, 1]."""
+        return _shares(self.levels)
+
+    @property
+    def alpha(self) -> Pixels | None:
+        """(H, W) in [0, 1]."""
+        return None if self.opaque is None else _shares(self.opaque)
+
+    @property
+    def light(self) -> Pixels:
+        """(H, W, 1 or 3) in [0, 1], linearised with the sRGB curve."""
+        return srgb.decode_levels(self.levels)
+
+
+def _shares(levels: np.ndarray) -> Pixels:
+    return np.ascontiguousarray(levels / np.float32(np.iinfo(levels.dtype).max), np.float32)
+
+
 @timed
-def read_display(path: Path) -> tuple[np.ndarray, np.ndarray | None]:
-    """Values (H, W, 1 or 3) float32 in [0, 1] as they are stored, palettes resolved, and alpha (H, W), if there is any.
+def read_levels(path: Path) -> Levels:
+    """What an image stores.
 
     Raises:
         InputError: missing or broken file, too many pixels, another format than the suffix says, CMYK, or 16-bit
@@ -43,23 +95,22 @@ def read_display(path: Path) -> tuple[np.ndarray, np.ndarray | None]:
     """
     input_file(path, "an image")
     stored = _levels(path, _format(path))
-    values = stored.astype(np.float32) / np.float32(LARGEST_LEVEL[stored.dtype])
-    values = values[..., None] if values.ndim == 2 else values
-    channels = values.shape[2]
+    stored = stored[..., None] if stored.ndim == 2 else stored
+    channels = stored.shape[2]
     has_alpha = channels in (2, 4)
-    return values[..., : channels - has_alpha], np.ascontiguousarray(values[..., -1]) if has_alpha else None
+    return Levels(stored[..., : channels - has_alpha], stored[..., -1] if has_alpha else None)
 
 
-def read_display_colour(path: Path) -> np.ndarray:
-    """(H, W, 3 or 4) float32 values in [0, 1] of RGB or RGBA, as they are stored.
+def read_colour_levels(path: Path) -> Levels:
+    """What an image in colour stores.
 
     Raises:
-        InputError: as `read_display`; also for images in grey.
+        InputError: as `read_levels`; also for images in grey.
     """
-    values, alpha = read_display(path)
-    if values.shape[2] != 3:
+    stored = read_levels(path)
+    if stored.levels.shape[2] != 3:
         raise _refusal(path, "8-bit RGB or RGBA", "grey levels")
-    return values if alpha is None else np.concatenate([values, alpha[..., None]], axis=2)
+    return stored
 
 
 def saturated_from(path: Path) -> float:
@@ -71,7 +122,7 @@ def saturated_from(path: Path) -> float:
     """
     margin = 0.5
     if _format(path) == "JPEG":
-        with Image.open(path, formats=["JPEG"]) as file:
+        with opened(path, path, ["JPEG"]) as file:
             table = np.asarray(file.quantization[0], dtype=np.float64)
         margin += COLOUR_ROUNDING + 2.0 * float(np.sqrt(np.mean(table**2) / 12.0))
     return float(srgb.decode(np.array(max(255.0 - margin, 0.0) / 255.0)))
@@ -87,14 +138,10 @@ def _format(path: Path) -> str:
 def _levels(path: Path, kind: str) -> np.ndarray:
     """(H, W) or (H, W, C) uint8, or uint16 of a grey image."""
     try:
-        with warnings.catch_warnings():
-            # Pillow only warns of sizes from half of those on that it refuses; the limit here is our own.
-            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
-            with Image.open(path, formats=[kind]) as file:
-                check_pixel_count(path, *file.size)
-                _check_depth(path, kind)
-                _check_orientation(path, file)
-                return _unpacked(path, file)
+        with opened(path, path, [kind]) as file:
+            _check_depth(path, kind)
+            _check_orientation(path, file)
+            return _unpacked(path, file)
     except InputError:
         raise
     except UnidentifiedImageError as error:

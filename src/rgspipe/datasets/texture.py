@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import io
-import warnings
 from pathlib import Path
 
 import numpy as np
 from PIL import Image, UnidentifiedImageError
 
-from rgspipe.datasets.display_image import DAMAGED
+from rgspipe.datasets.display_image import DAMAGED, opened
 from rgspipe.datasets.input_file import check_pixel_count
 from rgspipe.errors import InputError
 from rgspipe.scene import srgb
@@ -24,10 +23,8 @@ def check_texture(content: bytes, path: Path) -> None:
         InputError: names `path`.
     """
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # the limit here is our own
-            with Image.open(io.BytesIO(content), formats=FORMATS) as image:
-                check_pixel_count(path, *image.size)
+        with opened(io.BytesIO(content), path, FORMATS):
+            return
     except InputError:
         raise
     except UnidentifiedImageError as cause:

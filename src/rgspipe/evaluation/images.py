@@ -154,7 +154,7 @@ def fit_within(png: bytes, max_bytes: int, max_width: int = 1600, min_width: int
 
     A picture that fits is returned untouched; none becomes narrower than `min_width`, whatever its size.
     """
-    with Image.open(io.BytesIO(png)) as opened:
+    with Image.open(io.BytesIO(png), formats=["PNG"]) as opened:
         picture = opened.convert("RGB")
     width = min(picture.width, max_width)
     if width == picture.width and len(png) <= max_bytes:
