@@ -11,6 +11,7 @@ import trimesh
 import trimesh.resolvers
 from PIL import Image
 
+from rgspipe.arguments import as_path
 from rgspipe.datasets.gltf_check import check_gltf
 from rgspipe.datasets.input_file import input_file
 from rgspipe.datasets.json_file import shown
@@ -36,7 +37,7 @@ def read_mesh(path: str | Path, options: MeshOptions | None = None) -> TriangleM
     Raises:
         InputError: missing or broken file, another format, no triangles, or coordinates that cannot be.
     """
-    path, options = Path(path), options or MeshOptions()
+    path, options = as_path(path), options or MeshOptions()
     kind = path.suffix.lower()
     if kind not in FORMATS:
         remedy = "Export it as binary PLY or GLB."

@@ -12,6 +12,7 @@ import torch
 from torch import Tensor
 
 from rgspipe.datasets.grade_file import GRADE, load_grade, save_grade
+from rgspipe.datasets.input_file import is_there
 from rgspipe.datasets.json_file import shown
 from rgspipe.datasets.surfel_file import load_surfels, save_surfels
 from rgspipe.datasets.tensor_file import load_tensors, save_tensors
@@ -73,7 +74,7 @@ def load_parts(folder: Path, *, gather: bool) -> dict[str, Any]:
     Raises:
         InputError: no such folder, or none of a scene, or a file is missing, broken, or does not belong to the others.
     """
-    if not folder.is_dir():
+    if not (is_there(folder) and folder.is_dir()):
         raise InputError(folder, expected="the folder of a frozen scene", found="no such folder", remedy=MAKE_AGAIN)
     if not (folder / TRANSPORT).exists() and not (folder / SURFELS).exists():
         found = "neither surfels nor transport in it"
