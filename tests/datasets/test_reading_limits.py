@@ -79,6 +79,16 @@ def test_a_reader_is_stopped_once_it_has_taken_too_long(tmp_path: Path) -> None:
     assert signal.getsignal(signal.SIGVTALRM) is handler and signal.getitimer(signal.ITIMER_VIRTUAL) == (0.0, 0.0)
 
 
+def test_a_file_that_memory_does_not_hold_is_refused(tmp_path: Path) -> None:
+    """A file of zeros takes no room on a disk, whatever its size."""
+
+    def read(path: Path) -> bytes:
+        raise MemoryError
+
+    with pytest.raises(rg.InputError, match=r"a\.bin: expected a file that fits into memory"):
+        timed(read)(tmp_path / "a.bin")
+
+
 def test_in_another_thread_it_is_refused_when_it_is_back(tmp_path: Path) -> None:
     def read() -> int:
         with reading_within(ReadingLimits(seconds=1e-3)):

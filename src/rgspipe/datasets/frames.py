@@ -24,6 +24,9 @@ CAMERA, CAMERAS = "camera", "cameras_path"
 #: Suffixes of images; names without one of them are completed.
 SUFFIXES = (".exr", ".png", ".jpg", ".jpeg")
 
+#: The shortest focal length, pixels.
+SHORTEST = 1e-6
+
 #: Coefficients of lens distortion, as COLMAP and nerfstudio name them.
 DISTORTION = ("k1", "k2", "k3", "k4", "p1", "p2")
 
@@ -205,8 +208,10 @@ class FrameEntry:
     def _camera_from_intrinsics(self, pose: Tensor, intrinsics: object, width: int, height: int) -> Camera:
         cx, cy, fx, fy = numbers(intrinsics, 4, self.where, "camera_intrinsics")
         place = f"{self.where}.camera_intrinsics"
-        if fx <= 0 or fy <= 0:
-            raise InputError(place, expected="focal lengths above 0", found=f"{fx:g}, {fy:g}", remedy="Correct them.")
+        if min(fx, fy) < SHORTEST:
+            raise InputError(
+                place, expected="focal lengths in pixels, above 0", found=f"{fx:g}, {fy:g}", remedy="Correct them."
+            )
         for key, expected in (("w", width), ("h", height)):
             stated = self.fields.get(key, self.shared.get(key, expected))
             if stated != expected:

@@ -81,7 +81,7 @@ class _Check:
             if uri is None:
                 begin = GLB_HEADER + int.from_bytes(self._read(slice(12, 16)), "little")
                 yield slice(begin + 8, begin + 8 + int.from_bytes(self._read(slice(begin, begin + 4)), "little"))
-            elif uri in files:
+            elif isinstance(uri, str) and uri in files:
                 yield input_file(files[uri], "a buffer of a mesh", most_bytes=reading_limits().bytes)
             else:
                 yield self._decoded(uri, where)
@@ -154,7 +154,7 @@ class _Check:
             place, view = views[self._index(image, "bufferView", where, len(views))]
             buffer, start, length, _ = self._view(place, view, buffers)
             check_texture(self._bytes(buffers[buffer], start, length), self.path)
-        elif uri in self.links.textures:
+        elif isinstance(uri, str) and uri in self.links.textures:
             file = input_file(self.links.textures[uri], f"a texture that {self.path.name} names")
             check_texture(file.read_bytes(), file)
         else:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import warnings
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from rgspipe.datasets.json_file import shown
 from rgspipe.datasets.limits import FARTHEST
 from rgspipe.datasets.mesh_links import FORMATS, GLTF, mesh_links
 from rgspipe.datasets.mesh_options import MeshOptions
+from rgspipe.datasets.obj_text import plain_obj
 from rgspipe.datasets.reading_limits import RAISE, reading_limits, timed
 from rgspipe.datasets.texture import check_texture, texture_light
 from rgspipe.errors import InputError
@@ -109,7 +111,10 @@ def _loaded(path: Path) -> Any:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             # Nothing is merged or mended: points without area do no harm, and merging would move textures.
-            return trimesh.load_scene(path, resolver=own, process=False, maintain_order=True)
+            options = {"resolver": own, "process": False, "maintain_order": True}
+            if path.suffix.lower() != ".obj":
+                return trimesh.load_scene(path, **options)
+            return trimesh.load_scene(io.BytesIO(plain_obj(path.read_bytes(), path)), file_type="obj", **options)
     except InputError:
         raise
     except Exception as error:  # the library says of no format what it raises

@@ -65,6 +65,7 @@ def read_materials(path: Path, named: Named) -> Materials:
         counts = False
         for key, value in _statements(file):
             if key == "newmtl":
+                value = value.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
                 counts = value not in known
                 own.add(value)
             if not counts:

@@ -84,7 +84,7 @@ class _TookTooLong(BaseException):
 def timed(
     read: Callable[Concatenate[Path, Arguments], Made],
 ) -> Callable[Concatenate[str | Path, Arguments], Made]:
-    """A reader of a file that refuses it once that has taken longer than the limit."""
+    """A reader of a file that refuses it once that has taken longer than the limit, or all memory."""
 
     @functools.wraps(read)
     def limited(path: str | Path, *arguments: Arguments.args, **options: Arguments.kwargs) -> Made:
@@ -105,6 +105,12 @@ def timed(
                 found="one that takes longer",
                 remedy=f"Check the file. {RAISE}",
             ) from None
+        except MemoryError as error:
+            found, remedy = (
+                f"one that does not ({str(error) or 'no room'})",
+                "Check the file, or read it where there is more.",
+            )
+            raise InputError(path, expected="a file that fits into memory", found=found, remedy=remedy) from None
         return made
 
     return limited

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -29,6 +28,9 @@ from rgspipe.datasets.scans.radiance_image import hdr_size, read_hdr
 from rgspipe.datasets.scans.raw_image import RAW, read_raw
 from rgspipe.errors import InputError
 from rgspipe.scene import srgb
+
+#: What a camera can have been set to: shutter [s], ISO and f-number; what is beyond it is damaged.
+EXPOSED = ((1e-7, 1e5), (1.0, 1e8), (0.1, 1e3))
 
 Pixels = npt.NDArray[np.float32]
 
@@ -103,7 +105,8 @@ def exposure_of(path: Path) -> float | None:
     except (*DAMAGED, TypeError, ZeroDivisionError):
         # Whether its pixels can be read is asked elsewhere.
         return None
-    stated = all(0.0 < value < math.inf for value in (shutter, sensitivity, aperture))
+    values = zip((shutter, sensitivity, aperture), EXPOSED, strict=True)
+    stated = all(least <= value <= most for value, (least, most) in values)
     return shutter * sensitivity / aperture**2 if stated else None
 
 
