@@ -33,6 +33,9 @@ def write_glb(path: Path, content: dict, buffer: bytes) -> Path:
     return path
 
 
+#: The accessor of places in the texture, in the files that are written here.
+UV = 2
+
 #: Where something of a textured square's JSON is changed, what it becomes (None: nothing), and words of the refusal.
 CLAIMS: dict[str, tuple[tuple, object, str]] = {
     "points in no buffer": (("accessors", 0, "bufferView"), None, "compressed or sparse ones, or none"),
@@ -52,6 +55,16 @@ CLAIMS: dict[str, tuple[tuple, object, str]] = {
         1,
         "one set of texture coordinates",
     ),
+    "places that are shares": (("accessors", UV, "componentType"), 5121, "TEXCOORD_0: expected types of numbers"),
+    "numbers of points below 0": (("accessors", 0, "componentType"), 5122, "indices: expected types of numbers"),
+    "a colour of 7": (
+        ("materials", 0, "pbrMetallicRoughness", "baseColorFactor"),
+        [7, 7, 7, 1],
+        "numbers from 0 to 1",
+    ),
+    "a material of no number": (("meshes", 0, "primitives", 0, "material"), -1, "material: expected a whole number"),
+    "a mesh of no number": (("nodes", 0, "mesh"), 7, "nodes[0].mesh: expected the number of one of 1"),
+    "an old version": (("asset", "version"), "1.0", "asset.version: expected 2.0"),
     "a picture of no number": (("textures", 0, "source"), 7, "textures[0].source: expected the number of one of 1"),
 }
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from rgspipe.datasets.input_file import input_file
-from rgspipe.datasets.json_file import shown
+from rgspipe.datasets.json_file import numbers, shown
 from rgspipe.datasets.mesh_links import GLB_HEADER, Links, gltf_content
 from rgspipe.datasets.reading_limits import RAISE, reading_limits
 from rgspipe.datasets.texture import check_texture
@@ -23,6 +23,14 @@ NUMBERS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "
 #: Entries of one array, and of all of them, for each triangle that a mesh may have: three corners, and five numbers or
 #: vectors (index, place, normal, place in the texture, colour) of each.
 ONE, ALL = 3, 15
+
+#: Types of numbers and entries of what is read of a primitive: places as floats, not as shares of something.
+READ_AS = {
+    "indices": ((5121, 5123, 5125), ("SCALAR",)),
+    "POSITION": ((5126,), ("VEC3",)),
+    "TEXCOORD_0": ((5126,), ("VEC2",)),
+    "COLOR_0": ((5121, 5126), ("VEC3", "VEC4")),
+}
 
 #: Kinds of primitives that are read, or have no triangles: points, lines, triangles and strips of them. No fans.
 MODES = range(6)
@@ -56,6 +64,10 @@ class _Check:
 
     def all(self) -> None:
         self._extensions()
+        if not str(self._object(self.content, "asset", "").get("version", "")).startswith("2."):
+            self._refuse(
+                "asset.version", "2.0, or a later one that begins with 2", shown(self.content.get("asset")), PLAIN
+            )
         buffers = list(self._buffers())
         views = [self._view(*part, buffers) for part in self._parts("bufferViews")]
         self._accessors(views)
@@ -63,6 +75,9 @@ class _Check:
             for number, primitive in enumerate(self._listed(mesh, "primitives", where)):
                 self._primitive(primitive, f"{where}.primitives[{number}]")
         self._images(buffers)
+        for where, node in self._parts("nodes"):
+            if "mesh" in node:
+                self._index(node, "mesh", where, len(self._parts("meshes")))
 
     def _extensions(self) -> None:
         needed = self.content.get("extensionsRequired", [])
@@ -129,10 +144,16 @@ class _Check:
         attributes = primitive.get("attributes")
         if not isinstance(attributes, dict) or primitive.get("mode", 4) not in MODES:
             self._refuse(where, "triangles or strips of them, with attributes", shown(primitive), PLAIN)
+        if "material" in primitive:
+            self._index(primitive, "material", where, len(self.content.get("materials", [])))
         named = [*attributes.items(), *([("indices", primitive["indices"])] if "indices" in primitive else [])]
         accessors = self.content.get("accessors", [])
         for key, index in named:
             accessor = accessors[self._index({key: index}, key, where, len(accessors))]
+            kinds, types = READ_AS.get(key, (None, None))
+            if kinds is not None and (accessor["componentType"] not in kinds or accessor["type"] not in types):
+                found = f"type {accessor['componentType']} of {accessor['type']}"
+                self._refuse(f"{where}.{key}", "types of numbers that are read", found, PLAIN)
             if "bufferView" not in accessor or "sparse" in accessor:
                 self._refuse(f"{where}.{key}", "numbers in a buffer", "compressed or sparse ones, or none", PLAIN)
 
@@ -140,7 +161,11 @@ class _Check:
         """Look at the pictures that are colours: without one of them the decoder would go on, with another colour."""
         textures, images = self._parts("textures"), self._parts("images")
         for where, material in self._parts("materials"):
-            base = self._object(self._object(material, "pbrMetallicRoughness", where), "baseColorTexture", where)
+            colour = self._object(material, "pbrMetallicRoughness", where)
+            factor = numbers(colour.get("baseColorFactor", [1.0] * 4), 4, f"{self.path}: {where}", "baseColorFactor")
+            if not all(0.0 <= one <= 1.0 for one in factor):
+                self._refuse(f"{where}.baseColorFactor", "numbers from 0 to 1", shown(factor), PLAIN)
+            base = self._object(colour, "baseColorTexture", where)
             if base:
                 if self._count(base, "texCoord", where, 0) != 0:
                     self._refuse(f"{where}.texCoord", "one set of texture coordinates", "another one", PLAIN)

@@ -129,7 +129,7 @@ def _glb_content(path: Path) -> object:
     try:
         return parse_json(content.decode())
     except ValueError:
-        return {}
+        return None
 
 
 def _uris(content: object, key: str) -> Iterator[str]:
