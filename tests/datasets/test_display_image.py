@@ -172,3 +172,20 @@ def test_levels_that_are_looked_up_are_those_of_the_curve(kind: type) -> None:
     levels = np.arange(np.iinfo(kind).max + 1, dtype=kind).reshape(-1, 2)[:, ::-1]
     wanted = srgb.decode(levels / np.iinfo(kind).max).astype(np.float32)
     np.testing.assert_array_equal(srgb.decode_levels(levels), wanted)
+
+
+@pytest.mark.parametrize(("gamma", "good"), [(45455, True), (43000, True), (100000, False), (55556, False), (0, False)])
+def test_colours_by_another_curve_are_refused(tmp_path: Path, gamma: int, good: bool) -> None:
+    """Of linear levels (a gamma of 1) those of sRGB were made a second time."""
+    Image.fromarray(COLOUR).save(tmp_path / "a.png")
+    content = (tmp_path / "a.png").read_bytes()
+    chunk = b"gAMA" + struct.pack(">I", gamma)
+    place = content.index(b"IDAT") - 4
+    packed = struct.pack(">I", 4) + chunk + struct.pack(">I", zlib.crc32(chunk))
+    (tmp_path / "a.png").write_bytes(content[:place] + packed + content[place:])
+    np.testing.assert_array_equal(read_levels(tmp_path / "a.png").levels, COLOUR)
+    if good:
+        read_colour(tmp_path / "a.png")
+        return
+    with pytest.raises(InputError, match=r"a\.png: expected colours as of sRGB, found a gamma of"):
+        read_colour(tmp_path / "a.png")

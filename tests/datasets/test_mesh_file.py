@@ -160,3 +160,26 @@ def test_no_file_is_opened_that_a_mesh_does_not_name(tmp_path: Path) -> None:
     assert own.get("t.png") == picture.read_bytes()
     with pytest.raises(InputError, match=r"another file, 'other\.png'"):
         own.get("other.png")
+
+
+@pytest.mark.parametrize("rows", [-1, 1])
+def test_text_of_a_ply_has_the_rows_that_it_says(tmp_path: Path, rows: int) -> None:
+    """A point that is missing was made up by the first triangle, and those beyond the last were left out."""
+    content = trimesh.Trimesh(VERTICES, FACES, process=False).export(file_type="ply", encoding="ascii").decode()
+    (tmp_path / "a.ply").write_text(content)
+    assert len(read_mesh(tmp_path / "a.ply")) == 12
+    lines = content.splitlines()
+    first = lines.index("end_header") + 1
+    (tmp_path / "a.ply").write_text(
+        "\n".join([*lines[:first], *([lines[first]] * rows or []), *lines[first + (rows < 0) :]])
+    )
+    with pytest.raises(InputError, match=rf"a\.ply: expected 36 rows after the header, found {36 + rows}"):
+        read_mesh(tmp_path / "a.ply")
+
+
+def test_a_ply_of_several_textures_is_refused(tmp_path: Path) -> None:
+    path, picture = linked(tmp_path, "ply")
+    (tmp_path / "u.png").write_bytes(picture.read_bytes())
+    path.write_bytes(path.read_bytes().replace(b"\ncomment Tex", b"\ncomment TextureFile u.png\ncomment Tex", 1))
+    with pytest.raises(InputError, match=r"a\.ply: expected one texture at most in a PLY, found 2"):
+        read_mesh(path)

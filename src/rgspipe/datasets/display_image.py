@@ -33,6 +33,9 @@ DEPTH, COLOUR_TYPE, COLOURED = 24, 25, (2, 4, 6)
 #: colour are rounded, and these go into blue 1.77 times.
 COLOUR_ROUNDING = 1.5
 
+#: What a PNG of sRGB states as its gamma, and by how much it may miss that.
+DISPLAY_GAMMA, SAME_GAMMA = 1.0 / 2.2, 0.03
+
 #: What Pillow raises of damaged files, and of those that claim more pixels than it decodes.
 DAMAGED = (OSError, SyntaxError, ValueError, MemoryError, Image.DecompressionBombError)
 
@@ -60,10 +63,12 @@ class Levels:
     Attributes:
         levels: (H, W, 1 or 3) uint8 or uint16.
         opaque: (H, W) of the same type, if it has alpha.
+        other_curve: what is said where light is asked for and the file states another curve than that of sRGB.
     """
 
     levels: np.ndarray
     opaque: np.ndarray | None
+    other_curve: InputError | None = None
 
     @property
     def values(self) -> Pixels:
@@ -77,7 +82,13 @@ class Levels:
 
     @property
     def light(self) -> Pixels:
-        """(H, W, 1 or 3) in [0, 1], linearised with the sRGB curve."""
+        """(H, W, 1 or 3) in [0, 1], linearised with the sRGB curve.
+
+        Raises:
+            InputError: the file states another one.
+        """
+        if self.other_curve is not None:
+            raise self.other_curve
         return srgb.decode_levels(self.levels)
 
 
@@ -94,11 +105,11 @@ def read_levels(path: Path) -> Levels:
             colour, which no library at hand reads whole.
     """
     input_file(path, "an image")
-    stored = _levels(path, _format(path))
+    stored, other_curve = _levels(path, _format(path))
     stored = stored[..., None] if stored.ndim == 2 else stored
     channels = stored.shape[2]
     has_alpha = channels in (2, 4)
-    return Levels(stored[..., : channels - has_alpha], stored[..., -1] if has_alpha else None)
+    return Levels(stored[..., : channels - has_alpha], stored[..., -1] if has_alpha else None, other_curve)
 
 
 def read_colour_levels(path: Path) -> Levels:
@@ -135,13 +146,13 @@ def _format(path: Path) -> str:
     return kind
 
 
-def _levels(path: Path, kind: str) -> np.ndarray:
-    """(H, W) or (H, W, C) uint8, or uint16 of a grey image."""
+def _levels(path: Path, kind: str) -> tuple[np.ndarray, InputError | None]:
+    """(H, W) or (H, W, C) uint8, or uint16 of a grey image; and what speaks against taking them for sRGB."""
     try:
         with opened(path, path, [kind]) as file:
             _check_depth(path, kind)
             _check_orientation(path, file)
-            return _unpacked(path, file)
+            return _unpacked(path, file), _other_curve(path, file)
     except InputError:
         raise
     except UnidentifiedImageError as error:
@@ -172,6 +183,15 @@ def _check_orientation(path: Path, file: Image.Image) -> None:
             "tag (exiftool -Orientation= FILE); if they are of the image as it is shown, turn the pixels (mogrify "
             "-auto-orient FILE).",
         )
+
+
+def _other_curve(path: Path, file: Image.Image) -> InputError | None:
+    """What to say of colours that a PNG states to be stored by another curve than that of a display."""
+    gamma = file.info.get("gamma", DISPLAY_GAMMA)
+    if "srgb" in file.info or abs(gamma - DISPLAY_GAMMA) <= SAME_GAMMA:
+        return None
+    remedy = "Convert the image to sRGB, or, if its levels are meant as they are, remove the chunk gAMA."
+    return InputError(path, expected="colours as of sRGB", found=f"a gamma of {gamma:g}", remedy=remedy)
 
 
 def _unpacked(path: Path, file: Image.Image) -> np.ndarray:

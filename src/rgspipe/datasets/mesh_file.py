@@ -20,6 +20,7 @@ from rgspipe.datasets.limits import FARTHEST
 from rgspipe.datasets.mesh_links import FORMATS, GLTF, mesh_links
 from rgspipe.datasets.mesh_options import MeshOptions
 from rgspipe.datasets.obj_text import plain_obj
+from rgspipe.datasets.ply_header import check_rows
 from rgspipe.datasets.reading_limits import RAISE, reading_limits, timed
 from rgspipe.datasets.texture import check_texture, texture_light
 from rgspipe.errors import InputError
@@ -99,6 +100,8 @@ class OwnFiles(trimesh.resolvers.FilePathResolver):
             input_file(file, f"a file that {self._path.name} names")
         for file in self._links.textures.values():
             check_texture(file.read_bytes(), file)
+        if self._path.suffix.lower() == ".ply":
+            check_rows(self._path)
         if self._path.suffix.lower() == ".ply" and len(self._links.textures) > 1:
             found, remedy = f"{len(self._links.textures)}", "Export it as GLB."
             raise InputError(self._path, expected="one texture at most in a PLY", found=found, remedy=remedy)
