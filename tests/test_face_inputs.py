@@ -17,6 +17,7 @@ import rgspipe as rg
 WIDTH, HEIGHT = 48, 40
 CAMERA = rg.Camera.look_at([0, -1.5, 0.05], [0, 0, 0], width=WIDTH, height=HEIGHT)
 LIGHT = rg.PointLight([-0.3, 0.28, -0.1], [0.6, 0.8, 0.8])
+VIEW = rg.View("a", CAMERA, torch.zeros(HEIGHT, WIDTH, 3), torch.ones(HEIGHT, WIDTH), LIGHT)
 
 
 @pytest.fixture(scope="module")
@@ -347,6 +348,24 @@ REFUSED: dict[str, tuple[Callable[[rg.FrozenScene, Tensor], object], str, str, s
     "no cameras": (lambda s, i: rg.fit_lights(s, 3, [i]), "cameras", "int", "look_at"),
     "no views to train on": (lambda s, i: rg.train([], few_surfels()), "views", "none", "load_views"),
     "images for views": (lambda s, i: rg.train([i], few_surfels()), "views[0]", "Tensor", "load_views"),
+    "an image of another size than its camera's": (
+        lambda s, i: rg.View("a", CAMERA, i[:10], torch.ones(10, WIDTH)),
+        "image",
+        "shape (10, 48, 3)",
+        "Pass",
+    ),
+    "no camera of a view": (lambda s, i: rg.View("a", None, i, i[:, :, 0]), "camera", "NoneType", "look_at"),
+    "a place for a view's light": (
+        lambda s, i: rg.View("a", CAMERA, i, i[:, :, 0], [0, 0, 0]),
+        "light",
+        "list",
+        "PointLight",
+    ),
+    "words for surfels to train": (lambda s, i: rg.train([VIEW], "many"), "surfels", "'many'", "how many"),
+    "words for options": (lambda s, i: rg.train([VIEW], 50, "fast"), "options", "str", "such"),
+    "no camera for other light": (lambda s, i: rg.ambient_image(s, None), "camera", "NoneType", "look_at"),
+    "a scene for its views": (lambda s, i: rg.track_lights(s, [i]), "views", "FrozenScene", "FitViews.prepare"),
+    "no formats": (lambda s, i: rg.export_lights([LIGHT], "x", 3), "formats", "int", "usda"),
     "a picture of words": (lambda s, i: rg.tone_map("x"), "image", "'x'", "radiance"),
     "a folder that is not there": (lambda s, i: rg.FrozenScene.load("nowhere"), "nowhere", "no such folder", "Freeze"),
     "a file that is not there": (lambda s, i: rg.Surfels.from_ply("no.ply"), "no.ply", "no such file", "path"),

@@ -63,6 +63,7 @@ CLAIMS: dict[str, tuple[tuple, object, str]] = {
         "numbers from 0 to 1",
     ),
     "a material of no number": (("meshes", 0, "primitives", 0, "material"), -1, "material: expected a whole number"),
+    "materials that are none": (("materials",), 7, "materials: expected a list of objects"),
     "a mesh of no number": (("nodes", 0, "mesh"), 7, "nodes[0].mesh: expected the number of one of 1"),
     "an old version": (("asset", "version"), "1.0", "asset.version: expected 2.0"),
     "a picture of no number": (("textures", 0, "source"), 7, "textures[0].source: expected the number of one of 1"),

@@ -145,9 +145,9 @@ class _Check:
         if not isinstance(attributes, dict) or primitive.get("mode", 4) not in MODES:
             self._refuse(where, "triangles or strips of them, with attributes", shown(primitive), PLAIN)
         if "material" in primitive:
-            self._index(primitive, "material", where, len(self.content.get("materials", [])))
+            self._index(primitive, "material", where, len(self._parts("materials")))
         named = [*attributes.items(), *([("indices", primitive["indices"])] if "indices" in primitive else [])]
-        accessors = self.content.get("accessors", [])
+        accessors = self._listed(self.content, "accessors")
         for key, index in named:
             accessor = accessors[self._index({key: index}, key, where, len(accessors))]
             kinds, types = READ_AS.get(key, (None, None))
