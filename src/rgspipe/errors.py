@@ -21,7 +21,7 @@ class InputError(ValueError):
 
     def __init__(self, where: str | Path, *, expected: str, found: str, remedy: str) -> None:
         self.where, self.expected, self.found, self.remedy = str(where), expected, found, remedy
-        super().__init__(_printable(f"{where}: expected {expected}, found {found}. {remedy}"))
+        super().__init__(printable(f"{where}: expected {expected}, found {found}. {remedy}"))
 
     def within(self, section: str) -> InputError:
         """The same error where what is wrong is part of something larger: `section` and a dot before its name."""
@@ -29,6 +29,6 @@ class InputError(ValueError):
         return InputError(where, expected=self.expected, found=self.found, remedy=self.remedy)
 
 
-def _printable(text: str) -> str:
+def printable(text: str) -> str:
     """The text with what would steer a terminal, or cannot be printed, as escapes: it may be a stranger's."""
     return "".join(one if one.isprintable() else one.encode("unicode_escape").decode() for one in text)

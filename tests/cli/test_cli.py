@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -59,6 +60,20 @@ def test_nobody_need_read_on(arguments: list[str], tmp_path: Path, child_environ
     started.stdout.close()
     assert started.stderr.read() == ""
     assert started.wait() == UNREAD
+
+
+@pytest.mark.parametrize("words", ["--help", "status", "stage=sow"])
+def test_there_may_be_no_room_for_what_is_said(tmp_path: Path, child_environment: dict[str, str], words: str) -> None:
+    """A run is done all the same."""
+    command = [sys.executable, "-m", "toys", words]
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            command, env=child_environment, cwd=tmp_path, stdout=full, stderr=subprocess.PIPE, text=True
+        )
+    assert done.returncode == REFUSED
+    assert "standard output: expected room" in done.stderr
+    assert not {"Traceback", "HYDRA"} & set(re.findall(r"[A-Za-z]+", done.stderr))
+    assert "=" not in words or (tmp_path / "outputs/cornell/sow/latest").exists()
 
 
 @pytest.mark.parametrize("closed", ["1", "2"])
@@ -190,6 +205,18 @@ def test_a_run_prints_its_plan_and_result_and_leaves_a_status(rgspipe, tmp_path:
     assert "No such runs" in rgspipe("status", "state=failed").stdout
     listed = rgspipe("status")
     assert listed.stdout.count("done") == 2
+
+
+@pytest.mark.parametrize("named", [(), ("old",)], ids=["in the list", "by its name"])
+def test_what_would_steer_a_terminal_in_a_status_is_escaped(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], named: tuple[str, ...]
+) -> None:
+    status = RunStatus.start(tmp_path / "runs/old", "freeze", ["scene.path=\x1b[2J"])
+    status.failed(ValueError("\x1b]0;title\x07\nsecond"), 1)
+    assert main(["status", f"outputs={tmp_path}", *named]) == 0
+    told = capsys.readouterr().out
+    assert "\\x1b[2J" in told and "\\x1b]0;title" in told
+    assert not {"\x1b", "\x07"} & set(told)
 
 
 def test_a_failure_is_short_and_its_traceback_is_kept(rgspipe, tmp_path: Path) -> None:

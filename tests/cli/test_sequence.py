@@ -25,6 +25,12 @@ def test_every_step_of_the_shipped_pipelines_composes(name: str) -> None:
         check([f"stage={step.stage}", *step.overrides])
 
 
+#: Each line is ten times the one before: in full 10⁹ letters.
+BOMB = (
+    "a0: &a0 x\n" + "".join(f"a{n}: &a{n} [{', '.join([f'*a{n - 1}'] * 10)}]\n" for n in range(1, 10)) + "steps: [*a9]"
+)
+
+
 @pytest.mark.parametrize(
     ("text", "word"),
     [
@@ -36,6 +42,7 @@ def test_every_step_of_the_shipped_pipelines_composes(name: str) -> None:
         ("steps: [{overrides: []}]", "step 1"),
         ("steps: [{stage: freeze, overides: []}]", "step 1"),
         ("steps: [{stage: freeze, overrides: a}]", "step 1"),
+        (BOMB, "step 1"),
     ],
 )
 def test_a_damaged_pipeline_is_refused(tmp_path: Path, text: str, word: str) -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import re
+import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -109,20 +111,6 @@ def test_stages_remark_on_what_is_made_already(config: RgspipeConfig) -> None:
     assert last_lines()[0].startswith("harvest  reuse") and last_lines()[1] == "made: harvest."
 
 
-@pytest.mark.parametrize("stage", ["harvest", "grow"])
-def test_a_file_that_was_cut_off_after_it_was_made_is_told_where_it_is_reused(
-    config: RgspipeConfig, stage: str
-) -> None:
-    artifact = run(config, toys.load)
-    made = artifact.path if stage == "harvest" else next((artifact.path.parents[1] / "grow").glob("[0-9a-f]*"))
-    file = next(made.glob("total*.txt"))
-    file.write_bytes(b"")
-    wanted = config if stage == "harvest" else with_changes(config, {"report.views": [1, 2, 3]})
-    with pytest.raises(InputError, match=r"bytes that \w+ wrote, found 0 bytes\. Remove the folder") as caught:
-        run(wanted, toys.load)
-    assert caught.value.where == str(file)
-
-
 def test_a_link_that_was_lost_is_made_again(config: RgspipeConfig) -> None:
     artifact = run(config, toys.load)
     link = artifact.path.parent / "latest"
@@ -195,10 +183,52 @@ def test_foreign_files_count_by_content(config: RgspipeConfig, tmp_path: Path) -
     assert steps[0].reason == f"the files in {source} changed"
 
 
-def test_a_damaged_input_is_refused_and_left_alone(config: RgspipeConfig) -> None:
+@pytest.mark.parametrize(
+    ("name", "damage", "word"),
+    [
+        ("row_03.txt", lambda path: path.write_text(""), "0 bytes"),
+        ("row_03.txt", Path.unlink, "no file"),
+        ("manifest.json", lambda path: path.write_text(""), "damaged JSON"),
+        ("manifest.json", Path.unlink, "no file"),
+        ("", lambda path: (shutil.rmtree(path), path.write_text("")), "damaged JSON"),
+    ],
+    ids=["emptied", "removed", "manifest emptied", "manifest removed", "a file in place of the folder"],
+)
+def test_what_is_damaged_is_made_again_and_that_is_said(
+    config: RgspipeConfig, caplog: pytest.LogCaptureFixture, name: str, damage: Callable[[Path], object], word: str
+) -> None:
+    """As a power cut or a careless copy leaves it; what was made from it stays."""
+    whole = run(config, toys.load)
+    folder = (Path(config.outputs) / "cornell" / "sow" / "latest").resolve()
+    content = (folder / "row_03.txt").read_bytes()
+    damage(folder / name)
+    assert planned(config) == [("harvest", True, "")]
+    other = with_changes(config, {"report.views": [1, 2]})
+    assert [(step, reused) for step, reused, _ in planned(other)][1] == ("sow", False)
+    assert word in planned(other)[1][2]
+    run(other, toys.load)
+    assert (folder / "row_03.txt").read_bytes() == content
+    assert any(word in record.message and "made again" in record.message for record in caplog.records)
+    assert run(config, toys.load).manifest == whole.manifest
+    assert not list(folder.parent.glob(".gone-*"))
+
+
+def test_content_that_changed_is_refused_when_it_is_read(config: RgspipeConfig) -> None:
+    """Somebody may have meant it: what is as long as it was is not thrown away."""
     run(with_changes(config, {"stage": "sow"}), toys.load)
     path = next((Path(config.outputs) / "cornell" / "sow" / "latest").resolve().glob("row_03.txt"))
-    path.write_text("x")
-    with pytest.raises(InputError, match=r"row_03\.txt"):
+    changed = path.read_text()[::-1] + "x"
+    path.write_text(changed[: path.stat().st_size])
+    with pytest.raises(InputError, match=r"row_03\.txt.*checksum"):
         run(config, toys.load)
-    assert path.read_text() == "x"
+    assert path.read_text() == changed[: path.stat().st_size]
+
+
+def test_a_folder_in_place_of_the_link_stays(config: RgspipeConfig, caplog: pytest.LogCaptureFixture) -> None:
+    latest = Path(config.outputs) / "cornell" / "harvest" / "latest"
+    (latest / "mine").mkdir(parents=True)
+    for _ in range(2):
+        run(config, toys.load)
+        assert f"{latest} stays as it is" in caplog.text
+        caplog.clear()
+    assert (latest / "mine").is_dir()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import sys
 from collections.abc import Sequence
@@ -14,6 +15,7 @@ from rgspipe.cli.messages import EXIT_INPUT, EXIT_INTERRUPTED, EXIT_UNREAD, show
 from rgspipe.errors import InputError
 from rgspipe.graph.pipeline import StageLoader
 from rgspipe.stages import load_stage
+from rgspipe.store.files import NO_ROOM
 
 __all__ = ["main"]
 
@@ -36,21 +38,43 @@ def main(arguments: Sequence[str] | None = None, stage_loader: StageLoader = loa
     for stream in (sys.stdout, sys.stderr):
         # A terminal that knows ASCII alone shows the rest as escapes.
         stream.reconfigure(errors="backslashreplace")
+    # A log that finds no room, or no reader, is told once, where the output ends, not line by line.
+    logging.raiseExceptions = False
+    # The configuration may be what is wrong, so the wish for a traceback is read from the words themselves.
+    traceback = "debug.traceback=true" in arguments
     try:
         code = _dispatch(arguments, stage_loader)
         sys.stdout.flush()
         return code
-    except BrokenPipeError:
-        # Nobody reads on, as with `| head`. What is still to be written at the end goes nowhere.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except BrokenPipeError:  # nobody reads on, as with `| head`
+        _say_no_more()
         return EXIT_UNREAD
     except InputError as error:
-        # The configuration may be what is wrong, so the wish for a traceback is read from the words themselves.
-        show_input_error(error, "debug.traceback=true" in arguments)
+        show_input_error(error, traceback)
+        return EXIT_INPUT
+    except OSError as error:
+        if error.filename is not None or error.errno not in NO_ROOM:
+            raise
+        _say_no_more()
+        show_input_error(_no_room(error), traceback)
         return EXIT_INPUT
     except KeyboardInterrupt:
         print("\nInterrupted. What is done is kept, and the next run goes on from there.", file=sys.stderr)
         return EXIT_INTERRUPTED
+
+
+def _say_no_more() -> None:
+    """Let what is still to be written at the end go nowhere."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _no_room(error: OSError) -> InputError:
+    return InputError(
+        "standard output",
+        expected="room for what is said there",
+        found=f"none ({error.strerror})",
+        remedy="Free some, or send it elsewhere (> FILE). What is done is kept.",
+    )
 
 
 def _dispatch(arguments: list[str], stage_loader: StageLoader) -> int:

@@ -93,10 +93,11 @@ def run_hydra(arguments: Sequence[str], stage_loader: StageLoader, usual: Usual 
     """Hand the arguments to Hydra as they are; its exit status, or the largest of jobs in this process."""
 
     codes = [0]
+    found: list[str] = []
 
     # A closure, so that worker processes get the stage loader and what is usual with it.
     def job(values: DictConfig) -> int:
-        codes.append(_job(values, stage_loader, usual))
+        codes.append(_job(values, stage_loader, usual, found))
         return codes[-1]
 
     register_schema()
@@ -109,6 +110,9 @@ def run_hydra(arguments: Sequence[str], stage_loader: StageLoader, usual: Usual 
         return error.code if isinstance(error.code, int) else EXIT_FAILED
     finally:
         sys.argv = former
+    # Not within the job: Hydra has words of its own for output that finds no room.
+    for line in found:
+        print(line)
     return max(codes)
 
 
@@ -173,8 +177,8 @@ def quoted(path: Path) -> str:
     return f"'{text}'"
 
 
-def _job(values: DictConfig, stage_loader: StageLoader, usual: Usual | None) -> int:
-    """One run, or one job of a sweep; its exit status."""
+def _job(values: DictConfig, stage_loader: StageLoader, usual: Usual | None, found: list[str]) -> int:
+    """One run, or one job of a sweep; its exit status, and to `found` lines that say what a single run found."""
     settings = HydraConfig.get()
     overrides = list(settings.overrides.task)
     status = RunStatus.start(Path(settings.runtime.output_dir), str(values.get("stage")), overrides)
@@ -198,7 +202,7 @@ def _job(values: DictConfig, stage_loader: StageLoader, usual: Usual | None) -> 
         raise
     status.done(artifact.path)
     if settings.mode == RunMode.RUN:
-        print("\n".join([*_outcome(artifact), f"Result: {artifact.path}"]))
+        found += [*_outcome(artifact), f"Result: {artifact.path}"]
     return 0
 
 

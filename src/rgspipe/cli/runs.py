@@ -9,7 +9,7 @@ from typing import Any
 
 from rgspipe.cli.arguments import meant, refused
 from rgspipe.cli.help import groups, sections
-from rgspipe.errors import InputError
+from rgspipe.errors import InputError, printable
 from rgspipe.store.status import STATES, read_statuses
 
 #: What runs are told apart by beside what they were started with.
@@ -42,7 +42,9 @@ def show_runs(arguments: Sequence[str]) -> int:
     chosen = [(name, status) for name, status in runs if not names or name in names]
     chosen = [(name, status) for name, status in chosen if all(_has(status, text) for text in asked)]
     for name, status in chosen:
-        print("\n".join([_line(name, status), *(_details(status) if names else _reason(status))]))
+        told = [_line(name, status), *(_details(status) if names else _reason(status))]
+        # Whoever may write to the folder may have put there what would steer a terminal.
+        print("\n".join(printable(line) for text in told for line in text.splitlines()))
     if not chosen:
         print(f"No {'such ' if runs else ''}runs in {outputs / 'runs'}.")
     return 0

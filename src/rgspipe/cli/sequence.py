@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import reprlib
 import shlex
 import signal
 import subprocess
@@ -72,11 +73,11 @@ def _step(path: Path, number: int, item: Any) -> SequenceStep:
     where = f"{path}, step {number}"
     remedy = "A step is {stage: NAME, overrides: [key=value, ...], sweep: true or false}."
     if not isinstance(item, dict) or not isinstance(item.get("stage"), str):
-        raise InputError(where, expected="a step with a stage", found=repr(item), remedy=remedy)
+        raise InputError(where, expected="a step with a stage", found=reprlib.repr(item), remedy=remedy)
     unknown = set(item) - {"stage", "overrides", "sweep"}
     overrides = item.get("overrides", [])
     if unknown or not isinstance(overrides, list) or not all(isinstance(text, str) for text in overrides):
-        raise InputError(where, expected="stage, overrides and sweep", found=repr(item), remedy=remedy)
+        raise InputError(where, expected="stage, overrides and sweep", found=reprlib.repr(item), remedy=remedy)
     return SequenceStep(item["stage"], tuple(overrides), bool(item.get("sweep", False)))
 
 

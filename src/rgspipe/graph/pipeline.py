@@ -42,6 +42,7 @@ NO_RESULT = (
     "rgspipe.stages.sources",
     "rgspipe.store.artifacts",
     "rgspipe.store.files",
+    "rgspipe.store.locks",
     "rgspipe.store.manifest",
     "rgspipe.store.status",
     "rgspipe.store.unwritable",
@@ -133,7 +134,7 @@ def plan(root: Node, store: ArtifactStore) -> list[Step]:
     def visit(node: Node) -> None:
         if node.key in steps:
             return
-        reused = store.find(node.key) is not None
+        reused = store.usable(node.key) is not None
         if not reused:
             for needed in node.inputs:
                 visit(needed)
@@ -145,6 +146,8 @@ def plan(root: Node, store: ArtifactStore) -> list[Step]:
 
 
 def _reason(node: Node, store: ArtifactStore) -> str:
+    if (damage := store.damage(node.key)) is not None:
+        return f"{damage.where} is damaged: {damage.found}"
     if store.partial(node.key).exists():
         return "goes on where it was interrupted"
     newest = store.newest(node.key.scene, node.key.stage)
@@ -164,8 +167,8 @@ def _expected(node: Node, earlier: EarlierRuns, steps: Mapping[Key, Step]) -> Ex
 
 
 def _remarks(node: Node, store: ArtifactStore) -> tuple[str, ...]:
-    own = store.find(node.key)
-    found = {needed.stage.name: store.find(needed.key) for needed in reversed(node.inputs)} if own is None else {}
+    own = store.usable(node.key)
+    found = {needed.stage.name: store.usable(needed.key) for needed in reversed(node.inputs)} if own is None else {}
     made = {name: artifact for name, artifact in {**found, node.stage.name: own}.items() if artifact is not None}
     return tuple(node.stage.remarks(node.config, made))
 

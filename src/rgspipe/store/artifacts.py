@@ -21,21 +21,22 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from filelock import FileLock, Timeout
-
 from rgspipe.errors import InputError
 from rgspipe.machine.description import PeakMemory, library_versions, machine
 from rgspipe.store.files import (
+    IN_THE_WAY,
     NO_RIGHT,
     UNWRITABLE,
     make_folder,
     point_at,
     publish,
+    remove_at_once,
     remove_tree,
     sha256,
     unfinished_links,
     write_json,
 )
+from rgspipe.store.locks import lock_file, locked
 from rgspipe.store.manifest import MANIFEST, SCHEMA_VERSION, inventory, read_manifest
 
 #: What links to the newest artifacts are called, or begin with.
@@ -119,7 +120,7 @@ class Artifact:
     def _check_size(self, path: Path, entry: Mapping[str, Any]) -> None:
         if not path.is_file():
             raise self._damaged(path, entry, "no file")
-        if (size := path.stat().st_size) != entry["bytes"]:
+        if path.stat().st_size != entry["bytes"] and (size := _size_now(path)) != entry["bytes"]:
             raise self._damaged(path, entry, f"{size} bytes")
 
     def _damaged(self, path: Path, entry: Mapping[str, Any], found: str) -> InputError:
@@ -156,6 +157,22 @@ class ArtifactStore:
             self._known[key] = Artifact(path, read_manifest(path, key.stage, key.fingerprint))
         return self._known[key]
 
+    def usable(self, key: Key) -> Artifact | None:
+        """The published artifact if its manifest is its own and every file is as long as it was written, else None.
+
+        One that is not is made again; `damage` says what is wrong with it.
+        """
+        return None if self.damage(key) else self.find(key)
+
+    def damage(self, key: Key) -> InputError | None:
+        """What keeps the published artifact from being used, without reading its files; None if nothing does."""
+        try:
+            if (artifact := self.find(key)) is not None:
+                artifact.check_sizes()
+        except InputError as error:
+            return error
+        return None
+
     def newest(self, scene: str, stage: str) -> Artifact | None:
         """The artifact of a stage that was made or asked for last, or None if it cannot be read or there is none."""
         links = [link for link in (self.root / scene / stage).glob(f"{LATEST}*") if link.is_symlink() and link.exists()]
@@ -186,7 +203,7 @@ class ArtifactStore:
         try:
             point_at(link, key.fingerprint)
         except OSError as error:
-            if error.errno not in tolerated:
+            if error.errno not in (*tolerated, *IN_THE_WAY):
                 raise
             if not (link.is_symlink() and link.readlink() == Path(key.fingerprint)):
                 log.warning("%s stays as it is: %s", link, error.strerror)
@@ -212,7 +229,11 @@ class ArtifactStore:
         """
         path, partial = self.path(key), self.partial(key)
         make_folder(path.parent)
-        with _locked(path.parent / f".lock-{key.fingerprint}", key):
+        with locked(path.parent, key.fingerprint):
+            if (damage := self.damage(key)) is not None:
+                log.warning("%s: %s: made again", damage.where, damage.found)
+                remove_at_once(path)
+                self._known.pop(key, None)
             if (found := self.find(key)) is not None:
                 # Who made it may have been killed before it was linked to, and may call it otherwise. On a full disk
                 # the run ends, as the next one must find a reason to link to it.
@@ -224,7 +245,7 @@ class ArtifactStore:
             try:
                 facts = make(partial)
             except InputError:
-                _forget(partial, path.parent / f".lock-{key.fingerprint}")
+                _forget(partial, lock_file(path.parent, key.fingerprint))
                 raise
             seconds = round(time.perf_counter() - start, 3)
             made = {"seconds": seconds, "peak_memory_mib": memory.mib(), "resumed": resumed, "facts": dict(facts)}
@@ -253,24 +274,19 @@ class ArtifactStore:
         publish(partial, path)
 
 
-def _locked(lock_file: Path, key: Key) -> FileLock:
-    # The umask says who else may hold it: whoever may write to the folder of a group must be able to.
-    os.close(os.open(lock_file, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o666))
-    lock = FileLock(lock_file)
-    try:
-        return lock.acquire(timeout=0)
-    except Timeout:
-        log.info("%s: another process is making %s; waiting for it", key.stage, key.fingerprint)
-        return lock.acquire()
+def _size_now(path: Path) -> int:
+    """How long a file is; a network file system may have remembered it from when it was written, until it is opened."""
+    with path.open("rb") as stream:
+        return os.fstat(stream.fileno()).st_size
 
 
-def _forget(partial: Path, lock_file: Path) -> None:
+def _forget(partial: Path, lock: Path) -> None:
     """Leave no trace of what was refused before anything was made of it; its lock is held."""
     if any(path.is_file() for path in partial.rglob("*")):
         return
     remove_tree(partial)
     # Who waits for the lock sees that its file is gone, and takes a new one.
-    lock_file.unlink()
+    lock.unlink()
 
 
 def _remove_scratch(partial: Path) -> None:

@@ -19,11 +19,17 @@ NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 NO_RIGHT = (errno.EROFS, errno.EACCES, errno.EPERM)
 UNWRITABLE = NO_ROOM + NO_RIGHT
 
+#: Why a link cannot be made where there is room and the right to: a folder has its name.
+IN_THE_WAY = (errno.EISDIR, errno.ENOTEMPTY)
+
 #: Characters of a file's name that the one it is written under repeats: names may have 255 bytes.
 LONGEST_STEM = 40
 
 #: The longest name of a file or folder that is taken, bytes: file systems take 255, and one in the making is longer.
 LONGEST_NAME = 200
+
+#: What a folder's name begins with while it is removed, so that nobody takes it for what it was.
+GONE = ".gone-"
 
 #: What the name of a link ends with while it is made.
 UNFINISHED = ".new"
@@ -139,6 +145,23 @@ def remove_tree(folder: Path) -> None:
             raise
     except OSError as error:
         raise OSError(error.errno, error.strerror, str(folder)) from error
+
+
+def remove_at_once(folder: Path) -> None:
+    """Remove a folder, or a file in its place, in one step, then take it apart: a kill leaves it whole or gone.
+
+    What is left of a folder is called `.gone-` and its name.
+    """
+    if folder.is_dir() and not folder.is_symlink():
+        away = folder.with_name(f"{GONE}{folder.name.lstrip('.')}")
+        if away.exists():  # an earlier kill left it
+            remove_tree(away)
+        folder.rename(away)
+        sync(away.parent)
+        remove_tree(away)
+    else:
+        folder.unlink()
+        sync(folder.parent)
 
 
 def publish(partial: Path, folder: Path) -> None:

@@ -27,7 +27,7 @@ def read_manifest(folder: Path, stage: str, fingerprint: str) -> Mapping[str, An
         manifest = parse_json(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise InputError(path, expected=expected, found="no file", remedy=remedy) from None
-    except (IsADirectoryError, ValueError) as error:
+    except (IsADirectoryError, NotADirectoryError, ValueError) as error:
         raise InputError(path, expected=expected, found=f"damaged JSON ({error})", remedy=remedy) from None
     if not isinstance(manifest, dict) or manifest.get("schema") != SCHEMA_VERSION:
         raise InputError(path, expected=expected, found="another schema", remedy=remedy)

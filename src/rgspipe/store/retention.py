@@ -10,22 +10,20 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from filelock import FileLock, Timeout
+from filelock import Timeout
 
 from rgspipe.store.artifacts import LATEST, ArtifactStore, Key
-from rgspipe.store.files import remove_tree, sync
+from rgspipe.store.files import GONE, remove_at_once, remove_tree
 from rgspipe.store.fingerprints import DIGITS
+from rgspipe.store.locks import LOCK, locked_if_free
 from rgspipe.store.manifest import MANIFEST
 from rgspipe.store.unwritable import told_below
 
 #: The stage whose results are removed only where it is named.
 REPORT = "report"
 
-#: What a folder is called while it is removed; it is no artifact any more.
-GONE = ".gone-"
-
-#: What a folder is called while an artifact is made in it, and what is locked meanwhile.
-PARTIAL, LOCK = ".partial-", ".lock-"
+#: What a folder is called while an artifact is made in it.
+PARTIAL = ".partial-"
 
 #: What artifacts are called. Whoever names a folder that is no store must not lose what else is in it.
 FINGERPRINT = re.compile(f"[0-9a-f]{{{DIGITS}}}")
@@ -110,7 +108,7 @@ def in_the_making(outputs: Path) -> Path | None:
     for file in sorted(outputs.glob(f"*/*/{LOCK}*")):
         name = file.name.removeprefix(LOCK)
         try:
-            with _unused(file.parent, name):
+            with locked_if_free(file.parent, name):
                 pass
         except Timeout:
             return file.with_name(name)
@@ -147,19 +145,16 @@ def remove(outputs: Path, gone: Collection[Stored]) -> Iterator[Stored]:
         for left in outputs.glob(f"*/*/{GONE}*"):
             with (
                 contextlib.suppress(Timeout),
-                _unused(left.parent, left.name.removeprefix(GONE).removeprefix(PARTIAL[1:])),
+                locked_if_free(left.parent, left.name.removeprefix(GONE).removeprefix(PARTIAL[1:])),
             ):
                 remove_tree(left)
     for one in sorted(gone, key=lambda one: one.made, reverse=True):
-        with told_below(outputs), contextlib.suppress(Timeout), _unused(one.folder.parent, one.key.fingerprint):
+        with told_below(outputs), contextlib.suppress(Timeout), locked_if_free(one.folder.parent, one.key.fingerprint):
             if not one.folder.exists():
                 continue
             if one.whole:
                 _unlink(one)
-            away = one.folder.with_name(f"{GONE}{one.folder.name.lstrip('.')}")
-            one.folder.rename(away)
-            sync(away.parent)
-            remove_tree(away)
+            remove_at_once(one.folder)
             yield one
 
 
@@ -217,16 +212,3 @@ def _needed(everything: Sequence[Stored], stay: Sequence[Stored]) -> set[tuple[s
         found |= new
         new = {name for one in new for name in inputs.get(one, ())} - found
     return found
-
-
-@contextlib.contextmanager
-def _unused(folder: Path, name: str) -> Iterator[None]:
-    """Hold the lock under which the artifact of this name is made.
-
-    Raises:
-        Timeout: a process is making it.
-    """
-    file = folder / f"{LOCK}{name}"
-    os.close(os.open(file, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o666))
-    with FileLock(file).acquire(timeout=0):
-        yield

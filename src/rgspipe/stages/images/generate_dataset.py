@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from rgspipe.blender.job import DatasetJob
 from rgspipe.blender.render_dataset import render_dataset
 from rgspipe.config import RgspipeConfig
 from rgspipe.config.scene import MODELLED
+from rgspipe.datasets.blend_links import blend_links
 from rgspipe.datasets.gs3 import load_dataset
 from rgspipe.datasets.location import point_at_dataset
 from rgspipe.datasets.read_files import files_read
@@ -20,9 +22,13 @@ from rgspipe.stages.base import Stage, StageContext
 from rgspipe.stages.images.check_conventions import check_conventions
 from rgspipe.stages.images.scene_model import scene_model
 from rgspipe.stages.sources import require_images
+from rgspipe.store.artifacts import Artifact
 
 #: From this share of saturated pixels on, people are told.
 NOTICEABLE = 0.01
+
+#: Names of files that a sentence lists.
+LISTED = 3
 
 
 def run(context: StageContext) -> None:
@@ -98,7 +104,23 @@ def _files(config: RgspipeConfig) -> tuple[Path, ...]:
     if scene.kind not in ("external", "blend") or scene.path is None or not Path(scene.path).exists():
         return ()
     path = Path(scene.path).resolve()
-    return tuple(files_read(path)) if scene.kind == "external" else (path,)
+    return tuple(files_read(path) if scene.kind == "external" else blend_links(path).files)
+
+
+def _remarks(config: RgspipeConfig, made: Mapping[str, Artifact]) -> tuple[str, ...]:
+    """What of a .blend is not there, and what cannot be watched for changes."""
+    if config.scene.kind != "blend" or not _files(config):
+        return ()
+    links = blend_links(Path(config.scene.path or ""))
+    remarks = [
+        f"which files {path} names cannot be told ({why}): pack them, or changes of them go unnoticed"
+        for path, why in links.unknown.items()
+    ]
+    names = [f'"{path}"' for path in links.missing]
+    if names:
+        more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
+        remarks.append(f"not there, though the file names it: {', '.join(names[:LISTED])}{more}; what shows it is pink")
+    return tuple(remarks)
 
 
 STAGE = Stage(
@@ -108,4 +130,5 @@ STAGE = Stage(
     inputs=_inputs,
     config_keys=_config_keys,
     files=_files,
+    remarks=_remarks,
 )
