@@ -24,7 +24,7 @@ from types import FrameType
 
 import torch
 
-from mutants import mutated
+from mutants import mutated, names_place
 from readable_files import KINDS, fresh
 from rgspipe.errors import InputError
 from rgspipe.progress import progress_bar
@@ -98,7 +98,7 @@ def _outcome(name: str, folder: Path, mutant: bytes) -> str:
             return "read"
         story = "numbers that are not finite were let through"
     except InputError as error:
-        if str(folder) in str(error):
+        if names_place(str(error), str(folder)):
             return "refused"
         story = f"an error that does not name the file: {error}"
     except BaseException:  # whatever else happens is what is looked for

@@ -9,7 +9,13 @@ import trimesh
 from PIL import Image
 
 from raycast import Cuboid
+from rgspipe.datasets.mesh_file import read_mesh
+from rgspipe.datasets.mesh_options import MeshOptions
+from rgspipe.scene import srgb
 from rgspipe.scene.mesh import Paint, TriangleMesh
+
+#: What `quarters` shows: red and green above, blue and grey below.
+QUARTERS = np.array([[200, 0, 0], [0, 200, 0], [0, 0, 200], [90, 90, 90]])
 
 #: Corners of a cube's six sides, by signs.
 SIDES = [
@@ -62,3 +68,14 @@ def quarters() -> Image.Image:
     levels = np.zeros((4, 4, 3), np.uint8)
     levels[:2, :2], levels[:2, 2:], levels[2:, :2], levels[2:, 2:] = [200, 0, 0], [0, 200, 0], [0, 0, 200], [90] * 3
     return Image.fromarray(levels)
+
+
+def painted(path: Path) -> np.ndarray:
+    """(4, 3) levels of 255 that the file of a textured square has in its quarters; see QUARTERS."""
+    mesh = read_mesh(path, MeshOptions(up="z"))
+    places = np.array([[0.2, 0.9], [0.8, 0.9], [0.3, 0.1], [0.9, 0.1]])
+    found = []
+    for x, y in places:  # in the lower triangle, then in the upper one
+        face, shares = (0, [1 - x, x - y, y]) if y <= x else (1, [1 - y, x, y - x])
+        found.append(mesh.paint.at(np.array([face]), np.array([shares]))[0])
+    return np.round(255.0 * srgb.encode(np.array(found)))

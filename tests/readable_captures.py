@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from PIL import ExifTags, Image
 
 from rgspipe.datasets.gs3 import load_dataset
 from rgspipe.datasets.scans.importing import import_scan
@@ -65,6 +66,16 @@ def _of_scan(file: str, write: Callable[[Path], None]) -> Kind:
     return Kind(file, write, read)
 
 
+def _exposed(root: Path) -> None:
+    """Photographs that state how they were exposed."""
+    write_nerfstudio(root, SCANNED, ".jpg", ".png")
+    exif, base = Image.Exif(), ExifTags.Base
+    exif.get_ifd(ExifTags.IFD.Exif).update({base.ExposureTime: 0.01, base.FNumber: 2.8, base.ISOSpeedRatings: 200})
+    for path in (root / "images").iterdir():
+        with Image.open(path) as image:
+            image.save(path, exif=exif)
+
+
 def _replica_lens(root: Path) -> None:
     write_replica(root, SCANNED)
     view = SCANNED[0].camera
@@ -83,6 +94,7 @@ CAPTURES: dict[str, Kind] = {
     "scan: nerfstudio": _of_scan("transforms.json", lambda root: write_nerfstudio(root, SCANNED, ".png", ".png")),
     "scan: wide PNG": _of_scan("images/0.16.png", lambda root: write_nerfstudio(root, SCANNED, ".16.png", ".png")),
     "scan: depth": _of_scan("depth/0.png", lambda root: write_nerfstudio(root, SCANNED, ".png", ".png")),
+    "scan: photograph": _of_scan("images/0.jpg", _exposed),
     "scan: Polycam": _of_scan(
         "keyframes/corrected_cameras/1000.json", lambda root: write_polycam(root, *2 * [SCANNED])
     ),

@@ -13,10 +13,9 @@ import torch
 from PIL import Image
 
 from luminaire_files import COLUMNS, ies, ldt
-from mesh_files import cuboid_triangles, quarters, textured_square, write_coloured
 from ply_files import gaussian_columns, radiosity_columns, write_ply
-from raycast import ROOM
 from readable_captures import CAPTURES, Kind, Numbers
+from readable_meshes import MESHES
 from rgspipe.datasets.alternatives_file import ALTERNATIVES, read_alternatives
 from rgspipe.datasets.covariance_file import covariance_fields, read_covariances
 from rgspipe.datasets.exr import read_channels, write_channels, write_image
@@ -24,7 +23,6 @@ from rgspipe.datasets.grade_file import load_grade, save_grade
 from rgspipe.datasets.images import read_colour
 from rgspipe.datasets.light_file import light_fields, read_ambient, read_lights, write_lights
 from rgspipe.datasets.location import open_dataset
-from rgspipe.datasets.mesh_file import read_mesh
 from rgspipe.datasets.named_cameras import NamedCamera, read_camera, write_cameras
 from rgspipe.datasets.photometric_file import read_photometry
 from rgspipe.datasets.ply import read_ply
@@ -166,30 +164,9 @@ def _of_dataset(name: str) -> Kind:
     return Kind(name, write_tiny_dataset, _read_dataset)
 
 
-def _mesh(name: str, make: Callable[[Path], object] | None = None) -> Kind:
-    """By default a textured square."""
-
-    def read(folder: Path) -> Numbers:
-        mesh = read_mesh(folder / name)
-        weights = np.full((len(mesh), 3), 1.0 / 3.0)
-        colours = np.nan_to_num(mesh.paint.at(np.arange(len(mesh)), weights), nan=0.0)
-        return iter([torch.from_numpy(mesh.vertices[mesh.faces]), torch.from_numpy(colours)])
-
-    return Kind(name, make or (lambda folder: textured_square(quarters()).export(folder / name)), read)
-
-
-def _beside_mesh(mesh: str, file: str) -> Kind:
-    """A file that the mesh of a textured square names."""
-    return replace(_mesh(mesh), file=file)
-
-
 def _named_camera(folder: Path) -> Numbers:
     camera = read_camera(folder / "cameras.json", "Door").of_image(4, 3)
     return iter([camera.camera_to_world, torch.tensor([camera.fx, camera.fy, camera.cx, camera.cy])])
-
-
-def _coloured_mesh(folder: Path) -> None:
-    write_coloured(folder / "a.ply", *cuboid_triangles(ROOM), np.full((24, 3), 99, np.uint8))
 
 
 def _of_lamps_off(name: str) -> Kind:
@@ -204,6 +181,13 @@ def _of_frozen(name: str) -> Kind:
     return Kind(name, _frozen, _read_frozen)
 
 
+def _configured(folder: Path) -> None:
+    """A model of RadiosityGS as its program lays it out."""
+    write_ply(folder / "a.ply", radiosity_columns())
+    ranges = "max_scaling=0.2, max_roughness=0.7, max_specular=0.4, max_transmittance=0.5"
+    (folder / "cfg_args").write_text(f"Namespace(sh_degree=3, {ranges}, source_path='/data', white_background=False)")
+
+
 def _ply(columns: Callable[[], dict], text: bool = False) -> Kind:
     return Kind(
         "a.ply",
@@ -214,6 +198,7 @@ def _ply(columns: Callable[[], dict], text: bool = False) -> Kind:
 
 KINDS: dict[str, Kind] = {
     **CAPTURES,
+    **MESHES,
     "EXR": Kind(
         "a.exr",
         lambda folder: write_image(folder / "a.exr", np.ones((8, 8, 3)), np.ones((8, 8))),
@@ -239,9 +224,12 @@ KINDS: dict[str, Kind] = {
     "PLY, 3DGS": _ply(gaussian_columns),
     "PLY, text": _ply(gaussian_columns, text=True),
     "PLY, RadiosityGS": _ply(radiosity_columns),
+    "PLY, its model": replace(_ply(radiosity_columns), file="cfg_args", make=_configured),
     "surfels": Kind("a.safetensors", _surfels, _read_surfels),
     "frozen: transport": _of_frozen("transport.safetensors"),
     "frozen: gather": _of_frozen("gather.safetensors"),
+    "frozen: surfels": _of_frozen("surfels.safetensors"),
+    "frozen: grade": _of_frozen("grade.json"),
     "frozen: dictionary": _of_frozen("dictionary.safetensors"),
     "training views": _of_dataset("transforms_train.json"),
     "test views": _of_dataset("transforms_test.json"),
@@ -249,13 +237,6 @@ KINDS: dict[str, Kind] = {
     "targets.json": _of_dataset("targets/targets.json"),
     "a target's views": _of_dataset("targets/one/transforms.json"),
     "depth": _of_dataset("train/r_0000_depth.exr"),
-    "mesh, PLY": _mesh("a.ply", _coloured_mesh),
-    "mesh, OBJ": _mesh("a.obj"),
-    "mesh, GLB": _mesh("a.glb"),
-    "mesh, glTF": _mesh("a.gltf"),
-    "mesh, materials": _beside_mesh("a.obj", "material.mtl"),
-    "mesh, buffer": _beside_mesh("a.gltf", "gltf_buffer_0.bin"),
-    "mesh, texture": _beside_mesh("a.obj", "material_0.png"),
     "normals": _of_dataset("train/r_0000_normal.exr"),
     "views, lamps off": _of_lamps_off("transforms.json"),
     "image, lamps off": _of_lamps_off("off.exr"),

@@ -17,6 +17,7 @@ import rgspipe as rg
 WIDTH, HEIGHT = 48, 40
 CAMERA = rg.Camera.look_at([0, -1.5, 0.05], [0, 0, 0], width=WIDTH, height=HEIGHT)
 LIGHT = rg.PointLight([-0.3, 0.28, -0.1], [0.6, 0.8, 0.8])
+VIEW = rg.View("a", CAMERA, torch.zeros(HEIGHT, WIDTH, 3), torch.ones(HEIGHT, WIDTH), LIGHT)
 
 
 @pytest.fixture(scope="module")
@@ -131,6 +132,31 @@ REFUSED: dict[str, tuple[Callable[[rg.FrozenScene, Tensor], object], str, str, s
         "NaN",
         "steps",
     ),
+    "a light beyond what single precision holds": (
+        lambda s, i: s.render(CAMERA, rg.PointLight([0, 0, 1e200], 1)),
+        "lights[0].position",
+        "infinity",
+        "shorter",
+    ),
+    "a light that is too bright": (
+        lambda s, i: s.render(CAMERA, rg.PointLight([0, 0, 0], 1e39)),
+        "lights[0].intensity",
+        "infinity",
+        "shorter",
+    ),
+    "a light that is too bright for its place": (
+        lambda s, i: s.render(CAMERA, rg.PointLight([0, 0, 0], 3e38)),
+        "lights",
+        "infinity",
+        "too bright",
+    ),
+    "a sphere of infinite radius": (lambda s, i: rg.SphereLight([0, 0, 0], 1, math.inf), "radius", "inf", "number"),
+    "a cone in words": (
+        lambda s, i: rg.SpotLight([0, 0, 0], 1, [0, 0, -1], "smoothstep", "wide", 0.1),
+        "cone_angle",
+        "'wide'",
+        "number",
+    ),
     "a spot that aims nowhere": (
         lambda s, i: s.render(CAMERA, rg.SpotLight([0, 0, 0], 1, [0, 0, 0], "smoothstep", 0.4, 0.1)),
         "lights[0].direction",
@@ -145,6 +171,31 @@ REFUSED: dict[str, tuple[Callable[[rg.FrozenScene, Tensor], object], str, str, s
         "width",
         "0",
         "Round",
+    ),
+    "a width that is no number": (
+        lambda s, i: rg.Camera.look_at([0, -1, 0], [0, 0, 0], width=math.nan),
+        "width",
+        "nan",
+        "Round",
+    ),
+    "a width in quotes": (
+        lambda s, i: rg.Camera.look_at([0, -1, 0], [0, 0, 0], width="48"),
+        "width",
+        "'48'",
+        "Round",
+    ),
+    "a view of no angle": (
+        lambda s, i: rg.Camera.look_at([0, -1, 0], [0, 0, 0], fov_degrees=None),
+        "fov_degrees",
+        "None",
+        "usual",
+    ),
+    "a middle that is nowhere": (lambda s, i: rg.Camera(np.eye(4), 9, 9, math.nan, 8, 16, 16), "cx", "nan", "number"),
+    "a focal length of almost nothing": (
+        lambda s, i: rg.Camera(np.eye(4), 1e-300, 9, 8, 8, 16, 16),
+        "fx",
+        "1e-300",
+        "Axes",
     ),
     "a camera that sees all": (
         lambda s, i: rg.Camera.look_at([0, -1, 0], [0, 0, 0], fov_degrees=200),
@@ -278,6 +329,44 @@ REFUSED: dict[str, tuple[Callable[[rg.FrozenScene, Tensor], object], str, str, s
         "infinity",
         "Make it again",
     ),
+    "no light file": (lambda s, i: rg.read_lights(None), "a light file", "None", "name of a file"),
+    "no folder of a scene": (lambda s, i: rg.FrozenScene.load(3), "folder", "int 3", "name of a file"),
+    "a number for a name": (lambda s, i: rg.write_lights(3, LIGHT), "path", "int 3", "name of a file"),
+    "a scene for its surfels": (lambda s, i: rg.save_ply("x.ply", s), "surfels", "FrozenScene", "scene.surfels"),
+    "a file of no surfels": (lambda s, i: rg.save_ply("x.ply", no_surfels()), "surfels", "none", "scene"),
+    "a dictionary of an empty scene": (
+        lambda s, i: freeze(no_surfels()).with_dictionary(2),
+        "scene",
+        "none",
+        "exact_surfels",
+    ),
+    "a seed that is none": (lambda s, i: s.with_dictionary(2, seed=-1), "seed", "-1", "whole"),
+    "rays in quotes": (lambda s, i: freeze(few_surfels(), gather_rays="8"), "gather_rays", "'8'", "default"),
+    "a count of infinity": (lambda s, i: rg.exact_surfels(rg.CornellBox(), math.inf), "count", "inf", "2000"),
+    "a name for a model": (lambda s, i: rg.exact_surfels("box", 60), "model", "str", "CornellBox"),
+    "no camera to look through": (lambda s, i: s.view(None), "camera", "NoneType", "look_at"),
+    "no cameras": (lambda s, i: rg.fit_lights(s, 3, [i]), "cameras", "int", "look_at"),
+    "no views to train on": (lambda s, i: rg.train([], few_surfels()), "views", "none", "load_views"),
+    "images for views": (lambda s, i: rg.train([i], few_surfels()), "views[0]", "Tensor", "load_views"),
+    "an image of another size than its camera's": (
+        lambda s, i: rg.View("a", CAMERA, i[:10], torch.ones(10, WIDTH)),
+        "image",
+        "shape (10, 48, 3)",
+        "Pass",
+    ),
+    "no camera of a view": (lambda s, i: rg.View("a", None, i, i[:, :, 0]), "camera", "NoneType", "look_at"),
+    "a place for a view's light": (
+        lambda s, i: rg.View("a", CAMERA, i, i[:, :, 0], [0, 0, 0]),
+        "light",
+        "list",
+        "PointLight",
+    ),
+    "words for surfels to train": (lambda s, i: rg.train([VIEW], "many"), "surfels", "'many'", "how many"),
+    "words for options": (lambda s, i: rg.train([VIEW], 50, "fast"), "options", "str", "such"),
+    "no camera for other light": (lambda s, i: rg.ambient_image(s, None), "camera", "NoneType", "look_at"),
+    "a scene for its views": (lambda s, i: rg.track_lights(s, [i]), "views", "FrozenScene", "FitViews.prepare"),
+    "no formats": (lambda s, i: rg.export_lights([LIGHT], "x", 3), "formats", "int", "usda"),
+    "a picture of words": (lambda s, i: rg.tone_map("x"), "image", "'x'", "radiance"),
     "a folder that is not there": (lambda s, i: rg.FrozenScene.load("nowhere"), "nowhere", "no such folder", "Freeze"),
     "a file that is not there": (lambda s, i: rg.Surfels.from_ply("no.ply"), "no.ply", "no such file", "path"),
     "radiance for a picture": (lambda s, i: rg.save_png("x.png", i), "pixels", "float32", "tone_map"),

@@ -29,7 +29,13 @@ def test_a_file_without_covariances_has_none(tmp_path: Path) -> None:
     assert read_covariances(path) == ()
 
 
-@pytest.mark.parametrize("broken", [[["wide"]], [[1.0, 2.0], [3.0]], 7, [], [[1.0, 2.0]], [["nan"]], [[-1.0]]])
+#: Numbers as texts, of which only "inf" is one.
+UNLIKELY = [[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, text]] for text in ("1", "-inf", "1_0", True)]
+
+
+@pytest.mark.parametrize(
+    "broken", [[["wide"]], [[1.0, 2.0], [3.0]], 7, [], [[1.0, 2.0]], [["nan"]], [[-1.0]], [[1.0]], *UNLIKELY]
+)
 def test_what_is_no_matrix_is_refused(tmp_path: Path, broken: object) -> None:
     path = tmp_path / "lights.json"
     path.write_text(json.dumps({"lights": [{"covariance": broken}]}))

@@ -143,3 +143,14 @@ def test_a_few_pixels_do_not_claim_a_huge_image(tmp_path: Path) -> None:
     _write_windows(tmp_path / "claims.exr", _noise(2, 2), ((0, 0), (1, 1)), ((0, 0), (9000, 9000)))
     with pytest.raises(InputError, match=r"claims\.exr.*16777216 pixels.*9001 × 9001"):
         read_image(tmp_path / "claims.exr")
+
+
+@pytest.mark.parametrize(("ratio", "good"), [(1.0, True), (1.0001, True), (2.0, False), (0.9, False)])
+def test_pixels_that_are_no_squares_are_refused(tmp_path: Path, ratio: float, good: bool) -> None:
+    header = {"pixelAspectRatio": ratio, "type": OpenEXR.scanlineimage}
+    OpenEXR.File(header, {"Z": np.ones((4, 4), np.float32)}).write(str(tmp_path / "a.exr"))
+    if good:
+        assert read_channels(tmp_path / "a.exr")["Z"].shape == (4, 4)
+        return
+    with pytest.raises(InputError, match=rf"a\.exr: expected square pixels, found pixelAspectRatio {ratio:g}\."):
+        read_channels(tmp_path / "a.exr")

@@ -43,10 +43,20 @@ def test_what_is_no_grade_is_refused(tmp_path: Path, text: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "value"), [("unseen_at", [1.0, 2.0]), ("unseen_at", 3.0), ("missing", None), ("doubt", 1e7)]
+    ("name", "value"),
+    [
+        ("unseen_at", [1.0, 2.0]),
+        ("unseen_at", 3.0),
+        ("missing", None),
+        ("doubt", 1e7),
+        ("views", -1),
+        ("views", 1.5),
+        ("residual", -0.1),
+        ("unseen_at", [0.0, 0.0, 1e308]),
+    ],
 )
 def test_what_a_number_cannot_be_is_refused_by_its_name(tmp_path: Path, name: str, value: object) -> None:
     content = SceneGrade(31.5, 8, 0.02, 0.1, 0.05, 0.01, 0.0).data() | {name: value}
     (tmp_path / "grade.json").write_text(json.dumps(content))
-    with pytest.raises(InputError, match=f"{name} missing, no number or too large"):
+    with pytest.raises(InputError, match=f"{name} missing, no number or out of range"):
         load_grade(tmp_path / "grade.json")

@@ -137,11 +137,12 @@ NAN_MATRIX = [[float("nan"), 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
         (_frame(transform_matrix=_matrix(1, 1, 1, bottom=2)), r"transform_matrix.*last row"),
         (_frame(camera_intrinsics=...), 'camera_angle_x.*or "camera_intrinsics".*neither'),
         (_frame(camera_intrinsics=[3, 2, 5]), '4 finite numbers under "camera_intrinsics"'),
-        (_frame(camera_intrinsics=[3, 2, -5, 5]), "focal lengths above 0"),
         (
             _frame(camera_intrinsics=[1.5, 1.0, 2.5, 2.5], w=..., h=...),
             r"camera_intrinsics.*6 × 4 pixels.*middle of one of 3 × 2",
         ),
+        (_frame(camera_intrinsics=[3, 2, -5, 5]), "focal lengths in pixels, above 0"),
+        (_frame(camera_intrinsics=[3, 2, 5, 1e-320]), "focal lengths in pixels, above 0"),
         (_frame(camera_intrinsics=[64, 64, 100, 100]), r"r_0000\.exr.*principal point.*6 × 4"),
         (_frame(w=128, h=128), r'r_0000\.exr.*"w": 128.*6 × 4'),
         (_frame(camera_intrinsics=..., camera_angle_x=4), "camera_angle_x.*between 1e-06 and π"),

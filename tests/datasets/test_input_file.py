@@ -18,6 +18,9 @@ from rgspipe.datasets.info import read_info
 from rgspipe.datasets.input_file import input_folder
 from rgspipe.datasets.json_file import read_json
 from rgspipe.datasets.light_file import read_lights
+from rgspipe.datasets.location import load_views
+from rgspipe.datasets.mesh_file import read_mesh
+from rgspipe.datasets.photometric_file import read_photometry
 from rgspipe.datasets.ply_cameras import find_cameras, read_viewpoints
 from rgspipe.datasets.ply_radiosity import find_ranges
 from rgspipe.datasets.ply_table import read_vertices
@@ -122,3 +125,22 @@ def test_what_is_no_folder_is_refused_at_once(tmp_path: Path, reader: str, odd: 
     with pytest.raises(InputError) as caught:
         FOLDERS[reader](path)
     assert caught.value.where == str(path) and found in caught.value.found
+
+
+@pytest.mark.parametrize("reader", READERS)
+def test_a_name_that_no_text_can_say_is_refused_with_a_way_out(tmp_path: Path, reader: str) -> None:
+    """Names of old archives have bytes that are no UTF-8; no JSON could tell of which file a result is."""
+    (tmp_path / "caf\udce9").mkdir()
+    name, read = READERS[reader]
+    path = tmp_path / "caf\udce9" / name
+    path.touch()
+    with pytest.raises(InputError, match="Rename it") as caught:
+        read(path)
+    str(caught.value).encode()
+
+
+@pytest.mark.parametrize("path", [None, 3, b"a.json", ["a.json"], "a\0b"])
+def test_what_is_no_path_is_refused_in_words(path: object) -> None:
+    for read in (read_lights, load_surfels, read_mesh, read_photometry, load_views):
+        with pytest.raises(InputError, match="expected a path"):
+            read(path)

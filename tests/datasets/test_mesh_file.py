@@ -105,7 +105,7 @@ def test_textures_in_other_formats_are_not_opened(tmp_path: Path) -> None:
     (picture,) = tmp_path.glob("*.png")
     quarters().save(tmp_path / "b.gif")
     (tmp_path / "b.gif").rename(picture)
-    with pytest.raises(InputError, match="texture in the format GIF"):
+    with pytest.raises(InputError, match="texture in another format"):
         read_mesh(tmp_path / "a.obj")
 
 
@@ -158,14 +158,28 @@ def test_no_file_is_opened_that_a_mesh_does_not_name(tmp_path: Path) -> None:
     (tmp_path / "other.png").write_bytes(picture.read_bytes())
     own = OwnFiles(path)
     assert own.get("t.png") == picture.read_bytes()
-    with pytest.raises(FileNotFoundError):
+    with pytest.raises(InputError, match=r"another file, 'other\.png'"):
         own.get("other.png")
 
 
-def test_a_texture_of_an_obj_may_have_a_percent_sign_in_its_name(tmp_path: Path) -> None:
-    path, picture = linked(tmp_path, "obj")
-    (materials,) = tmp_path.glob("*.mtl")
-    materials.write_bytes(materials.read_bytes().replace(picture.name.encode(), b"a%20b.png"))
-    content = picture.read_bytes()
-    picture.rename(tmp_path / "a%20b.png")
-    assert OwnFiles(path).get("a%20b.png") == content
+@pytest.mark.parametrize("rows", [-1, 1])
+def test_text_of_a_ply_has_the_rows_that_it_says(tmp_path: Path, rows: int) -> None:
+    """A point that is missing was made up by the first triangle, and those beyond the last were left out."""
+    content = trimesh.Trimesh(VERTICES, FACES, process=False).export(file_type="ply", encoding="ascii").decode()
+    (tmp_path / "a.ply").write_text(content)
+    assert len(read_mesh(tmp_path / "a.ply")) == 12
+    lines = content.splitlines()
+    first = lines.index("end_header") + 1
+    (tmp_path / "a.ply").write_text(
+        "\n".join([*lines[:first], *([lines[first]] * rows or []), *lines[first + (rows < 0) :]])
+    )
+    with pytest.raises(InputError, match=rf"a\.ply: expected 36 rows after the header, found {36 + rows}"):
+        read_mesh(tmp_path / "a.ply")
+
+
+def test_a_ply_of_several_textures_is_refused(tmp_path: Path) -> None:
+    path, picture = linked(tmp_path, "ply")
+    (tmp_path / "u.png").write_bytes(picture.read_bytes())
+    path.write_bytes(path.read_bytes().replace(b"\ncomment Tex", b"\ncomment TextureFile u.png\ncomment Tex", 1))
+    with pytest.raises(InputError, match=r"a\.ply: expected one texture at most in a PLY, found 2"):
+        read_mesh(path)

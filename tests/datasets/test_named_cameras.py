@@ -62,6 +62,7 @@ def test_lens_and_shift_are_those_of_one_side(side: str, size: tuple[int, int], 
         ({"camera": 3}, {}, r"frames\[0\]\.camera: expected a path"),
         ({"camera": "Kitchen"}, {"cameras_path": None}, 'expected the key "cameras_path"'),
         ({"camera": "Kitchen"}, {"cameras_path": "none.json"}, "none.json"),
+        ({"camera": "Kitchen"}, {"cameras_path": "é" * 5000}, "no such file"),
     ],
 )
 def test_a_camera_that_is_not_there_is_said_with_those_that_are(
@@ -75,7 +76,8 @@ def test_a_camera_that_is_not_there_is_said_with_those_that_are(
 @pytest.mark.parametrize(
     ("key", "value", "message"),
     [
-        ("focal", -1.0, "above 0"),
+        ("focal", -1.0, "at least"),
+        ("focal", 1e-320, "at least"),
         ("side", "depth", "one of longer"),
         ("shift", [0.0], "2 finite"),
         ("shift", [0.0, 1e308], "at most 1e"),

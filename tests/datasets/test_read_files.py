@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from rgspipe.datasets.gs3 import load_dataset, load_target
+from rgspipe.datasets.gs3 import TargetFolder, load_dataset, load_target
 from rgspipe.datasets.read_files import files_read
 from rgspipe.errors import InputError
 from rgspipe.store.files import tree_digest
@@ -72,3 +73,16 @@ def test_a_listed_name_that_is_no_folder_is_refused(dataset: Path, name: str) ->
     (dataset / "targets/targets.json").write_text(f'{{"targets": [{{"name": "{name}"}}]}}')
     with pytest.raises(InputError, match=r"targets\.json.*name"):
         load_dataset(dataset)
+
+
+def test_a_target_that_is_listed_twice_is_refused(dataset: Path) -> None:
+    twice = [{"name": "one", "occlusion": "visible"}, {"name": "one", "occlusion": "occluded"}]
+    (dataset / "targets/targets.json").write_text(json.dumps({"targets": twice}))
+    with pytest.raises(InputError, match=r"targets\[1\]\.name: expected each target once, found 'one'"):
+        load_target(dataset / "targets/one")
+
+
+def test_a_target_that_is_a_loop_of_links_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "one").symlink_to("one")
+    with pytest.raises(InputError, match="symbolic links"):
+        TargetFolder.of(tmp_path / "one")

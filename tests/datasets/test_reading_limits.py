@@ -19,7 +19,7 @@ from luminaire_files import ies
 from mesh_files import cuboid_triangles, quarters, textured_square, write_coloured
 from raycast import ROOM
 from rgspipe.config import RgspipeConfig, with_changes
-from rgspipe.datasets.display_image import read_display
+from rgspipe.datasets.display_image import read_levels
 from rgspipe.datasets.json_file import read_json
 from rgspipe.datasets.mesh_file import read_mesh
 from rgspipe.datasets.photometric_file import read_photometry
@@ -37,7 +37,7 @@ COLOURS = np.full((24, 3), 99, np.uint8)
 
 #: What writes a file of a kind, what reads it, and a limit that it is beyond.
 KINDS: dict[str, tuple[Callable[[Path], object], Callable[[Path], object], dict[str, int]]] = {
-    "a.png": (lambda path: Image.new("L", (8, 8)).save(path), read_display, {"pixels": 63}),
+    "a.png": (lambda path: Image.new("L", (8, 8)).save(path), read_levels, {"pixels": 63}),
     "a.json": (lambda path: write_json(path, {"a": "b" * 100}), lambda path: read_json(path, "a"), {"text_bytes": 100}),
     "a.ply": (lambda path: write_vertices(path, {"x": np.arange(9.0)}, []), read_vertices, {"vertices": 8}),
     "a.obj": (lambda path: textured_square(quarters()).export(path), read_mesh, {"bytes": 20}),
@@ -77,6 +77,16 @@ def test_a_reader_is_stopped_once_it_has_taken_too_long(tmp_path: Path) -> None:
         _slow(tmp_path / "a.txt")
     assert time.thread_time() - begin < 1.0  # measured: 0.05 s
     assert signal.getsignal(signal.SIGVTALRM) is handler and signal.getitimer(signal.ITIMER_VIRTUAL) == (0.0, 0.0)
+
+
+def test_a_file_that_memory_does_not_hold_is_refused(tmp_path: Path) -> None:
+    """A file of zeros takes no room on a disk, whatever its size."""
+
+    def read(path: Path) -> bytes:
+        raise MemoryError
+
+    with pytest.raises(rg.InputError, match=r"a\.bin: expected a file that fits into memory"):
+        timed(read)(tmp_path / "a.bin")
 
 
 def test_in_another_thread_it_is_refused_when_it_is_back(tmp_path: Path) -> None:

@@ -182,8 +182,9 @@ def test_openrooms_comes_back(tmp_path: Path) -> None:
     ("change", "words"),
     [
         (lambda text: text.replace(text.splitlines()[1], "1 2"), "three finite numbers"),
-        (lambda text: "\n".join(text.splitlines()[:-1]), "three lines a camera"),
-        (lambda text: "\n".join(text.splitlines()[:7]), r"2 cameras and 4 images, the last im_4\.hdr"),
+        (lambda text: "\n".join(text.splitlines()[:-1]), "4 cameras of three lines, found 11"),
+        (lambda text: "\n".join(text.splitlines()[1:-1]), "three lines a camera"),
+        (lambda text: "\n".join(["2", *text.splitlines()[1:7]]), r"2 cameras and 4 images, the last im_4\.hdr"),
         (lambda text: text.replace(text.splitlines()[2], text.splitlines()[1]), "camera 1"),
     ],
 )

@@ -265,7 +265,7 @@ def test_radiance_pictures_come_back(tmp_path: Path, packed: bool) -> None:
             read_picture(tmp_path / "b.hdr", "srgb")
 
 
-@pytest.mark.parametrize("number", [IFDRational(0, 0), float("inf"), 0.0])
+@pytest.mark.parametrize("number", [IFDRational(0, 0), float("inf"), 0.0, 1e-30, 1e30])
 def test_an_exposure_that_cannot_be_is_not_stated(tmp_path: Path, number: object) -> None:
     """Lenses without electronics may state an f-number of 0/0."""
     exif = Image.Exif()

@@ -116,3 +116,11 @@ def test_files_from_before_surfels_were_guessed_are_read(tmp_path, surfels):
     old = {name: tensor for name, tensor in surfels.tensors().items() if name != "guessed"}
     save_tensors(tmp_path / "s.safetensors", old, note_of(surfels))
     assert not bool(load_surfels(tmp_path / "s.safetensors").guessed.any())
+
+
+def test_a_file_of_no_surfels_is_refused(tmp_path, surfels):
+    """In a frozen scene it was read, and an IndexError came of it in the first search."""
+    none = Surfels(**{name: tensor[:0] for name, tensor in surfels.tensors().items()}, coverage=surfels.coverage)
+    save_surfels(tmp_path / "a.safetensors", none)
+    with pytest.raises(InputError, match=r"a\.safetensors: expected surfels, found none"):
+        load_surfels(tmp_path / "a.safetensors")

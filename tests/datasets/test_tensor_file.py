@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from pathlib import Path
 
@@ -50,5 +51,21 @@ def test_types_that_no_scene_has_are_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize("note", ["1", "null", "[", '{"a": 1, "a": 2}'])
 def test_a_note_is_a_strict_json_object(tmp_path: Path, note: str) -> None:
     safetensors.torch.save_file({"x": torch.ones(1)}, tmp_path / "a.safetensors", metadata={"note": note})
+    with pytest.raises(InputError, match=r"a\.safetensors"):
+        load_tensors(tmp_path / "a.safetensors")
+
+
+@pytest.mark.parametrize("shape", [[2**64, 1], [-1], [2**40, 2**40], ["x"], None])
+def test_shapes_that_no_tensor_has_are_refused(tmp_path: Path, shape: object) -> None:
+    header = json.dumps({"x": {"dtype": "F32", "shape": shape, "data_offsets": [0, 0]}}).encode()
+    (tmp_path / "a.safetensors").write_bytes(len(header).to_bytes(8, "little") + header)
+    with pytest.raises(InputError, match=r"a\.safetensors: expected a safetensors file"):
+        load_tensors(tmp_path / "a.safetensors")
+
+
+def test_a_shape_that_torch_cannot_hold_is_refused(tmp_path: Path) -> None:
+    """Without entries its bytes are right, whatever its other sides."""
+    header = json.dumps({"x": {"dtype": "F32", "shape": [0, 2**63], "data_offsets": [0, 0]}}).encode()
+    (tmp_path / "a.safetensors").write_bytes(len(header).to_bytes(8, "little") + header)
     with pytest.raises(InputError, match=r"a\.safetensors"):
         load_tensors(tmp_path / "a.safetensors")

@@ -188,6 +188,15 @@ def test_values_that_no_scene_has_are_refused(folder, name, tensor, value, found
         FrozenScene.load(folder, gather=True)
 
 
+@pytest.mark.parametrize(("key", "value"), [("grid", -5), ("grid", 10**6), ("seed", -1), ("seed", 2**40)])
+def test_a_dictionary_that_no_search_can_make_again_is_refused(folder, key, value):
+    """It was read, and an error without its name came of it where a search left out shadows."""
+    tensors, note = load_tensors(folder / DICTIONARY)
+    save_tensors(folder / DICTIONARY, tensors, note | {key: value})
+    with pytest.raises(InputError, match=rf"{DICTIONARY}: expected a grid from 1"):
+        FrozenScene.load(folder)
+
+
 def test_a_missing_tensor_and_another_dictionary_are_refused(folder):
     tensors, note = load_tensors(folder / DICTIONARY)
     save_tensors(folder / DICTIONARY, tensors | {"irradiance": tensors["irradiance"][:, :-1]}, note)

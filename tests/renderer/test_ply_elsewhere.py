@@ -148,7 +148,15 @@ def test_ranges_come_from_the_models_configuration_without_running_it(tmp_path: 
     assert surfels.gloss is not None
     torch.testing.assert_close(surfels.gloss.exponents, torch.full((36,), 5.0))
     assert any(str(config) in note for note in conversion.notes)
-    for text in ("Namespace(sh_degree=open('x'))", "Namespace(sh_degree='four')", "1 +", "Namespace(max_scaling=-1)"):
+    for text in (
+        "Namespace(sh_degree=open('x'))",
+        "Namespace(sh_degree='four')",
+        "1 +",
+        "Namespace(max_scaling=-1)",
+        "Namespace(max_scaling=0.1, max_scaling=0.2)",
+        "Namespace(**{'max_scaling': 0.1})",
+        "dict(max_scaling=0.1)",
+    ):
         config.write_text(text)
         with pytest.raises(InputError, match="cfg_args"):
             load_ply(path, KEPT)

@@ -10,6 +10,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from rgspipe.arguments import as_count, as_several
 from rgspipe.capture.certainty import GUESS, Certainty
 from rgspipe.capture.field import Field, Graph, Variances
 from rgspipe.capture.lamps import LampProblem
@@ -115,9 +116,11 @@ def capture_scenes(
             no depth to make surfels from; or lamps are off in photographs of unknown exposure.
     """
     options = options or CaptureOptions()
+    views = as_several(views, View, "views", "rg.load_views reads them.")
     check_views(views, where)
     check_lightings(views, options.exposure, where)
-    if isinstance(surfels, int):
+    if not isinstance(surfels, Surfels):
+        surfels = as_count(surfels, "surfels", remedy="Pass surfels, or how many to make.")
         surfels = initialise_surfels(views, surfels, seed=options.seed, where=where)
     surfels = surfels.to(torch.float32)
     if options.unseen:

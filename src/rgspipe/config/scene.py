@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, get_args
 
+from rgspipe.arguments import as_path
 from rgspipe.blender.options import HotdogParameters, RoomParameters, ZooParameters
 from rgspipe.datasets.input_file import input_file, input_folder
 from rgspipe.datasets.mesh_options import MeshOptions
@@ -142,6 +143,7 @@ class SceneConfig(Options):
         if self.path is None:
             remedy = f"Say which: scene={self.kind} scene.path=PATH."
             raise InputError("scene.path", expected=what, found="nothing", remedy=remedy)
+        as_path(self.path, what)
         try:
             (input_folder if self.kind in ("external", "rgbd") else input_file)(self.path, what)
         except InputError as error:

@@ -9,8 +9,11 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
-from rgspipe.datasets.json_file import read_json, shown
+from rgspipe.datasets.json_file import is_number, read_json, shown
 from rgspipe.errors import InputError
+
+#: Rows of a light's place, which are the first.
+PLACE = 3
 
 
 def covariance_fields(lights: int, named: Mapping[str, Sequence[Tensor]]) -> list[dict[str, list]]:
@@ -34,14 +37,23 @@ def read_covariances(path: str | Path) -> tuple[Tensor, ...]:
 
 def _matrix(rows: object, path: str | Path) -> Tensor:
     try:
-        # float() reads "inf", too.
-        matrix = torch.tensor([[float(value) for value in row] for row in rows], dtype=torch.float64)
+        matrix = torch.tensor([[_number(value) for value in row] for row in rows], dtype=torch.float64)
     except (TypeError, ValueError) as error:
         raise _refusal(path, "covariance", "rows of numbers", str(error)) from None
-    square = matrix.ndim == 2 and matrix.shape[0] == matrix.shape[1]
+    square = matrix.ndim == 2 and matrix.shape[0] == matrix.shape[1] >= PLACE
     if not square or matrix.isnan().any() or (matrix.diagonal() < 0).any():
-        raise _refusal(path, "covariance", "as many rows as columns, with variances ≥ 0", shown(rows))
+        expected = f"as many rows as columns, {PLACE} or more, with variances ≥ 0"
+        raise _refusal(path, "covariance", expected, shown(rows))
     return matrix
+
+
+def _number(value: object) -> float:
+    """A number, or infinity, which JSON has not."""
+    if is_number(value):
+        return float(value)
+    if value != "inf":
+        raise ValueError(shown(value))
+    return math.inf
 
 
 def _refusal(path: str | Path, key: str, expected: str, found: str) -> InputError:

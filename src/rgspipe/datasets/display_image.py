@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import warnings
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 from PIL import ExifTags, Image, UnidentifiedImageError
 
 from rgspipe.datasets.input_file import check_pixel_count, input_file
 from rgspipe.datasets.reading_limits import timed
 from rgspipe.errors import InputError
 from rgspipe.scene import srgb
+
+Pixels = npt.NDArray[np.float32]
 
 #: What a file may be, by its suffix. Pillow would start Ghostscript for an EPS image by another name.
 FORMATS = {".png": "PNG", ".jpg": "JPEG", ".jpeg": "JPEG"}
@@ -26,40 +33,95 @@ DEPTH, COLOUR_TYPE, COLOURED = 24, 25, (2, 4, 6)
 #: colour are rounded, and these go into blue 1.77 times.
 COLOUR_ROUNDING = 1.5
 
-LARGEST_LEVEL = {np.dtype(np.uint8): 255.0, np.dtype(np.uint16): 65535.0}
-
+#: What a PNG of sRGB states as its gamma, and by how much it may miss that.
+DISPLAY_GAMMA, SAME_GAMMA = 1.0 / 2.2, 0.03
 
 #: What Pillow raises of damaged files, and of those that claim more pixels than it decodes.
 DAMAGED = (OSError, SyntaxError, ValueError, MemoryError, Image.DecompressionBombError)
 
 
+@contextlib.contextmanager
+def opened(source: Path | io.BytesIO, path: Path, formats: Sequence[str]) -> Iterator[Image.Image]:
+    """An image of one of these formats, by its header: pixels are decoded when they are asked for.
+
+    Raises:
+        InputError: more pixels than are read; names `path`.
+        OSError, SyntaxError, ValueError: another format, or a broken file; see DAMAGED.
+    """
+    with warnings.catch_warnings():
+        # Pillow warns of sizes, where the limit is our own, and of damaged tags, which nobody relies on.
+        warnings.simplefilter("ignore")
+        with Image.open(source, formats=formats) as file:
+            check_pixel_count(path, *file.size)
+            yield file
+
+
+@dataclass(frozen=True, eq=False)
+class Levels:
+    """What a PNG or JPEG stores, palettes resolved.
+
+    Attributes:
+        levels: (H, W, 1 or 3) uint8 or uint16.
+        opaque: (H, W) of the same type, if it has alpha.
+        other_curve: what is said where light is asked for and the file states another curve than that of sRGB.
+    """
+
+    levels: np.ndarray
+    opaque: np.ndarray | None
+    other_curve: InputError | None = None
+
+    @property
+    def values(self) -> Pixels:
+        """(H, W, 1 or 3) in [0, 1]."""
+        return _shares(self.levels)
+
+    @property
+    def alpha(self) -> Pixels | None:
+        """(H, W) in [0, 1]."""
+        return None if self.opaque is None else _shares(self.opaque)
+
+    @property
+    def light(self) -> Pixels:
+        """(H, W, 1 or 3) in [0, 1], linearised with the sRGB curve.
+
+        Raises:
+            InputError: the file states another one.
+        """
+        if self.other_curve is not None:
+            raise self.other_curve
+        return srgb.decode_levels(self.levels)
+
+
+def _shares(levels: np.ndarray) -> Pixels:
+    return np.ascontiguousarray(levels / np.float32(np.iinfo(levels.dtype).max), np.float32)
+
+
 @timed
-def read_display(path: Path) -> tuple[np.ndarray, np.ndarray | None]:
-    """Values (H, W, 1 or 3) float32 in [0, 1] as they are stored, palettes resolved, and alpha (H, W), if there is any.
+def read_levels(path: Path) -> Levels:
+    """What an image stores.
 
     Raises:
         InputError: missing or broken file, too many pixels, another format than the suffix says, CMYK, or 16-bit
             colour, which no library at hand reads whole.
     """
     input_file(path, "an image")
-    stored = _levels(path, _format(path))
-    values = stored.astype(np.float32) / np.float32(LARGEST_LEVEL[stored.dtype])
-    values = values[..., None] if values.ndim == 2 else values
-    channels = values.shape[2]
+    stored, other_curve = _levels(path, _format(path))
+    stored = stored[..., None] if stored.ndim == 2 else stored
+    channels = stored.shape[2]
     has_alpha = channels in (2, 4)
-    return values[..., : channels - has_alpha], np.ascontiguousarray(values[..., -1]) if has_alpha else None
+    return Levels(stored[..., : channels - has_alpha], stored[..., -1] if has_alpha else None, other_curve)
 
 
-def read_display_colour(path: Path) -> np.ndarray:
-    """(H, W, 3 or 4) float32 values in [0, 1] of RGB or RGBA, as they are stored.
+def read_colour_levels(path: Path) -> Levels:
+    """What an image in colour stores.
 
     Raises:
-        InputError: as `read_display`; also for images in grey.
+        InputError: as `read_levels`; also for images in grey.
     """
-    values, alpha = read_display(path)
-    if values.shape[2] != 3:
+    stored = read_levels(path)
+    if stored.levels.shape[2] != 3:
         raise _refusal(path, "8-bit RGB or RGBA", "grey levels")
-    return values if alpha is None else np.concatenate([values, alpha[..., None]], axis=2)
+    return stored
 
 
 def saturated_from(path: Path) -> float:
@@ -71,7 +133,7 @@ def saturated_from(path: Path) -> float:
     """
     margin = 0.5
     if _format(path) == "JPEG":
-        with Image.open(path, formats=["JPEG"]) as file:
+        with opened(path, path, ["JPEG"]) as file:
             table = np.asarray(file.quantization[0], dtype=np.float64)
         margin += COLOUR_ROUNDING + 2.0 * float(np.sqrt(np.mean(table**2) / 12.0))
     return float(srgb.decode(np.array(max(255.0 - margin, 0.0) / 255.0)))
@@ -84,17 +146,13 @@ def _format(path: Path) -> str:
     return kind
 
 
-def _levels(path: Path, kind: str) -> np.ndarray:
-    """(H, W) or (H, W, C) uint8, or uint16 of a grey image."""
+def _levels(path: Path, kind: str) -> tuple[np.ndarray, InputError | None]:
+    """(H, W) or (H, W, C) uint8, or uint16 of a grey image; and what speaks against taking them for sRGB."""
     try:
-        with warnings.catch_warnings():
-            # Pillow only warns of sizes from half of those on that it refuses; the limit here is our own.
-            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
-            with Image.open(path, formats=[kind]) as file:
-                check_pixel_count(path, *file.size)
-                _check_depth(path, kind)
-                _check_orientation(path, file)
-                return _unpacked(path, file)
+        with opened(path, path, [kind]) as file:
+            _check_depth(path, kind)
+            _check_orientation(path, file)
+            return _unpacked(path, file), _other_curve(path, file)
     except InputError:
         raise
     except UnidentifiedImageError as error:
@@ -125,6 +183,15 @@ def _check_orientation(path: Path, file: Image.Image) -> None:
             "tag (exiftool -Orientation= FILE); if they are of the image as it is shown, turn the pixels (mogrify "
             "-auto-orient FILE).",
         )
+
+
+def _other_curve(path: Path, file: Image.Image) -> InputError | None:
+    """What to say of colours that a PNG states to be stored by another curve than that of a display."""
+    gamma = file.info.get("gamma", DISPLAY_GAMMA)
+    if "srgb" in file.info or abs(gamma - DISPLAY_GAMMA) <= SAME_GAMMA:
+        return None
+    remedy = "Convert the image to sRGB, or, if its levels are meant as they are, remove the chunk gAMA."
+    return InputError(path, expected="colours as of sRGB", found=f"a gamma of {gamma:g}", remedy=remedy)
 
 
 def _unpacked(path: Path, file: Image.Image) -> np.ndarray:

@@ -12,6 +12,9 @@ from rgspipe.datasets.reading_limits import reading_limits, timed
 from rgspipe.errors import InputError
 from rgspipe.store.files import replacing
 
+#: How much pixels may differ from squares: an image of 4000 pixels would be one off.
+SQUARE = 1.0 / 4000.0
+
 RENDER_AGAIN = "Export or render this image again."
 
 
@@ -21,7 +24,7 @@ def read_channels(path: str | Path) -> dict[str, np.ndarray]:
 
     Raises:
         InputError: no such file, not an EXR file, truncated, a channel that is not a plain image or that two parts
-            have, or pixels outside of the display window.
+            have, pixels outside of the display window or that are no squares.
     """
     path = input_file(path, "an OpenEXR image")
     _check_pixels(path)
@@ -40,6 +43,7 @@ def _check_pixels(path: Path) -> None:
     try:
         with OpenEXR.File(str(path), separate_channels=True, header_only=True) as file:
             for part in file.parts:
+                _check_squares(path, part)
                 for window in ("displayWindow", "dataWindow"):
                     _, size = _window(part.header[window])
                     check_pixel_count(path, *size)
@@ -47,6 +51,14 @@ def _check_pixels(path: Path) -> None:
         raise
     except Exception as error:  # as in `read_channels`
         raise _broken(path, str(error)) from error
+
+
+def _check_squares(path: Path, part: OpenEXR.Part) -> None:
+    """Refuse pixels that are no squares, as of anamorphic lenses: the camera of a view has one scale in both."""
+    ratio = float(part.header.get("pixelAspectRatio", 1.0))
+    if not abs(ratio - 1.0) <= SQUARE:
+        remedy = "Resample the image to square pixels, or correct pixelAspectRatio in its header where they are."
+        raise InputError(path, expected="square pixels", found=f"pixelAspectRatio {ratio:g}", remedy=remedy)
 
 
 def _window(corners: tuple[np.ndarray, np.ndarray]) -> tuple[tuple[int, int], tuple[int, int]]:

@@ -28,6 +28,9 @@ SUFFIXES = (".exr", ".png", ".jpg", ".jpeg")
 #: ALIKE, is that of an image of another size: lenses are off by some hundredths, and rarely by as much both ways.
 ELSEWHERE, ALIKE = 0.1, 0.02
 
+#: The shortest focal length, pixels.
+SHORTEST = 1e-6
+
 #: Coefficients of lens distortion, as COLMAP and nerfstudio name them.
 DISTORTION = ("k1", "k2", "k3", "k4", "p1", "p2")
 
@@ -209,8 +212,10 @@ class FrameEntry:
     def _camera_from_intrinsics(self, pose: Tensor, intrinsics: object, width: int, height: int) -> Camera:
         cx, cy, fx, fy = numbers(intrinsics, 4, self.where, "camera_intrinsics")
         place = f"{self.where}.camera_intrinsics"
-        if fx <= 0 or fy <= 0:
-            raise InputError(place, expected="focal lengths above 0", found=f"{fx:g}, {fy:g}", remedy="Correct them.")
+        if min(fx, fy) < SHORTEST:
+            raise InputError(
+                place, expected="focal lengths in pixels, above 0", found=f"{fx:g}, {fy:g}", remedy="Correct them."
+            )
         for key, expected in (("w", width), ("h", height)):
             stated = self.fields.get(key, self.shared.get(key, expected))
             if stated != expected:

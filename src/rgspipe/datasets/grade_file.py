@@ -6,6 +6,7 @@ from dataclasses import fields
 from pathlib import Path
 
 from rgspipe.datasets.json_file import is_number, read_json
+from rgspipe.datasets.limits import FARTHEST
 from rgspipe.errors import InputError
 from rgspipe.scene.grade import KnownLamps, SceneGrade
 from rgspipe.store.files import write_json
@@ -34,7 +35,7 @@ def load_grade(path: Path) -> SceneGrade:
     names = [field.name for field in fields(SceneGrade) if field.name != _LAMPS]
     unknown = [name for name in names if name not in content or not _is_known(name, content[name])]
     if unknown:
-        expected, found = f"the numbers {', '.join(names)}", f"{', '.join(unknown)} missing, no number or too large"
+        expected, found = f"the numbers {', '.join(names)}", f"{', '.join(unknown)} missing, no number or out of range"
         raise InputError(path, expected=expected, found=found, remedy="Train the scene again.")
     place = content["unseen_at"]
     values = {name: content[name] for name in names} | {"unseen_at": None if place is None else tuple(place)}
@@ -61,5 +62,7 @@ def _is_known(name: str, value: object) -> bool:
     if value is None:
         return name in ("psnr", "unseen_at")
     if name == "unseen_at":
-        return isinstance(value, list) and len(value) == 3 and all(is_number(part) for part in value)
-    return is_number(value) and -LARGEST < value < LARGEST
+        return isinstance(value, list) and len(value) == 3 and all(is_number(x) and abs(x) <= FARTHEST for x in value)
+    if name == "views":
+        return type(value) is int and 0 <= value < LARGEST
+    return is_number(value) and (-LARGEST if name == "psnr" else 0.0) <= value < LARGEST

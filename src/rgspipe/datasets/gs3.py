@@ -109,7 +109,7 @@ class TargetFolder:
         Raises:
             InputError: it has no frames, or they are broken.
         """
-        place = Path(folder).resolve()
+        place = input_folder(folder, "the folder of a fit target").resolve()
         entries = read_entries(place / "transforms.json", "the cameras of a fit target")
         return cls(place.name, _listed_targets(place.parent).get(place.name, "unknown"), len(entries))
 
@@ -145,6 +145,8 @@ def _listed_targets(folder: Path) -> dict[str, str]:
         if occlusion not in OCCLUSIONS:
             expected = ", ".join(OCCLUSIONS)
             raise InputError(f"{place}.occlusion", expected=expected, found=repr(occlusion), remedy="Correct it.")
+        if name in classes:
+            raise InputError(f"{place}.name", expected="each target once", found=shown(name), remedy="Leave one.")
         classes[name] = occlusion
     return classes
 

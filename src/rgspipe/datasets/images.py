@@ -8,10 +8,10 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from rgspipe.datasets.display_image import read_display, read_display_colour
+from rgspipe.datasets.display_image import read_colour_levels, read_levels
 from rgspipe.datasets.exr import read_array, read_channels, read_image
 from rgspipe.errors import InputError
-from rgspipe.scene import Camera, srgb
+from rgspipe.scene import Camera
 from rgspipe.scene.arrays import check_radiance
 
 #: Depths from here on (Blender writes 1e10) say that there is no surface.
@@ -111,15 +111,18 @@ def check_size(path: Path, stored: np.ndarray | Tensor, camera: Camera) -> None:
 
 def _read_display_image(path: Path) -> tuple[np.ndarray, np.ndarray]:
     """A PNG or JPEG, linearised with the sRGB curve and premultiplied."""
-    values = read_display_colour(path)
-    alpha = values[..., 3] if values.shape[2] == 4 else np.ones(values.shape[:2], np.float32)
-    linear = srgb.decode(values[..., :3])
-    return (linear * alpha[..., None]).astype(np.float32), np.ascontiguousarray(alpha)
+    stored = read_colour_levels(path)
+    light, alpha = stored.light, stored.alpha
+    if alpha is None:
+        return light, np.ones(light.shape[:2], np.float32)
+    light *= alpha[..., None]
+    return light, alpha
 
 
 def _mask_levels(path: Path) -> np.ndarray:
     """(H, W) of a mask that an image program wrote: its alpha where that says anything, or else its grey levels."""
-    values, alpha = read_display(path)
+    stored = read_levels(path)
+    values, alpha = stored.values, stored.alpha
     if alpha is not None and alpha.min() < 1.0:
         return alpha
     if not (values == values[..., :1]).all():

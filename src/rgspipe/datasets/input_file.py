@@ -5,6 +5,7 @@ from __future__ import annotations
 import stat
 from pathlib import Path
 
+from rgspipe.arguments import as_path
 from rgspipe.datasets.reading_limits import RAISE, reading_limits
 from rgspipe.errors import InputError
 from rgspipe.store.files import LONGEST_NAME
@@ -19,10 +20,12 @@ def input_file(path: str | Path, expected: str, *, most_bytes: int | None = None
         most_bytes: the size from which on no such file is meant.
 
     Raises:
-        InputError: no such file, something else than a regular file, a name that cannot be, or too large.
+        InputError: no such file, something else than a regular file, a name that cannot be, or that no text can say, or
+            too large.
     """
+    path = as_path(path, expected)
     try:
-        status = Path(path).stat()
+        status = path.stat()
     except FileNotFoundError:
         raise InputError(path, expected=expected, found="no such file", remedy="Check the path.") from None
     except (OSError, ValueError) as error:  # a name too long, a loop of links, no permission; a null in the name
@@ -33,24 +36,33 @@ def input_file(path: str | Path, expected: str, *, most_bytes: int | None = None
     if most_bytes is not None and status.st_size > most_bytes:
         wanted = f"{expected} of at most {most_bytes} bytes"
         raise InputError(path, expected=wanted, found=f"{status.st_size} bytes", remedy=f"Check the file. {RAISE}")
-    return Path(path)
+    return path
 
 
 def input_folder(path: str | Path, expected: str) -> Path:
     """`path`, found to be a folder.
 
     Raises:
-        InputError: no such folder, a file or anything else, or a name that cannot be.
+        InputError: no such folder, a file or anything else, or a name that cannot be, or that no text can say.
     """
+    path = as_path(path, expected)
     try:
-        found = "a file" if stat.S_ISREG(mode := Path(path).stat().st_mode) else "a pipe or a device"
+        found = "a file" if stat.S_ISREG(mode := path.stat().st_mode) else "a pipe or a device"
     except FileNotFoundError:
         raise InputError(path, expected=expected, found="no such folder", remedy="Check the path.") from None
     except (OSError, ValueError) as error:
         raise InputError(_short(path), expected=expected, found=_why(error), remedy="Check the path.") from None
     if not stat.S_ISDIR(mode):
         raise InputError(path, expected=expected, found=found, remedy="Check the path.")
-    return Path(path)
+    return path
+
+
+def is_there(path: Path) -> bool:
+    """Whether there is anything of this name, which may be none that a file can have."""
+    try:
+        return path.exists()
+    except (OSError, ValueError):
+        return False
 
 
 def check_pixel_count(path: Path, width: int, height: int, most: int | None = None) -> None:

@@ -60,6 +60,14 @@ def numbers(value: object, count: int, where: str | Path, key: str) -> list[floa
     return [float(item) for item in value]
 
 
+def whole(value: object, where: str | Path, key: str) -> int:
+    """`value` as a whole number, or an InputError that names the key."""
+    if not is_number(value) or value != int(value):
+        expected = f'a whole number under "{key}"'
+        raise InputError(where, expected=expected, found=shown(value), remedy=f'Correct "{key}".')
+    return int(value)
+
+
 def is_number(value: object) -> bool:
     """Whether `value` is a finite JSON number."""
     if isinstance(value, bool) or not isinstance(value, int | float):

@@ -9,6 +9,7 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
+from rgspipe.arguments import as_path
 from rgspipe.datasets.json_file import is_number, numbers, read_json, required, shown
 from rgspipe.datasets.limits import FARTHEST, STRONGEST
 from rgspipe.errors import InputError
@@ -81,7 +82,8 @@ def write_lights(path: str | Path, lights: Light | Sequence[Light], extra: dict 
         InputError: `path` is a folder, or `lights` are none, or have numbers that are not finite.
         ValueError: `extra` would overwrite a field of the format.
     """
-    if Path(path).is_dir():
+    path = as_path(path)
+    if path.is_dir():
         raise InputError(path, expected="the name of a file", found="a folder", remedy="Add one: lights.json in it.")
     rig = as_rig(lights)
     check_numbers(rig)
@@ -90,7 +92,7 @@ def write_lights(path: str | Path, lights: Light | Sequence[Light], extra: dict 
     if len(further) != len(rig):
         raise ValueError(f'extra["lights"] must have {len(rig)} entries, got {len(further)}')
     entries = [_merged(light_fields(light), fields) for light, fields in zip(rig, further, strict=True)]
-    write_json(Path(path), _merged({"version": VERSION, "lights": entries}, extra))
+    write_json(path, _merged({"version": VERSION, "lights": entries}, extra))
 
 
 def _merged(fields: dict, further: dict) -> dict:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Literal
 
 from rgspipe.datasets.gs3 import load_dataset, load_target
+from rgspipe.datasets.input_file import input_folder
 from rgspipe.datasets.json_file import read_json, required
 from rgspipe.datasets.views import Dataset, View
 from rgspipe.errors import InputError
@@ -54,7 +55,11 @@ def load_views(folder: str | Path, split: Literal["train", "test"] = "train") ->
     Raises:
         InputError: any file is missing, broken or inconsistent.
     """
-    if (Path(folder) / TARGET).exists():
+    folder = input_folder(folder, "a folder with images and their cameras")
+    if split not in ("train", "test"):
+        remedy = "Correct it."
+        raise InputError("split", expected="train or test", found=repr(split)[:80], remedy=remedy)
+    if (folder / TARGET).exists():
         return load_target(folder).views
     dataset = open_dataset(folder, train=split == "train", test=split == "test", targets=False)
     return dataset.train if split == "train" else dataset.left_out()

@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+import io
 import warnings
 from pathlib import Path
 from typing import Any
-from urllib.parse import unquote
 
 import numpy as np
 import trimesh
 import trimesh.resolvers
 from PIL import Image
 
-from rgspipe.datasets.display_image import DAMAGED
-from rgspipe.datasets.input_file import check_pixel_count, input_file
+from rgspipe.arguments import as_path
+from rgspipe.datasets.gltf_check import check_gltf
+from rgspipe.datasets.input_file import input_file
+from rgspipe.datasets.json_file import shown
 from rgspipe.datasets.limits import FARTHEST
-from rgspipe.datasets.mesh_links import FORMATS, GLTF, mesh_files
+from rgspipe.datasets.mesh_links import FORMATS, GLTF, mesh_links
 from rgspipe.datasets.mesh_options import MeshOptions
+from rgspipe.datasets.obj_text import plain_obj
+from rgspipe.datasets.ply_header import check_rows
 from rgspipe.datasets.reading_limits import RAISE, reading_limits, timed
+from rgspipe.datasets.texture import check_texture, texture_light
 from rgspipe.errors import InputError
 from rgspipe.scene import srgb
 from rgspipe.scene.mesh import Numbers, Paint, TriangleMesh
@@ -35,14 +40,15 @@ def read_mesh(path: str | Path, options: MeshOptions | None = None) -> TriangleM
     Raises:
         InputError: missing or broken file, another format, no triangles, or coordinates that cannot be.
     """
-    path, options = Path(path), options or MeshOptions()
+    path, options = as_path(path), options or MeshOptions()
     kind = path.suffix.lower()
     if kind not in FORMATS:
         remedy = "Export it as binary PLY or GLB."
         raise InputError(path, expected=WHAT, found=f"the suffix {path.suffix!r}", remedy=remedy)
     content = _loaded(input_file(path, WHAT, most_bytes=reading_limits().bytes))
     try:
-        mesh = _joined([_part(*placed, linear=kind in GLTF, path=path) for placed in _placed(content)], path, content)
+        parts = [_part(*placed, linear=kind in GLTF, path=path) for placed in _placed(content, path)]
+        mesh = _joined(parts, path, content)
     except InputError:
         raise
     except (ValueError, IndexError, TypeError, KeyError, AttributeError, OSError) as error:
@@ -57,38 +63,61 @@ def is_y_up(path: Path, options: MeshOptions) -> bool:
 
 
 class OwnFiles(trimesh.resolvers.FilePathResolver):
-    """Gives those who decode a mesh the files that belong to it, and no others: only they are in fingerprints."""
+    """Gives those who decode a mesh the files that belong to it, and no others: only they are in fingerprints.
+
+    Decoders go on without what they do not get, as if nothing had been named, so that all is looked at before.
+    """
 
     def __init__(self, path: Path) -> None:
         super().__init__(str(path))
-        self._folder, self._own = path.parent, {file.resolve() for file in mesh_files(path)}
+        self._path, self._links = path, mesh_links(path)
+        self._links.there()
+        if path.suffix.lower() in GLTF:
+            check_gltf(path, self._links)
+        else:
+            self._check()
 
     def namespaced(self, namespace: str) -> OwnFiles:
         """No folder has files of its own."""
         return self
 
     def get(self, key: str) -> bytes:
-        """The content of a file beside the mesh.
+        """The content of a file beside the mesh; of an OBJ also all of its materials, whatever they are asked by.
 
         Raises:
-            FileNotFoundError: there is none, or the mesh does not name it.
-            InputError: a pipe, a device, or too large.
+            InputError: the mesh does not name it, or it is missing.
         """
-        # In glTF names are escaped as in addresses, in other formats they stand as they are.
-        named = [(self._folder / name).resolve() for name in (key.strip(), unquote(key.strip()))]
-        own = [path for path in named if path in self._own]
-        if not own:
-            raise FileNotFoundError(key)
-        return input_file(own[0], "a file of a mesh", most_bytes=reading_limits().bytes).read_bytes()
+        key, links = key.strip(), self._links
+        file = links.textures.get(key) or links.buffers.get(key)
+        if file is not None:
+            return input_file(file, f"a file that {self._path.name} names").read_bytes()
+        if links.materials is not None:
+            return links.materials.text
+        raise InputError(self._path, expected=WHAT, found=f"another file, {shown(key)}", remedy="Export it again.")
+
+    def _check(self) -> None:
+        for file in self._links.files:
+            input_file(file, f"a file that {self._path.name} names")
+        for file in self._links.textures.values():
+            check_texture(file.read_bytes(), file)
+        if self._path.suffix.lower() == ".ply":
+            check_rows(self._path)
+        if self._path.suffix.lower() == ".ply" and len(self._links.textures) > 1:
+            found, remedy = f"{len(self._links.textures)}", "Export it as GLB."
+            raise InputError(self._path, expected="one texture at most in a PLY", found=found, remedy=remedy)
 
 
 def _loaded(path: Path) -> Any:
+    own = OwnFiles(path)
     try:
         # Of broken files numpy warns before they are refused.
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             # Nothing is merged or mended: points without area do no harm, and merging would move textures.
-            return trimesh.load_scene(path, resolver=OwnFiles(path), process=False, maintain_order=True)
+            options = {"resolver": own, "process": False, "maintain_order": True}
+            if path.suffix.lower() != ".obj":
+                return trimesh.load_scene(path, **options)
+            return trimesh.load_scene(io.BytesIO(plain_obj(path.read_bytes(), path)), file_type="obj", **options)
     except InputError:
         raise
     except Exception as error:  # the library says of no format what it raises
@@ -100,11 +129,16 @@ def _broken(path: Path, error: BaseException) -> InputError:
     return InputError(path, expected=WHAT, found=found, remedy="Export it again.")
 
 
-def _placed(content: Any) -> list[tuple[Any, Numbers]]:
+def _placed(content: Any, path: Path) -> list[tuple[Any, Numbers]]:
     """The triangle meshes of a scene, each with the transform (4, 4) of its node."""
     nodes = [content.graph[name] for name in content.graph.nodes_geometry]
     found = [(content.geometry[name], np.asarray(matrix, np.float64)) for matrix, name in nodes]
-    return [(part, matrix) for part, matrix in found if isinstance(part, trimesh.Trimesh) and len(part.faces)]
+    placed = [(part, matrix) for part, matrix in found if isinstance(part, trimesh.Trimesh) and len(part.faces)]
+    # A mesh may stand at many nodes.
+    if (count := sum(len(part.faces) for part, _ in placed)) > (most := reading_limits().vertices):
+        expected, remedy = f"at most {most} triangles", f"Decimate the mesh. {RAISE}"
+        raise InputError(path, expected=expected, found=f"{count} triangles", remedy=remedy)
+    return placed
 
 
 def _part(part: Any, matrix: Numbers, *, linear: bool, path: Path) -> TriangleMesh:
@@ -113,9 +147,6 @@ def _part(part: Any, matrix: Numbers, *, linear: bool, path: Path) -> TriangleMe
     if faces.min() < 0 or faces.max() >= len(vertices):
         found = f"a triangle with point {int(faces.max())} of {len(vertices)}"
         raise InputError(path, expected="triangles between its points", found=found, remedy="Export it again.")
-    if len(faces) > (most := reading_limits().vertices):
-        found, remedy = f"{len(faces)} triangles", f"Decimate the mesh. {RAISE}"
-        raise InputError(path, expected=f"at most {most} triangles", found=found, remedy=remedy)
     return TriangleMesh(vertices, faces, _paint(part, faces, linear, path)).moved(matrix)
 
 
@@ -129,7 +160,7 @@ def _paint(part: Any, faces: np.ndarray, linear: bool, path: Path) -> Paint:
             return Paint(np.broadcast_to(colour, (count, 3, 3)), uv, none)
         white = colour if linear else np.ones(3)  # Kd beside map_Kd is what exporters leave there
         corners = np.broadcast_to(white, (count, 3, 3))
-        return Paint(corners, given[faces], np.zeros(count, np.int64), (_texture(image, path),))
+        return Paint(corners, given[faces], np.zeros(count, np.int64), (texture_light(image, path),))
     if visual.kind == "texture":
         return Paint(np.broadcast_to(_material(visual.material)[0], (count, 3, 3)), uv, none)
     if visual.kind == "vertex":
@@ -151,23 +182,11 @@ def _material(material: Any) -> tuple[Numbers, Image.Image | None]:
         level, image = material.baseColorFactor, material.baseColorTexture
         level = np.full(3, 255) if level is None else level
     else:
-        level, image = material.diffuse, material.image
+        # Of one that says nothing of a colour the library invents a grey.
+        level = material.diffuse if "kd" in material.kwargs else np.full(3, np.nan)
+        image = material.image
     colour = np.asarray(level)[:3].astype(np.float64) / 255.0
     return colour, image
-
-
-def _texture(image: Image.Image, path: Path) -> np.ndarray:
-    """(H, W, 3) linear float32 of an image that has not been decoded yet."""
-    if image.format not in ("PNG", "JPEG"):
-        found = f"a texture in the format {image.format}"
-        raise InputError(path, expected="textures as PNG or JPEG", found=found, remedy="Convert them.")
-    check_pixel_count(path, *image.size)
-    try:
-        levels = np.asarray(image.convert("RGB"), np.float64)
-    except DAMAGED as cause:
-        remedy = "Write the texture again."
-        raise InputError(path, expected="whole textures", found=f"a broken one: {cause}", remedy=remedy) from cause
-    return srgb.decode(levels / 255.0).astype(np.float32)
 
 
 def _joined(parts: list[TriangleMesh], path: Path, content: Any) -> TriangleMesh:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
 from urllib.parse import unquote
 
-from rgspipe.datasets.input_file import input_file
-from rgspipe.datasets.json_file import parse_json, read_json
+from rgspipe.datasets.input_file import input_file, is_there
+from rgspipe.datasets.json_file import parse_json, read_json, shown
+from rgspipe.datasets.obj_materials import Materials, read_materials
 from rgspipe.datasets.reading_limits import reading_limits
 from rgspipe.errors import InputError
 
@@ -16,68 +19,122 @@ from rgspipe.errors import InputError
 GLTF = (".glb", ".gltf")
 FORMATS = (".ply", ".obj", *GLTF)
 
-#: Lines of OBJ, MTL and the header of a PLY that name another file; some end with a carriage return alone.
-NAMED = re.compile(rb"(?:^|[\r\n])[ \t]*(?:mtllib|map_kd|comment[ \t]+texturefile)[ \t]+([^\r\n]+)", re.IGNORECASE)
+#: What in the header of a PLY names a picture.
+NAMED = re.compile(rb"texturefile([^\r\n]+)", re.IGNORECASE)
 
 #: Bytes of a PLY within which its header ends, and those of a GLB before its JSON.
 PLY_HEADER, GLB_HEADER = 65536, 20
 
 
-def mesh_files(path: Path) -> list[Path]:
-    """The file and those that it names, as far as they are there."""
+@dataclass(frozen=True)
+class Links:
+    """What a mesh names.
+
+    Attributes:
+        buffers, textures: files by the names that those who decode the mesh have for them, whether they are there or
+            not.
+        materials: of an OBJ.
+    """
+
+    buffers: dict[str, Path] = field(default_factory=dict)
+    textures: dict[str, Path] = field(default_factory=dict)
+    materials: Materials | None = None
+
+    @property
+    def files(self) -> list[Path]:
+        """All of them, each once."""
+        materials = [] if self.materials is None else self.materials.files
+        return list(dict.fromkeys([*materials, *self.buffers.values(), *self.textures.values()]))
+
+    def there(self) -> list[Path]:
+        """Those of them that there are.
+
+        Raises:
+            InputError: one is no regular file, or too large.
+        """
+        most = reading_limits().bytes
+        return [input_file(file, "a file of a mesh", most_bytes=most) for file in self.files if is_there(file)]
+
+
+def mesh_links(path: Path) -> Links:
+    """What a mesh names; nothing where it is broken, which those who decode it say.
+
+    Raises:
+        InputError: no such file, a name outside of its folder, or materials that would be read wrongly.
+    """
+    file = input_file(path, "a mesh", most_bytes=reading_limits().bytes)
+
+    def named(by: Path, name: str) -> Path:
+        return _place(file, by, name)
+
     match path.suffix.lower():
         case ".obj":
-            materials = list(_beside(path, _named(path)))
-            textures = [file for one in materials for file in _beside(one, _named(one))]
-            return [path, *dict.fromkeys([*materials, *textures])]
-        case ".gltf":
-            content = read_json(path, "a glTF file") if path.is_file() else {}
-            return [path, *dict.fromkeys(_beside(path, _uris(content)))]
-        case ".glb":
-            return [path, *dict.fromkeys(_beside(path, _uris(_glb_content(path))))]
+            materials = read_materials(file, named)
+            return Links(textures=materials.textures, materials=materials)
+        case ".gltf" | ".glb":
+            content = gltf_content(file)
+            parts = ({uri: named(file, unquote(uri)) for uri in _uris(content, key)} for key in ("buffers", "images"))
+            return Links(*parts)
         case ".ply":
-            return [path, *dict.fromkeys(_beside(path, _named(path, PLY_HEADER)))]
-    return [path]
+            return Links(textures={name: named(file, name) for name in _of_header(file)})
+    return Links()
 
 
-def _named(path: Path, most: int = -1) -> list[str]:
-    if not path.is_file():
-        return []
-    with input_file(path, "a mesh or its materials", most_bytes=reading_limits().bytes).open("rb") as stream:
-        content = stream.read(most)
-    return [name.strip().decode(errors="replace") for name in NAMED.findall(content)]
+def mesh_files(path: Path) -> list[Path]:
+    """The file and those that it names, as far as they are there.
+
+    Raises:
+        InputError: as `mesh_links`, but for a file that is missing; or one of them is no regular file.
+    """
+    if not path.exists():
+        return [path]
+    return [path, *mesh_links(path).there()]
+
+
+def _place(mesh: Path, by: Path, name: str) -> Path:
+    """The file that another one of a mesh names, which lies in the folder of the mesh or below.
+
+    Raises:
+        InputError: it lies elsewhere.
+    """
+    # Programs on Windows write backslashes.
+    places = [Path(os.path.normpath(by.parent / text)) for text in dict.fromkeys([name, name.replace("\\", "/")])]
+    place = next((one for one in places if is_there(one)), places[-1])
+    if Path(os.path.relpath(place, mesh.parent)).parts[:1] == ("..",):
+        expected, remedy = "names of files in the folder of the mesh or below", "Move the file there, and name it so."
+        raise InputError(by, expected=expected, found=shown(name), remedy=remedy)
+    return place
+
+
+def _of_header(path: Path) -> list[str]:
+    with path.open("rb") as stream:
+        header = stream.read(PLY_HEADER).partition(b"end_header")[0]
+    return [name.decode(errors="surrogateescape").strip() for name in NAMED.findall(header)]
+
+
+def gltf_content(path: Path) -> object:
+    """The JSON of a glTF file or a GLB; of a broken GLB nothing.
+
+    Raises:
+        InputError: a glTF file is no JSON.
+    """
+    return _glb_content(path) if path.suffix.lower() == ".glb" else read_json(path, "a glTF file")
 
 
 def _glb_content(path: Path) -> object:
-    """The JSON of a GLB; nothing where it is broken, which those who decode it say."""
-    if not path.is_file():
-        return {}
-    with input_file(path, "a mesh", most_bytes=reading_limits().bytes).open("rb") as stream:
+    with path.open("rb") as stream:
         header = stream.read(GLB_HEADER)
         length = int.from_bytes(header[12:16], "little")
         content = stream.read(min(length, reading_limits().text_bytes))
     try:
         return parse_json(content.decode())
     except ValueError:
-        return {}
+        return None
 
 
-def _uris(content: object) -> Iterator[str]:
-    for kind in ("buffers", "images"):
-        parts = content.get(kind, []) if isinstance(content, dict) else []
-        for part in parts if isinstance(parts, list) else []:
-            uri = part.get("uri") if isinstance(part, dict) else None
-            if isinstance(uri, str) and not uri.startswith("data:"):
-                yield unquote(uri)
-
-
-def _beside(path: Path, names: Iterator[str] | list[str]) -> Iterator[Path]:
-    for name in names:
-        try:
-            file = path.parent / name
-            if file.exists() and not file.is_dir():
-                yield input_file(file, "a file of a mesh")
-        except InputError:
-            raise
-        except (OSError, ValueError):  # no name of a file
-            continue
+def _uris(content: object, key: str) -> Iterator[str]:
+    parts = content.get(key, []) if isinstance(content, dict) else []
+    for part in parts if isinstance(parts, list) else []:
+        uri = part.get("uri") if isinstance(part, dict) else None
+        if isinstance(uri, str) and not uri.startswith("data:"):
+            yield uri

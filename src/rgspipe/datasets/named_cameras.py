@@ -9,6 +9,7 @@ from typing import Literal, get_args
 
 from torch import Tensor
 
+from rgspipe.datasets.input_file import is_there
 from rgspipe.datasets.json_file import numbers, read_json, required, shown
 from rgspipe.datasets.limits import LARGEST
 from rgspipe.datasets.rigid_pose import rigid_pose
@@ -17,6 +18,9 @@ from rgspipe.scene import Camera
 from rgspipe.store.files import write_json
 
 VERSION = 1
+
+#: The shortest focal length, in sides of the image.
+SHORTEST = 1e-6
 
 #: The side of an image that a lens is stated for.
 Side = Literal["longer", "width", "height"]
@@ -65,7 +69,7 @@ def read_camera(path: Path, name: str) -> NamedCamera:
     Raises:
         InputError: no such file, none of that name, or a broken one.
     """
-    if not path.is_file():
+    if not (is_there(path) and path.is_file()):
         remedy = "Check the path; of a .blend file, stage=generate_dataset writes cameras.json beside its images."
         raise InputError(path, expected="cameras by name", found="no such file", remedy=remedy)
     cameras = required(read_json(path, "cameras by name"), "cameras", path)
@@ -78,8 +82,8 @@ def read_camera(path: Path, name: str) -> NamedCamera:
     [focal] = numbers([required(fields, "focal", place)], 1, place, "focal")
     shift = numbers(required(fields, "shift", place), 2, place, "shift")
     side = required(fields, "side", place)
-    if focal <= 0.0 or side not in get_args(Side):
-        expected = f'"focal" above 0 and "side" one of {", ".join(get_args(Side))}'
+    if focal < SHORTEST or side not in get_args(Side):
+        expected = f'"focal" of at least {SHORTEST:g} and "side" one of {", ".join(get_args(Side))}'
         raise InputError(place, expected=expected, found=f"{focal:g}, {shown(side)}", remedy="Correct them.")
     if max(abs(value) for value in (focal, *shift)) > LARGEST:
         expected, found = f'"focal" and "shift" of at most {LARGEST:g}', f"{focal:g}, {shift[0]:g}, {shift[1]:g}"

@@ -11,6 +11,7 @@ from typing import NoReturn
 
 import torch
 
+from rgspipe.arguments import as_path
 from rgspipe.datasets.input_file import input_file, input_folder
 from rgspipe.datasets.reading_limits import reading_limits, timed
 from rgspipe.errors import InputError
@@ -39,7 +40,7 @@ def read_photometry(path: str | Path) -> Photometry:
     Raises:
         InputError: missing, too large, no such file, or something in it that cannot be.
     """
-    path = Path(path)
+    path = as_path(path)
     reader = READERS.get(path.suffix.lower())
     if reader is None:
         _refuse(path, " or ".join(READERS), path.suffix or "no ending", "Name a measured luminaire's file.")

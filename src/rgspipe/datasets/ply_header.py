@@ -63,6 +63,30 @@ def check_header(path: Path) -> None:
             )
 
 
+def check_rows(path: Path) -> None:
+    """Refuse text that has other rows than its header says: whoever reads it takes one element's for another's.
+
+    What is no header at all is left to the reader.
+
+    Raises:
+        InputError: naming both numbers.
+    """
+    with path.open("rb") as stream:
+        lines: list[list[str]] = []
+        while lines[-1:] != [["end_header"]]:
+            line = stream.readline(LONGEST)
+            if not line or stream.tell() > LONGEST:
+                return
+            lines.append(line.decode("ascii", errors="replace").split())
+        if not any(line[:2] == ["format", "ascii"] for line in lines):
+            return
+        rows = sum(bool(line.strip()) for line in stream)
+    claimed = [int(line[2]) for line in lines if line[:1] == ["element"] and len(line) == 3 and line[2].isdecimal()]
+    if rows != sum(claimed):
+        expected, remedy = f"{sum(claimed)} rows after the header", "Export it again, or copy it anew."
+        raise InputError(path, expected=expected, found=f"{rows}", remedy=remedy)
+
+
 def _elements(path: Path, lines: list[list[str]]) -> list[_Element]:
     elements: list[_Element] = []
     for words in lines:

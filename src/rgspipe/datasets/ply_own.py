@@ -17,6 +17,7 @@ import torch
 from scipy.special import expit, logit
 from torch import Tensor
 
+from rgspipe.arguments import as_one_of, as_path
 from rgspipe.datasets.conversion import Conversion, Loss, loss
 from rgspipe.datasets.json_file import is_number
 from rgspipe.datasets.ply_gaussians import HIGH, LOW, Y0, unit_quaternions
@@ -75,8 +76,13 @@ def save_ply(
         what a viewer does not show, and for "viewer" what the file does not hold.
 
     Raises:
+        InputError: no path, or no surfels, or none of them.
         ValueError: `radiance` is of another number of surfels.
     """
+    path = as_path(path)
+    as_one_of(surfels, Surfels, "surfels", "Pass those of a scene: scene.surfels.")
+    if not len(surfels):
+        raise InputError("surfels", expected="some of them", found="none", remedy="Pass those of a scene.")
     if radiance is not None and radiance.shape != (len(surfels), 3):
         raise ValueError(f"radiance must have shape {(len(surfels), 3)}, got {tuple(radiance.shape)}")
     shown, colour_losses = _shown(surfels, radiance)

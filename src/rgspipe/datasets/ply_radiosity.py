@@ -125,7 +125,10 @@ def _parse_ranges(path: Path) -> Ranges:
     input_file(path, "the configuration of a model", most_bytes=MOST_BYTES)
     try:
         call = ast.parse(path.read_text(encoding="utf-8").strip(), mode="eval").body
-        if not isinstance(call, ast.Call):
+        if not (isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id == "Namespace"):
+            raise error
+        given = [item.arg for item in call.keywords]
+        if call.args or None in given or len(set(given)) < len(given):
             raise error
         names = {item.name for item in fields(Ranges)}
         found = {item.arg: ast.literal_eval(item.value) for item in call.keywords if item.arg in names}

@@ -37,7 +37,7 @@ class ReadingLimits(Options):
     """Sizes from which on files are refused."""
 
     pixels: int = option(100_000_000, low=1, high=10**10)
-    """pixels of the largest image, photograph or depth map; decoded, so many take 1.2 GB"""
+    """pixels of the largest image, photograph or depth map; so many of a PNG in colour take 2.1 GiB"""
     cropped_pixels: int = option(2**24, low=1, high=10**10)
     """pixels of the largest image of which only a part is stored, so that a few bytes could claim any size"""
     vertices: int = option(20_000_000, low=2, high=10**10)
@@ -84,7 +84,7 @@ class _TookTooLong(BaseException):
 def timed(
     read: Callable[Concatenate[Path, Arguments], Made],
 ) -> Callable[Concatenate[str | Path, Arguments], Made]:
-    """A reader of a file that refuses it once that has taken longer than the limit."""
+    """A reader of a file that refuses it once that has taken longer than the limit, or all memory."""
 
     @functools.wraps(read)
     def limited(path: str | Path, *arguments: Arguments.args, **options: Arguments.kwargs) -> Made:
@@ -105,6 +105,12 @@ def timed(
                 found="one that takes longer",
                 remedy=f"Check the file. {RAISE}",
             ) from None
+        except MemoryError as error:
+            found, remedy = (
+                f"one that does not ({str(error) or 'no room'})",
+                "Check the file, or read it where there is more.",
+            )
+            raise InputError(path, expected="a file that fits into memory", found=found, remedy=remedy) from None
         return made
 
     return limited

@@ -12,11 +12,13 @@ from rgspipe.scene.surfels import Surfels
 
 
 def check_surfels(path: Path, surfels: Surfels, remedy: str) -> None:
-    """Refuse surfels that are not finite, too far away or too large, opaquer than opaque, or brighter than white.
+    """Refuse none at all, and those that are not finite, too far away or large, too opaque, or brighter than white.
 
     Raises:
         InputError: names the file, the property and its extremes.
     """
+    if not len(surfels):
+        raise InputError(path, expected="surfels", found="none", remedy=remedy)
     wanted: dict[str, tuple[Tensor, float, float]] = {
         "centers": (surfels.centers, -FARTHEST, FARTHEST),
         "scales": (surfels.scales, 0.0, FARTHEST),

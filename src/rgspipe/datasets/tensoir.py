@@ -13,7 +13,7 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
-from rgspipe.datasets.display_image import read_display_colour
+from rgspipe.datasets.display_image import read_colour_levels
 from rgspipe.datasets.field_of_view import camera_of_angle
 from rgspipe.datasets.images import check_size, read_colour
 from rgspipe.datasets.json_file import read_json, required
@@ -126,11 +126,11 @@ def _albedo(path: Path, camera: Camera) -> Tensor:
 
 def _normals(path: Path, camera: Camera) -> Tensor:
     """(H, W, 3) unit normals in world axes, stored as (n + 1)/2; 0 where there is no surface."""
-    stored = torch.from_numpy(read_display_colour(path))
-    check_size(path, stored, camera)
-    normals = 2.0 * stored[..., :3] - 1.0
+    stored = read_colour_levels(path)
+    check_size(path, stored.levels, camera)
+    normals = 2.0 * torch.from_numpy(stored.values) - 1.0
     length = normals.norm(dim=-1, keepdim=True)
     there = length > 0.5
-    if stored.shape[-1] == 4:
-        there &= stored[..., 3:] > 0
+    if stored.alpha is not None:
+        there &= torch.from_numpy(stored.alpha)[..., None] > 0
     return torch.where(there, normals / length.clamp(min=1e-6), 0.0)

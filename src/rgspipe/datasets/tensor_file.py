@@ -62,7 +62,8 @@ def _read(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
         if unusual := [f"{name} of {tensor.dtype}" for name, tensor in tensors.items() if tensor.dtype not in DTYPES]:
             raise ValueError(unusual[0])
         return tensors, note
-    except (OSError, safetensors.SafetensorError, ValueError, RecursionError) as error:
+    # The library lets errors of torch through.
+    except (OSError, safetensors.SafetensorError, ValueError, TypeError, OverflowError, RuntimeError) as error:
         raise InputError(
             path,
             expected="a safetensors file",

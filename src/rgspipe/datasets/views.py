@@ -8,9 +8,12 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
+from rgspipe.arguments import as_one_of
 from rgspipe.datasets.classes import Occlusion
 from rgspipe.errors import InputError
 from rgspipe.scene import Camera, PointLight
+from rgspipe.scene.arrays import as_tensor
+from rgspipe.scene.lights import Light
 from rgspipe.scene.shapes import Float
 
 
@@ -34,6 +37,9 @@ class View:
         base: (H, W, 3) the same with the lamps off, in a fit target.
         lighting: of photographs under unknown lamps, the name of those that were on: all of one name share them; "off"
             is what was there with all of them off.
+
+    Raises:
+        InputError: the camera or the light is none, or image and alpha are no numbers of the camera's size.
     """
 
     name: str
@@ -48,6 +54,14 @@ class View:
     emitters: Tensor | None = None
     base: Float[Tensor, "H W 3"] | None = None
     lighting: str = ""
+
+    def __post_init__(self) -> None:
+        as_one_of(self.camera, Camera, "camera", "Camera.look_at makes one.")
+        if self.light is not None:
+            as_one_of(self.light, Light, "light", "Pass one, such as PointLight([0, 0, 0.3], 1.0).")
+        size = (self.camera.height, self.camera.width)
+        object.__setattr__(self, "image", as_tensor(self.image, "image", (*size, 3)))
+        object.__setattr__(self, "alpha", as_tensor(self.alpha, "alpha", size))
 
     @property
     def saturated(self) -> Tensor:

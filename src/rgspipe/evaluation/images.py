@@ -11,9 +11,11 @@ import numpy.typing as npt
 import scipy.ndimage
 from PIL import Image, ImageDraw
 
+from rgspipe.arguments import as_path
 from rgspipe.errors import InputError
 from rgspipe.evaluation.arrays import ArrayLike, to_array
 from rgspipe.scene import srgb
+from rgspipe.scene.arrays import as_tensor
 from rgspipe.store.files import write_bytes
 
 Bytes = npt.NDArray[np.uint8]
@@ -131,6 +133,7 @@ def png_bytes(pixels: Bytes) -> bytes:
     Raises:
         InputError: they are something else, such as radiance.
     """
+    pixels = np.asarray(pixels)
     if pixels.ndim != 3 or pixels.shape[2] != 3 or pixels.dtype != np.uint8:
         found = f"shape {tuple(pixels.shape)} of {pixels.dtype}"
         remedy = "rg.tone_map makes them of radiance."
@@ -146,7 +149,7 @@ def save_png(path: str | Path, pixels: Bytes) -> None:
     Raises:
         InputError: the pixels are something else, such as radiance, of which `tone_map` makes them.
     """
-    write_bytes(path, png_bytes(pixels))
+    write_bytes(as_path(path), png_bytes(pixels))
 
 
 def fit_within(png: bytes, max_bytes: int, max_width: int = 1600, min_width: int = 240) -> bytes:
@@ -154,7 +157,7 @@ def fit_within(png: bytes, max_bytes: int, max_width: int = 1600, min_width: int
 
     A picture that fits is returned untouched; none becomes narrower than `min_width`, whatever its size.
     """
-    with Image.open(io.BytesIO(png)) as opened:
+    with Image.open(io.BytesIO(png), formats=["PNG"]) as opened:
         picture = opened.convert("RGB")
     width = min(picture.width, max_width)
     if width == picture.width and len(png) <= max_bytes:
@@ -168,7 +171,4 @@ def fit_within(png: bytes, max_bytes: int, max_width: int = 1600, min_width: int
 
 
 def _image(image: ArrayLike) -> npt.NDArray[np.float64]:
-    array = to_array(image)
-    if array.ndim != 3 or array.shape[2] != 3:
-        raise ValueError(f"an image must have shape (H, W, 3), got {array.shape}")
-    return array
+    return to_array(as_tensor(image, "image", ("H", "W", 3), remedy="Pass linear radiance, colours last."))

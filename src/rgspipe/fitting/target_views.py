@@ -10,6 +10,7 @@ from typing import Self
 import torch
 from torch import Tensor
 
+from rgspipe.arguments import as_several
 from rgspipe.errors import InputError
 from rgspipe.fitting.in_sight.sight import Sight, sights
 from rgspipe.fitting.model.capture import ImageCapture
@@ -177,9 +178,5 @@ def _weights(scene: FrozenScene, cameras: Cameras) -> list[ViewWeights]:
     if not isinstance(scene, FrozenScene):
         remedy = "FrozenScene.load(folder) reads one, FrozenScene.freeze(surfels) makes one."
         raise InputError("scene", expected="a FrozenScene", found=type(scene).__name__, remedy=remedy)
-    views = [cameras] if isinstance(cameras, Camera | ViewWeights) else list(cameras)
-    for index, view in enumerate(views):
-        if not isinstance(view, Camera | ViewWeights):
-            where, found = f"cameras[{index}]", type(view).__name__
-            raise InputError(where, expected="a Camera", found=found, remedy="Camera.look_at makes one.")
+    views = as_several(cameras, (Camera, ViewWeights), "cameras", "Camera.look_at makes one.")
     return [scene.view(view) if isinstance(view, Camera) else view for view in views]

@@ -9,6 +9,7 @@ from typing import Literal, get_args
 
 from torch import Tensor
 
+from rgspipe.arguments import as_path, as_several
 from rgspipe.datasets.light_file import write_lights
 from rgspipe.errors import InputError
 from rgspipe.light_export.blend import blend
@@ -73,10 +74,11 @@ def export_lights(
     world = world or World(metres)
     if not 0.0 < world.unit < float("inf"):
         raise InputError("metres", expected="above 0", found=f"{world.unit:g}", remedy="Say how long a scene unit is.")
+    formats = as_several(formats, str, "formats", f"Pass some of {', '.join(FORMATS)}.")
     for name in formats:
         if name not in FORMATS:
             raise InputError("formats", expected=" or ".join(FORMATS), found=repr(name), remedy="Correct the name.")
-    rig, folder = world.lights(as_rig(lights)), Path(folder)
+    rig, folder = world.lights(as_rig(lights)), as_path(folder, "folder")
     folder.mkdir(parents=True, exist_ok=True)
     regions = [None if one is None else world.unit**2 * one[:3, :3] for one in covariances]
     files, notes = [], []

@@ -5,6 +5,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from rgspipe.arguments import as_one_of
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.openness import rough_void_irradiance
 from rgspipe.renderer.view_weights import ViewWeights
@@ -35,7 +36,9 @@ def ambient_image(frozen: FrozenScene, camera: Camera | ViewWeights) -> Float[Te
     Light adds up: `scene.render(camera, lights) + radiance * ambient_image(scene, camera)`. The void itself is not in
     it, as it is in no image of a frozen scene.
     """
-    view, radiance = frozen.view(camera) if isinstance(camera, Camera) else camera, ambient_radiance(frozen)
+    as_one_of(frozen, FrozenScene, "scene", "FrozenScene.load(folder) reads one.")
+    view = camera if isinstance(camera, ViewWeights) else frozen.view(camera)
+    radiance = ambient_radiance(frozen)
     return view.image(torch.zeros_like(frozen.surfels.albedo) if radiance is None else radiance)
 
 

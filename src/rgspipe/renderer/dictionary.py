@@ -8,6 +8,7 @@ import scipy.spatial
 import torch
 from torch import Tensor
 
+from rgspipe.arguments import as_count
 from rgspipe.errors import InputError
 from rgspipe.progress import progress_bar
 from rgspipe.renderer.direct import unit_irradiance
@@ -96,9 +97,10 @@ def build_dictionary(
         shadows: whether surfels block light.
 
     Raises:
-        InputError: the scene is so small in its unit of length that the images of unit lights cannot be compared, or so
-            far from the origin that its places cannot.
+        InputError: an impossible grid or seed; or the scene is so small in its unit of length that the images of unit
+            lights cannot be compared, or so far from the origin that its places cannot.
     """
+    as_count(grid, "grid"), as_count(seed, "seed", 0)
     _check_place(surroundings)
     positions = candidate_grid(surroundings.lower, surroundings.upper, grid, seed)
     positions = positions[_clear_of_surfels(bvh.surfels, positions)]

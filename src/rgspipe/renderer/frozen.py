@@ -11,6 +11,7 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
+from rgspipe.arguments import as_count, as_one_of, as_path
 from rgspipe.errors import InputError
 from rgspipe.renderer.areas import surfel_areas
 from rgspipe.renderer.clusters import cluster_patches
@@ -33,7 +34,7 @@ from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.surroundings import OPEN, Surroundings
 from rgspipe.renderer.transport import PatchTransport, build_patch_transport
 from rgspipe.renderer.view_weights import ViewWeights, build_view_weights
-from rgspipe.scene.arrays import ArrayLike, as_tensor
+from rgspipe.scene.arrays import ArrayLike, as_tensor, check_finite
 from rgspipe.scene.camera import Camera
 from rgspipe.scene.grade import SceneGrade
 from rgspipe.scene.lights import Light, LightRig, as_rig, check_numbers
@@ -81,13 +82,10 @@ class FrozenScene:
         Raises:
             InputError: they are no surfels, or have impossible numbers; see `Surfels.check`.
         """
-        if not isinstance(surfels, Surfels):
-            found, remedy = type(surfels).__name__, "rg.exact_surfels makes them of a model, rg.train of views."
-            raise InputError("surfels", expected="Surfels", found=found, remedy=remedy)
+        as_one_of(surfels, Surfels, "surfels", "rg.exact_surfels makes them of a model, rg.train of views.")
         surfels.check()
-        for name, count in (("gather_rays", gather_rays), ("patches", patches)):
-            if count < 1:
-                raise InputError(name, expected="1 or more", found=str(count), remedy="Leave the default.")
+        for name, count in (("gather_rays", gather_rays), ("patches", patches), ("seed", seed)):
+            as_count(count, name, 0 if name == "seed" else 1, remedy="Leave the default.")
         centers, surfels = surfels.centers.double(), surfels.to(torch.float32)
         bvh = SurfelBvh(replace(surfels, centers=centers))
         areas = surfel_areas(bvh, seed=seed)
@@ -107,7 +105,7 @@ class FrozenScene:
         Raises:
             InputError: a file is missing, broken, or does not belong to the others.
         """
-        return cls(**load_parts(Path(folder), gather=gather))
+        return cls(**load_parts(as_path(folder, "folder"), gather=gather))
 
     def save(self, folder: str | Path) -> None:
         """Write surfels and operators, and the dictionary if it is made; docs/reference/formats.md has the files.
@@ -118,7 +116,7 @@ class FrozenScene:
         if self.transport.bounces is not None:
             raise ValueError(f"a frozen scene is stored with all bounces, got {self.transport.bounces}")
         save_parts(
-            Path(folder),
+            as_path(folder, "folder"),
             surfels=self.surfels,
             areas=self.areas,
             centers=(self.surfels.centers if self.centers is None else self.centers).double(),
@@ -162,7 +160,10 @@ class FrozenScene:
 
     @cached_property
     def bounds(self) -> tuple[Float[Tensor, " 3"], Float[Tensor, " 3"]]:
-        """(3,) lower and upper corner of the surfels' centres."""
+        """(3,) lower and upper corner of the surfels' centres, of which there must be some."""
+        if not len(self.surfels):
+            remedy = "Pass some: rg.exact_surfels makes them of a model, rg.train of views."
+            raise InputError("scene", expected="surfels, on which light falls", found="none", remedy=remedy)
         return self.surfels.centers.amin(dim=0), self.surfels.centers.amax(dim=0)
 
     @property
@@ -276,14 +277,16 @@ class FrozenScene:
                 which is quicker and less accurate.
 
         Raises:
-            InputError: no camera or no lights, but something else, or a light's numbers are not finite.
+            InputError: no camera or no lights, but something else, or numbers of light beyond single precision.
         """
         view, rig = self._recent.weights(camera), as_rig(lights)
         check_numbers(rig)
         pixels = ViewedPixels.every(self, [view])
         direct = (self._recent.direct(view),) if sharp else None
         model = SurfelModel(pixels, effects) if direct is None else PixelModel.of(pixels, effects, direct)
-        return pixels.split(model.image(rig))[0]
+        image = pixels.split(model.image(rig))[0]
+        check_finite(image, "lights", "The lights are too bright, or too near to surfaces, for single precision.")
+        return image
 
     def glossy_light(self, rig: LightRig, effects: Effects = ALL_EFFECTS) -> GlossyLight:
         """The light of a scene with gloss under `rig`, to be seen from anywhere; differentiable like `radiance_of`.

@@ -11,7 +11,9 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from rgspipe.arguments import LARGEST_COUNT
 from rgspipe.datasets.grade_file import GRADE, load_grade, save_grade
+from rgspipe.datasets.input_file import is_there
 from rgspipe.datasets.json_file import shown
 from rgspipe.datasets.surfel_file import load_surfels, save_surfels
 from rgspipe.datasets.tensor_file import load_tensors, save_tensors
@@ -30,6 +32,9 @@ EXACT = ("centers", "positions")
 SURFELS, GATHER, TRANSPORT, GLOSS, DICTIONARY = (
     f"{name}.safetensors" for name in ("surfels", "gather", "transport", "gloss", "dictionary")
 )
+
+#: Candidates along each axis of the finest dictionary: a search asks each of its million.
+FINEST = 100
 
 MAKE_AGAIN = "Freeze the scene again: FrozenScene.freeze and save, or the stage freeze."
 
@@ -73,7 +78,7 @@ def load_parts(folder: Path, *, gather: bool) -> dict[str, Any]:
     Raises:
         InputError: no such folder, or none of a scene, or a file is missing, broken, or does not belong to the others.
     """
-    if not folder.is_dir():
+    if not (is_there(folder) and folder.is_dir()):
         raise InputError(folder, expected="the folder of a frozen scene", found="no such folder", remedy=MAKE_AGAIN)
     if not (folder / TRANSPORT).exists() and not (folder / SURFELS).exists():
         found = "neither surfels nor transport in it"
@@ -156,6 +161,9 @@ def _load_dictionary(path: Path, count: int) -> LightDictionary:
     made_with = {name: note[name] for name in ("grid", "seed") if name in note}
     if odd := [f"{name} {shown(value)}" for name, value in made_with.items() if type(value) is not int]:
         raise InputError(path, expected="whole numbers as grid and seed", found=odd[0], remedy=MAKE_AGAIN)
+    if not (1 <= made_with.get("grid", 1) <= FINEST and 0 <= made_with.get("seed", 0) <= LARGEST_COUNT):
+        expected = f"a grid from 1 to {FINEST} and a seed from 0 to {LARGEST_COUNT}"
+        raise InputError(path, expected=expected, found=shown(made_with), remedy=MAKE_AGAIN)
     return LightDictionary(positions, irradiance, **made_with)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+from rgspipe.arguments import as_path
 from rgspipe.datasets.conversion import Conversion
 from rgspipe.datasets.ply import PlyOptions, read_ply
 from rgspipe.datasets.ply_cameras import find_cameras, read_viewpoints
@@ -22,7 +23,7 @@ def load_ply(path: str | Path, options: PlyOptions | None = None) -> tuple[Surfe
         InputError: no PLY file, a property is missing or has impossible values, or nothing says which side of the
             surfels is their front.
     """
-    path, options = Path(path), options or PlyOptions()
+    path, options = as_path(path), options or PlyOptions()
     read = read_ply(path, options)
     surfels, fronts = _oriented(read.surfels, path, options, own=read.own)
     return surfels, replace(read.conversion, notes=(*read.conversion.notes, *fronts))

@@ -11,6 +11,7 @@ import scipy.sparse
 import torch
 from torch import Tensor
 
+from rgspipe.arguments import as_one_of
 from rgspipe.renderer.kernels.composite import composite
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.pixel_edges import Seen, pixels_beside_edges, pixels_on_edges
@@ -48,7 +49,11 @@ def build_view_weights(bvh: SurfelBvh, camera: Camera, supersampling: int = 4) -
 
     Inside a surface radiance changes little across a pixel and its centre stands for it; on an edge a
     pixel is the mean over its area, as a box-filtered photograph is.
+
+    Raises:
+        InputError: no camera, but something else.
     """
+    as_one_of(camera, Camera, "camera", "Camera.look_at makes one.")
     pixels = torch.arange(camera.pixel_count)
     parts, seen = zip(*(_centres(bvh, camera, block) for block in _blocks(pixels)), strict=True)
     centres = Seen.joined(seen).reshape(camera.height, camera.width)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from rgspipe.arguments import as_count, as_number
 from rgspipe.errors import InputError
 from rgspipe.scene.arrays import ArrayLike, as_tensor, check_finite
 from rgspipe.scene.by_value import ByValue
@@ -20,6 +21,13 @@ AXES = (
     "cameras are in the scene's coordinates and look along −z, with +y up (from OpenCV, change the sign of their "
     "second and third column)"
 )
+
+
+#: What to do about a number of pixels that is none.
+ROUND = "Round it up."
+
+#: Of rays, across the axis over along it: beyond it their squares, which lengths are made of, may not be finite.
+STEEPEST = 1e100
 
 
 @dataclass(frozen=True)
@@ -42,7 +50,8 @@ class Camera(ByValue, Pinhole, _Pose):
         width, height: image size in pixels.
 
     Raises:
-        InputError: the transform is not rigid, a focal length not positive, or a size not a whole number of pixels.
+        InputError: the transform is not rigid, a focal length not positive, a size not a whole number of pixels, or a
+            number not finite.
     """
 
     def __post_init__(self) -> None:
@@ -51,9 +60,11 @@ class Camera(ByValue, Pinhole, _Pose):
         check_rigid(pose.detach().cpu().numpy(), "camera_to_world")
         object.__setattr__(self, "camera_to_world", pose)
         for name in ("width", "height"):
-            object.__setattr__(self, name, _pixels(name, getattr(self, name)))
-        for name in ("fx", "fy"):
-            _check_focal_length(name, getattr(self, name))
+            object.__setattr__(self, name, as_count(getattr(self, name), name, remedy=ROUND))
+        for name in ("cx", "cy"):
+            as_number(getattr(self, name), name)
+        for focal, centre, size in (("fx", self.cx, self.width), ("fy", self.cy, self.height)):
+            _check_focal_length(focal, getattr(self, focal), abs(centre) + size)
 
     @classmethod
     def look_at(
@@ -76,7 +87,7 @@ class Camera(ByValue, Pinhole, _Pose):
         Raises:
             InputError: a point is not three numbers, both are one, or the field of view or a size is out of range.
         """
-        if not 0.0 < fov_degrees < 180.0:
+        if not 0.0 < as_number(fov_degrees, "fov_degrees", "40 is usual.") < 180.0:
             raise InputError(
                 "fov_degrees", expected="an angle between 0 and 180", found=f"{fov_degrees}", remedy="40 is usual."
             )
@@ -85,6 +96,7 @@ class Camera(ByValue, Pinhole, _Pose):
     @classmethod
     def from_field_of_view(cls, camera_to_world: ArrayLike, angle_x: float, width: int, height: int) -> Camera:
         """A camera with square pixels, its axis through the middle, and `angle_x` [rad] across the width."""
+        width, height = as_count(width, "width", remedy=ROUND), as_count(height, "height", remedy=ROUND)
         focal = 0.5 * width / math.tan(0.5 * angle_x)
         return cls(camera_to_world, focal, focal, 0.5 * width, 0.5 * height, width, height)
 
@@ -154,26 +166,15 @@ class Camera(ByValue, Pinhole, _Pose):
         return torch.stack([x, y], dim=-1), depth
 
 
-def _check_focal_length(name: str, length: float) -> None:
-    """Refuse a focal length that no pinhole has.
+def _check_focal_length(name: str, length: float, reach: float) -> None:
+    """Refuse a focal length that no pinhole has, whose pixels reach so far from its axis.
 
     Raises:
-        InputError: it is not positive and finite.
+        InputError: it is not positive, or so short that directions have no length in double precision.
     """
-    if not 0.0 < length < math.inf:
-        found, remedy = f"{length}", "Axes with another sign belong into camera_to_world."
-        raise InputError(name, expected="a focal length in pixels, above 0", found=found, remedy=remedy)
-
-
-def _pixels(name: str, count: float) -> int:
-    """A number of pixels.
-
-    Raises:
-        InputError: it is not whole, or not positive.
-    """
-    if count < 1 or count != int(count):
-        raise InputError(name, expected="a whole number of pixels, at least 1", found=f"{count}", remedy="Round it up.")
-    return int(count)
+    expected, remedy = "a focal length in pixels, above 0", "Axes with another sign belong into camera_to_world."
+    if not 0.0 < reach < STEEPEST * as_number(length, name, remedy, expected=expected):
+        raise InputError(name, expected=expected, found=f"{length}", remedy=remedy)
 
 
 def look_at(origin: ArrayLike, target: ArrayLike, up: ArrayLike | None = None) -> Float[Tensor, "4 4"]:

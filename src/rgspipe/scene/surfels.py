@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import torch
 from torch import Tensor
 
+from rgspipe.arguments import as_number
 from rgspipe.errors import InputError
 from rgspipe.scene.arrays import as_tensor, check_finite
 from rgspipe.scene.gloss import Gloss
@@ -65,6 +66,8 @@ class Coverage:
     minimum_alpha: float = 0.01
 
     def __post_init__(self) -> None:
+        for field in fields(self):
+            as_number(getattr(self, field.name), f"coverage.{field.name}")
         if not 0.0 <= self.low < self.high <= 1.0:
             raise ValueError(f"coverage needs 0 ≤ low < high ≤ 1, got {self.low} and {self.high}")
         if not (self.layer_thickness > 0.0 and self.clip_softness > 0.0 and 0.0 < self.minimum_alpha < 1.0):

@@ -11,8 +11,10 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from rgspipe.arguments import as_count, as_one_of, as_several
 from rgspipe.completion import with_unseen_surfaces
 from rgspipe.datasets.views import View
+from rgspipe.errors import InputError
 from rgspipe.machine.sums import average
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.transport import with_albedo
@@ -83,11 +85,16 @@ def train(
         prior: known albedo that materials are pulled to.
 
     Raises:
-        InputError: the views have no lights, or no depth to make surfels from.
+        InputError: there are no views, or they have no lights, or no depth to make surfels from.
     """
-    options = options or TrainOptions()
-    if isinstance(surfels, int):
-        surfels = initialise_surfels(views, surfels, seed=options.seed)
+    options = TrainOptions() if options is None else as_one_of(options, TrainOptions, "options", "Pass such.")
+    views = as_several(views, View, "views", "rg.load_views reads them.")
+    if not isinstance(surfels, Surfels):
+        surfels = initialise_surfels(
+            views, as_count(surfels, "surfels", remedy="Pass surfels, or how many to make."), seed=options.seed
+        )
+    if not views:
+        raise InputError("views", expected="views to train on", found="none", remedy="rg.load_views reads them.")
     log = _Log(checkpoint.records if checkpoint else [])
     surfels = surfels.to(torch.float32)
     spacing, given = surfel_spacing(surfels), [view.light for view in views]

@@ -116,7 +116,7 @@ def test_a_softer_beam_is_wider_by_as_much_as_a_gaussian_s() -> None:
 
 @pytest.mark.parametrize("exponent", [-0.1, math.nan])
 def test_exponents_that_are_none_are_refused(exponent: float) -> None:
-    with pytest.raises(ValueError, match="exponent ≥ 0"):
+    with pytest.raises(ValueError, match="exponent"):
         led(exponent)
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from rgspipe.datasets.input_file import is_there
 from rgspipe.datasets.scans.colmap_model import Photograph, read_cameras, read_images
 from rgspipe.datasets.scans.frame import DepthImage, Lens, Scan, ScanFrame
 from rgspipe.datasets.scans.options import ScanOptions
@@ -54,7 +55,7 @@ def read(root: Path, options: ScanOptions) -> Scan:
         raise InputError(root, expected=WANTED, found="no model", remedy="Run colmap mapper, or correct scene.path.")
     cameras_path, images_path = found
     cameras, photographs = read_cameras(cameras_path), read_images(images_path)
-    folder = next((root / name for name in IMAGES if (root / name / photographs[0].name).is_file()), root / IMAGES[0])
+    folder = next((root / name for name in IMAGES if is_there(root / name / photographs[0].name)), root / IMAGES[0])
     # The order of the file is that of registration.
     ordered = sorted(photographs, key=lambda one: one.name)
     frames = tuple(_frame(one, cameras, root, folder, images_path, options) for one in ordered)
@@ -91,7 +92,7 @@ def _frame(
 
 def _depth(root: Path, name: str, options: ScanOptions) -> DepthImage | None:
     stem = Path(name).with_suffix("").as_posix()
-    path = next((path for place in DEPTHS if (path := root / place.format(name=name, stem=stem)).is_file()), None)
+    path = next((path for place in DEPTHS if is_there(path := root / place.format(name=name, stem=stem))), None)
     if path is None:
         return None
     usual = MILLIMETRE if path.suffix == ".png" else 1.0

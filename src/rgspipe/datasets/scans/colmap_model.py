@@ -59,6 +59,10 @@ def read_images(path: Path) -> list[Photograph]:
         InputError: a broken file, or none.
     """
     photographs = _whole(path, _binary_images if path.suffix == ".bin" else _text_images)
+    names = [one.name for one in photographs]
+    if len(set(names)) < len(names):
+        found = shown(next(name for name in names if names.count(name) > 1))
+        raise InputError(path, expected="each image once", found=f"{found} twice", remedy="Run colmap mapper again.")
     if not photographs:
         raise InputError(path, expected="registered images", found="none", remedy="Run colmap mapper again.")
     return photographs
@@ -103,6 +107,8 @@ def _text_cameras(path: Path, content: bytes) -> dict[int, Lens]:
     for line in _lines(content):
         if line.strip():
             number, model, width, height, *values = line.split()
+            if int(number) in found:
+                raise ValueError(f"camera {number} twice")
             found[int(number)] = _lens(path, model, (int(width), int(height)), [float(value) for value in values])
     return found
 
@@ -114,6 +120,8 @@ def _binary_cameras(path: Path, content: bytes) -> dict[int, Lens]:
         number, kind, width, height = struct.unpack_from("<iiQQ", content, place)
         model, parameters = MODELS.get(kind, (f"number {kind}", 0))
         values = struct.unpack_from(f"<{parameters}d", content, place + 24)
+        if number in found:
+            raise ValueError(f"camera {number} twice")
         found[number] = _lens(path, model, (width, height), values)
         place += 24 + 8 * parameters
     return found

@@ -9,7 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from rgspipe.datasets.frames import FrameEntry, read_entries
-from rgspipe.datasets.json_file import is_number, shown
+from rgspipe.datasets.json_file import is_number, shown, whole
 from rgspipe.datasets.scans.frame import DepthImage, Lens, Scan, ScanFrame
 from rgspipe.datasets.scans.options import ScanOptions
 from rgspipe.datasets.scans.poses import matrix_of, placed
@@ -23,6 +23,9 @@ WANTED = "transforms.json"
 
 #: Metres of 1 in a depth PNG, where the file does not say.
 MILLIMETRE = 1e-3
+
+#: How many times as long as another one a unit of length may be.
+MOST_UNITS = 1e9
 
 #: Models whose distortion is that of `Lens`.
 STRAIGHT = ("OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "PERSPECTIVE")
@@ -42,7 +45,7 @@ def read(root: Path, options: ScanOptions) -> Scan:
     """
     path = root / TRANSFORMS
     entries = read_entries(path, "the cameras of a nerfstudio capture")
-    scale = _positive(entries[0], "applied_scale", 1.0)
+    scale = _unit(entries[0], "applied_scale", 1.0)
     frames = tuple(_frame(entry, scale, options) for entry in entries)
     turned = "applied_transform" in entries[0].shared
     notes = ("the world's axes are those of the file, after its applied_transform",) if turned else ()
@@ -73,7 +76,7 @@ def _lens(entry: FrameEntry) -> Lens:
             found=shown(model),
             remedy="Undistort the photographs first (colmap image_undistorter).",
         )
-    width, height = (int(_positive(entry, key)) for key in ("w", "h"))
+    width, height = (whole(_positive(entry, key), entry.where, key) for key in ("w", "h"))
     fx, fisheye = _positive(entry, "fl_x"), model == FISHEYE
     centre = [_number(entry, key, 0.5 * size) for key, size in (("cx", width), ("cy", height))]
     radial = tuple(_number(entry, key, 0.0) for key in ("k1", "k2", "k3", "k4"))
@@ -87,7 +90,7 @@ def _depth(entry: FrameEntry, options: ScanOptions) -> DepthImage | None:
         return None
     path = entry.transforms_path.parent / _text(entry, "depth_file_path")
     default = 1.0 if path.suffix.lower() == ".exr" else MILLIMETRE
-    stated = _positive(entry, "depth_unit_scale_factor", default)
+    stated = _unit(entry, "depth_unit_scale_factor", default)
     return DepthImage(path, stated if options.depth_unit is None else options.depth_unit)
 
 
@@ -107,6 +110,15 @@ def _positive(entry: FrameEntry, key: str, default: float | None = None) -> floa
     value = _number(entry, key, default)
     if value <= 0.0:
         raise InputError(f"{entry.where}: {key}", expected="above 0", found=f"{value:g}", remedy="Correct it.")
+    return value
+
+
+def _unit(entry: FrameEntry, key: str, default: float) -> float:
+    """Units of one length in another."""
+    value = _positive(entry, key, default)
+    if not 1.0 / MOST_UNITS <= value <= MOST_UNITS:
+        expected = f"{1.0 / MOST_UNITS:g} to {MOST_UNITS:g}"
+        raise InputError(f"{entry.where}: {key}", expected=expected, found=f"{value:g}", remedy="Correct it.")
     return value
 
 

@@ -88,21 +88,27 @@ def _cameras(path: Path) -> list[Numbers]:
 
 
 def _rows(path: Path) -> Iterator[Numbers]:
-    """Lines of three numbers; a first line with one is their count over three."""
+    """Lines of three numbers; a first line with one says how many cameras they are of."""
     text = input_file(path, "cameras of OpenRooms", most_bytes=reading_limits().text_bytes).read_text(
         "utf-8", "replace"
     )
+    stated, count = None, 0
     for index, line in enumerate(line for line in text.splitlines() if line.strip()):
         try:
             values = np.array([float(word) for word in line.split()])
         except ValueError:
             values = np.zeros(0)
         if index == 0 and len(values) == 1:
+            stated = values[0]
             continue
         if len(values) != 3 or not np.isfinite(values).all():
             found = repr(line[:60])
             raise InputError(path, expected="lines of three finite numbers", found=found, remedy="Copy it anew.")
+        count += 1
         yield values
+    if stated is not None and count != 3 * stated:
+        found = f"{count} lines of them"
+        raise InputError(path, expected=f"{stated:g} cameras of three lines", found=found, remedy="Copy it anew.")
 
 
 def _camera(where: str, origin: Numbers, target: Numbers, up: Numbers) -> Numbers:

@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
-from PIL import ExifTags, Image
+from PIL import ExifTags
 
-from rgspipe.datasets.display_image import COLOUR_TYPE, COLOURED, DAMAGED, DEPTH, read_display, saturated_from
+from rgspipe.datasets.display_image import (
+    COLOUR_TYPE,
+    COLOURED,
+    DAMAGED,
+    DEPTH,
+    Levels,
+    opened,
+    read_levels,
+    saturated_from,
+)
 from rgspipe.datasets.exr import read_channels
 from rgspipe.datasets.images import NO_SURFACE, read_colour
 from rgspipe.datasets.input_file import check_pixel_count, input_file
@@ -20,6 +28,9 @@ from rgspipe.datasets.scans.radiance_image import hdr_size, read_hdr
 from rgspipe.datasets.scans.raw_image import RAW, read_raw
 from rgspipe.errors import InputError
 from rgspipe.scene import srgb
+
+#: What a camera can have been set to: shutter [s], ISO and f-number; what is beyond it is damaged.
+EXPOSED = ((1e-7, 1e5), (1.0, 1e8), (0.1, 1e3))
 
 Pixels = npt.NDArray[np.float32]
 
@@ -51,15 +62,15 @@ def read_picture(path: Path, response: str) -> Picture:
     if path.suffix.lower() in RAW:
         return Picture(*read_raw(path))
     if _has_wide_colours(path):
-        levels, limit = _wide_colours(path), 1.0 - 0.5 / 65535.0
+        stored, limit = _wide_colours(path), 1.0 - 0.5 / 65535.0
     else:
-        levels, _ = read_display(path)
+        stored = read_levels(path)
         # Of levels that are stored, not of light: the file's own curve is another matter.
         limit = float(srgb.encode(np.array(saturated_from(path))))
-    levels = np.repeat(levels, 3, axis=2) if levels.shape[2] == 1 else levels
-    if response == "linear":
-        return Picture(levels, limit)
-    return Picture(srgb.decode(levels).astype(np.float32), float(srgb.decode(np.array(limit))))
+    linear = response == "linear"
+    light = stored.values if linear else stored.light
+    light = np.repeat(light, 3, axis=2) if light.shape[2] == 1 else light
+    return Picture(light, limit if linear else float(srgb.decode(np.array(limit))))
 
 
 def read_depth_image(image: DepthImage) -> Pixels:
@@ -86,8 +97,7 @@ def exposure_of(path: Path) -> float | None:
         return None
     keys = (ExifTags.Base.ExposureTime, ExifTags.Base.ISOSpeedRatings, ExifTags.Base.FNumber)
     try:
-        with Image.open(input_file(path, "a photograph"), formats=["JPEG", "PNG"]) as file:
-            check_pixel_count(path, *file.size)  # of a PNG all pixels are decoded for it
+        with opened(input_file(path, "a photograph"), path, ["JPEG", "PNG"]) as file:
             tags = file.getexif().get_ifd(ExifTags.IFD.Exif)
         shutter, sensitivity, aperture = (float(np.ravel(tags.get(key, 0))[0]) for key in keys)
     except InputError:
@@ -95,7 +105,8 @@ def exposure_of(path: Path) -> float | None:
     except (*DAMAGED, TypeError, ZeroDivisionError):
         # Whether its pixels can be read is asked elsewhere.
         return None
-    stated = all(0.0 < value < math.inf for value in (shutter, sensitivity, aperture))
+    values = zip((shutter, sensitivity, aperture), EXPOSED, strict=True)
+    stated = all(least <= value <= most for value, (least, most) in values)
     return shutter * sensitivity / aperture**2 if stated else None
 
 
@@ -108,23 +119,26 @@ def _has_wide_colours(path: Path) -> bool:
     return len(header) > COLOUR_TYPE and header[DEPTH] == 16 and header[COLOUR_TYPE] in COLOURED
 
 
-def _wide_colours(path: Path) -> Pixels:
-    """(H, W, 3) in [0, 1]: upper bytes, and then lower ones, which a reader of the other byte order takes for upper."""
+@timed
+def _wide_colours(path: Path) -> Levels:
+    """Upper bytes, and then lower ones, which a reader of the other byte order takes for upper."""
     try:
-        upper, lower = (_bytes(path, order) for order in ("B", "L"))
+        levels = _bytes(path, "B").astype(np.uint16)
+        levels <<= 8
+        levels |= _bytes(path, "L")
     except InputError:
         raise
     except DAMAGED as error:
         found = f"an unreadable file ({error})"
         raise InputError(path, expected="a whole PNG image", found=found, remedy="Export it again.") from error
-    return ((256.0 * upper + lower)[..., :3] / 65535.0).astype(np.float32)
+    return Levels(levels, None)
 
 
-def _bytes(path: Path, order: str) -> npt.NDArray[np.float64]:
-    with Image.open(path, formats=["PNG"]) as file:
-        check_pixel_count(path, *file.size)
+def _bytes(path: Path, order: str) -> npt.NDArray[np.uint8]:
+    """(H, W, 3)"""
+    with opened(path, path, ["PNG"]) as file:
         file.tile = [part._replace(args=f"{file.mode};16{order}") for part in file.tile]
-        return np.asarray(file).astype(np.float64)
+        return np.asarray(file)[..., :3]
 
 
 @timed
@@ -141,22 +155,19 @@ def _stored_depth(path: Path) -> npt.NDArray[np.float64]:
             found = ", ".join(sorted(channels))
             raise InputError(path, expected="one channel of depth", found=found, remedy="Export only the depth.")
         return first.astype(np.float64)
-    levels, _ = read_display(path)
-    with Image.open(path) as file:
-        narrow = not file.mode.startswith("I")
-    if narrow or levels.shape[2] != 1:
+    levels = read_levels(path).levels
+    if levels.dtype != np.uint16 or levels.shape[2] != 1:
         raise InputError(
             path,
             expected="depth in 16 bits of grey, or EXR",
             found="8 bits, which is a picture of depth",
             remedy="Export the depth itself.",
         )
-    return np.round(levels[..., 0].astype(np.float64) * 65535.0)
+    return levels[..., 0].astype(np.float64)
 
 
 def _confidence(path: Path) -> Pixels:
-    levels, _ = read_display(path)
-    return levels[..., 0]
+    return read_levels(path).values[..., 0]
 
 
 def _colmap_array(path: Path) -> npt.NDArray[np.float64]:
@@ -201,8 +212,10 @@ def size_of(path: Path) -> tuple[int, int]:
     if path.suffix.lower() == ".hdr":
         return hdr_size(path)
     try:
-        with Image.open(input_file(path, "an image"), formats=["PNG", "JPEG"]) as file:
+        with opened(input_file(path, "an image"), path, ["PNG", "JPEG"]) as file:
             return file.size
+    except InputError:
+        raise
     except DAMAGED as error:
         found = f"an unreadable file ({error})"
         raise InputError(path, expected="a PNG or JPEG image", found=found, remedy="Export it again.") from error

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rgspipe.datasets.json_file import numbers, read_json, required
+from rgspipe.datasets.json_file import numbers, read_json, required, whole
 from rgspipe.datasets.scans.frame import DepthImage, Lens, Scan, ScanFrame
 from rgspipe.datasets.scans.options import ScanOptions
 from rgspipe.datasets.scans.poses import placed
@@ -58,7 +58,7 @@ def _frame(path: Path, keyframes: Path, images: str, options: ScanOptions) -> Sc
     values = [numbers([required(content, key, path)], 1, path, key)[0] for key in keys]
     matrix = np.concatenate([np.array(values).reshape(3, 4), [[0.0, 0.0, 0.0, 1.0]]])
     lens = [numbers([required(content, key, path)], 1, path, key)[0] for key in ("fx", "fy", "cx", "cy")]
-    size = [int(numbers([required(content, key, path)], 1, path, key)[0]) for key in ("width", "height")]
+    size = [whole(required(content, key, path), path, key) for key in ("width", "height")]
     depth, confidence = (keyframes / folder / f"{path.stem}.png" for folder in ("depth", "confidence"))
     unit = MILLIMETRE if options.depth_unit is None else options.depth_unit
     measured = DepthImage(depth, unit, confidence=confidence if confidence.is_file() else None)

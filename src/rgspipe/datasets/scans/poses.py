@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from rgspipe.datasets.input_file import input_file
-from rgspipe.datasets.json_file import shown
+from rgspipe.datasets.json_file import is_number, shown
 from rgspipe.datasets.reading_limits import reading_limits, timed
 from rgspipe.datasets.rigid_pose import check_place
 from rgspipe.datasets.scans.frame import Numbers
@@ -64,10 +64,9 @@ def matrix_of(value: object, where: str | Path) -> Numbers:
     Raises:
         InputError: it is neither, or holds what are no numbers.
     """
-    try:
-        matrix = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        matrix = np.zeros(0)
+    rows = value if isinstance(value, list) and all(isinstance(row, list) for row in value) else []
+    good = len({len(row) for row in rows}) == 1 and all(is_number(item) for row in rows for item in row)
+    matrix = np.array(rows, dtype=np.float64) if good else np.zeros(0)
     if matrix.shape == (3, 4):
         matrix = np.concatenate([matrix, [[0.0, 0.0, 0.0, 1.0]]])
     if matrix.shape != (4, 4):

@@ -17,6 +17,12 @@ WHAT = "a Radiance picture (.hdr)"
 #: Rows from the top and columns from the left, which is what all write.
 SIZE = re.compile(rb"\n\n-Y (\d{1,6}) \+X (\d{1,6})\n")
 
+#: Lines of the header that say what pixels are, besides their format; each may stand there several times.
+VARIABLES = re.compile(rb"\n(EXPOSURE|PIXASPECT|COLORCORR) *=([^\n]*)")
+
+#: The least that pixels may have been multiplied by; the most is as many times 1.
+LEAST_EXPOSED = 1e-9
+
 #: Widths of packed rows, and the two bytes that these begin with.
 PACKED, MARK = range(8, 32768), b"\x02\x02"
 
@@ -39,6 +45,7 @@ def read_hdr(path: Path) -> npt.NDArray[np.float32]:
     """
     content = _content(path)
     width, height, place = _header(path, content)
+    exposed = _exposed(path, content[:place])
     rows = np.empty((height, width, 4), np.uint8)
     try:
         for row in range(height):
@@ -46,7 +53,7 @@ def read_hdr(path: Path) -> npt.NDArray[np.float32]:
     except (IndexError, ValueError) as error:
         found = f"half of one ({error})"
         raise InputError(path, expected=WHAT, found=found, remedy="Copy it anew.") from error
-    scale = np.where(rows[..., 3] > 0, np.ldexp(1.0, rows[..., 3].astype(np.int64) - 136), 0.0)
+    scale = np.where(rows[..., 3] > 0, np.ldexp(1.0, rows[..., 3].astype(np.int64) - 136), 0.0) / exposed
     return ((rows[..., :3] + 0.5) * scale[..., None]).astype(np.float32)
 
 
@@ -64,6 +71,27 @@ def _header(path: Path, content: bytes) -> tuple[int, int, int]:
     height, width = int(size[1]), int(size[2])
     check_pixel_count(path, width, height)
     return width, height, size.end()
+
+
+def _exposed(path: Path, header: bytes) -> float:
+    """What all pixels were multiplied by, which their light has to be divided by.
+
+    Raises:
+        InputError: no number that can be, or pixels that are no squares or have other colours than red, green, blue.
+    """
+    exposed = 1.0
+    for key, value in VARIABLES.findall(header):
+        try:
+            number = [float(part) for part in value.split()]
+        except ValueError:
+            number = []
+        if key == b"EXPOSURE" and len(number) == 1 and LEAST_EXPOSED <= number[0] <= 1.0 / LEAST_EXPOSED:
+            exposed *= number[0]
+        elif key == b"EXPOSURE" or not number or any(one != 1.0 for one in number):
+            found = f"{key.decode()}={value.decode(errors='replace').strip()}"
+            expected = "square pixels without a correction of colours, and exposures that can be"
+            raise InputError(path, expected=expected, found=found, remedy="Convert it to EXR.")
+    return exposed
 
 
 def _row(content: bytes, place: int, width: int) -> tuple[npt.NDArray[np.uint8], int]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rgspipe.datasets.json_file import numbers, read_json, required
+from rgspipe.datasets.json_file import numbers, read_json, required, whole
 from rgspipe.datasets.scans.frame import DepthImage, Lens, Scan, ScanFrame
 from rgspipe.datasets.scans.options import ScanOptions
 from rgspipe.datasets.scans.poses import placed, read_numbers
@@ -64,4 +64,4 @@ def _camera(path: Path | None) -> tuple[Lens, float]:
         raise InputError(f"{where}: camera.scale", expected=expected, found=found, remedy=remedy)
     # Pixel centres are whole numbers there.
     centre = values["cx"] + 0.5, values["cy"] + 0.5
-    return Lens(values["fx"], values["fy"], *centre, int(values["w"]), int(values["h"])), values["scale"]
+    return Lens(values["fx"], values["fy"], *centre, *(whole(values[key], where, key) for key in "wh")), values["scale"]

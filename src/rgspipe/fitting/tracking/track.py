@@ -9,6 +9,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from rgspipe.arguments import as_one_of
 from rgspipe.errors import InputError
 from rgspipe.fitting.findings import FitStatus
 from rgspipe.fitting.fit import FitViews
@@ -56,6 +57,7 @@ def track_lights(
     Raises:
         InputError: light from all around, or images with the lamps off of unknown strength, are among the unknowns.
     """
+    as_one_of(views, FitViews, "views", "FitViews.prepare makes them of a scene and its cameras.")
     same = capture is None or isinstance(capture, ImageCapture)
     captures = [capture or ImageCapture()] * len(frames) if same else capture
     if views.lights.ambient or any(one.base is not None and one.base.scale_free for one in captures):

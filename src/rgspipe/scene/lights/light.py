@@ -12,6 +12,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from rgspipe.arguments import as_number
 from rgspipe.scene.arrays import ArrayLike, as_tensor
 from rgspipe.scene.by_value import ByValue
 from rgspipe.scene.lights.coordinates import PLACE, Coordinate
@@ -53,7 +54,7 @@ class Light(ByValue, ABC):
         intensity: (3,) RGB radiant intensity, W/sr, of a light with an axis along it; a single number is grey.
 
     Raises:
-        InputError: what is given is no vector.
+        InputError: what is given is no vector, or no finite number.
     """
 
     #: Its name in light files and settings.
@@ -75,6 +76,9 @@ class Light(ByValue, ABC):
         for field in fields(self):
             if field.name in ("position", "direction"):
                 object.__setattr__(self, field.name, as_tensor(getattr(self, field.name), field.name, (3,)))
+            elif field.type == "float":
+                value = getattr(self, field.name)
+                as_number(value.detach() if isinstance(value, Tensor) else value, field.name)
         object.__setattr__(self, "intensity", _colour(self.intensity))
 
     @property

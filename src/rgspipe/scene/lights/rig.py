@@ -35,14 +35,15 @@ def check_numbers(rig: LightRig) -> None:
     """Refuse lights that are nowhere or aim nowhere.
 
     Raises:
-        InputError: a number is not finite, or an axis has no length.
+        InputError: a number is not finite in single precision, or an axis has no length.
     """
     remedy = "Where steps moved it there, take shorter ones."
     for index, light in enumerate(rig):
         for field in fields(light):
             if isinstance(value := getattr(light, field.name), Tensor):
-                check_finite(value, f"lights[{index}].{field.name}", remedy)
-        if light.axis is not None and not bool(light.axis.any()):
+                # In float32, as light is computed.
+                check_finite(value.float(), f"lights[{index}].{field.name}", remedy)
+        if light.axis is not None and not bool(light.axis.float().any()):
             where = f"lights[{index}].direction"
             raise InputError(where, expected="a direction", found="(0, 0, 0)", remedy="Say where the light aims.")
 

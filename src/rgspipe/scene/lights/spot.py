@@ -49,7 +49,7 @@ class SpotLight(AxialLight):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.profile not in PROFILES:
+        if str(self.profile) not in PROFILES:
             raise ValueError(f"a spot's profile must be one of {', '.join(PROFILES)}, got {self.profile!r}")
         if not 0.0 <= self.cone_angle <= math.pi or not self.falloff >= 0.0:
             found = f"{self.cone_angle} and {self.falloff}"

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import torch
 
+from rgspipe.arguments import as_count
 from rgspipe.errors import InputError
 from rgspipe.scene.gloss import Gloss
 from rgspipe.scene.models.cornell import CornellBox
@@ -18,10 +19,12 @@ def exact_surfels(model: CornellBox | Corridor, count: int) -> Surfels:
     """About `count` float32 surfels on the rectangles of a model; those on glossy boxes have their lobe.
 
     Raises:
-        InputError: the count is below 1.
+        InputError: no model, or a count below 1.
     """
-    if count < 1:
-        raise InputError("count", expected="1 or more", found=str(count), remedy="2000 are enough for a first look.")
+    count = as_count(count, "count", remedy="2000 are enough for a first look.")
+    if not isinstance(model, CornellBox | Corridor):
+        found, remedy = type(model).__name__, "Pass one: rg.CornellBox()."
+        raise InputError("model", expected="a CornellBox or a Corridor", found=found, remedy=remedy)
     surfels = surfels_on(model.rectangles(), count)
     if isinstance(model, CornellBox) and model.gloss > 0.0:
         surfels = replace(surfels, gloss=_gloss(model, count))

@@ -1,0 +1,61 @@
+"""The text of an OBJ file as every program reads it, where its decoder here would read something else, or nothing."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from rgspipe.errors import InputError
+
+#: A face that counts back from the last point, which those who decode it count from the end of the file; and one with
+#: point 0, which they take for the first.
+BACKWARDS, NOUGHT = (
+    re.compile(rb"^f .*(?<=[ /])-\d", re.MULTILINE),
+    re.compile(rb"^f (?:.*[ /])?0+(?=[ /\n]|$)", re.MULTILINE),
+)
+
+#: What a face counts, by the place between slashes.
+COUNTED = (b"v", b"vt", b"vn")
+
+
+def plain_obj(content: bytes, path: Path) -> bytes:
+    """The same mesh with a line for each statement, words apart by one space, points counted from the first, UTF-8.
+
+    Raises:
+        InputError: a face has point 0, or counts back beyond the first.
+    """
+    content = re.sub(rb"\\\n", b" ", re.sub(rb"\r\n?", b"\n", content))
+    content = re.sub(rb"(?m)^ +", b"", content.replace(b"\t", b" "))
+    if NOUGHT.search(content):
+        raise _refusal(path, "0")
+    if BACKWARDS.search(content):
+        content = _forwards(content, path)
+    return content.decode("utf-8", "backslashreplace").encode()
+
+
+def _forwards(content: bytes, path: Path) -> bytes:
+    counts, lines = dict.fromkeys(COUNTED, 0), content.split(b"\n")
+    for number, line in enumerate(lines):
+        kind, _, rest = line.partition(b" ")
+        if kind in counts:
+            counts[kind] += 1
+        elif kind == b"f":
+            before = tuple(counts.values())
+            lines[number] = b"f " + b" ".join(_corner(corner, before, path) for corner in rest.split())
+    return b"\n".join(lines)
+
+
+def _corner(text: bytes, before: tuple[int, ...], path: Path) -> bytes:
+    parts = text.split(b"/")
+    for place, (part, count) in enumerate(zip(parts, before, strict=False)):
+        if part.startswith(b"-") and part[1:].isdigit():
+            index = count + 1 - int(part[1:])
+            if index < 1:
+                raise _refusal(path, part.decode())
+            parts[place] = b"%d" % index
+    return b"/".join(parts)
+
+
+def _refusal(path: Path, found: str) -> InputError:
+    expected = "faces of points that are there, counted from 1"
+    return InputError(path, expected=expected, found=f"point {found} in one", remedy="Export it again.")

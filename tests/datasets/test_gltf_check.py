@@ -1,0 +1,97 @@
+"""glTF files and GLBs that claim what they have not."""
+
+from __future__ import annotations
+
+import json
+import re
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from mesh_files import QUARTERS, painted, quarters, textured_square
+from rgspipe.datasets.mesh_file import read_mesh
+from rgspipe.datasets.reading_limits import ReadingLimits, reading_within
+from rgspipe.errors import InputError
+
+
+def gltf_parts(folder: Path) -> tuple[dict, bytes]:
+    """The JSON and the buffer of a textured square."""
+    trimesh.Scene(textured_square(quarters())).export(folder / "square.glb")
+    content = (folder / "square.glb").read_bytes()
+    length = int.from_bytes(content[12:16], "little")
+    return json.loads(content[20 : 20 + length]), content[28 + length :]
+
+
+def write_glb(path: Path, content: dict, buffer: bytes) -> Path:
+    text = json.dumps(content).encode()
+    text = text.ljust(-(-len(text) // 4) * 4)
+    chunks = struct.pack("<I", len(text)) + b"JSON" + text + struct.pack("<I", len(buffer)) + b"BIN\0" + buffer
+    path.write_bytes(b"glTF" + struct.pack("<II", 2, 12 + len(chunks)) + chunks)
+    return path
+
+
+#: The accessor of places in the texture, in the files that are written here.
+UV = 2
+
+#: Where something of a textured square's JSON is changed, what it becomes (None: nothing), and words of the refusal.
+CLAIMS: dict[str, tuple[tuple, object, str]] = {
+    "points in no buffer": (("accessors", 0, "bufferView"), None, "compressed or sparse ones, or none"),
+    "many points": (("accessors", 0, "count"), 100_000_000, "at most 20000000 triangles, found 100000000 entries"),
+    "more points than bytes": (("accessors", 0, "count"), 1000, "entries that are there, found"),
+    "entries within each other": (("bufferViews", 0, "byteStride"), 1, "entries that are there, found"),
+    "a view beyond its buffer": (("bufferViews", 0, "byteLength"), 10**9, "bytes, where its buffer has"),
+    "a negative count": (("accessors", 0, "count"), -1, "accessors[0].count: expected a whole number"),
+    "a fan": (("meshes", 0, "primitives", 0, "mode"), 6, "triangles or strips"),
+    "what must be understood": (("extensionsRequired",), ["KHR_mesh_quantization"], "KHR_mesh_quantization"),
+    "turned textures": (("extensionsUsed",), ["KHR_texture_transform"], "KHR_texture_transform"),
+    "a colour outside of the folder": (("images", 0), {"uri": "../t.png"}, "the folder of the mesh or below"),
+    "a colour that is not there": (("images", 0), {"uri": "t.png"}, "t.png: expected a texture that a.glb names"),
+    "a colour that is no picture": (("images", 0), {"uri": "data:;base64,AAAA"}, "texture in another format"),
+    "another set of places in it": (
+        ("materials", 0, "pbrMetallicRoughness", "baseColorTexture", "texCoord"),
+        1,
+        "one set of texture coordinates",
+    ),
+    "places that are shares": (("accessors", UV, "componentType"), 5121, "TEXCOORD_0: expected types of numbers"),
+    "numbers of points below 0": (("accessors", 0, "componentType"), 5122, "indices: expected types of numbers"),
+    "a colour of 7": (
+        ("materials", 0, "pbrMetallicRoughness", "baseColorFactor"),
+        [7, 7, 7, 1],
+        "numbers from 0 to 1",
+    ),
+    "a material of no number": (("meshes", 0, "primitives", 0, "material"), -1, "material: expected a whole number"),
+    "materials that are none": (("materials",), 7, "materials: expected a list of objects"),
+    "a mesh of no number": (("nodes", 0, "mesh"), 7, "nodes[0].mesh: expected the number of one of 1"),
+    "an old version": (("asset", "version"), "1.0", "asset.version: expected 2.0"),
+    "a picture of no number": (("textures", 0, "source"), 7, "textures[0].source: expected the number of one of 1"),
+}
+
+
+@pytest.mark.parametrize("case", CLAIMS)
+def test_a_glb_that_claims_what_it_has_not_is_refused_before_it_is_decoded(tmp_path: Path, case: str) -> None:
+    content, buffer = gltf_parts(tmp_path)
+    assert np.array_equal(painted(write_glb(tmp_path / "a.glb", content, buffer)), QUARTERS)
+    (*way, key), value, words = CLAIMS[case]
+    holder = content
+    for step in way:
+        holder = holder[step]
+    if value is None:
+        del holder[key]
+    else:
+        holder[key] = value
+    with pytest.raises(InputError, match=re.escape(words)):
+        read_mesh(write_glb(tmp_path / "a.glb", content, buffer))
+
+
+def test_a_mesh_at_many_nodes_counts_as_often(tmp_path: Path) -> None:
+    content, buffer = gltf_parts(tmp_path)
+    mesh = next(number for number, node in enumerate(content["nodes"]) if "mesh" in node)
+    content["nodes"] += [content["nodes"][mesh] | {"name": f"copy {number}"} for number in range(30)]
+    content["scenes"][0]["nodes"] += list(range(len(content["nodes"]) - 30, len(content["nodes"])))
+    path = write_glb(tmp_path / "a.glb", content, buffer)
+    assert len(read_mesh(path)) == 62
+    with reading_within(ReadingLimits(vertices=30)), pytest.raises(InputError, match="found 62 triangles"):
+        read_mesh(path)

@@ -1,0 +1,65 @@
+"""Fields of captures that cannot be meant: each is refused by its key, and none is rounded or left out silently."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from readable_captures import SCANNED
+from rgspipe.datasets.scans.colmap_model import read_cameras
+from rgspipe.datasets.scans.layouts import read_scan
+from rgspipe.datasets.scans.options import ScanOptions
+from rgspipe.datasets.scans.pictures import read_picture
+from rgspipe.errors import InputError
+from scan_layouts import write_colmap, write_nerfstudio, write_polycam
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [("w", 8.7), ("h", 0.5), ("applied_scale", 1e300), ("applied_scale", 1e-320), ("depth_unit_scale_factor", 1e300)],
+)
+def test_numbers_of_nerfstudio_that_cannot_be_are_refused_by_their_key(tmp_path: Path, key: str, value: float) -> None:
+    write_nerfstudio(tmp_path, SCANNED, ".png", ".png", {key: value})
+    with pytest.raises(InputError, match=rf"transforms\.json: frames\[0\].*{key}"):
+        read_scan(tmp_path, ScanOptions())
+
+
+def test_half_a_pixel_of_polycam_is_refused(tmp_path: Path) -> None:
+    write_polycam(tmp_path, SCANNED, SCANNED)
+    path = min((tmp_path / "keyframes/corrected_cameras").iterdir())
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"width": 8.5}))
+    with pytest.raises(InputError, match=r'a whole number under "width", found 8\.5'):
+        read_scan(tmp_path, ScanOptions())
+
+
+def images_of(root: Path) -> Path:
+    """The list of images of a COLMAP model as text."""
+    write_colmap(root, SCANNED, False)
+    return root / "sparse/0/images.txt"
+
+
+def test_an_image_of_colmap_that_is_there_twice_is_refused(tmp_path: Path) -> None:
+    path = images_of(tmp_path)
+    path.write_text(path.read_text().replace("00.exr", "01.exr"))
+    with pytest.raises(InputError, match=r"images\.txt: expected each image once, found '01\.exr' twice"):
+        read_scan(tmp_path, ScanOptions())
+
+
+@pytest.mark.parametrize("binary", [False, True])
+def test_a_camera_of_colmap_that_is_there_twice_is_refused(tmp_path: Path, binary: bool) -> None:
+    write_colmap(tmp_path, SCANNED, binary)
+    path = tmp_path / f"sparse/0/cameras.{'bin' if binary else 'txt'}"
+    content = path.read_bytes()
+    camera = content[8:] if binary else content.splitlines(keepends=True)[-1]
+    path.write_bytes((2).to_bytes(8, "little") + 2 * camera if binary else content + camera)
+    with pytest.raises(InputError, match=r"cameras\.(bin|txt).*camera \d+ twice"):
+        read_cameras(path)
+
+
+def test_a_name_of_colmap_that_no_path_can_have_is_refused(tmp_path: Path) -> None:
+    path = images_of(tmp_path)
+    path.write_text(path.read_text().replace("00.exr", "a/" * 3000 + "00.exr"))
+    with pytest.raises(InputError, match="no readable file"):
+        read_picture(read_scan(tmp_path, ScanOptions()).frames[-1].image, "srgb")
