@@ -56,7 +56,7 @@ def blend_links(path: Path) -> BlendLinks:
         if why:
             unknown[place] = why
         for name in names:
-            if not _is_there(name):
+            if not _is_readable(name):
                 missing[name] = None
             elif name not in found and _counts(name, path):
                 found[name] = None
@@ -64,7 +64,7 @@ def blend_links(path: Path) -> BlendLinks:
     return BlendLinks(tuple(found), tuple(missing), unknown)
 
 
-def _is_there(name: Path) -> bool:
+def _is_readable(name: Path) -> bool:
     """Whether there is something that may be read: not in another user's folder, nor by a name that cannot be."""
     return os.access(name, os.R_OK)
 
@@ -84,7 +84,7 @@ def _traced(path: Path) -> tuple[list[Path], str]:
 def _members(name: Path, sequence: bool) -> list[Path]:
     """The tiles or frames that are there, or the name itself; a folder is not opened, wherever it lies."""
     tiled = TILES.search(name.name) is not None
-    if not sequence or not (tiled or _is_there(name)) or name.is_dir() or not _is_there(name.parent):
+    if not sequence or not (tiled or _is_readable(name)) or name.is_dir() or not _is_readable(name.parent):
         return [name]
     if tiled:
         pattern = "*".join(glob.escape(part) for part in TILES.split(name.name))

@@ -14,7 +14,7 @@ from PIL import Image
 
 from rgspipe.arguments import as_path
 from rgspipe.datasets.gltf_check import check_gltf
-from rgspipe.datasets.input_file import input_file
+from rgspipe.datasets.input_file import input_file, is_there
 from rgspipe.datasets.json_file import shown
 from rgspipe.datasets.limits import FARTHEST
 from rgspipe.datasets.mesh_links import FORMATS, GLTF, mesh_links
@@ -97,7 +97,9 @@ class OwnFiles(trimesh.resolvers.FilePathResolver):
 
     def _check(self) -> None:
         for file in self._links.files:
-            input_file(file, f"a file that {self._path.name} names")
+            if not is_there(file):
+                remedy = f"Put it there, or take its name out of {self._path.name} or the materials that it names."
+                raise InputError(file, expected=f"a file that {self._path.name} names", found="no such file", remedy=remedy)
         for file in self._links.textures.values():
             check_texture(file.read_bytes(), file)
         if self._path.suffix.lower() == ".ply":
