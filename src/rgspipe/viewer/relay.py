@@ -97,7 +97,8 @@ def without_token(head: bytes, token: str) -> bytes | None:
     given, mark, query = given.partition(b"?")
     if not hmac.compare_digest(given, token.encode()):
         return None
-    lines = rest.split(b"\r\n")
+    # Who has the token need not come from a page of this machine.
+    lines = [one for one in rest.split(b"\r\n") if not one.lower().startswith(b"origin:")]
     if not any(one.lower().startswith(b"upgrade:") for one in lines):
         # What else comes on the connection would not be looked at: each request has one of its own.
         lines = [one for one in lines if not one.lower().startswith(b"connection:")]

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import io
 import logging
+import re
 import threading
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
@@ -31,6 +33,9 @@ if TYPE_CHECKING:
 #: The only address that the viewer listens at unless another is asked for: nothing of it leaves the machine.
 LOOPBACK = "127.0.0.1"
 
+#: Sites whose pages may use it: this machine's, by any port, as tunnels have others.
+OWN_SITES = re.compile(r"https?://(127\.0\.0\.1|localhost|\[::1\])(:\d+)?")
+
 
 class Viewer:
     """A running viewer; `stop` ends it.
@@ -51,7 +56,7 @@ class Viewer:
         logging.getLogger("websockets").setLevel(logging.WARNING)
         # Who leaves does not wait for the picture in the making.
         warnings.filterwarnings("ignore", r"Queued a \w+ on a closed connection", UserWarning)
-        with _unsaid():
+        with _unsaid(), _own_pages_alone():
             self._server = viser.ViserServer(host=LOOPBACK, port=port, verbose=False)
         self._relay: Relay | None = None
         theme(self._server.gui, dark=True)
@@ -100,6 +105,23 @@ class Viewer:
         page = self.pages.pop(client.client_id, None)
         if page is not None:
             page.leave()
+
+
+@contextlib.contextmanager
+def _own_pages_alone() -> Iterator[None]:
+    """Have the server that the block starts refuse pages of other sites.
+
+    Any page that the browser shows may open a connection to this machine, and would then press the page's buttons;
+    the browser says of which site it is. What is no browser says nothing.
+    """
+    from websockets.asyncio import server
+
+    former = server.serve
+    server.serve = functools.partial(former, origins=[OWN_SITES, None])
+    try:
+        yield
+    finally:
+        server.serve = former
 
 
 def _unsaid() -> contextlib.redirect_stdout:

@@ -1,0 +1,57 @@
+"""Which pages may use the viewer: this machine's own, and whoever has the token; no other site that a browser shows."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Iterator
+from urllib.parse import urlsplit
+
+import pytest
+
+from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.viewer.serve import Viewer, view
+
+pytest.importorskip("viser")
+
+HEAD = (
+    "GET {path} HTTP/1.1\r\nHost: {host}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"
+    "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n{more}\r\n"
+)
+
+
+@pytest.fixture(scope="module")
+def viewer(frozen: FrozenScene) -> Iterator[Viewer]:
+    viewer = view(frozen, port=0)
+    yield viewer
+    viewer.stop()
+
+
+def answer(url: str, origin: str | None) -> int:
+    """The status with which a WebSocket is answered that a page of `origin` asks for."""
+    place = urlsplit(url)
+    more = "" if origin is None else f"Origin: {origin}\r\n"
+    with socket.create_connection((place.hostname, place.port), timeout=10) as door:
+        door.sendall(HEAD.format(path=place.path or "/", host=place.netloc, more=more).encode())
+        return int(door.recv(200).split()[1])
+
+
+@pytest.mark.parametrize("origin", [None, "http://127.0.0.1:8080", "http://localhost", "https://[::1]:9"])
+def test_pages_of_this_machine_may_connect(viewer: Viewer, origin: str | None) -> None:
+    assert answer(viewer.url, origin) == 101
+
+
+@pytest.mark.parametrize(
+    "origin", ["http://evil.com", "http://127.0.0.1.evil.com", "http://localhost:8080.evil.com", "null", "file://"]
+)
+def test_pages_of_other_sites_may_not(viewer: Viewer, origin: str) -> None:
+    assert answer(viewer.url, origin) == 403
+
+
+def test_who_has_the_token_may_come_from_elsewhere(frozen: FrozenScene) -> None:
+    viewer = view(frozen, port=0, address="0.0.0.0")
+    try:
+        open_to_all = viewer.url.replace("0.0.0.0", "127.0.0.1")
+        assert answer(open_to_all, "http://laptop.home:1234") == 101
+        assert answer(open_to_all.rsplit("/", 2)[0] + "/wrong/", None) == 403
+    finally:
+        viewer.stop()
