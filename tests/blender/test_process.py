@@ -65,6 +65,15 @@ def test_a_folder_with_another_job_s_images_is_refused(fake_blender, tmp_path: P
         render_dataset(DatasetJob(seed=2), tmp_path)
 
 
+@pytest.mark.parametrize("name", ["o\\b", "o{1}", "o}", "a\nb"])
+def test_a_folder_whose_name_blender_takes_for_another_is_refused(fake_blender, tmp_path: Path, name: str) -> None:
+    """It wrote beside the store, or ended without a word that helps."""
+    fake_blender("exit 0")
+    with pytest.raises(InputError, match="by whose name Blender finds it"):
+        render_dataset(DatasetJob(), tmp_path / name / "data")
+    assert not (tmp_path / name).exists()
+
+
 def test_without_bpy_the_way_out_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     with pytest.raises(

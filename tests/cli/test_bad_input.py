@@ -100,9 +100,14 @@ def test_a_bad_dataset_is_refused(
         (["stage=init_depth", "scene=external"], ["scene.path"]),
         (["stage=init_depth", "scene=external", "scene.path=nowhere"], ["scene.path", "nowhere"]),
         (["stage=generate_dataset", "scene=blend", "scene.path=gone.blend"], ["scene.path", "gone.blend"]),
+        (["stage=freeze", "scene.name=a\\b"], ["scene.name", "plain folder name"]),
+        (["stage=freeze", "hydra.run.dir=${outputs}/${nope}"], ["nope", "not found"]),
+        (["status", f"outputs={'x' * 5000}"], ["folder of results", "too long"]),
+        (["doctor", "check=false", f"outputs={'x' * 5000}"], ["folder of results", "too long"]),
+        (["stage=freeze", "scene.name=\udcc3"], ["command line", "LC_ALL=C.UTF-8"]),
         (["stage=fit_light", "upstream=require"], ["freeze"]),
     ],
-    ids=lambda value: value[-1] if isinstance(value, list) else None,
+    ids=lambda value: ascii(value[-1][:40]) if isinstance(value, list) else None,
 )
 def test_a_bad_configuration_is_refused(run_cli: Callable, arguments: list[str], words: list[str]) -> None:
     result = run_cli(*arguments)

@@ -29,6 +29,9 @@ SCRATCH = ".scratch"
 #: Lines of Blender's output that an error shows.
 TAIL_LINES = 15
 
+#: What Blender takes for separators of folders, and for parts that it fills in.
+MEANT_OTHERWISE = "\\{}"
+
 log = logging.getLogger(__name__)
 
 
@@ -46,6 +49,7 @@ def run_blender(blender: Blender, module: str, job: dict, name: str, folder: Pat
         RuntimeError: Blender died; the message ends with the last lines it wrote.
     """
     folder = Path(folder).resolve()
+    _check_place(folder)
     folder.mkdir(parents=True, exist_ok=True)
     is_new = _claim(job, folder)
     scratch = folder / SCRATCH
@@ -67,6 +71,18 @@ def run_blender(blender: Blender, module: str, job: dict, name: str, folder: Pat
         raise InputError(input_error.pop("where"), **input_error)
     if child.returncode != 0:
         raise RuntimeError(f"Blender {_ending(child.returncode)} while rendering {folder}. Its last lines:\n{tail}")
+
+
+def _check_place(folder: Path) -> None:
+    """Refuse folders below which Blender would write elsewhere."""
+    odd = sorted(set(MEANT_OTHERWISE) & set(str(folder)))
+    if odd or not str(folder).isprintable():
+        raise InputError(
+            folder,
+            expected="a folder by whose name Blender finds it",
+            found=" and ".join(odd) or "a character that cannot be printed",
+            remedy="Blender takes these for something else: give another folder, outputs=FOLDER.",
+        )
 
 
 def _claim(job: dict, folder: Path) -> bool:

@@ -77,7 +77,21 @@ def _no_room(error: OSError) -> InputError:
     )
 
 
+def _check_letters(arguments: Sequence[str]) -> None:
+    """Refuse arguments that are no text: files could not be written about them."""
+    for text in arguments:
+        if any("\ud800" <= letter <= "\udfff" for letter in text):
+            encoding = sys.getfilesystemencoding()
+            raise InputError(
+                "the command line",
+                expected=f"letters that {encoding} knows, as this terminal's locale says",
+                found=ascii(text),
+                remedy="Set a locale that knows them, such as LC_ALL=C.UTF-8, or use other names.",
+            )
+
+
 def _dispatch(arguments: list[str], stage_loader: StageLoader) -> int:
+    _check_letters(arguments)
     if not arguments or arguments[0] in ASKS_FOR_HELP:
         print(help_text(arguments[1:]))
         return 0

@@ -20,6 +20,7 @@ from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 from rgspipe.cli.commands import COMMANDS
+from rgspipe.cli.sweep_values import check_jobs, first_value, single_jobs
 from rgspipe.config import RgspipeConfig
 from rgspipe.config.core import build, plain, unknown_key
 from rgspipe.datasets.json_file import shown
@@ -45,9 +46,6 @@ FREE_SECTIONS = (
 
 #: How a launcher is chosen: by the group of this program or by Hydra's own.
 LAUNCHER_GROUPS = ("launcher", "hydra/launcher")
-
-#: How many jobs of a sweep run side by side.
-JOBS_AT_ONCE = "hydra.launcher.n_jobs"
 
 #: The launcher that sends jobs to a cluster.
 SLURM_LAUNCHER = "hydra_plugins.rgspipe_slurm.SlurmLauncher"
@@ -122,14 +120,11 @@ def check_sweep(overrides: Sequence[str]) -> RgspipeConfig:
         the configuration of the first job.
     """
     parsed = _parse(overrides)
-    if any(override.key_or_group == JOBS_AT_ONCE and override.value() == 0 for override in parsed):
-        raise InputError(
-            JOBS_AT_ONCE, expected="a number of jobs, or -1 for one a core", found="0", remedy=f"Try {JOBS_AT_ONCE}=1."
-        )
-    first = [_first_value(override) for override in parsed]
+    check_jobs(parsed)
+    first = [first_value(override) for override in parsed]
     config = compose_config(first)
     for index, override in enumerate(parsed):
-        for text in itertools.islice(_values(override), 1, CHECKED_VALUES):
+        for text in itertools.islice(single_jobs(override), 1, CHECKED_VALUES):
             compose_config([*first[:index], text, *first[index + 1 :]])
     return config
 
@@ -139,8 +134,11 @@ def given_folder(overrides: Sequence[str], mode: str) -> Path | None:
     parsed = _parse(overrides)
     if not any(override.key_or_group == f"hydra.{mode}.dir" for override in parsed):
         return None
-    values = _compose([_first_value(override) for override in parsed], hydra=True)
-    return Path(str(values.hydra[mode].dir))
+    chosen = [first_value(override) for override in parsed]
+    try:
+        return Path(str(_compose(chosen, hydra=True).hydra[mode].dir))
+    except (HydraException, OmegaConfBaseException) as error:
+        raise _composition_error(error, chosen) from None
 
 
 def leaves_machine(overrides: Sequence[str]) -> bool:
@@ -184,20 +182,6 @@ def _parse(overrides: Sequence[str]) -> list[Override]:
                 remedy="Quote values with special characters, such as key='\"a b\"'; lists are written [1,2].",
             ) from None
     return parsed
-
-
-def _first_value(override: Override) -> str:
-    return next(_values(override), override.input_line or "")
-
-
-def _values(override: Override) -> Iterator[str]:
-    """The overrides of the single jobs that one override of a sweep stands for."""
-    if not override.is_sweep_override() or not (override.is_choice_sweep() or override.is_range_sweep()):
-        if not override.is_sweep_override():
-            yield override.input_line or ""
-        return
-    for value in override.sweep_string_iterator():
-        yield f"{override.get_key_element()}={value}"
 
 
 def _check_keys(overrides: Sequence[Override]) -> None:

@@ -16,7 +16,7 @@ from rgspipe.blender.options import OWN_BLENDER, BlenderOptions
 from rgspipe.cli.arguments import refused
 from rgspipe.cli.installation import EXTRAS, Part, needed_parts, optional_parts, slurm
 from rgspipe.cli.messages import EXIT_FAILED
-from rgspipe.datasets.input_file import input_folder
+from rgspipe.datasets.input_file import folder_to_be
 from rgspipe.errors import InputError
 from rgspipe.graph.commands import typed
 from rgspipe.machine.description import available_memory_gib, machine
@@ -41,8 +41,7 @@ def doctor(arguments: Sequence[str]) -> int:
         InputError: an argument cannot be used.
     """
     outputs, checked, blender = _parsed(arguments)
-    if outputs.exists():
-        input_folder(outputs, "the folder of results")
+    folder_to_be(outputs, "the folder of results")
     host = machine()
     print(f"rgspipe {__version__}, Python {host['python']}, {host['system']}")
     ills, refused = _installed(), _blender(blender)

@@ -9,6 +9,7 @@ from typing import Any
 
 from rgspipe.cli.arguments import meant, refused
 from rgspipe.cli.help import groups, sections
+from rgspipe.datasets.input_file import folder_to_be
 from rgspipe.errors import InputError, printable
 from rgspipe.store.status import STATES, read_statuses
 
@@ -100,4 +101,4 @@ def given_outputs(arguments: Sequence[str], command: str) -> Path:
 
 def _given_outputs(arguments: Sequence[str]) -> Path:
     given = [text.partition("=")[2] for text in arguments if text.startswith("outputs=")]
-    return Path(given[-1] if given else "outputs")
+    return folder_to_be(given[-1] if given else "outputs", "the folder of results")

@@ -8,7 +8,7 @@ from typing import Literal, get_args
 
 from rgspipe.arguments import as_path
 from rgspipe.blender.options import HotdogParameters, RoomParameters, ZooParameters
-from rgspipe.datasets.input_file import input_file, input_folder
+from rgspipe.datasets.input_file import input_file, input_folder, is_plain_name
 from rgspipe.datasets.mesh_options import MeshOptions
 from rgspipe.datasets.ply_options import PlyOptions
 from rgspipe.datasets.scans.options import ScanOptions
@@ -116,7 +116,8 @@ class SceneConfig(Options):
     def check(self) -> None:
         """Refuse names that are no folder of the scene's own."""
         name = self.folder
-        if name in ("", ".", "..", "runs") or "/" in name or name.startswith("."):
+        # Blender takes a backslash for another folder.
+        if name == "runs" or "\\" in name or not is_plain_name(name):
             raise InputError(
                 "name",
                 expected="a plain folder name other than 'runs'",

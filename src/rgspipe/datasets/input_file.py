@@ -57,6 +57,22 @@ def input_folder(path: str | Path, expected: str) -> Path:
     return path
 
 
+def folder_to_be(path: str | Path, expected: str) -> Path:
+    """`path`, found to be a folder, or nothing yet.
+
+    Raises:
+        InputError: as `input_folder`, but for a folder that is not there.
+    """
+    path = as_path(path, expected)
+    try:
+        path.stat()
+    except FileNotFoundError:
+        return path
+    except (OSError, ValueError):
+        pass
+    return input_folder(path, expected)
+
+
 def is_there(path: Path) -> bool:
     """Whether there is anything of this name, which may be none that a file can have."""
     try:

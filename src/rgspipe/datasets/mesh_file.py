@@ -99,7 +99,9 @@ class OwnFiles(trimesh.resolvers.FilePathResolver):
         for file in self._links.files:
             if not is_there(file):
                 remedy = f"Put it there, or take its name out of {self._path.name} or the materials that it names."
-                raise InputError(file, expected=f"a file that {self._path.name} names", found="no such file", remedy=remedy)
+                raise InputError(
+                    file, expected=f"a file that {self._path.name} names", found="no such file", remedy=remedy
+                )
         for file in self._links.textures.values():
             check_texture(file.read_bytes(), file)
         if self._path.suffix.lower() == ".ply":

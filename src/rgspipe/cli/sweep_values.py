@@ -1,0 +1,79 @@
+"""What the overrides of a sweep stand for: the values of each, how many jobs these are, and what cannot be meant."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+
+from hydra.core.override_parser.types import Override
+from hydra.errors import HydraException
+
+from rgspipe.datasets.json_file import shown
+from rgspipe.errors import InputError
+
+#: Jobs of the largest sweep: each has a folder, and the driver keeps a line of it in memory.
+MOST_JOBS = 100_000
+
+#: How many jobs of a sweep run side by side, and what the folder of each is called.
+JOBS_AT_ONCE, JOB_FOLDER = "hydra.launcher.n_jobs", "hydra.sweep.subdir"
+
+
+def first_value(override: Override) -> str:
+    """The override of the first job."""
+    return next(single_jobs(override), override.input_line or "")
+
+
+def single_jobs(override: Override) -> Iterator[str]:
+    """The overrides of the single jobs that one override of a sweep stands for.
+
+    Raises:
+        InputError: it stands for none that could be listed.
+    """
+    if not override.is_sweep_override():
+        yield override.input_line or ""
+        return
+    try:
+        for value in override.sweep_string_iterator():
+            yield f"{override.get_key_element()}={value}"
+    except (HydraException, ValueError) as error:
+        raise InputError(
+            override.key_or_group,
+            expected="values such as 1,2 or range(1,9)",
+            found=f"{shown((override.input_line or '').partition('=')[2])} ({error})",
+            remedy="List them, separated by commas.",
+        ) from None
+
+
+def check_jobs(overrides: Sequence[Override]) -> None:
+    """Refuse sweeps that cannot be run: of no jobs at once, of too many in all, or of jobs that share a folder.
+
+    Raises:
+        InputError: names the key.
+    """
+    for override in overrides:
+        if override.key_or_group == JOBS_AT_ONCE and override.value() == 0:
+            raise InputError(
+                JOBS_AT_ONCE,
+                expected="a number of jobs, or -1 for one a core",
+                found="0",
+                remedy=f"Try {JOBS_AT_ONCE}=1.",
+            )
+        if override.key_or_group == JOB_FOLDER and not _tells_jobs_apart(str(override.value())):
+            raise InputError(
+                JOB_FOLDER,
+                expected="a plain name that differs from job to job",
+                found=shown((override.input_line or "").partition("=")[2]),
+                remedy="Leave it away, or use ${hydra.job.num} in it.",
+            )
+    swept = [override for override in overrides if override.is_sweep_override()]
+    counts = [sum(1 for _ in itertools.islice(single_jobs(override), MOST_JOBS + 1)) for override in swept]
+    if math.prod(counts) > MOST_JOBS:
+        most = max(zip(counts, swept, strict=True), key=lambda one: one[0])[1]
+        found = f"{math.prod(counts)} or more"
+        remedy = "Sweep over fewer values, or in several sweeps."
+        raise InputError(most.key_or_group, expected=f"at most {MOST_JOBS} jobs", found=found, remedy=remedy)
+
+
+def _tells_jobs_apart(name: str) -> bool:
+    return "${hydra.job." in name and "/" not in name and ".." not in name
