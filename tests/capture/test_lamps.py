@@ -110,6 +110,6 @@ def test_a_lamp_in_a_wrong_place_is_found_again_beside_the_others() -> None:
     places = true_lamps(made).places.copy()
     places[1] *= -1.0
     stuck = made.refined(made.lamps(places, true_lamps(made).logs - 1.0), 25)
-    found = looked_for_again(made, Candidates.of(made), stuck)
+    found = looked_for_again(made, Candidates.of(made), stuck, lambda *_: None)
     assert made.cost(found) < 0.1 * made.cost(stuck)
     assert np.linalg.norm(found.places - true_lamps(made).places, axis=1).max() < 0.003
