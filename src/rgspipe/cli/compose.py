@@ -20,6 +20,7 @@ from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 from rgspipe.cli.commands import COMMANDS
+from rgspipe.cli.hydra_settings import check_hydra
 from rgspipe.cli.sweep_values import check_jobs, first_value, single_jobs
 from rgspipe.config import RgspipeConfig
 from rgspipe.config.core import build, plain, unknown_key
@@ -96,6 +97,7 @@ def compose_config(overrides: Sequence[str]) -> RgspipeConfig:
     # Before the keys: which of them exist depends on the launcher that is chosen.
     _check_choices(parsed)
     _check_keys(parsed)
+    check_hydra(parsed)
     try:
         return typed(_compose(overrides))
     except (HydraException, OmegaConfBaseException) as error:
