@@ -23,10 +23,21 @@ def _is_batch(value: object) -> bool:
     return value is None or (isinstance(value, int) and not isinstance(value, bool) and value > 0)
 
 
+def _tells_jobs_apart(value: object) -> bool:
+    name = str(value)
+    return "${hydra.job." in name and "/" not in name and ".." not in name
+
+
 #: By key: what a value must be, in words, and what to do about another one.
 CHECKED: dict[str, tuple[Callable[[object], bool], str, str]] = {
     "hydra.job.name": (lambda value: is_plain_name(str(value)), "a plain name, which logs have", "Leave it away."),
     "hydra.sweeper.max_batch_size": (_is_batch, "a number of jobs above 0, or null", "Leave it away."),
+    "hydra.sweep.subdir": (
+        _tells_jobs_apart,
+        "a plain name that differs from job to job",
+        "Leave it away, or use ${hydra.job.num} in it.",
+    ),
+    "hydra.launcher.n_jobs": (lambda value: value != 0, "a number of jobs, or -1 for one a core", "1 is the least."),
     "hydra.mode": (lambda value: False, "no mode: -m makes a sweep of a run", "Leave it away, and add -m for a sweep."),
 }
 

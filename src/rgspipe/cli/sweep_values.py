@@ -1,4 +1,4 @@
-"""What the overrides of a sweep stand for: the values of each, how many jobs these are, and what cannot be meant."""
+"""What the overrides of a sweep stand for: the values of each, and how many are too many."""
 
 from __future__ import annotations
 
@@ -14,9 +14,6 @@ from rgspipe.errors import InputError
 
 #: Jobs of the largest sweep: each has a folder, and the driver keeps a line of it in memory.
 MOST_JOBS = 100_000
-
-#: How many jobs of a sweep run side by side, and what the folder of each is called.
-JOBS_AT_ONCE, JOB_FOLDER = "hydra.launcher.n_jobs", "hydra.sweep.subdir"
 
 
 def first_value(override: Override) -> str:
@@ -46,26 +43,11 @@ def single_jobs(override: Override) -> Iterator[str]:
 
 
 def check_jobs(overrides: Sequence[Override]) -> None:
-    """Refuse sweeps that cannot be run: of no jobs at once, of too many in all, or of jobs that share a folder.
+    """Refuse sweeps of too many jobs.
 
     Raises:
-        InputError: names the key.
+        InputError: names the key with the most values.
     """
-    for override in overrides:
-        if override.key_or_group == JOBS_AT_ONCE and override.value() == 0:
-            raise InputError(
-                JOBS_AT_ONCE,
-                expected="a number of jobs, or -1 for one a core",
-                found="0",
-                remedy=f"Try {JOBS_AT_ONCE}=1.",
-            )
-        if override.key_or_group == JOB_FOLDER and not _tells_jobs_apart(str(override.value())):
-            raise InputError(
-                JOB_FOLDER,
-                expected="a plain name that differs from job to job",
-                found=shown((override.input_line or "").partition("=")[2]),
-                remedy="Leave it away, or use ${hydra.job.num} in it.",
-            )
     swept = [override for override in overrides if override.is_sweep_override()]
     counts = [sum(1 for _ in itertools.islice(single_jobs(override), MOST_JOBS + 1)) for override in swept]
     if math.prod(counts) > MOST_JOBS:
@@ -73,7 +55,3 @@ def check_jobs(overrides: Sequence[Override]) -> None:
         found = f"{math.prod(counts)} or more"
         remedy = "Sweep over fewer values, or in several sweeps."
         raise InputError(most.key_or_group, expected=f"at most {MOST_JOBS} jobs", found=found, remedy=remedy)
-
-
-def _tells_jobs_apart(name: str) -> bool:
-    return "${hydra.job." in name and "/" not in name and ".." not in name

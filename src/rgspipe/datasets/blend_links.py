@@ -20,7 +20,7 @@ from string import digits
 
 from rgspipe.datasets.input_file import input_file
 
-#: Seconds in which one file must have been traced. A file of 500 kB takes 0.3.
+#: Seconds in which one file must have been traced. A file of 500 kB takes 0.1.
 PATIENCE = 60.0
 
 #: What stands for the number of a tile in the name of an image.

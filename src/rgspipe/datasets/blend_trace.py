@@ -22,7 +22,7 @@ from blender_asset_tracer.trace.blocks2assets import iter_assets
 from blender_asset_tracer.trace.modifier_walkers import modifier_handlers
 
 #: Bytes of memory, and of a copy without compression, that may be taken: damaged files claim anything. One of 500 kB
-#: takes 60 MB.
+#: takes 20 MB.
 MEMORY, COPY = 2**31, 2**32
 
 #: Structures of nodes that name a file outside, where their mode is `OUTSIDE`: measured lamps and scripts.

@@ -37,7 +37,7 @@ class ReadingLimits(Options):
     """Sizes from which on files are refused."""
 
     pixels: int = option(100_000_000, low=1, high=10**10)
-    """pixels of the largest image, photograph or depth map; so many of a PNG in colour take 2.1 GiB"""
+    """pixels of the largest image, photograph or depth map; so many take 1.2 GB in colour"""
     cropped_pixels: int = option(2**24, low=1, high=10**10)
     """pixels of the largest image of which only a part is stored, so that a few bytes could claim any size"""
     vertices: int = option(20_000_000, low=2, high=10**10)

@@ -156,7 +156,7 @@ def remove_at_once(folder: Path) -> None:
 
     What is left of it is called `.gone-` and its name.
     """
-    away = folder.with_name(f"{GONE}{folder.name.lstrip('.')}")
+    away = folder.with_name(GONE + folder.name)
     remove_any(away)
     folder.rename(away)
     sync(away.parent)

@@ -25,9 +25,8 @@ REPORT = "report"
 
 #: What artifacts are called, those in the making, damaged ones that were set aside, and what is left of a removal.
 #: Whoever names a folder that is no store must not lose what else is in it.
-UNFINISHED = rf"(?:{re.escape(PARTIAL)}|{re.escape(ASIDE)}\d+-)"
-NAME = re.compile(rf"({UNFINISHED})?([0-9a-f]{{{DIGITS}}})")
-LEFT = re.compile(rf"{re.escape(GONE)}(?:partial-|damaged-\d+-)?([0-9a-f]{{{DIGITS}}})")
+NAME = re.compile(rf"({re.escape(PARTIAL)}|{re.escape(ASIDE)}\d+-)?([0-9a-f]{{{DIGITS}}})")
+LEFT = re.compile(re.escape(GONE) + NAME.pattern)
 
 
 @dataclass(frozen=True)
@@ -150,7 +149,7 @@ def remove(outputs: Path, gone: Collection[Stored]) -> Iterator[Stored]:
     """
     with told_below(outputs):
         for left, name in _named(outputs, LEFT):
-            with contextlib.suppress(Timeout), locked_if_free(left.parent, name[1]):
+            with contextlib.suppress(Timeout), locked_if_free(left.parent, name[2]):
                 remove_any(left)
     for one in sorted(gone, key=lambda one: one.made, reverse=True):
         with told_below(outputs), contextlib.suppress(Timeout), locked_if_free(one.folder.parent, one.key.fingerprint):
