@@ -40,8 +40,16 @@ def as_path(path: str | os.PathLike[str], name: str = "path") -> Path:
     return made
 
 
-def as_number(value: object, name: str, remedy: str = "Pass a number.", *, expected: str = "a finite number") -> float:
-    """A finite number, of Python, numpy, or a tensor of one.
+def as_number(
+    value: object,
+    name: str,
+    remedy: str = "Pass a number.",
+    *,
+    expected: str = "a finite number",
+    low: float = -math.inf,
+    high: float = math.inf,
+) -> float:
+    """A finite number from `low` to `high`, of Python, numpy, or a tensor of one.
 
     Raises:
         InputError: something else.
@@ -50,7 +58,7 @@ def as_number(value: object, name: str, remedy: str = "Pass a number.", *, expec
         number = math.nan if isinstance(value, str | bytes) else float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError, OverflowError, RuntimeError):  # what numpy and torch say of several numbers
         number = math.nan
-    if not math.isfinite(number):
+    if not (math.isfinite(number) and low <= number <= high):
         raise InputError(name, expected=expected, found=_shown(value), remedy=remedy)
     return number
 

@@ -70,10 +70,10 @@ def test_further_fields_cannot_replace_the_format_s_own(tmp_path: Path) -> None:
         ({"intensity": [1, -1, 1]}, r"lights\[0\]\.intensity"),
         ({"type": "spot", "direction": [0, 0, 0]}, "direction.*longer than 0"),
         ({"type": "led", "direction": [0, 0, 1e300], "exponent": 1}, "direction.*longer than 0"),
-        ({"type": "led", "direction": [0, 0, 1], "exponent": -1}, r"lights\[0\].*exponent ≥ 0"),
+        ({"type": "led", "direction": [0, 0, 1], "exponent": -1}, r"lights\[0\].*exponent: .*0 or more"),
         (
             {"type": "spot", "direction": [0, 0, 1], "profile": "gaussian", "cone_angle": 3.5, "falloff": 0.1},
-            r"lights\[0\].*cone_angle ≤ π",
+            r"lights\[0\].*cone_angle: .*0 to π",
         ),
         ({"position": [0, 0, 1e308]}, r"lights\[0\]\.position.*within"),
         ({"intensity": [1, 1e308, 1]}, r"lights\[0\]\.intensity.*up to|from 0 to"),

@@ -235,7 +235,7 @@ def test_counted_bounces_lead_to_all_of_them(room: FrozenScene) -> None:
 
 def test_other_solvers_refuse_gloss(room: FrozenScene) -> None:
     for solver in ("gather", "monte_carlo"):
-        with pytest.raises(ValueError, match="diffuse scenes"):
+        with pytest.raises(ValueError, match="this scene has gloss"):
             room.with_solver(solver)
 
 

@@ -19,6 +19,7 @@ import rgspipe
 from rgspipe.datasets.exr import write_channels
 from rgspipe.datasets.ply_table import write_vertices
 from rgspipe.datasets.tensor_file import save_tensors
+from rgspipe.errors import InputError
 from rgspipe.evaluation.images import save_png
 from rgspipe.store.files import (
     append_line,
@@ -159,6 +160,15 @@ def test_a_link_in_the_place_of_the_file_is_replaced(tmp_path: Path) -> None:
 def test_a_name_as_long_as_names_may_be_can_be_written(tmp_path: Path) -> None:
     write_text(tmp_path / ("ä" * 125 + ".json"), "{}")
     assert len(list(tmp_path.iterdir())) == 1
+
+
+def test_a_name_that_is_too_long_is_refused_before_anything_is_made(tmp_path: Path) -> None:
+    file = tmp_path / "new" / ("a" * 300 + ".json")
+    with pytest.raises(InputError, match=r"at most 255 bytes.*305 bytes.*shorter"):
+        write_json(file, {})
+    with pytest.raises(InputError, match=r"at most 255 bytes.*300 bytes.*shorter"):
+        write_json(tmp_path / ("é" * 150) / "x.json", {})
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_link_outlasts_a_power_cut(tmp_path: Path, recorded) -> None:

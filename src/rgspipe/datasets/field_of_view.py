@@ -9,9 +9,7 @@ from torch import Tensor
 from rgspipe.datasets.json_file import is_number, shown
 from rgspipe.errors import InputError
 from rgspipe.scene import Camera
-
-#: Radians across the narrowest image: telescopes see a hundred times as much, and focal lengths stay finite.
-NARROWEST = 1e-6
+from rgspipe.scene.camera import NARROWEST
 
 
 def camera_of_angle(pose: Tensor, angle: object, width: int, height: int, place: str) -> Camera:

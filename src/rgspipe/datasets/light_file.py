@@ -119,11 +119,13 @@ def _read_light(fields: dict, path: str | Path, where: str) -> Light:
         raise reader.refusal("intensity", f"W/sr from 0 to {STRONGEST:g}", str(intensity.tolist()))
     try:
         return kind.from_fields(position, intensity, reader)
-    except InputError:
-        raise
+    except InputError as error:
+        # What the reader refuses names the file; what no light can have names the light's own number alone.
+        raise error if error.where.startswith(reader.place) else error.within(reader.place) from None
     except ValueError as error:
-        where = f"{path}: {where}"
-        raise InputError(where, expected=f"a {kind.kind} light", found=str(error), remedy="Correct it.") from error
+        raise InputError(
+            reader.place, expected=f"a {kind.kind} light", found=str(error), remedy="Correct it."
+        ) from error
 
 
 @dataclass(frozen=True)

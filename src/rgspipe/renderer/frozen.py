@@ -34,7 +34,7 @@ from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.surroundings import OPEN, Surroundings
 from rgspipe.renderer.transport import PatchTransport, build_patch_transport
 from rgspipe.renderer.view_weights import ViewWeights, build_view_weights
-from rgspipe.scene.arrays import ArrayLike, as_tensor, check_finite
+from rgspipe.scene.arrays import ArrayLike, as_device, as_tensor, check_finite
 from rgspipe.scene.camera import Camera
 from rgspipe.scene.grade import SceneGrade
 from rgspipe.scene.lights import Light, LightRig, as_rig, check_numbers
@@ -139,8 +139,8 @@ class FrozenScene:
         return self.surfels.centers.device
 
     def to(self, device: torch.device | str) -> FrozenScene:
-        """The same scene on another device; this one if it is there already."""
-        device = torch.device(device)
+        """The same scene on another device, which must be there; this one if it is there already."""
+        device = as_device(device)
         if device.type == self.device.type and device.index in (None, self.device.index):
             return self
         parts = {"gather": self.gather, "solver": self.solver, "gloss": self.gloss, "centers": self.centers}
@@ -229,8 +229,8 @@ class FrozenScene:
             seed: of its rays.
 
         Raises:
-            ValueError: the solver has another name, needs the gather operator and the scene was loaded without it, or
-                the scene is glossy: light goes over gloss from patch to patch.
+            InputError: the solver has another name, needs the gather operator and the scene was loaded without it, or
+                the scene is glossy: light goes over gloss from patch to patch; or a count is out of range.
         """
         return replace(self, solver=indirect_solver(self, solver, bounces, samples, seed))
 

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Literal, Protocol
 import torch
 from torch import Tensor
 
+from rgspipe.arguments import as_count
+from rgspipe.errors import InputError
 from rgspipe.renderer.monte_carlo import MonteCarloSolver
 from rgspipe.renderer.radiosity import GatherSolver
 from rgspipe.renderer.transport import with_bounces
@@ -36,16 +38,24 @@ def indirect_solver(
     frozen: FrozenScene, solver: Solver, bounces: int | None, samples: int, seed: int
 ) -> IndirectSolver:
     """The solver of a scene; see `FrozenScene.with_solver`."""
+    for name, count, least in (("samples", samples, 1), ("seed", seed, 0)):
+        as_count(count, name, least)
+    if bounces is not None:
+        as_count(bounces, "bounces", 0)
     if solver == "patches":
         same = bounces == frozen.transport.bounces
         return frozen.transport if same else with_bounces(frozen.transport, bounces)
     if frozen.gloss is not None and solver in ("gather", "monte_carlo"):
-        raise ValueError(f"solver {solver} is for diffuse scenes: this one has gloss, which needs patches")
+        raise _refused("patches: this scene has gloss, over which light goes from patch to patch", solver)
     if solver == "gather":
         if frozen.gather is None:
-            raise ValueError("solver gather needs the gather operator: load the scene with gather=True")
+            raise _refused("a scene with its gather operator", "one without", "Load it with gather=True.")
         return GatherSolver(frozen.gather, frozen.surfels.albedo, bounces)
     if solver == "monte_carlo":
         bounces = MONTE_CARLO_BOUNCES if bounces is None else bounces
         return MonteCarloSolver(frozen.bvh, samples, bounces, torch.Generator().manual_seed(seed))
-    raise ValueError(f"solver must be patches, gather or monte_carlo, got {solver!r}")
+    raise _refused("patches, gather or monte_carlo", f"{solver!r:.80}")
+
+
+def _refused(expected: str, found: str, remedy: str = "Leave the default.") -> InputError:
+    return InputError("solver", expected=expected, found=found, remedy=remedy)

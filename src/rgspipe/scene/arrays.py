@@ -24,6 +24,9 @@ REMEDY = "Pass a list, numpy array or tensor."
 #: Noise reaches about as far below zero as above it; what reaches so many times as far is a broken pixel.
 NOISE = 2.0
 
+#: Kinds of devices that there are kernels for.
+DEVICES = ("cpu", "cuda")
+
 #: How many entries an axis has; a name for any number of them.
 Axis = int | str
 
@@ -56,6 +59,27 @@ def as_list(value: Sequence[ArrayLike] | ArrayLike, axes: int) -> list[ArrayLike
     """Several arrays of `axes` axes each; one of them, also one with too few axes, stands for a list of it."""
     none = isinstance(value, list | tuple) and not value
     return [value] if _axes(value) <= axes and not none else list(value)
+
+
+def as_device(device: torch.device | str) -> torch.device:
+    """A device that this machine has.
+
+    Raises:
+        InputError: it has no such device, or there is none of this name.
+    """
+    try:
+        made = torch.device(device)
+        if made.type not in DEVICES:
+            raise RuntimeError(f"{made.type} is not used")
+        torch.empty(0, device=made)
+    except (
+        RuntimeError,
+        AssertionError,
+        TypeError,
+    ) as error:  # no such name, no such part
+        found, remedy = f"{device!r:.40} ({str(error).splitlines()[0]:.80})", "Pass cpu."
+        raise InputError("device", expected="cpu, or cuda where there is a GPU", found=found, remedy=remedy) from None
+    return made
 
 
 def check_finite(tensor: Tensor, name: str, remedy: str) -> None:

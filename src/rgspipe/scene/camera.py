@@ -29,6 +29,9 @@ ROUND = "Round it up."
 #: Of rays, across the axis over along it: beyond it their squares, which lengths are made of, may not be finite.
 STEEPEST = 1e100
 
+#: Radians across the narrowest image: telescopes see a hundred times as much.
+NARROWEST = 1e-6
+
 
 @dataclass(frozen=True)
 class _Pose:
@@ -50,7 +53,7 @@ class Camera(ByValue, Pinhole, _Pose):
         width, height: image size in pixels.
 
     Raises:
-        InputError: the transform is not rigid, a focal length not positive, a size not a whole number of pixels, or a
+        InputError: the transform is not rigid, a focal length of no lens, a size not a whole number of pixels, or a
             number not finite.
     """
 
@@ -64,7 +67,7 @@ class Camera(ByValue, Pinhole, _Pose):
         for name in ("cx", "cy"):
             as_number(getattr(self, name), name)
         for focal, centre, size in (("fx", self.cx, self.width), ("fy", self.cy, self.height)):
-            _check_focal_length(focal, getattr(self, focal), abs(centre) + size)
+            _check_focal_length(focal, getattr(self, focal), abs(centre) + size, size)
 
     @classmethod
     def look_at(
@@ -87,10 +90,9 @@ class Camera(ByValue, Pinhole, _Pose):
         Raises:
             InputError: a point is not three numbers, both are one, or the field of view or a size is out of range.
         """
-        if not 0.0 < as_number(fov_degrees, "fov_degrees", "40 is usual.") < 180.0:
-            raise InputError(
-                "fov_degrees", expected="an angle between 0 and 180", found=f"{fov_degrees}", remedy="40 is usual."
-            )
+        least, remedy = math.degrees(NARROWEST), "40 is usual."
+        expected = f"an angle from {least:.1g} to below 180 degrees"
+        as_number(fov_degrees, "fov_degrees", remedy, expected=expected, low=least, high=math.nextafter(180.0, 0.0))
         return cls.from_field_of_view(look_at(eye, target, up), math.radians(fov_degrees), width, height)
 
     @classmethod
@@ -166,15 +168,19 @@ class Camera(ByValue, Pinhole, _Pose):
         return torch.stack([x, y], dim=-1), depth
 
 
-def _check_focal_length(name: str, length: float, reach: float) -> None:
-    """Refuse a focal length that no pinhole has, whose pixels reach so far from its axis.
+def _check_focal_length(name: str, length: float, reach: float, size: int) -> None:
+    """Refuse a focal length that no lens has, of an image of `size` pixels that reach so far from its axis.
 
     Raises:
-        InputError: it is not positive, or so short that directions have no length in double precision.
+        InputError: it is not positive, so short that directions have no length in double precision, or so long that
+            the image shows one direction.
     """
     expected, remedy = "a focal length in pixels, above 0", "Axes with another sign belong into camera_to_world."
     if not 0.0 < reach < STEEPEST * as_number(length, name, remedy, expected=expected):
         raise InputError(name, expected=expected, found=f"{length}", remedy=remedy)
+    if length * NARROWEST > size:
+        expected = f"at most {size / NARROWEST:g} pixels for {size} pixels across"
+        raise InputError(name, expected=expected, found=f"{length:g}", remedy="Focal lengths are in pixels.")
 
 
 def look_at(origin: ArrayLike, target: ArrayLike, up: ArrayLike | None = None) -> Float[Tensor, "4 4"]:

@@ -15,6 +15,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from rgspipe.errors import InputError
+
 #: Why a file cannot be written though nothing is wrong with what it holds: no room, or no right to.
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 NO_RIGHT = (errno.EROFS, errno.EACCES, errno.EPERM)
@@ -23,10 +25,13 @@ UNWRITABLE = NO_ROOM + NO_RIGHT
 #: Why a file, folder or link cannot be made where there is room and the right to: something else has its name.
 OCCUPIED = (errno.EISDIR, errno.ENOTDIR, errno.ENOTEMPTY, errno.EEXIST, errno.ELOOP)
 
-#: Characters of a file's name that the one it is written under repeats: names may have 255 bytes.
+#: Characters of a file's name that the one it is written under repeats: names may have NAME_BYTES.
 LONGEST_STEM = 40
 
-#: The longest name of a file or folder that is taken, bytes: file systems take 255, and one in the making is longer.
+#: Bytes of a name, and of a path, that file systems take.
+NAME_BYTES, PATH_BYTES = 255, 4096
+
+#: The longest name of a file or folder that is read or stands in a list, bytes: one in the making is longer.
 LONGEST_NAME = 200
 
 #: What a folder's name begins with while it is removed, so that nobody takes it for what it was.
@@ -48,9 +53,11 @@ def replacing(path: str | Path) -> Iterator[Path]:
     nobody can foresee; who may read it is what the umask says.
 
     Raises:
+        InputError: its name is too long.
         OSError: the file cannot be written; names it.
     """
     path = Path(path)
+    _check_name(path)
     make_folder(path.parent)
     temporary = path.with_name(f".{path.stem[:LONGEST_STEM]}.{secrets.token_hex(8)}{path.suffix}")
     try:
@@ -129,7 +136,12 @@ def unfinished_links(folder: Path, name: str) -> Iterator[Path]:
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder, and those above it, where they are not there, so that they outlast a power cut."""
+    """Make a folder, and those above it, where they are not there, so that they outlast a power cut.
+
+    Raises:
+        InputError: its name is too long.
+    """
+    _check_name(folder)
     missing = [place for place in (folder, *folder.parents) if not place.exists()]
     folder.mkdir(parents=True, exist_ok=True)
     for place in missing:
@@ -207,6 +219,15 @@ def sync(path: Path) -> None:
         # A folder that may be written to but not listed, or a network file system that keeps names in its own way.
         if error.errno not in (errno.EACCES, errno.EINVAL) or not path.is_dir():
             raise
+
+
+def _check_name(path: Path) -> None:
+    """Refuse a name that no file system takes, before anything is made on its way."""
+    longest = max((len(os.fsencode(part)) for part in path.parts), default=0)
+    if longest > NAME_BYTES or len(os.fsencode(path)) >= PATH_BYTES:
+        found = f"one of {longest} bytes, in a path of {len(os.fsencode(path))}"
+        expected, remedy = f"names of at most {NAME_BYTES} bytes, {PATH_BYTES} in all", "Choose a shorter one."
+        raise InputError(f"{str(path)[:LONGEST_NAME]}…", expected=expected, found=found, remedy=remedy)
 
 
 def _create(temporary: Path) -> int:

@@ -8,6 +8,7 @@ from dataclasses import replace
 import pytest
 import torch
 
+from rgspipe.errors import InputError
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import PointLight, SpotLight
 from rgspipe.scene.lights.angles import angle_from_axis, angle_slopes
@@ -114,10 +115,10 @@ def test_a_hard_edge_has_no_rim() -> None:
 
 @pytest.mark.parametrize(("profile", "cone", "falloff"), [("gaussian", 2.0 * math.pi, 0.1), ("linear", 0.4, -0.1)])
 def test_angles_out_of_range_are_refused(profile: str, cone: float, falloff: float) -> None:
-    with pytest.raises(ValueError, match="cone_angle"):
+    with pytest.raises(InputError, match=r"cone_angle: .*6.28|falloff: .*-0.1"):
         SpotLight.shaped(profile, cone, falloff)
 
 
 def test_profiles_of_no_name_are_refused() -> None:
-    with pytest.raises(ValueError, match="gaussian, smoothstep, linear"):
+    with pytest.raises(InputError, match="gaussian, smoothstep, linear"):
         SpotLight.shaped("round")

@@ -31,19 +31,12 @@ class LedLight(AxialLight):
 
     Attributes:
         exponent: m ≥ 0; ln ½ / ln cos of the half-angle that data sheets give.
-
-    Raises:
-        ValueError: the exponent is below 0.
     """
 
     kind: ClassVar[str] = "led"
+    ranges: ClassVar = {"exponent": ("an exponent, 0 or more", 0.0, math.inf)}
 
     exponent: float
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if not self.exponent >= 0.0:
-            raise ValueError(f"an LED needs an exponent ≥ 0, got {self.exponent}")
 
     @classmethod
     def shaped(cls, exponent: float = 1.0) -> Self:

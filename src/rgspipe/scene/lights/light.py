@@ -54,7 +54,7 @@ class Light(ByValue, ABC):
         intensity: (3,) RGB radiant intensity, W/sr, of a light with an axis along it; a single number is grey.
 
     Raises:
-        InputError: what is given is no vector, or no finite number.
+        InputError: what is given is no vector, no finite number, or one that such a light cannot have.
     """
 
     #: Its name in light files and settings.
@@ -69,6 +69,9 @@ class Light(ByValue, ABC):
     #: Of its intensity.
     unit: ClassVar[str] = "W/sr"
 
+    #: What its numbers may be, in words and from where to where; any finite number where nothing is said.
+    ranges: ClassVar[Mapping[str, tuple[str, float, float]]] = {}
+
     position: Given
     intensity: Given
 
@@ -78,7 +81,9 @@ class Light(ByValue, ABC):
                 object.__setattr__(self, field.name, as_tensor(getattr(self, field.name), field.name, (3,)))
             elif field.type == "float":
                 value = getattr(self, field.name)
-                as_number(value.detach() if isinstance(value, Tensor) else value, field.name)
+                expected, low, high = self.ranges.get(field.name, ("a finite number", -math.inf, math.inf))
+                number = value.detach() if isinstance(value, Tensor) else value
+                as_number(number, field.name, expected=expected, low=low, high=high)
         object.__setattr__(self, "intensity", _colour(self.intensity))
 
     @property

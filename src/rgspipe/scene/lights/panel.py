@@ -39,21 +39,14 @@ class PanelLight(AxialLight):
         width, height: sides, scene units; exchanged, with a quarter of a turn, they are the same panel (`told`).
         turn: angle [rad] from the x-axis to the side `width`, around the axis, where the axis points straight down
             (−z); for another axis the x-axis is taken along on the shortest way there.
-
-    Raises:
-        ValueError: a side is below 0.
     """
 
     kind: ClassVar[str] = "panel"
+    ranges: ClassVar = dict.fromkeys(("width", "height"), ("a length, 0 or more", 0.0, math.inf))
 
     width: float
     height: float
     turn: float = 0.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if not (self.width >= 0.0 and self.height >= 0.0):
-            raise ValueError(f"a panel needs sides ≥ 0, got {self.width} and {self.height}")
 
     @classmethod
     def shaped(cls, width: float = 0.2, height: float = 0.2, turn: float = 0.0) -> Self:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar, Self
@@ -26,19 +27,12 @@ class SphereLight(Light):
 
     Attributes:
         radius: r ≥ 0, scene units.
-
-    Raises:
-        ValueError: the radius is below 0.
     """
 
     kind: ClassVar[str] = "sphere"
+    ranges: ClassVar = {"radius": ("a radius, 0 or more", 0.0, math.inf)}
 
     radius: float
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if not self.radius >= 0.0:
-            raise ValueError(f"a sphere needs a radius ≥ 0, got {self.radius}")
 
     @classmethod
     def shaped(cls, radius: float = 0.05) -> Self:

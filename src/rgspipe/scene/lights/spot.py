@@ -10,6 +10,7 @@ from typing import Any, ClassVar, Literal, Self
 import torch
 from torch import Tensor
 
+from rgspipe.errors import InputError
 from rgspipe.scene.lights.axial import AxialLight
 from rgspipe.scene.lights.reader import Reader
 from rgspipe.scene.lights.shape_coordinates import Between, Positive
@@ -38,10 +39,14 @@ class SpotLight(AxialLight):
             `linear` the beam angle [rad].
 
     Raises:
-        ValueError: the profile has another name, or an angle is out of range.
+        InputError: the profile has another name, or an angle is out of range.
     """
 
     kind: ClassVar[str] = "spot"
+    ranges: ClassVar = {
+        "cone_angle": ("a half-angle from 0 to π radians", 0.0, math.pi),
+        "falloff": ("an angle, or a blend, of 0 or more", 0.0, math.inf),
+    }
 
     profile: SpotProfile
     cone_angle: float
@@ -50,10 +55,8 @@ class SpotLight(AxialLight):
     def __post_init__(self) -> None:
         super().__post_init__()
         if str(self.profile) not in PROFILES:
-            raise ValueError(f"a spot's profile must be one of {', '.join(PROFILES)}, got {self.profile!r}")
-        if not 0.0 <= self.cone_angle <= math.pi or not self.falloff >= 0.0:
-            found = f"{self.cone_angle} and {self.falloff}"
-            raise ValueError(f"a spot needs 0 ≤ cone_angle ≤ π and falloff ≥ 0, got {found}")
+            expected, found = f"one of {', '.join(PROFILES)}", f"{self.profile!r:.80}"
+            raise InputError("profile", expected=expected, found=found, remedy="gaussian is usual.")
 
     @classmethod
     def shaped(cls, profile: SpotProfile = "smoothstep", cone_angle: float = CONES[1], falloff: float = 0.15) -> Self:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rgspipe.scene.models.box import Box, Vector
+from rgspipe.arguments import as_number, as_several
+from rgspipe.scene.models.box import Box, Vector, check_albedo, check_lengths
 from rgspipe.scene.rectangles import Rectangles, rectangle
 
 #: The walls, in the order of `CornellBox.walls`.
@@ -22,6 +23,9 @@ class CornellBox:
         boxes: what stands in the room.
         gloss: specular reflectance k_s of the boxes; 0 leaves them diffuse.
         shininess: exponent n of their Phong lobe.
+
+    Raises:
+        InputError: a length is not above 0, or a reflectance not from 0 to 1.
     """
 
     room: Vector = (1.0, 1.0, 1.0)
@@ -34,6 +38,15 @@ class CornellBox:
     )
     gloss: float = 0.0
     shininess: float = 20.0
+
+    def __post_init__(self) -> None:
+        check_lengths("room", self.room)
+        for name in ("white", "left", "right"):
+            check_albedo(name, getattr(self, name))
+        boxes = as_several(self.boxes, Box, "boxes", "Pass a tuple of them, empty for none.")
+        object.__setattr__(self, "boxes", tuple(boxes))
+        as_number(self.gloss, "gloss", expected="a reflectance from 0 to 1", low=0.0, high=1.0)
+        as_number(self.shininess, "shininess", expected="an exponent, 1 or more", low=1.0)
 
     def walls(self) -> Rectangles:
         """The five walls, which face into the room."""

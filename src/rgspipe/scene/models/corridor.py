@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from rgspipe.scene.models.box import Box, Vector
+from rgspipe.arguments import as_number
+from rgspipe.scene.models.box import Box, Vector, check_albedo
 from rgspipe.scene.models.floor_plan import FloorPlan
 from rgspipe.scene.rectangles import Rectangles
 
@@ -48,6 +49,9 @@ class Corridor:
         wall: albedo of walls and ceiling.
         floor: albedo of the floor.
         near_end, far_end: albedo of the walls at the end of the leg with the target cameras, and of the other.
+
+    Raises:
+        InputError: a length is out of range, or a reflectance not from 0 to 1.
     """
 
     width: float = 0.32
@@ -56,6 +60,13 @@ class Corridor:
     floor: Vector = (0.55, 0.5, 0.42)
     near_end: Vector = (0.2, 0.35, 0.65)
     far_end: Vector = (0.7, 0.4, 0.15)
+
+    def __post_init__(self) -> None:
+        expected = "a width below the 1 that each leg is long"
+        as_number(self.width, "width", expected=expected, low=math.nextafter(0.0, 1.0), high=math.nextafter(1.0, 0.0))
+        as_number(self.height, "height", expected="a height above 0", low=math.nextafter(0.0, 1.0))
+        for name in ("wall", "floor", "near_end", "far_end"):
+            check_albedo(name, getattr(self, name))
 
     def plan(self) -> FloorPlan:
         """Its walls, floor and ceiling."""
