@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PIL import ExifTags, Image
+from PIL import ExifTags, Image, ImageCms
 
 from rgspipe.datasets.display_image import read_colour_levels, read_levels
 from rgspipe.datasets.images import read_colour, read_mask
@@ -189,3 +189,31 @@ def test_colours_by_another_curve_are_refused(tmp_path: Path, gamma: int, good: 
         return
     with pytest.raises(InputError, match=r"a\.png: expected colours as of sRGB, found a gamma of"):
         read_colour(tmp_path / "a.png")
+
+
+@pytest.mark.parametrize(
+    ("gamma", "good"),
+    [("00026666", True), ("00023333", False), ("0001cccd", False)],  # 2.4, as sRGB has it with its toe, 2.2, 1.8
+)
+@pytest.mark.parametrize("suffix", [".png", ".jpg"])
+def test_colours_by_the_curve_of_another_profile_are_refused(
+    tmp_path: Path, suffix: str, gamma: str, good: bool
+) -> None:
+    """Photographs in AdobeRGB or ProPhoto were taken for sRGB."""
+    profile = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
+    assert profile.count(bytes.fromhex("00026666")) == 1
+    profile = profile.replace(bytes.fromhex("00026666"), bytes.fromhex(gamma))
+    path = tmp_path / f"a{suffix}"
+    Image.fromarray(COLOUR).save(path, icc_profile=profile)
+    assert read_levels(path).levels.shape == COLOUR.shape
+    if good:
+        read_colour(path)
+        return
+    with pytest.raises(InputError, match=r"expected colours as of sRGB, found the profile .* levels off"):
+        read_colour(path)
+
+
+@pytest.mark.parametrize("profile", [b"x", b"\0" * 500])
+def test_a_damaged_profile_says_nothing(tmp_path: Path, profile: bytes) -> None:
+    Image.fromarray(COLOUR).save(tmp_path / "a.png", icc_profile=profile)
+    read_colour(tmp_path / "a.png")

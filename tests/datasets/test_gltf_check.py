@@ -65,6 +65,18 @@ CLAIMS: dict[str, tuple[tuple, object, str]] = {
     "a material of no number": (("meshes", 0, "primitives", 0, "material"), -1, "material: expected a whole number"),
     "materials that are none": (("materials",), 7, "materials: expected a list of objects"),
     "a mesh of no number": (("nodes", 0, "mesh"), 7, "nodes[0].mesh: expected the number of one of 1"),
+    "nodes below each other": (
+        ("nodes",),
+        [{"mesh": 0}, {"children": [2]}, {"children": [1]}],
+        "a node that is its own descendant",
+    ),
+    "a node below itself": (("nodes",), [{"mesh": 0, "children": [0]}], "a node that is its own descendant"),
+    "a node of two parents": (
+        ("nodes",),
+        [{"children": [2]}, {"children": [2]}, {"mesh": 0}],
+        "found two: nodes[0] and nodes[1]",
+    ),
+    "a child of no number": (("nodes",), [{"mesh": 0, "children": [9]}], "children: expected the number of one of 1"),
     "an old version": (("asset", "version"), "1.0", "asset.version: expected 2.0"),
     "a picture of no number": (("textures", 0, "source"), 7, "textures[0].source: expected the number of one of 1"),
 }

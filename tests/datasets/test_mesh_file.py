@@ -165,15 +165,34 @@ def test_no_file_is_opened_that_a_mesh_does_not_name(tmp_path: Path) -> None:
 @pytest.mark.parametrize("rows", [-1, 1])
 def test_text_of_a_ply_has_the_rows_that_it_says(tmp_path: Path, rows: int) -> None:
     """A point that is missing was made up by the first triangle, and those beyond the last were left out."""
-    content = trimesh.Trimesh(VERTICES, FACES, process=False).export(file_type="ply", encoding="ascii").decode()
-    (tmp_path / "a.ply").write_text(content)
+    lines = text_ply(tmp_path)
     assert len(read_mesh(tmp_path / "a.ply")) == 12
-    lines = content.splitlines()
     first = lines.index("end_header") + 1
     (tmp_path / "a.ply").write_text(
         "\n".join([*lines[:first], *([lines[first]] * rows or []), *lines[first + (rows < 0) :]])
     )
+    with pytest.raises(InputError, match=r"a\.ply: (vertex 23|face 0): expected a row of [13] properties"):
+        read_mesh(tmp_path / "a.ply")
+    (tmp_path / "a.ply").write_text("\n".join(lines[:-1] if rows < 0 else [*lines, lines[-1]]))
     with pytest.raises(InputError, match=rf"a\.ply: expected 36 rows after the header, found {36 + rows}"):
+        read_mesh(tmp_path / "a.ply")
+
+
+def text_ply(folder: Path) -> list[str]:
+    """Lines of `a.ply`, a box in text."""
+    content = trimesh.Trimesh(VERTICES, FACES, process=False).export(file_type="ply", encoding="ascii").decode()
+    (folder / "a.ply").write_text(content)
+    return content.splitlines()
+
+
+@pytest.mark.parametrize("change", ["7 3", "", "4"])
+def test_a_face_in_text_with_a_number_too_many_or_too_few_is_refused(tmp_path: Path, change: str) -> None:
+    """It was read as other triangles, silently."""
+    lines = text_ply(tmp_path)
+    first = lines.index("end_header") + 25  # after 24 vertices
+    lines[first] = lines[first].replace("3", change, 1)
+    (tmp_path / "a.ply").write_text("\n".join(lines))
+    with pytest.raises(InputError, match=r"a\.ply: face 0: expected a row of 1 properties"):
         read_mesh(tmp_path / "a.ply")
 
 

@@ -6,6 +6,7 @@ import errno
 import json
 import multiprocessing
 import os
+import threading
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -256,6 +257,29 @@ def test_what_is_refused_leaves_nothing_unless_something_was_made(tmp_path: Path
 
     with pytest.raises(InputError, match="walls"):
         ArtifactStore(tmp_path).build(KEY, RECIPE, refuse)
-    left = [path.name for path in (tmp_path / "scene" / "stage").iterdir()]
+    left = [path.name for path in tmp_path.glob("scene/stage/*")]
     assert sorted(left) == ([f".lock-{KEY.fingerprint}", f".partial-{KEY.fingerprint}"] if written else [])
+    assert (tmp_path / "scene").exists() == bool(written)
     assert built(tmp_path).facts == {"answer": 42}
+
+
+def test_who_waits_for_what_is_refused_makes_it_in_a_new_folder(tmp_path: Path) -> None:
+    begun, refused, made = threading.Event(), threading.Event(), []
+
+    def refuse(_: Path) -> Mapping[str, object]:
+        begun.set()
+        time.sleep(0.5)  # until the other waits
+        raise InputError("scene", expected="walls", found="none", remedy="Build some.")
+
+    def first() -> None:
+        with pytest.raises(InputError, match="walls"):
+            ArtifactStore(tmp_path).build(KEY, RECIPE, refuse)
+        refused.set()
+
+    threads = [threading.Thread(target=first), threading.Thread(target=lambda: made.append(built(tmp_path)))]
+    threads[0].start()
+    assert begun.wait(10)
+    threads[1].start()
+    for thread in threads:
+        thread.join(10)
+    assert refused.is_set() and made[0].facts == {"answer": 42}

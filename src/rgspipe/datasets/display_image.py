@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
-from PIL import ExifTags, Image, UnidentifiedImageError
+from PIL import ExifTags, Image, ImageCms, UnidentifiedImageError
 
 from rgspipe.datasets.input_file import check_pixel_count, input_file
 from rgspipe.datasets.reading_limits import timed
@@ -35,6 +35,9 @@ COLOUR_ROUNDING = 1.5
 
 #: What a PNG of sRGB states as its gamma, and by how much it may miss that.
 DISPLAY_GAMMA, SAME_GAMMA = 1.0 / 2.2, 0.03
+
+#: Levels by which a profile may show greys otherwise than sRGB: its variants do by 2, a gamma of 2.2 by 7.
+SAME_LEVELS = 3
 
 #: What Pillow raises of damaged files, and of those that claim more pixels than it decodes.
 DAMAGED = (OSError, SyntaxError, ValueError, MemoryError, Image.DecompressionBombError)
@@ -186,12 +189,35 @@ def _check_orientation(path: Path, file: Image.Image) -> None:
 
 
 def _other_curve(path: Path, file: Image.Image) -> InputError | None:
-    """What to say of colours that a PNG states to be stored by another curve than that of a display."""
+    """What to say of colours that a file states to be stored by another curve than that of a display.
+
+    Which red, green and blue they are of does not matter: light bounces alike in all, and lamps are told in them.
+    """
     gamma = file.info.get("gamma", DISPLAY_GAMMA)
-    if "srgb" in file.info or abs(gamma - DISPLAY_GAMMA) <= SAME_GAMMA:
+    profile = file.info.get("icc_profile")
+    if "srgb" in file.info:
         return None
-    remedy = "Convert the image to sRGB, or, if its levels are meant as they are, remove the chunk gAMA."
-    return InputError(path, expected="colours as of sRGB", found=f"a gamma of {gamma:g}", remedy=remedy)
+    if profile:
+        found, what = _profile_curve(profile, file.mode), "its colour profile"
+    else:
+        found, what = None if abs(gamma - DISPLAY_GAMMA) <= SAME_GAMMA else f"a gamma of {gamma:g}", "the chunk gAMA"
+    remedy = f"Convert the image to sRGB, or, if its levels are meant as they are, remove {what}."
+    return None if found is None else InputError(path, expected="colours as of sRGB", found=found, remedy=remedy)
+
+
+def _profile_curve(profile: bytes, mode: str) -> str | None:
+    """What an ICC profile makes of greys that sRGB does not; None if nothing, or it is not to be understood."""
+    ramp = np.arange(256, dtype=np.uint8)[None]
+    grey = Image.fromarray(ramp).convert("L" if mode in ("L", "LA", "1") else "RGB")
+    try:
+        own = ImageCms.ImageCmsProfile(io.BytesIO(profile))
+        intent = ImageCms.Intent.RELATIVE_COLORIMETRIC
+        shown = ImageCms.profileToProfile(grey, own, ImageCms.createProfile("sRGB"), intent, outputMode="RGB")
+        name = ImageCms.getProfileDescription(own).strip()
+    except (ImageCms.PyCMSError, OSError, ValueError, TypeError):  # damaged, or of other colours: shown as without it
+        return None
+    off = int(np.abs(np.asarray(shown, dtype=np.int64) - ramp[..., None]).max())
+    return f"the profile {name!r:.80}, which shows greys {off} levels off" if off > SAME_LEVELS else None
 
 
 def _unpacked(path: Path, file: Image.Image) -> np.ndarray:

@@ -78,6 +78,7 @@ class _Check:
         for where, node in self._parts("nodes"):
             if "mesh" in node:
                 self._index(node, "mesh", where, len(self._parts("meshes")))
+        self._tree()
 
     def _extensions(self) -> None:
         needed = self.content.get("extensionsRequired", [])
@@ -184,6 +185,29 @@ class _Check:
             check_texture(file.read_bytes(), file)
         else:
             check_texture(self._decoded(uri, where), self.path)
+
+    def _tree(self) -> None:
+        """Refuse nodes that are their own descendants, or have two parents: nobody could say what stands where."""
+        nodes = self._parts("nodes")
+        parents: dict[int, str] = {}
+        below: list[list[int]] = []
+        for where, node in nodes:
+            children = node.get("children", [])
+            if not isinstance(children, list):
+                self._refuse(f"{where}.children", "a list of nodes", shown(children), PLAIN)
+            below.append([self._index({"children": one}, "children", where, len(nodes)) for one in children])
+            for child in below[-1]:
+                if child in parents:
+                    found = f"two: {parents[child]} and {where}"
+                    self._refuse(f"nodes[{child}]", "at most one parent", found, PLAIN)
+                parents[child] = where
+        left = [number for number in range(len(nodes)) if number not in parents]
+        reached = 0
+        while left:
+            reached += 1
+            left.extend(below[left.pop()])
+        if reached < len(nodes):
+            self._refuse("nodes", "trees", "a node that is its own descendant", PLAIN)
 
     def _object(self, holder: dict, key: str, where: str) -> dict:
         value = holder.get(key, {})

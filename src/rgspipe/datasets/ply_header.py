@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -21,12 +22,16 @@ KINDS = {
     "float64": "f8",
 }  # fmt: skip
 
+#: What a property is called in the place of its kind where it has several numbers, after how many.
+LIST = "list"
+
 
 @dataclass
 class _Element:
     name: str
     count: int
     kinds: list[str] = field(default_factory=list)
+    names: list[str] = field(default_factory=list)
 
 
 def check_header(path: Path) -> None:
@@ -64,12 +69,13 @@ def check_header(path: Path) -> None:
 
 
 def check_rows(path: Path) -> None:
-    """Refuse text that has other rows than its header says: whoever reads it takes one element's for another's.
+    """Refuse text whose rows are not those of its header: whoever reads it takes one element's for another's, or reads
+    what a number too many has shifted.
 
     What is no header at all is left to the reader.
 
     Raises:
-        InputError: naming both numbers.
+        InputError: names the row.
     """
     with path.open("rb") as stream:
         lines: list[list[str]] = []
@@ -80,25 +86,55 @@ def check_rows(path: Path) -> None:
             lines.append(line.decode("ascii", errors="replace").split())
         if not any(line[:2] == ["format", "ascii"] for line in lines):
             return
-        rows = sum(bool(line.strip()) for line in stream)
-    claimed = [int(line[2]) for line in lines if line[:1] == ["element"] and len(line) == 3 and line[2].isdecimal()]
-    if rows != sum(claimed):
-        expected, remedy = f"{sum(claimed)} rows after the header", "Export it again, or copy it anew."
-        raise InputError(path, expected=expected, found=f"{rows}", remedy=remedy)
+        rows = (words for line in stream if (words := line.split()))
+        read = 0
+        for element in _listed(lines):
+            for number, words in enumerate(itertools.islice(rows, element.count)):
+                read += 1
+                if not _fits(words, element.kinds):
+                    expected = f"a row of {len(element.kinds)} properties"
+                    found, remedy = f"{len(words)} words: {b' '.join(words)[:60]!r}", "Export it again."
+                    raise InputError(f"{path}: {element.name} {number}", expected=expected, found=found, remedy=remedy)
+        rest = sum(1 for _ in rows)
+    claimed = sum(element.count for element in _listed(lines))
+    if read + rest != claimed:
+        expected, remedy = f"{claimed} rows after the header", "Export it again, or copy it anew."
+        raise InputError(path, expected=expected, found=f"{read + rest}", remedy=remedy)
+
+
+def _fits(words: list[bytes], kinds: list[str]) -> bool:
+    """Whether a row has a word for each property, and for each entry of a list as many as it says first."""
+    if LIST not in kinds:
+        return len(words) == len(kinds)
+    place = 0
+    for kind in kinds:
+        entries = words[place : place + 1]
+        place += 1
+        if kind == LIST:
+            place += int(entries[0]) if entries and entries[0].isdigit() and len(entries[0]) < 10 else 0
+    return place == len(words)
 
 
 def _elements(path: Path, lines: list[list[str]]) -> list[_Element]:
+    """The elements of a header without lists."""
+    elements = _listed(lines)
+    for element in elements:
+        if LIST in element.kinds and element.count:
+            raise InputError(
+                f"{path}: element {element.name}, property {element.names[element.kinds.index(LIST)]}",
+                expected="one number for each vertex",
+                found="a list",
+                remedy="Export the file again, without faces.",
+            )
+    return elements
+
+
+def _listed(lines: list[list[str]]) -> list[_Element]:
     elements: list[_Element] = []
     for words in lines:
         if words[:1] == ["element"] and len(words) == 3 and words[2].isdecimal() and len(words[2]) < 20:
             elements.append(_Element(words[1], int(words[2])))
         elif words[:1] == ["property"] and elements and len(words) > 2:
-            if words[1] == "list" and elements[-1].count:
-                raise InputError(
-                    f"{path}: element {elements[-1].name}, property {words[-1]}",
-                    expected="one number for each vertex",
-                    found="a list",
-                    remedy="Export the file again, without faces.",
-                )
             elements[-1].kinds.append(words[1])
+            elements[-1].names.append(words[-1])
     return elements

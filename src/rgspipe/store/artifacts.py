@@ -27,7 +27,6 @@ from rgspipe.store.files import (
     NO_RIGHT,
     OCCUPIED,
     UNWRITABLE,
-    make_folder,
     point_at,
     publish,
     set_aside,
@@ -238,7 +237,6 @@ class ArtifactStore:
             the artifact, and whether this call made it.
         """
         path, partial = self.path(key), self.partial(key)
-        make_folder(path.parent)
         with locked(path.parent, key.fingerprint):
             if (damage := self.damage(key)) is not None:
                 log.warning("%s: %s: made again; what is left is in %s", damage.where, damage.found, set_aside(path))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 
 from rgspipe.errors import InputError
@@ -25,12 +26,15 @@ def begin(partial: Path) -> bool:
 
 
 def forget(partial: Path, lock: Path) -> None:
-    """Leave no trace of what was refused before anything was made of it; its lock is held."""
+    """Leave no trace of what was refused before anything was made of it, nor empty folders; its lock is held."""
     if any(path.is_file() for path in partial.rglob("*")):
         return
     remove_tree(partial)
     # Who waits for the lock sees that its file is gone, and takes a new one.
     lock.unlink()
+    for folder in (partial.parent, partial.parent.parent):  # of its stage, and of its scene
+        with contextlib.suppress(OSError):  # something is in it, or was never ours
+            folder.rmdir()
 
 
 def remove_scratch(partial: Path) -> None:
