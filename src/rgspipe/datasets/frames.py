@@ -16,6 +16,7 @@ from rgspipe.datasets.named_cameras import read_camera
 from rgspipe.datasets.rigid_pose import check_place, rigid_pose
 from rgspipe.errors import InputError
 from rgspipe.scene import Camera
+from rgspipe.scene.camera import longest_focal
 from rgspipe.scene.lights import WATTS_PER_INTENSITY
 
 #: The key of a camera by its name in the scene's own file, and that of the file that lists these.
@@ -212,10 +213,10 @@ class FrameEntry:
     def _camera_from_intrinsics(self, pose: Tensor, intrinsics: object, width: int, height: int) -> Camera:
         cx, cy, fx, fy = numbers(intrinsics, 4, self.where, "camera_intrinsics")
         place = f"{self.where}.camera_intrinsics"
-        if min(fx, fy) < SHORTEST:
-            raise InputError(
-                place, expected="focal lengths in pixels, above 0", found=f"{fx:g}, {fy:g}", remedy="Correct them."
-            )
+        longest = longest_focal(max(width, height))
+        if min(fx, fy) < SHORTEST or max(fx, fy) > longest:
+            expected = f"focal lengths in pixels, above 0 and up to {longest:g}"
+            raise InputError(place, expected=expected, found=f"{fx:g}, {fy:g}", remedy="Correct them.")
         for key, expected in (("w", width), ("h", height)):
             stated = self.fields.get(key, self.shared.get(key, expected))
             if stated != expected:

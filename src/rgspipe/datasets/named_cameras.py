@@ -15,6 +15,7 @@ from rgspipe.datasets.limits import LARGEST
 from rgspipe.datasets.rigid_pose import rigid_pose
 from rgspipe.errors import InputError
 from rgspipe.scene import Camera
+from rgspipe.scene.camera import longest_focal
 from rgspipe.store.files import write_json
 
 VERSION = 1
@@ -85,7 +86,8 @@ def read_camera(path: Path, name: str) -> NamedCamera:
     if focal < SHORTEST or side not in get_args(Side):
         expected = f'"focal" of at least {SHORTEST:g} and "side" one of {", ".join(get_args(Side))}'
         raise InputError(place, expected=expected, found=f"{focal:g}, {shown(side)}", remedy="Correct them.")
-    if max(abs(value) for value in (focal, *shift)) > LARGEST:
-        expected, found = f'"focal" and "shift" of at most {LARGEST:g}', f"{focal:g}, {shift[0]:g}, {shift[1]:g}"
+    if focal > longest_focal(1) or max(abs(value) for value in shift) > LARGEST:
+        expected = f'"focal" of at most {longest_focal(1):g}, and "shift" of {LARGEST:g}'
+        found = f"{focal:g}, {shift[0]:g}, {shift[1]:g}"
         raise InputError(place, expected=expected, found=found, remedy="Correct them.")
     return NamedCamera(pose, focal, side, (shift[0], shift[1]))

@@ -32,6 +32,9 @@ STEEPEST = 1e100
 #: Radians across the narrowest image: telescopes see a hundred times as much.
 NARROWEST = 1e-6
 
+#: Of a focal length that is computed from an angle.
+ROUNDING = 1e-9
+
 
 @dataclass(frozen=True)
 class _Pose:
@@ -67,7 +70,7 @@ class Camera(ByValue, Pinhole, _Pose):
         for name in ("cx", "cy"):
             as_number(getattr(self, name), name)
         for focal, centre, size in (("fx", self.cx, self.width), ("fy", self.cy, self.height)):
-            _check_focal_length(focal, getattr(self, focal), abs(centre) + size, size)
+            _check_focal_length(focal, getattr(self, focal), abs(centre) + size, max(self.width, self.height))
 
     @classmethod
     def look_at(
@@ -169,7 +172,7 @@ class Camera(ByValue, Pinhole, _Pose):
 
 
 def _check_focal_length(name: str, length: float, reach: float, size: int) -> None:
-    """Refuse a focal length that no lens has, of an image of `size` pixels that reach so far from its axis.
+    """Refuse a focal length that no lens has, of an image of `size` pixels across that reach so far from its axis.
 
     Raises:
         InputError: it is not positive, so short that directions have no length in double precision, or so long that
@@ -178,9 +181,14 @@ def _check_focal_length(name: str, length: float, reach: float, size: int) -> No
     expected, remedy = "a focal length in pixels, above 0", "Axes with another sign belong into camera_to_world."
     if not 0.0 < reach < STEEPEST * as_number(length, name, remedy, expected=expected):
         raise InputError(name, expected=expected, found=f"{length}", remedy=remedy)
-    if length * NARROWEST > size:
-        expected = f"at most {size / NARROWEST:g} pixels for {size} pixels across"
+    if length > longest_focal(size) * (1.0 + ROUNDING):
+        expected = f"at most {longest_focal(size):g} pixels for {size} pixels across"
         raise InputError(name, expected=expected, found=f"{length:g}", remedy="Focal lengths are in pixels.")
+
+
+def longest_focal(size: int) -> float:
+    """The longest focal length in pixels of an image that is so many pixels across."""
+    return size / NARROWEST
 
 
 def look_at(origin: ArrayLike, target: ArrayLike, up: ArrayLike | None = None) -> Float[Tensor, "4 4"]:
