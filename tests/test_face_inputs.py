@@ -295,6 +295,15 @@ REFUSED: dict[str, tuple[Callable[[rg.FrozenScene, Tensor], object], str, str, s
         "255",
         "Divide",
     ),
+    "a masked array": (
+        lambda s, i: fit(s, np.ma.masked_less(i.numpy(), 0.05)),
+        "images[0]",
+        "a masked array",
+        "masks",
+    ),
+    "a complex image": (lambda s, i: fit(s, i.to(torch.complex64)), "images[0]", "complex64", "channels last"),
+    "a sparse image": (lambda s, i: fit(s, i.to_sparse()), "images[0]", "sparse", "channels last"),
+    "an image without content": (lambda s, i: fit(s, i.to("meta")), "images[0]", "on meta", "channels last"),
     "a mask of nothing": (lambda s, i: fit(s, i, masks=np.zeros((HEIGHT, WIDTH))), "target", "0 of 1920", "masks"),
     "a mask with channels": (
         lambda s, i: fit(s, i, masks=np.ones((HEIGHT, WIDTH, 1))),
@@ -317,6 +326,7 @@ REFUSED: dict[str, tuple[Callable[[rg.FrozenScene, Tensor], object], str, str, s
         "99",
         "range",
     ),
+    "a step of no length": (lambda s, i: rg.Search(schedule={"met": 0}), "schedule.met", "0", "range"),
     "a misspelt threshold": (
         lambda s, i: rg.Search(certainty={"doubtfl": 0.1}),
         "certainty.doubtfl",
@@ -435,6 +445,17 @@ def test_what_cannot_be_meant_is_refused_in_words(scene, image, case: str) -> No
     error = caught.value
     assert error.where == where and found in error.found and remedy in error.remedy, error
     assert error.expected and str(error).startswith(f"{where}: expected ")
+
+
+def test_another_default_type_of_torch_is_refused_in_words(scene, image) -> None:
+    """It ended in errors of kernels."""
+    torch.set_default_dtype(torch.float64)
+    try:
+        for act in (lambda: fit(scene, image), lambda: freeze(few_surfels())):
+            with pytest.raises(rg.InputError, match=r"torch\.set_default_dtype: expected torch\.float32"):
+                act()
+    finally:
+        torch.set_default_dtype(torch.float32)
 
 
 def fit(scene: rg.FrozenScene, image: Any, **options: Any) -> rg.FitResult:

@@ -188,6 +188,25 @@ def test_foreign_files_count_by_content(config: RgspipeConfig, tmp_path: Path) -
     assert steps[0].reason == f"the files in {source} changed"
 
 
+@pytest.mark.parametrize("gone", [False, True])
+def test_a_file_that_changes_while_a_run_reads_it_is_refused_and_nothing_is_kept_of_it(
+    config: RgspipeConfig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, gone: bool
+) -> None:
+    """What was made of it had the fingerprint of what had been there before, and was reused for good."""
+    source = tmp_path / "foreign.txt"
+    source.write_text("1")
+
+    load = {**toys.STAGES, "sow": dataclasses.replace(toys.SOW, files=lambda config: [source])}.__getitem__
+    with monkeypatch.context() as meanwhile:
+        change = (lambda: source.unlink(missing_ok=True)) if gone else (lambda: source.write_text("2"))
+        meanwhile.setattr(toys.time, "sleep", lambda _: change())
+        with pytest.raises(InputError, match=r"foreign\.txt: expected what it was when the run began"):
+            run(config, load)
+    assert not list((Path(config.outputs) / "cornell").glob("sow/.partial-*"))
+    source.write_text("1")
+    assert run(config, load).file("totals.txt").read_text() == "496\n1488\n"
+
+
 @pytest.mark.parametrize(
     ("name", "damage", "word"),
     [

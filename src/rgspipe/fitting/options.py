@@ -57,7 +57,7 @@ class ScheduleOptions(Options):
     """share of starts with an axis that take the first turn, by how they look before it"""
     going_on: float = option(0.4, low=0, high=1)
     """share of the starts, at least two of them, that take a turn after the one before: the best go on"""
-    met: float = option(0.02, low=0, high=10)
+    met: float = option(0.02, low=1e-3, high=10)
     """rigs whose lights are within this part of the scene's size, and as many rad, are on their way to one place; and
     two lights of one rig that end so close are one, where their number is open"""
 

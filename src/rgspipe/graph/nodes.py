@@ -10,8 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from rgspipe.config import RgspipeConfig
+from rgspipe.errors import InputError
 from rgspipe.stages.base import Failure, Stage, StageContext
 from rgspipe.store.artifacts import Artifact, ArtifactStore, Key
+from rgspipe.store.files import remove_any, tree_digest
 
 log = logging.getLogger(__name__)
 
@@ -91,6 +93,7 @@ class Making:
         def make(folder: Path) -> Mapping[str, Any]:
             context = StageContext(node.config, inputs, lists, folder, failures=failed)
             node.stage.run(context)
+            _check_unchanged(node.recipe["foreign"], folder)
             return context.facts
 
         log.info("%s: %s", node.stage.name, node.stage.help)
@@ -114,3 +117,17 @@ class Making:
             else:
                 found.append(self.artifacts[needed.key])
         return lists, failed
+
+
+def _check_unchanged(foreign: Mapping[str, str], folder: Path) -> None:
+    """Refuse what was made of other files than those that its fingerprint is of, and remove it.
+
+    Raises:
+        InputError: a file or folder has changed since the run began.
+    """
+    changed = [path for path, digest in foreign.items() if tree_digest(Path(path)) != digest]
+    if changed:
+        for path in list(folder.iterdir()):
+            remove_any(path)
+        remedy = "Run again once nothing writes to it: what was made of it is removed."
+        raise InputError(changed[0], expected="what it was when the run began", found="other content", remedy=remedy)

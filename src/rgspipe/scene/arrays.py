@@ -48,6 +48,8 @@ def as_tensor(
         InputError: it holds no numbers, or has another shape.
     """
     tensor = value if isinstance(value, Tensor) else _from_numbers(value, name, shape, remedy)
+    if tensor.is_complex() or tensor.layout != torch.strided or tensor.device.type not in DEVICES:
+        _refuse(name, shape, f"a tensor of {tensor.dtype}, {tensor.layout}, on {tensor.device}", remedy)
     if not tensor.is_floating_point():
         tensor = tensor.double()
     if not _fits(tensor.shape, shape):
@@ -122,6 +124,8 @@ def _from_numbers(value: object, name: str, shape: Sequence[Axis], remedy: str) 
         array = np.array(value)
     except ValueError:  # rows of different lengths
         array = np.array(None)
+    if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
+        _refuse(name, shape, "a masked array, of which some are none", "Fill it, and say by masks what does not count.")
     if array.dtype.kind not in NUMBERS:
         _refuse(name, shape, f"{type(value).__name__} {value!r}"[:120], remedy)
     return torch.from_numpy(array.astype(np.float64))

@@ -15,6 +15,9 @@ import torch
 import warp as wp
 from torch import Tensor
 
+from rgspipe.errors import InputError
+from rgspipe.renderer.kernels.kernel_cache import start_with_cache
+
 wp.config.log_level = wp.LOG_ERROR
 
 
@@ -34,7 +37,7 @@ def _start() -> None:
         os.close(kept)
 
 
-_start()
+start_with_cache(_start)
 
 #: Slices per thread of a launch whose items differ in cost; more slices balance better and start slower.
 SLICES_PER_THREAD = 4
@@ -85,6 +88,7 @@ def launch(
     """
     if count == 0:
         return
+    _check_default_dtype()
     if device.type != "cpu":
         with torch_stream(device):
             wp.launch(kernel, dim=count, inputs=[0, 0, *inputs], device=wp.device_from_torch(device))
@@ -103,6 +107,18 @@ def launch(
     # Compile and load before the threads start, so that they do not queue on the module lock.
     kernel.module.load(wp.get_device("cpu"), block_dim=1)
     list(_threads().map(run, range(len(parts))))
+
+
+def _check_default_dtype() -> None:
+    """Refuse another default type than that of the kernels, in which tensors between them are made.
+
+    Raises:
+        InputError: somebody has set it.
+    """
+    default = torch.get_default_dtype()
+    if default != torch.float32:
+        remedy = "Set it back to torch.float32, and pass dtypes where you want others."
+        raise InputError("torch.set_default_dtype", expected="torch.float32", found=str(default), remedy=remedy)
 
 
 def as_vec3(tensor: Tensor) -> wp.array:
