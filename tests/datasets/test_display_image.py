@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 from PIL import ExifTags, Image, ImageCms
 
-from rgspipe.datasets.display_image import read_colour_levels, read_levels
+from rgspipe.datasets.display_image import read_colour_levels, read_levels, saturated_from
 from rgspipe.datasets.images import read_colour, read_mask
 from rgspipe.errors import InputError
 from rgspipe.scene import Camera, look_at, srgb
+from scan_layouts import write_wide_png
 
 #: The left half of 6 × 4 pixels counts.
 MASK = np.repeat([[255, 255, 255, 0, 0, 0]], 4, axis=0).astype(np.uint8)
@@ -86,11 +87,29 @@ def test_8_bit_colours_are_their_levels_bit_for_bit(tmp_path: Path) -> None:
     np.testing.assert_array_equal(stored.alpha, MASK.astype(np.float32) / 255.0)
 
 
-@pytest.mark.parametrize(("kind", "channels"), [(2, 3), (4, 2), (6, 4)])
-def test_16_bit_colours_are_refused_as_half_would_be_lost(tmp_path: Path, kind: int, channels: int) -> None:
-    path = _png(tmp_path / "deep.png", 16, kind, [bytes(range(2 * channels))], 1)
+def test_16_bit_grey_with_alpha_is_refused_as_half_would_be_lost(tmp_path: Path) -> None:
+    path = _png(tmp_path / "deep.png", 16, 4, [bytes(range(4))], 1)
     with pytest.raises(InputError, match=r"deep\.png: expected 8 bits a channel.*found 16.*OpenEXR"):
         read_levels(path)
+
+
+@pytest.mark.parametrize("channels", [3, 4])
+def test_16_bit_colours_are_read_whole_and_clipped_at_their_brightest_level(tmp_path: Path, channels: int) -> None:
+    levels = np.random.default_rng(0).integers(0, 65535, (5, 7, channels), dtype=np.uint16)
+    levels[0, 0], levels[0, 1] = 65535, 65534
+    write_wide_png(tmp_path / "a.png", levels)
+    stored = read_levels(tmp_path / "a.png")
+    np.testing.assert_array_equal(stored.levels, levels[..., :3])
+    assert (stored.opaque is None) == (channels == 3) or np.array_equal(stored.opaque, levels[..., 3])
+    assert stored.light[0, 0, 0] >= saturated_from(tmp_path / "a.png") > stored.light[0, 1, 0]
+
+
+def test_a_16_bit_colour_that_is_transparent_is(tmp_path: Path) -> None:
+    levels = np.random.default_rng(0).integers(0, 65535, (5, 7, 3), dtype=np.uint16)
+    write_wide_png(tmp_path / "a.png", levels)
+    _with_chunk(tmp_path / "a.png", b"tRNS", levels[2, 3].astype(">u2").tobytes())
+    alpha = read_levels(tmp_path / "a.png").alpha
+    assert alpha[2, 3] == 0.0 and alpha.sum() == 34.0
 
 
 @pytest.mark.parametrize("name", ["a.jpg", "a.png"])
@@ -174,21 +193,84 @@ def test_levels_that_are_looked_up_are_those_of_the_curve(kind: type) -> None:
     np.testing.assert_array_equal(srgb.decode_levels(levels), wanted)
 
 
+def _with_chunk(path: Path, name: bytes, content: bytes) -> None:
+    """Put a chunk before the pixels of a PNG."""
+    png = path.read_bytes()
+    place = png.index(b"IDAT") - 4
+    packed = struct.pack(">I", len(content)) + name + content + struct.pack(">I", zlib.crc32(name + content))
+    path.write_bytes(png[:place] + packed + png[place:])
+
+
+def _coloured(path: Path, bits: int) -> np.ndarray:
+    """The levels of a PNG in colour of so many bits, which is written."""
+    levels = COLOUR if bits == 8 else 257 * COLOUR.astype(np.uint16)
+    Image.fromarray(levels).save(path) if bits == 8 else write_wide_png(path, levels)
+    return levels
+
+
+@pytest.mark.parametrize("bits", [8, 16])
 @pytest.mark.parametrize(("gamma", "good"), [(45455, True), (43000, True), (100000, False), (55556, False), (0, False)])
-def test_colours_by_another_curve_are_refused(tmp_path: Path, gamma: int, good: bool) -> None:
+def test_colours_by_another_curve_are_refused(tmp_path: Path, gamma: int, good: bool, bits: int) -> None:
     """Of linear levels (a gamma of 1) those of sRGB were made a second time."""
-    Image.fromarray(COLOUR).save(tmp_path / "a.png")
-    content = (tmp_path / "a.png").read_bytes()
-    chunk = b"gAMA" + struct.pack(">I", gamma)
-    place = content.index(b"IDAT") - 4
-    packed = struct.pack(">I", 4) + chunk + struct.pack(">I", zlib.crc32(chunk))
-    (tmp_path / "a.png").write_bytes(content[:place] + packed + content[place:])
-    np.testing.assert_array_equal(read_levels(tmp_path / "a.png").levels, COLOUR)
+    levels = _coloured(tmp_path / "a.png", bits)
+    _with_chunk(tmp_path / "a.png", b"gAMA", struct.pack(">I", gamma))
+    np.testing.assert_array_equal(read_levels(tmp_path / "a.png").levels, levels)
     if good:
         read_colour(tmp_path / "a.png")
         return
     with pytest.raises(InputError, match=r"a\.png: expected colours as of sRGB, found a gamma of"):
         read_colour(tmp_path / "a.png")
+
+
+@pytest.mark.parametrize("bits", [8, 16])
+@pytest.mark.parametrize(
+    ("code", "good"),
+    [((1, 13, 0, 1), True), ((9, 13, 0, 1), True), ((1, 2, 0, 1), True), ((1,), True)]
+    + [((1, transfer, 0, 1), False) for transfer in (1, 8, 16, 18)]
+    + [((1, 13, 0, 0), False)],
+)
+def test_colours_by_another_curve_of_cicp_are_refused(
+    tmp_path: Path, code: tuple[int, ...], good: bool, bits: int
+) -> None:
+    """Of film (BT.709), of linear light, of HDR (PQ, HLG), and of levels that do not begin at 0."""
+    _coloured(tmp_path / "a.png", bits)
+    _with_chunk(tmp_path / "a.png", b"cICP", bytes(code))
+    if good:
+        read_colour(tmp_path / "a.png")
+        return
+    with pytest.raises(InputError, match=r"a\.png: .*found transfer characteristics \d+ of .* the chunk cICP"):
+        read_colour(tmp_path / "a.png")
+
+
+def test_what_cicp_says_stands_above_a_gamma(tmp_path: Path) -> None:
+    _coloured(tmp_path / "a.png", 8)
+    for name, content in ((b"cICP", bytes([1, 13, 0, 1])), (b"gAMA", struct.pack(">I", 100000))):
+        _with_chunk(tmp_path / "a.png", name, content)
+    read_colour(tmp_path / "a.png")
+
+
+@pytest.mark.parametrize(("space", "named", "good"), [(65535, "R03", False), (1, "R98", True), (65535, "R98", True)])
+def test_photographs_that_exif_says_to_be_in_adobe_rgb_are_refused(
+    tmp_path: Path, space: int, named: str, good: bool
+) -> None:
+    """Cameras write no profile of it, but a name in EXIF (DCF 2.0)."""
+    exif = Image.Exif()
+    exif.get_ifd(ExifTags.IFD.Exif).update({0xA001: space, ExifTags.IFD.Interop: {1: named}})
+    Image.fromarray(COLOUR).save(tmp_path / "a.jpg", exif=exif)
+    if good:
+        read_colour(tmp_path / "a.jpg")
+        return
+    with pytest.raises(InputError, match=r"a\.jpg: expected colours as of sRGB, found AdobeRGB.* remove its EXIF"):
+        read_colour(tmp_path / "a.jpg")
+
+
+def test_16_bit_pixels_that_are_to_be_turned_are_refused(tmp_path: Path) -> None:
+    _coloured(tmp_path / "a.png", 16)
+    exif = Image.Exif()
+    exif[ExifTags.Base.Orientation] = 6
+    _with_chunk(tmp_path / "a.png", b"eXIf", exif.tobytes().removeprefix(b"Exif\0\0"))
+    with pytest.raises(InputError, match=r"a\.png: expected pixels as they are shown.*orientation 6\."):
+        read_levels(tmp_path / "a.png")
 
 
 @pytest.mark.parametrize(

@@ -63,3 +63,33 @@ def test_a_name_of_colmap_that_no_path_can_have_is_refused(tmp_path: Path) -> No
     path.write_text(path.read_text().replace("00.exr", "a/" * 3000 + "00.exr"))
     with pytest.raises(InputError, match="no readable file"):
         read_picture(read_scan(tmp_path, ScanOptions()).frames[-1].image, "srgb")
+
+
+def test_images_of_colmap_without_lines_of_points_are_refused(tmp_path: Path) -> None:
+    """Every second photograph was taken for the points of the one before it, and left out."""
+    path = images_of(tmp_path)
+    lines = path.read_text().splitlines()
+    path.write_text("\n".join([lines[0], *lines[1::2]]) + "\n")
+    with pytest.raises(InputError, match=r"images\.txt: expected a line of points below that of 00\.exr.*found '2 "):
+        read_scan(tmp_path, ScanOptions())
+
+
+def test_empty_lines_between_images_of_colmap_and_a_last_line_that_is_missing_do_no_harm(tmp_path: Path) -> None:
+    path = images_of(tmp_path)
+    count = len(read_scan(tmp_path, ScanOptions()).frames)
+    lines = path.read_text().rstrip("\n").splitlines()
+    path.write_text("\n".join([lines[0], "", *lines[1:3], "", "", *lines[3:]]))
+    assert len(read_scan(tmp_path, ScanOptions()).frames) == count == len(SCANNED)
+
+
+@pytest.mark.parametrize(
+    ("model", "count", "expected"), [("SIMPLE_PINHOLE", 4, 3), ("SIMPLE_RADIAL", 6, 4), ("PINHOLE", 5, 4)]
+)
+def test_parameters_of_colmap_that_a_model_has_not_are_refused(
+    tmp_path: Path, model: str, count: int, expected: int
+) -> None:
+    """Those beyond the principal point became distortion."""
+    path = tmp_path / "cameras.txt"
+    path.write_text(" ".join(["1", model, "8", "8", *["4"] * count]))
+    with pytest.raises(InputError, match=rf"cameras\.txt: expected {expected} parameters.* {model}, found {count}\."):
+        read_cameras(path)

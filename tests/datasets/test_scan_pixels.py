@@ -16,6 +16,8 @@ from PIL import ExifTags, Image
 from PIL.TiffImagePlugin import IFDRational
 
 from raycast import BLOCK, ROOM, cast, room_views
+from rgspipe.datasets.display_image import read_levels
+from rgspipe.datasets.exr import read_image, write_image
 from rgspipe.datasets.gs3 import load_dataset
 from rgspipe.datasets.scans.frame import DepthImage, Lens
 from rgspipe.datasets.scans.importing import import_scan
@@ -197,6 +199,34 @@ def test_masked_pixels_are_left_out_however_little_of_one_is_masked(tmp_path: Pa
     expected[2, 3] = 0.0
     assert torch.equal(read[0].alpha, expected) and bool(read[1].alpha.all())
     assert torch.equal(read[0].depth.isnan(), expected == 0.0)
+
+
+@pytest.mark.parametrize("suffix", [".png", ".16.png", ".exr"])
+def test_what_of_a_photograph_is_not_opaque_does_not_count(tmp_path: Path, suffix: str) -> None:
+    """Its colours, which programs make white or black, were taken for light."""
+    write_nerfstudio(tmp_path / "scan", photographed(3, 32), suffix)
+    path = tmp_path / f"scan/images/0{suffix}"
+    alpha = np.ones((32, 32), np.float32)
+    alpha[9, 13] = 0.0
+    _with_alpha(path, alpha)
+    read = imported(tmp_path / "scan", resolution=8)
+    expected = torch.ones(8, 8)
+    expected[2, 3] = 0.0
+    assert torch.equal(read[0].alpha, expected) and bool(read[1].alpha.all())
+    assert torch.equal(read[0].depth.isnan(), expected == 0.0)
+    _with_alpha(path, 0.0 * alpha)
+    with pytest.raises(InputError, match=r"images/0.*: expected a photograph with pixels that are opaque, found none"):
+        imported(tmp_path / "scan", resolution=8)
+
+
+def _with_alpha(path: Path, alpha: np.ndarray) -> None:
+    if path.suffix == ".exr":
+        write_image(path, read_image(path)[0] * alpha[..., None], alpha)
+        return
+    levels = read_levels(path).levels
+    opaque = (np.iinfo(levels.dtype).max * alpha).astype(levels.dtype)
+    write = write_wide_png if levels.dtype == np.uint16 else lambda path, levels: Image.fromarray(levels).save(path)
+    write(path, np.dstack([levels, opaque]))
 
 
 def test_a_fisheye_lens_is_undone(tmp_path: Path) -> None:

@@ -11,10 +11,11 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
-from PIL import ExifTags, Image, ImageCms, UnidentifiedImageError
+from PIL import ExifTags, Image, UnidentifiedImageError
 
 from rgspipe.datasets.input_file import check_pixel_count, input_file
 from rgspipe.datasets.reading_limits import timed
+from rgspipe.datasets.stored_curve import other_curve
 from rgspipe.errors import InputError
 from rgspipe.scene import srgb
 
@@ -26,18 +27,12 @@ FORMATS = {".png": "PNG", ".jpg": "JPEG", ".jpeg": "JPEG"}
 #: What the pixels of each of Pillow's modes become: grey or colour, with alpha or without.
 MODES = {"1": "L", "L": "L", "LA": "LA", "RGB": "RGB", "RGBA": "RGBA", "P": "RGB", "PA": "RGBA"}
 
-#: Depth and colour type in a PNG's header; the type of pixels with three or four channels.
-DEPTH, COLOUR_TYPE, COLOURED = 24, 25, (2, 4, 6)
+#: Where a PNG has depth and type of colours; the types of colours, without and with alpha, and of grey with alpha.
+DEPTH, COLOUR_TYPE, COLOURED, GREY_ALPHA = 24, 25, (2, 6), 4
 
 #: Levels by which a JPEG's colours may miss, besides what its tables leave out: brightness and two differences of
 #: colour are rounded, and these go into blue 1.77 times.
 COLOUR_ROUNDING = 1.5
-
-#: What a PNG of sRGB states as its gamma, and by how much it may miss that.
-DISPLAY_GAMMA, SAME_GAMMA = 1.0 / 2.2, 0.03
-
-#: Levels by which a profile may show greys otherwise than sRGB: its variants do by 2, a gamma of 2.2 by 7.
-SAME_LEVELS = 3
 
 #: What Pillow raises of damaged files, and of those that claim more pixels than it decodes.
 DAMAGED = (OSError, SyntaxError, ValueError, MemoryError, Image.DecompressionBombError)
@@ -105,14 +100,14 @@ def read_levels(path: Path) -> Levels:
 
     Raises:
         InputError: missing or broken file, too many pixels, another format than the suffix says, CMYK, or 16-bit
-            colour, which no library at hand reads whole.
+            grey with alpha, which no library at hand reads whole.
     """
     input_file(path, "an image")
-    stored, other_curve = _levels(path, _format(path))
+    stored, curve = _levels(path, _format(path))
     stored = stored[..., None] if stored.ndim == 2 else stored
     channels = stored.shape[2]
     has_alpha = channels in (2, 4)
-    return Levels(stored[..., : channels - has_alpha], stored[..., -1] if has_alpha else None, other_curve)
+    return Levels(stored[..., : channels - has_alpha], stored[..., -1] if has_alpha else None, curve)
 
 
 def read_colour_levels(path: Path) -> Levels:
@@ -128,18 +123,19 @@ def read_colour_levels(path: Path) -> Levels:
 
 
 def saturated_from(path: Path) -> float:
-    """Linear radiance from which on an 8-bit image that can be read may have been clipped at its brightest level.
+    """Linear radiance from which on an image that can be read may have been clipped at its brightest level.
 
     In a PNG that is the brightest level itself, in a JPEG also what may have become of it: the levels within twice
     the standard deviation of what its table of brightness leaves out. Coefficients of an orthonormal transform are
     rounded to multiples of q, so that the error of a pixel has the variance of q² / 12 in the mean.
     """
-    margin = 0.5
-    if _format(path) == "JPEG":
+    margin, kind = 0.5, _format(path)
+    most = float(2 ** _depth(path, kind)[0] - 1)
+    if kind == "JPEG":
         with opened(path, path, ["JPEG"]) as file:
             table = np.asarray(file.quantization[0], dtype=np.float64)
         margin += COLOUR_ROUNDING + 2.0 * float(np.sqrt(np.mean(table**2) / 12.0))
-    return float(srgb.decode(np.array(max(255.0 - margin, 0.0) / 255.0)))
+    return float(srgb.decode(np.array(max(most - margin, 0.0) / most)))
 
 
 def _format(path: Path) -> str:
@@ -150,12 +146,15 @@ def _format(path: Path) -> str:
 
 
 def _levels(path: Path, kind: str) -> tuple[np.ndarray, InputError | None]:
-    """(H, W) or (H, W, C) uint8, or uint16 of a grey image; and what speaks against taking them for sRGB."""
+    """(H, W) or (H, W, C) uint8 or uint16; and what speaks against taking them for sRGB."""
     try:
         with opened(path, path, [kind]) as file:
-            _check_depth(path, kind)
+            depth, colour_type = _depth(path, kind)
+            if depth == 16 and colour_type == GREY_ALPHA:
+                raise _refusal(path, "8 bits a channel, or 16 of grey or colours", "16 of grey and alpha")
             _check_orientation(path, file)
-            return _unpacked(path, file), _other_curve(path, file)
+            wide = depth == 16 and colour_type in COLOURED
+            return (_wide if wide else _unpacked)(path, file), other_curve(path, file)
     except InputError:
         raise
     except UnidentifiedImageError as error:
@@ -166,12 +165,30 @@ def _levels(path: Path, kind: str) -> tuple[np.ndarray, InputError | None]:
         raise _refusal(path, "a whole PNG or OpenEXR image", f"an unreadable file ({error})") from error
 
 
-def _check_depth(path: Path, kind: str) -> None:
-    """Refuse 16-bit colours, of which Pillow drops the lower byte without a word."""
+def _depth(path: Path, kind: str) -> tuple[int, int]:
+    """Bits a channel of at least 8, and a PNG's type of colours."""
+    if kind != "PNG":
+        return 8, 2
     with path.open("rb") as stream:
         header = stream.read(COLOUR_TYPE + 1)
-    if kind == "PNG" and header[DEPTH] == 16 and header[COLOUR_TYPE] in COLOURED:
-        raise _refusal(path, "8 bits a channel", "16, of which half would be lost")
+    return max(header[DEPTH], 8), header[COLOUR_TYPE]
+
+
+def _wide(path: Path, file: Image.Image) -> np.ndarray:
+    """(H, W, 3 or 4) uint16 of 16-bit colours, of which Pillow reads the upper byte.
+
+    The lower one is what it reads as the upper byte where it is told the other order of bytes.
+    """
+    levels = np.asarray(file).astype(np.uint16)
+    levels <<= 8
+    with opened(path, path, ["PNG"]) as again:
+        again.tile = [part._replace(args=f"{again.mode};16L") for part in again.tile]
+        levels |= np.asarray(again)
+    clear = file.info.get("transparency")  # one colour that is
+    if clear is None:
+        return levels
+    opaque = np.where((levels == np.array(clear)).all(axis=2), 0, np.iinfo(np.uint16).max)
+    return np.dstack([levels, opaque.astype(np.uint16)])
 
 
 def _check_orientation(path: Path, file: Image.Image) -> None:
@@ -186,38 +203,6 @@ def _check_orientation(path: Path, file: Image.Image) -> None:
             "tag (exiftool -Orientation= FILE); if they are of the image as it is shown, turn the pixels (mogrify "
             "-auto-orient FILE).",
         )
-
-
-def _other_curve(path: Path, file: Image.Image) -> InputError | None:
-    """What to say of colours that a file states to be stored by another curve than that of a display.
-
-    Which red, green and blue they are of does not matter: light bounces alike in all, and lamps are told in them.
-    """
-    gamma = file.info.get("gamma", DISPLAY_GAMMA)
-    profile = file.info.get("icc_profile")
-    if "srgb" in file.info:
-        return None
-    if profile:
-        found, what = _profile_curve(profile, file.mode), "its colour profile"
-    else:
-        found, what = None if abs(gamma - DISPLAY_GAMMA) <= SAME_GAMMA else f"a gamma of {gamma:g}", "the chunk gAMA"
-    remedy = f"Convert the image to sRGB, or, if its levels are meant as they are, remove {what}."
-    return None if found is None else InputError(path, expected="colours as of sRGB", found=found, remedy=remedy)
-
-
-def _profile_curve(profile: bytes, mode: str) -> str | None:
-    """What an ICC profile makes of greys that sRGB does not; None if nothing, or it is not to be understood."""
-    ramp = np.arange(256, dtype=np.uint8)[None]
-    grey = Image.fromarray(ramp).convert("L" if mode in ("L", "LA", "1") else "RGB")
-    try:
-        own = ImageCms.ImageCmsProfile(io.BytesIO(profile))
-        intent = ImageCms.Intent.RELATIVE_COLORIMETRIC
-        shown = ImageCms.profileToProfile(grey, own, ImageCms.createProfile("sRGB"), intent, outputMode="RGB")
-        name = ImageCms.getProfileDescription(own).strip()
-    except (ImageCms.PyCMSError, OSError, ValueError, TypeError):  # damaged, or of other colours: shown as without it
-        return None
-    off = int(np.abs(np.asarray(shown, dtype=np.int64) - ramp[..., None]).max())
-    return f"the profile {name!r:.80}, which shows greys {off} levels off" if off > SAME_LEVELS else None
 
 
 def _unpacked(path: Path, file: Image.Image) -> np.ndarray:

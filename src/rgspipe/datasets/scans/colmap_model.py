@@ -21,6 +21,9 @@ from rgspipe.store.files import LONGEST_NAME
 MODELS = {0: ("SIMPLE_PINHOLE", 3), 1: ("PINHOLE", 4), 2: ("SIMPLE_RADIAL", 4), 3: ("RADIAL", 5), 4: ("OPENCV", 8)}
 MODELS |= {5: ("OPENCV_FISHEYE", 8), 8: ("SIMPLE_RADIAL_FISHEYE", 4), 9: ("RADIAL_FISHEYE", 5)}
 
+#: What helps against files that another program, or a person, wrote in another way than COLMAP.
+REWRITE = "Write it as COLMAP does (colmap model_converter --output_type TXT)."
+
 #: A quaternion shorter than this is none.
 LEAST_NORM = 1e-6
 
@@ -80,6 +83,17 @@ def _whole(path: Path, read: Callable[[Path, bytes], Parts]) -> Parts:
 
 
 def _lens(path: Path, model: str, size: Sequence[int], values: Sequence[float]) -> Lens:
+    parameters = dict(MODELS.values()).get(model)
+    if parameters is None:
+        raise InputError(
+            path,
+            expected=f"cameras of the models {', '.join(name for name, _ in MODELS.values())}",
+            found=shown(model),
+            remedy="Undistort the photographs (colmap image_undistorter) and give its output as scene.path.",
+        )
+    if len(values) != parameters:
+        expected, remedy = f"{parameters} parameters of a camera of the model {model}", REWRITE
+        raise InputError(path, expected=expected, found=f"{len(values)}", remedy=remedy)
     match model:
         case "SIMPLE_PINHOLE" | "SIMPLE_RADIAL" | "RADIAL":
             focal, cx, cy, *radial = values
@@ -92,14 +106,7 @@ def _lens(path: Path, model: str, size: Sequence[int], values: Sequence[float]) 
         case "SIMPLE_RADIAL_FISHEYE" | "RADIAL_FISHEYE":
             focal, cx, cy, *radial = values
             return Lens(focal, focal, cx, cy, *size, tuple(radial), fisheye=True)
-        case "OPENCV_FISHEYE":
-            return Lens(*values[:4], *size, tuple(values[4:]), fisheye=True)
-    raise InputError(
-        path,
-        expected=f"cameras of the models {', '.join(name for name, _ in MODELS.values())}",
-        found=shown(model),
-        remedy="Undistort the photographs (colmap image_undistorter) and give its output as scene.path.",
-    )
+    return Lens(*values[:4], *size, tuple(values[4:]), fisheye=True)  # OPENCV_FISHEYE
 
 
 def _text_cameras(path: Path, content: bytes) -> dict[int, Lens]:
@@ -128,13 +135,25 @@ def _binary_cameras(path: Path, content: bytes) -> dict[int, Lens]:
 
 
 def _text_images(path: Path, content: bytes) -> list[Photograph]:
-    # Each image has a second line, of its points, which may be empty.
-    found = []
-    for line in _lines(content)[::2]:
+    """Each image has a second line, of its points, which may be empty; the last one may lack it."""
+    lines, found = iter(_lines(content)), []
+    for line in lines:
         if line.strip():
             _, *values, camera, name = line.split(maxsplit=9)
             found.append(_photograph(name.strip(), int(camera), [float(value) for value in values]))
+            _check_points(path, found[-1].name, next(lines, ""))
     return found
+
+
+def _check_points(path: Path, name: str, line: str) -> None:
+    """Refuse what is no line of points (column, row, number) below an image: it may be the next image's, left out."""
+    try:
+        whole = len([float(word) for word in line.split()]) % 3 == 0
+    except ValueError:
+        whole = False
+    if not whole:
+        expected = f"a line of points below that of {name}, which may be empty"
+        raise InputError(path, expected=expected, found=shown(line[:60]), remedy=REWRITE)
 
 
 def _binary_images(path: Path, content: bytes) -> list[Photograph]:

@@ -11,17 +11,21 @@ import numpy as np
 from rgspipe.datasets.exr import write_channels, write_image
 from rgspipe.datasets.gs3_write import frame_entry, write_transforms
 from rgspipe.datasets.info import INFO
-from rgspipe.datasets.scans.frame import Scan, ScanFrame
+from rgspipe.datasets.scans.frame import Lens, Scan, ScanFrame
 from rgspipe.datasets.scans.lens_check import check_shape
 from rgspipe.datasets.scans.options import ScanOptions
-from rgspipe.datasets.scans.pictures import exposure_of, read_depth_image, read_picture
+from rgspipe.datasets.scans.pictures import Picture, exposure_of, read_depth_image, read_picture
 from rgspipe.datasets.scans.resample import resampled_colour, resampled_depth, straight_camera
+from rgspipe.errors import InputError
 from rgspipe.progress import progress_bar
 from rgspipe.scene import Camera
 from rgspipe.scene.passes import Passes
 from rgspipe.store.files import write_json
 
 TRANSFORMS = "transforms_train.json"
+
+#: Levels of a mask, of 1, up to which pixels do not count.
+MASKED = 0.5
 
 #: What a camera sees of surfaces that are known.
 Surfaces = Callable[[Camera], Passes]
@@ -108,8 +112,8 @@ def _written(
         entry["saturated_from"] = float(limit / np.float32(exposure))
     write_image(path.with_suffix(".exr"), light / np.float32(exposure))
     passes = _measured(frame, camera, options) if surfaces is None else surfaces(camera)
-    if frame.mask is not None:
-        used = _mask(frame, camera)
+    used = _used(frame, picture, camera)
+    if used is not None:
         passes = replace(passes, depth=None if passes.depth is None else np.where(used, passes.depth, np.nan))
         write_channels(path.with_name(f"{path.name}_mask.exr"), {"A": used.astype(np.float32)})
         entry["mask_path"] = f"./{path.parent.name}/{path.name}_mask.exr"
@@ -131,13 +135,29 @@ def _measured(frame: ScanFrame, camera: Camera, options: ScanOptions) -> Passes:
     return Passes(depth, None, albedo)
 
 
-def _mask(frame: ScanFrame, camera: Camera) -> np.ndarray:
-    """(H, W) bool: which of a camera's pixels show nothing that is masked."""
-    mask = read_picture(frame.mask, "linear").light
-    check_shape(frame.mask, mask.shape, frame.lens)
-    # What is masked is "clipped" downwards: any sample of it counts.
-    _, masked = resampled_colour(1.0 - mask, 0.5, camera, frame.lens)
-    return ~masked.any(axis=2)
+def _used(frame: ScanFrame, picture: Picture, camera: Camera) -> np.ndarray | None:
+    """(H, W) bool: which of a camera's pixels show nothing that is masked or not opaque; None where all count.
+
+    Raises:
+        InputError: nothing of the photograph is opaque, as programs write that have no use for alpha.
+    """
+    if picture.hidden is not None and picture.hidden.all():
+        expected, remedy = "a photograph with pixels that are opaque", "Write it without alpha, or correct its alpha."
+        raise InputError(frame.image, expected=expected, found="none", remedy=remedy)
+    hidden = [picture.hidden]
+    if frame.mask is not None:
+        mask = read_picture(frame.mask, "linear")
+        check_shape(frame.mask, mask.light.shape, frame.lens)
+        hidden += [mask.hidden, (mask.light <= MASKED).any(axis=2)]
+    parts = [part for part in hidden if part is not None]
+    return ~np.any([_shown(part, camera, frame.lens) for part in parts], axis=0) if parts else None
+
+
+def _shown(where: np.ndarray, camera: Camera, lens: Lens) -> np.ndarray:
+    """(H, W) bool: which of a camera's pixels show any of those that are marked (H, W bool) in an image."""
+    # What is marked is "clipped": any sample of it counts.
+    marked = np.repeat(where[..., None].astype(np.float32), 3, axis=2)
+    return resampled_colour(marked, 1.0, camera, lens)[1].any(axis=2)
 
 
 def _write_passes(passes: Passes, path: Path) -> tuple[str, ...]:

@@ -9,16 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from PIL import ExifTags
 
-from rgspipe.datasets.display_image import (
-    COLOUR_TYPE,
-    COLOURED,
-    DAMAGED,
-    DEPTH,
-    Levels,
-    opened,
-    read_levels,
-    saturated_from,
-)
+from rgspipe.datasets.display_image import DAMAGED, opened, read_levels, saturated_from
 from rgspipe.datasets.exr import read_channels
 from rgspipe.datasets.images import NO_SURFACE, read_colour
 from rgspipe.datasets.input_file import check_pixel_count, input_file
@@ -32,6 +23,9 @@ from rgspipe.scene import srgb
 #: What a camera can have been set to: shutter [s], ISO and f-number; what is beyond it is damaged.
 EXPOSED = ((1e-7, 1e5), (1.0, 1e8), (0.1, 1e3))
 
+#: Alpha from which on a pixel is opaque; floats of renderers may miss 1 by this.
+OPAQUE = 1.0 - 1e-3
+
 Pixels = npt.NDArray[np.float32]
 
 
@@ -43,34 +37,41 @@ class Picture:
         light: (H, W, 3) float32, linear.
         clipped_from: where it is as bright as this the photograph tells only that there was at least so much light;
             None where it was not clipped by its format.
+        hidden: (H, W) bool, where it is not opaque, so that its colours say nothing of the room; None if it is.
     """
 
     light: Pixels
     clipped_from: float | None
+    hidden: npt.NDArray[np.bool_] | None = None
 
 
 def read_picture(path: Path, response: str) -> Picture:
     """A photograph in 8 or 16 bits, by its `response` ("srgb" or "linear"), or in floats.
 
     Raises:
-        InputError: missing or broken file, another format than the suffix says, or pixels to be turned (EXIF).
+        InputError: missing or broken file, another format than the suffix says, pixels to be turned (EXIF), or levels
+            by another curve than that of sRGB.
     """
     if path.suffix.lower() == ".exr":
-        return Picture(read_colour(path)[0].numpy(), None)
+        light, alpha = read_colour(path)
+        return Picture(light.numpy(), None, _not_opaque(alpha.numpy()))
     if path.suffix.lower() == ".hdr":
         return Picture(read_hdr(path), None)
     if path.suffix.lower() in RAW:
         return Picture(*read_raw(path))
-    if _has_wide_colours(path):
-        stored, limit = _wide_colours(path), 1.0 - 0.5 / 65535.0
-    else:
-        stored = read_levels(path)
-        # Of levels that are stored, not of light: the file's own curve is another matter.
-        limit = float(srgb.encode(np.array(saturated_from(path))))
+    stored, limit = read_levels(path), saturated_from(path)
     linear = response == "linear"
     light = stored.values if linear else stored.light
     light = np.repeat(light, 3, axis=2) if light.shape[2] == 1 else light
-    return Picture(light, limit if linear else float(srgb.decode(np.array(limit))))
+    # Of levels that are stored, not of light, where the file has no curve.
+    limit = float(srgb.encode(np.array(limit))) if linear else limit
+    return Picture(light, limit, None if stored.alpha is None else _not_opaque(stored.alpha))
+
+
+def _not_opaque(alpha: Pixels) -> npt.NDArray[np.bool_] | None:
+    """(H, W) where alpha is below 1; None where it nowhere is."""
+    hidden = alpha < OPAQUE
+    return hidden if hidden.any() else None
 
 
 def read_depth_image(image: DepthImage) -> Pixels:
@@ -108,37 +109,6 @@ def exposure_of(path: Path) -> float | None:
     values = zip((shutter, sensitivity, aperture), EXPOSED, strict=True)
     stated = all(least <= value <= most for value, (least, most) in values)
     return shutter * sensitivity / aperture**2 if stated else None
-
-
-def _has_wide_colours(path: Path) -> bool:
-    """Whether it is a PNG with 16 bits a colour, of which Pillow by itself reads half."""
-    if path.suffix.lower() != ".png":
-        return False
-    with input_file(path, "a photograph").open("rb") as stream:
-        header = stream.read(COLOUR_TYPE + 1)
-    return len(header) > COLOUR_TYPE and header[DEPTH] == 16 and header[COLOUR_TYPE] in COLOURED
-
-
-@timed
-def _wide_colours(path: Path) -> Levels:
-    """Upper bytes, and then lower ones, which a reader of the other byte order takes for upper."""
-    try:
-        levels = _bytes(path, "B").astype(np.uint16)
-        levels <<= 8
-        levels |= _bytes(path, "L")
-    except InputError:
-        raise
-    except DAMAGED as error:
-        found = f"an unreadable file ({error})"
-        raise InputError(path, expected="a whole PNG image", found=found, remedy="Export it again.") from error
-    return Levels(levels, None)
-
-
-def _bytes(path: Path, order: str) -> npt.NDArray[np.uint8]:
-    """(H, W, 3)"""
-    with opened(path, path, ["PNG"]) as file:
-        file.tile = [part._replace(args=f"{file.mode};16{order}") for part in file.tile]
-        return np.asarray(file)[..., :3]
 
 
 @timed
