@@ -202,3 +202,49 @@ def test_a_ply_of_several_textures_is_refused(tmp_path: Path) -> None:
     path.write_bytes(path.read_bytes().replace(b"\ncomment Tex", b"\ncomment TextureFile u.png\ncomment Tex", 1))
     with pytest.raises(InputError, match=r"a\.ply: expected one texture at most in a PLY, found 2"):
         read_mesh(path)
+
+
+def square(path: Path, points: tuple[str, ...] = (), faces: str = "", values: str = "", places: str = "") -> Path:
+    """A unit square in text, whose points and faces have properties more."""
+    head = ["ply", "format ascii 1.0", "element vertex 4", *(f"property float {name}" for name in "xyz")]
+    head += [f"property {one}" for one in points] + ["element face 2", "property list uchar int vertex_indices"]
+    head += [f"property {faces}"] * bool(faces) + ["end_header"]
+    rows = [f"{place} {values}" for place in ("0 0 0", "1 0 0", "1 1 0", "0 1 0")]
+    path.write_text("\n".join([*head, *rows, f"3 0 1 2 {places}", f"3 0 2 3 {places}", ""]))
+    return path
+
+
+@pytest.mark.parametrize("kind", ["ushort", "uint16", "short", "int", "char"])
+@pytest.mark.parametrize("of", ["vertex", "face"])
+def test_colours_of_a_ply_that_are_no_bytes_are_refused(tmp_path: Path, kind: str, of: str) -> None:
+    """Of 16 bits the upper ones were left out."""
+    given = tuple(f"{kind} {name}" for name in ("red", "green", "blue"))
+    if of == "vertex":
+        path = square(tmp_path / "a.ply", given, values="1 2 3")
+    else:
+        path = square(tmp_path / "a.ply", faces="\nproperty ".join(given), places="1 2 3")
+    with pytest.raises(InputError, match=rf"a\.ply: element {of}, property red: expected colours in bytes.* {kind}\."):
+        read_mesh(path)
+
+
+@pytest.mark.parametrize(("kind", "values"), [("uchar", "51 102 255"), ("float", "0.2 0.4 1"), ("double", "0.2 0.4 1")])
+def test_colours_of_a_ply_are_bytes_or_shares(tmp_path: Path, kind: str, values: str) -> None:
+    path = square(tmp_path / "a.ply", tuple(f"{kind} {name}" for name in ("red", "green", "blue")), values=values)
+    found = read_mesh(path).paint.corners
+    np.testing.assert_allclose(found, np.broadcast_to(srgb.decode(np.array([0.2, 0.4, 1.0])), (2, 3, 3)))
+
+
+@pytest.mark.parametrize("kind", ["s t", "u v", "texture_u texture_v", "faces"])
+@pytest.mark.parametrize("coloured", [False, True])
+def test_places_in_no_texture_are_no_white(tmp_path: Path, kind: str, coloured: bool) -> None:
+    """They made a mesh white, and hid the colours of its points."""
+    points, values = ("uchar red", "uchar green", "uchar blue") * coloured, "51 102 255" * coloured
+    if kind == "faces":
+        path = square(tmp_path / "a.ply", points, "list uchar float texcoord", values, "6 0 0 1 0 1 1")
+    else:
+        named = tuple(f"float {name}" for name in kind.split())
+        path = square(tmp_path / "a.ply", (*points, *named), values=f"{values} 0.5 0.5")
+    paint = read_mesh(path).paint
+    assert paint.known == coloured
+    if coloured:
+        np.testing.assert_allclose(paint.corners[0, 0], srgb.decode(np.array([0.2, 0.4, 1.0])))

@@ -44,6 +44,23 @@ def test_the_last_plane_tells_the_symmetry(tmp_path: Path, planes: str, count: i
 
 
 @pytest.mark.parametrize(
+    ("first", "factor"),
+    [
+        ("IES:LM-63-2019", 1.0),
+        ("IESNA:LM-63-2002", 1.0),
+        ("IESNA:LM-63-1995", 1.10101),
+        ("IESNA91", 1.10101),
+        ("[MANUFAC] maker", 1.10101),
+    ],
+)
+def test_how_a_file_was_made_is_no_factor(tmp_path: Path, first: str, factor: float) -> None:
+    """The number that was one of ballast and lamp, until 2002: the light of a file of 2019 was 10 % too strong."""
+    text = ies().replace("IESNA:LM-63-2002", first).replace("\n0.5 1 20", "\n0.5 1.10101 20")
+    expected = torch.tensor([COLUMNS[k] for k in (0, 1, 2, 1)], dtype=torch.float64)
+    torch.testing.assert_close(candela(read(tmp_path, "a.ies", text)), factor * expected)
+
+
+@pytest.mark.parametrize(
     ("symmetry", "planes", "known"), [(0, 4, (0, 1, 2, 1)), (1, 4, (0,)), (2, 4, (0, 1, 2)), (4, 8, (0, 1, 2))]
 )
 def test_eulumdat_is_candela_per_1000_lumens(tmp_path: Path, symmetry: int, planes: int, known: tuple) -> None:

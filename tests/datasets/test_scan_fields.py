@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from readable_captures import SCANNED
@@ -24,6 +25,48 @@ def test_numbers_of_nerfstudio_that_cannot_be_are_refused_by_their_key(tmp_path:
     write_nerfstudio(tmp_path, SCANNED, ".png", ".png", {key: value})
     with pytest.raises(InputError, match=rf"transforms\.json: frames\[0\].*{key}"):
         read_scan(tmp_path, ScanOptions())
+
+
+OPTICS = [("k5", 0.3), ("k6", -0.1), ("skew", 3.0), ("distortion_params", [0.3, 0.1, 0, 0, 0, 0]), ("is_fisheye", True)]
+OPTICS += [("fisheye_crop_radius", 4), ("rolling_shutter", [0, 0, 0.1, 0]), ("rolling_shutter_time", 0.01)]
+
+
+@pytest.mark.parametrize(("key", "value"), OPTICS)
+@pytest.mark.parametrize("shared", [True, False])
+def test_optics_of_nerfstudio_that_are_not_known_are_refused(
+    tmp_path: Path, key: str, value: object, shared: bool
+) -> None:
+    """They were left out without a word."""
+    write_nerfstudio(tmp_path, SCANNED, ".png", ".png", {key: value} if shared else {})
+    if not shared:
+        _of_second(tmp_path / "transforms.json", {key: value})
+    with pytest.raises(InputError, match=rf"transforms\.json: frames\[{0 if shared else 1}\]: {key}: expected 0"):
+        read_scan(tmp_path, ScanOptions())
+
+
+def _of_second(path: Path, fields: dict) -> None:
+    """Add fields to the second frame of a file."""
+    content = json.loads(path.read_text())
+    content["frames"][1] |= fields
+    path.write_text(json.dumps(content))
+
+
+def test_optics_of_nerfstudio_that_do_nothing_are_read(tmp_path: Path) -> None:
+    nothing = {"k5": 0, "skew": 0.0, "distortion_params": [0.0] * 6, "is_fisheye": False, "rolling_shutter_time": None}
+    write_nerfstudio(tmp_path, SCANNED, ".png", ".png", nothing)
+    assert not read_scan(tmp_path, ScanOptions()).frames[0].lens.bends
+    write_nerfstudio(tmp_path, SCANNED, ".png", ".png", {"is_fisheye": True, "camera_model": "OPENCV_FISHEYE"})
+    assert read_scan(tmp_path, ScanOptions()).frames[0].lens.fisheye
+
+
+def test_a_frame_of_nerfstudio_has_its_own_scale(tmp_path: Path) -> None:
+    """That of the first frame held for all."""
+    write_nerfstudio(tmp_path, SCANNED, ".png", ".png", {"applied_scale": 0.5})
+    before = read_scan(tmp_path, ScanOptions()).frames
+    _of_second(tmp_path / "transforms.json", {"applied_scale": 2.0})
+    after = read_scan(tmp_path, ScanOptions()).frames
+    for index, factor in ((0, 1.0), (1, 0.25)):
+        np.testing.assert_allclose(after[index].pose[:3, 3], factor * before[index].pose[:3, 3])
 
 
 def test_half_a_pixel_of_polycam_is_refused(tmp_path: Path) -> None:

@@ -20,7 +20,7 @@ from rgspipe.datasets.limits import FARTHEST
 from rgspipe.datasets.mesh_links import FORMATS, GLTF, mesh_links
 from rgspipe.datasets.mesh_options import MeshOptions
 from rgspipe.datasets.obj_text import plain_obj
-from rgspipe.datasets.ply_header import check_rows
+from rgspipe.datasets.ply_header import check_colours, check_rows, without_texture
 from rgspipe.datasets.reading_limits import RAISE, reading_limits, timed
 from rgspipe.datasets.texture import check_texture, texture_light
 from rgspipe.errors import InputError
@@ -77,6 +77,11 @@ class OwnFiles(trimesh.resolvers.FilePathResolver):
         else:
             self._check()
 
+    @property
+    def has_textures(self) -> bool:
+        """Whether the mesh names any picture."""
+        return bool(self._links.textures)
+
     def namespaced(self, namespace: str) -> OwnFiles:
         """No folder has files of its own."""
         return self
@@ -106,6 +111,7 @@ class OwnFiles(trimesh.resolvers.FilePathResolver):
             check_texture(file.read_bytes(), file)
         if self._path.suffix.lower() == ".ply":
             check_rows(self._path)
+            check_colours(self._path)
         if self._path.suffix.lower() == ".ply" and len(self._links.textures) > 1:
             found, remedy = f"{len(self._links.textures)}", "Export it as GLB."
             raise InputError(self._path, expected="one texture at most in a PLY", found=found, remedy=remedy)
@@ -119,9 +125,12 @@ def _loaded(path: Path) -> Any:
             warnings.simplefilter("ignore")
             # Nothing is merged or mended: points without area do no harm, and merging would move textures.
             options = {"resolver": own, "process": False, "maintain_order": True}
-            if path.suffix.lower() != ".obj":
+            kind = path.suffix.lower()
+            if kind in GLTF or (kind == ".ply" and own.has_textures):
                 return trimesh.load_scene(path, **options)
-            return trimesh.load_scene(io.BytesIO(plain_obj(path.read_bytes(), path)), file_type="obj", **options)
+            content = path.read_bytes()
+            content = plain_obj(content, path) if kind == ".obj" else without_texture(content)
+            return trimesh.load_scene(io.BytesIO(content), file_type=kind[1:], **options)
     except InputError:
         raise
     except Exception as error:  # the library says of no format what it raises

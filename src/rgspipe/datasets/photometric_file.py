@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -28,6 +29,9 @@ SAME = 1e-4
 
 #: Photometric types of LM-63 by their number.
 TYPES = {1: "C", 2: "B", 3: "A"}
+
+#: The first line of LM-63 since 1995, and since when its twelfth number is no factor.
+STANDARD, UNUSED_SINCE = re.compile(r"\s*IES(?:NA)?:LM-63-(\d{4})", re.IGNORECASE), 2002
 
 #: Numbers of LM-63 before the angles, and of EULUMDAT's sets of lamps and direct ratios lines.
 HEADER, LAMP_LINES, RATIOS = 13, 6, 10
@@ -128,8 +132,16 @@ def _ies(source: _Source) -> Photometry:
     columns = {turn: list(_take(source, words, count, "candela")) for turn in turns}
     if extra := next(words, None):
         source.refuse(f"{planes} × {count} candela", f"more: {extra[:40]!r}")
-    # Multiplier, ballast factor, and in files before 2002 that of ballast and lamp together.
-    return source.table(vertical, _all_around(source, columns), header[2] * header[10] * header[11])
+    # Multiplier, ballast factor, and that of ballast and lamp together, in the place of which later standards have a
+    # number without a use (2002), and how the file was made (2019: 1.10101, for one).
+    together = header[11] if _year(head) < UNUSED_SINCE else 1.0
+    return source.table(vertical, _all_around(source, columns), header[2] * header[10] * together)
+
+
+def _year(head: str) -> int:
+    """Of the standard, by the first line: `IESNA:LM-63-1995`, `IES:LM-63-2019`; 0 of older ones, as `IESNA91`."""
+    stated = STANDARD.match(head)
+    return int(stated[1]) if stated else 0
 
 
 def _skip_tilt(source: _Source, words: Iterator[str]) -> None:

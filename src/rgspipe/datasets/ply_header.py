@@ -26,6 +26,14 @@ KINDS = {
 LIST = "list"
 
 
+#: Properties that say where points of a mesh are and which colours they have, the latter in bytes or as floats up to 1.
+PLACES, COLOURS = ("x", "y", "z", "nx", "ny", "nz"), ("red", "green", "blue", "alpha")
+COLOUR_KINDS = ("u1", "f4", "f8")
+
+#: The list of a face's places in a texture.
+FACE_PLACES = "texcoord"
+
+
 @dataclass
 class _Element:
     name: str
@@ -42,11 +50,9 @@ def check_header(path: Path) -> None:
     Raises:
         InputError: naming the element and the property.
     """
-    with path.open("rb") as stream:
-        head, end, _ = stream.read(LONGEST).partition(b"end_header")
-    if not end:
+    head, lines = _head(path)
+    if not lines:
         return
-    lines = [line.split() for line in head.decode("ascii", errors="replace").splitlines()]
     text = ["format", "ascii", "1.0"] in lines
     size = path.stat().st_size - len(head)
     for element in _elements(path, lines):
@@ -66,6 +72,53 @@ def check_header(path: Path) -> None:
                 found=f"{size} bytes",
                 remedy="Export it again.",
             )
+
+
+def check_colours(path: Path) -> None:
+    """Refuse colours of a mesh in other numbers than bytes and floats: those who decode it take them modulo 256.
+
+    What is no header at all is left to the reader.
+
+    Raises:
+        InputError: names the element and the property.
+    """
+    for element in _listed(_head(path)[1]):
+        for kind, name in zip(element.kinds, element.names, strict=True):
+            if name in COLOURS and KINDS.get(kind) not in COLOUR_KINDS:
+                raise InputError(
+                    f"{path}: element {element.name}, property {name}",
+                    expected="colours in bytes (uchar), or as floats from 0 to 1",
+                    found=kind,
+                    remedy="Export the mesh again with colours in bytes.",
+                )
+
+
+def without_texture(content: bytes) -> bytes:
+    """A mesh whose places in a texture have other names, where there is none: decoders make a white one up for them.
+
+    Colours of points, which they would leave out for it, are then seen.
+    """
+    head, end, rest = content.partition(b"end_header")
+    if len(head) > LONGEST:
+        return content
+    lines, element = head.splitlines(keepends=True), b""
+    for number, line in enumerate(lines):
+        words = line.split()
+        if words[:1] == [b"element"]:
+            element = (words[1:2] or [b""])[0]
+        elif words[:1] == [b"property"] and len(words) > 2:
+            name = words[-1].decode(errors="replace")
+            told = name in (*PLACES, *COLOURS) if element == b"vertex" else name != FACE_PLACES
+            place = line.rindex(words[-1])
+            lines[number] = line if told else line[:place] + b"unused_" + line[place:]
+    return b"".join(lines) + end + rest
+
+
+def _head(path: Path) -> tuple[bytes, list[list[str]]]:
+    """What stands before the end of a header, as it is and by lines and words; no lines where there is no header."""
+    with path.open("rb") as stream:
+        head, end, _ = stream.read(LONGEST).partition(b"end_header")
+    return head, [line.split() for line in head.decode("ascii", errors="replace").splitlines()] if end else []
 
 
 def check_rows(path: Path) -> None:

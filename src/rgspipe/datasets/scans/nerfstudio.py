@@ -6,6 +6,7 @@ metres, the turn is kept.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from rgspipe.datasets.frames import FrameEntry, read_entries
@@ -31,6 +32,10 @@ MOST_UNITS = 1e9
 STRAIGHT = ("OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "PERSPECTIVE")
 FISHEYE = "OPENCV_FISHEYE"
 
+#: What changes where a camera sees things and `Lens` does not have, in files for nerfstudio and instant-ngp.
+OTHER_OPTICS = ("k5", "k6", "skew", "distortion_params", "fisheye_crop_radius")
+OTHER_OPTICS += ("rolling_shutter", "rolling_shutter_time")
+
 
 def found_in(root: Path) -> bool:
     """Whether the folder has this layout."""
@@ -45,19 +50,18 @@ def read(root: Path, options: ScanOptions) -> Scan:
     """
     path = root / TRANSFORMS
     entries = read_entries(path, "the cameras of a nerfstudio capture")
-    scale = _unit(entries[0], "applied_scale", 1.0)
-    frames = tuple(_frame(entry, scale, options) for entry in entries)
+    frames = tuple(_frame(entry, options) for entry in entries)
     turned = "applied_transform" in entries[0].shared
     notes = ("the world's axes are those of the file, after its applied_transform",) if turned else ()
     return Scan("nerfstudio", path, (path,), frames, options.camera_axes(AXES), notes)
 
 
-def _frame(entry: FrameEntry, scale: float, options: ScanOptions) -> ScanFrame:
+def _frame(entry: FrameEntry, options: ScanOptions) -> ScanFrame:
     where = f"{entry.where}.transform_matrix"
     if "transform_matrix" not in entry.fields:
         raise InputError(where, expected="a 4 × 4 matrix", found="no such key", remedy="Add it.")
     matrix = matrix_of(entry.fields["transform_matrix"], where)
-    matrix[:3, 3] /= scale
+    matrix[:3, 3] /= _unit(entry, "applied_scale", 1.0)
     return ScanFrame(
         image=entry.transforms_path.parent / _text(entry, "file_path"),
         lens=_lens(entry),
@@ -76,13 +80,28 @@ def _lens(entry: FrameEntry) -> Lens:
             found=shown(model),
             remedy="Undistort the photographs first (colmap image_undistorter).",
         )
+    fisheye = model == FISHEYE
+    # instant-ngp tells a fisheye lens by a key of its own.
+    _refuse_other_optics(entry, OTHER_OPTICS if fisheye else (*OTHER_OPTICS, "is_fisheye"))
     width, height = (whole(_positive(entry, key), entry.where, key) for key in ("w", "h"))
-    fx, fisheye = _positive(entry, "fl_x"), model == FISHEYE
+    fx = _positive(entry, "fl_x")
     centre = [_number(entry, key, 0.5 * size) for key, size in (("cx", width), ("cy", height))]
     radial = tuple(_number(entry, key, 0.0) for key in ("k1", "k2", "k3", "k4"))
     # A fisheye lens has no such terms; files may hold those of another model.
     tangential = (0.0, 0.0) if fisheye else (_number(entry, "p1", 0.0), _number(entry, "p2", 0.0))
     return Lens(fx, _positive(entry, "fl_y", fx), *centre, width, height, radial, tangential, fisheye)
+
+
+def _refuse_other_optics(entry: FrameEntry, keys: Sequence[str]) -> None:
+    for key in keys:
+        value = _value(entry, key)
+        if not all(part in (None, 0) for part in (value if isinstance(value, list) else [value])):  # 0 is False, too
+            raise InputError(
+                f"{entry.where}: {key}",
+                expected=f"0: lenses of k1 to k4, p1 and p2, or the camera_model {FISHEYE} with k1 to k4",
+                found=shown(value),
+                remedy="State the lens so, or undistort the photographs (colmap image_undistorter); remove the key.",
+            )
 
 
 def _depth(entry: FrameEntry, options: ScanOptions) -> DepthImage | None:

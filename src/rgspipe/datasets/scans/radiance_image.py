@@ -17,11 +17,17 @@ WHAT = "a Radiance picture (.hdr)"
 #: Rows from the top and columns from the left, which is what all write.
 SIZE = re.compile(rb"\n\n-Y (\d{1,6}) \+X (\d{1,6})\n")
 
+#: The line of the header that names the format of pixels, and the one that is read: not CIE's XYZ.
+FORMAT, PIXELS = re.compile(rb"\nFORMAT *= *([^\n]*?)[ \r]*(?=\n)"), b"32-bit_rle_rgbe"
+
 #: Lines of the header that say what pixels are, besides their format; each may stand there several times.
 VARIABLES = re.compile(rb"\n(EXPOSURE|PIXASPECT|COLORCORR) *=([^\n]*)")
 
 #: The least that pixels may have been multiplied by; the most is as many times 1.
 LEAST_EXPOSED = 1e-9
+
+#: Red, green and blue of what says how often the pixel before it is repeated: one of a pixel is 128 at least, or all 0.
+REPEATED = 1
 
 #: Widths of packed rows, and the two bytes that these begin with.
 PACKED, MARK = range(8, 32768), b"\x02\x02"
@@ -50,9 +56,11 @@ def read_hdr(path: Path) -> npt.NDArray[np.float32]:
     try:
         for row in range(height):
             rows[row], place = _row(content, place, width)
+        if place != len(content):
+            raise ValueError(f"{len(content) - place} bytes after its last row")
     except (IndexError, ValueError) as error:
-        found = f"half of one ({error})"
-        raise InputError(path, expected=WHAT, found=found, remedy="Copy it anew.") from error
+        found = f"half of one, or another packing ({error})"
+        raise InputError(path, expected=WHAT, found=found, remedy="Copy it anew, or convert it to EXR.") from error
     scale = np.where(rows[..., 3] > 0, np.ldexp(1.0, rows[..., 3].astype(np.int64) - 136), 0.0) / exposed
     return ((rows[..., :3] + 0.5) * scale[..., None]).astype(np.float32)
 
@@ -65,8 +73,11 @@ def _header(path: Path, content: bytes) -> tuple[int, int, int]:
     """Width, height, and where pixels begin."""
     head = content[:HEADER_BYTES]
     size = SIZE.search(head)
-    if not head.startswith(b"#?") or size is None or b"32-bit_rle_rgbe" not in head[: size.start()]:
-        found = "another format, or rows in another order than from the top"
+    formats = set() if size is None else set(FORMAT.findall(head[: size.start() + 1]))
+    if not head.startswith(b"#?") or size is None or formats != {PIXELS}:
+        stated = b", ".join(sorted(formats)).decode(errors="replace")
+        other = "another format, or rows in another order than from the top"
+        found = other if formats in (set(), {PIXELS}) else f"FORMAT={stated:.80}"
         raise InputError(path, expected=WHAT, found=found, remedy="Convert it to EXR.")
     height, width = int(size[1]), int(size[2])
     check_pixel_count(path, width, height)
@@ -97,8 +108,10 @@ def _exposed(path: Path, header: bytes) -> float:
 def _row(content: bytes, place: int, width: int) -> tuple[npt.NDArray[np.uint8], int]:
     """(W, 4) bytes of a row that begins at `place`, and where the next one does."""
     if width not in PACKED or content[place : place + 2] != MARK or content[place + 2] > 127:
-        values = np.frombuffer(content, np.uint8, 4 * width, place)
-        return values.reshape(width, 4), place + 4 * width
+        values = np.frombuffer(content, np.uint8, 4 * width, place).reshape(width, 4)
+        if (values[:, :3] == REPEATED).all(axis=1).any():
+            raise ValueError("runs of pixels, as before 1991")
+        return values, place + 4 * width
     if int.from_bytes(content[place + 2 : place + 4], "big") != width:
         raise ValueError("a row of another width")
     place, channels = place + 4, []
