@@ -39,10 +39,10 @@ from rooms import closed_box
 from tiny_dataset import HEIGHT, WIDTH, tiny_camera, write_tiny_dataset
 
 
-def _image(name: str, mode: str) -> Kind:
+def _image(name: str, mode: str, **options: object) -> Kind:
     def make(folder: Path) -> None:
         values = np.random.default_rng(0).integers(0, 256, (8, 8, 4), dtype=np.uint8)
-        Image.fromarray(values).convert(mode).save(folder / name)
+        Image.fromarray(values).convert(mode).save(folder / name, **options)
 
     return Kind(name, make, lambda folder: iter(read_colour(folder / name)))
 
@@ -212,6 +212,8 @@ KINDS: dict[str, Kind] = {
     "PNG": _image("a.png", "RGBA"),
     "PNG, palette": _image("a.png", "P"),
     "JPEG": _image("a.jpg", "RGB"),
+    "JPEG, restarts": _image("a.jpg", "RGB", restart_marker_blocks=1, subsampling=0),
+    "JPEG, progressive": _image("a.jpg", "RGB", progressive=True),
     "light file": Kind("a.json", _lights, _read_lights),
     "a fit's light file": Kind("a.json", _extents, _read_lights),
     "IES": _luminaire("a.ies", ies()),

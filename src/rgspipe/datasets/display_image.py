@@ -14,6 +14,7 @@ import numpy.typing as npt
 from PIL import ExifTags, Image, UnidentifiedImageError
 
 from rgspipe.datasets.input_file import check_pixel_count, input_file
+from rgspipe.datasets.jpeg_data import check_codes
 from rgspipe.datasets.reading_limits import timed
 from rgspipe.datasets.stored_curve import other_curve
 from rgspipe.errors import InputError
@@ -154,7 +155,10 @@ def _levels(path: Path, kind: str) -> tuple[np.ndarray, InputError | None]:
                 raise _refusal(path, "8 bits a channel, or 16 of grey or colours", "16 of grey and alpha")
             _check_orientation(path, file)
             wide = depth == 16 and colour_type in COLOURED
-            return (_wide if wide else _unpacked)(path, file), other_curve(path, file)
+            stored, curve = (_wide if wide else _unpacked)(path, file), other_curve(path, file)
+        if kind == "JPEG":
+            check_codes(path, path.read_bytes(), stored, lambda content: _decoded(path, content))
+        return stored, curve
     except InputError:
         raise
     except UnidentifiedImageError as error:
@@ -163,6 +167,15 @@ def _levels(path: Path, kind: str) -> tuple[np.ndarray, InputError | None]:
         ) from error
     except DAMAGED as error:
         raise _refusal(path, "a whole PNG or OpenEXR image", f"an unreadable file ({error})") from error
+
+
+def _decoded(path: Path, content: bytes) -> np.ndarray | None:
+    """What the content of a JPEG stores; None if it cannot be read."""
+    try:
+        with opened(io.BytesIO(content), path, ["JPEG"]) as file:
+            return _unpacked(path, file)
+    except (InputError, *DAMAGED):
+        return None
 
 
 def _depth(path: Path, kind: str) -> tuple[int, int]:
