@@ -248,3 +248,16 @@ def test_places_in_no_texture_are_no_white(tmp_path: Path, kind: str, coloured: 
     assert paint.known == coloured
     if coloured:
         np.testing.assert_allclose(paint.corners[0, 0], srgb.decode(np.array([0.2, 0.4, 1.0])))
+
+
+@pytest.mark.parametrize("values", ["51 102 255", "0.2 nan 1", "0.2 0.4 -1"])
+@pytest.mark.parametrize("of", ["vertex", "face"])
+def test_colours_of_a_ply_in_floats_that_are_no_shares_are_refused(tmp_path: Path, values: str, of: str) -> None:
+    """Of levels up to 255 all became 1, NaN became 0."""
+    given = tuple(f"float {name}" for name in ("red", "green", "blue"))
+    if of == "vertex":
+        path = square(tmp_path / "a.ply", given, values=values)
+    else:
+        path = square(tmp_path / "a.ply", faces="\nproperty ".join(given), places=values)
+    with pytest.raises(InputError, match=rf"a\.ply: element {of}, property .*: expected floats from 0 to"):
+        read_mesh(path)

@@ -20,7 +20,7 @@ from rgspipe.datasets.limits import FARTHEST
 from rgspipe.datasets.mesh_links import FORMATS, GLTF, mesh_links
 from rgspipe.datasets.mesh_options import MeshOptions
 from rgspipe.datasets.obj_text import plain_obj
-from rgspipe.datasets.ply_header import check_colours, check_rows, without_texture
+from rgspipe.datasets.ply_header import COLOURS, check_colours, check_rows, without_texture
 from rgspipe.datasets.reading_limits import RAISE, reading_limits, timed
 from rgspipe.datasets.texture import check_texture, texture_light
 from rgspipe.errors import InputError
@@ -160,7 +160,21 @@ def _part(part: Any, matrix: Numbers, *, linear: bool, path: Path) -> TriangleMe
     if faces.min() < 0 or faces.max() >= len(vertices):
         found = f"a triangle with point {int(faces.max())} of {len(vertices)}"
         raise InputError(path, expected="triangles between its points", found=found, remedy="Export it again.")
+    _check_shares(part, path)
     return TriangleMesh(vertices, faces, _paint(part, faces, linear, path)).moved(matrix)
+
+
+def _check_shares(part: Any, path: Path) -> None:
+    """Refuse colours of a PLY in floats that are no shares of 1: the library has cut them off by then."""
+    for name, element in part.metadata.get("_ply_raw", {}).items():
+        data = element.get("data")
+        given = getattr(getattr(data, "dtype", None), "names", None) or (data if isinstance(data, dict) else ())
+        for key in set(COLOURS).intersection(given):
+            values = np.asarray(data[key])
+            if values.dtype.kind == "f" and not ((values >= 0.0) & (values <= 1.0)).all():
+                found = f"{values.min():g} to {values.max():g}"
+                where, remedy = f"{path}: element {name}, property {key}", "Export the mesh with colours in bytes."
+                raise InputError(where, expected="floats from 0 to 1", found=found, remedy=remedy)
 
 
 def _paint(part: Any, faces: np.ndarray, linear: bool, path: Path) -> Paint:
