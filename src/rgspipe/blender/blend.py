@@ -1,12 +1,12 @@
 """A user's .blend file as a scene of bare surfaces in the unit cube.
 
-The evaluated meshes are copied into a scene of their own. So nothing else of the file can change a
+The meshes that a render shows are copied into a scene of their own. So nothing else of the file can change a
 number: no lights, cameras, world, compositing, animation, render settings or view layers.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,9 +16,14 @@ from mathutils import Matrix
 
 from rgspipe.blender.left_out import left_out
 from rgspipe.blender.own_cameras import own_cameras
+from rgspipe.blender.rendered import Surface, rendered_surfaces
 from rgspipe.datasets.input_file import input_file
+from rgspipe.datasets.limits import FARTHEST
 from rgspipe.datasets.named_cameras import NamedCamera
 from rgspipe.errors import InputError
+
+#: The smallest extent of a scene, its units: even an atom is larger, in metres.
+SMALLEST_SCENE = 1e-10
 
 #: Sockets by which a surface or a volume glows, by node type, and what turns them off.
 GLOWING_SOCKETS = {
@@ -51,32 +56,30 @@ def open_normalised(path: str | Path) -> Normalised:
     """The surfaces of a .blend file, and what of its own they were.
 
     Raises:
-        InputError: no such file, not a .blend file, or one without a surface to render.
+        InputError: no such file, not a .blend file, or one without a surface to render, too small, or too far away.
     """
     path = Path(path)
     _open(path)
-    source = bpy.context.scene
-    _show_what_is_rendered(source)
-    copies = list(_copy_meshes(source))
-    if not copies:
+    source, layer = bpy.context.scene, bpy.context.view_layer
+    surfaces = rendered_surfaces(source, layer)
+    if not surfaces:
         raise InputError(
             path,
             expected=f'meshes in its scene "{source.name}"',
             found="none that is rendered",
             remedy="Add an object with faces, or show the hidden ones in renders.",
         )
-    remarks = left_out(source, [material for mesh, _ in copies for material in mesh.materials])
-    lo, hi = _bounds(copies)
-    longest = float((hi - lo).max())
-    if not np.isfinite(longest) or longest <= 0:
-        raise InputError(path, expected="a scene of finite size", found=f"{longest:g}", remedy="Correct its meshes.")
-    rescale, offset = 1.0 / longest, -0.5 * (lo + hi)
+    remarks = left_out(source, layer, surfaces)
+    lo, hi = _bounds(surfaces)
+    _require_extent(path, lo, hi)
+    rescale, offset = 1.0 / float((hi - lo).max()), -0.5 * (lo + hi)
+    _show_cameras(source)
     cameras, others = own_cameras(source, rescale, tuple(offset.tolist()))
     scene = bpy.data.scenes.new("surfaces")
     bpy.context.window.scene = scene
-    for index, (mesh, matrix) in enumerate(copies):
-        mesh.transform(Matrix.Scale(rescale, 4) @ Matrix.Translation(offset) @ matrix)
-        scene.collection.objects.link(bpy.data.objects.new(f"surface_{index}", mesh))
+    for index, surface in enumerate(surfaces):
+        surface.mesh.transform(Matrix.Scale(rescale, 4) @ Matrix.Translation(offset) @ surface.pose)
+        scene.collection.objects.link(bpy.data.objects.new(f"surface_{index}", surface.mesh))
     remove_emission()
     bpy.context.view_layer.update()
     return Normalised(scene, rescale, tuple(offset.tolist()), [*remarks, *others], cameras)
@@ -110,42 +113,35 @@ def _open(path: Path) -> None:
         raise InputError(path, expected="a .blend file", found=found, remedy="Save it again with Blender.") from error
 
 
-def _show_what_is_rendered(scene: bpy.types.Scene) -> None:
-    """Make the evaluated scene hold what a render would show, not what the viewport did."""
-    for collection in [scene.collection, *bpy.data.collections]:
-        collection.hide_viewport = collection.hide_render
-    for item in scene.objects:
-        item.hide_viewport = item.hide_render
-        item.hide_set(False)
+def _show_cameras(scene: bpy.types.Scene) -> None:
+    """Have Blender know where all cameras are: of what the viewport hides it knows nothing."""
+    direct = set(scene.collection.objects)
+    for item in list(scene.objects):
+        is_camera = item.type == "CAMERA"
+        item.hide_viewport = not is_camera
+        if is_camera and item not in direct:
+            scene.collection.objects.link(item)
     bpy.context.view_layer.update()
 
 
-def _copy_meshes(scene: bpy.types.Scene) -> Iterator[tuple[bpy.types.Mesh, Matrix]]:
-    """Independent copies of all evaluated meshes with faces (curves, texts and instances too), and their poses."""
-    graph = bpy.context.evaluated_depsgraph_get()
-    for instance in graph.object_instances:
-        item = instance.object
-        if item.type not in {"MESH", "CURVE", "SURFACE", "FONT", "META"} or item.hide_render or not instance.show_self:
-            continue
-        mesh = bpy.data.meshes.new_from_object(item, preserve_all_data_layers=True, depsgraph=graph)
-        if len(mesh.polygons):
-            _take_materials(mesh, item)
-            yield mesh, instance.matrix_world.copy()
+def _require_extent(path: Path, lo: np.ndarray, hi: np.ndarray) -> None:
+    """Blender's own numbers, of single precision, hold neither the faces of what is smaller nor places further away."""
+    longest, farthest = float((hi - lo).max()), float(np.maximum(-lo, hi).max())
+    if not (longest >= SMALLEST_SCENE and farthest <= FARTHEST):
+        raise InputError(
+            path,
+            expected=f"a scene of {SMALLEST_SCENE:g} units at least, no further than {FARTHEST:g} from the origin",
+            found=f"its longest side {longest:g}, its farthest point {farthest:g} away",
+            remedy="Scale or move all of it in Blender, or correct the mesh that is too large or too far away.",
+        )
 
 
-def _take_materials(mesh: bpy.types.Mesh, item: bpy.types.Object) -> None:
-    """Materials may hang on the object instead of its mesh."""
-    for index, slot in enumerate(item.material_slots):
-        if slot.material is not None and index < len(mesh.materials):
-            mesh.materials[index] = bpy.data.materials[slot.material.name]
-
-
-def _bounds(copies: list[tuple[bpy.types.Mesh, Matrix]]) -> tuple[np.ndarray, np.ndarray]:
+def _bounds(surfaces: Sequence[Surface]) -> tuple[np.ndarray, np.ndarray]:
     points = []
-    for mesh, matrix in copies:
-        local = np.empty(3 * len(mesh.vertices), np.float32)
-        mesh.vertices.foreach_get("co", local)
-        pose = np.array(matrix)
+    for surface in surfaces:
+        local = np.empty(3 * len(surface.mesh.vertices), np.float32)
+        surface.mesh.vertices.foreach_get("co", local)
+        pose = np.array(surface.pose)
         points.append(local.reshape(-1, 3) @ pose[:3, :3].T + pose[:3, 3])
     stacked = np.concatenate(points)
     return stacked.min(axis=0), stacked.max(axis=0)

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import TypeVar
 
 import bpy
+
+from rgspipe.blender.rendered import Surface
 
 #: Nodes that let light through, and those that mirror.
 CLEAR = {"BSDF_GLASS", "BSDF_REFRACTION", "BSDF_TRANSPARENT", "BSDF_TRANSLUCENT", "BSDF_RAY_PORTAL"}
@@ -14,23 +17,30 @@ MIRRORING = {"BSDF_GLOSSY", "BSDF_METALLIC", "BSDF_ANISOTROPIC"}
 #: Inputs that all have to be above 0 for a surface to glow.
 GLOWING = {"EMISSION": ("Strength", "Color"), "BSDF_PRINCIPLED": ("Emission Strength", "Emission Color")}
 
-#: Names of materials that a sentence lists.
+#: Names of materials or objects that a sentence lists.
 LISTED = 4
 
+#: Kinds of rays that an object may be invisible to; to those of fog it matters nothing, as no model has any.
+RAYS = ("camera", "diffuse", "glossy", "transmission", "shadow")
+
+Block = TypeVar("Block", bound=bpy.types.ID)
 Test = Callable[[bpy.types.ShaderNodeTree], bool]
 
 
-def left_out(scene: bpy.types.Scene, materials: Iterable[bpy.types.Material]) -> list[str]:
+def left_out(scene: bpy.types.Scene, layer: bpy.types.ViewLayer, surfaces: Sequence[Surface]) -> list[str]:
     """Sentences about the open file as it is, one a subject.
 
     Args:
-        scene: what is rendered of it.
-        materials: of the surfaces that are.
+        scene, layer: what is rendered of it.
+        surfaces: the same.
     """
-    used = sorted({material for material in materials if material is not None}, key=lambda material: material.name)
-    found = {what: _named(used, test) for what, test in TESTS.items()}
+    used = _by_name({material for one in surfaces for material in one.mesh.materials if material is not None})
+    items = _by_name({one.item for one in surfaces})
+    found = {what: _listed([one for one in used if _has(one, test)]) for what, test in TESTS.items()}
     sentences = [_lamps(scene), _world(scene)]
     sentences += [f"{what} of {names} {COSTS[what]}" for what, names in found.items() if names]
+    treated = {what: _listed([one for one in items if test(one, layer)]) for what, test in TREATED.items()}
+    sentences += [f"{what} of {names} is left out: {ORDINARY}" for what, names in treated.items() if names]
     sentences.append(_other_objects(scene))
     return [sentence for sentence in sentences if sentence]
 
@@ -61,11 +71,18 @@ def _other_objects(scene: bpy.types.Scene) -> str:
     return f"objects that are no surfaces ({listed}) are left out: they are in no image"
 
 
-def _named(materials: Sequence[bpy.types.Material], test: Test) -> str:
-    """The names of those with a property; empty for none."""
-    names = [material.name for material in materials if material.node_tree is not None and test(material.node_tree)]
-    more = [f"{len(names) - LISTED} more"] if len(names) > LISTED else []
-    return ", ".join([*(f'"{name}"' for name in names[:LISTED]), *more])
+def _by_name(blocks: Iterable[Block]) -> list[Block]:
+    return sorted(blocks, key=lambda block: block.name_full)
+
+
+def _listed(blocks: Sequence[bpy.types.ID]) -> str:
+    """The names of some of them; empty for none."""
+    more = [f"{len(blocks) - LISTED} more"] if len(blocks) > LISTED else []
+    return ", ".join([*(f'"{block.name}"' for block in blocks[:LISTED]), *more])
+
+
+def _has(material: bpy.types.Material, test: Test) -> bool:
+    return material.node_tree is not None and test(material.node_tree)
 
 
 def _glows(tree: bpy.types.ShaderNodeTree) -> bool:
@@ -104,6 +121,15 @@ COSTS = {
     "taken for its own colour",
     "fog": "is in the images, but no model has any: surfaces behind it are taken for paler or darker than they are",
 }
+
+
+#: What a render may do with an object besides showing it, and what is done instead.
+TREATED: dict[str, Callable[[bpy.types.Object, bpy.types.ViewLayer], bool]] = {
+    "invisibility to some rays": lambda item, layer: not all(getattr(item, f"visible_{ray}") for ray in RAYS),
+    "the holdout": lambda item, layer: item.is_holdout or item.holdout_get(view_layer=layer),
+    "the shadow catcher": lambda item, layer: item.is_shadow_catcher,
+}
+ORDINARY = "it is a surface like any other, in all images"
 
 
 def reached(tree: bpy.types.ShaderNodeTree) -> Iterator[bpy.types.Node]:

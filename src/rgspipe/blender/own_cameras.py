@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Sequence
+
 import bpy
 import torch
 
@@ -20,10 +23,17 @@ def own_cameras(
         rescale, offset: a point x of the file becomes (x + offset) · rescale.
     """
     cameras = [item for item in scene.objects if item.type == "CAMERA"]
-    pinholes = {item.name: _camera(item, rescale, offset) for item in cameras if item.data.type == "PERSP"}
-    others = [item.name for item in cameras if item.name not in pinholes]
+    names = _names(cameras)
+    pinholes = {names[item]: _camera(item, rescale, offset) for item in cameras if item.data.type == "PERSP"}
+    others = [names[item] for item in cameras if item.data.type != "PERSP"]
     remark = f"cameras that are no perspective ones, and cannot be a target's: {', '.join(others)}"
     return pinholes, [remark] if others else []
+
+
+def _names(cameras: Sequence[bpy.types.Object]) -> dict[bpy.types.Object, str]:
+    """What each is called: as in its file, and with Blender's name of its library where another is called so."""
+    count = Counter(item.name for item in cameras)
+    return {item: item.name if count[item.name] == 1 else item.name_full for item in cameras}
 
 
 def _camera(item: bpy.types.Object, rescale: float, offset: tuple[float, float, float]) -> NamedCamera:

@@ -1,0 +1,186 @@
+"""What is made of .blend files, run by the tests in a process of its own: `blend_in_blender.py FOLDER NAME…`."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from rgspipe.blender import blend
+from rgspipe.blender.nodes import tree_of
+from rgspipe.errors import InputError
+
+
+def rendered_alone(folder: Path) -> None:
+    """Faces and size in units of the file, of files whose viewport shows other things than a render does."""
+    found = {}
+    for name, build in FILES.items():
+        path = folder / f"{name}.blend"
+        _cube()
+        build(_cube(x=3.0, fresh=False))
+        bpy.ops.wm.save_as_mainfile(filepath=str(path))
+        found[name] = _measured(blend.open_normalised(path))
+    _write(folder, "rendered_alone", found)
+
+
+def linked(folder: Path) -> None:
+    """A red cube and a camera in a library, beside a blue cube and another camera of the same names."""
+    _cube().data.materials.append(_paint((1.0, 0.0, 0.0, 1.0)))
+    _camera((0.0, -5.0, 0.0))
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "library.blend"))
+    _cube().data.materials.append(_paint((0.0, 0.0, 1.0, 1.0)))
+    _camera((9.0, -9.0, 9.0))
+    with bpy.data.libraries.load(str(folder / "library.blend"), link=True) as (_, taken):
+        taken.objects = ["cube", "Kitchen"]
+    for item in taken.objects:
+        bpy.context.scene.collection.objects.link(item)
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "house.blend"))
+    found = blend.open_normalised(folder / "house.blend")
+    paints = [item.data.materials[0].node_tree for item in found.scene.objects]
+    colours = [list(paint.nodes["Principled BSDF"].inputs["Base Color"].default_value) for paint in paints]
+    cameras = {name: (camera.pose[:3, 3] / found.rescale).tolist() for name, camera in found.cameras.items()}
+    _write(folder, "linked", {"colours": colours, "cameras": cameras})
+
+
+def hidden_cameras(folder: Path) -> None:
+    """Where cameras are that the viewport, or a render, does not show, or whose collection it does not."""
+    _cube()
+    for index, name in enumerate(("viewport", "render", "collection", "eye")):
+        item = _camera((float(index), -5.0, 0.0), name)
+        item.hide_viewport, item.hide_render = name == "viewport", name == "render"
+        if name == "collection":
+            hidden = bpy.data.collections.new(name)
+            hidden.hide_viewport = hidden.hide_render = True
+            bpy.context.scene.collection.children.link(hidden)
+            bpy.context.scene.collection.objects.unlink(item)
+            hidden.objects.link(item)
+        item.hide_set(name == "eye")
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "hidden.blend"))
+    found = blend.open_normalised(folder / "hidden.blend")
+    _write(
+        folder,
+        "hidden_cameras",
+        {name: float(camera.pose[0, 3] / found.rescale) for name, camera in found.cameras.items()},
+    )
+
+
+def extents(folder: Path) -> None:
+    """What is said of files that are too small, too large, or too far away."""
+    _write(
+        folder,
+        "extents",
+        {name: said for size, x, name in SIZES for said in _refused(folder / f"{name}.blend", size, x)},
+    )
+
+
+def treated(folder: Path) -> None:
+    """What is said of objects with which a render does something else than to show them."""
+    item = _cube("ordinary")
+    for name, set_to in (("unseen", "visible_camera"), ("caught", "is_shadow_catcher"), ("held", "is_holdout")):
+        item = _cube(name, 2.0, fresh=False)
+        setattr(item, set_to, not getattr(item, set_to))
+    out = bpy.data.collections.new("out")
+    bpy.context.scene.collection.children.link(out)
+    item = _cube("out", 4.0, fresh=False)
+    bpy.context.scene.collection.objects.unlink(item)
+    out.objects.link(item)
+    bpy.context.view_layer.layer_collection.children["out"].holdout = True
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "treated.blend"))
+    _write(folder, "treated", blend.open_normalised(folder / "treated.blend").remarks)
+
+
+def _cube(name: str = "cube", x: float = 0.0, size: float = 1.0, fresh: bool = True) -> bpy.types.Object:
+    if fresh:
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.mesh.primitive_cube_add(size=size, location=(x, 0.0, 0.0))
+    bpy.context.object.name = name
+    return bpy.context.object
+
+
+def _camera(place: tuple[float, float, float], name: str = "Kitchen") -> bpy.types.Object:
+    item = bpy.data.objects.new(name, bpy.data.cameras.new(name))
+    item.location = place
+    bpy.context.scene.collection.objects.link(item)
+    return item
+
+
+def _paint(colour: tuple[float, float, float, float]) -> bpy.types.Material:
+    material = bpy.data.materials.new("Paint")
+    tree_of(material).nodes["Principled BSDF"].inputs["Base Color"].default_value = colour
+    return material
+
+
+def _refused(path: Path, size: float, x: float) -> Iterator[str]:
+    _cube(size=size, x=x)
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    try:
+        blend.open_normalised(path)
+    except InputError as error:
+        yield str(error)
+
+
+def _measured(found: blend.Normalised) -> dict:
+    meshes = [item.data for item in found.scene.objects]
+    points = np.array([point.co for mesh in meshes for point in mesh.vertices]) / found.rescale
+    return {"faces": sum(len(mesh.polygons) for mesh in meshes), "length": float(np.ptp(points[:, 0]))}
+
+
+def _write(folder: Path, name: str, found: object) -> None:
+    (folder / f"{name}.json").write_text(json.dumps(found))
+
+
+def _subdivided(item: bpy.types.Object) -> None:
+    modifier = item.modifiers.new("finer", "SUBSURF")
+    modifier.levels, modifier.render_levels = 0, 3
+
+
+def _repeated(in_viewport: bool) -> Callable[[bpy.types.Object], None]:
+    def build(item: bpy.types.Object) -> None:
+        modifier = item.modifiers.new("row", "ARRAY")
+        modifier.count, modifier.show_viewport, modifier.show_render = 5, in_viewport, not in_viewport
+
+    return build
+
+
+def _instanced(item: bpy.types.Object) -> None:
+    """A small cube at each corner of the second one, which renders do not show."""
+    small = _cube("small", 3.0, 0.1, fresh=False)
+    small.parent, item.instance_type = item, "VERTS"
+    item.show_instancer_for_render = False
+
+
+def _hidden_in_viewport(item: bpy.types.Object) -> None:
+    item.hide_viewport = True
+
+
+def _hidden_in_render(item: bpy.types.Object) -> None:
+    item.hide_render = True
+
+
+def _in_second_layer(item: bpy.types.Object) -> None:
+    """The layer of which a render is asked for is the one that the window shows."""
+    bpy.context.scene.view_layers.new("other")
+    bpy.context.scene.view_layers[0].use = False
+
+
+FILES = {
+    "subdivided": _subdivided,
+    "row in renders": _repeated(in_viewport=False),
+    "row in the viewport": _repeated(in_viewport=True),
+    "instancer": _instanced,
+    "hidden in the viewport": _hidden_in_viewport,
+    "hidden in renders": _hidden_in_render,
+    "second layer": _in_second_layer,
+}
+
+SIZES = ((1e-42, 0.0, "tiny"), (1e-9, 0.0, "small"), (1e11, 0.0, "huge"), (1e9, 0.0, "large"), (1.0, 3e10, "far"))
+
+
+if __name__ == "__main__":
+    measurements = {one.__name__: one for one in (rendered_alone, linked, hidden_cameras, extents, treated)}
+    for name in sys.argv[2:]:
+        measurements[name](Path(sys.argv[1]))

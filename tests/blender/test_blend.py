@@ -1,0 +1,78 @@
+"""A .blend file is taken as a render of it would show it, and what is called the same is told apart."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+MEASURED = ("rendered_alone", "linked", "hidden_cameras", "extents", "treated")
+
+
+@pytest.fixture(scope="module")
+def folder(in_blender: Callable[..., None], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What blend_in_blender.py writes."""
+    folder = tmp_path_factory.mktemp("blend")
+    in_blender(folder, *MEASURED, script="blend_in_blender.py")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def found(folder: Path) -> Callable[[str], Any]:
+    """`found("linked")` is what that function of it writes."""
+    return lambda name: json.loads((folder / f"{name}.json").read_text())
+
+
+def test_what_a_render_shows_is_taken_whatever_the_viewport_shows(found: Callable[[str], Any]) -> None:
+    """Beside a cube of 6 faces another one, 3 units away: subdivided, in a row of 5, as instances, hidden."""
+    shown = found("rendered_alone")
+    assert {name: one["faces"] for name, one in shown.items()} == {
+        "subdivided": 6 + 6 * 4**3,
+        "row in renders": 6 + 5 * 6,
+        "row in the viewport": 6 + 6,
+        "instancer": 6 + 8 * 6,  # one at each corner of the second cube, which is not shown itself
+        "hidden in the viewport": 6 + 6,
+        "hidden in renders": 6,
+        "second layer": 6 + 6,
+    }
+    # Measured 8.000000 and 4.000000, in single precision.
+    assert shown["row in renders"]["length"] == pytest.approx(8.0, rel=1e-6)
+    assert shown["row in the viewport"]["length"] == pytest.approx(4.0, rel=1e-6)
+
+
+def test_materials_and_cameras_of_a_library_are_not_taken_for_those_of_the_same_name(
+    found: Callable[[str], Any],
+) -> None:
+    told = found("linked")
+    assert sorted(told["colours"]) == [[0.0, 0.0, 1.0, 1.0], [1.0, 0.0, 0.0, 1.0]]
+    # Poses are of single precision; measured exact.
+    assert told["cameras"] == {
+        "Kitchen": pytest.approx([9.0, -9.0, 9.0], rel=1e-6),
+        "Kitchen [library.blend]": pytest.approx([0.0, -5.0, 0.0], abs=1e-6),
+    }
+
+
+def test_cameras_are_where_they_are_also_where_they_are_hidden(found: Callable[[str], Any]) -> None:
+    assert found("hidden_cameras") == {"viewport": 0.0, "render": 1.0, "collection": 2.0, "eye": 3.0}
+
+
+def test_a_scene_that_is_too_small_or_too_far_away_is_refused_by_its_file(
+    found: Callable[[str], Any], folder: Path
+) -> None:
+    said = found("extents")
+    assert {*said} == {"tiny", "huge", "far"}
+    for name, sentence in said.items():
+        assert sentence.startswith(f"{folder / name}.blend: expected a scene of 1e-10 units at least")
+    assert "its longest side 1.00053e-42" in said["tiny"] and "3e+10 away" in said["far"]
+
+
+def test_what_a_render_does_with_an_object_besides_showing_it_is_told(found: Callable[[str], Any]) -> None:
+    ordinary = "is left out: it is a surface like any other, in all images"
+    assert found("treated") == [
+        f'invisibility to some rays of "unseen" {ordinary}',
+        f'the holdout of "held", "out" {ordinary}',
+        f'the shadow catcher of "caught" {ordinary}',
+    ]
