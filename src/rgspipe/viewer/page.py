@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 
 import viser
@@ -28,19 +29,27 @@ STEEP = 0.95
 _HELP = "Drag a lamp by its arrows. Mouse: turn, move, zoom; **W A S D Q E** fly. **Ctrl-K** lists all keys."
 
 
+#: What comes of a camera that cannot be: a canvas without a size, a turn of length zero, what is no number. Browsers
+#: tell of such ones while a page is folded away or not yet drawn, and whoever is no browser may tell of anything.
+NO_CAMERA = (ValueError, ArithmeticError, TypeError)
+
+
 class Page:
-    """What a visitor sees and does."""
+    """What a visitor sees and does; to be furnished once it is known who leaves it."""
 
     def __init__(self, client: viser.ClientHandle, exhibit: Exhibit) -> None:
-        self._client, self._resolution, self._seen = client, exhibit.resolution, b""
+        self._client, self._exhibit, self._resolution, self._seen = client, exhibit, exhibit.resolution, b""
+        self._wanted: Camera | None = None
         self.session = exhibit.session()
         self.painter = Painter(self.session, self.camera, self._show, exhibit.resolution, exhibit.turn)
         self.drawings = Drawings(client.scene, exhibit.images.frozen.size, self._go_to)
         self.actions = Actions(client)
+
+    def furnish(self) -> None:
+        """Make all fields, and go to where the first picture is taken from."""
+        client, exhibit, gui = self._client, self._exhibit, self._client.gui
         visit = Visit(client, self.session, exhibit, self.actions, self._here, self._go_to, self.painter.changed)
-        # A page that stands upright, as on a phone, begins with its fields folded, since they lie over the picture. Its
-        # pixels do not tell: browsers count several to a point on phones, and draw fewer where drawing is slow.
-        gui, wide = client.gui, client.camera.image_width >= client.camera.image_height
+        wide = self._is_wide()
         if wide:
             gui.add_markdown(_HELP)
         self.fit = FitControls(visit, self.drawings, lambda: self.lamps.refresh(), is_open=wide)
@@ -52,16 +61,16 @@ class Page:
             DrawingControls(gui, self.actions, self.drawings)
         with gui.add_folder("save", expand_by_default=False):
             Saving(visit)
-        self._go_to(exhibit.camera)
         client.camera.on_update(self._moved)
+        self._go_to(exhibit.camera)
         self.painter.changed()
 
     def camera(self, longest: int) -> Camera | None:
-        """The visitor's camera with `longest` pixels along its longer side; None before the browser told."""
+        """The visitor's camera with `longest` pixels along its longer side; None before the browser told of one."""
         try:
             held = self._client.camera
             return camera_of(held.position, held.wxyz, held.fov, held.aspect, longest)
-        except (ValueError, ZeroDivisionError):  # a canvas without a size, or a turn of length zero
+        except NO_CAMERA:
             return None
 
     def leave(self) -> None:
@@ -72,10 +81,19 @@ class Page:
     def _here(self) -> Camera | None:
         return self.camera(self._resolution)
 
+    def _is_wide(self) -> bool:
+        """Whether it lies on its side. One that stands upright, as on a phone, begins with its fields folded, since
+        they lie over the picture.
+
+        Its pixels do not tell: browsers count several to a point on phones, and draw fewer where drawing is slow.
+        """
+        held = self._client.camera
+        return held.image_width >= held.image_height
+
     async def _moved(self, _: viser.CameraHandle) -> None:
         camera = self._here()
         # The browser tells of its camera also where it stands still.
-        if camera is not None and camera.key != self._seen:
+        if camera is not None and (camera.key != self._seen or self._wanted is not None):
             self._seen = camera.key
             self.painter.changed()
             self.actions.do("look", lambda: self._look(camera))
@@ -83,6 +101,7 @@ class Page:
     def _look(self, camera: Camera) -> None:
         self.drawings.seen_from(camera)
         self.lamps.seen_from(camera)
+        self._follow()
 
     def _show(self, picture: Bytes, top: float, sharp: bool) -> None:
         scene = self._client.scene
@@ -93,13 +112,25 @@ class Page:
             scene.set_background_image(picture, format="jpeg", jpeg_quality=MOVING)
 
     def _go_to(self, camera: Camera) -> None:
+        """Look through a camera; where the browser's own cannot be, as soon as it can."""
+        self._wanted = camera
+        self._follow()
+
+    def _follow(self) -> None:
+        camera = self._wanted
+        if camera is None:
+            return
+        with contextlib.suppress(*NO_CAMERA), self._client.atomic():
+            self._set(camera)
+            self._wanted = None
+
+    def _set(self, camera: Camera) -> None:
         position, _, fov = pose_of(camera)
         held = self._client.camera
         forward, up = -camera.camera_to_world[:3, 2].numpy(), camera.camera_to_world[:3, 1].numpy()
         # On a page that is narrower than the picture, its sides are to be seen rather than its top and bottom.
         across = math.tan(0.5 * fov) * camera.width / camera.height
         fov = 2.0 * math.atan(max(math.tan(0.5 * fov), across / max(held.aspect, 0.1)))
-        with self._client.atomic():
-            held.up_direction = up if abs(forward[2]) > STEEP else (0.0, 0.0, 1.0)
-            held.position, held.fov = position, fov
-            held.look_at = position + forward * max(self.session.images.frozen.size, 1e-3)
+        held.up_direction = up if abs(forward[2]) > STEEP else (0.0, 0.0, 1.0)
+        held.position, held.fov = position, fov
+        held.look_at = position + forward * max(self.session.images.frozen.size, 1e-3)

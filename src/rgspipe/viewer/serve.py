@@ -97,9 +97,12 @@ class Viewer:
     def _welcome(self, client) -> None:
         from rgspipe.viewer.page import Page
 
-        self.pages[client.client_id] = Page(client, self._exhibit)
-        if client.client_id not in self._server.get_clients():  # left meanwhile
-            self._bye(client)
+        page = self.pages[client.client_id] = Page(client, self._exhibit)
+        try:
+            page.furnish()
+        finally:
+            if client.client_id not in self._server.get_clients():  # left meanwhile
+                self._bye(client)
 
     def _bye(self, client) -> None:
         page = self.pages.pop(client.client_id, None)

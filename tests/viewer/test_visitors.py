@@ -1,0 +1,123 @@
+"""Visitors whose browsers tell of cameras that cannot be: their pages wait, and go with them."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import msgspec
+import pytest
+
+from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.scene import Camera
+from rgspipe.viewer.serve import Viewer, view
+
+viser = pytest.importorskip("viser")
+
+import zstandard  # noqa: E402  # viser brings both
+from websockets.sync.client import ClientConnection, connect  # noqa: E402
+
+NAN = float("nan")
+
+#: First messages of cameras that cannot be.
+IMPOSSIBLE: dict[str, dict[str, Any]] = {
+    "a canvas without a size": {"image_width": 0, "image_height": 0},
+    "a canvas without a height": {"image_height": 0},
+    "a place of NaN": {"position": [NAN] * 3},
+    "a turn of length zero": {"wxyz": [0.0] * 4},
+    "a field of view of NaN": {"fov": NAN},
+    "a target that is its place": {"look_at": [0.0, -1.5, 0.0]},
+    "up that is nowhere": {"up_direction": [NAN] * 3},
+    "a place of one number, a turn of a word": {"position": [1.0], "wxyz": ["x"]},
+    "a place beyond all numbers": {"position": [1e300] * 3, "look_at": [-1e308] * 3},
+}
+
+#: Where the first picture is taken from.
+EYE = [-0.45, -0.45, 0.0]
+
+
+@pytest.fixture(scope="module")
+def viewer(frozen: FrozenScene) -> Iterator[Viewer]:
+    camera = Camera.look_at(EYE, [0.1, -0.15, 0.25], fov_degrees=70, width=32, height=32)
+    made = view(frozen, camera=camera, port=0, resolution=32)
+    yield made
+    made.stop()
+
+
+def visitor(viewer: Viewer) -> ClientConnection:
+    kind = f"viser-v{viser.__version__}"
+    return connect(viewer.url.replace("http", "ws"), subprotocols=[kind], max_size=None)
+
+
+def message(**other: Any) -> bytes:
+    """What a browser tells of its camera, but for what is other."""
+    usual = {"wxyz": [0.707, -0.707, 0.0, 0.0], "position": [0.0, -1.5, 0.0], "fov": 0.8, "near": 0.01, "far": 100.0}
+    usual |= {"look_at": [0.0, 0.0, 0.0], "up_direction": [0.0, 0.0, 1.0], "image_height": 300, "image_width": 400}
+    return msgspec.msgpack.encode({"type": "ViewerCameraMessage", **usual, **other})
+
+
+def words(frame: bytes) -> bytes:
+    """What viser sends, without its arrays: after two lengths of 8 bytes, the second of them the compressed one."""
+    return zstandard.ZstdDecompressor().decompress(frame[16 : 16 + int.from_bytes(frame[8:16], "little")])
+
+
+def wait_until_told(browser: ClientConnection, *kinds: bytes) -> None:
+    """Until each kind of message came."""
+    awaited = {*kinds}
+    while awaited:
+        told = words(browser.recv(timeout=60.0))
+        awaited = {one for one in awaited if one not in told}
+
+
+def wait_for(what: Callable[[], object]) -> None:
+    """On a busy machine, too."""
+    end = time.monotonic() + 60.0
+    while not what():
+        assert time.monotonic() < end, "it did not come"
+        time.sleep(0.01)
+
+
+def threads() -> list[str]:
+    """Those of pages."""
+    return [one.name for one in threading.enumerate() if one.name.startswith("rgspipe-")]
+
+
+@pytest.mark.parametrize("first", IMPOSSIBLE.values(), ids=IMPOSSIBLE)
+def test_a_page_waits_for_a_camera_that_can_be_and_goes_with_its_visitor(viewer: Viewer, first: dict[str, Any]) -> None:
+    with visitor(viewer) as browser:
+        browser.send(message(**first))
+        wait_for(lambda: viewer.pages)
+        [page] = viewer.pages.values()
+        wait_for(lambda: hasattr(page, "picture"))
+        browser.send(message())
+        # The browser is told where to look from, and shown a picture.
+        wait_until_told(browser, b"SetCameraPositionMessage", b"BackgroundImageMessage")
+    wait_for(lambda: not viewer.pages and not threads())
+
+
+def test_a_camera_that_can_be_no_more_harms_no_page(viewer: Viewer) -> None:
+    with visitor(viewer) as browser:
+        browser.send(message())
+        wait_for(lambda: viewer.pages)
+        [page] = viewer.pages.values()
+        wait_until_told(browser, b"SetCameraLookAtMessage", b"BackgroundImageMessage")  # it went to its first place
+        for other in IMPOSSIBLE.values():
+            browser.send(message(**other))
+        browser.send(message(position=[1.0, -3.0, 0.0]))
+        wait_for(lambda: page._client.camera.position.tolist() == [1.0, -3.0, 0.0])
+        page._go_to(viewer._exhibit.camera)
+        assert page._client.camera.position.tolist() == pytest.approx(EYE)
+    wait_for(lambda: not viewer.pages and not threads())
+
+
+def test_thirty_visitors_who_leave_at_once_leave_no_thread(viewer: Viewer) -> None:
+    for _ in range(30):
+        with visitor(viewer) as browser:
+            browser.send(message(image_height=0))
+    wait_for(lambda: not viewer.pages and not threads())
+    with visitor(viewer) as browser:
+        browser.send(message())
+        wait_for(lambda: viewer.pages)
+    wait_for(lambda: not viewer.pages and not threads())
