@@ -13,6 +13,7 @@ import toys
 from rgspipe.cli import main
 from rgspipe.config import RgspipeConfig, with_changes
 from rgspipe.graph.pipeline import run
+from rgspipe.store.retention import removing
 from rgspipe.store.status import process_start
 
 
@@ -106,6 +107,16 @@ def test_nothing_goes_while_something_is_made_by_whomever(outputs: Path, capsys:
         assert told.startswith("That is refused for now: ") and 16 * "a" in told
         assert main(["outputs", "prune", f"outputs={outputs}", "remove=true"]) == 2
     assert 16 * "a" in capsys.readouterr().err
+    assert len(list(outputs.glob("cornell/*/[0-9a-f]*"))) == 6
+
+
+def test_what_another_prune_removes_is_not_told_as_a_run(outputs: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with removing(outputs):
+        assert main(["outputs", "prune", f"outputs={outputs}"]) == 0
+        assert "refused for now" in capsys.readouterr().out.splitlines()[-1]
+        assert main(["outputs", "prune", f"outputs={outputs}", "remove=true"]) == 2
+    told = capsys.readouterr().err
+    assert "another outputs prune" in told and "process that makes" not in told and "status" not in told
     assert len(list(outputs.glob("cornell/*/[0-9a-f]*"))) == 6
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import shutil
 from collections.abc import Callable
@@ -14,7 +15,7 @@ from filelock import FileLock
 
 from rgspipe.errors import InputError
 from rgspipe.store.artifacts import ArtifactStore, Key
-from rgspipe.store.retention import Choice, Stored, artifact_keys, in_the_making, removable, remove, stored
+from rgspipe.store.retention import Choice, Stored, artifact_keys, in_the_making, removable, remove, removing, stored
 
 
 def full(name: str) -> str:
@@ -163,6 +164,35 @@ def test_a_process_that_makes_something_is_seen(store: Path) -> None:
     assert in_the_making(store) is None
     with FileLock(store / "room" / "fit" / f".lock-{full('b9')}"):
         assert in_the_making(store) == store / "room" / "fit" / full("b9")
+
+
+def test_where_there_is_no_room_for_locks_results_go_all_the_same(store: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A disk without inodes, as of a store that was copied without its locks."""
+    for lock in store.glob("*/*/.lock-*"):
+        lock.unlink()
+    left = store / "room" / "fit" / f".gone-{full('b8')}"
+    left.mkdir()
+    opened = os.open
+
+    def full_disk(path: Any, flags: int, *given: Any, **named: Any) -> int:
+        if flags & os.O_CREAT and not os.path.lexists(path):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), path)
+        return opened(path, flags, *given, **named)
+
+    monkeypatch.setattr(os, "open", full_disk)
+    assert names(list(remove(store, removable(stored(store), Choice(stage="fit"))))) == {"b2", "b3"}
+    assert not left.exists() and names(stored(store)) == {"a1", "b1", "c1", "a2"}
+
+
+def test_only_one_process_removes_from_a_store(store: Path) -> None:
+    """It takes no file for it."""
+    before = sorted(store.rglob("*"))
+    with removing(store):
+        assert sorted(store.rglob("*")) == before
+        with pytest.raises(InputError, match="another outputs prune"), removing(store):
+            pass
+    with removing(store):
+        pass
 
 
 def test_other_folders_are_no_results(tmp_path: Path) -> None:

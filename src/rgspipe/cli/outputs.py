@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 import re
 import time
@@ -12,7 +13,7 @@ from rgspipe.cli.arguments import refused
 from rgspipe.cli.columns import columns, without_empty
 from rgspipe.datasets.input_file import input_folder
 from rgspipe.errors import InputError
-from rgspipe.store.retention import Choice, Stored, in_the_making, removable, remove, stored
+from rgspipe.store.retention import Choice, Stored, in_the_making, removable, remove, removing, stored
 from rgspipe.store.status import read_statuses
 
 #: Seconds of what ages are written in.
@@ -43,9 +44,14 @@ def show_outputs(arguments: Sequence[str]) -> int:
         return 0
     input_folder(outputs, "the folder of results")
     choice = Choice(values.get("scene"), values.get("stage"), _seconds(values["older"]) if "older" in values else None)
-    really = values.get("remove") == "true"
-    if really:
+    if values.get("remove") != "true":
+        return _show(outputs, choice, prune)
+    with removing(outputs):
         list(remove(outputs, []))  # what a removal that was killed has left
+        return _show(outputs, choice, prune, really=True)
+
+
+def _show(outputs: Path, choice: Choice, prune: bool, really: bool = False) -> int:
     everything = stored(outputs)
     _check_names(choice, everything)
     if prune:
@@ -59,7 +65,7 @@ def show_outputs(arguments: Sequence[str]) -> int:
 
 
 def _prune(outputs: Path, everything: Sequence[Stored], choice: Choice, really: bool) -> int:
-    gone, busy = removable(everything, choice), _busy(outputs)
+    gone, busy = removable(everything, choice), _busy(outputs, really)
     if really:
         if busy is not None:
             raise busy
@@ -75,8 +81,17 @@ def _prune(outputs: Path, everything: Sequence[Stored], choice: Choice, really: 
     return 0
 
 
-def _busy(outputs: Path) -> InputError | None:
-    """Why nothing may be taken away: a run may be about to read it."""
+def _busy(outputs: Path, removes: bool) -> InputError | None:
+    """Why nothing may be taken away: a run may be about to read it, or another removal is going on.
+
+    Args:
+        removes: whether who asks is the one that is.
+    """
+    try:
+        with contextlib.nullcontext() if removes else removing(outputs):
+            pass
+    except InputError as error:
+        return error
     remedy = "Wait for it, or stop it; python -m rgspipe status shows it."
     for folder, status in read_statuses(outputs / "runs"):
         if status["state"] == "running":

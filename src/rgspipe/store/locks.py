@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import logging
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 from filelock import FileLock, Timeout
 
-from rgspipe.store.files import make_folder
+from rgspipe.store.files import NO_ROOM, make_folder
 
 #: What the file that is locked is called, before the name of the artifact.
 LOCK = ".lock-"
@@ -37,6 +39,42 @@ def locked_if_free(folder: Path, name: str) -> FileLock:
             os.close(os.open(file, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o666))
             break
     return FileLock(file).acquire(timeout=0)
+
+
+def locked_to_remove(folder: Path, name: str) -> contextlib.AbstractContextManager[object]:
+    """`locked_if_free`, also on a disk that has no room for the file that is locked: what is removed makes some.
+
+    Where that file is not there nobody holds it, and nobody else finds room for it either.
+
+    Raises:
+        filelock.Timeout: another process holds it.
+    """
+    try:
+        return locked_if_free(folder, name)
+    except OSError as error:
+        if error.errno in NO_ROOM and not lock_file(folder, name).exists():
+            return contextlib.nullcontext()
+        raise
+
+
+@contextlib.contextmanager
+def folder_locked_if_free(folder: Path) -> Iterator[None]:
+    """A lock on a folder itself, which needs no file and no room; nothing where the file system has none of folders.
+
+    Raises:
+        filelock.Timeout: another process holds it.
+    """
+    number = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        try:
+            fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise Timeout(str(folder)) from None
+        except OSError:  # NFS locks only what can be written to, and a folder cannot
+            pass
+        yield
+    finally:
+        os.close(number)
 
 
 def locked(folder: Path, name: str) -> FileLock:

@@ -12,10 +12,11 @@ from pathlib import Path
 
 from filelock import Timeout
 
+from rgspipe.errors import InputError
 from rgspipe.store.artifacts import LATEST, ArtifactStore, Key
 from rgspipe.store.files import ASIDE, GONE, remove_any, remove_at_once
 from rgspipe.store.fingerprints import DIGITS
-from rgspipe.store.locks import LOCK, locked_if_free
+from rgspipe.store.locks import LOCK, folder_locked_if_free, locked_if_free, locked_to_remove
 from rgspipe.store.manifest import MANIFEST
 from rgspipe.store.partial import PARTIAL
 from rgspipe.store.unwritable import told_below
@@ -117,6 +118,24 @@ def in_the_making(outputs: Path) -> Path | None:
     return None
 
 
+@contextlib.contextmanager
+def removing(outputs: Path) -> Iterator[None]:
+    """What is removed in the block no other process removes meanwhile.
+
+    Raises:
+        InputError: another one is removing from the store.
+    """
+    with contextlib.ExitStack() as held:
+        try:
+            with told_below(outputs):
+                held.enter_context(folder_locked_if_free(outputs))
+        except Timeout:
+            expected, found = "nobody who removes results from this folder", "another outputs prune that does"
+            remedy = "Wait for it to end, and see what is left then."
+            raise InputError(outputs, expected=expected, found=found, remedy=remedy) from None
+        yield
+
+
 def removable(everything: Sequence[Stored], choice: Choice) -> list[Stored]:
     """What goes: what was chosen and nothing that stays needs.
 
@@ -149,10 +168,11 @@ def remove(outputs: Path, gone: Collection[Stored]) -> Iterator[Stored]:
     """
     with told_below(outputs):
         for left, name in _named(outputs, LEFT):
-            with contextlib.suppress(Timeout), locked_if_free(left.parent, name[2]):
+            with contextlib.suppress(Timeout), locked_to_remove(left.parent, name[2]):
                 remove_any(left)
     for one in sorted(gone, key=lambda one: one.made, reverse=True):
-        with told_below(outputs), contextlib.suppress(Timeout), locked_if_free(one.folder.parent, one.key.fingerprint):
+        place, name = one.folder.parent, one.key.fingerprint
+        with told_below(outputs), contextlib.suppress(Timeout), locked_to_remove(place, name):
             if not one.folder.exists():
                 continue
             if one.whole:
