@@ -12,6 +12,8 @@ import pytest
 import torch
 
 import rgspipe as rg
+from rgspipe.datasets.light_file import read_lights
+from rgspipe.datasets.photometric_file import read_photometry
 from rgspipe.errors import InputError
 from rgspipe.light_export.export import FORMATS, NAMES, export_lights
 from rgspipe.light_export.world import World, candela, lumens
@@ -122,6 +124,44 @@ def test_ies_files_have_the_candela_of_every_angle(tmp_path: Path) -> None:
 def test_the_same_lights_give_the_same_files(tmp_path: Path) -> None:
     one, other = (export_lights(RIG, tmp_path / name).files for name in "ab")
     assert [path.read_bytes() for path in one] == [path.read_bytes() for path in other]
+
+
+@pytest.mark.parametrize("metres", [1e9, 1e-9])
+def test_what_is_refused_is_what_cannot_be_read_back(tmp_path: Path, metres: float) -> None:
+    """Candela and W/sr go with the square of a unit: 1 W/sr in units of 10⁹ m is 6.8·10²⁰ cd."""
+    lamp = rg.PointLight([0.0, 0.0, 1.0], 1.0)
+    if metres > 1.0:
+        with pytest.raises(InputError, match=r"lamp_1\.ies: expected at most 1e\+15 cd"):
+            export_lights(lamp, tmp_path, ["usda", "ies"], metres=metres)
+        assert list(tmp_path.iterdir()) == []
+    lamp = rg.PointLight([0.0, 0.0, 1.0], 1.0 / metres**2)
+    export_lights(lamp, tmp_path, ["ies", "json"], metres=metres)
+    assert read_photometry(tmp_path / "lamp_1.ies").relative.max() == 1.0
+    (back,) = read_lights(tmp_path / "lamps.json")
+    # The square of a unit is taken twice, in double precision.
+    torch.testing.assert_close(back.intensity, torch.ones(3).double())
+
+
+@pytest.mark.parametrize(
+    ("light", "metres", "said"),
+    [
+        (
+            rg.PointLight([0.0, 0.0, 20.0], 1.0),
+            1e9,
+            r"lights\[0\]\.position: expected at most 1e\+10 m, found 2e\+10 m",
+        ),
+        (rg.PointLight([0.0, 0.0, 1.0], 1e3), 1e8, r"lights\[0\]\.intensity: expected at most 1e\+18 W/sr"),
+        (rg.SphereLight([0.0, 0.0, 1.0], 1.0, 20.0), 1e9, r"lights\[0\]\.radius: expected at most 1e\+10 m"),
+        (rg.SphereLight([0.0, 0.0, 1.0], 1.0, 1e-30), 1.0, "radiance: expected at most"),
+        (rg.PanelLight([0.0, 0.0, 1.0], 1.0, [0.0, 0.0, -1.0], 0.0, 1.0), 1.0, "radiance: expected .* found inf"),
+        (rg.PointLight([0.0, 0.0, 1.0], 1.0), 1e200, "metres: expected 1e-09 to 1e"),
+        (rg.PointLight([0.0, 0.0, 1.0], 1.0), 1e-200, "metres: expected 1e-09 to 1e"),
+    ],
+)
+def test_lights_that_no_format_can_hold_are_refused(tmp_path: Path, light: Light, metres: float, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        export_lights(light, tmp_path / "lamps", metres=metres)
+    assert not (tmp_path / "lamps").exists()
 
 
 def test_wrong_requests_are_refused(tmp_path: Path) -> None:

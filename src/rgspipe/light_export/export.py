@@ -15,6 +15,7 @@ from rgspipe.errors import InputError
 from rgspipe.light_export.blend import blend
 from rgspipe.light_export.gltf import gltf
 from rgspipe.light_export.ies import ies
+from rgspipe.light_export.limits import check_range, check_world
 from rgspipe.light_export.mitsuba import mitsuba
 from rgspipe.light_export.three import three
 from rgspipe.light_export.usd import usda
@@ -69,27 +70,25 @@ def export_lights(
         covariances: of each light, of which the first three rows are its place [scene units²].
 
     Raises:
-        InputError: an unknown format, or a length of no metres.
+        InputError: an unknown format, a unit that is none, or a light that a format cannot hold.
     """
     world = world or World(metres)
-    if not 0.0 < world.unit < float("inf"):
-        raise InputError("metres", expected="above 0", found=f"{world.unit:g}", remedy="Say how long a scene unit is.")
+    check_world(world)
     formats = as_several(formats, str, "formats", f"Pass some of {', '.join(FORMATS)}.")
     for name in formats:
         if name not in FORMATS:
             raise InputError("formats", expected=" or ".join(FORMATS), found=repr(name), remedy="Correct the name.")
     rig, folder = world.lights(as_rig(lights)), as_path(folder, "folder")
-    folder.mkdir(parents=True, exist_ok=True)
+    check_range(rig)
     regions = [None if one is None else world.unit**2 * one[:3, :3] for one in covariances]
-    files, notes = [], []
-    for name in formats:
-        for path, text, said in _texts(name, rig, folder, regions):
-            files.append(path)
-            notes += said
-            if text is None:
-                write_lights(path, rig, {"units": "metres, W/sr; of suns W/m²"})
-            else:
-                write_text(path, text)
+    made = [file for name in formats for file in _texts(name, rig, folder, regions)]
+    folder.mkdir(parents=True, exist_ok=True)
+    for path, text, _ in made:
+        if text is None:
+            write_lights(path, rig, {"units": "metres, W/sr; of suns W/m²"})
+        else:
+            write_text(path, text)
+    notes = [note for _, _, said in made for note in said]
     if "ies" in formats:
         notes += [f"light {n}: LM-63 has no suns; it is left out." for n, one in enumerate(rig, start=1) if one.distant]
     if {*formats} - {"ies", "json"}:
@@ -99,7 +98,7 @@ def export_lights(
             if isinstance(one, ProfileLight) and not one.round
         ]
     write_text(folder / "lamps.txt", f"{world.line()}\n\n{table(rig)}" + "".join(f"{note}\n" for note in notes))
-    return LightExport(tuple(files), (world.line(), *notes))
+    return LightExport(tuple(path for path, _, _ in made), (world.line(), *notes))
 
 
 def _texts(

@@ -7,6 +7,9 @@ import math
 import torch
 from torch import Tensor
 
+from rgspipe.datasets.photometric_file import BRIGHTEST
+from rgspipe.errors import InputError
+from rgspipe.light_export.limits import REMEDY
 from rgspipe.light_export.world import candela
 from rgspipe.scene import Light
 from rgspipe.scene.lights import PanelLight, ProfileLight, SphereLight
@@ -16,8 +19,18 @@ ANGLES = torch.linspace(0.0, 180.0, 361, dtype=torch.float64)
 
 
 def ies(light: Light, name: str) -> tuple[str, list[str]]:
-    """The text of a light's file, and what it does not hold."""
+    """The text of a light's file, and what it does not hold.
+
+    Raises:
+        InputError: it is brighter than readers of such files take, ours among them.
+    """
     vertical, planes, shares = _table(light)
+    brightest = candela(light) * float(shares.max())
+    if not brightest <= BRIGHTEST:
+        expected = f"at most {BRIGHTEST:g} cd, as no luminaire is brighter"
+        raise InputError(
+            f"{name}.ies", expected=expected, found=f"{brightest:g} cd", remedy=f"{REMEDY} Other formats hold it."
+        )
     values = [(candela(light) * column).tolist() for column in shares]
     width, length, height = _extent(light)
     header = [

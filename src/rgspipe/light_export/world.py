@@ -47,7 +47,7 @@ class World:
             for number in light.shape
             if isinstance(number.coordinate, Length)
         }
-        factor = 1.0 if light.distant else self.unit**2
+        factor = 1.0 if light.distant else self.unit * self.unit
         return replace(light, position=position, intensity=factor * light.intensity.double(), **sizes)
 
     def line(self) -> str:
