@@ -77,8 +77,9 @@ def _bulb(light: Light) -> bpy.types.Light:
 
 def _table(nodes: _Nodes, light: ProfileLight) -> bpy.types.NodeSocket:
     """Relative intensity of a measured luminaire, as Cycles reads its table."""
-    if TABLE in bpy.data.texts:
-        bpy.data.texts.remove(bpy.data.texts[TABLE])
+    before = bpy.data.texts.get((TABLE, None))  # of no library
+    if before is not None:
+        bpy.data.texts.remove(before)
     unit, node = replace(light, intensity=torch.ones(3).double()), nodes.add("ShaderNodeTexIES")
     node.mode, node.ies = "INTERNAL", bpy.data.texts.new(TABLE)
     node.ies.write(ies(unit, TABLE)[0])
