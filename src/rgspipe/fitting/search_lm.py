@@ -24,6 +24,7 @@ from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.options import SearchOptions
 from rgspipe.fitting.result import FitResult, dark_result
 from rgspipe.fitting.search.beside import settled_beside
+from rgspipe.fitting.search.bright_spots import seeing_bright_spots
 from rgspipe.fitting.search.coarse import CoarseImages
 from rgspipe.fitting.search.compare import column_energies
 from rgspipe.fitting.search.grow import grown
@@ -81,6 +82,7 @@ def fit_search_lm(
     (polished, best), *rivals = sorted(every, key=lambda pair: pair[0].unexplained(pair[1]))
     best, beside = settled_beside(polished, best, options, refiner)
     others = [*(state for _, state in rivals), *beside]
+    polished, (best, *others) = _seen_well(polished, [best, *others], options)
     if not bool((best.intensity[: len(best.emitters)] > 0).any()):
         return _without_lights(polished.problem, meter)
     findings = found.findings
@@ -100,11 +102,13 @@ def fit_from(
     problem: LightProblem, start: Sequence[Emitter], iterations: int = 30, options: SearchOptions | None = None
 ) -> FitResult:
     """Lights from known starts, by plain least squares: no search, no robust loss."""
+    options = options or SearchOptions()
     if problem.black:
         return dark_result(0.0)
     refiner = Refiner.of(problem.sharpest())
     best = refiner.refined(refiner.start(start, PLAIN), PLAIN, iterations)
-    return _result(refiner, best, (), Costs({}), options or SearchOptions())
+    refiner, (best,) = _seen_well(refiner, [best], options)
+    return _result(refiner, best, (), Costs({}), options)
 
 
 @dataclass(frozen=True)
@@ -183,6 +187,21 @@ def _polished(refiner: Refiner, best: State, iterations: int) -> tuple[Refiner, 
         exposures = problem.moments(best.columns, PLAIN.at(problem, best.columns, best.intensity)).exposures
         problem = replace(problem.with_exposures(exposures), exposure_free=False)
     return refiner.on(problem), best
+
+
+def _seen_well(refiner: Refiner, states: Sequence[State], options: SearchOptions) -> tuple[Refiner, list[State]]:
+    """The refiner and the rigs, the best first, with bright spots seen well; as they are where that explains no more.
+
+    Images that the model of patches made are explained best by it.
+    """
+    problem = seeing_bright_spots(refiner.problem, states, options.spots)
+    if problem is refiner.problem:
+        return refiner, [*states]
+    every = [_polished(refiner.on(problem), one, options.iterations) for one in states]
+    (better, best), *rest = sorted(every, key=lambda pair: pair[0].unexplained(pair[1]))
+    if better.unexplained(best) >= refiner.unexplained(states[0]):
+        return refiner, [*states]
+    return better, [best, *(state for _, state in rest)]
 
 
 def _told(state: State) -> tuple[Emitter, ...]:

@@ -24,7 +24,7 @@ class PatchTransport:
     where R (P, N) averages over patches by area, F_p (N, P) gathers from patches and b is the number of bounces;
     for all of them M^b is zero.
 
-    Light per patch is an average, so a lamp near a wall, whose bright spot is smaller than a patch, loses most by it.
+    Of a spot as bright as that of a lamp near a wall few rays of F_p know; see `renderer.bright_spots`.
 
     Attributes:
         average: R.

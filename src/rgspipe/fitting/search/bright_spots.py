@@ -1,0 +1,42 @@
+"""Where lights shine on a spot that the scene's patches see badly: the same problem with such spots seen well."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import torch
+from torch import Tensor
+
+from rgspipe.fitting.model.problem import LightProblem
+from rgspipe.fitting.options import SpotOptions
+from rgspipe.fitting.search.refine import State
+from rgspipe.renderer.bright_spots import spot_share, with_bright_spots
+from rgspipe.renderer.images.model import ViewModel
+from rgspipe.renderer.kernels.lit_transmittance import LEAST_LIT
+from rgspipe.renderer.lit_surfels import lit_columns
+
+
+def seeing_bright_spots(problem: LightProblem, states: Sequence[State], options: SpotOptions) -> LightProblem:
+    """The problem with the bright spots of some rigs seen well; itself where none is notable, or light does not bounce.
+
+    Scenes with gloss keep their patches: over gloss light goes from patch to patch.
+    """
+    model, frozen = problem.model, problem.views.frozen
+    if not isinstance(model, ViewModel) or not model.effects.interreflection or frozen.gloss or frozen.solver:
+        return problem
+    lightings = [_irradiance(problem, state) for state in states]
+    notable = [one for one in lightings if spot_share(frozen, one, options.share) > options.notable]
+    if not notable:
+        return problem
+    views = replace(problem.views, frozen=with_bright_spots(frozen, notable, options.share, options.points))
+    return replace(problem, views=views, model=model.on(views))
+
+
+def _irradiance(problem: LightProblem, state: State) -> Tensor:
+    """(N,) of all lights of a rig."""
+    frozen, effects = problem.views.frozen, problem.model.effects
+    total = torch.zeros(len(frozen.surfels), device=frozen.device)
+    for emitter, strength in zip(state.emitters, state.intensity, strict=False):
+        total = total + lit_columns(frozen.bvh, emitter, effects, LEAST_LIT)[:, 0] * float(strength.mean())
+    return total
