@@ -81,7 +81,8 @@ def wait_for(what: Callable[[], object]) -> None:
 
 def threads() -> list[str]:
     """Those of pages."""
-    return [one.name for one in threading.enumerate() if one.name.startswith("rgspipe-")]
+    names = [one.name for one in threading.enumerate()]
+    return [name for name in names if name.startswith("rgspipe-") and not name.startswith("rgspipe-kernel")]
 
 
 @pytest.mark.parametrize("first", IMPOSSIBLE.values(), ids=IMPOSSIBLE)
