@@ -49,6 +49,7 @@ MOMENTARY = {
     "blender/materials.py": "a shader for Blender's compiler, in a temporary folder",
     "benchmark/mitsuba_worker.py": "what a worker hands to its parent, in a temporary folder",
     "benchmark/mitsuba_process.py": "what a parent hands to its worker, in a temporary folder",
+    "renderer/kernels/kernel_cache.py": "a file without a name, to see that there is room",
     "renderer/kernels/launch.py": "the null device",
     "machine/description.py": "a switch of the kernel",
     "renderer/frozen_pickle.py": "what one process hands to another, in a temporary folder",

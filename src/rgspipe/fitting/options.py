@@ -135,19 +135,6 @@ class StepLimits(Options):
 
 
 @dataclass(frozen=True)
-class SpotOptions(Options):
-    """The brightest spot of a scene, as beside a lamp near a wall, which surfels see with few of their rays."""
-
-    notable: float = option(0.1, low=0, high=1)
-    """share of what surfaces reflect first above which the answer is polished with its spot seen well: a lamp in a room
-    of size 1 reaches it 0.25 from a wall. 1: never"""
-    share: float = option(0.01, low=1e-4, high=0.1)
-    """of the scene's area that counts as a spot"""
-    points: int = option(64, low=1, high=4096)
-    """that stand for it; each costs a shadow ray to every surfel"""
-
-
-@dataclass(frozen=True)
 class CertaintyOptions(Options):
     """How sure a fit says that it is; the search itself does not ask."""
 
@@ -182,6 +169,8 @@ class SearchOptions(Options):
     answer may (`certainty.poorly`)"""
     iterations: int = option(30, low=1, high=10000)
     """most Levenberg-Marquardt steps of the final refinement"""
+    bright_spots: bool = True
+    """polish the answer once more where a lamp lights a spot near it that reflects much, with that spot seen well"""
     aimed: AimedOptions = AimedOptions()
     combinations: CombinationOptions = CombinationOptions()
     schedule: ScheduleOptions = ScheduleOptions()
@@ -189,7 +178,6 @@ class SearchOptions(Options):
     rivals: RivalOptions = RivalOptions()
     loss: LossOptions = LossOptions()
     limits: StepLimits = StepLimits()
-    spots: SpotOptions = SpotOptions()
     certainty: CertaintyOptions = CertaintyOptions()
 
 

@@ -14,7 +14,7 @@ from torch import Tensor
 
 from rgspipe.fitting.alternative import Alternative
 from rgspipe.fitting.certainty.uncertainty import light_covariances
-from rgspipe.fitting.findings import Finding, LightMissing, LightSpare, MuchAmbient, NoOpening
+from rgspipe.fitting.findings import Finding, FitStatus, LightMissing, LightSpare, MuchAmbient, NoOpening
 from rgspipe.fitting.meter import Meter
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.exposure import rough_exposures
@@ -107,7 +107,8 @@ def fit_from(
         return dark_result(0.0)
     refiner = Refiner.of(problem.sharpest())
     best = refiner.refined(refiner.start(start, PLAIN), PLAIN, iterations)
-    refiner, (best,) = _seen_well(refiner, [best], options)
+    if best.status is FitStatus.CONVERGED:
+        refiner, (best,) = _seen_well(refiner, [best], options)
     return _result(refiner, best, (), Costs({}), options)
 
 
@@ -194,7 +195,7 @@ def _seen_well(refiner: Refiner, states: Sequence[State], options: SearchOptions
 
     Images that the model of patches made are explained best by it.
     """
-    problem = seeing_bright_spots(refiner.problem, states, options.spots)
+    problem = seeing_bright_spots(refiner.problem, states) if options.bright_spots else refiner.problem
     if problem is refiner.problem:
         return refiner, [*states]
     every = [_polished(refiner.on(problem), one, options.iterations) for one in states]

@@ -22,6 +22,13 @@ from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.kernels.receiver import RECEIVER_FADE, RECEIVER_SKIP
 from rgspipe.renderer.transport import PatchTransport
 
+#: Share of the scene's area that counts as a spot. Of a lamp 0.05 from a wall it reflects two fifths of all that is
+#: reflected first; half or twice as much area finds lamps as well.
+SHARE = 0.01
+
+#: Points that stand for it; each costs a shadow ray to every surfel. Half or twice as many find lamps as well.
+POINTS = 64
+
 
 @dataclass(frozen=True)
 class SpotTransport:
@@ -54,34 +61,33 @@ class SpotTransport:
         return own + self.others.indirect(direct.index_fill(0, self.chosen, 0.0) + own)
 
 
-def spot_share(frozen: FrozenScene, irradiance: Tensor, share: float) -> float:
-    """Part of what surfaces reflect first under a lighting (N,) that the brightest `share` of their area does."""
+def spot_share(frozen: FrozenScene, irradiance: Tensor) -> float:
+    """Part of what surfaces reflect first under a lighting (N,) that its spot does."""
     sent, areas = _sent(frozen, irradiance), frozen.areas.double().cpu()
-    bright = _brightest(sent, areas, share)
+    bright = _brightest(sent, areas)
     return float((sent * areas)[bright].sum() / (sent * areas).sum().clamp(min=1e-300))
 
 
-def with_bright_spots(frozen: FrozenScene, irradiances: Sequence[Tensor], share: float, points: int) -> FrozenScene:
-    """The scene with its brightest spots under each of several lightings taken out of the patches.
+def with_bright_spots(frozen: FrozenScene, irradiances: Sequence[Tensor]) -> FrozenScene:
+    """The scene with its brightest spots under each of several lightings taken out of the patches; the scene itself
+    where no surface sees a spot.
 
     Args:
         frozen: a diffuse scene with patch transport.
         irradiances: (N,) of each lighting.
-        share: of the scene's area that counts as the spot of a lighting.
-        points: that stand for it.
     """
     areas = frozen.areas.double().cpu()
     averages, factors, order, chosen = [], [], [], torch.zeros(len(areas), dtype=torch.bool)
     for irradiance in irradiances:
-        spot = _brightest(_sent(frozen, irradiance), areas, share) & ~chosen
+        spot = _brightest(_sent(frozen, irradiance), areas) & ~chosen
         places = spot.nonzero()[:, 0]
         if len(places):
-            average = _means(frozen, places, areas, points)
+            average = _means(frozen, places, areas)
             averages.append(average)
             factors.append(_form_factors(frozen, places, average, areas[places]))
             order.append(places)
             chosen |= spot
-    if not averages:
+    if not any(bool(one.any()) for one in factors):
         return frozen
     average = torch.block_diag(*averages).to(frozen.surfels.albedo)
     spots = SpotTransport(frozen.transport, torch.cat(order).to(frozen.device), average, torch.cat(factors, dim=1))
@@ -93,18 +99,18 @@ def _sent(frozen: FrozenScene, irradiance: Tensor) -> Tensor:
     return irradiance.double().cpu().clamp(min=0.0) * frozen.surfels.albedo.double().cpu().mean(dim=1)
 
 
-def _brightest(radiosity: Tensor, areas: Tensor, share: float) -> Tensor:
-    """(N,) bool the brightest surfels, as many as cover `share` of the area, that are lit at all."""
+def _brightest(radiosity: Tensor, areas: Tensor) -> Tensor:
+    """(N,) bool the brightest surfels, as many as cover SHARE of the area, that are lit at all."""
     order = radiosity.argsort(descending=True, stable=True)
-    within = areas[order].cumsum(0) <= share * areas.sum()
+    within = areas[order].cumsum(0) <= SHARE * areas.sum()
     within[:1] = True
     return torch.zeros_like(within).index_put_((order,), within) & (radiosity > 0.0)
 
 
-def _means(frozen: FrozenScene, places: Tensor, areas: Tensor, points: int) -> Tensor:
+def _means(frozen: FrozenScene, places: Tensor, areas: Tensor) -> Tensor:
     """(K, S) float64 means by area over the surfels `places` of each of K points."""
     surfels = frozen.surfels
-    labels = cluster_patches(surfels.centers[places], surfels.normals[places], points, seed=0)
+    labels = cluster_patches(surfels.centers[places], surfels.normals[places], POINTS, seed=0)
     members = torch.from_numpy(np.equal.outer(np.arange(labels.max() + 1), labels)).double() * areas[places]
     return members / members.sum(dim=1, keepdim=True)
 

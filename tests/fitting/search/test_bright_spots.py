@@ -6,7 +6,6 @@ import pytest
 
 import rgspipe as rg
 from rgspipe.fitting import FitViews
-from rgspipe.fitting.options import SpotOptions
 from rgspipe.renderer.frozen import FrozenScene
 
 #: Of a room whose ceiling no camera sees.
@@ -16,7 +15,7 @@ CAMERAS = [
 ]
 
 #: What leaves spots to the patches.
-NEVER = rg.Search(spots=SpotOptions(notable=1.0))
+NEVER = rg.Search(bright_spots=False)
 
 
 def room(rays: int, patches: int) -> FrozenScene:
