@@ -16,8 +16,8 @@ from rgspipe.renderer.kernels.lit_transmittance import LEAST_LIT
 from rgspipe.renderer.lit_surfels import lit_columns
 
 #: Share of what surfaces reflect first above which a spot is seen well: a lamp in a room of size 1 reaches it 0.25 from
-#: a wall. With half of it most lamps of a room take longer and are found no better; with twice as much those from 0.13
-#: to 0.25 away stay up to 0.002 off.
+#: a wall. Twice as much leaves out those from 0.13 to 0.25 away, which are up to 0.002 off without; half of it has not
+#: been tried.
 NOTABLE = 0.1
 
 
