@@ -19,6 +19,7 @@ from rgspipe.scene import Coverage, Surfels
 from rgspipe.scene.models import CornellBox, exact_surfels
 from rgspipe.scene.rectangles import Rectangles
 from rgspipe.scene.surfels import quaternion_from_normal
+from rooms import surfels_on
 
 LIGHTS = torch.tensor([[0.1, 0.2, 0.3], [0.0, 0.0, 0.9], [-0.7, 0.3, -0.2]], dtype=torch.float64)
 
@@ -82,6 +83,32 @@ def test_slopes_are_finite_where_an_occluder_begins_to_fade_in(device: str) -> N
         assert torch.isfinite(shares).all() and torch.isfinite(found).all(), size
         # What only begins to fade in takes nothing away. Measured 0 and 5.6e-7 per unit of length.
         assert float((shares[:, 0] - 1.0).abs().max()) < 1e-6 and float(found[:, 0].abs().max()) < 1e-4
+
+
+@pytest.mark.parametrize("device", DEVICES)
+def test_a_lamp_in_the_plane_of_a_wall_has_derivatives_that_tell_where_light_goes(device: str) -> None:
+    """Surfels of a trained wall are tilted by a degree or so, and rays in its plane meet some of them from their edge.
+
+    Each shades for a sliver of the lamp's way alone, over which the derivative says nothing of a step.
+    """
+    generator = torch.Generator().manual_seed(2)
+
+    def spread(count: int, width: float) -> Tensor:
+        return width * (2.0 * torch.rand(count, 1, generator=generator, dtype=torch.float64) - 1.0)
+
+    wall = torch.cat([spread(400, 1e-3), spread(400, 0.5), 0.5 + spread(400, 0.5)], dim=1)
+    floor = torch.cat([spread(300, 0.2), 1.0 + spread(300, 0.2), torch.zeros(300, 1)], dim=1)
+    tilted = torch.tensor([1.0, 0.0, 0.0]) + 0.02 * torch.randn(400, 3, generator=generator, dtype=torch.float64)
+    up = torch.tensor([[0.0, 0.0, 1.0]], dtype=torch.float64).expand(300, 3)
+    surfels = surfels_on(torch.cat([floor, wall]), torch.cat([up, tilted]), 0.03)
+    bvh = SurfelBvh(surfels.to(torch.float32).to(device))
+    along = torch.linspace(-0.02, 0.02, 401, dtype=torch.float64)
+    lamps = torch.tensor([0.0, -0.9, 0.5], dtype=torch.float64) + along[:, None] * torch.eye(3, dtype=torch.float64)[0]
+    shares, found = (x[:, :300].double().cpu() for x in transmittance(bvh, lamps))
+    partly = float(((shares > 0.01) & (shares < 0.99)).double().mean())
+    assert partly > 0.01, "the wall must shade some of the floor for this to prove anything"
+    # Measured 4.7e3; 5.8e4 where discs were met from their edge.
+    assert float(found.abs().max()) < 1e4
 
 
 def receiver_below(occluders: Surfels) -> Surfels:

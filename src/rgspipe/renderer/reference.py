@@ -17,7 +17,7 @@ from rgspipe.renderer.kernels.irradiance import SOFTENING
 from rgspipe.renderer.kernels.pixel_light import MIDDLE_WEIGHT, NEAR, NODE, REACH, SIDE_WEIGHT
 from rgspipe.renderer.kernels.places import homogeneous
 from rgspipe.renderer.kernels.receiver import COPLANAR_COSINE, COPLANAR_OFFSET, RECEIVER_FADE, RECEIVER_SKIP
-from rgspipe.renderer.kernels.shadow import EDGE_ON
+from rgspipe.renderer.kernels.shadow import EDGE_ON, IN_PLANE
 from rgspipe.scene.camera import Camera
 from rgspipe.scene.surfels import Coverage, Surfels
 
@@ -135,10 +135,11 @@ def transmittance_at(surfels: Surfels, light: Tensor, receivers: Tensor, points:
     path = torch.where(lit[:, None], way(points), own)
     rays = path / path.norm(dim=1, keepdim=True)
     facing = rays @ normals.T
-    met = (facing.abs() > EDGE_ON) & ~coplanar & ((way(centers) * normals).sum(-1) * facing > 0.0)
+    met = (facing.abs() > IN_PLANE * EDGE_ON) & ~coplanar & ((way(centers) * normals).sum(-1) * facing > 0.0)
     depth = (between * normals).sum(-1) / torch.where(met, facing, torch.ones_like(facing))
     fade = ((depth / scale[:, None] - RECEIVER_SKIP) / RECEIVER_FADE).clamp(0.0, 1.0)
     fade = torch.where(facing < 0.0, (depth > 0.0).to(fade), fade)
+    fade = fade * smoothstep(facing.abs(), 0.0, EDGE_ON)
     alpha = alpha_at(surfels, depth[..., None] * rays[:, None] - between)
     met = met & (fade > 0.0) & (alpha > coverage.minimum_alpha)
     passing = _layers_from_afar(torch.where(met, alpha * fade, torch.zeros_like(alpha)), depth, coverage)

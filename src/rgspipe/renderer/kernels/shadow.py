@@ -21,8 +21,13 @@ from rgspipe.renderer.kernels.surfel_bvh import SurfelRecord, SurfelTree, clip_h
 # Adjoints are written by hand; generating them would double the compile time.
 wp.set_module_options({"enable_backward": False})
 
-#: A ray closer to an occluder's plane than this cosine does not meet it.
-EDGE_ON = wp.constant(1.0e-6)
+#: An occluder fades out as a ray comes nearer to its plane than this cosine, from where on its disc is a line. Rays
+#: that nearly lie in the plane of a wall meet one of its surfels here and there, each for a sliver of the light's
+#: places, and the derivative within a sliver says nothing of a step of the light. Half and twice of it were not tried.
+EDGE_ON = wp.constant(0.02)
+
+#: Below this part of it nothing is met.
+IN_PLANE = wp.constant(1.0e-4)
 
 #: Rays to a light at infinity end here.
 ENDLESS = wp.constant(1.0e30)
@@ -44,6 +49,13 @@ def faded_in(way: float, scale: float, facing: float):
     if facing < 0.0:
         fade = wp.where(way > 0.0, 1.0, 0.0)
     return fade
+
+
+@wp.func
+def broadside(cosine: float):
+    """Share of its opacity that an occluder shows to a ray at this cosine, positive, of its normal."""
+    y = wp.min(cosine / EDGE_ON, 1.0)
+    return y * y * (3.0 - 2.0 * y)
 
 
 @wp.func
@@ -69,14 +81,15 @@ def occluder(
     between = surfels[j].center - at
     own = surfels[receiver].normal
     scale = surfels[receiver].scale
-    if wp.abs(facing) > EDGE_ON * distance and not on_own_surface(n, own, between, scale):
+    cosine = wp.abs(facing) / distance
+    if cosine > IN_PLANE * EDGE_ON and not on_own_surface(n, own, between, scale):
         depth = wp.dot(between, n) / facing
         fade = faded_in(depth * distance, scale, facing)
         if fade > 0.0 and wp.dot(way_to(light, surfels[j].center), n) * facing > 0.0:
             alpha = surfel_alpha(surfels, j, depth * path - between)
             if alpha <= minimum_alpha:
                 alpha = float(0.0)
-            alpha *= fade
+            alpha *= fade * broadside(cosine)
     return alpha, depth
 
 
@@ -128,6 +141,9 @@ def occluder_slope(
     if fade < 1.0:
         steepness = RECEIVER_FADE * surfels[receiver].scale
         change -= (alpha / fade * depth / steepness) * (path / distance - n * (distance / facing))
+    y = wp.abs(facing) / (EDGE_ON * distance)
+    if y < 1.0:
+        change -= (alpha * 6.0 * (1.0 - y) / (3.0 - 2.0 * y)) * (n / facing - path / (distance * distance))
     return change
 
 
