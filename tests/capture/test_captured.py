@@ -96,6 +96,16 @@ def test_the_words_say_what_was_found() -> None:
     assert "known to" in words and "has to explain" in words
 
 
+def test_surfaces_that_are_saturated_are_told() -> None:
+    assert "saturated" not in captured_words(found())
+    views = photographs(LAMPS)
+    white = float(np.quantile(np.concatenate([view.image.ravel() for view in views]), 0.9))
+    clipped = [replace(view, image=view.image.clamp(max=white), saturated_from=white) for view in views]
+    captured = capture_scene(clipped, blank_room(), replace(OPTIONS, count=2))
+    assert float(captured.measured.blown_out.mean()) > 0.03
+    assert "of the surfaces, the brightest, are saturated" in captured_words(captured)
+
+
 def test_a_given_number_is_not_asked() -> None:
     alone = capture_scene(photographs(LAMPS[:1]), blank_room(), replace(OPTIONS, count=1))
     assert len(alone.lamps) == 1

@@ -58,6 +58,7 @@ class Measured:
         error: median relative error of a pixel.
         apart: (N,) mean relative error of the pixels that show each surfel, outliers and all.
         shown_by: (N,) photographs that show it.
+        blown_out: (N,) bool: too much of it is saturated to measure the rest.
     """
 
     radiance: Numbers
@@ -67,6 +68,7 @@ class Measured:
     error: float
     apart: Numbers
     shown_by: NDArray[np.int64]
+    blown_out: NDArray[np.bool_]
 
 
 def measured_radiance(
@@ -97,14 +99,15 @@ def measured_radiance(
         latest, limit = counted, max(OUTLIER * error, 1e-6)
         counted = [one.base / (1.0 + (part / limit) ** 2) for one, part in zip(photographs, relative, strict=True)]
     variance = _log_variance(photographs, latest, off, normal, radiance)
-    seen = np.where(_clipped(photographs) > MOST_CLIPPED, 0.0, seen)
+    blown_out = _clipped(photographs) > MOST_CLIPPED
+    seen = np.where(blown_out, 0.0, seen)
     known = seen > 0.0
     middle = np.median(radiance[known], axis=0) if known.any() else np.ones(3)
     least = 1e-6 * np.maximum(middle, 1e-300)
     radiance = np.where(known[:, None], np.maximum(radiance, least), middle)
     shown_by = sum((_pixels(view) > SHOWN).astype(np.int64) for view in weights)
     variance = np.where(known, variance, np.inf)
-    return Measured(radiance, variance, seen, cameras, error, _apart(photographs, relative), shown_by)
+    return Measured(radiance, variance, seen, cameras, error, _apart(photographs, relative), shown_by, blown_out)
 
 
 def _floor(photographs: Sequence[Photograph]) -> float:

@@ -15,8 +15,8 @@ DISAGREE = 0.1
 #: More of the surfels than this unmeasured is worth a word.
 UNMEASURED = 0.1
 
-#: Part of the surfaces that cannot be, or that look different from different sides, and part of the light that surfaces
-#: send of their own, which are worth one.
+#: Part of the surfaces that cannot be, are saturated, or look different from different sides, and part of the light
+#: that surfaces send of their own, which are worth one.
 NOTICEABLE, GLOW = 0.03, 0.05
 
 
@@ -99,6 +99,12 @@ def _doubts(found: Captured) -> Iterator[str]:
         yield (
             f"{100.0 * odd.shining.share:.0f} % of the surfaces, such as around {_point(odd.shining.place)}, look "
             "different from different sides: gloss, a mirror, or depth that is wrong there. They count for little."
+        )
+    blown_out = float(found.measured.blown_out.mean())
+    if blown_out > NOTICEABLE:
+        yield (
+            f"{100.0 * blown_out:.0f} % of the surfaces, the brightest, are saturated: how bright they are is a guess, "
+            "and lamps may be farther off than is said. Expose for the brightest surfaces, or take brackets."
         )
     unmeasured = 1.0 - float((found.answer.best.problem.field.weight > 0.0).mean())
     if unmeasured > UNMEASURED:
