@@ -27,15 +27,13 @@ from rgspipe.cli.compose import (
     typed,
     usual_command,
 )
+from rgspipe.cli.leading import lead_on, lead_on_sweep
 from rgspipe.cli.messages import EXIT_FAILED, EXIT_INPUT, EXIT_INTERRUPTED, show_failure, show_input_error
 from rgspipe.cli.sweep_table import write_sweep_table
-from rgspipe.config import RgspipeConfig
 from rgspipe.errors import InputError
-from rgspipe.graph.commands import command
 from rgspipe.graph.pipeline import StageLoader, Usual, run
 from rgspipe.stages import load_stage
-from rgspipe.stages.following import following
-from rgspipe.store.artifacts import Artifact, ArtifactStore, Key
+from rgspipe.store.artifacts import Artifact
 from rgspipe.store.files import NO_RIGHT
 from rgspipe.store.status import RunStatus, read_status, read_statuses, record_stopped
 
@@ -52,7 +50,7 @@ def run_jobs(overrides: Sequence[str], stage_loader: StageLoader, multirun: bool
     Launchers are for sweeps, so that with launcher=slurm even a single run is one: of one job, on the cluster.
 
     Args:
-        leads_on: whether a single run ends with what usually comes next. One whose folder is given is a step of
+        leads_on: whether the end says what usually comes next. A run or sweep whose folder is given is a step of
             something larger, as in a pipeline, and does not.
 
     Raises:
@@ -81,7 +79,7 @@ def run_jobs(overrides: Sequence[str], stage_loader: StageLoader, multirun: bool
             record_stopped(folder, EXIT_INTERRUPTED)
         raise
     if multirun:
-        return _sweep_summary(folder, code)
+        return _sweep_summary(folder, code, overrides if leads_on else None)
     status = read_status(folder)
     code = max(code, EXIT_FAILED if status is None else int(status.get("exit_code", EXIT_FAILED)))
     if leads_on and code == 0:
@@ -216,18 +214,12 @@ def _outcome(artifact: Artifact) -> list[str]:
     return outcome(artifact)
 
 
-def lead_on(config: RgspipeConfig, result: Path, overrides: Sequence[str]) -> None:
-    """Print what usually comes after a run, with the command or the file for it."""
-    key = Key(result.parts[-3], config.stage, result.name)
-    made = ArtifactStore(Path(config.outputs)).find(key)
-    found = None if made is None else following(config, made)
-    if found is not None:
-        what = command(found.stage, overrides, found.changes) if found.stage else result / found.file
-        print(f"Next, {found.purpose}: {what}")
+def _sweep_summary(folder: Path, code: int, overrides: Sequence[str] | None) -> int:
+    """Print how each job ended, gather their tables into one, and say what comes next; the largest exit status.
 
-
-def _sweep_summary(folder: Path, code: int) -> int:
-    """Print how each job ended and gather their tables into one; the largest exit status."""
+    Args:
+        overrides: of the sweep, for what comes next; None where that is not said.
+    """
     jobs = read_statuses(folder)
     for path, status in jobs:
         state = "killed" if status["state"] in ("killed", "running") else status["state"]
@@ -238,5 +230,8 @@ def _sweep_summary(folder: Path, code: int) -> int:
     print(f"{len(jobs) - len(failed)} of {len(jobs)} jobs done; {folder}")
     if not jobs:
         return max(code, EXIT_FAILED)
-    print(f"Table: {write_sweep_table(folder, jobs)}")
+    table = write_sweep_table(folder, jobs)
+    print(f"Table: {table}")
+    if overrides is not None and not failed and code == 0:
+        lead_on_sweep(overrides, jobs, table)
     return max([code, *(int(status.get("exit_code", EXIT_FAILED)) for status in failed)])

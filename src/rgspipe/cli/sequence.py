@@ -17,7 +17,8 @@ from typing import Any
 import yaml
 
 from rgspipe.cli.compose import compose_config, leaves_machine
-from rgspipe.cli.jobs import lead_on, new_run_folder, quoted
+from rgspipe.cli.jobs import new_run_folder, quoted
+from rgspipe.cli.leading import lead_on
 from rgspipe.cli.messages import EXIT_FAILED
 from rgspipe.datasets.input_file import input_file
 from rgspipe.errors import InputError

@@ -26,18 +26,21 @@ def program() -> tuple[str, ...]:
     return (script.name,) if found is not None and Path(found).samefile(script) else (str(script),)
 
 
-def command(stage: str, overrides: Sequence[str], changes: Mapping[str, object] | None = None) -> str:
+def command(
+    stage: str, overrides: Sequence[str], changes: Mapping[str, object] | None = None, sweep: bool = False
+) -> str:
     """The command that runs a stage as another run was started, quoted for a shell.
 
     Args:
         overrides: of the other run; its stage, and whether it may make what is missing, are not taken over.
         changes: values by key that take the place of theirs.
+        sweep: whether the overrides are those of a sweep, of which the command is one, too.
     """
     changes = changes or {}
     own = {"stage", "upstream", *changes}
     kept = [text for text in overrides if text.split("=")[0].lstrip("+~") not in own]
     changed = [f"{key}={as_override(value)}" for key, value in changes.items()]
-    return typed(f"stage={stage}", *kept, *changed)
+    return typed(*(["-m"] if sweep else []), f"stage={stage}", *kept, *changed)
 
 
 def typed(*words: str) -> str:
