@@ -72,3 +72,26 @@ def test_what_was_done_before_tells_nothing_of_the_pace(
         count, minutes, seconds = map(int, re.search(r" (\d+)/160 \[\d+:\d+<(\d+):(\d+),", line).groups())
         assert abs(60 * minutes + seconds - 12 * (160 - count)) <= 1
     assert count == 51 and len(lines) == 4
+
+
+def test_progress_is_told_to_a_listener_instead(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    told: list[str] = []
+    with progress.progress_told(told.append):
+        tracked(monkeypatch, range(10), seconds=3.0)
+    assert told.pop() == "" and len(told) == 10
+    for done, words in enumerate(told, start=1):
+        percent, left = map(int, re.fullmatch(r"steps: (\d+) %, 00:(\d+) left", words).groups())
+        # Seconds are cut off: measured 1 less, of 2.9999.
+        assert percent == 10 * done and 0 <= 3 * (10 - done) - left <= 1
+    assert capsys.readouterr().err == ""
+    tracked(monkeypatch, range(10), seconds=3.0)
+    assert len(told) == 10 and "steps" in capsys.readouterr().err
+
+
+def test_a_listener_hears_nothing_of_short_work_but_its_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[str] = []
+    with progress.progress_told(told.append):
+        tracked(monkeypatch, range(25), seconds=0.05)
+    assert told == [""]

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import Any, TypeVar
 
 from tqdm import tqdm
@@ -13,9 +15,19 @@ Item = TypeVar("Item")
 #: Work that ends sooner than this many seconds shows nothing.
 QUIET_SECONDS = 2.0
 
+#: Is given progress in words, and nothing once it has ended.
+Listener = Callable[[str], object]
+
+_LISTENER: ContextVar[Listener | None] = ContextVar("listener", default=None)
 
 #: As tqdm's own, with the time that is left of everything.
 _FORMAT = "{l_bar}{bar}| {n_fmt}/{total_fmt} [{elapsed}, {left} left{postfix}]"
+
+#: For listeners.
+_WORDS = "{desc}: {percentage:.0f} %, {left} left"
+
+#: Seconds between lines on a terminal or for a listener, and in a log.
+_OFTEN, _SELDOM = 0.2, 10.0
 
 
 class _Bar(tqdm):
@@ -27,7 +39,7 @@ class _Bar(tqdm):
 
     def __init__(self, *arguments: object, after: float | None = None, **options: object) -> None:
         self._after = after
-        super().__init__(*arguments, bar_format=None if after is None else _FORMAT, **options)
+        super().__init__(*arguments, **{"bar_format": None if after is None else _FORMAT} | options)
 
     def begin(self, total: int, done: int) -> None:
         """Say only now how many items there are, of which `done` were done before and tell nothing of the pace.
@@ -43,11 +55,11 @@ class _Bar(tqdm):
     def format_dict(self) -> dict[str, Any]:
         """What `_FORMAT` may name."""
         found = super().format_dict
-        if self._after is None:
+        if self.total is None:
             return found
         done, seconds = self.n - self.initial, found["elapsed"]
         rate = found["rate"] or (done / seconds if seconds else 0.0)
-        left = self.format_interval((self.total - self.n) / rate + self._after) if rate else "?"
+        left = self.format_interval((self.total - self.n) / rate + (self._after or 0.0)) if rate else "?"
         return found | {"left": left}
 
 
@@ -69,6 +81,40 @@ class _Lines(_Bar):
             self._decr_instances(self)
 
 
+class _Words(_Lines):
+    """Progress that is told to who asked for it, and not shown."""
+
+    def __init__(self, *arguments: object, **options: object) -> None:
+        self._listener = _LISTENER.get()
+        super().__init__(*arguments, bar_format=_WORDS, **options)
+
+    def display(self, msg: str | None = None, pos: int | None = None) -> bool:
+        if self.total:
+            self._listener(str(self))
+        return True
+
+    def close(self) -> None:
+        """Nothing goes on any more."""
+        if not self.disable:
+            self._listener("")
+        super().close()
+
+
+@contextmanager
+def progress_told(listener: Listener) -> Iterator[None]:
+    """Give the progress of work within the block, in this thread, to `listener` instead of showing it.
+
+    Args:
+        listener: is given "distant candidates: 40 %, 00:12 left" now and then, and "" where such work has ended; in
+            any thread.
+    """
+    token = _LISTENER.set(listener)
+    try:
+        yield
+    finally:
+        _LISTENER.reset(token)
+
+
 def progress_bar(
     items: Iterable[Item],
     description: str,
@@ -80,7 +126,8 @@ def progress_bar(
 ) -> _Bar:
     """Iterate over `items` while a progress line with an estimate stands on stderr.
 
-    On a terminal the line is written over; in a log a new one comes every ten seconds. The returned bar can
+    On a terminal the line is written over; in a log a new one comes every ten seconds; within `progress_told` it is
+    given to a listener. The returned bar can
     be iterated over, or updated by hand (`bar.update(1)`) in a `with` block, where `bar.begin(total, done)` may say
     later how much there is; `bar.set_postfix_str("38.2 dB", refresh=False)` shows a figure beside the estimate.
 
@@ -89,8 +136,9 @@ def progress_bar(
         done: how many were done before these.
         after: seconds of other work that follows and that the estimate shall include.
     """
-    interactive = sys.stderr.isatty()
-    return (_Bar if interactive else _Lines)(
+    told = _LISTENER.get() is not None
+    interactive = sys.stderr.isatty() and not told
+    return (_Words if told else _Bar if interactive else _Lines)(
         items,
         desc=description,
         total=total,
@@ -100,6 +148,6 @@ def progress_bar(
         delay=QUIET_SECONDS,
         ncols=None if interactive else 100,
         dynamic_ncols=interactive,
-        mininterval=0.2 if interactive else 10.0,
+        mininterval=_OFTEN if interactive or told else _SELDOM,
         leave=False,
     )

@@ -9,6 +9,7 @@ import torch
 
 from lit_room import VISIBLE, room_cameras
 from rgspipe.errors import InputError
+from rgspipe.progress import progress_told
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import PointLight
 from rgspipe.scene.lights.sphere import SphereLight
@@ -34,6 +35,18 @@ def test_the_lamp_of_photographs_is_found(finder: Finder, photographs: list[Phot
     result = finder.find(photographs, "point")
     # Found 2.7e-8 off.
     assert torch.allclose(result.lights[0].position, LAMP.position, atol=1e-3)
+
+
+def test_how_far_a_first_search_is_is_told(
+    frozen: FrozenScene, photographs: list[Photograph], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rgspipe.progress.QUIET_SECONDS", 0.0)
+    told: list[str] = []
+    with progress_told(told.append):
+        Finder(frozen).find(photographs[:1])
+    # The dictionary of the scene may be there already.
+    begun = {line.partition(":")[0] for line in told if line}
+    assert "aimed candidates" in begun and told[-1] == ""
 
 
 def test_a_refit_begins_with_the_lamps_of_now(finder: Finder, photographs: list[Photograph]) -> None:

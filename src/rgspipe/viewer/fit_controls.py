@@ -10,6 +10,7 @@ import numpy as np
 
 from rgspipe.fitting import FitResult
 from rgspipe.fitting.words import told_costs
+from rgspipe.progress import progress_told
 from rgspipe.viewer.actions import Action
 from rgspipe.viewer.around import cameras_around
 from rgspipe.viewer.drawings import Drawings
@@ -22,7 +23,7 @@ WANTED = 0.003
 #: At most so many cameras of the dataset are asked which would tell most.
 ASKED = 24
 
-_FREE = "free"
+_FREE, _SEARCHING = "free", "Searching …"
 
 
 class FitControls:
@@ -114,8 +115,17 @@ class FitControls:
         self.searching = True
         for button in self._buttons:
             button.disabled = True
-        self._told.content = "Somebody else's search goes first …" if self._visit.exhibit.finder.busy else "Searching …"
-        self._visit.actions.beside("find it", search, self._found)
+        self._told.content = "Somebody else's search goes first …" if self._visit.exhibit.finder.busy else _SEARCHING
+        self._visit.actions.beside("find it", lambda: self._telling(_SEARCHING, search), self._found)
+
+    def _telling(self, words: str, work: Callable[[], Any]) -> Any:
+        """What the finder works out; until then `words` and how far it is stand there."""
+
+        def tell(progress: str) -> None:
+            self._told.content = f"{words}\n\n{progress}" if progress else words
+
+        with progress_told(tell):
+            return work()
 
     def _found(self, ended: Future) -> None:
         self.searching = False
@@ -150,16 +160,19 @@ class FitControls:
         every = max(1, -(-len(self._visit.exhibit.references) // ASKED))
         named = [(one.name, one.camera) for one in self._visit.exhibit.references[::every]]
         named += cameras_around(session.images.frozen, taken[0].camera) if taken else []
-        self._told.content = "Looking through other cameras …"
+        words = self._told.content = "Looking through other cameras …"
         finder, lights, cameras = self._visit.exhibit.finder, session.lights, [camera for _, camera in named]
 
         def advised(ended: Future) -> None:
             advice = self._result(ended)
-            words = advice.words([name for name, _ in named])
-            self._told.content = f"{words} Click the yellow camera to look through it."
+            answer = advice.words([name for name, _ in named])
+            self._told.content = f"{answer} Click the yellow camera to look through it."
             self._drawings.advised(named[advice.ranked[0].camera][1] if advice.ranked else None)
 
-        self._visit.actions.beside("which view next?", lambda: finder.advice(taken, lights, cameras, WANTED), advised)
+        def advice() -> Any:
+            return self._telling(words, lambda: finder.advice(taken, lights, cameras, WANTED))
+
+        self._visit.actions.beside("which view next?", advice, advised)
 
     def _compare(self) -> None:
         if self._photographs:
