@@ -27,8 +27,8 @@ def lead_on(config: RgspipeConfig, result: Path, overrides: Sequence[str]) -> No
 def lead_on_sweep(overrides: Sequence[str], jobs: Sequence[Job], table: Path) -> None:
     """Print what usually comes after a sweep all of whose jobs are done.
 
-    That is a sweep of the stage that all jobs lead on to, where there is one; the table of what the jobs measured; or
-    what comes after the last job.
+    That is a sweep of the stage that the first and the last job lead on to, where it is the same; the table of what the
+    jobs measured; or what comes after the last job. The others are not asked: there may be a hundred thousand.
 
     Args:
         overrides: of the sweep, with all values.
@@ -36,9 +36,8 @@ def lead_on_sweep(overrides: Sequence[str], jobs: Sequence[Job], table: Path) ->
         table: of the sweep.
     """
     statuses = [status for _, status in jobs]
-    led = [_after(status) for status in statuses]
-    last, [*_, name] = led[-1], [folder.name for folder, _ in jobs]
-    if last is not None and last.stage not in (None, "view") and all(one == last for one in led):
+    first, last, name = _after(statuses[0]), _after(statuses[-1]), jobs[-1][0].name
+    if last is not None and last.stage not in (None, "view") and first == last:
         print(f"Next, {last.purpose}: {command(last.stage, overrides, last.changes, sweep=True)}")
     elif any(status["stage"] in STAGE_TABLES for status in statuses):
         print(f"Next, compare what the jobs measured: {table}")
