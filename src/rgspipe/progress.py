@@ -127,9 +127,9 @@ def progress_bar(
     """Iterate over `items` while a progress line with an estimate stands on stderr.
 
     On a terminal the line is written over; in a log a new one comes every ten seconds; within `progress_told` it is
-    given to a listener. The returned bar can
-    be iterated over, or updated by hand (`bar.update(1)`) in a `with` block, where `bar.begin(total, done)` may say
-    later how much there is; `bar.set_postfix_str("38.2 dB", refresh=False)` shows a figure beside the estimate.
+    given to a listener. The returned bar can be iterated over, or updated by hand (`bar.update(1)`) in a `with` block,
+    where `bar.begin(total, done)` may say later how much there is; `bar.set_postfix_str("38.2 dB", refresh=False)`
+    shows a figure beside the estimate.
 
     Args:
         total: of items, those done before and later included; by default how many `items` has.

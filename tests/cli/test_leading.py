@@ -32,9 +32,7 @@ def _led(capsys: pytest.CaptureFixture[str], overrides: list[str], jobs: list[tu
     return capsys.readouterr().out
 
 
-def test_jobs_that_all_lead_to_one_stage_lead_to_a_sweep_of_it(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_jobs_that_lead_to_one_stage_lead_to_a_sweep_of_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     jobs = [_job(tmp_path, seed, "fit_light", f"seed={seed}") for seed in (1, 2)]
     said = _led(capsys, ["stage=fit_light", "seed=1,2", "scene=a b"], jobs)
     assert said == ("Next, to compare them with the truth: python -m rgspipe -m stage=evaluate seed=1,2 'scene=a b'\n")

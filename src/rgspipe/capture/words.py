@@ -104,7 +104,7 @@ def _doubts(found: Captured) -> Iterator[str]:
     if blown_out > NOTICEABLE:
         yield (
             f"{100.0 * blown_out:.0f} % of the surfaces, the brightest, are saturated: how bright they are is a guess, "
-            "and lamps may be farther off than is said. Expose for the brightest surfaces, or take brackets."
+            "and lamps may be farther off than is said. Expose for the brightest surfaces."
         )
     unmeasured = 1.0 - float((found.answer.best.problem.field.weight > 0.0).mean())
     if unmeasured > UNMEASURED:

@@ -35,14 +35,26 @@ def layer_rule(coverage: Coverage) -> LayerRule:
 
 
 @wp.func
+def smoothstep(y: float):
+    """3y² − 2y³, 0 below 0 and 1 above 1."""
+    x = wp.clamp(y, 0.0, 1.0)
+    return x * x * (3.0 - 2.0 * x)
+
+
+@wp.func
+def smoothstep_slope(y: float):
+    """Its derivative."""
+    x = wp.clamp(y, 0.0, 1.0)
+    return 6.0 * x * (1.0 - x)
+
+
+@wp.func
 def sharpened(clear: float, rule: LayerRule):
     """C of a layer with the raw transparency P = `clear`."""
-    y = wp.clamp((1.0 - clear - rule.low) / (rule.high - rule.low), 0.0, 1.0)
-    return y * y * (3.0 - 2.0 * y)
+    return smoothstep((1.0 - clear - rule.low) / (rule.high - rule.low))
 
 
 @wp.func
 def sharpened_slope(clear: float, rule: LayerRule):
     """dC/d(1 − P)."""
-    y = wp.clamp((1.0 - clear - rule.low) / (rule.high - rule.low), 0.0, 1.0)
-    return 6.0 * y * (1.0 - y) / (rule.high - rule.low)
+    return smoothstep_slope((1.0 - clear - rule.low) / (rule.high - rule.low)) / (rule.high - rule.low)

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import warp as wp
 
-from rgspipe.renderer.kernels.coverage import sharpened, sharpened_slope
+from rgspipe.renderer.kernels.coverage import sharpened, sharpened_slope, smoothstep, smoothstep_slope
 from rgspipe.renderer.kernels.places import way_to
 from rgspipe.renderer.kernels.receiver import RECEIVER_FADE, RECEIVER_SKIP, on_own_surface
 from rgspipe.renderer.kernels.surfel_bvh import SurfelRecord, SurfelTree, clip_height, surfel_alpha
@@ -52,13 +52,6 @@ def faded_in(way: float, scale: float, facing: float):
 
 
 @wp.func
-def broadside(cosine: float):
-    """Share of its opacity that an occluder shows to a ray at this cosine, positive, of its normal."""
-    y = wp.min(cosine / EDGE_ON, 1.0)
-    return y * y * (3.0 - 2.0 * y)
-
-
-@wp.func
 def occluder(
     surfels: wp.array(dtype=SurfelRecord),
     minimum_alpha: float,
@@ -89,7 +82,7 @@ def occluder(
             alpha = surfel_alpha(surfels, j, depth * path - between)
             if alpha <= minimum_alpha:
                 alpha = float(0.0)
-            alpha *= fade * broadside(cosine)
+            alpha *= fade * smoothstep(cosine / EDGE_ON)
     return alpha, depth
 
 
@@ -143,7 +136,7 @@ def occluder_slope(
         change -= (alpha / fade * depth / steepness) * (path / distance - n * (distance / facing))
     y = wp.abs(facing) / (EDGE_ON * distance)
     if y < 1.0:
-        change -= (alpha * 6.0 * (1.0 - y) / (3.0 - 2.0 * y)) * (n / facing - path / (distance * distance))
+        change -= (alpha * y * smoothstep_slope(y) / smoothstep(y)) * (n / facing - path / (distance * distance))
     return change
 
 
