@@ -26,9 +26,9 @@ from rgspipe.renderer.transport import PatchTransport
 #: reflected first. Two and four times as much area finds lamps no better; half of it has not been tried.
 SHARE = 0.01
 
-#: Points that stand for it; each costs a shadow ray to every surfel. Of 16 lamps 0.01 to 0.05 before a surface the
-#: mean error was 0.28 % of the room with 8 and with 16 and 0.27 % with 64, which took most of a fit's time. In a
-#: coarser room (tests/fitting/search/test_bright_spots.py) 8 leave a lamp twice as far off as 64 do.
+#: Points that stand for it; each costs a shadow ray to every surfel. Of 12 lamps 0.01 to 0.05 before a surface the mean
+#: error is 0.36 % of the room with 16, 0.39 % with 32, 0.38 % with 64 and 0.66 % with none (docs/laboratory/lamps.md).
+#: In a coarser room (tests/fitting/search/test_bright_spots.py) 8 leave a lamp twice as far off as 64 do.
 POINTS = 16
 
 
