@@ -16,6 +16,7 @@ from rgspipe.pages import report
 from rgspipe.pages.room_view import room_view
 from rgspipe.scene import PointLight
 from rgspipe.scene.models import CornellBox, exact_surfels
+from rgspipe.scene.srgb import decode
 
 CHROMIUM = shutil.which("chromium")
 
@@ -98,3 +99,37 @@ def test_it_turns_and_tells_in_a_browser(full_contents: report.ReportContents, t
         assert page.evaluate("document.documentElement.scrollWidth") <= 400
         assert page.locator(".wide.more").count() > 0 and not errors
         browser.close()
+
+
+@pytest.mark.browser
+@pytest.mark.skipif(CHROMIUM is None, reason="needs chromium (Debian: apt-get install chromium)")
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_symbols_of_classes_are_seen_on_every_page(full_contents: report.ReportContents, tmp_path, scheme: str) -> None:
+    """Contrast with the page as WCAG 2 has it; it wants 3 of what is drawn. Without paler ones 1.5 on dark pages."""
+    playwright = pytest.importorskip("playwright.sync_api")
+    path = tmp_path / "report.html"
+    path.write_text(report.render_report(dataclasses.replace(full_contents, fits=())))
+    with playwright.sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        page = browser.new_page(color_scheme=scheme)
+        page.goto(path.as_uri())
+        drawn = page.evaluate(
+            """() => [document.body, ...document.querySelectorAll(".dot")].map((element) => {
+                const pen = document.createElement("canvas").getContext("2d");
+                pen.fillStyle = getComputedStyle(element).backgroundColor;
+                pen.fillRect(0, 0, 1, 1);
+                return [element.className, ...pen.getImageData(0, 0, 1, 1).data.slice(0, 3)];
+            })"""
+        )
+        browser.close()
+    (_, *ground), *dots = drawn
+    contrast = {name: _contrast(colour, ground) for name, *colour in dots}
+    assert set(contrast) >= {"dot visible", "dot out_of_frame", "dot occluded"}
+    # Orange is a square of 2.2 on white, and told by its word there.
+    least = {name: value for name, value in contrast.items() if name != "dot out_of_frame" or scheme == "dark"}
+    assert min(least.values()) > 3.0  # measured 5.2 and 4.8
+
+
+def _contrast(*colours: list[int]) -> float:
+    dark, light = sorted(float(decode(np.array(one) / 255.0) @ [0.2126, 0.7152, 0.0722]) for one in colours)
+    return (light + 0.05) / (dark + 0.05)

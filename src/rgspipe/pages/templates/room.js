@@ -72,21 +72,22 @@ for (const box of document.querySelectorAll(".room")) {
     }
   };
   const lamp = (pen, at, light) => {
-    const scale = canvas.width / canvas.clientWidth || 1, page = dark.matches && !printing ? "#13171b" : "#fff";
-    pen.strokeStyle = pen.fillStyle = light.colour; pen.lineWidth = 1.2 * scale;
+    const scale = canvas.width / canvas.clientWidth || 1, onDark = dark.matches && !printing;
+    const page = onDark ? "#13171b" : "#fff", tint = onDark ? `color-mix(in srgb, ${light.colour} 60%, white)` : light.colour;
+    pen.strokeStyle = pen.fillStyle = tint; pen.lineWidth = 1.2 * scale;
     if (shown("regions") && light.region && light.found) region(pen, at, light);
     const found = light.found && at(light.found), truth = light.truth && at(light.truth);
     if (found && truth) { pen.lineWidth = 2 * scale; path(pen, [found, truth]); pen.stroke(); }
     if (truth) {
       const r = 5 * scale;
-      for (const [colour, width] of [[page, 4.5], [light.colour, 2]]) {
+      for (const [colour, width] of [[page, 4.5], [tint, 2]]) {
         pen.strokeStyle = colour; pen.lineWidth = width * scale;
         for (const s of [1, -1]) { path(pen, [[truth[0] - r, truth[1] - s * r], [truth[0] + r, truth[1] + s * r]]); pen.stroke(); }
       }
     }
     if (!found) return;
     shape(pen, light.class, found, 5.5 * scale);
-    pen.fillStyle = light.colour; pen.fill(); pen.strokeStyle = page; pen.lineWidth = 1.5 * scale; pen.stroke();
+    pen.fillStyle = tint; pen.fill(); pen.strokeStyle = page; pen.lineWidth = 1.5 * scale; pen.stroke();
     spots.push({ x: found[0] / scale, y: found[1] / scale, light });
   };
 
