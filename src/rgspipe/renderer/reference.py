@@ -14,7 +14,7 @@ from torch import Tensor
 
 from rgspipe.renderer.kernels.composite import GRAZING, OPAQUE
 from rgspipe.renderer.kernels.irradiance import SOFTENING
-from rgspipe.renderer.kernels.pixel_light import MIDDLE_WEIGHT, NEAR, NODE, REACH, SIDE_WEIGHT
+from rgspipe.renderer.kernels.pixel_light import BLUR, MIDDLE_WEIGHT, NEAR, NODE, REACH, SIDE_WEIGHT
 from rgspipe.renderer.kernels.places import homogeneous
 from rgspipe.renderer.kernels.receiver import COPLANAR_COSINE, COPLANAR_OFFSET, RECEIVER_FADE, RECEIVER_SKIP
 from rgspipe.renderer.kernels.shadow import EDGE_ON, IN_PLANE
@@ -196,20 +196,24 @@ def direct_image(
     reach = torch.where(edges[pixels], REACH * scale, torch.full_like(scale, torch.inf))
     normals, origin = surfels.normals[indices], camera.origin.double()
 
-    def lit(x: float, y: float) -> tuple[Tensor, Tensor]:
-        seen = points_on_surfels(surfels, origin, rays[pixels] + x * right + y * up, indices, reach)
-        path = place[:3] - place[3] * seen
-        square = path.square().sum(-1)
-        soft = (square.square() + (place[3] * SOFTENING * scale).pow(4)).pow(0.75)
-        return seen, (path * normals).sum(-1).clamp(min=0.0) / soft
+    def looked_at(x: float, y: float) -> Tensor:
+        return points_on_surfels(surfels, origin, rays[pixels] + x * right + y * up, indices, reach)
 
-    seen, value = lit(0.0, 0.0)
+    seen = looked_at(0.0, 0.0)
     away = seen - origin
     footprint = right.norm() * away.square().sum(-1) / (away * normals).sum(-1).abs()
+    softening = torch.minimum(SOFTENING * scale, BLUR * footprint)
+
+    def lit(seen: Tensor) -> Tensor:
+        path = place[:3] - place[3] * seen
+        square = path.square().sum(-1)
+        soft = (square.square() + (place[3] * softening).pow(4)).pow(0.75)
+        return (path * normals).sum(-1).clamp(min=0.0) / soft
+
     near = place[3] * footprint > NEAR * (place[:3] - place[3] * seen).norm(dim=1)
     nodes = ((-float(NODE), float(SIDE_WEIGHT)), (0.0, float(MIDDLE_WEIGHT)), (float(NODE), float(SIDE_WEIGHT)))
-    mean = sum(wx * wy * lit(x, y)[1] for x, wx in nodes for y, wy in nodes)
+    mean = sum(wx * wy * lit(looked_at(x, y)) for x, wx in nodes for y, wy in nodes)
     part = torch.where(own_passing[pixels] >= 0.0, own_passing[pixels], passing[indices])
-    contribution = weights[pixels, indices] * part * torch.where(near, mean, value)
+    contribution = weights[pixels, indices] * part * torch.where(near, mean, lit(seen))
     image = torch.zeros(len(weights), 3, dtype=weights.dtype)
     return image.index_add(0, pixels, contribution[:, None] * surfels.albedo[indices] / math.pi)
