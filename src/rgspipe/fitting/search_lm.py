@@ -20,7 +20,7 @@ from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.exposure import rough_exposures
 from rgspipe.fitting.model.known_images import FIELDS, Strength
 from rgspipe.fitting.model.moments import moments
-from rgspipe.fitting.model.problem import LightProblem
+from rgspipe.fitting.model.problem import ROUNDING, LightProblem
 from rgspipe.fitting.options import SearchOptions
 from rgspipe.fitting.result import FitResult, dark_result
 from rgspipe.fitting.search.beside import settled_beside
@@ -191,16 +191,17 @@ def _polished(refiner: Refiner, best: State, iterations: int) -> tuple[Refiner, 
 
 
 def _seen_well(refiner: Refiner, states: Sequence[State], options: SearchOptions) -> tuple[Refiner, list[State]]:
-    """The refiner and the rigs, the best first, with bright spots seen well; as they are where that explains no more.
+    """The refiner and the rigs, the best first, with bright spots seen well; as they are where that explains much less.
 
-    Images that the model of patches made are explained best by it.
+    With spots left to patches least squares explain a little more by noise alone, at places that are worse (errors in
+    variables); images that the model of patches made are explained by it to rounding.
     """
     problem = seeing_bright_spots(refiner.problem, states) if options.bright_spots else refiner.problem
     if problem is refiner.problem:
         return refiner, [*states]
     every = [_polished(refiner.on(problem), one, options.iterations) for one in states]
     (better, best), *rest = sorted(every, key=lambda pair: pair[0].unexplained(pair[1]))
-    if better.unexplained(best) >= refiner.unexplained(states[0]):
+    if better.unexplained(best) > options.rivals.energy * max(refiner.unexplained(states[0]), ROUNDING**2):
         return refiner, [*states]
     return better, [best, *(state for _, state in rest)]
 
