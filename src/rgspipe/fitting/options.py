@@ -154,7 +154,7 @@ class CertaintyOptions(Options):
     """an answer that leaves more than this share of the target's energy unexplained is none, and is searched on"""
     largest_share: float = option(0.99, low=0, high=0.999)
     """no cell's share of the evidence counts as more than this: one that tells everything cannot be left out. The spot
-    of a lamp beside a wall does nearly, and 0.95 made such regions too small (docs/laboratory/lamps.md)"""
+    of a lamp beside a wall nearly does; 0.95 made such a region too small (docs/laboratory/lamps.md)"""
     common: float = option(0.4, low=0, high=1)
     """η: the share of the variance of the model's errors that all views have in common. Chosen on every other of 60
     targets of one trained scene, such that fits of one and of two views foretell what fits of two and of four state"""
