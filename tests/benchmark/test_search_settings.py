@@ -29,7 +29,7 @@ def test_every_number_is_halved_and_doubled_alone() -> None:
     assert found["starts"] == ["2", "8"] and found["bar.least"] == ["0.1", "0.4"]
     assert found["schedule.softness"] == ["(0.15, 0.075, 0.025)", "(0.6, 0.3, 0.1)"]
     # What is out of range is not tried.
-    assert found["certainty.largest_share"] == ["0.475"]
+    assert found["certainty.largest_share"] == ["0.495"]
 
 
 def test_numbers_are_chosen_by_name_or_by_section() -> None:
