@@ -11,7 +11,7 @@ import torch
 from lit_room import HIDDEN, VISIBLE
 from open_room import TINT, frozen_open_room, lit_images, open_room_cameras, radiance_for
 from rgspipe.errors import InputError
-from rgspipe.fitting import BaseImages, FitStatus, FitViews, ImageCapture, LightSpec, PaperAdam, Search, fit_lights
+from rgspipe.fitting import BaseImages, FitStatus, FitViews, ImageCapture, LightSpec, PaperAdam, fit_lights
 from rgspipe.fitting.findings import LightMissing, MaybeAmbient, MuchAmbient, NoOpening
 from rgspipe.fitting.tracking.track import track_lights
 from rgspipe.renderer.ambient import ambient_image
@@ -19,10 +19,6 @@ from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.view_weights import ViewWeights
 
 AMBIENT = LightSpec("point", ambient=True)
-
-#: For noisy images that the model of patches made: with bright spots seen well they are explained nearly as well, at
-#: places up to 0.002 off.
-PATCHES = Search(bright_spots=False)
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +37,7 @@ def test_a_light_beside_as_much_ambient_light(open_room, point_light, where, cou
     assert float((exact.lights[0].position - light.position).norm()) < 1e-5  # measured 5e-8
     torch.testing.assert_close(exact.ambient.value, radiance.double(), rtol=1e-5, atol=0.0)  # measured 7e-8
     noisy = lit_images(frozen, views, (light,), radiance, noise=0.02)
-    found = fit_lights(frozen, views, noisy, lights=AMBIENT, sharp=False, solver=PATCHES)
+    found = fit_lights(frozen, views, noisy, lights=AMBIENT, sharp=False)
     error = found.lights[0].position - light.position
     # Measured with 2 % of noise: 0.0005 and 0.0006 with one view, 0.0004 and 0.0001 with three.
     assert float(error.norm()) < 0.002
@@ -139,7 +135,7 @@ def test_images_with_the_lamps_off(open_room, point_light, where, scale_free: bo
     images = [(image + 0.01 * image.mean() * torch.randn(image.shape, generator=draw)).clamp(min=0) for image in images]
     factor = 0.25 if scale_free else 1.0
     capture = ImageCapture(base=BaseImages([factor * image for image in base], scale_free))
-    result = fit_lights(frozen, views, images, capture=capture, sharp=False, solver=PATCHES)
+    result = fit_lights(frozen, views, images, capture=capture, sharp=False)
     assert (
         float((result.lights[0].position - light.position).norm()) < 0.001
     )  # measured 0.0002 at most; 0.44 and 1.1 with the base left in
@@ -147,7 +143,7 @@ def test_images_with_the_lamps_off(open_room, point_light, where, scale_free: bo
     if scale_free:
         assert result.base_scale.value.tolist() == pytest.approx([4.0] * 3, rel=1e-3)  # measured 2e-4
     else:
-        same = fit_lights(frozen, views, images, base=base, sharp=False, solver=PATCHES)
+        same = fit_lights(frozen, views, images, base=base, sharp=False)
         assert torch.equal(same.lights[0].position, result.lights[0].position) and result.base_scale is None
 
 
