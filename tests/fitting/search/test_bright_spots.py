@@ -62,6 +62,16 @@ def test_images_that_the_model_itself_made_are_explained_by_it(scene: FrozenScen
     assert found.lights[0].position.tolist() == pytest.approx(lamp.position.tolist(), abs=1e-4)  # measured 1e-6
 
 
+def test_images_that_the_model_itself_made_may_be_noisy(scene: FrozenScene) -> None:
+    lamp = rg.PointLight([0.13, 0.11, 0.45], 1.0)
+    draw = torch.Generator().manual_seed(1)
+    images = [scene.render(camera, lamp) for camera in CAMERAS]
+    images = [image + 0.02 * image.mean() * torch.randn(image.shape, generator=draw) for image in images]
+    views = FitViews.prepare(scene, CAMERAS)
+    usual, never = (views.fit(images, solver=solver) for solver in (rg.Search(), NEVER))
+    assert usual.lights[0].position.tolist() == never.lights[0].position.tolist()
+
+
 def test_patches_that_explain_a_little_more_by_noise_are_not_believed(scene: FrozenScene) -> None:
     """Of a room whose paint is up to a quarter off: there noise, too, explains a part of what is wrong."""
     surfels = scene.surfels

@@ -76,6 +76,21 @@ def light_covariances(problem: LightProblem, state: State, options: CertaintyOpt
     return Covariances(*blocks, known=strengths[0])
 
 
+def shared_errors(problem: LightProblem, state: State, cell: float) -> float:
+    """Σ_k |Σ_{p∈k} r_p|² / Σ_p |r_p|² over cells k of the surface, of the residual r (P, 3) of a fit.
+
+    It is 1 or less where that is noise, other in each pixel, and more where pixels that look at the same place share
+    what the model gets wrong.
+
+    Args:
+        cell: as for `surface_cells`.
+    """
+    residual = problem.residual(state.columns, state.intensity).double().cpu()
+    labels, count = surface_cells(problem.views, cell)
+    sums = torch.zeros((count, 3), dtype=torch.float64).index_add(0, labels, residual)
+    return float(sums.square().sum() / residual.square().sum().clamp(min=1e-300))
+
+
 def surface_cells(views: PreparedViews, cell: float) -> tuple[Tensor, int]:
     """(P,) int64 cell of the surface that each trusted pixel looks at, and how many there are.
 
