@@ -50,8 +50,8 @@ from rgspipe.renderer.images.blocks import view_of_blocks
 from rgspipe.renderer.images.model import ImageModel
 
 #: What a fit leaves is noise if pixels share no more than that again (`certainty.uncertainty.shared_errors`). Images of
-#: the model itself with 0.5 to 2 % of noise come to 0.8 to 0.9, path-traced ones in trained scenes to 5.7 and more: half
-#: or twice of it tells them apart as well.
+#: the model itself with 0.5 to 2 % of noise come to 0.8 to 0.9, path-traced ones in trained scenes to 5.7 and more, so
+#: half or twice of it tells them apart as well.
 NOISE = 2.0
 
 
