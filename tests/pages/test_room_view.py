@@ -105,7 +105,7 @@ def test_it_turns_and_tells_in_a_browser(full_contents: report.ReportContents, t
 @pytest.mark.skipif(CHROMIUM is None, reason="needs chromium (Debian: apt-get install chromium)")
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_symbols_of_classes_are_seen_on_every_page(full_contents: report.ReportContents, tmp_path, scheme: str) -> None:
-    """Contrast with the page as WCAG 2 has it; it wants 3 of what is drawn. Without paler ones 1.5 on dark pages."""
+    """Contrast with the page as WCAG 2 has it; it wants 3 of what is drawn. Not made paler 1.6 on dark pages."""
     playwright = pytest.importorskip("playwright.sync_api")
     path = tmp_path / "report.html"
     path.write_text(report.render_report(dataclasses.replace(full_contents, fits=())))

@@ -13,7 +13,7 @@ import torch
 from torch import Tensor
 
 from rgspipe.fitting.alternative import Alternative
-from rgspipe.fitting.certainty.uncertainty import light_covariances, shared_errors
+from rgspipe.fitting.certainty.uncertainty import design_effect, light_covariances
 from rgspipe.fitting.findings import Finding, FitStatus, LightMissing, LightSpare, MuchAmbient, NoOpening
 from rgspipe.fitting.meter import Meter
 from rgspipe.fitting.model.emitter import Emitter
@@ -49,9 +49,9 @@ from rgspipe.fitting.spec import AUTO, LightSpec
 from rgspipe.renderer.images.blocks import view_of_blocks
 from rgspipe.renderer.images.model import ImageModel
 
-#: What a fit leaves is noise if pixels share no more than that again (`certainty.uncertainty.shared_errors`). Images of
-#: the model itself with 0.5 to 2 % of noise come to 0.8 to 0.9, path-traced ones in trained scenes to 5.7 and more, so
-#: half or twice of it tells them apart as well.
+#: What a fit leaves is noise if its `design_effect` is less: pixels share no more than that again. Images of the model
+#: itself with 0.5 to 2 % of noise come to 0.8 to 0.9, path-traced ones in trained scenes to 5.7 and more, so half or
+#: twice of it tells them apart as well.
 NOISE = 2.0
 
 
@@ -202,7 +202,7 @@ def _seen_well(refiner: Refiner, states: Sequence[State], options: SearchOptions
     variables). Images that the model of patches made are left to it: it explains them to rounding or to their noise.
     """
     problem = seeing_bright_spots(refiner.problem, states) if options.bright_spots else refiner.problem
-    if problem is refiner.problem or shared_errors(refiner.problem, states[0], options.certainty.cell) < NOISE:
+    if problem is refiner.problem or design_effect(refiner.problem, states[0], options.certainty.cell) < NOISE:
         return refiner, [*states]
     every = [_polished(refiner.on(problem), one, options.iterations) for one in states]
     (better, best), *rest = sorted(every, key=lambda pair: pair[0].unexplained(pair[1]))

@@ -175,3 +175,15 @@ def test_errors_of_the_model_widen_the_region(room, point_light, where):
     eigenvalues = torch.linalg.eigvalsh(found.calibrated[0] - found.noise[0])
     assert float(eigenvalues.min()) > -1e-9 * float(eigenvalues.max())
     assert math.isfinite(wide) and dataclasses.is_dataclass(found)
+
+
+def test_the_design_effect_tells_noise_from_errors_that_neighbours_share(room):
+    light, generator = PointLight(VISIBLE, 1.0), torch.Generator().manual_seed(2)
+    views = room.one.prepared
+    problem = LightProblem.create(views, views.stack_images(room.images(light)))
+    emitter = Emitter.of(light)
+    state = State((emitter,), (problem.evaluate(emitter),), light.intensity[None] / problem.scale)
+    noise = 0.02 * torch.randn(problem.target.shape, generator=generator)
+    for error, low, high in ((noise, 0.7, 1.3), (0.05 * problem.target, 10.0, math.inf)):
+        wrong = dataclasses.replace(problem, target=problem.target + error)
+        assert low < uncertainty.design_effect(wrong, state, 0.2) < high  # measured 0.94 and 44

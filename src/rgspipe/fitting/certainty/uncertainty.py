@@ -76,8 +76,8 @@ def light_covariances(problem: LightProblem, state: State, options: CertaintyOpt
     return Covariances(*blocks, known=strengths[0])
 
 
-def shared_errors(problem: LightProblem, state: State, cell: float) -> float:
-    """Σ_k |Σ_{p∈k} r_p|² / Σ_p |r_p|² over cells k of the surface, of the residual r (P, 3) of a fit.
+def design_effect(problem: LightProblem, state: State, cell: float) -> float:
+    """Σ_k |Σ_{p∈k} r_p|² / Σ_p |r_p|² over cells k of the surface, of the residual r (P, 3) of a fit (Kish 1965).
 
     It is 1 or less where that is noise, other in each pixel, and more where pixels that look at the same place share
     what the model gets wrong.
