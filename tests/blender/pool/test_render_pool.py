@@ -11,10 +11,12 @@ import pytest
 
 from rgspipe.blender.job import DatasetJob
 from rgspipe.blender.pool.job import PoolJob, SpotRange
+from rgspipe.blender.pool.lamps import LampRange
 from rgspipe.blender.pool.pool_file import PooledLight, read_pool
 from rgspipe.blender.pool.render_pool import render_pool
 from rgspipe.errors import InputError
 from rgspipe.scene import SpotLight
+from rgspipe.scene.lights import PanelLight
 from rgspipe.scene.models import Corridor
 from rgspipe.store.whole_files import RECORD
 
@@ -71,3 +73,17 @@ def test_another_job_s_folder_is_refused(rendered: Path) -> None:
     with pytest.raises(InputError, match=r"job\.json.*differs in number"):
         render_pool(PoolJob(DATASET, "spots", 5, CLASSES, JOB.spot, 1), rendered)
     assert np.isfinite(read_pool(rendered)[0].brightness()).all()
+
+
+@pytest.mark.slow
+def test_lamps_hang_on_surfaces_and_look_out_of_them_but_for_spots(tmp_path: Path) -> None:
+    if importlib.util.find_spec("bpy") is None:
+        pytest.skip("bpy is not installed")
+    panels, spots = tmp_path / "panels", tmp_path / "spots"
+    render_pool(PoolJob(DATASET, "panels", 3, ("visible",), views=1), panels)
+    render_pool(PoolJob(DATASET, "spots", 1, ("visible",), views=1, lamps=LampRange(mounted=(0.01, 0.05))), spots)
+    for pooled in read_pool(panels):
+        assert isinstance(pooled.light, PanelLight)
+        assert pooled.light.axis.abs().max() == 1.0  # walls, floor and ceiling of the corridor lie along the axes
+    (pooled,) = read_pool(spots)
+    assert isinstance(pooled.light, SpotLight)

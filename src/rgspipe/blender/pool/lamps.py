@@ -59,6 +59,10 @@ class LampRange:
             return ProfileLight.shaped(float(rng.uniform(-math.pi, math.pi)), table)
         return PointLight.shaped()
 
+    def hang(self, kind: str) -> bool:
+        """Whether lamps of a kind hang on surfaces."""
+        return kind == "panels" or self.mounted is not None
+
     def hung(self, lamp: Light, near: np.ndarray, geometry: Geometry, rng: np.random.Generator) -> Light | None:
         """The lamp on a surface that `near` (3,) looks at; None if it does not fit there."""
         towards = np.array(UP if rng.uniform() < 0.5 else SIDES[rng.integers(len(SIDES))])

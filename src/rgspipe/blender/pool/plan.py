@@ -141,8 +141,8 @@ def _where(place: _Place, light: Light) -> np.ndarray:
 
 
 def _needs_aim(light: Light, job: PoolJob) -> bool:
-    """Whether nothing says yet where it looks, as a surface that it hangs on does."""
-    return isinstance(light, AxialLight) and job.lamps.mounted is None
+    """Whether nothing says yet where it looks, as a surface that it hangs on does of all but spots."""
+    return isinstance(light, AxialLight) and (job.kind == "spots" or not job.lamps.hang(job.kind))
 
 
 def _placed(place: _Place, occlusion: str, rng: np.random.Generator, index: int) -> Light | None:
@@ -155,7 +155,7 @@ def _placed(place: _Place, occlusion: str, rng: np.random.Generator, index: int)
         return lamp
     clearance = max(clearance, lamp.radius) if isinstance(lamp, SphereLight) else clearance
     position = (place.layout.hidden_light if hidden else place.layout.light)(rng, clearance)
-    if lamps.mounted is not None or job.kind == "panels":
+    if lamps.hang(job.kind):
         return lamps.hung(lamp, position, place.geometry, rng)
     return lamp.at(torch.from_numpy(position))
 
