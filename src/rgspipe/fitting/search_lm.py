@@ -13,6 +13,7 @@ import torch
 from torch import Tensor
 
 from rgspipe.fitting.alternative import Alternative
+from rgspipe.fitting.certainty.minima import holding
 from rgspipe.fitting.certainty.uncertainty import design_effect, light_covariances
 from rgspipe.fitting.findings import Finding, FitStatus, LightMissing, LightSpare, MuchAmbient, NoOpening
 from rgspipe.fitting.meter import Meter
@@ -38,6 +39,7 @@ from rgspipe.fitting.selection.diagnosis import Costs, hanging, standing
 from rgspipe.fitting.selection.kinds import told_kinds
 from rgspipe.fitting.selection.number import Doubted, doubted_number, faded_light
 from rgspipe.fitting.selection.rivals import (
+    as_good_nearby,
     leaves_as_little,
     rival_among,
     rival_elsewhere,
@@ -83,10 +85,13 @@ def fit_search_lm(
     refiner = Refiner.of(problem.coarsest(blocks), meter, options.limits)
     found = _search(refiner, candidates, options, spec)
     # Which of those that blocks do not tell apart is the answer, pixels say.
-    every = [_polished(refiner.on(problem.sharpest()), one, options.iterations) for one in (found.best, *found.others)]
-    (polished, best), *rivals = sorted(every, key=lambda pair: pair[0].unexplained(pair[1]))
+    rough = refiner.on(problem.sharpest().of_few_points())
+    polished, (best, *others) = _all_polished(rough, [found.best, *found.others], options.iterations)
     best, beside = settled_beside(polished, best, options, refiner)
-    others = [*(state for _, state in rivals), *beside]
+    others = [*others, *beside]
+    if not all(emitter.light.in_one_point for emitter in best.emitters):
+        near = [other for other in others if leaves_as_little(polished, best, other, options.rivals)]
+        polished, (best, *others) = _all_polished(refiner.on(problem.sharpest()), [best, *near], options.iterations)
     polished, (best, *others) = _seen_well(polished, [best, *others], options)
     if not bool((best.intensity[: len(best.emitters)] > 0).any()):
         return _without_lights(polished.problem, meter)
@@ -179,6 +184,13 @@ def _roughly_exposed(problem: LightProblem, coarse: Sequence[CoarseImages]) -> L
     return problem.with_exposures(rough_exposures(seen, target, weights, views, len(problem.exposures)))
 
 
+def _all_polished(refiner: Refiner, states: Sequence[State], iterations: int) -> tuple[Refiner, list[State]]:
+    """`_polished` of each rig, the best first, with the refiner of that one."""
+    every = [_polished(refiner, one, iterations) for one in states]
+    every.sort(key=lambda pair: pair[0].unexplained(pair[1]))
+    return every[0][0], [state for _, state in every]
+
+
 def _polished(refiner: Refiner, best: State, iterations: int) -> tuple[Refiner, State]:
     """Plain squares to the end with all pixels, direct light where these look if views are ready for it.
 
@@ -204,11 +216,10 @@ def _seen_well(refiner: Refiner, states: Sequence[State], options: SearchOptions
     problem = seeing_bright_spots(refiner.problem, states) if options.bright_spots else refiner.problem
     if problem is refiner.problem or design_effect(refiner.problem, states[0], options.certainty.cell) < NOISE:
         return refiner, [*states]
-    every = [_polished(refiner.on(problem), one, options.iterations) for one in states]
-    (better, best), *rest = sorted(every, key=lambda pair: pair[0].unexplained(pair[1]))
-    if better.unexplained(best) > options.rivals.energy * max(refiner.unexplained(states[0]), ROUNDING**2):
+    better, seen = _all_polished(refiner.on(problem), states, options.iterations)
+    if better.unexplained(seen[0]) > options.rivals.energy * max(refiner.unexplained(states[0]), ROUNDING**2):
         return refiner, [*states]
-    return better, [best, *(state for _, state in rest)]
+    return better, seen
 
 
 def _told(state: State) -> tuple[Emitter, ...]:
@@ -229,8 +240,9 @@ def _result(
     spread = light_covariances(problem, best, options.certainty)
     # They may have found other exposures.
     others = [refiner.start(other.emitters, PLAIN, other) for other in others]
-    rival = rival_polished(refiner, best, others, spread.calibrated, options)
-    rival = rival or rival_elsewhere(refiner, best, spread.calibrated, options)
+    near = as_good_nearby(refiner, best, others, options)
+    certainty = holding(spread.calibrated, best, near, problem.scale, refiner.region.size)
+    rival = rival_polished(refiner, best, others, options) or rival_elsewhere(refiner, best, certainty, options)
     rivals = [] if rival is None else [rival]
     told = weighed(refiner, best, [*rivals, *others], findings, options)
     told += still_apart(refiner, best, earlier, told, options.certainty.doubtful)
@@ -238,13 +250,13 @@ def _result(
     findings = (*(told_rival(refiner, best, other) for other in rivals), *findings, *open_tables)
     return FitResult(
         lights=last.lights,
-        findings=(*standing(refiner, best, spread.calibrated, options.certainty), *findings, *hanging(best)),
+        findings=(*standing(refiner, best, certainty, options.certainty), *findings, *hanging(best)),
         loss=last.loss,
         iterations=meter.iterations,
         evaluations=meter.evaluations,
         lights_tried=max([*costs.by_count, len(best.emitters)]),
         seconds=meter.seconds,
-        covariance=spread.calibrated,
+        covariance=certainty,
         trajectory=(*best.steps, last),
         costs=costs.by_count,
         exposures=tuple(problem.exposures.tolist()),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 import torch
 
@@ -9,7 +11,14 @@ from emitters import placed, refiner_of
 from rgspipe.fitting.findings import Rival
 from rgspipe.fitting.options import BarOptions, RivalOptions, ScheduleOptions, SearchOptions
 from rgspipe.fitting.search.compare import drop
-from rgspipe.fitting.selection.rivals import equally_good, rival_among, rival_elsewhere, rival_polished, told_rival
+from rgspipe.fitting.selection.rivals import (
+    as_good_nearby,
+    equally_good,
+    rival_among,
+    rival_elsewhere,
+    rival_polished,
+    told_rival,
+)
 
 
 def test_rigs_that_leave_only_rounding_are_equally_good(room, point_light) -> None:
@@ -58,17 +67,16 @@ def test_rivals_of_another_number_have_no_distance(room, point_light) -> None:
     assert rival_among(refiner, one, [one], LENIENT) is None
     rival = rival_among(refiner, one, [one, two], LENIENT)
     assert rival is not None and len(rival.emitters) == 2
-    assert rival_polished(refiner, one, [rival], [torch.eye(6).double()], LENIENT) is rival
+    assert rival_polished(refiner, one, [rival], LENIENT) is rival
     assert told_rival(refiner, one, rival) == Rival(None)
 
 
-def test_a_near_rival_is_one_where_the_region_does_not_hold_it(room, point_light) -> None:
-    """Nearer than lights that are clearly apart, and farther than those on their way to one place."""
+def test_what_explains_as_much_nearby_is_no_rival(room, point_light) -> None:
+    """It is nearer than lights that are clearly apart, and farther than those on their way to one place."""
     refiner = refiner_of(room, point_light)
-    off, near, met = (placed(refiner, by) for by in (0.02, 0.04, 0.021))
-    for deviation, rival in ((0.001, near), (0.1, None)):
-        covariance = [deviation**2 * torch.eye(6, dtype=torch.float64)]
-        assert rival_polished(refiner, off, [near], covariance, LENIENT) is rival
-        assert rival_polished(refiner, off, [met], covariance, LENIENT) is None
-    distance = told_rival(refiner, off, near).distance
-    assert distance == pytest.approx(0.02 * 3.0**0.5 / refiner.region.size, rel=1e-6)
+    off, near, met, far = (placed(refiner, by) for by in (0.02, 0.04, 0.021, -0.1))
+    assert as_good_nearby(refiner, off, [near, met, far], LENIENT) == [near]
+    assert rival_polished(refiner, off, [near, met], LENIENT) is None
+    assert rival_polished(refiner, off, [near, met, far], LENIENT) is far
+    strict = replace(LENIENT, rivals=RivalOptions())
+    assert as_good_nearby(refiner, placed(refiner, 0.0), [near], strict) == []

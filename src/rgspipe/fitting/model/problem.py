@@ -144,6 +144,10 @@ class LightProblem:
         """The same problem with the sharpest images that there are."""
         return self if self.sharp is None else replace(self, model=self.sharp)
 
+    def of_few_points(self) -> LightProblem:
+        """The same problem with lights with an extent seen as few points: images on the way to an answer."""
+        return replace(self, model=self.model.of_few_points())
+
     def coarsest(self, blocks: ImageModel | None) -> LightProblem:
         """The same problem for averages over blocks of pixels, if all that it asks of pixels can be asked of blocks.
 

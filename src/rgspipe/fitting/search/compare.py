@@ -130,11 +130,16 @@ def _distance(one: Emitter, other: Emitter, size: float) -> float:
 
 def counterparts(one: Sequence[Emitter], other: Sequence[Emitter], size: float) -> list[tuple[Emitter, Emitter]]:
     """The lights of one rig, each with one of another of as many lights, such that they are closest together."""
+    return [(one[first], other[second]) for first, second in places_of_counterparts(one, other, size)]
+
+
+def places_of_counterparts(one: Sequence[Emitter], other: Sequence[Emitter], size: float) -> list[tuple[int, int]]:
+    """The indices of `counterparts` in their rigs."""
     if len(one) == 1:
-        return [(one[0], other[0])]
+        return [(0, 0)]
     first, second = (torch.stack([emitter.light.standing(size) for emitter in rig]).numpy() for rig in (one, other))
     rows, columns = linear_sum_assignment(np.linalg.norm(first[:, None] - second[None], axis=-1))
-    return [(one[row], other[column]) for row, column in zip(rows, columns, strict=True)]
+    return list(zip(rows.tolist(), columns.tolist(), strict=True))
 
 
 def energy_shares(state: State) -> list[float]:

@@ -8,13 +8,11 @@ from collections.abc import Iterator, Sequence
 import torch
 from torch import Tensor
 
-from rgspipe.fitting.certainty.regions import inside
 from rgspipe.fitting.findings import Rival
 from rgspipe.fitting.model.problem import ROUNDING, LightProblem
 from rgspipe.fitting.options import RivalOptions, SearchOptions
 from rgspipe.fitting.search.compare import (
     best_state,
-    counterparts,
     distinct,
     drop,
     energy_shares,
@@ -47,27 +45,31 @@ def rival_among(refiner: Refiner, best: State, others: Sequence[State], options:
     return other if clear and leaves_as_little(refiner, best, other, options.rivals) else None
 
 
-def rival_polished(
-    refiner: Refiner, best: State, others: Sequence[State], covariance: Sequence[Tensor], options: SearchOptions
-) -> State | None:
-    """The nearest of other minima that explains as much as an answer, clearly apart or not held by its regions.
-
-    A covariance knows of one minimum. Another that explains as much is another answer, however near, unless the regions
-    of the first are wide enough for both.
+def rival_polished(refiner: Refiner, best: State, others: Sequence[State], options: SearchOptions) -> State | None:
+    """The nearest of other minima clearly apart from an answer that explains as much.
 
     Args:
         refiner: on the problem that the answer was polished on.
         others: polished on all pixels, too, with the exposures of the answer.
-        covariance: of each light of the answer, see `FitResult.covariance`.
+    """
+    size = refiner.region.size
+    for other in sorted(others, key=lambda state: rig_distance(best.emitters, state.emitters, size)):
+        clear = rig_distance(best.emitters, other.emitters, size) > options.certainty.doubtful
+        if clear and as_good(refiner, best, other, options.rivals):
+            return other
+    return None
+
+
+def as_good_nearby(refiner: Refiner, best: State, others: Sequence[State], options: SearchOptions) -> list[State]:
+    """The other minima that explain as much as an answer, but are not clearly apart from it.
+
+    Args:
+        refiner, others: as for `rival_polished`.
     """
     size = refiner.region.size
     _, *apart = distinct([best, *others], options.schedule.met, size)
-    for other in sorted(apart, key=lambda state: rig_distance(best.emitters, state.emitters, size)):
-        clear = rig_distance(best.emitters, other.emitters, size) > options.certainty.doubtful
-        told = clear or not _regions_hold(best, other, covariance, size)
-        if told and as_good(refiner, best, other, options.rivals):
-            return other
-    return None
+    near = (one for one in apart if rig_distance(best.emitters, one.emitters, size) <= options.certainty.doubtful)
+    return [other for other in near if as_good(refiner, best, other, options.rivals)]
 
 
 def rival_elsewhere(
@@ -85,15 +87,6 @@ def rival_elsewhere(
         if as_good(refiner, best, other, options.rivals):
             return other
     return None
-
-
-def _regions_hold(best: State, other: State, covariance: Sequence[Tensor], size: float) -> bool:
-    """Whether the regions around the lights of an answer hold those of another rig."""
-    one, two = zip(*counterparts(best.emitters, other.emitters, size), strict=True)
-    order = [next(k for k, emitter in enumerate(best.emitters) if emitter is first) for first in one]
-    spreads = [first.light.standing_spread(covariance[k], size) for first, k in zip(one, order, strict=True)]
-    places = ([emitter.light.standing(size) for emitter in rig] for rig in (one, two))
-    return inside(*places, spreads)
 
 
 def told_rival(refiner: Refiner, best: State, other: State) -> Rival:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Self, TypeAlias
 
 import torch
@@ -49,6 +49,10 @@ class ImageModel(ABC):
         """How many images `columns` makes of a light."""
         return 1
 
+    def of_few_points(self) -> ImageModel:
+        """The same with lights of few points (`Light.nodes`); itself where it takes no more anyway."""
+        return self
+
 
 @dataclass(frozen=True)
 class ViewModel(ImageModel):
@@ -57,10 +61,15 @@ class ViewModel(ImageModel):
     Attributes:
         views: the pixels.
         effects: parts of light transport.
+        few: whether lights with an extent are seen as few points, see `Light.nodes`.
     """
 
     views: ViewedPixels
     effects: Effects
+    few: bool = field(default=False, kw_only=True)
+
+    def of_few_points(self) -> Self:
+        return replace(self, few=True)
 
     @property
     def view_of(self) -> Tensor:
@@ -111,14 +120,14 @@ class SurfelModel(ViewModel):
     def columns(self, light: UnitLight) -> Tensor:
         frozen, bounces = self.views.frozen, self.effects.interreflection
         if self.gloss is None:
-            lit = lit_columns(frozen.bvh, light, self.effects, LEAST_LIT)
+            lit = lit_columns(frozen.bvh, light, self.effects, LEAST_LIT, self.few)
             return self.views.seen(frozen.radiance(lit, bounces))
 
         def glossy(part: UnitLight) -> tuple[Tensor]:
             lit = lit_surfels(frozen.bvh, part, self.effects, LEAST_LIT).columns
             return (seen_with_gloss(self.views, part.light.place, lit, bounces),)
 
-        (columns,) = added(light, glossy)
+        (columns,) = added(light, glossy, self.few)
         return columns
 
     def image(self, rig: LightRig) -> Tensor:

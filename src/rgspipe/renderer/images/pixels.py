@@ -54,7 +54,7 @@ class PixelModel(ViewModel):
         return torch.cat([direct.points for direct in self.direct])[self.views.pixels]
 
     def columns(self, light: UnitLight) -> Tensor:
-        columns, lit = added(light, self._columns)
+        columns, lit = added(light, self._columns, self.few)
         if self.gloss is not None or not self.effects.interreflection:
             return columns
         frozen = self.views.frozen
