@@ -88,11 +88,13 @@ def fit_search_lm(
     rough = refiner.on(problem.sharpest().of_few_points())
     polished, (best, *others) = _all_polished(rough, [found.best, *found.others], options.iterations)
     best, beside = settled_beside(polished, best, options, refiner)
-    others = [*others, *beside]
-    if not all(emitter.light.in_one_point for emitter in best.emitters):
+    others, worse = [*others, *beside], []
+    if any(len(emitter.light.parts()) > 1 for emitter in best.emitters):
         near = [other for other in others if leaves_as_little(polished, best, other, options.rivals)]
+        worse = [other for other in others if not any(other is one for one in near)]
         polished, (best, *others) = _all_polished(refiner.on(problem.sharpest()), [best, *near], options.iterations)
     polished, (best, *others) = _seen_well(polished, [best, *others], options)
+    others += [polished.start(other.emitters, PLAIN) for other in worse]
     if not bool((best.intensity[: len(best.emitters)] > 0).any()):
         return _without_lights(polished.problem, meter)
     findings = found.findings
