@@ -95,3 +95,15 @@ def test_a_listener_hears_nothing_of_short_work_but_its_end(monkeypatch: pytest.
     with progress.progress_told(told.append):
         tracked(monkeypatch, range(25), seconds=0.05)
     assert told == [""]
+
+
+def test_a_listener_hears_at_once_of_what_goes_on_after_long_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A second part of work that has lasted for longer than nothing is said: no silence in between."""
+    told: list[str] = []
+    clock = Clock()
+    monkeypatch.setattr("rgspipe.progress.time.monotonic", clock)
+    with progress.progress_told(told.append):
+        clock.now += 3.0
+        with progress.progress_bar([], "lights", total=4):
+            assert told == ["lights"]
+    assert told == ["lights", ""]

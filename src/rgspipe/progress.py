@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -18,10 +19,14 @@ QUIET_SECONDS = 2.0
 #: Is given progress in words, and nothing once it has ended.
 Listener = Callable[[str], object]
 
-_LISTENER: ContextVar[Listener | None] = ContextVar("listener", default=None)
+#: Who listens, and since when.
+_LISTENER: ContextVar[tuple[Listener, float] | None] = ContextVar("listener", default=None)
 
 #: As tqdm's own, with the time that is left of everything.
 _FORMAT = "{l_bar}{bar}| {n_fmt}/{total_fmt} [{elapsed}, {left} left{postfix}]"
+
+#: Of work whose items mean nothing to who waits for it.
+_UNCOUNTED = "{l_bar}{bar}| [{elapsed}, {left} left]"
 
 #: For listeners.
 _WORDS = "{desc}: {percentage:.0f} %, {left} left"
@@ -30,7 +35,7 @@ _WORDS = "{desc}: {percentage:.0f} %, {left} left"
 _OFTEN, _SELDOM = 0.2, 10.0
 
 
-class _Bar(tqdm):
+class ProgressBar(tqdm):
     """Progress whose estimate counts work that follows the items.
 
     Args:
@@ -63,7 +68,7 @@ class _Bar(tqdm):
         return found | {"left": left}
 
 
-class _Lines(_Bar):
+class _Lines(ProgressBar):
     """Progress in a log: whole lines instead of one that is written over."""
 
     def display(self, msg: str | None = None, pos: int | None = None) -> bool:
@@ -85,12 +90,14 @@ class _Words(_Lines):
     """Progress that is told to who asked for it, and not shown."""
 
     def __init__(self, *arguments: object, **options: object) -> None:
-        self._listener = _LISTENER.get()
-        super().__init__(*arguments, bar_format=_WORDS, **options)
+        self._listener, since = _LISTENER.get()
+        # Silence between two parts of long work would look as if nothing went on.
+        delay = max(0.0, QUIET_SECONDS - (time.monotonic() - since))
+        super().__init__(*arguments, **options | {"bar_format": _WORDS, "delay": delay})
 
     def display(self, msg: str | None = None, pos: int | None = None) -> bool:
         if self.total:
-            self._listener(str(self))
+            self._listener(str(self) if self.n > self.initial else self.desc)
         return True
 
     def close(self) -> None:
@@ -105,10 +112,10 @@ def progress_told(listener: Listener) -> Iterator[None]:
     """Give the progress of work within the block, in this thread, to `listener` instead of showing it.
 
     Args:
-        listener: is given "distant candidates: 40 %, 00:12 left" now and then, and "" where such work has ended; in
-            any thread.
+        listener: is given "distant candidates: 40 %, 00:12 left" now and then, at once where the block has lasted for
+            QUIET_SECONDS, and "" where such work has ended; in any thread.
     """
-    token = _LISTENER.set(listener)
+    token = _LISTENER.set((listener, time.monotonic()))
     try:
         yield
     finally:
@@ -123,7 +130,8 @@ def progress_bar(
     *,
     done: int = 0,
     after: float | None = None,
-) -> _Bar:
+    counted: bool = True,
+) -> ProgressBar:
     """Iterate over `items` while a progress line with an estimate stands on stderr.
 
     On a terminal the line is written over; in a log a new one comes every ten seconds; within `progress_told` it is
@@ -135,10 +143,13 @@ def progress_bar(
         total: of items, those done before and later included; by default how many `items` has.
         done: how many were done before these.
         after: seconds of other work that follows and that the estimate shall include.
+        counted: whether it is worth telling how many items are done; if not, they may be shares of a whole that take
+            as long as they are large, and the estimate is by the pace since the beginning.
     """
+    even = {} if counted else {"bar_format": _UNCOUNTED, "smoothing": 0.0, "miniters": 0}
     told = _LISTENER.get() is not None
     interactive = sys.stderr.isatty() and not told
-    return (_Words if told else _Bar if interactive else _Lines)(
+    return (_Words if told else ProgressBar if interactive else _Lines)(
         items,
         desc=description,
         total=total,
@@ -150,4 +161,5 @@ def progress_bar(
         dynamic_ncols=interactive,
         mininterval=_OFTEN if interactive or told else _SELDOM,
         leave=False,
+        **even,
     )

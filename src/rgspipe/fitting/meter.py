@@ -1,9 +1,11 @@
-"""What a fit takes: its clock, and the steps and renderings that are counted."""
+"""What a fit takes: its clock, the steps and renderings that are counted, and how far it is."""
 
 from __future__ import annotations
 
 import time
 from dataclasses import dataclass, field
+
+from rgspipe.fitting.course import Course
 
 
 @dataclass
@@ -13,10 +15,12 @@ class Meter:
     Attributes:
         iterations: steps that were taken.
         evaluations: renderings of a light.
+        course: how far the fit is; told nobody unless one is given.
     """
 
     iterations: int = 0
     evaluations: int = 0
+    course: Course = field(default_factory=Course)
     _begin: float = field(default_factory=time.perf_counter, init=False)
 
     @property

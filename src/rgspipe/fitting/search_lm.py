@@ -14,18 +14,30 @@ from torch import Tensor
 
 from rgspipe.fitting.alternative import Alternative
 from rgspipe.fitting.certainty.minima import holding
-from rgspipe.fitting.certainty.uncertainty import design_effect, light_covariances
+from rgspipe.fitting.certainty.uncertainty import light_covariances
+from rgspipe.fitting.course import (
+    BEGINNING,
+    BESIDE,
+    BLOCKS_BESIDE,
+    BRIGHT_SPOTS,
+    KINDS,
+    POLISH,
+    Course,
+    effort_after,
+    effort_of,
+    weight,
+)
 from rgspipe.fitting.findings import Finding, FitStatus, LightMissing, LightSpare, MuchAmbient, NoOpening
 from rgspipe.fitting.meter import Meter
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.exposure import rough_exposures
 from rgspipe.fitting.model.known_images import FIELDS, Strength
 from rgspipe.fitting.model.moments import moments
-from rgspipe.fitting.model.problem import ROUNDING, LightProblem
+from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.options import SearchOptions
+from rgspipe.fitting.polish import all_polished, seen_well
 from rgspipe.fitting.result import FitResult, dark_result
-from rgspipe.fitting.search.beside import settled_beside
-from rgspipe.fitting.search.bright_spots import seeing_bright_spots
+from rgspipe.fitting.search.beside import settled_beside, steps_aside
 from rgspipe.fitting.search.coarse import CoarseImages
 from rgspipe.fitting.search.compare import column_energies
 from rgspipe.fitting.search.grow import grown
@@ -51,11 +63,6 @@ from rgspipe.fitting.spec import AUTO, LightSpec
 from rgspipe.renderer.images.blocks import view_of_blocks
 from rgspipe.renderer.images.model import ImageModel
 
-#: What a fit leaves is noise if its `design_effect` is less: pixels share no more than that again. Images of the model
-#: itself with 0.5 to 2 % of noise come to 0.8 to 0.9, path-traced ones in trained scenes to 5.7 and more, so half or
-#: twice of it tells them apart as well.
-NOISE = 2.0
-
 
 def fit_search_lm(
     problem: LightProblem,
@@ -71,13 +78,28 @@ def fit_search_lm(
         spec: what is known of the lights; one point light if None.
         blocks: the views as blocks of pixels, on which starts are refined; on all pixels if None.
     """
-    meter, spec = Meter(), spec or LightSpec()
+    spec = spec or LightSpec()
     if problem.black:
-        return dark_result(meter.seconds)
+        return dark_result(0.0)
+    with Course.shown(effort_of(spec)) as course:
+        return _fitted(problem, coarse, options, spec, blocks, Meter(course=course))
+
+
+def _fitted(
+    problem: LightProblem,
+    coarse: Sequence[CoarseImages],
+    options: SearchOptions,
+    spec: LightSpec,
+    blocks: ImageModel | None,
+    meter: Meter,
+) -> FitResult:
+    """`fit_search_lm` of a target that is not black."""
+    course = meter.course
     problem = _roughly_exposed(problem, coarse)
     free = [spec.seed.free(images.shapes[0]) for images in coarse]
     pairs = zip(coarse, free, strict=True)
-    candidates = [Candidates.of(problem, images, shape_free, options.combinations) for images, shape_free in pairs]
+    with course.part("looking at candidates", BEGINNING):
+        candidates = [Candidates.of(problem, images, shape_free, options.combinations) for images, shape_free in pairs]
     candidates = [one for one in candidates if one.lit]
     if not candidates:
         dark = _without_lights(problem, meter)
@@ -86,14 +108,19 @@ def fit_search_lm(
     found = _search(refiner, candidates, options, spec)
     # Which of those that blocks do not tell apart is the answer, pixels say.
     rough = refiner.on(problem.sharpest().of_few_points())
-    polished, (best, *others) = _all_polished(rough, [found.best, *found.others], options.iterations)
-    best, beside = settled_beside(polished, best, options, refiner)
+    size, chosen = weight(found.best.emitters), [found.best, *found.others]
+    with course.polishing(size, len(chosen)):
+        polished, (best, *others) = all_polished(rough, chosen, options.iterations)
+    with course.part("looking beside", BESIDE * size, 2 * steps_aside(options)):
+        best, beside = settled_beside(polished, best, options, refiner)
     others, worse = [*others, *beside], []
     if any(len(emitter.light.parts()) > 1 for emitter in best.emitters):
         near = [other for other in others if leaves_as_little(polished, best, other, options.rivals)]
         worse = [other for other in others if not any(other is one for one in near)]
-        polished, (best, *others) = _all_polished(refiner.on(problem.sharpest()), [best, *near], options.iterations)
-    polished, (best, *others) = _seen_well(polished, [best, *others], options)
+        with course.polishing(size, 1 + len(near), planned=0):
+            polished, (best, *others) = all_polished(refiner.on(problem.sharpest()), [best, *near], options.iterations)
+    with course.part("bright spots", BRIGHT_SPOTS * size, 1 + len(others)):
+        polished, (best, *others) = seen_well(polished, [best, *others], options)
     others += [polished.start(other.emitters, PLAIN) for other in worse]
     if not bool((best.intensity[: len(best.emitters)] > 0).any()):
         return _without_lights(polished.problem, meter)
@@ -117,11 +144,15 @@ def fit_from(
     options = options or SearchOptions()
     if problem.black:
         return dark_result(0.0)
-    refiner = Refiner.of(problem.sharpest())
-    best = refiner.refined(refiner.start(start, PLAIN), PLAIN, iterations)
-    if best.status is FitStatus.CONVERGED:
-        refiner, (best,) = _seen_well(refiner, [best], options)
-    return _result(refiner, best, (), Costs({}), options)
+    size = weight(start)
+    with Course.shown((POLISH + BRIGHT_SPOTS) * size) as course:
+        refiner = Refiner.of(problem.sharpest(), Meter(course=course))
+        with course.polishing(size, 1):
+            best = refiner.refined(refiner.start(start, PLAIN), PLAIN, iterations)
+        if best.status is FitStatus.CONVERGED:
+            with course.part("bright spots", BRIGHT_SPOTS * size):
+                refiner, (best,) = seen_well(refiner, [best], options)
+        return _result(refiner, best, (), Costs({}), options)
 
 
 @dataclass(frozen=True)
@@ -148,12 +179,16 @@ def _search(refiner: Refiner, candidates: Sequence[Candidates], options: SearchO
     search = RigSearch(refiner, candidates, options, kinds_open=len(spec.kinds) > 1)
     found = search.unknown() if spec.count is None else search.known(spec.count)
     found = grown(refiner, found, spec, options) if spec.extended or spec.mounted else found
-    best, kinds = found.best, ()
-    if spec.type == AUTO:
-        best, kinds, tables = told_kinds(refiner, candidates, best, spec, options)
-    else:
-        best, tables = told_tables(refiner, best, spec, options)
-    best, beside = settled_beside(refiner, best, options)
+    best, kinds, course = found.best, (), refiner.meter.course
+    size = weight(best.emitters)
+    course.further(effort_after(size) - effort_after((spec.count or 1) ** 2))
+    with course.part("kinds of lights", KINDS * size, len(best.emitters)):
+        if spec.type == AUTO:
+            best, kinds, tables = told_kinds(refiner, candidates, best, spec, options)
+        else:
+            best, tables = told_tables(refiner, best, spec, options)
+    with course.part("looking beside", BLOCKS_BESIDE * size, 2 * steps_aside(options)):
+        best, beside = settled_beside(refiner, best, options)
     if best is not found.best:
         found = replace(found, best=best, compared={**found.compared, len(best.emitters): best})
     rival = rival_among(refiner, best, found.others, options)
@@ -184,49 +219,6 @@ def _roughly_exposed(problem: LightProblem, coarse: Sequence[CoarseImages]) -> L
     weights = problem.block_weights(target, images.counts.to(target), images.blocks)
     views = view_of_blocks(images.blocks, problem.views)
     return problem.with_exposures(rough_exposures(seen, target, weights, views, len(problem.exposures)))
-
-
-def _all_polished(refiner: Refiner, states: Sequence[State], iterations: int) -> tuple[Refiner, list[State]]:
-    """`_polished` of each rig, the best first, with the refiner of that one."""
-    every = [_polished(refiner, one, iterations) for one in states]
-    every.sort(key=lambda pair: pair[0].unexplained(pair[1]))
-    return every[0][0], [state for _, state in every]
-
-
-def _polished(refiner: Refiner, best: State, iterations: int) -> tuple[Refiner, State]:
-    """Plain squares to the end with all pixels, direct light where these look if views are ready for it.
-
-    Returns:
-        the refiner on the problem with the exposures that were found, from here on taken as known; and the rig.
-    """
-    best = refiner.refined(refiner.at(best, _told(best)), PLAIN, iterations)
-    if (told := _told(best)) != best.emitters:
-        best = refiner.at(best, told)
-    problem = refiner.problem
-    if problem.exposure_free:
-        exposures = problem.moments(best.columns, PLAIN.at(problem, best.columns, best.intensity)).exposures
-        problem = replace(problem.with_exposures(exposures), exposure_free=False)
-    return refiner.on(problem), best
-
-
-def _seen_well(refiner: Refiner, states: Sequence[State], options: SearchOptions) -> tuple[Refiner, list[State]]:
-    """The refiner and the rigs, the best first, with bright spots seen well; as they are where that explains much less.
-
-    With spots left to patches least squares explain a little more by noise alone, at places that are worse (errors in
-    variables). Images that the model of patches made are left to it: it explains them to rounding or to their noise.
-    """
-    problem = seeing_bright_spots(refiner.problem, states) if options.bright_spots else refiner.problem
-    if problem is refiner.problem or design_effect(refiner.problem, states[0], options.certainty.cell) < NOISE:
-        return refiner, [*states]
-    better, seen = _all_polished(refiner.on(problem), states, options.iterations)
-    if better.unexplained(seen[0]) > options.rivals.energy * max(refiner.unexplained(states[0]), ROUNDING**2):
-        return refiner, [*states]
-    return better, seen
-
-
-def _told(state: State) -> tuple[Emitter, ...]:
-    """The lights of a rig by the numbers that results tell."""
-    return tuple(emitter.told for emitter in state.emitters)
 
 
 def _result(

@@ -54,11 +54,17 @@ def minima_beside(
         rigs: Iterable[EmitterRig] = _walk(refiner, answer, side * direction, options)
         if blocks is not None:
             rigs = takewhile(lambda rig: _left_of(blocks, rig) <= most, rigs)
-        walked = [refiner.start(rig, PLAIN, answer) for rig in rigs]
+        walked = [_walked(refiner, rig, answer) for rig in rigs]
         behind = _behind_a_rise([refiner.unexplained(state) for state in (answer, *walked)])
         if behind:
             found.append(refiner.refined(walked[behind - 1], PLAIN, steps))
     return sorted(distinct(found, met, size), key=refiner.unexplained)
+
+
+def _walked(refiner: Refiner, rig: EmitterRig, answer: State) -> State:
+    state = refiner.start(rig, PLAIN, answer)
+    refiner.meter.course.piece()
+    return state
 
 
 def _left_of(blocks: Refiner, rig: EmitterRig) -> float:
@@ -68,8 +74,13 @@ def _left_of(blocks: Refiner, rig: EmitterRig) -> float:
 def _walk(refiner: Refiner, answer: State, direction: Tensor, options: SearchOptions) -> Iterator[EmitterRig]:
     """The lights moved along a direction in steps, as far as starts are apart."""
     step = options.schedule.met
-    for count in range(1, 1 + round(options.combinations.separation / step)):
+    for count in range(1, 1 + steps_aside(options)):
         yield moved_rig(answer.emitters, count * step * direction, refiner.region)
+
+
+def steps_aside(options: SearchOptions) -> int:
+    """How many steps the loss is followed each way at most."""
+    return round(options.combinations.separation / options.schedule.met)
 
 
 def _behind_a_rise(losses: list[float]) -> int:

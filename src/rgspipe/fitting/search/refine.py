@@ -103,7 +103,13 @@ class Refiner:
     def descended(self, squares: Problem[State], start: State, iterations: int) -> State:
         """The least squares of any problem in these lights, with the steps that led there."""
         steps = [*start.steps]
-        found = least_squares(squares, start, iterations, self.solver, lambda state: steps.append(self.step(state)))
+
+        def watch(state: State) -> None:
+            steps.append(self.step(state))
+            self.meter.course.step(len(steps) - len(start.steps), iterations)
+
+        found = least_squares(squares, start, iterations, self.solver, watch)
+        self.meter.course.piece()
         self.meter.iterations += found.iterations
         return replace(found.value, steps=tuple(steps), status=STATUSES[found.ended])
 

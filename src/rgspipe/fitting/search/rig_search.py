@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import zip_longest
 
+from rgspipe.fitting.course import BEAMS, POINTS, Course
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.options import MOST_LIGHTS, SearchOptions
 from rgspipe.fitting.search.compare import best_state, distinct, drop, passed, worth_keeping
@@ -17,6 +18,9 @@ from rgspipe.fitting.search.refine import Refiner, State
 from rgspipe.fitting.search.schedule import refined_starts
 from rgspipe.fitting.search.starts import Candidates, EmitterRig
 from rgspipe.fitting.search.weighting import PLAIN, ROBUST
+
+#: Descents for each start: the better ones go on.
+DESCENTS = 1.3
 
 
 @dataclass(frozen=True)
@@ -50,6 +54,10 @@ class RigSearch:
     options: SearchOptions = field(default_factory=SearchOptions)
     kinds_open: bool = False
 
+    @property
+    def _course(self) -> Course:
+        return self.refiner.meter.course
+
     def known(self, lights: int) -> Found:
         """The best rig of a given number of lights; fewer where there are too few candidates."""
         found = None
@@ -66,6 +74,8 @@ class RigSearch:
         """The best rig of the least number of lights to which one more adds too little."""
         best, compared, bar = None, {}, self.options.bar
         for lights in range(1, MOST_LIGHTS + 1):
+            if lights > 2:
+                self._course.further(POINTS * lights)
             found = self._of(lights, best and best.best, patient=False)
             if found is None:
                 break
@@ -112,10 +122,8 @@ class RigSearch:
         found: list[Found] = []
         for aimed in (False, True):
             kinds = [kind for kind in self.candidates if kind.aimed is aimed]
-            if not (found and kinds and self._beamless(found[0].best)):
-                starts = zip_longest(*(self._starts(kind, lights, previous, batches) for kind in kinds))
-                rigs = [rig for row in starts for rig in row if rig is not None]
-                found += [self._refined(rigs, batches, previous)] if rigs else []
+            if kinds and not (found and self._beamless(found[0].best)):
+                found += self._tried(kinds, lights, previous, batches)
         if not found:
             return None
         best = found[0].best
@@ -124,6 +132,18 @@ class RigSearch:
                 best = richer.best
         best = self._with_plain_lights(best) if self.kinds_open else best
         return Found(best, tuple(state for one in found for state in one.others))
+
+    def _tried(self, kinds: Sequence[Candidates], lights: int, previous: State | None, batches: int) -> list[Found]:
+        """The best of starts of some kinds, if there are any."""
+        words, effort = f"trying {lights} light{'s' * (lights != 1)}", POINTS * lights
+        if kinds[0].aimed:
+            words, effort = f"{words} with beams", BEAMS * lights
+            self._course.further(effort)
+        with self._course.part(words, effort) as part:
+            starts = zip_longest(*(self._starts(kind, lights, previous, batches) for kind in kinds))
+            rigs = [rig for row in starts for rig in row if rig is not None]
+            part.pieces = DESCENTS * len(rigs) / batches
+            return [self._refined(rigs, batches, previous)] if rigs else []
 
     def _beamless(self, state: State) -> bool:
         """Whether points explain the image, and no beam in the place of one promises to do so better."""
