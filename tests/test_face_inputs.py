@@ -373,7 +373,7 @@ REFUSED: dict[str, tuple[Callable[[rg.FrozenScene, Tensor], object], str, str, s
         "FitResult",
         "result.lights",
     ),
-    "a folder without a scene": (lambda s, i: rg.FrozenScene.load("/"), "/", "neither", "freeze/latest"),
+    "a folder without a scene": (lambda s, i: rg.FrozenScene.load("/"), "/", "no surfels", "freeze/latest"),
     "a folder for a light file": (lambda s, i: rg.write_lights("/", [LIGHT]), "/", "a folder", "lights.json"),
     "a light nowhere for a file": (
         lambda s, i: rg.write_lights("x.json", rg.PointLight([0, 0, math.nan], 1)),
@@ -425,7 +425,7 @@ REFUSED: dict[str, tuple[Callable[[rg.FrozenScene, Tensor], object], str, str, s
     "a scene for its views": (lambda s, i: rg.track_lights(s, [i]), "views", "FrozenScene", "FitViews.prepare"),
     "no formats": (lambda s, i: rg.export_lights([LIGHT], "x", 3), "formats", "int", "usda"),
     "a picture of words": (lambda s, i: rg.tone_map("x"), "image", "'x'", "radiance"),
-    "a folder that is not there": (lambda s, i: rg.FrozenScene.load("nowhere"), "nowhere", "no such folder", "Freeze"),
+    "a folder that is not there": (lambda s, i: rg.FrozenScene.load("nowhere"), "nowhere", "no such folder", "Name"),
     "a file that is not there": (lambda s, i: rg.Surfels.from_ply("no.ply"), "no.ply", "no such file", "path"),
     "radiance for a picture": (lambda s, i: rg.save_png("x.png", i), "pixels", "float32", "tone_map"),
     "views without lights": (

@@ -177,6 +177,10 @@ def test_a_choice_is_explained(topic: str) -> None:
         (["--help", "fot"], "fit"),
         (["docter"], "Did you mean doctor?"),
         (["fit_ligth"], "Did you mean stage=fit_light?"),
+        (["trian"], "Did you mean stage=train_surfels?"),
+        (["--cfgg", "job"], "Did you mean --cfg?"),
+        (["--nothing"], "--help options lists them."),
+        (["stage=freeze", "scene=mesh", "scene.path=/etc/hostname"], "expected a mesh"),
     ],
 )
 def test_a_mistake_is_one_paragraph_and_leaves_nothing(
@@ -217,6 +221,22 @@ def test_what_would_steer_a_terminal_in_a_status_is_escaped(
     told = capsys.readouterr().out
     assert "\\x1b[2J" in told and "\\x1b]0;title" in told
     assert not {"\x1b", "\x07"} & set(told)
+
+
+@pytest.mark.parametrize("width", [60, 80, 200])
+def test_what_went_wrong_fits_the_terminal(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], width: int
+) -> None:
+    """As an error, and in the list of runs in a few lines, of which the last says whether there is more."""
+    monkeypatch.setenv("COLUMNS", str(width))
+    assert main(["stage=nothing", "seed=1"]) == REFUSED
+    told = capsys.readouterr().err.splitlines()
+    assert len(told) > 1 and max(map(len, told)) <= min(width, 110)
+    status = RunStatus.start(tmp_path / "runs/old", "freeze", [])
+    status.failed(ValueError("word " * 100), 1)
+    assert main(["status", f"outputs={tmp_path}"]) == 0
+    _, *reason = capsys.readouterr().out.splitlines()
+    assert len(reason) == 3 and max(map(len, reason)) <= min(width, 110) and reason[-1].endswith(" …")
 
 
 def test_a_failure_is_short_and_its_traceback_is_kept(rgspipe, tmp_path: Path) -> None:

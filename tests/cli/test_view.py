@@ -14,12 +14,16 @@ from pathlib import Path
 import pytest
 import torch
 
-from rgspipe.cli.view import Wanted, parsed, serve, view_folder
+from rgspipe.cli.view import DEMO, Wanted, parsed, serve, view_folder
 from rgspipe.errors import InputError
 from rgspipe.light_export.world import World
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.viewer.serve import view
 from rooms import closed_box
+
+
+def test_what_the_demo_says_fits_a_terminal() -> None:
+    assert max(map(len, DEMO.splitlines())) <= 80
 
 
 def test_a_folder_and_keys_are_understood() -> None:

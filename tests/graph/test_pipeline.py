@@ -97,6 +97,15 @@ def test_what_the_plan_could_not_remark_yet_is_said_when_a_stage_begins(
     assert [said.count(remark) for remark in ("always.", "of none.", "of grow.")] == [1, 0, 1]
 
 
+def test_a_long_remark_has_lines_of_its_own_that_fit_a_terminal(config: RgspipeConfig) -> None:
+    stage = dataclasses.replace(toys.HARVEST, remarks=lambda config, made: ["a word of it " * 20])
+    load = {**toys.STAGES, "harvest": stage}.__getitem__
+    told = describe_plan(plan(resolve(config, load), ArtifactStore(Path(config.outputs)))).splitlines()
+    remark = [line for line in told if "a word of it" in line]
+    assert len(remark) > 3 and max(map(len, remark)) <= 80
+    assert len({len(line) - len(line.lstrip()) for line in remark}) == 1
+
+
 def test_stages_remark_on_what_is_made_already(config: RgspipeConfig) -> None:
     """Below their lines in the plan: nothing yet, then of the inputs, then of the artifact itself."""
     stage = dataclasses.replace(toys.HARVEST, remarks=lambda config, made: [f"made: {' '.join(sorted(made))}."])

@@ -208,8 +208,19 @@ def test_a_missing_tensor_and_another_dictionary_are_refused(folder):
 
 
 def test_a_folder_that_is_none_is_refused(tmp_path):
-    with pytest.raises(InputError, match="no such folder"):
+    with pytest.raises(InputError, match=r"no such folder\. Name the folder"):
         FrozenScene.load(tmp_path / "nowhere")
+    (tmp_path / "file").touch()
+    with pytest.raises(InputError, match="something else than a folder"):
+        FrozenScene.load(tmp_path / "file")
+
+
+@pytest.mark.parametrize("names", [(SURFELS,), (TRANSPORT,), (SURFELS, TRANSPORT)])
+def test_a_folder_with_less_than_a_scene_is_refused_by_what_is_missing(folder, names):
+    for name in names:
+        (folder / name).unlink()
+    with pytest.raises(InputError, match=f"no {' and no '.join(names)} in it"):
+        FrozenScene.load(folder)
 
 
 @pytest.mark.parametrize("part", ["rows", "columns", "values"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import logging
 import os
 import sys
@@ -13,6 +14,7 @@ from rgspipe.cli.completion import LINE, completed, is_question
 from rgspipe.cli.help import help_text, version_text
 from rgspipe.cli.messages import EXIT_INPUT, EXIT_INTERRUPTED, EXIT_UNREAD, show_input_error
 from rgspipe.errors import InputError
+from rgspipe.graph.commands import typed
 from rgspipe.graph.pipeline import StageLoader
 from rgspipe.stages import load_stage
 from rgspipe.store.files import NO_ROOM
@@ -22,6 +24,13 @@ __all__ = ["main"]
 MULTIRUN_FLAGS = ("-m", "--multirun")
 
 ASKS_FOR_HELP = ("-h", "--help", "help")
+
+#: What Hydra knows beside them.
+HYDRA_OPTIONS = (
+    *("--cfg", "--config-dir", "--config-name", "--config-path", "--experimental-rerun", "--hydra-help", "--info"),
+    *("--package", "--resolve", "--run", "--shell-completion", "--version", "-c", "-cd", "-cn", "-cp", "-i", "-p"),
+    *("-r", "-sc"),
+)
 
 
 def main(arguments: Sequence[str] | None = None, stage_loader: StageLoader = load_stage) -> int:
@@ -122,9 +131,21 @@ def _dispatch(arguments: list[str], stage_loader: StageLoader) -> int:
     from rgspipe.cli.jobs import run_hydra, run_jobs
 
     if any(text.startswith("-") and text not in MULTIRUN_FLAGS for text in arguments):
+        _check_options(arguments)
         return run_hydra(arguments, stage_loader)
     overrides = [text for text in arguments if text not in MULTIRUN_FLAGS]
     return run_jobs(overrides, stage_loader, multirun=len(overrides) < len(arguments))
+
+
+def _check_options(arguments: Sequence[str]) -> None:
+    """Refuse options that nobody knows: Hydra would answer with a list of its own."""
+    known = (*MULTIRUN_FLAGS, *ASKS_FOR_HELP, *HYDRA_OPTIONS)
+    for text in arguments:
+        name = text.partition("=")[0]
+        if name.startswith("-") and name not in known:
+            near = difflib.get_close_matches(name, known, n=1)
+            remedy = f"Did you mean {near[0]}?" if near else f"{typed('--help', 'options')} lists them."
+            raise InputError(repr(name), expected="an option", found="none of this name", remedy=remedy)
 
 
 def _check_working_folder() -> None:

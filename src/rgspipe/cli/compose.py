@@ -26,10 +26,11 @@ from rgspipe.config import RgspipeConfig
 from rgspipe.config.core import build, plain, unknown_key
 from rgspipe.datasets.json_file import shown
 from rgspipe.errors import InputError
+from rgspipe.graph import commands
 from rgspipe.graph.pipeline import Usual
 from rgspipe.graph.variants import plain_overrides
 from rgspipe.machine.resources import resource_folder
-from rgspipe.stages import NAMES, load_stage
+from rgspipe.stages import NAMES, load_stage, near_stage
 from rgspipe.store.files import LONGEST_NAME
 
 CONFIG_NAME = "config"
@@ -168,9 +169,9 @@ def _compose(overrides: Sequence[str], hydra: bool = False) -> DictConfig:
 def _parse(overrides: Sequence[str]) -> list[Override]:
     for text in overrides:
         if "=" not in text and not text.startswith("~"):
-            near = difflib.get_close_matches(text, [*COMMANDS, *NAMES], n=1)
-            named = [name if name in COMMANDS else f"stage={name}" for name in near]
-            remedy = f"Did you mean {named[0]}?" if named else "See python -m rgspipe --help."
+            named, stage = difflib.get_close_matches(text, COMMANDS, n=1), near_stage(text)
+            near = named[0] if named else stage and f"stage={stage}"
+            remedy = f"Did you mean {near}?" if near else f"See {commands.typed('--help')}."
             raise InputError(repr(text), expected="a command or key=value", found="neither", remedy=remedy)
     parsed = []
     for text in overrides:
@@ -259,7 +260,7 @@ def _composition_error(error: Exception, overrides: Sequence[str]) -> InputError
         "the command line",
         expected="overrides that fit the configuration",
         found=" ".join(str(error).split()),
-        remedy="See python -m rgspipe --help.",
+        remedy=f"See {commands.typed('--help')}.",
     )
 
 

@@ -15,7 +15,7 @@ from rgspipe.blender.interpreter import find_blender
 from rgspipe.blender.options import OWN_BLENDER, BlenderOptions
 from rgspipe.cli.arguments import refused
 from rgspipe.cli.installation import EXTRAS, Part, needed_parts, optional_parts, slurm
-from rgspipe.cli.messages import EXIT_FAILED
+from rgspipe.cli.messages import EXIT_FAILED, line_width
 from rgspipe.datasets.input_file import folder_to_be
 from rgspipe.errors import InputError
 from rgspipe.graph.commands import typed
@@ -168,7 +168,7 @@ def _results(outputs: Path) -> str:
     try:
         everything = stored(outputs)
     except InputError as error:
-        return f"{error} See python -m rgspipe verify."
+        return f"{error} See {typed('verify')}."
     spare = sum(one.bytes for one in removable(everything, Choice())) / 1e6
     size = sum(one.bytes for one in everything) / 1e6
     words = f"{len(everything)} results in {outputs} take {size:.1f} MB"
@@ -209,6 +209,11 @@ def _wrapped(text: str, first: str) -> str:
     """Lines that fit a screen, those after the first set in."""
     after = "  " + " " * (len(first) - len(first.lstrip()))
     lines = textwrap.wrap(
-        text, WIDTH, initial_indent=first, subsequent_indent=after, break_long_words=False, break_on_hyphens=False
+        text,
+        line_width(WIDTH),
+        initial_indent=first,
+        subsequent_indent=after,
+        break_long_words=False,
+        break_on_hyphens=False,
     )
     return "\n".join(lines).replace("\N{NO-BREAK SPACE}", " ")

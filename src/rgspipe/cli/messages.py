@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import sys
 import textwrap
 import traceback
@@ -16,6 +17,14 @@ EXIT_FAILED, EXIT_INPUT, EXIT_INTERRUPTED, EXIT_UNREAD = 1, 2, 130, 141
 
 TRACEBACK_VARIABLE = "RGSPIPE_TRACEBACK"
 
+#: Columns of a message where there is no terminal, and the most on a wide one.
+WIDTH = 110
+
+
+def line_width(most: int = WIDTH) -> int:
+    """How many letters a line may have: those of the terminal, where there is one and it has fewer than `most`."""
+    return min(most, shutil.get_terminal_size((most, 24)).columns)
+
 
 def traceback_wanted(option: bool = False) -> bool:
     """Whether tracebacks go to the terminal: `debug.traceback=true` or RGSPIPE_TRACEBACK=1."""
@@ -26,7 +35,8 @@ def show_input_error(error: InputError, option: bool = False) -> None:
     """One paragraph on stderr; the traceback before it only if asked for."""
     if traceback_wanted(option):
         traceback.print_exception(error, file=sys.stderr)
-    print(textwrap.fill(f"Error: {error}", 110, break_long_words=False, break_on_hyphens=False), file=sys.stderr)
+    told = textwrap.fill(f"Error: {error}", line_width(), break_long_words=False, break_on_hyphens=False)
+    print(told, file=sys.stderr)
 
 
 def show_failure(error: BaseException, status: Path, option: bool = False) -> None:
@@ -36,6 +46,6 @@ def show_failure(error: BaseException, status: Path, option: bool = False) -> No
     first = (str(error).splitlines() or [""])[0]
     print(
         f"Failed: {type(error).__name__}: {first}\n"
-        f"The traceback is in {status}; debug.traceback=true (or {TRACEBACK_VARIABLE}=1) shows it here as well.",
+        f"The traceback is in {status};\ndebug.traceback=true (or {TRACEBACK_VARIABLE}=1) shows it here as well.",
         file=sys.stderr,
     )

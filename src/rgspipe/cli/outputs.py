@@ -13,6 +13,7 @@ from rgspipe.cli.arguments import refused
 from rgspipe.cli.columns import columns, without_empty
 from rgspipe.datasets.input_file import input_folder
 from rgspipe.errors import InputError
+from rgspipe.graph.commands import typed
 from rgspipe.store.retention import Choice, Stored, in_the_making, removable, remove, removing, stored
 from rgspipe.store.status import read_statuses
 
@@ -92,7 +93,7 @@ def _busy(outputs: Path, removes: bool) -> InputError | None:
             pass
     except InputError as error:
         return error
-    remedy = "Wait for it, or stop it; python -m rgspipe status shows it."
+    remedy = f"Wait for it, or stop it; {typed('status')} shows it."
     for folder, status in read_statuses(outputs / "runs"):
         if status["state"] == "running":
             return InputError(folder, expected="no run going on in this folder", found="one", remedy=remedy)

@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import difflib
+import textwrap
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from rgspipe.cli.arguments import meant, refused
 from rgspipe.cli.help import groups, sections
+from rgspipe.cli.messages import line_width
 from rgspipe.datasets.input_file import folder_to_be
 from rgspipe.errors import InputError, printable
+from rgspipe.graph.commands import typed
 from rgspipe.store.status import STATES, read_statuses
 
 #: What runs are told apart by beside what they were started with.
 _KEYS = ("state", "stage", "outputs")
 
-#: Characters of a reason in the list.
-REASON = 120
+#: Where reasons begin in the list, and their lines at most; `status RUN` has all of it.
+REASON, MOST_LINES = 18, 3
 
 
 def show_runs(arguments: Sequence[str]) -> int:
@@ -36,7 +39,7 @@ def show_runs(arguments: Sequence[str]) -> int:
     runs = [(str(folder.relative_to(outputs / "runs")), status) for folder, status in read_statuses(outputs / "runs")]
     if unknown := [name for name in names if name not in dict(runs)]:
         near = difflib.get_close_matches(unknown[0], [name for name, _ in runs], n=1, cutoff=0.3)
-        remedy = f"Did you mean {near[0]}?" if near else "python -m rgspipe status lists them."
+        remedy = f"Did you mean {near[0]}?" if near else f"{typed('status')} lists them."
         raise InputError(unknown[0], expected=f"the name of a run in {outputs / 'runs'}", found="none", remedy=remedy)
     asked = [text for text in wanted if "=" in text]
     _check_keys(asked, [status for _, status in runs])
@@ -76,9 +79,13 @@ def _line(name: str, status: Mapping[str, Any]) -> str:
 
 
 def _reason(status: Mapping[str, Any]) -> list[str]:
-    """Why it failed, in a line."""
+    """Why it failed, in few lines."""
     lines = str(status.get("error", "")).splitlines()
-    return [f"{'':18}{lines[0][:REASON]}"] if lines and status["state"] != "stopped" else []
+    if not lines or status["state"] == "stopped":
+        return []
+    room = line_width() - REASON
+    told = textwrap.wrap(lines[0], room, max_lines=MOST_LINES, placeholder=" …", break_on_hyphens=False)
+    return [f"{'':{REASON}}{line}" for line in told]
 
 
 def _details(status: Mapping[str, Any]) -> list[str]:

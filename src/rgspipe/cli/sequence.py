@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import difflib
 import reprlib
-import shlex
 import signal
 import subprocess
 import sys
@@ -22,6 +21,7 @@ from rgspipe.cli.leading import lead_on
 from rgspipe.cli.messages import EXIT_FAILED
 from rgspipe.datasets.input_file import input_file
 from rgspipe.errors import InputError
+from rgspipe.graph.commands import typed
 from rgspipe.machine.resources import resource_folder
 from rgspipe.store.status import read_statuses
 
@@ -97,7 +97,7 @@ def run_sequence(name: str, extra: Sequence[str], program: Sequence[str] = RGSPI
     for number, step in enumerate(steps, 1):
         run_folder = folder / f"{number:02d}_{step.stage}"
         command = [*(["-m"] if step.sweep else []), f"stage={step.stage}", *step.overrides, *extra]
-        print(f"[{number}/{len(steps)}] python -m rgspipe {shlex.join(command)}", flush=True)
+        print(f"[{number}/{len(steps)}] {typed(*command)}", flush=True)
         begin = time.perf_counter()
         key = "hydra.sweep.dir" if step.sweep else "hydra.run.dir"
         code = _run([*program, *command, f"{key}={quoted(run_folder)}"])

@@ -26,8 +26,9 @@ KEYS = {
 }
 
 DEMO = """\
-Drag the lamp. Then press "find it from the photographs": three photographs were taken of this room under
-another lamp, which none of them shows; it is looked for in what it lights."""
+Drag the lamp. Then press "find it from the photographs": three photographs
+were taken of this room under another lamp, which none of them shows; it is
+looked for in what it lights."""
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,8 @@ MODELLED: tuple[Modelled, ...] = get_args(Modelled)
 
 #: What `scene.path` has to be, by kind.
 PATHS = {"blend": "a .blend file", "external": "a dataset's folder", "ply": "a .ply file"}
-PATHS |= {"rgbd": "a capture's folder", "mesh": "a mesh (.ply, .obj, .glb, .gltf)"}
+MESHES = (".ply", ".obj", ".glb", ".gltf")
+PATHS |= {"rgbd": "a capture's folder", "mesh": f"a mesh ({', '.join(MESHES)})"}
 
 Colour = tuple[float, float, float]
 
@@ -150,3 +151,7 @@ class SceneConfig(Options):
         except InputError as error:
             remedy = "Check scene.path; a relative path starts at the current folder."
             raise InputError(error.where, expected=what, found=error.found, remedy=remedy) from None
+        suffix = Path(self.path).suffix
+        if self.kind == "mesh" and suffix.lower() not in MESHES:
+            remedy = "Name the mesh, or export it as binary PLY or GLB."
+            raise InputError(self.path, expected=what, found=f"the suffix {suffix!r}", remedy=remedy)

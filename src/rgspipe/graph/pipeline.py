@@ -7,6 +7,7 @@ anything is made.
 from __future__ import annotations
 
 import logging
+import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -34,6 +35,7 @@ NO_RESULT = (
     "rgspipe.config",
     "rgspipe.datasets.reading_limits",
     "rgspipe.errors",
+    "rgspipe.fitting.course",
     "rgspipe.graph",
     "rgspipe.machine.description",
     "rgspipe.options",
@@ -52,6 +54,9 @@ NO_RESULT = (
 
 #: At most this many causes are named for one stage in the plan.
 SHOWN_CAUSES = 3
+
+#: Letters of a line of a remark in the plan.
+WIDTH = 80
 
 log = logging.getLogger(__name__)
 
@@ -183,7 +188,9 @@ def describe_plan(steps: Sequence[Step]) -> str:
     for step, time in zip(steps, times, strict=True):
         row = [step.node.stage.name.ljust(width), "reuse" if step.reused else "make ", step.node.key.fingerprint]
         lines.append(f"  {'  '.join([*row, *([time.rjust(longest)] if longest else []), step.reason])}".rstrip())
-        lines += [f"  {'':<{width}}         {remark}" for remark in step.remarks]
+        for remark in step.remarks:
+            parts = textwrap.wrap(remark, WIDTH - width - 11, break_long_words=False, break_on_hyphens=False)
+            lines += [f"  {'':<{width}}         {part}" for part in parts]
     return "\n".join([*lines, *_total(steps)])
 
 

@@ -36,6 +36,8 @@ SURFELS, GATHER, TRANSPORT, GLOSS, DICTIONARY = (
 #: Candidates along each axis of the finest dictionary: a search asks each of its million.
 FINEST = 100
 
+NAME_IT = "Name the folder that holds one: outputs/<scene>/freeze/latest, or what FrozenScene.save was given."
+
 MAKE_AGAIN = "Freeze the scene again: FrozenScene.freeze and save, or the stage freeze."
 
 
@@ -78,12 +80,14 @@ def load_parts(folder: Path, *, gather: bool) -> dict[str, Any]:
     Raises:
         InputError: no such folder, or none of a scene, or a file is missing, broken, or does not belong to the others.
     """
-    if not (is_there(folder) and folder.is_dir()):
-        raise InputError(folder, expected="the folder of a frozen scene", found="no such folder", remedy=MAKE_AGAIN)
-    if not (folder / TRANSPORT).exists() and not (folder / SURFELS).exists():
-        found = "neither surfels nor transport in it"
-        remedy = "Name the folder that holds them: outputs/<scene>/freeze/latest, or what FrozenScene.save was given."
-        raise InputError(folder, expected="the folder of a frozen scene", found=found, remedy=remedy)
+    what, there = "the folder of a frozen scene", is_there(folder)
+    if not (there and folder.is_dir()):
+        found = "something else than a folder" if there else "no such folder"
+        raise InputError(folder, expected=what, found=found, remedy=NAME_IT)
+    missing = [name for name in (SURFELS, TRANSPORT) if not (folder / name).exists()]
+    if missing:
+        found = f"no {' and no '.join(missing)} in it"
+        raise InputError(folder, expected=what, found=found, remedy=NAME_IT)
     surfels = load_surfels(folder / SURFELS)
     areas, centers, transport = _load_transport(folder / TRANSPORT, surfels.albedo.float())
     glossy = surfels.gloss is not None and len(surfels.gloss.glossy) > 0

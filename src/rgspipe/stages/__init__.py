@@ -43,10 +43,17 @@ def load_stage(name: str) -> Stage:
         InputError: there is none; the message suggests the nearest name.
     """
     if name not in NAMES:
-        near = difflib.get_close_matches(name, NAMES, n=1)
-        remedy = f"Did you mean stage={near[0]}?" if near else "Choose one of them: stage=NAME."
+        near = near_stage(name)
+        remedy = f"Did you mean stage={near}?" if near else "Choose one of them: stage=NAME."
         raise InputError("stage", expected=f"one of {', '.join(NAMES)}", found=repr(name), remedy=remedy)
     return importlib.import_module(f"{__name__}.{_room(name)}.{name}").STAGE
+
+
+def near_stage(word: str) -> str | None:
+    """The stage that a misspelt word may have meant, by its name or a part of it; None if none is like it."""
+    parts = {part: name for name in reversed(NAMES) for part in name.split("_")}
+    near = difflib.get_close_matches(word, [*NAMES, *parts], n=1)
+    return {**parts, **{name: name for name in NAMES}}[near[0]] if near else None
 
 
 def stage_summary(name: str) -> str:
