@@ -31,6 +31,8 @@ from rgspipe.evaluation.calibration import half_axes
 from rgspipe.evaluation.images import Bytes, beside, display_gain, signed_difference, stack, tone_map
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import LightRig
+from rgspipe.viewer.lamp_images import LampImages
+from rgspipe.viewer.session import SHOWN, Session
 
 IMAGES = Path(__file__).resolve().parents[1] / "docs" / "images"
 
@@ -249,17 +251,55 @@ def drawn(figure: Figure) -> Bytes:
     return np.ascontiguousarray(np.asarray(canvas.buffer_rgba())[..., :3])
 
 
+def kinds(scene: FrozenScene) -> Bytes:
+    """One lamp of each kind in the same place, or from where its light comes in; all shown as bright as each other."""
+    down, place, unit = [0.3, 0.2, -1.0], [0.05, -0.05, 0.3], [1.0, 1.0, 1.0]
+    lamps = {
+        "point": rg.PointLight(place, unit),
+        "sphere, radius 0.12": rg.SphereLight(place, unit, 0.12),
+        "spot, cone 30°": rg.SpotLight(place, unit, down, "gaussian", math.radians(30.0), math.radians(2.0)),
+        "led, exponent 4": rg.LedLight(place, unit, down, 4.0),
+        "panel, 0.4 × 0.3": rg.PanelLight(place, unit, down, 0.4, 0.3),
+        "sun": rg.SunLight([0.0, 0.0, 0.0], unit, [0.5, 1.0, -0.7]),
+    }
+    figure = Figure(figsize=(7.2, 5.1), dpi=100, layout="constrained")
+    for axes, (title, lamp) in zip(figure.subplots(2, 3).flat, lamps.items(), strict=True):
+        image = scene.render(camera(*FRONT, side=2 * SIDE), lamp)
+        axes.imshow(tone_map(image, display_gain(image)))
+        axes.set_title(title, fontsize=9)
+        axes.set_axis_off()
+    return drawn(figure)
+
+
+def viewer_shows(scene: FrozenScene) -> Bytes:
+    """What a picture of the viewer may show: photograph, irradiance and illuminance in colours, and a section."""
+    session, view = Session(LampImages(scene)), camera((0.5, -1.35, 0.45), (0.0, 0.05, -0.05), side=2 * SIDE)
+    session.lights = (rg.PointLight([-0.3, 0.28, -0.1], [0.6, 0.8, 0.8]),)
+    figure = Figure(figsize=(8.4, 2.6), dpi=100, layout="constrained")
+    axes = figure.subplots(1, 3)
+    for place, shown in zip(axes, (*SHOWN[::2], "a section across x"), strict=True):
+        session.shown = shown if shown in SHOWN else SHOWN[0]
+        session.section = None if shown in SHOWN else (0, 0.2)
+        picture, top = session.picture(session.seen(view))
+        place.imshow(picture)
+        place.set_title(shown if shown != SHOWN[2] else f"{shown}: yellow is {round(top, -2):.0f}", fontsize=9)
+        place.set_axis_off()
+    return drawn(figure)
+
+
 PICTURES: dict[str, Callable[[FrozenScene], Bytes]] = {
     "captures": captures,
     "other_light": other_light,
     "target_classes": target_classes,
     "gradients": gradients,
+    "kinds": kinds,
     "regions": regions,
     "exported": exported,
     "photographs": photographs,
     "ply": ply,
     "scan": scan,
     "sweep": sweep,
+    "viewer_shows": viewer_shows,
 }
 
 #: Of lines and letters, which are kept as they are.
