@@ -25,11 +25,12 @@ _LISTENER: ContextVar[tuple[Listener, float] | None] = ContextVar("listener", de
 #: As tqdm's own, with the time that is left of everything.
 _FORMAT = "{l_bar}{bar}| {n_fmt}/{total_fmt} [{elapsed}, {left} left{postfix}]"
 
-#: Of work whose items mean nothing to who waits for it.
-_UNCOUNTED = "{l_bar}{bar}| [{elapsed}, {left} left]"
+#: Of a whole, whose items mean nothing to who waits for it.
+_WHOLE = "{l_bar}{bar}| [{elapsed}, {left} left]"
 
-#: For listeners.
+#: For listeners: of a part of what they wait for, and of the whole.
 _WORDS = "{desc}: {percentage:.0f} %, {left} left"
+_WORDS_OF_WHOLE = f"{_WORDS} in all"
 
 #: Seconds between lines on a terminal or for a listener, and in a log.
 _OFTEN, _SELDOM = 0.2, 10.0
@@ -93,7 +94,8 @@ class _Words(_Lines):
         self._listener, since = _LISTENER.get()
         # Silence between two parts of long work would look as if nothing went on.
         delay = max(0.0, QUIET_SECONDS - (time.monotonic() - since))
-        super().__init__(*arguments, **options | {"bar_format": _WORDS, "delay": delay})
+        words = _WORDS_OF_WHOLE if options.get("bar_format") == _WHOLE else _WORDS
+        super().__init__(*arguments, **options | {"bar_format": words, "delay": delay})
 
     def display(self, msg: str | None = None, pos: int | None = None) -> bool:
         if self.total:
@@ -130,7 +132,7 @@ def progress_bar(
     *,
     done: int = 0,
     after: float | None = None,
-    counted: bool = True,
+    whole: bool = False,
 ) -> ProgressBar:
     """Iterate over `items` while a progress line with an estimate stands on stderr.
 
@@ -143,10 +145,10 @@ def progress_bar(
         total: of items, those done before and later included; by default how many `items` has.
         done: how many were done before these.
         after: seconds of other work that follows and that the estimate shall include.
-        counted: whether it is worth telling how many items are done; if not, they may be shares of a whole that take
-            as long as they are large, and the estimate is by the pace since the beginning.
+        whole: whether the items are shares of all that is waited for, which take as long as they are large: the
+            estimate is by the pace since the beginning, and how many are done is not told.
     """
-    even = {} if counted else {"bar_format": _UNCOUNTED, "smoothing": 0.0, "miniters": 0}
+    even = {"bar_format": _WHOLE, "smoothing": 0.0, "miniters": 0} if whole else {}
     told = _LISTENER.get() is not None
     interactive = sys.stderr.isatty() and not told
     return (_Words if told else ProgressBar if interactive else _Lines)(

@@ -40,6 +40,7 @@ def test_a_folder_and_keys_are_understood() -> None:
         (["a", "prt=3"], "Did you mean port="),
         (["a", "port=x"], "port: expected a whole number"),
         (["a", "port=70000"], "70000"),
+        (["a", "resolution=16"], "resolution: expected a whole number from 32 to 2048, found '16'"),
     ],
 )
 def test_what_cannot_be_meant_is_refused(words: list[str], found: str) -> None:
@@ -89,6 +90,13 @@ class Served:
         pass
 
 
+@pytest.mark.parametrize(("port", "told"), [(1, ""), (0, ""), (8080, "Port 8080 is taken")])
+def test_another_port_than_was_asked_for_is_told(port: int, told: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert serve(Served(), port) == 0
+    *said, last = capsys.readouterr().out.splitlines()
+    assert last.startswith(Served.url) and " ".join(said).startswith(told) and bool(said) is bool(told)
+
+
 def test_an_interrupt_before_the_wait_begins_ends_it_as_well(monkeypatch: pytest.MonkeyPatch) -> None:
     viewer = view(FrozenScene.freeze(closed_box(0.5).to(torch.float32)), port=0)
     stopped = []
@@ -98,4 +106,4 @@ def test_an_interrupt_before_the_wait_begins_ends_it_as_well(monkeypatch: pytest
 
     monkeypatch.setattr(viewer, "wait", interrupted)
     monkeypatch.setattr(viewer, "stop", lambda stop=viewer.stop: stopped.append(stop()))
-    assert serve(viewer) == 0 and stopped == [None]
+    assert serve(viewer, 0) == 0 and stopped == [None]

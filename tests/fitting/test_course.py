@@ -30,7 +30,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
 
 def left(line: str) -> tuple[str, int, int]:
     """The part, per cent and seconds of a line."""
-    words, percent, minutes, seconds = re.fullmatch(r"(.*): (\d+) %, (\d+):(\d+) left", line).groups()
+    words, percent, minutes, seconds = re.fullmatch(r"(.*): (\d+) %, (\d+):(\d+) left in all", line).groups()
     return words, int(percent), 60 * int(minutes) + int(seconds)
 
 

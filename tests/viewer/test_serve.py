@@ -8,6 +8,7 @@ from urllib.parse import urlsplit
 
 import pytest
 
+from rgspipe.errors import InputError
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.viewer.serve import Viewer, view
 
@@ -45,6 +46,17 @@ def test_pages_of_this_machine_may_connect(viewer: Viewer, origin: str | None) -
 )
 def test_pages_of_other_sites_may_not(viewer: Viewer, origin: str) -> None:
     assert answer(viewer.url, origin) == 403
+
+
+def test_where_nobody_can_listen_the_server_behind_is_stopped(
+    frozen: FrozenScene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """viser's own words at the end of the process came before the error."""
+    stopped, stop = [], Viewer.stop
+    monkeypatch.setattr(Viewer, "stop", lambda viewer: stopped.append(stop(viewer)))
+    with pytest.raises(InputError, match="where to listen"):
+        view(frozen, port=0, address="192.0.2.1")
+    assert stopped == [None]
 
 
 def test_who_has_the_token_may_come_from_elsewhere(frozen: FrozenScene) -> None:

@@ -71,7 +71,7 @@ def view_folder(arguments: Sequence[str]) -> int:
         address=wanted.address,
         world=world_of(1.0, origin_of(wanted.folder / SURFELS)),
     )
-    return serve(viewer)
+    return serve(viewer, wanted.port)
 
 
 def demo(arguments: Sequence[str]) -> int:
@@ -92,12 +92,18 @@ def demo(arguments: Sequence[str]) -> int:
 
     viewer = view(demo_scene(), cases=[case_in(TARGET)], **given)
     print(DEMO)
-    return serve(viewer)
+    return serve(viewer, given.get("port", Wanted.port))
 
 
-def serve(viewer: Any) -> int:
-    """Say where the page is, and serve it until the process is interrupted; the exit status."""
+def serve(viewer: Any, port: int) -> int:
+    """Say where the page is, and serve it until the process is interrupted; the exit status.
+
+    Args:
+        port: that was asked for; 0 for any.
+    """
     try:
+        if port and f":{port}/" not in f"{viewer.url}/":
+            print(f"Port {port} is taken, by another page perhaps; the next free one is used.")
         print(f"{viewer.url}  (Ctrl-C ends it)", flush=True)
         viewer.wait()
     except KeyboardInterrupt:
@@ -137,9 +143,14 @@ def _text(key: str, text: str) -> str:
 
 
 def _whole(key: str, text: str) -> int:
-    if not text.isdecimal() or int(text) > 65535:
-        raise InputError(key, expected="a whole number, at most 65535", found=text, remedy="Correct it.")
+    low, high, usual = _RANGES[key]
+    if not (text.isdecimal() and low <= int(text) <= high):
+        expected, remedy = f"a whole number from {low} to {high}", f"{usual} is usual."
+        raise InputError(key, expected=expected, found=repr(text), remedy=remedy)
     return int(text)
 
 
-_READERS: dict[str, Callable[[str, str], Any]] = {"port": _whole, "resolution": _whole}
+#: Least, most and usual number of a key: told before a scene is made ready, which takes seconds.
+_RANGES = {"port": (0, 65535, 8080), "resolution": (32, 2048, 256)}
+
+_READERS: dict[str, Callable[[str, str], Any]] = dict.fromkeys(_RANGES, _whole)

@@ -75,7 +75,7 @@ def _serve(made: _Made) -> int:
         address=page.address,
         world=world,
     )
-    return serve(viewer)
+    return serve(viewer, page.port)
 
 
 def _cases(made: _Made, config: RgspipeConfig) -> list:

@@ -66,7 +66,7 @@ class Course:
     @contextmanager
     def shown(cls, effort: float) -> Iterator[Self]:
         """A course of some effort, which is shown while it takes."""
-        with progress_bar([], "looking for lights", total=effort, counted=False) as bar:
+        with progress_bar([], "looking for lights", total=effort, whole=True) as bar:
             yield cls(bar)
 
     def further(self, effort: float) -> None:

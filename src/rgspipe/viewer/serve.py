@@ -178,5 +178,9 @@ def view(
     exhibit = Exhibit(images, finder, camera, rig, tuple(cases), tuple(references), resolution, world or World())
     viewer = Viewer(exhibit, 0 if is_open else port)
     if is_open:
-        viewer.open_to(address, port)
+        try:
+            viewer.open_to(address, port)
+        except InputError:
+            viewer.stop()
+            raise
     return viewer
