@@ -57,9 +57,12 @@ def view_folder(arguments: Sequence[str]) -> int:
     from rgspipe.renderer.frozen_file import SURFELS
     from rgspipe.stages.scene.export import world_of
     from rgspipe.stages.scene.light_origin import origin_of
+    from rgspipe.stages.sources import check_target
     from rgspipe.viewer.material import Case, case_in, found_in
     from rgspipe.viewer.serve import view
 
+    if wanted.target is not None:
+        check_target(wanted.target)
     found = None if wanted.fit is None else found_in(wanted.fit)
     case = Case(found=found) if wanted.target is None else case_in(wanted.target, found)
     viewer = view(

@@ -5,7 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from rgspipe.config import RgspipeConfig
+from rgspipe.datasets.input_file import input_folder
 from rgspipe.errors import InputError
+
+#: Names of a folder that are told.
+SHOWN = 5
 
 
 def surfel_stage(config: RgspipeConfig) -> str:
@@ -46,6 +50,25 @@ def target_stage(config: RgspipeConfig) -> list[str]:
     if config.fit.target is None and config.fit.targets == "generated":
         return ["generate_targets"]
     return image_stage(config)
+
+
+def check_target(folder: str | Path) -> None:
+    """Refuse a folder of photographs, say, that does not tell where their cameras were.
+
+    Raises:
+        InputError: says what a target is.
+    """
+    folder = input_folder(folder, "the folder of a fit target")
+    if not (folder / "transforms.json").exists():
+        names = sorted(path.name for path in folder.iterdir())
+        more = ", …" if len(names) > SHOWN else ""
+        raise InputError(
+            folder,
+            expected="images and a transforms.json, which tells where their cameras were",
+            found=f"no such file among {', '.join(names[:SHOWN])}{more}" if names else "an empty folder",
+            remedy="docs/guides/your_own_scene.md says what stands in it, "
+            "docs/guides/photographs.md what to do where no camera is known.",
+        )
 
 
 def require_images(config: RgspipeConfig, what: str) -> None:

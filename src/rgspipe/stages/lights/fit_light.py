@@ -37,7 +37,7 @@ from rgspipe.stages.lights.spec import light_spec, table_files
 from rgspipe.stages.lights.spoken import COMMAND_LINE
 from rgspipe.stages.lights.targets import all_targets, require_views, select_targets, target_seed, used_views
 from rgspipe.stages.scene.effects import chosen_effects, frozen_scene, wanted_effects
-from rgspipe.stages.sources import image_stage, require_images, target_stage
+from rgspipe.stages.sources import check_target, image_stage, require_images, target_stage
 from rgspipe.store.artifacts import Artifact
 from rgspipe.store.files import write_text
 from rgspipe.store.whole_files import WholeFiles
@@ -270,6 +270,7 @@ def _files(config: RgspipeConfig) -> list[Path]:
     if target is None:
         _refuse_base(base)
     else:
+        check_target(target)
         load_target(target, base)
     require_views(config)
     read = [folder for folder in (target, base) if folder is not None]
