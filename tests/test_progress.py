@@ -97,6 +97,16 @@ def test_a_listener_hears_nothing_of_short_work_but_its_end(monkeypatch: pytest.
     assert told == [""]
 
 
+def test_a_whole_that_may_be_one_of_many_has_a_line_only_where_it_takes_long(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    tracked(monkeypatch, range(8), seconds=1.0, whole=True)
+    assert capsys.readouterr().err == ""
+    tracked(monkeypatch, range(8), seconds=4.0, whole=True)
+    first, *_, last = capsys.readouterr().err.splitlines()
+    assert re.search(r"steps: +\d+%\|.*\| \[00:12, 00:20 left\]", first) and "/8" not in last
+
+
 def test_a_listener_hears_at_once_of_what_goes_on_after_long_work(monkeypatch: pytest.MonkeyPatch) -> None:
     """A second part of work that has lasted for longer than nothing is said: no silence in between."""
     told: list[str] = []

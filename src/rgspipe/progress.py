@@ -146,7 +146,8 @@ def progress_bar(
         done: how many were done before these.
         after: seconds of other work that follows and that the estimate shall include.
         whole: whether the items are shares of all that is waited for, which take as long as they are large: the
-            estimate is by the pace since the beginning, and how many are done is not told.
+            estimate is by the pace since the beginning, and how many are done is not told. As such a whole may be one
+            of many, which have a line, it has one only after ten seconds.
     """
     even = {"bar_format": _WHOLE, "smoothing": 0.0, "miniters": 0} if whole else {}
     told = _LISTENER.get() is not None
@@ -158,7 +159,7 @@ def progress_bar(
         unit=unit,
         initial=done,
         after=after,
-        delay=QUIET_SECONDS,
+        delay=_SELDOM if whole else QUIET_SECONDS,
         ncols=None if interactive else 100,
         dynamic_ncols=interactive,
         mininterval=_OFTEN if interactive or told else _SELDOM,
