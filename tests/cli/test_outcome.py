@@ -90,6 +90,10 @@ def test_an_evaluation_is_a_table_per_class_or_a_line_per_target(tmp_path: Path)
     assert f"{median:.2f} %" in many[4]
     few = outcome(artifact(tmp_path / "few", "evaluate", lambda folder: make(folder, targets.head(2))))
     assert [line.split()[0] for line in few[1:3]] == ["visible_000", "visible_001"]
+    assert max(map(len, few[:-1])) <= 80 and not any(" visible " in line for line in few)
+    other = targets.head(2).assign(target=["kitchen", "hall"])
+    named = outcome(artifact(tmp_path / "named", "evaluate", lambda folder: make(folder, other)))
+    assert [line.split()[:2] for line in named[1:3]] == [["kitchen", "visible"], ["hall", "visible"]]
     assert f"{100.0 * targets['position_error'][1]:.2f} %" in few[2] and few[2].endswith("converged")
     alone = outcome(artifact(tmp_path / "alone", "evaluate", lambda folder: make(folder, pd.concat([targets[:3]] * 2))))
     assert [line.split()[0] for line in alone[1:-1]] == ["visible"]
