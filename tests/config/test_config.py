@@ -55,6 +55,8 @@ def test_choosing_a_method_by_group_or_by_key_means_the_same() -> None:
         ("dataset.resolutoin=64", ["dataset.resolutoin", "dataset.resolution"]),
         ("resolution=64", ["Did you mean", "dataset.resolution"]),
         ("scnee=cornell", ["scnee", "Did you mean scene"]),
+        ("port=8600", ["Did you mean viewer.port or report"]),
+        ("ligth.count=2", ["Did you mean light.count or relight.count or light.mount?"]),
         ("=", ["'='", "--help lists the keys"]),
         ("+foo=1", ["foo", "no such key"]),
         ("++fit.serach.starts=1", ["fit.search.starts"]),

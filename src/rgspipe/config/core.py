@@ -13,6 +13,9 @@ from rgspipe.options import Options, Setting, settings
 
 Schema = TypeVar("Schema", bound=Options)
 
+#: Keys that a misspelt one may have meant: so many are told at most.
+SUGGESTED = 3
+
 
 def build(schema: type[Schema], values: Mapping[str, Any], section: str = "") -> Schema:
     """Options from nested plain values, as YAML has them; what is not among them has its default.
@@ -61,10 +64,11 @@ def unknown_key(key: str, known: Sequence[str]) -> InputError:
 
 
 def _suggestion(key: str, known: Sequence[str]) -> str:
-    near = difflib.get_close_matches(key, known, n=3, cutoff=0.7)
-    # The right name in the wrong section, such as resolution= for dataset.resolution=.
-    last = key.rpartition(".")[2]
-    near += [name for name in known if name.rpartition(".")[2] == last and name not in near][:3]
+    like = difflib.get_close_matches(key, known, n=SUGGESTED, cutoff=0.7)
+    # The right name in the wrong section, or in none, such as resolution= for dataset.resolution=.
+    elsewhere, _, last = key.rpartition(".")
+    same = [name for name in known if name.rpartition(".")[2] == last]
+    near = list(dict.fromkeys([*like, *same] if elsewhere else [*same, *like]))[:SUGGESTED]
     if near:
         return f"Did you mean {' or '.join(near)}?"
     section = key.partition(".")[0]
