@@ -41,6 +41,8 @@ def test_how_far_each_part_of_a_search_is_is_told(
     frozen: FrozenScene, photographs: list[Photograph], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("rgspipe.progress.QUIET_SECONDS", 0.0)
+    # Parts that take less than what lies between two lines are told, too.
+    monkeypatch.setattr("rgspipe.progress._OFTEN", 0.0)
     told: list[str] = []
     with progress_told(told.append):
         Finder(frozen).find(photographs[:1])
