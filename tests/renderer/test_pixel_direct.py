@@ -16,6 +16,7 @@ from rgspipe.renderer import reference
 from rgspipe.renderer.direct import unit_irradiance
 from rgspipe.renderer.kernels.irradiance import SOFTENING
 from rgspipe.renderer.kernels.pixel_light import PixelLight
+from rgspipe.renderer.kernels.pixel_rays import pixel_rays
 from rgspipe.renderer.kernels.pixel_shadow import pixel_transmittance
 from rgspipe.renderer.kernels.places import ways_to
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
@@ -55,7 +56,7 @@ def test_light_at_pixels_matches_the_reference(distance: float, device: str) -> 
     own = torch.where(torch.rand(144, generator=generator) < 0.3, torch.rand(144, generator=generator), -1.0).double()
     light = SUN if distance == math.inf else surfels.centers[7] + distance * surfels.normals[7]
     softening = float(SOFTENING) * surfels.scales.prod(dim=1).sqrt()
-    prepared = PixelLight(bvh, view.operator.matrix, view.edges, seen, softening.to(device))
+    prepared = PixelLight(bvh, view.operator.matrix, view.edges, pixel_rays(bvh, seen), softening.to(device))
     own4 = torch.cat([own[:, None], torch.zeros(144, 3)], dim=1).float().to(device)
     slope = torch.zeros(60, 3, device=device)
     found = prepared.image(light, passing.to(device), slope, own4).double().cpu()
@@ -79,7 +80,7 @@ def test_shadows_of_pixels_match_the_reference(place: Tensor, device: str) -> No
     receivers = torch.randint(0, 120, (144,), generator=torch.Generator().manual_seed(3))
     pixels, places = torch.arange(0, 144, 3), even_places(4)
     bvh = SurfelBvh(surfels.to(torch.float32).to(device))
-    found = pixel_transmittance(bvh, seen, receivers, pixels, place, places).double().cpu()
+    found = pixel_transmittance(bvh, pixel_rays(bvh, seen), receivers, pixels, place, places).double().cpu()
     _, directions, lengths = seen.rays()
     axes = seen.camera_to_world[:3, :3].double()
 

@@ -10,6 +10,7 @@ from hard_cases import CAMERAS, GEOMETRIES, INSIDE, LIGHTS, SCENES, HardScene, c
 from rgspipe.renderer import reference
 from rgspipe.renderer.kernels.irradiance import SOFTENING
 from rgspipe.renderer.kernels.pixel_light import PixelLight
+from rgspipe.renderer.kernels.pixel_rays import pixel_rays
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.pixel_direct import PixelDirect, surfel_transmittance
 from rgspipe.renderer.view_weights import build_view_weights
@@ -23,7 +24,7 @@ def compare(scene: HardScene, light: torch.Tensor, within, camera_name: str = "p
     passing = torch.rand(len(surfels), generator=torch.Generator().manual_seed(0), dtype=torch.float64)
     unknown = torch.full((seen.pixel_count,), -1.0, dtype=torch.float64)
     softening = float(SOFTENING) * exact.scales.prod(dim=1).sqrt()
-    prepared = PixelLight(bvh, view.operator.matrix, view.edges, seen, softening)
+    prepared = PixelLight(bvh, view.operator.matrix, view.edges, pixel_rays(bvh, seen), softening)
     own = torch.cat([unknown[:, None], torch.zeros(len(unknown), 3)], dim=1).float()
     found = prepared.image(position, passing, torch.zeros(len(surfels), 3), own)
     weights = torch.from_numpy(view.operator.to_scipy().toarray()).double()

@@ -17,7 +17,6 @@ from rgspipe.fitting.certainty.minima import holding
 from rgspipe.fitting.certainty.uncertainty import light_covariances
 from rgspipe.fitting.course import (
     BEGINNING,
-    BESIDE,
     BLOCKS_BESIDE,
     BRIGHT_SPOTS,
     KINDS,
@@ -35,7 +34,7 @@ from rgspipe.fitting.model.known_images import FIELDS, Strength
 from rgspipe.fitting.model.moments import moments
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.options import SearchOptions
-from rgspipe.fitting.polish import all_polished, seen_well
+from rgspipe.fitting.polish import polished_on_pixels, seen_well
 from rgspipe.fitting.result import FitResult, dark_result
 from rgspipe.fitting.search.beside import settled_beside, steps_aside
 from rgspipe.fitting.search.coarse import CoarseImages
@@ -107,21 +106,7 @@ def _fitted(
     refiner = Refiner.of(problem.coarsest(blocks), meter, options.limits)
     found = _search(refiner, candidates, options, spec)
     # Which of those that blocks do not tell apart is the answer, pixels say.
-    rough = refiner.on(problem.sharpest().of_few_points())
-    size, chosen = weight(found.best.emitters), [found.best, *found.others]
-    with course.polishing(size, len(chosen)):
-        polished, (best, *others) = all_polished(rough, chosen, options.iterations)
-    with course.part("looking beside", BESIDE * size, 2 * steps_aside(options)):
-        best, beside = settled_beside(polished, best, options, refiner)
-    others, worse = [*others, *beside], []
-    if any(len(emitter.light.parts()) > 1 for emitter in best.emitters):
-        near = [other for other in others if leaves_as_little(polished, best, other, options.rivals)]
-        worse = [other for other in others if not any(other is one for one in near)]
-        with course.polishing(size, 1 + len(near), planned=0):
-            polished, (best, *others) = all_polished(refiner.on(problem.sharpest()), [best, *near], options.iterations)
-    with course.part("bright spots", BRIGHT_SPOTS * size, 1 + len(others)):
-        polished, (best, *others) = seen_well(polished, [best, *others], options)
-    others += [polished.start(other.emitters, PLAIN) for other in worse]
+    polished, (best, *others) = polished_on_pixels(refiner, problem, [found.best, *found.others], options)
     if not bool((best.intensity[: len(best.emitters)] > 0).any()):
         return _without_lights(polished.problem, meter)
     findings = found.findings

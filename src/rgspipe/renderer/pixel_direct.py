@@ -10,6 +10,7 @@ from torch import Tensor
 
 from rgspipe.renderer.kernels.irradiance import SOFTENING, transmittance
 from rgspipe.renderer.kernels.pixel_light import REACH, PixelLight
+from rgspipe.renderer.kernels.pixel_rays import pixel_rays
 from rgspipe.renderer.kernels.pixel_shadow import pixel_transmittance
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.looked_at import on_planes
@@ -34,15 +35,24 @@ class PixelDirect:
 
     Args:
         bvh: N surfels.
-        view: the view, P pixels.
+        view: the view.
+        pixels: (P,) int64 those of it that are asked for; all if None.
+
+    Attributes:
+        weights: (P, N) of the view, of these pixels.
     """
 
-    def __init__(self, bvh: SurfelBvh, view: ViewWeights) -> None:
-        self._bvh, self._view = bvh, view
+    def __init__(self, bvh: SurfelBvh, view: ViewWeights, pixels: Tensor | None = None) -> None:
+        self._bvh, self._camera = bvh, view.camera
+        whole = pixels is None or len(pixels) == view.camera.pixel_count
+        self._pixels = torch.arange(view.camera.pixel_count) if pixels is None else pixels.cpu()
+        self.weights = view.operator if whole else view.operator.rows(self._pixels)
+        self._edges, self._coverage = (part.cpu()[self._pixels].to(bvh.device) for part in (view.edges, view.coverage))
+        self._rays = pixel_rays(bvh, view.camera, self._pixels)
         scales = bvh.surfels.scales.detach().prod(dim=1).sqrt()
-        self._light = PixelLight(bvh, view.operator.matrix, view.edges, view.camera, float(SOFTENING) * scales)
-        self._receivers = _heaviest(view.operator)
-        self._plain = ~view.edges.to(bvh.device) & (view.coverage.to(bvh.device) > 0.5)
+        self._light = PixelLight(bvh, self.weights.matrix, self._edges, self._rays, float(SOFTENING) * scales)
+        self._receivers = _heaviest(self.weights)
+        self._plain = ~self._edges & (self._coverage > 0.5)
 
     @cached_property
     def points(self) -> Tensor:
@@ -52,12 +62,12 @@ class PixelDirect:
         two and a half scales of its centre. In an empty scene it is the camera's.
         """
         surfels, receivers = self._bvh.surfels, self._receivers.to(self._bvh.device)
-        origins, directions, _ = (part.to(self._bvh.device) for part in self._view.camera.rays())
+        origins, directions, _ = (part.to(self._bvh.device) for part in self._camera.rays(self._pixels))
         if not len(surfels):
             return origins.expand_as(directions)
         centers, normals = surfels.centers.double()[receivers], surfels.normals.double()[receivers]
         reach = float(REACH) * surfels.scales.detach().double().prod(dim=1).sqrt()[receivers]
-        reach = torch.where(self._view.edges.to(reach.device), reach, torch.full_like(reach, torch.inf))
+        reach = torch.where(self._edges, reach, torch.full_like(reach, torch.inf))
         return on_planes(origins, directions, centers, normals, reach)
 
     def image(
@@ -87,14 +97,14 @@ class PixelDirect:
             passing: `surfel_transmittance` of the light.
         """
         entries = self._light.entries(position, passing, self._own_passing(position, passing, WHOLE))
-        return self._view.operator.with_values(entries)
+        return self.weights.with_values(entries)
 
     def _own_passing(self, position: Tensor, passing: Tensor, share: Share) -> Tensor:
         """(P, 4) `own_passing` of `PixelLight.image`: of pixels on a shadow's edge."""
-        lit = (self._view.operator @ passing[:, None])[:, 0] / self._view.coverage.to(self._bvh.device).clamp(min=1e-6)
+        lit = (self.weights @ passing[:, None])[:, 0] / self._coverage.clamp(min=1e-6)
         pixels = (self._plain & (lit > LIT_OR_NOT) & (lit < 1.0 - LIT_OR_NOT)).nonzero()[:, 0]
         places = edge_places(share)
-        return pixel_transmittance(self._bvh, self._view.camera, self._receivers, pixels, position, places)
+        return pixel_transmittance(self._bvh, self._rays, self._receivers, pixels, position, places)
 
 
 @cache

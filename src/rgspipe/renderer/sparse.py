@@ -54,6 +54,10 @@ class SparseOperator:
         """An operator with `values` (entries,) in the same places; both share the indices, also of the transposes."""
         return SparseOperator(in_places(self.matrix, values), self.places or self)
 
+    def rows(self, chosen: Tensor) -> SparseOperator:
+        """An operator of the rows `chosen` (K,) alone."""
+        return SparseOperator.from_scipy(self.to_scipy()[chosen.cpu().numpy()], self.matrix.device)
+
     @property
     def shape(self) -> tuple[int, int]:
         return self.matrix.shape[0], self.matrix.shape[1]

@@ -152,6 +152,22 @@ def test_an_image_and_its_gradient_are_the_columns_of_its_light(
     assert float((found - expected).norm()) < 1e-4 * float(expected.norm())
 
 
+@pytest.mark.parametrize("scene", ["frozen", "glossy"])
+@pytest.mark.parametrize("kind", ["point", "gaussian"])
+def test_some_pixels_see_what_they_see_among_all(scene: str, kind: str, request: pytest.FixtureRequest) -> None:
+    """An image costs as many pixels as are asked for, and each is the same."""
+    frozen = request.getfixturevalue(scene)
+    every = ViewedPixels.every(frozen, [frozen.view(CAMERA), frozen.view(CAMERA.resized(9, 9))])
+    chosen = torch.arange(1, len(every.pixels), 3)
+    some = ViewedPixels(frozen, every.views, chosen, every.operator.rows(chosen))
+    models = [PixelModel.of(every, Effects()), PixelModel.of(every, Effects()).on(some)]
+    whole, part = (model.columns(OwnLight(LIGHTS[kind])) for model in models)
+    assert part.shape == (len(chosen), *whole.shape[1:])
+    # Measured 0, and 8e-9 of the largest under a spot.
+    torch.testing.assert_close(part, whole[chosen], rtol=0.0, atol=1e-6 * float(whole.abs().max()))
+    assert [len(own) for own in some.own] == [65, 27]
+
+
 def test_lights_of_a_rig_add_up_and_each_has_its_gradient(frozen: FrozenScene) -> None:
     rig = (LIGHTS["point"], LIGHTS["gaussian"], LIGHTS["led"])
     alone = sum(frozen.render(CAMERA, light) for light in rig)

@@ -43,6 +43,10 @@ class KnownImage:
         """(P, 3, 1) as `ImageModel.columns` has those of lights: no derivatives."""
         return self.image[:, :, None]
 
+    def at(self, pixels: Tensor) -> KnownImage:
+        """As some of its pixels (K,) see it."""
+        return replace(self, image=self.image[pixels])
+
     def averaged(self, blocks: SparseOperator) -> KnownImage:
         """As blocks of pixels see it."""
         return replace(self, image=blocks @ self.image)

@@ -14,11 +14,13 @@ from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.exposure import ExposedMoments, best_factors, moments_by_view
 from rgspipe.fitting.model.known_images import KnownImage
 from rgspipe.fitting.model.moments import Moments, moments
-from rgspipe.fitting.model.views import PreparedViews
+from rgspipe.fitting.model.views import LEAST_PIXELS, PreparedViews
 from rgspipe.fitting.options import LossOptions
 from rgspipe.machine.sums import average, total
 from rgspipe.renderer.effects import ALL_EFFECTS, Effects
+from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.images.model import ImageModel, SurfelModel
+from rgspipe.renderer.images.pixels import PixelModel
 from rgspipe.renderer.sparse import SparseOperator
 
 #: Images in float32 are wrong by less than this part of a pixel, so a share ROUNDING² of the energy says nothing.
@@ -148,6 +150,17 @@ class LightProblem:
         """The same problem with lights with an extent seen as few points: images on the way to an answer."""
         return replace(self, model=self.model.of_few_points())
 
+    def of_few_pixels(self) -> LightProblem:
+        """The same problem with a quarter of the pixels, where the model is one of pixels: likewise on the way."""
+        views = self.views.thinned
+        if not isinstance(self.model, PixelModel) or int(torch.tensor(views.bounds).diff().min()) < LEAST_PIXELS:
+            return self
+        chosen = self.views.few_pixels
+        clip, noise = (None if part is None else part[chosen] for part in (self.clip, self.noise))
+        known = tuple(image.at(chosen) for image in self.known)
+        model, target = self.model.on(views), self.target[chosen]
+        return replace(self, views=views, model=model, target=target, clip=clip, noise=noise, known=known, sharp=None)
+
     def coarsest(self, blocks: ImageModel | None) -> LightProblem:
         """The same problem for averages over blocks of pixels, if all that it asks of pixels can be asked of blocks.
 
@@ -158,6 +171,11 @@ class LightProblem:
             return self
         known = tuple(image.averaged(blocks.average) for image in self.known)
         return replace(self, target=blocks.average @ self.target, model=blocks, noise=None, known=known)
+
+    def in_scene(self, frozen: FrozenScene) -> LightProblem:
+        """The same problem for the same surfels with another solver of what bounces."""
+        views = replace(self.views, frozen=frozen)
+        return self if frozen is self.views.frozen else replace(self, views=views, model=self.model.on(views))
 
     def moments(self, columns: Sequence[Tensor], weights: Tensor) -> Moments | ExposedMoments:
         """Weighted moments of the lights' evaluations, and of known images behind them, against the target."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import torch
 from torch import Tensor
@@ -31,10 +30,7 @@ def seeing_bright_spots(problem: LightProblem, states: Sequence[State]) -> Light
         return problem
     lightings = [_irradiance(problem, state) for state in states]
     seen = with_bright_spots(frozen, [one for one in lightings if spot_share(frozen, one) > NOTABLE])
-    if seen is frozen:
-        return problem
-    views = replace(problem.views, frozen=seen)
-    return replace(problem, views=views, model=model.on(views))
+    return problem.in_scene(seen)
 
 
 def _irradiance(problem: LightProblem, state: State) -> Tensor:

@@ -10,7 +10,7 @@ from rgspipe.renderer.glossy_transport import GlossyTransport
 from rgspipe.renderer.kernels.places import ways_to
 from rgspipe.renderer.pixel_direct import PixelDirect
 from rgspipe.renderer.pixel_lobe import only_columns
-from rgspipe.renderer.view_weights import ViewWeights
+from rgspipe.scene.camera import Camera
 
 #: A surfel that less of the light reaches has no relative slope of its shadow.
 LEAST_PASSING = 1e-3
@@ -30,17 +30,18 @@ class PixelHighlights:
 
     Args:
         gloss: of the scene, G glossy surfels of N.
-        view: the view, P pixels; direct: its direct light.
+        camera: whose view it is.
+        direct: the direct light of P of its pixels.
     """
 
-    def __init__(self, gloss: GlossyTransport, view: ViewWeights, direct: PixelDirect) -> None:
+    def __init__(self, gloss: GlossyTransport, camera: Camera, direct: PixelDirect) -> None:
         self._gloss, self._direct = gloss, direct
-        self._places, self._kept = only_columns(view.operator, gloss.glossy)
+        self._places, self._kept = only_columns(direct.weights, gloss.glossy)
         matrix = self._places.matrix
         self._columns = matrix.col_indices().long()
         counts = matrix.crow_indices().diff().long()
         self._rows = torch.repeat_interleave(torch.arange(len(counts)).to(counts), counts)
-        eyes = torch.nn.functional.normalize(view.camera.origin.to(direct.points) - direct.points, dim=1)
+        eyes = torch.nn.functional.normalize(camera.origin.to(direct.points) - direct.points, dim=1)
         self._normals = gloss.geometry[1].float()[self._columns]
         self._mirrors = mirrored(eyes.float()[self._rows], self._normals)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import torch
@@ -28,8 +28,8 @@ class PixelModel(ViewModel):
     """How pixels see lights where they look.
 
     Attributes:
-        direct: per view its direct light.
-        highlights: of a scene with gloss, per view its highlights.
+        direct: per view the direct light of its pixels.
+        highlights: of a scene with gloss, per view their highlights.
     """
 
     direct: tuple[PixelDirect, ...]
@@ -40,18 +40,24 @@ class PixelModel(ViewModel):
         """The model of some pixels.
 
         Args:
-            direct: per view its direct light, where it is known already.
+            direct: per view the direct light of these pixels, where it is known already.
         """
         frozen = views.frozen
         if direct is None:
-            direct = tuple(PixelDirect(frozen.bvh, view) for view in views.views)
+            direct = tuple(PixelDirect(frozen.bvh, *pair) for pair in zip(views.views, views.own, strict=True))
         pairs = zip(views.views, direct, strict=True) if frozen.gloss is not None and effects.lobes else ()
-        return cls(views, effects, direct, tuple(PixelHighlights(frozen.gloss, *pair) for pair in pairs))
+        highlights = tuple(PixelHighlights(frozen.gloss, view.camera, one) for view, one in pairs)
+        return cls(views, effects, direct, highlights)
+
+    def on(self, views: ViewedPixels) -> PixelModel:
+        if views.pixels is self.views.pixels:
+            return replace(self, views=views)
+        return replace(PixelModel.of(views, self.effects), few=self.few)
 
     @cached_property
     def points(self) -> Tensor:
         """(P, 3) float64 place that each pixel looks at."""
-        return torch.cat([direct.points for direct in self.direct])[self.views.pixels]
+        return torch.cat([direct.points for direct in self.direct])
 
     def columns(self, light: UnitLight) -> Tensor:
         columns, lit = added(light, self._columns, self.few)
@@ -95,7 +101,7 @@ class PixelModel(ViewModel):
         images = [direct.image(place, lit.passing, lit.slope, lit.origin, light.share) for direct in self.direct]
         for index, highlights in enumerate(self.highlights):
             images[index] = images[index] + highlights.image(place, lit.passing, lit.slope)
-        columns = torch.cat(images)[self.views.pixels]
+        columns = torch.cat(images)
         if light.light.axis is None:
             return columns
         return attenuated(columns, emitted_intensity(light, self.points, self.effects.spots), light)

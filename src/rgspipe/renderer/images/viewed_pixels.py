@@ -54,6 +54,13 @@ class ViewedPixels:
         return torch.repeat_interleave(torch.arange(len(counts)), counts).to(self.pixels.device)
 
     @cached_property
+    def own(self) -> tuple[Tensor, ...]:
+        """Per view (P_v,) int64 which of its pixels these are."""
+        starts = itertools.accumulate((view.camera.pixel_count for view in self.views), initial=0)
+        parts = itertools.pairwise(self.bounds)
+        return tuple(self.pixels[first:last] - start for (first, last), start in zip(parts, starts, strict=False))
+
+    @cached_property
     def rows(self) -> tuple[SparseOperator, ...]:
         """Per view the rows of `operator` that are its own."""
         if len(self.views) == 1:

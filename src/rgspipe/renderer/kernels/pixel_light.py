@@ -9,10 +9,9 @@ import warp as wp
 from torch import Tensor
 
 from rgspipe.renderer.kernels.launch import as_array, as_vec3, launch
-from rgspipe.renderer.kernels.pixel_rays import PixelRays, pixel_rays
+from rgspipe.renderer.kernels.pixel_rays import PixelRays
 from rgspipe.renderer.kernels.places import as_place, way_to
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
-from rgspipe.scene.camera import Camera
 
 # Adjoints are written by hand; generating them would double the compile time.
 wp.set_module_options({"enable_backward": False})
@@ -169,11 +168,11 @@ class PixelLight:
         bvh: N surfels.
         matrix: (P, N) view weights in compressed rows.
         edges: (P,) bool, pixels on or beside an edge.
-        camera: whose view it is.
+        rays: of the pixels.
         softening: (N,) ε of `direct.unit_irradiance`, scene units; less of it where pixels are finer.
     """
 
-    def __init__(self, bvh: SurfelBvh, matrix: Tensor, edges: Tensor, camera: Camera, softening: Tensor) -> None:
+    def __init__(self, bvh: SurfelBvh, matrix: Tensor, edges: Tensor, rays: PixelRays, softening: Tensor) -> None:
         surfels = bvh.surfels
         self._bvh, self._pixels = bvh, matrix.shape[0]
         view = self._view = PixelView()
@@ -182,7 +181,7 @@ class PixelLight:
         view.centers, view.normals = as_vec3(bvh.local(surfels.centers)), as_vec3(surfels.normals)
         scales = surfels.scales.detach().prod(dim=1).sqrt()
         view.scales, view.softening = as_array(scales.float()), as_array(softening.float())
-        self._rays = pixel_rays(bvh, camera)
+        self._rays = rays
         self._reflectance = as_vec3(surfels.albedo / math.pi)
 
     def image(self, light: Tensor, passing: Tensor, passing_slope: Tensor, own_passing: Tensor) -> Tensor:

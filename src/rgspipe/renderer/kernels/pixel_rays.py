@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warp as wp
+from torch import Tensor
 
 from rgspipe.renderer.kernels.launch import as_vec3, vector
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
@@ -22,9 +23,13 @@ class PixelRays:
     up: wp.vec3
 
 
-def pixel_rays(bvh: SurfelBvh, camera: Camera) -> PixelRays:
-    """The rays of a camera in the coordinates of the surfels' hierarchy."""
-    _, directions, lengths = camera.rays()
+def pixel_rays(bvh: SurfelBvh, camera: Camera, pixels: Tensor | None = None) -> PixelRays:
+    """The rays of a camera in the coordinates of the surfels' hierarchy.
+
+    Args:
+        pixels: (P,) int64 whose rays; all if None.
+    """
+    _, directions, lengths = camera.rays(None if pixels is None else pixels.cpu())
     axes = camera.camera_to_world[:3, :3].double()
     rays = PixelRays()
     rays.origin = vector(bvh.local(camera.origin))

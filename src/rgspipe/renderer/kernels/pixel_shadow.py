@@ -8,11 +8,10 @@ from torch import Tensor
 
 from rgspipe.renderer.kernels.launch import as_array, launch
 from rgspipe.renderer.kernels.pixel_light import point_on_surfel
-from rgspipe.renderer.kernels.pixel_rays import PixelRays, pixel_rays
+from rgspipe.renderer.kernels.pixel_rays import PixelRays
 from rgspipe.renderer.kernels.places import as_place, way_to
 from rgspipe.renderer.kernels.shadow import light_transmittance
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh, SurfelTree
-from rgspipe.scene.camera import Camera
 
 # Adjoints are written by hand; generating them would double the compile time.
 wp.set_module_options({"enable_backward": False})
@@ -46,22 +45,23 @@ def _pixel_transmittance(
 
 
 def pixel_transmittance(
-    bvh: SurfelBvh, camera: Camera, receivers: Tensor, pixels: Tensor, light: Tensor, places: Tensor
+    bvh: SurfelBvh, rays: PixelRays, receivers: Tensor, pixels: Tensor, light: Tensor, places: Tensor
 ) -> Tensor:
     """(P, 4) part of a light that reaches each pixel's surface, its mean over the pixel, and d/d(light) of it.
 
     Args:
+        rays: of P pixels.
         receivers: (P,) int64 surfel that stands for the surface in each pixel.
         pixels: (K,) int64 those that are computed; that of the others is −1.
         light: (3,) position, or (4,) place.
         places: (K, 2) of a pixel's shadow rays in the unit square.
     """
-    transmittance = torch.full((camera.pixel_count, 4), -1.0, dtype=torch.float32, device=bvh.device)
+    transmittance = torch.full((len(receivers), 4), -1.0, dtype=torch.float32, device=bvh.device)
     if len(pixels) == 0:
         return transmittance
     lattice = wp.from_torch(places.float().contiguous().to(bvh.device), dtype=wp.vec2)
     records = wp.to_torch(bvh.rank)[receivers.to(bvh.device)].int()
     which = [as_array(pixels.to(bvh.device).int()), as_array(records), as_place(bvh, light)]
-    inputs = [bvh.tree, pixel_rays(bvh, camera), lattice, *which, wp.from_torch(transmittance, dtype=wp.vec4)]
+    inputs = [bvh.tree, rays, lattice, *which, wp.from_torch(transmittance, dtype=wp.vec4)]
     launch(_pixel_transmittance, len(pixels), inputs, bvh.device)
     return transmittance
