@@ -175,6 +175,7 @@ def _problem(
 ) -> LampProblem:
     gather = frozen.gather.to_scipy().astype(np.float64).tocsr()
     seen = measured.seen >= LEAST_SEEN
+    clipped = np.where(measured.blown_out, measured.variance, np.inf)
     prediction = None if options.albedo_prior == "none" else Prediction.of(predicted, graph)
     # A surface's paint is taken for even until there are lamps to ask.
     expected = predicted if prediction is None else prediction.with_shares(1.0, 0.0)
@@ -182,7 +183,7 @@ def _problem(
     pixels = np.where(seen, measured.variance, np.inf)
     field = Field(graph, pixels, seen.astype(np.float64), Variances())
     rays = options.gather_rays
-    return LampProblem(frozen, received, field, measured.radiance, expected, pixels, rays, prediction)
+    return LampProblem(frozen, received, field, measured.radiance, expected, pixels, rays, prediction, clipped)
 
 
 def _captured(measured: Measured, answer: Answer, options: CaptureOptions, lighting: str) -> Captured:

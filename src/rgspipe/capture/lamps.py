@@ -85,11 +85,13 @@ class LampProblem:
         frozen: the surfels, for what a lamp sends to each.
         received: what they send each other.
         field: the field that is eliminated.
-        radiance: (N, 3) L.
+        radiance: (N, 3) L, or the least that it may be.
         predicted: (N, 3) ρ̂, as far as it is believed.
         pixels: (N,) variance of log L by the pixels alone; infinite where none shows the surfel.
         rays: of the gather, from each surfel.
         prediction: what ρ̂ comes from; None where it is not asked how much of it is believed.
+        clipped: (N,) what `pixels` would be where L is known from below alone; infinite for all others. None if there
+            are none.
     """
 
     frozen: FrozenScene
@@ -100,6 +102,7 @@ class LampProblem:
     pixels: Numbers
     rays: int
     prediction: Prediction | None = None
+    clipped: Numbers | None = None
 
     @cached_property
     def target(self) -> Numbers:

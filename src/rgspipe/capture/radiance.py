@@ -6,8 +6,9 @@ linear in the N radiances, with the weights W of the views, and g_v the exposure
     min over L, g of  Σ_p w_p ( I_p − g_p (W L)_p )² .
 
 w_p gives little weight to what most pixels contradict (Cauchy's loss on the relative error): edges that are not quite
-where the surfels have them, gloss, people who walked by. Saturated pixels and those half outside of all surfaces do
-not count.
+where the surfels have them, gloss, people who walked by. Pixels half outside of all surfaces do not count. Saturated
+ones tell only that it is at least so bright: they count for little, so that what another photograph shows of the same
+surface decides, and where none shows more L is the least that it may be.
 """
 
 from __future__ import annotations
@@ -25,7 +26,8 @@ from rgspipe.capture.photographs import SHOWN, Numbers, Photograph
 from rgspipe.datasets.views import View
 from rgspipe.renderer.view_weights import ViewWeights
 
-#: Surfels with a larger part of their pixels saturated are brighter than the rest of them say.
+#: Surfels with a larger part of their pixels saturated, of those that the others do not contradict, are brighter than
+#: these say.
 MOST_CLIPPED = 0.3
 
 #: Rounds of reweighting.
@@ -51,14 +53,15 @@ class Measured:
     """Radiance of N surfels in V photographs.
 
     Attributes:
-        radiance: (N, 3) in the photographs' unit, above 0; what is not seen has the median.
+        radiance: (N, 3) in the photographs' unit, above 0; the least that it may be where it is blown out; what no
+            photograph shows has the median.
         variance: (N,) of its logarithm, by how far pixels are off; infinite where none was seen.
-        seen: (N,) pixels that show the surfel, all together.
+        seen: (N,) pixels that show the surfel, all together; 0 where it is blown out.
         cameras: exposures, white balance and vignetting of the photographs.
         error: median relative error of a pixel.
         apart: (N,) mean relative error of the pixels that show each surfel, outliers and all.
         shown_by: (N,) photographs that show it.
-        blown_out: (N,) bool: too much of it is saturated to measure the rest.
+        blown_out: (N,) bool: so much of it is saturated, in every photograph, that its radiance is known from below.
     """
 
     radiance: Numbers
@@ -92,21 +95,21 @@ def measured_radiance(
     cameras, radiance = Cameras.of(len(views), exposure, vignetting, bent), None
     counted, floor = [photograph.base for photograph in photographs], _floor(photographs)
     for _ in range(ROUNDS):
-        cameras = cameras.fitted(photographs, counted, radiance)
+        plain = [np.where(one.saturated, 0.0, weight) for one, weight in zip(photographs, counted, strict=True)]
+        cameras = cameras.fitted(photographs, plain, radiance)
         radiance, seen, normal = _radiance(photographs, cameras, counted)
         off, relative = _errors(photographs, cameras, radiance, floor)
         error = _typical(photographs, relative)
         latest, limit = counted, max(OUTLIER * error, 1e-6)
         counted = [one.base / (1.0 + (part / limit) ** 2) for one, part in zip(photographs, relative, strict=True)]
     variance = _log_variance(photographs, latest, off, normal, radiance)
-    blown_out = _clipped(photographs) > MOST_CLIPPED
-    seen = np.where(blown_out, 0.0, seen)
-    known = seen > 0.0
+    blown_out, known = _clipped(photographs, counted) > MOST_CLIPPED, seen > 0.0
     middle = np.median(radiance[known], axis=0) if known.any() else np.ones(3)
     least = 1e-6 * np.maximum(middle, 1e-300)
     radiance = np.where(known[:, None], np.maximum(radiance, least), middle)
     shown_by = sum((_pixels(view) > SHOWN).astype(np.int64) for view in weights)
     variance = np.where(known, variance, np.inf)
+    seen = np.where(blown_out, 0.0, seen)
     return Measured(radiance, variance, seen, cameras, error, _apart(photographs, relative), shown_by, blown_out)
 
 
@@ -150,13 +153,13 @@ def _pixels(weights: ViewWeights) -> Numbers:
     return np.asarray(weights.operator.to_scipy().sum(axis=0)).ravel()
 
 
-def _clipped(photographs: Sequence[Photograph]) -> Numbers:
-    """(N,) part of the pixels of each surfel that are saturated."""
+def _clipped(photographs: Sequence[Photograph], weights: Sequence[Numbers]) -> Numbers:
+    """(N,) part of the pixels of each surfel that are saturated, by weights (P,) of what the others leave of them."""
     saturated, shown = 0.0, 0.0
-    for photograph in photographs:
-        rows = photograph.rows
-        saturated = saturated + rows.T @ photograph.saturated
-        shown = shown + np.asarray(rows.sum(axis=0)).ravel()
+    for photograph, weight in zip(photographs, weights, strict=True):
+        back = photograph.rows.T
+        left = np.divide(weight, photograph.base, out=np.zeros_like(weight), where=photograph.base > 0.0)
+        saturated, shown = saturated + back @ (photograph.saturated * left), shown + back @ left
     return saturated / np.maximum(shown, 1e-12)
 
 

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rgspipe.capture.bounds import with_bounds
 from rgspipe.capture.doubts import model_variance
 from rgspipe.capture.lamps import DARK, LampProblem, Lamps
 from rgspipe.capture.photographs import Numbers
@@ -129,6 +130,7 @@ def looked_for_again(problem: LampProblem, candidates: Candidates, lamps: Lamps,
 
 def weighed(problem: LampProblem, lamps: Lamps | None) -> LampProblem:
     """The problem with what belongs to `lamps`: the albedo of the unseen, variances, and trust in the surfels."""
+    problem, lamps = with_bounds(problem, lamps)
     measured = problem.pixels + model_variance(problem, lamps, problem.rays)
     problem = replace(problem, field=replace(problem.field, measured=measured))
     if lamps is None:

@@ -1,0 +1,33 @@
+"""Surfaces whose radiance is known from below alone, as they are clipped in every photograph.
+
+Under some lamps such a surfel sends ρ d, with the albedo that the field continues into it. Where that is above the
+bound b, what was measured is met whatever it is above by: it says nothing, and the surfel sends what it gets, as one
+that no camera saw. Where it is below, the least that the surfel may send is the likeliest: L = b, measured like any
+other, and that is what others get from it. Which bounds count so depends on the lamps, and is asked anew for each round
+of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from rgspipe.capture.lamps import LampProblem, Lamps
+from rgspipe.capture.received import Received
+from rgspipe.training.albedo import ALBEDO_RANGE
+
+
+def with_bounds(problem: LampProblem, lamps: Lamps | None) -> tuple[LampProblem, Lamps | None]:
+    """The problem in which those bounds count that lamps do not meet, and what lamps make of it.
+
+    None count before there are lamps.
+    """
+    if lamps is None or problem.clipped is None:
+        return problem, lamps
+    bounded, albedo = np.isfinite(problem.clipped), np.clip(problem.albedo(lamps), *ALBEDO_RANGE)
+    above = (np.log(albedo * problem.arriving(lamps)) - np.log(problem.radiance)).mean(axis=1) > 0.0
+    pixels = np.where(bounded, np.where(above, np.inf, problem.clipped), problem.pixels)
+    received = Received.of(problem.received.gather, problem.radiance, np.isfinite(pixels), albedo)
+    problem = replace(problem, pixels=pixels, received=received)
+    return problem, problem.lamps(lamps.places, lamps.logs)
