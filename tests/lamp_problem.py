@@ -38,11 +38,16 @@ def unseen() -> np.ndarray:
     return (centers[:, 0] > 0.05) & (centers[:, 2] < -0.1)
 
 
+def in_all_channels(seen: np.ndarray) -> np.ndarray:
+    """(N, 3) of (N,)."""
+    return np.repeat(seen[:, None], 3, axis=1)
+
+
 @cache
 def problem() -> LampProblem:
     frozen = frozen_room()
     albedo = frozen.surfels.albedo.double().numpy()
-    received = Received.of(gather(), radiance(), ~unseen(), albedo)
+    received = Received.of(gather(), radiance(), in_all_channels(~unseen()), albedo)
     grey = np.full_like(albedo, 0.5)
     measured = np.where(unseen(), np.inf, 1e-4)
     field = Field(Graph.of(frozen.surfels, grey), measured, (~unseen()).astype(np.float64), Variances())

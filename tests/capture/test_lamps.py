@@ -21,7 +21,7 @@ def test_light_that_comes_back_from_the_unseen_is_that_of_the_whole_scene() -> N
 
 
 def test_without_any_unseen_nothing_comes_back() -> None:
-    everything = np.ones(len(radiance()), dtype=bool)
+    everything = np.ones(radiance().shape, dtype=bool)
     received = Received.of(gather(), radiance(), everything, radiance())
     np.testing.assert_array_equal(received.known, gather() @ radiance())
 

@@ -1,4 +1,4 @@
-"""Surfaces whose radiance is known from below alone, as they are clipped in every photograph.
+"""Channels of surfaces that are known from below alone, as they are clipped in every photograph.
 
 Under some lamps such a surfel sends ρ d, with the albedo that the field continues into it. Where that is above the
 bound b, what was measured is met whatever it is above by: it says nothing, and the surfel sends what it gets, as one
@@ -25,9 +25,9 @@ def with_bounds(problem: LampProblem, lamps: Lamps | None) -> tuple[LampProblem,
     """
     if lamps is None or problem.clipped is None:
         return problem, lamps
-    bounded, albedo = np.isfinite(problem.clipped), np.clip(problem.albedo(lamps), *ALBEDO_RANGE)
-    above = (np.log(albedo * problem.arriving(lamps)) - np.log(problem.radiance)).mean(axis=1) > 0.0
-    pixels = np.where(bounded, np.where(above, np.inf, problem.clipped), problem.pixels)
-    received = Received.of(problem.received.gather, problem.radiance, np.isfinite(pixels), albedo)
-    problem = replace(problem, pixels=pixels, received=received)
+    albedo = np.clip(problem.albedo(lamps), *ALBEDO_RANGE)
+    met = problem.clipped & (albedo * problem.arriving(lamps) > problem.radiance)
+    told = np.isfinite(problem.pixels)[:, None] & ~met
+    received = Received.of(problem.received.gather, problem.radiance, told, albedo)
+    problem = replace(problem, received=received, field=replace(problem.field, told=told))
     return problem, problem.lamps(lamps.places, lamps.logs)
