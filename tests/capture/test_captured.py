@@ -103,7 +103,7 @@ def test_surfaces_that_are_saturated_are_told() -> None:
     clipped = [replace(view, image=view.image.clamp(max=white), saturated_from=white) for view in views]
     captured = capture_scene(clipped, blank_room(), replace(OPTIONS, count=2))
     assert float(captured.measured.blown_out.mean()) > 0.03
-    assert "of the surfaces, the brightest, are saturated" in captured_words(captured)
+    assert "of what surfaces send, the brightest, is saturated" in captured_words(captured)
 
 
 def test_a_given_number_is_not_asked() -> None:

@@ -86,3 +86,21 @@ def test_neighbours_of_other_predicted_paint_are_not_of_one_surface() -> None:
     surfels = closed_box(1 / 7)
     predicted = np.where(surfels.centers[:, :1].numpy() > 0.0, 0.8, 0.2) * np.ones((1, 3))
     assert set(Graph.of(surfels, predicted).sizes) != {49.0}
+
+
+def test_channels_that_are_told_apart_are_fields_of_their_own(field: Field) -> None:
+    """Each is as one of which only those surfels were measured, and other captures may know more of one."""
+    rng, numbers = np.random.default_rng(2), residual(field, 3)
+    told, known = rng.random(numbers.shape) < 0.7, rng.uniform(0.0, 50.0, numbers.shape)
+    apart = replace(field, told=told, known=known)
+    alone = [
+        replace(field, measured=np.where(own, field.measured, np.inf), known=elsewhere)
+        for own, elsewhere in zip(told.T, known.T, strict=True)
+    ]
+    columns = np.split(numbers, 3, axis=1)
+    for channel, (own, column) in enumerate(zip(alone, columns, strict=True)):
+        np.testing.assert_allclose(apart.whitened_colours(numbers)[:, channel : channel + 1], own.whitened(column))
+        np.testing.assert_allclose(apart.mean_colours(numbers)[:, channel : channel + 1], own.mean(column))
+    total = sum(own.deviance(column) for own, column in zip(alone, columns, strict=True))
+    assert apart.deviance(numbers) == pytest.approx(total, rel=1e-9)
+    assert apart.measurements == sum(own.measurements for own in alone) // 3

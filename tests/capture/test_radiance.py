@@ -75,13 +75,42 @@ def test_what_one_photograph_alone_shows_does_not_count() -> None:
     assert error(measured_radiance(weights(), views)) < 0.01  # 0.0054
 
 
-def test_saturated_pixels_do_not_count() -> None:
-    limit = float(torch.stack([view.image for view in photographs()]).quantile(0.9))
-    views = [replace(view, image=view.image.clamp(max=limit), saturated_from=limit) for view in photographs()]
-    found = measured_radiance(weights(), views)
-    clipped = (truth() > 1.3 * limit).any(axis=1) & (plain().seen > 2.0)
-    assert clipped.sum() > 20
-    assert np.isinf(found.variance[clipped]).mean() > 0.9
+def _clipped_at(limits: list[float]) -> tuple[Measured, np.ndarray]:
+    """Measured by photographs that are clipped at limits of their own, and (N, 3) what is above the first of them."""
+    views = [
+        replace(view, image=view.image.clamp(max=limit), saturated_from=limit)
+        for view, limit in zip(photographs(), limits, strict=True)
+    ]
+    above = (truth() > 1.3 * limits[0]) & (plain().seen > 2.0)[:, None]
+    assert above.sum() > 20
+    return measured_radiance(weights(), views), above
+
+
+def bright() -> float:
+    return float(torch.stack([view.image for view in photographs()]).quantile(0.9))
+
+
+def test_what_is_saturated_everywhere_is_known_from_below() -> None:
+    found, above = _clipped_at([bright()] * 14)
+    assert found.blown_out[above].mean() > 0.9
+    held = found.blown_out & above
+    assert np.median(np.abs(found.radiance[held] / bright() - 1.0)) < 0.02
+
+
+def test_channels_that_are_not_clipped_are_measured() -> None:
+    found, above = _clipped_at([bright()] * 14)
+    beside = above.any(axis=1, keepdims=True) & (truth() < 0.8 * bright())
+    assert beside.sum() > 20
+    assert not found.blown_out[beside].any()
+    assert np.median(np.abs(found.radiance / plain().radiance - 1.0)[beside]) < 0.01
+
+
+def test_what_is_saturated_in_some_photographs_is_measured_by_the_others() -> None:
+    found, above = _clipped_at([bright(), 100.0 * bright()] * 7)
+    shown = above & (measured_radiance(weights()[1::2], photographs()[1::2]).seen > 2.0)[:, None]
+    assert shown.sum() > 20
+    assert found.blown_out[shown].mean() < 0.05
+    assert np.median(np.abs(found.radiance / truth() - 1.0)[shown]) < 0.02
 
 
 def test_the_variance_is_that_of_the_error() -> None:

@@ -18,7 +18,7 @@ def problem(noise: float) -> LampProblem:
     """Of which lamps and paint leave `noise` of the logarithm unexplained."""
     frozen = replace(frozen_room(), candidates=None).with_dictionary(3)
     albedo = frozen.surfels.albedo.double().numpy()
-    radiance, everything = radiance_under(LAMPS).double().numpy(), np.ones(len(albedo), dtype=bool)
+    radiance, everything = radiance_under(LAMPS).double().numpy(), np.ones(albedo.shape, dtype=bool)
     received = Received.of(frozen.gather.to_scipy().astype(np.float64).tocsr(), radiance, everything, albedo)
     measured = np.full(len(albedo), 1e-4)
     variances = Variances(noise=noise**2)

@@ -153,7 +153,8 @@ def _measured(
             chosen, taken, exposure=options.exposure, vignetting=options.vignetting, bent=bent
         )
         if name != OFF:
-            check_measured(found[name].seen >= LEAST_SEEN, found[name].radiance, taken, where)
+            seen = (found[name].seen >= LEAST_SEEN) & ~found[name].blown_out.all(axis=1)
+            check_measured(seen, found[name].radiance, taken, where)
     off = found.pop(OFF, None)
     return found if off is None else {name: without(measured, off) for name, measured in found.items()}
 
@@ -175,14 +176,17 @@ def _problem(
 ) -> LampProblem:
     gather = frozen.gather.to_scipy().astype(np.float64).tocsr()
     seen = measured.seen >= LEAST_SEEN
+    told, clipped = seen[:, None] & ~measured.blown_out, seen[:, None] & measured.blown_out
+    bounded = bool(clipped.any())
     prediction = None if options.albedo_prior == "none" else Prediction.of(predicted, graph)
     # A surface's paint is taken for even until there are lamps to ask.
     expected = predicted if prediction is None else prediction.with_shares(1.0, 0.0)
-    received = Received.of(gather, measured.radiance, seen, expected)
+    received = Received.of(gather, measured.radiance, told, expected)
     pixels = np.where(seen, measured.variance, np.inf)
-    field = Field(graph, pixels, seen.astype(np.float64), Variances())
+    field = Field(graph, pixels, seen.astype(np.float64), Variances(), told=told if bounded else None)
     rays = options.gather_rays
-    return LampProblem(frozen, received, field, measured.radiance, expected, pixels, rays, prediction)
+    bounds = clipped if bounded else None
+    return LampProblem(frozen, received, field, measured.radiance, expected, pixels, rays, prediction, bounds)
 
 
 def _captured(measured: Measured, answer: Answer, options: CaptureOptions, lighting: str) -> Captured:

@@ -16,11 +16,13 @@ with one sparse factorisation. λ, τ, σ, h and g are found by what was measure
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
+from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
 from rgspipe.capture.photographs import Numbers
@@ -108,8 +110,10 @@ class Field:
         measured: (N,) variance of each measurement by its pixels; infinite where there is none.
         trust: (N,) in [0, 1], what a measurement counts beside that: 0 for outliers.
         variances: of the scene.
-        known: (N,) precision with which the field is known from elsewhere to be 0; None for not at all.
+        known: (N,) precision with which the field is known from elsewhere to be 0, or (N, 3) in each channel; None for
+            not at all.
         rough, grain: (S,) h and g of each surface; None where all are alike.
+        told: (N, 3) bool, channels in which there is a measurement; None where it is in all or none.
     """
 
     graph: Graph
@@ -119,6 +123,22 @@ class Field:
     known: Numbers | None = None
     rough: Numbers | None = None
     grain: Numbers | None = None
+    told: NDArray[np.bool_] | None = None
+
+    @cached_property
+    def channels(self) -> tuple[Field, ...]:
+        """That of each channel; one for all where they do not differ."""
+        elsewhere = self.known is not None and self.known.ndim > 1
+        if self.told is None and not elsewhere:
+            return (self,)
+        trust = np.repeat(self.trust[:, None], 3, axis=1)
+        trust = (trust if self.told is None else np.where(self.told, trust, 0.0)).T
+        known = self.known.T if elsewhere else [self.known] * 3
+        return tuple(replace(self, trust=own, known=k, told=None) for own, k in zip(trust, known, strict=True))
+
+    def channel(self, number: int) -> Field:
+        """That of one channel."""
+        return self.channels[number % len(self.channels)]
 
     def trusted(self, trust: Numbers) -> Field:
         """With another trust (N,)."""
@@ -132,8 +152,9 @@ class Field:
 
     @cached_property
     def weight(self) -> Numbers:
-        """(N,) diagonal of D."""
-        return self.trust / (self.measured + self.noise)
+        """(N,) diagonal of D, of surfels that any channel tells something of."""
+        trust = self.trust if self.told is None else np.where(self.told.any(axis=1), self.trust, 0.0)
+        return trust / (self.measured + self.noise)
 
     @cached_property
     def precision(self) -> sp.csc_matrix:
@@ -143,19 +164,33 @@ class Field:
     @cached_property
     def _prior(self) -> sp.csc_matrix:
         """(N, N) precision before the measurements."""
-        return self.precision if self.known is None else (self.precision + sp.diags(self.known)).tocsc()
+        if self.known is None:
+            return self.precision
+        return (self.precision + sp.diags(self.known.reshape(len(self.trust), -1).mean(axis=1))).tocsc()
 
     @cached_property
     def _posterior(self) -> sp.linalg.SuperLU:
         return factorised((sp.diags(self.weight) + self._prior).tocsc())
 
+    def _parts(self, residual: Numbers) -> Iterator[tuple[Field, Numbers]]:
+        """The field of each channel with what of residuals (N, 3) is of it; all with the one field where it is one."""
+        return zip(self.channels, np.split(residual, len(self.channels), axis=1), strict=True)
+
+    def whitened_colours(self, residual: Numbers) -> Numbers:
+        """(N, 3) Σ⁻¹ r in each channel."""
+        return np.concatenate([own.whitened(part) for own, part in self._parts(residual)], axis=1)
+
+    def mean_colours(self, residual: Numbers) -> Numbers:
+        """(N, 3) the field that is most likely after residuals (N, 3)."""
+        return np.concatenate([own.mean(part) for own, part in self._parts(residual)], axis=1)
+
     def whitened(self, residual: Numbers) -> Numbers:
-        """Σ⁻¹ r of residuals (N, K)."""
+        """Σ⁻¹ r of residuals (N, K) of one channel."""
         weighted = self.weight[:, None] * residual
         return weighted - self.weight[:, None] * self._posterior.solve(weighted)
 
     def mean(self, residual: Numbers) -> Numbers:
-        """(N, K) the field that is most likely after residuals (N, K)."""
+        """(N, K) the field that is most likely after residuals (N, K) of one channel."""
         return self._posterior.solve(self.weight[:, None] * residual)
 
     def draws(self, samples: int, seed: int) -> Numbers:
@@ -166,11 +201,19 @@ class Field:
         return factors.solve((factors.L @ white)[factors.perm_r])
 
     def deviation(self, samples: int, seed: int) -> Numbers:
-        """(N,) standard deviation of the field after the measurements, by draws of it."""
-        return self.draws(samples, seed).std(axis=1)
+        """(N,) standard deviation of the field after the measurements, by draws of it in every channel."""
+        return np.sqrt(np.mean([own.draws(samples, seed).var(axis=1) for own in self.channels], axis=0))
 
     def deviance(self, residual: Numbers) -> float:
-        """−2 log p of residuals (N, C) of C channels, up to a constant."""
+        """−2 log p of residuals (N, 3), up to a constant."""
+        return sum(own._deviance(part) for own, part in self._parts(residual))
+
+    @property
+    def measurements(self) -> int:
+        """How many there are, all channels together."""
+        return sum(int((own.weight > 0.0).sum()) for own in self.channels) * 3 // len(self.channels)
+
+    def _deviance(self, residual: Numbers) -> float:
         kept = self.weight > 0.0
         determinant = _log_determinant(self._posterior) - np.log(self.weight[kept]).sum()
         determinant -= _log_determinant(factorised(self._prior))

@@ -16,6 +16,7 @@ from functools import cached_property
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from rgspipe.capture.field import Field
@@ -85,11 +86,13 @@ class LampProblem:
         frozen: the surfels, for what a lamp sends to each.
         received: what they send each other.
         field: the field that is eliminated.
-        radiance: (N, 3) L.
+        radiance: (N, 3) L, or the least that it may be.
         predicted: (N, 3) ρ̂, as far as it is believed.
-        pixels: (N,) variance of log L by the pixels alone; infinite where none shows the surfel.
+        pixels: (N,) variance of log L, or of what it is at least, by the pixels alone; infinite where none shows the
+            surfel.
         rays: of the gather, from each surfel.
         prediction: what ρ̂ comes from; None where it is not asked how much of it is believed.
+        clipped: (N, 3) bool, where L is known from below alone; None if it is nowhere.
     """
 
     frozen: FrozenScene
@@ -100,6 +103,7 @@ class LampProblem:
     pixels: Numbers
     rays: int
     prediction: Prediction | None = None
+    clipped: NDArray[np.bool_] | None = None
 
     @cached_property
     def target(self) -> Numbers:
@@ -144,12 +148,12 @@ class LampProblem:
 
     def albedo(self, lamps: Lamps) -> Numbers:
         """(N, 3) the albedo that is most likely under the lamps, also of what was not seen; any number above 0."""
-        return self.predicted * np.exp(self.field.mean(self.residual(lamps)))
+        return self.predicted * np.exp(self.field.mean_colours(self.residual(lamps)))
 
     def cost(self, lamps: Lamps | None) -> float:
         """What the lamps leave."""
         residual = self.residual(lamps)
-        return float((residual * self.field.whitened(residual)).sum())
+        return float((residual * self.field.whitened_colours(residual)).sum())
 
     def refined(self, lamps: Lamps, steps: int) -> Lamps:
         """A place of least cost near `lamps`."""
@@ -190,7 +194,7 @@ class _Around:
         matrix, direction, cost = np.zeros((width, width)), np.zeros(width), 0.0
         for channel in range(3):
             own = residual[:, channel]
-            whitened = field.whitened(np.column_stack([jacobian[channel], own]))
+            whitened = field.channel(channel).whitened(np.column_stack([jacobian[channel], own]))
             matrix += jacobian[channel].T @ whitened[:, :-1]
             direction += jacobian[channel].T @ whitened[:, -1]
             cost += float(own @ whitened[:, -1])

@@ -17,8 +17,8 @@ Numbers = NDArray[np.float64]
 #: Pixels with less surface than this are mixed with what is behind.
 LEAST_COVERAGE = 0.9
 
-#: Weight of pixels beside edges: they say where nothing else does.
-EDGE_WEIGHT = 0.03
+#: Weight of pixels beside edges, and beside the others of saturated ones: they say where nothing else does.
+LITTLE = 0.03
 
 #: Pixels, all together, with which a photograph shows a surfel.
 SHOWN = 0.3
@@ -31,8 +31,7 @@ class Photograph:
     Attributes:
         operator: (P, N) view weights.
         view: what was photographed.
-        base: (P,) what pixels count before they are looked at: nothing where they are saturated or half outside of all
-            surfaces.
+        base: (P,) what pixels count before they are looked at: nothing where they are half outside of all surfaces.
     """
 
     operator: SparseOperator
@@ -41,9 +40,8 @@ class Photograph:
 
     @classmethod
     def of(cls, weights: ViewWeights, view: View) -> Photograph:
-        whole = (weights.coverage >= LEAST_COVERAGE).cpu() & ~view.saturated.any(dim=-1).reshape(-1)
-        whole &= view.alpha.reshape(-1) >= LEAST_COVERAGE
-        base = np.where(weights.edges.cpu().numpy(), EDGE_WEIGHT, 1.0) * whole.numpy()
+        whole = (weights.coverage >= LEAST_COVERAGE).cpu() & (view.alpha.reshape(-1) >= LEAST_COVERAGE)
+        base = np.where(weights.edges.cpu().numpy(), LITTLE, 1.0) * whole.numpy()
         return cls(weights.operator, view, base.astype(np.float32))
 
     @property
@@ -65,6 +63,14 @@ class Photograph:
         return squared / squared.max()
 
     @property
-    def saturated(self) -> Numbers:
-        """(P,) 1 where a channel is saturated."""
-        return self.view.saturated.any(dim=-1).reshape(-1).double().numpy()
+    def saturated(self) -> NDArray[np.bool_]:
+        """(P, 3) where channels are saturated."""
+        return self.view.saturated.reshape(-1, 3).numpy()
+
+    def plain(self, weight: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Weights (P,) of the pixels in which nothing is saturated; 0 for the others."""
+        return np.where(self.saturated.any(axis=1), np.float32(0.0), weight)
+
+    def believed(self, weight: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Weights (P,) with which pixels tell the radiance: little where anything is saturated."""
+        return np.where(self.saturated.any(axis=1), np.float32(LITTLE), np.float32(1.0)) * weight

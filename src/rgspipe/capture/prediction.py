@@ -48,7 +48,7 @@ class Prediction:
         matrix, right = np.zeros((2, 2)), np.zeros(2)
         for channel in range(3):
             columns = np.column_stack([self.between[:, channel], self.within[:, channel]])
-            whitened = field.whitened(columns)
+            whitened = field.channel(channel).whitened(columns)
             matrix += columns.T @ whitened
             right += whitened.T @ (log_albedo[:, channel] - self.level[channel])
         shares = np.clip(np.linalg.pinv(matrix, hermitian=True) @ right, 0.0, 1.0)

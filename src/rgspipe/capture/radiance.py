@@ -6,8 +6,9 @@ linear in the N radiances, with the weights W of the views, and g_v the exposure
     min over L, g of  Σ_p w_p ( I_p − g_p (W L)_p )² .
 
 w_p gives little weight to what most pixels contradict (Cauchy's loss on the relative error): edges that are not quite
-where the surfels have them, gloss, people who walked by. Saturated pixels and those half outside of all surfaces do
-not count.
+where the surfels have them, gloss, people who walked by. Pixels half outside of all surfaces do not count. Saturated
+ones tell only that it is at least so bright: they count for little, so that what another photograph shows of the same
+surface decides, and where none shows more L is the least that it may be.
 """
 
 from __future__ import annotations
@@ -25,7 +26,8 @@ from rgspipe.capture.photographs import SHOWN, Numbers, Photograph
 from rgspipe.datasets.views import View
 from rgspipe.renderer.view_weights import ViewWeights
 
-#: Surfels with a larger part of their pixels saturated are brighter than the rest of them say.
+#: Surfels with a larger part of their pixels saturated in a channel, of those that the others do not contradict, are
+#: brighter than these say.
 MOST_CLIPPED = 0.3
 
 #: Rounds of reweighting.
@@ -51,14 +53,15 @@ class Measured:
     """Radiance of N surfels in V photographs.
 
     Attributes:
-        radiance: (N, 3) in the photographs' unit, above 0; what is not seen has the median.
+        radiance: (N, 3) in the photographs' unit, above 0; the least that it may be where it is blown out; what no
+            photograph shows has the median.
         variance: (N,) of its logarithm, by how far pixels are off; infinite where none was seen.
         seen: (N,) pixels that show the surfel, all together.
         cameras: exposures, white balance and vignetting of the photographs.
         error: median relative error of a pixel.
         apart: (N,) mean relative error of the pixels that show each surfel, outliers and all.
         shown_by: (N,) photographs that show it.
-        blown_out: (N,) bool: too much of it is saturated to measure the rest.
+        blown_out: (N, 3) bool: so much of a channel is saturated, in every photograph, that it is known from below.
     """
 
     radiance: Numbers
@@ -92,16 +95,17 @@ def measured_radiance(
     cameras, radiance = Cameras.of(len(views), exposure, vignetting, bent), None
     counted, floor = [photograph.base for photograph in photographs], _floor(photographs)
     for _ in range(ROUNDS):
-        cameras = cameras.fitted(photographs, counted, radiance)
-        radiance, seen, normal = _radiance(photographs, cameras, counted)
+        plain = [one.plain(weight) for one, weight in zip(photographs, counted, strict=True)]
+        cameras = cameras.fitted(photographs, plain, radiance)
+        believed = [one.believed(weight) for one, weight in zip(photographs, counted, strict=True)]
+        radiance, normal = _radiance(photographs, cameras, believed)
         off, relative = _errors(photographs, cameras, radiance, floor)
         error = _typical(photographs, relative)
         latest, limit = counted, max(OUTLIER * error, 1e-6)
         counted = [one.base / (1.0 + (part / limit) ** 2) for one, part in zip(photographs, relative, strict=True)]
-    variance = _log_variance(photographs, latest, off, normal, radiance)
-    blown_out = _clipped(photographs) > MOST_CLIPPED
-    seen = np.where(blown_out, 0.0, seen)
-    known = seen > 0.0
+    variance = _log_variance(photographs, believed, off, normal, radiance)
+    seen, clipped = _shown(photographs, latest)
+    known, blown_out = seen > 0.0, clipped > MOST_CLIPPED * seen[:, None]
     middle = np.median(radiance[known], axis=0) if known.any() else np.ones(3)
     least = 1e-6 * np.maximum(middle, 1e-300)
     radiance = np.where(known[:, None], np.maximum(radiance, least), middle)
@@ -112,7 +116,9 @@ def measured_radiance(
 
 def _floor(photographs: Sequence[Photograph]) -> float:
     """Radiance that is added before errors are relative."""
-    grey = np.concatenate([photograph.image.mean(axis=1)[photograph.base > 0.0] for photograph in photographs])
+    grey = np.concatenate(
+        [photograph.image.mean(axis=1)[photograph.plain(photograph.base) > 0.0] for photograph in photographs]
+    )
     return FLOOR * float(np.quantile(grey, 0.99)) if len(grey) else 1.0
 
 
@@ -131,7 +137,8 @@ def _errors(
 
 def _typical(photographs: Sequence[Photograph], relative: Sequence[NDArray[np.float32]]) -> float:
     """The median of relative errors (P,) of plain pixels."""
-    plain = [np.abs(part[photograph.base == 1.0]) for photograph, part in zip(photographs, relative, strict=True)]
+    pairs = zip(photographs, relative, strict=True)
+    plain = [np.abs(part[photograph.plain(photograph.base) == 1.0]) for photograph, part in pairs]
     every = np.concatenate(plain)
     return float(np.median(every)) if len(every) else 0.0
 
@@ -140,8 +147,8 @@ def _apart(photographs: Sequence[Photograph], relative: Sequence[NDArray[np.floa
     """(N,) mean of relative errors (P,) over the pixels that show each surfel."""
     off, shown = 0.0, 0.0
     for photograph, part in zip(photographs, relative, strict=True):
-        back = photograph.rows.T
-        off, shown = off + back @ (photograph.base * np.abs(part)), shown + back @ photograph.base
+        back, plain = photograph.rows.T, photograph.plain(photograph.base)
+        off, shown = off + back @ (plain * np.abs(part)), shown + back @ plain
     return off / np.maximum(shown, 1e-12)
 
 
@@ -150,20 +157,19 @@ def _pixels(weights: ViewWeights) -> Numbers:
     return np.asarray(weights.operator.to_scipy().sum(axis=0)).ravel()
 
 
-def _clipped(photographs: Sequence[Photograph]) -> Numbers:
-    """(N,) part of the pixels of each surfel that are saturated."""
-    saturated, shown = 0.0, 0.0
-    for photograph in photographs:
-        rows = photograph.rows
-        saturated = saturated + rows.T @ photograph.saturated
-        shown = shown + np.asarray(rows.sum(axis=0)).ravel()
-    return saturated / np.maximum(shown, 1e-12)
+def _shown(photographs: Sequence[Photograph], weights: Sequence[Numbers]) -> tuple[Numbers, Numbers]:
+    """(N,) pixels that show each surfel, and (N, 3) those of them that are saturated, by weights (P,) of pixels."""
+    shown, saturated = 0.0, 0.0
+    for photograph, weight in zip(photographs, weights, strict=True):
+        back = photograph.rows.T
+        shown, saturated = shown + back @ weight, saturated + back @ (photograph.saturated * weight[:, None])
+    return shown, saturated
 
 
 def _radiance(
     photographs: Sequence[Photograph], cameras: Cameras, weights: Sequence[Numbers]
-) -> tuple[Numbers, Numbers, sp.linalg.SuperLU]:
-    """(N, 3) radiance, (N,) how much of the pixels shows each surfel, and the normal equations."""
+) -> tuple[Numbers, sp.linalg.SuperLU]:
+    """(N, 3) radiance, and the normal equations."""
     seen, right, matrix = 0.0, 0.0, 0.0
     for photograph, even, weight in zip(photographs, cameras.even(photographs), weights, strict=True):
         rows = photograph.rows
@@ -174,7 +180,7 @@ def _radiance(
     pull = PULL * seen + 1e-9
     normal = factorised((matrix + sp.diags(pull)).tocsc())
     mean = right / np.maximum(seen, 1e-12)[:, None]
-    return np.maximum(normal.solve(right + pull[:, None] * mean), 0.0), seen, normal
+    return np.maximum(normal.solve(right + pull[:, None] * mean), 0.0), normal
 
 
 def _log_variance(

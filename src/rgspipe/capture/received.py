@@ -5,8 +5,8 @@ camera saw, u, send what they get, with the albedo that the field continues into
 
     L_u = (1 − ρ_u F_uu)⁻¹ ρ_u (Σ a e_u + F_us L_s) .
 
-So all that arrives is linear in the lamps,  Σ a T e + G ,  with  T e = e + F_·u (1 − ρ_u F_uu)⁻¹ ρ_u e_u  and G what
-the measured radiance becomes.
+A surfel that is known in some channels only is seen in those, and unseen in the others. So all that arrives is linear
+in the lamps,  Σ a T e + G ,  with  T e = e + F_·u (1 − ρ_u F_uu)⁻¹ ρ_u e_u  and G what the measured radiance becomes.
 """
 
 from __future__ import annotations
@@ -29,25 +29,28 @@ class Received:
 
     Attributes:
         gather: (N, N) F.
-        unseen: (U,) surfels whose radiance was not measured.
-        albedo: (U, 3) of those.
+        unseen: (U,) surfels whose radiance was not measured in all channels.
+        told: (U, 3) bool, channels in which it was.
+        albedo: (U, 3) of those; 0 in these channels.
         seen: (N, 3) F_·s L_s, what arrives from the seen.
     """
 
     gather: sp.csr_matrix
     unseen: np.ndarray
+    told: np.ndarray
     albedo: Numbers
     seen: Numbers
 
     @classmethod
     def of(cls, gather: sp.csr_matrix, radiance: Numbers, seen: np.ndarray, albedo: Numbers) -> Received:
-        """With the measured `radiance` (N, 3) where `seen` (N,) bool, and `albedo` (N, 3) elsewhere."""
-        unseen = (~seen).nonzero()[0]
-        return cls(gather, unseen, albedo[unseen], gather @ np.where(seen[:, None], radiance, 0.0))
+        """With the measured `radiance` (N, 3) where `seen` (N, 3) bool, and `albedo` (N, 3) elsewhere."""
+        unseen = (~seen.all(axis=1)).nonzero()[0]
+        told = seen[unseen]
+        return cls(gather, unseen, told, np.where(told, 0.0, albedo[unseen]), gather @ np.where(seen, radiance, 0.0))
 
     def with_albedo(self, albedo: Numbers) -> Received:
         """With another albedo (N, 3); that of the seen is not looked at."""
-        return replace(self, albedo=albedo[self.unseen])
+        return replace(self, albedo=np.where(self.told, 0.0, albedo[self.unseen]))
 
     @cached_property
     def known(self) -> Numbers:

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rgspipe.capture.bounds import with_bounds
 from rgspipe.capture.doubts import model_variance
 from rgspipe.capture.lamps import DARK, LampProblem, Lamps
 from rgspipe.capture.photographs import Numbers
@@ -68,9 +69,10 @@ class Candidates:
 
 def ranked(problem: LampProblem, candidates: Candidates, known: Lamps | None) -> tuple[Numbers, Numbers]:
     """(C,) cost of one more grey lamp at each candidate, and (C,) the logarithm of its intensity over π."""
-    target = problem.target.mean(axis=1)
+    grey = _grey(problem)
+    target = (grey * problem.target).sum(axis=1)
     light = problem.received.known + (0.0 if known is None else known.arriving)
-    light = np.maximum(np.exp(np.log(np.maximum(light, 1e-300)).mean(axis=1)), DARK * np.median(light))
+    light = np.maximum(np.exp((grey * np.log(np.maximum(light, 1e-300))).sum(axis=1)), DARK * np.median(light))
     sent = np.exp(target) * 0.2
     costs, logs = [], []
     for begin in range(0, candidates.shares.shape[1], BATCH):
@@ -88,6 +90,15 @@ def ranked(problem: LampProblem, candidates: Candidates, known: Lamps | None) ->
         costs.append((residual * problem.field.whitened(residual)).sum(axis=0))
         logs.append(gain)
     return np.concatenate(costs), np.concatenate(logs)
+
+
+def _grey(problem: LampProblem) -> Numbers:
+    """(N, 3) what each channel counts in the mean of those that were measured."""
+    told = problem.field.told
+    if told is None:
+        return np.full((len(problem.radiance), 3), 1.0 / 3.0)
+    known = np.where(told.any(axis=1, keepdims=True), told, True)
+    return known / known.sum(axis=1, keepdims=True)
 
 
 def with_one_more(problem: LampProblem, candidates: Candidates, known: Lamps | None, told: Told) -> Lamps:
@@ -129,6 +140,7 @@ def looked_for_again(problem: LampProblem, candidates: Candidates, lamps: Lamps,
 
 def weighed(problem: LampProblem, lamps: Lamps | None) -> LampProblem:
     """The problem with what belongs to `lamps`: the albedo of the unseen, variances, and trust in the surfels."""
+    problem, lamps = with_bounds(problem, lamps)
     measured = problem.pixels + model_variance(problem, lamps, problem.rays)
     problem = replace(problem, field=replace(problem.field, measured=measured))
     if lamps is None:
@@ -179,7 +191,7 @@ class OneMore:
     @classmethod
     def between(cls, fewer: Tried, more: Tried) -> OneMore:
         """By the variances that are most likely for either."""
-        measurements = 3 * int((more.problem.field.weight > 0.0).sum())
+        measurements = more.problem.field.measurements
         gain = 1.0 - float(np.exp(min(0.0, more.deviance - fewer.deviance) / max(measurements, 1)))
         sent = more.lamps.sent(more.problem.frozen.areas.double().cpu().numpy())
         faint = sent.min() < BAR.faint * sent.sum()
@@ -245,8 +257,8 @@ def over_even(best: Tried) -> float:
     does not.
     """
     problem = best.problem
-    ones = problem.field.whitened(np.ones((len(problem.radiance), 1)))[:, 0]
-    residual = problem.target - (ones @ problem.target) / max(float(ones.sum()), 1e-300)
+    ones = problem.field.whitened_colours(np.ones_like(problem.target))
+    residual = problem.target - (ones * problem.target).sum(axis=0) / np.maximum(ones.sum(axis=0), 1e-300)
     even = with_likely_variances(problem.field, residual).deviance(residual)
-    measurements = 3 * int((problem.field.weight > 0.0).sum())
+    measurements = problem.field.measurements
     return 1.0 - float(np.exp(min(0.0, best.deviance - even) / max(measurements, 1)))

@@ -44,15 +44,17 @@ def found_in_turns(problems: Sequence[LampProblem], search: Callable[[LampProble
 
 def informed(problem: LampProblem, others: Sequence[Tried]) -> LampProblem:
     """The problem of one capture with what the lamps of others make of the albedo."""
-    precision, weighted = np.zeros(len(problem.radiance)), np.zeros_like(problem.radiance)
+    precision, weighted = np.zeros((len(problem.radiance), 1)), np.zeros_like(problem.radiance)
     for other in others:
-        weight = other.problem.field.weight
+        weight = np.stack([own.weight for own in other.problem.field.channels], axis=1)
         log_albedo = np.log(other.problem.radiance) - np.log(other.problem.arriving(other.lamps))
-        precision += weight
-        weighted += weight[:, None] * (log_albedo - np.log(problem.predicted))
+        precision = precision + weight
+        weighted += weight * (log_albedo - np.log(problem.predicted))
     known = others[0].problem.field
-    mean = factorised((known.precision + sp.diags(precision)).tocsc()).solve(weighted)
-    predicted = problem.predicted * np.exp(mean)
+    parts = zip(precision.T, np.split(weighted, precision.shape[1], axis=1), strict=True)
+    mean = [factorised((known.precision + sp.diags(own)).tocsc()).solve(part) for own, part in parts]
+    predicted = problem.predicted * np.exp(np.concatenate(mean, axis=1))
+    precision = precision if precision.shape[1] == 3 else precision[:, 0]
     field = replace(problem.field, variances=known.variances, rough=known.rough, known=precision)
     return replace(problem, predicted=predicted, field=field, prediction=None)
 
@@ -63,6 +65,7 @@ def without(capture: Measured, off: Measured) -> Measured:
     grey = np.maximum(left.mean(axis=1), 1e-300)
     squared = capture.variance * capture.radiance.mean(axis=1) ** 2 + off.variance * off.radiance.mean(axis=1) ** 2
     plain = (left > LEAST_LEFT * capture.radiance).all(axis=1) & np.isfinite(squared)
+    plain &= ~off.blown_out.any(axis=1)
     seen = np.where(plain, np.minimum(capture.seen, off.seen), 0.0)
     middle = np.median(left[plain], axis=0) if plain.any() else np.ones(3)
     radiance = np.where(plain[:, None], left, np.maximum(middle, 1e-300))

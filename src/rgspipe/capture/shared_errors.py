@@ -28,7 +28,7 @@ from rgspipe.training.albedo import ALBEDO_RANGE
 def shared_covariance(problem: LampProblem, lamps: Lamps, parts: np.ndarray) -> Numbers:
     """(6 K, 6 K) of the lamps' numbers; `parts` (N,) says which part of the scene each surfel is of."""
     jacobian, spread = problem.jacobian(lamps), problem.covariance(lamps)
-    whitened = [problem.field.whitened(columns) for columns in jacobian]
+    whitened = [problem.field.channel(c).whitened(columns) for c, columns in enumerate(jacobian)]
     shifts = [*_beyond(problem, lamps, parts), *_unseen(problem, lamps, parts)]
     moved = [spread @ sum(part.T @ shift[:, k] for k, part in enumerate(whitened)) for shift in shifts]
     missing = spread @ sum(part.T for part in whitened) @ _missing(problem, lamps)
@@ -39,7 +39,8 @@ def excess(problem: LampProblem, lamps: Lamps) -> Numbers:
     """(N, 3) by how much the logarithm of the albedo is beyond what surfaces may reflect; 0 where nothing was seen."""
     albedo = problem.albedo(lamps)
     beyond = np.maximum(np.log(albedo / ALBEDO_RANGE[1]), 0.0)
-    return np.where((problem.field.weight > 0.0)[:, None], beyond, 0.0)
+    used = np.stack([problem.field.channel(c).weight > 0.0 for c in range(3)], axis=1)
+    return np.where(used, beyond, 0.0)
 
 
 def _beyond(problem: LampProblem, lamps: Lamps, parts: np.ndarray) -> Iterator[Numbers]:

@@ -76,32 +76,44 @@ class _Squares:
 
     @cached_property
     def _mean(self) -> Numbers:
-        return self.field.mean(self.residual)
+        return self.field.mean_colours(self.residual)
 
     @cached_property
-    def _draws(self) -> Numbers:
-        return self.field.draws(DRAWS, self.seed)
+    def _draws(self) -> list[Numbers]:
+        """(N, DRAWS) of each channel, or of all where they do not differ."""
+        return [own.draws(DRAWS, self.seed) for own in self.field.channels]
 
     @cached_property
     def _unknown(self) -> Numbers:
-        """(N,) variance of the field."""
-        return (self._draws**2).mean(axis=1)
+        """(N, 1 or 3) variance of the field."""
+        return np.stack([(draws**2).mean(axis=1) for draws in self._draws], axis=1)
+
+    @cached_property
+    def _weight(self) -> Numbers:
+        """(N, 1 or 3) of the measurements."""
+        return np.stack([own.weight for own in self.field.channels], axis=1)
+
+    @cached_property
+    def _told(self) -> Numbers:
+        """(N, 1 or 3) 1 where there may be one."""
+        return np.ones((len(self.residual), 1)) if self.field.told is None else self.field.told.astype(np.float64)
 
     @cached_property
     def _left(self) -> Numbers:
-        """(N,) squares of what the field leaves over the variance of the measurement; 0 where there is none."""
-        return self.field.weight * ((self.residual - self._mean) ** 2).mean(axis=1)
+        """(N, 3) squares of what the field leaves over the variance of the measurement; 0 where there is none."""
+        return self._weight * (self.residual - self._mean) ** 2
 
     @cached_property
     def _explained(self) -> Numbers:
-        """(N,) part of a measurement that the field follows."""
-        return np.minimum(self.field.weight * self._unknown, FOLLOWED)
+        """(N, 1 or 3) part of a measurement that the field follows."""
+        return np.minimum(self._weight * self._unknown, FOLLOWED)
 
     def _steps(self) -> tuple[float, Numbers]:
         """1/λ, and (S,) h."""
         surfels = np.bincount(self.field.graph.surfaces)
         rough = _or_ones(self.field.rough, len(surfels))
-        squares, unknown = self._bends(self._mean), self._bends(self._draws)
+        squares = self._bends(self._mean)
+        unknown = np.mean([self._bends(draws) for draws in self._draws], axis=0)
         known = surfels - 1.0 - unknown / (self.field.variances.step * rough)
         return _shared(squares, np.maximum(known, LEAST_FREE * (surfels - 1.0)), rough)
 
@@ -116,7 +128,7 @@ class _Squares:
     def _surface(self) -> float:
         """τ²."""
         sizes, count = self.field.graph.sizes, self.field.graph.surfaces.max() + 1
-        known = count - (self._unknown / sizes).sum() / self.field.variances.surface
+        known = count - (self._unknown.mean(axis=1) / sizes).sum() / self.field.variances.surface
         return float(((self._mean**2).mean(axis=1) / sizes).sum() / max(known, LEAST_FREE * count))
 
     def _noises(self) -> tuple[float, Numbers]:
@@ -124,15 +136,17 @@ class _Squares:
         field, surfaces = self.field, self.field.graph.surfaces
         count = surfaces.max() + 1
         share = np.where(np.isfinite(field.measured), field.noise / (field.measured + field.noise), 0.0)
-        squares = np.bincount(surfaces, share * field.noise * self._left, minlength=count)
-        known = np.bincount(surfaces, share * (1.0 - self._explained), minlength=count)
+        squares = np.bincount(surfaces, share * field.noise * self._left.mean(axis=1), minlength=count)
+        known = np.bincount(surfaces, share * (self._told * (1.0 - self._explained)).mean(axis=1), minlength=count)
         return _shared(squares, known, _or_ones(field.grain, count))
 
     def _trust(self) -> Numbers:
         """(N,) what measurements count beside their variance, by what all others say of them."""
-        known, trust = np.isfinite(self.field.measured), self.field.trust
+        told, trust = self._told.mean(axis=1), self.field.trust
+        known = np.isfinite(self.field.measured) & (told > 0.0)
         # The field follows what it is given: without a surfel's own part it would be further off.
-        plain = np.divide(self._left, trust, out=np.zeros_like(trust), where=trust > 0.0) / (1.0 - self._explained)
+        left = (self._left / (1.0 - self._explained)).mean(axis=1)
+        plain = np.divide(left, trust * told, out=np.zeros_like(trust), where=trust * told > 0.0)
         return np.where(known, (FREEDOM + 1.0) / (FREEDOM + plain), 0.0)
 
 

@@ -103,8 +103,8 @@ def _doubts(found: Captured) -> Iterator[str]:
     blown_out = float(found.measured.blown_out.mean())
     if blown_out > NOTICEABLE:
         yield (
-            f"{100.0 * blown_out:.0f} % of the surfaces, the brightest, are saturated: how bright they are is a guess, "
-            "and lamps may be farther off than is said. Expose for the brightest surfaces."
+            f"{100.0 * blown_out:.0f} % of what surfaces send, the brightest, is saturated in every photograph: it is "
+            "known to be at least so bright. Lamps may be farther off than is said; expose for the brightest surfaces."
         )
     unmeasured = 1.0 - float((found.answer.best.problem.field.weight > 0.0).mean())
     if unmeasured > UNMEASURED:
