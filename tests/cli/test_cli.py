@@ -14,6 +14,8 @@ import rgspipe as rg
 from rgspipe.cli import main
 from rgspipe.cli.commands import COMMANDS
 from rgspipe.cli.help import PAGES, help_text, topics
+from rgspipe.cli.messages import show_input_error
+from rgspipe.errors import InputError
 from rgspipe.stages import NAMES
 from rgspipe.store.status import RunStatus
 
@@ -237,6 +239,15 @@ def test_what_went_wrong_fits_the_terminal(
     assert main(["status", f"outputs={tmp_path}"]) == 0
     _, *reason = capsys.readouterr().out.splitlines()
     assert len(reason) == 3 and max(map(len, reason)) <= min(width, 110) and reason[-1].endswith(" …")
+
+
+def test_a_path_that_is_longer_than_a_line_stays_behind_the_word(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", "60")
+    path = "/" + 80 * "a"
+    show_input_error(InputError(path, expected="a file", found="none", remedy="Name one."))
+    assert capsys.readouterr().err == f"Error: {path}:\nexpected a file, found none. Name one.\n"
 
 
 def test_a_failure_is_short_and_its_traceback_is_kept(rgspipe, tmp_path: Path) -> None:

@@ -115,7 +115,7 @@ def test_what_another_prune_removes_is_not_told_as_a_run(outputs: Path, capsys: 
         assert main(["outputs", "prune", f"outputs={outputs}"]) == 0
         assert "refused for now" in capsys.readouterr().out.splitlines()[-1]
         assert main(["outputs", "prune", f"outputs={outputs}", "remove=true"]) == 2
-    told = capsys.readouterr().err
+    told = " ".join(capsys.readouterr().err.split())
     assert "another outputs prune" in told and "process that makes" not in told and "status" not in told
     assert len(list(outputs.glob("cornell/*/[0-9a-f]*"))) == 6
 

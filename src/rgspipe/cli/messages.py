@@ -35,8 +35,10 @@ def show_input_error(error: InputError, option: bool = False) -> None:
     """One paragraph on stderr; the traceback before it only if asked for."""
     if traceback_wanted(option):
         traceback.print_exception(error, file=sys.stderr)
-    told = textwrap.fill(f"Error: {error}", line_width(), break_long_words=False, break_on_hyphens=False)
-    print(told, file=sys.stderr)
+    # A path that is longer than a line stays behind the word.
+    told = f"Error:\N{NO-BREAK SPACE}{error}"
+    told = textwrap.fill(told, line_width(), break_long_words=False, break_on_hyphens=False)
+    print(told.replace("\N{NO-BREAK SPACE}", " ", 1), file=sys.stderr)
 
 
 def show_failure(error: BaseException, status: Path, option: bool = False) -> None:
