@@ -21,7 +21,8 @@ from rgspipe.progress import ProgressBar, progress_bar
 POINTS, BEAMS = 0.8, 7.0
 
 #: Efforts of what follows, for one point; for others `weight` times as much, which was found by one to three points and
-#: a spot: measured half to twice of it. Answers are polished on few pixels, and on all.
+#: a spot, before few pixels were looked at first: two points take a third to a half of it since. Answers are polished
+#: on few pixels, and on all.
 KINDS, BLOCKS_BESIDE, POLISH, BESIDE, BRIGHT_SPOTS = 0.4, 0.3, 0.6, 0.4, 0.6
 
 #: Efforts of what comes first and last.
