@@ -15,6 +15,7 @@ import pytest
 import torch
 import warp as wp
 from torch import Tensor
+from torch.autograd.graph import _engine_run_backward as run_backward
 from torch.overrides import TorchFunctionMode
 
 CPU, CUDA = torch.device("cpu"), torch.device("cuda", 0)
@@ -54,6 +55,12 @@ class _Mode(TorchFunctionMode):
             wanted = CUDA
             if kwargs.get("generator") is not None:
                 raise RuntimeError("a generator of the CPU cannot draw on cuda")
+        if name == "backward":
+            # Functions of our own make tensors in it, which the mode sees where it is entered again; torch's own door
+            # to it would then lead here.
+            with self:
+                roots = (args[0],), (torch.ones_like(args[0]),)
+                return run_backward(*roots, False, False, (), allow_unreachable=True, accumulate_grad=True)
         result = function(*args, **kwargs)
         if wanted is None and (name in INDEXING or name in COPYING):
             wanted = where(args[0])
@@ -83,7 +90,7 @@ def _moved(name: str, args: tuple, kwargs: dict[str, Any]) -> Tensor:
         moved = tensor.to(*plain, **{key: x for key, x in kwargs.items() if key != "device"})
     else:
         moved = tensor
-    if target is not None and moved is tensor and (where(tensor) or target).type != target.type:
+    if target is not None and moved is tensor and (where(tensor) or CPU).type != target.type:
         moved = tensor.clone() if tensor.layout == torch.strided else tensor.detach().clone()
     if moved is tensor and where(tensor) is not None:
         return tensor
@@ -135,6 +142,7 @@ def pretend_cuda() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch, _Mode():
         patch.setattr(torch, "from_numpy", lambda value: _marked(from_numpy(value), CPU))
         patch.setattr(torch.cuda, "is_available", lambda: True)
+        patch.setattr(torch.cuda, "synchronize", lambda device=None: None)
         patch.setattr(wp, "from_torch", as_warp)
         patch.setattr(wp, "to_torch", as_torch)
         patch.setattr(wp, "device_from_torch", lambda device: "cpu")

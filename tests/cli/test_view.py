@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 import torch
 
-from rgspipe.cli.view import DEMO, Wanted, parsed, serve, view_folder
+from rgspipe.cli.view import DEMO, Asked, parsed, serve, view_folder
 from rgspipe.errors import InputError
 from rgspipe.light_export.world import World
 from rgspipe.renderer.frozen import FrozenScene
@@ -27,9 +27,9 @@ def test_what_the_demo_says_fits_a_terminal() -> None:
 
 
 def test_a_folder_and_keys_are_understood() -> None:
-    words = ["a/b", "lights=l.json", "target=t", "fit=f", "port=0", "resolution=64", "address=::1"]
-    assert parsed(words) == Wanted(Path("a/b"), "l.json", "t", "f", 0, 64, "::1")
-    assert parsed(["a"]) == Wanted(Path("a"))
+    words = ["a/b", "lights=l.json", "target=t", "fit=f", "port=0", "resolution=64", "address=::1", "device=cpu"]
+    assert parsed(words) == Asked(Path("a/b"), "l.json", "t", "f", 0, 64, "::1", "cpu")
+    assert parsed(["a"]) == Asked(Path("a"))
 
 
 @pytest.mark.parametrize(
@@ -40,6 +40,7 @@ def test_a_folder_and_keys_are_understood() -> None:
         (["a", "prt=3"], "Did you mean port="),
         (["a", "port=x"], "port: expected a whole number"),
         (["a", "port=70000"], "70000"),
+        (["a", "device=gpu"], "device: expected auto or cpu or cuda, found 'gpu'"),
         (["a", "resolution=16"], "resolution: expected a whole number from 32 to 2048, found '16'"),
     ],
 )
@@ -75,7 +76,8 @@ def test_lamps_are_exported_to_where_they_are_in_the_scene_s_own_file(
     info = tmp_path / "room" / "generate_dataset" / "aa" / "dataset_info.json"
     info.write_text(json.dumps({"version": 1, "rescale": 0.25, "offset": [1.0, 2.0, -3.0]}))
     given = {}
-    monkeypatch.setattr(FrozenScene, "load", lambda folder: None)
+    scene = FrozenScene.freeze(closed_box(0.5).to(torch.float32))
+    monkeypatch.setattr(FrozenScene, "load", lambda folder: scene)
     monkeypatch.setattr("rgspipe.viewer.serve.view", lambda *_, **words: given.update(words) or Served())
     assert view_folder([str(folder)]) == 0
     assert given["world"] == World(1.0, 0.25, (1.0, 2.0, -3.0))

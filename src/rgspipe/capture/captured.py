@@ -102,7 +102,7 @@ def capture_scenes(
     *,
     where: str | Path = "the photographs",
 ) -> list[Captured]:
-    """The same for each lighting of the photographs, which share the room's albedo.
+    """The same for each lighting of the photographs, which share the room's albedo; on the CPU.
 
     Args:
         views: the photographs, with their cameras; their lights are not known. All of one `lighting` share their
@@ -122,7 +122,8 @@ def capture_scenes(
     if not isinstance(surfels, Surfels):
         surfels = as_count(surfels, "surfels", remedy="Pass surfels, or how many to make.")
         surfels = initialise_surfels(views, surfels, seed=options.seed, where=where)
-    surfels = surfels.to(torch.float32)
+    # Its statistics are scipy's.
+    surfels, views = surfels.to(torch.float32).to("cpu"), [view.to("cpu") for view in views]
     if options.unseen:
         surfels = with_unseen_surfaces(surfels, [view.camera for view in views], depths=[view.depth for view in views])
     weights = trace_views(surfels, views, options.supersampling, OperatorStore(options.memory_mib))

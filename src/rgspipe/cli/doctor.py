@@ -139,10 +139,10 @@ def _print_machine() -> None:
     if threads < cores:
         print(_wrapped(f"{threads} of {cores} cores work: unset OMP_NUM_THREADS to have them all.", "  "))
     if torch.cuda.is_available():
-        print(f"CUDA: {torch.cuda.get_device_name()}; in Python scene.to('cuda'). Stages run on the CPU.")
+        print(f"CUDA: {torch.cuda.get_device_name()}; stages use it unless device=cpu says otherwise.")
     else:
         why = "torch is built without it" if torch.version.cuda is None else "no device or no driver"
-        print(_wrapped(f"none ({why}). In Python scene.to('cuda') would use it; stages need none.", "CUDA: "))
+        print(_wrapped(f"none ({why}). Nothing needs it; it makes trainings and fits faster.", "CUDA: "))
 
 
 def _counted(count: int, what: str) -> str:

@@ -9,12 +9,14 @@ from pathlib import Path
 from typing import Any
 
 from rgspipe.errors import InputError
+from rgspipe.machine.device import CHOICES, Wanted, chosen_device
 
 #: Keys of every page, and what they mean.
 PAGE_KEYS = {
     "port": "of the page",
     "resolution": "pixels along the longer side of pictures at rest",
     "address": "of this machine to listen at, if others are to look; then with a token",
+    "device": "where pictures are made: auto (a CUDA GPU where there is one), cpu or cuda",
 }
 
 #: What can be said beside the folder of a scene.
@@ -32,7 +34,7 @@ looked for in what it lights."""
 
 
 @dataclass(frozen=True)
-class Wanted:
+class Asked:
     """What a command line asks for."""
 
     folder: Path
@@ -42,6 +44,7 @@ class Wanted:
     port: int = 8080
     resolution: int = 256
     address: str = "127.0.0.1"
+    device: Wanted = "auto"
 
 
 def view_folder(arguments: Sequence[str]) -> int:
@@ -50,7 +53,7 @@ def view_folder(arguments: Sequence[str]) -> int:
     Raises:
         InputError: an argument or a file cannot be used.
     """
-    wanted = parsed(arguments)
+    asked = parsed(arguments)
 
     from rgspipe.datasets.light_file import read_lights
     from rgspipe.renderer.frozen import FrozenScene
@@ -61,20 +64,21 @@ def view_folder(arguments: Sequence[str]) -> int:
     from rgspipe.viewer.material import Case, case_in, found_in
     from rgspipe.viewer.serve import view
 
-    if wanted.target is not None:
-        check_target(wanted.target)
-    found = None if wanted.fit is None else found_in(wanted.fit)
-    case = Case(found=found) if wanted.target is None else case_in(wanted.target, found)
+    device = chosen_device(asked.device)
+    if asked.target is not None:
+        check_target(asked.target)
+    found = None if asked.fit is None else found_in(asked.fit)
+    case = Case(found=found) if asked.target is None else case_in(asked.target, found)
     viewer = view(
-        FrozenScene.load(wanted.folder),
-        None if wanted.lights is None else read_lights(wanted.lights),
+        FrozenScene.load(asked.folder).to(device),
+        None if asked.lights is None else read_lights(asked.lights),
         cases=[case],
-        port=wanted.port,
-        resolution=wanted.resolution,
-        address=wanted.address,
-        world=world_of(1.0, origin_of(wanted.folder / SURFELS)),
+        port=asked.port,
+        resolution=asked.resolution,
+        address=asked.address,
+        world=world_of(1.0, origin_of(asked.folder / SURFELS)),
     )
-    return serve(viewer, wanted.port)
+    return serve(viewer, asked.port)
 
 
 def demo(arguments: Sequence[str]) -> int:
@@ -87,15 +91,16 @@ def demo(arguments: Sequence[str]) -> int:
     if folders:
         remedy = "For a scene of yours: rgspipe view FOLDER."
         raise InputError("demo", expected="no folder: it has a scene of its own", found=folders[0], remedy=remedy)
+    device = chosen_device(given.pop("device", Asked.device))
     print("Making the light of a small room ready …", flush=True)
 
     from rgspipe.demo import TARGET, demo_scene
     from rgspipe.viewer.material import case_in
     from rgspipe.viewer.serve import view
 
-    viewer = view(demo_scene(), cases=[case_in(TARGET)], **given)
+    viewer = view(demo_scene(device), cases=[case_in(TARGET)], **given)
     print(DEMO)
-    return serve(viewer, given.get("port", Wanted.port))
+    return serve(viewer, given.get("port", Asked.port))
 
 
 def serve(viewer: Any, port: int) -> int:
@@ -115,7 +120,7 @@ def serve(viewer: Any, port: int) -> int:
     return 0
 
 
-def parsed(arguments: Sequence[str]) -> Wanted:
+def parsed(arguments: Sequence[str]) -> Asked:
     """What the arguments after `view` say: a folder, and KEY=VALUE.
 
     Raises:
@@ -125,7 +130,7 @@ def parsed(arguments: Sequence[str]) -> Wanted:
     if len(folders) != 1:
         found, remedy = " ".join(folders) or "none", "Say which: view outputs/cornell/freeze/latest."
         raise InputError("view", expected="the folder of one frozen scene", found=found, remedy=remedy)
-    return Wanted(Path(folders[0]), **given)
+    return Asked(Path(folders[0]), **given)
 
 
 def _split(arguments: Sequence[str], keys: Mapping[str, str]) -> tuple[list[str], dict[str, Any]]:
@@ -156,4 +161,12 @@ def _whole(key: str, text: str) -> int:
 #: Least, most and usual number of a key: told before a scene is made ready, which takes seconds.
 _RANGES = {"port": (0, 65535, 8080), "resolution": (32, 2048, 256)}
 
-_READERS: dict[str, Callable[[str, str], Any]] = dict.fromkeys(_RANGES, _whole)
+
+def _device(key: str, text: str) -> str:
+    if text not in CHOICES:
+        remedy = "auto takes a GPU where there is one."
+        raise InputError(key, expected=" or ".join(CHOICES), found=repr(text), remedy=remedy)
+    return text
+
+
+_READERS: dict[str, Callable[[str, str], Any]] = {**dict.fromkeys(_RANGES, _whole), "device": _device}

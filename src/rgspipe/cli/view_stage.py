@@ -57,6 +57,7 @@ class _Made:
 def _serve(made: _Made) -> int:
     from rgspipe.cli.view_capture import captured
     from rgspipe.datasets.info import INFO
+    from rgspipe.machine.device import chosen_device
     from rgspipe.renderer.frozen import FrozenScene
     from rgspipe.stages.scene.export import world_of
     from rgspipe.viewer.serve import view
@@ -67,7 +68,7 @@ def _serve(made: _Made) -> int:
     world = world_of(config.export.metres, None if dataset is None else dataset.folder() / INFO)
     page = config.viewer
     viewer = view(
-        FrozenScene.load(freeze.folder()),
+        FrozenScene.load(freeze.folder()).to(chosen_device(config.device)),
         cases=[*_cases(made, config), *captured(made.find, config)],
         references=_references(dataset),
         port=page.port,

@@ -25,6 +25,7 @@ from rgspipe.config.viewer import ViewerConfig
 from rgspipe.datasets.classes import LightClass
 from rgspipe.datasets.reading_limits import ReadingLimits
 from rgspipe.degradation.options import Capture, ModelError, TargetCapture
+from rgspipe.machine.device import Wanted
 from rgspipe.options import Options, option
 
 
@@ -55,6 +56,8 @@ class RgspipeConfig(Options):
     """what to do about missing inputs"""
     outputs: str = "outputs"
     """folder of artifacts and reports, relative to the current one"""
+    device: Wanted = "auto"
+    """where training, freezing, fitting and relighting compute; auto: on a CUDA GPU where there is one"""
     seed: int = option(0, low=0, high=2**31 - 1)
     """seed of the fit's own draws"""
     occlusion: Literal[LightClass, "all"] = "all"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 import torch
@@ -12,7 +12,7 @@ from rgspipe.arguments import as_one_of
 from rgspipe.datasets.classes import Occlusion
 from rgspipe.errors import InputError
 from rgspipe.scene import Camera, PointLight
-from rgspipe.scene.arrays import as_tensor
+from rgspipe.scene.arrays import as_device, as_tensor
 from rgspipe.scene.lights import Light
 from rgspipe.scene.shapes import Float
 
@@ -69,6 +69,12 @@ class View:
         if self.saturated_from is None:
             return torch.zeros_like(self.image, dtype=torch.bool)
         return self.image >= self.saturated_from
+
+    def to(self, device: torch.device | str) -> View:
+        """The same view with its images on another device, which must be there."""
+        device = as_device(device)
+        parts = {field.name: getattr(self, field.name) for field in fields(self)}
+        return replace(self, **{name: part.to(device) for name, part in parts.items() if isinstance(part, Tensor)})
 
     def as_photographed(self, rendered: Float[Tensor, "H W 3"]) -> Float[Tensor, "H W 3"]:
         """A render (H, W, 3) that is the image wherever that is saturated and the render at least as bright."""

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import torch
+
 from rgspipe.datasets.surfel_file import load_surfels
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.frozen_file import SURFELS
@@ -18,6 +20,6 @@ TARGET = ROOM / "targets" / "hidden"
 GATHER_RAYS, PATCHES = 128, 400
 
 
-def demo_scene() -> FrozenScene:
+def demo_scene(device: torch.device | str = "cpu") -> FrozenScene:
     """The scene, frozen now: its operators take ten times the space of its surfels."""
-    return FrozenScene.freeze(load_surfels(ROOM / SURFELS), gather_rays=GATHER_RAYS, patches=PATCHES)
+    return FrozenScene.freeze(load_surfels(ROOM / SURFELS).to(device), gather_rays=GATHER_RAYS, patches=PATCHES)

@@ -81,7 +81,8 @@ def render_held_out(
     Raises:
         ValueError: surfels with gloss, and no gather operator or no transport.
     """
-    store = store or OperatorStore()
+    store, device, given = store or OperatorStore(), surfels.centers.device, views
+    views = [view.to(device) for view in given]
     weights = trace_views(surfels, views, supersampling, store)
     bvh, own = SurfelBvh(surfels), surfels.albedo.float()
     lighting = trace_lighting(bvh, views)
@@ -96,9 +97,9 @@ def render_held_out(
         bounced = [None] * len(views) if transport is None else indirect_irradiance(lighting, own, transport)
         flat = [model.image(own, indirect) for model, indirect in zip(models, bounced, strict=True)]
     images = tuple(_image(view, pixels) for view, pixels in zip(views, flat, strict=True))
-    albedo = tuple(weight.image(own).numpy() for weight in weights)
-    return HeldOut(tuple(views), images, albedo)
+    albedo = tuple(weight.image(own).cpu().numpy() for weight in weights)
+    return HeldOut(tuple(given), images, albedo)
 
 
 def _image(view: View, pixels: Tensor) -> npt.NDArray[np.float32]:
-    return view.as_photographed(pixels.reshape(view.image.shape)).numpy()
+    return view.as_photographed(pixels.reshape(view.image.shape)).cpu().numpy()

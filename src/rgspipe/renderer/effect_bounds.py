@@ -10,6 +10,7 @@ from typing import Any
 
 import torch
 
+from rgspipe.machine.device import finish
 from rgspipe.renderer.effects import Effects
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.glossy import largest_lobe
@@ -110,18 +111,24 @@ def measure_costs(frozen: FrozenScene) -> dict[str, float]:
     }
     if frozen.gloss is not None:
         pairs["specular lobes"] = lambda on: frozen.radiance_of(point, Effects(shadows=False, lobes=on))
-    return {name: max(0.0, _milliseconds(run, True) - _milliseconds(run, False)) for name, run in pairs.items()}
+    device = frozen.device
+    return {
+        name: max(0.0, _milliseconds(run, True, device) - _milliseconds(run, False, device))
+        for name, run in pairs.items()
+    }
 
 
 def _at_most(numerator: float, denominator: float) -> float:
     return min(NO_BOUND, numerator / denominator) if denominator > 0.0 else NO_BOUND
 
 
-def _milliseconds(run: Callable[[bool], object], on: bool) -> float:
+def _milliseconds(run: Callable[[bool], object], on: bool, device: torch.device) -> float:
     run(on)
+    finish(device)
     times = []
     for _ in range(RUNS):
         begin = time.perf_counter()
         run(on)
+        finish(device)
         times.append(1e3 * (time.perf_counter() - begin))
     return min(times)

@@ -45,9 +45,9 @@ class PixelDirect:
     def __init__(self, bvh: SurfelBvh, view: ViewWeights, pixels: Tensor | None = None) -> None:
         self._bvh, self._camera = bvh, view.camera
         whole = pixels is None or len(pixels) == view.camera.pixel_count
-        self._pixels = torch.arange(view.camera.pixel_count) if pixels is None else pixels.cpu()
+        self._pixels = torch.arange(view.camera.pixel_count, device=bvh.device) if pixels is None else pixels
         self.weights = view.operator if whole else view.operator.rows(self._pixels)
-        self._edges, self._coverage = (part.cpu()[self._pixels].to(bvh.device) for part in (view.edges, view.coverage))
+        self._edges, self._coverage = view.edges[self._pixels], view.coverage[self._pixels]
         self._rays = pixel_rays(bvh, view.camera, self._pixels)
         scales = bvh.surfels.scales.detach().prod(dim=1).sqrt()
         self._light = PixelLight(bvh, self.weights.matrix, self._edges, self._rays, float(SOFTENING) * scales)

@@ -43,10 +43,11 @@ def lobe_cosines(
     origin = view.camera.origin.to(centers)
     points = centers
     if at_pixels:
-        rows = torch.repeat_interleave(torch.arange(matrix.shape[0]).to(columns), matrix.crow_indices().diff().long())
-        directions = view.camera.rays(torch.arange(view.camera.pixel_count))[1].to(centers)[rows]
+        pixels = torch.arange(matrix.shape[0], device=columns.device)
+        rows = torch.repeat_interleave(pixels, matrix.crow_indices().diff().long())
+        directions = view.camera.rays(pixels)[1].to(centers)[rows]
         reach = float(REACH) * surfels.scales.double().prod(dim=1).sqrt()[columns]
-        reach = torch.where(view.edges.to(rows.device)[rows], reach, torch.full_like(reach, torch.inf))
+        reach = torch.where(view.edges[rows], reach, torch.full_like(reach, torch.inf))
         points = on_planes(origin, directions, centers, normals, reach)
     towards = torch.nn.functional.normalize(light.to(centers) - points, dim=-1)
     eye = torch.nn.functional.normalize(origin - points, dim=-1)

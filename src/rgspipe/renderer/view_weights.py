@@ -72,10 +72,9 @@ def build_view_weights(bvh: SurfelBvh, camera: Camera, supersampling: int = 4) -
         fine = scipy.sparse.vstack([_rows(bvh, camera, block, places) for block in blocks], format="csr")
         matrix = _replace_rows(matrix, chosen.numpy(), fine)
     coverage = torch.from_numpy(matrix.sum(axis=1)).float().reshape(-1)
-    edges = scipy.ndimage.binary_dilation(beside.numpy(), structure=np.ones((3, 3)))
-    return ViewWeights(
-        camera, SparseOperator.from_scipy(matrix, bvh.device), torch.from_numpy(edges).reshape(-1), coverage
-    )
+    edges = torch.from_numpy(scipy.ndimage.binary_dilation(beside.numpy(), structure=np.ones((3, 3)))).reshape(-1)
+    operator = SparseOperator.from_scipy(matrix, bvh.device)
+    return ViewWeights(camera, operator, edges.to(bvh.device), coverage.to(bvh.device))
 
 
 def _check_memory(camera: Camera) -> None:

@@ -135,30 +135,30 @@ class Camera(ByValue, Pinhole, _Pose):
         """Rays through a regular `subsamples × subsamples` grid in each pixel, or through given places in it.
 
         Args:
-            pixels: (P,) int64 flat indices, row · width + column; all pixels in order if None.
+            pixels: (P,) int64 flat indices, row · width + column; all pixels in order, on the CPU, if None.
             subsamples: grid size per pixel; 1 is the pixel centre.
             places: (s², 2) float64 columns and rows within the pixel, in [0, 1], instead of the grid.
 
         Returns:
             origins (P·s², 3), unit directions (P·s², 3), and the length along a ray per unit of planar
-            depth (P·s²,) — multiply planar z by it to get the ray distance. float64, the rays of one
-            pixel stand together.
+            depth (P·s²,) — multiply planar z by it to get the ray distance. float64, where `pixels` are; the
+            rays of one pixel stand together.
         """
-        if pixels is None:
-            pixels = torch.arange(self.pixel_count)
+        pixels = torch.arange(self.pixel_count) if pixels is None else pixels
         if places is None:
             step = (torch.arange(subsamples, dtype=torch.float64) + 0.5) / subsamples
             sub_y, sub_x = torch.meshgrid(step, step, indexing="ij")
             places = torch.stack([sub_x.reshape(-1), sub_y.reshape(-1)], dim=1)
+        places, pose = places.to(pixels.device), self.camera_to_world.to(pixels.device)
         column = (pixels % self.width)[:, None] + places[:, 0]
         row = torch.div(pixels, self.width, rounding_mode="floor")[:, None] + places[:, 1]
         local = torch.stack(
             [(column - self.cx) / self.fx, -(row - self.cy) / self.fy, -torch.ones_like(column)], dim=-1
         ).reshape(-1, 3)
-        directions = local @ self.camera_to_world[:3, :3].T
+        directions = local @ pose[:3, :3].T
         lengths = directions.norm(dim=1)
         directions = directions / lengths[:, None]
-        return self.origin.expand_as(directions), directions, lengths
+        return pose[:3, 3].expand_as(directions), directions, lengths
 
     def project(self, points: Float[Tensor, "*B 3"]) -> tuple[Float[Tensor, "*B 2"], Float[Tensor, "*B"]]:
         """Pixel coordinates (…, 2) and planar depth (…,) of world points (…, 3); depth ≤ 0 is behind."""

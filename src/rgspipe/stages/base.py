@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rgspipe.config import RgspipeConfig
+from rgspipe.machine.device import chosen_device
 from rgspipe.store.artifacts import Artifact
+
+if TYPE_CHECKING:
+    import torch
 
 #: Folder under outputs/ of what is of several scenes.
 SCENES = "scenes"
@@ -70,6 +75,15 @@ class StageContext:
     def note(self, **facts: Any) -> None:
         """Keep JSON values in the manifest, under "facts"."""
         self.facts.update(facts)
+
+    @cached_property
+    def device(self) -> torch.device:
+        """Where to compute.
+
+        Raises:
+            InputError: a GPU is asked for where there is none.
+        """
+        return chosen_device(self.config.device)
 
     @property
     def scratch(self) -> Path:

@@ -69,16 +69,17 @@ class Checkpoint:
         return [] if kept is None else [Record(**row) for row in kept[1]["records"]]
 
     def load(self, like: Surfels) -> tuple[Surfels, Tensor, RefineState | None, list[PointLight]] | None:
-        """What `save` kept, or None; `like` gives what of the coverage is not trained."""
+        """What `save` kept, or None; `like` gives the device, and what of the coverage is not trained."""
         if (kept := self._kept()) is None:
             return None
-        tensors, note = kept
+        (tensors, note), device = kept, like.centers.device
+        light = _group(tensors, "light")
+        tensors = {name: tensor.to(device) for name, tensor in tensors.items()}
         low, high = note["thresholds"]
         coverage, gloss = replace(like.coverage, low=low, high=high), _group(tensors, "gloss")
         surfels = replace(
             like, coverage=coverage, gloss=Gloss(**gloss) if gloss else None, **_group(tensors, "surfels")
         )
-        light = _group(tensors, "light")
         lights = [PointLight(*pair) for pair in zip(light["position"], light["intensity"], strict=True)]
         if note["step"] is None:
             return surfels, tensors["radiance"], None, lights

@@ -31,7 +31,7 @@ def surfel_errors(weights: Iterable[ViewWeights], radiance: Tensor, views: Seque
         weights: of V views.
         radiance: (V, N, 3) of the surfels under the views' lights.
     """
-    total = torch.zeros(radiance.shape[1])
+    total = torch.zeros(radiance.shape[1], device=radiance.device)
     for weight, shown, view in zip(weights, radiance, views, strict=True):
         image = view.image.float()
         render = view.as_photographed((weight.operator @ shown).reshape(image.shape))

@@ -116,7 +116,7 @@ def fit_gloss(
     weights = [w * torch.where(e, EDGE_WEIGHT, 1.0) for w, e in zip(problem.pixel_weights, edges, strict=True)]
     if start.gloss is None:
         chosen, logs = _found(scene, problem, start, indirect, weights, seed)
-        at = Reflection(start.albedo.float(), torch.zeros(len(chosen), 3), logs)
+        at = Reflection(start.albedo.float(), logs.new_zeros(len(chosen), 3), logs)
     else:
         chosen, at = reflection_of(start)
     if len(chosen) == 0:
@@ -136,7 +136,8 @@ def _found(
     seed: int,
 ) -> tuple[Tensor, Tensor]:
     """`find_lobes` by some of the views."""
-    views, everywhere = searched_views(len(scene.models)), torch.arange(len(surfels))
+    views = searched_views(len(scene.models))
+    everywhere = torch.arange(len(surfels), device=surfels.centers.device)
     some, images = scene.of_views(views), [problem.images[v] for v in views]
     light = some.highlights(everywhere, None if indirect is None else indirect[views])
     whole = GlossProblem.build(surfels, some.models, images, everywhere)
@@ -184,8 +185,8 @@ def _solve(
 def _without_faint(surfels: Surfels, chosen: Tensor, at: Reflection) -> Surfels:
     bright = (at.specular.mean(dim=1) >= FAINTEST)[:, None]
     specular = torch.where(bright, at.specular, torch.zeros_like(at.specular))
-    reflectance = torch.zeros(len(surfels), 3).index_copy(0, chosen, specular)
-    exponents = torch.ones(len(surfels)).index_copy(0, chosen, at.log_exponents.exp().clamp(min=1.0))
+    reflectance = specular.new_zeros(len(surfels), 3).index_copy(0, chosen, specular)
+    exponents = specular.new_ones(len(surfels)).index_copy(0, chosen, at.log_exponents.exp().clamp(min=1.0))
     return replace(surfels, gloss=Gloss(reflectance, exponents))
 
 

@@ -92,7 +92,7 @@ class GlossLight:
 
     def of_views(self, views: Sequence[int]) -> GlossLight:
         """The same for some of the views."""
-        index = torch.tensor(views, dtype=torch.int64)
+        index = list(views)
         parts = (None if part is None else part[index] for part in (self.received, self.arriving))
         return GlossLight(self.chosen, [self.highlights[v] for v in views], *parts)
 
@@ -182,6 +182,6 @@ def centre_cosines(surfels: Surfels, chosen: Tensor, lights: Tensor, eyes: Tenso
     """(V, G) cos α at the centres of the surfels `chosen` (G,), of lights and cameras (V, 3)."""
     centers, normals = surfels.centers.double()[chosen], surfels.normals.double()[chosen]
     towards, eye = (
-        torch.nn.functional.normalize(points.double()[:, None] - centers, dim=-1) for points in (lights, eyes)
+        torch.nn.functional.normalize(points.to(centers)[:, None] - centers, dim=-1) for points in (lights, eyes)
     )
     return (towards * mirrored(eye, normals)).sum(-1).float()

@@ -61,14 +61,15 @@ def find_lobes(
     count, views = len(surfels), range(len(problem.models))
     fitted, checked = views[::2], views[1::2]
     labels = cluster_patches(surfels.centers, surfels.normals, max(1, count // PATCH_SURFELS), seed=seed)
-    patches = torch.from_numpy(labels.astype(np.int64))
+    patches = torch.from_numpy(labels.astype(np.int64)).to(surfels.centers.device)
     errors = _Errors(problem.of_views(checked), light.of_views(checked), [pixel_weights[v] for v in checked], patches)
     own, held, weights = problem.of_views(fitted), light.of_views(fitted), [pixel_weights[v] for v in fitted]
-    diffuse = Reflection(surfels.albedo.float(), torch.zeros(count, 3), torch.zeros(count))
+    albedo = surfels.albedo.float()
+    diffuse = Reflection(albedo, torch.zeros_like(albedo), torch.zeros_like(albedo[:, 0]))
     before = errors.of(own.step(held, diffuse, weights, specular=False, exponents=False))
     after = []
     for exponent in progress_bar(EXPONENTS, "gloss", unit="exponent"):
-        start = replace(diffuse, log_exponents=torch.full((count,), math.log(exponent)))
+        start = replace(diffuse, log_exponents=torch.full_like(albedo[:, 0], math.log(exponent)))
         after.append(errors.of(own.step(held, start, weights, exponents=False)))
     gains = before - torch.stack(after)
     best = gains.sum(dim=1).argmax(dim=0)
@@ -79,7 +80,7 @@ def find_lobes(
         seen = images > LEAST_SEEN * images.median()
         pays, best = _spread(pays, best, seen & (gains.sum(dim=0) >= 0.0), patches, surfels)
     chosen = pays[patches].nonzero()[:, 0]
-    return chosen, torch.tensor(EXPONENTS).log()[best][patches[chosen]]
+    return chosen, torch.tensor(EXPONENTS, device=albedo.device).log()[best][patches[chosen]]
 
 
 def _pays(gains: Tensor, before: Tensor, images: Tensor) -> Tensor:
@@ -93,7 +94,7 @@ def _spread(pays: Tensor, best: Tensor, harmless: Tensor, patches: Tensor, surfe
     """Patches (C,) that pay, or are `harmless`, touch such a one and have its colour; and the exponents with it."""
     count, members = len(pays), torch.bincount(patches)[:, None]
     albedo, places = (
-        torch.zeros(count, 3).index_add(0, patches, part.float()) / members
+        members.new_zeros(count, 3, dtype=torch.float32).index_add(0, patches, part.float()) / members
         for part in (surfels.albedo, surfels.centers)
     )
     near = nearest_surfels(places, albedo)
@@ -141,4 +142,4 @@ class _Errors:
     def _shared(self, model: ViewModel, values: Tensor) -> Tensor:
         """(C,) of values of pixels (P,), shared out by the weights of the patches' surfels."""
         shares = (model.weights.operator.transposed @ values[:, None])[:, 0]
-        return torch.zeros(int(self.patches.max()) + 1).index_add(0, self.patches, shares)
+        return shares.new_zeros(int(self.patches.max()) + 1).index_add(0, self.patches, shares)

@@ -194,8 +194,8 @@ class _Penalty:
 
 def _factorised(diagonal: Tensor, laplacian: scipy.sparse.csc_matrix) -> Callable[[Tensor], Tensor]:
     """Solves with `diagonal` (G,) and `laplacian` (G, G) together."""
-    factors = scipy.sparse.linalg.splu((scipy.sparse.diags(diagonal.double().numpy()) + laplacian).tocsc())
-    return lambda x: torch.from_numpy(factors.solve(x.double().numpy())).to(x)
+    factors = scipy.sparse.linalg.splu((scipy.sparse.diags(diagonal.double().cpu().numpy()) + laplacian).tocsc())
+    return lambda x: torch.from_numpy(factors.solve(x.double().cpu().numpy())).to(x)
 
 
 def _median(diagonal: Tensor) -> float:

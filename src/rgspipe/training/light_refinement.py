@@ -76,7 +76,7 @@ class _Seen:
     @property
     def image(self) -> Tensor:
         """(P, 3)."""
-        return self.unit[:, :, 0] * self.light.intensity.float()
+        return self.unit[:, :, 0] * self.light.intensity.to(self.unit)
 
 
 class _OneLight:
@@ -134,12 +134,12 @@ class _AroundLight:
     @cached_property
     def normal(self) -> NormalEquations:
         view, seen = self.view, self.seen
-        by_position = view.size * seen.unit[:, :, 1:] * seen.light.intensity.float()[:, None]
+        by_position = view.size * seen.unit[:, :, 1:] * seen.light.intensity.to(seen.unit)[:, None]
         jacobian = torch.cat([by_position, torch.diag_embed(seen.image)], dim=2).double()
         weighted = jacobian * view.weights[:, None, None]
         matrix = torch.einsum("pck,pcl->kl", weighted, jacobian)
         direction = torch.einsum("pck,pc->k", weighted, (view.image - seen.image).double())
-        return NormalEquations(matrix, direction, view.cost(seen))
+        return NormalEquations(matrix.cpu(), direction.cpu(), view.cost(seen))
 
     def allowed(self, step: Tensor) -> float:
         return min(within(float(step[:3].norm()), LONGEST), within(float(step[3:].abs().max()), STRONGEST))

@@ -34,6 +34,6 @@ class Mixing:
         normal = torch.einsum("nck,ncl->ckl", changes, changes).double()
         right = torch.einsum("nck,nc->ck", changes, misses[..., -1]).double()
         ridge = MIXING_RIDGE * normal.diagonal(dim1=1, dim2=2).mean(dim=1)[:, None, None]
-        share = torch.linalg.solve(normal + (ridge + 1e-30) * torch.eye(normal.shape[1]), right).to(x)
+        share = torch.linalg.solve(normal + (ridge + 1e-30) * torch.eye(normal.shape[1]).to(normal), right).to(x)
         change = torch.einsum("nck,ck->nc", steps + self._step * changes, share)
         return x + self._step * misses[..., -1] - change

@@ -26,18 +26,18 @@ def start_parameters(surfels: Surfels) -> dict[str, Tensor]:
     and v and angle (N,) about the normal [rad]; log_scales (N, 2), logit (N,) of the opacity, clip_offsets and
     clip_angles (N, 2), albedo (N, 3), thresholds (2,) of the coverage.
     """
-    count, coverage = len(surfels), surfels.coverage
+    coverage, device = surfels.coverage, surfels.centers.device
     return {
-        "offset": torch.zeros(count, 2),
-        "height": torch.zeros(count),
-        "tilt": torch.zeros(count, 2),
-        "angle": torch.zeros(count),
+        "offset": torch.zeros_like(surfels.scales),
+        "height": torch.zeros_like(surfels.opacities),
+        "tilt": torch.zeros_like(surfels.scales),
+        "angle": torch.zeros_like(surfels.opacities),
         "log_scales": surfels.scales.log(),
         "logit": torch.logit(surfels.opacities.clamp(0.01, 0.99)),
         "clip_offsets": surfels.clip_offsets.clone(),
         "clip_angles": surfels.clip_angles.clone(),
         "albedo": surfels.albedo.clone(),
-        "thresholds": torch.tensor([coverage.low, coverage.high]),
+        "thresholds": torch.tensor([coverage.low, coverage.high], device=device),
     }
 
 

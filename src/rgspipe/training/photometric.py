@@ -128,8 +128,9 @@ def shading_of_view(
     """Derivative (Q, 3N) of the Q pixels that tell normals towards turns about u, about v and log-albedo; their
     residuals (Q,) and weights (Q,). Radiance is the mean of the channels in units of the view's level."""
     operator = view.operator.to_scipy()
-    lit = (operator @ light.transmittance.double().numpy()) / np.maximum(view.coverage.double().numpy(), 1e-6)
-    pixels = np.flatnonzero(~view.edges.numpy() & (view.coverage.numpy() > 0.5) & (lit > LIT))
+    coverage = view.coverage.double().cpu().numpy()
+    lit = (operator @ light.transmittance.double().numpy()) / np.maximum(coverage, 1e-6)
+    pixels = np.flatnonzero(~view.edges.cpu().numpy() & (coverage > 0.5) & (lit > LIT))
     rows = operator[pixels].tocoo()
     p, j = torch.from_numpy(rows.row).long(), torch.from_numpy(rows.col).long()
     origin, rays, _ = view.camera.rays(torch.from_numpy(pixels))

@@ -101,7 +101,8 @@ def prior_from_maps(views: Sequence[View], strength: float) -> PriorOf:
 
     def prior(surfels: Surfels) -> AlbedoPrior:
         # Edges are left out, so one ray a pixel says enough.
-        albedo, weight = albedo_prior(each_view(surfels, views, supersampling=1), views)
+        there = [view.to(surfels.centers.device) for view in views]
+        albedo, weight = albedo_prior(each_view(surfels, there, supersampling=1), there)
         return AlbedoPrior(rescaled(albedo, weight, surfels.albedo), strength * weight)
 
     return prior

@@ -198,7 +198,7 @@ def _step_loss(
         for view, draw, seen in zip(chosen, draws, _split(draws, colours), strict=True)
     ]
     data = _image_term(chosen, draws, images, options)
-    prior = torch.zeros(())
+    prior = torch.zeros((), device=radiance.device)
     if options.alpha_weight > 0.0:
         ones = torch.ones_like(radiance[:1])
         covered = shade_rays(bvh, surfels, thresholds, ones, rays[0], rays[1], torch.zeros_like(rays[2]), hits)
@@ -223,7 +223,7 @@ def _draw(view: RefineView, options: RefineOptions, generator: torch.Generator) 
 
 def _joined(draws: Sequence[PixelDraw]) -> tuple[Tensor, Tensor, Tensor]:
     """Origins, directions and slots of all rays."""
-    slots = [torch.full((len(draw.origins),), slot) for slot, draw in enumerate(draws)]
+    slots = [torch.full_like(draw.ray_pixel, slot) for slot, draw in enumerate(draws)]
     origins, directions = torch.cat([d.origins for d in draws]), torch.cat([d.directions for d in draws])
     return origins, directions, torch.cat(slots)
 

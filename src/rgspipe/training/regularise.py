@@ -39,9 +39,10 @@ def find_neighbours(surfels: Surfels, spacing: float) -> Neighbours:
     """The nearest surfels of each, weighted 1/(1 + (angle/CREASE)² + (offset/spacing)²)² so that edges stay."""
     centers, normals = surfels.centers.detach(), surfels.normals.detach()
     count = min(NEIGHBOURS + 1, len(surfels))
-    features = torch.cat([centers, 2.0 * spacing * normals], dim=1).double().numpy()
+    features = torch.cat([centers, 2.0 * spacing * normals], dim=1).double().cpu().numpy()
     index = torch.from_numpy(cKDTree(features).query(features, k=count)[1].reshape(len(surfels), count))
-    first = torch.arange(len(surfels)).repeat_interleave(count - 1)
+    index = index.to(centers.device)
+    first = torch.arange(len(surfels), device=centers.device).repeat_interleave(count - 1)
     second = index[:, 1:].reshape(-1)
     angle = (normals[first] - normals[second]).norm(dim=1)
     offset = _mean_plane_offset(centers, normals, first, second)

@@ -49,8 +49,8 @@ def draw_pixels(
     pixels = torch.cat(parts)
     origins, directions, _ = camera.rays(pixels, subsamples)
     rays = subsamples**2
-    ray_pixel = torch.arange(len(pixels)).repeat_interleave(rays)
-    share = torch.full((len(ray_pixel),), 1.0 / rays)
+    ray_pixel = torch.arange(len(pixels), device=pixels.device).repeat_interleave(rays)
+    share = torch.full((len(ray_pixel),), 1.0 / rays, device=pixels.device)
     return PixelDraw(pixels, None, origins.float(), directions.float(), ray_pixel, share)
 
 
@@ -60,7 +60,7 @@ def draw_window(camera: Camera, edges: Tensor, size: int, subsamples: int, gener
     top = int(torch.randint(camera.height - rows + 1, (1,), generator=generator))
     left = int(torch.randint(camera.width - columns + 1, (1,), generator=generator))
     row, column = torch.arange(top, top + rows), torch.arange(left, left + columns)
-    pixels = (row[:, None] * camera.width + column).reshape(-1)
+    pixels = (row[:, None] * camera.width + column).reshape(-1).to(edges.device)
     fine = edges[pixels].nonzero()[:, 0]
     plain = (~edges[pixels]).nonzero()[:, 0]
     fine_rays, plain_rays = camera.rays(pixels[fine], subsamples), camera.rays(pixels[plain])
@@ -71,11 +71,11 @@ def draw_window(camera: Camera, edges: Tensor, size: int, subsamples: int, gener
         torch.cat([fine_rays[0], plain_rays[0]]).float(),
         torch.cat([fine_rays[1], plain_rays[1]]).float(),
         torch.cat([fine.repeat_interleave(count), plain]),
-        torch.cat([torch.full((len(fine) * count,), 1.0 / count), torch.ones(len(plain))]),
+        torch.cat([torch.full((len(fine) * count,), 1.0 / count), torch.ones(len(plain))]).to(edges.device),
     )
 
 
 def pixel_means(draw: PixelDraw, colours: Tensor) -> Tensor:
     """(P, C) means of the rays' colours (R, C), differentiable."""
     weighted = colours * draw.ray_share[:, None].to(colours)
-    return torch.zeros(len(draw.pixels), colours.shape[1], dtype=colours.dtype).index_add(0, draw.ray_pixel, weighted)
+    return weighted.new_zeros(len(draw.pixels), colours.shape[1]).index_add(0, draw.ray_pixel, weighted)

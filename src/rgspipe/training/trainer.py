@@ -19,6 +19,7 @@ from rgspipe.machine.sums import average
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.transport import with_albedo
 from rgspipe.renderer.view_weights import build_view_weights
+from rgspipe.scene.arrays import as_device
 from rgspipe.scene.gloss import Gloss
 from rgspipe.scene.lights import PointLight
 from rgspipe.scene.surfels import Surfels
@@ -73,6 +74,7 @@ def train(
     *,
     checkpoint: Checkpoint | None = None,
     prior: PriorOf | None = None,
+    device: torch.device | str | None = None,
 ) -> Trained:
     """Fit materials and geometry of surfels to views with known lights.
 
@@ -83,12 +85,14 @@ def train(
         checkpoint: where to keep what is done; an interrupted training goes on from there and ends with
             the surfels of an uninterrupted one.
         prior: known albedo that materials are pulled to.
+        device: where to compute, and what is trained is; where the surfels are if None.
 
     Raises:
-        InputError: there are no views, or they have no lights, or no depth to make surfels from.
+        InputError: there are no views, or they have no lights, no depth to make surfels from, or no such device.
     """
     options = TrainOptions() if options is None else as_one_of(options, TrainOptions, "options", "Pass such.")
     views = as_several(views, View, "views", "rg.load_views reads them.")
+    device = None if device is None else as_device(device)
     if not isinstance(surfels, Surfels):
         surfels = initialise_surfels(
             views, as_count(surfels, "surfels", remedy="Pass surfels, or how many to make."), seed=options.seed
@@ -96,7 +100,8 @@ def train(
     if not views:
         raise InputError("views", expected="views to train on", found="none", remedy="rg.load_views reads them.")
     log = _Log(checkpoint.records if checkpoint else [])
-    surfels = surfels.to(torch.float32)
+    surfels = surfels.to(torch.float32) if device is None else surfels.to(torch.float32).to(device)
+    views = [view.to(surfels.centers.device) for view in views]
     spacing, given = surfel_spacing(surfels), [view.light for view in views]
     most = int(options.growth * len(surfels))
     if checkpoint is not None and (found := checkpoint.load(surfels)) is not None:
@@ -125,9 +130,12 @@ def _closed(surfels: Surfels, views: Sequence[View], options: TrainOptions, hidd
     """With surfels on the surfaces that no view shows, if those are wanted."""
     if not options.unseen:
         return surfels
-    cameras, depths = [view.camera for view in views], [view.depth for view in views]
-    lamps = [view.light.position for view in views if view.light is not None]
-    return with_unseen_surfaces(surfels, cameras, lamps, depths, hidden=hidden)
+    # What is inside of what is numpy's and scipy's work.
+    known = [view.to("cpu") for view in views]
+    cameras, depths = [view.camera for view in known], [view.depth for view in known]
+    lamps = [view.light.position for view in known if view.light is not None]
+    closed = with_unseen_surfaces(surfels.to("cpu"), cameras, lamps, depths, hidden=hidden)
+    return closed.to(surfels.centers.device)
 
 
 def _seen(surfels: Surfels) -> Surfels:
@@ -168,10 +176,15 @@ def _fit_materials(
 def _turned_by_shading(
     surfels: Surfels, measured: Tensor, views: Sequence[View], radiance: Tensor, spacing: float
 ) -> Surfels | None:
-    """Rough surfels with normals and heights as the shading says; None if depth knows better."""
+    """Rough surfels with normals and heights as the shading says; None if depth knows better.
+
+    The linear systems are scipy's, on the CPU.
+    """
+    device, surfels = surfels.centers.device, surfels.to("cpu")
     pairs = find_neighbours(surfels, spacing)
     if roughness(surfels, pairs) < LEAST_ROUGHNESS:
         return None
+    radiance, views = radiance.cpu(), [view.to("cpu") for view in views]
     lights = surfel_lights(surfels, [view.light for view in views], radiance / surfels.albedo.clamp(min=1e-6))
     # Saturated pixels tell as little of shading as edges do, and are left out with them.
     weights = (
@@ -180,7 +193,7 @@ def _turned_by_shading(
     )
     images = [view.image.reshape(-1, 3).float() for view in views]
     turned = fit_normals(surfels, weights, images, lights, pairs)
-    return fit_heights(turned, measured, find_neighbours(turned, spacing))
+    return fit_heights(turned, measured.cpu(), find_neighbours(turned, spacing)).to(device)
 
 
 def _refine_geometry(

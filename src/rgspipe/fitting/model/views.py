@@ -68,7 +68,7 @@ class PreparedViews(ViewedPixels):
             InputError: too few pixels are left.
         """
         out = [torch.from_numpy(np.asarray(mask, dtype=bool)) for mask in pixels]
-        kept = (~torch.cat([mask.reshape(-1) for mask in out])[self.pixels.cpu()]).nonzero()[:, 0]
+        kept = (~torch.cat([mask.reshape(-1) for mask in out]).to(self.pixels.device)[self.pixels]).nonzero()[:, 0]
         if len(kept) < LEAST_PIXELS:
             expected, found = f"at least {LEAST_PIXELS} pixels that are no lamp's", f"{len(kept)} of {len(self.pixels)}"
             raise InputError("emitters", expected=expected, found=found, remedy="Mark only what is a lamp itself.")
@@ -77,7 +77,7 @@ class PreparedViews(ViewedPixels):
 
     def _of(self, kept: Tensor) -> PreparedViews:
         """With the `kept` (K,) of the pixels alone."""
-        return replace(self, pixels=self.pixels[kept.to(self.pixels.device)], operator=self.operator.rows(kept))
+        return replace(self, pixels=self.pixels[kept], operator=self.operator.rows(kept))
 
     @cached_property
     def few_pixels(self) -> Tensor:
@@ -88,7 +88,7 @@ class PreparedViews(ViewedPixels):
             squares = (len(rows) // THINNED + 1, len(columns) // THINNED + 1)
             drawn = torch.randint(THINNED**2, squares, generator=generator)[rows // THINNED, columns // THINNED]
             chosen.append((THINNED * (rows % THINNED) + columns % THINNED == drawn).reshape(-1))
-        return torch.cat(chosen)[self.pixels.cpu()].nonzero()[:, 0].to(self.pixels.device)
+        return torch.cat(chosen).to(self.pixels.device)[self.pixels].nonzero()[:, 0]
 
     @cached_property
     def thinned(self) -> PreparedViews:
@@ -153,8 +153,8 @@ def prepare_views(
     rows = [
         view.operator.to_scipy()[chosen.cpu().numpy().nonzero()[0]] for view, chosen in zip(views, trusted, strict=True)
     ]
-    operator = SparseOperator.from_scipy(scipy.sparse.vstack(rows, format="csr"), frozen.surfels.centers.device)
-    return PreparedViews(frozen, tuple(views), pixels, operator, tuple(masks))
+    operator = SparseOperator.from_scipy(scipy.sparse.vstack(rows, format="csr"), frozen.device)
+    return PreparedViews(frozen, tuple(views), pixels.to(frozen.device), operator, tuple(masks))
 
 
 def _trusted(view: ViewWeights, mask: Tensor, mask_edges: bool) -> Tensor:

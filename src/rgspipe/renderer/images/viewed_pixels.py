@@ -39,7 +39,8 @@ class ViewedPixels:
     def every(cls, frozen: FrozenScene, views: Sequence[ViewWeights]) -> ViewedPixels:
         """All pixels of some views."""
         operator = stack([view.operator for view in views])
-        return ViewedPixels(frozen, tuple(views), torch.arange(operator.shape[0]), operator)
+        pixels = torch.arange(operator.shape[0], device=operator.matrix.device)
+        return ViewedPixels(frozen, tuple(views), pixels, operator)
 
     @cached_property
     def bounds(self) -> list[int]:

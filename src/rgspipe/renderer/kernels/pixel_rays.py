@@ -29,7 +29,7 @@ def pixel_rays(bvh: SurfelBvh, camera: Camera, pixels: Tensor | None = None) -> 
     Args:
         pixels: (P,) int64 whose rays; all if None.
     """
-    _, directions, lengths = camera.rays(None if pixels is None else pixels.cpu())
+    _, directions, lengths = camera.rays(pixels)
     axes = camera.camera_to_world[:3, :3].double()
     rays = PixelRays()
     rays.origin = vector(bvh.local(camera.origin))

@@ -70,13 +70,14 @@ class Relighter:
             model.image(rig)
             self._rendered = model
         began = time.perf_counter()
-        images = model.views.split(model.image(rig))
+        # Read back before the clock stops: a GPU is still at it.
+        images = model.views.split(model.image(rig).cpu())
         seconds = time.perf_counter() - began
         if ambient is not None:
             views = (self._view(camera) for camera in cameras)
-            lit = (ambient.to(images[0]) * ambient_image(self.frozen, view) for view in views)
+            lit = (ambient.to(images[0]) * ambient_image(self.frozen, view).cpu() for view in views)
             images = [image + other for image, other in zip(images, lit, strict=True)]
-        return [image.cpu() for image in images], seconds
+        return images, seconds
 
     def write(
         self,

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from rgspipe.config import RgspipeConfig
 from rgspipe.config.effects import EffectsConfig
 from rgspipe.datasets.json_file import read_json
+from rgspipe.machine.device import chosen_device
 from rgspipe.renderer.effect_bounds import EffectBounds
 from rgspipe.renderer.effect_choice import EffectChoice, RigKind, choose_effects
 from rgspipe.renderer.effects import Effects
@@ -18,9 +19,16 @@ EFFECTS = "effects.json"
 
 
 def frozen_scene(config: RgspipeConfig, artifact: Artifact) -> FrozenScene:
-    """The frozen scene, with the solver that is wanted; the full gather operator is read only for its own."""
+    """The frozen scene where it is to compute, with the solver that is wanted.
+
+    The full gather operator is read only for its own solver.
+
+    Raises:
+        InputError: a GPU is asked for where there is none.
+    """
     wanted = config.effects
     frozen = FrozenScene.load(artifact.folder(), gather=wanted.solver == "gather")
+    frozen = frozen.to(chosen_device(config.device))
     if wanted.solver == "patches" and wanted.bounces is None:
         return frozen
     return frozen.with_solver(wanted.solver, bounces=wanted.bounces, samples=wanted.samples, seed=config.seed)

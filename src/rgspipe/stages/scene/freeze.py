@@ -34,7 +34,7 @@ def run(context: StageContext) -> None:
     options = context.config.freeze
     source = context.inputs[surfel_stage(context.config)]
     surfels = load_surfels(source.file(SURFELS))
-    surfels = with_error(surfels, context.config.model_error)
+    surfels = with_error(surfels, context.config.model_error).to(context.device)
     begin = time.perf_counter()
     frozen = FrozenScene.freeze(surfels, gather_rays=options.gather_rays, patches=options.patches, seed=options.seed)
     built = time.perf_counter()

@@ -53,7 +53,7 @@ def run(context: StageContext) -> None:
     checkpoint = Checkpoint(context.scratch / "checkpoint.safetensors", config.checkpoint_every)
     train_views = degraded(dataset.train, context.config.capture)
     known = prior_from_maps(train_views, config.albedo_prior_weight) if config.albedo_prior == "dataset" else None
-    trained = train(train_views, start, options, checkpoint=checkpoint, prior=known)
+    trained = train(train_views, start.to(context.device), options, checkpoint=checkpoint, prior=known)
     save_surfels(context.folder / "surfels.safetensors", trained.surfels)
     _write_table(context.folder / "training.csv", trained)
 
@@ -127,7 +127,8 @@ def _direct_only(
     trained: Trained, train_views: tuple[View, ...], test_views: tuple[View, ...], options: TrainOptions
 ) -> float:
     """Mean held-out PSNR of the same geometry when light does not bounce, its albedo fitted accordingly."""
-    surfels = fit_materials(trained.surfels, train_views, options, bounces=False).surfels
+    there = [view.to(trained.surfels.centers.device) for view in train_views]
+    surfels = fit_materials(trained.surfels, there, options, bounces=False).surfels
     held_out = render_held_out(
         surfels, test_views, None, options.supersampling, options.at_pixels, OperatorStore.of(options)
     )
