@@ -27,21 +27,22 @@ def _pixel_transmittance(
     pixels: wp.array(dtype=int),
     receivers: wp.array(dtype=int),
     light: wp.vec4,
-    transmittance: wp.array(dtype=wp.vec4),
+    parts: int,
+    found: wp.array(dtype=wp.vec4),
 ):
     item = wp.tid() + offset
-    p = pixels[item]
+    p = pixels[item / parts]
     i = receivers[p]
     n = tree.records[i].normal
     total = wp.vec4(0.0, 0.0, 0.0, 0.0)
-    for k in range(places.shape[0]):
+    for k in range(item % parts, places.shape[0], parts):
         d = rays.directions[p] + (places[k][0] - 0.5) * rays.right + (places[k][1] - 0.5) * rays.up
         at = point_on_surfel(rays.origin, d, tree.records[i].center, n, 1.0e30)
         path = way_to(light, at)
         if wp.dot(path, n) > 0.0:
             passing, slope = light_transmittance(tree, i, at, light, path)
             total += wp.vec4(passing, slope[0], slope[1], slope[2])
-    transmittance[p] = total / float(places.shape[0])
+    found[item] = total / float(places.shape[0])
 
 
 def pixel_transmittance(
@@ -59,9 +60,15 @@ def pixel_transmittance(
     transmittance = torch.full((len(receivers), 4), -1.0, dtype=torch.float32, device=bvh.device)
     if len(pixels) == 0:
         return transmittance
+    # On a GPU an item is a ray, as the few pixels on shadows' edges do not fill it; on a CPU, to which an item costs more
+    # than a loop's round, a pixel.
+    parts = 1 if bvh.device.type == "cpu" else len(places)
+    found = torch.empty((len(pixels), parts, 4), dtype=torch.float32, device=bvh.device)
     lattice = wp.from_torch(places.float().contiguous().to(bvh.device), dtype=wp.vec2)
     records = wp.to_torch(bvh.rank)[receivers.to(bvh.device)].int()
-    which = [as_array(pixels.to(bvh.device).int()), as_array(records), as_place(bvh, light)]
-    inputs = [bvh.tree, rays, lattice, *which, wp.from_torch(transmittance, dtype=wp.vec4)]
-    launch(_pixel_transmittance, len(pixels), inputs, bvh.device)
+    pixels = pixels.to(bvh.device)
+    which = [as_array(pixels.int()), as_array(records), as_place(bvh, light), parts]
+    inputs = [bvh.tree, rays, lattice, *which, wp.from_torch(found.reshape(-1, 4), dtype=wp.vec4)]
+    launch(_pixel_transmittance, len(pixels) * parts, inputs, bvh.device)
+    transmittance[pixels] = found.sum(dim=1)
     return transmittance
