@@ -9,7 +9,7 @@ TEST_WORKERS ?= 2
 ARGS ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup test test-python test-slurm third-party crash soak bits fuzz fuzz-commands smoke reproduce scenes train-study light-study bench docs lint house
+.PHONY: help setup test test-python test-slurm third-party crash soak bits devices fuzz fuzz-commands smoke reproduce scenes train-study light-study bench docs lint house
 
 help:  ## this list
 	@echo "rgspipe: from images of a scene, find its lights"
@@ -51,6 +51,9 @@ soak: setup  ## a sweep of 200 jobs, 8 at a time, with random kills; its memory 
 
 bits: setup  ## training and a fit with other numbers of threads, and other instructions of the processor (minutes)
 	$(VENV)/bin/python tests/bits.py
+
+devices: setup  ## how long freezing, training, images and fits take on the CPU and on a GPU (minutes)
+	$(VENV)/bin/python tests/device_times.py
 
 fuzz: setup  ## damaged files of every kind that is read: each is read or refused (a minute; ARGS="CASES SEED")
 	$(VENV)/bin/python tests/fuzz.py $(ARGS)

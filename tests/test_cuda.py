@@ -6,6 +6,7 @@ themselves are right on one is for tests that are skipped without it, and for th
 
 from __future__ import annotations
 
+import importlib.util
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
@@ -146,6 +147,7 @@ def test_a_scene_is_trained_there(gloss: str, request) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.skipif(importlib.util.find_spec("bpy") is None, reason="bpy is not installed")
 def test_the_whole_way_goes_there(tmp_path: Path, request) -> None:
     outputs = f"outputs={tmp_path}"
     arguments = [f"{key}={value}" for key, value in TINY.items() if key != "stage"]

@@ -60,8 +60,8 @@ def pixel_transmittance(
     transmittance = torch.full((len(receivers), 4), -1.0, dtype=torch.float32, device=bvh.device)
     if len(pixels) == 0:
         return transmittance
-    # On a GPU an item is a ray, as the few pixels on shadows' edges do not fill it; on a CPU, to which an item costs more
-    # than a loop's round, a pixel.
+    # On a GPU an item is a ray, as the few pixels on shadows' edges do not fill it; on a CPU it is a pixel, as an item
+    # costs more there than a round of a loop.
     parts = 1 if bvh.device.type == "cpu" else len(places)
     found = torch.empty((len(pixels), parts, 4), dtype=torch.float32, device=bvh.device)
     lattice = wp.from_torch(places.float().contiguous().to(bvh.device), dtype=wp.vec2)
