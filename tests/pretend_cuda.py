@@ -143,6 +143,7 @@ def pretend_cuda() -> Iterator[None]:
         patch.setattr(torch, "from_numpy", lambda value: _marked(from_numpy(value), CPU))
         patch.setattr(torch.cuda, "is_available", lambda: True)
         patch.setattr(torch.cuda, "synchronize", lambda device=None: None)
+        patch.setattr(wp, "is_cuda_available", lambda: True)
         patch.setattr(wp, "from_torch", as_warp)
         patch.setattr(wp, "to_torch", as_torch)
         patch.setattr(wp, "device_from_torch", lambda device: "cpu")

@@ -14,13 +14,15 @@ from pathlib import Path
 
 import pytest
 import torch
+import warp as wp
 from torch import Tensor
 
 import rgspipe as rg
 from painted_room import LIGHT, painted_box, painted_views
 from pretend_cuda import pretend_cuda
 from rgspipe.cli import main
-from rgspipe.machine.device import chosen_device
+from rgspipe.evaluation.self_check import self_check
+from rgspipe.renderer.device import chosen_device
 from rgspipe.scene.gloss import Gloss
 from whole_way import TINY
 
@@ -133,6 +135,12 @@ def test_a_glossy_scene_is_rendered_there(request) -> None:
 
 
 @pytest.mark.slow
+def test_the_doctor_s_check_is_of_the_gpu(cuda) -> None:
+    figures = list(self_check("cuda"))
+    assert len(figures) == 5 and all(figure.is_right for figure in figures)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("gloss", ["none", "auto"])
 def test_a_scene_is_trained_there(gloss: str, request) -> None:
     views, start = painted_views()[:8], painted_box()
@@ -160,8 +168,23 @@ def test_a_gpu_is_taken_where_there_is_one(cuda) -> None:
     assert [chosen_device(wanted).type for wanted in ("auto", "cpu", "cuda")] == ["cuda", "cpu", "cuda"]
 
 
+def test_a_gpu_that_warp_cannot_use_is_none(cuda, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(wp, "is_cuda_available", lambda: False)
+    assert chosen_device("auto").type == "cpu"
+    with pytest.raises(rg.InputError, match="driver 580"):
+        chosen_device("cuda")
+
+
 @pytest.mark.skipif(torch.cuda.is_available(), reason="there is a GPU")
 def test_without_a_gpu_the_cpu_is_taken() -> None:
     assert [chosen_device(wanted).type for wanted in ("auto", "cpu")] == ["cpu", "cpu"]
-    with pytest.raises(rg.InputError, match=r"a GPU that torch can use.*device=auto"):
+    with pytest.raises(rg.InputError, match=r"a GPU, for device=cuda.*device=auto"):
         chosen_device("cuda")
+
+
+@pytest.mark.skipif(torch.cuda.is_available(), reason="there is a GPU")
+def test_a_gpu_that_is_not_there_is_told_before_anything_is_made(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["stage=train_surfels", f"outputs={tmp_path}", "device=cuda"]) == 2
+    assert "device: expected a GPU" in capsys.readouterr().err and not list(tmp_path.glob("*/*/*/manifest.json"))

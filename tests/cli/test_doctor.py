@@ -30,7 +30,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nothing is imported for being tried, nothing measured."""
     monkeypatch.setattr(command, "needed_parts", lambda: FINE)
     monkeypatch.setattr(command, "optional_parts", list)
-    monkeypatch.setattr(check, "self_check", lambda: iter(()))
+    monkeypatch.setattr(check, "self_check", lambda device: iter(()))
 
 
 def told(capsys: pytest.CaptureFixture[str]) -> str:
@@ -74,7 +74,7 @@ def test_figures_that_are_wrong_end_with_status_1(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, value: float
 ) -> None:
     monkeypatch.setattr(
-        check, "self_check", lambda: iter([Figure("lamps", value, 0.01, 0.1), Figure("time", 9, 1, unit="s")])
+        check, "self_check", lambda device: iter([Figure("lamps", value, 0.01, 0.1), Figure("time", 9, 1, unit="s")])
     )
     assert main(["doctor", f"outputs={tmp_path}"]) == 1
     said = told(capsys)
@@ -84,7 +84,7 @@ def test_figures_that_are_wrong_end_with_status_1(
 def test_a_check_that_ends_early_is_told(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def ends() -> Iterator[Figure]:
+    def ends(device: object) -> Iterator[Figure]:
         raise RuntimeError("no kernel\nand more")
         yield
 

@@ -131,6 +131,8 @@ def _print_machine() -> None:
     # Loaded here: help need not wait for it, and it may be what is missing.
     import torch
 
+    from rgspipe.renderer.device import missing_gpu
+
     host, cores = machine(), len(os.sched_getaffinity(0))
     threads = torch.get_num_threads()
     free = available_memory_gib()
@@ -138,11 +140,11 @@ def _print_machine() -> None:
     print(f"Machine: {host['processor']}, {_counted(cores, 'core')}, {_counted(threads, 'thread')}, {room}")
     if threads < cores:
         print(_wrapped(f"{threads} of {cores} cores work: unset OMP_NUM_THREADS to have them all.", "  "))
-    if torch.cuda.is_available():
-        print(f"CUDA: {torch.cuda.get_device_name()}; stages use it unless device=cpu says otherwise.")
+    missing = missing_gpu()
+    if missing is None:
+        print(_wrapped(f"{torch.cuda.get_device_name()}; stages use it unless device=cpu says otherwise.", "CUDA: "))
     else:
-        why = "torch is built without it" if torch.version.cuda is None else "no device or no driver"
-        print(_wrapped(f"none ({why}). Nothing needs it; it makes trainings and fits faster.", "CUDA: "))
+        print(_wrapped(f"none ({missing}). Nothing needs it; it makes trainings and fits faster.", "CUDA: "))
 
 
 def _counted(count: int, what: str) -> str:
@@ -178,11 +180,12 @@ def _results(outputs: Path) -> str:
 def _measured() -> list[str]:
     """Print figures of accuracy and speed beside those of the docs; what has to be done about them."""
     from rgspipe.evaluation.self_check import self_check
+    from rgspipe.renderer.device import chosen_device
 
     print("Check (half a minute at most; first use compiles kernels):", flush=True)
     ills, begin, slow = [], time.perf_counter(), False
     try:
-        for figure in self_check():
+        for figure in self_check(chosen_device("auto")):
             unit = f" {figure.unit}" if figure.unit else ""
             words = "" if figure.is_right else f", wrong: at most {figure.limit:.2g}"
             print(f"  {figure.name}: {figure.value:.2g}{unit} (docs: {figure.documented:.2g}{words})", flush=True)

@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from rgspipe.errors import InputError
-from rgspipe.machine.device import CHOICES, Wanted, chosen_device
+from rgspipe.machine.device import CHOICES, Wanted
+from rgspipe.renderer.device import chosen_device
 
 #: Keys of every page, and what they mean.
 PAGE_KEYS = {

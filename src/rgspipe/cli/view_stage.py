@@ -57,7 +57,7 @@ class _Made:
 def _serve(made: _Made) -> int:
     from rgspipe.cli.view_capture import captured
     from rgspipe.datasets.info import INFO
-    from rgspipe.machine.device import chosen_device
+    from rgspipe.renderer.device import chosen_device
     from rgspipe.renderer.frozen import FrozenScene
     from rgspipe.stages.scene.export import world_of
     from rgspipe.viewer.serve import view

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import torch
 
 from rgspipe.fitting.fit import fit_lights
+from rgspipe.machine.device import finish
 from rgspipe.renderer.effects import Effects
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import Camera, PointLight
@@ -53,20 +54,22 @@ class Figure:
         return self.value <= self.limit
 
 
-def self_check() -> Iterator[Figure]:
+def self_check(device: torch.device | str = "cpu") -> Iterator[Figure]:
     """Measure, one figure after the other: direct light and bounces in an empty room against their closed forms, a
     scene that is frozen, and three lamps that are found. Five seconds, and seven more where kernels are compiled.
     """
-    yield from _closed_forms()
+    device = torch.device(device)
+    yield from _closed_forms(device)
     begin = time.perf_counter()
-    scene = FrozenScene.freeze(exact_surfels(CornellBox(), 2000))
+    scene = FrozenScene.freeze(exact_surfels(CornellBox(), 2000).to(device))
+    finish(device)
     yield Figure("a scene of 2000 surfels frozen", time.perf_counter() - begin, 1.1, unit="s")
     yield from _lamps(scene)
 
 
-def _closed_forms() -> Iterator[Figure]:
+def _closed_forms(device: torch.device) -> Iterator[Figure]:
     walls = inside_of_box([0.0, 0.0, 0.0], [1.0, 1.0, 1.0], [ALBEDO] * 3)
-    room = FrozenScene.freeze(surfels_on(walls, 1000), gather_rays=64, patches=150)
+    room = FrozenScene.freeze(surfels_on(walls, 1000).to(device), gather_rays=64, patches=150)
     towards = -room.surfels.centers.double()
     distance = towards.norm(dim=1)
     cosine = (towards * room.surfels.normals).sum(dim=1) / distance
@@ -77,14 +80,15 @@ def _closed_forms() -> Iterator[Figure]:
     name = "direct light in an empty room, relative error of the worst surfel"
     yield Figure(name, float((direct / expected - 1.0).abs().max()), 3.4e-6, 1e-4)
     # B = E/(1 − ρ) where all surfaces emit E.
-    emission = torch.ones(len(room.surfels), 3, 1)
+    emission = torch.ones(len(room.surfels), 3, 1, device=device)
     radiosity = emission + room.transport.indirect(emission)
     error = float(((1.0 - ALBEDO) * radiosity - 1.0).abs().max())
     yield Figure("all bounces in an empty room, relative error of the worst surfel", error, 7.2e-7, 3e-5)
 
 
 def _lamps(scene: FrozenScene) -> Iterator[Figure]:
-    fine = FrozenScene.freeze(exact_surfels(CornellBox(), 8000), gather_rays=128, seed=1)
+    surfels = exact_surfels(CornellBox(), 8000).to(scene.device)
+    fine = FrozenScene.freeze(surfels, gather_rays=128, seed=1)
     camera = Camera.look_at([0.0, -1.5, 0.05], [0.0, 0.0, 0.0], fov_degrees=40.0, width=96, height=96)
     errors, seconds = [], []
     for place in LAMPS:

@@ -11,6 +11,7 @@ from typing import Any
 
 from rgspipe.config import RgspipeConfig
 from rgspipe.errors import InputError
+from rgspipe.machine.device import gpu_in_use
 from rgspipe.stages.base import Failure, Stage, StageContext
 from rgspipe.store.artifacts import Artifact, ArtifactStore, Key
 from rgspipe.store.files import remove_any, tree_digest
@@ -94,7 +95,8 @@ class Making:
             context = StageContext(node.config, inputs, lists, folder, failures=failed)
             node.stage.run(context)
             _check_unchanged(node.recipe["foreign"], folder)
-            return context.facts
+            gpu = gpu_in_use()
+            return context.facts if gpu is None else {**context.facts, "gpu": gpu}
 
         log.info("%s: %s", node.stage.name, node.stage.help)
         for remark in node.stage.remarks(node.config, inputs):

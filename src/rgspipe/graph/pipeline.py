@@ -21,6 +21,7 @@ from rgspipe.graph.nodes import Making, Node, indispensable
 from rgspipe.graph.source_code import SourceCode
 from rgspipe.graph.variants import variant_name
 from rgspipe.machine.threads import order_of_sums
+from rgspipe.renderer.device import chosen_device
 from rgspipe.stages.base import Stage
 from rgspipe.store.artifacts import Artifact, ArtifactStore, Key
 from rgspipe.store.files import tree_digest
@@ -226,6 +227,9 @@ def run(
 
 
 def _run(config: RgspipeConfig, load_stage: StageLoader, overrides: Sequence[str], usual: Usual | None) -> Artifact:
+    if config.device == "cuda":
+        # Where there is none, that is told before anything is made.
+        chosen_device("cuda")
     store = ArtifactStore(Path(config.outputs))
     resolver = _Resolver(load_stage)
     root = resolver.resolve(config.stage, config, {})

@@ -2,33 +2,21 @@
 
 from __future__ import annotations
 
+import sys
 from typing import TYPE_CHECKING, Literal, get_args
-
-from rgspipe.errors import InputError
 
 if TYPE_CHECKING:
     import torch
 
-#: What may be asked for; "auto" is the GPU where there is one.
+#: What may be asked for (`renderer.device`); "auto" is the GPU where there is one.
 Wanted = Literal["auto", "cpu", "cuda"]
 CHOICES: tuple[str, ...] = get_args(Wanted)
 
 
-def chosen_device(wanted: Wanted) -> torch.device:
-    """The device that is asked for.
-
-    Raises:
-        InputError: it is a GPU, and there is none that torch can use.
-    """
-    # Loaded here: what may be asked for is told without it.
-    import torch
-
-    there = torch.cuda.is_available()
-    if wanted == "cuda" and not there:
-        why = "torch is built without CUDA" if torch.version.cuda is None else "no GPU, or no driver for it"
-        remedy = "device=auto takes what there is; rgspipe doctor says what that is."
-        raise InputError("device", expected="a GPU that torch can use, for device=cuda", found=why, remedy=remedy)
-    return torch.device("cuda" if there and wanted != "cpu" else "cpu")
+def gpu_in_use() -> str | None:
+    """Name of the GPU that this process has computed on; None where it has not."""
+    torch = sys.modules.get("torch")
+    return torch.cuda.get_device_name() if torch is not None and torch.cuda.is_initialized() else None
 
 
 def finish(device: torch.device) -> None:

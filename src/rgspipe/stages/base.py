@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rgspipe.config import RgspipeConfig
-from rgspipe.machine.device import chosen_device
+from rgspipe.renderer.device import chosen_device
 from rgspipe.store.artifacts import Artifact
 
 if TYPE_CHECKING:

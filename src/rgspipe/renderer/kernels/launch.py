@@ -39,6 +39,12 @@ def _start() -> None:
 
 start_with_cache(_start)
 
+
+def warp_finds_gpu() -> bool:
+    """Whether Warp can use a GPU, for which it may need a newer driver than torch."""
+    return wp.is_cuda_available()
+
+
 #: Slices per thread of a launch whose items differ in cost; more slices balance better and start slower.
 SLICES_PER_THREAD = 4
 

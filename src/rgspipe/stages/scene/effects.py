@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from rgspipe.config import RgspipeConfig
 from rgspipe.config.effects import EffectsConfig
 from rgspipe.datasets.json_file import read_json
-from rgspipe.machine.device import chosen_device
+from rgspipe.renderer.device import chosen_device
 from rgspipe.renderer.effect_bounds import EffectBounds
 from rgspipe.renderer.effect_choice import EffectChoice, RigKind, choose_effects
 from rgspipe.renderer.effects import Effects
