@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import torch
@@ -15,6 +16,9 @@ from rgspipe.scene import Camera
 
 #: Most pixels along a side that are traced of a camera.
 LONGEST_SIDE = 96
+
+#: Cameras that are asked at once: few calls for few points, and what the first ones see need not be asked the others.
+AT_ONCE = 8
 
 #: Most cells along a side of a grid.
 MOST_CELLS = 128
@@ -91,15 +95,35 @@ class SeenSpace:
     def holds(self, points: Tensor, margin: float) -> Tensor:
         """(P,) bool: points (P, 3) that lie nearer to a camera, by `margin`, than the surface behind them."""
         free = torch.zeros(len(points), dtype=torch.bool)
-        for camera, reach in zip(self.cameras, self.reaches, strict=True):
+        for first in range(0, len(self.cameras), AT_ONCE):
             unseen = (~free).nonzero()[:, 0]
-            pixel, depth = camera.project(points[unseen])
-            column, row = pixel.floor().long().unbind(-1)
-            framed = (depth > 0) & (column >= 0) & (column < camera.width) & (row >= 0) & (row < camera.height)
-            chosen = unseen[framed]
-            distance = (points[chosen] - camera.origin.double()).norm(dim=-1)
-            free[chosen[distance < reach[row[framed] * camera.width + column[framed]] - margin]] = True
+            free[unseen] = self._seen_by_some(slice(first, first + AT_ONCE), points[unseen].double(), margin)
         return free
+
+    def _seen_by_some(self, cameras: slice, points: Tensor, margin: float) -> Tensor:
+        """(P,) bool: what some of the cameras (C,) see of points (P, 3), as in `holds`."""
+        origins, rotations, lenses, sizes, starts, reaches = self._stacked
+        fx, fy, cx, cy = lenses[cameras, :, None].unbind(1)
+        width, height = sizes[cameras, :, None].unbind(1)
+        # As `Camera.project` has it.
+        local = (points - origins[cameras, None]) @ rotations[cameras]
+        depth = -local[:, :, 2]
+        scale = 1.0 / torch.where(depth.abs() > 1e-12, depth, 1e-12)
+        column, row = (cx + fx * local[:, :, 0] * scale).floor(), (cy - fy * local[:, :, 1] * scale).floor()
+        framed = (depth > 0) & (column >= 0) & (column < width) & (row >= 0) & (row < height)
+        pixel = starts[cameras, None] + torch.where(framed, row * width + column, 0.0).long()
+        return (framed & (local.norm(dim=2) < reaches[pixel] - margin)).any(dim=0)
+
+    @cached_property
+    def _stacked(self) -> tuple[Tensor, ...]:
+        """Of all cameras, float64: origins (V, 3), rotations (V, 3, 3), fx, fy, cx and cy (V, 4), widths and heights
+        (V, 2), where (V,) the pixels of each begin among all reaches (R,), and these."""
+        poses = torch.stack([camera.camera_to_world.double() for camera in self.cameras])
+        lenses = [[camera.fx, camera.fy, camera.cx, camera.cy] for camera in self.cameras]
+        sizes = torch.tensor([[camera.width, camera.height] for camera in self.cameras])
+        pixels = sizes.prod(dim=1)
+        lenses, starts = torch.tensor(lenses, dtype=torch.float64), pixels.cumsum(dim=0) - pixels
+        return poses[:, :3, 3], poses[:, :3, :3], lenses, sizes.double(), starts, torch.cat(self.reaches)
 
     def cells(self, grid: Grid, margin: float) -> Tensor:
         """(X, Y, Z) bool: cells whose middles were seen."""
