@@ -19,6 +19,7 @@ from rgspipe.fitting.course import (
     BEGINNING,
     BLOCKS_BESIDE,
     BRIGHT_SPOTS,
+    GROWTH,
     KINDS,
     POLISH,
     Course,
@@ -166,7 +167,7 @@ def _search(refiner: Refiner, candidates: Sequence[Candidates], options: SearchO
     found = grown(refiner, found, spec, options) if spec.extended or spec.mounted else found
     best, kinds, course = found.best, (), refiner.meter.course
     size = weight(best.emitters)
-    course.further(effort_after(size) - effort_after((spec.count or 1) ** 2))
+    course.further(effort_after(size) - effort_after((spec.count or 1) ** GROWTH))
     with course.part("kinds of lights", KINDS * size, len(best.emitters)):
         if spec.type == AUTO:
             best, kinds, tables = told_kinds(refiner, candidates, best, spec, options)
