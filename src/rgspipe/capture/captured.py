@@ -122,7 +122,7 @@ def capture_scenes(
     if not isinstance(surfels, Surfels):
         surfels = as_count(surfels, "surfels", remedy="Pass surfels, or how many to make.")
         surfels = initialise_surfels(views, surfels, seed=options.seed, where=where)
-    # Its statistics are scipy's.
+    # The statistics of what follows are numpy's and scipy's.
     surfels, views = surfels.to(torch.float32).to("cpu"), [view.to("cpu") for view in views]
     if options.unseen:
         surfels = with_unseen_surfaces(surfels, [view.camera for view in views], depths=[view.depth for view in views])

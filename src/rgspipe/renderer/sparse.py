@@ -127,7 +127,8 @@ def _check_compressed(rows: Tensor, columns: Tensor, values: Tensor, shape: tupl
 
 def in_places(matrix: Tensor, values: Tensor) -> Tensor:
     """A tensor in compressed rows with other values (entries,) and the indices of `matrix`, not copied."""
-    return _compressed(matrix.crow_indices(), matrix.col_indices(), values, matrix.shape)
+    rows, columns = matrix.crow_indices(), matrix.col_indices()
+    return torch.sparse_csr_tensor(rows, columns, values, size=matrix.shape, check_invariants=False)
 
 
 def stack(operators: list[SparseOperator]) -> SparseOperator:
@@ -141,12 +142,8 @@ def stack(operators: list[SparseOperator]) -> SparseOperator:
 def _to_torch(matrix: scipy.sparse.csr_matrix, device: torch.device | str) -> Tensor:
     kinds = (matrix.indptr, np.int32), (matrix.indices, np.int32), (matrix.data, np.float32)
     rows, columns, values = (torch.from_numpy(part.astype(kind, copy=False)).to(device) for part, kind in kinds)
-    return _compressed(rows, columns, values, matrix.shape)
-
-
-def _compressed(rows: Tensor, columns: Tensor, values: Tensor, shape: tuple[int, int]) -> Tensor:
-    """A tensor in compressed rows of these parts, without what torch has to say at the first."""
     with warnings.catch_warnings():
-        # That they are in beta: the products used here are stable; and, before torch 2.13, that nothing checks them.
+        # torch announces at the first use that its compressed rows are in beta (the products used here are stable), and
+        # before 2.13 that nothing checks them.
         warnings.filterwarnings("ignore", message="Sparse (CSR tensor support is in beta|invariant checks are)")
-        return torch.sparse_csr_tensor(rows, columns, values, size=shape, check_invariants=False)
+        return torch.sparse_csr_tensor(rows, columns, values, size=matrix.shape, check_invariants=False)
