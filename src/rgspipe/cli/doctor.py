@@ -18,8 +18,8 @@ from rgspipe.cli.installation import EXTRAS, Part, needed_parts, optional_parts,
 from rgspipe.cli.messages import EXIT_FAILED, line_width
 from rgspipe.datasets.input_file import folder_to_be
 from rgspipe.errors import InputError
-from rgspipe.graph.commands import typed
 from rgspipe.machine.description import available_memory_gib, machine
+from rgspipe.program import typed
 
 #: Columns of what is printed.
 WIDTH = 100

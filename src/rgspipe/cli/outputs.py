@@ -13,7 +13,7 @@ from rgspipe.cli.arguments import refused
 from rgspipe.cli.columns import columns, without_empty
 from rgspipe.datasets.input_file import input_folder
 from rgspipe.errors import InputError
-from rgspipe.graph.commands import typed
+from rgspipe.program import typed
 from rgspipe.store.retention import Choice, Stored, in_the_making, removable, remove, removing, stored
 from rgspipe.store.status import read_statuses
 

@@ -13,7 +13,7 @@ from rgspipe.cli.help import groups, sections
 from rgspipe.cli.messages import line_width
 from rgspipe.datasets.input_file import folder_to_be
 from rgspipe.errors import InputError, printable
-from rgspipe.graph.commands import typed
+from rgspipe.program import typed
 from rgspipe.store.status import STATES, read_statuses
 
 #: What runs are told apart by beside what they were started with.

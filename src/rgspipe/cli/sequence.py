@@ -21,8 +21,8 @@ from rgspipe.cli.leading import lead_on
 from rgspipe.cli.messages import EXIT_FAILED
 from rgspipe.datasets.input_file import input_file
 from rgspipe.errors import InputError
-from rgspipe.graph.commands import typed
 from rgspipe.machine.resources import resource_folder
+from rgspipe.program import typed
 from rgspipe.store.status import read_statuses
 
 #: What each step of a pipeline is run with.

@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 
 from rgspipe.errors import InputError
 from rgspipe.options import Options, Setting, settings
+from rgspipe.program import typed
 
 Schema = TypeVar("Schema", bound=Options)
 
@@ -41,7 +42,7 @@ def _nested(setting: Setting, value: Any, key: str) -> Any:
         return value
     if not isinstance(value, Mapping):
         first = settings(setting.section)[0].name
-        remedy = f"python -m rgspipe --help {key} lists them."
+        remedy = f"{typed('--help', key)} lists them."
         raise InputError(key, expected=f"keys such as {key}.{first}", found=str(value), remedy=remedy)
     return build(setting.section, value, key)
 
@@ -73,8 +74,8 @@ def _suggestion(key: str, known: Sequence[str]) -> str:
         return f"Did you mean {' or '.join(near)}?"
     section = key.partition(".")[0]
     if section in known and section != key:
-        return f"python -m rgspipe --help {section} lists the keys of {section}."
-    return "python -m rgspipe --help lists the keys."
+        return f"{typed('--help', section)} lists the keys of {section}."
+    return f"{typed('--help')} lists the keys."
 
 
 def plain(value: Any) -> Any:

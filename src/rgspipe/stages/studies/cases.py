@@ -15,6 +15,7 @@ from hydra.errors import HydraException
 from rgspipe.config import RgspipeConfig, get_value, with_changes
 from rgspipe.config.core import describe
 from rgspipe.errors import InputError
+from rgspipe.program import typed
 from rgspipe.studies.captures import CLEAN
 
 #: The key that lists cases.
@@ -135,7 +136,7 @@ def _unknown(text: str, key: str, known: Sequence[str]) -> InputError:
         LISTED,
         expected="keys of the configuration",
         found=f"{text!r}: no key {key}",
-        remedy=f"Did you mean {' or '.join(near)}?" if near else "python -m rgspipe --help lists the keys.",
+        remedy=f"Did you mean {' or '.join(near)}?" if near else f"{typed('--help')} lists the keys.",
     )
 
 
