@@ -172,8 +172,7 @@ def refine(
 
 
 def _shown(state: RefineState) -> str:
-    loss, error = (max(fmean(values[-SHOWN_STEPS:]), 1e-30) for values in (state.losses, state.errors))
-    return f"loss {loss:.2e}, {-10.0 * math.log10(error):.1f} dB"
+    return f"{-10.0 * math.log10(max(fmean(state.errors[-SHOWN_STEPS:]), 1e-30)):.1f} dB"
 
 
 def _step_loss(
