@@ -53,7 +53,7 @@ def run(context: StageContext) -> None:
     checkpoint = Checkpoint(context.scratch / "checkpoint.safetensors", config.checkpoint_every)
     train_views = degraded(dataset.train, context.config.capture)
     known = prior_from_maps(train_views, config.albedo_prior_weight) if config.albedo_prior == "dataset" else None
-    trained = train(train_views, start.to(context.device), options, checkpoint=checkpoint, prior=known)
+    trained = train(train_views, start, options, checkpoint=checkpoint, prior=known, device=context.device)
     save_surfels(context.folder / "surfels.safetensors", trained.surfels)
     _write_table(context.folder / "training.csv", trained)
 
