@@ -8,8 +8,9 @@ import numpy as np
 
 from lamp_problem import gather, problem, radiance, true_lamps, unseen
 from photographed_room import frozen_room
+from rgspipe.capture.candidates import Candidates
 from rgspipe.capture.received import Received
-from rgspipe.capture.search import Candidates, looked_for_again
+from rgspipe.capture.search import looked_beside, looked_for_again, settled_beside
 
 
 def test_light_that_comes_back_from_the_unseen_is_that_of_the_whole_scene() -> None:
@@ -69,3 +70,14 @@ def test_a_lamp_in_a_wrong_place_is_found_again_beside_the_others() -> None:
     found = looked_for_again(made, Candidates.of(made), stuck, lambda *_: None)
     assert made.cost(found) < 0.1 * made.cost(stuck)
     assert np.linalg.norm(found.places - true_lamps(made).places, axis=1).max() < 0.003
+
+
+def test_a_lamp_goes_to_the_better_minimum_beside_it_and_stays_there() -> None:
+    made = problem()
+    made = replace(made, frozen=made.frozen.with_dictionary(8, seed=0))
+    candidates, true = Candidates.of(made), true_lamps(made)
+    places = true.places.copy()
+    places[1] += 0.1 * made.size * np.array([0.6, -0.8, 0.0])
+    found = settled_beside(made, candidates, made.lamps(places, true.logs))
+    assert np.linalg.norm(found.places - true.places, axis=1).max() < 0.003  # 3e-4 of the room
+    assert all(looked_beside(made, candidates, found, own) is found for own in (0, 1))

@@ -1,11 +1,11 @@
 """Where lamps may be: candidates all over the scene, ranked on surfels alone, and how many of them it takes.
 
-A candidate beside the lamps that are known is ranked with the intensity that suits it, in one grey channel, by a few
-steps of Gauss and Newton that all candidates take at once. The best are refined. One lamp more is there if it makes
-what was measured so much more likely, with the variances of the albedo estimated anew for either number: a lamp that is
-left out looks like paint, and the more of it there is to explain, the less is paint expected to change. How much is
-enough is what a light of a fit has to lower its cost by (`fitting.options.BarOptions`): of n measurements a share g of
-their squares is worth −n log(1 − g) of −2 log p.
+The best candidates are refined. One lamp more is there if it makes what was measured so much more likely, with the
+variances of the albedo estimated anew for either number: a lamp that is left out looks like paint, and the more of it
+there is to explain, the less is paint expected to change. How much is enough is what a light of a fit has to lower its
+cost by (`fitting.options.BarOptions`): of n measurements a share g of their squares is worth −n log(1 − g) of −2 log p.
+
+Edges of shadows make many minima beside each other, so that each lamp is looked for again from places around it.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rgspipe.capture.bounds import with_bounds
+from rgspipe.capture.candidates import Candidates, ranked
 from rgspipe.capture.doubts import model_variance
-from rgspipe.capture.lamps import DARK, LampProblem, Lamps
-from rgspipe.capture.photographs import Numbers
+from rgspipe.capture.lamps import LampProblem, Lamps
 from rgspipe.capture.variances import with_likely_variances
 from rgspipe.fitting.options import BarOptions
 from rgspipe.fitting.search.apart import CandidatePlaces
@@ -28,14 +28,11 @@ from rgspipe.training.albedo import ALBEDO_RANGE
 #: Candidates that are refined, and least distance of two of them in parts of the scene's size.
 TRIES, APART = 5, 0.14
 
-#: Steps of candidates' intensities, and of lamps: at first and at last.
-RANKING, FIRST, LAST = 5, 8, 25
+#: Places around a lamp from which it is refined, of 26. Two of a false minimum's first three led out of it.
+AROUND = 3
 
-#: Largest step of the logarithm of a candidate's intensity.
-LONGEST_GAIN = 1.5
-
-#: Candidates that are ranked at once.
-BATCH = 128
+#: Steps of lamps: at first and at last.
+FIRST, LAST = 8, 25
 
 #: How much one more lamp has to explain.
 BAR = BarOptions()
@@ -45,60 +42,6 @@ ROUNDS = 3
 
 #: Is told of each refinement.
 Told = Callable[[int], object]
-
-
-@dataclass(frozen=True, eq=False)
-class Candidates:
-    """Places of lamps, and what a grey lamp at each sends to every surfel, T e.
-
-    Attributes:
-        places: (C, 3) scene units.
-        shares: (N, C).
-    """
-
-    places: Numbers
-    shares: Numbers
-
-    @classmethod
-    def of(cls, problem: LampProblem) -> Candidates:
-        """Those of the scene's dictionary."""
-        dictionary = problem.frozen.dictionary
-        shares = problem.received.spread(dictionary.irradiance.double().cpu().numpy().T)
-        return cls(dictionary.positions.double().numpy(), shares)
-
-
-def ranked(problem: LampProblem, candidates: Candidates, known: Lamps | None) -> tuple[Numbers, Numbers]:
-    """(C,) cost of one more grey lamp at each candidate, and (C,) the logarithm of its intensity over π."""
-    grey = _grey(problem)
-    target = (grey * problem.target).sum(axis=1)
-    light = problem.received.known + (0.0 if known is None else known.arriving)
-    light = np.maximum(np.exp((grey * np.log(np.maximum(light, 1e-300))).sum(axis=1)), DARK * np.median(light))
-    sent = np.exp(target) * 0.2
-    costs, logs = [], []
-    for begin in range(0, candidates.shares.shape[1], BATCH):
-        shares = candidates.shares[:, begin : begin + BATCH]
-        typical = np.array([np.median(column[column > 0.0]) if (column > 0.0).any() else 1.0 for column in shares.T])
-        gain = np.log(np.median(sent) / np.maximum(typical, 1e-300))
-        for _ in range(RANKING):
-            own = shares * np.exp(gain)
-            arriving = own + light[:, None]
-            residual, slope = target[:, None] - np.log(arriving), own / arriving
-            whitened = problem.field.whitened(slope)
-            step = (whitened * residual).sum(axis=0) / np.maximum((whitened * slope).sum(axis=0), 1e-12)
-            gain = gain + np.clip(step, -LONGEST_GAIN, LONGEST_GAIN)
-        residual = target[:, None] - np.log(shares * np.exp(gain) + light[:, None])
-        costs.append((residual * problem.field.whitened(residual)).sum(axis=0))
-        logs.append(gain)
-    return np.concatenate(costs), np.concatenate(logs)
-
-
-def _grey(problem: LampProblem) -> Numbers:
-    """(N, 3) what each channel counts in the mean of those that were measured."""
-    told = problem.field.told
-    if told is None:
-        return np.full((len(problem.radiance), 3), 1.0 / 3.0)
-    known = np.where(told.any(axis=1, keepdims=True), told, True)
-    return known / known.sum(axis=1, keepdims=True)
 
 
 def with_one_more(problem: LampProblem, candidates: Candidates, known: Lamps | None, told: Told) -> Lamps:
@@ -124,8 +67,11 @@ def settled(problem: LampProblem, candidates: Candidates, lamps: Lamps, told: To
         problem = weighed(problem, lamps)
         lamps = problem.refined(problem.lamps(lamps.places, lamps.logs), LAST)
         told(1)
-        if left == 1 and len(lamps) > 1:
-            lamps = looked_for_again(problem, candidates, lamps, told)
+        if left == 1:
+            if len(lamps) > 1:
+                lamps = looked_for_again(problem, candidates, lamps, told)
+            lamps = settled_beside(problem, candidates, lamps)
+            told(AROUND * len(lamps))
     return Tried.of(problem, lamps)
 
 
@@ -136,6 +82,31 @@ def looked_for_again(problem: LampProblem, candidates: Candidates, lamps: Lamps,
         again = with_one_more(problem, candidates, lamps.at(others), told).at(np.argsort([*others, own]).tolist())
         lamps = min(lamps, again, key=problem.cost)
     return lamps
+
+
+def settled_beside(problem: LampProblem, candidates: Candidates, lamps: Lamps) -> Lamps:
+    """The least minimum that is reached by moving one lamp after the other to a better one beside it."""
+    for own in range(len(lamps)):
+        beside = looked_beside(problem, candidates, lamps, own)
+        if beside is not lamps:
+            return settled_beside(problem, candidates, beside)
+    return lamps
+
+
+def looked_beside(problem: LampProblem, candidates: Candidates, lamps: Lamps, own: int) -> Lamps:
+    """Lamps of which one has moved to a better minimum beside, or the same if none is found."""
+    others = lamps.at([other for other in range(len(lamps)) if other != own]) if len(lamps) > 1 else None
+    around = candidates.around(problem, lamps.places[own])
+    costs, _ = ranked(problem, around, others)
+    found = [lamps]
+    for index in np.argsort(costs)[:AROUND]:
+        places = lamps.places.copy()
+        places[own] = around.places[index]
+        found.append(problem.refined(problem.lamps(places, lamps.logs), FIRST))
+    best = min(found, key=problem.cost)
+    moved = float(np.linalg.norm(best.places[own] - lamps.places[own]))
+    # Nearer than half of the way is the minimum that is known.
+    return problem.refined(best, LAST) if moved > 0.5 * candidates.between else lamps
 
 
 def weighed(problem: LampProblem, lamps: Lamps | None) -> LampProblem:
@@ -207,7 +178,8 @@ def best_with_one_more(problem: LampProblem, candidates: Candidates, known: Lamp
     """The best lamps found that are one more than `known`, settled, while a progress line stands."""
     number = 1 if known is None else len(known) + 1
     looks = 1 if known is None else 1 + number
-    with progress_bar([], f"looking for lamp {number}", looks * (TRIES + 1) + ROUNDS, unit="step") as bar:
+    steps = looks * (TRIES + 1) + ROUNDS + AROUND * number
+    with progress_bar([], f"looking for lamp {number}", steps, unit="step") as bar:
         lamps = with_one_more(problem, candidates, known, bar.update)
         return settled(problem, candidates, lamps, bar.update)
 

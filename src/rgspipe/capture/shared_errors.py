@@ -18,9 +18,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from rgspipe.capture.candidates import Candidates
 from rgspipe.capture.lamps import LampProblem, Lamps
 from rgspipe.capture.photographs import Numbers
-from rgspipe.capture.search import Candidates
 from rgspipe.capture.variances import FREEDOM
 from rgspipe.training.albedo import ALBEDO_RANGE
 
