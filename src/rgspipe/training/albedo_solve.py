@@ -170,10 +170,7 @@ class Quadratic:
         right = ties.summed(right - self.smoothness * (self.laplacian.matrix @ at.albedo))
         precondition = 1.0 / ties.summed(self.diagonal)
         found = conjugate_gradients(
-            lambda x: ties.summed(self._normal(ties.spread(x))),
-            right,
-            lambda x: precondition * x,
-            torch.zeros_like(right),
+            lambda x: ties.summed(self._normal(ties.spread(x))), right, lambda x: precondition * x
         )
         return ties.spread(found)
 
@@ -228,15 +225,14 @@ def conjugate_gradients(
     operator: Callable[[Tensor], Tensor],
     right: Tensor,
     precondition: Callable[[Tensor], Tensor],
-    x: Tensor,
     steps: int = CG_STEPS,
 ) -> Tensor:
-    """So many steps from x (M, C) towards the solution of `operator` x = `right`, each column on its own.
+    """So many steps from 0 towards the solution x (M, C) of `operator` x = `right`, each column on its own.
 
     Args:
         precondition: about the operator's inverse, symmetric.
     """
-    residual = right - operator(x)
+    x, residual = torch.zeros_like(right), right
     z = precondition(residual)
     direction, energy = z, (residual * z).sum(dim=0)
     for _ in range(steps):

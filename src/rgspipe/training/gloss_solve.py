@@ -115,8 +115,7 @@ class GlossProblem:
         def precondition(x: Tensor) -> Tensor:
             return (held * inverse(at.like(x[:, 0])).flat())[:, None]
 
-        start = torch.zeros_like(right)[:, None]
-        step = conjugate_gradients(normal_operator, right[:, None], precondition, start, CG_STEPS)
+        step = conjugate_gradients(normal_operator, right[:, None], precondition, CG_STEPS)
         return limited(at, at.like(at.flat() + step[:, 0]), self.chosen)
 
 
