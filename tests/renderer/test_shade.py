@@ -18,7 +18,7 @@ GEOMETRY = ("centers", "rotations", "scales", "opacities", "clip_offsets", "clip
 
 
 def gradients(surfels: Surfels, rays: tuple[Tensor, Tensor], kernel: bool) -> dict[str, Tensor]:
-    """Gradients of a random linear function of the colours, in the dtype of the surfels and on their device."""
+    """Gradients of a random linear function of colours and coverage, in the dtype and on the device of the surfels."""
     like = surfels.centers
     leaves = {name: getattr(surfels, name).clone().requires_grad_() for name in GEOMETRY}
     scene = replace(surfels, **leaves)
@@ -26,7 +26,7 @@ def gradients(surfels: Surfels, rays: tuple[Tensor, Tensor], kernel: bool) -> di
     generator = torch.Generator().manual_seed(4)
     radiance = torch.rand(2, len(surfels), 3, generator=generator, dtype=torch.float64)
     radiance = radiance.to(like.device, torch.float32 if kernel else torch.float64).requires_grad_()
-    cotangent = torch.randn(len(rays[0]), 3, generator=generator, dtype=torch.float64).to(like.device)
+    cotangent = torch.randn(len(rays[0]), 4, generator=generator, dtype=torch.float64).to(like.device)
     ray_view = torch.arange(len(rays[0]), device=like.device) % 2
     arguments = (scene, thresholds, radiance, rays[0].to(like.device), rays[1].to(like.device), ray_view)
     colours = shade_rays(SurfelBvh(scene), *arguments) if kernel else reference.shade_rays(*arguments)

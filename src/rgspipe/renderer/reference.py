@@ -77,9 +77,10 @@ def composite_dense(
 def shade_rays(
     surfels: Surfels, thresholds: Tensor, radiance: Tensor, origins: Tensor, directions: Tensor, ray_view: Tensor
 ) -> Tensor:
-    """(R, 3) colours: `kernels.shade.shade_rays`."""
+    """(R, 4) colours and coverage: `kernels.shade.shade_rays`."""
     weights, _ = composite_dense(surfels, origins, directions, thresholds=thresholds)
-    return torch.einsum("rn,rnc->rc", weights, radiance[ray_view.long()])
+    colours = torch.einsum("rn,rnc->rc", weights, radiance[ray_view.long()])
+    return torch.cat([colours, weights.sum(dim=1, keepdim=True)], dim=1)
 
 
 def geometry_factor(positions: Tensor, centers: Tensor, normals: Tensor, scales: Tensor) -> tuple[Tensor, Tensor]:

@@ -190,18 +190,15 @@ def _step_loss(
     rays = _joined(draws)
     radiance = shaded_radiance(surfels, [view.light for view in chosen])
     bvh = SurfelBvh(surfels)
-    hits = composite(bvh, rays[0], rays[1])
-    colours = shade_rays(bvh, surfels, thresholds, radiance, *rays, hits)
+    colours = shade_rays(bvh, surfels, thresholds, radiance, *rays)
+    means = [pixel_means(draw, seen) for draw, seen in zip(draws, _split(draws, colours), strict=True)]
     images = [
-        view.as_photographed(draw.pixels, pixel_means(draw, seen))
-        for view, draw, seen in zip(chosen, draws, _split(draws, colours), strict=True)
+        view.as_photographed(draw.pixels, mean[:, :3]) for view, draw, mean in zip(chosen, draws, means, strict=True)
     ]
     data = _image_term(chosen, draws, images, options)
     prior = torch.zeros((), device=radiance.device)
     if options.alpha_weight > 0.0:
-        ones = torch.ones_like(radiance[:1])
-        covered = shade_rays(bvh, surfels, thresholds, ones, rays[0], rays[1], torch.zeros_like(rays[2]), hits)
-        prior = prior + options.alpha_weight * _alpha_term(chosen, draws, covered)
+        prior = prior + options.alpha_weight * _alpha_term(chosen, draws, [mean[:, 3] for mean in means])
     if options.continuity_weight > 0.0:
         prior = prior + options.continuity_weight * continuity(surfels, pairs)
     if options.smoothness_weight > 0.0:
@@ -252,13 +249,10 @@ def _squared_error(views: Sequence[RefineView], draws: Sequence[PixelDraw], imag
     )
 
 
-def _alpha_term(views: Sequence[RefineView], draws: Sequence[PixelDraw], covered: Tensor) -> Tensor:
-    """Mean |coverage − alpha|."""
-    triples = zip(views, draws, _split(draws, covered), strict=True)
-    terms = [
-        average((pixel_means(draw, seen[:, :1])[:, 0] - view.alpha[draw.pixels]).abs()) for view, draw, seen in triples
-    ]
-    return torch.stack(terms).mean()
+def _alpha_term(views: Sequence[RefineView], draws: Sequence[PixelDraw], covered: Sequence[Tensor]) -> Tensor:
+    """Mean |coverage − alpha| of each view's pixels (P,)."""
+    triples = zip(views, draws, covered, strict=True)
+    return torch.stack([average((own - view.alpha[draw.pixels]).abs()) for view, draw, own in triples]).mean()
 
 
 def _steps(rates: Mapping[str, float], options: RefineOptions, spacing: float) -> dict[str, float]:

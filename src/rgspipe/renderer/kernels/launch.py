@@ -132,6 +132,11 @@ def as_vec3(tensor: Tensor) -> wp.array:
     return wp.from_torch(tensor.detach().float().contiguous(), dtype=wp.vec3)
 
 
+def as_vec4(tensor: Tensor) -> wp.array:
+    """(N, 4) float32 tensor as an array of vec4, without a copy where it is contiguous."""
+    return wp.from_torch(tensor.detach().float().contiguous(), dtype=wp.vec4)
+
+
 def as_array(tensor: Tensor) -> wp.array:
     """A tensor as a Warp array of the same scalar type, without a copy where it is contiguous."""
     return wp.from_torch(tensor.detach().contiguous())

@@ -1,4 +1,4 @@
-"""Colours of composited rays, differentiable towards the surfels, the coverage thresholds and the radiance."""
+"""Colours and coverage of composited rays, differentiable towards surfels, coverage thresholds and radiance."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from torch import Tensor
 
 from rgspipe.renderer.kernels.composite import Hits, composite
 from rgspipe.renderer.kernels.coverage import LayerRule, sharpened, sharpened_slope
-from rgspipe.renderer.kernels.launch import as_array, as_vec3, launch
-from rgspipe.renderer.kernels.shade_gradients import quaternion_gradient, radiance_gradient
+from rgspipe.renderer.kernels.launch import as_array, as_vec3, as_vec4, launch
+from rgspipe.renderer.kernels.shade_gradients import quaternion_gradient
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh, SurfelRecord, clip_height
 from rgspipe.scene.surfels import Surfels
 
@@ -34,16 +34,18 @@ def _shade(
     weights: wp.array(dtype=float, ndim=2),
     ray_view: wp.array(dtype=int),
     radiance: wp.array(dtype=wp.vec3, ndim=2),
-    colours: wp.array(dtype=wp.vec3),
+    colours: wp.array(dtype=wp.vec4),
 ):
     i = wp.tid() + offset
     view = ray_view[i]
     colour = wp.vec3(0.0, 0.0, 0.0)
+    covered = float(0.0)
     k = int(0)
     while k < indices.shape[1] and indices[i, wp.min(k, indices.shape[1] - 1)] >= 0:
         colour += weights[i, k] * radiance[view, indices[i, k]]
+        covered += weights[i, k]
         k += 1
-    colours[i] = colour
+    colours[i] = wp.vec4(colour[0], colour[1], colour[2], covered)
 
 
 @wp.func
@@ -118,23 +120,29 @@ def _shade_adjoint(
     indices: wp.array(dtype=int, ndim=2),
     depths: wp.array(dtype=float, ndim=2),
     alphas: wp.array(dtype=float, ndim=2),
+    weights: wp.array(dtype=float, ndim=2),
     ray_view: wp.array(dtype=int),
     radiance: wp.array(dtype=wp.vec3, ndim=2),
-    ray_gradient: wp.array(dtype=wp.vec3),
+    ray_gradient: wp.array(dtype=wp.vec4),
     to_weight: wp.array(dtype=float, ndim=2),
     layer_passing: wp.array(dtype=float, ndim=2),
     layer_first: wp.array(dtype=int, ndim=2),
     gradient: wp.array(dtype=float, ndim=3),
     threshold_gradient: wp.array(dtype=float, ndim=2),
+    radiance_gradient: wp.array(dtype=wp.vec3, ndim=3),
 ):
     i = wp.tid() + offset
     o = origins[i]
     d = directions[i]
     view = ray_view[i]
     width = indices.shape[1]
+    to_colour = wp.vec3(ray_gradient[i][0], ray_gradient[i][1], ray_gradient[i][2])
     count = int(0)
     while count < width and indices[i, wp.min(count, width - 1)] >= 0:
-        to_weight[i, count] = wp.dot(ray_gradient[i], radiance[view, indices[i, count]])
+        seen = indices[i, count]
+        to_weight[i, count] = wp.dot(to_colour, radiance[view, seen]) + ray_gradient[i][3]
+        if radiance_gradient.shape[2] > 0:
+            wp.atomic_add(radiance_gradient, slab, view, seen, weights[i, count] * to_colour)
         count += 1
     # Front to back: what reaches each layer, noted at its last hit.
     passing = float(1.0)
@@ -190,10 +198,10 @@ class _ShadeRays(torch.autograd.Function):
         ctx: Any, bvh: SurfelBvh, rays: tuple[Tensor, ...], hits: Hits, radiance: Tensor, *parameters: Tensor
     ) -> Tensor:
         origins, _, ray_view = rays
-        colours = torch.empty((origins.shape[0], 3), dtype=torch.float32, device=bvh.device)
+        colours = torch.empty((origins.shape[0], 4), dtype=torch.float32, device=bvh.device)
         radiance_array = wp.from_torch(radiance.detach().float().contiguous(), dtype=wp.vec3)
         arguments = [as_array(hits.indices), as_array(hits.weights), as_array(ray_view), radiance_array]
-        launch(_shade, origins.shape[0], [*arguments, as_vec3(colours)], bvh.device)
+        launch(_shade, origins.shape[0], [*arguments, as_vec4(colours)], bvh.device)
         ctx.bvh, ctx.rays, ctx.hits = bvh, rays, hits
         ctx.save_for_backward(radiance, *parameters)
         return colours
@@ -201,16 +209,14 @@ class _ShadeRays(torch.autograd.Function):
     @staticmethod
     def backward(ctx: Any, colour_gradient: Tensor) -> tuple[Tensor | None, ...]:
         radiance, _centers, rotations, scales, *_rest = ctx.saved_tensors
-        packed, thresholds = _surfel_gradient(ctx.bvh, ctx.rays, ctx.hits, radiance, colour_gradient)
+        wanted = ctx.needs_input_grad[3]
+        packed, thresholds, to_radiance = _gradients(ctx.bvh, ctx.rays, ctx.hits, radiance, colour_gradient, wanted)
         softness = ctx.bvh.coverage.clip_softness
-        to_radiance = None
-        if ctx.needs_input_grad[3]:
-            to_radiance = radiance_gradient(ctx.hits, ctx.rays[2], radiance, colour_gradient)
         return (
             None,
             None,
             None,
-            to_radiance,
+            to_radiance if wanted else None,
             packed[:, 0:3],
             quaternion_gradient(rotations, packed[:, 3:6]),
             # By the scales that rays meet: those of surfels without extent are not zero there.
@@ -222,22 +228,34 @@ class _ShadeRays(torch.autograd.Function):
         )
 
 
-def _surfel_gradient(
-    bvh: SurfelBvh, rays: tuple[Tensor, ...], hits: Hits, radiance: Tensor, colour_gradient: Tensor
-) -> tuple[Tensor, Tensor]:
-    """(N, GRADIENT_COLUMNS) and (2,) gradients of Σ colour_gradient · colour."""
+def _gradients(
+    bvh: SurfelBvh,
+    rays: tuple[Tensor, ...],
+    hits: Hits,
+    radiance: Tensor,
+    colour_gradient: Tensor,
+    to_radiance: bool,
+) -> tuple[Tensor, Tensor, Tensor]:
+    """(N, GRADIENT_COLUMNS), (2,) and (V, N, 3) gradients of Σ colour_gradient · colour; the last is none if unwanted.
+
+    Each slab takes 12 bytes a surfel and view for the radiance, less than what is kept of the rays of a view.
+    """
     origins, directions, ray_view = rays
     count, device = origins.shape[0], bvh.device
     slabs = SLABS if device.type == "cpu" else 1
-    packed = torch.zeros((slabs, len(bvh.surfels), GRADIENT_COLUMNS), dtype=torch.float32, device=device)
-    thresholds = torch.zeros((slabs, 2), dtype=torch.float32, device=device)
+    views, surfels = radiance.shape[:2] if to_radiance else (0, 0)
+
+    def zeros(*shape: int) -> Tensor:
+        return torch.zeros((slabs, *shape), dtype=torch.float32, device=device)
+
+    packed, thresholds, shown = zeros(len(bvh.surfels), GRADIENT_COLUMNS), zeros(2), zeros(views, surfels, 3)
     scratch = [torch.empty_like(hits.weights), torch.empty_like(hits.weights), torch.empty_like(hits.indices)]
     arguments = [bvh.records, bvh.rank, bvh.rule, as_vec3(bvh.local(origins)), as_vec3(directions)]
-    arguments += [as_array(x) for x in (hits.indices, hits.depths, hits.alphas, ray_view)]
-    arguments += [wp.from_torch(radiance.detach().float().contiguous(), dtype=wp.vec3), as_vec3(colour_gradient)]
+    arguments += [as_array(x) for x in (hits.indices, hits.depths, hits.alphas, hits.weights, ray_view)]
+    arguments += [wp.from_torch(radiance.detach().float().contiguous(), dtype=wp.vec3), as_vec4(colour_gradient)]
     arguments += [as_array(x) for x in (*scratch, packed, thresholds)]
-    launch(_shade_adjoint, count, arguments, device, slabs=slabs)
-    return packed.sum(dim=0), thresholds.sum(dim=0)
+    launch(_shade_adjoint, count, [*arguments, wp.from_torch(shown, dtype=wp.vec3)], device, slabs=slabs)
+    return packed.sum(dim=0), thresholds.sum(dim=0), shown.sum(dim=0)
 
 
 def shade_rays(
@@ -248,9 +266,8 @@ def shade_rays(
     origins: Tensor,
     directions: Tensor,
     ray_view: Tensor,
-    hits: Hits | None = None,
 ) -> Tensor:
-    """Colours seen along rays, with gradients towards surfels, thresholds and radiance.
+    """Colours seen along rays and how far they are covered, with gradients towards surfels, thresholds and radiance.
 
     The gradient takes the order of hits and their grouping into layers as given: at the instants where
     they change the image jumps by less than the noise of a pixel, and no derivative exists there.
@@ -262,13 +279,12 @@ def shade_rays(
         radiance: (V, N, 3) outgoing radiance of every surfel in each of V lightings.
         origins, directions: (R, 3).
         ray_view: (R,) which of the V lightings each ray sees.
-        hits: what `composite` made of the same rays, where they are shaded more than once.
 
     Returns:
-        (R, 3) float32 radiance.
+        (R, 4) float32 radiance, and the share of the ray that surfels stop.
     """
     device = bvh.device
-    hits = composite(bvh, origins.detach(), directions.detach()) if hits is None else hits
+    hits = composite(bvh, origins.detach(), directions.detach())
     rays = (origins.detach(), directions.detach().to(device, torch.float32), ray_view.to(device, torch.int32))
     return _ShadeRays.apply(
         bvh,

@@ -5,17 +5,6 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from rgspipe.renderer.kernels.composite import Hits
-
-
-def radiance_gradient(hits: Hits, ray_view: Tensor, radiance: Tensor, colour_gradient: Tensor) -> Tensor:
-    """(V, N, 3) gradient towards the radiance: the weights' transpose."""
-    gradient = torch.zeros_like(radiance)
-    ray, column = torch.nonzero(hits.indices >= 0, as_tuple=True)
-    rows = ray_view.long()[ray] * radiance.shape[1] + hits.indices[ray, column].long()
-    gradient.view(-1, 3).index_add_(0, rows, hits.weights[ray, column, None] * colour_gradient[ray])
-    return gradient
-
 
 def quaternion_gradient(quaternions: Tensor, to_rotation: Tensor) -> Tensor:
     """Gradient towards quaternions (N, 4) from that towards world-space rotation vectors (N, 3).
