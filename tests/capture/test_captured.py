@@ -56,7 +56,7 @@ def test_the_search_tells_how_far_it_is(monkeypatch: pytest.MonkeyPatch) -> None
     )
     search.found_lamps(found().answer.best.problem, 2, 3)
     assert [bar.desc for bar in bars] == ["looking for lamp 1", "looking for lamp 2"]
-    assert [bar.n for bar in bars] == [bar.total for bar in bars] == [9, 21]
+    assert [bar.n for bar in bars] == [bar.total for bar in bars] == [12, 27]
 
 
 def test_the_albedo_is_that_of_the_paint() -> None:

@@ -28,7 +28,7 @@ from rgspipe.training.albedo import ALBEDO_RANGE
 #: Candidates that are refined, and least distance of two of them in parts of the scene's size.
 TRIES, APART = 5, 0.14
 
-#: Places around a lamp from which it is refined, of 26. Two of a false minimum's first three led out of it.
+#: Places around a lamp from which it is refined, of 26: the best of these led out of the false minima that were met.
 AROUND = 3
 
 #: Steps of lamps: at first and at last.
