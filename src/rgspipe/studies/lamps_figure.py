@@ -23,7 +23,7 @@ def lamps_figure(table: pd.DataFrame) -> Figure:
             for row, case in enumerate(cases):
                 errors = 100.0 * shown[(shown["case"] == case) & (shown["where"] == group)]["position_error"]
                 height, colour = row + 0.7 * ((place + 0.5) / len(groups) - 0.5), COLOURS[place % len(COLOURS)]
-                label = group if row == 0 else None
+                label = group.replace("_", " ") if row == 0 else None
                 axis.scatter(errors, [height] * len(errors), s=14, color=colour, alpha=0.7, lw=0, label=label)
                 if len(errors):
                     axis.scatter([errors.median()], [height], marker="|", s=160, color=colour)
