@@ -55,8 +55,7 @@ class Candidates:
         """Those of a cube around `place` (3,) whose sides are two of `between`, where lamps may be."""
         sides = np.array([offset for offset in product((-1.0, 0.0, 1.0), repeat=3) if any(offset)])
         places = np.clip(place + self.between * sides, *problem.bounds)
-        with torch.no_grad():
-            irradiance, _ = problem.frozen.unit_irradiance(torch.from_numpy(places))
+        irradiance, _ = problem.frozen.unit_irradiance(torch.from_numpy(places))
         return Candidates(places, problem.received.spread(irradiance.double().cpu().numpy().T))
 
 
