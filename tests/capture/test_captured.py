@@ -12,7 +12,7 @@ import pytest
 import torch
 
 from photographed_room import LAMPS, painted_room, photographs
-from rgspipe.capture import search
+from rgspipe.capture import minima, search
 from rgspipe.capture.captured import Captured, capture_scene
 from rgspipe.capture.lamp_file import write_lamps
 from rgspipe.capture.options import CaptureOptions
@@ -51,12 +51,15 @@ def test_both_lamps_are_found_and_no_third() -> None:
 
 def test_the_search_tells_how_far_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
     bars = []
-    monkeypatch.setattr(
-        search, "progress_bar", lambda *given, **named: bars.append(progress_bar(*given, **named)) or bars[-1]
-    )
+    for module in (search, minima):
+        monkeypatch.setattr(
+            module, "progress_bar", lambda *given, **named: bars.append(progress_bar(*given, **named)) or bars[-1]
+        )
     search.found_lamps(found().answer.best.problem, 2, 3)
-    assert [bar.desc for bar in bars] == ["looking for lamp 1", "looking for lamp 2"]
-    assert [bar.n for bar in bars] == [bar.total for bar in bars] == [12, 27]
+    compared = "comparing places of lamps"
+    assert [bar.desc for bar in bars] == ["looking for lamp 1", compared, "looking for lamp 2", compared]
+    assert [bar.n for bar in bars] == [bar.total for bar in bars]
+    assert [bar.n for bar in bars[::2]] == [12, 27]
 
 
 def test_the_albedo_is_that_of_the_paint() -> None:

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from lamp_problem import gather, problem, radiance, true_lamps, unseen
 from photographed_room import frozen_room
-from rgspipe.capture.candidates import Candidates
 from rgspipe.capture.received import Received
-from rgspipe.capture.search import looked_beside, looked_for_again, settled_beside
 
 
 def test_light_that_comes_back_from_the_unseen_is_that_of_the_whole_scene() -> None:
@@ -59,25 +55,3 @@ def test_lamps_are_found_from_nearby() -> None:
     found = made.refined(start, 30)
     assert made.cost(found) < 0.1 * made.cost(start)
     assert np.linalg.norm(found.places - true_lamps(made).places, axis=1).max() < 0.003  # 5e-4 of the room
-
-
-def test_a_lamp_in_a_wrong_place_is_found_again_beside_the_others() -> None:
-    made = problem()
-    made = replace(made, frozen=made.frozen.with_dictionary(4, seed=0))
-    places = true_lamps(made).places.copy()
-    places[1] *= -1.0
-    stuck = made.refined(made.lamps(places, true_lamps(made).logs - 1.0), 25)
-    found = looked_for_again(made, Candidates.of(made), stuck, lambda *_: None)
-    assert made.cost(found) < 0.1 * made.cost(stuck)
-    assert np.linalg.norm(found.places - true_lamps(made).places, axis=1).max() < 0.003
-
-
-def test_a_lamp_goes_to_the_better_minimum_beside_it_and_stays_there() -> None:
-    made = problem()
-    made = replace(made, frozen=made.frozen.with_dictionary(8, seed=0))
-    candidates, true = Candidates.of(made), true_lamps(made)
-    places = true.places.copy()
-    places[1] += 0.1 * made.size * np.array([0.6, -0.8, 0.0])
-    found = settled_beside(made, candidates, made.lamps(places, true.logs))
-    assert np.linalg.norm(found.places - true.places, axis=1).max() < 0.003  # 3e-4 of the room
-    assert all(looked_beside(made, candidates, found, own) is found for own in (0, 1))

@@ -11,34 +11,24 @@ Edges of shadows make many minima beside each other, so that each lamp is looked
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from rgspipe.capture.bounds import with_bounds
 from rgspipe.capture.candidates import Candidates, ranked
-from rgspipe.capture.doubts import model_variance
 from rgspipe.capture.lamps import LampProblem, Lamps
+from rgspipe.capture.likelihood import ROUNDS, STEPS, Tried, weighed
+from rgspipe.capture.minima import AROUND, FIRST, likeliest, settled_beside
 from rgspipe.capture.variances import with_likely_variances
 from rgspipe.fitting.options import BarOptions
 from rgspipe.fitting.search.apart import CandidatePlaces
 from rgspipe.progress import progress_bar
-from rgspipe.training.albedo import ALBEDO_RANGE
 
 #: Candidates that are refined, and least distance of two of them in parts of the scene's size.
 TRIES, APART = 5, 0.14
 
-#: Places around a lamp from which it is refined, of 26: the best of these led out of the false minima that were met.
-AROUND = 3
-
-#: Steps of lamps: at first and at last.
-FIRST, LAST = 8, 25
-
 #: How much one more lamp has to explain.
 BAR = BarOptions()
-
-#: Rounds in which outliers, variances and the albedo of the unseen follow from the lamps and these from them.
-ROUNDS = 3
 
 #: Is told of each refinement.
 Told = Callable[[int], object]
@@ -56,7 +46,7 @@ def with_one_more(problem: LampProblem, candidates: Candidates, known: Lamps | N
         lamps = problem.refined(problem.lamps(places, gains), FIRST)
         found.append((problem.cost(lamps), lamps))
         told(1)
-    best = problem.refined(min(found, key=lambda pair: pair[0])[1], LAST)
+    best = problem.refined(min(found, key=lambda pair: pair[0])[1], STEPS)
     told(1)
     return best
 
@@ -65,7 +55,7 @@ def settled(problem: LampProblem, candidates: Candidates, lamps: Lamps, told: To
     """With variances, outliers and unseen albedo that belong to the lamps, and lamps that belong to these."""
     for left in reversed(range(ROUNDS)):
         problem = weighed(problem, lamps)
-        lamps = problem.refined(problem.lamps(lamps.places, lamps.logs), LAST)
+        lamps = problem.refined(problem.lamps(lamps.places, lamps.logs), STEPS)
         told(1)
         if left == 1:
             if len(lamps) > 1:
@@ -82,67 +72,6 @@ def looked_for_again(problem: LampProblem, candidates: Candidates, lamps: Lamps,
         again = with_one_more(problem, candidates, lamps.at(others), told).at(np.argsort([*others, own]).tolist())
         lamps = min(lamps, again, key=problem.cost)
     return lamps
-
-
-def settled_beside(problem: LampProblem, candidates: Candidates, lamps: Lamps) -> Lamps:
-    """The least minimum that is reached by moving one lamp after the other to a better one beside it."""
-    for own in range(len(lamps)):
-        beside = looked_beside(problem, candidates, lamps, own)
-        if beside is not lamps:
-            return settled_beside(problem, candidates, beside)
-    return lamps
-
-
-def looked_beside(problem: LampProblem, candidates: Candidates, lamps: Lamps, own: int) -> Lamps:
-    """Lamps of which one has moved to a better minimum beside, or the same if none is found."""
-    others = lamps.at([other for other in range(len(lamps)) if other != own]) if len(lamps) > 1 else None
-    around = candidates.around(problem, lamps.places[own])
-    costs, _ = ranked(problem, around, others)
-    found = [lamps]
-    for index in np.argsort(costs)[:AROUND]:
-        places = lamps.places.copy()
-        places[own] = around.places[index]
-        found.append(problem.refined(problem.lamps(places, lamps.logs), FIRST))
-    best = min(found, key=problem.cost)
-    moved = float(np.linalg.norm(best.places[own] - lamps.places[own]))
-    # Nearer than half of the way is the minimum that is known.
-    return problem.refined(best, LAST) if moved > 0.5 * candidates.between else lamps
-
-
-def weighed(problem: LampProblem, lamps: Lamps | None) -> LampProblem:
-    """The problem with what belongs to `lamps`: the albedo of the unseen, variances, and trust in the surfels."""
-    problem, lamps = with_bounds(problem, lamps)
-    measured = problem.pixels + model_variance(problem, lamps, problem.rays)
-    problem = replace(problem, field=replace(problem.field, measured=measured))
-    if lamps is None:
-        return problem
-    problem = problem.with_belief(lamps)
-    albedo = np.clip(problem.albedo(lamps), *ALBEDO_RANGE)
-    problem = replace(problem, received=problem.received.with_albedo(albedo))
-    residual = problem.residual(problem.lamps(lamps.places, lamps.logs))
-    return replace(problem, field=with_likely_variances(problem.field, residual, trusting=True))
-
-
-@dataclass(frozen=True, eq=False)
-class Tried:
-    """Lamps of one number.
-
-    Attributes:
-        problem: with the variances that they make most likely.
-        lamps: as fitted.
-        deviance: −2 log p of what was measured.
-    """
-
-    problem: LampProblem
-    lamps: Lamps
-    deviance: float
-
-    @classmethod
-    def of(cls, problem: LampProblem, lamps: Lamps) -> Tried:
-        """With the variances as they are most likely."""
-        residual = problem.residual(lamps)
-        field = with_likely_variances(problem.field, residual)
-        return cls(replace(problem, field=field), lamps, field.deviance(residual))
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,9 +116,7 @@ def best_with_one_more(problem: LampProblem, candidates: Candidates, known: Lamp
 def one_more(candidates: Candidates, fewer: Tried) -> OneMore:
     """The best lamps found that are one more than `fewer`."""
     more = best_with_one_more(fewer.problem, candidates, fewer.lamps)
-    again = more.problem.lamps(fewer.lamps.places, fewer.lamps.logs)
-    less = Tried.of(more.problem, more.problem.refined(again, LAST))
-    return OneMore.between(less, more)
+    return OneMore.between(Tried.refined(more.problem, fewer.lamps), more)
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,14 +138,14 @@ def found_lamps(problem: LampProblem, count: int | None, most: int) -> Answer:
     """So many lamps, or as many as what was measured calls for, one to `most`."""
     problem = weighed(problem, None)
     candidates = Candidates.of(problem)
-    best = best_with_one_more(problem, candidates, None)
+    best = likeliest(candidates, best_with_one_more(problem, candidates, None))
     compared: list[OneMore] = []
     while count is None or len(best.lamps) < count:
         found = one_more(candidates, best)
         compared.append(found)
         if count is None and (not found.worth or len(best.lamps) == most):
             break
-        best = found.more
+        best = likeliest(candidates, found.more)
     return Answer(best, tuple(compared), over_even(best))
 
 

@@ -1,0 +1,80 @@
+"""Lamps with what belongs to them: the variances and the albedo of the unseen that they make likely, and −2 log p.
+
+Each place of lamps makes other variances likely. By those of one place any other looks worse, so that lamps are
+compared once each has its own, by the surfels that either trusts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rgspipe.capture.bounds import with_bounds
+from rgspipe.capture.doubts import model_variance
+from rgspipe.capture.lamps import LampProblem, Lamps
+from rgspipe.capture.variances import with_likely_variances
+from rgspipe.training.albedo import ALBEDO_RANGE
+
+#: Steps of lamps that nearly stand where they belong.
+STEPS = 25
+
+#: Rounds in which outliers, variances and the albedo of the unseen follow from the lamps and these from them.
+ROUNDS = 3
+
+
+def weighed(problem: LampProblem, lamps: Lamps | None) -> LampProblem:
+    """The problem with what belongs to `lamps`: the albedo of the unseen, variances, and trust in the surfels."""
+    problem, lamps = with_bounds(problem, lamps)
+    measured = problem.pixels + model_variance(problem, lamps, problem.rays)
+    problem = replace(problem, field=replace(problem.field, measured=measured))
+    if lamps is None:
+        return problem
+    problem = problem.with_belief(lamps)
+    albedo = np.clip(problem.albedo(lamps), *ALBEDO_RANGE)
+    problem = replace(problem, received=problem.received.with_albedo(albedo))
+    residual = problem.residual(problem.lamps(lamps.places, lamps.logs))
+    return replace(problem, field=with_likely_variances(problem.field, residual, trusting=True))
+
+
+@dataclass(frozen=True, eq=False)
+class Tried:
+    """Lamps of one number.
+
+    Attributes:
+        problem: with the variances that they make most likely.
+        lamps: as fitted.
+        deviance: −2 log p of what was measured.
+    """
+
+    problem: LampProblem
+    lamps: Lamps
+    deviance: float
+
+    @classmethod
+    def of(cls, problem: LampProblem, lamps: Lamps) -> Tried:
+        """With the variances as they are most likely."""
+        residual = problem.residual(lamps)
+        field = with_likely_variances(problem.field, residual)
+        return cls(replace(problem, field=field), lamps, field.deviance(residual))
+
+    @classmethod
+    def refined(cls, problem: LampProblem, lamps: Lamps) -> Tried:
+        """The lamps where they belong by the surfels that `problem` trusts."""
+        return cls.of(problem, problem.refined(problem.lamps(lamps.places, lamps.logs), STEPS))
+
+    @classmethod
+    def settled(cls, problem: LampProblem, lamps: Lamps) -> Tried:
+        """The lamps where they belong by what belongs to them."""
+        for _ in range(ROUNDS):
+            problem = weighed(problem, lamps)
+            lamps = problem.refined(problem.lamps(lamps.places, lamps.logs), STEPS)
+        return cls.of(problem, lamps)
+
+    def likelier_than(self, other: Tried) -> bool:
+        """Whether these lamps are likelier than others, by the surfels that either trusts, both together."""
+        gain = 0.0
+        for problem in (self.problem, other.problem):
+            own, others = (Tried.refined(problem, tried.lamps) for tried in (self, other))
+            gain += others.deviance - own.deviance
+        return gain > 0.0

@@ -1,0 +1,62 @@
+"""Lamps leave false minima for better ones beside, and stay in the best."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+
+from lamp_problem import problem, true_lamps
+from rgspipe.capture.candidates import Candidates
+from rgspipe.capture.lamps import LampProblem, Lamps
+from rgspipe.capture.likelihood import Tried
+from rgspipe.capture.minima import cheapest_beside, likelier_beside, likeliest, looked_beside, settled_beside
+
+
+@cache
+def room() -> tuple[LampProblem, Candidates]:
+    made = replace(problem(), frozen=problem().frozen.with_dictionary(8, seed=0))
+    return made, Candidates.of(made)
+
+
+def displaced() -> Lamps:
+    """The true lamps, of which one was moved by a tenth of the room."""
+    made, _ = room()
+    places = true_lamps(made).places.copy()
+    places[1] += 0.1 * made.size * np.array([0.6, -0.8, 0.0])
+    return made.lamps(places, true_lamps(made).logs)
+
+
+def distance(lamps: Lamps) -> float:
+    """Of the farther one from the truth."""
+    return float(np.linalg.norm(lamps.places - true_lamps(room()[0]).places, axis=1).max())
+
+
+def test_a_lamp_goes_to_the_better_minimum_beside_it_and_stays_there() -> None:
+    made, candidates = room()
+    found = settled_beside(made, candidates, displaced())
+    assert distance(found) < 0.003  # 3e-4 of the room
+    assert all(looked_beside(made, candidates, found, own) is found for own in (0, 1))
+
+
+def test_another_minimum_is_another_place() -> None:
+    made, candidates = room()
+    lamps = true_lamps(made)
+    for own in (0, 1):
+        beside = cheapest_beside(made, candidates, lamps, own)
+        if beside is not None:
+            assert np.linalg.norm(beside.places[own] - lamps.places[own]) > 0.4 * candidates.between
+            assert made.cost(beside) > made.cost(lamps)
+
+
+def test_a_lamp_goes_to_the_likelier_minimum_beside_it_and_stays_there() -> None:
+    made, _ = room()
+    # So far apart that one of the places around the false minimum, at the other side of the room, is near the truth.
+    candidates = Candidates(np.array([[-0.7, 0.0, 0.0], [0.7, 0.0, 0.0]]), np.zeros((len(made.radiance), 2)))
+    true = true_lamps(made)
+    false = Tried.settled(made, made.lamps(true.places * [[1, 1, 1], [-1, 1, 1]], true.logs - 1.0))
+    assert distance(false.lamps) > 0.5  # 0.70
+    best = likeliest(candidates, false)
+    assert distance(best.lamps) < 0.003  # 7e-4
+    assert all(likelier_beside(candidates, best, own) is best for own in (0, 1))
