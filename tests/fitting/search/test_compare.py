@@ -17,6 +17,7 @@ from rgspipe.fitting.search.compare import (
     distinct,
     drop,
     passed,
+    ranked,
     rig_distance,
     worth_keeping,
 )
@@ -49,6 +50,10 @@ def test_the_true_light_is_better_than_another(problem: LightProblem) -> None:
     true, other = state(problem, VISIBLE), state(problem, HIDDEN)
     assert best_state(problem, [other, true]) is true
     assert drop(problem, other, true) > 0.5 and not equally_good(problem, true, other, RivalOptions())
+
+
+def test_there_may_be_nothing_to_rank(problem: LightProblem) -> None:
+    assert ranked(problem, []) == []
 
 
 def test_a_light_more_than_there_are_gains_next_to_nothing(problem: LightProblem) -> None:

@@ -94,12 +94,12 @@ def robust_costs(problem: LightProblem, states: Sequence[State]) -> list[float]:
 def _losses_and_scale(problem: LightProblem, states: Sequence[State]) -> tuple[list[Tensor], float]:
     base = ROBUST.base(problem)
     residuals = [base * problem.residual(state.columns, state.intensity) for state in states]
-    scale = min(cauchy_scale(problem, residual) for residual in residuals)
+    scale = min((cauchy_scale(problem, residual) for residual in residuals), default=1.0)
     return [(residual.double() / scale).square().log1p().mean(dim=1) for residual in residuals], scale
 
 
 def ranked(problem: LightProblem, states: Sequence[State]) -> list[State]:
-    """The rigs by their robust losses, best first."""
+    """The rigs by their robust losses, best first; none of none."""
     losses = [float(average(loss)) for loss in robust_losses(problem, states)]
     return [states[index] for index in sorted(range(len(states)), key=losses.__getitem__)]
 
