@@ -58,7 +58,7 @@ def _add_points(areas: Tensor, bvh: SurfelBvh, block: Tensor, samples: int, gene
     per_hit = torch.where(first_layer, samples * hits.alphas / footprint[index], torch.zeros_like(hits.alphas))
     density = per_hit.sum(dim=1)
     own_share = torch.where(density > 0, own_share / density.clamp(min=1e-30), torch.zeros_like(density))
-    shares = torch.where(valid, normalised_weights(hits), torch.zeros_like(hits.weights)) * own_share[:, None]
+    shares = torch.where(first_layer, normalised_weights(hits), torch.zeros_like(hits.weights)) * own_share[:, None]
     areas.index_add_(0, index.reshape(-1), shares.reshape(-1))
 
 

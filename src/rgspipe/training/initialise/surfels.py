@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -42,6 +43,16 @@ class Footprint:
     coverage_high: float = 0.9
     clip_softness: float = 0.12
     minimum_alpha: float = 0.01
+
+    @property
+    def seen(self) -> tuple[float, float]:
+        """How far a surfel is seen where another like it lies, in spacings: one that is whole, and one at an edge.
+
+        Two of opacity α cover 1 − (1 − α)², which is seen from `coverage_low` on.
+        """
+        least = 1.0 - math.sqrt(1.0 - self.coverage_low)
+        whole = self.scale * math.sqrt(2.0 * math.log(max(self.opacity / least, 1.0)))
+        return whole, whole * self.clipped_growth
 
 
 def initialise_surfels(
@@ -134,7 +145,8 @@ def _dress(centers: Cloud, spacing: np.ndarray, cloud: Cloud | None, thinned: Cl
     rotations = quaternion_from_normal(torch.from_numpy(centers.normals))
     offsets, angles = np.full((count, 2), NO_CLIP), np.zeros((count, 2))
     if cloud is not None:
-        offsets, angles = find_edges(centers, quaternion_to_axes(rotations).numpy(), cloud, thinned, median)
+        axes = quaternion_to_axes(rotations).numpy()
+        offsets, angles = find_edges(centers, axes, cloud, thinned, spacing, footprint.seen)
     growth = np.where(offsets[:, 0] < NO_CLIP, footprint.clipped_growth, 1.0)
     scale = torch.from_numpy(footprint.scale * growth * spacing).float()
     coverage = Coverage(

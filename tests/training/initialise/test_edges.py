@@ -1,0 +1,61 @@
+"""Surfels end where their surface does, however it is turned."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rgspipe.scene.surfels import NO_CLIP
+from rgspipe.training.initialise.cloud import Cloud
+from rgspipe.training.initialise.edges import find_edges
+
+SPACING = 0.1
+#: How far surfels are seen that are whole, and that are clipped, in spacings.
+SEEN = (0.9, 1.3)
+
+
+def plate(points: int, turn: float, seed: int) -> tuple[Cloud, np.ndarray]:
+    """Points in the unit square, turned in its plane, and the square's axes."""
+    flat = np.random.default_rng(seed).uniform(-0.5, 0.5, (points, 2))
+    axes = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
+    places = np.column_stack([flat @ axes, np.zeros(points)])
+    return Cloud(places, np.broadcast_to([0.0, 0.0, 1.0], places.shape)), axes
+
+
+def edges_of(turn: float, factor: float = 1.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Centres (N, 2) on a plate that is turned, in its own axes, and their clips: (N, 2) how far from the centre of the
+    plate each stands, NaN where there is none, and (N, 2) the angles from the plate's axes, at most 45°."""
+    cloud, axes = plate(40_000, turn, seed=0)
+    steps = SPACING * (np.arange(10) + 0.5) - 0.5
+    own = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+    centers = Cloud(np.column_stack([own @ axes, np.zeros(len(own))]), np.tile([0.0, 0.0, 1.0], (len(own), 1)))
+    frames = np.broadcast_to(np.eye(3), (len(own), 3, 3))
+    spacing = np.full(len(own), factor * SPACING)
+    offsets, angles = find_edges(centers, frames, cloud, cloud, spacing, SEEN)
+    directions = np.stack([np.cos(angles), np.sin(angles)], axis=-1) @ axes.T
+    along = np.abs(directions).argmax(axis=-1)
+    stand = np.abs(np.take_along_axis(own[:, None] + offsets[..., None] * directions, along[..., None], axis=-1))[
+        ..., 0
+    ]
+    off = np.arcsin(np.abs(directions).min(axis=-1))
+    found = offsets < NO_CLIP
+    return own, np.where(found, stand, np.nan), np.where(found, off, 0.0)
+
+
+@pytest.mark.parametrize("degrees", [0.0, 1.2, 2.5, 20.0])
+def test_clips_stand_where_the_surface_ends(degrees: float) -> None:
+    own, stand, off = edges_of(np.radians(degrees))
+    outermost = np.abs(own).max(axis=1) > 0.4
+    assert np.isfinite(stand[outermost, 0]).all() and np.isnan(stand[np.abs(own).max(axis=1) < 0.3]).all()
+    corners = np.abs(own).min(axis=1) > 0.4
+    assert np.isfinite(stand[corners]).all()
+    # Three points of 0.005 apart are left out; by steps of 5° alone clips stood up to 0.003 outside.
+    assert np.nanmax(stand) < 0.5 + 0.005 * SPACING and np.nanmean(stand) > 0.5 - 0.02 * SPACING
+    assert np.degrees(np.median(off[np.isfinite(stand)])) < 1.0  # 0.3
+
+
+def test_large_surfels_are_clipped_from_farther_away() -> None:
+    own, stand, _ = edges_of(0.0, factor=2.0)
+    second = np.abs(np.abs(own).max(axis=1) - 0.35) < 1e-9
+    assert np.isfinite(stand[second, 0]).all()
+    assert np.isnan(edges_of(0.0)[1][second]).all()
