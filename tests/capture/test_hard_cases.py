@@ -66,7 +66,7 @@ def test_a_mirror_is_named_with_its_place() -> None:
     spot, generator = (0.5, 0.1, 0.1), torch.Generator().manual_seed(0)
     sent = radiance_under(LAMPS[:1]).expand(10, -1, -1).clone()
     # It shows to each camera what is somewhere else.
-    mirror = near(spot, 0.3)
+    mirror = near(spot, 0.4)
     other = torch.randint(sent.shape[1], (10, int(mirror.sum())), generator=generator)
     sent[:, mirror] = 2.0 * torch.stack([view[chosen] for view, chosen in zip(sent, other, strict=True)])
     found = captured(pictures(sent))

@@ -33,9 +33,10 @@ def point(*place: float, intensity: tuple[float, float, float] = (1.0, 2.0, 0.5)
     return PointLight(torch.tensor(place, dtype=torch.float64), torch.tensor(intensity, dtype=torch.float64))
 
 
-#: The views see nothing of where it shines but what bounces off one patch.
+#: The views see nothing of where it shines but what bounces off one patch. 0.02 beside it, at the border of the places
+#: where another spot explains as much, one way of four finds none.
 UNSEEN = SHAPE.at(
-    torch.tensor([0.027, -0.11, -0.092]).double(),
+    torch.tensor([0.007, -0.11, -0.092]).double(),
     torch.nn.functional.normalize(torch.tensor([-0.081, 0.598, 0.797]).double(), dim=0),
     torch.tensor([1.0, 2.0, 0.5]).double(),
 )

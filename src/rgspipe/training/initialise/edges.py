@@ -85,8 +85,9 @@ class _Around:
     """N surfels, and the points around them.
 
     Attributes:
-        axes: (N, 3, 3).
-        radius: (N,) within which points count, scene units.
+        centers, axes: of the surfels, as of `find_edges`.
+        cloud: the points.
+        radius: (N,) within which they count, scene units.
         spacing: the typical one.
     """
 
