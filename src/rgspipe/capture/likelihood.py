@@ -37,6 +37,12 @@ def weighed(problem: LampProblem, lamps: Lamps | None) -> LampProblem:
     return replace(problem, field=with_likely_variances(problem.field, residual, trusting=True))
 
 
+def settled_once(problem: LampProblem, lamps: Lamps) -> tuple[LampProblem, Lamps]:
+    """The problem with what belongs to `lamps`, and lamps where they belong by that."""
+    problem = weighed(problem, lamps)
+    return problem, problem.refined(problem.lamps(lamps.places, lamps.logs), STEPS)
+
+
 @dataclass(frozen=True, eq=False)
 class Tried:
     """Lamps of one number.
@@ -67,8 +73,7 @@ class Tried:
     def settled(cls, problem: LampProblem, lamps: Lamps) -> Tried:
         """The lamps where they belong by what belongs to them."""
         for _ in range(ROUNDS):
-            problem = weighed(problem, lamps)
-            lamps = problem.refined(problem.lamps(lamps.places, lamps.logs), STEPS)
+            problem, lamps = settled_once(problem, lamps)
         return cls.of(problem, lamps)
 
     def likelier_than(self, other: Tried) -> bool:

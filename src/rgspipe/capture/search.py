@@ -17,7 +17,7 @@ import numpy as np
 
 from rgspipe.capture.candidates import Candidates, ranked
 from rgspipe.capture.lamps import LampProblem, Lamps
-from rgspipe.capture.likelihood import ROUNDS, STEPS, Tried, weighed
+from rgspipe.capture.likelihood import ROUNDS, STEPS, Tried, settled_once, weighed
 from rgspipe.capture.minima import AROUND, FIRST, likeliest, settled_beside
 from rgspipe.capture.variances import with_likely_variances
 from rgspipe.fitting.options import BarOptions
@@ -54,8 +54,7 @@ def with_one_more(problem: LampProblem, candidates: Candidates, known: Lamps | N
 def settled(problem: LampProblem, candidates: Candidates, lamps: Lamps, told: Told) -> Tried:
     """With variances, outliers and unseen albedo that belong to the lamps, and lamps that belong to these."""
     for left in reversed(range(ROUNDS)):
-        problem = weighed(problem, lamps)
-        lamps = problem.refined(problem.lamps(lamps.places, lamps.logs), STEPS)
+        problem, lamps = settled_once(problem, lamps)
         told(1)
         if left == 1:
             if len(lamps) > 1:
