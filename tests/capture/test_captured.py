@@ -14,7 +14,9 @@ import torch
 from photographed_room import LAMPS, painted_room, photographs
 from rgspipe.capture import minima, search
 from rgspipe.capture.captured import Captured, capture_scene
+from rgspipe.capture.certainty import Certainty
 from rgspipe.capture.lamp_file import write_lamps
+from rgspipe.capture.minima import Rival
 from rgspipe.capture.options import CaptureOptions
 from rgspipe.capture.words import captured_words
 from rgspipe.datasets.light_file import read_lights
@@ -107,6 +109,22 @@ def test_surfaces_that_are_saturated_are_told() -> None:
     captured = capture_scene(clipped, blank_room(), replace(OPTIONS, count=2))
     assert float(captured.measured.blown_out.mean()) > 0.03
     assert "of what surfaces send, the brightest, is saturated" in captured_words(captured)
+
+
+def test_another_place_that_is_as_likely_is_in_the_region_and_is_told() -> None:
+    best = found().answer.best
+    places = best.lamps.places.copy()
+    places[0] += 0.1 * best.problem.size * np.array([1.0, 0.0, 0.0])
+    beside = replace(best, lamps=best.problem.lamps(places, best.lamps.logs))
+    plain = replace(found().answer, rivals=())
+    before = Certainty.of(plain).spread(best.problem.size)
+    for odds, part in ((1.0, 0.5), (0.25, 0.2)):
+        answer = replace(plain, rivals=(Rival(beside, odds),))
+        spread = Certainty.of(answer).spread(best.problem.size)
+        np.testing.assert_allclose(spread**2 - before**2, [part * 0.1**2, 0.0], atol=1e-12)
+        words = captured_words(replace(found(), answer=answer))
+        assert f"instead, 10.0 % of the scene's size away: the odds of that are 1 to {1.0 / odds:.1f}." in words
+    assert "instead" not in captured_words(replace(found(), answer=replace(plain, rivals=(Rival(beside, 0.01),))))
 
 
 def test_a_given_number_is_not_asked() -> None:

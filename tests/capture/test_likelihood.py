@@ -5,9 +5,13 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 
 from lamp_problem import problem, true_lamps
-from rgspipe.capture.likelihood import Tried, weighed
+from rgspipe.capture.likelihood import Comparison, Tried, weighed
 
 
 @cache
@@ -32,9 +36,26 @@ def test_lamps_settle_with_the_variances_that_belong_to_them() -> None:
 
 def test_of_two_the_true_lamps_are_likelier_whichever_is_asked() -> None:
     near, far = settled()
-    assert near.likelier_than(far) and not far.likelier_than(near)
+    gained, lost = near.over(far), far.over(near)
+    assert gained.gain > 0.0 > lost.gain
+    assert gained.gain == pytest.approx(-lost.gain, rel=1e-6)
+    assert gained.odds < 0.05 and lost.odds == 1.0
 
 
-def test_lamps_are_no_likelier_than_they_are() -> None:
+def test_lamps_are_as_likely_as_they_are() -> None:
     near, _ = settled()
-    assert not near.likelier_than(near)
+    assert near.over(near).gain == pytest.approx(0.0, abs=1e-3 * near.problem.field.measurements)
+
+
+@given(arrays(np.float64, st.integers(1, 20), elements=st.floats(-1e6, 1e6)))
+def test_odds_are_those_of_a_rival(gains: np.ndarray) -> None:
+    odds = Comparison.of(gains).odds
+    assert 0.0 <= odds <= 1.0
+    assert odds == 1.0 or gains.sum() > 0.0
+    assert Comparison.of(1e-3 * gains).odds == pytest.approx(odds)  # of no unit
+
+
+def test_parts_that_say_the_same_leave_no_doubt() -> None:
+    assert Comparison.of(np.full(12, 3.0)).odds == 0.0
+    assert Comparison.of(np.full(12, -3.0)).odds == 1.0
+    assert Comparison.of(np.array([30.0, -30.0])).odds == pytest.approx(1.0)

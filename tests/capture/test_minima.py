@@ -11,7 +11,7 @@ from lamp_problem import problem, true_lamps
 from rgspipe.capture.candidates import Candidates
 from rgspipe.capture.lamps import LampProblem, Lamps
 from rgspipe.capture.likelihood import Tried
-from rgspipe.capture.minima import cheapest_beside, likelier_beside, likeliest, looked_beside, settled_beside
+from rgspipe.capture.minima import likelier_beside, likeliest, looked_beside, minima_beside, settled_beside
 
 
 @cache
@@ -44,10 +44,11 @@ def test_another_minimum_is_another_place() -> None:
     made, candidates = room()
     lamps = true_lamps(made)
     for own in (0, 1):
-        beside = cheapest_beside(made, candidates, lamps, own)
-        if beside is not None:
-            assert np.linalg.norm(beside.places[own] - lamps.places[own]) > 0.4 * candidates.between
-            assert made.cost(beside) > made.cost(lamps)
+        costs = [made.cost(lamps)]
+        for beside in minima_beside(made, candidates, lamps, own):
+            assert np.linalg.norm(beside.places - lamps.places, axis=1).max() > 0.5 * candidates.between
+            costs.append(made.cost(beside))
+        assert costs == sorted(costs)
 
 
 def test_a_lamp_goes_to_the_likelier_minimum_beside_it_and_stays_there() -> None:
@@ -57,6 +58,18 @@ def test_a_lamp_goes_to_the_likelier_minimum_beside_it_and_stays_there() -> None
     true = true_lamps(made)
     false = Tried.settled(made, made.lamps(true.places * [[1, 1, 1], [-1, 1, 1]], true.logs - 1.0))
     assert distance(false.lamps) > 0.5  # 0.70
-    best = likeliest(candidates, false)
-    assert distance(best.lamps) < 0.003  # 7e-4
-    assert all(likelier_beside(candidates, best, own) is best for own in (0, 1))
+    found = likeliest(candidates, false)
+    assert distance(found.best.lamps) < 0.003  # 7e-4
+    assert all(likelier_beside(candidates, found.best, own, []) is found.best for own in (0, 1))
+    assert all(distance(rival.tried.lamps) > 0.1 and rival.odds < 0.05 for rival in found.rivals)
+    assert found.rivals
+
+
+def test_what_was_settled_is_not_settled_again() -> None:
+    made, candidates = room()
+    best, others = Tried.settled(made, displaced()), list[Tried]()
+    for own in (0, 1):
+        best = likelier_beside(candidates, best, own, others)
+    before = list(others)
+    assert likelier_beside(candidates, best, 1, others) is best
+    assert all(new is old for new, old in zip(others, before, strict=True))

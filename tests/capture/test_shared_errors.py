@@ -33,7 +33,7 @@ def test_what_is_not_explained_may_be_the_light_of_another_lamp(noise: float, lo
         np.stack([lamp.position.numpy() for lamp in LAMPS]),
         np.log(np.stack([lamp.intensity.numpy() for lamp in LAMPS]) / np.pi),
     )
-    covariance = shared_covariance(made, lamps, np.zeros(len(made.radiance), dtype=int))
+    covariance = shared_covariance(made, lamps)
     spread = np.sqrt(np.diagonal(covariance).reshape(2, 6)[:, :3].sum(axis=1))
     # 0, 0.002 to 0.003, and 0.05 to 0.07 of the room.
     assert (low <= spread).all() and (spread <= high).all()

@@ -7,9 +7,9 @@ Tukey, with blocks as Künsch 1989 has them), beside what the likelihood knows:
 
     C = (Jᵀ Σ⁻¹ J)⁻¹ + (B − 1)/B Σ_b (θ_b − θ̄)(θ_b − θ̄)ᵀ ,
 
-beside what the model of light lacks as a whole (`capture.shared_errors`), what the lamps would move by if the one more
-that was not believed were there after all, as far as it came towards being believed, and to no place better than
-surfels resolve light.
+beside what the model of light lacks as a whole (`capture.shared_errors`), what the lamps would move by if another
+minimum beside were theirs, as likely as the scene's parts leave that, or if the one more that was not believed were
+there after all, as far as it came towards being believed, and to no place better than surfels resolve light.
 """
 
 from __future__ import annotations
@@ -22,11 +22,10 @@ from rgspipe.capture.lamps import NUMBERS, LampProblem, Lamps
 from rgspipe.capture.photographs import Numbers
 from rgspipe.capture.search import Answer
 from rgspipe.capture.shared_errors import shared_covariance
-from rgspipe.renderer.clusters import cluster_patches
 from rgspipe.scene.spacing import surfel_spacing
 
-#: Blocks of neighbours over the whole scene, and steps of the lamps without one of them.
-BLOCKS, STEPS = 12, 6
+#: Steps of the lamps without one of the scene's parts.
+STEPS = 6
 
 #: No coordinate is known better than to this part of the distance of neighbours, over which light is taken for even:
 #: with 2000 to 4000 surfels in a Cornell box lamps were 0.1 to 0.3 of it off where the rest of C said 0.05.
@@ -59,7 +58,7 @@ class Certainty:
     def of(cls, answer: Answer) -> Certainty:
         """Of lamps as they were fitted."""
         problem, lamps = answer.best.problem, answer.best.lamps
-        covariance = _covariance(problem, lamps) + _number_covariance(problem, answer)
+        covariance = _covariance(problem, lamps) + _rival_covariance(answer) + _number_covariance(problem, answer)
         count, size = len(lamps), problem.size
         numbers = covariance.reshape(count, NUMBERS, count, NUMBERS)
         own = numbers[np.arange(count), :, np.arange(count)]
@@ -91,12 +90,20 @@ def _spacing(problem: LampProblem) -> float:
 
 def _covariance(problem: LampProblem, lamps: Lamps) -> Numbers:
     """(6 K, 6 K) C of the lamps' numbers."""
-    surfels = problem.frozen.surfels
-    blocks = cluster_patches(surfels.centers.double(), surfels.normals, BLOCKS, seed=0)
-    found = np.stack([_numbers(problem, _without(problem, lamps, blocks == block)) for block in np.unique(blocks)])
+    parts = problem.parts
+    found = np.stack([_numbers(problem, _without(problem, lamps, parts == part)) for part in np.unique(parts)])
     apart = found - found.mean(axis=0)
     resampled = (len(found) - 1) / len(found) * (apart.T @ apart)
-    return problem.covariance(lamps) + resampled + shared_covariance(problem, lamps, blocks)
+    return problem.covariance(lamps) + resampled + shared_covariance(problem, lamps)
+
+
+def _rival_covariance(answer: Answer) -> Numbers:
+    """(6 K, 6 K) of the lamps' numbers, by the other minima that they may belong to."""
+    problem, lamps = answer.best.problem, answer.best.lamps
+    own = _numbers(problem, lamps)
+    moved = np.stack([own - own, *(_numbers(problem, rival.tried.lamps) - own for rival in answer.rivals)])
+    odds = np.array([1.0, *(rival.odds for rival in answer.rivals)])
+    return moved.T @ (moved * (odds / odds.sum())[:, None])
 
 
 def _number_covariance(problem: LampProblem, answer: Answer) -> Numbers:

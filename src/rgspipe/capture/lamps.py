@@ -24,6 +24,7 @@ from rgspipe.capture.photographs import Numbers
 from rgspipe.capture.prediction import Prediction
 from rgspipe.capture.received import Received
 from rgspipe.optim.levenberg_marquardt import NormalEquations, least_squares, within
+from rgspipe.renderer.clusters import cluster_patches
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene.lights import PointLight
 
@@ -32,6 +33,9 @@ LONGEST_MOVE, LONGEST_GAIN = 0.12, 1.0
 
 #: Of a lamp six numbers are looked for: its place, and its intensity in three channels.
 NUMBERS = 6
+
+#: Parts of the scene, each of neighbours, whose errors are taken for independent.
+PARTS = 12
 
 #: Light below this part of the median counts as this much: its logarithm says nothing.
 DARK = 1e-3
@@ -116,6 +120,12 @@ class LampProblem:
         return self.frozen.size
 
     @cached_property
+    def parts(self) -> NDArray[np.integer]:
+        """(N,) which of up to `PARTS` parts of the scene each surfel belongs to."""
+        surfels = self.frozen.surfels
+        return cluster_patches(surfels.centers.double(), surfels.normals, PARTS, seed=0)
+
+    @cached_property
     def bounds(self) -> tuple[Numbers, Numbers]:
         """(3,) corners of where lamps may be."""
         lower, upper = self.frozen.surroundings.bounds
@@ -152,8 +162,12 @@ class LampProblem:
 
     def cost(self, lamps: Lamps | None) -> float:
         """What the lamps leave."""
+        return float(self.costs(lamps).sum())
+
+    def costs(self, lamps: Lamps | None) -> Numbers:
+        """(N,) each surfel's part of it, which may be below 0: the field ties them together."""
         residual = self.residual(lamps)
-        return float((residual * self.field.whitened_colours(residual)).sum())
+        return (residual * self.field.whitened_colours(residual)).sum(axis=1)
 
     def refined(self, lamps: Lamps, steps: int) -> Lamps:
         """A place of least cost near `lamps`."""

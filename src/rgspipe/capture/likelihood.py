@@ -1,7 +1,9 @@
 """Lamps with what belongs to them: the variances and the albedo of the unseen that they make likely, and −2 log p.
 
 Each place of lamps makes other variances likely. By those of one place any other looks worse, so that lamps are
-compared once each has its own, by the surfels that either trusts.
+compared once each has its own, by what belongs to either, both together. How sure a comparison is follows from the
+parts of the scene, whose errors are their own: what each says for one side, and how differently they say it (the test
+of Vuong 1989, with parts of the scene for its draws).
 """
 
 from __future__ import annotations
@@ -9,10 +11,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import ndtr
 
 from rgspipe.capture.bounds import with_bounds
 from rgspipe.capture.doubts import model_variance
 from rgspipe.capture.lamps import LampProblem, Lamps
+from rgspipe.capture.photographs import Numbers
 from rgspipe.capture.variances import with_likely_variances
 from rgspipe.training.albedo import ALBEDO_RANGE
 
@@ -76,10 +80,37 @@ class Tried:
             problem, lamps = settled_once(problem, lamps)
         return cls.of(problem, lamps)
 
-    def likelier_than(self, other: Tried) -> bool:
-        """Whether these lamps are likelier than others, by the surfels that either trusts, both together."""
-        gain = 0.0
-        for problem in (self.problem, other.problem):
-            own, others = (Tried.refined(problem, tried.lamps) for tried in (self, other))
-            gain += others.deviance - own.deviance
-        return gain > 0.0
+    def over(self, other: Tried) -> Comparison:
+        """How much likelier these settled lamps are than others, by what belongs to either, both together."""
+        theirs = other.problem.refined(other.problem.lamps(self.lamps.places, self.lamps.logs), STEPS)
+        ours = self.problem.refined(self.problem.lamps(other.lamps.places, other.lamps.logs), STEPS)
+        gains = self.problem.costs(ours) - self.problem.costs(self.lamps)
+        gains += other.problem.costs(other.lamps) - other.problem.costs(theirs)
+        return Comparison.of(np.bincount(self.problem.parts, gains))
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """How much likelier some lamps are than others.
+
+    Attributes:
+        gain: of −2 log p, positive where they are likelier.
+        doubt: its standard deviation, if each part of the scene is a draw of its own.
+    """
+
+    gain: float
+    doubt: float
+
+    @classmethod
+    def of(cls, gains: Numbers) -> Comparison:
+        """Of gains (B,) by parts of the scene."""
+        count = len(gains)
+        return cls(float(gains.sum()), float(np.sqrt(count * gains.var(ddof=1))) if count > 1 else 0.0)
+
+    @property
+    def odds(self) -> float:
+        """Of the others being likelier after all; at most 1, as such others would be the answer."""
+        if self.gain <= 0.0 or self.doubt == 0.0:
+            return float(self.gain <= 0.0)
+        chance = float(ndtr(-self.gain / self.doubt))
+        return chance / (1.0 - chance)

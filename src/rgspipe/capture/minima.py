@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from dataclasses import dataclass
+
 import numpy as np
 
 from rgspipe.capture.candidates import Candidates, ranked
@@ -20,6 +23,27 @@ FIRST = 8
 RIVAL = 1.0 / (1.0 - BarOptions().least)
 
 
+@dataclass(frozen=True, eq=False)
+class Rival:
+    """Lamps in another minimum than the likeliest.
+
+    Attributes:
+        tried: with what belongs to them.
+        odds: of their being the right ones, against the likeliest.
+    """
+
+    tried: Tried
+    odds: float
+
+
+@dataclass(frozen=True, eq=False)
+class Minima:
+    """The likeliest minimum that was reached, and the others that were."""
+
+    best: Tried
+    rivals: tuple[Rival, ...] = ()
+
+
 def settled_beside(problem: LampProblem, candidates: Candidates, lamps: Lamps) -> Lamps:
     """The least minimum that is reached by moving one lamp after the other to a better one beside it."""
     for own in range(len(lamps)):
@@ -31,52 +55,67 @@ def settled_beside(problem: LampProblem, candidates: Candidates, lamps: Lamps) -
 
 def looked_beside(problem: LampProblem, candidates: Candidates, lamps: Lamps, own: int) -> Lamps:
     """Lamps of which one has moved to a better minimum beside, or the same if none is found."""
-    best = cheapest_beside(problem, candidates, lamps, own)
-    return best if best is not None and problem.cost(best) < problem.cost(lamps) else lamps
+    found = minima_beside(problem, candidates, lamps, own)
+    best = problem.refined(found[0], STEPS) if found else lamps
+    return best if problem.cost(best) < problem.cost(lamps) else lamps
 
 
-def cheapest_beside(problem: LampProblem, candidates: Candidates, lamps: Lamps, own: int) -> Lamps | None:
-    """The least other minimum that is reached from around one of the lamps, if there is any."""
+def minima_beside(problem: LampProblem, candidates: Candidates, lamps: Lamps, own: int) -> list[Lamps]:
+    """Other minima that are nearly reached from around one of the lamps, the least first."""
     others = lamps.at([other for other in range(len(lamps)) if other != own]) if len(lamps) > 1 else None
     around = candidates.around(problem, lamps.places[own])
     costs, _ = ranked(problem, around, others)
-    found = []
+    reached = []
     for index in np.argsort(costs)[:AROUND]:
         places = lamps.places.copy()
         places[own] = around.places[index]
-        beside = problem.refined(problem.lamps(places, lamps.logs), FIRST)
-        if _is_apart(candidates, beside, lamps, own):
+        reached.append(problem.refined(problem.lamps(places, lamps.logs), FIRST))
+    found: list[Lamps] = []
+    for beside in sorted(reached, key=problem.cost):
+        if all(_are_apart(candidates, beside, known) for known in (lamps, *found)):
             found.append(beside)
-    return problem.refined(min(found, key=problem.cost), STEPS) if found else None
+    return found
 
 
-def likeliest(candidates: Candidates, best: Tried) -> Tried:
-    """The likeliest of the minima that are reached by moving one lamp after the other, each by its own variances."""
+def likeliest(candidates: Candidates, best: Tried) -> Minima:
+    """Of the minima that are reached by moving one lamp after the other, each by its own variances."""
     count = len(best.lamps)
     with progress_bar([], "comparing places of lamps", 1 + count, unit="step") as bar:
-        best = Tried.settled(best.problem, best.lamps)
+        best, others = Tried.settled(best.problem, best.lamps), list[Tried]()
         bar.update()
         for passes in range(1, ROUNDS + 1):
             before, bar.total = best, 1 + passes * count
             for own in range(count):
-                best = likelier_beside(candidates, best, own)
+                best = likelier_beside(candidates, best, own, others)
                 bar.update()
             if best is before:
                 break
+    rivals = [other for other in others if _are_apart(candidates, other.lamps, best.lamps)]
+    return Minima(best, tuple(Rival(rival, best.over(rival).odds) for rival in rivals))
+
+
+def likelier_beside(candidates: Candidates, best: Tried, own: int, others: list[Tried]) -> Tried:
+    """Lamps of which one has moved to a likelier minimum beside, or the same if none is found.
+
+    What is settled on the way and is not the answer joins `others`, from which none is settled again.
+    """
+    problem, least = best.problem, best.problem.cost(best.lamps)
+    for beside in minima_beside(problem, candidates, best.lamps, own):
+        known = (best, *others)
+        if problem.cost(beside) > RIVAL * least or not _is_new(candidates, beside, known):
+            continue
+        rival = Tried.settled(problem, beside)
+        if not _is_new(candidates, rival.lamps, known):
+            continue
+        less, best = (best, rival) if rival.over(best).gain > 0.0 else (rival, best)
+        others.append(less)
     return best
 
 
-def likelier_beside(candidates: Candidates, best: Tried, own: int) -> Tried:
-    """Lamps of which one has moved to a likelier minimum beside, or the same if none is found."""
-    problem = best.problem
-    beside = cheapest_beside(problem, candidates, best.lamps, own)
-    if beside is None or problem.cost(beside) > RIVAL * problem.cost(best.lamps):
-        return best
-    rival = Tried.settled(problem, beside)
-    apart = _is_apart(candidates, rival.lamps, best.lamps, own)
-    return rival if apart and rival.likelier_than(best) else best
+def _is_new(candidates: Candidates, lamps: Lamps, known: Iterable[Tried]) -> bool:
+    return all(_are_apart(candidates, lamps, tried.lamps) for tried in known)
 
 
-def _is_apart(candidates: Candidates, lamps: Lamps, known: Lamps, own: int) -> bool:
+def _are_apart(candidates: Candidates, lamps: Lamps, known: Lamps) -> bool:
     """Whether one of the lamps stands in another minimum: nearer than half of the way to the next is the known one."""
-    return bool(np.linalg.norm(lamps.places[own] - known.places[own]) > 0.5 * candidates.between)
+    return bool(np.linalg.norm(lamps.places - known.places, axis=1).max() > 0.5 * candidates.between)

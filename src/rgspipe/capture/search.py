@@ -18,7 +18,7 @@ import numpy as np
 from rgspipe.capture.candidates import Candidates, ranked
 from rgspipe.capture.lamps import LampProblem, Lamps
 from rgspipe.capture.likelihood import ROUNDS, STEPS, Tried, settled_once, weighed
-from rgspipe.capture.minima import AROUND, FIRST, likeliest, settled_beside
+from rgspipe.capture.minima import AROUND, FIRST, Rival, likeliest, settled_beside
 from rgspipe.capture.variances import with_likely_variances
 from rgspipe.fitting.options import BarOptions
 from rgspipe.fitting.search.apart import CandidatePlaces
@@ -124,11 +124,13 @@ class Answer:
 
     Attributes:
         best: the lamps.
+        rivals: other minima that they may belong to.
         compared: each number with the next, as far as it was asked; the last of them may not be worth it.
         over_even: share of the squares that the lamps explain of those that light which is the same everywhere leaves.
     """
 
     best: Tried
+    rivals: tuple[Rival, ...]
     compared: tuple[OneMore, ...]
     over_even: float
 
@@ -137,15 +139,15 @@ def found_lamps(problem: LampProblem, count: int | None, most: int) -> Answer:
     """So many lamps, or as many as what was measured calls for, one to `most`."""
     problem = weighed(problem, None)
     candidates = Candidates.of(problem)
-    best = likeliest(candidates, best_with_one_more(problem, candidates, None))
+    minima = likeliest(candidates, best_with_one_more(problem, candidates, None))
     compared: list[OneMore] = []
-    while count is None or len(best.lamps) < count:
-        found = one_more(candidates, best)
+    while count is None or len(minima.best.lamps) < count:
+        found = one_more(candidates, minima.best)
         compared.append(found)
-        if count is None and (not found.worth or len(best.lamps) == most):
+        if count is None and (not found.worth or len(minima.best.lamps) == most):
             break
-        best = likeliest(candidates, found.more)
-    return Answer(best, tuple(compared), over_even(best))
+        minima = likeliest(candidates, found.more)
+    return Answer(minima.best, minima.rivals, tuple(compared), over_even(minima.best))
 
 
 def over_even(best: Tried) -> float:

@@ -25,11 +25,11 @@ from rgspipe.capture.variances import FREEDOM
 from rgspipe.training.albedo import ALBEDO_RANGE
 
 
-def shared_covariance(problem: LampProblem, lamps: Lamps, parts: np.ndarray) -> Numbers:
-    """(6 K, 6 K) of the lamps' numbers; `parts` (N,) says which part of the scene each surfel is of."""
+def shared_covariance(problem: LampProblem, lamps: Lamps) -> Numbers:
+    """(6 K, 6 K) of the lamps' numbers."""
     jacobian, spread = problem.jacobian(lamps), problem.covariance(lamps)
     whitened = [problem.field.channel(c).whitened(columns) for c, columns in enumerate(jacobian)]
-    shifts = [*_beyond(problem, lamps, parts), *_unseen(problem, lamps, parts)]
+    shifts = [*_beyond(problem, lamps), *_unseen(problem, lamps)]
     moved = [spread @ sum(part.T @ shift[:, k] for k, part in enumerate(whitened)) for shift in shifts]
     missing = spread @ sum(part.T for part in whitened) @ _missing(problem, lamps)
     return np.stack(moved).T @ np.stack(moved) + missing @ missing.T
@@ -43,12 +43,12 @@ def excess(problem: LampProblem, lamps: Lamps) -> Numbers:
     return np.where(used, beyond, 0.0)
 
 
-def _beyond(problem: LampProblem, lamps: Lamps, parts: np.ndarray) -> Iterator[Numbers]:
+def _beyond(problem: LampProblem, lamps: Lamps) -> Iterator[Numbers]:
     """(N, 3) shifts by impossible albedo, one a part."""
     used = problem.field.weight > 0.0
     size = float(np.sqrt((excess(problem, lamps)[used] ** 2).mean())) if used.any() else 0.0
-    for part in np.unique(parts):
-        yield size * np.repeat((parts == part)[:, None], 3, axis=1)
+    for part in np.unique(problem.parts):
+        yield size * np.repeat((problem.parts == part)[:, None], 3, axis=1)
 
 
 def _missing(problem: LampProblem, lamps: Lamps) -> Numbers:
@@ -63,11 +63,12 @@ def _missing(problem: LampProblem, lamps: Lamps) -> Numbers:
     return shifts / np.sqrt(max(int(shining.sum()), 1))
 
 
-def _unseen(problem: LampProblem, lamps: Lamps, parts: np.ndarray) -> Iterator[Numbers]:
+def _unseen(problem: LampProblem, lamps: Lamps) -> Iterator[Numbers]:
     """(N, 3) shifts by light from surfaces that no camera saw, one a part that has any."""
     received, arriving = problem.received, problem.arriving(lamps)
     deviation = np.sqrt(problem.field.variances.surface)
     sent = received.albedo * arriving[received.unseen]
-    for part in np.unique(parts[received.unseen]):
-        own = np.where((parts[received.unseen] == part)[:, None], sent, 0.0)
+    parts = problem.parts[received.unseen]
+    for part in np.unique(parts):
+        own = np.where((parts == part)[:, None], sent, 0.0)
         yield deviation * (received.gather[:, received.unseen] @ own) / arriving

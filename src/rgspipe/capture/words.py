@@ -5,12 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
+import numpy as np
+
 from rgspipe.capture.captured import Captured
 from rgspipe.capture.search import BAR
 
 #: Photographs whose pixels disagree by more than this, in the middle, are not of one diffuse scene; nor are surfaces
 #: that lamps and paint explain worse.
 DISAGREE = 0.1
+
+#: Odds of another place that are worth a word: a region of 95 % holds it.
+RIVAL = 0.05
 
 #: More of the surfels than this unmeasured is worth a word.
 UNMEASURED = 0.1
@@ -22,7 +27,7 @@ NOTICEABLE, GLOW = 0.03, 0.05
 
 def captured_words(found: Captured) -> str:
     """Sentences: the lamps, how sure they are, whether intensities and albedo are told apart, and what to doubt."""
-    return " ".join([_lamps(found), _number(found), _even(found), _scale(found), *_doubts(found)])
+    return " ".join([_lamps(found), *_rivals(found), _number(found), _even(found), _scale(found), *_doubts(found)])
 
 
 def _lamps(found: Captured) -> str:
@@ -42,6 +47,20 @@ def _point(place: Sequence[float]) -> str:
 def _place(part: float, guess: bool) -> str:
     sure = f"known to {100.0 * part:.1f} % of the scene's size"
     return f"a guess, {sure}" if guess else sure
+
+
+def _rivals(found: Captured) -> Iterator[str]:
+    best, size = found.answer.best.lamps.places, found.frozen.size
+    for rival in found.answer.rivals:
+        places = rival.tried.lamps.places
+        moves = np.linalg.norm(places - best, axis=1)
+        own = int(moves.argmax())
+        if rival.odds > RIVAL:
+            yield (
+                f"The lamp at {_point(best[own].tolist())} may be at {_point(places[own].tolist())} instead, "
+                f"{100.0 * moves[own] / size:.1f} % of the scene's size away: the odds of that are 1 to "
+                f"{1.0 / rival.odds:.1f}."
+            )
 
 
 def _number(found: Captured) -> str:
