@@ -123,7 +123,7 @@ def test_another_place_that_is_as_likely_is_in_the_region_and_is_told() -> None:
         spread = Certainty.of(answer).spread(best.problem.size)
         np.testing.assert_allclose(spread**2 - before**2, [part * 0.1**2, 0.0], atol=1e-12)
         words = captured_words(replace(found(), answer=answer))
-        assert f"instead, 10.0 % of the scene's size away: the odds of that are 1 to {1.0 / odds:.1f}." in words
+        assert f", 10.0 % of the scene's size away, with odds of 1 to {1.0 / odds:.0f}." in words
     assert "instead" not in captured_words(replace(found(), answer=replace(plain, rivals=(Rival(beside, 0.01),))))
 
 

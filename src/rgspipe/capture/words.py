@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -51,16 +52,16 @@ def _place(part: float, guess: bool) -> str:
 
 def _rivals(found: Captured) -> Iterator[str]:
     best, size = found.answer.best.lamps.places, found.frozen.size
+    instead = defaultdict[int, list[str]](list)
     for rival in found.answer.rivals:
         places = rival.tried.lamps.places
         moves = np.linalg.norm(places - best, axis=1)
         own = int(moves.argmax())
         if rival.odds > RIVAL:
-            yield (
-                f"The lamp at {_point(best[own].tolist())} may be at {_point(places[own].tolist())} instead, "
-                f"{100.0 * moves[own] / size:.1f} % of the scene's size away: the odds of that are 1 to "
-                f"{1.0 / rival.odds:.1f}."
-            )
+            away, against = f"{100.0 * moves[own] / size:.1f} % of the scene's size", f"1 to {1.0 / rival.odds:.0f}"
+            instead[own].append(f"{_point(places[own].tolist())}, {away} away, with odds of {against}")
+    for own, places in sorted(instead.items()):
+        yield f"The lamp at {_point(best[own].tolist())} may be elsewhere instead: at {'; at '.join(places)}."
 
 
 def _number(found: Captured) -> str:
