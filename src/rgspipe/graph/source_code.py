@@ -121,9 +121,10 @@ def _describe(node: ast.AST, parts: list[str], names: set[str]) -> None:
         names |= {node.value, f"{node.value}.__main__"}
     parts.append(type(node).__name__)
     for field_name in node._fields:
-        if field_name == "ctx":  # it follows from the place
-            continue
         value = getattr(node, field_name, None)
+        # The context follows from the place, and of type parameters Python before 3.12 has not even an empty list.
+        if field_name == "ctx" or (field_name == "type_params" and not value):
+            continue
         if isinstance(value, ast.AST):
             _describe(value, parts, names)
         elif isinstance(value, list):
