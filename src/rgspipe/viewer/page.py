@@ -29,6 +29,10 @@ STEEP = 0.95
 _HELP = "Drag a lamp by its arrows. Mouse: turn, move, zoom; **W A S D Q E** fly. **Ctrl-K** lists all keys."
 
 
+#: Width over height below which a page is a phone's: these have 9/16 and less, and a window of 640 × 480 has 0.66 for
+#: the moment in which its fields stand beside the picture while it is laid out.
+UPRIGHT = 0.6
+
 #: What comes of a camera that cannot be: a canvas without a size, a turn of length zero, what is no number. Browsers
 #: tell of such ones while a page is folded away or not yet drawn, and whoever is no browser may tell of anything.
 NO_CAMERA = (ValueError, ArithmeticError, TypeError)
@@ -82,13 +86,12 @@ class Page:
         return self.camera(self._resolution)
 
     def _is_wide(self) -> bool:
-        """Whether it lies on its side. One that stands upright, as on a phone, begins with its fields folded, since
-        they lie over the picture.
+        """Whether it is no phone's that is held upright, where fields lie over the picture and so begin folded.
 
         Its pixels do not tell: browsers count several to a point on phones, and draw fewer where drawing is slow.
         """
         held = self._client.camera
-        return held.image_width >= held.image_height
+        return held.image_width >= UPRIGHT * held.image_height
 
     async def _moved(self, _: viser.CameraHandle) -> None:
         camera = self._here()
