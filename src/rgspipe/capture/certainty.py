@@ -101,7 +101,7 @@ def _rival_covariance(answer: Answer) -> Numbers:
     """(6 K, 6 K) of the lamps' numbers, by the other minima that they may belong to."""
     problem, lamps = answer.best.problem, answer.best.lamps
     own = _numbers(problem, lamps)
-    moved = np.stack([own - own, *(_numbers(problem, rival.tried.lamps) - own for rival in answer.rivals)])
+    moved = np.stack([np.zeros_like(own), *(_numbers(problem, rival.tried.lamps) - own for rival in answer.rivals)])
     odds = np.array([1.0, *(rival.odds for rival in answer.rivals)])
     return moved.T @ (moved * (odds / odds.sum())[:, None])
 

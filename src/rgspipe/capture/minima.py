@@ -41,7 +41,7 @@ class Minima:
     """The likeliest minimum that was reached, and the others that were."""
 
     best: Tried
-    rivals: tuple[Rival, ...] = ()
+    rivals: tuple[Rival, ...]
 
 
 def settled_beside(problem: LampProblem, candidates: Candidates, lamps: Lamps) -> Lamps:
