@@ -6,6 +6,7 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
+import pytest
 
 from lamp_problem import problem, true_lamps
 from rgspipe.capture.candidates import Candidates
@@ -51,12 +52,21 @@ def test_another_minimum_is_another_place() -> None:
         assert costs == sorted(costs)
 
 
-def test_a_lamp_goes_to_the_likelier_minimum_beside_it_and_stays_there() -> None:
+#: So far apart that one of the places around a false minimum, at the other side of the room, is near the truth.
+FAR = np.array([[-0.7, 0.0, 0.0], [0.7, 0.0, 0.0]])
+
+
+@cache
+def false_minimum() -> tuple[Candidates, Tried]:
+    """Of which the second lamp stands at the other side of the room, and candidates that lead out of it."""
     made, _ = room()
-    # So far apart that one of the places around the false minimum, at the other side of the room, is near the truth.
-    candidates = Candidates(np.array([[-0.7, 0.0, 0.0], [0.7, 0.0, 0.0]]), np.zeros((len(made.radiance), 2)))
     true = true_lamps(made)
     false = Tried.settled(made, made.lamps(true.places * [[1, 1, 1], [-1, 1, 1]], true.logs - 1.0))
+    return Candidates(FAR, np.zeros((len(made.radiance), 2))), false
+
+
+def test_a_lamp_goes_to_the_likelier_minimum_beside_it_and_stays_there() -> None:
+    candidates, false = false_minimum()
     assert distance(false.lamps) > 0.5  # 0.70
     found = likeliest(candidates, false)
     assert distance(found.best.lamps) < 0.003  # 7e-4
@@ -65,11 +75,10 @@ def test_a_lamp_goes_to_the_likelier_minimum_beside_it_and_stays_there() -> None
     assert found.rivals
 
 
-def test_what_was_settled_is_not_settled_again() -> None:
-    made, candidates = room()
-    best, others = Tried.settled(made, displaced()), list[Tried]()
-    for own in (0, 1):
-        best = likelier_beside(candidates, best, own, others)
-    before = list(others)
-    assert likelier_beside(candidates, best, 1, others) is best
-    assert all(new is old for new, old in zip(others, before, strict=True))
+def test_a_minimum_that_is_known_is_not_settled_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    candidates, false = false_minimum()
+    beside = minima_beside(false.problem, candidates, false.lamps, 1)
+    assert len(beside) == 2
+    monkeypatch.setattr(Tried, "settled", lambda *_: pytest.fail("it is settled again"))
+    others = [replace(false, lamps=lamps) for lamps in beside]
+    assert likelier_beside(candidates, false, 1, others) is false

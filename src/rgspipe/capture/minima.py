@@ -78,7 +78,7 @@ def minima_beside(problem: LampProblem, candidates: Candidates, lamps: Lamps, ow
 
 
 def likeliest(candidates: Candidates, best: Tried) -> Minima:
-    """Of the minima that are reached by moving one lamp after the other, each by its own variances."""
+    """The likeliest of the minima that are reached by moving one lamp after the other, each by its own variances."""
     count = len(best.lamps)
     with progress_bar([], "comparing places of lamps", 1 + count, unit="step") as bar:
         best, others = Tried.settled(best.problem, best.lamps), list[Tried]()
