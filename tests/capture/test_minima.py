@@ -47,7 +47,7 @@ def test_another_minimum_is_another_place() -> None:
     for own in (0, 1):
         costs = [made.cost(lamps)]
         for beside in minima_beside(made, candidates, lamps, own):
-            assert np.linalg.norm(beside.places - lamps.places, axis=1).max() > 0.5 * candidates.between
+            assert np.linalg.norm(beside.places - lamps.places, axis=1).max() > made.resolved
             costs.append(made.cost(beside))
         assert costs == sorted(costs)
 
@@ -71,14 +71,14 @@ def test_a_lamp_goes_to_the_likelier_minimum_beside_it_and_stays_there() -> None
     found = likeliest(candidates, false)
     assert distance(found.best.lamps) < 0.003  # 7e-4
     assert all(likelier_beside(candidates, found.best, own, []) is found.best for own in (0, 1))
-    assert all(distance(rival.tried.lamps) > 0.1 and rival.odds < 0.05 for rival in found.rivals)
+    assert all(distance(rival.tried.lamps) > 0.1 and rival.chance < 0.05 for rival in found.rivals)  # 0.014
     assert found.rivals
 
 
 def test_a_minimum_that_is_known_is_not_settled_again(monkeypatch: pytest.MonkeyPatch) -> None:
     candidates, false = false_minimum()
     beside = minima_beside(false.problem, candidates, false.lamps, 1)
-    assert len(beside) == 2
+    assert len(beside) > 1
     monkeypatch.setattr(Tried, "settled", lambda *_: pytest.fail("it is settled again"))
     others = [replace(false, lamps=lamps) for lamps in beside]
     assert likelier_beside(candidates, false, 1, others) is false

@@ -22,14 +22,9 @@ from rgspipe.capture.lamps import NUMBERS, LampProblem, Lamps
 from rgspipe.capture.photographs import Numbers
 from rgspipe.capture.search import Answer
 from rgspipe.capture.shared_errors import shared_covariance
-from rgspipe.scene.spacing import surfel_spacing
 
 #: Steps of the lamps without one of the scene's parts.
 STEPS = 6
-
-#: No coordinate is known better than to this part of the distance of neighbours, over which light is taken for even:
-#: with 2000 to 4000 surfels in a Cornell box lamps were 0.1 to 0.3 of it off where the rest of C said 0.05.
-RESOLVED = 0.1
 
 #: A lamp whose place is less sure than this part of the scene's size is a guess.
 GUESS = 0.05
@@ -62,7 +57,7 @@ class Certainty:
         count, size = len(lamps), problem.size
         numbers = covariance.reshape(count, NUMBERS, count, NUMBERS)
         own = numbers[np.arange(count), :, np.arange(count)]
-        places = size**2 * own[:, :3, :3] + (RESOLVED * _spacing(problem)) ** 2 * np.eye(3)
+        places = size**2 * own[:, :3, :3] + problem.resolved**2 * np.eye(3)
         every = np.zeros((count, NUMBERS))
         every[:, 3:] = 1.0 / (3 * count)
         scale = every.reshape(-1) @ covariance @ every.reshape(-1)
@@ -82,12 +77,6 @@ class Certainty:
         return self.scale <= TIED
 
 
-def _spacing(problem: LampProblem) -> float:
-    """Distance of neighbours, scene units."""
-    surfels = problem.frozen.surfels
-    return surfel_spacing(surfels.centers.cpu(), surfels.normals.cpu())
-
-
 def _covariance(problem: LampProblem, lamps: Lamps) -> Numbers:
     """(6 K, 6 K) C of the lamps' numbers."""
     parts = problem.parts
@@ -101,9 +90,8 @@ def _rival_covariance(answer: Answer) -> Numbers:
     """(6 K, 6 K) of the lamps' numbers, by the other minima that they may belong to."""
     problem, lamps = answer.best.problem, answer.best.lamps
     own = _numbers(problem, lamps)
-    moved = np.stack([np.zeros_like(own), *(_numbers(problem, rival.tried.lamps) - own for rival in answer.rivals)])
-    odds = np.array([1.0, *(rival.odds for rival in answer.rivals)])
-    return moved.T @ (moved * (odds / odds.sum())[:, None])
+    moved = np.array([_numbers(problem, rival.tried.lamps) - own for rival in answer.rivals]).reshape(-1, len(own))
+    return moved.T @ (moved * np.array([rival.chance for rival in answer.rivals])[:, None])
 
 
 def _number_covariance(problem: LampProblem, answer: Answer) -> Numbers:

@@ -27,6 +27,7 @@ from rgspipe.optim.levenberg_marquardt import NormalEquations, least_squares, wi
 from rgspipe.renderer.clusters import cluster_patches
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene.lights import PointLight
+from rgspipe.scene.spacing import surfel_spacing
 
 #: Longest steps: of a place in parts of the scene's size, and of the logarithm of an intensity.
 LONGEST_MOVE, LONGEST_GAIN = 0.12, 1.0
@@ -36,6 +37,10 @@ NUMBERS = 6
 
 #: Parts of the scene, each of neighbours, whose errors are taken for independent.
 PARTS = 12
+
+#: No coordinate is known better than to this part of the distance of neighbours, over which light is taken for even:
+#: with 2000 to 4000 surfels in a Cornell box lamps were 0.1 to 0.3 of it off where their covariance said 0.05.
+RESOLVED = 0.1
 
 #: Light below this part of the median counts as this much: its logarithm says nothing.
 DARK = 1e-3
@@ -118,6 +123,12 @@ class LampProblem:
     def size(self) -> float:
         """Longest side of the scene."""
         return self.frozen.size
+
+    @cached_property
+    def resolved(self) -> float:
+        """Distance below which the surfels tell no places apart, scene units."""
+        surfels = self.frozen.surfels
+        return RESOLVED * surfel_spacing(surfels.centers.cpu(), surfels.normals.cpu())
 
     @cached_property
     def parts(self) -> NDArray[np.integer]:

@@ -18,7 +18,7 @@ import numpy as np
 from rgspipe.capture.candidates import Candidates, ranked
 from rgspipe.capture.lamps import LampProblem, Lamps
 from rgspipe.capture.likelihood import ROUNDS, STEPS, Tried, settled_once, weighed
-from rgspipe.capture.minima import AROUND, FIRST, Rival, likeliest, settled_beside
+from rgspipe.capture.minima import AROUND, FIRST, Rival, likeliest, likeliest_all_around, settled_beside
 from rgspipe.capture.variances import with_likely_variances
 from rgspipe.fitting.options import BarOptions
 from rgspipe.fitting.search.apart import CandidatePlaces
@@ -147,6 +147,7 @@ def found_lamps(problem: LampProblem, count: int | None, most: int) -> Answer:
         if count is None and (not found.worth or len(minima.best.lamps) == most):
             break
         minima = likeliest(candidates, found.more)
+    minima = likeliest_all_around(candidates, minima)
     return Answer(minima.best, minima.rivals, tuple(compared), over_even(minima.best))
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import defaultdict
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -15,7 +14,7 @@ from rgspipe.capture.search import BAR
 #: that lamps and paint explain worse.
 DISAGREE = 0.1
 
-#: Odds of another place that are worth a word: a region of 95 % holds it.
+#: Chance of another place that is worth a word: a region of 95 % holds it.
 RIVAL = 0.05
 
 #: More of the surfels than this unmeasured is worth a word.
@@ -52,16 +51,21 @@ def _place(part: float, guess: bool) -> str:
 
 def _rivals(found: Captured) -> Iterator[str]:
     best, size = found.answer.best.lamps.places, found.frozen.size
-    instead = defaultdict[int, list[str]](list)
-    for rival in found.answer.rivals:
+    spread = size * found.certainty.spread(size)
+    told = set[int]()
+    for rival in sorted(found.answer.rivals, key=lambda rival: -rival.chance):
         places = rival.tried.lamps.places
         moves = np.linalg.norm(places - best, axis=1)
         own = int(moves.argmax())
-        if rival.odds > RIVAL:
-            away, against = f"{100.0 * moves[own] / size:.1f} % of the scene's size", f"1 to {1.0 / rival.odds:.0f}"
-            instead[own].append(f"{_point(places[own].tolist())}, {away} away, with odds of {against}")
-    for own, places in sorted(instead.items()):
-        yield f"The lamp at {_point(best[own].tolist())} may be elsewhere instead: at {'; at '.join(places)}."
+        # Nearer ones are what "known to" says.
+        if rival.chance > RIVAL and moves[own] > spread[own] and own not in told:
+            told.add(own)
+            away, chance = (
+                f"{100.0 * moves[own] / size:.1f} % of the scene's size away",
+                f"{100.0 * rival.chance:.0f} %",
+            )
+            there = f"{_point(places[own].tolist())}, {away}, with a chance of {chance}"
+            yield f"The lamp at {_point(best[own].tolist())} may be elsewhere instead: at {there}."
 
 
 def _number(found: Captured) -> str:

@@ -91,7 +91,9 @@ def _metrics(found: Captured) -> dict[str, Any]:
             "scale_error": certainty.scale,
             "bounced": certainty.bounced,
             "over_even_light": found.answer.over_even,
-            "rivals": [{"places": one.tried.lamps.places.tolist(), "odds": one.odds} for one in found.answer.rivals],
+            "rivals": [
+                {"places": one.tried.lamps.places.tolist(), "chance": one.chance} for one in found.answer.rivals
+            ],
             "compared": [
                 {"lamps": len(one.more.lamps), "gain": one.gain, "wanted": one.wanted} for one in found.answer.compared
             ],
