@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 import torch
@@ -34,6 +37,22 @@ def direct(box: FrozenScene) -> Tensor:
 
 def relative_error(found: Tensor, expected: Tensor) -> float:
     return float((found.double() - expected.double()).norm() / expected.double().norm())
+
+
+#: A room of several hundred patches, made after torch was told its number of threads.
+THREADS_SET = """
+import torch
+torch.set_num_threads(2)
+from rgspipe.renderer.frozen import FrozenScene
+from rooms import closed_box
+frozen = FrozenScene.freeze(closed_box(1 / 16, albedo=0.5), gather_rays=16, patches=400, seed=0)
+assert frozen.transport.inverse.isfinite().all()
+"""
+
+
+def test_scenes_freeze_where_the_number_of_threads_was_set() -> None:
+    # In a process of its own, as nothing else shall run with that.
+    subprocess.run([sys.executable, "-c", THREADS_SET], check=True, timeout=120, cwd=Path(__file__).parents[1])
 
 
 def test_direct_and_iterative_solves_agree(box: FrozenScene, albedo: Tensor, direct: Tensor) -> None:

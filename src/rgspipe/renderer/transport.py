@@ -123,9 +123,9 @@ def _bounce_operator(
     rho = albedo.double().clamp(0.0, LARGEST_ALBEDO).cpu().numpy()
     gathered = gathered.astype(np.float64)
     steps = [(average @ scipy.sparse.diags(rho[:, c]) @ gathered).toarray() for c in range(3)]
-    bounce = torch.from_numpy(np.stack(steps))
-    identity = torch.eye(average.shape[0], dtype=torch.float64)
-    result = torch.linalg.inv(identity - bounce)
+    bounce, identity = np.stack(steps), np.eye(average.shape[0])
+    # Not torch's, which fails or hangs for stacks of such matrices where its number of threads was set (MKL).
+    result = np.linalg.inv(identity - bounce)
     if bounces is not None:
-        result = result @ (identity - torch.linalg.matrix_power(bounce, bounces))
-    return result.float().to(albedo.device)
+        result = result @ (identity - np.linalg.matrix_power(bounce, bounces))
+    return torch.from_numpy(result).float().to(albedo.device)
