@@ -80,6 +80,7 @@ class Cost:
 
     @property
     def build_s(self) -> float:
+        """Seconds that the model took to make."""
         return self.areas_s + self.gather_s + self.transport_s + self.views_s
 
 
@@ -95,6 +96,7 @@ class Model:
 
     @property
     def at_pixels(self) -> bool:
+        """Whether direct light is evaluated where pixels look."""
         return self.setting.shadows == "pixels"
 
     def image(self, camera: int, rig: LightRig, indirect: bool = True) -> Tensor:

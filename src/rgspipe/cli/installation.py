@@ -61,6 +61,7 @@ class Part:
 
     @property
     def works(self) -> bool:
+        """Whether it is installed, and nothing is wrong with it."""
         return self.version is not None and not self.fault
 
     @property

@@ -61,7 +61,7 @@ def _check(where: str, value: float, most: float, unit: str) -> None:
 def _radiance(light: Light) -> float:
     """Of its surface [W/(m² sr)]; 0 for what has none."""
     shape = surface(light)
-    # A ball of no size is a point.
+    # A sphere of no size is a point.
     if shape is None or radius(light) == 0.0:
         return 0.0
     return float(light.intensity.max()) / shape.area if shape.area > 0.0 else math.inf

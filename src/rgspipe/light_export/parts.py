@@ -11,7 +11,7 @@ from torch import Tensor
 from rgspipe.scene import Light, SpotLight
 from rgspipe.scene.lights import AxialLight, SpotProfile
 from rgspipe.scene.lights.panel import sides
-from rgspipe.scene.lights.surface import Ball, Rectangle, Surface
+from rgspipe.scene.lights.surface import EvenRectangle, EvenSphere, Surface
 
 #: Lights by what people call them: from 1 on, without those that no format holds.
 Numbered = Mapping[int, Light]
@@ -24,15 +24,15 @@ def surface(light: Light) -> Surface | None:
 
 
 def radius(light: Light) -> float | None:
-    """That of its ball [m]; None if it is none."""
-    ball = surface(light)
-    return float(ball.radius) if isinstance(ball, Ball) else None
+    """That of its sphere [m]; None if it is none."""
+    shape = surface(light)
+    return float(shape.radius) if isinstance(shape, EvenSphere) else None
 
 
 def rectangle(light: Light) -> tuple[float, float] | None:
     """Width and height [m] of its rectangle; None if it is none."""
     shape = surface(light)
-    return (float(shape.width), float(shape.height)) if isinstance(shape, Rectangle) else None
+    return (float(shape.width), float(shape.height)) if isinstance(shape, EvenRectangle) else None
 
 
 def is_of_another_shape(light: Light) -> bool:
@@ -72,7 +72,7 @@ def frame(light: Light) -> Tensor:
         return torch.eye(3, dtype=torch.float64)
     axis = torch.nn.functional.normalize(light.axis.double(), dim=0)
     shape = surface(light)
-    across, up = (shape.across, shape.up) if isinstance(shape, Rectangle) else sides(axis, axis.new_zeros(()))
+    across, up = (shape.across, shape.up) if isinstance(shape, EvenRectangle) else sides(axis, axis.new_zeros(()))
     return torch.stack([across, -up, -axis], dim=1)
 
 

@@ -60,6 +60,7 @@ class AlbedoProblem:
 
     @classmethod
     def build(cls, surfels: Surfels, models: Sequence[ViewModel], views: Sequence[View]) -> AlbedoProblem:
+        """That of views, each with how it sees the surfels under its light."""
         images = [view.image.reshape(-1, 3).float() for view in views]
         albedo = surfels.albedo.float().clamp(*ALBEDO_RANGE)
         scales = levels(images, [model.image(albedo, None) for model in models])

@@ -140,6 +140,7 @@ class GlossView:
 
     @classmethod
     def of(cls, model: ViewModel, light: GlossLight, v: int, at: Reflection) -> GlossView:
+        """View `v` of those that share a light, linear around a reflection."""
         received = None if light.received is None else light.received[v]
         own = light.highlights[v]
         parts = *own.lobes(at.log_exponents), *light.reflected(v, at.log_exponents)

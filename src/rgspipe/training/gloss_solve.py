@@ -61,6 +61,7 @@ class GlossProblem:
         chosen: Tensor,
         prior: AlbedoPrior | None = None,
     ) -> GlossProblem:
+        """That of views, of which the surfels `chosen` (G,) may be glossy."""
         centers, normals, albedo = surfels.centers.float(), surfels.normals.float(), surfels.albedo.float()
         # A material goes on around the creases of a thing, so gloss is alike where places and colours are.
         graphs = nearest_surfels(centers, normals), nearest_surfels(centers[chosen], albedo[chosen])

@@ -45,7 +45,7 @@ class Nodes:
         direction: (3,) along which each shines with the cosine, as a piece of a surface does; None where each shines
             alike in all directions.
         distant: whether they are infinitely far away.
-        surface: that which they stand for: a ball of points without a direction, a rectangle of those with one; None
+        surface: that which they stand for: a sphere of points without a direction, a rectangle of those with one; None
             where it has another shape.
     """
 

@@ -15,7 +15,7 @@ from rgspipe.scene.lights.point import PointLight
 from rgspipe.scene.lights.reader import Reader
 from rgspipe.scene.lights.shape_coordinates import LENGTH
 from rgspipe.scene.lights.shape_number import ShapeNumber
-from rgspipe.scene.lights.surface import Ball
+from rgspipe.scene.lights.surface import EvenSphere
 from rgspipe.scene.shapes import Float
 
 #: Radii that a fit begins with, in parts of the scene's size: where the radius is 0, nothing tells which way it goes.
@@ -53,7 +53,7 @@ class SphereLight(Light):
 
     def nodes(self, values: Mapping[str, Tensor], few: bool = False) -> Nodes:
         places = values["position"] + values["radius"] * ball_nodes(few).to(values["position"])
-        return Nodes(places, surface=Ball(values["radius"]))
+        return Nodes(places, surface=EvenSphere(values["radius"]))
 
     def grown(self, size: float, free: bool) -> tuple[Self, ...]:
         return tuple(replace(self, radius=share * size) for share in RADII) if free else (self,)

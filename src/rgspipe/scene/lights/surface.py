@@ -11,7 +11,7 @@ from rgspipe.scene.shapes import Float
 
 
 @dataclass(frozen=True)
-class Ball:
+class EvenSphere:
     """A sphere around the light's place that shines to all sides.
 
     Attributes:
@@ -27,7 +27,7 @@ class Ball:
 
 
 @dataclass(frozen=True)
-class Rectangle:
+class EvenRectangle:
     """A rectangle around the light's place that shines to the side of its axis.
 
     Attributes:
@@ -46,4 +46,4 @@ class Rectangle:
         return float(self.width) * float(self.height)
 
 
-Surface = Ball | Rectangle
+Surface = EvenSphere | EvenRectangle
