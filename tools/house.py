@@ -14,7 +14,7 @@ import subprocess
 import tarfile
 import tempfile
 from collections import Counter, defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -30,7 +30,7 @@ FLOORS = (
     ("fitting", "completion"),
     ("training",),
     ("capture",),
-    ("degradation", "evidence", "robustness", "blender", "olat", "evaluation", "light_export"),
+    ("degradation", "evidence", "blender", "evaluation", "light_export"),
     ("relighting", "studies", "benchmark", "pages", "viewer"),
     ("config",),
     ("stages",),
@@ -95,11 +95,10 @@ class Module:
                     if _is_number(value):
                         yield f"{owner.name}.{node.target.id}"
 
-    def bare(self) -> Iterator[str]:
-        """Public functions, classes and methods without a docstring; what overrides an interface has that one's."""
-        yield from (
-            f"{self.name}.{node.name}" for node in self.tree.body if _public(node) and not ast.get_docstring(node)
-        )
+    def classes(self) -> Iterator[ast.ClassDef]:
+        for node in self.tree.body:
+            if isinstance(node, ast.ClassDef):
+                yield node
 
     def significant(self) -> list[tuple[int, str]]:
         """Lines of code with their numbers, without imports, comments, docstrings and lone punctuation."""
@@ -134,8 +133,24 @@ def _is_number(node: ast.expr) -> bool:
     return isinstance(node, ast.Constant) and isinstance(node.value, int | float) and not isinstance(node.value, bool)
 
 
-def _public(node: ast.stmt) -> bool:
-    return isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_")
+def _bare(nodes: Iterable[ast.stmt]) -> Iterator[str]:
+    """Public functions and classes among them without a docstring."""
+    for node in nodes:
+        public = isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_")
+        if public and not ast.get_docstring(node):
+            yield node.name
+
+
+def _bases(owner: ast.ClassDef) -> set[str]:
+    """Names of what a class extends, without the modules that they are from."""
+    plain = (base.value if isinstance(base, ast.Subscript) else base for base in owner.bases)
+    return {base.attr if isinstance(base, ast.Attribute) else getattr(base, "id", "") for base in plain}
+
+
+def _said(owner: ast.ClassDef) -> set[str]:
+    """Names that a class says something of: its methods with a docstring, and its attributes."""
+    fields = {node.target.id for node in owner.body if isinstance(node, ast.AnnAssign)}
+    return fields | {node.name for node in owner.body if isinstance(node, ast.FunctionDef) and ast.get_docstring(node)}
 
 
 @dataclass(frozen=True)
@@ -197,6 +212,39 @@ class House:
         }
         return sorted(", ".join(sorted(loop)) for loop in loops)
 
+    def bare(self) -> list[str]:
+        """Public functions, classes and methods without a docstring; what overrides an interface has that one's.
+
+        An interface is a class that is extended, or any protocol, as those are met without being named.
+        """
+        owners = defaultdict(list)
+        for module in self.modules.values():
+            for owner in module.classes():
+                owners[owner.name].append(owner)
+        extends = {name: set().union(*map(_bases, same)) for name, same in owners.items()}
+        protocols = {name for name, bases in extends.items() if "Protocol" in bases}
+        found = []
+        for module in self.modules.values():
+            found += [f"{module.name}.{name}" for name in _bare(module.tree.body)]
+            for owner in module.classes():
+                above = (protocols | _reached(extends, owner.name)) - {owner.name}
+                said = set().union(*(_said(one) for name in above for one in owners[name]))
+                if not owner.name.startswith("_"):
+                    found += [f"{module.name}.{owner.name}.{name}" for name in _bare(owner.body) if name not in said]
+        return found
+
+    def twins(self) -> list[str]:
+        """Names of public classes that stand for several."""
+        homes = defaultdict(list)
+        for module in self.modules.values():
+            for owner in module.classes():
+                homes[owner.name].append(module.name)
+        return [
+            f"{name}: {', '.join(where)}"
+            for name, where in sorted(homes.items())
+            if len(where) > 1 and not name.startswith("_")
+        ]
+
     def blocks(self) -> list[str]:
         """Places where BLOCK or more lines of code stand that stand elsewhere, too."""
         places = defaultdict(list)
@@ -246,7 +294,8 @@ def measures(house: House) -> dict[str, object]:
         "constants in fitting/": sum(len(list(m.constants())) for m in fits),
         "numbers among the options of fits": sum(len(list(m.settings())) for m in fits if m.name.endswith("options")),
         "constants in all": sum(len(list(m.constants())) for m in modules),
-        "public names without docstring": sum(len(list(m.bare())) for m in modules),
+        "public names without docstring": len(house.bare()),
+        "names of several classes": len(house.twins()),
         "circles of imports": len(house.circles()),
         "imports of what is above": len(house.upward()),
         f"blocks of {BLOCK} lines that stand twice": len(house.blocks()),
@@ -265,7 +314,9 @@ def main() -> None:
     """Print the measures, beside those of a commit if one is named."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--since", metavar="REV", help="a commit to compare with")
-    parser.add_argument("--list", action="store_true", help="name the circles, upward imports, blocks and bare names")
+    parser.add_argument(
+        "--list", action="store_true", help="name the circles, upward imports, blocks, bare names and twins"
+    )
     wanted = parser.parse_args()
     now = House.at(Path(__file__).parents[1])
     houses = [House.of(wanted.since), now] if wanted.since else [now]
@@ -276,8 +327,8 @@ def main() -> None:
             print(f"{name:40}" + "".join(f"  {table.get(name, '')!s:32}" for table in tables).rstrip())
         print()
     if wanted.list:
-        bare = [name for module in now.modules.values() for name in module.bare()]
-        for title, found in (("circle", now.circles()), ("up", now.upward()), ("twice", now.blocks()), ("bare", bare)):
+        titles = ("circle", now.circles()), ("up", now.upward()), ("twice", now.blocks())
+        for title, found in (*titles, ("bare", now.bare()), ("twin", now.twins())):
             print(*(f"{title}: {item}" for item in found), sep="\n")
 
 

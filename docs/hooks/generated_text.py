@@ -9,7 +9,7 @@ from pathlib import Path
 import yaml
 
 import rgspipe
-from rgspipe.cli.help import PAGES, Setting, groups, help_text, sections
+from rgspipe.cli.help import PAGES, SettingHelp, groups, help_text, sections
 from rgspipe.options import Options
 from rgspipe.options import settings as option_fields
 
@@ -66,7 +66,7 @@ MARKS = {
 }
 
 
-def _table(rows: list[Setting]) -> str:
+def _table(rows: list[SettingHelp]) -> str:
     cells = [f"| `{row.key}` | {_cell(row.meaning)} | `{_cell(row.default)}` |" for row in rows]
     return "\n".join(["| setting | meaning | default |", "| --- | --- | --- |", *cells])
 

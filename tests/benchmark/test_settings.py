@@ -11,11 +11,11 @@ from rgspipe.benchmark.image_error import image_errors
 from rgspipe.benchmark.light_bias import light_biases
 from rgspipe.benchmark.rooms import ROOMS, Room
 from rgspipe.benchmark.scaling import scaling
-from rgspipe.benchmark.settings import Model, Setting, Workshop, sweep
+from rgspipe.benchmark.settings import Model, RenderSetting, Workshop, sweep
 from rgspipe.benchmark.truth import Truth
 from rgspipe.stages.benchmark.benchmark import preset_settings
 
-SMALL = Setting(surfels=800, gather_rays=16, patches=60, resolution=16)
+SMALL = RenderSetting(surfels=800, gather_rays=16, patches=60, resolution=16)
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +79,7 @@ def test_the_sweep_holds_the_presets_and_turns_every_knob() -> None:
     settings = sweep(presets.values())
     assert len(set(settings)) == len(settings)
     assert set(presets.values()) <= set(settings)
-    for knob in Setting.__dataclass_fields__:
+    for knob in RenderSetting.__dataclass_fields__:
         assert len({getattr(setting, knob) for setting in settings}) > 1, knob
 
 

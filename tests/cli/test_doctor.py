@@ -14,7 +14,7 @@ import pytest
 
 from rgspipe.cli import doctor as command
 from rgspipe.cli import main
-from rgspipe.cli.installation import Part
+from rgspipe.cli.installation import Distribution
 from rgspipe.evaluation import self_check as check
 from rgspipe.evaluation.self_check import Figure
 from rgspipe.store.artifacts import ArtifactStore, Key
@@ -22,7 +22,7 @@ from rgspipe.store.artifacts import ArtifactStore, Key
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "doctor.md"
 
 #: Parts as where all is well.
-FINE = [Part("torch", ">=2.6", "2.13.0")]
+FINE = [Distribution("torch", ">=2.6", "2.13.0")]
 
 
 @pytest.fixture(autouse=True)
@@ -47,7 +47,11 @@ def test_a_machine_where_all_is_well(tmp_path: Path, capsys: pytest.CaptureFixtu
 def test_what_is_broken_is_told_with_what_to_do(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    broken = [*FINE, Part("scipy", ">=1.14", "1.17", "does not load: libfoo.so"), Part("viser", ">=1.1.1", None)]
+    broken = [
+        *FINE,
+        Distribution("scipy", ">=1.14", "1.17", "does not load: libfoo.so"),
+        Distribution("viser", ">=1.1.1", None),
+    ]
     monkeypatch.setattr(command, "needed_parts", lambda: broken)
     assert main(["doctor", f"outputs={tmp_path}"]) == 1
     said = told(capsys)
@@ -59,8 +63,8 @@ def test_what_is_missing_beyond_that_is_said_with_what_it_would_give(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     more = [
-        Part("bpy", "==5.0.1", "5.0.1", "does not load: libX.so", "blender"),
-        Part("mitsuba", "", None, "", "bench"),
+        Distribution("bpy", "==5.0.1", "5.0.1", "does not load: libX.so", "blender"),
+        Distribution("mitsuba", "", None, "", "bench"),
     ]
     monkeypatch.setattr(command, "optional_parts", lambda: more)
     assert main(["doctor", f"outputs={tmp_path}"]) == 0

@@ -15,7 +15,7 @@ from rgspipe.training.albedo import AlbedoPrior, AlbedoProblem
 from rgspipe.training.lighting import indirect_irradiance, trace_lighting
 from rgspipe.training.materials import build_frozen, fit_materials, trace_views
 from rgspipe.training.options import MaterialOptions
-from rgspipe.training.view_model import ViewModel, build_view_models
+from rgspipe.training.view_model import LitViewModel, build_view_models
 
 OPTIONS = MaterialOptions(rounds=5, gather_rays=32, patches=60, supersampling=1)
 
@@ -40,7 +40,7 @@ def unlit_views(count: int = 8, resolution: int = 24) -> list[View]:
     return found
 
 
-def models_of(surfels: Surfels, views: list[View], at_pixels: bool) -> tuple[ViewModel, ...]:
+def models_of(surfels: Surfels, views: list[View], at_pixels: bool) -> tuple[LitViewModel, ...]:
     bvh = SurfelBvh(surfels)
     return build_view_models(bvh, trace_views(surfels, views, 1), trace_lighting(bvh, views), at_pixels)
 

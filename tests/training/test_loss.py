@@ -9,7 +9,7 @@ import torch
 
 from rgspipe.scene import Camera, look_at
 from rgspipe.training.loss import compressed, image_loss
-from rgspipe.training.options import LossOptions
+from rgspipe.training.options import ImageLossOptions
 from rgspipe.training.sampling import draw_pixels, draw_window, pixel_means, views_of_step
 
 IMAGE = torch.rand(16, 16, 3, generator=torch.Generator().manual_seed(0), dtype=torch.float64)
@@ -18,7 +18,7 @@ OTHER = torch.rand(16, 16, 3, generator=torch.Generator().manual_seed(1), dtype=
 
 @pytest.mark.parametrize("kind", ["l2", "l1", "l1_ssim"])
 def test_brightness_of_a_scene_does_not_matter_and_equal_images_cost_nothing(kind: str) -> None:
-    options = LossOptions(kind, compression=10.0)
+    options = ImageLossOptions(kind, compression=10.0)
     loss = image_loss(IMAGE, OTHER, 1.0, options, window=True)
     scaled = image_loss(1e6 * IMAGE, 1e6 * OTHER, 1e6, options, window=True)
     torch.testing.assert_close(scaled, loss, rtol=1e-9, atol=0.0)
@@ -38,14 +38,14 @@ def test_compression_keeps_zero_and_peak_and_weighs_dark_errors_more() -> None:
 @pytest.mark.parametrize("kind", ["l2", "l1_ssim"])
 def test_losses_have_the_gradient_of_finite_differences(kind: str) -> None:
     leaf = IMAGE.clone().requires_grad_()
-    options = LossOptions(kind, compression=5.0)
+    options = ImageLossOptions(kind, compression=5.0)
     # Measured below 1e-8.
     assert torch.autograd.gradcheck(lambda x: image_loss(x, OTHER, 0.7, options, True), leaf, fast_mode=True)
 
 
 def test_ssim_refuses_pixels_that_stand_alone() -> None:
     with pytest.raises(ValueError, match="window"):
-        image_loss(IMAGE.reshape(-1, 3), OTHER.reshape(-1, 3), 1.0, LossOptions("l1_ssim"), window=False)
+        image_loss(IMAGE.reshape(-1, 3), OTHER.reshape(-1, 3), 1.0, ImageLossOptions("l1_ssim"), window=False)
 
 
 def camera() -> Camera:

@@ -17,7 +17,7 @@ from rgspipe.training.parameters import tilted
 from rgspipe.training.photometric import fit_heights, fit_normals, roughness, shading_of_view
 from rgspipe.training.regularise import find_neighbours
 from rgspipe.training.shading import SurfelLight, surfel_lights
-from rgspipe.training.trainer import surfel_spacing, train
+from rgspipe.training.trainer import spacing_of_clips, train
 from rooms import sphere
 
 #: The painted room's surfels stand this far apart.
@@ -106,7 +106,7 @@ def test_heights_follow_the_normals_and_keep_what_was_measured_on_the_whole() ->
 
 def test_roughness_is_zero_on_spheres_and_measures_noise() -> None:
     ball = sphere(2000).to(torch.float32)
-    spacing = surfel_spacing(ball)
+    spacing = spacing_of_clips(ball)
     clean = roughness(ball, find_neighbours(ball, spacing))
     noisy = leaning(ball, 0.05)
     # Measured 2e-7: chords of a sphere are at right angles to the mean normal.

@@ -22,7 +22,7 @@ from rgspipe.training.options import RefineOptions
 from rgspipe.training.parameters import build_surfels, start_parameters, tilted
 from rgspipe.training.refine import RefineState, refine
 from rgspipe.training.shading import SurfelLight, shaded_radiance, surfel_lights
-from rgspipe.training.trainer import refine_views, surfel_spacing
+from rgspipe.training.trainer import refine_views, spacing_of_clips
 
 
 @pytest.fixture(scope="module")
@@ -119,7 +119,7 @@ def test_geometry_steps_lower_the_loss(views: list[View], radiance: Tensor) -> N
     shrunk = replace(painted_box(), scales=0.8 * painted_box().scales)
     seen = refine_views(painted_box(), views, radiance)
     options = RefineOptions(steps=30, views_per_step=16, edge_pixels=150, interior_pixels=150, subsamples=1)
-    refined, state = refine(shrunk, seen, surfel_spacing(shrunk), options)
+    refined, state = refine(shrunk, seen, spacing_of_clips(shrunk), options)
     # Measured: the loss falls by a factor of 150, and the scales grow by 1.26, to the truth's 1.25.
     assert sum(state.losses[-5:]) < 0.05 * sum(state.losses[:5])
     assert float((refined.scales / shrunk.scales).mean()) == pytest.approx(1.25, rel=0.1)
@@ -139,7 +139,7 @@ def test_gradients_turn_normals_back(views: list[View], radiance: Tensor) -> Non
         smoothness_weight=0.01,
     )
     still = dict.fromkeys(("offset", "log_scales", "angle", "logit"), 0.0)
-    refined, _ = refine(spoiled, seen, surfel_spacing(truth), options, rates=still)
+    refined, _ = refine(spoiled, seen, spacing_of_clips(truth), options, rates=still)
     before, after = normal_error(spoiled, truth), normal_error(refined, truth)
     # Measured: 7.4° to 1.0°; 5.2° without the smoothness, as surfels blend in pixels.
     assert after < 0.5 * before
@@ -160,12 +160,12 @@ def test_a_rebased_refinement_goes_on_where_it_was(views: list[View], radiance: 
     truth = painted_box()
     seen = refine_views(truth, views, radiance)
     options = RefineOptions(steps=8, views_per_step=4, interior_pixels=100, subsamples=1, tilt_rate=0.01)
-    half, state = refine(truth, seen, surfel_spacing(truth), options, until=4)
+    half, state = refine(truth, seen, spacing_of_clips(truth), options, until=4)
     assert state.step == 4
     rebased = state.rebased(half)
     torch.testing.assert_close(build_surfels(half, rebased.parameters).centers, half.centers)
     assert all(bool((rebased.first[name] == state.first[name]).all()) for name in state.first)
-    _, done = refine(half, seen, surfel_spacing(truth), options, rebased)
+    _, done = refine(half, seen, spacing_of_clips(truth), options, rebased)
     assert done.step == 8
     assert len(done.losses) == 8
 
@@ -175,7 +175,7 @@ def test_limits_hold_however_far_the_steps_go(views: list[View], radiance: Tenso
     seen = refine_views(truth, views, radiance)
     options = RefineOptions(steps=4, views_per_step=2, interior_pixels=50, subsamples=1)
     wild = {"log_scales": 9.0, "albedo": 9.0, "logit": 99.0}
-    refined, _ = refine(truth, seen, surfel_spacing(truth), options, RefineState.start(truth), rates=wild)
+    refined, _ = refine(truth, seen, spacing_of_clips(truth), options, RefineState.start(truth), rates=wild)
     change = (refined.scales / truth.scales).log()
     assert float(change.min()) >= -1.5001
     assert float(change.max()) <= 0.6001

@@ -12,13 +12,13 @@ from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.scene import Surfels
 from rgspipe.training.parameters import tilted
 from rgspipe.training.regularise import continuity, distortion, find_neighbours, normal_smoothness
-from rgspipe.training.trainer import surfel_spacing
+from rgspipe.training.trainer import spacing_of_clips
 from rooms import closed_box, sphere
 
 
 def on_sphere() -> tuple[Surfels, float]:
     ball = sphere(500)
-    return ball, surfel_spacing(ball)
+    return ball, spacing_of_clips(ball)
 
 
 def test_continuity_is_zero_on_a_sphere_and_smoothness_is_not() -> None:

@@ -8,13 +8,13 @@ from statistics import fmean
 import pandas as pd
 
 from rgspipe.benchmark.rooms import Room
-from rgspipe.benchmark.settings import Model, Setting, Workshop
+from rgspipe.benchmark.settings import Model, RenderSetting, Workshop
 from rgspipe.benchmark.step_cost import StepCost, step_cost
 from rgspipe.benchmark.truth import KINDS, Truth
 from rgspipe.progress import progress_bar
 
 
-def image_errors(room: Room, truth: Truth, settings: list[Setting], repetitions: int) -> pd.DataFrame:
+def image_errors(room: Room, truth: Truth, settings: list[RenderSetting], repetitions: int) -> pd.DataFrame:
     """One row a setting: the knobs, PSNR and relative error of direct and global images, and what they cost.
 
     Columns `direct_db`, `global_db` and with `_off_edges` are means over all cameras and lights, `_worst` the worst

@@ -22,7 +22,7 @@ from rgspipe.benchmark.mitsuba_peer import mitsuba_rows
 from rgspipe.benchmark.ray_rate import memory_traffic, ray_rates
 from rgspipe.benchmark.rooms import Room
 from rgspipe.benchmark.scaling import scaling
-from rgspipe.benchmark.settings import Setting, Workshop, sweep
+from rgspipe.benchmark.settings import RenderSetting, Workshop, sweep
 from rgspipe.benchmark.truth import Truth
 from rgspipe.evaluation.plots import png_of, svg_bytes
 from rgspipe.evaluation.timing import load_average
@@ -52,7 +52,7 @@ class Bench:
 
     rooms: tuple[tuple[Room, Truth], ...]
     repetitions: int
-    presets: Mapping[str, Setting]
+    presets: Mapping[str, RenderSetting]
     folder: Path
 
 
@@ -77,7 +77,7 @@ def run_bench(bench: Bench) -> None:
 
 def _of_one_size(rows: pd.DataFrame) -> pd.DataFrame:
     """Rows of the standard resolution: errors of smaller images cannot be compared with theirs."""
-    return rows[rows["resolution"] == Setting().resolution]
+    return rows[rows["resolution"] == RenderSetting().resolution]
 
 
 def _part(bench: Bench, name: str, measure: Callable[[Bench], pd.DataFrame]) -> pd.DataFrame:
@@ -101,7 +101,7 @@ def _error(bench: Bench) -> pd.DataFrame:
 
 
 def _bias(bench: Bench) -> pd.DataFrame:
-    settings = [Setting(), replace(Setting(), shadows="pixels"), *bench.presets.values()]
+    settings = [RenderSetting(), replace(RenderSetting(), shadows="pixels"), *bench.presets.values()]
     parts = []
     for room, truth in bench.rooms:
         workshop = Workshop(room)
@@ -111,7 +111,7 @@ def _bias(bench: Bench) -> pd.DataFrame:
 
 def _steps(bench: Bench) -> pd.DataFrame:
     room = bench.rooms[0][0]
-    model = Workshop(room).model(Setting())
+    model = Workshop(room).model(RenderSetting())
     small, large = room.cameras(128)[0], room.cameras(256)[0]
     timings = fit_steps(model.frozen, small, large, room.lights[0].float(), bench.repetitions)
     return pd.DataFrame([asdict(timing) for timing in timings])
@@ -119,13 +119,13 @@ def _steps(bench: Bench) -> pd.DataFrame:
 
 def _rays(bench: Bench) -> pd.DataFrame:
     room = bench.rooms[0][0]
-    model = Workshop(room).model(Setting())
+    model = Workshop(room).model(RenderSetting())
     return ray_rates(model.frozen.surfels, room.lights.float(), room.cameras(256)[0], bench.repetitions)
 
 
 def _traffic(bench: Bench) -> pd.DataFrame:
     room = bench.rooms[0][0]
-    model = Workshop(room).model(Setting())
+    model = Workshop(room).model(RenderSetting())
     frozen = model.frozen
     operators = {"view weights, 128²": model.views[0].operator, "gather from patches": frozen.transport.gather}
     return memory_traffic(operators | {"full gather": frozen.gather}, 3, bench.repetitions)
@@ -133,7 +133,7 @@ def _traffic(bench: Bench) -> pd.DataFrame:
 
 def _gather(bench: Bench) -> pd.DataFrame:
     room = bench.rooms[0][0]
-    surfels = Workshop(room).model(replace(Setting(), surfels=GATHER_SURFELS)).frozen.surfels
+    surfels = Workshop(room).model(replace(RenderSetting(), surfels=GATHER_SURFELS)).frozen.surfels
     return compare_gathers(room, surfels, rays=GATHER_RAYS)
 
 
@@ -144,7 +144,7 @@ def _effects(bench: Bench) -> pd.DataFrame:
 def _peers(bench: Bench) -> pd.DataFrame:
     parts = []
     for room, truth in bench.rooms:
-        model = Workshop(room).model(Setting(resolution=truth.resolution))
+        model = Workshop(room).model(RenderSetting(resolution=truth.resolution))
         away = [~view.edges.reshape(truth.resolution, truth.resolution) for view in model.views]
         parts.append(mitsuba_rows(room, truth, bench.repetitions, away=away))
     return pd.concat(parts, ignore_index=True)

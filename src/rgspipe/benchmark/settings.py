@@ -32,7 +32,7 @@ Shadows = Literal["surfels", "pixels", "none"]
 
 
 @dataclass(frozen=True)
-class Setting:
+class RenderSetting:
     """The knobs that cost time and buy accuracy.
 
     Attributes:
@@ -58,7 +58,7 @@ class Setting:
     @property
     def changed(self) -> str:
         """What differs from the default, for a row of a table."""
-        base = Setting()
+        base = RenderSetting()
         names = [name for name in self.__dataclass_fields__ if getattr(self, name) != getattr(base, name)]
         return ", ".join(f"{name}={getattr(self, name)}" for name in names) or "base"
 
@@ -80,6 +80,7 @@ class Cost:
 
     @property
     def build_s(self) -> float:
+        """Seconds that the model took to make."""
         return self.areas_s + self.gather_s + self.transport_s + self.views_s
 
 
@@ -87,7 +88,7 @@ class Cost:
 class Model:
     """A room made with a setting: the frozen scene, its views, and how each of these sees lights."""
 
-    setting: Setting
+    setting: RenderSetting
     frozen: FrozenScene
     views: tuple[ViewWeights, ...]
     seen: tuple[ViewModel, ...]
@@ -95,6 +96,7 @@ class Model:
 
     @property
     def at_pixels(self) -> bool:
+        """Whether direct light is evaluated where pixels look."""
         return self.setting.shadows == "pixels"
 
     def image(self, camera: int, rig: LightRig, indirect: bool = True) -> Tensor:
@@ -129,7 +131,7 @@ class Workshop:
     seed: int = 0
     _kept: dict[tuple[int, int], tuple[SurfelBvh, SparseOperator, Tensor, float, float]] = field(default_factory=dict)
 
-    def model(self, setting: Setting) -> Model:
+    def model(self, setting: RenderSetting) -> Model:
         """The room's model; times are those of making it from nothing, also where the gather was kept."""
         bvh, gather, areas, areas_s, gather_s = self._gather(setting)
         surfels = bvh.surfels
@@ -147,7 +149,7 @@ class Workshop:
         size = 8 * sum(part.entries for part in parts) + 4 * transport.inverse.numel()
         return Model(setting, frozen, views, seen, Cost(areas_s, gather_s, middle - begin, views_s, size / 2**20))
 
-    def _gather(self, setting: Setting) -> tuple[SurfelBvh, SparseOperator, Tensor, float, float]:
+    def _gather(self, setting: RenderSetting) -> tuple[SurfelBvh, SparseOperator, Tensor, float, float]:
         key = setting.surfels, setting.gather_rays
         if key not in self._kept:
             self._kept.clear()
@@ -161,9 +163,9 @@ class Workshop:
         return self._kept[key]
 
 
-def sweep(presets: Iterable[Setting] = ()) -> list[Setting]:
+def sweep(presets: Iterable[RenderSetting] = ()) -> list[RenderSetting]:
     """The base setting, every knob turned alone, and a few turned together; neighbours share a gather operator."""
-    base = Setting()
+    base = RenderSetting()
     turned = [
         *(replace(base, patches=n) for n in (100, 250, 1000, 2000)),
         *(replace(base, bounces=n) for n in (0, 1, 2, 4, 8)),
@@ -175,14 +177,14 @@ def sweep(presets: Iterable[Setting] = ()) -> list[Setting]:
         *(replace(base, surfels=n) for n in (2_500, 5_000, 20_000, 40_000)),
     ]
     together = [
-        Setting(2_500, 64, 100),
-        Setting(2_500, 64, 250, shadows="pixels"),
-        Setting(5_000, 64, 250),
-        Setting(5_000, 128, 500, shadows="pixels"),
-        Setting(10_000, 128, 1000, shadows="pixels"),
-        Setting(10_000, 128, 2000, shadows="pixels"),
-        Setting(20_000, 256, 1000),
-        Setting(40_000, 128, 2000, shadows="pixels"),
+        RenderSetting(2_500, 64, 100),
+        RenderSetting(2_500, 64, 250, shadows="pixels"),
+        RenderSetting(5_000, 64, 250),
+        RenderSetting(5_000, 128, 500, shadows="pixels"),
+        RenderSetting(10_000, 128, 1000, shadows="pixels"),
+        RenderSetting(10_000, 128, 2000, shadows="pixels"),
+        RenderSetting(20_000, 256, 1000),
+        RenderSetting(40_000, 128, 2000, shadows="pixels"),
     ]
     settings = dict.fromkeys([base, *turned, *together, *presets])
     return sorted(settings, key=lambda s: (s.surfels, s.gather_rays))

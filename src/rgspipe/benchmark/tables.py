@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import pandas as pd
 
-from rgspipe.benchmark.settings import Setting
+from rgspipe.benchmark.settings import RenderSetting
 from rgspipe.evaluation.markdown import markdown_table
 
 ERRORS = {
@@ -33,7 +33,7 @@ def report(
     parts: Mapping[str, pd.DataFrame],
     front: pd.DataFrame,
     loads: Mapping[str, float],
-    presets: Mapping[str, Setting],
+    presets: Mapping[str, RenderSetting],
 ) -> str:
     """All tables as Markdown."""
     error = parts["error"]
@@ -92,7 +92,7 @@ def report(
 
 
 def _by_surfels(error: pd.DataFrame) -> str:
-    names = [Setting(surfels=n).changed for n in (2_500, 5_000, 10_000, 20_000, 40_000)]
+    names = [RenderSetting(surfels=n).changed for n in (2_500, 5_000, 10_000, 20_000, 40_000)]
     rows = error[error["setting"].isin(names)].sort_values(["room", "surfels"], kind="stable")
     return markdown_table(rows, {"room": ("room", ""), "surfels": ("surfels", ",")} | ERRORS)
 
@@ -103,7 +103,7 @@ def _knobs(error: pd.DataFrame) -> str:
     return markdown_table(rows, {"setting": ("setting", "")} | ERRORS | COSTS)
 
 
-def _presets(error: pd.DataFrame, presets: Mapping[str, Setting]) -> str:
+def _presets(error: pd.DataFrame, presets: Mapping[str, RenderSetting]) -> str:
     rows = []
     for name, setting in presets.items():
         found = error[error["setting"] == setting.changed]

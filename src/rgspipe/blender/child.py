@@ -25,7 +25,9 @@ class Named(Protocol):
     """An image to render."""
 
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        """Its name among the images."""
+        ...
 
 
 FrameType = TypeVar("FrameType", bound=Named)

@@ -52,6 +52,7 @@ class DatasetJob(DatasetOptions):
         return RenderSettings(self.resolution, self.samples, self.denoise, self.max_bounces)
 
     def to_json(self) -> dict:
+        """Everything of the job, as JSON has it."""
         return asdict(self) | {"kind": kind_of(self.model)}
 
     @classmethod

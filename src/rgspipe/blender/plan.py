@@ -73,6 +73,7 @@ class Plan:
 
     @property
     def frames(self) -> list[Frame]:
+        """Every image to render, those of the targets last."""
         return [*self.train, *self.test, *(frame for target in self.targets for frame in target.frames)]
 
 

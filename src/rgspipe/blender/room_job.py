@@ -97,6 +97,7 @@ class RoomJob:
         ]  # fmt: skip
 
     def to_json(self) -> dict:
+        """Everything of the job, as JSON has it."""
         return asdict(self)
 
     @classmethod

@@ -33,6 +33,7 @@ class Command(NamedTuple):
         return f"{written}\n\n{self.summary}\n{rest}".rstrip()
 
     def load(self) -> Callable[[Sequence[str]], int]:
+        """The function that runs it, which takes the words after its name and gives the exit status."""
         return getattr(import_module(f"rgspipe.cli.{self.module}"), self.function)
 
 

@@ -14,7 +14,7 @@ from rgspipe import __version__
 from rgspipe.blender.interpreter import find_blender
 from rgspipe.blender.options import OWN_BLENDER, BlenderOptions
 from rgspipe.cli.arguments import refused
-from rgspipe.cli.installation import EXTRAS, Part, needed_parts, optional_parts, slurm
+from rgspipe.cli.installation import EXTRAS, Distribution, needed_parts, optional_parts, slurm
 from rgspipe.cli.messages import EXIT_FAILED, line_width
 from rgspipe.datasets.input_file import folder_to_be
 from rgspipe.errors import InputError
@@ -102,17 +102,17 @@ def _blender(options: BlenderOptions) -> list[str]:
     return []
 
 
-def _listed(parts: Sequence[Part]) -> str:
+def _listed(parts: Sequence[Distribution]) -> str:
     """Names and versions, which stay on one line each."""
     return ", ".join(f"{part.name}\N{NO-BREAK SPACE}{part.version}" for part in parts) or "none"
 
 
-def _ill(part: Part) -> str:
+def _ill(part: Distribution) -> str:
     state = f"{part.name} {part.version} {part.fault}" if part.version else f"{part.name} is not installed"
     return f"{state}. Install it (in a checkout, make setup does): {part.remedy}"
 
 
-def _extra(parts: Sequence[Part], gives: str) -> list[str]:
+def _extra(parts: Sequence[Distribution], gives: str) -> list[str]:
     """Lines on an extra: what it brings, whether that is there, and how to have it."""
     there = [part for part in parts if part.works]
     lines = [_wrapped(f"{_listed(there)}: {gives}", "  ")] if there else []

@@ -98,7 +98,7 @@ Options, anywhere on the line
 Exit status: 0 done, 1 failed, 2 input that cannot be used, 130 interrupted."""
 
 
-class Setting(NamedTuple):
+class SettingHelp(NamedTuple):
     """A key of the configuration, its meaning with unit and range, and its default as the command line has it."""
 
     key: str
@@ -106,12 +106,12 @@ class Setting(NamedTuple):
     default: str
 
 
-def sections() -> dict[str, list[Setting]]:
+def sections() -> dict[str, list[SettingHelp]]:
     """Every setting by section; those outside of one are under ""."""
-    found: dict[str, list[Setting]] = {}
+    found: dict[str, list[SettingHelp]] = {}
     for key, meaning, default in describe(RgspipeConfig()):
         section, _, name = key.partition(".")
-        found.setdefault(section if name else "", []).append(Setting(key, meaning, shown(default)))
+        found.setdefault(section if name else "", []).append(SettingHelp(key, meaning, shown(default)))
     return found
 
 
@@ -219,7 +219,7 @@ def _topic(topic: str) -> str:
     return "\n".join([*lines, *map(_setting, rows)])
 
 
-def _setting(setting: Setting) -> str:
+def _setting(setting: SettingHelp) -> str:
     """A key with its default, as it can be typed, and below it what it means."""
     return "\n".join([f"  {setting.key}={setting.default}", _wrapped(setting.meaning, " " * 6)])
 

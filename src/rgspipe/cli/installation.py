@@ -42,7 +42,7 @@ PATIENCE = 120.0
 
 
 @dataclass(frozen=True)
-class Part:
+class Distribution:
     """A distribution that is installed, or could be.
 
     Attributes:
@@ -61,6 +61,7 @@ class Part:
 
     @property
     def works(self) -> bool:
+        """Whether it is installed, and nothing is wrong with it."""
         return self.version is not None and not self.fault
 
     @property
@@ -71,12 +72,12 @@ class Part:
         return f'{sys.executable} -m pip install "{self.name}{self.wanted}"'
 
 
-def needed_parts() -> list[Part]:
+def needed_parts() -> list[Distribution]:
     """What every command may need, each tried; empty where the package itself was not installed."""
     return [_tried(name, wanted) for name, wanted, extra in _requirements() if not extra]
 
 
-def optional_parts() -> list[Part]:
+def optional_parts() -> list[Distribution]:
     """What the extras bring; of those for developers it is only seen whether they are there."""
     found = []
     for name, wanted, extra in _requirements():
@@ -84,7 +85,7 @@ def optional_parts() -> list[Part]:
             continue
         version = _version(name)
         fault = _apart(name) if name in TRIED_APART and version is not None else ""
-        found.append(Part(name, wanted, version, fault, extra))
+        found.append(Distribution(name, wanted, version, fault, extra))
     return found
 
 
@@ -110,16 +111,16 @@ def _version(name: str) -> str | None:
         return None
 
 
-def _tried(name: str, wanted: str) -> Part:
+def _tried(name: str, wanted: str) -> Distribution:
     version = _version(name)
     if version is None:
-        return Part(name, wanted, None)
+        return Distribution(name, wanted, None)
     try:
         importlib.import_module(MODULES.get(name, name.replace("-", "_")))
         fits = _fits(version, wanted)
     except Exception as error:  # whatever a broken library raises
-        return Part(name, wanted, version, f"does not load: {_first_line(error)}")
-    return Part(name, wanted, version, "" if fits else f"is not {wanted}")
+        return Distribution(name, wanted, version, f"does not load: {_first_line(error)}")
+    return Distribution(name, wanted, version, "" if fits else f"is not {wanted}")
 
 
 def _fits(version: str, wanted: str) -> bool:

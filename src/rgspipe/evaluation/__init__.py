@@ -1,1 +1,4 @@
-"""Measures, tables, pictures and figures. Reads no dataset and renders nothing."""
+"""Measures, tables, pictures and figures of scenes and fits.
+
+What is measured is rendered or fitted for it here; datasets are read by those who ask.
+"""

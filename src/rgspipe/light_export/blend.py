@@ -9,9 +9,9 @@ from functools import partial
 import torch
 from torch import Tensor
 
-from rgspipe.light_export.parts import peak_and_colour, pose
-from rgspipe.scene import Light, LightRig, SpotLight
-from rgspipe.scene.lights import WATTS_PER_INTENSITY, PanelLight, SphereLight
+from rgspipe.light_export.parts import Numbered, is_spot, peak_and_colour, pose, radius, rectangle
+from rgspipe.scene import Light
+from rgspipe.scene.lights import WATTS_PER_INTENSITY
 
 #: Standard deviations of the ellipsoid that holds 95 % of a normal distribution in space.
 ELLIPSOID = 2.795
@@ -99,18 +99,18 @@ if "--" in sys.argv:
 """
 
 
-def blend(rig: LightRig, covariances: Sequence[Tensor | None] = ()) -> tuple[str, list[str]]:
-    """The text of the script, which holds every kind exactly.
+def blend(lights: Numbered, covariances: Sequence[Tensor | None] = ()) -> tuple[str, list[str]]:
+    """The text of the script, which holds every one exactly.
 
     Args:
         covariances: (3, 3) of each light's place [m²], where it is known.
     """
     lines = []
-    for number, light in enumerate(rig, start=1):
+    for number, light in lights.items():
         lines += _lamp(f"light {number}", light)
     for number, covariance in enumerate(covariances, start=1):
-        if covariance is not None and bool(torch.isfinite(covariance).all()):
-            lines.append(f'region("light {number} (95 %)", {_ellipsoid(rig[number - 1].position, covariance)})')
+        if number in lights and covariance is not None and bool(torch.isfinite(covariance).all()):
+            lines.append(f'region("light {number} (95 %)", {_ellipsoid(lights[number].position, covariance)})')
     return SCRIPT + "\n".join(lines) + "\n" + SAVE, []
 
 
@@ -121,12 +121,13 @@ def _lamp(name: str, light: Light) -> list[str]:
     if light.distant:
         # Blender's strength of a sun is W/m² across its light.
         kind, watts, fields = "SUN", peak, {"angle": 0.0}
-    elif isinstance(light, PanelLight):
+    elif lengths := rectangle(light):
+        width, height = lengths
         kind, watts = "AREA", math.pi * peak
-        fields = {"shape": "RECTANGLE", "size": float(light.width), "size_y": float(light.height)}
-    elif isinstance(light, SphereLight):
-        fields["shadow_soft_size"] = float(light.radius)
-    elif _is_blender_s_spot(light):
+        fields = {"shape": "RECTANGLE", "size": width, "size_y": height}
+    elif size := radius(light):
+        fields["shadow_soft_size"] = size
+    elif is_spot(light, "smoothstep"):
         kind = "SPOT"
         fields |= {"spot_size": 2.0 * float(light.cone_angle), "spot_blend": float(light.falloff)}
     given = "".join(f", {field}={value!r}" for field, value in fields.items())
@@ -136,10 +137,6 @@ def _lamp(name: str, light: Light) -> list[str]:
     maths = _Source()
     strength = light.emission(maths, f"cosine(tree, {tuple(light.axis.tolist())!r})")
     return [f"tree = tree_of({made})", *maths.lines, f"shine(tree, {strength})"]
-
-
-def _is_blender_s_spot(light: Light) -> bool:
-    return isinstance(light, SpotLight) and light.profile == "smoothstep"
 
 
 def _ellipsoid(position: Tensor, covariance: Tensor) -> list[list[float]]:

@@ -17,6 +17,7 @@ from rgspipe.light_export.gltf import gltf
 from rgspipe.light_export.ies import ies
 from rgspipe.light_export.limits import check_range, check_world
 from rgspipe.light_export.mitsuba import mitsuba
+from rgspipe.light_export.parts import Numbered, is_of_another_shape, is_told
 from rgspipe.light_export.three import three
 from rgspipe.light_export.usd import usda
 from rgspipe.light_export.world import World, table
@@ -31,7 +32,7 @@ FORMATS: tuple[Format, ...] = get_args(Format)
 NAMES = {"blend": "lamps_blender.py", "usda": "lamps.usda", "gltf": "lamps.gltf"}
 NAMES |= {"mitsuba": "lamps_mitsuba.xml", "three": "lamps_three.json", "json": "lamps.json"}
 
-_WRITERS: dict[str, Callable[[LightRig], tuple[str, list[str]]]] = {
+_WRITERS: dict[str, Callable[[Numbered], tuple[str, list[str]]]] = {
     "usda": usda,
     "gltf": gltf,
     "mitsuba": mitsuba,
@@ -81,33 +82,45 @@ def export_lights(
     rig, folder = world.lights(as_rig(lights)), as_path(folder, "folder")
     check_range(rig)
     regions = [None if one is None else world.unit**2 * one[:3, :3] for one in covariances]
-    made = [file for name in formats for file in _texts(name, rig, folder, regions)]
+    told = {number: light for number, light in enumerate(rig, start=1) if is_told(light)}
+    made = [file for name in formats for file in _texts(name, told, folder, regions)]
     folder.mkdir(parents=True, exist_ok=True)
     for path, text, _ in made:
         if text is None:
             write_lights(path, rig, {"units": "metres, W/sr; of suns W/m²"})
         else:
             write_text(path, text)
-    notes = [note for _, _, said in made for note in said]
-    if "ies" in formats:
-        notes += [f"light {n}: LM-63 has no suns; it is left out." for n, one in enumerate(rig, start=1) if one.distant]
-    if {*formats} - {"ies", "json"}:
-        notes += [
-            f"light {n}: the {one.label} is written as its mean around the axis; IES and JSON hold all of it."
-            for n, one in enumerate(rig, start=1)
-            if isinstance(one, ProfileLight) and not one.round
-        ]
+    notes = [note for _, _, said in made for note in said] + _lost(rig, {*formats})
     write_text(folder / "lamps.txt", f"{world.line()}\n\n{table(rig)}" + "".join(f"{note}\n" for note in notes))
     return LightExport(tuple(path for path, _, _ in made), (world.line(), *notes))
 
 
 def _texts(
-    name: str, rig: LightRig, folder: Path, regions: Sequence[Tensor | None]
+    name: str, lights: Numbered, folder: Path, regions: Sequence[Tensor | None]
 ) -> list[tuple[Path, str | None, list[str]]]:
     """Files of a format, each with its text (None for a light file) and what it does not hold."""
     if name == "ies":
-        named = [(f"lamp_{number}", light) for number, light in enumerate(rig, start=1)]
+        named = [(f"lamp_{number}", light) for number, light in lights.items()]
         return [(folder / f"{stem}.ies", *ies(light, stem)) for stem, light in named if not light.distant]
     if name == "json":
         return [(folder / NAMES[name], None, [])]
-    return [(folder / NAMES[name], *(blend(rig, regions) if name == "blend" else _WRITERS[name](rig)))]
+    return [(folder / NAMES[name], *(blend(lights, regions) if name == "blend" else _WRITERS[name](lights)))]
+
+
+def _lost(rig: LightRig, formats: set[str]) -> list[str]:
+    """What several formats do not hold."""
+    numbered, others, notes = [*enumerate(rig, start=1)], formats - {"json"}, []
+    if "ies" in formats:
+        notes += [f"light {n}: LM-63 has no suns; it is left out." for n, one in numbered if one.distant]
+    if others - {"ies"}:
+        notes += [
+            f"light {n}: the {one.label} is written as its mean around the axis; IES and JSON hold all of it."
+            for n, one in numbered
+            if isinstance(one, ProfileLight) and not one.round
+        ]
+    for n, one in numbered if others else ():
+        if not is_told(one):
+            notes.append(f"light {n}: where a {one.label} shines no other program is told; JSON alone holds it.")
+        elif is_of_another_shape(one):
+            notes.append(f"light {n}: the {one.label} is written without its extent; JSON holds all of it.")
+    return notes

@@ -7,10 +7,9 @@ import math
 
 import torch
 
-from rgspipe.light_export.parts import cone, is_cone, peak_and_colour, pose
+from rgspipe.light_export.parts import Numbered, cone, is_cone, peak_and_colour, pose, radius, rectangle
 from rgspipe.light_export.world import LUMENS_PER_WATT
-from rgspipe.scene import Light, LightRig
-from rgspipe.scene.lights import PanelLight, SphereLight
+from rgspipe.scene import Light
 
 #: From axes with Z up to those with Y up.
 Y_UP = torch.tensor([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]], dtype=torch.float64)
@@ -21,21 +20,19 @@ CONVENTION = (
 )
 
 
-def gltf(rig: LightRig) -> tuple[str, list[str]]:
+def gltf(lights: Numbered) -> tuple[str, list[str]]:
     """The text of a file, and what it does not hold."""
-    held = [(number, light) for number, light in enumerate(rig, start=1) if not isinstance(light, PanelLight)]
+    held = [(number, light) for number, light in lights.items() if not rectangle(light)]
     content = {
         "asset": {"version": "2.0", "generator": "rgspipe", "extras": {"photometry": CONVENTION}},
         "scene": 0,
         "scenes": [{"nodes": [*range(len(held))]} if held else {}],
     }
     if held:
-        lights = {"KHR_lights_punctual": {"lights": [_light(number, light) for number, light in held]}}
-        content |= {"extensionsUsed": [*lights], "extensions": lights}
+        punctual = {"KHR_lights_punctual": {"lights": [_light(number, light) for number, light in held]}}
+        content |= {"extensionsUsed": [*punctual], "extensions": punctual}
         content["nodes"] = [_node(index, number, light) for index, (number, light) in enumerate(held)]
-    return json.dumps(content, indent=1) + "\n", [
-        note for n, light in enumerate(rig, start=1) for note in _notes(n, light)
-    ]
+    return json.dumps(content, indent=1) + "\n", [note for n, light in lights.items() for note in _notes(n, light)]
 
 
 def _light(number: int, light: Light) -> dict:
@@ -59,10 +56,10 @@ def _turned_back(light: Light) -> torch.Tensor:
 
 
 def _notes(number: int, light: Light) -> list[str]:
-    if isinstance(light, PanelLight):
-        return [f"light {number}: glTF has no area lights; the panel is left out."]
-    if isinstance(light, SphereLight):
-        return [f"light {number}: glTF has no lights of a size; the sphere of radius {light.radius:.4g} m is a point."]
+    if rectangle(light):
+        return [f"light {number}: glTF has no area lights; the {light.kind} is left out."]
+    if (size := radius(light)) is not None:
+        return [f"light {number}: glTF has no lights of a size; the {light.kind} of radius {size:.4g} m is a point."]
     if is_cone(light):
         return [f"light {number}: a spot of glTF falls with a squared ramp of the cosine, a {light.kind} does not."]
     return []

@@ -10,9 +10,10 @@ from torch import Tensor
 from rgspipe.datasets.photometric_file import BRIGHTEST
 from rgspipe.errors import InputError
 from rgspipe.light_export.limits import REMEDY
+from rgspipe.light_export.parts import radius, rectangle
 from rgspipe.light_export.world import candela
 from rgspipe.scene import Light
-from rgspipe.scene.lights import PanelLight, ProfileLight, SphereLight
+from rgspipe.scene.lights import ProfileLight
 
 #: Vertical angles from straight along the axis to straight back [degrees].
 ANGLES = torch.linspace(0.0, 180.0, 361, dtype=torch.float64)
@@ -63,11 +64,9 @@ def _table(light: Light) -> tuple[Tensor, Tensor, Tensor]:
 
 def _extent(light: Light) -> tuple[float, float, float]:
     """Width, length and height [m]; negative ones are those of something round."""
-    if isinstance(light, PanelLight):
-        return float(light.width), float(light.height), 0.0
-    if isinstance(light, SphereLight):
-        return (-2.0 * float(light.radius),) * 3
-    return 0.0, 0.0, 0.0
+    if lengths := rectangle(light):
+        return *lengths, 0.0
+    return (-2.0 * size,) * 3 if (size := radius(light)) is not None else (0.0, 0.0, 0.0)
 
 
 def _wrapped(values: list[float], count: int = 10) -> str:

@@ -8,9 +8,9 @@ import torch
 
 from rgspipe.datasets.limits import FARTHEST, STRONGEST
 from rgspipe.errors import InputError
+from rgspipe.light_export.parts import radius, surface
 from rgspipe.light_export.world import World
 from rgspipe.scene import Light, LightRig
-from rgspipe.scene.lights import PanelLight, SphereLight
 from rgspipe.scene.lights.shape_coordinates import Length
 
 #: Metres of a unit, as `export.metres` takes them: from a nanometre to further than the moon.
@@ -60,10 +60,8 @@ def _check(where: str, value: float, most: float, unit: str) -> None:
 
 def _radiance(light: Light) -> float:
     """Of its surface [W/(m² sr)]; 0 for what has none."""
-    if isinstance(light, PanelLight):
-        area = float(light.width) * float(light.height)
-    elif isinstance(light, SphereLight) and light.radius > 0.0:
-        area = math.pi * float(light.radius) ** 2
-    else:
+    shape = surface(light)
+    # A sphere of no size is a point.
+    if shape is None or radius(light) == 0.0:
         return 0.0
-    return float(light.intensity.max()) / area if area > 0.0 else math.inf
+    return float(light.intensity.max()) / shape.area if shape.area > 0.0 else math.inf

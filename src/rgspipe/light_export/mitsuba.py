@@ -5,15 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from rgspipe.light_export.parts import cone, is_cone, pose
-from rgspipe.scene import Light, LightRig, SpotLight
-from rgspipe.scene.lights import PanelLight, SphereLight
+from rgspipe.light_export.parts import Numbered, cone, is_cone, is_spot, pose, radius, rectangle
+from rgspipe.scene import Light
 
 
-def mitsuba(rig: LightRig) -> tuple[str, list[str]]:
+def mitsuba(lights: Numbered) -> tuple[str, list[str]]:
     """The text of a file, and what it does not hold."""
-    notes = [note for number, light in enumerate(rig, start=1) for note in _notes(number, light)]
-    return "\n".join(['<scene version="3.0.0">', *map(_emitter, rig), "</scene>", ""]), notes
+    notes = [note for number, light in lights.items() for note in _notes(number, light)]
+    return "\n".join(['<scene version="3.0.0">', *map(_emitter, lights.values()), "</scene>", ""]), notes
 
 
 def _emitter(light: Light) -> str:
@@ -22,16 +21,17 @@ def _emitter(light: Light) -> str:
         along = f'<vector name="direction" x="{x!r}" y="{y!r}" z="{z!r}"/>'
         return f'  <emitter type="directional">{along}{_rgb("irradiance", light)}</emitter>'
     x, y, z = light.position.tolist()
-    if isinstance(light, SphereLight) and light.radius > 0.0:
-        radiance = _rgb("radiance", light, 1.0 / (math.pi * light.radius**2))
-        place = f'<point name="center" x="{x!r}" y="{y!r}" z="{z!r}"/><float name="radius" value="{light.radius!r}"/>'
+    if size := radius(light):
+        radiance = _rgb("radiance", light, 1.0 / (math.pi * size**2))
+        place = f'<point name="center" x="{x!r}" y="{y!r}" z="{z!r}"/><float name="radius" value="{size!r}"/>'
         return f'  <shape type="sphere">{place}<emitter type="area">{radiance}</emitter></shape>'
-    if isinstance(light, PanelLight):
-        radiance = _rgb("radiance", light, 1.0 / (light.width * light.height))
+    if lengths := rectangle(light):
+        width, height = lengths
+        radiance = _rgb("radiance", light, 1.0 / (width * height))
         # Mitsuba's rectangle spans −1 to 1 and shines along +z; z of our frame is against the axis.
         scaled = pose(light)
-        scaled[:3, 0] *= 0.5 * light.width
-        scaled[:3, 1] *= -0.5 * light.height
+        scaled[:3, 0] *= 0.5 * width
+        scaled[:3, 1] *= -0.5 * height
         scaled[:3, 2] *= -1.0
         return f'  <shape type="rectangle">{_matrix(scaled)}<emitter type="area">{radiance}</emitter></shape>'
     if is_cone(light):
@@ -46,7 +46,7 @@ def _emitter(light: Light) -> str:
 
 
 def _notes(number: int, light: Light) -> list[str]:
-    if is_cone(light) and not (isinstance(light, SpotLight) and light.profile == "linear"):
+    if is_cone(light) and not is_spot(light, "linear"):
         return [f"light {number}: a spot of Mitsuba falls linearly with the angle, a {light.kind} does not."]
     return []
 

@@ -1,14 +1,63 @@
-"""What the formats ask of a light: its colour, its cone, and where its axes are."""
+"""What the formats ask of a light: its surface, its colour, its cone, and where its axes are."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import torch
 from torch import Tensor
 
 from rgspipe.scene import Light, SpotLight
-from rgspipe.scene.lights import AxialLight, PanelLight
+from rgspipe.scene.lights import AxialLight, SpotProfile
+from rgspipe.scene.lights.panel import sides
+from rgspipe.scene.lights.surface import EvenRectangle, EvenSphere, Surface
+
+#: Lights by what people call them: from 1 on, without those that no format holds.
+Numbered = Mapping[int, Light]
+
+
+def surface(light: Light) -> Surface | None:
+    """What of it shines evenly; None of a light in one point, and of one whose extent has another shape."""
+    nodes = light.nodes(light.places())
+    return None if nodes is None else nodes.surface
+
+
+def radius(light: Light) -> float | None:
+    """That of its sphere [m]; None if it is none."""
+    shape = surface(light)
+    return float(shape.radius) if isinstance(shape, EvenSphere) else None
+
+
+def rectangle(light: Light) -> tuple[float, float] | None:
+    """Width and height [m] of its rectangle; None if it is none."""
+    shape = surface(light)
+    return (float(shape.width), float(shape.height)) if isinstance(shape, EvenRectangle) else None
+
+
+def is_of_another_shape(light: Light) -> bool:
+    """Whether it has an extent that no format has a word for."""
+    nodes = light.nodes(light.places())
+    return nodes is not None and nodes.surface is None and len(nodes.positions) > 1
+
+
+def is_told(light: Light) -> bool:
+    """Whether what goes where can be told: from one direction, alike everywhere, or by the angle from an axis."""
+    if light.distant:
+        return light.axis is not None
+    if light.axis is None:
+        return light.relative_intensity(light.position[None] + 1.0) is None
+    return isinstance(light, AxialLight) and radius(light) is None
+
+
+def is_cone(light: Light) -> bool:
+    """Whether formats that know nothing but points and cones write it as a cone."""
+    return isinstance(light, AxialLight) and rectangle(light) is None
+
+
+def is_spot(light: Light, profile: SpotProfile) -> bool:
+    """Whether it is a spot of that profile; what extends a spot may fall otherwise."""
+    return type(light) is SpotLight and light.profile == profile
 
 
 def peak_and_colour(light: Light) -> tuple[float, list[float]]:
@@ -18,14 +67,12 @@ def peak_and_colour(light: Light) -> tuple[float, list[float]]:
 
 
 def frame(light: Light) -> Tensor:
-    """(3, 3) unit columns x, y, z: z against its axis, x along a panel's width; the world's without an axis."""
+    """(3, 3) unit columns x, y, z: z against its axis, x along a rectangle's width; the world's without an axis."""
     if light.axis is None:
         return torch.eye(3, dtype=torch.float64)
     axis = torch.nn.functional.normalize(light.axis.double(), dim=0)
-    if isinstance(light, PanelLight):
-        across, up = light.sides()
-    else:
-        across, up = PanelLight(light.position, 1.0, axis, 0.0, 0.0).sides()
+    shape = surface(light)
+    across, up = (shape.across, shape.up) if isinstance(shape, EvenRectangle) else sides(axis, axis.new_zeros(()))
     return torch.stack([across, -up, -axis], dim=1)
 
 
@@ -38,9 +85,9 @@ def pose(light: Light) -> Tensor:
 
 def cone(light: AxialLight) -> tuple[float, float]:
     """Angles [rad] of the inner and the outer cone: a spot's own, or where 90 and 1 % of the intensity are left."""
-    if isinstance(light, SpotLight) and light.profile == "linear":
+    if is_spot(light, "linear"):
         return float(light.falloff), float(light.cone_angle)
-    if isinstance(light, SpotLight) and light.profile == "smoothstep":
+    if is_spot(light, "smoothstep"):
         edge = math.cos(light.cone_angle)
         return math.acos(min(1.0, edge + float(light.falloff) * (1.0 - edge))), float(light.cone_angle)
     angles = torch.linspace(0.0, 0.5 * math.pi, 1801, dtype=torch.float64)
@@ -49,8 +96,3 @@ def cone(light: AxialLight) -> tuple[float, float]:
     lit = (angles[share >= level * float(share.max())] for level in (0.9, 0.01))
     inner, outer = (float(part[-1]) for part in lit)
     return inner, outer
-
-
-def is_cone(light: Light) -> bool:
-    """Whether formats that know nothing but points and cones write it as a cone."""
-    return isinstance(light, AxialLight) and not isinstance(light, PanelLight)

@@ -6,24 +6,21 @@ import json
 import math
 import uuid
 
-from rgspipe.light_export.parts import cone, is_cone, peak_and_colour, pose
+from rgspipe.light_export.parts import Numbered, cone, is_cone, is_spot, peak_and_colour, pose, radius, rectangle
 from rgspipe.light_export.world import LUMENS_PER_WATT
-from rgspipe.scene import Light, LightRig, SpotLight, srgb
-from rgspipe.scene.lights import PanelLight, SphereLight
+from rgspipe.scene import Light, srgb
 
 
-def three(rig: LightRig) -> tuple[str, list[str]]:
+def three(lights: Numbered) -> tuple[str, list[str]]:
     """The text of a file, and what it does not hold."""
-    children = [child for number, light in enumerate(rig, start=1) for child in _objects(number, light)]
+    children = [child for number, light in lights.items() for child in _objects(number, light)]
     content = {
         "metadata": {"version": 4.6, "type": "Object", "generator": "rgspipe"},
         "object": {"uuid": _id("lights"), "type": "Group", "name": "lights, z up", "children": children},
     }
-    notes = ["three.js colours have 8 bits a channel."] if rig else []
-    return json.dumps(content, indent=1) + "\n", [
-        *notes,
-        *(n for i, one in enumerate(rig, start=1) for n in _notes(i, one)),
-    ]
+    notes = ["three.js colours have 8 bits a channel."] if lights else []
+    notes += [note for number, light in lights.items() for note in _notes(number, light)]
+    return json.dumps(content, indent=1) + "\n", notes
 
 
 def _objects(number: int, light: Light) -> list[dict]:
@@ -36,11 +33,11 @@ def _objects(number: int, light: Light) -> list[dict]:
         "color": red << 16 | green << 8 | blue,
         "matrix": pose(light).T.reshape(-1).tolist(),
     }
-    if isinstance(light, PanelLight):
+    if lengths := rectangle(light):
         # nits: candela along the axis over the area.
-        area = light.width * light.height
-        shown = {"type": "RectAreaLight", "width": light.width, "height": light.height}
-        return [fields | shown | {"intensity": LUMENS_PER_WATT * peak / area}]
+        width, height = lengths
+        shown = {"type": "RectAreaLight", "width": width, "height": height}
+        return [fields | shown | {"intensity": LUMENS_PER_WATT * peak / (width * height)}]
     fields |= {"intensity": LUMENS_PER_WATT * peak}
     fading = {"distance": 0, "decay": 2}
     if light.axis is None:
@@ -62,9 +59,9 @@ def _target(name: str, light: Light) -> dict:
 
 
 def _notes(number: int, light: Light) -> list[str]:
-    if isinstance(light, SphereLight):
-        return [f"light {number}: three.js has no spheres; that of radius {light.radius:.4g} m is a point."]
-    if is_cone(light) and not (isinstance(light, SpotLight) and light.profile == "smoothstep"):
+    if (size := radius(light)) is not None:
+        return [f"light {number}: three.js has no spheres; that of radius {size:.4g} m is a point."]
+    if is_cone(light) and not is_spot(light, "smoothstep"):
         return [f"light {number}: a spot of three.js falls with a smoothstep of the cosine, a {light.kind} does not."]
     return []
 

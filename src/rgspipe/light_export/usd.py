@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 
-from rgspipe.light_export.parts import cone, is_cone, peak_and_colour, pose
-from rgspipe.scene import Light, LightRig
-from rgspipe.scene.lights import PanelLight, SphereLight
+from rgspipe.light_export.parts import Numbered, cone, is_cone, peak_and_colour, pose, radius, rectangle
+from rgspipe.scene import Light
 
 HEADER = """#usda 1.0
 (
@@ -22,10 +21,10 @@ def Xform "Lights" (
 """
 
 
-def usda(rig: LightRig) -> tuple[str, list[str]]:
+def usda(lights: Numbered) -> tuple[str, list[str]]:
     """The text of a file, and what it does not hold."""
-    lights = "\n".join(_light(number, light) for number, light in enumerate(rig, start=1))
-    return f"{HEADER}{lights}}}\n", [note for n, light in enumerate(rig, start=1) for note in _notes(n, light)]
+    made = "\n".join(_light(number, light) for number, light in lights.items())
+    return f"{HEADER}{made}}}\n", [note for n, light in lights.items() for note in _notes(n, light)]
 
 
 def _light(number: int, light: Light) -> str:
@@ -33,15 +32,16 @@ def _light(number: int, light: Light) -> str:
     if light.distant:
         # Of an angle of 0 the intensity is the irradiance across the light.
         kind, radiance, own = "DistantLight", peak, {"float inputs:angle": 0.0, "bool inputs:normalize": 1}
-    elif isinstance(light, PanelLight):
-        kind, radiance = "RectLight", peak / (light.width * light.height)
-        own = {"float inputs:width": light.width, "float inputs:height": light.height}
+    elif lengths := rectangle(light):
+        width, height = lengths
+        kind, radiance = "RectLight", peak / (width * height)
+        own = {"float inputs:width": width, "float inputs:height": height}
     else:
         # With normalize, radiance is intensity over the area 4πr², and a sphere of radiance L sends πr²L: 4 times I.
         kind, radiance = "SphereLight", 4.0 * peak
-        radius = light.radius if isinstance(light, SphereLight) else 0.0
-        own = {"float inputs:radius": radius, "bool inputs:normalize": 1}
-        own |= {} if radius > 0.0 else {"bool treatAsPoint": 1}
+        size = radius(light) or 0.0
+        own = {"float inputs:radius": size, "bool inputs:normalize": 1}
+        own |= {} if size > 0.0 else {"bool treatAsPoint": 1}
     schema = ""
     if is_cone(light):
         inner, outer = cone(light)

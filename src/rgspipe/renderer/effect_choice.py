@@ -32,6 +32,7 @@ class RigKind:
 
     @classmethod
     def of(cls, rig: LightRig) -> RigKind:
+        """That of the lights of a rig."""
         suns = sum(light.distant for light in rig)
         spots = tuple(one.least_relative_intensity for one in rig if one.axis is not None and not one.distant)
         return cls(len(rig) - len(spots) - suns, spots, suns)

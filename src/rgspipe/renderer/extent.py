@@ -14,7 +14,7 @@ from rgspipe.scene.lights import Light
 
 
 @dataclass(frozen=True)
-class Part:
+class LightPart:
     """One of the points that a light is made of, as a `UnitLight` of D' numbers: its position and its axis, if any.
 
     Attributes:
@@ -52,7 +52,7 @@ def added(
     return tuple(map(sum, zip(*seen, strict=True)))
 
 
-def parts_of(light: UnitLight, few: bool = False) -> list[Part] | None:
+def parts_of(light: UnitLight, few: bool = False) -> list[LightPart] | None:
     """The points that a light is made of, and how they move with its numbers; None of a light in one point."""
     lights = light.light.parts(few)
     if light.light.in_one_point:
@@ -74,7 +74,7 @@ def parts_of(light: UnitLight, few: bool = False) -> list[Part] | None:
     value[:, 0] = share
     chains = torch.cat([value, chains], dim=2)
     pairs = enumerate(zip(lights, chains, strict=True))
-    return [Part(one, light.softness, chain, Share(index, rows)) for index, (one, chain) in pairs]
+    return [LightPart(one, light.softness, chain, Share(index, rows)) for index, (one, chain) in pairs]
 
 
 def _fields(light: Light) -> tuple[str, ...]:

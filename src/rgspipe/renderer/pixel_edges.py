@@ -50,6 +50,7 @@ class Seen:
         return cls(*(torch.cat([getattr(part, name) for part in parts]) for name in ("normal", "inverse", "passing")))
 
     def reshape(self, *shape: int) -> Seen:
+        """The same in another leading shape."""
         return Seen(self.normal.reshape(*shape, 3), self.inverse.reshape(shape), self.passing.reshape(shape))
 
     def __getitem__(self, index: Tensor | tuple[slice | Tensor | None, ...]) -> Seen:

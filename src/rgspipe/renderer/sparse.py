@@ -40,6 +40,7 @@ class SparseOperator:
 
     @classmethod
     def from_scipy(cls, matrix: scipy.sparse.csr_matrix, device: torch.device | str = "cpu") -> SparseOperator:
+        """The operator of a matrix of scipy, on a device."""
         return cls(_to_torch(matrix.tocsr(), device))
 
     @cached_property
@@ -60,6 +61,7 @@ class SparseOperator:
 
     @property
     def shape(self) -> tuple[int, int]:
+        """Rows and columns."""
         return self.matrix.shape[0], self.matrix.shape[1]
 
     @property
@@ -72,6 +74,7 @@ class SparseOperator:
         return _Product.apply(self, operand.contiguous())
 
     def to_scipy(self) -> scipy.sparse.csr_matrix:
+        """The matrix as scipy has it, on the CPU."""
         m = self.matrix
         parts = (m.values().cpu().numpy(), m.col_indices().cpu().numpy(), m.crow_indices().cpu().numpy())
         return scipy.sparse.csr_matrix(parts, shape=self.shape)

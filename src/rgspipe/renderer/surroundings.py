@@ -40,6 +40,7 @@ class Surroundings:
 
     @property
     def middle(self) -> Tensor:
+        """(3,) of the box."""
         return 0.5 * (self.lower + self.upper)
 
     @property

@@ -1,4 +1,6 @@
-"""Plain data: cameras, surfels, lights, the curve of display values. Nothing here reads a file or renders."""
+"""Plain data: cameras, surfels, lights, the curve of display values. Nothing here renders, and no file is read but
+through `Surfels.from_ply`, which hands it to those who know the format.
+"""
 
 from rgspipe.scene.camera import Camera, look_at
 from rgspipe.scene.gloss import Gloss

@@ -118,6 +118,7 @@ class Camera(ByValue, Pinhole, _Pose):
 
     @property
     def pixel_count(self) -> int:
+        """Number of its pixels."""
         return self.width * self.height
 
     def resized(self, width: int, height: int | None = None) -> Camera:

@@ -84,6 +84,7 @@ class GuessedSurfaces:
 
     @classmethod
     def of(cls, surfels: Surfels) -> GuessedSurfaces:
+        """Those of surfels that know which of them are guessed."""
         labels = labels_of_guesses(surfels)
         centers, normals, spacing = surfels.centers.double(), surfels.normals.double(), _spacing(surfels)
         seen, kin = surfels.guessed == 0.0, []

@@ -12,7 +12,7 @@ from rgspipe.datasets.views import View
 from rgspipe.scene.surfels import Surfels
 from rgspipe.training.levels import levels
 from rgspipe.training.likeness import nearest_surfels
-from rgspipe.training.view_model import ViewModel
+from rgspipe.training.view_model import LitViewModel
 
 #: Albedo stays within these: below is numerically black, above rooms that never darken.
 ALBEDO_RANGE = (0.005, 0.98)
@@ -52,14 +52,15 @@ class AlbedoProblem:
         neighbours: (N, 6) nearest surfels by position and normal.
     """
 
-    models: Sequence[ViewModel]
+    models: Sequence[LitViewModel]
     images: Sequence[Tensor]
     levels: Sequence[Tensor]
     pixel_weights: Sequence[Tensor]
     neighbours: Tensor
 
     @classmethod
-    def build(cls, surfels: Surfels, models: Sequence[ViewModel], views: Sequence[View]) -> AlbedoProblem:
+    def build(cls, surfels: Surfels, models: Sequence[LitViewModel], views: Sequence[View]) -> AlbedoProblem:
+        """That of views, each with how it sees the surfels under its light."""
         images = [view.image.reshape(-1, 3).float() for view in views]
         albedo = surfels.albedo.float().clamp(*ALBEDO_RANGE)
         scales = levels(images, [model.image(albedo, None) for model in models])

@@ -86,6 +86,7 @@ class Linearised:
     def of(
         cls, problem: AlbedoProblem, lighting: Lighting, albedo: Tensor, transport: PatchTransport | None
     ) -> Linearised:
+        """The images of a problem, linear around an albedo (N, 3)."""
         indirect = None
         if transport is not None:
             transport = with_albedo(transport, albedo)
@@ -153,6 +154,7 @@ class Quadratic:
     def of(
         cls, at: Linearised, pixel_weights: Sequence[Tensor], laplacian: Laplacian, pulls: tuple[Tensor, Tensor]
     ) -> Quadratic:
+        """Around linear images, with the weights and the targets (N, 3) that pull at the albedo."""
         diagonal = torch.zeros_like(at.albedo)
         for v, model in enumerate(at.problem.models):
             diagonal += model.squared(pixel_weights[v], None if at.indirect is None else at.indirect[v])

@@ -27,7 +27,7 @@ from rgspipe.training.gloss_search import find_lobes, searched_views
 from rgspipe.training.gloss_solve import GlossProblem
 from rgspipe.training.lighting import Lighting
 from rgspipe.training.mixing import DAMPING, Mixing
-from rgspipe.training.view_model import ViewModel
+from rgspipe.training.view_model import LitViewModel
 
 #: Mean specular reflectance below which a surfel is diffuse.
 FAINTEST = 0.02
@@ -50,7 +50,7 @@ class GlossScene:
     """
 
     surfels: Surfels
-    models: Sequence[ViewModel]
+    models: Sequence[LitViewModel]
     lighting: Lighting
     operators: OperatorsOf
     transport: PatchTransport

@@ -19,7 +19,7 @@ from rgspipe.scene.gloss import Gloss
 from rgspipe.scene.surfels import Surfels
 from rgspipe.training.gloss_model import GlossLight, Highlights, Reflection
 from rgspipe.training.lighting import Lighting
-from rgspipe.training.view_model import ViewModel
+from rgspipe.training.view_model import LitViewModel
 
 #: The operators of glossy surfels (G,) int64.
 OperatorsOf = Callable[[Tensor], GlossyOperators]
@@ -41,7 +41,7 @@ def operators_from(surfels: Surfels, gather: SparseOperator, transport: PatchTra
 def highlight_light(
     surfels: Surfels,
     chosen: Tensor,
-    models: Sequence[ViewModel],
+    models: Sequence[LitViewModel],
     lighting: Lighting,
     received: Tensor | None,
     at_pixels: bool,

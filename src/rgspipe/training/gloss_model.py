@@ -21,7 +21,7 @@ from torch import Tensor
 from rgspipe.renderer.glossy import lobe_coefficients, mirrored, phong_lobe
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.scene.surfels import Surfels
-from rgspipe.training.view_model import ViewModel, products
+from rgspipe.training.view_model import LitViewModel, products
 
 #: Range of exponents: below, a lobe is hardly told from a diffuse surface; above, it is narrower than a pixel's surfel.
 EXPONENT_RANGE = (1.0, 300.0)
@@ -128,7 +128,7 @@ class GlossView:
         specular: (G, 3) k_s that it is linear around, which the slope towards exponents is proportional to.
     """
 
-    model: ViewModel
+    model: LitViewModel
     chosen: Tensor
     received: Tensor | None
     weights: SparseOperator
@@ -139,7 +139,8 @@ class GlossView:
     specular: Tensor
 
     @classmethod
-    def of(cls, model: ViewModel, light: GlossLight, v: int, at: Reflection) -> GlossView:
+    def of(cls, model: LitViewModel, light: GlossLight, v: int, at: Reflection) -> GlossView:
+        """View `v` of those that share a light, linear around a reflection."""
         received = None if light.received is None else light.received[v]
         own = light.highlights[v]
         parts = *own.lobes(at.log_exponents), *light.reflected(v, at.log_exponents)

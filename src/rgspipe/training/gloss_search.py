@@ -16,7 +16,7 @@ from rgspipe.scene.surfels import Surfels
 from rgspipe.training.gloss_model import GlossLight, Reflection
 from rgspipe.training.gloss_solve import GlossProblem
 from rgspipe.training.likeness import nearest_surfels
-from rgspipe.training.view_model import ViewModel
+from rgspipe.training.view_model import LitViewModel
 
 #: Exponents that are tried.
 EXPONENTS = (5.0, 10.0, 20.0, 40.0, 80.0, 160.0)
@@ -136,10 +136,10 @@ class _Errors:
         ]
         return torch.stack(rows)
 
-    def _views(self) -> Iterator[tuple[ViewModel, Tensor, Tensor]]:
+    def _views(self) -> Iterator[tuple[LitViewModel, Tensor, Tensor]]:
         return zip(self.problem.models, self.problem.images, self.weights, strict=True)
 
-    def _shared(self, model: ViewModel, values: Tensor) -> Tensor:
+    def _shared(self, model: LitViewModel, values: Tensor) -> Tensor:
         """(C,) of values of pixels (P,), shared out by the weights of the patches' surfels."""
         shares = (model.weights.operator.transposed @ values[:, None])[:, 0]
         return shares.new_zeros(int(self.patches.max()) + 1).index_add(0, self.patches, shares)

@@ -16,7 +16,7 @@ from rgspipe.training.albedo import ALBEDO_RANGE, AlbedoPrior
 from rgspipe.training.albedo_solve import SMOOTHNESS, conjugate_gradients, pull
 from rgspipe.training.gloss_model import EXPONENT_RANGE, GlossLight, GlossView, Reflection
 from rgspipe.training.likeness import Laplacian, graph_laplacian, nearest_surfels
-from rgspipe.training.view_model import ViewModel
+from rgspipe.training.view_model import LitViewModel
 
 #: Weight of neighbours' likeness in specular reflectance and in the logarithm of the exponent, against the mean of
 #: what the images say. A surfel alone sees few highlights, so these are larger than that of albedo.
@@ -44,7 +44,7 @@ class GlossProblem:
         prior: of the albedo.
     """
 
-    models: Sequence[ViewModel]
+    models: Sequence[LitViewModel]
     images: Sequence[Tensor]
     albedo_graph: Tensor
     gloss_graph: Tensor
@@ -56,11 +56,12 @@ class GlossProblem:
     def build(
         cls,
         surfels: Surfels,
-        models: Sequence[ViewModel],
+        models: Sequence[LitViewModel],
         images: Sequence[Tensor],
         chosen: Tensor,
         prior: AlbedoPrior | None = None,
     ) -> GlossProblem:
+        """That of views, of which the surfels `chosen` (G,) may be glossy."""
         centers, normals, albedo = surfels.centers.float(), surfels.normals.float(), surfels.albedo.float()
         # A material goes on around the creases of a thing, so gloss is alike where places and colours are.
         graphs = nearest_surfels(centers, normals), nearest_surfels(centers[chosen], albedo[chosen])

@@ -57,4 +57,5 @@ class Laplacian:
         self._degrees = torch.from_numpy(degrees).float().to(device)
 
     def diagonal(self) -> Tensor:
+        """(N,) float32 diagonal of the operator."""
         return self._degrees

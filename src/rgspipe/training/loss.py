@@ -9,7 +9,7 @@ from torch import Tensor
 
 from rgspipe.machine.sums import average
 from rgspipe.optim.ssim import ssim_map
-from rgspipe.training.options import LossOptions
+from rgspipe.training.options import ImageLossOptions
 
 
 def compressed(values: Tensor, strength: float) -> Tensor:
@@ -19,7 +19,7 @@ def compressed(values: Tensor, strength: float) -> Tensor:
     return values.sign() * torch.log1p(strength * values.abs()) / math.log1p(strength)
 
 
-def image_loss(rendered: Tensor, photographed: Tensor, peak: float, options: LossOptions, window: bool) -> Tensor:
+def image_loss(rendered: Tensor, photographed: Tensor, peak: float, options: ImageLossOptions, window: bool) -> Tensor:
     """Scalar loss of pixels (P, 3), or with `window` of an image (H, W, 3).
 
     Args:

@@ -35,7 +35,7 @@ class MaterialOptions(Options):
 
 
 @dataclass(frozen=True)
-class LossOptions(Options):
+class ImageLossOptions(Options):
     """What gradient steps minimise."""
 
     loss: Literal["l2", "l1", "l1_ssim"] = "l2"
@@ -47,7 +47,7 @@ class LossOptions(Options):
 
 
 @dataclass(frozen=True)
-class RefineOptions(LossOptions):
+class RefineOptions(ImageLossOptions):
     """How geometry is refined."""
 
     steps: int = option(140, low=0, high=1000000)

@@ -99,6 +99,7 @@ class RefineState:
 
     @classmethod
     def start(cls, surfels: Surfels) -> RefineState:
+        """That of a refinement which begins with these surfels."""
         parameters = start_parameters(surfels)
         first, second = ({name: torch.zeros_like(value) for name, value in parameters.items()} for _ in range(2))
         return cls(parameters, first, second, surfels.scales.log())

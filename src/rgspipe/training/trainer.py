@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import logging
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
 import torch
 from torch import Tensor
 
@@ -15,7 +13,6 @@ from rgspipe.arguments import as_count, as_one_of, as_several
 from rgspipe.completion import with_unseen_surfaces
 from rgspipe.datasets.views import View
 from rgspipe.errors import InputError
-from rgspipe.machine.sums import average
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.transport import with_albedo
 from rgspipe.renderer.view_weights import build_view_weights
@@ -31,7 +28,8 @@ from rgspipe.training.initialise import Footprint, initialise_surfels
 from rgspipe.training.levels import level
 from rgspipe.training.light_refinement import refine_lights
 from rgspipe.training.lighting import total_irradiance, trace_lighting
-from rgspipe.training.materials import Materials, PriorOf, build_frozen, each_view, fit_materials
+from rgspipe.training.log import TrainingLog
+from rgspipe.training.materials import PriorOf, build_frozen, each_view, fit_materials
 from rgspipe.training.operator_store import Stored
 from rgspipe.training.options import TrainOptions
 from rgspipe.training.photometric import LEAST_ROUGHNESS, fit_heights, fit_normals, roughness
@@ -39,8 +37,6 @@ from rgspipe.training.record import Record, materials_seconds
 from rgspipe.training.refine import RefineState, RefineView, refine
 from rgspipe.training.regularise import find_neighbours
 from rgspipe.training.shading import surfel_lights
-
-logger = logging.getLogger(__name__)
 
 #: How many surfels a scene gets if nothing else is said.
 SURFELS = 10_000
@@ -99,10 +95,10 @@ def train(
         )
     if not views:
         raise InputError("views", expected="views to train on", found="none", remedy="rg.load_views reads them.")
-    log = _Log(checkpoint.records if checkpoint else [])
+    log = TrainingLog(checkpoint.records if checkpoint else [])
     surfels = surfels.to(torch.float32) if device is None else surfels.to(torch.float32).to(device)
     views = [view.to(surfels.centers.device) for view in views]
-    spacing, given = surfel_spacing(surfels), [view.light for view in views]
+    spacing, given = spacing_of_clips(surfels), [view.light for view in views]
     most = int(options.growth * len(surfels))
     if checkpoint is not None and (found := checkpoint.load(surfels)) is not None:
         surfels, radiance, state, lights = found
@@ -147,8 +143,8 @@ def _seen(surfels: Surfels) -> Surfels:
     )
 
 
-def surfel_spacing(surfels: Surfels) -> float:
-    """Typical distance of neighbours: initialisation makes the softness of clips a fixed part of it."""
+def spacing_of_clips(surfels: Surfels) -> float:
+    """Typical distance of neighbours, of which initialisation makes the softness of clips a fixed part."""
     return surfels.coverage.clip_softness / Footprint.clip_softness
 
 
@@ -157,7 +153,7 @@ def _fit_materials(
     views: Sequence[View],
     measured: Sequence[PointLight],
     options: TrainOptions,
-    log: _Log,
+    log: TrainingLog,
     phase: str,
     prior: PriorOf | None,
 ) -> tuple[Surfels, Tensor, Sequence[View]]:
@@ -203,7 +199,7 @@ def _refine_geometry(
     views: Sequence[View],
     spacing: float,
     options: TrainOptions,
-    log: _Log,
+    log: TrainingLog,
     checkpoint: Checkpoint | None,
     most: int,
 ) -> Surfels:
@@ -269,37 +265,3 @@ def refine_views(surfels: Surfels, views: Sequence[View], radiance: Tensor) -> l
         saturated = None if view.saturated_from is None else view.saturated.reshape(-1, 3)
         found.append(RefineView(view.camera, image, alpha, light, weights.edges, against, saturated))
     return found
-
-
-class _Log:
-    """The training table as it grows."""
-
-    def __init__(self, records: list[Record]) -> None:
-        self.records, self.stored = list(records), Stored()
-        self._start = time.monotonic() - (self.records[-1].seconds if self.records else 0.0)
-
-    def steps(self, state: RefineState) -> None:
-        self._add("geometry", state.step, state.losses[-1], _decibels(state.errors[-1]))
-
-    def materials(self, phase: str, views: Sequence[View], fitted: Materials) -> None:
-        errors = []
-        for view, render in zip(views, fitted.renders, strict=True):
-            image = view.image.reshape(-1, 3)
-            peak = torch.quantile(image, 0.995).clamp(min=1e-12)
-            shown = view.as_photographed(render.reshape(view.image.shape)).reshape(-1, 3)
-            errors.append(float(average(((shown - image) / peak).square())))
-        self._add(phase, 0, float(np.mean(errors)), float(np.mean([_decibels(error) for error in errors])))
-        self.stored = max(self.stored, fitted.stored, key=lambda stored: stored.memory + stored.file)
-        last = self.records[-1]
-        logger.info(
-            "%s: %.1f dB on the training images, %d surfels, %s, %.0f s so far",
-            *(phase, last.psnr, len(fitted.surfels), fitted.stored, last.seconds),
-        )
-
-    def _add(self, phase: str, step: int, loss: float, psnr: float) -> None:
-        self.records.append(Record(phase, step, loss, psnr, time.monotonic() - self._start))
-
-
-def _decibels(error: float) -> float:
-    """PSNR of a mean squared error in units of the peak."""
-    return -10.0 * float(np.log10(max(error, 1e-30)))

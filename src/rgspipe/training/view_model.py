@@ -18,7 +18,7 @@ from rgspipe.training.operator_store import OperatorStore
 
 
 @dataclass(frozen=True)
-class ViewModel:
+class LitViewModel:
     """One view under its own light, of P pixels and N surfels.
 
         image = D (ρ ∘ I) + W (ρ ∘ L)
@@ -75,7 +75,7 @@ def build_view_models(
     lighting: Lighting,
     at_pixels: bool,
     store: OperatorStore | None = None,
-) -> tuple[ViewModel, ...]:
+) -> tuple[LitViewModel, ...]:
     """A model of every view under its own light.
 
     Args:
@@ -88,7 +88,7 @@ def build_view_models(
             direct = PixelDirect(bvh, view).operator(lighting.positions[index], lighting.transmittance[index])
         else:
             direct = _at_centers(view.operator, lighting.irradiance[index])
-        models.append(ViewModel(view, keep(direct), lighting.intensity[index] / torch.pi))
+        models.append(LitViewModel(view, keep(direct), lighting.intensity[index] / torch.pi))
     return tuple(models)
 
 

@@ -89,6 +89,7 @@ class PoolJob:
             raise ValueError(f"{self.views} views take as many cameras, got {len(self.cameras)}")
 
     def to_json(self) -> dict:
+        """Everything of the job, as JSON has it."""
         return asdict(self) | {"dataset": self.dataset.to_json()}
 
     @classmethod

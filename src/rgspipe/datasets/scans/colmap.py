@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from rgspipe.datasets.input_file import is_there
-from rgspipe.datasets.scans.colmap_model import Photograph, read_cameras, read_images
+from rgspipe.datasets.scans.colmap_model import ColmapImage, read_cameras, read_images
 from rgspipe.datasets.scans.frame import DepthImage, Lens, Scan, ScanFrame
 from rgspipe.datasets.scans.options import ScanOptions
 from rgspipe.datasets.scans.poses import from_quaternion, placed
@@ -74,7 +74,7 @@ def _model(root: Path) -> tuple[Path, Path] | None:
 
 
 def _frame(
-    photograph: Photograph, cameras: Mapping[int, Lens], root: Path, folder: Path, where: Path, options: ScanOptions
+    photograph: ColmapImage, cameras: Mapping[int, Lens], root: Path, folder: Path, where: Path, options: ScanOptions
 ) -> ScanFrame:
     if photograph.camera not in cameras:
         found = f"camera {photograph.camera} of {photograph.name}, which the model lacks"

@@ -31,7 +31,7 @@ Parts = TypeVar("Parts")
 
 
 @dataclass(frozen=True, eq=False)
-class Photograph:
+class ColmapImage:
     """An image of a model.
 
     Attributes:
@@ -55,7 +55,7 @@ def read_cameras(path: Path) -> dict[int, Lens]:
     return _whole(path, _binary_cameras if path.suffix == ".bin" else _text_cameras)
 
 
-def read_images(path: Path) -> list[Photograph]:
+def read_images(path: Path) -> list[ColmapImage]:
     """All images, at least one.
 
     Raises:
@@ -134,7 +134,7 @@ def _binary_cameras(path: Path, content: bytes) -> dict[int, Lens]:
     return found
 
 
-def _text_images(path: Path, content: bytes) -> list[Photograph]:
+def _text_images(path: Path, content: bytes) -> list[ColmapImage]:
     """Each image has a second line, of its points, which may be empty; the last one may lack it."""
     lines, found = iter(_lines(content)), []
     for line in lines:
@@ -156,7 +156,7 @@ def _check_points(path: Path, name: str, line: str) -> None:
         raise InputError(path, expected=expected, found=shown(line[:60]), remedy=REWRITE)
 
 
-def _binary_images(path: Path, content: bytes) -> list[Photograph]:
+def _binary_images(path: Path, content: bytes) -> list[ColmapImage]:
     (count,), place = struct.unpack_from("<Q", content), 8
     found = []
     for _ in range(count):
@@ -171,13 +171,13 @@ def _binary_images(path: Path, content: bytes) -> list[Photograph]:
     return found
 
 
-def _photograph(name: str, camera: int, values: Sequence[float]) -> Photograph:
+def _photograph(name: str, camera: int, values: Sequence[float]) -> ColmapImage:
     numbers = np.array(values)
     if len(numbers) != 7 or not np.isfinite(numbers).all() or np.linalg.norm(numbers[:4]) < LEAST_NORM:
         raise ValueError(f"no pose of {shown(name)}")
     if not all(part.isprintable() and 0 < len(part.encode()) <= LONGEST_NAME for part in name.split("/")):
         raise ValueError(f"no name of an image: {shown(name)}")
-    return Photograph(name, camera, numbers[:4], numbers[4:])
+    return ColmapImage(name, camera, numbers[:4], numbers[4:])
 
 
 def _lines(content: bytes) -> list[str]:

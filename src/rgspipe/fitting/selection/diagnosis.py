@@ -70,6 +70,7 @@ class Costs:
 
     @classmethod
     def of(cls, refiner: Refiner, compared: Mapping[int, State]) -> Costs:
+        """Those of `compared` rigs by their number of lights."""
         costs = robust_costs(refiner.problem, [*compared.values()]) if compared else []
         return cls(dict(zip(compared, costs, strict=True)))
 

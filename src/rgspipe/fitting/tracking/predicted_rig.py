@@ -67,6 +67,7 @@ class PredictedRig:
     inflation: float
 
     def around(self, state: State) -> _AroundRig:
+        """The problem with the noise and the weights that it has at a state."""
         return _AroundRig(self, state, Evidence.of(self.refiner.problem, state, self.predicted.reference))
 
     @cached_property

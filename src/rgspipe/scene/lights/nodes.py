@@ -12,6 +12,7 @@ from torch import Tensor
 from rgspipe.scene.lights.led import LedLight
 from rgspipe.scene.lights.light import Light
 from rgspipe.scene.lights.point import PointLight
+from rgspipe.scene.lights.surface import Surface
 from rgspipe.scene.shapes import Float
 
 
@@ -44,11 +45,14 @@ class Nodes:
         direction: (3,) along which each shines with the cosine, as a piece of a surface does; None where each shines
             alike in all directions.
         distant: whether they are infinitely far away.
+        surface: that which they stand for: a sphere of points without a direction, a rectangle of those with one; None
+            where it has another shape.
     """
 
     positions: Float[Tensor, "Q 3"]
     direction: Float[Tensor, " 3"] | None = None
     distant: bool = False
+    surface: Surface | None = None
 
     def lights(self, intensity: Float[Tensor, " 3"]) -> tuple[Light, ...]:
         """A light at each, of a light of `intensity`."""

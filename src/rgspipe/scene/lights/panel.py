@@ -17,6 +17,7 @@ from rgspipe.scene.lights.nodes import Nodes, square_nodes
 from rgspipe.scene.lights.reader import Reader
 from rgspipe.scene.lights.shape_coordinates import LENGTH, Turn
 from rgspipe.scene.lights.shape_number import ShapeNumber
+from rgspipe.scene.lights.surface import EvenRectangle
 from rgspipe.scene.shapes import Float
 
 #: Nodes along each side.
@@ -112,7 +113,8 @@ class PanelLight(AxialLight):
         across, up = sides(values["direction"], values["turn"])
         places = square_nodes(SIDE, few).to(across)
         offsets = places[:, :1] * values["width"] * across + places[:, 1:] * values["height"] * up
-        return Nodes(values["position"] + offsets, values["direction"])
+        surface = EvenRectangle(values["width"], values["height"], across, up)
+        return Nodes(values["position"] + offsets, values["direction"], surface=surface)
 
     def grown(self, size: float, free: bool) -> tuple[Self, ...]:
         return tuple(replace(self, width=share * size, height=share * size) for share in SIDES) if free else (self,)

@@ -15,6 +15,7 @@ from rgspipe.scene.lights.point import PointLight
 from rgspipe.scene.lights.reader import Reader
 from rgspipe.scene.lights.shape_coordinates import LENGTH
 from rgspipe.scene.lights.shape_number import ShapeNumber
+from rgspipe.scene.lights.surface import EvenSphere
 from rgspipe.scene.shapes import Float
 
 #: Radii that a fit begins with, in parts of the scene's size: where the radius is 0, nothing tells which way it goes.
@@ -51,7 +52,8 @@ class SphereLight(Light):
         return self.plain
 
     def nodes(self, values: Mapping[str, Tensor], few: bool = False) -> Nodes:
-        return Nodes(values["position"] + values["radius"] * ball_nodes(few).to(values["position"]))
+        places = values["position"] + values["radius"] * ball_nodes(few).to(values["position"])
+        return Nodes(places, surface=EvenSphere(values["radius"]))
 
     def grown(self, size: float, free: bool) -> tuple[Self, ...]:
         return tuple(replace(self, radius=share * size) for share in RADII) if free else (self,)

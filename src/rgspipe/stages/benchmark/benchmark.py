@@ -16,7 +16,7 @@ from rgspipe.benchmark.fit_steps import fit_steps
 from rgspipe.benchmark.renderer_report import REPORT, Bench, run_bench
 from rgspipe.benchmark.rooms import ROOMS
 from rgspipe.benchmark.search_settings import KnownTarget, rendered_spots, search_markdown, search_table
-from rgspipe.benchmark.settings import Setting
+from rgspipe.benchmark.settings import RenderSetting
 from rgspipe.benchmark.truth import load_truth
 from rgspipe.config import RgspipeConfig, get_value
 from rgspipe.datasets.light_file import read_lights
@@ -58,18 +58,18 @@ def _renderer(context: StageContext) -> None:
     print((context.folder / REPORT).read_text(encoding="utf-8"))
 
 
-def preset_settings() -> dict[str, Setting]:
+def preset_settings() -> dict[str, RenderSetting]:
     """The renderer's part of the presets `accuracy=draft|standard|reference`."""
     return {name: _preset(resource_folder("conf") / "accuracy" / f"{name}.yaml") for name in PRESETS}
 
 
-def _preset(path: Path) -> Setting:
+def _preset(path: Path) -> RenderSetting:
     preset, schema = OmegaConf.load(path), RgspipeConfig()
 
     def value(key: str) -> Any:
         return OmegaConf.select(preset, key, default=get_value(schema, key))
 
-    return Setting(
+    return RenderSetting(
         surfels=value("init.surfels"),
         gather_rays=value("freeze.gather_rays"),
         patches=value("freeze.patches"),

@@ -71,6 +71,7 @@ class Fitter:
 
     @classmethod
     def create(cls, context: StageContext) -> Fitter:
+        """That of a stage with a frozen scene among its inputs."""
         config, artifact = context.config, context.inputs["freeze"]
         frozen = frozen_scene(config, artifact)
         _require_fit(frozen, config, artifact)

@@ -54,6 +54,7 @@ class Relighter:
 
     @classmethod
     def of(cls, config: RgspipeConfig, freeze: Artifact) -> Relighter:
+        """That of the frozen scene of an artifact."""
         return cls(config, freeze, frozen_scene(config, freeze))
 
     def render(
