@@ -83,6 +83,12 @@ class Tried:
             problem, lamps = settled_once(problem, lamps)
         return cls.of(problem, lamps)
 
+    def put_by(self) -> Tried:
+        """The same without what is large and can be made again."""
+        problem = self.problem
+        fresh = replace(problem, field=replace(problem.field), received=replace(problem.received))
+        return replace(self, problem=fresh)
+
     def costs_less(self, lamps: Lamps) -> Comparison:
         """How much likelier these lamps are than others by what belongs to these."""
         return Comparison(np.bincount(self.problem.parts, self.problem.costs(lamps) - self.problem.costs(self.lamps)))

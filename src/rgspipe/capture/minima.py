@@ -23,7 +23,7 @@ ALL_AROUND = 12
 FIRST = 8
 
 #: By other variances a minimum may be the likelier one that is so in this part of the draws of the scene's parts.
-POSSIBLE = 0.001
+POSSIBLE = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +103,7 @@ def _likeliest(candidates: Candidates, best: Tried, others: list[Tried], around:
             if best is before:
                 break
     rivals = [other for other in others if _is_new(best.problem, other.lamps, [best.lamps])]
-    chance = chances([best.over(rival) for rival in rivals])[1:]
+    chance = chances([best.over(rival.put_by()) for rival in rivals])[1:]
     return Minima(best, tuple(Rival(rival, float(part)) for rival, part in zip(rivals, chance, strict=True)))
 
 
@@ -120,7 +120,7 @@ def likelier_beside(candidates: Candidates, best: Tried, own: int, others: list[
         if not _is_new(problem, rival.lamps, _lamps(best, *others)):
             continue
         less, best = (best, rival) if rival.over(best).gain > 0.0 else (rival, best)
-        others.append(less)
+        others.append(less.put_by())
     return best
 
 
