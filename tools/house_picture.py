@@ -12,7 +12,7 @@ from pathlib import Path
 
 from house import FLOORS, PACKAGE, House
 
-#: Pixels: height of a floor, of what parts two, and the widths of the tower, of its smallest room and of what is beside.
+#: Pixels: height of a floor, what parts two, and the widths of the tower, of its smallest room and of what is beside.
 FLOOR, GAP, TOWER, SMALLEST, BESIDE = 46, 6, 620, 74, 170
 
 #: Floors from the ground up that belong together, by the first of their rooms.
@@ -41,19 +41,20 @@ def picture(house: House) -> str:
     for index, room in enumerate(beside):
         place = (TOWER + 4 * GAP, GAP + index * (tall + GAP), BESIDE, tall)
         parts.append(_room(room, lines[room], place, "#e6f1e4"))
-    size = f'viewBox="0 0 {TOWER + BESIDE + 5 * GAP} {height}"'
-    return f'<svg xmlns="http://www.w3.org/2000/svg" {size} font-family="sans-serif">\n' + "\n".join(parts) + "\n</svg>\n"
+    size = f'viewBox="0 0 {TOWER + BESIDE + 5 * GAP} {height}" font-family="sans-serif"'
+    return "\n".join([f'<svg xmlns="http://www.w3.org/2000/svg" {size}>', *parts, "</svg>", ""])
 
 
 def _room(name: str, lines: int, place: tuple[float, float, float, float], colour: str) -> str:
     left, top, width, height = place
-    box = f'<rect x="{left:.1f}" y="{top:.1f}" width="{width:.1f}" height="{height:.1f}" rx="4" fill="{colour}"/>'
     middle, base = left + width / 2, top + height / 2
-    said = (
-        f'<text x="{middle:.1f}" y="{base - 2:.1f}" text-anchor="middle" font-size="12" fill="#222">{escape(name)}</text>'
-        f'<text x="{middle:.1f}" y="{base + 13:.1f}" text-anchor="middle" font-size="10" fill="#555">{lines}</text>'
-    )
-    return box + said
+    box = f'<rect x="{left:.1f}" y="{top:.1f}" width="{width:.1f}" height="{height:.1f}" rx="4" fill="{colour}"/>'
+    return box + _text(escape(name), middle, base - 2, 12, "#222") + _text(str(lines), middle, base + 13, 10, "#555")
+
+
+def _text(said: str, middle: float, base: float, size: int, colour: str) -> str:
+    place = f'x="{middle:.1f}" y="{base:.1f}" text-anchor="middle"'
+    return f'<text {place} font-size="{size}" fill="{colour}">{said}</text>'
 
 
 if __name__ == "__main__":
