@@ -9,6 +9,7 @@ from rgspipe.config import RgspipeConfig
 from rgspipe.config.core import describe
 from rgspipe.config.spoken import CALLS, as_keys, told_with_keys
 from rgspipe.errors import InputError
+from rgspipe.fitting.findings import Finding
 
 KEYS = {key for key, _, _ in describe(RgspipeConfig())}
 
@@ -41,6 +42,13 @@ def test_what_is_no_key_stays_as_it_is(said: str) -> None:
 def test_what_is_told_in_the_place_of_calls_are_keys() -> None:
     told = {word.partition("=")[0] for keys in CALLS.values() for word in keys.replace(",", "").split()}
     assert told - KEYS == {"scene"}  # which scene is a choice of a group, and no key
+
+
+def test_settings_that_decide_a_fit_s_findings_are_told_as_keys() -> None:
+    named = {name for kind in Finding.__subclasses__() for name in kind.__dict__.get("decided_by", ())}
+    assert named
+    for name in named:
+        assert as_keys(f"Search.{name}") == f"fit.search.{name}"
 
 
 def test_errors_keep_their_parts_and_their_cause() -> None:
