@@ -30,6 +30,7 @@ from rgspipe.fitting.findings import (
     Undetermined,
     gravest,
 )
+from rgspipe.percent import percent
 
 #: What a status means and what to do, where no finding says more.
 MEANINGS = {
@@ -67,7 +68,7 @@ def told_alternative(one: Alternative) -> str:
     if one.more > 0:
         if one.cost > 0.995:
             return f"{len(one.lights)} lights do not lower the cost."
-        gain = f"{len(one.lights)} lights lower the cost by {percent(1.0 - one.cost)}"
+        gain = f"{len(one.lights)} lights lower the cost by {percent(1.0 - one.cost, 0)}"
         return f"{gain}{', too little to count' if one.ruled_out else ''}."
     if one.more < 0:
         fewer = f"{_lights(len(one.lights))}: {_times(one.cost)} the cost"
@@ -86,7 +87,7 @@ def told_costs(costs: Mapping[int, float]) -> str:
     if len(costs) < 2:
         return ""
     (fewest, most), *others = sorted(costs.items())
-    shares = (f"{count} leave {percent(cost / most) if most > 0.0 else 'all of it'}" for count, cost in others)
+    shares = (f"{count} leave {percent(cost / most, 0) if most > 0.0 else 'all of it'}" for count, cost in others)
     return f"Of what {_lights(fewest)} leave{'s' * (fewest == 1)} unexplained, {', '.join(shares)}."
 
 
@@ -117,20 +118,20 @@ def _decided(finding: Finding) -> list[str]:
 
 
 def _missing(found: LightMissing) -> str:
-    more = f"One more light would lower the cost by {percent(found.gain)}: fit with LightSpec(count={found.count + 1})"
-    return f"{more}, or LightSpec(count=None) to have them counted."
+    more = f"One more light would lower the cost by {percent(found.gain, 0)}"
+    return f"{more}: fit with LightSpec(count={found.count + 1}), or LightSpec(count=None) to have them counted."
 
 
 def _rival(found: Rival) -> str:
     others = "The others are more, or fewer"
     if found.distance is not None:
-        others = f"One of those stands {percent(found.distance)} of the scene's size away from where it stands here"
+        others = f"One of those stands {percent(found.distance, 0)} of the scene's size away from where it stands here"
     return f"{MEANINGS[found.status]} {others}."
 
 
 def _spare(found: LightSpare) -> str:
-    little = f"lowers the cost by {percent(found.gain)} only" if found.gain >= 0.005 else "does not lower the cost"
-    less = f"Light {found.number} {little} and may not be there (it counts from {percent(found.wanted)} on): "
+    little = f"lowers the cost by {percent(found.gain, 0)} only" if found.gain >= 0.005 else "does not lower the cost"
+    less = f"Light {found.number} {little} and may not be there (it counts from {percent(found.wanted, 0)} on): "
     return f"{less}fit with LightSpec(count={found.count - 1}), or LightSpec(count=None) to have them counted."
 
 
@@ -141,7 +142,7 @@ def _undetermined(found: Undetermined) -> str:
 
 def _rough(found: RoughShape) -> str:
     errors = zip(found.fields, found.errors, strict=True)
-    names = " and ".join(f"{_field(name)} (by {percent(min(error, 1.0))})" for name, error in errors)
+    names = " and ".join(f"{_field(name)} (by {percent(min(error, 1.0), 0)})" for name, error in errors)
     return f"Hardly determined by these views: {names}{_of_light(found.number, found.count)}."
 
 
@@ -150,7 +151,7 @@ def _uncertain(found: Uncertain) -> str:
         aim = f"the direction{_of_light(found.number, found.count)}"
         return f"Uncertain: {aim} by {math.degrees(found.error):.0f}°; give more views, or a sharper scene."
     place = f"the position{_of_light(found.number, found.count)}"
-    return f"Uncertain: {place} by {percent(found.error)} of the scene's size; give more views, or a sharper scene."
+    return f"Uncertain: {place} by {percent(found.error, 0)} of the scene's size; give more views, or a sharper scene."
 
 
 def _on_surface(found: OnSurface) -> str:
@@ -159,7 +160,7 @@ def _on_surface(found: OnSurface) -> str:
 
 
 def _poor_scene(found: PoorScene) -> str:
-    return f"The scene is poor: lights in it are expected to be off by {percent(found.error)} of its size."
+    return f"The scene is poor: lights in it are expected to be off by {percent(found.error, 0)} of its size."
 
 
 def _all_steps(found: AllStepsTaken) -> str:
@@ -169,8 +170,8 @@ def _all_steps(found: AllStepsTaken) -> str:
 
 
 def _maybe(found: MaybeOneMore) -> str:
-    more = f"One more light would lower the cost by {percent(found.gain)}: there may be one"
-    return f"{more} (it counts from {percent(found.wanted)} on)."
+    more = f"One more light would lower the cost by {percent(found.gain, 0)}: there may be one"
+    return f"{more} (it counts from {percent(found.wanted, 0)} on)."
 
 
 def _exposure(found: ExposureUnknown) -> str:
@@ -201,11 +202,11 @@ def _left_out(found: LampsLeftOut) -> str:
 
 
 def _much_ambient(found: MuchAmbient) -> str:
-    return f"{percent(found.share)} of the light in the images comes from all around, through openings."
+    return f"{percent(found.share, 0)} of the light in the images comes from all around, through openings."
 
 
 def _maybe_ambient(found: MaybeAmbient) -> str:
-    gain = f"Light from all around would lower the cost by {percent(found.gain)}: there may be some"
+    gain = f"Light from all around would lower the cost by {percent(found.gain, 0)}: there may be some"
     return f"{gain}; allow for it (LightSpec(ambient=True)), or give images with the lamps off."
 
 
@@ -235,11 +236,6 @@ _WORDS: dict[type[Finding], Callable[..., str]] = {
     MaybeAmbient: _maybe_ambient,
     NoOpening: _no_opening,
 }
-
-
-def percent(share: float) -> str:
-    """A share in words."""
-    return f"{100.0 * share:.0f} %"
 
 
 def _field(name: str) -> str:
