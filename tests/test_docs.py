@@ -17,6 +17,7 @@ from pymdownx.slugs import slugify
 import rgspipe
 from rgspipe.evaluation import goals
 from rgspipe.fitting import Search
+from rgspipe.percent import percent
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -110,10 +111,10 @@ def test_what_is_wanted_is_what_the_report_wants() -> None:
         time = None if floor.fit_seconds is None else goals.at_most(floor.fit_seconds * goals.SLOWER)
         cells = [scene, goals.at_least(floor.psnr - goals.PSNR_NOISE)]
         cells += [goals.at_most(floor.training_seconds * goals.SLOWER)]
-        cells += [goals.percent(floor.medians.get(place, float("nan"))) for place in places]
+        cells += [percent(floor.medians.get(place, float("nan"))) for place in places]
         assert f"| {' | '.join([*cells, time or '—'])} |\n" in text
     for case, limit in goals.KINDS.items():
-        assert f"| {case} | {goals.percent(limit)} |\n" in text
+        assert f"| {case} | {percent(limit)} |\n" in text
 
 
 def test_every_picture_is_shown() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 
@@ -10,7 +11,8 @@ class InputError(ValueError):
 
     The message is one paragraph that names the place, what was expected, what was found and what to
     do. The command line prints it without a traceback and exits with status 2; library callers can
-    read the parts as attributes.
+    read the parts as attributes. Options are named as Python has them, such as CaptureOptions(exposure='same'),
+    which the command line tells as its own keys: see `config.spoken`.
 
     Args:
         where: the file, folder or configuration key that is wrong.
@@ -27,6 +29,11 @@ class InputError(ValueError):
         """The same error where what is wrong is part of something larger: `section` and a dot before its name."""
         where = f"{section}.{self.where}" if section else self.where
         return InputError(where, expected=self.expected, found=self.found, remedy=self.remedy)
+
+    def reworded(self, words: Callable[[str], str]) -> InputError:
+        """The same error in the words of another reader, such as with keys of the command line for names in Python."""
+        expected, found, remedy = map(words, (self.expected, self.found, self.remedy))
+        return InputError(words(self.where), expected=expected, found=found, remedy=remedy)
 
 
 def printable(text: str) -> str:

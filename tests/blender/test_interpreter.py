@@ -36,7 +36,9 @@ def answering(folder: Path, **facts: object) -> str:
     ("path", "found"), [("/no/such", "No such file"), ("true", "status 0 and said: nothing"), (__file__, "denied")]
 )
 def test_what_is_neither_python_nor_blender_is_refused(key: str, path: str, found: str) -> None:
-    with pytest.raises(InputError, match=rf"blender\.{key}: expected an? .*{found}.*Correct blender\.{key}"):
+    with pytest.raises(
+        InputError, match=rf"BlenderOptions\.{key}: expected an? .*{found}.*Correct BlenderOptions\.{key}"
+    ):
         find_blender(BlenderOptions(**{key: path}), "scene")
 
 
@@ -56,7 +58,7 @@ def test_a_blender_that_is_too_old_is_refused(tmp_path: Path) -> None:
 
 def test_packages_are_lent_by_a_python_of_blender_s_version(tmp_path: Path) -> None:
     program = answering(tmp_path, python=[3, 9], path=["/x/site-packages", "/x"], missing=[], blender=[5, 0, 1])
-    with pytest.raises(InputError, match=r"runs Python 3\.9\. Install rgspipe with Python 3\.9.*blender\.python=PATH"):
+    with pytest.raises(InputError, match=r"Install rgspipe with Python 3\.9.*BlenderOptions\(python=PATH\)"):
         find_blender(BlenderOptions(executable=program), "scene")
     both = find_blender(BlenderOptions(python=program, executable=program), "scene")
     assert both.words == "Blender 5.0.1" and both.command("m", "a")[-3:] == ["/x/site-packages", "m", "a"]

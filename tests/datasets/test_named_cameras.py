@@ -96,5 +96,5 @@ def test_broken_cameras_are_refused(tmp_path: Path, key: str, value: object, mes
 
 def test_a_file_that_is_yet_to_be_made_says_what_makes_it(target: Path) -> None:
     (target.parent / "cameras.json").unlink()
-    with pytest.raises(InputError, match=r"stage=generate_dataset writes cameras\.json"):
+    with pytest.raises(InputError, match=r"the stage generate_dataset writes cameras\.json"):
         load_target(target)

@@ -68,7 +68,7 @@ def test_a_box_of_surfels_is_missing_and_an_empty_box_is_refused(surfels: Surfel
     lower, upper = torch.tensor([-0.15, -0.15, -0.4]), torch.tensor([0.25, 0.25, 0.0])
     inside = ((fewer.centers > lower) & (fewer.centers < upper)).all(dim=1)
     assert len(fewer) < len(surfels) and not bool(inside.any())
-    with pytest.raises(InputError, match=r"model_error\.missing"):
+    with pytest.raises(InputError, match=r"ModelError\.missing"):
         with_error(surfels, ModelError(missing=[5.0, 5.0, 5.0, 6.0, 6.0, 6.0]))
 
 

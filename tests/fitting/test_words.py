@@ -27,13 +27,12 @@ from rgspipe.fitting.findings import (
     gravest,
 )
 from rgspipe.fitting.options import SearchOptions
-from rgspipe.fitting.words import MEANINGS, Spoken, explained, told_alternative, told_costs
+from rgspipe.fitting.words import MEANINGS, explained, told_alternative, told_costs
 from rgspipe.scene import PointLight
 
 DOUBT = Undetermined(1, 1, ("intensity",))
 BAR = ("bar.least",)
 DOUBTED = "Not determined by these views: intensity."
-ELSEWHERE = Spoken("lamps:{}".format, "lamps:?", "daylight", "dial {}".format)
 
 
 def test_without_a_finding_a_fit_has_converged() -> None:
@@ -63,9 +62,9 @@ def test_the_gravest_finding_is_the_status_and_all_are_told(found: Sequence[Find
 
 
 def test_a_number_that_is_too_small_is_told_with_the_next_one() -> None:
-    words = explained([LightMissing(1, 0.62, decided_by=BAR)], ELSEWHERE)
+    words = explained([LightMissing(1, 0.62, decided_by=BAR)])
     assert gravest([LightMissing(1, 0.62, decided_by=BAR)]) is FitStatus.UNEXPLAINED
-    assert "62 %" in words and "lamps:2" in words and "lamps:?" in words and "LightSpec" not in words
+    assert "62 %" in words and "LightSpec(count=2)" in words and "LightSpec(count=None)" in words
     assert (
         "count=4" in explained([LightMissing(3, 0.62, decided_by=BAR)]) and MEANINGS[FitStatus.UNEXPLAINED] not in words
     )
@@ -78,10 +77,10 @@ def test_what_is_left_unexplained_is_told_beside_a_light_that_is_missing() -> No
 
 def test_a_number_that_is_too_large_is_told_with_the_light_that_may_not_be_there() -> None:
     found = [LightSpare(3, 3, 0.04, 0.2, decided_by=BAR)]
-    words = explained(found, ELSEWHERE)
+    words = explained(found)
     assert gravest(found) is FitStatus.AMBIGUOUS and MEANINGS[FitStatus.AMBIGUOUS] not in words
     assert words.startswith("Light 3 lowers the cost by 4 % only") and "from 20 % on" in words
-    assert "lamps:2" in words and "lamps:?" in words
+    assert "LightSpec(count=2)" in words and "LightSpec(count=None)" in words
 
 
 def test_other_lights_that_explain_as_much_are_told_beside_a_light_too_many() -> None:
@@ -123,14 +122,14 @@ def test_a_poor_scene_is_no_place_for_an_answer_that_is_sure() -> None:
     assert "The scene is poor: lights in it are expected to be off by 5 % of its size." in explained([PoorScene(0.05)])
 
 
-def test_a_finding_names_the_settings_that_decided_as_the_reader_knows_them() -> None:
+def test_a_finding_names_the_settings_that_decided() -> None:
     assert explained([LightSpare(2, 2, 0.24, 0.5, decided_by=("bar.least_faint",))]).endswith(
         "Decided by Search.bar.least_faint."
     )
-    assert "Decided by dial certainty.doubtful." in explained([Uncertain(1, 1, 0.3)], ELSEWHERE)
-    rivals = "dial rivals.deviations, dial rivals.energy and dial certainty.doubtful."
-    assert explained([Rival(0.2)], ELSEWHERE).endswith(f"Decided by {rivals}")
-    assert "Decided" not in explained([DOUBT], ELSEWHERE)
+    assert "Decided by Search.certainty.doubtful." in explained([Uncertain(1, 1, 0.3)])
+    rivals = "Search.rivals.deviations, Search.rivals.energy and Search.certainty.doubtful."
+    assert explained([Rival(0.2)]).endswith(f"Decided by {rivals}")
+    assert "Decided" not in explained([DOUBT])
 
 
 def test_what_decides_are_numbers_of_the_search() -> None:

@@ -106,7 +106,7 @@ def test_a_disk_without_room_says_what_to_do(tmp_path: Path) -> None:
     store, (soft, hard) = OperatorStore(0.0, tmp_path), resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (1024, hard))
     try:
-        with pytest.raises(InputError, match=r"File too large.*train\.memory_mib"):
+        with pytest.raises(InputError, match=r"File too large.*TrainOptions\.memory_mib"):
             store.keep(random_operator(70, 50, seed=0))
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))

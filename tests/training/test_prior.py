@@ -119,7 +119,7 @@ def test_views_without_maps_are_passed_over_and_all_without_refused(weights: lis
     among, _ = albedo_prior(weights, [views[0], *bare[1:]])
     assert torch.equal(alone, among)
     for refused in (lambda: albedo_prior(weights, bare), lambda: prior_from_maps(bare, 1.0)):
-        with pytest.raises(InputError, match=r"albedo_prior=dataset.*albedo_path"):
+        with pytest.raises(InputError, match=r"^prior_from_maps.*albedo_path.*prior=None"):
             refused()
 
 

@@ -46,7 +46,7 @@ class Bench:
     Attributes:
         rooms: with their truth; the first one stands for all where one is enough.
         repetitions: of each timing.
-        presets: the settings of `accuracy=…`, by name.
+        presets: the settings of the accuracy presets, by name.
         folder: receives a CSV file per part; parts that are there already are not measured again.
     """
 

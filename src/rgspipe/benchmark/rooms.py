@@ -55,7 +55,7 @@ class Room:
 
 
 def _cornell() -> Room:
-    """Open towards −y, with two boxes; the same room as `scene=cornell`."""
+    """Open towards −y, with two boxes; the same room as the scene cornell."""
     viewpoints = [[[0.0, -1.6, 0.0], [0.0, 0.0, 0.0]], [[0.35, -1.2, 0.3], [0.0, 0.1, -0.15]]]
     lights = [[0.0, 0.0, 0.38], [-0.3, -0.3, 0.2], [0.3, 0.25, -0.1], [0.44, 0.1, 0.1], [-0.1, -0.2, -0.45]]
     return Room("cornell", CornellBox().rectangles(), torch.tensor(viewpoints), torch.tensor(lights))

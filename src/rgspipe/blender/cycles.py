@@ -59,10 +59,10 @@ def _configure_denoiser(cycles: bpy.types.PropertyGroup) -> None:
         cycles.denoiser = "OPENIMAGEDENOISE"
     except TypeError:  # its enumeration has no such value
         raise InputError(
-            "dataset.denoise",
+            "DatasetOptions.denoise",
             expected="false with this Blender, which was built without Open Image Denoise",
             found="true",
-            remedy="Set it, with four times as many dataset.samples; or take a Blender from blender.org.",
+            remedy="Set it, with four times as many DatasetOptions.samples; or take a Blender from blender.org.",
         ) from None
     cycles.denoising_input_passes = "RGB_ALBEDO_NORMAL"
     cycles.denoising_prefilter = "ACCURATE"

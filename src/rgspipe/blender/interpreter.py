@@ -86,7 +86,7 @@ def find_blender(options: BlenderOptions, where: str, otherwise: str = "") -> Bl
 #: What to do where there is no Blender.
 HAVE_BLENDER = (
     "With Python 3.11, install its module: pip install 'rgspipe[blender]'. Else name another Python that has it "
-    "(blender.python=PATH), or an installed Blender (blender.executable=PATH)."
+    "(BlenderOptions(python=PATH)), or an installed Blender (BlenderOptions(executable=PATH))."
 )
 
 
@@ -94,7 +94,7 @@ def _interpreter(python: str) -> Blender:
     facts = _asked_python(python)
     if facts["missing"]:
         raise InputError(
-            "blender.python",
+            "BlenderOptions.python",
             expected=f"a Python with bpy, {', '.join(PACKAGES)}",
             found=f"{python} without {', '.join(facts['missing'])}",
             remedy=f"Have Python 3.11 there and install rgspipe in it: {python} -m pip install 'rgspipe[blender]'.",
@@ -104,14 +104,14 @@ def _interpreter(python: str) -> Blender:
 
 def _program(executable: str, python: str | None) -> Blender:
     facts = _asked(
-        "blender.executable",
+        "BlenderOptions.executable",
         [executable, "--background", "--factory-startup", "--python-exit-code", "1", "--python-expr", PROBE],
         "an installed Blender",
     )
     version = ".".join(map(str, facts["blender"]))
     if tuple(facts["blender"]) < OLDEST:
         raise InputError(
-            "blender.executable",
+            "BlenderOptions.executable",
             expected=f"Blender {'.'.join(map(str, OLDEST))} or later",
             found=version,
             remedy="Install a later one, or Blender's module: pip install 'rgspipe[blender]' with Python 3.11.",
@@ -120,10 +120,10 @@ def _program(executable: str, python: str | None) -> Blender:
     if lender["python"] != facts["python"]:
         own, wanted = (".".join(map(str, one["python"])) for one in (lender, facts))
         raise InputError(
-            "blender.executable",
+            "BlenderOptions.executable",
             expected=f"a Blender that runs the Python that lends it rgspipe's packages, {own}",
             found=f"Blender {version}, which runs Python {wanted}",
-            remedy=f"Install rgspipe with Python {wanted}, and name that: blender.python=PATH.",
+            remedy=f"Install rgspipe with Python {wanted}, and name that: BlenderOptions(python=PATH).",
         )
     packages = os.pathsep.join(part for part in lender["path"] if "site-packages" in part or "dist-packages" in part)
     source = str(Path(rgspipe.__file__).resolve().parents[1])
@@ -132,7 +132,7 @@ def _program(executable: str, python: str | None) -> Blender:
 
 
 def _asked_python(python: str) -> dict[str, Any]:
-    return _asked("blender.python", [python, "-c", PROBE], "a Python interpreter")
+    return _asked("BlenderOptions.python", [python, "-c", PROBE], "a Python interpreter")
 
 
 def _asked(key: str, command: Sequence[str], expected: str) -> dict[str, Any]:

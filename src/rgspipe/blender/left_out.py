@@ -117,8 +117,8 @@ COSTS = {
     "light": "is left out: nothing glows",
     "glass": "is in the images, but a surfel lets no light through: what is seen through it, and the light that "
     "falls through it, is taken for its own colour, and a lamp behind it is not found",
-    "metal": "is in the images, but surfels are diffuse (train.gloss=auto finds broad highlights): what it mirrors is "
-    "taken for its own colour",
+    "metal": "is in the images, but surfels are diffuse (training with gloss finds broad highlights): what it mirrors "
+    "is taken for its own colour",
     "fog": "is in the images, but no model has any: surfaces behind it are taken for paler or darker than they are",
 }
 

@@ -16,7 +16,7 @@ class BlenderOptions(Options):
     """a Python interpreter that rgspipe is installed in with Blender's module, "rgspipe[blender]", which renders; by
     default the one that runs"""
     executable: str | None = None
-    """an installed Blender, which renders instead; it takes rgspipe's packages from blender.python, which has to be a
+    """an installed Blender, which renders instead; it takes rgspipe's packages from `python`, which has to be a
     Python of Blender's own version"""
 
 
@@ -26,7 +26,7 @@ OWN_BLENDER = BlenderOptions()
 
 @dataclass(frozen=True)
 class DatasetOptions(Options):
-    """How images are made (unused by scene=external)."""
+    """How images are made; unused where they are given."""
 
     resolution: int = option(128, low=8, high=8192)
     """image width and height, pixels"""
@@ -39,7 +39,7 @@ class DatasetOptions(Options):
     target_views: int = option(3, low=1, high=3)
     """fixed cameras that see each fit target"""
     lamps: int = option(2, low=1, high=8)
-    """lamps that are on in all training views alike, where these are unknown (scene.lamps=unknown)"""
+    """lamps that are on in all training views alike, where these are unknown"""
     samples: int = option(48, low=1, high=1000000)
     """paths per pixel of training views and targets"""
     test_samples: int = option(192, low=1, high=1000000)

@@ -81,7 +81,7 @@ def _check_place(folder: Path) -> None:
             folder,
             expected="a folder by whose name Blender finds it",
             found=" and ".join(odd) or "a character that cannot be printed",
-            remedy="Blender takes these for something else: give another folder, outputs=FOLDER.",
+            remedy="Blender takes these for something else: give another folder.",
         )
 
 

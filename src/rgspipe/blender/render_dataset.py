@@ -10,17 +10,25 @@ from rgspipe.blender.job import DatasetJob
 from rgspipe.blender.options import OWN_BLENDER, BlenderOptions
 from rgspipe.blender.process import SCRATCH, run_blender
 
+#: Said where there is no Blender.
+OTHERWISE = "Images that you have need none."
 
-def render_dataset(job: DatasetJob, folder: Path, options: BlenderOptions = OWN_BLENDER) -> None:
+
+def render_dataset(
+    job: DatasetJob, folder: Path, options: BlenderOptions = OWN_BLENDER, otherwise: str = OTHERWISE
+) -> None:
     """Render the dataset of `job` into `folder`; frames that are already there and whole are kept.
 
     May be killed at any moment and called again: the result is the same.
+
+    Args:
+        otherwise: how to do without Blender, a sentence for the error where there is none.
 
     Raises:
         InputError: there is no Blender, the scene cannot be used, or `folder` holds the images of another job.
         RuntimeError: Blender died; the message ends with the last lines it wrote.
     """
-    blender = find_blender(options, "scene", "Images that you have need none: scene=external or scene=rgbd.")
+    blender = find_blender(options, "scene", otherwise)
     run_blender(blender, __name__, job.to_json(), job.scene, folder)
 
 

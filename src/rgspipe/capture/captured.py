@@ -126,7 +126,8 @@ def capture_scenes(
     surfels, views = surfels.to(torch.float32).to("cpu"), [view.to("cpu") for view in views]
     if options.unseen:
         surfels = with_unseen_surfaces(surfels, [view.camera for view in views], depths=[view.depth for view in views])
-    weights = trace_views(surfels, views, options.supersampling, OperatorStore(options.memory_mib))
+    store = OperatorStore(options.memory_mib, name="CaptureOptions")
+    weights = trace_views(surfels, views, options.supersampling, store)
     lit = _measured(weights, views, options, where)
     frozen = FrozenScene.freeze(surfels, gather_rays=options.gather_rays, seed=options.seed)
     frozen = frozen.with_dictionary(options.grid, seed=options.seed)
@@ -165,7 +166,8 @@ def _predicted(weights: Sequence[ViewWeights], views: Sequence[View], options: C
     surfels = weights[0].operator.shape[1]
     if options.albedo_prior == "none":
         return np.full((surfels, 3), GREY)
-    albedo, weight = (part.double().numpy() for part in albedo_prior(weights, views))
+    asked, otherwise = (f"CaptureOptions(albedo_prior={prior!r})" for prior in ("dataset", "none"))
+    albedo, weight = (part.double().numpy() for part in albedo_prior(weights, views, asked, otherwise))
     known = weight > 0.0
     # A prediction is known up to a scale, and what no map shows is as the middle of the rest.
     middle = np.median(albedo[known], axis=0) if known.any() else GREY

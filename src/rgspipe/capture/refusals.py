@@ -41,9 +41,9 @@ def check_views(views: Sequence[View], where: str | Path) -> None:
     if lit:
         raise InputError(
             where,
-            expected="photographs that were taken while the same unknown lamps were on (scene.lamps=unknown)",
+            expected="photographs that were taken while the same unknown lamps were on (rg.capture_scene(views))",
             found=f"{len(lit)} of {len(views)} with a known light of their own, such as {lit[0].name}",
-            remedy="Train on them instead (scene.lamps=known), or take pl_pos and pl_intensity out of "
+            remedy="Train on them instead (rg.train(views)), or take pl_pos and pl_intensity out of "
             "transforms_train.json if they mean nothing.",
         )
 
@@ -60,11 +60,11 @@ def check_lightings(views: Sequence[View], exposure: str, where: str | Path) -> 
             where,
             expected="photographs with lamps on beside those with all of them off",
             found="only the latter",
-            remedy="Add them (scene.rgbd.others), or name the lighting otherwise if something was on.",
+            remedy="Add them (ScanOptions.others), or name the lighting otherwise if something was on.",
         )
     if OFF in names and exposure != "same":
         raise InputError(
-            "lamps.exposure",
+            "CaptureOptions.exposure",
             expected="same, so that what shines with the lamps off can be taken away",
             found=exposure,
             remedy="Expose all photographs alike, or leave those with the lamps off out.",
@@ -80,19 +80,19 @@ def check_brackets(views: Sequence[View], exposure: str) -> None:
     whites = np.array([np.nan if view.saturated_from is None else view.saturated_from for view in views])
     found = None
     if exposure != "same":
-        found = f"lamps.exposure={exposure}: of unknown exposures a curve is known only up to a power"
+        found = f"CaptureOptions(exposure={exposure!r}): of unknown exposures a curve is known only up to a power"
     elif np.isnan(whites).any():
         found = "images that do not say what white is, as floating point"
     elif whites.max() < BRACKET * whites.min():
         found = f"exposures that differ by a factor of {whites.max() / whites.min():.2f} at most"
     if found is not None:
         raise InputError(
-            "lamps.response",
+            "CaptureOptions.response",
             expected="photographs in 8 or 16 bits whose exposures are known (EXIF), and differ by a stop or more: the "
             "same surfaces at other levels are what a curve is told by",
             found=found,
             remedy="Photograph some views at two exposures, with shutter, aperture and ISO in the files, or leave "
-            "lamps.response=known.",
+            "CaptureOptions(response='known').",
         )
 
 
@@ -112,7 +112,7 @@ def check_overlap(weights: Sequence[ViewWeights], where: str | Path) -> None:
             where,
             expected="photographs that show the same surfaces as others do, so that their exposures follow",
             found=f"{groups} groups of {', '.join(map(str, sizes))} photographs that share nothing",
-            remedy="Add photographs in between, or expose all alike (lamps.exposure=same).",
+            remedy="Add photographs in between, or expose all alike (CaptureOptions(exposure='same')).",
         )
 
 

@@ -77,7 +77,7 @@ def _number(found: Captured) -> str:
     if len(last.fewer.lamps) < len(found.lamps):
         return f"The last of them {explains}."
     if last.worth:
-        return f"There may be more: one more {explains}, but no more are looked for (lamps.most)."
+        return f"There may be more: one more {explains}, but no more are looked for (CaptureOptions.most)."
     return f"{'There may be one more: it' if last.gain > BAR.doubtful else 'One more'} {explains}."
 
 
@@ -137,11 +137,11 @@ def _doubts(found: Captured) -> Iterator[str]:
     if noise > DISAGREE:
         yield (
             f"Lamps and paint leave {100.0 * noise:.0f} % of a surface's light unexplained: detail that surfels are "
-            "too coarse for (init.surfels), gloss, or depth and poses that are off. Lamps may be missing, and places "
+            "too coarse for (surfels=…), gloss, or depth and poses that are off. Lamps may be missing, and places "
             "worse than is said."
         )
     if found.measured.error > DISAGREE:
         yield (
             f"Photographs disagree by {100.0 * found.measured.error:.0f} % about the same surfaces: gloss, other "
-            "exposures (lamps.exposure=free) or poses."
+            "exposures (CaptureOptions(exposure='free')) or poses."
         )

@@ -6,6 +6,8 @@ import math
 
 import pandas as pd
 
+from rgspipe.percent import percent as told
+
 
 def words(name: object) -> str:
     """A status in words; nothing where there is none."""
@@ -24,9 +26,7 @@ def time(values: pd.Series) -> str:
 
 def percent(value: object, digits: int = 2) -> str:
     """A fraction as percent; nothing where it is not known, words where it is infinite."""
-    if pd.isna(value):
-        return ""
-    return "unbounded" if math.isinf(float(value)) else f"{100.0 * float(value):.{digits}f} %"
+    return told(value, digits, unknown="", unbounded="unbounded")
 
 
 def degrees(value: object) -> str:

@@ -16,6 +16,7 @@ from rgspipe.blender.options import OWN_BLENDER, BlenderOptions
 from rgspipe.cli.arguments import refused
 from rgspipe.cli.installation import EXTRAS, Distribution, needed_parts, optional_parts, slurm
 from rgspipe.cli.messages import EXIT_FAILED, line_width
+from rgspipe.config.spoken import as_keys
 from rgspipe.datasets.input_file import folder_to_be
 from rgspipe.errors import InputError
 from rgspipe.machine.description import available_memory_gib, machine
@@ -97,7 +98,7 @@ def _blender(options: BlenderOptions) -> list[str]:
     try:
         found = find_blender(options, "blender")
     except InputError as error:
-        return [str(error)]
+        return [as_keys(str(error))]
     print(_wrapped(f"{found.words} renders", "  "))
     return []
 

@@ -9,6 +9,7 @@ import textwrap
 import traceback
 from pathlib import Path
 
+from rgspipe.config.spoken import as_keys
 from rgspipe.errors import InputError
 
 #: Exit status of a run that failed, of one whose input cannot be used, of one that was stopped with Ctrl-C, and of one
@@ -36,7 +37,7 @@ def show_input_error(error: InputError, option: bool = False) -> None:
     if traceback_wanted(option):
         traceback.print_exception(error, file=sys.stderr)
     # A path that is longer than a line stays behind the word.
-    told = f"Error:\N{NO-BREAK SPACE}{error}"
+    told = f"Error:\N{NO-BREAK SPACE}{error.reworded(as_keys)}"
     told = textwrap.fill(told, line_width(), break_long_words=False, break_on_hyphens=False)
     print(told.replace("\N{NO-BREAK SPACE}", " ", 1), file=sys.stderr)
 

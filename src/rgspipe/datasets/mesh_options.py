@@ -10,10 +10,10 @@ from rgspipe.options import Options, option
 
 @dataclass(frozen=True)
 class MeshOptions(Options):
-    """How a mesh stands among its photographs, whose cameras are read as scene.rgbd says."""
+    """How a mesh stands among its photographs, whose cameras are read as `ScanOptions` say."""
 
     photographs: str | None = None
-    """folder of the photographs and their cameras, in any layout that scene=rgbd reads; by default the mesh's own"""
+    """folder of the photographs and their cameras, in any layout of a capture; by default the mesh's own"""
     up: Literal["auto", "y", "z"] = "auto"
     """axis of the file that points up in the cameras' world, whose z is up; auto: y in glTF, as its specification has
     it, z elsewhere"""

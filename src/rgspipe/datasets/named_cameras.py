@@ -71,7 +71,7 @@ def read_camera(path: Path, name: str) -> NamedCamera:
         InputError: no such file, none of that name, or a broken one.
     """
     if not (is_there(path) and path.is_file()):
-        remedy = "Check the path; of a .blend file, stage=generate_dataset writes cameras.json beside its images."
+        remedy = "Check the path; of a .blend file, the stage generate_dataset writes cameras.json beside its images."
         raise InputError(path, expected="cameras by name", found="no such file", remedy=remedy)
     cameras = required(read_json(path, "cameras by name"), "cameras", path)
     if not isinstance(cameras, dict) or not isinstance(cameras.get(name), dict):

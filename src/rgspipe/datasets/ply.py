@@ -25,6 +25,9 @@ from rgspipe.scene.surfels import NO_CLIP, Surfels, quaternion_to_axes
 #: for those of an empty cube, whose rays meet fewer.
 FREEZING_BYTES = 110e3
 
+#: How less of a file is taken.
+CROP = "PlyOptions(crop=[x, y, z, x, y, z])"
+
 __all__ = ["PlyOptions", "PlySurfels", "read_ply", "save_ply"]
 
 
@@ -66,7 +69,7 @@ def read_ply(path: Path, options: PlyOptions) -> PlySurfels:
         rule = surfels.coverage
         notes = [*discs.notes, f"Coverage is inferred: thresholds {rule.low:g} and {rule.high:g}, layers of "
                  f"{rule.layer_thickness:.3g}."]  # fmt: skip
-    check_surfels(path, surfels, "Correct them, leave them out with scene.ply.crop=[x,y,z,x,y,z], or export it again.")
+    check_surfels(path, surfels, f"Correct them, leave them out with {CROP}, or export it again.")
     left = loss("left out: outside of the box, or too faint to be there", 1.0 * ~kept, 0.0, "each")
     return PlySurfels(surfels, own, Conversion.of(path, layout, len(surfels), [*losses, left], notes))
 
@@ -78,16 +81,17 @@ def _check_count(path: Path, kept: np.ndarray, options: PlyOptions) -> None:
             path,
             expected="surfels that can be seen",
             found=f"{count} of {len(kept)} in the box and above an opacity of {options.minimum_alpha}",
-            remedy="Correct scene.ply.crop, or lower scene.ply.minimum_alpha.",
+            remedy="Correct PlyOptions.crop, or lower PlyOptions.minimum_alpha.",
         )
     if count > options.max_surfels:
         raise InputError(
             path,
-            expected=f"at most {options.max_surfels} surfels (scene.ply.max_surfels)",
+            expected=f"at most {options.max_surfels} surfels (PlyOptions.max_surfels)",
             found=f"{count}, of {len(kept)} in the file; frozen with the default rays they take about "
             f"{count * FREEZING_BYTES / 2**30:.0f} GiB of memory",
-            remedy="Keep a part of the scene with scene.ply.crop=[x,y,z,x,y,z], thin the file in the program that made "
-            "it, or raise scene.ply.max_surfels where there is the memory; fewer freeze.gather_rays take less.",
+            remedy=f"Keep a part of the scene with {CROP}, thin the file in the program that made it, or raise "
+            "PlyOptions.max_surfels where there is the memory; fewer rays take less "
+            "(FrozenScene.freeze(gather_rays=…)).",
         )
 
 
@@ -112,7 +116,7 @@ def _dressed(path: Path, discs: Discs, kept: np.ndarray, options: PlyOptions) ->
         )
     except ValueError as error:
         raise InputError(
-            path, expected="surfels that lie on surfaces", found=str(error), remedy="Check the file and scene.ply."
+            path, expected="surfels that lie on surfaces", found=str(error), remedy="Check the file and PlyOptions."
         ) from error
     edges = {
         "clip_offsets": torch.full_like(tensors["scales"], NO_CLIP),

@@ -37,7 +37,7 @@ VERSION = 1
 #: Said of a file that another program wrote with our properties.
 LOST_COMMENT = (
     f"The comment {MARK} is gone, which says how surfels cover: inferred as thresholds {{:g}} and {{:g}}, layers of "
-    "{:.3g} (scene.ply.low, high and layer change that). Edits of colours are passed over."
+    "{:.3g} (PlyOptions.low, high and layer change that). Edits of colours are passed over."
 )
 
 #: Third log-scale: so thin that viewers of 3DGS draw a disc.

@@ -87,7 +87,7 @@ def _without(surfels: Surfels, box: Sequence[float]) -> Surfels:
     if not bool(inside.any()) or bool(inside.all()):
         lower, upper = (corner.tolist() for corner in (centers.amin(dim=0), centers.amax(dim=0)))
         raise InputError(
-            "model_error.missing",
+            "ModelError.missing",
             expected=f"a box that holds some of the surfels, which are between {lower} and {upper}, but not all",
             found=f"{list(box)} with {int(inside.sum())} of {len(surfels)}",
             remedy="Give the lower and then the upper corner of what is to be left out, scene units.",

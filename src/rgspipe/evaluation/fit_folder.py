@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +20,6 @@ from rgspipe.evaluation.metrics import psnr
 from rgspipe.fitting.fit import FitViews
 from rgspipe.fitting.in_sight.lamp import Mask, left_out
 from rgspipe.fitting.result import FitResult, Step
-from rgspipe.fitting.words import PYTHON, Spoken
 from rgspipe.scene import LightRig
 from rgspipe.store.files import publish, remove_tree, write_bytes, write_text
 
@@ -38,7 +37,7 @@ def write_result(
     views: FitViews,
     targets: Sequence[Tensor],
     further: Mapping[str, bytes] | None = None,
-    spoken: Spoken = PYTHON,
+    words: Callable[[str], str] = str,
     there: Sequence[Tensor] | None = None,
     saturated: Sequence[Tensor] | None = None,
 ) -> None:
@@ -47,7 +46,7 @@ def write_result(
     fit.png has one row a view: target, start, midway, end, difference. final.exr is the first view's
     final image; those of further views are final_1.exr and so on. Where pixels of lamps in sight were left out, they
     are outlined in fit.png, and emitters.png, emitters_1.png and so on are their masks. `further` holds more files by
-    name; settings in the reason are named as `spoken` has them. `there` is what every view shows besides the lights, if
+    name; the reason is told in these `words`. `there` is what every view shows besides the lights, if
     that was looked for or given: it stands in all images of the fit, and in fit.png by itself beside the target.
     Where targets are `saturated`, (H, W, 3) bool a view, fit.png and the PSNR take renders as the camera would have.
     """
@@ -58,7 +57,7 @@ def write_result(
     final = shown[-1]
     shown = [_photographed(images, targets, saturated) for images in shown]
     masks = left_out(result.lamps, [image.shape[:2] for image in final]) if result.lamps else None
-    result.save(partial / "lights.json", spoken, psnr=_psnr(shown[-1], targets, masks))
+    result.save(partial / "lights.json", words, psnr=_psnr(shown[-1], targets, masks))
     _write_convergence(partial / "convergence.csv", result.trajectory)
     save_png(partial / "fit.png", _picture(targets, [*([there] if there else []), *shown], masks))
     for index, mask in enumerate(masks or ()):

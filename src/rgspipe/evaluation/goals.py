@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import pandas as pd
 
 from rgspipe.evaluation.classes import ALL
+from rgspipe.percent import percent
 
 #: Held-out views of two trainings differ by about so much, dB; a time may be longer by this factor.
 PSNR_NOISE, SLOWER = 0.1, 1.05
@@ -112,13 +113,6 @@ def primary_method(summary: pd.DataFrame, preferred: str = "search_lm") -> str:
     """The method that the goals are about: `preferred` if it was run, else the first one; "" without any."""
     methods = list(dict.fromkeys(summary["method"]))
     return preferred if preferred in methods or not methods else str(methods[0])
-
-
-def percent(fraction: float, digits: int = 2) -> str:
-    """A fraction as percent; ∞ for failed fits, — for what is not known."""
-    if math.isnan(fraction):
-        return "—"
-    return "∞" if math.isinf(fraction) else f"{100.0 * fraction:.{digits}f} %"
 
 
 def at_least(limit: float) -> str:

@@ -10,6 +10,7 @@ from torch import Tensor
 
 from rgspipe.evaluation.arrays import ArrayLike, to_array
 from rgspipe.evaluation.escaped_light import escaped_light
+from rgspipe.percent import percent
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene.camera import Camera
 from rgspipe.scene.grade import Grade, KnownLamps, SceneGrade
@@ -109,10 +110,13 @@ def _two_means(error: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def graded_words(grade: SceneGrade) -> str:
     """Sentences: the grade, why it is so, and what to do where it is not good."""
     parts = [
-        (grade.residual, f"renders are {_percent(grade.residual)} off, noise apart"),
-        (grade.doubt, f"{_percent(grade.guessed)} of what surfaces look at was seen by no camera and is guessed"),
-        (grade.missing, f"{_percent(grade.missing)} of what surfaces look at was seen by no camera and is left open"),
-        (grade.at_bound, f"the albedo of {_percent(grade.at_bound)} is as high as it may be, as if light were missing"),
+        (grade.residual, f"renders are {percent(grade.residual, 0)} off, noise apart"),
+        (grade.doubt, f"{percent(grade.guessed, 0)} of what surfaces look at was seen by no camera and is guessed"),
+        (grade.missing, f"{percent(grade.missing, 0)} of what surfaces look at was seen by no camera and is left open"),
+        (
+            grade.at_bound,
+            f"the albedo of {percent(grade.at_bound, 0)} is as high as it may be, as if light were missing",
+        ),
     ]
     reasons = "; ".join([words for size, words in sorted(parts, reverse=True) if size >= LEAST] + _lamps(grade.lamps))
     error = f"lights found by bounced light are expected to be {100.0 * grade.error:.1f} % of its size off"
@@ -139,7 +143,3 @@ def _advice(grade: SceneGrade) -> str:
         )
     place = ", ".join(f"{value:.2f}" for value in grade.unseen_at)
     return f"Photograph what no view shows, first of all around ({place}); the report draws guesses in colour."
-
-
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.0f} %"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -16,7 +16,7 @@ from rgspipe.fitting.findings import Dark, Finding, FitStatus, gravest
 from rgspipe.fitting.in_sight.lamp import LampInSight
 from rgspipe.fitting.model.known_images import Strength
 from rgspipe.fitting.result_text import ambient_line, as_html, as_text, base_line, headline, light_lines
-from rgspipe.fitting.words import PYTHON, Spoken, explained, told_alternative
+from rgspipe.fitting.words import explained, told_alternative
 from rgspipe.scene import LightRig
 from rgspipe.scene.shapes import Float
 
@@ -117,11 +117,11 @@ class FitResult:
             lines.append(base_line(self.base_scale))
         return first, lines, self.reason
 
-    def save(self, path: str | Path, spoken: Spoken = PYTHON, **more: object) -> None:
+    def save(self, path: str | Path, words: Callable[[str], str] = str, **more: object) -> None:
         """Write a light file with the covariances, and beside the lights how the fit went.
 
         Args:
-            spoken: how settings are named in `reason`.
+            words: for who reads `reason`, such as with keys of the command line for options of Python.
             more: further fields of the file, such as JSON holds.
         """
         fit = {
@@ -132,7 +132,7 @@ class FitResult:
             "costs": {str(count): cost for count, cost in self.costs.items()},
             "seconds": round(self.seconds, 4),
             "result": str(self.status),
-            "reason": explained(self.findings, spoken),
+            "reason": words(explained(self.findings)),
             "findings": [finding.data() for finding in self.findings],
             "exposures": list(self.exposures),
             "emitters": [lamp.data() for lamp in self.lamps],

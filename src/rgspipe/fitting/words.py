@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 
 from rgspipe.fitting.alternative import Alternative
 from rgspipe.fitting.findings import (
@@ -31,6 +30,7 @@ from rgspipe.fitting.findings import (
     Undetermined,
     gravest,
 )
+from rgspipe.percent import percent
 
 #: What a status means and what to do, where no finding says more.
 MEANINGS = {
@@ -52,32 +52,12 @@ MEANINGS = {
 FIELDS = {"direction": "axis", "cone_angle": "cone"}
 
 
-@dataclass(frozen=True)
-class Spoken:
-    """How settings are named to whoever reads.
-
-    Attributes:
-        count: a given number of lights; takes the number.
-        uncounted: a number of lights that is to be found.
-        ambient: light from all around besides.
-        setting: a number that steers a search; takes its place in `SearchOptions`.
-    """
-
-    count: Callable[[int], str]
-    uncounted: str
-    ambient: str
-    setting: Callable[[str], str]
-
-
-PYTHON = Spoken("LightSpec(count={})".format, "LightSpec(count=None)", "LightSpec(ambient=True)", "Search.{}".format)
-
-
-def explained(findings: Sequence[Finding], spoken: Spoken = PYTHON) -> str:
+def explained(findings: Sequence[Finding]) -> str:
     """All that was found, in sentences."""
     status = gravest(findings)
     order = list(FitStatus)
     told = sorted(findings, key=lambda finding: order.index(finding.status))
-    parts = [_sentence(finding, spoken) for finding in told]
+    parts = [_sentence(finding) for finding in told]
     if not told or told[0].status is FitStatus.CONVERGED or status is FitStatus.UNDETERMINED:
         parts.insert(0, MEANINGS[status])
     return " ".join(_joined(parts))
@@ -88,7 +68,7 @@ def told_alternative(one: Alternative) -> str:
     if one.more > 0:
         if one.cost > 0.995:
             return f"{len(one.lights)} lights do not lower the cost."
-        gain = f"{len(one.lights)} lights lower the cost by {percent(1.0 - one.cost)}"
+        gain = f"{len(one.lights)} lights lower the cost by {percent(1.0 - one.cost, 0)}"
         return f"{gain}{', too little to count' if one.ruled_out else ''}."
     if one.more < 0:
         fewer = f"{_lights(len(one.lights))}: {_times(one.cost)} the cost"
@@ -107,7 +87,7 @@ def told_costs(costs: Mapping[int, float]) -> str:
     if len(costs) < 2:
         return ""
     (fewest, most), *others = sorted(costs.items())
-    shares = (f"{count} leave {percent(cost / most) if most > 0.0 else 'all of it'}" for count, cost in others)
+    shares = (f"{count} leave {percent(cost / most, 0) if most > 0.0 else 'all of it'}" for count, cost in others)
     return f"Of what {_lights(fewest)} leave{'s' * (fewest == 1)} unexplained, {', '.join(shares)}."
 
 
@@ -124,113 +104,113 @@ def _joined(parts: Sequence[str]) -> list[str]:
     return list(dict.fromkeys(parts))
 
 
-def _sentence(finding: Finding, spoken: Spoken) -> str:
+def _sentence(finding: Finding) -> str:
     words = _WORDS.get(type(finding))
-    told = MEANINGS[finding.status] if words is None else words(finding, spoken)
-    return " ".join([told, *_decided(finding, spoken)])
+    told = MEANINGS[finding.status] if words is None else words(finding)
+    return " ".join([told, *_decided(finding)])
 
 
-def _decided(finding: Finding, spoken: Spoken) -> list[str]:
+def _decided(finding: Finding) -> list[str]:
     """By which settings, in a sentence; none where no setting decides."""
-    names = [spoken.setting(name) for name in finding.decided_by]
+    names = [f"Search.{name}" for name in finding.decided_by]
     together = [", ".join(names[:-1]), names[-1]] if len(names) > 1 else names
     return [f"Decided by {' and '.join(together)}."] if names else []
 
 
-def _missing(found: LightMissing, spoken: Spoken) -> str:
-    more = f"One more light would lower the cost by {percent(found.gain)}: fit with {spoken.count(found.count + 1)}"
-    return f"{more}, or {spoken.uncounted} to have them counted."
+def _missing(found: LightMissing) -> str:
+    more = f"One more light would lower the cost by {percent(found.gain, 0)}"
+    return f"{more}: fit with LightSpec(count={found.count + 1}), or LightSpec(count=None) to have them counted."
 
 
-def _rival(found: Rival, spoken: Spoken) -> str:
+def _rival(found: Rival) -> str:
     others = "The others are more, or fewer"
     if found.distance is not None:
-        others = f"One of those stands {percent(found.distance)} of the scene's size away from where it stands here"
+        others = f"One of those stands {percent(found.distance, 0)} of the scene's size away from where it stands here"
     return f"{MEANINGS[found.status]} {others}."
 
 
-def _spare(found: LightSpare, spoken: Spoken) -> str:
-    little = f"lowers the cost by {percent(found.gain)} only" if found.gain >= 0.005 else "does not lower the cost"
-    less = f"Light {found.number} {little} and may not be there (it counts from {percent(found.wanted)} on): "
-    return f"{less}fit with {spoken.count(found.count - 1)}, or {spoken.uncounted} to have them counted."
+def _spare(found: LightSpare) -> str:
+    little = f"lowers the cost by {percent(found.gain, 0)} only" if found.gain >= 0.005 else "does not lower the cost"
+    less = f"Light {found.number} {little} and may not be there (it counts from {percent(found.wanted, 0)} on): "
+    return f"{less}fit with LightSpec(count={found.count - 1}), or LightSpec(count=None) to have them counted."
 
 
-def _undetermined(found: Undetermined, spoken: Spoken) -> str:
+def _undetermined(found: Undetermined) -> str:
     names = " and ".join(map(_field, found.fields))
     return f"Not determined by these views: {names}{_of_light(found.number, found.count)}."
 
 
-def _rough(found: RoughShape, spoken: Spoken) -> str:
+def _rough(found: RoughShape) -> str:
     errors = zip(found.fields, found.errors, strict=True)
-    names = " and ".join(f"{_field(name)} (by {percent(min(error, 1.0))})" for name, error in errors)
+    names = " and ".join(f"{_field(name)} (by {percent(min(error, 1.0), 0)})" for name, error in errors)
     return f"Hardly determined by these views: {names}{_of_light(found.number, found.count)}."
 
 
-def _uncertain(found: Uncertain, spoken: Spoken) -> str:
+def _uncertain(found: Uncertain) -> str:
     if found.distant:
         aim = f"the direction{_of_light(found.number, found.count)}"
         return f"Uncertain: {aim} by {math.degrees(found.error):.0f}°; give more views, or a sharper scene."
     place = f"the position{_of_light(found.number, found.count)}"
-    return f"Uncertain: {place} by {percent(found.error)} of the scene's size; give more views, or a sharper scene."
+    return f"Uncertain: {place} by {percent(found.error, 0)} of the scene's size; give more views, or a sharper scene."
 
 
-def _on_surface(found: OnSurface, spoken: Spoken) -> str:
+def _on_surface(found: OnSurface) -> str:
     which = _the_light(found.number, found.count)
     return f"{which} stands on a surface, where lights that belong elsewhere are stopped: give more views."
 
 
-def _poor_scene(found: PoorScene, spoken: Spoken) -> str:
-    return f"The scene is poor: lights in it are expected to be off by {percent(found.error)} of its size."
+def _poor_scene(found: PoorScene) -> str:
+    return f"The scene is poor: lights in it are expected to be off by {percent(found.error, 0)} of its size."
 
 
-def _all_steps(found: AllStepsTaken, spoken: Spoken) -> str:
+def _all_steps(found: AllStepsTaken) -> str:
     change = 100.0 * found.change
     words = "hardly changed" if abs(change) < 1.0 else f"{'fell' if change < 0.0 else 'rose'} by {abs(change):.0f} %"
     return f"All {found.steps} steps were taken; over the last epoch the loss {words}."
 
 
-def _maybe(found: MaybeOneMore, spoken: Spoken) -> str:
-    more = f"One more light would lower the cost by {percent(found.gain)}: there may be one"
-    return f"{more} (it counts from {percent(found.wanted)} on)."
+def _maybe(found: MaybeOneMore) -> str:
+    more = f"One more light would lower the cost by {percent(found.gain, 0)}: there may be one"
+    return f"{more} (it counts from {percent(found.wanted, 0)} on)."
 
 
-def _exposure(found: ExposureUnknown, spoken: Spoken) -> str:
+def _exposure(found: ExposureUnknown) -> str:
     return "One view cannot tell its exposure from the lights' intensity: intensities are relative to the exposure."
 
 
-def _hangs(found: Hangs, spoken: Spoken) -> str:
+def _hangs(found: Hangs) -> str:
     return f"{_the_light(found.number, found.count)} hangs {found.distance:.2g} (scene units) from its surface."
 
 
-def _extent_open(found: ExtentOpen, spoken: Spoken) -> str:
+def _extent_open(found: ExtentOpen) -> str:
     which = _the_light(found.number, found.count)
     return f"{which} may be a {found.kind} of up to {found.size:.2g} (scene units): these views would not show it."
 
 
-def _kind_open(found: KindOpen, spoken: Spoken) -> str:
+def _kind_open(found: KindOpen) -> str:
     return f"{_the_light(found.number, found.count)} may as well be of the kind {found.kind}: these views do not tell."
 
 
-def _elsewhere(found: LampElsewhere, spoken: Spoken) -> str:
+def _elsewhere(found: LampElsewhere) -> str:
     place = f"at column {found.column:.0f}, row {found.row:.0f} of view {found.view}"
     return f"A lamp is in sight {place}, and no light was found there: there may be more lights, or it is no lamp."
 
 
-def _left_out(found: LampsLeftOut, spoken: Spoken) -> str:
+def _left_out(found: LampsLeftOut) -> str:
     views = f"{found.views} views" if found.views > 1 else "one view"
     return f"Pixels of lamps in sight were left out: {found.pixels} in {views}."
 
 
-def _much_ambient(found: MuchAmbient, spoken: Spoken) -> str:
-    return f"{percent(found.share)} of the light in the images comes from all around, through openings."
+def _much_ambient(found: MuchAmbient) -> str:
+    return f"{percent(found.share, 0)} of the light in the images comes from all around, through openings."
 
 
-def _maybe_ambient(found: MaybeAmbient, spoken: Spoken) -> str:
-    gain = f"Light from all around would lower the cost by {percent(found.gain)}: there may be some"
-    return f"{gain}; allow for it ({spoken.ambient}), or give images with the lamps off."
+def _maybe_ambient(found: MaybeAmbient) -> str:
+    gain = f"Light from all around would lower the cost by {percent(found.gain, 0)}: there may be some"
+    return f"{gain}; allow for it (LightSpec(ambient=True)), or give images with the lamps off."
 
 
-def _no_opening(found: NoOpening, spoken: Spoken) -> str:
+def _no_opening(found: NoOpening) -> str:
     return "The scene is closed: no light comes in from outside."
 
 
@@ -256,11 +236,6 @@ _WORDS: dict[type[Finding], Callable[..., str]] = {
     MaybeAmbient: _maybe_ambient,
     NoOpening: _no_opening,
 }
-
-
-def percent(share: float) -> str:
-    """A share in words."""
-    return f"{100.0 * share:.0f} %"
 
 
 def _field(name: str) -> str:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from rgspipe.config import RgspipeConfig, get_value, with_changes
+from rgspipe.config.spoken import told_with_keys
 from rgspipe.datasets.reading_limits import reading_within
 from rgspipe.errors import InputError
 from rgspipe.graph.commands import as_override, command
@@ -222,7 +223,7 @@ def run(
         InputError: an input cannot be used, or is missing under `upstream=require`; the store cannot be read or
             written to, or its disk is full.
     """
-    with told_below(Path(config.outputs)), reading_within(config.limits):
+    with told_with_keys(), told_below(Path(config.outputs)), reading_within(config.limits):
         return _run(config, load_stage, overrides, usual)
 
 

@@ -24,7 +24,7 @@ def check_world(world: World) -> None:
     """Refuse a unit that nothing is measured in.
 
     Raises:
-        InputError: it is of no length, or of one beyond those of `export.metres`, or scaled by nothing.
+        InputError: it is of no length, or of one beyond those of a world, or scaled by nothing.
     """
     if not LEAST_METRES <= world.metres <= MOST_METRES:
         expected, found = f"{LEAST_METRES:g} to {MOST_METRES:g}", f"{world.metres:g}"

@@ -10,7 +10,8 @@ import pandas as pd
 
 from rgspipe.evaluation import goals
 from rgspipe.evaluation.classes import ALL
-from rgspipe.pages.html import decimals, percent
+from rgspipe.pages.html import decimals
+from rgspipe.percent import percent
 
 #: Columns of a quality table that are highlights.
 _QUALITY = ("psnr", "psnr_off_edges", "ssim", "flip", "albedo_l1")

@@ -11,8 +11,9 @@ import jinja2
 import pandas as pd
 from matplotlib.figure import Figure
 
-from rgspipe.evaluation import goals, images, plots
+from rgspipe.evaluation import images, plots
 from rgspipe.evaluation.classes import ALL
+from rgspipe.percent import percent
 
 #: Pixels of the page that an inch of a figure takes at most, so that letters have one size in all of them.
 INCH = 106
@@ -31,11 +32,6 @@ def render(template: str, **values: Any) -> str:
     )
     environment.filters |= {"percent": percent, "bare_percent": bare_percent, "decimals": decimals, "label": label}
     return environment.get_template(template).render(**values)
-
-
-def percent(value: Any, digits: int = 2) -> str:
-    """A fraction as percent."""
-    return MISSING if value is None or pd.isna(value) else goals.percent(float(value), digits)
 
 
 def bare_percent(value: Any, digits: int = 2) -> str:

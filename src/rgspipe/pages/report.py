@@ -16,13 +16,14 @@ from rgspipe.evaluation.quality_plots import split_figure
 from rgspipe.pages.gallery import Gallery, Shot
 from rgspipe.pages.glossary import GLOSSARY
 from rgspipe.pages.highlights import highlights, tiles
-from rgspipe.pages.html import MISSING, data_address, decimals, figure_address, percent, picture_address, render
+from rgspipe.pages.html import MISSING, data_address, decimals, figure_address, picture_address, render
 from rgspipe.pages.light_studies import LightStudy, light_studies
 from rgspipe.pages.provenance import StageRecord
 from rgspipe.pages.quality import compared_lights, quality_columns, quality_rows
 from rgspipe.pages.relit import Relighting, relightings
 from rgspipe.pages.room_view import Alternatives, room_view
 from rgspipe.pages.section import Section, shown_sections
+from rgspipe.percent import percent
 from rgspipe.scene import Surfels
 from rgspipe.scene.grade import SceneGrade
 from rgspipe.studies.capture_figure import capture_figure

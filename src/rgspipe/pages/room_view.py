@@ -16,7 +16,8 @@ from rgspipe.evaluation import calibration
 from rgspipe.evaluation.light_plot import CameraMark, nearer
 from rgspipe.evaluation.plots import colour_of
 from rgspipe.evaluation.tables import VARIANCES
-from rgspipe.pages.html import label, percent
+from rgspipe.pages.html import label
+from rgspipe.percent import percent
 from rgspipe.scene import Surfels
 from rgspipe.scene.srgb import encode
 

@@ -42,9 +42,10 @@ def _oriented(surfels: Surfels, path: Path, options: PlyOptions, *, own: bool) -
             raise InputError(
                 f"{path}: fronts",
                 expected="to know which side of each surfel is seen: other programs draw both, light falls on one",
-                found=f"scene.ply.fronts={options.fronts} and no cameras.json beside the file or in its model's folder",
-                remedy="Set scene.ply.fronts=outwards for an object in empty space, inwards for a room, kept to trust "
-                "the rotations, or scene.ply.cameras=FILE (cameras.json or a transforms file).",
+                found=f"PlyOptions(fronts={options.fronts!r}) and no cameras.json beside the file or in its model's "
+                "folder",
+                remedy="Set PlyOptions(fronts='outwards') for an object in empty space, inwards for a room, kept to "
+                "trust the rotations, or PlyOptions(cameras=FILE) (cameras.json or a transforms file).",
             )
         away, where = backs_towards_cameras(surfels, read_viewpoints(cameras)), f"the cameras in {cameras}"
     else:

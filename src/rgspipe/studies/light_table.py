@@ -9,9 +9,9 @@ from typing import Any
 import pandas as pd
 
 from rgspipe.evaluation.classes import ALL
-from rgspipe.evaluation.goals import percent
 from rgspipe.evaluation.markdown import markdown_lines
 from rgspipe.evaluation.plots import LABELS
+from rgspipe.percent import percent
 from rgspipe.studies.lights import STATUSES, several, without_repeats
 
 Row = dict[str, Any]

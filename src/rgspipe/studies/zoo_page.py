@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pandas as pd
 
-from rgspipe.evaluation.goals import percent
 from rgspipe.evaluation.markdown import markdown_lines, markdown_table
 from rgspipe.evaluation.plots import LABELS
+from rgspipe.percent import percent
 from rgspipe.studies.light_table import Row, with_interval
 from rgspipe.studies.lights import several
 from rgspipe.studies.written import FIGURE

@@ -48,10 +48,11 @@ class OperatorStore:
     Args:
         budget_mib: of the operators in memory.
         folder: on the disk that the file goes to; by default the system's for temporary files.
+        name: of the options whose `memory_mib` the budget is, for errors.
     """
 
-    def __init__(self, budget_mib: float = math.inf, folder: Path | None = None) -> None:
-        self._budget, self._folder = budget_mib * MIB, folder
+    def __init__(self, budget_mib: float = math.inf, folder: Path | None = None, name: str = "TrainOptions") -> None:
+        self._budget, self._folder, self._name = budget_mib * MIB, folder, name
         self._file: _PageFile | None = None
         self.stored = Stored()
 
@@ -81,7 +82,7 @@ class OperatorStore:
     def beside(self) -> OperatorStore:
         """A store for operators that are dropped sooner, with what this one leaves of the budget."""
         left = self._budget - self.stored.memory if self._file is None else 0.0
-        return OperatorStore(left / MIB, self._folder)
+        return OperatorStore(left / MIB, self._folder, self._name)
 
     def _no_room(self, size: int, error: OSError) -> InputError:
         kept = (self.stored.memory + self.stored.file) / MIB
@@ -89,8 +90,8 @@ class OperatorStore:
             self._folder or tempfile.gettempdir(),
             expected=f"room for {size / MIB:.1f} MiB more of the views' operators, after {kept:.0f} MiB",
             found=str(error),
-            remedy="Free disk space there, raise train.memory_mib if the machine has memory left, "
-            "or train on fewer (capture.views) or smaller images.",
+            remedy=f"Free disk space there, raise {self._name}.memory_mib if the machine has memory left, "
+            "or take fewer (Capture.views) or smaller images.",
         )
 
 

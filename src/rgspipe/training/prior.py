@@ -37,8 +37,13 @@ OUTLIER = 0.1
 #: Rounds of reweighting.
 ROUNDS = 10
 
+#: What asks training for a prior, and what does without.
+FROM_MAPS, NO_PRIOR = "prior_from_maps(views)", "rg.train(prior=None)"
 
-def albedo_prior(weights: Iterable[ViewWeights], views: Sequence[View]) -> tuple[Tensor, Tensor]:
+
+def albedo_prior(
+    weights: Iterable[ViewWeights], views: Sequence[View], asked: str = FROM_MAPS, otherwise: str = NO_PRIOR
+) -> tuple[Tensor, Tensor]:
     """Albedo that the views' albedo maps agree on.
 
         log a_vi = log s_v + log ρ_i
@@ -49,6 +54,8 @@ def albedo_prior(weights: Iterable[ViewWeights], views: Sequence[View]) -> tuple
     Args:
         weights: view weights of the V views on N surfels.
         views: those with an albedo map count.
+        asked: what asks for a prior, for errors.
+        otherwise: what does without.
 
     Returns:
         albedo (N, 3) in [DARKEST, 1], and weight (N,) in [0, 1]: 1/(1 + (spread/HALF_SPREAD)²) by the spread of
@@ -57,7 +64,7 @@ def albedo_prior(weights: Iterable[ViewWeights], views: Sequence[View]) -> tuple
     Raises:
         InputError: no view has an albedo map.
     """
-    _require_maps(views)
+    _require_maps(views, asked, otherwise)
     pairs = ((weight, view) for weight, view in zip(weights, views, strict=True) if view.albedo is not None)
     logs, shares = (torch.stack(parts) for parts in zip(*(_on_surfels(*pair) for pair in pairs), strict=True))
     channels = [_common(logs[:, :, channel], shares) for channel in range(3)]
@@ -97,7 +104,7 @@ def prior_from_maps(views: Sequence[View], strength: float) -> PriorOf:
     Raises:
         InputError: no view has an albedo map.
     """
-    _require_maps(views)
+    _require_maps(views, FROM_MAPS, NO_PRIOR)
 
     def prior(surfels: Surfels) -> AlbedoPrior:
         # Edges are left out, so one ray a pixel says enough.
@@ -128,13 +135,13 @@ def _median(values: Tensor, weights: Tensor) -> Tensor:
     return torch.where(heights[-1] > 0, median, 0.0)
 
 
-def _require_maps(views: Sequence[View]) -> None:
+def _require_maps(views: Sequence[View], asked: str, otherwise: str) -> None:
     if all(view.albedo is None for view in views):
         raise InputError(
-            "train.albedo_prior=dataset",
+            asked,
             expected="training views with albedo maps",
             found=f"none in {len(views)} views",
-            remedy='Give their frames an "albedo_path", or use train.albedo_prior=none.',
+            remedy=f'Give their frames an "albedo_path", or use {otherwise}.',
         )
 
 

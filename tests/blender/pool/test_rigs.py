@@ -81,11 +81,11 @@ def test_headlights_go_in_pairs_of_one_intensity() -> None:
 @pytest.mark.parametrize(
     ("values", "words"),
     [
-        ({"count": (3, 2)}, r"targets\.count.*3 to 2"),
-        ({"count": (1, 13)}, r"targets\.count.*12 lights of the pool"),
-        ({"count": (2, 4), "weakest": 0.25}, r"targets\.weakest.*below 0\.25"),
-        ({"count": (2, 2), "weakest": 0.499}, r"2 lights.*none in .* draws.*targets\.weakest"),
-        ({"count": (3, 3), "separation": 1.2}, r"at least 1\.2 from each other.*targets\.separation"),
+        ({"count": (3, 2)}, r"RigRequest\.count.*3 to 2"),
+        ({"count": (1, 13)}, r"RigRequest\.count.*12 lights of the pool"),
+        ({"count": (2, 4), "weakest": 0.25}, r"RigRequest\.weakest.*below 0\.25"),
+        ({"count": (2, 2), "weakest": 0.499}, r"2 lights.*none in .* draws.*RigRequest\.weakest"),
+        ({"count": (3, 3), "separation": 1.2}, r"at least 1\.2 from each other.*RigRequest\.separation"),
     ],
 )
 def test_what_can_not_be_is_refused_with_a_way_out(values: dict, words: str) -> None:

@@ -14,6 +14,7 @@ from luminaire_files import ies
 from rgspipe.blender.pool.job import SpotRange
 from rgspipe.blender.pool.pool_file import PooledLight, write_pool
 from rgspipe.config import RgspipeConfig, with_changes
+from rgspipe.config.spoken import told_with_keys
 from rgspipe.datasets.exr import write_image
 from rgspipe.datasets.json_file import read_json
 from rgspipe.datasets.light_file import read_lights
@@ -177,7 +178,7 @@ def test_angles_are_given_in_degrees_and_blends_as_they_are() -> None:
 def test_what_can_not_be_made_is_refused_before_anything_is_made(values: dict, words: str) -> None:
     config = _config(**values)
     stage = render_olat.STAGE if config.stage == "render_olat" else generate_targets.STAGE
-    with pytest.raises(InputError, match=words):
+    with pytest.raises(InputError, match=words), told_with_keys():
         stage.needs(config)
 
 

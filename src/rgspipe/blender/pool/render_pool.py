@@ -11,16 +11,19 @@ from rgspipe.blender.pool.job import PoolJob
 from rgspipe.blender.process import SCRATCH, run_blender
 
 
-def render_pool(job: PoolJob, folder: Path, options: BlenderOptions = OWN_BLENDER) -> None:
+def render_pool(job: PoolJob, folder: Path, options: BlenderOptions = OWN_BLENDER, otherwise: str = "") -> None:
     """Render the lights of `job` into `folder`; images that are already there and whole are kept.
 
     May be killed at any moment and called again: the result is the same.
+
+    Args:
+        otherwise: how to do without Blender, a sentence for the error where there is none.
 
     Raises:
         InputError: there is no Blender, the scene cannot be used, or `folder` holds the images of another job.
         RuntimeError: Blender died; the message ends with the last lines it wrote.
     """
-    blender = find_blender(options, "fit.targets", "The dataset's own targets need none: fit.targets=dataset.")
+    blender = find_blender(options, "fit targets", otherwise)
     run_blender(blender, __name__, job.to_json(), job.dataset.scene, folder)
 
 

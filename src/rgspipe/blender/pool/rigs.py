@@ -146,7 +146,7 @@ def _draw(pool: _Pool, request: RigRequest, number: int) -> RigPlan:
         expected=f"rigs of {count} lights, at least {request.separation:g} from each other, each with at least "
         f"{request.weakest:g} of the mean radiance",
         found=f"none in {MAX_DRAWS} draws from {size} lights",
-        remedy="Lower targets.weakest or targets.separation, or raise targets.pool.",
+        remedy="Lower RigRequest.weakest or RigRequest.separation, or have more lights in the pool.",
     )
 
 
@@ -159,14 +159,13 @@ def check_request(size: int, request: RigRequest) -> None:
     fewest, most = request.count
     if fewest > most:
         found = f"{fewest} to {most}"
-        raise InputError("targets.count", expected="fewest, then most", found=found, remedy="Put them in order.")
+        raise InputError("RigRequest.count", expected="fewest, then most", found=found, remedy="Put them in order.")
     if most > size:
-        raise InputError(
-            "targets.count", expected=f"at most the {size} lights of the pool", found=str(most), remedy="Ask for fewer."
-        )
+        expected = f"at most the {size} lights of the pool"
+        raise InputError("RigRequest.count", expected=expected, found=str(most), remedy="Ask for fewer.")
     if most > 1 and most * request.weakest >= 1.0:
         raise InputError(
-            "targets.weakest",
+            "RigRequest.weakest",
             expected=f"below {1.0 / most:.3g}: {most} lights share the whole",
             found=f"{request.weakest:g}",
             remedy="Lower it, or ask for fewer lights.",

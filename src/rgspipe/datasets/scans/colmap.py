@@ -52,14 +52,14 @@ def read(root: Path, options: ScanOptions) -> Scan:
     """
     found = _model(root)
     if found is None:
-        raise InputError(root, expected=WANTED, found="no model", remedy="Run colmap mapper, or correct scene.path.")
+        raise InputError(root, expected=WANTED, found="no model", remedy="Run colmap mapper, or correct the path.")
     cameras_path, images_path = found
     cameras, photographs = read_cameras(cameras_path), read_images(images_path)
     folder = next((root / name for name in IMAGES if is_there(root / name / photographs[0].name)), root / IMAGES[0])
     # The order of the file is that of registration.
     ordered = sorted(photographs, key=lambda one: one.name)
     frames = tuple(_frame(one, cameras, root, folder, images_path, options) for one in ordered)
-    unit = "lengths are in the model's own unit, which is metres only if it was scaled (scene.rgbd.pose_unit)"
+    unit = "lengths are in the model's own unit, which is metres only if it was scaled (ScanOptions.pose_unit)"
     return Scan("colmap", images_path, (cameras_path, images_path), frames, options.camera_axes(AXES), (unit,))
 
 

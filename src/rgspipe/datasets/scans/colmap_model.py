@@ -89,7 +89,7 @@ def _lens(path: Path, model: str, size: Sequence[int], values: Sequence[float]) 
             path,
             expected=f"cameras of the models {', '.join(name for name, _ in MODELS.values())}",
             found=shown(model),
-            remedy="Undistort the photographs (colmap image_undistorter) and give its output as scene.path.",
+            remedy="Undistort the photographs (colmap image_undistorter) and give its output in the place of this.",
         )
     if len(values) != parameters:
         expected, remedy = f"{parameters} parameters of a camera of the model {model}", REWRITE

@@ -51,8 +51,8 @@ def read(root: Path, options: ScanOptions) -> Scan:
     field = options.fov or USUAL_FIELD
     lens = lens_by_field(image, field)
     frame = ScanFrame(image, lens, level_pose(), DepthImage(depth, unit), _partner(root, image, "albedo"))
-    scale = "of median depth 1, not in metres" if options.depth_unit is None else "by scene.rgbd.depth_unit"
-    notes = (f"a field of view of {field:g}° is taken for granted (scene.rgbd.fov)", f"lengths are {scale}")
+    scale = "of median depth 1, not in metres" if options.depth_unit is None else "by ScanOptions.depth_unit"
+    notes = (f"a field of view of {field:g}° is taken for granted (ScanOptions.fov)", f"lengths are {scale}")
     return Scan("iid", image, (), (frame,), options.camera_axes(AXES), notes)
 
 

@@ -50,7 +50,7 @@ def read(root: Path, options: ScanOptions) -> Scan:
         albedo,
         material,
     )
-    notes = (f"a field of view of {field:g}° is taken for granted (scene.rgbd.fov)",)
+    notes = (f"a field of view of {field:g}° is taken for granted (ScanOptions.fov)",)
     return Scan("interiorverse", image, (), (frame,), options.camera_axes(AXES), notes)
 
 

@@ -35,8 +35,8 @@ def read_scan(root: str | Path, options: ScanOptions, *, depth: bool = True) -> 
             root,
             expected="depth of the photographs, where the layout has it (docs/reference/capture_layouts.md)",
             found="none: poses, and the points of a sparse model, are no surfaces",
-            remedy="Of COLMAP, run image_undistorter and patch_match_stereo and give its workspace as scene.path; else "
-            "add depth of a sensor in the unit of the poses, or give a mesh of the room: scene=mesh scene.path=FILE.",
+            remedy="Of COLMAP, run image_undistorter and patch_match_stereo and give its workspace; else "
+            "add depth of a sensor in the unit of the poses, or give a mesh of the room: read_mesh(FILE).",
         )
     for frame in scan.frames:
         check_lens(frame.lens, f"{scan.stated}: intrinsics of {frame.image.name}")
@@ -55,13 +55,13 @@ def _layout(root: Path, options: ScanOptions) -> str:
                 root,
                 expected=f"{wanted}, of a capture in the layout {options.format}",
                 found=f"{_listed(root)}{others}",
-                remedy="Correct scene.path or scene.rgbd.format.",
+                remedy="Correct the path or ScanOptions.format.",
             )
         return options.format
     if len(fitting) == 1:
         return fitting[0]
     if fitting:
-        remedy = f"Say which: scene.rgbd.format={fitting[0]}."
+        remedy = f"Say which: ScanOptions(format={fitting[0]!r})."
         found = f"files of {' and '.join(fitting)}"
         raise InputError(root, expected="a capture in one layout", found=found, remedy=remedy)
     wanted = "; ".join(f"{name}: {reader.WANTED}" for name, reader in READERS.items())
@@ -69,8 +69,9 @@ def _layout(root: Path, options: ScanOptions) -> str:
         root,
         expected=f"a capture in one of these layouts: {wanted}",
         found=_listed(root),
-        remedy="Correct scene.path: it is the folder that holds these. A dataset in our own layout is scene=external. "
-        "Photographs alone need poses and depth first, such as COLMAP's: see docs/guides/photographs.md.",
+        remedy="Correct the path: it is the folder that holds these. A dataset in our own layout is for "
+        "rg.load_views(folder). Photographs alone need poses and depth first, such as COLMAP's: see "
+        "docs/guides/photographs.md.",
     )
 
 

@@ -62,7 +62,7 @@ def read(root: Path, options: ScanOptions) -> Scan:
                 albedo if albedo.is_file() else None,
             )
         )
-    notes = (f"a field of view of {field:g}° is taken for granted (scene.rgbd.fov)",)
+    notes = (f"a field of view of {field:g}° is taken for granted (ScanOptions.fov)",)
     return Scan("openrooms", path, (path,), tuple(frames), options.camera_axes(AXES), notes)
 
 

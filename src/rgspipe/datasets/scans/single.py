@@ -23,7 +23,7 @@ def level_pose() -> Numbers:
 
 
 def chosen(images: Sequence[Path], root: Path, options: ScanOptions) -> Path:
-    """The photograph that scene.rgbd.photograph names, or the only one.
+    """The photograph that the options name, or the only one.
 
     Raises:
         InputError: there are none or several, or none of that name.
@@ -34,10 +34,10 @@ def chosen(images: Sequence[Path], root: Path, options: ScanOptions) -> Path:
         if len(fitting) == 1:
             return fitting[0]
         expected = f"a photograph of the name {options.photograph}"
-        raise InputError(root, expected=expected, found=names or "none", remedy="Correct scene.rgbd.photograph.")
+        raise InputError(root, expected=expected, found=names or "none", remedy="Correct ScanOptions.photograph.")
     if len(images) != 1:
         expected = "one photograph: without poses several do not go together"
-        remedy = "Say which: scene.rgbd.photograph=NAME."
+        remedy = "Say which: ScanOptions(photograph=NAME)."
         raise InputError(root, expected=expected, found=f"{len(images)} ({names})", remedy=remedy)
     return images[0]
 

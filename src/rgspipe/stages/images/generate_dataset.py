@@ -27,6 +27,9 @@ from rgspipe.store.artifacts import Artifact
 #: From this share of saturated pixels on, people are told.
 NOTICEABLE = 0.01
 
+#: What does without Blender.
+OTHERWISE = "Images that you have need none: scene=external or scene=rgbd."
+
 #: Names of files that a sentence lists.
 LISTED = 3
 
@@ -39,7 +42,7 @@ def run(context: StageContext) -> None:
         _take(context, context.inputs["import_scan"].folder())
     else:
         job = replace(dataset_job(context.config), lamps_known=context.config.scene.lamps == "known")
-        render_dataset(job, context.folder, context.config.blender)
+        render_dataset(job, context.folder, context.config.blender, OTHERWISE)
     context.note(kind=context.config.scene.kind)
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from rgspipe.capture.refusals import OFF
 from rgspipe.config import RgspipeConfig
+from rgspipe.config.spoken import as_keys
 from rgspipe.datasets.gs3 import load_dataset
 from rgspipe.datasets.mesh_file import read_mesh
 from rgspipe.datasets.mesh_links import mesh_files
@@ -31,7 +32,7 @@ def run(context: StageContext) -> None:
         check_scan(scan, views)
     else:
         check_mesh(scan, views, mesh, mesh_path(config), config.scene.mesh)
-    print(imported.words(scan.layout))
+    print(as_keys(imported.words(scan.layout)))
     context.note(layout=scan.layout, frames=imported.frames, with_depth=imported.with_depth, exif=imported.exif)
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import pandas as pd
 
 from rgspipe.config import RgspipeConfig
+from rgspipe.config.spoken import as_keys
 from rgspipe.datasets.frames import read_entries
 from rgspipe.datasets.gs3 import load_target
 from rgspipe.datasets.location import dataset_root
@@ -34,7 +35,6 @@ from rgspipe.stages.lights.capture import KEYS as CAPTURE_KEYS
 from rgspipe.stages.lights.capture import captured_views, known_emitters
 from rgspipe.stages.lights.extras import Named, further_files, training_cameras
 from rgspipe.stages.lights.spec import light_spec, table_files
-from rgspipe.stages.lights.spoken import COMMAND_LINE
 from rgspipe.stages.lights.targets import all_targets, require_views, select_targets, target_seed, used_views
 from rgspipe.stages.scene.effects import chosen_effects, frozen_scene, wanted_effects
 from rgspipe.stages.sources import check_target, image_stage, require_images, target_stage
@@ -101,7 +101,7 @@ class Fitter:
         there = there and [image / exposure for image, exposure in zip(there, exposures, strict=True)]
         limit = capture.saturated_from
         saturated = None if limit is None else [image >= limit for image in taken]
-        write_result(folder / target.name, result, prepared, images, further, COMMAND_LINE, there, saturated)
+        write_result(folder / target.name, result, prepared, images, further, as_keys, there, saturated)
 
     def solver(self, seed: int = 0) -> Solver:
         """The method that is configured; `seed` is that of a target."""

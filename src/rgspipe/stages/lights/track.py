@@ -8,6 +8,7 @@ from pathlib import Path
 import torch
 
 from rgspipe.config import RgspipeConfig
+from rgspipe.config.spoken import as_keys
 from rgspipe.datasets.light_file import read_lights, write_lights
 from rgspipe.datasets.location import dataset_root, open_dataset
 from rgspipe.datasets.read_files import files_read
@@ -26,7 +27,6 @@ from rgspipe.stages.lights.capture import KEYS as CAPTURE_KEYS
 from rgspipe.stages.lights.capture import captured_views
 from rgspipe.stages.lights.fit_light import Fitter
 from rgspipe.stages.lights.spec import table_files
-from rgspipe.stages.lights.spoken import COMMAND_LINE
 from rgspipe.stages.lights.targets import used_views
 from rgspipe.store.files import write_bytes, write_text
 
@@ -51,7 +51,7 @@ def run(context: StageContext) -> None:
         told = {
             "status": str(frame.status),
             "result": str(frame.result.status),
-            "reason": explained(frame.result.findings, COMMAND_LINE),
+            "reason": as_keys(explained(frame.result.findings)),
         }
         write_lights(context.folder / "frames" / f"{name}.json", frame.result.lights, told)
     origins = torch.stack([view.camera.origin for view in views.prepared.views])

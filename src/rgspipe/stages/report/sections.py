@@ -16,9 +16,10 @@ from rgspipe.errors import InputError
 from rgspipe.evaluation.classes import class_of
 from rgspipe.evaluation.plots import png_of
 from rgspipe.pages.gallery import Shot, light_words, picture, spread
-from rgspipe.pages.html import bare_percent, decimals, label, percent
+from rgspipe.pages.html import bare_percent, decimals, label
 from rgspipe.pages.section import Section
 from rgspipe.pages.targets_figure import targets_figure
+from rgspipe.percent import percent
 from rgspipe.scene import LightRig, Surfels
 from rgspipe.stages.report.studies import newest_studies, study_rows
 from rgspipe.store.artifacts import Artifact, ArtifactStore, Key

@@ -16,6 +16,7 @@ from rgspipe.capture.captured import Captured, capture_scenes
 from rgspipe.capture.lamp_file import write_lamps
 from rgspipe.capture.options import CaptureOptions
 from rgspipe.capture.words import captured_words
+from rgspipe.config.spoken import as_keys
 from rgspipe.datasets.grade_file import GRADE, save_grade
 from rgspipe.datasets.light_file import read_lights
 from rgspipe.datasets.location import LAMPS_TRUTH, dataset_root, open_dataset
@@ -61,7 +62,8 @@ def run(context: StageContext) -> None:
     save_tensors(context.folder / "doubt.safetensors", {"log_albedo": found.doubt})
     for one in (found, *others):
         write_lamps(context.folder / (f"lamps_{one.lighting}.json" if one.lighting else "lamps.json"), one)
-        print(f"Lighting {one.lighting}: {captured_words(one)}" if one.lighting else captured_words(one))
+        words = as_keys(captured_words(one))
+        print(f"Lighting {one.lighting}: {words}" if one.lighting else words)
     frozen = FrozenScene.freeze(found.surfels, gather_rays=context.config.lamps.gather_rays)
     further = {one.lighting: _metrics(one) for one in others}
     metrics = (
@@ -84,7 +86,7 @@ def _metrics(found: Captured) -> dict[str, Any]:
     """What is known of the answer without a truth."""
     variances, certainty = found.answer.best.problem.field.variances, found.certainty
     return {
-        "words": captured_words(found),
+        "words": as_keys(captured_words(found)),
         "lamps": {
             "number": len(found.lamps),
             "spread": certainty.spread(found.frozen.size).tolist(),

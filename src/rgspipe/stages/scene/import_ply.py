@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from rgspipe.config import RgspipeConfig
+from rgspipe.config.spoken import as_keys
 from rgspipe.datasets.ply_cameras import find_cameras
 from rgspipe.datasets.ply_radiosity import find_config
 from rgspipe.datasets.surfel_file import save_surfels
@@ -17,6 +19,7 @@ def run(context: StageContext) -> None:
     """Write surfels.safetensors and conversion.json."""
     scene = context.config.scene
     surfels, conversion = load_ply(_path(context.config), scene.ply)
+    conversion = replace(conversion, notes=tuple(map(as_keys, conversion.notes)))
     save_surfels(context.folder / "surfels.safetensors", surfels)
     conversion.save(context.folder / "conversion.json")
     print("\n".join(conversion.lines()))

@@ -11,11 +11,11 @@ from rgspipe.datasets.location import dataset_root
 from rgspipe.datasets.mesh_file import read_mesh
 from rgspipe.datasets.mesh_links import mesh_files
 from rgspipe.datasets.surfel_file import save_surfels
-from rgspipe.datasets.tensoir import require_lights
 from rgspipe.degradation.capture import degraded
 from rgspipe.scene import NO_CLIP
 from rgspipe.stages.base import Stage, StageContext
 from rgspipe.stages.scene.detail import surfel_count
+from rgspipe.stages.scene.known_lights import require_lights
 from rgspipe.stages.sources import mesh_path
 from rgspipe.training.initialise import Footprint, initialise_surfels, surfels_on
 from rgspipe.training.initialise.mesh_cloud import cloud_from_mesh

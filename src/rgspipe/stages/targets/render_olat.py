@@ -26,13 +26,16 @@ from rgspipe.stages.sources import has_truth
 #: Of a camera: where it stands, what it looks at, degrees across.
 CAMERA_NUMBERS = 7
 
+#: What does without Blender.
+OTHERWISE = "The dataset's own targets need none: fit.targets=dataset."
+
 #: Kinds of targets with spots.
 SPOTS = ("spots", "mixed", "drive")
 
 
 def run(context: StageContext) -> None:
     """Leave the pool's files and images; a repeated run goes on where an interrupted one ended."""
-    render_pool(pool_job(context.config), context.folder, context.config.blender)
+    render_pool(pool_job(context.config), context.folder, context.config.blender, OTHERWISE)
     context.note(kind=context.config.targets.kind, lights=len(read_pool(context.folder)))
 
 

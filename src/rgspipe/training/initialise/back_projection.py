@@ -23,7 +23,7 @@ OUTLIER = 5.0
 
 DEPTH_HELP = (
     'Give the frames of transforms_train.json a "depth_path" and name the "depth_convention" (planar_z or '
-    "ray_distance) in dataset_info.json, or use a scene that Blender renders (scene=cornell, scene=blend)."
+    "ray_distance) in dataset_info.json, or use a scene that Blender renders (render_dataset(job))."
 )
 
 
@@ -118,9 +118,9 @@ def _pass(view: View, where: str | Path) -> tuple[np.ndarray, np.ndarray]:
     if view.normal is None:
         raise InputError(
             f"{where}: {view.name}",
-            expected="a normal pass, as init.normals=pass asks for",
+            expected="a normal pass, as initialise_surfels(normals='pass') asks for",
             found="none",
-            remedy='Give its frame a "normal_path", or use init.normals=estimate.',
+            remedy="Give its frame a \"normal_path\", or use initialise_surfels(normals='estimate').",
         )
     normals = view.normal.detach().cpu().double().numpy()
     length = np.linalg.norm(normals, axis=-1)

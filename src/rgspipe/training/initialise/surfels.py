@@ -96,7 +96,7 @@ def initialise_surfels(
             where,
             expected=f"at least {count} depth pixels on surfaces, one for each surfel",
             found=f"{len(cloud)} in {sum(view.depth is not None for view in views)} views",
-            remedy=f"Ask for at most {max(len(cloud) // 4, 1)} surfels (init.surfels), or give more views or a higher "
+            remedy=f"Ask for at most {max(len(cloud) // 4, 1)} surfels (surfels=…), or give more views or a higher "
             "resolution.",
         )
     return surfels_on(cloud, count, seed=seed, clips=clips, footprint=footprint)
