@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 
 import bpy
+import torch
 from mathutils import Vector
+from torch import Tensor
 
 from rgspipe.blender import passes
 from rgspipe.blender.job import RenderSettings
@@ -15,10 +18,21 @@ from rgspipe.blender.materials import diffuse_material
 from rgspipe.blender.meshes import add, polygon
 from rgspipe.blender.passes import Studio
 from rgspipe.blender.plan import Frame
+from rgspipe.errors import InputError
 from rgspipe.scene import Light, PointLight, SpotLight
+from rgspipe.scene.lights import Nodes
 from spots_on_plane import ALBEDO, SIZE, hard_spots, lopsided_luminaire, plane_camera, plane_lights
 
 SAMPLES = 1024
+
+
+class Tube(PointLight):
+    """Two points side by side, which Blender has no lamp for."""
+
+    kind = "tube"
+
+    def nodes(self, values: Mapping[str, Tensor], few: bool = False) -> Nodes:
+        return Nodes(values["position"] + torch.tensor([[-0.5, 0.0, 0.0], [0.5, 0.0, 0.0]]).to(values["position"]))
 
 
 def _render(studio: Studio, name: str, light: Light, folder: Path) -> None:
@@ -44,6 +58,10 @@ def main(folder: Path) -> None:
     for name, light in (lights | hard_spots() | {"luminaire": lopsided_luminaire()}).items():
         _render(studio, name, light, folder)
     _render(studio, "again", lights["point"], folder)
+    try:
+        place_lamp(bpy.data.objects.new("tube", None), Tube([0.0, 0.0, 1.0], 1.0))
+    except InputError as error:
+        (folder / "refused.txt").write_text(str(error))
     spot = lights["smoothstep"]
     passes.place_lamp = _blender_s_spot
     _render(studio, "blender", spot, folder)

@@ -63,3 +63,8 @@ def test_our_smoothstep_is_blender_s_spot(rendered: Path) -> None:
 
 def test_a_lamp_keeps_nothing_of_the_light_before(rendered: Path) -> None:
     assert (rendered / "again.exr").read_bytes() == (rendered / "point.exr").read_bytes()
+
+
+def test_a_light_whose_extent_blender_has_no_lamp_for_is_refused(rendered: Path) -> None:
+    told = (rendered / "refused.txt").read_text(encoding="utf-8")
+    assert "a tube: expected a lamp in one point, a sphere, a rectangle or a sun" in told

@@ -16,10 +16,12 @@ import bpy
 import torch
 from mathutils import Matrix
 
+from rgspipe.errors import InputError
 from rgspipe.light_export.ies import ies
+from rgspipe.light_export.parts import frame, is_of_another_shape, radius, rectangle
 from rgspipe.light_export.world import candela
 from rgspipe.scene import Light
-from rgspipe.scene.lights import WATTS_PER_INTENSITY, PanelLight, ProfileLight, SphereLight
+from rgspipe.scene.lights import WATTS_PER_INTENSITY, ProfileLight
 from rgspipe.scene.lights.coordinates import tangents
 
 #: What Cycles makes of a candela in a file of LM-63: 4π over the 177.83 lm/W of daylight.
@@ -47,21 +49,29 @@ def _lamp(light: Light) -> bpy.types.Light:
         lamp = bpy.data.lights.new("light", "SUN")
         lamp.angle = 0.0
         return lamp
-    return _panel(light) if isinstance(light, PanelLight) else _bulb(light)
+    if is_of_another_shape(light):
+        raise InputError(
+            f"a {light.label}",
+            expected="a lamp in one point, a sphere, a rectangle or a sun, as Blender has them",
+            found="an extent of another shape",
+            remedy="Choose such a light, or several.",
+        )
+    sides = rectangle(light)
+    return _bulb(light) if sides is None else _panel(*sides)
 
 
 def _energy(light: Light) -> float:
     """Blender's strength of a light of intensity 1: W, and of a sun W/m² across its light."""
     if light.distant:
         return 1.0
-    return float((light.power() / light.intensity).max()) if isinstance(light, PanelLight) else WATTS_PER_INTENSITY
+    return WATTS_PER_INTENSITY if rectangle(light) is None else float((light.power() / light.intensity).max())
 
 
 def _bulb(light: Light) -> bpy.types.Light:
     lamp = bpy.data.lights.new("light", "POINT")
     if "use_soft_falloff" in lamp.bl_rna.properties:  # Blender 4 and later
         lamp.use_soft_falloff = False
-    lamp.shadow_soft_size = light.radius if isinstance(light, SphereLight) else 0.0
+    lamp.shadow_soft_size = radius(light) or 0.0
     lamp.use_nodes = True
     nodes = _Nodes(lamp.node_tree)
     emission, output = nodes.add("ShaderNodeEmission"), nodes.add("ShaderNodeOutputLight")
@@ -93,18 +103,17 @@ def _table(nodes: _Nodes, light: ProfileLight) -> bpy.types.NodeSocket:
     return node.outputs["Fac"]
 
 
-def _panel(light: PanelLight) -> bpy.types.Light:
+def _panel(width: float, height: float) -> bpy.types.Light:
     lamp = bpy.data.lights.new("light", "AREA")
-    lamp.shape, lamp.size, lamp.size_y = "RECTANGLE", light.width, light.height
+    lamp.shape, lamp.size, lamp.size_y = "RECTANGLE", width, height
     return lamp
 
 
 def _pose(light: Light) -> Matrix:
     """Blender's lamps shine along −z; a panel's width is along x."""
     pose = torch.eye(4, dtype=torch.float64)
-    if isinstance(light, PanelLight):
-        across, up = light.sides()
-        pose[:3, :3] = torch.stack([across, -up, -light.axis / light.axis.norm()], dim=1)
+    if rectangle(light) is not None:
+        pose[:3, :3] = frame(light)
     elif light.distant:
         pose[:3, :3] = torch.cat([tangents(light.axis), -light.axis[None]]).T * torch.tensor([1.0, -1.0, 1.0])
     pose[:3, 3] = light.position
