@@ -40,6 +40,7 @@ class Photograph:
 
     @classmethod
     def of(cls, weights: ViewWeights, view: View) -> Photograph:
+        """A photograph and what its pixels see; edges count little, what is not the scene nothing."""
         whole = (weights.coverage >= LEAST_COVERAGE).cpu() & (view.alpha.reshape(-1) >= LEAST_COVERAGE)
         base = np.where(weights.edges.cpu().numpy(), LITTLE, 1.0) * whole.numpy()
         return cls(weights.operator, view, base.astype(np.float32))

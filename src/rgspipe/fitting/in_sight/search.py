@@ -67,10 +67,12 @@ class Lookout:
 
     @property
     def size(self) -> float:
+        """Longest side of the scene."""
         return self.views.prepared.frozen.size
 
     @property
     def sights(self) -> tuple[Sight, ...]:
+        """What the pixels look at, one a view."""
         return self.views.sights
 
     @cached_property

@@ -35,6 +35,7 @@ class CandidatePlaces:
 
     @classmethod
     def of(cls, coarse: CoarseImages) -> CandidatePlaces:
+        """Those whose images there are."""
         axes = None if coarse.axes is None else coarse.axes.double().cpu().numpy()
         return cls(coarse.positions.double().cpu().numpy(), axes, coarse.spacing)
 

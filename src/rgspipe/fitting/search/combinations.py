@@ -45,6 +45,7 @@ class Scored:
 
     @classmethod
     def of(cls, problem: LightProblem, coarse: CoarseImages) -> Scored:
+        """The candidates by how much of a target each explains."""
         target = (coarse.blocks @ problem.target).double()
         root = problem.block_weights(target, coarse.counts.to(target), coarse.blocks).sqrt()
         images = (coarse.images * root.to(coarse.images)).permute(0, 2, 1).contiguous()

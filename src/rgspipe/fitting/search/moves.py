@@ -33,9 +33,11 @@ class Region:
         return cls(*frozen.surroundings.bounds, frozen.size)
 
     def clip(self, position: Tensor) -> Tensor:
+        """The nearest place (3,) inside."""
         return torch.minimum(torch.maximum(position, self.lower), self.upper)
 
     def at_bound(self, position: Tensor) -> bool:
+        """Whether a place (3,) lies on its surface."""
         near = 1e-6 * self.size
         return bool(((position - self.lower < near) | (self.upper - position < near)).any())
 

@@ -49,6 +49,7 @@ class State:
     status: FitStatus = FitStatus.MAX_ITERATIONS
 
     def lights(self, problem: LightProblem) -> LightRig:
+        """The lights with their intensities, in the units of the images."""
         return tuple(
             emitter.shining(problem.scale * strength)
             for emitter, strength in zip(self.emitters, self.intensity[: len(self.emitters)], strict=True)

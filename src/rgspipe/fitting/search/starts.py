@@ -47,6 +47,7 @@ class Candidates:
         shape_free: bool = False,
         options: CombinationOptions | None = None,
     ) -> Candidates:
+        """Those of coarse images, ranked for a target."""
         return cls(problem, coarse, Scored.of(problem, coarse), shape_free, options or CombinationOptions())
 
     @property
@@ -64,6 +65,7 @@ class Candidates:
         return bool((single_gains(self.scored) > 0).any())
 
     def emitters(self, combination: Sequence[int]) -> EmitterRig:
+        """The lights of a combination, by their numbers."""
         return tuple(self.coarse.emitter(index, self.shape_free) for index in combination)
 
     def rigs(self, lights: int, count: int, size: float) -> list[EmitterRig]:
