@@ -9,8 +9,8 @@ import trimesh
 from PIL import Image
 
 from raycast import Cuboid
-from rgspipe.datasets.mesh_file import read_mesh
-from rgspipe.datasets.mesh_options import MeshOptions
+from rgspipe.datasets.mesh.file import read_mesh
+from rgspipe.datasets.mesh.options import MeshOptions
 from rgspipe.scene import srgb
 from rgspipe.scene.mesh import Paint, TriangleMesh
 

@@ -25,9 +25,9 @@ from rgspipe.datasets.light_file import light_fields, read_ambient, read_lights,
 from rgspipe.datasets.location import open_dataset
 from rgspipe.datasets.named_cameras import NamedCamera, read_camera, write_cameras
 from rgspipe.datasets.photometric_file import read_photometry
-from rgspipe.datasets.ply import read_ply
-from rgspipe.datasets.ply_cameras import read_viewpoints
-from rgspipe.datasets.ply_options import PlyOptions
+from rgspipe.datasets.ply.cameras import read_viewpoints
+from rgspipe.datasets.ply.file import read_ply
+from rgspipe.datasets.ply.options import PlyOptions
 from rgspipe.datasets.surfel_file import load_surfels, save_surfels
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import Camera, PointLight, SpotLight

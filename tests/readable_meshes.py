@@ -13,7 +13,7 @@ import trimesh
 from mesh_files import cuboid_triangles, quarters, textured_square, write_coloured
 from raycast import ROOM
 from readable_captures import Kind, Numbers
-from rgspipe.datasets.mesh_file import read_mesh
+from rgspipe.datasets.mesh.file import read_mesh
 
 
 def _mesh(name: str, make: Callable[[Path], object] | None = None) -> Kind:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from rgspipe.datasets.light_file import read_ambient, read_lights, write_lights
     from rgspipe.datasets.location import load_views
     from rgspipe.datasets.photometric_file import read_photometry
-    from rgspipe.datasets.ply import PlyOptions, save_ply
+    from rgspipe.datasets.ply.file import PlyOptions, save_ply
     from rgspipe.datasets.reading_limits import ReadingLimits, reading_within
     from rgspipe.datasets.surfel_file import load_surfels, save_surfels
     from rgspipe.datasets.views import View

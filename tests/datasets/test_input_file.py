@@ -19,11 +19,11 @@ from rgspipe.datasets.input_file import input_folder
 from rgspipe.datasets.json_file import read_json
 from rgspipe.datasets.light_file import read_lights
 from rgspipe.datasets.location import load_views
-from rgspipe.datasets.mesh_file import read_mesh
+from rgspipe.datasets.mesh.file import read_mesh
 from rgspipe.datasets.photometric_file import read_photometry
-from rgspipe.datasets.ply_cameras import find_cameras, read_viewpoints
-from rgspipe.datasets.ply_radiosity import find_ranges
-from rgspipe.datasets.ply_table import read_vertices
+from rgspipe.datasets.ply.cameras import find_cameras, read_viewpoints
+from rgspipe.datasets.ply.radiosity import find_ranges
+from rgspipe.datasets.ply.table import read_vertices
 from rgspipe.datasets.read_files import files_read
 from rgspipe.datasets.surfel_file import load_surfels
 from rgspipe.datasets.tensor_file import load_tensors

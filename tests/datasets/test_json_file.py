@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from rgspipe.datasets.json_file import read_json, read_json_value
-from rgspipe.datasets.ply_cameras import read_viewpoints
+from rgspipe.datasets.ply.cameras import read_viewpoints
 from rgspipe.errors import InputError
 
 

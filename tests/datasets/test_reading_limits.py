@@ -21,9 +21,9 @@ from raycast import ROOM
 from rgspipe.config import RgspipeConfig, with_changes
 from rgspipe.datasets.display_image import read_levels
 from rgspipe.datasets.json_file import read_json
-from rgspipe.datasets.mesh_file import read_mesh
+from rgspipe.datasets.mesh.file import read_mesh
 from rgspipe.datasets.photometric_file import read_photometry
-from rgspipe.datasets.ply_table import read_vertices, write_vertices
+from rgspipe.datasets.ply.table import read_vertices, write_vertices
 from rgspipe.datasets.reading_limits import ReadingLimits, reading_limits, reading_within, timed
 from rgspipe.datasets.scans.radiance_image import read_hdr
 from rgspipe.datasets.tensor_file import load_tensors, save_tensors

@@ -15,8 +15,8 @@ from plyfile import PlyData
 from ply_files import gaussian_columns, radiosity_columns, write_ply
 from rgspipe.datasets.gs3_write import frame_entry, write_transforms
 from rgspipe.datasets.opacity_profile import fit_profiles, smoothstep
-from rgspipe.datasets.ply import PlyOptions
-from rgspipe.datasets.ply_radiosity import profile
+from rgspipe.datasets.ply.file import PlyOptions
+from rgspipe.datasets.ply.radiosity import profile
 from rgspipe.errors import InputError
 from rgspipe.renderer.ply import load_ply
 from rgspipe.scene import Camera, look_at

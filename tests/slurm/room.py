@@ -9,7 +9,7 @@ import torch
 from lit_room import frozen_room, room_cameras, room_surfels
 from rgspipe.datasets.exr import write_image
 from rgspipe.datasets.gs3_write import frame_entry, write_transforms
-from rgspipe.datasets.ply import save_ply
+from rgspipe.datasets.ply.file import save_ply
 from rgspipe.fitting import FitViews
 from rgspipe.scene import PointLight
 

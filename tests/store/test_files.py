@@ -17,7 +17,7 @@ import torch
 
 import rgspipe
 from rgspipe.datasets.exr import write_channels
-from rgspipe.datasets.ply_table import write_vertices
+from rgspipe.datasets.ply.table import write_vertices
 from rgspipe.datasets.tensor_file import save_tensors
 from rgspipe.errors import InputError
 from rgspipe.evaluation.images import save_png
@@ -207,7 +207,7 @@ import errno, sys
 from pathlib import Path
 import numpy as np, torch
 from rgspipe.datasets.exr import write_channels
-from rgspipe.datasets.ply_table import write_vertices
+from rgspipe.datasets.ply.table import write_vertices
 from rgspipe.datasets.tensor_file import save_tensors
 from rgspipe.evaluation.images import save_png
 from rgspipe.store.files import write_json, write_text

@@ -9,8 +9,8 @@ from typing import Literal, get_args
 from rgspipe.arguments import as_path
 from rgspipe.blender.options import HotdogParameters, RoomParameters, ZooParameters
 from rgspipe.datasets.input_file import input_file, input_folder, is_plain_name
-from rgspipe.datasets.mesh_options import MeshOptions
-from rgspipe.datasets.ply_options import PlyOptions
+from rgspipe.datasets.mesh.options import MeshOptions
+from rgspipe.datasets.ply.options import PlyOptions
 from rgspipe.datasets.scans.options import ScanOptions
 from rgspipe.errors import InputError
 from rgspipe.options import Options, option

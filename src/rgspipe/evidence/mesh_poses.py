@@ -15,7 +15,7 @@ import numpy as np
 import torch
 from scipy.stats import rankdata
 
-from rgspipe.datasets.mesh_file import UPRIGHT
+from rgspipe.datasets.mesh.file import UPRIGHT
 from rgspipe.datasets.views import View
 from rgspipe.evidence.comparison import FEWEST_VIEWS, REMAINDER, clearly_above, plainest
 from rgspipe.evidence.readings import FLIP, Numbers

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from rgspipe.arguments import as_path
 from rgspipe.datasets.conversion import Conversion
-from rgspipe.datasets.ply import PlyOptions, read_ply
-from rgspipe.datasets.ply_cameras import find_cameras, read_viewpoints
+from rgspipe.datasets.ply.cameras import find_cameras, read_viewpoints
+from rgspipe.datasets.ply.file import PlyOptions, read_ply
 from rgspipe.errors import InputError
 from rgspipe.renderer.fronts import backs_towards_cameras
 from rgspipe.scene.orientation import backs_towards, turned_over

@@ -17,7 +17,7 @@ from rgspipe.scene.gloss import Gloss
 from rgspipe.scene.shapes import Float, Given
 
 if TYPE_CHECKING:
-    from rgspipe.datasets.ply import PlyOptions
+    from rgspipe.datasets.ply.file import PlyOptions
 
 #: Entries of each surfel in its tensors.
 ENTRIES = {

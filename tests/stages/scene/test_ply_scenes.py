@@ -19,7 +19,7 @@ from rgspipe.config import RgspipeConfig
 from rgspipe.datasets.exr import write_image
 from rgspipe.datasets.gs3_write import frame_entry, write_transforms
 from rgspipe.datasets.light_file import write_lights
-from rgspipe.datasets.ply import save_ply
+from rgspipe.datasets.ply.file import save_ply
 from rgspipe.datasets.surfel_file import load_surfels
 from rgspipe.errors import InputError
 from rgspipe.fitting import FitViews

@@ -8,8 +8,8 @@ from rgspipe.capture.refusals import OFF
 from rgspipe.config import RgspipeConfig
 from rgspipe.config.spoken import as_keys
 from rgspipe.datasets.gs3 import load_dataset
-from rgspipe.datasets.mesh_file import read_mesh
-from rgspipe.datasets.mesh_links import mesh_files
+from rgspipe.datasets.mesh.file import read_mesh
+from rgspipe.datasets.mesh.links import mesh_files
 from rgspipe.datasets.scans.frame import Scan
 from rgspipe.datasets.scans.importing import import_scan
 from rgspipe.datasets.scans.layouts import read_scan

@@ -10,7 +10,7 @@ from rgspipe.datasets.covariance_file import read_covariances
 from rgspipe.datasets.info import INFO
 from rgspipe.datasets.json_file import numbers, read_json
 from rgspipe.datasets.light_file import read_lights
-from rgspipe.datasets.ply import save_ply
+from rgspipe.datasets.ply.file import save_ply
 from rgspipe.datasets.surfel_file import load_surfels
 from rgspipe.errors import InputError
 from rgspipe.light_export.export import export_lights

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from rgspipe.config import RgspipeConfig
 from rgspipe.config.spoken import as_keys
-from rgspipe.datasets.ply_cameras import find_cameras
-from rgspipe.datasets.ply_radiosity import find_config
+from rgspipe.datasets.ply.cameras import find_cameras
+from rgspipe.datasets.ply.radiosity import find_config
 from rgspipe.datasets.surfel_file import save_surfels
 from rgspipe.errors import InputError
 from rgspipe.renderer.ply import load_ply

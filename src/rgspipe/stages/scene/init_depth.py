@@ -8,8 +8,8 @@ import numpy as np
 
 from rgspipe.datasets.gs3 import load_dataset
 from rgspipe.datasets.location import dataset_root
-from rgspipe.datasets.mesh_file import read_mesh
-from rgspipe.datasets.mesh_links import mesh_files
+from rgspipe.datasets.mesh.file import read_mesh
+from rgspipe.datasets.mesh.links import mesh_files
 from rgspipe.datasets.surfel_file import save_surfels
 from rgspipe.degradation.capture import degraded
 from rgspipe.scene import NO_CLIP

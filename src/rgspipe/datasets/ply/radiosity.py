@@ -19,9 +19,9 @@ from rgspipe.datasets.conversion import Loss, loss
 from rgspipe.datasets.input_file import input_file
 from rgspipe.datasets.json_file import shown
 from rgspipe.datasets.opacity_profile import FittedProfiles, fit_profiles, smoothstep
-from rgspipe.datasets.ply_gaussians import Discs, exponentials, unit_quaternions
-from rgspipe.datasets.ply_options import PlyOptions
-from rgspipe.datasets.ply_table import VertexTable
+from rgspipe.datasets.ply.gaussians import Discs, exponentials, unit_quaternions
+from rgspipe.datasets.ply.options import PlyOptions
+from rgspipe.datasets.ply.table import VertexTable
 from rgspipe.errors import InputError
 
 #: What only this layout has.

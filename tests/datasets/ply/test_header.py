@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from ply_files import gaussian_columns, write_ply
-from rgspipe.datasets.ply import read_ply
-from rgspipe.datasets.ply_options import PlyOptions
-from rgspipe.datasets.ply_table import read_vertices
+from rgspipe.datasets.ply.file import read_ply
+from rgspipe.datasets.ply.options import PlyOptions
+from rgspipe.datasets.ply.table import read_vertices
 from rgspipe.errors import InputError
 
 

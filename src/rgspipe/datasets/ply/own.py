@@ -20,9 +20,9 @@ from torch import Tensor
 from rgspipe.arguments import as_one_of, as_path
 from rgspipe.datasets.conversion import Conversion, Loss, loss
 from rgspipe.datasets.json_file import is_number
-from rgspipe.datasets.ply_gaussians import HIGH, LOW, Y0, unit_quaternions
-from rgspipe.datasets.ply_options import PlyOptions
-from rgspipe.datasets.ply_table import VertexTable, write_vertices
+from rgspipe.datasets.ply.gaussians import HIGH, LOW, Y0, unit_quaternions
+from rgspipe.datasets.ply.options import PlyOptions
+from rgspipe.datasets.ply.table import VertexTable, write_vertices
 from rgspipe.errors import InputError
 from rgspipe.scene import srgb
 from rgspipe.scene.gloss import Gloss

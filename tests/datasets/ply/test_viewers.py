@@ -12,8 +12,8 @@ import torch
 from plyfile import PlyData
 
 from clouds import cloud
-from rgspipe.datasets.ply import PlyOptions, save_ply
-from rgspipe.datasets.ply_own import Layout
+from rgspipe.datasets.ply.file import PlyOptions, save_ply
+from rgspipe.datasets.ply.own import Layout
 from rgspipe.errors import InputError
 from rgspipe.renderer.ply import load_ply
 from rgspipe.scene import Surfels

@@ -10,11 +10,11 @@ import torch
 from torch import Tensor
 
 from rgspipe.datasets.conversion import Conversion, loss
-from rgspipe.datasets.ply_gaussians import Discs, read_gaussians
-from rgspipe.datasets.ply_options import PlyOptions
-from rgspipe.datasets.ply_own import is_own, read_own, save_ply
-from rgspipe.datasets.ply_radiosity import is_radiosity, read_radiosity
-from rgspipe.datasets.ply_table import read_vertices
+from rgspipe.datasets.ply.gaussians import Discs, read_gaussians
+from rgspipe.datasets.ply.options import PlyOptions
+from rgspipe.datasets.ply.own import is_own, read_own, save_ply
+from rgspipe.datasets.ply.radiosity import is_radiosity, read_radiosity
+from rgspipe.datasets.ply.table import read_vertices
 from rgspipe.datasets.surfel_range import check_surfels
 from rgspipe.errors import InputError
 from rgspipe.scene.gloss import Gloss

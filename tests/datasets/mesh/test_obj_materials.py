@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from mesh_files import QUARTERS, painted, quarters, textured_square
-from rgspipe.datasets.mesh_file import read_mesh
-from rgspipe.datasets.mesh_links import mesh_files
+from rgspipe.datasets.mesh.file import read_mesh
+from rgspipe.datasets.mesh.links import mesh_files
 from rgspipe.errors import InputError
 
 #: The line of a material's texture t.png, the name that it has, and the line of its library a.mtl.

@@ -13,8 +13,8 @@ from scipy.special import expit
 
 from rgspipe.datasets.conversion import Loss, loss
 from rgspipe.datasets.opacity_profile import smoothstep
-from rgspipe.datasets.ply_options import PlyOptions
-from rgspipe.datasets.ply_table import VertexTable
+from rgspipe.datasets.ply.options import PlyOptions
+from rgspipe.datasets.ply.table import VertexTable
 from rgspipe.errors import InputError
 from rgspipe.scene import srgb
 

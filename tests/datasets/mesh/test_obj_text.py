@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mesh_files import QUARTERS, painted, quarters, textured_square
-from rgspipe.datasets.mesh_file import read_mesh
+from rgspipe.datasets.mesh.file import read_mesh
 from rgspipe.errors import InputError
 
 #: Two triangles, the second above the first.

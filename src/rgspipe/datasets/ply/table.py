@@ -10,7 +10,7 @@ import numpy as np
 from plyfile import PlyData, PlyElement, PlyListProperty, PlyParseError
 
 from rgspipe.datasets.input_file import input_file
-from rgspipe.datasets.ply_header import check_header
+from rgspipe.datasets.ply.header import check_header
 from rgspipe.datasets.reading_limits import timed
 from rgspipe.errors import InputError
 from rgspipe.store.files import replacing

@@ -13,16 +13,16 @@ import trimesh.resolvers
 from PIL import Image
 
 from rgspipe.arguments import as_path
-from rgspipe.datasets.gltf_check import check_gltf
 from rgspipe.datasets.input_file import input_file, is_there
 from rgspipe.datasets.json_file import shown
 from rgspipe.datasets.limits import FARTHEST
-from rgspipe.datasets.mesh_links import FORMATS, GLTF, mesh_links
-from rgspipe.datasets.mesh_options import MeshOptions
-from rgspipe.datasets.obj_text import plain_obj
-from rgspipe.datasets.ply_header import COLOURS, check_colours, check_rows, without_texture
+from rgspipe.datasets.mesh.gltf_check import check_gltf
+from rgspipe.datasets.mesh.links import FORMATS, GLTF, mesh_links
+from rgspipe.datasets.mesh.obj_text import plain_obj
+from rgspipe.datasets.mesh.options import MeshOptions
+from rgspipe.datasets.mesh.texture import check_texture, texture_light
+from rgspipe.datasets.ply.header import COLOURS, check_colours, check_rows, without_texture
 from rgspipe.datasets.reading_limits import RAISE, reading_limits, timed
-from rgspipe.datasets.texture import check_texture, texture_light
 from rgspipe.errors import InputError
 from rgspipe.scene import srgb
 from rgspipe.scene.mesh import Numbers, Paint, TriangleMesh

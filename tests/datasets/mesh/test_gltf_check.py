@@ -12,7 +12,7 @@ import pytest
 import trimesh
 
 from mesh_files import QUARTERS, painted, quarters, textured_square
-from rgspipe.datasets.mesh_file import read_mesh
+from rgspipe.datasets.mesh.file import read_mesh
 from rgspipe.datasets.reading_limits import ReadingLimits, reading_within
 from rgspipe.errors import InputError
 

@@ -14,7 +14,7 @@ from hypothesis.extra import numpy as arrays
 from plyfile import PlyData
 
 from clouds import cloud
-from rgspipe.datasets.ply import PlyOptions, save_ply
+from rgspipe.datasets.ply.file import PlyOptions, save_ply
 from rgspipe.errors import InputError
 from rgspipe.renderer.ply import load_ply
 from rgspipe.scene import NO_CLIP, Coverage, Gloss, Surfels

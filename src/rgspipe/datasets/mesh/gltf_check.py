@@ -11,9 +11,9 @@ from typing import NoReturn
 
 from rgspipe.datasets.input_file import input_file
 from rgspipe.datasets.json_file import numbers, shown
-from rgspipe.datasets.mesh_links import GLB_HEADER, Links, gltf_content
+from rgspipe.datasets.mesh.links import GLB_HEADER, Links, gltf_content
+from rgspipe.datasets.mesh.texture import check_texture
 from rgspipe.datasets.reading_limits import RAISE, reading_limits
-from rgspipe.datasets.texture import check_texture
 from rgspipe.errors import InputError
 
 #: Bytes of each type of number, and numbers of each entry.

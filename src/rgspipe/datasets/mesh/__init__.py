@@ -1,0 +1,1 @@
+"""Meshes of other programs, and whether their files are what they claim."""

@@ -1,0 +1,1 @@
+"""Surfels in PLY files: of other programs, of viewers, and our own."""
