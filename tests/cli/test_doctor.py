@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from rgspipe.blender.interpreter import Blender
 from rgspipe.cli import doctor as command
 from rgspipe.cli import main
 from rgspipe.cli.installation import Part
@@ -108,6 +109,14 @@ def test_results_and_what_nothing_needs_are_counted(tmp_path: Path, capsys: pyte
 def test_a_blender_that_is_named_is_tried(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["doctor", "blender.executable=/no/such", f"outputs={tmp_path}", "check=false"]) == 1
     assert "found /no/such: No such file or directory. Correct blender.executable" in told(capsys)
+
+
+def test_a_blender_without_a_denoiser_says_so(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(command, "find_blender", lambda *_: Blender((), "Blender 3.4.1", denoises=False))
+    assert main(["doctor", "blender.executable=blender", f"outputs={tmp_path}", "check=false"]) == 0
+    assert "Blender 3.4.1 renders; no denoiser: dataset.denoise=false" in told(capsys)
 
 
 @pytest.mark.parametrize("word", ["outputs=", "check=perhaps", "spring", f"outputs={__file__}"])

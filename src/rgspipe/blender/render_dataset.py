@@ -20,7 +20,8 @@ def render_dataset(job: DatasetJob, folder: Path, options: BlenderOptions = OWN_
         InputError: there is no Blender, the scene cannot be used, or `folder` holds the images of another job.
         RuntimeError: Blender died; the message ends with the last lines it wrote.
     """
-    blender = find_blender(options, "scene", "Images that you have need none: scene=external or scene=rgbd.")
+    otherwise = "Images that you have need none: scene=external or scene=rgbd."
+    blender = find_blender(options, "scene", otherwise, job.denoise)
     run_blender(blender, __name__, job.to_json(), job.scene, folder)
 
 

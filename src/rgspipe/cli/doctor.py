@@ -98,7 +98,7 @@ def _blender(options: BlenderOptions) -> list[str]:
         found = find_blender(options, "blender")
     except InputError as error:
         return [str(error)]
-    print(_wrapped(f"{found.words} renders", "  "))
+    print(_wrapped(f"{found.words} renders{'' if found.denoises else '; no denoiser: dataset.denoise=false'}", "  "))
     return []
 
 
