@@ -99,7 +99,7 @@ def test_hydra_shows_the_whole_configuration(rgspipe) -> None:
 
 def test_help_explains_stages_scenes_groups_and_keys_without_torch(rgspipe) -> None:
     told = rgspipe("--help", *PAGES).stdout
-    for word in (*NAMES, "external", "draft | reference | standard", "upstream=require", "dataset", "reproduce"):
+    for word in (*NAMES, "external", "draft | reference | standard", "upstream=require", "--dry-run", "dataset"):
         assert word in told
     assert "8 to 8192" in rgspipe("--help", "dataset").stdout
     code = "import sys; from rgspipe.cli import main; main(['--help']); sys.exit('torch' in sys.modules)"
