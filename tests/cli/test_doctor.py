@@ -62,12 +62,14 @@ def test_what_is_missing_beyond_that_is_said_with_what_it_would_give(
     more = [
         Part("bpy", "==5.0.1", "5.0.1", "does not load: libX.so", "blender"),
         Part("mitsuba", "", None, "", "bench"),
+        *(Part(name, "", None, "", "dev") for name in ("pytest", "ruff")),
     ]
     monkeypatch.setattr(command, "optional_parts", lambda: more)
     assert main(["doctor", f"outputs={tmp_path}"]) == 0
     said = told(capsys)
     assert "bpy 5.0.1 does not load: libX.so. Without it there is none of: renders" in said
     assert "mitsuba is missing: the path tracer" in said
+    assert "pytest, ruff are missing: tests, " in said and said.count('pip install "rgspipe[dev]"') == 1
 
 
 @pytest.mark.parametrize("value", [0.2, math.nan])
@@ -79,7 +81,16 @@ def test_figures_that_are_wrong_end_with_status_1(
     )
     assert main(["doctor", f"outputs={tmp_path}"]) == 1
     said = told(capsys)
+    assert f"lamps: {value:.2g} (docs: 0.01; wrong above 0.1)" in said and "time: 9 s (docs: 1)" in said
     assert f"lamps: {value:.2g} instead of 0.01" in said and "make setup" in said and "Slower than" in said
+
+
+def test_a_figure_that_is_right_says_so(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(check, "self_check", lambda device: iter([Figure("lamps", 0.016, 0.011, 0.05)]))
+    assert main(["doctor", f"outputs={tmp_path}"]) == 0
+    assert "lamps: 0.016 (docs: 0.011; right up to 0.05)" in told(capsys)
 
 
 def test_a_check_that_ends_early_is_told(
