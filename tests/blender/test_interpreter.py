@@ -6,6 +6,7 @@ import importlib.util
 import json
 import shutil
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -25,6 +26,7 @@ JOB = DatasetJob(train_views=1, test_views=1, targets_per_class=0, resolution=16
 
 def answering(folder: Path, **facts: object) -> str:
     """A program that says this of itself."""
+    facts = {"path": [], "missing": [], "denoises": True, **facts}
     path = folder / "program"
     path.write_text(f"#!/bin/sh\necho noise\necho '{ANSWER}{json.dumps(facts)}'\n")
     path.chmod(0o755)
@@ -43,7 +45,7 @@ def test_what_is_neither_python_nor_blender_is_refused(key: str, path: str, foun
 
 
 def test_a_python_without_the_module_says_how_to_have_it(tmp_path: Path) -> None:
-    program = answering(tmp_path, python=[3, 13], path=[], missing=["bpy", "torch"], blender=None)
+    program = answering(tmp_path, python=[3, 13], missing=["bpy", "torch"], blender=None)
     with pytest.raises(
         InputError, match=rf"{program} without bpy, torch.*{program} -m pip install 'rgspipe\[blender\]'"
     ):
@@ -51,17 +53,26 @@ def test_a_python_without_the_module_says_how_to_have_it(tmp_path: Path) -> None
 
 
 def test_a_blender_that_is_too_old_is_refused(tmp_path: Path) -> None:
-    program = answering(tmp_path, python=[3, 10], path=[], missing=[], blender=[2, 93, 1])
+    program = answering(tmp_path, python=[3, 10], blender=[2, 93, 1])
     with pytest.raises(InputError, match=r"Blender 3\.4 or later, found 2\.93\.1"):
         find_blender(BlenderOptions(executable=program), "scene")
 
 
 def test_packages_are_lent_by_a_python_of_blender_s_version(tmp_path: Path) -> None:
-    program = answering(tmp_path, python=[3, 9], path=["/x/site-packages", "/x"], missing=[], blender=[5, 0, 1])
+    program = answering(tmp_path, python=[3, 9], path=["/x/site-packages", "/x"], blender=[5, 0, 1])
     with pytest.raises(InputError, match=r"Install rgspipe with Python 3\.9.*BlenderOptions\(python=PATH\)"):
         find_blender(BlenderOptions(executable=program), "scene")
     both = find_blender(BlenderOptions(python=program, executable=program), "scene")
     assert both.words == "Blender 5.0.1" and both.command("m", "a")[-3:] == ["/x/site-packages", "m", "a"]
+
+
+def test_a_blender_without_a_denoiser_is_refused_before_anything_is_rendered(tmp_path: Path) -> None:
+    program = answering(tmp_path, python=list(sys.version_info[:2]), blender=[3, 4, 1], denoises=False)
+    options, folder = BlenderOptions(executable=program), tmp_path / "dataset"
+    with pytest.raises(InputError, match=r"dataset\.denoise: expected false with this Blender"):
+        render_dataset(replace(JOB, denoise=True), folder, options)
+    assert not folder.exists()
+    assert not find_blender(options, "scene").denoises
 
 
 @needs_bpy

@@ -99,7 +99,7 @@ def test_hydra_shows_the_whole_configuration(rgspipe) -> None:
 
 def test_help_explains_stages_scenes_groups_and_keys_without_torch(rgspipe) -> None:
     told = rgspipe("--help", *PAGES).stdout
-    for word in (*NAMES, "external", "draft | reference | standard", "upstream=require", "dataset", "reproduce"):
+    for word in (*NAMES, "external", "draft | reference | standard", "upstream=require", "--dry-run", "dataset"):
         assert word in told
     assert "8 to 8192" in rgspipe("--help", "dataset").stdout
     code = "import sys; from rgspipe.cli import main; main(['--help']); sys.exit('torch' in sys.modules)"
@@ -239,6 +239,19 @@ def test_what_went_wrong_fits_the_terminal(
     assert main(["status", f"outputs={tmp_path}"]) == 0
     _, *reason = capsys.readouterr().out.splitlines()
     assert len(reason) == 3 and max(map(len, reason)) <= min(width, 110) and reason[-1].endswith(" …")
+
+
+@pytest.mark.parametrize("width", [60, 80, 200])
+def test_what_a_run_was_started_with_fits_the_terminal(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], width: int
+) -> None:
+    monkeypatch.setenv("COLUMNS", str(width))
+    overrides = ["stage=freeze", "scene.path=/home/somebody/room.blend", *(f"train.number_{i}={i}" for i in range(20))]
+    RunStatus.start(tmp_path / "runs/old", "freeze", overrides).done(tmp_path)
+    assert main(["status", f"outputs={tmp_path}"]) == 0
+    first, *more = capsys.readouterr().out.splitlines()
+    assert first[18:].startswith("old  stage=freeze") and max(map(len, [first, *more])) <= min(width, 110)
+    assert len(more) == 2 and more[-1].endswith(" …") and all(line[:18].isspace() for line in more)
 
 
 def test_a_path_that_is_longer_than_a_line_stays_behind_the_word(

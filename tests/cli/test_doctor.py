@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from rgspipe.blender.interpreter import Blender
 from rgspipe.cli import doctor as command
 from rgspipe.cli import main
 from rgspipe.cli.installation import Distribution
@@ -65,12 +66,14 @@ def test_what_is_missing_beyond_that_is_said_with_what_it_would_give(
     more = [
         Distribution("bpy", "==5.0.1", "5.0.1", "does not load: libX.so", "blender"),
         Distribution("mitsuba", "", None, "", "bench"),
+        *(Distribution(name, "", None, "", "dev") for name in ("pytest", "ruff")),
     ]
     monkeypatch.setattr(command, "optional_parts", lambda: more)
     assert main(["doctor", f"outputs={tmp_path}"]) == 0
     said = told(capsys)
     assert "bpy 5.0.1 does not load: libX.so. Without it there is none of: renders" in said
     assert "mitsuba is missing: the path tracer" in said
+    assert "pytest, ruff are missing: tests, " in said and said.count('pip install "rgspipe[dev]"') == 1
 
 
 @pytest.mark.parametrize("value", [0.2, math.nan])
@@ -82,7 +85,16 @@ def test_figures_that_are_wrong_end_with_status_1(
     )
     assert main(["doctor", f"outputs={tmp_path}"]) == 1
     said = told(capsys)
+    assert f"lamps: {value:.2g} (docs: 0.01; wrong above 0.1)" in said and "time: 9 s (docs: 1)" in said
     assert f"lamps: {value:.2g} instead of 0.01" in said and "make setup" in said and "Slower than" in said
+
+
+def test_a_figure_that_is_right_says_so(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(check, "self_check", lambda device: iter([Figure("lamps", 0.016, 0.011, 0.05)]))
+    assert main(["doctor", f"outputs={tmp_path}"]) == 0
+    assert "lamps: 0.016 (docs: 0.011; right up to 0.05)" in told(capsys)
 
 
 def test_a_check_that_ends_early_is_told(
@@ -112,6 +124,14 @@ def test_results_and_what_nothing_needs_are_counted(tmp_path: Path, capsys: pyte
 def test_a_blender_that_is_named_is_tried(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["doctor", "blender.executable=/no/such", f"outputs={tmp_path}", "check=false"]) == 1
     assert "found /no/such: No such file or directory. Correct blender.executable" in told(capsys)
+
+
+def test_a_blender_without_a_denoiser_says_so(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(command, "find_blender", lambda *_: Blender((), "Blender 3.4.1", denoises=False))
+    assert main(["doctor", "blender.executable=blender", f"outputs={tmp_path}", "check=false"]) == 0
+    assert "Blender 3.4.1 renders; no denoiser: dataset.denoise=false" in told(capsys)
 
 
 @pytest.mark.parametrize("word", ["outputs=", "check=perhaps", "spring", f"outputs={__file__}"])

@@ -8,13 +8,15 @@ import signal
 import subprocess
 import sys
 import urllib.request
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 
 import pytest
 import torch
 
-from rgspipe.cli.view import DEMO, Asked, parsed, serve, view_folder
+from rgspipe.cli.commands import COMMANDS
+from rgspipe.cli.view import DEMO, KEYS, PAGE_KEYS, Asked, parsed, serve, view_folder
 from rgspipe.errors import InputError
 from rgspipe.light_export.world import World
 from rgspipe.renderer.frozen import FrozenScene
@@ -27,8 +29,9 @@ def test_what_the_demo_says_fits_a_terminal() -> None:
 
 
 def test_a_folder_and_keys_are_understood() -> None:
-    words = ["a/b", "lights=l.json", "target=t", "fit=f", "port=0", "resolution=64", "address=::1", "device=cpu"]
-    assert parsed(words) == Asked(Path("a/b"), "l.json", "t", "f", 0, 64, "::1", "cpu")
+    words = ["a/b", "lights=l.json", "target=t", "fit=f", "port=0", "resolution=64", "address=::1"]
+    words += ["browser=false", "device=cpu"]
+    assert parsed(words) == Asked(Path("a/b"), "l.json", "t", "f", 0, 64, "::1", False, "cpu")
     assert parsed(["a"]) == Asked(Path("a"))
 
 
@@ -41,6 +44,7 @@ def test_a_folder_and_keys_are_understood() -> None:
         (["a", "port=x"], "port: expected a whole number"),
         (["a", "port=70000"], "70000"),
         (["a", "device=gpu"], "device: expected auto or cpu or cuda, found 'gpu'"),
+        (["a", "browser=firefox"], "browser: expected true or false, found 'firefox'"),
         (["a", "resolution=16"], "resolution: expected a whole number from 32 to 2048, found '16'"),
     ],
 )
@@ -48,6 +52,22 @@ def test_what_cannot_be_meant_is_refused(words: list[str], found: str) -> None:
     with pytest.raises(InputError) as caught:
         parsed(words)
     assert found in str(caught.value)
+
+
+@pytest.mark.parametrize("keys", [KEYS, PAGE_KEYS])
+def test_help_names_every_key(keys: Mapping[str, str]) -> None:
+    command = COMMANDS["view" if keys is KEYS else "demo"]
+    for key in keys:
+        assert f"[{key}=" in command.usage and f"\n  {key} " in command.usage
+        assert any(word.startswith(f"{key}=") for word in command.words)
+
+
+@pytest.mark.parametrize("browser", [True, False])
+def test_the_page_is_opened_unless_that_is_not_wanted(browser: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[str] = []
+    monkeypatch.setattr("rgspipe.cli.view.open_page", opened.append)
+    assert serve(Served(), 1, browser) == 0
+    assert opened == [Served.url] * browser
 
 
 def test_a_page_is_served_until_it_is_interrupted(tmp_path: Path) -> None:
@@ -79,7 +99,7 @@ def test_lamps_are_exported_to_where_they_are_in_the_scene_s_own_file(
     scene = FrozenScene.freeze(closed_box(0.5).to(torch.float32))
     monkeypatch.setattr(FrozenScene, "load", lambda folder: scene)
     monkeypatch.setattr("rgspipe.viewer.serve.view", lambda *_, **words: given.update(words) or Served())
-    assert view_folder([str(folder)]) == 0
+    assert view_folder([str(folder), "browser=false"]) == 0
     assert given["world"] == World(1.0, 0.25, (1.0, 2.0, -3.0))
 
 
@@ -94,7 +114,7 @@ class Served:
 
 @pytest.mark.parametrize(("port", "told"), [(1, ""), (0, ""), (8080, "Port 8080 is taken")])
 def test_another_port_than_was_asked_for_is_told(port: int, told: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert serve(Served(), port) == 0
+    assert serve(Served(), port, browser=False) == 0
     *said, last = capsys.readouterr().out.splitlines()
     assert last.startswith(Served.url) and " ".join(said).startswith(told) and bool(said) is bool(told)
 
@@ -108,4 +128,4 @@ def test_an_interrupt_before_the_wait_begins_ends_it_as_well(monkeypatch: pytest
 
     monkeypatch.setattr(viewer, "wait", interrupted)
     monkeypatch.setattr(viewer, "stop", lambda stop=viewer.stop: stopped.append(stop()))
-    assert serve(viewer, 0) == 0 and stopped == [None]
+    assert serve(viewer, 0, browser=False) == 0 and stopped == [None]

@@ -10,10 +10,18 @@ from rgspipe.datasets.light_file import read_lights
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.images.model import SurfelModel
 from rgspipe.scene import PointLight
+from rgspipe.scene.lights import KINDS
 from rgspipe.viewer.lamp_images import LampImages
-from rgspipe.viewer.session import ILLUMINANCE, IRRADIANCE, OFFERED, Session, same_lights
+from rgspipe.viewer.session import ILLUMINANCE, IRRADIANCE, OFFERED, Session, kinds_for, same_lights
 
 LAMP = PointLight(list(VISIBLE), [0.6, 0.5, 0.4])
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_lamp_can_be_of_its_own_kind_and_of_those_that_are_offered(kind: str) -> None:
+    kinds = kinds_for(KINDS[kind].shaped())
+    assert set(kinds) == {*OFFERED, kind}
+    assert len(kinds) == len(set(kinds))
 
 
 @pytest.fixture

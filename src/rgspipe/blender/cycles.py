@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import bpy
 
+from rgspipe.blender.interpreter import no_denoiser
 from rgspipe.blender.job import RenderSettings
 from rgspipe.blender.nodes import tree_of
-from rgspipe.errors import InputError
 
 #: Width of the pixel filter [pixels] that makes a single sample fall on the pixel's centre.
 CENTER_FILTER_WIDTH = 0.01
@@ -58,12 +58,7 @@ def _configure_denoiser(cycles: bpy.types.PropertyGroup) -> None:
     try:
         cycles.denoiser = "OPENIMAGEDENOISE"
     except TypeError:  # its enumeration has no such value
-        raise InputError(
-            "DatasetOptions.denoise",
-            expected="false with this Blender, which was built without Open Image Denoise",
-            found="true",
-            remedy="Set it, with four times as many DatasetOptions.samples; or take a Blender from blender.org.",
-        ) from None
+        raise no_denoiser() from None
     cycles.denoising_input_passes = "RGB_ALBEDO_NORMAL"
     cycles.denoising_prefilter = "ACCURATE"
     if bpy.app.version >= (4, 2, 0):

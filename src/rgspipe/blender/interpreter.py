@@ -31,10 +31,16 @@ ANSWER = "@rgspipe is "
 PROBE = f"""
 import importlib.util, json, sys
 bpy = sys.modules.get("bpy")
+def denoises():
+    try:
+        bpy.context.scene.cycles.denoiser = "OPENIMAGEDENOISE"
+    except TypeError:  # its enumeration has no such value
+        return False
+    return True
 print({ANSWER!r} + json.dumps({{
     "python": list(sys.version_info[:2]), "path": [part for part in sys.path if part],
     "missing": [name for name in {("bpy", *PACKAGES)!r} if importlib.util.find_spec(name) is None],
-    "blender": list(bpy.app.version) if bpy else None}}))
+    "blender": list(bpy.app.version) if bpy else None, "denoises": denoises() if bpy else None}}))
 """
 
 #: Run by an installed Blender: our modules first, the packages of another interpreter after Blender's own.
@@ -48,29 +54,35 @@ class Blender:
     Attributes:
         start: the command, to which a module's name and arguments are added.
         words: what it is, for people.
+        denoises: whether it was built with a denoiser, as Blender's modules are.
     """
 
     start: tuple[str, ...]
     words: str
+    denoises: bool = True
 
     def command(self, module: str, *arguments: str) -> list[str]:
         """What runs `module` as a program."""
         return [*self.start, module, *arguments]
 
 
-def find_blender(options: BlenderOptions, where: str, otherwise: str = "") -> Blender:
+def find_blender(options: BlenderOptions, where: str, otherwise: str = "", denoise: bool = False) -> Blender:
     """The Blender that renders.
 
     Args:
         options: which it is.
         where: what is to be rendered, for errors.
         otherwise: how to do without Blender, a sentence.
+        denoise: whether images are to be denoised.
 
     Raises:
-        InputError: there is none, or it is not what `options` say.
+        InputError: there is none, it is not what `options` say, or it cannot denoise.
     """
     if options.executable is not None:
-        return _program(options.executable, options.python)
+        blender = _program(options.executable, options.python)
+        if denoise and not blender.denoises:
+            raise no_denoiser()
+        return blender
     if options.python is not None:
         return _interpreter(options.python)
     if importlib.util.find_spec("bpy") is None:
@@ -88,6 +100,16 @@ HAVE_BLENDER = (
     "With Python 3.11, install its module: pip install 'rgspipe[blender]'. Else name another Python that has it "
     "(BlenderOptions(python=PATH)), or an installed Blender (BlenderOptions(executable=PATH))."
 )
+
+
+def no_denoiser() -> InputError:
+    """What is wrong where images are to be denoised by a Blender that cannot."""
+    return InputError(
+        "DatasetOptions.denoise",
+        expected="false with this Blender, which was built without Open Image Denoise",
+        found="true",
+        remedy="Set it, with four times as many DatasetOptions.samples; or take a Blender from blender.org.",
+    )
 
 
 def _interpreter(python: str) -> Blender:
@@ -128,7 +150,7 @@ def _program(executable: str, python: str | None) -> Blender:
     packages = os.pathsep.join(part for part in lender["path"] if "site-packages" in part or "dist-packages" in part)
     source = str(Path(rgspipe.__file__).resolve().parents[1])
     options = ("--background", "--factory-startup", "--python-exit-code", "1", "--python", str(BOOT), "--")
-    return Blender((executable, *options, source, packages), f"Blender {version}")
+    return Blender((executable, *options, source, packages), f"Blender {version}", facts["denoises"])
 
 
 def _asked_python(python: str) -> dict[str, Any]:

@@ -28,7 +28,7 @@ def render_dataset(
         InputError: there is no Blender, the scene cannot be used, or `folder` holds the images of another job.
         RuntimeError: Blender died; the message ends with the last lines it wrote.
     """
-    blender = find_blender(options, "scene", otherwise)
+    blender = find_blender(options, "scene", otherwise, job.denoise)
     run_blender(blender, __name__, job.to_json(), job.scene, folder)
 
 

@@ -25,6 +25,8 @@ MULTIRUN_FLAGS = ("-m", "--multirun")
 
 ASKS_FOR_HELP = ("-h", "--help", "help")
 
+DRY_RUN = "--dry-run"
+
 #: What Hydra knows beside them.
 HYDRA_OPTIONS = (
     *("--cfg", "--config-dir", "--config-name", "--config-path", "--experimental-rerun", "--hydra-help", "--info"),
@@ -118,6 +120,10 @@ def _dispatch(arguments: list[str], stage_loader: StageLoader) -> int:
     _check_working_folder()
     if arguments[0] in COMMANDS:
         return COMMANDS[arguments[0]].load()(arguments[1:])
+    if DRY_RUN in arguments:
+        from rgspipe.cli.dry_run import dry_run
+
+        return dry_run([text for text in arguments if text != DRY_RUN], stage_loader)
     if "stage=view" in arguments:
         from rgspipe.cli.view_stage import view_stage
 
@@ -139,7 +145,7 @@ def _dispatch(arguments: list[str], stage_loader: StageLoader) -> int:
 
 def _check_options(arguments: Sequence[str]) -> None:
     """Refuse options that nobody knows: Hydra would answer with a list of its own."""
-    known = (*MULTIRUN_FLAGS, *ASKS_FOR_HELP, *HYDRA_OPTIONS)
+    known = (*MULTIRUN_FLAGS, *ASKS_FOR_HELP, DRY_RUN, *HYDRA_OPTIONS)
     for text in arguments:
         name = text.partition("=")[0]
         if name.startswith("-") and name not in known:

@@ -37,13 +37,17 @@ class Command(NamedTuple):
         return getattr(import_module(f"rgspipe.cli.{self.module}"), self.function)
 
 
-_PAGE_WORDS = ("port=", "resolution=", "address=")
+_PAGE_WORDS = ("port=", "resolution=", "address=", "browser=false", "device=")
 
 _PAGE = """\
   port        of the page
   resolution  pixels along the longer side of pictures at rest
   address     of this machine to listen at, if others are to look; then with a
-              token"""
+              token
+  browser     false does not open the page in the browser, which is done where
+              a terminal and a screen are
+  device      where pictures are made: auto (a CUDA GPU where there is one), cpu
+              or cuda"""
 
 COMMANDS = {
     "demo": Command(
@@ -52,6 +56,7 @@ COMMANDS = {
         "A small room in the browser: drag its lamp, see a hidden one found.",
         f"""\
 rgspipe demo [port=8080] [resolution=256] [address=127.0.0.1]
+             [browser=false] [device=auto]
 
 {_PAGE}""",
         _PAGE_WORDS,
@@ -63,6 +68,7 @@ rgspipe demo [port=8080] [resolution=256] [address=127.0.0.1]
         f"""\
 rgspipe view FOLDER [lights=FILE] [target=DIR] [fit=DIR]
              [port=8080] [resolution=256] [address=127.0.0.1]
+             [browser=false] [device=auto]
 
   FOLDER      outputs/<scene>/freeze/latest, for example
   lights      light file: the lamps at first

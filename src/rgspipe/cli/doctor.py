@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import shutil
 import textwrap
@@ -9,6 +10,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rgspipe import __version__
 from rgspipe.blender.interpreter import find_blender
@@ -21,6 +23,9 @@ from rgspipe.datasets.input_file import folder_to_be
 from rgspipe.errors import InputError
 from rgspipe.machine.description import available_memory_gib, machine
 from rgspipe.program import typed
+
+if TYPE_CHECKING:
+    from rgspipe.evaluation.self_check import Figure
 
 #: Columns of what is printed.
 WIDTH = 100
@@ -99,7 +104,7 @@ def _blender(options: BlenderOptions) -> list[str]:
         found = find_blender(options, "blender")
     except InputError as error:
         return [as_keys(str(error))]
-    print(_wrapped(f"{found.words} renders", "  "))
+    print(_wrapped(f"{found.words} renders{'' if found.denoises else '; no denoiser: dataset.denoise=false'}", "  "))
     return []
 
 
@@ -117,11 +122,12 @@ def _extra(parts: Sequence[Distribution], gives: str) -> list[str]:
     """Lines on an extra: what it brings, whether that is there, and how to have it."""
     there = [part for part in parts if part.works]
     lines = [_wrapped(f"{_listed(there)}: {gives}", "  ")] if there else []
+    if missing := [part for part in parts if part.version is None]:
+        names, what = ", ".join(part.name for part in missing), "" if there else f": {gives}"
+        are, them = ("is", "it") if len(missing) == 1 else ("are", "them")
+        lines.append(_wrapped(f"{names} {are} missing{what}. To have {them}: {missing[0].remedy}", "  "))
     for part in parts:
-        if part.version is None:
-            what = "" if there else f": {gives}"
-            lines.append(_wrapped(f"{part.name} is missing{what}. To have it: {part.remedy}", "  "))
-        elif part.fault:
+        if part.fault:
             lines.append(
                 _wrapped(f"{part.name} {part.version} {part.fault}. Without it there is none of: {gives}", "  ")
             )
@@ -188,8 +194,8 @@ def _measured() -> list[str]:
     try:
         for figure in self_check(chosen_device("auto")):
             unit = f" {figure.unit}" if figure.unit else ""
-            words = "" if figure.is_right else f", wrong: at most {figure.limit:.2g}"
-            print(f"  {figure.name}: {figure.value:.2g}{unit} (docs: {figure.documented:.2g}{words})", flush=True)
+            words = f"{figure.value:.2g}{unit} (docs: {figure.documented:.2g}{_verdict(figure)})"
+            print(_wrapped(f"{figure.name}: {words}", "  "), flush=True)
             slow |= figure.unit == "s" and figure.value > SLOW * figure.documented
             if not figure.is_right:
                 ills.append(f"{figure.name}: {figure.value:.2g}{unit} instead of {figure.documented:.2g}. {_ADVICE}")
@@ -200,6 +206,13 @@ def _measured() -> list[str]:
     if slow:
         print(_wrapped("Slower than the laboratory: are other programs busy, or few threads allowed?", "  "))
     return ills
+
+
+def _verdict(figure: Figure) -> str:
+    """Whether a figure is as it should be; nothing of times, of which none is wrong."""
+    if math.isinf(figure.limit):
+        return ""
+    return f"; {'right up to' if figure.is_right else 'wrong above'} {figure.limit:.2g}"
 
 
 #: What to do where the library computes what it should not.

@@ -83,6 +83,7 @@ OPTIONS = """\
 Options, anywhere on the line
 
   pipeline=NAME             {pipelines}
+  --dry-run                 show what would be made and reused, and stop
   upstream=require          refuse, instead of making, missing inputs
   -m KEY=A,B                sweep: a job for each value
   hydra.launcher.n_jobs=K   K jobs of a sweep at once

@@ -31,7 +31,7 @@ EXTRAS = {
     "blender": "renders datasets, targets and truth; images of your own need none (scene=external, rgbd, mesh)",
     "raw": "photographs as a camera's sensor has them (RAW), in captures",
     "bench": "the path tracer that stage=benchmark compares with",
-    "dev": "tests, the site of the docs, lint",
+    "dev": "tests, the site of the docs and lint, which developers alone need",
 }
 
 #: Those that are tried in a process of their own, as they may take it down.
@@ -66,10 +66,11 @@ class Distribution:
 
     @property
     def remedy(self) -> str:
-        """The command that brings it."""
+        """The command that brings it, and all of its extra."""
         if self.name == "bpy":
             return HAVE_BLENDER
-        return f'{sys.executable} -m pip install "{self.name}{self.wanted}"'
+        what = f"rgspipe[{self.extra}]" if self.extra else f"{self.name}{self.wanted}"
+        return f'{sys.executable} -m pip install "{what}"'
 
 
 def needed_parts() -> list[Distribution]:

@@ -19,7 +19,7 @@ from rgspipe.store.status import STATES, read_statuses
 #: What runs are told apart by beside what they were started with.
 _KEYS = ("state", "stage", "outputs")
 
-#: Where reasons begin in the list, and their lines at most; `status RUN` has all of it.
+#: Where names and reasons begin in the list, and the lines of each at most; `status RUN` has all of it.
 REASON, MOST_LINES = 18, 3
 
 
@@ -46,7 +46,7 @@ def show_runs(arguments: Sequence[str]) -> int:
     chosen = [(name, status) for name, status in runs if not names or name in names]
     chosen = [(name, status) for name, status in chosen if all(_has(status, text) for text in asked)]
     for name, status in chosen:
-        told = [_line(name, status), *(_details(status) if names else _reason(status))]
+        told = [*_head(name, status), *(_details(status) if names else _reason(status))]
         # Whoever may write to the folder may have put there what would steer a terminal.
         print("\n".join(printable(line) for text in told for line in text.splitlines()))
     if not chosen:
@@ -73,9 +73,11 @@ def _has(status: Mapping[str, Any], wanted: str) -> bool:
     return wanted in (f"state={status['state']}", f"stage={status['stage']}", *status["overrides"])
 
 
-def _line(name: str, status: Mapping[str, Any]) -> str:
+def _head(name: str, status: Mapping[str, Any]) -> list[str]:
+    """How it ended, its name and what it was started with, in few lines."""
     seconds = f"{status['seconds']:.0f} s" if "seconds" in status else ""
-    return f"{status['state']:<8} {seconds:>7}  {name}  {' '.join(status['overrides'])}"
+    first, *more = _wrapped(f"{name}  {' '.join(status['overrides'])}")
+    return [f"{status['state']:<8} {seconds:>7}  {first.strip()}", *more]
 
 
 def _reason(status: Mapping[str, Any]) -> list[str]:
@@ -83,8 +85,13 @@ def _reason(status: Mapping[str, Any]) -> list[str]:
     lines = str(status.get("error", "")).splitlines()
     if not lines or status["state"] == "stopped":
         return []
+    return _wrapped(lines[0])
+
+
+def _wrapped(text: str) -> list[str]:
+    """The beginning of a text, in lines that fit the terminal."""
     room = line_width() - REASON
-    told = textwrap.wrap(lines[0], room, max_lines=MOST_LINES, placeholder=" …", break_on_hyphens=False)
+    told = textwrap.wrap(text, room, max_lines=MOST_LINES, placeholder=" …", break_on_hyphens=False)
     return [f"{'':{REASON}}{line}" for line in told]
 
 

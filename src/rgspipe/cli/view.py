@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from rgspipe.cli.browser import open_page
 from rgspipe.errors import InputError
 from rgspipe.machine.device import CHOICES, Wanted
 from rgspipe.renderer.device import chosen_device
@@ -17,6 +18,7 @@ PAGE_KEYS = {
     "port": "of the page",
     "resolution": "pixels along the longer side of pictures at rest",
     "address": "of this machine to listen at, if others are to look; then with a token",
+    "browser": "whether it is opened in the browser, where there is one: true or false",
     "device": "where pictures are made: auto (a CUDA GPU where there is one), cpu or cuda",
 }
 
@@ -45,6 +47,7 @@ class Asked:
     port: int = 8080
     resolution: int = 256
     address: str = "127.0.0.1"
+    browser: bool = True
     device: Wanted = "auto"
 
 
@@ -79,7 +82,7 @@ def view_folder(arguments: Sequence[str]) -> int:
         address=asked.address,
         world=world_of(1.0, origin_of(asked.folder / SURFELS)),
     )
-    return serve(viewer, asked.port)
+    return serve(viewer, asked.port, asked.browser)
 
 
 def demo(arguments: Sequence[str]) -> int:
@@ -92,7 +95,7 @@ def demo(arguments: Sequence[str]) -> int:
     if folders:
         remedy = "For a scene of yours: rgspipe view FOLDER."
         raise InputError("demo", expected="no folder: it has a scene of its own", found=folders[0], remedy=remedy)
-    device = chosen_device(given.pop("device", Asked.device))
+    device, browser = chosen_device(given.pop("device", Asked.device)), given.pop("browser", Asked.browser)
     print("Making the light of a small room ready …", flush=True)
 
     from rgspipe.demo import TARGET, demo_scene
@@ -101,19 +104,22 @@ def demo(arguments: Sequence[str]) -> int:
 
     viewer = view(demo_scene(device), cases=[case_in(TARGET)], **given)
     print(DEMO)
-    return serve(viewer, given.get("port", Asked.port))
+    return serve(viewer, given.get("port", Asked.port), browser)
 
 
-def serve(viewer: Any, port: int) -> int:
+def serve(viewer: Any, port: int, browser: bool) -> int:
     """Say where the page is, and serve it until the process is interrupted; the exit status.
 
     Args:
         port: that was asked for; 0 for any.
+        browser: whether the page is opened, if there is a browser.
     """
     try:
         if port and f":{port}/" not in f"{viewer.url}/":
             print(f"Port {port} is taken, by another page perhaps; the next free one is used.")
         print(f"{viewer.url}  (Ctrl-C ends it)", flush=True)
+        if browser:
+            open_page(viewer.url)
         viewer.wait()
     except KeyboardInterrupt:
         # Whoever reads the line may be faster than the wait begins.
@@ -170,4 +176,14 @@ def _device(key: str, text: str) -> str:
     return text
 
 
-_READERS: dict[str, Callable[[str, str], Any]] = {**dict.fromkeys(_RANGES, _whole), "device": _device}
+def _yes_or_no(key: str, text: str) -> bool:
+    if text not in ("true", "false"):
+        raise InputError(key, expected="true or false", found=repr(text), remedy="true is usual.")
+    return text == "true"
+
+
+_READERS: dict[str, Callable[[str, str], Any]] = {
+    **dict.fromkeys(_RANGES, _whole),
+    "browser": _yes_or_no,
+    "device": _device,
+}

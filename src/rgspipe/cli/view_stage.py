@@ -76,7 +76,7 @@ def _serve(made: _Made) -> int:
         address=page.address,
         world=world,
     )
-    return serve(viewer, page.port)
+    return serve(viewer, page.port, page.browser)
 
 
 def _cases(made: _Made, config: RgspipeConfig) -> list:

@@ -17,3 +17,5 @@ class ViewerConfig(Options):
     """pixels along the longer side of pictures at rest"""
     address: str = "127.0.0.1"
     """of this machine to listen at; where others can reach it, the page is under a token that is printed"""
+    browser: bool = True
+    """whether the page is opened in the browser, where a terminal and a screen are"""

@@ -181,6 +181,16 @@ def _remarks(node: Node, store: ArtifactStore) -> tuple[str, ...]:
     return tuple(node.stage.remarks(node.config, made))
 
 
+def planned(config: RgspipeConfig, load_stage: StageLoader) -> list[Step]:
+    """What `run` would make and reuse, of which nothing is made.
+
+    Raises:
+        InputError: an input cannot be used, or the store cannot be read.
+    """
+    with told_below(Path(config.outputs)), reading_within(config.limits):
+        return plan(resolve(config, load_stage), ArtifactStore(Path(config.outputs)))
+
+
 def describe_plan(steps: Sequence[Step]) -> str:
     """The plan as a table for people."""
     width = max(len(step.node.stage.name) for step in steps)

@@ -23,7 +23,7 @@ WANTED = 0.003
 #: At most so many cameras of the dataset are asked which would tell most.
 ASKED = 24
 
-_FREE, _SEARCHING = "free", "Searching …"
+_FREE, _SEARCHING, _TAKE = "free", "Searching …", "take a photograph"
 
 
 class FitControls:
@@ -99,7 +99,7 @@ class FitControls:
             Action("refit from here", "R", "From the lamps of now, downhill: no search.", self.refit),
             Action("which view next?", "V", "The camera that would tell most, in yellow.", self._advise),
             Action("compare", "C", "The next photograph, picture and difference (red: too bright).", self._compare),
-            Action("take a photograph", "P", "Keep this view under the lamps of now, to look for them.", self._take),
+            Action(_TAKE, "P", "Keep this view under the lamps of now, to look for them.", self._take),
         )
 
     @property
@@ -226,7 +226,7 @@ class FitControls:
 def _told(case: Case, found: Found | None) -> str:
     """What was found, or how many photographs there are to find lamps in, or why there are none."""
     if not case.photographs:
-        why = f"{case.lacking} Take one of this view: **P**."
+        why = f"{case.lacking} Take one of this view: “{_TAKE}” under “photographs”, or key **P**."
         return why if found is None else f"{_words(found)}\n\n{why}"
     count = len(case.photographs)
     return _words(found) if found is not None else f"{count} photograph{'s' * (count != 1)}."

@@ -14,7 +14,7 @@ from rgspipe.viewer.actions import Action
 from rgspipe.viewer.cameras import axis_of, turned_to
 from rgspipe.viewer.lamp_fields import LampFields
 from rgspipe.viewer.lamp_numbers import colour_of
-from rgspipe.viewer.session import OFFERED
+from rgspipe.viewer.session import kinds_for
 from rgspipe.viewer.visit import Visit
 
 #: Length of a gizmo's arms and radius of the ball in it, of the scene's size.
@@ -42,7 +42,7 @@ class LampControls:
         )
         visit.actions.keys(*further)
         self._kind = gui.add_dropdown(
-            "kind", list(OFFERED), hint="Point, spot, sphere or panel, at the same place. Key K."
+            "kind", kinds_for(None), hint="Point, spot, sphere or panel, at the same place. Key K."
         )
         self._fields = LampFields(gui, visit.actions, session.images.frozen.size, self._edited)
         visit.actions.field(self._which, self._choose)
@@ -120,8 +120,9 @@ class LampControls:
         lights = self._session.lights
         self._kind.disabled = not lights
         light = lights[self._chosen] if lights else None
+        self._kind.options = kinds_for(light)
         if light is not None:
-            self._kind.value = light.kind if light.kind in OFFERED else OFFERED[0]
+            self._kind.value = light.kind
         self._fields.show(light)
 
     def _edited(self, light: Light, what: str) -> None:
@@ -142,9 +143,9 @@ class LampControls:
 
     def _next_kind(self) -> None:
         if lights := self._session.lights:
-            now = lights[self._chosen].kind
-            place = OFFERED.index(now) + 1 if now in OFFERED else 0
-            self._with(self._session.as_kind, OFFERED[place % len(OFFERED)])
+            light = lights[self._chosen]
+            kinds = kinds_for(light)
+            self._with(self._session.as_kind, kinds[(kinds.index(light.kind) + 1) % len(kinds)])
 
     def _with(self, action: Callable[..., None], *given: Any) -> None:
         if self._session.lights:

@@ -167,6 +167,11 @@ class Session:
         save_png(path, self.picture(self.seen(camera))[0])
 
 
+def kinds_for(light: Light | None) -> list[str]:
+    """Kinds that a lamp can be made: those that are offered, and its own."""
+    return list(OFFERED if light is None else dict.fromkeys((*OFFERED, light.kind)))
+
+
 def same_lights(one: LightRig, other: LightRig) -> bool:
     """Whether two rigs shine alike."""
     return len(one) == len(other) and all(_fields(a) == _fields(b) for a, b in zip(one, other, strict=True))

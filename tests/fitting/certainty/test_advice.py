@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 
 import pytest
@@ -38,7 +39,15 @@ def test_the_camera_that_sees_the_bright_spot_helps_most(room, fitted):
     assert advice.ranked[0].camera == 1 and advice.ranked[0].position_sd < 0.7 * advice.present_sd  # measured 0.57
     assert [view.camera for view in advice.ranked[1:]] == [0, 2]
     assert advice.plan[0] == advice.ranked[0] and len(advice.plan) == 3 and advice.views_needed is None
-    assert "the bright one would help most" in advice.words(["a", "the bright one", "b"])
+    told = r"With 1 view the least certain light's place is known to \S+ % of the scene's size; the bright one would "
+    told += r"help most, and then it is known to \S+ % of .*\. 1e-07 % is not reached: with 4 views it is known to "
+    assert re.match(told, advice.words(["a", "the bright one", "b"]))
+    assert replace(advice, views_needed=3).words(["a", "b", "c"]).endswith(". For 1e-07 % it takes 3 views.")
+    assert (
+        replace(advice, present_sd=math.inf)
+        .words(["a", "b", "c"])
+        .startswith("With 1 view the least certain light's place is undetermined; b would help most")
+    )
 
 
 def test_the_present_uncertainty_is_the_fits_own(room, fitted):

@@ -23,7 +23,7 @@ def render_pool(job: PoolJob, folder: Path, options: BlenderOptions = OWN_BLENDE
         InputError: there is no Blender, the scene cannot be used, or `folder` holds the images of another job.
         RuntimeError: Blender died; the message ends with the last lines it wrote.
     """
-    blender = find_blender(options, "fit targets", otherwise)
+    blender = find_blender(options, "fit targets", otherwise, job.dataset.denoise)
     run_blender(blender, __name__, job.to_json(), job.dataset.scene, folder)
 
 

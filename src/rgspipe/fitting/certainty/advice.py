@@ -85,16 +85,16 @@ class ViewAdvice:
 
     def words(self, names: Sequence[str]) -> str:
         """The advice in a sentence or two; `names` are the candidates' names."""
-        present = f"{_views(self.present_views)} leave{'s' * (self.present_views == 1)} {_percent(self.present_sd)}"
+        now = f"With {_views(self.present_views)} the least certain light's place is {_known(self.present_sd)}"
         if not self.ranked:
-            return f"{present}; there is no other camera to add."
-        best = self.ranked[0]
-        text = f"{present}; {names[best.camera]} would help most and leave {_percent(best.position_sd)}. "
+            return f"{now}; there is no other camera to add."
+        best, wanted = self.ranked[0], f"{100.0 * self.wanted:.2g} %"
+        text = f"{now}; {names[best.camera]} would help most, and then it is {_known(best.position_sd)}. "
         if self.views_needed is None:
             last = self.plan[-1].position_sd if self.plan else self.present_sd
             most = self.present_views + len(self.plan)
-            return text + f"{_percent(self.wanted)} is not reached with {_views(most)}, which leave {_percent(last)}."
-        return text + f"{_percent(self.wanted)} takes {_views(self.views_needed)}."
+            return f"{text}{wanted} is not reached: with {_views(most)} it is {_known(last)}."
+        return f"{text}For {wanted} it takes {_views(self.views_needed)}."
 
 
 def suggest_views(
@@ -283,5 +283,5 @@ def _views(count: int) -> str:
     return "1 view" if count == 1 else f"{count} views"
 
 
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.2g} % of the scene" if math.isfinite(share) else "the position undetermined"
+def _known(share: float) -> str:
+    return f"known to {100.0 * share:.2g} % of the scene's size" if math.isfinite(share) else "undetermined"
