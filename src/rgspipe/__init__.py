@@ -57,7 +57,7 @@ _HOMES = {
     "capture.options": ("CaptureOptions",),
     "datasets.light_file": ("read_ambient", "read_lights", "write_lights"),
     "datasets.location": ("load_views",),
-    "datasets.ply": ("PlyOptions", "save_ply"),
+    "datasets.ply.file": ("PlyOptions", "save_ply"),
     "datasets.reading_limits": ("ReadingLimits", "reading_within"),
     "datasets.surfel_file": ("load_surfels", "save_surfels"),
     "datasets.views": ("View",),

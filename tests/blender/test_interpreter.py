@@ -69,7 +69,7 @@ def test_packages_are_lent_by_a_python_of_blender_s_version(tmp_path: Path) -> N
 def test_a_blender_without_a_denoiser_is_refused_before_anything_is_rendered(tmp_path: Path) -> None:
     program = answering(tmp_path, python=list(sys.version_info[:2]), blender=[3, 4, 1], denoises=False)
     options, folder = BlenderOptions(executable=program), tmp_path / "dataset"
-    with pytest.raises(InputError, match=r"dataset\.denoise: expected false with this Blender"):
+    with pytest.raises(InputError, match=r"DatasetOptions\.denoise: expected false with this Blender"):
         render_dataset(replace(JOB, denoise=True), folder, options)
     assert not folder.exists()
     assert not find_blender(options, "scene").denoises
