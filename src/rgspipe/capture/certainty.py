@@ -17,8 +17,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.stats import chi2
 
 from rgspipe.capture.lamps import NUMBERS, LampProblem, Lamps
+from rgspipe.capture.minima import LIKELY
 from rgspipe.capture.photographs import Numbers
 from rgspipe.capture.search import Answer
 from rgspipe.capture.shared_errors import shared_covariance
@@ -91,7 +93,10 @@ def _rival_covariance(answer: Answer) -> Numbers:
     problem, lamps = answer.best.problem, answer.best.lamps
     own = _numbers(problem, lamps)
     moved = np.array([_numbers(problem, rival.tried.lamps) - own for rival in answer.rivals]).reshape(-1, len(own))
-    return moved.T @ (moved * np.array([rival.chance for rival in answer.rivals])[:, None])
+    chance = np.array([rival.chance for rival in answer.rivals])
+    # The second moment of few that are far away would leave them out of the region.
+    weight = np.where(chance > LIKELY, np.maximum(chance, 1.0 / chi2.ppf(1.0 - LIKELY, df=3)), chance)
+    return moved.T @ (moved * weight[:, None])
 
 
 def _number_covariance(problem: LampProblem, answer: Answer) -> Numbers:

@@ -25,6 +25,9 @@ FIRST = 8
 #: By other variances a minimum may be the likelier one that is so in this part of the draws of the scene's parts.
 POSSIBLE = 0.01
 
+#: One that is likelier than this is told, and a region of 95 % holds it.
+LIKELY = 0.05
+
 
 @dataclass(frozen=True, eq=False)
 class Rival:

@@ -8,14 +8,12 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from rgspipe.capture.captured import Captured
+from rgspipe.capture.minima import LIKELY
 from rgspipe.capture.search import BAR
 
 #: Photographs whose pixels disagree by more than this, in the middle, are not of one diffuse scene; nor are surfaces
 #: that lamps and paint explain worse.
 DISAGREE = 0.1
-
-#: Chance of another place that is worth a word: a region of 95 % holds it.
-RIVAL = 0.05
 
 #: More of the surfels than this unmeasured is worth a word.
 UNMEASURED = 0.1
@@ -58,7 +56,7 @@ def _rivals(found: Captured) -> Iterator[str]:
         moves = np.linalg.norm(places - best, axis=1)
         own = int(moves.argmax())
         # Nearer ones are what "known to" says.
-        if rival.chance > RIVAL and moves[own] > spread[own] and own not in told:
+        if rival.chance > LIKELY and moves[own] > spread[own] and own not in told:
             told.add(own)
             away, chance = (
                 f"{100.0 * moves[own] / size:.1f} % of the scene's size away",

@@ -120,7 +120,8 @@ class LampControls:
         lights = self._session.lights
         self._kind.disabled = not lights
         light = lights[self._chosen] if lights else None
-        self._kind.options = kinds_for(light)
+        if [*self._kind.options] != kinds_for(light):
+            self._kind.options = kinds_for(light)
         if light is not None:
             self._kind.value = light.kind
         self._fields.show(light)
