@@ -52,12 +52,12 @@ def test_both_lamps_are_found_and_no_third() -> None:
 
 
 def test_the_search_tells_how_far_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
-    bars = []
+    bars, problem = [], found().answer.best.problem
     for module in (search, minima):
         monkeypatch.setattr(
             module, "progress_bar", lambda *given, **named: bars.append(progress_bar(*given, **named)) or bars[-1]
         )
-    search.found_lamps(found().answer.best.problem, 2, 3)
+    search.found_lamps(problem, 2, 3)
     compared = "comparing places of lamps"
     assert [bar.desc for bar in bars] == ["looking for lamp 1", compared, "looking for lamp 2", compared, compared]
     assert [bar.n for bar in bars] == [bar.total for bar in bars]

@@ -23,7 +23,7 @@ ALL_AROUND = 12
 FIRST = 8
 
 #: By other variances a minimum may be the likelier one that is so in this part of the draws of the scene's parts.
-POSSIBLE = 0.01
+POSSIBLE = 0.001
 
 #: One that is likelier than this is told, and a region of 95 % holds it.
 LIKELY = 0.05
