@@ -27,8 +27,8 @@ JOB = PoolJob(DATASET, "spots", 4, CLASSES, SpotRange(cone_angle=(0.35, 0.5), fa
 
 def test_without_bpy_the_way_out_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
-    with pytest.raises(InputError, match=r"Blender.*pip install.*fit\.targets=dataset"):
-        render_pool(JOB, tmp_path)
+    with pytest.raises(InputError, match=r"Blender.*pip install.*Take the dataset's own"):
+        render_pool(JOB, tmp_path, otherwise="Take the dataset's own.")
 
 
 @pytest.fixture(scope="module")
