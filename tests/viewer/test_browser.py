@@ -218,14 +218,18 @@ def test_keys_change_every_number_of_a_lamp(window, page: Page) -> None:
     page.actions.do("refresh", page.lamps.refresh).result()
 
 
+#: What stands in the fields.
+VALUES = "() => [...document.querySelectorAll('input')].map(field => field.value)"
+
+
 def test_a_lamp_of_a_kind_that_is_not_offered_has_its_own_and_can_be_made_a_point(window, page: Page) -> None:
     session = page.session
     for kind in ("led", "sun"):
         session.change([KINDS[kind].shaped().at(LAMP.position, torch.tensor([0.6, 0.0, -0.8]), LAMP.intensity)])
         page.actions.do("refresh", page.lamps.refresh).result()
-        until(lambda kind=kind: kind in (field.input_value() for field in window.locator("input").all()))
-        field = next(field for field in window.locator("input").all() if field.input_value() == kind)
-        field.click()
+        # All at once, as fields come and go with the kind.
+        until(lambda kind=kind: kind in window.evaluate(VALUES))
+        window.locator("input").nth(window.evaluate(VALUES).index(kind)).click()
         window.get_by_role("option", name="point", exact=True).click()
         until(lambda: session.lights[0].kind == "point")
     session.change([LAMP])
