@@ -33,7 +33,7 @@ from rgspipe.renderer.effects import Effects
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import Camera, PointLight, Surfels
 from rgspipe.scene.gloss import Gloss
-from rgspipe.scene.rectangles import inside_of_box, rectangle, surfels_on
+from rgspipe.scene.rectangles import inside_of_box, rectangle, solid_box, surfels_on
 
 #: Distance of the room's surfels, and the side of a cell.
 SPACING, CELL = 1.0 / 15.0, 0.5 / 15.0
@@ -237,6 +237,18 @@ def test_a_room_that_was_photographed_along_one_wall_is_closed_behind_the_camera
     new = closed.guessed > 0.0
     wall = new & (closed.normals[:, 0] > 0.9) & (closed.centers[:, 0] < 0.1)
     assert int(wall.sum()) * SPACING**2 > 0.8 * 0.8  # measured 0.92 of the 0.8 that are missing
+
+
+def test_a_wall_behind_the_cameras_is_closed_although_things_divide_it() -> None:
+    """The hidden sides of three pillars lead to it, and where they end a part of it is no open rim."""
+    shapes = inside_of_box([0.5, 0.5, 0.4], [1.0, 1.0, 0.8], WALLS)
+    for y in (0.25, 0.5, 0.75):
+        shapes = shapes + rows(solid_box([0.3, y, 0.3], [0.2, 0.1, 0.6], BOX), [1, 2, 3, 4, 5])
+    between = ((0.1, 0.3, 0.3), (0.38, 0.3, 0.1), (0.38, 0.5, 0.9), (0.62, 0.3, 0.1), (0.62, 0.5, 0.9), (0.9, 0.4, 0.7))
+    cameras = [camera_at([0.1, y, z], [1.0, aim, 0.4], 64, 1.3) for y, z, aim in between]
+    closed = with_unseen_surfaces(seen_by(cameras, surfels_on(shapes, 2 * COUNT)), cameras, hidden=False)
+    wall = (closed.guessed > 0.0) & (closed.normals[:, 0] > 0.9) & (closed.centers[:, 0] < 0.1)
+    assert int(wall.sum()) > 200  # measured 252; 52 where such ends counted as open
 
 
 def test_lamps_stand_in_the_room() -> None:

@@ -90,7 +90,7 @@ def _side(
     unknown = raster.within(grid) & ~raster.crossed(space) & ~raster.near(surfaces, BARE)
     unknown = binary_opening(unknown, np.ones((3, 3)))
     near = raster.near(known, 2.0 * BARE)
-    return raster.chosen(_parts(unknown, solids, raster, lambda rim: near[rim].mean() > 0.5, outer=False))
+    return raster.chosen(_parts(unknown, solids, raster, lambda rim: 2 * near[rim].sum() > rim.sum(), outer=False))
 
 
 def _parts(
@@ -108,9 +108,10 @@ def _parts(
     kept = np.zeros_like(unknown)
     for index in range(1, count + 1):
         part = labels == index
-        rim = binary_dilation(part) & ~part if outer else part & ~_eroded(part)
-        # Surfaces reach past a thing's faces by the blur of their edges, and tell nothing of what is in the thing.
-        if is_kept(rim & ~cut if outer else rim):
+        # Surfaces reach past a thing's faces by the blur of their edges, and tell nothing of what is in the thing; and
+        # where the faces divide a side, that rim leads nowhere.
+        rim = binary_dilation(part) & ~part & ~cut if outer else part & ~_eroded(part | cut)
+        if is_kept(rim):
             kept |= part
     return kept | binary_dilation(kept, iterations=2) & unknown & cut
 
