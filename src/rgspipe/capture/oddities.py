@@ -1,4 +1,4 @@
-"""What of a capture is not a room of matt surfaces that everything lights: what glows, and what shines or mirrors."""
+"""What of a capture is not a closed room of matt surfaces: what glows, shines or mirrors, and where light leaves."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from rgspipe.capture.lamps import LampProblem, Lamps
 from rgspipe.capture.photographs import Numbers
 from rgspipe.capture.radiance import Measured
 from rgspipe.capture.shared_errors import excess
+from rgspipe.training.albedo import ALBEDO_RANGE
 
 #: Surfaces that send this many times the light that falls on them glow, whatever errors the gather has.
 GLOWS = 2.0
@@ -23,10 +24,11 @@ AROUND = 0.1
 
 @dataclass(frozen=True)
 class Odd:
-    """Surfels that are not matt and lit.
+    """Surfels that are not matt and lit, or that look out of the room.
 
     Attributes:
-        share: how much of the whole they are: of the light that glowing ones send beside all lamps', of the area else.
+        share: how much of the whole they are: of the light that glowing ones send beside all lamps', of what surfaces
+            send that leaves the scene, of the area else.
         place: where the strongest are, scene units.
     """
 
@@ -41,12 +43,14 @@ class Oddities:
     Attributes:
         glowing: lamps, windows.
         shining: gloss, mirrors, whatever looks different from different sides.
+        open: what looks on nothing, as the front of a room does, or a wall is missing.
         impossible: part of the measured surfels whose albedo would have to be beyond 1.
         single: part of them that one photograph alone shows.
     """
 
     glowing: Odd | None
     shining: Odd | None
+    open: Odd | None
     impossible: float
     single: float
 
@@ -58,6 +62,7 @@ class Oddities:
         return cls(
             _glowing(problem, lamps, used),
             _shining(problem, measured, used),
+            _open(problem, lamps),
             float(beyond[used].mean()) if used.any() else 0.0,
             float((measured.shown_by[used] <= 1).mean()) if used.any() else 0.0,
         )
@@ -80,6 +85,14 @@ def _shining(problem: LampProblem, measured: Measured, used: np.ndarray) -> Odd 
     areas, apart = problem.frozen.areas.double().cpu().numpy(), measured.apart
     odd = np.where(several & (apart > DISAGREE * max(float(np.median(apart[several])), 0.01)), areas, 0.0)
     return Odd(float(odd.sum() / areas[several].sum()), _place(problem, odd * apart)) if odd.any() else None
+
+
+def _open(problem: LampProblem, lamps: Lamps) -> Odd | None:
+    areas = problem.frozen.areas.double().cpu().numpy()
+    sent = areas * (np.clip(problem.albedo(lamps), *ALBEDO_RANGE) * problem.arriving(lamps)).mean(axis=1)
+    leaves = np.maximum(1.0 - np.asarray(problem.received.gather.sum(axis=1)).ravel(), 0.0)
+    share = float(sent @ leaves / sent.sum())
+    return Odd(share, _place(problem, areas * leaves)) if share > 0.0 else None
 
 
 def _place(problem: LampProblem, weight: Numbers) -> tuple[float, float, float]:

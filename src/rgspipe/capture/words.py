@@ -19,7 +19,7 @@ DISAGREE = 0.1
 UNMEASURED = 0.1
 
 #: Part of the surfaces that cannot be, are saturated, or look different from different sides, and part of the light
-#: that surfaces send of their own, which are worth one.
+#: that surfaces send of their own, or that leaves, which are worth one.
 NOTICEABLE, GLOW = 0.03, 0.05
 
 
@@ -116,6 +116,11 @@ def _doubts(found: Captured) -> Iterator[str]:
             f"Surfaces around {_point(odd.glowing.place)} send more light than falls on them, "
             f"{100.0 * odd.glowing.share:.0f} % of all: a lamp or a window in the picture. It is counted as their own "
             "and in no lamp above; leave them out of the depth (0 there) to have it found as a lamp."
+        )
+    if odd.open is not None and odd.open.share > GLOW:
+        yield (
+            f"{100.0 * odd.open.share:.0f} % of what surfaces send leaves the scene: what those around "
+            f"{_point(odd.open.place)} face is taken to be open. If there is a wall, take photographs that show it."
         )
     if odd.shining is not None and odd.shining.share > NOTICEABLE:
         yield (
