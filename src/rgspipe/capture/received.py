@@ -16,11 +16,40 @@ from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
+import torch
 
 from rgspipe.capture.photographs import Numbers
+from rgspipe.renderer.sparse import SparseOperator
 
 #: Bounces among surfels that no camera saw.
 BOUNCES = 8
+
+
+@dataclass(frozen=True, eq=False)
+class FromUnseen:
+    """Where the light of U surfels that no camera saw goes, in single precision, as it is most of a search's work.
+
+    Attributes:
+        among: (U, U) F_uu.
+        on_all: (N, U) F_·u.
+    """
+
+    among: SparseOperator
+    on_all: SparseOperator
+
+    @classmethod
+    def of(cls, gather: sp.csr_matrix, unseen: np.ndarray) -> FromUnseen:
+        """Of the surfels `unseen` (U,) by the operator (N, N) of all."""
+        on_all = gather[:, unseen]
+        return cls(SparseOperator.from_scipy(on_all[unseen]), SparseOperator.from_scipy(on_all))
+
+    def returned(self, arriving: Numbers, albedo: Numbers) -> Numbers:
+        """(N, K) what comes back of `arriving` (U, K) from surfels of `albedo` (U,)."""
+        first, reflected = (torch.from_numpy(part).float() for part in (arriving, albedo[:, None]))
+        sent = reflected * first
+        for _ in range(BOUNCES):
+            sent = reflected * (first + self.among @ sent)
+        return (self.on_all @ sent).double().numpy()
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +59,7 @@ class Received:
     Attributes:
         gather: (N, N) F.
         unseen: (U,) surfels whose radiance was not measured in all channels.
+        from_unseen: where their light goes.
         told: (U, 3) bool, channels in which it was.
         albedo: (U, 3) of those; 0 in these channels.
         seen: (N, 3) F_·s L_s, what arrives from the seen.
@@ -37,6 +67,7 @@ class Received:
 
     gather: sp.csr_matrix
     unseen: np.ndarray
+    from_unseen: FromUnseen
     told: np.ndarray
     albedo: Numbers
     seen: Numbers
@@ -46,7 +77,8 @@ class Received:
         """With the measured `radiance` (N, 3) where `seen` (N, 3) bool, and `albedo` (N, 3) elsewhere."""
         unseen = (~seen.all(axis=1)).nonzero()[0]
         told = seen[unseen]
-        return cls(gather, unseen, told, np.where(told, 0.0, albedo[unseen]), gather @ np.where(seen, radiance, 0.0))
+        albedo, sent = np.where(told, 0.0, albedo[unseen]), np.where(seen, radiance, 0.0)
+        return cls(gather, unseen, FromUnseen.of(gather, unseen), told, albedo, gather @ sent)
 
     def with_albedo(self, albedo: Numbers) -> Received:
         """With another albedo (N, 3); that of the seen is not looked at."""
@@ -58,26 +90,12 @@ class Received:
         columns = [self.spread(self.seen[:, channel : channel + 1], channel) for channel in range(3)]
         return np.concatenate(columns, axis=1)
 
-    @cached_property
-    def _among_unseen(self) -> sp.csr_matrix:
-        """(U, U) F_uu."""
-        return self.gather[self.unseen][:, self.unseen]
-
-    @cached_property
-    def _from_unseen(self) -> sp.csr_matrix:
-        """(N, U) F_·u."""
-        return self.gather[:, self.unseen]
-
     def spread(self, arriving: Numbers, channel: int | None = None) -> Numbers:
         """(N, K) T e of `arriving` (N, K), with what returns from the unseen; grey if `channel` is None."""
         if not len(self.unseen):
             return arriving
         albedo = self.albedo.mean(axis=1) if channel is None else self.albedo[:, channel]
-        first = arriving[self.unseen]
-        sent = albedo[:, None] * first
-        for _ in range(BOUNCES):
-            sent = albedo[:, None] * (first + self._among_unseen @ sent)
-        return arriving + self._from_unseen @ sent
+        return arriving + self.from_unseen.returned(arriving[self.unseen], albedo)
 
     def spread_colours(self, arriving: Numbers) -> Numbers:
         """(N, K, 3) `spread` in each channel."""
