@@ -271,6 +271,26 @@ def kinds(scene: FrozenScene) -> Bytes:
     return drawn(figure)
 
 
+def exponents(scene: FrozenScene) -> Bytes:
+    """One LED under three exponents, and what it sends into each direction."""
+    figure, angles = Figure(figsize=(8.4, 2.3), dpi=100, layout="constrained"), torch.linspace(-90.0, 90.0, 181)
+    *pictures, profile = figure.subplots(1, 4)
+    for axes, exponent in zip(pictures, (1.0, 8.0, 64.0), strict=True):
+        lamp = rg.LedLight([0.0, -0.1, 0.35], [1.0, 1.0, 1.0], [0.0, 0.4, -1.0], exponent)
+        image = scene.render(camera(*FRONT, side=2 * SIDE), lamp)
+        axes.imshow(tone_map(image, display_gain(image)))
+        axes.set_title(f"exponent {exponent:.0f}", fontsize=9)
+        axes.set_axis_off()
+        value, _ = lamp.profile_at(torch.deg2rad(angles), {"exponent": torch.tensor(exponent)})
+        profile.plot(angles, value, label=f"{exponent:.0f}")
+    profile.set_xlabel("angle to the axis (°)", fontsize=8)
+    profile.set_title("part of its intensity", fontsize=9)
+    profile.set_xticks([-90, -45, 0, 45, 90])
+    profile.tick_params(labelsize=8)
+    profile.legend(fontsize=7, frameon=False)
+    return drawn(figure)
+
+
 def viewer_shows(scene: FrozenScene) -> Bytes:
     """What a picture of the viewer may show: photograph, irradiance and illuminance in colours, and a section."""
     session, view = Session(LampImages(scene)), camera((0.5, -1.35, 0.45), (0.0, 0.05, -0.05), side=2 * SIDE)
@@ -293,6 +313,7 @@ PICTURES: dict[str, Callable[[FrozenScene], Bytes]] = {
     "target_classes": target_classes,
     "gradients": gradients,
     "kinds": kinds,
+    "exponents": exponents,
     "regions": regions,
     "exported": exported,
     "photographs": photographs,
