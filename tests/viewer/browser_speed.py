@@ -1,0 +1,128 @@
+"""How often and how soon a browser shows a lamp that is dragged: `python tests/viewer/browser_speed.py [FOLDER]`.
+
+Chromium draws without a GPU, on the same processor that makes the pictures. Without the folder of a frozen scene it is
+a Cornell box of 10000 surfels on its true surfaces.
+"""
+
+from __future__ import annotations
+
+import math
+import shutil
+import statistics
+import sys
+import time
+
+import torch
+
+import rgspipe as rg
+from rgspipe.viewer.cameras import first_camera
+from rgspipe.viewer.lamp_controls import ARMS
+from rgspipe.viewer.page import Page
+from rgspipe.viewer.serve import Viewer, view
+
+#: Software rendering, as in the tests.
+ARGUMENTS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+
+#: Pixels of windows.
+WINDOWS = ((1280, 800), (640, 480))
+
+#: Seconds of a drag without rest, times the mouse is moved in each, and single moves with a rest after each, s.
+DRAGGED, HERTZ, MOVES, REST = 10.0, 60.0, 15, 1.5
+
+#: Pixels that the mouse is moved by.
+FAR = 40.0
+
+#: Notes when the mouse moves, and when a picture is drawn: its texture has come, and a frame has been asked for.
+NOTES = """
+window.moved = []; window.drawn = [];
+window.addEventListener("pointermove", () => window.moved.push(performance.now()), true);
+const source = Object.getOwnPropertyDescriptor(HTMLImageElement.prototype, "src");
+Object.defineProperty(HTMLImageElement.prototype, "src", {...source, set(url) {
+  if (url.startsWith("blob:")) this.addEventListener("load",
+    () => requestAnimationFrame(() => window.drawn.push(performance.now())));
+  source.set.call(this, url);
+}});
+"""
+
+
+def main() -> None:
+    """Print pictures a second while a lamp is dragged, and the time from a move of the mouse to its picture."""
+    from playwright.sync_api import sync_playwright
+
+    given = sys.argv[1:]
+    frozen = rg.FrozenScene.load(given[0]) if given else rg.FrozenScene.freeze(rg.exact_surfels(rg.CornellBox(), 10000))
+    lower, upper = frozen.bounds
+    lamp = rg.PointLight((0.5 * (lower + upper)).tolist(), 1.0)
+    viewer = view(frozen, lamp, camera=first_camera(lower, upper), port=8290)
+    print(f"{len(frozen.surfels)} surfels, {torch.get_num_threads()} threads", flush=True)
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=ARGUMENTS)
+        for width, height in WINDOWS:
+            print(f"a window of {width} by {height}: ", end="", flush=True)
+            window = browser.new_page(viewport={"width": width, "height": height})
+            _measure(viewer, window, lamp)
+            window.close()
+        browser.close()
+    viewer.stop()
+
+
+def _measure(viewer: Viewer, window, lamp: rg.PointLight) -> None:
+    window.add_init_script(NOTES)
+    window.goto(viewer.url)
+    window.get_by_text("Brightest colour").wait_for(timeout=3e5)
+    start = _held(window, _page(viewer), lamp)
+    _dragged(window, start)
+    window.wait_for_timeout(1e3 * REST)
+    _moved_once(window, start)
+    window.mouse.up()
+
+
+def _page(viewer: Viewer) -> Page:
+    while len(viewer.pages) != 1:
+        time.sleep(0.1)
+    [page] = viewer.pages.values()
+    page.painter.at_rest.wait()
+    return page
+
+
+def _held(window, page: Page, lamp: rg.PointLight) -> tuple[float, float]:
+    """Where on the page the mouse holds the lamp by an arrow of its gizmo."""
+    window.wait_for_timeout(3e3)
+    camera, box = page.camera(256), window.locator("canvas").first.bounding_box()
+    arm = torch.tensor([0.75 * ARMS * page.session.images.frozen.size, 0.0, 0.0], dtype=torch.float64)
+    (x, y), _ = camera.project(lamp.position + arm)
+    scale = box["width"] / camera.width
+    start = box["x"] + scale * float(x), box["y"] + scale * float(y)
+    window.mouse.move(*start)
+    window.wait_for_timeout(1e3 * REST)
+    window.mouse.down()
+    window.wait_for_timeout(1e3 * REST)
+    return start
+
+
+def _dragged(window, start: tuple[float, float]) -> None:
+    x, y = start
+    window.evaluate("window.moved = []; window.drawn = []")
+    began = time.monotonic()
+    while (gone := time.monotonic() - began) < DRAGGED:
+        window.mouse.move(x + FAR * math.sin(gone), y)
+        time.sleep(max(0.0, began + gone + 1.0 / HERTZ - time.monotonic()))
+    moved, drawn = window.evaluate("[window.moved, window.drawn]")
+    seconds = 1e-3 * (moved[-1] - moved[0])
+    rate = sum(when <= moved[-1] for when in drawn) / seconds
+    print(f"{rate:.1f} pictures a second for {len(moved) / seconds:.0f} moves of the mouse, ", end="", flush=True)
+
+
+def _moved_once(window, start: tuple[float, float]) -> None:
+    took = []
+    for move in range(MOVES):
+        window.evaluate("window.moved = []; window.drawn = []")
+        window.mouse.move(start[0] + (FAR if move % 2 else 0.0), start[1])
+        window.wait_for_timeout(1e3 * REST)
+        moved, drawn = window.evaluate("[window.moved, window.drawn]")
+        took.append(min(when for when in drawn if when > moved[0]) - moved[0])
+    print(f"each {statistics.median(took):.0f} ms after its move, {max(took):.0f} at most", flush=True)
+
+
+if __name__ == "__main__":
+    main()
