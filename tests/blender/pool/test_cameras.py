@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 import torch
+
+pytest.importorskip("bpy")
 
 from rgspipe.blender.cameras import aimed
 from rgspipe.blender.fixed_view import FixedView
