@@ -7,6 +7,9 @@ camera saw, u, send what they get, with the albedo that the field continues into
 
 A surfel that is known in some channels only is seen in those, and unseen in the others. So all that arrives is linear
 in the lamps,  Σ a T e + G ,  with  T e = e + F_·u (1 − ρ_u F_uu)⁻¹ ρ_u e_u  and G what the measured radiance becomes.
+
+Some bounces are followed. All further ones add to a surfel what they do under light that is the same everywhere, in
+proportion to the last that was followed: by then light has forgotten where it came from.
 """
 
 from __future__ import annotations
@@ -17,12 +20,20 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 import torch
+from torch import Tensor
 
 from rgspipe.capture.photographs import Numbers
 from rgspipe.renderer.sparse import SparseOperator
 
-#: Bounces among surfels that no camera saw.
-BOUNCES = 8
+#: Bounces among surfels that no camera saw which are followed. In a room of albedo 0.9, half of it unseen, what arrives
+#: is 0.02 % off in the median and 0.3 % at most; 0.2 and 2 % with 2 of them, 0.0002 and 0.009 % with 8.
+BOUNCES = 4
+
+#: Of the albedo of three channels and their mean, the mean.
+GREY = 3
+
+#: What further bounces add is known once one adds no more than this part of it.
+SETTLED = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,13 +54,33 @@ class FromUnseen:
         on_all = gather[:, unseen]
         return cls(SparseOperator.from_scipy(on_all[unseen]), SparseOperator.from_scipy(on_all))
 
-    def returned(self, arriving: Numbers, albedo: Numbers) -> Numbers:
-        """(N, K) what comes back of `arriving` (U, K) from surfels of `albedo` (U,)."""
-        first, reflected = (torch.from_numpy(part).float() for part in (arriving, albedo[:, None]))
-        sent = reflected * first
+    def returned(self, arriving: Numbers, albedo: Numbers, further: Tensor) -> Numbers:
+        """(N, K) what comes back of `arriving` (U, K) from surfels of `albedo` (U,) to which `further` (U,) belongs."""
+        reflected = _single(albedo)[:, None]
+        sent, last = self._followed(reflected * _single(arriving), reflected)
+        return (self.on_all @ (sent + further[:, None] * last)).double().numpy()
+
+    def further(self, albedo: Numbers) -> Tensor:
+        """(U, K) what bounces that are not followed add to the last that is, for each albedo (U, K)."""
+        reflected = _single(albedo)
+        _, last = self._followed(reflected, reflected)
+        bounced, rest = last, torch.zeros_like(last)
+        while bounced.sum() > SETTLED * rest.sum():
+            bounced = reflected * (self.among @ bounced)
+            rest = rest + bounced
+        return torch.where(last > 0.0, rest / last, 0.0)
+
+    def _followed(self, sent: Tensor, reflected: Tensor) -> tuple[Tensor, Tensor]:
+        """(U, K) all that is sent of what is sent at first, and the last bounce of it."""
+        last = sent
         for _ in range(BOUNCES):
-            sent = reflected * (first + self.among @ sent)
-        return (self.on_all @ sent).double().numpy()
+            last = reflected * (self.among @ last)
+            sent = sent + last
+        return sent, last
+
+
+def _single(values: Numbers) -> Tensor:
+    return torch.from_numpy(np.ascontiguousarray(values)).float()
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,12 +121,22 @@ class Received:
         columns = [self.spread(self.seen[:, channel : channel + 1], channel) for channel in range(3)]
         return np.concatenate(columns, axis=1)
 
+    @cached_property
+    def _albedos(self) -> Numbers:
+        """(U, 4) of the channels, and their mean."""
+        return np.column_stack([self.albedo, self.albedo.mean(axis=1)])
+
+    @cached_property
+    def _further(self) -> Tensor:
+        return self.from_unseen.further(self._albedos)
+
     def spread(self, arriving: Numbers, channel: int | None = None) -> Numbers:
         """(N, K) T e of `arriving` (N, K), with what returns from the unseen; grey if `channel` is None."""
         if not len(self.unseen):
             return arriving
-        albedo = self.albedo.mean(axis=1) if channel is None else self.albedo[:, channel]
-        return arriving + self.from_unseen.returned(arriving[self.unseen], albedo)
+        kind = GREY if channel is None else channel
+        albedo, further = self._albedos[:, kind], self._further[:, kind]
+        return arriving + self.from_unseen.returned(arriving[self.unseen], albedo, further)
 
     def spread_colours(self, arriving: Numbers) -> Numbers:
         """(N, K, 3) `spread` in each channel."""
