@@ -41,6 +41,11 @@ def test_black_surfaces_send_nothing_back() -> None:
     np.testing.assert_array_equal(received.spread(light(received)), light(received))
 
 
+def test_a_prediction_beyond_what_surfaces_reflect_is_no_light_without_end() -> None:
+    """Albedo maps are known up to a scale."""
+    np.testing.assert_array_equal(half_unseen(3.0).known, half_unseen(0.98).known)
+
+
 def test_another_albedo_is_taken_throughout() -> None:
     received = half_unseen(0.9).with_albedo(np.full(radiance().shape, 0.3))
     np.testing.assert_array_equal(received.known, half_unseen(0.3).known)

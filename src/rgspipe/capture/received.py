@@ -24,6 +24,7 @@ from torch import Tensor
 
 from rgspipe.capture.photographs import Numbers
 from rgspipe.renderer.sparse import SparseOperator
+from rgspipe.training.albedo import ALBEDO_RANGE
 
 #: Bounces among surfels that no camera saw which are followed. In a room of albedo 0.9, half of it unseen, what arrives
 #: is 0.02 % off in the median and 0.3 % at most; 0.2 and 2 % with 2 of them, 0.0002 and 0.009 % with 8.
@@ -108,12 +109,12 @@ class Received:
         """With the measured `radiance` (N, 3) where `seen` (N, 3) bool, and `albedo` (N, 3) elsewhere."""
         unseen = (~seen.all(axis=1)).nonzero()[0]
         told = seen[unseen]
-        albedo, sent = np.where(told, 0.0, albedo[unseen]), np.where(seen, radiance, 0.0)
-        return cls(gather, unseen, FromUnseen.of(gather, unseen), told, albedo, gather @ sent)
+        sent = gather @ np.where(seen, radiance, 0.0)
+        return cls(gather, unseen, FromUnseen.of(gather, unseen), told, _untold(told, albedo[unseen]), sent)
 
     def with_albedo(self, albedo: Numbers) -> Received:
         """With another albedo (N, 3); that of the seen is not looked at."""
-        return replace(self, albedo=np.where(self.told, 0.0, albedo[self.unseen]))
+        return replace(self, albedo=_untold(self.told, albedo[self.unseen]))
 
     @cached_property
     def known(self) -> Numbers:
@@ -143,3 +144,8 @@ class Received:
         if not len(self.unseen):
             return np.repeat(arriving[:, :, None], 3, axis=2)
         return np.stack([self.spread(arriving, channel) for channel in range(3)], axis=2)
+
+
+def _untold(told: np.ndarray, albedo: Numbers) -> Numbers:
+    """`albedo` (U, 3) where it is not `told` (U, 3) what is sent: below 1, or no light would ever go."""
+    return np.where(told, 0.0, np.minimum(albedo, ALBEDO_RANGE[1]))
