@@ -147,5 +147,5 @@ class Received:
 
 
 def _untold(told: np.ndarray, albedo: Numbers) -> Numbers:
-    """`albedo` (U, 3) where it is not `told` (U, 3) what is sent: below 1, or no light would ever go."""
+    """`albedo` (U, 3), 0 where it is `told` (U, 3) what is sent, and no more than surfaces may reflect."""
     return np.where(told, 0.0, np.minimum(albedo, ALBEDO_RANGE[1]))
