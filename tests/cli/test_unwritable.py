@@ -67,6 +67,8 @@ def run_as_nobody(
     user = ["setpriv", f"--reuid={NOBODY}", f"--regid={NOBODY}", "--clear-groups", "--no-new-privs"]
     if subprocess.run([*user, "test", "-r", __file__], capture_output=True).returncode != 0:
         pytest.skip("other users cannot read this checkout")
+    if subprocess.run([*user, sys.executable, "-c", ""], cwd="/tmp", capture_output=True).returncode != 0:
+        pytest.skip("other users cannot start this Python")
     return subprocess.run([*user, *command], env=environment, cwd="/tmp", capture_output=True, text=True, timeout=120)
 
 

@@ -43,7 +43,7 @@ def test_a_pair_is_side_by_side_and_shines_ahead() -> None:
         across = (left.position - right.position).numpy()
         assert np.linalg.norm(across) == pytest.approx(GAUGE * corridor.width)
         assert across[:2] @ ahead == pytest.approx(0.0, abs=1e-12)
-        assert np.cross(ahead, across[:2]) > 0.0  # the left one to the left
+        assert ahead[0] * across[1] - ahead[1] * across[0] > 0.0  # the left one to the left
         np.testing.assert_allclose(0.5 * (left.position + right.position)[:2].numpy(), middle)
         for light in (left, right):
             assert np.linalg.norm(light.direction) == pytest.approx(1.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from pathlib import Path
 
 import pandas as pd
@@ -27,6 +28,7 @@ BLIND = (
 
 
 @pytest.mark.slow
+@pytest.mark.skipif(find_spec("bpy") is None, reason="bpy is not installed")
 def test_a_room_that_cannot_be_trained_is_no_end_of_the_study(tmp_path: Path) -> None:
     config = compose_config(["stage=study", "experiment=zoo", f"outputs={tmp_path / 'outputs'}", *BLIND])
     study = run(config, load_stage)
