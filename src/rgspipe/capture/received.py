@@ -31,7 +31,7 @@ from rgspipe.training.albedo import ALBEDO_RANGE
 BOUNCES = 4
 
 #: Of the albedo of three channels and their mean, the mean.
-GREY = 3
+MEAN = 3
 
 #: What further bounces add is known once one adds no more than this part of it.
 SETTLED = 1e-4
@@ -135,7 +135,7 @@ class Received:
         """(N, K) T e of `arriving` (N, K), with what returns from the unseen; grey if `channel` is None."""
         if not len(self.unseen):
             return arriving
-        kind = GREY if channel is None else channel
+        kind = MEAN if channel is None else channel
         albedo, further = self._albedos[:, kind], self._further[:, kind]
         return arriving + self.from_unseen.returned(arriving[self.unseen], albedo, further)
 
