@@ -108,11 +108,15 @@ class Course:
 
 
 def effort_of(spec: LightSpec) -> float:
-    """What a search takes as far as is known when it begins: with an unknown number that there is one light."""
+    """What a fit takes as far as is known when it begins: with an unknown number that there is one light."""
+    return effort_of_search(spec) + effort_after((spec.count or 1) ** GROWTH) + CERTAINTY
+
+
+def effort_of_search(spec: LightSpec) -> float:
+    """What comes before lights are chosen, as far as is known when it begins."""
     tried = 2 if spec.count is None else spec.count
     first = 1 if spec.count is None or len(spec.kinds) > 1 else tried
-    known = spec.count or 1
-    return BEGINNING + POINTS * sum(range(first, tried + 1)) + effort_after(known**GROWTH) + CERTAINTY
+    return BEGINNING + POINTS * sum(range(first, tried + 1))
 
 
 def effort_after(weight: float) -> float:

@@ -50,17 +50,15 @@ class FitViews(TargetViews):
             )
         capture = capture or ImageCapture()
 
-        def fit(views: TargetViews) -> FitResult:
-            return solver.fit(views, stacked, capture)
-
-        if emitters is None:
-            return fit(self)
-        if not isinstance(emitters, str):
-            return fit_without(self, stacked, capture, fit, self.prepared.emitter_masks(as_list(emitters, axes=2)))
-        if emitters != "auto":
+        if not isinstance(emitters, str | None):
+            masks = self.prepared.emitter_masks(as_list(emitters, axes=2))
+            return fit_without(self, stacked, capture, solver, masks)
+        if emitters not in {"auto", None}:
             raise InputError("emitters", expected='"auto", masks or None', found=repr(emitters), remedy="Choose one.")
         # The published method has no way to look twice.
-        return fit_on_lookout(self, stacked, capture, fit) if isinstance(solver, Search) else fit(self)
+        if emitters == "auto" and isinstance(solver, Search):
+            return fit_on_lookout(self, stacked, capture, solver)
+        return solver.fit(self, stacked, capture)
 
     def refit(
         self, images: Sequence[ArrayLike] | ArrayLike, start: LightRig, capture: ImageCapture | None = None

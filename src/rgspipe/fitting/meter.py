@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
+from typing import Self
 
 from rgspipe.fitting.course import Course
 
@@ -22,6 +25,13 @@ class Meter:
     evaluations: int = 0
     course: Course = field(default_factory=Course)
     _begin: float = field(default_factory=time.perf_counter, init=False)
+
+    @classmethod
+    @contextmanager
+    def shown(cls, effort: float) -> Iterator[Self]:
+        """Of a fit of some effort, which is shown while it takes."""
+        with Course.shown(effort) as course:
+            yield cls(course=course)
 
     @property
     def seconds(self) -> float:

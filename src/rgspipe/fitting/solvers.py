@@ -10,13 +10,16 @@ from torch import Tensor
 
 from rgspipe.fitting.baselines.paper_adam import fit_paper_adam
 from rgspipe.fitting.baselines.paper_adam_start import LightPrior
+from rgspipe.fitting.course import effort_of
 from rgspipe.fitting.findings import ExposureUnknown
+from rgspipe.fitting.meter import Meter
 from rgspipe.fitting.model.capture import ImageCapture
 from rgspipe.fitting.model.differences import DifferenceModel, by_differences
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.options import AdamOptions, SearchOptions
 from rgspipe.fitting.result import FitResult
-from rgspipe.fitting.search_lm import fit_search_lm
+from rgspipe.fitting.search_lm import polished
+from rgspipe.fitting.searched import Searched, searched
 from rgspipe.fitting.target_views import TargetViews
 from rgspipe.scene import PointLight
 
@@ -39,13 +42,28 @@ class Search(SearchOptions):
 
     def fit(self, views: TargetViews, images: Tensor, capture: ImageCapture) -> FitResult:
         """The lights of images (all pixels of all views, 3)."""
-        problem, blocks = views.problem(images, capture, self.loss), views.blocks
+        with Meter.shown(effort_of(views.lights)) as meter:
+            return self.polished(self.searched(views, images, capture, meter), views, images, capture, meter)
+
+    def searched(self, views: TargetViews, images: Tensor, capture: ImageCapture, meter: Meter) -> Searched | None:
+        """What blocks of pixels tell of the lights; None if no light explains any of the images."""
+        problem, blocks = self._problem(views, images, capture), views.blocks
         if self.derivatives == "differences":
-            problem, blocks = by_differences(problem), DifferenceModel(blocks, views.prepared.frozen.size)
-        result = fit_search_lm(problem, views.coarse(self.aimed), self, views.lights, blocks)
+            blocks = DifferenceModel(blocks, views.prepared.frozen.size)
+        return None if problem.black else searched(problem, views.coarse(self.aimed), self, views.lights, blocks, meter)
+
+    def polished(
+        self, found: Searched | None, views: TargetViews, images: Tensor, capture: ImageCapture, meter: Meter
+    ) -> FitResult:
+        """The lights, by all pixels of `views`: those that were searched, or more of the same images."""
+        result = polished(self._problem(views, images, capture), found, self, views.lights, meter)
         if capture.exposure_free and len(views.prepared.views) == 1:
             return replace(result, findings=(*result.findings, ExposureUnknown()))
         return result
+
+    def _problem(self, views: TargetViews, images: Tensor, capture: ImageCapture) -> LightProblem:
+        problem = views.problem(images, capture, self.loss)
+        return by_differences(problem) if self.derivatives == "differences" else problem
 
 
 @dataclass(frozen=True)

@@ -52,12 +52,10 @@ def off(result: FitResult, light: PointLight) -> float:
 
 
 def same(one: FitResult, other: FitResult) -> bool:
-    """Whether two results are equal to the last bit."""
-    return (
-        one.findings == other.findings
-        and one.loss == other.loss
-        and all(torch.equal(a.position, b.position) for a, b in zip(one.lights, other.lights, strict=True))
-        and all(torch.equal(a, b) for a, b in zip(one.covariance, other.covariance, strict=True))
+    """Whether two results of images without noise are equal to rounding."""
+    return one.findings == other.findings and all(
+        torch.allclose(a.position, b.position, rtol=0.0, atol=1e-6)  # measured at most 4.3e-8
+        for a, b in zip(one.lights, other.lights, strict=True)
     )
 
 
@@ -82,7 +80,7 @@ def test_a_lamp_in_sight_is_left_out_and_found(ready: dict[int, FitViews], name:
 
 
 def test_plain_targets_are_fitted_as_ever(ready: dict[int, FitViews]) -> None:
-    """To the last bit, wherever the light is, near walls too, and nearly all of them by one fit."""
+    """Wherever the light is, near walls too, and nearly all of them by one search."""
     generator, views, more = torch.Generator().manual_seed(5), ready[1], 0
     for _ in range(12):
         place = 0.9 * (torch.rand(3, generator=generator, dtype=torch.float64) - 0.5)
@@ -91,15 +89,19 @@ def test_plain_targets_are_fitted_as_ever(ready: dict[int, FitViews]) -> None:
         found, plain = views.fit(images), views.fit(images, emitters=None)
         assert same(found, plain) or inside
         assert found.lamps == ()
-        more += found.evaluations > plain.evaluations
-    assert more <= 2
+        more += found.evaluations > 1.5 * plain.evaluations
+    assert more <= 1  # measured 0; 1.33 times as many at most
 
 
 @pytest.mark.parametrize("place", [(0.45, -0.1, 0.05), (0.2, -0.3, -0.45), (0.15, 0.45, 0.2)])
 def test_a_bright_reflection_is_no_lamp(ready: dict[int, FitViews], place: tuple[float, float, float]) -> None:
     """A light 0.05 away from a wall in sight makes it up to 90 times as bright as the room."""
     images = ready[1].render(lit(place))
-    assert same(ready[1].fit(images), ready[1].fit(images, emitters=None))
+    found, plain = ready[1].fit(images), ready[1].fit(images, emitters=None)
+    assert same(found, plain)
+    assert (
+        found.evaluations < 2 * plain.evaluations
+    )  # measured 0.7 to 1.2 times as many: what was searched is not searched again
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -2,30 +2,27 @@
 
 What is striking enough is left out at once. Everything else is fitted first, as if there were no lamps in sight: only
 where that explains little, all that may be a lamp is left out, and it is searched again. Suspects are lamps if the
-lights that were found without them do not light them: else they come back.
+lights that were found without them do not light them: else they come back, and where all do, those lights are polished
+on what they light, too.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
-import torch
 from torch import Tensor
 
-from rgspipe.fitting.findings import LampElsewhere, LampsLeftOut, PoorlyExplained
-from rgspipe.fitting.in_sight.confirm import confirmed, located
-from rgspipe.fitting.in_sight.lamp import LampInSight, Mask, given_lamps, left_out
-from rgspipe.fitting.in_sight.places import places
-from rgspipe.fitting.in_sight.sight import Numbers, Sight, needed_intensity
-from rgspipe.fitting.in_sight.suspects import POSSIBLE, SURE, Bar, saturated, shaded, suspects, usual
+from rgspipe.fitting.course import effort_of, effort_of_search
+from rgspipe.fitting.in_sight.lamp import LampInSight, Mask, given_lamps
+from rgspipe.fitting.in_sight.lookout import Answer, Lookout, poorly_explained
+from rgspipe.fitting.in_sight.suspects import POSSIBLE
+from rgspipe.fitting.meter import Meter
 from rgspipe.fitting.model.capture import ImageCapture
-from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.result import FitResult
-from rgspipe.fitting.search.refine import Refiner
-from rgspipe.fitting.search.weighting import PLAIN
+from rgspipe.fitting.searched import Searched
+from rgspipe.fitting.solvers import Search, Solver
 from rgspipe.fitting.target_views import TargetViews
 
 #: A fit is made again where more than this part of what was left out for it are no lamp's pixels, or beside them …
@@ -34,188 +31,104 @@ SPARED = 0.5
 #: … but not more often than that.
 ROUNDS = 3
 
-#: Steps of a fit that goes on without what is saturated.
-FURTHER = 5
 
-#: Lights that leave less than this part of what others leave of the same pixels are the better ones by far.
-FAR_BETTER = 0.5
-
-Fit = Callable[[TargetViews], FitResult]
-
-
-@dataclass(frozen=True)
-class Answer:
-    """A fit, and the lamps whose pixels it was made without."""
-
-    result: FitResult
-    lamps: Sequence[LampInSight]
-
-
-@dataclass(frozen=True)
-class Lookout:
-    """Images in which lamps may be in sight.
-
-    Attributes:
-        views: they are of.
-        images: (all pixels, 3), stacked.
-        capture: how they were taken.
-    """
-
-    views: TargetViews
-    images: Tensor
-    capture: ImageCapture
-
-    @property
-    def size(self) -> float:
-        """Longest side of the scene."""
-        return self.views.prepared.frozen.size
-
-    @property
-    def sights(self) -> tuple[Sight, ...]:
-        """What the pixels look at, one a view."""
-        return self.views.sights
-
-    @cached_property
-    def greys(self) -> list[Numbers]:
-        """(H, W) mean radiance of the channels, one a view."""
-        return [_grey(image) for image in self.views.prepared.split(self.images)]
-
-    def exposed(self, result: FitResult) -> list[Numbers]:
-        """The greys, divided by the exposures that a fit found."""
-        exposures = result.exposures or (1.0,) * len(self.greys)
-        return [grey / exposure for grey, exposure in zip(self.greys, exposures, strict=True)]
-
-    def suspects(self, bar: Bar) -> list[LampInSight]:
-        """By the images alone."""
-        shadings = [shaded(sight, grey) for sight, grey in zip(self.sights, self.greys, strict=True)]
-        levels = [usual(sight, shading, bar.compact) for sight, shading in zip(self.sights, shadings, strict=True)]
-        values = [
-            np.minimum(shading, level)[sight.surface]
-            for sight, shading, level in zip(self.sights, shadings, levels, strict=True)
-        ]
-        seen = np.concatenate(values)
-        needed = needed_intensity(self.views.prepared, float(seen.mean()) if seen.size else 0.0)
-        return suspects(self.sights, self.greys, needed, bar)
-
-    def striking(self) -> list[LampInSight]:
-        """What no reflection is; and, as a lamp in one view may be in the others, too, what may be one there."""
-        sure = self.suspects(SURE)
-        told = {lamp.view for lamp in sure}
-        return [*sure, *(lamp for lamp in self.suspects(POSSIBLE) if lamp.view not in told)] if sure else []
-
-    @cached_property
-    def full(self) -> list[Mask]:
-        """(H, W) bool a view, pixels that are saturated in all channels."""
-        if self.capture.clip is None:
-            return [np.zeros(grey.shape, dtype=bool) for grey in self.greys]
-        full = self.images >= self.capture.saturated * self.capture.clip
-        return [mask.all(dim=2).cpu().numpy() for mask in self.views.prepared.split(full)]
-
-    @cached_property
-    def saturated(self) -> list[LampInSight]:
-        """What is saturated and compact."""
-        return saturated(self.sights, self.greys, self.full)
-
-    def doubtful(self, result: FitResult) -> list[LampInSight]:
-        """What is saturated and no longer lit when a fit goes a little further without it."""
-        if not result.lights or not self.saturated or not self.enough_without(self.saturated):
-            return []
-        views = self.without(self.saturated)
-        refiner = Refiner.of(views.problem(self.images, self.capture).sharpest())
-        rig = [Emitter.fitted(light, matrix) for light, matrix in zip(result.lights, result.covariance, strict=True)]
-        state = refiner.refined(refiner.start(rig, PLAIN), PLAIN, FURTHER)
-        return self.confirmed(self.saturated, replace(result, lights=state.lights(refiner.problem)))
-
-    def rendered(self, result: FitResult) -> list[Numbers]:
-        """(H, W) mean radiance of the channels under a fit's lights, one a view, over its exposures."""
-        exposures = result.exposures or (1.0,) * len(self.greys)
-        return [_grey(image) / exposure for image, exposure in zip(self.explained(result), exposures, strict=True)]
-
-    def explained(self, result: FitResult) -> list[Tensor]:
-        """(H, W, 3) what a fit has for the images, one a view: its lights, and what is there besides them."""
-        with torch.no_grad():
-            shown = self.views.render(result.lights)
-        exposures = result.exposures or (1.0,) * len(shown)
-        exposed = [image * exposure for image, exposure in zip(shown, exposures, strict=True)]
-        there = self.views.there_anyway(result, self.capture)
-        return [image + other.to(image) for image, other in zip(exposed, there, strict=True)] if there else exposed
-
-    def without(self, lamps: Sequence[LampInSight]) -> TargetViews:
-        """The views less the lamps' pixels, looked at first from where the lamps may stand."""
-        masks = left_out(lamps, [grey.shape for grey in self.greys])
-        return self.views.without(masks, places(self.sights, lamps, self.size))
-
-    def enough_without(self, lamps: Sequence[LampInSight]) -> bool:
-        """Whether most of the trusted pixels are left without the lamps'."""
-        masks = left_out(lamps, [grey.shape for grey in self.greys])
-        out = np.concatenate([mask.reshape(-1) for mask in masks])[self.views.prepared.pixels.cpu().numpy()]
-        return float(out.mean()) < 0.5
-
-    def sure(self, answer: Answer) -> bool:
-        """Whether lights explain what was not left out, and stand where lamps are: pools of light are no lamps."""
-        lamps = located(self.sights, answer.lamps, answer.result.lights, self.size)
-        return not _poor(answer.result) and all(lamp.light is not None for lamp in lamps)
-
-    def confirmed(self, lamps: Sequence[LampInSight], result: FitResult) -> list[LampInSight]:
-        """Those that a fit without them does not light."""
-        rendered = self.rendered(result)
-        return confirmed(self.sights, self.exposed(result), lamps, result.lights, rendered, self.full, self.size)
-
-    def left(self, views: TargetViews, result: FitResult) -> float:
-        """Share of the energy of the pixels of `views` that a fit's lights leave."""
-        pixels = views.prepared.pixels
-        image = torch.cat([image.reshape(-1, 3) for image in self.explained(result)])[pixels].double()
-        target = self.images[pixels].double()
-        return float((target - image).square().sum() / target.square().sum())
-
-    def told(self, answer: Answer) -> FitResult:
-        """A fit with what is to be said of the lamps that it left out."""
-        result = answer.result
-        lamps = located(self.sights, answer.lamps, result.lights, self.size)
-        masks = left_out(lamps, [grey.shape for grey in self.greys])
-        count, views = int(sum(mask.sum() for mask in masks)), sum(bool(mask.any()) for mask in masks)
-        elsewhere = [LampElsewhere(lamp.view, *lamp.place) for lamp in lamps if lamp.light is None and result.lights]
-        findings = (*result.findings, *elsewhere, LampsLeftOut(len(lamps), count, views))
-        return replace(result, findings=findings, lamps=tuple(lamps))
-
-
-def fit_without(views: TargetViews, images: Tensor, capture: ImageCapture, fit: Fit, masks: Sequence) -> FitResult:
+def fit_without(
+    views: TargetViews, images: Tensor, capture: ImageCapture, solver: Solver, masks: Sequence[Mask]
+) -> FitResult:
     """A fit that leaves out given pixels of lamps, masks (H, W) bool, one a view."""
     lookout, lamps = Lookout(views, images, capture), given_lamps(masks)
-    return lookout.told(Answer(fit(lookout.without(lamps)), lamps)) if lamps else fit(views)
+    if not lamps:
+        return solver.fit(views, images, capture)
+    return lookout.told(Answer(solver.fit(lookout.without(lamps), images, capture), lamps))
 
 
-def fit_on_lookout(views: TargetViews, images: Tensor, capture: ImageCapture, fit: Fit) -> FitResult:
-    """A fit that leaves out the lamps that it finds in sight; without any it is `fit` of all pixels."""
-    lookout, fits = Lookout(views, images, capture), _Fits(fit)
-    # Pools of narrow lights end as sharply as lamps do, so images that may hold some are fitted first.
-    aimed = any(kind.axis is not None for kind in views.lights.kinds)
-    answers = [] if aimed else _without_lamps(lookout, fits, lookout.striking())
-    if answers and not _poor(answers[0].result):
-        return fits.spent(lookout.told(answers[0]))
-    whole = fits(views)
-    if _poor(whole):
-        possible = lookout.striking() if aimed else [*lookout.suspects(POSSIBLE), *lookout.saturated]
-        answers = [*_without_lamps(lookout, fits, possible), *answers]
-        answers = [one for one in answers if _far_better(lookout, one, whole) and (not aimed or lookout.sure(one))]
-    else:
-        answers = _without_lamps(lookout, fits, lookout.doubtful(whole))
-    return fits.spent(lookout.told(answers[0]) if answers else whole)
+def fit_on_lookout(views: TargetViews, images: Tensor, capture: ImageCapture, solver: Search) -> FitResult:
+    """A fit that leaves out the lamps that it finds in sight; without any it is that of all pixels."""
+    with Meter.shown(effort_of(views.lights)) as meter:
+        result = _Fits(Lookout(views, images, capture), solver, meter).best()
+        return replace(result, seconds=meter.seconds, iterations=meter.iterations, evaluations=meter.evaluations)
 
 
-def _without_lamps(lookout: Lookout, fit: Fit, lamps: Sequence[LampInSight]) -> list[Answer]:
-    """A fit without what it does not light of some suspects; none where it lights all of them."""
-    answers, kept = [], lamps
-    for _ in range(ROUNDS):
-        if not kept or not lookout.enough_without(kept):
-            return []
-        lamps, result = kept, fit(lookout.without(kept))
-        if not result.lights:
-            return []
-        kept, answers = lookout.confirmed(lamps, result), [Answer(result, lamps)]
-        if _agree(lamps, kept):
-            break
-    return answers
+@dataclass(frozen=True)
+class _Trial:
+    """What comes of a search without suspects.
+
+    Attributes:
+        answer: without those that are lamps; None if none is, or no light was found.
+        lit: what was searched, where its lights light all suspects; of the pixels that `views` have.
+    """
+
+    answer: Answer | None = None
+    lit: Searched | None = None
+    views: TargetViews | None = None
+
+
+@dataclass(frozen=True)
+class _Fits:
+    """Fits of one target to whichever of its pixels."""
+
+    lookout: Lookout
+    solver: Search
+    meter: Meter
+
+    def best(self) -> FitResult:
+        """The fit that explains most, with lamps left out if there are any."""
+        lookout = self.lookout
+        # Pools of narrow lights end as sharply as lamps do, so images that may hold some are fitted first.
+        aimed = any(kind.axis is not None for kind in lookout.views.lights.kinds)
+        striking = _Trial() if aimed else self.without(lookout.striking())
+        if striking.answer is not None and not poorly_explained(striking.answer.result):
+            return lookout.told(striking.answer)
+        whole = self.whole(striking)
+        if poorly_explained(whole):
+            possible = lookout.striking() if aimed else [*lookout.suspects(POSSIBLE), *lookout.saturated]
+            answers = [one for one in (self.without(possible).answer, striking.answer) if one is not None]
+            answers = [one for one in answers if lookout.far_better(one, whole) and (not aimed or lookout.sure(one))]
+        else:
+            answers = [one for one in (self.without(lookout.doubtful(whole)).answer,) if one is not None]
+        return lookout.told(answers[0]) if answers else whole
+
+    def without(self, suspects: Sequence[LampInSight]) -> _Trial:
+        """A fit without those of some suspects that it does not light."""
+        kept, found, views = suspects, None, None
+        for last in (*[False] * (ROUNDS - 1), True):
+            if not kept:
+                return _Trial(None, found, views)
+            if not self.lookout.enough_without(kept):
+                return _Trial()
+            lamps, views = kept, self.lookout.without(kept)
+            found = self.searched(views)
+            if found is None:
+                return _Trial()
+            # Blocks tell most of them apart, and pixels what is left.
+            kept = self.lookout.confirmed(lamps, found.roughly())
+            if kept and (last or _agree(lamps, kept)):
+                result = self.polished(found, views)
+                kept = self.lookout.confirmed(lamps, result)
+                if not result.lights:
+                    return _Trial()
+                if last or _agree(lamps, kept):
+                    return _Trial(Answer(result, lamps))
+        return _Trial(None, found, views)
+
+    def whole(self, striking: _Trial) -> FitResult:
+        """A fit of all pixels: of lights that were found without some, if they explain these as well as the others."""
+        views, lit = self.lookout.views, striking.lit
+        if lit is not None and lit.unexplained <= self.solver.certainty.poorly:
+            result = self.polished(lit, views)
+            if self.lookout.explains_more(result, striking.views):
+                return result
+        return self.polished(self.searched(views), views)
+
+    def searched(self, views: TargetViews) -> Searched | None:
+        """What a search of `views` finds."""
+        if self.meter.iterations:
+            self.meter.course.further(effort_of_search(views.lights))
+        return self.solver.searched(views, self.lookout.images, self.lookout.capture, self.meter)
+
+    def polished(self, found: Searched | None, views: TargetViews) -> FitResult:
+        """What was searched, polished on the pixels of `views`."""
+        return self.solver.polished(found, views, self.lookout.images, self.lookout.capture, self.meter)
 
 
 def _agree(before: Sequence[LampInSight], after: Sequence[LampInSight]) -> bool:
@@ -234,37 +147,3 @@ def _agree(before: Sequence[LampInSight], after: Sequence[LampInSight]) -> bool:
 def _masks(out: Sequence[LampInSight], wanted: Sequence[LampInSight]) -> tuple[list[Mask], list[Mask], list[Mask]]:
     """Of one view: what was left out, what has to be, and what may be."""
     return [lamp.pixels for lamp in out], [lamp.core for lamp in wanted], [lamp.pixels for lamp in wanted]
-
-
-def _poor(result: FitResult) -> bool:
-    return any(isinstance(finding, PoorlyExplained) for finding in result.findings)
-
-
-def _far_better(lookout: Lookout, answer: Answer, whole: FitResult) -> bool:
-    """Whether a fit without lamps is to be preferred to one with them."""
-    if not whole.lights:
-        return True
-    rest = lookout.without(answer.lamps)
-    return lookout.left(rest, answer.result) < FAR_BETTER * lookout.left(rest, whole)
-
-
-class _Fits:
-    """Fits of one target, and what all of them take."""
-
-    def __init__(self, fit: Fit) -> None:
-        self.fit, self.made = fit, []
-
-    def __call__(self, views: TargetViews) -> FitResult:
-        self.made.append(self.fit(views))
-        return self.made[-1]
-
-    def spent(self, result: FitResult) -> FitResult:
-        """A result with what all fits took."""
-        if len(self.made) == 1:
-            return result
-        sums = {name: sum(getattr(one, name) for one in self.made) for name in ("seconds", "iterations", "evaluations")}
-        return replace(result, **sums)
-
-
-def _grey(image: Tensor) -> Numbers:
-    return image.detach().double().mean(dim=2).cpu().numpy()
