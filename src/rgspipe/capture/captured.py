@@ -21,7 +21,7 @@ from rgspipe.capture.prediction import Prediction
 from rgspipe.capture.radiance import Measured, measured_radiance
 from rgspipe.capture.received import Received
 from rgspipe.capture.refusals import OFF, check_brackets, check_lightings, check_measured, check_overlap, check_views
-from rgspipe.capture.search import BAR, Answer, found_lamps
+from rgspipe.capture.search import BAR, FoundLamps, found_lamps
 from rgspipe.capture.several import found_in_turns, without
 from rgspipe.completion import with_unseen_surfaces
 from rgspipe.datasets.views import View
@@ -67,7 +67,7 @@ class Captured:
     certainty: Certainty
     doubt: Tensor
     measured: Measured
-    answer: Answer
+    answer: FoundLamps
     frozen: FrozenScene
     oddities: Oddities
     lighting: str = ""
@@ -192,7 +192,7 @@ def _problem(
     return LampProblem(frozen, received, field, measured.radiance, expected, pixels, rays, prediction, bounds)
 
 
-def _captured(measured: Measured, answer: Answer, options: CaptureOptions, lighting: str) -> Captured:
+def _captured(measured: Measured, answer: FoundLamps, options: CaptureOptions, lighting: str) -> Captured:
     best, frozen = answer.best, answer.best.problem.frozen
     albedo = torch.from_numpy(np.clip(best.problem.albedo(best.lamps), *ALBEDO_RANGE)).float()
     doubt = torch.from_numpy(best.problem.field.deviation(DRAWS, options.seed)).float()
