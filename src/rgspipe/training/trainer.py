@@ -30,7 +30,7 @@ from rgspipe.training.light_refinement import refine_lights
 from rgspipe.training.lighting import total_irradiance, trace_lighting
 from rgspipe.training.log import TrainingLog
 from rgspipe.training.materials import PriorOf, build_frozen, each_view, fit_materials
-from rgspipe.training.operator_store import Stored
+from rgspipe.training.operator_store import OperatorBytes
 from rgspipe.training.options import TrainOptions
 from rgspipe.training.photometric import LEAST_ROUGHNESS, fit_heights, fit_normals, roughness
 from rgspipe.training.record import Record, materials_seconds
@@ -56,7 +56,7 @@ class Trained:
     surfels: Surfels
     records: tuple[Record, ...]
     views: tuple[View, ...]
-    stored: Stored
+    stored: OperatorBytes
 
     def __repr__(self) -> str:
         last = self.records[-1]
