@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from rgspipe.arguments import as_count, as_several
@@ -29,6 +30,7 @@ from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.view_weights import ViewWeights
 from rgspipe.scene.guesses import LEAST_DOUBT
 from rgspipe.scene.lights import PointLight
+from rgspipe.scene.shapes import Float
 from rgspipe.scene.surfels import Surfels
 from rgspipe.training.albedo import ALBEDO_RANGE
 from rgspipe.training.initialise import initialise_surfels
@@ -65,7 +67,7 @@ class Captured:
     surfels: Surfels
     lamps: tuple[PointLight, ...]
     certainty: Certainty
-    doubt: Tensor
+    doubt: Float[Tensor, " N"]
     measured: Measured
     answer: FoundLamps
     frozen: FrozenScene
@@ -73,7 +75,7 @@ class Captured:
     lighting: str = ""
 
     @property
-    def guesses(self) -> np.ndarray:
+    def guesses(self) -> NDArray[np.bool_]:
         """(K,) bool: lamps whose place is little sure, or all where light that is the same everywhere does as well."""
         return (self.certainty.spread(self.frozen.size) > GUESS) | (self.answer.over_even < BAR.least)
 
