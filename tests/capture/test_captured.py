@@ -16,7 +16,7 @@ from rgspipe.capture import minima, search
 from rgspipe.capture.captured import Captured, capture_scene
 from rgspipe.capture.certainty import Certainty
 from rgspipe.capture.lamp_file import write_lamps
-from rgspipe.capture.minima import Rival
+from rgspipe.capture.minima import RivalLamps
 from rgspipe.capture.options import CaptureOptions
 from rgspipe.capture.words import captured_words
 from rgspipe.datasets.light_file import read_lights
@@ -119,12 +119,12 @@ def test_another_place_that_is_as_likely_is_in_the_region_and_is_told() -> None:
     plain = replace(found().answer, rivals=())
     before = Certainty.of(plain).spread(best.problem.size)
     for chance, weight in ((0.5, 0.5), (0.2, 0.2), (0.06, 0.128)):  # the region of 95 % ends at 0.128
-        answer = replace(plain, rivals=(Rival(beside, chance),))
+        answer = replace(plain, rivals=(RivalLamps(beside, chance),))
         spread = Certainty.of(answer).spread(best.problem.size)
         np.testing.assert_allclose(spread**2 - before**2, [weight * 0.1**2, 0.0], atol=1e-6)
         words = captured_words(replace(found(), answer=answer))
         assert f", 10.0 % of the scene's size away, with a chance of {100.0 * chance:.0f} %." in words
-    assert "instead" not in captured_words(replace(found(), answer=replace(plain, rivals=(Rival(beside, 0.01),))))
+    assert "instead" not in captured_words(replace(found(), answer=replace(plain, rivals=(RivalLamps(beside, 0.01),))))
 
 
 def test_a_given_number_is_not_asked() -> None:

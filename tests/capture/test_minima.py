@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 
 from lamp_problem import problem, true_lamps
-from rgspipe.capture.candidates import Candidates
+from rgspipe.capture.candidates import CandidateLamps
 from rgspipe.capture.lamps import LampProblem, Lamps
 from rgspipe.capture.likelihood import Tried
 from rgspipe.capture.minima import likelier_beside, likeliest, looked_beside, minima_beside, settled_beside
 
 
 @cache
-def room() -> tuple[LampProblem, Candidates]:
+def room() -> tuple[LampProblem, CandidateLamps]:
     made = replace(problem(), frozen=problem().frozen.with_dictionary(8, seed=0))
-    return made, Candidates.of(made)
+    return made, CandidateLamps.of(made)
 
 
 def displaced() -> Lamps:
@@ -57,12 +57,12 @@ FAR = np.array([[-0.7, 0.0, 0.0], [0.7, 0.0, 0.0]])
 
 
 @cache
-def false_minimum() -> tuple[Candidates, Tried]:
+def false_minimum() -> tuple[CandidateLamps, Tried]:
     """Of which the second lamp stands at the other side of the room, and candidates that lead out of it."""
     made, _ = room()
     true = true_lamps(made)
     false = Tried.settled(made, made.lamps(true.places * [[1, 1, 1], [-1, 1, 1]], true.logs - 1.0))
-    return Candidates(FAR, np.zeros((len(made.radiance), 2))), false
+    return CandidateLamps(FAR, np.zeros((len(made.radiance), 2))), false
 
 
 def test_a_lamp_goes_to_the_likelier_minimum_beside_it_and_stays_there() -> None:

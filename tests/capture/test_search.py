@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from lamp_problem import problem, true_lamps
-from rgspipe.capture.candidates import Candidates
+from rgspipe.capture.candidates import CandidateLamps
 from rgspipe.capture.search import looked_for_again
 
 
@@ -17,6 +17,6 @@ def test_a_lamp_in_a_wrong_place_is_found_again_beside_the_others() -> None:
     places = true_lamps(made).places.copy()
     places[1] *= -1.0
     stuck = made.refined(made.lamps(places, true_lamps(made).logs - 1.0), 25)
-    found = looked_for_again(made, Candidates.of(made), stuck, lambda *_: None)
+    found = looked_for_again(made, CandidateLamps.of(made), stuck, lambda *_: None)
     assert made.cost(found) < 0.1 * made.cost(stuck)
     assert np.linalg.norm(found.places - true_lamps(made).places, axis=1).max() < 0.003

@@ -51,7 +51,7 @@ def make_contents() -> report.ReportContents:
         summary=summary_table(targets, seed=0, resamples=200),
         targets=targets,
         curves=pd.concat([part[1] for part in parts], ignore_index=True),
-        fits=[report.Picture("search_lm, 1 view", "visible_000, median of its class", png)],
+        fits=[report.FitPicture("search_lm, 1 view", "visible_000, median of its class", png)],
         is_measured=True,
         surfels=exact_surfels(CornellBox(), 500),
         cameras=[CameraMark((0.5, -2.0, 0.5), (0.0, 1.0, 0.0), 0.7)],

@@ -119,7 +119,7 @@ def test_failed_fits_are_shown_as_infinitely_far_away(fitted):
 
 def test_large_pictures_do_not_make_a_large_report(full_contents):
     noise = images.png_bytes(np.random.default_rng(0).integers(0, 256, (900, 1500, 3), dtype=np.uint8))
-    pictures = [report.Picture("search_lm, 1 view", f"target {index}", noise) for index in range(6)]
+    pictures = [report.FitPicture("search_lm, 1 view", f"target {index}", noise) for index in range(6)]
     html = report.render_report(dataclasses.replace(full_contents, fits=pictures))
     assert len(html) < 8_000_000  # measured 5.3 MB
 

@@ -16,6 +16,7 @@ from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import Camera, PointLight
 from rgspipe.scene.models import CornellBox, exact_surfels
 from rgspipe.scene.surfels import turn_in_plane
+from rgspipe.training.trainer import refine_views
 
 
 def test_arguments_of_other_shapes_are_refused() -> None:
@@ -43,6 +44,12 @@ def test_light_of_a_frozen_scene_has_a_row_for_each_surfel() -> None:
         scene.radiance(irradiance[:, 0])
     with pytest.raises(jaxtyping.TypeCheckError):
         replace(scene, areas=scene.areas[:-1], centers=scene.centers)
+
+
+def test_radiance_that_is_trained_with_is_of_views_and_surfels() -> None:
+    surfels = exact_surfels(CornellBox(), 60)
+    with pytest.raises(jaxtyping.TypeCheckError):
+        refine_views(surfels, [], torch.ones(len(surfels), 3))
 
 
 def test_covariances_are_matrices() -> None:

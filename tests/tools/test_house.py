@@ -62,6 +62,10 @@ class Child(Base):
     assert house.bare() == ["rgspipe.a.Shape", "rgspipe.a.Child.own"]
 
 
+def test_no_class_has_the_name_of_another(tool: ModuleType) -> None:
+    assert tool.House.at(ROOT).twins() == []
+
+
 def test_twins_are_public_classes_of_one_name(tool: ModuleType) -> None:
     texts = {"rgspipe.a": "class One: ...\nclass _Two: ...", "rgspipe.b": "class One: ...\nclass _Two: ..."}
     house = tool.House({name: tool.Module(name, text) for name, text in texts.items()})

@@ -28,8 +28,8 @@ BATCH = 128
 
 
 @dataclass(frozen=True, eq=False)
-class Candidates:
-    """Places of lamps, and what a grey lamp at each sends to every surfel, T e.
+class CandidateLamps:
+    """Grey lamps in places where lamps may be, and what each sends to every surfel, T e.
 
     Attributes:
         places: (C, 3) scene units.
@@ -40,7 +40,7 @@ class Candidates:
     shares: Numbers
 
     @classmethod
-    def of(cls, problem: LampProblem) -> Candidates:
+    def of(cls, problem: LampProblem) -> CandidateLamps:
         """Those of the scene's dictionary."""
         dictionary = problem.frozen.dictionary
         shares = problem.received.spread(dictionary.irradiance.double().cpu().numpy().T)
@@ -51,15 +51,15 @@ class Candidates:
         """Half of the typical distance of neighbours, scene units: how far a lamp is from the next candidate."""
         return 0.5 * float(np.median(cKDTree(self.places).query(self.places, k=2)[0][:, 1]))
 
-    def around(self, problem: LampProblem, place: Numbers) -> Candidates:
+    def around(self, problem: LampProblem, place: Numbers) -> CandidateLamps:
         """Those of a cube around `place` (3,) whose sides are two of `between`, where lamps may be."""
         sides = np.array([offset for offset in product((-1.0, 0.0, 1.0), repeat=3) if any(offset)])
         places = np.clip(place + self.between * sides, *problem.bounds)
         irradiance, _ = problem.frozen.unit_irradiance(torch.from_numpy(places))
-        return Candidates(places, problem.received.spread(irradiance.double().cpu().numpy().T))
+        return CandidateLamps(places, problem.received.spread(irradiance.double().cpu().numpy().T))
 
 
-def ranked(problem: LampProblem, candidates: Candidates, known: Lamps | None) -> tuple[Numbers, Numbers]:
+def ranked(problem: LampProblem, candidates: CandidateLamps, known: Lamps | None) -> tuple[Numbers, Numbers]:
     """(C,) cost of one more grey lamp at each candidate, and (C,) the logarithm of its intensity over π."""
     grey = _grey(problem)
     target = (grey * problem.target).sum(axis=1)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from rgspipe.arguments import as_count, as_several
@@ -21,7 +22,7 @@ from rgspipe.capture.prediction import Prediction
 from rgspipe.capture.radiance import Measured, measured_radiance
 from rgspipe.capture.received import Received
 from rgspipe.capture.refusals import OFF, check_brackets, check_lightings, check_measured, check_overlap, check_views
-from rgspipe.capture.search import BAR, Answer, found_lamps
+from rgspipe.capture.search import BAR, FoundLamps, found_lamps
 from rgspipe.capture.several import found_in_turns, without
 from rgspipe.completion import with_unseen_surfaces
 from rgspipe.datasets.views import View
@@ -29,6 +30,7 @@ from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.view_weights import ViewWeights
 from rgspipe.scene.guesses import LEAST_DOUBT
 from rgspipe.scene.lights import PointLight
+from rgspipe.scene.shapes import Float
 from rgspipe.scene.surfels import Surfels
 from rgspipe.training.albedo import ALBEDO_RANGE
 from rgspipe.training.initialise import initialise_surfels
@@ -65,15 +67,15 @@ class Captured:
     surfels: Surfels
     lamps: tuple[PointLight, ...]
     certainty: Certainty
-    doubt: Tensor
+    doubt: Float[Tensor, " N"]
     measured: Measured
-    answer: Answer
+    answer: FoundLamps
     frozen: FrozenScene
     oddities: Oddities
     lighting: str = ""
 
     @property
-    def guesses(self) -> np.ndarray:
+    def guesses(self) -> NDArray[np.bool_]:
         """(K,) bool: lamps whose place is little sure, or all where light that is the same everywhere does as well."""
         return (self.certainty.spread(self.frozen.size) > GUESS) | (self.answer.over_even < BAR.least)
 
@@ -192,7 +194,7 @@ def _problem(
     return LampProblem(frozen, received, field, measured.radiance, expected, pixels, rays, prediction, bounds)
 
 
-def _captured(measured: Measured, answer: Answer, options: CaptureOptions, lighting: str) -> Captured:
+def _captured(measured: Measured, answer: FoundLamps, options: CaptureOptions, lighting: str) -> Captured:
     best, frozen = answer.best, answer.best.problem.frozen
     albedo = torch.from_numpy(np.clip(best.problem.albedo(best.lamps), *ALBEDO_RANGE)).float()
     doubt = torch.from_numpy(best.problem.field.deviation(DRAWS, options.seed)).float()

@@ -22,7 +22,7 @@ from scipy.stats import chi2
 from rgspipe.capture.lamps import NUMBERS, LampProblem, Lamps
 from rgspipe.capture.minima import LIKELY
 from rgspipe.capture.photographs import Numbers
-from rgspipe.capture.search import Answer
+from rgspipe.capture.search import FoundLamps
 from rgspipe.capture.shared_errors import shared_covariance
 
 #: Steps of the lamps without one of the scene's parts.
@@ -52,7 +52,7 @@ class Certainty:
     bounced: float
 
     @classmethod
-    def of(cls, answer: Answer) -> Certainty:
+    def of(cls, answer: FoundLamps) -> Certainty:
         """Of lamps as they were fitted."""
         problem, lamps = answer.best.problem, answer.best.lamps
         covariance = _covariance(problem, lamps) + _rival_covariance(answer) + _number_covariance(problem, answer)
@@ -88,7 +88,7 @@ def _covariance(problem: LampProblem, lamps: Lamps) -> Numbers:
     return problem.covariance(lamps) + resampled + shared_covariance(problem, lamps)
 
 
-def _rival_covariance(answer: Answer) -> Numbers:
+def _rival_covariance(answer: FoundLamps) -> Numbers:
     """(6 K, 6 K) of the lamps' numbers, by the other minima that they may belong to."""
     problem, lamps = answer.best.problem, answer.best.lamps
     own = _numbers(problem, lamps)
@@ -99,7 +99,7 @@ def _rival_covariance(answer: Answer) -> Numbers:
     return moved.T @ (moved * weight[:, None])
 
 
-def _number_covariance(problem: LampProblem, answer: Answer) -> Numbers:
+def _number_covariance(problem: LampProblem, answer: FoundLamps) -> Numbers:
     """(6 K, 6 K) of the lamps' numbers, by one more lamp that was not believed."""
     lamps = answer.best.lamps
     last = answer.compared[-1] if answer.compared else None

@@ -19,7 +19,7 @@ from typing import Literal
 
 import numpy as np
 
-from rgspipe.capture.photographs import Numbers, Photograph
+from rgspipe.capture.photographs import Numbers, TracedPhotograph
 from rgspipe.capture.response import Response
 
 Exposure = Literal["same", "free", "free_colour"]
@@ -51,16 +51,16 @@ class Cameras:
         curve = Response.as_decoded() if bent else None
         return cls(exposure, vignetting, np.ones((count, 3)), np.zeros(2), curve)
 
-    def even(self, photographs: Sequence[Photograph]) -> Iterator[Numbers]:
+    def even(self, photographs: Sequence[TracedPhotograph]) -> Iterator[Numbers]:
         """(P, 3) of each photograph what it would show under factors of 1."""
         for photograph, gains in zip(photographs, self.gains, strict=True):
             yield self._light(photograph) / (gains * self._corner(photograph))
 
-    def _light(self, photograph: Photograph) -> Numbers:
+    def _light(self, photograph: TracedPhotograph) -> Numbers:
         """(P, 3) as the curve has it."""
         return photograph.image if self.response is None else self.response.light(photograph)
 
-    def _corner(self, photograph: Photograph) -> Numbers:
+    def _corner(self, photograph: TracedPhotograph) -> Numbers:
         """(P, 1) what the lens leaves of the light."""
         if not self.vignetting:
             return np.ones((1, 1))
@@ -68,7 +68,7 @@ class Cameras:
         return np.exp(sum(part * squared**power for part, power in zip(self.falloff, POWERS, strict=True)))[:, None]
 
     def fitted(
-        self, photographs: Sequence[Photograph], weights: Sequence[Numbers], radiance: Numbers | None
+        self, photographs: Sequence[TracedPhotograph], weights: Sequence[Numbers], radiance: Numbers | None
     ) -> Cameras:
         """With the factors that photographs call for.
 
@@ -89,7 +89,7 @@ class Cameras:
         return replace(cameras, gains=cameras._gains(photographs, weights, radiance))
 
     def _gains(
-        self, photographs: Sequence[Photograph], weights: Sequence[Numbers], radiance: Numbers | None
+        self, photographs: Sequence[TracedPhotograph], weights: Sequence[Numbers], radiance: Numbers | None
     ) -> Numbers:
         """(V, 3) factors."""
         if radiance is None:
@@ -102,7 +102,9 @@ class Cameras:
         gains = np.log(np.where(over > 0.0, over, 1.0) / np.where(over > 0.0, under, 1.0))
         return np.exp(gains - gains.mean(axis=0))
 
-    def _first_gains(self, photographs: Sequence[Photograph], weights: Sequence[Numbers], channel: int) -> Numbers:
+    def _first_gains(
+        self, photographs: Sequence[TracedPhotograph], weights: Sequence[Numbers], channel: int
+    ) -> Numbers:
         """(V,) factors of a channel by the surfels that photographs share."""
         pixels = (
             self._seen_as_one(self._light(photograph) / self._corner(photograph))[:, channel]
@@ -117,7 +119,7 @@ class Cameras:
         return np.repeat(colours.mean(axis=1, keepdims=True), 3, axis=1)
 
 
-def _powers(photographs: Sequence[Photograph], weights: Sequence[Numbers]) -> list[Numbers]:
+def _powers(photographs: Sequence[TracedPhotograph], weights: Sequence[Numbers]) -> list[Numbers]:
     """(V, N) means of each power of r² over the pixels that show a surfel."""
     pairs = list(zip(photographs, weights, strict=True))
     return [
@@ -126,7 +128,7 @@ def _powers(photographs: Sequence[Photograph], weights: Sequence[Numbers]) -> li
     ]
 
 
-def _mean(photograph: Photograph, values: Numbers, weight: Numbers) -> tuple[Numbers, Numbers]:
+def _mean(photograph: TracedPhotograph, values: Numbers, weight: Numbers) -> tuple[Numbers, Numbers]:
     """(N,) means of values (P,) over the pixels that show each surfel, and (N,) how many do."""
     back = photograph.rows.T
     shown = back @ weight
@@ -146,7 +148,9 @@ class _Means:
     counted: Numbers
 
     @classmethod
-    def of(cls, photographs: Sequence[Photograph], pixels: Iterable[Numbers], weights: Sequence[Numbers]) -> _Means:
+    def of(
+        cls, photographs: Sequence[TracedPhotograph], pixels: Iterable[Numbers], weights: Sequence[Numbers]
+    ) -> _Means:
         """By `pixels` (P,) of each photograph."""
         parts = (_mean(*one) for one in zip(photographs, pixels, weights, strict=True))
         mean, shown = (np.stack(part) for part in zip(*parts, strict=True))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rgspipe.capture.candidates import Candidates, ranked
+from rgspipe.capture.candidates import CandidateLamps, ranked
 from rgspipe.capture.lamps import LampProblem, Lamps
 from rgspipe.capture.likelihood import ROUNDS, STEPS, Tried, chances
 from rgspipe.progress import progress_bar
@@ -30,7 +30,7 @@ LIKELY = 0.05
 
 
 @dataclass(frozen=True, eq=False)
-class Rival:
+class RivalLamps:
     """Lamps in another minimum than the likeliest.
 
     Attributes:
@@ -47,10 +47,10 @@ class Minima:
     """The likeliest minimum that was reached, and the others that were."""
 
     best: Tried
-    rivals: tuple[Rival, ...]
+    rivals: tuple[RivalLamps, ...]
 
 
-def settled_beside(problem: LampProblem, candidates: Candidates, lamps: Lamps) -> Lamps:
+def settled_beside(problem: LampProblem, candidates: CandidateLamps, lamps: Lamps) -> Lamps:
     """The least minimum that is reached by moving one lamp after the other to a better one beside it."""
     for own in range(len(lamps)):
         beside = looked_beside(problem, candidates, lamps, own)
@@ -59,7 +59,7 @@ def settled_beside(problem: LampProblem, candidates: Candidates, lamps: Lamps) -
     return lamps
 
 
-def looked_beside(problem: LampProblem, candidates: Candidates, lamps: Lamps, own: int) -> Lamps:
+def looked_beside(problem: LampProblem, candidates: CandidateLamps, lamps: Lamps, own: int) -> Lamps:
     """Lamps of which one has moved to a better minimum beside, or the same if none is found."""
     found = minima_beside(problem, candidates, lamps, own)
     best = problem.refined(found[0], STEPS) if found else lamps
@@ -67,7 +67,7 @@ def looked_beside(problem: LampProblem, candidates: Candidates, lamps: Lamps, ow
 
 
 def minima_beside(
-    problem: LampProblem, candidates: Candidates, lamps: Lamps, own: int, around: int = AROUND
+    problem: LampProblem, candidates: CandidateLamps, lamps: Lamps, own: int, around: int = AROUND
 ) -> list[Lamps]:
     """Other minima that are nearly reached from so many places around one of the lamps, the least first."""
     others = lamps.at([other for other in range(len(lamps)) if other != own]) if len(lamps) > 1 else None
@@ -85,17 +85,17 @@ def minima_beside(
     return found
 
 
-def likeliest(candidates: Candidates, best: Tried) -> Minima:
+def likeliest(candidates: CandidateLamps, best: Tried) -> Minima:
     """The likeliest of the minima that are reached by moving one lamp after the other, each by its own variances."""
     return _likeliest(candidates, Tried.settled(best.problem, best.lamps), [], AROUND)
 
 
-def likeliest_all_around(candidates: Candidates, minima: Minima) -> Minima:
+def likeliest_all_around(candidates: CandidateLamps, minima: Minima) -> Minima:
     """The same from more places around the lamps, and the minima that are known."""
     return _likeliest(candidates, minima.best, [rival.tried for rival in minima.rivals], ALL_AROUND)
 
 
-def _likeliest(candidates: Candidates, best: Tried, others: list[Tried], around: int) -> Minima:
+def _likeliest(candidates: CandidateLamps, best: Tried, others: list[Tried], around: int) -> Minima:
     count = len(best.lamps)
     with progress_bar([], "comparing places of lamps", count, unit="step") as bar:
         for passes in range(1, ROUNDS + 1):
@@ -107,10 +107,12 @@ def _likeliest(candidates: Candidates, best: Tried, others: list[Tried], around:
                 break
     rivals = [other for other in others if _is_new(best.problem, other.lamps, [best.lamps])]
     chance = chances([best.over(rival.put_by()) for rival in rivals])[1:]
-    return Minima(best, tuple(Rival(rival, float(part)) for rival, part in zip(rivals, chance, strict=True)))
+    return Minima(best, tuple(RivalLamps(rival, float(part)) for rival, part in zip(rivals, chance, strict=True)))
 
 
-def likelier_beside(candidates: Candidates, best: Tried, own: int, others: list[Tried], around: int = AROUND) -> Tried:
+def likelier_beside(
+    candidates: CandidateLamps, best: Tried, own: int, others: list[Tried], around: int = AROUND
+) -> Tried:
     """Lamps of which one has moved to a likelier minimum beside, or the same if none is found.
 
     What is settled on the way and is not the answer joins `others`, from which none is settled again.

@@ -25,8 +25,8 @@ SHOWN = 0.3
 
 
 @dataclass(frozen=True, eq=False)
-class Photograph:
-    """P pixels that are sums of the radiance of N surfels.
+class TracedPhotograph:
+    """A photograph of which was traced what its P pixels see: they are sums of the radiance of N surfels.
 
     Attributes:
         operator: (P, N) view weights.
@@ -39,7 +39,7 @@ class Photograph:
     base: NDArray[np.float32]
 
     @classmethod
-    def of(cls, weights: ViewWeights, view: View) -> Photograph:
+    def of(cls, weights: ViewWeights, view: View) -> TracedPhotograph:
         """A photograph and what its pixels see; edges count little, what is not the scene nothing."""
         whole = (weights.coverage >= LEAST_COVERAGE).cpu() & (view.alpha.reshape(-1) >= LEAST_COVERAGE)
         base = np.where(weights.edges.cpu().numpy(), LITTLE, 1.0) * whole.numpy()

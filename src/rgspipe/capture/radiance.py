@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
 from rgspipe.capture.exposures import Cameras, Exposure
-from rgspipe.capture.photographs import SHOWN, Numbers, Photograph
+from rgspipe.capture.photographs import SHOWN, Numbers, TracedPhotograph
 from rgspipe.datasets.views import View
 from rgspipe.renderer.view_weights import ViewWeights
 
@@ -91,7 +91,7 @@ def measured_radiance(
         vignetting: whether corners may be darker, alike in all photographs.
         bent: whether the camera's curve may be another than that by which they were decoded.
     """
-    photographs = [Photograph.of(*pair) for pair in zip(weights, views, strict=True)]
+    photographs = [TracedPhotograph.of(*pair) for pair in zip(weights, views, strict=True)]
     cameras, radiance = Cameras.of(len(views), exposure, vignetting, bent), None
     counted, floor = [photograph.base for photograph in photographs], _floor(photographs)
     for _ in range(ROUNDS):
@@ -114,7 +114,7 @@ def measured_radiance(
     return Measured(radiance, variance, seen, cameras, error, _apart(photographs, relative), shown_by, blown_out)
 
 
-def _floor(photographs: Sequence[Photograph]) -> float:
+def _floor(photographs: Sequence[TracedPhotograph]) -> float:
     """Radiance that is added before errors are relative."""
     grey = np.concatenate(
         [photograph.image.mean(axis=1)[photograph.plain(photograph.base) > 0.0] for photograph in photographs]
@@ -123,7 +123,7 @@ def _floor(photographs: Sequence[Photograph]) -> float:
 
 
 def _errors(
-    photographs: Sequence[Photograph], cameras: Cameras, radiance: Numbers, floor: float
+    photographs: Sequence[TracedPhotograph], cameras: Cameras, radiance: Numbers, floor: float
 ) -> tuple[list[NDArray[np.float32]], list[NDArray[np.float32]]]:
     """(P,) of each photograph how far pixels are off, and the same in parts of what they should be."""
     off, relative = [], []
@@ -135,7 +135,7 @@ def _errors(
     return off, relative
 
 
-def _typical(photographs: Sequence[Photograph], relative: Sequence[NDArray[np.float32]]) -> float:
+def _typical(photographs: Sequence[TracedPhotograph], relative: Sequence[NDArray[np.float32]]) -> float:
     """The median of relative errors (P,) of plain pixels."""
     pairs = zip(photographs, relative, strict=True)
     plain = [np.abs(part[photograph.plain(photograph.base) == 1.0]) for photograph, part in pairs]
@@ -143,7 +143,7 @@ def _typical(photographs: Sequence[Photograph], relative: Sequence[NDArray[np.fl
     return float(np.median(every)) if len(every) else 0.0
 
 
-def _apart(photographs: Sequence[Photograph], relative: Sequence[NDArray[np.float32]]) -> Numbers:
+def _apart(photographs: Sequence[TracedPhotograph], relative: Sequence[NDArray[np.float32]]) -> Numbers:
     """(N,) mean of relative errors (P,) over the pixels that show each surfel."""
     off, shown = 0.0, 0.0
     for photograph, part in zip(photographs, relative, strict=True):
@@ -157,7 +157,7 @@ def _pixels(weights: ViewWeights) -> Numbers:
     return np.asarray(weights.operator.to_scipy().sum(axis=0)).ravel()
 
 
-def _shown(photographs: Sequence[Photograph], weights: Sequence[Numbers]) -> tuple[Numbers, Numbers]:
+def _shown(photographs: Sequence[TracedPhotograph], weights: Sequence[Numbers]) -> tuple[Numbers, Numbers]:
     """(N,) pixels that show each surfel, and (N, 3) those of them that are saturated, by weights (P,) of pixels."""
     shown, saturated = 0.0, 0.0
     for photograph, weight in zip(photographs, weights, strict=True):
@@ -167,7 +167,7 @@ def _shown(photographs: Sequence[Photograph], weights: Sequence[Numbers]) -> tup
 
 
 def _radiance(
-    photographs: Sequence[Photograph], cameras: Cameras, weights: Sequence[Numbers]
+    photographs: Sequence[TracedPhotograph], cameras: Cameras, weights: Sequence[Numbers]
 ) -> tuple[Numbers, sp.linalg.SuperLU]:
     """(N, 3) radiance, and the normal equations."""
     seen, right, matrix = 0.0, 0.0, 0.0
@@ -184,7 +184,7 @@ def _radiance(
 
 
 def _log_variance(
-    photographs: Sequence[Photograph],
+    photographs: Sequence[TracedPhotograph],
     weights: Sequence[Numbers],
     off: Sequence[NDArray[np.float32]],
     normal: sp.linalg.SuperLU,

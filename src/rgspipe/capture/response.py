@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rgspipe.capture.photographs import Numbers, Photograph
+from rgspipe.capture.photographs import Numbers, TracedPhotograph
 
 #: Stops below white between which r is linear.
 STOPS = np.arange(-8.0, 1.0)
@@ -42,11 +42,11 @@ class Response:
         """The curve that images were decoded by."""
         return cls(np.zeros(len(STOPS)))
 
-    def light(self, photograph: Photograph) -> Numbers:
+    def light(self, photograph: TracedPhotograph) -> Numbers:
         """(P, 3) what the pixels of a photograph tell of the light."""
         return photograph.image * np.exp(-_shares(photograph) @ self.logs)
 
-    def fitted(self, photographs: Sequence[Photograph], weights: Sequence[Numbers]) -> Response:
+    def fitted(self, photographs: Sequence[TracedPhotograph], weights: Sequence[Numbers]) -> Response:
         """With pixels that count by `weights`, (P,) of each photograph."""
         surfels, width = photographs[0].operator.shape[1], len(STOPS)
         matrix, right = np.zeros((width, width)), np.zeros(width)
@@ -67,7 +67,7 @@ class Response:
         return replace(self, logs=logs - logs.mean())
 
 
-def _means(photograph: Photograph, weight: Numbers) -> list[tuple[Numbers, Numbers, Numbers]]:
+def _means(photograph: TracedPhotograph, weight: Numbers) -> list[tuple[Numbers, Numbers, Numbers]]:
     """For each channel what pixels (N,) show a surfel, and means over them: shares of STOPS (N, K) and logarithms."""
     back, image, shares = photograph.rows.T, photograph.image, _shares(photograph)
     found = []
@@ -81,7 +81,7 @@ def _means(photograph: Photograph, weight: Numbers) -> list[tuple[Numbers, Numbe
     return found
 
 
-def _shares(photograph: Photograph) -> Numbers:
+def _shares(photograph: TracedPhotograph) -> Numbers:
     """(P, 3, K) what each pixel has of the value at each of STOPS."""
     white = photograph.view.saturated_from
     level = np.log2(np.maximum(photograph.image / white, 2.0 ** STOPS[0]))

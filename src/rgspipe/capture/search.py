@@ -15,10 +15,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rgspipe.capture.candidates import Candidates, ranked
+from rgspipe.capture.candidates import CandidateLamps, ranked
 from rgspipe.capture.lamps import LampProblem, Lamps
 from rgspipe.capture.likelihood import ROUNDS, STEPS, Tried, settled_once, weighed
-from rgspipe.capture.minima import AROUND, FIRST, Rival, likeliest, likeliest_all_around, settled_beside
+from rgspipe.capture.minima import AROUND, FIRST, RivalLamps, likeliest, likeliest_all_around, settled_beside
 from rgspipe.capture.variances import with_likely_variances
 from rgspipe.fitting.options import BarOptions
 from rgspipe.fitting.search.apart import CandidatePlaces
@@ -34,7 +34,7 @@ BAR = BarOptions()
 Told = Callable[[int], object]
 
 
-def with_one_more(problem: LampProblem, candidates: Candidates, known: Lamps | None, told: Told) -> Lamps:
+def with_one_more(problem: LampProblem, candidates: CandidateLamps, known: Lamps | None, told: Told) -> Lamps:
     """The best lamps found that are one more than `known`; TRIES + 1 refinements at most."""
     costs, logs = ranked(problem, candidates, known)
     ranking, standing = [(int(index),) for index in np.argsort(costs)], CandidatePlaces(candidates.places, None, 0.0)
@@ -51,7 +51,7 @@ def with_one_more(problem: LampProblem, candidates: Candidates, known: Lamps | N
     return best
 
 
-def settled(problem: LampProblem, candidates: Candidates, lamps: Lamps, told: Told) -> Tried:
+def settled(problem: LampProblem, candidates: CandidateLamps, lamps: Lamps, told: Told) -> Tried:
     """With variances, outliers and unseen albedo that belong to the lamps, and lamps that belong to these."""
     for left in reversed(range(ROUNDS)):
         problem, lamps = settled_once(problem, lamps)
@@ -64,7 +64,7 @@ def settled(problem: LampProblem, candidates: Candidates, lamps: Lamps, told: To
     return Tried.of(problem, lamps)
 
 
-def looked_for_again(problem: LampProblem, candidates: Candidates, lamps: Lamps, told: Told) -> Lamps:
+def looked_for_again(problem: LampProblem, candidates: CandidateLamps, lamps: Lamps, told: Told) -> Lamps:
     """Each lamp in the place that is best beside the others: it was found by variances of a room without it."""
     for own in range(len(lamps)):
         others = [other for other in range(len(lamps)) if other != own]
@@ -74,7 +74,7 @@ def looked_for_again(problem: LampProblem, candidates: Candidates, lamps: Lamps,
 
 
 @dataclass(frozen=True, eq=False)
-class OneMore:
+class OneMoreLamp:
     """Lamps, and the best found that are one more, both by the surfels that the latter trust.
 
     Attributes:
@@ -88,7 +88,7 @@ class OneMore:
     wanted: float
 
     @classmethod
-    def between(cls, fewer: Tried, more: Tried) -> OneMore:
+    def between(cls, fewer: Tried, more: Tried) -> OneMoreLamp:
         """By the variances that are most likely for either."""
         measurements = more.problem.field.measurements
         gain = 1.0 - float(np.exp(min(0.0, more.deviance - fewer.deviance) / max(measurements, 1)))
@@ -102,7 +102,7 @@ class OneMore:
         return self.gain >= self.wanted
 
 
-def best_with_one_more(problem: LampProblem, candidates: Candidates, known: Lamps | None) -> Tried:
+def best_with_one_more(problem: LampProblem, candidates: CandidateLamps, known: Lamps | None) -> Tried:
     """The best lamps found that are one more than `known`, settled, while a progress line stands."""
     number = 1 if known is None else len(known) + 1
     looks = 1 if known is None else 1 + number
@@ -112,14 +112,14 @@ def best_with_one_more(problem: LampProblem, candidates: Candidates, known: Lamp
         return settled(problem, candidates, lamps, bar.update)
 
 
-def one_more(candidates: Candidates, fewer: Tried) -> OneMore:
+def one_more(candidates: CandidateLamps, fewer: Tried) -> OneMoreLamp:
     """The best lamps found that are one more than `fewer`."""
     more = best_with_one_more(fewer.problem, candidates, fewer.lamps)
-    return OneMore.between(Tried.refined(more.problem, fewer.lamps), more)
+    return OneMoreLamp.between(Tried.refined(more.problem, fewer.lamps), more)
 
 
 @dataclass(frozen=True, eq=False)
-class Answer:
+class FoundLamps:
     """Lamps that were found.
 
     Attributes:
@@ -130,17 +130,17 @@ class Answer:
     """
 
     best: Tried
-    rivals: tuple[Rival, ...]
-    compared: tuple[OneMore, ...]
+    rivals: tuple[RivalLamps, ...]
+    compared: tuple[OneMoreLamp, ...]
     over_even: float
 
 
-def found_lamps(problem: LampProblem, count: int | None, most: int) -> Answer:
+def found_lamps(problem: LampProblem, count: int | None, most: int) -> FoundLamps:
     """So many lamps, or as many as what was measured calls for, one to `most`."""
     problem = weighed(problem, None)
-    candidates = Candidates.of(problem)
+    candidates = CandidateLamps.of(problem)
     minima = likeliest(candidates, best_with_one_more(problem, candidates, None))
-    compared: list[OneMore] = []
+    compared: list[OneMoreLamp] = []
     while count is None or len(minima.best.lamps) < count:
         found = one_more(candidates, minima.best)
         compared.append(found)
@@ -148,7 +148,7 @@ def found_lamps(problem: LampProblem, count: int | None, most: int) -> Answer:
             break
         minima = likeliest(candidates, found.more)
     minima = likeliest_all_around(candidates, minima)
-    return Answer(minima.best, minima.rivals, tuple(compared), over_even(minima.best))
+    return FoundLamps(minima.best, minima.rivals, tuple(compared), over_even(minima.best))
 
 
 def over_even(best: Tried) -> float:

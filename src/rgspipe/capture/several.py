@@ -23,7 +23,7 @@ import scipy.sparse as sp
 from rgspipe.capture.field import factorised
 from rgspipe.capture.lamps import LampProblem
 from rgspipe.capture.radiance import Measured
-from rgspipe.capture.search import Answer, Tried
+from rgspipe.capture.search import FoundLamps, Tried
 
 #: Rounds in which each capture is fitted beside the others.
 ROUNDS = 2
@@ -32,7 +32,7 @@ ROUNDS = 2
 LEAST_LEFT = 0.02
 
 
-def found_in_turns(problems: Sequence[LampProblem], search: Callable[[LampProblem], Answer]) -> list[Answer]:
+def found_in_turns(problems: Sequence[LampProblem], search: Callable[[LampProblem], FoundLamps]) -> list[FoundLamps]:
     """The lamps of each capture, beside what the others tell of the albedo."""
     answers = [search(problem) for problem in problems]
     for _ in range(ROUNDS if len(problems) > 1 else 0):

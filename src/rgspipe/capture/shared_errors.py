@@ -18,7 +18,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from rgspipe.capture.candidates import Candidates
+from rgspipe.capture.candidates import CandidateLamps
 from rgspipe.capture.lamps import LampProblem, Lamps
 from rgspipe.capture.photographs import Numbers
 from rgspipe.capture.variances import FREEDOM
@@ -54,7 +54,7 @@ def _beyond(problem: LampProblem, lamps: Lamps) -> Iterator[Numbers]:
 def _missing(problem: LampProblem, lamps: Lamps) -> Numbers:
     """(N, C) shifts by one more lamp at each of C candidates, over √C."""
     used = problem.field.weight > 0.0
-    spread = Candidates.of(problem).shares / problem.arriving(lamps).mean(axis=1)[:, None]
+    spread = CandidateLamps.of(problem).shares / problem.arriving(lamps).mean(axis=1)[:, None]
     size = np.sqrt((spread[used] ** 2).mean(axis=0))
     shining = size > 0.0
     # The variance of Student's t, of which the noise is the scale.

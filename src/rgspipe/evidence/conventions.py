@@ -17,7 +17,7 @@ from rgspipe.evidence.reprojection import Agreement, Trials
 
 
 @dataclass(frozen=True)
-class Finding:
+class ViewFinding:
     """A reading that explains the images where the files' own does not.
 
     Attributes:
@@ -31,7 +31,7 @@ class Finding:
     stated: Agreement
 
 
-def misread(views: Sequence[View], along_rays: bool) -> Finding | None:
+def misread(views: Sequence[View], along_rays: bool) -> ViewFinding | None:
     """The reading that the views' depth clearly calls for, if it is not the one that they were read by.
 
     Args:
@@ -47,7 +47,7 @@ def misread(views: Sequence[View], along_rays: bool) -> Finding | None:
     stated, found = results[READINGS[0]], results[meant]
     if 1.0 - found.share > REMAINDER * (1.0 - stated.share) or not clearly_above(found.scores):
         return None
-    return Finding(meant, found, stated)
+    return ViewFinding(meant, found, stated)
 
 
 def stated_agreement(views: Sequence[View], along_rays: bool) -> Agreement | None:

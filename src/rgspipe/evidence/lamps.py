@@ -21,7 +21,7 @@ POINTS, FEWEST_POINTS = 500, 50
 
 
 @dataclass(frozen=True)
-class Reading:
+class LampReading:
     """How places of lamps could have been meant.
 
     Attributes:
@@ -43,17 +43,20 @@ def _turned(*rows: tuple[float, float, float]) -> Callable[[Numbers, Numbers], N
     return lambda place, pose: np.array(rows) @ place
 
 
-STATED = Reading("as read", "", lambda place, pose: place)
+STATED = LampReading("as read", "", lambda place, pose: place)
 READINGS = (
     STATED,
-    Reading("with +z up where +y was", "Write (x, −z, y) for (x, y, z).", _turned((1, 0, 0), (0, 0, -1), (0, 1, 0))),
-    Reading("with +y up where +z was", "Write (x, z, −y) for (x, y, z).", _turned((1, 0, 0), (0, 0, 1), (0, -1, 0))),
-    Reading("with y and z of other sign", "Change the sign of y and z.", _turned((1, 0, 0), (0, -1, 0), (0, 0, -1))),
-    Reading("times 0.001", "Write them in the unit of the poses: times 0.001.", lambda place, pose: 0.001 * place),
-    Reading("times 1000", "Write them in the unit of the poses: times 1000.", lambda place, pose: 1000.0 * place),
-    Reading("in the camera's axes", "Multiply them by transform_matrix.", _in_camera(np.eye(4))),
-    Reading("in OpenCV axes of the camera", "Change the sign of y and z, then multiply by transform_matrix.",
-          _in_camera(FLIP)),
+    LampReading("with +z up where +y was", "Write (x, −z, y) for (x, y, z).",
+                _turned((1, 0, 0), (0, 0, -1), (0, 1, 0))),
+    LampReading("with +y up where +z was", "Write (x, z, −y) for (x, y, z).",
+                _turned((1, 0, 0), (0, 0, 1), (0, -1, 0))),
+    LampReading("with y and z of other sign", "Change the sign of y and z.",
+                _turned((1, 0, 0), (0, -1, 0), (0, 0, -1))),
+    LampReading("times 0.001", "Write them in the unit of the poses: times 0.001.", lambda place, pose: 0.001 * place),
+    LampReading("times 1000", "Write them in the unit of the poses: times 1000.", lambda place, pose: 1000.0 * place),
+    LampReading("in the camera's axes", "Multiply them by transform_matrix.", _in_camera(np.eye(4))),
+    LampReading("in OpenCV axes of the camera", "Change the sign of y and z, then multiply by transform_matrix.",
+                _in_camera(FLIP)),
 )  # fmt: skip
 
 
@@ -66,7 +69,7 @@ class LampFinding:
         found, stated: mean rank correlation of brightness with what surfaces get, as meant and as stated.
     """
 
-    lamps: Reading
+    lamps: LampReading
     found: float
     stated: float
 
@@ -122,7 +125,7 @@ def _some(
     return rows[chosen], columns[chosen]
 
 
-def _correlation(view: View, surface: _Surface, lamps: Reading) -> float:
+def _correlation(view: View, surface: _Surface, lamps: LampReading) -> float:
     """Rank correlation of brightness with what the surfaces would get; 0 where either is the same all over."""
     place = lamps.place(view.light.position.double().numpy(), view.camera.camera_to_world.numpy())
     path = place - surface.points

@@ -64,7 +64,7 @@ log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
-class Step:
+class PlannedStep:
     """One line of the plan: a node, whether it is there already, and if not, why not; and what its stage remarks.
 
     Attributes:
@@ -131,12 +131,12 @@ def resolve(config: RgspipeConfig, load_stage: StageLoader) -> Node:
     return _Resolver(load_stage).resolve(config.stage, config, {})
 
 
-def plan(root: Node, store: ArtifactStore) -> list[Step]:
+def plan(root: Node, store: ArtifactStore) -> list[PlannedStep]:
     """What has to be made and what is reused for `root`, inputs first.
 
     Nothing is listed below an artifact that is there: it holds all that it was made from.
     """
-    steps: dict[Key, Step] = {}
+    steps: dict[Key, PlannedStep] = {}
     earlier = EarlierRuns(store)
 
     def visit(node: Node) -> None:
@@ -147,7 +147,7 @@ def plan(root: Node, store: ArtifactStore) -> list[Step]:
             for needed in node.inputs:
                 visit(needed)
         reason, time = ("", None) if reused else (_reason(node, store), _expected(node, earlier, steps))
-        steps[node.key] = Step(node, reused, reason, _remarks(node, store), time)
+        steps[node.key] = PlannedStep(node, reused, reason, _remarks(node, store), time)
 
     visit(root)
     return list(steps.values())
@@ -166,7 +166,7 @@ def _reason(node: Node, store: ArtifactStore) -> str:
     return shown + (f" and {len(causes) - SHOWN_CAUSES} more" if len(causes) > SHOWN_CAUSES else "")
 
 
-def _expected(node: Node, earlier: EarlierRuns, steps: Mapping[Key, Step]) -> Expected | None:
+def _expected(node: Node, earlier: EarlierRuns, steps: Mapping[Key, PlannedStep]) -> Expected | None:
     """What making a node will take. It takes another time, too, where what it is made from has other settings."""
     found = earlier.expected(node.key, node.recipe["config"])
     before = [steps[needed.key].expected for needed in node.inputs]
@@ -181,7 +181,7 @@ def _remarks(node: Node, store: ArtifactStore) -> tuple[str, ...]:
     return tuple(node.stage.remarks(node.config, made))
 
 
-def planned(config: RgspipeConfig, load_stage: StageLoader) -> list[Step]:
+def planned(config: RgspipeConfig, load_stage: StageLoader) -> list[PlannedStep]:
     """What `run` would make and reuse, of which nothing is made.
 
     Raises:
@@ -191,7 +191,7 @@ def planned(config: RgspipeConfig, load_stage: StageLoader) -> list[Step]:
         return plan(resolve(config, load_stage), ArtifactStore(Path(config.outputs)))
 
 
-def describe_plan(steps: Sequence[Step]) -> str:
+def describe_plan(steps: Sequence[PlannedStep]) -> str:
     """The plan as a table for people."""
     width = max(len(step.node.stage.name) for step in steps)
     times = [str(step.expected or "") for step in steps]
@@ -206,7 +206,7 @@ def describe_plan(steps: Sequence[Step]) -> str:
     return "\n".join([*lines, *_total(steps)])
 
 
-def _total(steps: Sequence[Step]) -> list[str]:
+def _total(steps: Sequence[PlannedStep]) -> list[str]:
     """What all that is made will take, as far as earlier runs tell."""
     made = [step for step in steps if not step.reused]
     known = [step.expected for step in made if step.expected]
@@ -286,7 +286,7 @@ def _take(node: Node, store: ArtifactStore, variant: str) -> Artifact:
     return artifact
 
 
-def _refuse_missing(steps: Sequence[Step], overrides: Sequence[str]) -> None:
+def _refuse_missing(steps: Sequence[PlannedStep], overrides: Sequence[str]) -> None:
     missing = [step.node for step in steps[:-1] if not step.reused]
     if not missing:
         return

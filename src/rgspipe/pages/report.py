@@ -38,8 +38,8 @@ PLAN_BYTES = 400_000
 
 
 @dataclass(frozen=True)
-class Picture:
-    """A PNG with the words under it; `group` gathers pictures under one heading."""
+class FitPicture:
+    """A PNG of a fit with the words under it; `group` gathers pictures under one heading."""
 
     group: str
     caption: str
@@ -87,7 +87,7 @@ class ReportContents:
     summary: pd.DataFrame
     targets: pd.DataFrame
     curves: pd.DataFrame
-    fits: Sequence[Picture] = ()
+    fits: Sequence[FitPicture] = ()
     is_measured: bool = False
     surfels: Surfels | None = None
     cameras: Sequence[CameraMark] = ()
@@ -198,7 +198,7 @@ def _shots(shots: Sequence[Shot]) -> list[dict[str, Any]]:
     ]
 
 
-def _grouped_fits(pictures: Sequence[Picture], budget: int) -> list[dict]:
+def _grouped_fits(pictures: Sequence[FitPicture], budget: int) -> list[dict]:
     groups: dict[str, list[dict]] = {}
     for picture in pictures:
         shown = {"caption": picture.caption, "source": picture_address(picture.png, budget)}

@@ -11,8 +11,8 @@ import torch
 
 from rgspipe.datasets.views import View
 from rgspipe.machine.sums import average
-from rgspipe.training.materials import Materials
-from rgspipe.training.operator_store import Stored
+from rgspipe.training.materials import FittedMaterials
+from rgspipe.training.operator_store import OperatorBytes
 from rgspipe.training.record import Record
 from rgspipe.training.refine import RefineState
 
@@ -27,14 +27,14 @@ class TrainingLog:
     """
 
     def __init__(self, records: list[Record]) -> None:
-        self.records, self.stored = list(records), Stored()
+        self.records, self.stored = list(records), OperatorBytes()
         self._start = time.monotonic() - (self.records[-1].seconds if self.records else 0.0)
 
     def steps(self, state: RefineState) -> None:
         """Add a row for the newest step of the geometry."""
         self._add("geometry", state.step, state.losses[-1], _decibels(state.errors[-1]))
 
-    def materials(self, phase: str, views: Sequence[View], fitted: Materials) -> None:
+    def materials(self, phase: str, views: Sequence[View], fitted: FittedMaterials) -> None:
         """Add a row for a fit of the materials, and say how far it is."""
         errors = []
         for view, render in zip(views, fitted.renders, strict=True):

@@ -20,7 +20,7 @@ from rgspipe.training.albedo_solve import solve_albedo
 from rgspipe.training.gloss import GlossScene, fit_gloss
 from rgspipe.training.gloss_light import operators_from
 from rgspipe.training.lighting import trace_lighting
-from rgspipe.training.operator_store import OperatorStore, Stored
+from rgspipe.training.operator_store import OperatorBytes, OperatorStore
 from rgspipe.training.options import MaterialOptions
 from rgspipe.training.view_model import build_view_models
 
@@ -51,7 +51,7 @@ class Prepared:
 
 
 @dataclass(frozen=True)
-class Materials:
+class FittedMaterials:
     """Fitted materials, and the images that follow.
 
     Attributes:
@@ -66,7 +66,7 @@ class Materials:
     surfels: Surfels
     radiance: Tensor
     renders: tuple[Tensor, ...]
-    stored: Stored
+    stored: OperatorBytes
 
 
 def fit_materials(
@@ -77,7 +77,7 @@ def fit_materials(
     bounces: bool = True,
     prior: PriorOf | None = None,
     prepared: Prepared | None = None,
-) -> Materials:
+) -> FittedMaterials:
     """The albedo that explains `views` best, on surfels that stay where they are.
 
     Args:
@@ -107,7 +107,7 @@ def fit_materials(
         known = None if prior is None else prior(surfels)
         fit = fit_gloss(glossy, problem, surfels, None, rounds, known, options.seed)
         if fit is not None:
-            return Materials(prepared, fit.surfels, fit.radiance, fit.renders, stored)
+            return FittedMaterials(prepared, fit.surfels, fit.radiance, fit.renders, stored)
     surfels, known = replace(surfels, gloss=None), None
     if prior is not None:
         # What the images say alone: maps know albedo only up to a scale.
@@ -118,10 +118,10 @@ def fit_materials(
     if glossy is not None:
         fit = fit_gloss(glossy, problem, surfels, indirect, rounds, known, options.seed)
         if fit is not None:
-            return Materials(prepared, fit.surfels, fit.radiance, fit.renders, stored)
+            return FittedMaterials(prepared, fit.surfels, fit.radiance, fit.renders, stored)
     renders = tuple(problem.render(v, albedo, indirect) for v in range(len(views)))
     received = lighting.direct() if indirect is None else lighting.direct() + indirect
-    return Materials(prepared, surfels, received * albedo, renders, stored)
+    return FittedMaterials(prepared, surfels, received * albedo, renders, stored)
 
 
 def prepare(surfels: Surfels, views: Sequence[View], options: MaterialOptions, bounces: bool = True) -> Prepared:

@@ -20,14 +20,14 @@ MIB = 2**20
 
 
 @dataclass(frozen=True)
-class Stored:
+class OperatorBytes:
     """Bytes of operators with their transposes, where they are."""
 
     memory: int = 0
     file: int = 0
 
-    def __add__(self, other: Stored) -> Stored:
-        return Stored(self.memory + other.memory, self.file + other.file)
+    def __add__(self, other: OperatorBytes) -> OperatorBytes:
+        return OperatorBytes(self.memory + other.memory, self.file + other.file)
 
     def mib(self) -> dict[str, float]:
         """JSON values [MiB]."""
@@ -54,7 +54,7 @@ class OperatorStore:
     def __init__(self, budget_mib: float = math.inf, folder: Path | None = None, name: str = "TrainOptions") -> None:
         self._budget, self._folder, self._name = budget_mib * MIB, folder, name
         self._file: _PageFile | None = None
-        self.stored = Stored()
+        self.stored = OperatorBytes()
 
     @classmethod
     def of(cls, options: MaterialOptions) -> OperatorStore:
@@ -69,14 +69,14 @@ class OperatorStore:
         """
         size = _size(operator)
         if self._file is None and self.stored.memory + size <= self._budget:
-            self.stored += Stored(memory=size)
+            self.stored += OperatorBytes(memory=size)
             return operator
         try:
             self._file = self._file or _PageFile(self._folder)
             kept = PagedOperator(operator, self._file)
         except OSError as error:
             raise self._no_room(size, error) from error
-        self.stored += Stored(file=size)
+        self.stored += OperatorBytes(file=size)
         return kept
 
     def beside(self) -> OperatorStore:

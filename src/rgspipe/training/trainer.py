@@ -19,6 +19,7 @@ from rgspipe.renderer.view_weights import build_view_weights
 from rgspipe.scene.arrays import as_device
 from rgspipe.scene.gloss import Gloss
 from rgspipe.scene.lights import PointLight
+from rgspipe.scene.shapes import Float
 from rgspipe.scene.surfels import Surfels
 from rgspipe.training.checkpoint import Checkpoint
 from rgspipe.training.density import redistributed, surfel_errors
@@ -30,7 +31,7 @@ from rgspipe.training.light_refinement import refine_lights
 from rgspipe.training.lighting import total_irradiance, trace_lighting
 from rgspipe.training.log import TrainingLog
 from rgspipe.training.materials import PriorOf, build_frozen, each_view, fit_materials
-from rgspipe.training.operator_store import Stored
+from rgspipe.training.operator_store import OperatorBytes
 from rgspipe.training.options import TrainOptions
 from rgspipe.training.photometric import LEAST_ROUGHNESS, fit_heights, fit_normals, roughness
 from rgspipe.training.record import Record, materials_seconds
@@ -56,7 +57,7 @@ class Trained:
     surfels: Surfels
     records: tuple[Record, ...]
     views: tuple[View, ...]
-    stored: Stored
+    stored: OperatorBytes
 
     def __repr__(self) -> str:
         last = self.records[-1]
@@ -253,8 +254,8 @@ def _relit(surfels: Surfels, views: Sequence[View], options: TrainOptions) -> Te
     return total_irradiance(lighting, surfels.albedo, frozen.transport) * surfels.albedo
 
 
-def refine_views(surfels: Surfels, views: Sequence[View], radiance: Tensor) -> list[RefineView]:
-    """What a refinement of `surfels` looks at; their radiance (V, N, 3) says how light bounces."""
+def refine_views(surfels: Surfels, views: Sequence[View], radiance: Float[Tensor, "V N 3"]) -> list[RefineView]:
+    """What a refinement of `surfels` looks at; their radiance says how light bounces."""
     bvh = SurfelBvh(surfels)
     lights = surfel_lights(surfels, [view.light for view in views], radiance / surfels.albedo.clamp(min=1e-6))
     found = []

@@ -6,9 +6,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
+import pytest
 import torch
 
 from lit_room import VISIBLE
+from rgspipe.errors import InputError
 from rgspipe.fitting import FitViews, LightSpec, Search
 from rgspipe.fitting.findings import OutOfSteps, Rival
 from rgspipe.fitting.options import CertaintyOptions, TrackOptions
@@ -62,6 +64,20 @@ def test_a_light_that_jumps_is_found_again_and_a_dark_frame_does_not_end_the_tra
     for frame, place in zip(track, places, strict=True):
         if place:
             assert _error(frame, place) < 1e-3
+
+
+def test_frames_are_tensors_arrays_or_lists(room, point_light) -> None:
+    images = room.images(point_light(VISIBLE), 2)
+    track = track_lights(room.two, [images, [one.numpy() for one in images], [one.tolist() for one in images]])
+    assert FrameStatus.LOST not in {frame.status for frame in track}
+    # Measured: 9e-8.
+    assert max(_error(frame, VISIBLE) for frame in track) < 1e-5
+
+
+@pytest.mark.parametrize("wrong", [(48, 48, 4), (9, 48, 3)])
+def test_frames_of_another_shape_are_refused(room, wrong: tuple[int, ...]) -> None:
+    with pytest.raises(InputError, match="images"):
+        track_lights(room.two, [[torch.ones(wrong)] * 2])
 
 
 def _sure(frame: TrackedFrame) -> bool:

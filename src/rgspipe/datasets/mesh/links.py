@@ -11,7 +11,7 @@ from urllib.parse import unquote
 
 from rgspipe.datasets.input_file import input_file, is_there
 from rgspipe.datasets.json_file import parse_json, read_json, shown
-from rgspipe.datasets.mesh.obj_materials import Materials, read_materials
+from rgspipe.datasets.mesh.obj_materials import ObjMaterials, read_materials
 from rgspipe.datasets.reading_limits import reading_limits
 from rgspipe.errors import InputError
 
@@ -38,7 +38,7 @@ class Links:
 
     buffers: dict[str, Path] = field(default_factory=dict)
     textures: dict[str, Path] = field(default_factory=dict)
-    materials: Materials | None = None
+    materials: ObjMaterials | None = None
 
     @property
     def files(self) -> list[Path]:

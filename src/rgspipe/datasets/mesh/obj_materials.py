@@ -36,7 +36,7 @@ WORD, QUOTED = re.compile(r"(\S+)\s+(?=\S)"), re.compile(r'"([^"]+)"')
 
 
 @dataclass(frozen=True)
-class Materials:
+class ObjMaterials:
     """The materials of an OBJ file.
 
     Attributes:
@@ -50,7 +50,7 @@ class Materials:
     text: bytes
 
 
-def read_materials(path: Path, named: Named) -> Materials:
+def read_materials(path: Path, named: Named) -> ObjMaterials:
     """The materials of an OBJ file; of two with the same name in different files the first counts.
 
     Raises:
@@ -76,7 +76,7 @@ def read_materials(path: Path, named: Named) -> Materials:
                 textures[value] = texture
             lines.append(f"{key} {_colour(file, value) if key == 'kd' else value}")
         known |= own
-    return Materials(files, textures, "\n".join(lines).encode())
+    return ObjMaterials(files, textures, "\n".join(lines).encode())
 
 
 def _libraries(path: Path, named: Named) -> Iterator[Path]:

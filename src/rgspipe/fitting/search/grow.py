@@ -13,7 +13,7 @@ from rgspipe.fitting.model.mount import Mount
 from rgspipe.fitting.options import SearchOptions
 from rgspipe.fitting.search.compare import distinct, drop, ranked
 from rgspipe.fitting.search.refine import Refiner, State
-from rgspipe.fitting.search.rig_search import Found
+from rgspipe.fitting.search.rig_search import FoundRigs
 from rgspipe.fitting.search.weighting import PLAIN
 from rgspipe.fitting.spec import LightSpec
 from rgspipe.scene import Light
@@ -27,7 +27,7 @@ STARTS = 2
 WALLS = 3
 
 
-def grown(refiner: Refiner, found: Found, spec: LightSpec, options: SearchOptions) -> Found:
+def grown(refiner: Refiner, found: FoundRigs, spec: LightSpec, options: SearchOptions) -> FoundRigs:
     """What was found, with lights that have an extent, or hang on surfaces, in the place of others."""
     problem, size = refiner.problem, refiner.region.size
     near = [one for one in found.others if drop(problem, one, found.best) < options.bar.least]
@@ -39,7 +39,7 @@ def grown(refiner: Refiner, found: Found, spec: LightSpec, options: SearchOption
     ]
     states = best_of_starts(refiner, rigs, options.schedule.steps)
     best = min(states, key=refiner.unexplained)
-    return Found(best, tuple(states), {len(best.emitters): best})
+    return FoundRigs(best, tuple(states), {len(best.emitters): best})
 
 
 def best_of_starts(refiner: Refiner, rigs: Sequence[Sequence[Emitter]], steps: int) -> list[State]:

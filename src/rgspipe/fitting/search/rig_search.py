@@ -24,11 +24,11 @@ DESCENTS = 1.3
 
 
 @dataclass(frozen=True)
-class Found:
-    """What a search found.
+class FoundRigs:
+    """The rigs that a search found.
 
     Attributes:
-        best: the rig.
+        best: the answer.
         others: all rigs of its number that were refined to the end, the best one among them.
         compared: by number of lights the rigs that were compared.
     """
@@ -58,7 +58,7 @@ class RigSearch:
     def _course(self) -> Course:
         return self.refiner.meter.course
 
-    def known(self, lights: int) -> Found:
+    def known(self, lights: int) -> FoundRigs:
         """The best rig of a given number of lights; fewer where there are too few candidates."""
         found = None
         # Kinds have candidates of their own, so rigs of several kinds grow light by light.
@@ -68,9 +68,9 @@ class RigSearch:
             lights -= 1
             found = self._of(lights, None, patient=True)
         best = self.settled([found.best]) if self.kinds_open else found.best
-        return Found(best, found.others, {len(best.emitters): found.best})
+        return FoundRigs(best, found.others, {len(best.emitters): found.best})
 
-    def unknown(self) -> Found:
+    def unknown(self) -> FoundRigs:
         """The best rig of the least number of lights to which one more adds too little."""
         best, compared, bar = None, {}, self.options.bar
         for lights in range(1, MOST_LIGHTS + 1):
@@ -92,7 +92,7 @@ class RigSearch:
             compared[count] = answer
         # A rig of more lights, two of which are one, explains as much and is no other answer.
         others = tuple(state for state in best.others if len(state.emitters) <= count)
-        return Found(answer, others, compared)
+        return FoundRigs(answer, others, compared)
 
     def settled(self, states: Sequence[State]) -> State:
         """Of the best states by either loss the one that explains most after some steps of plain squares.
@@ -111,7 +111,7 @@ class RigSearch:
         fewer = self._pruned(settled)
         return settled if fewer is settled else self.without_twins(fewer)
 
-    def _of(self, lights: int, previous: State | None, patient: bool) -> Found | None:
+    def _of(self, lights: int, previous: State | None, patient: bool) -> FoundRigs | None:
         """The best rig of `lights` lights; None without candidates for so many.
 
         Args:
@@ -119,7 +119,7 @@ class RigSearch:
             patient: whether further starts follow while all explain little.
         """
         batches = self.options.starts if patient else 1
-        found: list[Found] = []
+        found: list[FoundRigs] = []
         for aimed in (False, True):
             kinds = [kind for kind in self.candidates if kind.aimed is aimed]
             if kinds and not (found and self._beamless(found[0].best)):
@@ -131,9 +131,9 @@ class RigSearch:
             if drop(self.refiner.problem, best, richer.best) >= self.options.bar.least:
                 best = richer.best
         best = self._with_plain_lights(best) if self.kinds_open else best
-        return Found(best, tuple(state for one in found for state in one.others))
+        return FoundRigs(best, tuple(state for one in found for state in one.others))
 
-    def _tried(self, kinds: Sequence[Candidates], lights: int, previous: State | None, batches: int) -> list[Found]:
+    def _tried(self, kinds: Sequence[Candidates], lights: int, previous: State | None, batches: int) -> list[FoundRigs]:
         """The best of starts of some kinds, if there are any."""
         words, effort = f"trying {lights} light{'s' * (lights != 1)}", POINTS * lights
         if kinds[0].aimed:
@@ -161,7 +161,7 @@ class RigSearch:
         pairs = zip_longest(candidates.extended(previous, half, size), candidates.rigs(lights, half, size))
         return [rig for pair in pairs for rig in pair if rig is not None]
 
-    def _refined(self, rigs: Sequence[EmitterRig], batches: int, previous: State | None) -> Found:
+    def _refined(self, rigs: Sequence[EmitterRig], batches: int, previous: State | None) -> FoundRigs:
         """The best of several starts after a few steps each; of `batches` parts the next ones only if need be.
 
         Rigs that are to be compared with others have the least robust loss; else they are settled.
@@ -174,12 +174,12 @@ class RigSearch:
             best = best_state(self.refiner.problem, refined) if compared else self.settled(refined)
             if self.refiner.unexplained(best) < self.options.certainty.poorly:
                 break
-        return Found(best, tuple(refined))
+        return FoundRigs(best, tuple(refined))
 
-    def _further(self, found: Found) -> Found:
+    def _further(self, found: FoundRigs) -> FoundRigs:
         """The same with more steps of the best rig."""
         further = self.refiner.refined(found.best, ROBUST, 2 * self.options.schedule.steps)
-        return Found(further, tuple(further if state is found.best else state for state in found.others))
+        return FoundRigs(further, tuple(further if state is found.best else state for state in found.others))
 
     def _with_plain_lights(self, state: State) -> State:
         """The rig with plain lights in the place of those whose shapes explain too little."""

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
-from torch import Tensor
 
 from rgspipe.arguments import as_one_of
 from rgspipe.errors import InputError
@@ -27,7 +26,7 @@ from rgspipe.fitting.tracking.twins import split_lights
 from rgspipe.machine.sums import total
 from rgspipe.progress import progress_bar
 from rgspipe.scene import LightRig
-from rgspipe.scene.arrays import ArrayLike, as_list
+from rgspipe.scene.arrays import ArrayLike, as_list, as_tensor
 
 
 def track_lights(
@@ -220,9 +219,14 @@ class _Tracker:
         return soft(tuple(Emitter.of(light, self.views.lights.shape_free) for light in rig), 0.0)
 
 
-def frame_energy(images: Sequence[Tensor]) -> float:
-    """Σ y² over the images of a frame."""
-    return sum(float(total(torch.nan_to_num(image).double().square())) for image in images)
+def frame_energy(images: Sequence[ArrayLike]) -> float:
+    """Σ y² over the images (H, W, 3) of a frame.
+
+    Raises:
+        InputError: one has another shape.
+    """
+    shown = (as_tensor(image, "images", ("H", "W", 3)) for image in images)
+    return sum(float(total(torch.nan_to_num(image).double().square())) for image in shown)
 
 
 def search_order(energies: Sequence[float], searches: int) -> list[int]:

@@ -7,7 +7,7 @@ from pathlib import Path
 from rgspipe.datasets.info import INFO, read_info
 from rgspipe.datasets.views import Dataset
 from rgspipe.errors import InputError
-from rgspipe.evidence.conventions import Finding, misread
+from rgspipe.evidence.conventions import ViewFinding, misread
 from rgspipe.evidence.lamps import misplaced
 from rgspipe.evidence.readings import Reading
 from rgspipe.evidence.reprojection import Agreement
@@ -41,7 +41,7 @@ def check_conventions(dataset: Dataset) -> None:
         )
 
 
-def _refusal(root: Path, convention: str, finding: Finding) -> InputError:
+def _refusal(root: Path, convention: str, finding: ViewFinding) -> InputError:
     reading = finding.reading
     about_poses = reading.opencv or reading.inverse or reading.scale != 1.0
     meant = _meant(reading, OTHER[convention])

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from rgspipe.datasets.scans.frame import Scan
 from rgspipe.datasets.views import View
 from rgspipe.errors import InputError
-from rgspipe.evidence.conventions import Finding, misread, stated_agreement
+from rgspipe.evidence.conventions import ViewFinding, misread, stated_agreement
 from rgspipe.evidence.readings import Reading
 from rgspipe.evidence.reprojection import Agreement
 
@@ -41,7 +41,7 @@ def check_scan(scan: Scan, views: Sequence[View]) -> None:
         )
 
 
-def _refusal(scan: Scan, finding: Finding) -> InputError:
+def _refusal(scan: Scan, finding: ViewFinding) -> InputError:
     meant = _meant(finding.reading, scan.axes)
     return InputError(
         scan.stated,

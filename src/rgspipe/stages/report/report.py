@@ -115,12 +115,12 @@ def _joined(artifacts: Sequence[Artifact], name: str) -> pd.DataFrame | None:
     return pd.concat([part for part in parts if len(part)] or parts[:1], ignore_index=True)
 
 
-def _pictures(artifacts: Iterable[Artifact], described: Iterable[Mapping[str, Any]]) -> list[report.Picture]:
+def _pictures(artifacts: Iterable[Artifact], described: Iterable[Mapping[str, Any]]) -> list[report.FitPicture]:
     pictures = []
     for artifact, content in zip(artifacts, described, strict=True):
         for entry in content["pictures"]:
             caption = report.picture_caption(entry["target"], entry["kind"], entry["position_error"], entry["psnr"])
-            pictures.append(report.Picture(_group(content), caption, artifact.file(entry["file"]).read_bytes()))
+            pictures.append(report.FitPicture(_group(content), caption, artifact.file(entry["file"]).read_bytes()))
     return pictures
 
 

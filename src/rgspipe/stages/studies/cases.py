@@ -29,7 +29,7 @@ OVERRIDE = re.compile(r"""(?:\[[^\]]*\]|'[^']*'|"[^"]*"|\S)+""")
 
 
 @dataclass(frozen=True)
-class Case:
+class StudyCase:
     """One row of a study.
 
     Attributes:
@@ -51,7 +51,7 @@ def chosen_scenes(config: RgspipeConfig) -> Iterator[tuple[dict[str, object], Rg
         yield changes, with_changes(config, changes)
 
 
-def checked_cases(config: RgspipeConfig) -> list[Case]:
+def checked_cases(config: RgspipeConfig) -> list[StudyCase]:
     """The cases that the configuration lists, their values in the types of the configuration.
 
     A value means the same artifact as on the command line: 1 for a number with a fraction becomes 1.0.
@@ -69,7 +69,7 @@ def checked_cases(config: RgspipeConfig) -> list[Case]:
     return cases
 
 
-def parse_case(text: str) -> Case:
+def parse_case(text: str) -> StudyCase:
     """A case: overrides as on the command line, with a name in front if wanted, or `CLEAN`.
 
     "train.steps=0 capture.views=50", "few views: capture.views=25", "as it is: clean".
@@ -83,7 +83,7 @@ def parse_case(text: str) -> Case:
     if not name.strip() or not settings.strip():
         raise _unclear(text)
     overrides = [] if settings.strip() == CLEAN else OVERRIDE.findall(settings)
-    return Case(" ".join(name.split()), dict(_change(override, text) for override in overrides))
+    return StudyCase(" ".join(name.split()), dict(_change(override, text) for override in overrides))
 
 
 def _change(override: str, text: str) -> tuple[str, Any]:
@@ -108,7 +108,7 @@ def _unclear(text: str) -> InputError:
     )
 
 
-def _checked(config: RgspipeConfig, text: str, case: Case) -> Case:
+def _checked(config: RgspipeConfig, text: str, case: StudyCase) -> StudyCase:
     known = [key for key, _, _ in describe(config)]
     for key in case.changes:
         if key not in known:
@@ -127,7 +127,7 @@ def _checked(config: RgspipeConfig, text: str, case: Case) -> Case:
         raise InputError(
             f"{LISTED}: {text!r}: {error.where}", expected=error.expected, found=error.found, remedy=error.remedy
         ) from None
-    return Case(case.name, {key: get_value(changed, key) for key in case.changes})
+    return StudyCase(case.name, {key: get_value(changed, key) for key in case.changes})
 
 
 def _unknown(text: str, key: str, known: Sequence[str]) -> InputError:

@@ -24,7 +24,7 @@ TYPES = {"target": str, "result": str, "reason": str, "success": "boolean", "ins
 
 
 @dataclass(frozen=True)
-class Cell:
+class LightStudyCell:
     """The fits of one case with one method and number of views.
 
     Attributes:
@@ -63,18 +63,18 @@ def _advice(fit: Artifact, targets: pd.DataFrame) -> dict[str, pd.DataFrame]:
     return {name: own_views_in_order(fit.file(file)) for name, file in files.items() if file in fit.manifest["files"]}
 
 
-def _cells(config: RgspipeConfig) -> list[Cell]:
+def _cells(config: RgspipeConfig) -> list[LightStudyCell]:
     return list(_each_cell(config))
 
 
-def _each_cell(config: RgspipeConfig) -> Iterator[Cell]:
+def _each_cell(config: RgspipeConfig) -> Iterator[LightStudyCell]:
     wanted = config.study
     for scene, chosen in chosen_scenes(config):
         for case in checked_cases(chosen):
             for method, views in wanted.fits():
                 foretells = wanted.kind == "views" and method == "search_lm" and views == min(wanted.views)
                 changes = scene | fit_changes(chosen, chosen.study, method, views) | case.changes
-                yield Cell(
+                yield LightStudyCell(
                     chosen.scene.folder,
                     case.name,
                     changes | ({"fit.suggest_view": True} if foretells else {}),

@@ -38,7 +38,7 @@ STAGES = ("generate_dataset", "train_surfels", "freeze", "evaluate")
 
 
 @dataclass(frozen=True)
-class Cell:
+class ZooStudyCell:
     """The fits of one room in one case, with one method and number of views.
 
     Attributes:
@@ -63,7 +63,7 @@ def _gather(context: StageContext) -> Study:
     return Study(table, page(table, figures), zoo_figure(table), beside)
 
 
-def _rows(cell: Cell, *made: Artifact | Failure) -> list[Row]:
+def _rows(cell: ZooStudyCell, *made: Artifact | Failure) -> list[Row]:
     """The fits of a cell, or why there are none."""
     *scene, evaluated = made
     room = _properties(cell, *scene)
@@ -76,7 +76,7 @@ def _rows(cell: Cell, *made: Artifact | Failure) -> list[Row]:
 
 
 def _properties(
-    cell: Cell, dataset: Artifact | Failure, trained: Artifact | Failure, frozen: Artifact | Failure
+    cell: ZooStudyCell, dataset: Artifact | Failure, trained: Artifact | Failure, frozen: Artifact | Failure
 ) -> dict[str, Any]:
     """What a room is like, how it was photographed and trained; None for what is not known."""
     config, room = cell.config, _room(cell.config.scene.zoo)
@@ -110,7 +110,7 @@ def _training(trained: Artifact) -> dict[str, Any]:
     }
 
 
-def _cells(config: RgspipeConfig) -> Iterator[Cell]:
+def _cells(config: RgspipeConfig) -> Iterator[ZooStudyCell]:
     for seed in config.study.zoo.seeds:
         room = _room_changes(config, seed)
         for case in checked_cases(with_changes(config, room)):
@@ -119,7 +119,7 @@ def _cells(config: RgspipeConfig) -> Iterator[Cell]:
                     fits = {"fit.method": method, "views.count": views, "views.indices": None}
                     fits |= {"fit.limit": target_limit(config)}
                     changes = room | fits | case.changes
-                    yield Cell(seed, case.name, changes, with_changes(config, changes))
+                    yield ZooStudyCell(seed, case.name, changes, with_changes(config, changes))
 
 
 def _room_changes(config: RgspipeConfig, seed: int) -> dict[str, object]:
