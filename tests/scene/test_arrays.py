@@ -46,6 +46,8 @@ def test_gradients_flow_through_numbers_that_are_tensors() -> None:
         ("here", "str 'here'"),
         (None, "NoneType"),
         (np.zeros(3, complex), "ndarray"),
+        ([torch.zeros(2), torch.zeros(3)], r"a list of \(2,\), \(3,\)"),
+        ([torch.tensor(1.0), "b", None], r"a list of \(\), str, NoneType"),
     ],
 )
 def test_what_is_no_vector_is_refused_by_name(value: object, found: str) -> None:

@@ -119,7 +119,11 @@ def check_radiance(where: object, least: float, most: float) -> None:
 
 def _from_numbers(value: object, name: str, shape: Sequence[Axis], remedy: str) -> Tensor:
     if isinstance(value, list | tuple) and any(isinstance(part, Tensor) for part in value):
-        return torch.stack([torch.as_tensor(part).double() for part in value])
+        try:
+            return torch.stack([torch.as_tensor(part).double() for part in value])
+        except (RuntimeError, TypeError, ValueError):
+            parts = [_written(part.shape) if isinstance(part, Tensor) else type(part).__name__ for part in value[:4]]
+            _refuse(name, shape, f"a list of {', '.join(parts)}{', …' if len(value) > 4 else ''}", remedy)
     try:
         array = np.array(value)
     except ValueError:  # rows of different lengths
