@@ -1,15 +1,22 @@
 """Make the pictures of the guides that need no training: `python tools/guide_pictures.py [NAME …]`, some minutes.
 
-All are of the small room that comes with the package. NAME is one of PICTURES; all of them if none is named.
+Nearly all are of the small room that comes with the package. NAME is one of PICTURES; all of them if none is named.
+`settings` needs Chromium and Playwright, `cluster` Slurm (Debian: slurm-wlm and munge).
 """
 
 from __future__ import annotations
 
+import io
 import math
+import os
+import re
+import shutil
 import subprocess
 import sys
+import textwrap
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from datetime import datetime
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -18,11 +25,12 @@ import pandas as pd
 import torch
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.patches import Ellipse
+from matplotlib.patches import Ellipse, Patch, Rectangle
 from PIL import Image
 
 import rgspipe as rg
 from rgspipe.cli import main
+from rgspipe.cli.compose import compose_config
 from rgspipe.datasets.exr import read_image
 from rgspipe.datasets.gs3 import load_target
 from rgspipe.datasets.light_file import read_lights
@@ -31,16 +39,37 @@ from rgspipe.evaluation.calibration import half_axes
 from rgspipe.evaluation.images import Bytes, beside, display_gain, signed_difference, stack, tone_map
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import LightRig
+from rgspipe.stages import Stage, load_stage
 from rgspipe.viewer.lamp_images import LampImages
 from rgspipe.viewer.session import SHOWN, Session
 
-IMAGES = Path(__file__).resolve().parents[1] / "docs" / "images"
+ROOT = Path(__file__).resolve().parents[1]
+IMAGES = ROOT / "docs" / "images"
 
 #: Pixels along a side of a panel.
 SIDE = 160
 
 #: What the guide on sweeps varies.
 SWEPT = ("views.count=1,3", "target_capture.noise=0,0.1,0.3,1")
+
+#: What a job of it may do, and the colours of that.
+DOING = {
+    "waits for a core": "#e4e7eb",
+    "starts": "#aab2bd",
+    "freezes the scene": "#e8a33d",
+    "waits for it": "#f6dcb2",
+    "fits": "#4a7fb5",
+}
+
+#: In what a job prints: when it began and ended, and how long each stage took that it made or waited for.
+STAMP = re.compile(r"^submitit INFO \(([^)]+)\)", re.MULTILINE)
+MADE = re.compile(r"^(\w+): made( by another process)? in ([\d.]+) s", re.MULTILINE)
+
+#: The stage that the guide adds: the first block of Python on its page.
+ADDED = re.compile(r"^```python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+
+#: The row of Settings that is shown with those around it, and how wide the page is, pixels.
+SETTING, WIDE = "fit.search.starts", 1000
 
 #: The room that is captured: its surfels, pixels along a side of its photographs, and the lamps that are on in them.
 SMALL, COARSE = 1500, 48
@@ -230,11 +259,7 @@ def sweep(scene: FrozenScene) -> Bytes:
     """What the guide's sweep of the demo's target finds: errors of the hidden lamp over noise, by views."""
     with TemporaryDirectory() as name:
         folder = Path(name)
-        rg.save_ply(folder / "room.ply", scene.surfels)
-        words = [f"scene.path={folder / 'room.ply'}", f"outputs={folder / 'outputs'}", f"fit.target={TARGET}"]
-        words += [f"fit.truth={ROOM / 'truth' / TARGET.name}.json", "scene=ply", "launcher=basic"]
-        words += [f"freeze.gather_rays={GATHER_RAYS}", f"freeze.patches={PATCHES}"]
-        if main(["-m", "stage=evaluate", *words, *SWEPT]):
+        if main(["-m", "stage=evaluate", *_of_room(scene, folder), "launcher=basic", *SWEPT]):
             sys.exit("the sweep failed")
         [path] = folder.glob("outputs/runs/*_sweep/table.csv")
         table = pd.read_csv(path)
@@ -243,6 +268,48 @@ def sweep(scene: FrozenScene) -> Bytes:
     axes = figure.add_subplot()
     (100.0 * errors).plot(ax=axes, marker="o", ylim=(0.0, None), ylabel="position error, % of the room")
     return drawn(figure)
+
+
+def _of_room(scene: FrozenScene, folder: Path) -> list[str]:
+    """Words of a command that finds the hidden lamp in the room, which is written as a file into the folder."""
+    rg.save_ply(folder / "room.ply", scene.surfels)
+    words = ["scene=ply", f"scene.path={folder / 'room.ply'}", f"outputs={folder / 'outputs'}", f"fit.target={TARGET}"]
+    words += [f"fit.truth={ROOM / 'truth' / TARGET.name}.json"]
+    return [*words, f"freeze.gather_rays={GATHER_RAYS}", f"freeze.patches={PATCHES}"]
+
+
+def cluster(scene: FrozenScene) -> Bytes:
+    """What became of each job of the same sweep on a cluster of this machine, which runs four at a time."""
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        words = [*_of_room(scene, folder), *SWEPT, "launcher=slurm", "hydra.launcher.cpus_per_task=1"]
+        command = [sys.executable, "-m", "rgspipe", "-m", "stage=evaluate", *words]
+        subprocess.run([sys.executable, str(ROOT / "tests" / "slurm" / "cluster.py"), *command], check=True)
+        jobs = sorted(folder.glob("outputs/runs/*_sweep/[0-9]*"), key=lambda job: int(job.name))
+        parts = [_parts(job) for job in jobs]
+    figure = Figure(figsize=(8.4, 2.8), dpi=100, layout="constrained")
+    axes = figure.add_subplot(xlabel="seconds since the jobs were sent", ylabel="job", yticks=range(len(parts)))
+    for number, job in enumerate(parts):
+        ends = np.cumsum([seconds for _, seconds in job])
+        for (words, seconds), end in zip(job, ends, strict=True):
+            axes.barh(number, seconds, left=end - seconds, color=DOING[words])
+    axes.invert_yaxis()
+    handles = [Patch(color=colour, label=words) for words, colour in DOING.items()]
+    figure.legend(handles=handles, ncols=len(handles), loc="outside upper center", fontsize=9, frameon=False)
+    return drawn(figure)
+
+
+def _parts(job: Path) -> list[tuple[str, float]]:
+    """What a job did, one after the other, and for how many seconds, as what it printed says."""
+    text = (job / "slurm.log").read_text()
+    began, *_, ended = (datetime.fromisoformat(stamp).timestamp() for stamp in STAMP.findall(text))
+    [script] = job.parent.glob("slurm/*_submission.sh")
+    stages = [
+        ("fits" if name in ("fit_light", "evaluate") else "waits for it" if other else "freezes the scene", float(took))
+        for name, other, took in MADE.findall(text)
+    ]
+    starts = ended - began - sum(seconds for _, seconds in stages)
+    return [("waits for a core", began - script.stat().st_mtime), ("starts", starts), *stages]
 
 
 def drawn(figure: Figure) -> Bytes:
@@ -307,6 +374,57 @@ def viewer_shows(scene: FrozenScene) -> Bytes:
     return drawn(figure)
 
 
+def stages(_: FrozenScene) -> Bytes:
+    """The stages that the guide's added one is made after, and which of them makes what another reads."""
+    names: dict[str, object] = {}
+    exec(ADDED.search((ROOT / "docs" / "guides" / "add_stage.md").read_text())[1], names)
+    added, config, found = names["STAGE"], compose_config(["stage=fit_light", "scene=cornell"]), {}
+
+    def visit(stage: Stage) -> None:
+        needed = [load_stage(name) for name in dict.fromkeys(need.stage for need in stage.needs(config))]
+        for one in needed:
+            visit(one)
+        found.setdefault(stage.name, (stage, [one.name for one in needed]))
+
+    visit(added)
+    figure, order = Figure(figsize=(8.4, 2.1), dpi=100), list(found)
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0), xlim=(-0.5, len(found) - 0.5), ylim=(-1.3, 1.0))
+    axes.set_axis_off()
+    for place, (stage, needed) in enumerate(found.values()):
+        colour, side = ("#e8a33d", 1.0) if stage is added else ("#7f8b99", -1.0)
+        axes.add_patch(Rectangle((place - 0.44, -0.5), 0.88, 1.0, facecolor=colour, alpha=0.3))
+        axes.text(place, 0.33, stage.name, ha="center", va="center", fontsize=8.5, weight="bold")
+        axes.text(place, -0.14, textwrap.fill(stage.help, 19), ha="center", va="center", fontsize=7.5)
+        for start in map(order.index, needed):
+            # From box to box, or around those that stand between.
+            near = place == start + 1
+            ends = ((start + 0.44, 0.0), (place - 0.44, 0.0)) if near else ((start, side / 2), (place, side / 2))
+            arrow = {"arrowstyle": "-|>", "color": colour, "connectionstyle": f"arc3,rad={0.0 if near else -side / 4}"}
+            axes.annotate("", ends[1], ends[0], arrowprops=arrow)
+    return drawn(figure)
+
+
+def settings(_: FrozenScene) -> Bytes:
+    """A row of the site's page of settings, and those around it, as a browser shows them."""
+    from playwright.sync_api import sync_playwright
+    from viewer_picture import ARGUMENTS
+
+    with TemporaryDirectory() as folder, sync_playwright() as playwright:
+        build = [sys.executable, "-m", "mkdocs", "build", "--quiet", "--site-dir", folder]
+        subprocess.run(build, check=True, cwd=ROOT, env=os.environ | {"NO_MKDOCS_2_WARNING": "1"})
+        browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=ARGUMENTS)
+        page = browser.new_page(viewport={"width": WIDE, "height": 700})
+        page.goto(f"file://{folder}/reference/settings.html")
+        row = page.locator("tr", has_text=SETTING)
+        row.evaluate("row => row.scrollIntoView({block: 'center'})")
+        last = row.locator("xpath=following-sibling::tr[2]").bounding_box()
+        place = row.bounding_box() | {"y": row.locator("xpath=preceding-sibling::tr[2]").bounding_box()["y"]}
+        place["height"] = last["y"] + last["height"] - place["y"]
+        picture = page.screenshot(clip=place)
+        browser.close()
+    return np.asarray(Image.open(io.BytesIO(picture)).convert("RGB"))
+
+
 PICTURES: dict[str, Callable[[FrozenScene], Bytes]] = {
     "captures": captures,
     "other_light": other_light,
@@ -319,12 +437,15 @@ PICTURES: dict[str, Callable[[FrozenScene], Bytes]] = {
     "photographs": photographs,
     "ply": ply,
     "scan": scan,
+    "settings": settings,
+    "stages": stages,
     "sweep": sweep,
+    "cluster": cluster,
     "viewer_shows": viewer_shows,
 }
 
 #: Of lines and letters, which are kept as they are.
-DRAWN = ("photographs", "regions", "sweep")
+DRAWN = ("cluster", "photographs", "regions", "settings", "stages", "sweep")
 
 
 if __name__ == "__main__":

@@ -7,21 +7,17 @@ a Cornell box of 10000 surfels on its true surfaces.
 from __future__ import annotations
 
 import math
-import shutil
 import statistics
 import sys
 import time
 
 import torch
+from chromium import grip, launched, on_canvas
 
 import rgspipe as rg
 from rgspipe.viewer.cameras import first_camera
-from rgspipe.viewer.lamp_controls import ARMS
 from rgspipe.viewer.page import Page
 from rgspipe.viewer.serve import Viewer, view
-
-#: Software rendering, as in the tests.
-ARGUMENTS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 
 #: Pixels of windows.
 WINDOWS = ((1280, 800), (640, 480))
@@ -56,7 +52,7 @@ def main() -> None:
     viewer = view(frozen, lamp, camera=first_camera(lower, upper), port=8290)
     print(f"{len(frozen.surfels)} surfels, {torch.get_num_threads()} threads", flush=True)
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=ARGUMENTS)
+        browser = launched(playwright)
         for width, height in WINDOWS:
             print(f"a window of {width} by {height}: ", end="", flush=True)
             window = browser.new_page(viewport={"width": width, "height": height})
@@ -88,11 +84,7 @@ def _page(viewer: Viewer) -> Page:
 def _held(window, page: Page, lamp: rg.PointLight) -> tuple[float, float]:
     """Where on the page the mouse holds the lamp by an arrow of its gizmo."""
     window.wait_for_timeout(3e3)
-    camera, box = page.camera(256), window.locator("canvas").first.bounding_box()
-    arm = torch.tensor([0.75 * ARMS * page.session.images.frozen.size, 0.0, 0.0], dtype=torch.float64)
-    (x, y), _ = camera.project(lamp.position + arm)
-    scale = box["width"] / camera.width
-    start = box["x"] + scale * float(x), box["y"] + scale * float(y)
+    start = on_canvas(page.camera(256), window, lamp.position + grip(page.session.images.frozen.size))
     window.mouse.move(*start)
     window.wait_for_timeout(1e3 * REST)
     window.mouse.down()

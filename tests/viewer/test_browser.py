@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import shutil
 import time
 import zipfile
 from collections.abc import Callable, Iterator
@@ -25,8 +24,7 @@ from rgspipe.viewer.page import Page
 from rgspipe.viewer.saving import FRAMES
 from rgspipe.viewer.serve import Viewer, view
 from rgspipe.viewer.session import ILLUMINANCE, IRRADIANCE, PICTURE, same_lights
-
-CHROMIUM = shutil.which("chromium")
+from viewer.chromium import CHROMIUM, grip, launched, on_canvas
 
 pytestmark = [
     pytest.mark.browser,
@@ -36,9 +34,6 @@ pytestmark = [
         reason="needs chromium (Debian: apt-get install chromium) and Playwright (pip install playwright)",
     ),
 ]
-
-#: Software rendering, so that no GPU is needed.
-ARGUMENTS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 
 LAMP = PointLight(list(VISIBLE), 0.5)
 
@@ -63,7 +58,7 @@ def browser() -> Iterator:
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
-        made = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+        made = launched(playwright)
         yield made
         made.close()
 
@@ -113,19 +108,11 @@ def seen(page: Page, window) -> np.ndarray:
     return np.asarray(Image.open(io.BytesIO(picture)).convert("RGB")).astype(float)
 
 
-def on_canvas(camera: Camera, window, place: torch.Tensor) -> tuple[float, float]:
-    """Where a point of the scene is on the page."""
-    box = window.locator("canvas").first.bounding_box()
-    (x, y), _ = camera.project(place)
-    scale = box["width"] / camera.width
-    return box["x"] + scale * float(x), box["y"] + scale * float(y)
-
-
 def test_a_lamp_is_dragged_and_the_picture_is_that_of_the_scene(viewer: Viewer, window, page: Page) -> None:
     session = page.session
     until(lambda: torch.allclose(page.camera(64).origin, CAMERA.origin, atol=1e-6))
     camera = page.camera(64)
-    arm = torch.tensor([0.75 * ARMS * session.images.frozen.size, 0.0, 0.0], dtype=torch.float64)
+    arm = grip(session.images.frozen.size)
     window.mouse.move(*on_canvas(camera, window, LAMP.position + arm))
     window.wait_for_timeout(1500)
     window.mouse.down()

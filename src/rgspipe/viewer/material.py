@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
 import torch
 from torch import Tensor
 
@@ -135,6 +134,9 @@ def _path(table: Path, lights: LightRig) -> tuple[LightRig, ...]:
     """The rigs of the steps in a fit's convergence.csv, as far as they are of the lights that were found."""
     if not lights or not table.exists():
         return ()
+    # Only the folder of a fit has a table; without pandas a page starts half a second sooner.
+    import pandas as pd
+
     endings = ["" if index == 0 else f"_{index}" for index in range(len(lights))]
     rigs = []
     for row in pd.read_csv(table).to_dict("records"):
