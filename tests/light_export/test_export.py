@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import ast
 import json
 import math
+import re
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
@@ -104,6 +106,71 @@ def test_mitsuba_s_emitters_have_our_radiance_and_axes(tmp_path: Path) -> None:
     rectangle = np.array(root.find("shape[@type='rectangle']//matrix").get("value").split(), dtype=float).reshape(4, 4)
     area = 4.0 * np.linalg.norm(np.cross(rectangle[:3, 0], rectangle[:3, 1]))
     assert area == pytest.approx(panel.width * panel.height)
+
+
+def luminaire(folder: Path, *candela: float) -> Light:
+    """One that hangs at height 2 and sends these towards 0, 30, …, 180 degrees from straight down."""
+    shown = " ".join(map(str, candela))
+    header = "IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 7 1 1 2 0 0 0\n1 1 10\n"
+    (folder / "made.ies").write_text(f"{header}0 30 60 90 120 150 180\n0\n{shown}\n")
+    down = torch.tensor([0.0, 0.0, -1.0], dtype=torch.float64)
+    return rg.ProfileLight([0.0, 0.0, 2.0], 5.0, down, 0.0, read_photometry(folder / "made.ies"))
+
+
+@pytest.mark.parametrize(
+    ("candela", "up", "peak", "lost"),
+    [
+        ((1000, 800, 400, 0, 0, 0, 0), False, 1.0, None),
+        ((0, 0, 0, 0, 400, 800, 1000), True, 1.0, None),
+        ((100, 80, 40, 0, 500, 900, 1000), True, 1.0, "8"),
+        ((1000, 900, 500, 0, 40, 80, 100), False, 1.0, "8"),
+    ],
+)
+def test_a_cone_looks_where_most_of_the_light_goes(
+    tmp_path: Path, candela: tuple[float, ...], up: bool, peak: float, lost: str | None
+) -> None:
+    """Up where it does, with the peak that is there; what goes the other way is said."""
+    light, way = luminaire(tmp_path, *candela), 1.0 if up else -1.0
+    done = export_lights(light, tmp_path, ["gltf", "three", "mitsuba", "usda"])
+    content = json.loads((tmp_path / NAMES["gltf"]).read_text())
+    matrix = np.array(content["nodes"][0]["matrix"]).reshape(4, 4).T
+    assert -matrix[:3, 2] == pytest.approx([0.0, way, 0.0])  # Y is up, and −z is where it shines
+    [spot] = content["extensions"]["KHR_lights_punctual"]["lights"]
+    assert spot["intensity"] == pytest.approx(683.0 * 5.0 * peak)
+    lamp, target = json.loads((tmp_path / NAMES["three"]).read_text())["object"]["children"]
+    assert target["matrix"][12:15] == pytest.approx([0.0, 0.0, 2.0 + way])
+    assert lamp["intensity"] == pytest.approx(683.0 * 5.0 * peak)
+    emitter = ElementTree.parse(tmp_path / NAMES["mitsuba"]).getroot()[0]
+    to_world = np.array(emitter.find("transform/matrix").get("value").split(), dtype=float).reshape(4, 4)
+    assert to_world[:3, 2] == pytest.approx([0.0, 0.0, way])
+    [rows] = re.findall(r"xformOp:transform = (.*)", (tmp_path / NAMES["usda"]).read_text())
+    assert np.array(ast.literal_eval(rows))[2, :3] == pytest.approx([0.0, 0.0, -way])
+    said = [line for line in done.lines if "beyond 90°" in line]
+    assert len(said) == (0 if lost is None else 4) and all(f"{lost}" in line for line in said)
+
+
+def test_a_cone_that_is_too_wide_is_cut_with_a_word(tmp_path: Path) -> None:
+    spot = rg.SpotLight([0.0, 0.0, 1.0], 1.0, [0.0, 0.0, -1.0], "smoothstep", math.radians(120.0), 0.5)
+    done = export_lights(spot, tmp_path, ["gltf", "three", "blend"])
+    [shown] = json.loads((tmp_path / NAMES["gltf"]).read_text())["extensions"]["KHR_lights_punctual"]["lights"]
+    assert shown["spot"]["outerConeAngle"] == pytest.approx(0.5 * math.pi)
+    assert sum("beyond 90°" in line for line in done.lines) == 2
+    # Blender's own spots end there, too: its shader does not.
+    assert "spot_size=" not in (tmp_path / NAMES["blend"]).read_text()
+
+
+def test_a_place_that_is_not_known_has_no_ellipsoid_and_says_so(tmp_path: Path) -> None:
+    light = rg.PointLight([0.0, 0.0, 1.0], 1.0)
+    done = export_lights(light, tmp_path, ["blend"], covariances=[torch.tensor([math.inf, 1e-4, 1e-4]).diag()])
+    assert any("light 1" in line and "no ellipsoid" in line for line in done.lines)
+    assert 'region("light' not in (tmp_path / NAMES["blend"]).read_text()
+
+
+def test_blender_s_script_says_that_it_is_in_metres(tmp_path: Path) -> None:
+    light = rg.PointLight([0.0, 0.0, 1.0], 1.0)
+    for metres, said in ((0.01, True), (1.0, False)):
+        lines = export_lights(light, tmp_path, ["blend"], metres=metres).lines
+        assert any("metres=1" in line for line in lines) is said
 
 
 def test_ies_files_have_the_candela_of_every_angle(tmp_path: Path) -> None:

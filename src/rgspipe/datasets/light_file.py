@@ -118,7 +118,7 @@ def _read_light(fields: dict, path: str | Path, where: str) -> Light:
     if (intensity < 0).any() or (intensity > STRONGEST).any():
         raise reader.refusal("intensity", f"W/sr from 0 to {STRONGEST:g}", str(intensity.tolist()))
     try:
-        return kind.from_fields(position, intensity, reader)
+        light = kind.from_fields(position, intensity, reader)
     except InputError as error:
         # What the reader refuses names the file; what no light can have names the light's own number alone.
         raise error if error.where.startswith(reader.place) else error.within(reader.place) from None
@@ -126,6 +126,11 @@ def _read_light(fields: dict, path: str | Path, where: str) -> Light:
         raise InputError(
             reader.place, expected=f"a {kind.kind} light", found=str(error), remedy="Correct it."
         ) from error
+    for number in light.shape:
+        # The limit, but for the rounding of whoever wrote it.
+        if (value := float(getattr(light, number.name))) > number.largest * (1.0 + 1e-9):
+            raise reader.refusal(number.key, f"at most {number.largest:g}", f"{value:g}")
+    return light
 
 
 @dataclass(frozen=True)

@@ -104,14 +104,21 @@ def blend(lights: Numbered, covariances: Sequence[Tensor | None] = ()) -> tuple[
 
     Args:
         covariances: (3, 3) of each light's place [m²], where it is known.
+
+    Returns:
+        the text, and of which lights no ellipsoid shows how sure their place is.
     """
-    lines = []
+    lines, notes = [], []
     for number, light in lights.items():
         lines += _lamp(f"light {number}", light)
     for number, covariance in enumerate(covariances, start=1):
-        if number in lights and covariance is not None and bool(torch.isfinite(covariance).all()):
+        if number not in lights or covariance is None:
+            continue
+        if bool(torch.isfinite(covariance).all()):
             lines.append(f'region("light {number} (95 %)", {_ellipsoid(lights[number].position, covariance)})')
-    return SCRIPT + "\n".join(lines) + "\n" + SAVE, []
+        else:
+            notes.append(f"light {number}: the images do not tell where it is along every axis; it has no ellipsoid.")
+    return SCRIPT + "\n".join(lines) + "\n" + SAVE, notes
 
 
 def _lamp(name: str, light: Light) -> list[str]:
@@ -127,7 +134,7 @@ def _lamp(name: str, light: Light) -> list[str]:
         fields = {"shape": "RECTANGLE", "size": width, "size_y": height}
     elif size := radius(light):
         fields["shadow_soft_size"] = size
-    elif is_spot(light, "smoothstep"):
+    elif is_spot(light, "smoothstep") and light.cone_angle <= 0.5 * math.pi:
         kind = "SPOT"
         fields |= {"spot_size": 2.0 * float(light.cone_angle), "spot_blend": float(light.falloff)}
     given = "".join(f", {field}={value!r}" for field, value in fields.items())

@@ -91,6 +91,8 @@ def export_lights(
         else:
             write_text(path, text)
     notes = [note for _, _, said in made for note in said] + _lost(rig, {*formats})
+    if "blend" in formats and world.metres != 1.0:
+        notes.append(f"{NAMES['blend']} is in metres: for a file whose unit is another, export it with metres=1.")
     write_text(folder / "lamps.txt", f"{world.line()}\n\n{table(rig)}" + "".join(f"{note}\n" for note in notes))
     return LightExport(tuple(path for path, _, _ in made), (world.line(), *notes))
 

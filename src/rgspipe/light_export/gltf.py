@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import json
-import math
 
 import torch
 
-from rgspipe.light_export.parts import Numbered, cone, is_cone, peak_and_colour, pose, radius, rectangle
+from rgspipe.light_export.cone import Cone
+from rgspipe.light_export.parts import Numbered, is_cone, peak_and_colour, pose, radius, rectangle
 from rgspipe.light_export.world import LUMENS_PER_WATT
 from rgspipe.scene import Light
 
@@ -40,13 +40,14 @@ def _light(number: int, light: Light) -> dict:
     fields = {"name": f"light {number}", "color": colour, "intensity": LUMENS_PER_WATT * peak}
     if not is_cone(light):
         return fields | {"type": "directional" if light.distant else "point"}
-    inner, outer = cone(light)
-    outer = min(outer, 0.5 * math.pi)
-    return fields | {"type": "spot", "spot": {"innerConeAngle": min(inner, 0.999 * outer), "outerConeAngle": outer}}
+    cone = Cone.of(light).narrow(light)
+    angles = {"innerConeAngle": min(cone.inner, 0.999 * cone.outer), "outerConeAngle": cone.outer}
+    return fields | {"intensity": cone.peak * fields["intensity"], "type": "spot", "spot": angles}
 
 
 def _node(index: int, number: int, light: Light) -> dict:
-    matrix = (Y_UP @ pose(light) @ _turned_back(light)).T.reshape(-1).tolist()
+    own = Cone.of(light).pose(light) if is_cone(light) else pose(light)
+    matrix = (Y_UP @ own @ _turned_back(light)).T.reshape(-1).tolist()
     return {"name": f"light {number}", "matrix": matrix, "extensions": {"KHR_lights_punctual": {"light": index}}}
 
 
@@ -61,5 +62,6 @@ def _notes(number: int, light: Light) -> list[str]:
     if (size := radius(light)) is not None:
         return [f"light {number}: glTF has no lights of a size; the {light.kind} of radius {size:.4g} m is a point."]
     if is_cone(light):
-        return [f"light {number}: a spot of glTF falls with a squared ramp of the cosine, a {light.kind} does not."]
+        said = f"light {number}: a spot of glTF falls with a squared ramp of the cosine, a {light.kind} does not."
+        return [said, *Cone.of(light).narrow(light).notes(number)]
     return []

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from rgspipe.light_export.parts import Numbered, cone, is_cone, is_spot, pose, radius, rectangle
+from rgspipe.light_export.cone import Cone
+from rgspipe.light_export.parts import Numbered, is_cone, is_spot, pose, radius, rectangle
 from rgspipe.scene import Light
 
 
@@ -35,19 +36,21 @@ def _emitter(light: Light) -> str:
         scaled[:3, 2] *= -1.0
         return f'  <shape type="rectangle">{_matrix(scaled)}<emitter type="area">{radiance}</emitter></shape>'
     if is_cone(light):
-        inner, outer = (math.degrees(angle) for angle in cone(light))
+        cone = Cone.of(light)
+        inner, outer = math.degrees(cone.inner), math.degrees(cone.outer)
         angles = f'<float name="beam_width" value="{inner!r}"/><float name="cutoff_angle" value="{outer!r}"/>'
         # Mitsuba's spot looks along +z.
-        turned = pose(light)
+        turned = cone.pose(light)
         turned[:3, 1:3] *= -1.0
-        return f'  <emitter type="spot">{_matrix(turned)}{angles}{_rgb("intensity", light)}</emitter>'
+        return f'  <emitter type="spot">{_matrix(turned)}{angles}{_rgb("intensity", light, cone.peak)}</emitter>'
     place = f'<point name="position" x="{x!r}" y="{y!r}" z="{z!r}"/>'
     return f'  <emitter type="point">{place}{_rgb("intensity", light)}</emitter>'
 
 
 def _notes(number: int, light: Light) -> list[str]:
     if is_cone(light) and not is_spot(light, "linear"):
-        return [f"light {number}: a spot of Mitsuba falls linearly with the angle, a {light.kind} does not."]
+        said = f"light {number}: a spot of Mitsuba falls linearly with the angle, a {light.kind} does not."
+        return [said, *Cone.of(light).notes(number)]
     return []
 
 

@@ -1,8 +1,7 @@
-"""What the formats ask of a light: its surface, its colour, its cone, and where its axes are."""
+"""What the formats ask of a light: its surface, its colour, and where its axes are."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 
 import torch
@@ -81,18 +80,3 @@ def pose(light: Light) -> Tensor:
     matrix = torch.eye(4, dtype=torch.float64)
     matrix[:3, :3], matrix[:3, 3] = frame(light), light.position.double()
     return matrix
-
-
-def cone(light: AxialLight) -> tuple[float, float]:
-    """Angles [rad] of the inner and the outer cone: a spot's own, or where 90 and 1 % of the intensity are left."""
-    if is_spot(light, "linear"):
-        return float(light.falloff), float(light.cone_angle)
-    if is_spot(light, "smoothstep"):
-        edge = math.cos(light.cone_angle)
-        return math.acos(min(1.0, edge + float(light.falloff) * (1.0 - edge))), float(light.cone_angle)
-    angles = torch.linspace(0.0, 0.5 * math.pi, 1801, dtype=torch.float64)
-    share = light.relative_intensity_at(angles)
-    # Measured luminaires may be brightest to their sides, or dark below.
-    lit = (angles[share >= level * float(share.max())] for level in (0.9, 0.01))
-    inner, outer = (float(part[-1]) for part in lit)
-    return inner, outer

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
-import math
 import uuid
 
-from rgspipe.light_export.parts import Numbered, cone, is_cone, is_spot, peak_and_colour, pose, radius, rectangle
+from torch import Tensor
+
+from rgspipe.light_export.cone import Cone
+from rgspipe.light_export.parts import Numbered, is_cone, is_spot, peak_and_colour, pose, radius, rectangle
 from rgspipe.light_export.world import LUMENS_PER_WATT
 from rgspipe.scene import Light, srgb
 
@@ -42,18 +44,21 @@ def _objects(number: int, light: Light) -> list[dict]:
     fading = {"distance": 0, "decay": 2}
     if light.axis is None:
         return [fields | fading | {"type": "PointLight"}]
-    target = _target(name, light)
     if light.distant:
+        target = _target(name, pose(light))
         return [fields | {"type": "DirectionalLight", "target": target["uuid"]}, target]
-    inner, outer = cone(light)
-    shown = {"type": "SpotLight", "angle": min(outer, 0.5 * math.pi), "penumbra": 1.0 - inner / outer}
+    cone = Cone.of(light).narrow(light)
+    matrix = cone.pose(light)
+    target = _target(name, matrix)
+    shown = {"type": "SpotLight", "angle": cone.outer, "penumbra": 1.0 - cone.inner / cone.outer}
+    fields |= {"matrix": matrix.T.reshape(-1).tolist(), "intensity": cone.peak * fields["intensity"]}
     return [fields | fading | shown | {"target": target["uuid"]}, target]
 
 
-def _target(name: str, light: Light) -> dict:
-    """What an aimed light looks at."""
-    aim = pose(light)
-    aim[:3, 3] = light.position + light.axis
+def _target(name: str, pose: Tensor) -> dict:
+    """What an aimed light, whose pose (4, 4) is given, looks at."""
+    aim = pose.clone()
+    aim[:3, 3] -= pose[:3, 2]
     known = {"uuid": _id(f"{name} target"), "type": "Object3D", "name": f"{name} target"}
     return known | {"matrix": aim.T.reshape(-1).tolist()}
 
@@ -61,9 +66,10 @@ def _target(name: str, light: Light) -> dict:
 def _notes(number: int, light: Light) -> list[str]:
     if (size := radius(light)) is not None:
         return [f"light {number}: three.js has no spheres; that of radius {size:.4g} m is a point."]
-    if is_cone(light) and not is_spot(light, "smoothstep"):
-        return [f"light {number}: a spot of three.js falls with a smoothstep of the cosine, a {light.kind} does not."]
-    return []
+    if not is_cone(light):
+        return []
+    said = f"light {number}: a spot of three.js falls with a smoothstep of the cosine, a {light.kind} does not."
+    return [*([] if is_spot(light, "smoothstep") else [said]), *Cone.of(light).narrow(light).notes(number)]
 
 
 def _id(name: str) -> str:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from rgspipe.light_export.parts import Numbered, cone, is_cone, peak_and_colour, pose, radius, rectangle
+from rgspipe.light_export.cone import Cone
+from rgspipe.light_export.parts import Numbered, is_cone, peak_and_colour, pose, radius, rectangle
 from rgspipe.scene import Light
 
 HEADER = """#usda 1.0
@@ -42,16 +43,17 @@ def _light(number: int, light: Light) -> str:
         size = radius(light) or 0.0
         own = {"float inputs:radius": size, "bool inputs:normalize": 1}
         own |= {} if size > 0.0 else {"bool treatAsPoint": 1}
-    schema = ""
+    schema, matrix = "", pose(light)
     if is_cone(light):
-        inner, outer = cone(light)
+        cone = Cone.of(light)
+        radiance, matrix = cone.peak * radiance, cone.pose(light)
         schema = ' (\n        prepend apiSchemas = ["ShapingAPI"]\n    )'
-        own |= {"float inputs:shaping:cone:angle": math.degrees(outer)}
-        own |= {"float inputs:shaping:cone:softness": max(0.0, 1.0 - inner / outer)}
+        own |= {"float inputs:shaping:cone:angle": math.degrees(cone.outer)}
+        own |= {"float inputs:shaping:cone:softness": max(0.0, 1.0 - cone.inner / cone.outer)}
     own |= {"float inputs:intensity": radiance}
     lines = [f"        {name} = {value!r}" for name, value in own.items()]
     lines.append(f"        color3f inputs:color = ({', '.join(map(repr, colour))})")
-    rows = ", ".join(f"({', '.join(map(repr, row))})" for row in pose(light).T.tolist())
+    rows = ", ".join(f"({', '.join(map(repr, row))})" for row in matrix.T.tolist())
     lines.append(f"        matrix4d xformOp:transform = ( {rows} )")
     lines.append('        uniform token[] xformOpOrder = ["xformOp:transform"]')
     return f'    def {kind} "light_{number}"{schema}\n    {{\n' + "\n".join(lines) + "\n    }\n"
@@ -59,7 +61,6 @@ def _light(number: int, light: Light) -> str:
 
 def _notes(number: int, light: Light) -> list[str]:
     if is_cone(light):
-        return [
-            f"light {number}: a cone of USD falls off as its renderer likes, the profile of a {light.kind} is not held."
-        ]
+        said = "a cone of USD falls off as its renderer likes, the profile of a"
+        return [f"light {number}: {said} {light.kind} is not held.", *Cone.of(light).notes(number)]
     return []
