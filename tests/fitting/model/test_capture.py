@@ -33,8 +33,9 @@ def test_rounding_noise_is_that_of_eight_bits() -> None:
     # The first range is that of levels 2 to 9.
     for lower, upper in ((0.00092, 0.00576), (0.1, 0.2), (1.0, 1.9)):
         chosen = (values > lower) & (values < upper)
-        expected = rounding_noise(values[chosen], 2.0).square().mean().sqrt()
+        expected = rounding_noise(values[chosen], torch.tensor(2.0)).square().mean().sqrt()
         assert float(errors[chosen].std()) == pytest.approx(float(expected), rel=0.05)
+    assert rounding_noise(values, torch.tensor(torch.inf)).max() == 0.0
 
 
 def test_a_clipped_value_counts_only_where_the_image_is_darker(room, point_light) -> None:

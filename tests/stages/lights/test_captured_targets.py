@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 
 import pytest
@@ -107,6 +108,33 @@ def test_radiance_is_not_clipped_and_a_stated_clip_counts(images: list[torch.Ten
     assert capture.clip is not None and float(noisy[0].image.max()) <= capture.clip * (1 + 1e-6)
     with pytest.raises(InputError, match=r"fit\.exposure"):
         captured_views(views, "a", _config(fit__method="paper_adam", fit__exposure="free"))
+
+
+def test_each_view_is_clipped_where_it_is(freeze: Artifact, images: list[torch.Tensor]) -> None:
+    """Of a view that is not, no value is doubted, however bright; of the others those that are saturated."""
+    cameras, limits = room_cameras(RESOLUTION), [float(images[0].quantile(0.8)), None]
+    views = [
+        View(
+            f"v{k}",
+            camera,
+            image if limit is None else image.clamp(max=limit),
+            torch.ones(image.shape[:2]),
+            saturated_from=limit,
+        )
+        for k, (camera, image, limit) in enumerate(zip(cameras, images, limits, strict=True))
+    ]
+    _, capture = captured_views(views, "a", _config())
+    assert capture.clip == [limits[0], math.inf]
+    seen = FitViews.prepare(FrozenScene.load(freeze.folder()), cameras, sharp=True)
+    pixels = [view.image for view in views]
+    problem = seen.problem(seen.prepared.stack_images(pixels), capture)
+    first = seen.prepared.view_of == 0
+    assert problem.saturated[first].any() and not problem.saturated[~first].any()
+    found, naive = seen.fit(pixels, capture=capture, emitters=None), seen.fit(pixels, emitters=None)
+    assert _error(found.lights[0]) < 1e-4  # measured 3e-8
+    assert _error(naive.lights[0]) > 0.01  # measured 0.08
+    with pytest.raises(InputError, match="clip: expected one number, or 2"):
+        seen.fit(pixels, capture=ImageCapture(clip=[1.0, 1.0, 1.0]))
 
 
 def test_a_frozen_scene_with_a_missing_object_has_fewer_surfels(freeze: Artifact, tmp_path: Path) -> None:

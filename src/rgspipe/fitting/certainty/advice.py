@@ -145,8 +145,10 @@ def suggest_views(
 
 def _clips(result: FitResult, capture: ImageCapture, present: int, count: int) -> Tensor:
     """(count,) radiance from which on each view is saturated, in the exposure of the first one."""
-    limit = math.inf if capture.saturated_from is None else capture.saturated_from
-    clips = torch.full((count,), limit, dtype=torch.float64)
+    clips = torch.full((count,), math.inf, dtype=torch.float64)
+    clips[:present] = capture.saturated * capture.clips(present)
+    # A further one is taken as the others were.
+    clips[present:] = clips[:present].min()
     if result.exposures:
         clips[:present] /= torch.tensor(result.exposures, dtype=torch.float64)
     return clips

@@ -94,10 +94,9 @@ class Lookout:
     @cached_property
     def full(self) -> list[Mask]:
         """(H, W) bool a view, pixels that are saturated in all channels."""
-        if self.capture.clip is None:
-            return [np.zeros(grey.shape, dtype=bool) for grey in self.greys]
-        full = self.images >= self.capture.saturated * self.capture.clip
-        return [mask.all(dim=2).cpu().numpy() for mask in self.views.prepared.split(full)]
+        limits = (self.capture.saturated * self.capture.clips(len(self.greys))).tolist()
+        images = self.views.prepared.split(self.images)
+        return [(image >= limit).all(dim=2).cpu().numpy() for image, limit in zip(images, limits, strict=True)]
 
     @cached_property
     def saturated(self) -> list[LampInSight]:

@@ -43,8 +43,9 @@ class ImageCapture:
 
     Attributes:
         exposure_free: whether every view but the first has an unknown exposure.
-        clip: radiance of the brightest level of 8-bit sRGB images, at which they are clipped; None for images that hold
-            radiance as it was. Saturated values tell only that the radiance is at least so high.
+        clip: radiance of the brightest level of 8-bit sRGB images, at which they are clipped, or one of each view, inf
+            where it is not; None for images that hold radiance as it was. Saturated values tell only that the radiance
+            is at least so high.
         saturated: a value from here on, as a part of the clip, is saturated.
         base: what was there anyway; nothing if None.
 
@@ -53,14 +54,21 @@ class ImageCapture:
     """
 
     exposure_free: bool = False
-    clip: float | None = None
+    clip: float | Sequence[float] | None = None
     saturated: float = SATURATED
     base: BaseImages | None = None
 
-    @property
-    def saturated_from(self) -> float | None:
-        """Radiance from which on a value is saturated; None where none is."""
-        return None if self.clip is None else self.saturated * self.clip
+    def clips(self, count: int) -> Tensor:
+        """(count,) float64 radiance at which each view is clipped; inf where it is not.
+
+        Raises:
+            InputError: it is known of another number of views.
+        """
+        found = torch.tensor(math.inf if self.clip is None else self.clip, dtype=torch.float64)
+        if found.dim() and len(found) != count:
+            expected, remedy = f"one number, or {count}, as there are views", "Give inf for views that are not clipped."
+            raise InputError("clip", expected=expected, found=f"{len(found)}", remedy=remedy)
+        return found.expand(count)
 
     def __post_init__(self) -> None:
         if self.exposure_free and self.base is not None and self.base.scale_free:
@@ -81,11 +89,12 @@ def stored_in_eight_bits(image: Tensor, alpha: Tensor) -> bool:
     return bool(((levels - levels.round()).abs() < ROUNDING).all())
 
 
-def rounding_noise(values: Tensor, clip: float) -> Tensor:
-    """Standard deviation of the rounding of values (…) of 8-bit sRGB images that are clipped at `clip`.
+def rounding_noise(values: Tensor, clip: Tensor) -> Tensor:
+    """Standard deviation of the rounding of values (…) of 8-bit sRGB images that are clipped at `clip` (…).
 
-    A level is a step of dL/dE / 255 at the value's place on the curve, and the error is uniform within it.
+    A level is a step of dL/dE / 255 at the value's place on the curve, and the error is uniform within it. Images that
+    are not clipped, at inf, are not rounded.
     """
     share = (values.double() / clip).clamp(0.0, 1.0)
     slope = torch.where(share <= 0.0031308, 1.0 / 12.92, 2.4 / 1.055 * share.clamp(min=1e-6) ** (1.4 / 2.4))
-    return clip * slope / LEVELS / math.sqrt(12.0)
+    return torch.where(clip < math.inf, clip, 0.0) * slope / LEVELS / math.sqrt(12.0)

@@ -105,8 +105,8 @@ class LightProblem:
 
         Where the base is saturated nothing is known of the lights: what is left of the target there is at least 0.
         """
-        clip = capture.clip / self.scale
-        limit, noise = torch.full_like(self.target[:, :1], clip), rounding_noise(taken, clip)
+        clip = capture.clips(len(self.views.views)).to(taken.device)[self.model.view_of][:, None] / self.scale
+        limit, noise = clip.to(self.target), rounding_noise(taken, clip)
         target = self.target
         if base is not None:
             base = base / self.scale

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -79,7 +80,9 @@ def known_emitters(views: Sequence[View], config: RgspipeConfig) -> Emitters:
 
 def _found_capture(views: Sequence[View], free: bool) -> ImageCapture:
     """What the images themselves tell of where they are clipped."""
-    limits = [view.saturated_from for view in views if view.saturated_from is not None]
+    limits = [view.saturated_from for view in views]
+    known = [limit for limit in limits if limit is not None]
     if all(stored_in_eight_bits(view.image, view.alpha) for view in views):
-        return ImageCapture(free, 1.0, min(limits, default=SATURATED))
-    return ImageCapture(free, limits[0]) if len(limits) == len(views) and len(set(limits)) == 1 else ImageCapture(free)
+        return ImageCapture(free, 1.0, min(known, default=SATURATED))
+    # The others say nothing, and are as they were.
+    return ImageCapture(free, [math.inf if limit is None else limit for limit in limits] if known else None)

@@ -99,8 +99,9 @@ class Fitter:
         images = [image / exposure for image, exposure in zip(taken, exposures, strict=True)]
         there = prepared.there_anyway(result, capture)
         there = there and [image / exposure for image, exposure in zip(there, exposures, strict=True)]
-        limit = capture.saturated_from
-        saturated = None if limit is None else [image >= limit for image in taken]
+        limits = (capture.saturated * capture.clips(len(taken))).tolist()
+        clipped = [image >= limit for image, limit in zip(taken, limits, strict=True)]
+        saturated = None if capture.clip is None else clipped
         write_result(folder / target.name, result, prepared, images, further, as_keys, there, saturated)
 
     def solver(self, seed: int = 0) -> Solver:
