@@ -66,6 +66,18 @@ def test_a_curved_surface_comes_out_of_noise(torus: list[View]) -> None:
     assert rms(torus_distance(cloud.points)) < 0.3 * rms(torus_distance(seen.measured_points))  # measured 0.18
 
 
+@pytest.mark.parametrize("share", [0.01, 0.3, 0.9])
+def test_an_even_part_of_many_pixels_is_kept(room: list[View], share: float) -> None:
+    every = see_surfaces(room)
+    part = see_surfaces(room, most=share * sum(view.depth.numel() for view in room))
+    assert len(part) == pytest.approx(share * len(every), rel=0.06)  # measured 0.037 at most
+    known = {tuple(point) for point in every.measured_points.round(9)}
+    assert all(tuple(point) in known for point in part.measured_points.round(9))
+    # Each corner of the room has its share.
+    corner = [(one.points > np.median(every.points, axis=0)).all(axis=1).sum() for one in (every, part)]
+    assert corner[1] == pytest.approx(share * corner[0], rel=0.2)  # measured 0.09 at most
+
+
 def test_exact_depth_is_left_as_it_is(room: list[View]) -> None:
     bare = degraded(room[:4], Capture(normals=False))
     cloud, seen = cloud_from_views(bare, 500), see_surfaces(bare)

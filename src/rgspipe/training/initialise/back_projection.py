@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
@@ -18,6 +19,9 @@ from rgspipe.training.initialise.sightings import EXACT, Sightings, joined
 #: Which normals a view contributes: fitted to its depth, its normal pass, or the pass where there is one.
 NormalSource = Literal["auto", "estimate", "pass"]
 
+#: 1/ρ and 1/ρ² of the plastic number ρ, the root of ρ³ = ρ + 1: steps whose multiples fill the unit square evenly.
+PLASTIC = (0.7548776662466927, 0.5698402909980532)
+
 #: A fitted distance that is farther from the measured one, in standard deviations, is of another surface.
 OUTLIER = 5.0
 
@@ -32,6 +36,7 @@ def see_surfaces(
     *,
     normals: NormalSource = "auto",
     least_cosine: float = 0.08,
+    most: float = math.inf,
     where: str | Path = "the training views",
 ) -> Sightings:
     """What the pixels saw of all views that have depth, each view by itself.
@@ -40,6 +45,7 @@ def see_surfaces(
         views: at least one with `depth`; the others are passed over.
         normals: where a view's normals come from.
         least_cosine: surfaces seen at a smaller cosine are left out, as depth says little about them.
+        most: sightings that are wanted, about; of more pixels an even part is kept.
         where: the dataset, for errors.
 
     Raises:
@@ -51,7 +57,9 @@ def see_surfaces(
         listed = ", ".join(view.name for view in views[:3]) + (", …" if len(views) > 3 else "")
         found = f"no depth in any of its {len(views)} views ({listed})" if views else "no views"
         raise InputError(where, expected="training views with a depth map", found=found, remedy=DEPTH_HELP)
-    seen = joined([_see(view, normals, least_cosine, where) for view in progress_bar(with_depth, "depth", unit="view")])
+    share = most / sum(view.depth.numel() for view in with_depth)
+    shown = progress_bar(with_depth, "depth", unit="view")
+    seen = joined([_see(view, normals, least_cosine, share, where) for view in shown])
     if not len(seen):
         raise InputError(
             where,
@@ -63,8 +71,8 @@ def see_surfaces(
     return seen
 
 
-def _see(view: View, source: NormalSource, least_cosine: float, where: str | Path) -> Sightings:
-    """What one view saw, in world axes."""
+def _see(view: View, source: NormalSource, least_cosine: float, share: float, where: str | Path) -> Sightings:
+    """What a share of the pixels of one view saw, in world axes."""
     depth = view.depth.detach().cpu().double().numpy()
     bad = depth <= 0
     if bad.any():
@@ -80,7 +88,7 @@ def _see(view: View, source: NormalSource, least_cosine: float, where: str | Pat
     fitted, normals, valid, given = _surface(view, depth, source, noise, where)
     origins, directions, lengths = (part.numpy() for part in view.camera.rays())
     directions, lengths = directions.reshape(*depth.shape, 3), lengths.reshape(depth.shape)
-    keep = valid & (-(normals * directions).sum(axis=-1) > least_cosine)
+    keep = valid & (-(normals * directions).sum(axis=-1) > least_cosine) & _even_part(depth.shape, share)
     measured, count = lengths[keep] * depth[keep], int(keep.sum())
     return Sightings(
         origins=np.repeat(origins[:1], count, axis=0),
@@ -91,6 +99,12 @@ def _see(view: View, source: NormalSource, least_cosine: float, where: str | Pat
         normals=normals[keep],
         given=np.full(count, given),
     )
+
+
+def _even_part(shape: tuple[int, int], share: float) -> np.ndarray:
+    """(H, W) bool, true for an evenly spread share of the pixels: the sequence R2 of Roberts (2018)."""
+    row, column = np.indices(shape)
+    return np.modf(row * PLASTIC[0] + column * PLASTIC[1])[0] < share
 
 
 def _surface(

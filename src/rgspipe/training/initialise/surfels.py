@@ -20,6 +20,10 @@ from rgspipe.training.initialise.fusion import fuse
 from rgspipe.training.initialise.planes import refit_planes
 from rgspipe.training.initialise.resample import estimate_spacing, even_out, neighbour_spacing, thin_for
 
+#: Pixels of depth that are used for each surfel that is wanted, about: memory goes with them. Of 800 in a room whose
+#: depth has 1 % of noise, all leave normals 0.02° off, 400 0.03°, 200 0.05° and 100 0.07°; places are as good with 100.
+SIGHTINGS = 200
+
 
 @dataclass(frozen=True)
 class Footprint:
@@ -132,7 +136,7 @@ def cloud_from_views(
     Raises:
         InputError: as `see_surfaces`.
     """
-    seen = see_surfaces(views, normals=normals, where=where)
+    seen = see_surfaces(views, normals=normals, most=SIGHTINGS * count, where=where)
     cloud = Cloud(seen.points, seen.normals)
     if not seen.noisy:
         return cloud
