@@ -57,3 +57,13 @@ def test_a_light_that_had_another_kind_on_its_way_stands_where_it_is() -> None:
     steps = [_light(0.4, 0, 0), SphereLight([0.1, 0.0, 0.0], 1.0, 0.05)]
     table = convergence_table(_curve(*steps), TARGET, (steps[-1],), (SphereLight([0.0] * 3, 1.0, 0.05),), 1.0)
     assert table["position_error"].tolist() == pytest.approx([0.4, 0.1])
+
+
+@pytest.mark.parametrize("first", [0, 1])
+def test_lights_without_a_match_do_not_count_whichever_they_are(first: int) -> None:
+    true = (_light(0, 0, 0), _light(1.0, 0, 0))[:: -1 if first else 1]
+    for place in (0.1, 0.9):
+        near = _curve(_light(place, 0, 0)).assign(x_1=math.nan, y_1=math.nan, z_1=math.nan)
+        assert convergence_table(near, TARGET, true, true, 1.0)["position_error"].tolist() == pytest.approx([0.1])
+    nothing = near.assign(x=math.nan)
+    assert convergence_table(nothing, TARGET, true, true, 1.0)["position_error"].isna().all()

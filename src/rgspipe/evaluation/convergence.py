@@ -27,8 +27,8 @@ def convergence_table(
             at least; names of the second light's end in _1, and so on.
         target: `target`, `occlusion`, `method` and `views` of the fit; repeated in every row.
         found: the lights at the end, which are of the kinds that those of the steps are.
-        truth: true rig, empty if unknown; the error is the largest of the lights after the best matching, that of a
-            sun the angle by which it is off [rad].
+        truth: true rig, empty if unknown; the error is the largest of the lights that have a match, after the best
+            matching, that of a sun the angle by which it is off [rad].
         scene_size: longest side of the scene's bounding box, NaN if unknown.
 
     Returns:
@@ -78,5 +78,8 @@ def _standing(curve: pd.DataFrame, found: LightRig, size: float) -> npt.NDArray[
 
 
 def _worst_distance(found: npt.NDArray[np.float64], wanted: npt.NDArray[np.float64]) -> float:
-    pairs = match_positions(found, wanted)
-    return max(float(np.linalg.norm(found[i] - wanted[j])) for i, j in pairs)
+    """Of the lights that have a match; NaN where none has."""
+    there = found[np.isfinite(found).all(axis=1)]
+    return max(
+        (float(np.linalg.norm(there[i] - wanted[j])) for i, j in match_positions(there, wanted)), default=math.nan
+    )
