@@ -23,6 +23,6 @@ def make_fitted(views: int, seed: int = 0, with_truth: bool = True) -> tuple[pd.
             rows.append(row | {"seconds": 1.5, "psnr": 35.0, "result": "converged", "reason": "small <step>"})
             path = true + found + np.geomspace(0.5, 1e-4, 6)[:, None]
             curve = pd.DataFrame(path, columns=list("xyz")).assign(step=range(6), loss=np.geomspace(1.0, 0.01, 6))
-            courses.append(convergence.convergence_table(curve, row, truths[name], 1.0))
+            courses.append(convergence.convergence_table(curve, row, estimates[name], truths[name], 1.0))
     table = target_table(pd.DataFrame(rows), estimates, truths, 1.0)
     return table, pd.concat(courses, ignore_index=True)

@@ -32,6 +32,12 @@ def plane_lights() -> dict[str, Light]:
     return {name: shape.at(place, axis, intensity) for name, shape in (narrow | spots).items()}
 
 
+def yellow_lights() -> dict[str, Light]:
+    """A light of each kind that has none of blue."""
+    none = torch.tensor([0.5, 1.0, 0.0], dtype=torch.float64)
+    return {f"yellow_{name}": replace(plane_lights()[name], intensity=none) for name in KINDS if name != "spot"}
+
+
 def lopsided_luminaire() -> ProfileLight:
     """A smooth beam that no turn around its axis leaves as it is, in the place of the others."""
     down = torch.linspace(0.0, math.pi, 73, dtype=torch.float64)[:, None]

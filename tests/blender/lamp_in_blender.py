@@ -21,7 +21,7 @@ from rgspipe.blender.plan import Frame
 from rgspipe.errors import InputError
 from rgspipe.scene import Light, PointLight, SpotLight
 from rgspipe.scene.lights import Nodes
-from spots_on_plane import ALBEDO, SIZE, hard_spots, lopsided_luminaire, plane_camera, plane_lights
+from spots_on_plane import ALBEDO, SIZE, hard_spots, lopsided_luminaire, plane_camera, plane_lights, yellow_lights
 
 SAMPLES = 1024
 
@@ -55,9 +55,12 @@ def main(folder: Path) -> None:
     add(bpy.context.scene, polygon("plane", corners), diffuse_material("plane", ALBEDO))
     studio = Studio(bpy.context.scene, RenderSettings(SIZE, SAMPLES, denoise=False, max_bounces=0), folder)
     lights = plane_lights()
-    for name, light in (lights | hard_spots() | {"luminaire": lopsided_luminaire()}).items():
+    for name, light in (lights | hard_spots() | yellow_lights() | {"luminaire": lopsided_luminaire()}).items():
         _render(studio, name, light, folder)
     _render(studio, "again", lights["point"], folder)
+    dark = bpy.data.objects.new("dark", bpy.data.lights.new("dark", "POINT"))
+    place_lamp(dark, PointLight([0.0, 0.0, 1.0], 0.0))
+    (folder / "dark.txt").write_text(f"{dark.data.energy} {list(dark.data.color)}")
     try:
         place_lamp(bpy.data.objects.new("tube", None), Tube([0.0, 0.0, 1.0], 1.0))
     except InputError as error:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from rgspipe.datasets.exr import read_image
-from spots_on_plane import hard_spots, lopsided_luminaire, plane_image, plane_lights
+from spots_on_plane import hard_spots, lopsided_luminaire, plane_image, plane_lights, yellow_lights
 
 pytestmark = [
     pytest.mark.slow,
@@ -33,9 +33,21 @@ def rendered(tmp_path_factory: pytest.TempPathFactory, child_environment: dict[s
 def test_cycles_renders_the_closed_form_of_every_profile(rendered: Path, name: str) -> None:
     image, expected = read_image(rendered / f"{name}.exr")[0], plane_image(plane_lights()[name])
     # 1024 samples inside a pixel against 256 subpixels, over the brightest pixel: 1.5e-4 for the point light, 1.0e-3
-    # where the smoothstep's rim crosses a pixel; means differ by 8e-5 at most.
+    # where the smoothstep's rim crosses a pixel; means differ by 1.7e-4 at most (the panel).
     np.testing.assert_allclose(image, expected, atol=2e-3 * expected.max())
     assert abs(image.mean() / expected.mean() - 1.0) < 2e-4
+
+
+@pytest.mark.parametrize("name", yellow_lights())
+def test_a_light_may_have_none_of_a_colour(rendered: Path, name: str) -> None:
+    image, expected = read_image(rendered / f"{name}.exr")[0], plane_image(yellow_lights()[name])
+    # As in all colours: at most 1.0e-3 of the brightest pixel and 1.7e-4 of the mean, both under the panel.
+    np.testing.assert_allclose(image, expected, atol=2e-3 * expected.max())
+    assert not image[..., 2].any() and abs(image.mean() / expected.mean() - 1.0) < 2e-4
+
+
+def test_a_light_may_be_dark(rendered: Path) -> None:
+    assert (rendered / "dark.txt").read_text() == "0.0 [0.0, 0.0, 0.0]"
 
 
 @pytest.mark.parametrize("name", hard_spots())

@@ -7,7 +7,6 @@ import pandas as pd
 import pytest
 import torch
 
-from rgspipe.evaluation import convergence
 from rgspipe.evaluation.summary import SUMMARY_COLUMNS, summary_table
 from rgspipe.evaluation.tables import TARGET_COLUMNS, VARIANCES, exemplars, target_table
 from rgspipe.scene import PointLight, SpotLight
@@ -122,20 +121,6 @@ def test_exemplars_without_truth_go_by_psnr():
     results = _results([("a", "unknown"), ("b", "unknown"), ("c", "unknown")]).assign(psnr=[20.0, 40.0, 30.0])
     chosen = exemplars(target_table(results, {}, {}, 1.0))
     assert chosen == {"unknown": {"median": "c", "worst": "a"}}
-
-
-def test_convergence_measures_the_distance_to_the_nearest_true_light():
-    curve = pd.DataFrame({"step": [0, 1], "loss": [1.0, 0.1], "x": [0.0, 2.0], "y": 0.0, "z": 0.0})
-    target = {"target": "a", "occlusion": "visible", "method": "search_lm", "views": 1}
-    table = convergence.convergence_table(curve, target, (_light(0.5, 0, 0), _light(2.0, 0, 1.0)), 2.0)
-    assert table["position_error"].tolist() == pytest.approx([0.25, 0.5])
-    two = curve.assign(x_1=[3.0, 0.5], y_1=0.0, z_1=0.0)
-    both = convergence.convergence_table(two, target, (_light(0.5, 0, 0), _light(2.0, 0, 0)), 2.0)
-    assert both["position_error"].tolist() == pytest.approx([0.5, 0.0])
-    assert table["seconds"].isna().all() and list(table.columns) == list(convergence.COLUMNS)
-    assert np.isnan(convergence.convergence_table(curve, target, (), 2.0)["position_error"]).all()
-    with pytest.raises(ValueError, match="loss"):
-        convergence.convergence_table(curve.drop(columns="loss"), target, (), 2.0)
 
 
 def test_regions_are_judged_where_truth_and_covariance_are_known():

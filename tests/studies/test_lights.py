@@ -27,6 +27,7 @@ def _targets(views: int = 1) -> pd.DataFrame:
             "result": ["converged", "converged", "converged", "ambiguous"],
             "axis_error": [math.nan, 0.5, 1.5, math.nan],
             "shape_error": math.nan,
+            "shape_kind": None,
             "count_right": pd.array([True, True, True, False], dtype="boolean"),
             "types_right": pd.array([True, False, True, False], dtype="boolean"),
         }
@@ -89,6 +90,17 @@ def test_predictions_are_medians_of_what_first_fits_foretell() -> None:
     assert found[2, "occluded"] == math.inf
 
 
+def test_errors_of_shapes_have_the_unit_of_their_kind_and_of_several_kinds_none() -> None:
+    told = _targets().assign(shape_error=[0.01, 0.02, 0.03, math.nan])
+    for kinds, shape in ((["sphere"] * 4, "0.0200 (0.0100–0.0300)"), (["spot"] * 4, "0.02° (0.01–0.03)")):
+        table = case_rows("cornell", "clean", told.assign(shape_kind=kinds), seed=0, resamples=500)
+        assert table["shape_kind"].tolist() == kinds[:1] * 3 and shown_rows(table, "kinds")[1][0]["shape"] == shape
+    table = case_rows("cornell", "clean", told.assign(shape_kind=["led", "led", "spot", None]), seed=0, resamples=500)
+    # Both visible ones are LEDs.
+    assert table["shape_kind"].tolist() == ["led", "spot", None] and table["shape"].tolist()[:2] == [0.015, 0.03]
+    assert shown_rows(table, "kinds")[1][0]["shape"] == "—"
+
+
 def test_text_shows_what_differs_and_says_what_is_not_known() -> None:
     table = case_rows("cornell", "noise 3 %", _targets(), seed=0, resamples=100)
     headings, rows = shown_rows(table, "robustness")
@@ -103,8 +115,9 @@ def test_text_shows_what_differs_and_says_what_is_not_known() -> None:
     assert rows[0]["truth in 95 % region"].count("–") == 0
     (row,) = shown_rows(table, "regions")[1]
     assert row["truth in 95 % region"].count("–") == 1
-    # A study that was made before types were judged can still be shown.
+    # A study that was made before types were judged, or before kinds were told, can still be shown.
     assert "right types" not in shown_rows(table.drop(columns="right_types"), "kinds")[0]
+    assert "shape" not in shown_rows(table.drop(columns="shape_kind"), "kinds")[0]
     table = pd.concat([table, table.assign(views=2, predicted=0.01, position=math.inf)])
     headings, rows = shown_rows(table, "views")
     assert rows[-1]["predicted"] == "1.00 %" and rows[0]["predicted"] == "—" and rows[-1]["position error"][0] == "∞"

@@ -7,8 +7,9 @@ import math
 import pandas as pd
 import pytest
 
-from rgspipe.studies.zoo import SCARCE, WHITE, fit_rows, fits_table, groups, misled, range_text, scarce
-from zoo_fits import five_rooms, five_rooms_figures, room_of, targets
+from rgspipe.studies.lights import figures
+from rgspipe.studies.zoo import SCARCE, WHITE, failed_rows, fit_rows, fits_table, groups, misled, range_text, scarce
+from zoo_fits import CLASSES, five_rooms, five_rooms_figures, room_of, targets
 
 
 def _row(figures: pd.DataFrame, part: str, name: str, value: str, views: int = 1) -> pd.Series:
@@ -32,6 +33,20 @@ def test_a_failed_training_counts_as_missed_and_a_room_that_could_not_be_built_d
     # Three rooms, of which the last has no fits that count: 2 of 6 solved.
     assert (work["rooms"], work["with_truth"], work["success"]) == (3, 6, pytest.approx(1 / 3))
     assert work["silent"] == pytest.approx(1 / 6) and work["inside_95"] == 0.5
+
+
+def test_a_failed_training_has_the_figures_of_fits_that_found_nothing() -> None:
+    nothing = targets(1, (math.inf,) * 3).assign(intensity_error=math.inf, count_right=False, types_right=False)
+    found = fit_rows(room_of(4), targets(1, (0.001,)).assign(count_right=True, types_right=True))
+    rooms = found + fit_rows(room_of(2), nothing.assign(result="not_enough_light", inside_95=pd.NA))
+    failed = found + failed_rows(room_of(2), CLASSES, "search_lm", 1, "train_surfels", "the loss is NaN")
+    unbuilt = found + failed_rows(room_of(2), CLASSES, "search_lm", 1, "generate_dataset", "no place for a camera")
+    names = ["with_truth", "position", "intensity", "success", "right_number", "right_types", "inside_95", "silent"]
+    expected, counted, passed_over = (
+        pd.Series(figures(fits_table(rows), 0, resamples=0))[names].tolist() for rows in (rooms, failed, unbuilt)
+    )
+    assert counted == expected == [4.0, math.inf, math.inf, 0.25, 0.25, 0.25, 1.0, 0.0]
+    assert passed_over == [1.0, 0.001, 0.02, 1.0, 1.0, 1.0, 1.0, 0.0]
 
 
 def test_fits_are_grouped_by_every_property_that_is_known() -> None:

@@ -8,6 +8,7 @@ its own way. A panel is Blender's own rectangle, a sun its own sun.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -18,7 +19,7 @@ from mathutils import Matrix
 
 from rgspipe.errors import InputError
 from rgspipe.light_export.ies import ies
-from rgspipe.light_export.parts import frame, is_of_another_shape, radius, rectangle
+from rgspipe.light_export.parts import frame, is_of_another_shape, peak_and_colour, radius, rectangle
 from rgspipe.light_export.world import candela
 from rgspipe.scene import Light
 from rgspipe.scene.lights import WATTS_PER_INTENSITY, ProfileLight
@@ -38,9 +39,8 @@ def place_lamp(item: bpy.types.Object, light: Light) -> None:
     before, item.data = item.data, _lamp(light)
     if before is not None:
         bpy.data.lights.remove(before)
-    peak = float(light.intensity.max())
+    peak, item.data.color = peak_and_colour(light)
     item.data.energy = _energy(light) * peak
-    item.data.color = (light.intensity / peak).tolist()
     item.matrix_world = _pose(light)
 
 
@@ -64,7 +64,7 @@ def _energy(light: Light) -> float:
     """Blender's strength of a light of intensity 1: W, and of a sun W/m² across its light."""
     if light.distant:
         return 1.0
-    return WATTS_PER_INTENSITY if rectangle(light) is None else float((light.power() / light.intensity).max())
+    return WATTS_PER_INTENSITY if rectangle(light) is None else math.pi
 
 
 def _bulb(light: Light) -> bpy.types.Light:

@@ -12,6 +12,7 @@ from scipy.optimize import linear_sum_assignment
 
 from rgspipe.evaluation import metrics
 from rgspipe.evaluation.arrays import to_array
+from rgspipe.evaluation.shapes import is_one_kind, shape_kind
 from rgspipe.scene import Light, LightRig
 
 
@@ -25,7 +26,8 @@ class RigErrors:
         axis: the largest angle between the axes of the true lights that have one and their matches, degrees; infinite
             where a match is of another kind, NaN where no light has an axis.
         shape: the largest error of the first numbers of their shapes and of those that are measured as these (cone
-            angles, degrees; exponents; radii; both sides of panels), likewise.
+            angles, degrees; exponents; radii; both sides of panels), likewise; NaN where the true lights that have
+            shapes are of several kinds, whose numbers have no common unit.
         pairs: (estimate, truth) indices of the matched lights, in the order of the truth.
     """
 
@@ -72,14 +74,15 @@ def rig_errors(estimate: LightRig, truth: LightRig, scene_size: float) -> RigErr
         raise ValueError("the true rig has no light")
     if not estimate:
         axis = math.inf if any(light.axis is not None for light in truth) else math.nan
-        shape = math.inf if any(light.shape for light in truth) else math.nan
+        shape = math.inf if is_one_kind(shape_kind(truth)) else math.nan
         return RigErrors(math.inf, math.inf, axis, shape, ())
     found, wanted = (np.stack([to_array(light.standing(scene_size)) for light in rig]) for rig in (estimate, truth))
     pairs = match_positions(found, wanted)
     positions = [metrics.position_error(found[i], wanted[j], scene_size) for i, j in pairs]
     intensities = [metrics.intensity_error(estimate[i].intensity, truth[j].intensity) for i, j in pairs]
     axis, shape = _shape_errors([(estimate[i], truth[j]) for i, j in pairs])
-    return RigErrors(max(positions), float(np.mean(intensities)), axis, shape, pairs)
+    comparable = is_one_kind(shape_kind(truth))
+    return RigErrors(max(positions), float(np.mean(intensities)), axis, shape if comparable else math.nan, pairs)
 
 
 def _shape_errors(pairs: Sequence[tuple[Light, Light]]) -> tuple[float, float]:

@@ -9,6 +9,7 @@ import pandas as pd
 
 from rgspipe.evaluation import metrics
 from rgspipe.evaluation.classes import ALL, class_order
+from rgspipe.evaluation.shapes import shape_errors
 
 SUMMARY_COLUMNS = (
     "method",
@@ -72,7 +73,7 @@ def _summary(group: pd.DataFrame, seed: int, resamples: int) -> dict[str, float]
         "median_seconds": _median(group["seconds"]),
         "worst_seconds": float(group["seconds"].max()),
         "median_axis_error": _median(group["axis_error"]),
-        "median_shape_error": _median(group["shape_error"]),
+        "median_shape_error": _median(shape_errors(group)),
         "count_rate": _rate(group["count_right"]),
         "types_rate": _rate(group["types_right"]),
         "median_position_sd": _median(group["position_sd"]),

@@ -13,6 +13,7 @@ from rgspipe.evaluation import calibration, metrics
 from rgspipe.evaluation.arrays import ArrayLike, to_array
 from rgspipe.evaluation.classes import class_of, class_order
 from rgspipe.evaluation.rig_errors import rig_errors
+from rgspipe.evaluation.shapes import shape_kind
 from rgspipe.fitting.certainty.regions import inside
 from rgspipe.scene import LightRig
 
@@ -28,6 +29,7 @@ TARGET_COLUMNS = (
     "intensity_error",
     "axis_error",
     "shape_error",
+    "shape_kind",
     "psnr",
     "seconds",
     "success",
@@ -77,8 +79,9 @@ def target_table(
     Returns:
         A table with `TARGET_COLUMNS`. `success` is True, False or missing; a rig with lights too many
         or too few is never a success, and has no right types: `types_right` is whether every true light is matched
-        by one of its own kind, and none is left over. Positions and intensities are those of the true
-        rig's first light and of the estimate matched to it. `position_sd` is the error that the fit expects of itself
+        by one of its own kind, and none is left over. `shape_kind` is that of the true lights that have a shape, in
+        whose unit `shape_error` is. Positions and intensities are those of the true rig's first light and of the
+        estimate matched to it. `position_sd` is the error that the fit expects of itself
         (`calibration.position_sd`), `inside_95` whether the true positions lie inside its 95 % regions; missing
         where that cannot be told or the number of lights is wrong.
     """
@@ -156,6 +159,7 @@ def _target_row(
         {name: row[name] for name in ("target", "occlusion", "method", "views", "seconds")}
         | {"occlusion": class_of(row["occlusion"], len(truth))}
         | {"position_error": position, "intensity_error": intensity, "axis_error": axis, "shape_error": shape}
+        | {"shape_kind": shape_kind(truth)}
         | {"success": solved, "count_right": len(estimate) == len(truth) if truth else None}
         | {"types_right": _types_right(estimate, truth, pairs)}
         | {"psnr": _number(row.get("psnr")), "result": row.get("result", ""), "reason": row.get("reason", "")}

@@ -38,8 +38,8 @@ def track_table(
     """One row a light and frame (one without a light where none was found).
 
     Columns: frame, target, status, result, cost, seconds, evaluations, light, type, and `Light.columns`; position_sd,
-    the position error that is to be expected (parts of the scene's size); where the truth is known position_error (the
-    same), intensity_error and, of lights with an axis, axis_error [degrees].
+    the position error that is to be expected (parts of the scene's size; of suns the angle [rad]); where the truth is
+    known position_error (the same), intensity_error and, of lights with an axis, axis_error [degrees].
     """
     rows = []
     for index, (frame, name) in enumerate(zip(frames, names, strict=True)):
@@ -143,9 +143,10 @@ def _errors(rig: LightRig, truth: LightRig, scene_size: float) -> list[dict[str,
     errors: list[dict[str, float]] = [{} for _ in rig]
     if not rig or not truth:
         return errors
-    for k, j in match_positions(*([light.position.tolist() for light in lights] for lights in (rig, truth))):
+    found, wanted = ([light.standing(scene_size).tolist() for light in lights] for lights in (rig, truth))
+    for k, j in match_positions(found, wanted):
         one, other = rig[k], truth[j]
-        errors[k]["position_error"] = metrics.position_error(one.position, other.position, scene_size)
+        errors[k]["position_error"] = metrics.position_error(found[k], wanted[j], scene_size)
         errors[k]["intensity_error"] = metrics.intensity_error(one.intensity, other.intensity)
         if one.axis is not None and other.axis is not None:
             errors[k]["axis_error"] = metrics.angle_between(one.axis, other.axis)

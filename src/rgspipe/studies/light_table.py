@@ -11,6 +11,7 @@ import pandas as pd
 from rgspipe.evaluation.classes import ALL
 from rgspipe.evaluation.markdown import markdown_lines
 from rgspipe.evaluation.plots import LABELS
+from rgspipe.evaluation.shapes import told_shape_error
 from rgspipe.percent import percent
 from rgspipe.studies.lights import STATUSES, several, without_repeats
 
@@ -19,8 +20,9 @@ Row = dict[str, Any]
 #: Of all kinds whose rows are kinds of lights.
 LIGHTS_NOTE = (
     "Medians with 95 % bootstrap intervals, shares with Wilson’s; position errors are parts of the scene’s longest "
-    "side, of several lights the worst. Silent: the fit says converged, is off by more than the limit, and no region "
-    "that it states holds the truth. Times are wall times of single fits, beside whatever else ran."
+    "side, of several lights the worst. Errors of shapes are in degrees, of exponents, or of radii and sides in scene "
+    "units. Silent: the fit says converged, is off by more than the limit, and no region that it states holds the "
+    "truth. Times are wall times of single fits, beside whatever else ran."
 )
 
 #: What stands over the rows and says what the columns mean, by kind of study.
@@ -79,9 +81,10 @@ def _columns(rows: pd.DataFrame, kind: str) -> dict[str, Callable[[Row], str]]:
     columns["intensity error"] = lambda row: with_interval(row, "intensity", 1)
     if kind in OF_LIGHTS:
         columns["axis"] = lambda row: _degrees(row, "axis")
-        columns["shape"] = lambda row: _degrees(row, "shape")
+        # Studies that were made before kinds were told and types compared do not have these.
+        if "shape_kind" in rows:
+            columns["shape"] = _shape
         columns["right number"] = lambda row: with_interval(row, "right_number", 0)
-        # Studies that were made before types were compared do not have it.
         if "right_types" in rows:
             columns["right types"] = lambda row: with_interval(row, "right_types", 0)
     columns["solved"] = lambda row: with_interval(row, "success", 0)
@@ -99,6 +102,13 @@ def _columns(rows: pd.DataFrame, kind: str) -> dict[str, Callable[[Row], str]]:
 
 def _degrees(row: Row, name: str) -> str:
     return "—" if math.isnan(row[name]) else f"{row[name]:.2f}° ({row[f'{name}_low']:.2f}–{row[f'{name}_high']:.2f})"
+
+
+def _shape(row: Row) -> str:
+    if math.isnan(row["shape"]):
+        return "—"
+    middle, low, high = (told_shape_error(row[f"shape{end}"], row["shape_kind"]) for end in ("", "_low", "_high"))
+    return f"{middle} ({low.removesuffix('°')}–{high.removesuffix('°')})"
 
 
 def _class(row: Row) -> str:

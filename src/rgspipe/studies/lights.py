@@ -13,6 +13,7 @@ import pandas as pd
 
 from rgspipe.evaluation import metrics
 from rgspipe.evaluation.classes import ALL, class_order
+from rgspipe.evaluation.shapes import common_shape_kind, shape_errors
 
 #: What is studied.
 KINDS = ("views", "robustness", "classes", "kinds", "regions", "adam")
@@ -52,8 +53,9 @@ def case_rows(
 
     Returns:
         `KEYS`, `count` and `with_truth` (targets, and those with a known truth), and
-        - `position` (fraction of the scene), `intensity` (fraction), `seconds`, of spots `axis` and `shape` (degrees):
+        - `position` (fraction of the scene), `intensity` (fraction), `seconds`, `axis` (degrees) and `shape`:
           medians, each with `_low` and `_high`;
+        - `shape_kind`, the kind of light in whose unit `shape` is; empty, as `shape`, where there are several;
         - `success` (within the limit, with the right number of lights), `inside_95` (the truth lies inside the region
           that the fit states for 95 %), `right_number` (of lights) and `right_types` (their number is right, and each
           is a point or a spot where it should be): shares of those where it is known, with `_low` and `_high`;
@@ -107,12 +109,14 @@ def wilson_interval(successes: int, count: int) -> tuple[float, float]:
     return float(interval.low), float(interval.high)
 
 
-def figures(group: pd.DataFrame, seed: int, resamples: int = metrics.RESAMPLES) -> dict[str, float]:
+def figures(group: pd.DataFrame, seed: int, resamples: int = metrics.RESAMPLES) -> dict[str, float | str | None]:
     """The figures of some targets, see `case_rows`."""
     known = group["position_error"].notna()
-    found: dict[str, float] = {"count": len(group), "with_truth": int(known.sum())}
+    found: dict[str, float | str | None] = {"count": len(group), "with_truth": int(known.sum())}
+    group = group.assign(shape_error=shape_errors(group))
     for name, column in MEDIANS.items():
         found |= _median(name, group[column].astype(float), seed, resamples)
+    found["shape_kind"] = common_shape_kind(group)
     for name, column in SHARES.items():
         found |= _share(name, group[column])
     found["stated"] = float(group["position_sd"].median()) if group["position_sd"].notna().any() else math.nan

@@ -81,7 +81,7 @@ def fit_rows(room: Row, targets: pd.DataFrame) -> list[Row]:
 def failed_rows(room: Row, classes: Sequence[str], method: str, views: int, stage: str, reason: str) -> list[Row]:
     """The rows of a room whose lights could not be looked for, one a class.
 
-    They count as not solved, but where the room itself could not be made.
+    They count as not solved, in errors and in shares, but where the room itself could not be made.
 
     Args:
         stage: what failed.
@@ -89,7 +89,9 @@ def failed_rows(room: Row, classes: Sequence[str], method: str, views: int, stag
     """
     made = stage != "generate_dataset"
     row = dict(room) | dict.fromkeys(TARGET_COLUMNS, math.nan) | dict.fromkeys(VERDICTS)
-    row |= {"position_error": math.inf, "success": False} if made else {}
+    if made:
+        row |= {"position_error": math.inf, "intensity_error": math.inf}
+        row |= {"success": False, "count_right": False, "types_right": False}
     row |= {"target": "", "method": method, "views": views, "result": FAILED, "reason": reason, "lights_found": 0}
     return [row | {"occlusion": name, "silent": False, "failed_in": stage} for name in classes]
 

@@ -24,10 +24,10 @@ from rgspipe.stages.studies import study
 from rgspipe.stages.studies.zoo import STAGES
 from rgspipe.store.artifacts import Artifact, ArtifactStore, Key
 
-ROWS = "target,occlusion,method,views,position_error,intensity_error,axis_error,shape_error,psnr,seconds,success,"
-ROWS += "count_right,types_right,position_sd,inside_95,result,reason\n"
-ROWS += "visible_000,visible,search_lm,{views},0.004,0.02,,,30,0.5,True,True,True,0.004,True,converged,\n"
-ROWS += "occluded_000,occluded,search_lm,{views},0.04,0.02,,,30,0.5,False,True,True,0.01,False,converged,\n"
+ROWS = "target,occlusion,method,views,position_error,intensity_error,axis_error,shape_error,shape_kind,psnr,seconds,"
+ROWS += "success,count_right,types_right,position_sd,inside_95,result,reason\n"
+ROWS += "visible_000,visible,search_lm,{views},0.004,0.02,,,,30,0.5,True,True,True,0.004,True,converged,\n"
+ROWS += "occluded_000,occluded,search_lm,{views},0.04,0.02,,,,30,0.5,False,True,True,0.01,False,converged,\n"
 
 
 def _config(*overrides: str) -> RgspipeConfig:

@@ -44,7 +44,8 @@ class TrackedFrame:
         status: how they were found. UNCERTAIN where neither the frame's images nor the motion tell the positions, or
             where the track has no sure frame; LOST where nothing explains the frame.
         cost: median of the pixels' residuals over their brightness, 1 without lights.
-        position_errors: per light the error that is to be expected, root mean square over the scene's size.
+        position_errors: per light the error that is to be expected, root mean square over the scene's size; of suns of
+            the direction [rad].
     """
 
     result: FitResult

@@ -115,12 +115,13 @@ class Motion:
         return replace(self, rig=rig, intensity=intensity, rates=rates, covariance=0.5 * (covariance + covariance.T))
 
     def position_errors(self) -> list[float]:
-        """Per light the error that is to be expected of its position, root mean square over the scene's size."""
-        errors, first = [], 0
-        for emitter in self.rig:
-            errors.append(float(self.covariance.diagonal()[first : first + 3].clamp(min=0.0).sum().sqrt()))
-            first += emitter.parameters
-        return errors
+        """Per light the error that is to be expected of its position, root mean square over the scene's size.
+
+        Of suns it is that of the direction [rad].
+        """
+        pairs = zip(self.rig, self.light_covariances(), strict=True)
+        spreads = [emitter.light.standing_spread(covariance, self.size) for emitter, covariance in pairs]
+        return [float(spread.diagonal().clamp(min=0.0).sum().sqrt()) / self.size for spread in spreads]
 
     def light_covariances(self) -> tuple[Tensor, ...]:
         """Per light the covariance of its natural parameters and intensity; see `FitResult.covariance`."""

@@ -54,7 +54,8 @@ def run(context: StageContext) -> None:
     summary = summary_table(targets, config.seed)
     write_text(context.folder / "metrics.csv", targets.to_csv(index=False))
     write_text(context.folder / "summary.csv", summary.to_csv(index=False))
-    write_text(context.folder / "convergence.csv", _curves(fit, targets, truth.rigs, size).to_csv(index=False))
+    curves = _curves(fit, targets, estimates, truth.rigs, size)
+    write_text(context.folder / "convergence.csv", curves.to_csv(index=False))
     content = {
         "version": 1,
         "scene_size": size,
@@ -100,13 +101,20 @@ def _truth(config: RgspipeConfig, dataset: Artifact | None, freeze: Artifact | N
     return _Truth(rigs, bounds, notes)
 
 
-def _curves(fit: Artifact, targets: pd.DataFrame, truths: Mapping[str, LightRig], size: float) -> pd.DataFrame:
+def _curves(
+    fit: Artifact,
+    targets: pd.DataFrame,
+    estimates: Mapping[str, LightRig],
+    truths: Mapping[str, LightRig],
+    size: float,
+) -> pd.DataFrame:
     parts = []
     for row in targets.to_dict("records"):
         name = f"{row['target']}/convergence.csv"
         if name in fit.manifest["files"]:
             curve = pd.read_csv(fit.file(name))
-            parts.append(convergence.convergence_table(curve, row, truths.get(row["target"], ()), size))
+            found, truth = estimates[row["target"]], truths.get(row["target"], ())
+            parts.append(convergence.convergence_table(curve, row, found, truth, size))
     return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=list(convergence.COLUMNS))
 
 
