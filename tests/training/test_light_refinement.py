@@ -13,7 +13,7 @@ from rgspipe.renderer.transport import PatchTransport
 from rgspipe.renderer.view_weights import ViewWeights
 from rgspipe.scene import Camera, PointLight, Surfels, look_at
 from rgspipe.scene.rectangles import inside_of_box, solid_box, surfels_on
-from rgspipe.training.light_refinement import refine_lights
+from rgspipe.training.light_refinement import in_gauge, log_gains, refine_lights
 from rgspipe.training.lighting import indirect_irradiance, trace_lighting
 from rgspipe.training.materials import build_frozen, trace_views
 from rgspipe.training.options import MaterialOptions
@@ -88,3 +88,28 @@ def test_a_view_that_shows_nothing_keeps_its_light(scene) -> None:
     found = refine_lights(SurfelBvh(surfels), weights, transport, empty, lights)
     for view, light in zip(found, lights, strict=True):
         torch.testing.assert_close(view.light.position, light.position, atol=1e-12, rtol=0)
+
+
+def test_red_lamps_are_put_right_among_white_ones(scene) -> None:
+    surfels, truth, weights, transport = scene
+    red = torch.tensor([1.0, 0.0, 0.0])
+    coloured = [replace(truth[0], image=truth[0].image * red), *truth[1:]]
+    measured = measured_lights(truth)
+    measured[0] = replace(measured[0], intensity=measured[0].intensity * red.double())
+    wrong = [replace(view, light=light) for view, light in zip(coloured, measured, strict=True)]
+    found = [view.light for view in refine_lights(SurfelBvh(surfels), weights, transport, wrong, measured)]
+    offsets = [float((light.position - view.light.position).norm()) for light, view in zip(found, truth, strict=True)]
+    assert max(offsets) < 3e-4, offsets  # measured 4e-5
+    assert all(light.intensity.isfinite().all() for light in found)
+    assert float(found[0].intensity[1:].abs().max()) < 1e-6 < float(found[0].intensity[0])
+
+
+def test_a_lamp_without_one_of_the_colours_leaves_the_others_theirs() -> None:
+    """Red lamps say nothing of how bright all others are in green."""
+    red, white = PointLight([0.0, 0.0, 0.5], [1.0, 0.0, 0.0]), PointLight([0.1, 0.0, 0.5], [1.0, 1.0, 1.0])
+    brighter = replace(white, intensity=2.0 * white.intensity)
+    gains = log_gains([red, brighter], [red, white])
+    assert gains[0, 0] == 0.0 and gains[0, 1:].isnan().all()
+    first, second = in_gauge([red, brighter], [red, white])
+    torch.testing.assert_close(second.intensity, torch.tensor([2.0**0.5, 1.0, 1.0], dtype=torch.float64))
+    assert first.intensity[1:].eq(0.0).all() and first.intensity.isfinite().all()

@@ -56,13 +56,20 @@ def refine_lights(
     """
     pairs = zip(views, weights, strict=True)
     found = [_OneLight(bvh, weight, transport, view).refined() for view, weight in progress_bar(list(pairs), "lights")]
-    return [replace(view, light=light) for view, light in zip(views, _in_gauge(found, measured), strict=True)]
+    return [replace(view, light=light) for view, light in zip(views, in_gauge(found, measured), strict=True)]
 
 
-def _in_gauge(lights: Sequence[PointLight], measured: Sequence[PointLight]) -> list[PointLight]:
+def log_gains(lights: Sequence[PointLight], measured: Sequence[PointLight]) -> Tensor:
+    """(V, 3) logarithm of the intensities of lights over the measured ones; NaN in colours that one does not have."""
+    pairs = zip(lights, measured, strict=True)
+    gains = torch.stack([(light.intensity / given.intensity).log() for light, given in pairs])
+    return torch.where(gains.isfinite(), gains, torch.nan)
+
+
+def in_gauge(lights: Sequence[PointLight], measured: Sequence[PointLight]) -> list[PointLight]:
     """`lights` without their mean difference from the measured ones."""
     shift = torch.stack([a.position - b.position for a, b in zip(lights, measured, strict=True)]).mean(dim=0)
-    gain = torch.stack([(a.intensity / b.intensity).log() for a, b in zip(lights, measured, strict=True)]).mean(dim=0)
+    gain = log_gains(lights, measured).nanmean(dim=0).nan_to_num()
     return [PointLight(light.position - shift, light.intensity * (-gain).exp()) for light in lights]
 
 

@@ -31,6 +31,7 @@ from rgspipe.stages.base import Stage, StageContext
 from rgspipe.store.files import write_json, write_text
 from rgspipe.training.albedo import ALBEDO_RANGE
 from rgspipe.training.checkpoint import Checkpoint
+from rgspipe.training.light_refinement import log_gains
 from rgspipe.training.materials import build_frozen, fit_materials
 from rgspipe.training.operator_store import OperatorStore
 from rgspipe.training.options import TrainOptions
@@ -149,10 +150,10 @@ def _corrections(measured: Sequence[View], refined: Sequence[View]) -> dict[str,
     """How far training lights were moved, scene units, and their intensities changed: root mean squares."""
     lights = [(a.light, b.light) for a, b in zip(measured, refined, strict=True)]
     moved = torch.stack([b.position - a.position for a, b in lights]).norm(dim=1)
-    gain = torch.stack([(b.intensity / a.intensity).log() for a, b in lights])
+    gain = log_gains([b for _, b in lights], [a for a, _ in lights])
     return {
         "position_rms": float(moved.square().mean().sqrt()),
-        "log_intensity_rms": float(gain.square().mean().sqrt()),
+        "log_intensity_rms": float(gain.square().nanmean().sqrt()),
     }
 
 
