@@ -112,6 +112,12 @@ def test_holes_of_depth_stay_holes(tmp_path: Path) -> None:
     assert np.nanmax(np.abs(small - 2.0)) < 1e-6
 
 
+def test_the_highest_level_of_depth_is_no_distance(tmp_path: Path) -> None:
+    write_depth(tmp_path / "a.png", np.array([[65535.0, 65534.0, 1.0]]), 1.0)
+    read = read_depth_image(DepthImage(tmp_path / "a.png", 1.0))
+    assert np.array_equal(read, np.array([[np.nan, 65534.0, 1.0]], np.float32), equal_nan=True)
+
+
 @pytest.mark.parametrize("kind", ["8 bits", "colours"])
 def test_pictures_of_depth_are_refused(tmp_path: Path, kind: str) -> None:
     shape = (4, 4) if kind == "8 bits" else (4, 4, 3)

@@ -126,7 +126,9 @@ def _measured(frame: ScanFrame, camera: Camera, options: ScanOptions) -> Passes:
     """Depth and predicted albedo of a frame, as far as it has them."""
     depth = albedo = None
     if frame.depth is not None:
-        depth = resampled_depth(read_depth_image(frame.depth), camera, frame.depth.lens or frame.lens)
+        stored, lens = read_depth_image(frame.depth), frame.depth.lens or frame.lens
+        check_shape(frame.depth.path, stored.shape, lens)
+        depth = resampled_depth(stored, camera, lens)
     if frame.albedo is not None:
         albedo, _ = resampled_colour(read_picture(frame.albedo, options.response).light, None, camera, frame.lens)
     if albedo is not None and frame.material is not None:

@@ -26,6 +26,9 @@ EXPOSED = ((1e-7, 1e5), (1.0, 1e8), (0.1, 1e3))
 #: Alpha from which on a pixel is opaque; floats of renderers may miss 1 by this.
 OPAQUE = 1.0 - 1e-3
 
+#: Level of 16-bit depth that tells no distance.
+FARTHEST = 65535
+
 Pixels = npt.NDArray[np.float32]
 
 
@@ -133,7 +136,8 @@ def _stored_depth(path: Path) -> npt.NDArray[np.float64]:
             found="8 bits, which is a picture of depth",
             remedy="Export the depth itself.",
         )
-    return levels[..., 0].astype(np.float64)
+    # The highest level is all that is too far as well, or nothing measured.
+    return np.where(levels == FARTHEST, np.nan, levels.astype(np.float64))[..., 0]
 
 
 def _confidence(path: Path) -> Pixels:
