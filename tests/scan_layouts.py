@@ -57,7 +57,7 @@ def write_photograph(path: Path, light: np.ndarray) -> None:
 
 
 def write_wide_png(path: Path, levels: np.ndarray) -> None:
-    """(H, W, 3 or 4) uint16; each row with another of the format's filters, as real files have them."""
+    """(H, W, 1, 3 or 4) uint16; each row with another of the format's filters, as real files have them."""
     height, width, channels = levels.shape
     rows = levels.astype(">u2").reshape(height, -1).view(np.uint8).astype(np.int64)
     step, lines = 2 * channels, []
@@ -66,7 +66,7 @@ def write_wide_png(path: Path, levels: np.ndarray) -> None:
         left = np.concatenate([np.zeros(step, np.int64), row[:-step]])
         predicted = (0 * row, left, rows[index - 1])[kind]
         lines.append(bytes([kind]) + ((row - predicted) % 256).astype(np.uint8).tobytes())
-    header = struct.pack(">IIBBBBB", width, height, 16, {3: 2, 4: 6}[channels], 0, 0, 0)
+    header = struct.pack(">IIBBBBB", width, height, 16, {1: 0, 3: 2, 4: 6}[channels], 0, 0, 0)
     parts = ((b"IHDR", header), (b"IDAT", zlib.compress(b"".join(lines))), (b"IEND", b""))
     chunks = (struct.pack(">I", len(c)) + name + c + struct.pack(">I", zlib.crc32(name + c)) for name, c in parts)
     path.write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(chunks))

@@ -190,10 +190,12 @@ def test_a_lens_that_folds_the_image_is_refused() -> None:
         straight_camera(lens, np.eye(4), 64, Path("a.png"))
 
 
-def test_masked_pixels_are_left_out_however_little_of_one_is_masked(tmp_path: Path) -> None:
+@pytest.mark.parametrize("kept", [255, 1])
+def test_masked_pixels_are_left_out_however_little_of_one_is_masked(tmp_path: Path, kept: int) -> None:
+    """Programs write masks of 0 and 255, or of 0 and 1."""
     views = photographed(3, 32)
     write_nerfstudio(tmp_path / "scan", views)
-    levels = np.full((32, 32), 255, np.uint8)
+    levels = np.full((32, 32), kept, np.uint8)
     levels[9, 13] = 0
     Image.fromarray(levels).save(tmp_path / "scan/mask.png")
     path = tmp_path / "scan/transforms.json"

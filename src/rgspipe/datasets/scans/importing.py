@@ -24,9 +24,6 @@ from rgspipe.store.files import write_json
 
 TRANSFORMS = "transforms_train.json"
 
-#: Levels of a mask, of 1, up to which pixels do not count.
-MASKED = 0.5
-
 #: What a camera sees of surfaces that are known.
 Surfaces = Callable[[Camera], Passes]
 
@@ -111,7 +108,7 @@ def _written(
         light = np.where(clipped, np.maximum(light, limit), light)
         entry["saturated_from"] = float(limit / np.float32(exposure))
     write_image(path.with_suffix(".exr"), light / np.float32(exposure))
-    passes = _measured(frame, camera, options) if surfaces is None else surfaces(camera)
+    passes = _measured(frame, camera) if surfaces is None else surfaces(camera)
     used = _used(frame, picture, camera)
     if used is not None:
         passes = replace(passes, depth=None if passes.depth is None else np.where(used, passes.depth, np.nan))
@@ -122,15 +119,15 @@ def _written(
     return frame_entry(f"{path.parent.name}/{path.name}", camera, surfaces=kinds) | entry, share
 
 
-def _measured(frame: ScanFrame, camera: Camera, options: ScanOptions) -> Passes:
-    """Depth and predicted albedo of a frame, as far as it has them."""
+def _measured(frame: ScanFrame, camera: Camera) -> Passes:
+    """Depth and predicted albedo of a frame, as far as it has them; networks write albedo in sRGB or floats."""
     depth = albedo = None
     if frame.depth is not None:
         stored, lens = read_depth_image(frame.depth), frame.depth.lens or frame.lens
         check_shape(frame.depth.path, stored.shape, lens)
         depth = resampled_depth(stored, camera, lens)
     if frame.albedo is not None:
-        albedo, _ = resampled_colour(read_picture(frame.albedo, options.response).light, None, camera, frame.lens)
+        albedo, _ = resampled_colour(read_picture(frame.albedo, "srgb").light, None, camera, frame.lens)
     if albedo is not None and frame.material is not None:
         material, _ = resampled_colour(read_picture(frame.material, "linear").light, None, camera, frame.lens)
         albedo = albedo * (1.0 - np.clip(material[..., 1:2], 0.0, 1.0))
@@ -150,7 +147,8 @@ def _used(frame: ScanFrame, picture: Picture, camera: Camera) -> np.ndarray | No
     if frame.mask is not None:
         mask = read_picture(frame.mask, "linear")
         check_shape(frame.mask, mask.light.shape, frame.lens)
-        hidden += [mask.hidden, (mask.light <= MASKED).any(axis=2)]
+        # Masks may be of levels 0 and 1: whatever is not black counts.
+        hidden += [mask.hidden, (mask.light <= 0.0).any(axis=2)]
     parts = [part for part in hidden if part is not None]
     return ~np.any([_shown(part, camera, frame.lens) for part in parts], axis=0) if parts else None
 

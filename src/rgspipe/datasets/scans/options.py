@@ -23,7 +23,7 @@ class ScanOptions(Options):
     resolution: int = option(160, low=8, high=8192)
     """pixels along the longer side that photographs are reduced to"""
     response: Literal["srgb", "linear"] = "srgb"
-    """how levels of PNG and JPEG rise with light; EXR is linear"""
+    """how levels of PNG and JPEG photographs rise with light; EXR is linear, and albedo maps in levels are sRGB"""
     exposure: Literal["exif", "same"] = "exif"
     """exif: photographs are made alike by shutter, aperture and ISO where all of them state them; same: taken as they
     are"""
