@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import tifffile
 import torch
-from PIL import Image
+from PIL import ExifTags, Image
 
 from raycast import room_views
 from rgspipe.datasets.exr import write_channels, write_image
@@ -54,6 +54,16 @@ def write_photograph(path: Path, light: np.ndarray) -> None:
         write_wide_png(path, np.round(65535.0 * levels).astype(np.uint16))
     else:
         Image.fromarray(np.round(255.0 * levels).astype(np.uint8)).save(path, quality=95)
+
+
+def write_exposed(path: Path, light: np.ndarray, shutter: object, f_number: object = 2.0) -> None:
+    """A photograph of ISO 200 that states its exposure."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    levels = np.round(255.0 * srgb.encode(np.clip(light.astype(np.float64), 0.0, 1.0))).astype(np.uint8)
+    exif, base = Image.Exif(), ExifTags.Base
+    stated = {base.ExposureTime: shutter, base.FNumber: f_number, base.ISOSpeedRatings: 200}
+    exif.get_ifd(ExifTags.IFD.Exif).update(stated)
+    Image.fromarray(levels).save(path, quality=95, subsampling=0, exif=exif)
 
 
 def write_wide_png(path: Path, levels: np.ndarray) -> None:

@@ -10,6 +10,7 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from rgspipe.capture.photographs import SHOWN, Numbers
+from rgspipe.datasets.exif_exposure import check_exposures
 from rgspipe.datasets.views import View
 from rgspipe.errors import InputError
 from rgspipe.renderer.view_weights import ViewWeights
@@ -49,7 +50,7 @@ def check_views(views: Sequence[View], where: str | Path) -> None:
 
 
 def check_lightings(views: Sequence[View], exposure: str, where: str | Path) -> None:
-    """Refuse photographs with the lamps off that are alone, or that cannot be compared.
+    """Refuse photographs with the lamps off that are alone, and lightings or exposures that cannot be compared.
 
     Raises:
         InputError: says which.
@@ -69,6 +70,9 @@ def check_lightings(views: Sequence[View], exposure: str, where: str | Path) -> 
             found=exposure,
             remedy="Expose all photographs alike, or leave those with the lamps off out.",
         )
+    if exposure == "same":
+        remedy = "Let CaptureOptions(exposure='free') find them, or photograph all with one exposure."
+        check_exposures([(view.name, view.exposure) for view in views], where, remedy)
 
 
 def check_brackets(views: Sequence[View], exposure: str) -> None:

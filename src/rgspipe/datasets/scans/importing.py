@@ -8,13 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
+from rgspipe.datasets.exif_exposure import differ, exposure_of
 from rgspipe.datasets.exr import write_channels, write_image
 from rgspipe.datasets.gs3_write import frame_entry, write_transforms
 from rgspipe.datasets.info import INFO
 from rgspipe.datasets.scans.frame import Lens, Scan, ScanFrame
 from rgspipe.datasets.scans.lens_check import check_shape
 from rgspipe.datasets.scans.options import ScanOptions
-from rgspipe.datasets.scans.pictures import Picture, exposure_of, read_depth_image, read_picture
+from rgspipe.datasets.scans.pictures import Picture, read_depth_image, read_picture
 from rgspipe.datasets.scans.resample import resampled_colour, resampled_depth, straight_camera
 from rgspipe.errors import InputError
 from rgspipe.progress import progress_bar
@@ -84,12 +85,24 @@ def import_scan(scan: Scan, options: ScanOptions, folder: Path, surfaces: Surfac
 
 
 def _exposures(scan: Scan, options: ScanOptions) -> np.ndarray | None:
-    """(V,) exposures by EXIF over their geometric mean; None where one does not say."""
+    """(V,) exposures by EXIF over their geometric mean; None where one does not say, and the others are alike.
+
+    Raises:
+        InputError: one does not say, and the others differ.
+    """
     if options.exposure != "exif":
         return None
     stated = [exposure_of(frame.image) for frame in scan.frames]
     known = np.array([value for value in stated if value is not None])
     if len(known) < len(stated):
+        if differ(known.tolist()):
+            raise InputError(
+                scan.frames[stated.index(None)].image,
+                expected="shutter, aperture and ISO (EXIF), as in other photographs, whose exposures differ by a "
+                f"factor of {known.max() / known.min():.3g}",
+                found=f"not all three in {len(stated) - len(known)} of {len(stated)} photographs",
+                remedy="Leave those out, or take all as they are: ScanOptions(exposure='same').",
+            )
         return None
     return known / np.exp(np.log(known).mean())
 

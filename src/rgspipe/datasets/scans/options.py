@@ -25,8 +25,8 @@ class ScanOptions(Options):
     response: Literal["srgb", "linear"] = "srgb"
     """how levels of PNG and JPEG photographs rise with light; EXR is linear, and albedo maps in levels are sRGB"""
     exposure: Literal["exif", "same"] = "exif"
-    """exif: photographs are made alike by shutter, aperture and ISO where all of them state them; same: taken as they
-    are"""
+    """exif: photographs are made alike by shutter, aperture and ISO where all of them state them, and refused where
+    some do and differ; same: taken as they are"""
     axes: Literal["layout", "opengl", "opencv"] = "layout"
     """axes of the cameras, where files do not keep to their layout: y up and z backwards, or y down and z forwards"""
     depth_unit: float | None = option(None, low=1e-9, high=1e9)

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
-from PIL import ExifTags
 
 from rgspipe.datasets.display_image import DAMAGED, opened, read_levels, saturated_from
 from rgspipe.datasets.exr import read_channels
@@ -19,9 +18,6 @@ from rgspipe.datasets.scans.radiance_image import hdr_size, read_hdr
 from rgspipe.datasets.scans.raw_image import RAW, read_raw
 from rgspipe.errors import InputError
 from rgspipe.scene import srgb
-
-#: What a camera can have been set to: shutter [s], ISO and f-number; what is beyond it is damaged.
-EXPOSED = ((1e-7, 1e5), (1.0, 1e8), (0.1, 1e3))
 
 #: Alpha from which on a pixel is opaque; floats of renderers may miss 1 by this.
 OPAQUE = 1.0 - 1e-3
@@ -93,25 +89,6 @@ def read_depth_image(image: DepthImage) -> Pixels:
             raise InputError(image.confidence, expected=expected, found=found, remedy="Export both at one size.")
         known &= sure > 0.0
     return np.where(known, stored * image.unit, np.nan).astype(np.float32)
-
-
-def exposure_of(path: Path) -> float | None:
-    """Shutter time × ISO / aperture², by the file's EXIF; None where it does not state all three."""
-    if path.suffix.lower() in (".exr", ".hdr"):
-        return None
-    keys = (ExifTags.Base.ExposureTime, ExifTags.Base.ISOSpeedRatings, ExifTags.Base.FNumber)
-    try:
-        with opened(input_file(path, "a photograph"), path, ["JPEG", "PNG"]) as file:
-            tags = file.getexif().get_ifd(ExifTags.IFD.Exif)
-        shutter, sensitivity, aperture = (float(np.ravel(tags.get(key, 0))[0]) for key in keys)
-    except InputError:
-        raise
-    except (*DAMAGED, TypeError, ZeroDivisionError):
-        # Whether its pixels can be read is asked elsewhere.
-        return None
-    values = zip((shutter, sensitivity, aperture), EXPOSED, strict=True)
-    stated = all(least <= value <= most for value, (least, most) in values)
-    return shutter * sensitivity / aperture**2 if stated else None
 
 
 @timed
