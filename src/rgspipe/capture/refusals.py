@@ -49,7 +49,7 @@ def check_views(views: Sequence[View], where: str | Path) -> None:
         )
 
 
-def check_lightings(views: Sequence[View], exposure: str, where: str | Path) -> None:
+def check_lightings(views: Sequence[View], exposure: str, response: str, where: str | Path) -> None:
     """Refuse photographs with the lamps off that are alone, and lightings or exposures that cannot be compared.
 
     Raises:
@@ -69,6 +69,15 @@ def check_lightings(views: Sequence[View], exposure: str, where: str | Path) -> 
             expected="same, so that what shines with the lamps off can be taken away",
             found=exposure,
             remedy="Expose all photographs alike, or leave those with the lamps off out.",
+        )
+    if len(names) > 1 and response == "free":
+        # Each lighting's photographs give a curve of their own, in a unit of its own.
+        raise InputError(
+            "CaptureOptions.response",
+            expected="known, so that several lightings can be compared",
+            found=response,
+            remedy="Leave CaptureOptions(response='known'), and say which curve levels have: "
+            "ScanOptions(response='srgb') or ScanOptions(response='linear').",
         )
     if exposure == "same":
         remedy = "Let CaptureOptions(exposure='free') find them, or photograph all with one exposure."
