@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import tifffile
 import torch
-from PIL import Image
+from PIL import ExifTags, Image
 
 from raycast import room_views
 from rgspipe.datasets.exr import write_channels, write_image
@@ -56,8 +56,18 @@ def write_photograph(path: Path, light: np.ndarray) -> None:
         Image.fromarray(np.round(255.0 * levels).astype(np.uint8)).save(path, quality=95)
 
 
+def write_exposed(path: Path, light: np.ndarray, shutter: object, f_number: object = 2.0) -> None:
+    """A photograph of ISO 200 that states its exposure."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    levels = np.round(255.0 * srgb.encode(np.clip(light.astype(np.float64), 0.0, 1.0))).astype(np.uint8)
+    exif, base = Image.Exif(), ExifTags.Base
+    stated = {base.ExposureTime: shutter, base.FNumber: f_number, base.ISOSpeedRatings: 200}
+    exif.get_ifd(ExifTags.IFD.Exif).update(stated)
+    Image.fromarray(levels).save(path, quality=95, subsampling=0, exif=exif)
+
+
 def write_wide_png(path: Path, levels: np.ndarray) -> None:
-    """(H, W, 3 or 4) uint16; each row with another of the format's filters, as real files have them."""
+    """(H, W, 1, 3 or 4) uint16; each row with another of the format's filters, as real files have them."""
     height, width, channels = levels.shape
     rows = levels.astype(">u2").reshape(height, -1).view(np.uint8).astype(np.int64)
     step, lines = 2 * channels, []
@@ -66,7 +76,7 @@ def write_wide_png(path: Path, levels: np.ndarray) -> None:
         left = np.concatenate([np.zeros(step, np.int64), row[:-step]])
         predicted = (0 * row, left, rows[index - 1])[kind]
         lines.append(bytes([kind]) + ((row - predicted) % 256).astype(np.uint8).tobytes())
-    header = struct.pack(">IIBBBBB", width, height, 16, {3: 2, 4: 6}[channels], 0, 0, 0)
+    header = struct.pack(">IIBBBBB", width, height, 16, {1: 0, 3: 2, 4: 6}[channels], 0, 0, 0)
     parts = ((b"IHDR", header), (b"IDAT", zlib.compress(b"".join(lines))), (b"IEND", b""))
     chunks = (struct.pack(">I", len(c)) + name + c + struct.pack(">I", zlib.crc32(name + c)) for name, c in parts)
     path.write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(chunks))

@@ -32,6 +32,19 @@ def test_photographs_with_lamps_of_their_own() -> None:
     assert "2 of 2 with a known light" in refusal(views) and "rg.train(views)" in refusal(views)
 
 
+def test_photographs_that_state_other_exposures() -> None:
+    first, second, *others = photographs()
+    views = [replace(first, exposure=1.0), replace(second, exposure=4.0), *others]
+    said = refusal(views)
+    assert f"{second.name} exposed 4 times as much as {first.name}" in said and "exposure='free'" in said
+
+
+def test_several_lightings_under_a_curve_that_nobody_knows() -> None:
+    first, *others = photographs()
+    said = refusal([replace(first, lighting="off"), *others], response="free")
+    assert said.startswith("CaptureOptions.response") and "ScanOptions(response='linear')" in said
+
+
 def test_black_photographs() -> None:
     views = [replace(view, image=torch.zeros_like(view.image)) for view in photographs()[:3]]
     assert "black" in refusal(views)

@@ -53,6 +53,19 @@ def test_a_folder_with_cameras_of_its_own(dataset: Path, tmp_path: Path) -> None
     assert view.base.equal(view.image)
 
 
+def test_a_folder_with_another_principal_point(dataset: Path, change: Change, tmp_path: Path) -> None:
+    def by_angle(content: dict) -> None:
+        del content["frames"][0]["camera_intrinsics"]
+        content.update(camera_angle_x=1.0, cx=3.0)
+
+    change(TARGET, by_angle)
+    _copy(dataset, tmp_path / "off")
+    load_target(dataset / "targets/one", tmp_path / "off")
+    change(TARGET, lambda content: content.update(cx=2.5))
+    with pytest.raises(InputError, match="camera of"):
+        load_target(dataset / "targets/one", tmp_path / "off")
+
+
 def test_a_folder_of_images_that_are_named_as_the_target_s(dataset: Path, tmp_path: Path) -> None:
     _copy(dataset, tmp_path / "off")
     (tmp_path / "off" / "transforms.json").unlink()

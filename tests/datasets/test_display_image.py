@@ -104,8 +104,9 @@ def test_16_bit_colours_are_read_whole_and_clipped_at_their_brightest_level(tmp_
     assert stored.light[0, 0, 0] >= saturated_from(tmp_path / "a.png") > stored.light[0, 1, 0]
 
 
-def test_a_16_bit_colour_that_is_transparent_is(tmp_path: Path) -> None:
-    levels = np.random.default_rng(0).integers(0, 65535, (5, 7, 3), dtype=np.uint16)
+@pytest.mark.parametrize("channels", [1, 3])
+def test_a_16_bit_level_or_colour_that_is_transparent_is(tmp_path: Path, channels: int) -> None:
+    levels = np.random.default_rng(0).integers(0, 65535, (5, 7, channels), dtype=np.uint16)
     write_wide_png(tmp_path / "a.png", levels)
     _with_chunk(tmp_path / "a.png", b"tRNS", levels[2, 3].astype(">u2").tobytes())
     alpha = read_levels(tmp_path / "a.png").alpha

@@ -21,10 +21,12 @@ from rgspipe.errors import InputError
 from scan_layouts import (
     photographed,
     write_colmap,
+    write_depth,
     write_iid,
     write_interiorverse,
     write_nerfstudio,
     write_openrooms,
+    write_photograph,
     write_polycam,
     write_replica,
     write_scannet,
@@ -141,6 +143,37 @@ def test_scannet_comes_back_without_lost_frames_and_with_depth_of_its_own_lens(t
         assert float(miss.max()) < 0.00051, "every second pixel is one of the depth image"
 
 
+@pytest.mark.parametrize("shift", [6, 8])
+def test_depth_of_scannet_that_shows_less_than_the_photograph_is_known_there_alone(tmp_path: Path, shift: int) -> None:
+    """The border of the depth image went on for ever."""
+    write_scannet(tmp_path / "scan", VIEWS[:1])
+    intrinsics = tmp_path / "scan/intrinsic"
+    matrix = np.loadtxt(intrinsics / "intrinsic_color.txt")
+    matrix[:2, 2] -= shift
+    np.savetxt(intrinsics / "intrinsic_depth.txt", matrix)
+    seen = slice(shift, shift + 16)
+    write_depth(tmp_path / "scan/depth/0.png", VIEWS[0].depth.numpy()[seen, seen], 1000.0)
+    _, (view,) = back(tmp_path / "scan")
+    shown = torch.zeros(SIZE, SIZE, dtype=torch.bool)
+    shown[seen, seen] = True
+    assert torch.equal(view.depth.isfinite(), shown)
+    # Half a millimetre is a step's; single precision is the rest.
+    assert float((view.depth - VIEWS[0].depth)[shown].abs().max()) < 0.00051
+
+
+@pytest.mark.parametrize("name", ["color", "depth"])
+def test_cameras_of_scannet_in_two_places_are_refused(tmp_path: Path, name: str) -> None:
+    write_scannet(tmp_path / "scan", VIEWS)
+    path = tmp_path / f"scan/intrinsic/extrinsic_{name}.txt"
+    np.savetxt(path, np.eye(4))
+    read_scan(tmp_path / "scan", ScanOptions())
+    beside = np.eye(4)
+    beside[0, 3] = 0.3
+    np.savetxt(path, beside)
+    with pytest.raises(InputError, match=rf"extrinsic_{name}\.txt: expected the identity"):
+        read_scan(tmp_path / "scan", ScanOptions())
+
+
 def test_one_photograph_with_predictions_comes_back(tmp_path: Path) -> None:
     write_iid(tmp_path / "scan", VIEWS[0], (24, 40))
     made, (view,) = back(tmp_path / "scan", fov=np.degrees(1.4))
@@ -151,6 +184,16 @@ def test_one_photograph_with_predictions_comes_back(tmp_path: Path) -> None:
     assert float(view.depth.median()) == pytest.approx(1.0, abs=0.05)
     assert float((view.albedo - 0.5 * VIEWS[0].image).abs().max()) == 0.0
     assert any("not in metres" in note for note in made.notes)
+
+
+@pytest.mark.parametrize("response", ["srgb", "linear"])
+def test_albedo_in_levels_is_in_srgb_whatever_the_photograph_is(tmp_path: Path, response: str) -> None:
+    write_iid(tmp_path / "scan", VIEWS[0], (SIZE, SIZE))
+    (tmp_path / "scan/albedo.exr").unlink()
+    write_photograph(tmp_path / "scan/albedo.png", np.full((SIZE, SIZE, 3), 0.5))
+    _, (view,) = back(tmp_path / "scan", response=response)
+    # Measured 0.003: half a level is up to 0.0033; read as linear it is 0.74.
+    assert float((view.albedo - 0.5).abs().max()) < 0.0034
 
 
 def test_interiorverse_comes_back_with_the_diffuse_part_of_its_albedo(tmp_path: Path) -> None:
@@ -293,6 +336,16 @@ def test_several_photographs_without_poses_are_refused(tmp_path: Path) -> None:
     assert read_scan(tmp_path, ScanOptions(photograph="a")).frames[0].image.name == "a.png"
     with pytest.raises(InputError, match=r"of the name c.*a\.png, b\.png"):
         read_scan(tmp_path, ScanOptions(photograph="c"))
+
+
+def test_depth_of_another_shape_than_its_photograph_is_refused(tmp_path: Path) -> None:
+    write_nerfstudio(tmp_path / "a", VIEWS[:1], ".exr", ".png")
+    write_depth(tmp_path / "a/depth/0.png", np.full((SIZE // 2, SIZE), 2.0), 1000.0)
+    with pytest.raises(InputError, match=r"depth/0\.png: expected an image of the shape of its intrinsics, 32 × 32"):
+        back(tmp_path / "a")
+    write_depth(tmp_path / "a/depth/0.png", np.full((SIZE // 2, SIZE // 2), 2.0), 1000.0)
+    _, (view,) = back(tmp_path / "a")
+    assert float((view.depth - 2.0).abs().max()) < 1e-6  # measured 5e-8
 
 
 def test_turned_photographs_and_intrinsics_of_other_ones_are_refused(tmp_path: Path) -> None:

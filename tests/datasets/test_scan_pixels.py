@@ -12,18 +12,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from PIL import ExifTags, Image
-from PIL.TiffImagePlugin import IFDRational
+from PIL import Image
 
 from raycast import BLOCK, ROOM, cast, room_views
 from rgspipe.datasets.display_image import read_levels
+from rgspipe.datasets.exif_exposure import exposure_of
 from rgspipe.datasets.exr import read_image, write_image
 from rgspipe.datasets.gs3 import load_dataset
 from rgspipe.datasets.scans.frame import DepthImage, Lens
 from rgspipe.datasets.scans.importing import import_scan
 from rgspipe.datasets.scans.layouts import read_scan
 from rgspipe.datasets.scans.options import ScanOptions
-from rgspipe.datasets.scans.pictures import _colmap_array, exposure_of, read_depth_image, read_picture, size_of
+from rgspipe.datasets.scans.pictures import _colmap_array, read_depth_image, read_picture, size_of
 from rgspipe.datasets.scans.resample import resampled_colour, resampled_depth, straight_camera
 from rgspipe.datasets.views import View
 from rgspipe.errors import InputError
@@ -34,9 +34,9 @@ from scan_layouts import (
     pose_of,
     write_depth,
     write_dng,
+    write_exposed,
     write_hdr,
     write_nerfstudio,
-    write_photograph,
     write_wide_png,
 )
 
@@ -77,7 +77,7 @@ def test_photographs_are_made_alike_by_what_they_state(tmp_path: Path) -> None:
     seconds = (0.01, 0.02, 0.04)
     write_nerfstudio(tmp_path / "scan", views, ".jpg", ".png")
     for index, (view, shutter) in enumerate(zip(views, seconds, strict=True)):
-        _stated(tmp_path / f"scan/images/{index}.jpg", 0.25 * shutter / 0.01 * view.image.numpy(), shutter)
+        write_exposed(tmp_path / f"scan/images/{index}.jpg", 0.25 * shutter / 0.01 * view.image.numpy(), shutter)
     assert exposure_of(tmp_path / "scan/images/1.jpg") == pytest.approx(0.02 * 200 / 4)
     for exposure, expected in (("exif", [0.5, 0.5, 0.5]), ("same", [0.25, 0.5, 1.0])):
         read = imported(tmp_path / "scan", exposure=exposure)
@@ -87,17 +87,18 @@ def test_photographs_are_made_alike_by_what_they_state(tmp_path: Path) -> None:
         assert limits[0] / limits[2] == pytest.approx(4.0 if exposure == "exif" else 1.0)
 
 
-def _stated(path: Path, light: np.ndarray, shutter: float) -> None:
-    levels = np.round(255.0 * srgb.encode(np.clip(light.astype(np.float64), 0.0, 1.0))).astype(np.uint8)
-    exif = Image.Exif()
-    base = ExifTags.Base
-    exif.get_ifd(ExifTags.IFD.Exif).update({base.ExposureTime: shutter, base.FNumber: 2.0, base.ISOSpeedRatings: 200})
-    Image.fromarray(levels).save(path, quality=95, subsampling=0, exif=exif)
-
-
-def test_a_photograph_that_states_nothing_leaves_all_as_they_are(tmp_path: Path) -> None:
-    write_photograph(tmp_path / "a.jpg", np.full((8, 8, 3), 0.5))
-    assert exposure_of(tmp_path / "a.jpg") is None and exposure_of(tmp_path / "a.exr") is None
+def test_photographs_some_of_which_state_nothing_are_alike_or_refused(tmp_path: Path) -> None:
+    """One that stated nothing made nobody's exposure count, and no word was said."""
+    views = photographed(3, 32)
+    write_nerfstudio(tmp_path / "scan", views, ".jpg", ".png")
+    written = [tmp_path / f"scan/images/{index}.jpg" for index in range(3)]
+    write_exposed(written[0], views[0].image.numpy(), 0.01)
+    write_exposed(written[2], views[2].image.numpy(), 0.0102)
+    assert len(imported(tmp_path / "scan")) == 3
+    write_exposed(written[2], views[2].image.numpy(), 0.04)
+    with pytest.raises(InputError, match=r"images/1\.jpg: .*differ by a factor of 4, found .* 1 of 3.*exposure='same'"):
+        imported(tmp_path / "scan")
+    assert len(imported(tmp_path / "scan", exposure="same")) == 3
 
 
 def test_holes_of_depth_stay_holes(tmp_path: Path) -> None:
@@ -110,6 +111,12 @@ def test_holes_of_depth_stay_holes(tmp_path: Path) -> None:
     small = resampled_depth(read, straight_camera(lens, np.eye(4), 8, tmp_path), lens)
     assert np.isnan(small[:4, :4]).all() and np.isfinite(small).sum() == 48
     assert np.nanmax(np.abs(small - 2.0)) < 1e-6
+
+
+def test_the_highest_level_of_depth_is_no_distance(tmp_path: Path) -> None:
+    write_depth(tmp_path / "a.png", np.array([[65535.0, 65534.0, 1.0]]), 1.0)
+    read = read_depth_image(DepthImage(tmp_path / "a.png", 1.0))
+    assert np.array_equal(read, np.array([[np.nan, 65534.0, 1.0]], np.float32), equal_nan=True)
 
 
 @pytest.mark.parametrize("kind", ["8 bits", "colours"])
@@ -184,10 +191,12 @@ def test_a_lens_that_folds_the_image_is_refused() -> None:
         straight_camera(lens, np.eye(4), 64, Path("a.png"))
 
 
-def test_masked_pixels_are_left_out_however_little_of_one_is_masked(tmp_path: Path) -> None:
+@pytest.mark.parametrize("kept", [255, 1])
+def test_masked_pixels_are_left_out_however_little_of_one_is_masked(tmp_path: Path, kept: int) -> None:
+    """Programs write masks of 0 and 255, or of 0 and 1."""
     views = photographed(3, 32)
     write_nerfstudio(tmp_path / "scan", views)
-    levels = np.full((32, 32), 255, np.uint8)
+    levels = np.full((32, 32), kept, np.uint8)
     levels[9, 13] = 0
     Image.fromarray(levels).save(tmp_path / "scan/mask.png")
     path = tmp_path / "scan/transforms.json"
@@ -293,16 +302,6 @@ def test_radiance_pictures_come_back(tmp_path: Path, packed: bool) -> None:
         (tmp_path / "b.hdr").write_bytes((tmp_path / "a.hdr").read_bytes()[:length])
         with pytest.raises(InputError, match=r"b\.hdr"):
             read_picture(tmp_path / "b.hdr", "srgb")
-
-
-@pytest.mark.parametrize("number", [IFDRational(0, 0), float("inf"), 0.0, 1e-30, 1e30])
-def test_an_exposure_that_cannot_be_is_not_stated(tmp_path: Path, number: object) -> None:
-    """Lenses without electronics may state an f-number of 0/0."""
-    exif = Image.Exif()
-    base = ExifTags.Base
-    exif.get_ifd(ExifTags.IFD.Exif).update({base.ExposureTime: 0.01, base.FNumber: number, base.ISOSpeedRatings: 200})
-    Image.fromarray(np.zeros((8, 8, 3), np.uint8)).save(tmp_path / "a.jpg", exif=exif)
-    assert exposure_of(tmp_path / "a.jpg") is None
 
 
 @pytest.mark.parametrize("channels", [0, -1])

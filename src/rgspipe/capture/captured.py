@@ -120,7 +120,7 @@ def capture_scenes(
     options = options or CaptureOptions()
     views = as_several(views, View, "views", "rg.load_views reads them.")
     check_views(views, where)
-    check_lightings(views, options.exposure, where)
+    check_lightings(views, options.exposure, options.response, where)
     if not isinstance(surfels, Surfels):
         surfels = as_count(surfels, "surfels", remedy="Pass surfels, or how many to make.")
         surfels = initialise_surfels(views, surfels, seed=options.seed, where=where)

@@ -10,6 +10,7 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from rgspipe.capture.photographs import SHOWN, Numbers
+from rgspipe.datasets.exif_exposure import check_exposures
 from rgspipe.datasets.views import View
 from rgspipe.errors import InputError
 from rgspipe.renderer.view_weights import ViewWeights
@@ -48,8 +49,8 @@ def check_views(views: Sequence[View], where: str | Path) -> None:
         )
 
 
-def check_lightings(views: Sequence[View], exposure: str, where: str | Path) -> None:
-    """Refuse photographs with the lamps off that are alone, or that cannot be compared.
+def check_lightings(views: Sequence[View], exposure: str, response: str, where: str | Path) -> None:
+    """Refuse photographs with the lamps off that are alone, and lightings or exposures that cannot be compared.
 
     Raises:
         InputError: says which.
@@ -69,6 +70,18 @@ def check_lightings(views: Sequence[View], exposure: str, where: str | Path) -> 
             found=exposure,
             remedy="Expose all photographs alike, or leave those with the lamps off out.",
         )
+    if len(names) > 1 and response == "free":
+        # Each lighting's photographs give a curve of their own, in a unit of its own.
+        raise InputError(
+            "CaptureOptions.response",
+            expected="known, so that several lightings can be compared",
+            found=response,
+            remedy="Leave CaptureOptions(response='known'), and say which curve levels have: "
+            "ScanOptions(response='srgb') or ScanOptions(response='linear').",
+        )
+    if exposure == "same":
+        remedy = "Let CaptureOptions(exposure='free') find them, or photograph all with one exposure."
+        check_exposures([(view.name, view.exposure) for view in views], where, remedy)
 
 
 def check_brackets(views: Sequence[View], exposure: str) -> None:

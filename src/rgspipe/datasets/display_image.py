@@ -197,7 +197,12 @@ def _wide(path: Path, file: Image.Image) -> np.ndarray:
     with opened(path, path, ["PNG"]) as again:
         again.tile = [part._replace(args=f"{again.mode};16L") for part in again.tile]
         levels |= np.asarray(again)
-    clear = file.info.get("transparency")  # one colour that is
+    return _with_clear(levels, file)
+
+
+def _with_clear(levels: np.ndarray, file: Image.Image) -> np.ndarray:
+    """(H, W, C or C + 1) uint16: with alpha if the file says that one level or colour is transparent."""
+    clear = file.info.get("transparency")
     if clear is None:
         return levels
     opaque = np.where((levels == np.array(clear)).all(axis=2), 0, np.iinfo(np.uint16).max)
@@ -220,7 +225,7 @@ def _check_orientation(path: Path, file: Image.Image) -> None:
 
 def _unpacked(path: Path, file: Image.Image) -> np.ndarray:
     if file.mode.startswith("I;16"):
-        return np.asarray(file).astype(np.uint16)
+        return _with_clear(np.asarray(file).astype(np.uint16)[..., None], file)
     mode = MODES.get(file.mode)
     if mode is None:
         raise _refusal(path, "grey, RGB or RGBA", f"{file.mode} pixels")

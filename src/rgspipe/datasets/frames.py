@@ -13,6 +13,7 @@ from rgspipe.datasets.input_file import is_plain_name
 from rgspipe.datasets.json_file import is_number, numbers, read_json, required, shown
 from rgspipe.datasets.limits import STRONGEST
 from rgspipe.datasets.named_cameras import read_camera
+from rgspipe.datasets.pinhole_keys import KEYS, stated_intrinsics
 from rgspipe.datasets.rigid_pose import check_place, rigid_pose
 from rgspipe.errors import InputError
 from rgspipe.scene import Camera
@@ -149,9 +150,15 @@ class FrameEntry:
         if CAMERA in self.fields:
             return read_camera(self.cameras_path, self._text(CAMERA)).of_image(width, height)
         pose = self.pose()
-        holder = self.fields if self.fields.keys() & {"camera_intrinsics", "camera_angle_x"} else self.shared
+        own = self.fields.keys() & {"camera_intrinsics", "camera_angle_x", *KEYS}
+        holder = self.fields if own else self.shared
         if "camera_intrinsics" in holder:
-            return self._camera_from_intrinsics(pose, holder["camera_intrinsics"], width, height)
+            self._require_size(width, height)
+            values = numbers(holder["camera_intrinsics"], 4, self.where, "camera_intrinsics")
+            return self._camera_of(values, "camera_intrinsics", pose, width, height)
+        values = stated_intrinsics(self.shared | self.fields, width, height, self.where)
+        if values is not None:
+            return self._camera_of(values, ", ".join(KEYS), pose, width, height)
         if "camera_angle_x" not in holder:
             raise InputError(
                 self.where,
@@ -210,13 +217,8 @@ class FrameEntry:
         power = torch.tensor(watts, dtype=torch.float64)
         return torch.tensor(position, dtype=torch.float64), power / WATTS_PER_INTENSITY
 
-    def _camera_from_intrinsics(self, pose: Tensor, intrinsics: object, width: int, height: int) -> Camera:
-        cx, cy, fx, fy = numbers(intrinsics, 4, self.where, "camera_intrinsics")
-        place = f"{self.where}.camera_intrinsics"
-        longest = longest_focal(max(width, height))
-        if min(fx, fy) < SHORTEST or max(fx, fy) > longest:
-            expected = f"focal lengths in pixels, above 0 and up to {longest:g}"
-            raise InputError(place, expected=expected, found=f"{fx:g}, {fy:g}", remedy="Correct them.")
+    def _require_size(self, width: int, height: int) -> None:
+        """Refuse an image of another size than is stated."""
         for key, expected in (("w", width), ("h", height)):
             stated = self.fields.get(key, self.shared.get(key, expected))
             if stated != expected:
@@ -224,12 +226,21 @@ class FrameEntry:
                 raise InputError(
                     self.image_path, expected=f'"{key}": {stated!r} of {self.where}', found=found, remedy="Correct one."
                 )
+
+    def _camera_of(self, intrinsics: list[float], keys: str, pose: Tensor, width: int, height: int) -> Camera:
+        """The camera of cx, cy, fx, fy under these keys, if an image of this size can have it."""
+        cx, cy, fx, fy = intrinsics
+        place = f"{self.where}.{keys}"
+        longest = longest_focal(max(width, height))
+        if min(fx, fy) < SHORTEST or max(fx, fy) > longest:
+            expected = f"focal lengths in pixels, above 0 and up to {longest:g}"
+            raise InputError(place, expected=expected, found=f"{fx:g}, {fy:g}", remedy="Correct them.")
         if abs(cx - 0.5 * width) > 0.25 * width or abs(cy - 0.5 * height) > 0.25 * height:
             raise InputError(
                 self.image_path,
                 expected=f"an image whose middle is near the principal point ({cx:g}, {cy:g}) of {place}",
                 found=f"{width} × {height} pixels",
-                remedy="Use intrinsics [cx, cy, fx, fy] of this image size.",
+                remedy="Use intrinsics of this image size.",
             )
         across, down, stated = 2.0 * cx / width, 2.0 * cy / height, self.fields.keys() | self.shared.keys()
         if not {"w", "h"} <= stated and abs(across - down) < ALIKE and abs(across - 1.0) > ELSEWHERE:

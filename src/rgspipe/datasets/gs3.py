@@ -14,6 +14,7 @@ import torch
 
 from rgspipe.datasets.base_images import base_paths, read_base
 from rgspipe.datasets.classes import OCCLUSIONS
+from rgspipe.datasets.exif_exposure import EXPOSE_ALIKE, check_exposures, exposure_of
 from rgspipe.datasets.frames import FrameEntry, read_entries
 from rgspipe.datasets.images import read_colour, read_depth, read_mask, read_vectors
 from rgspipe.datasets.info import INFO, DatasetInfo, read_info
@@ -52,12 +53,19 @@ def load_dataset(root: str | Path, *, train: bool = True, test: bool = True, tar
 
 
 def load_split(root: Path, split: str, info: DatasetInfo | None) -> tuple[View, ...]:
-    """The views of transforms_<split>.json, each with its light; without lights where no frame names one."""
+    """The views of transforms_<split>.json, each with its light; without lights where no frame names one.
+
+    Raises:
+        InputError: a file is missing, broken or inconsistent, or images under known lights state other exposures.
+    """
     what = f"the cameras and lights of the {split} views, laid out as docs/guides/your_own_scene.md says"
     entries = read_entries(root / f"transforms_{split}.json", what)
     lit = any(entry.names_light for entry in entries)
     reading = progress_bar(entries, f"reading {split} views", unit="view")
-    return with_saturation(entries, [_load_view(entry, root, info, light=lit, depth=True) for entry in reading])
+    views = [_load_view(entry, root, info, light=lit, depth=True) for entry in reading]
+    if lit:
+        check_exposures([(view.name, view.exposure) for view in views], root / f"transforms_{split}.json", EXPOSE_ALIKE)
+    return with_saturation(entries, views)
 
 
 def load_target(folder: str | Path, base: str | Path | None = None) -> Target:
@@ -194,8 +202,11 @@ def _load_view(
         surface.albedo,
         emitters=None if entry.emitter_path is None else read_mask(entry.emitter_path, camera) >= 0.5,
         lighting=entry.lighting,
+        exposure=exposure_of(entry.image_path),
     )
-    return view if base is None else replace(view, base=read_base(base, camera, mask))
+    if base is None:
+        return view
+    return replace(view, base=read_base(base, camera, mask), base_exposure=exposure_of(base))
 
 
 def _name(path: Path, root: Path) -> str:

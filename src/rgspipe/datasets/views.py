@@ -37,6 +37,8 @@ class View:
         base: (H, W, 3) the same with the lamps off, in a fit target.
         lighting: of photographs under unknown lamps, the name of those that were on: all of one name share them; "off"
             is what was there with all of them off.
+        exposure: shutter time × ISO / aperture² that the image's file states; None where it does not.
+        base_exposure: what that of `base` states.
 
     Raises:
         InputError: the camera or the light is none, or image and alpha are no numbers of the camera's size.
@@ -54,6 +56,8 @@ class View:
     emitters: Tensor | None = None
     base: Float[Tensor, "H W 3"] | None = None
     lighting: str = ""
+    exposure: float | None = None
+    base_exposure: float | None = None
 
     def __post_init__(self) -> None:
         as_one_of(self.camera, Camera, "camera", "Camera.look_at makes one.")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -95,6 +96,35 @@ def test_views_of_unknown_exposure(freeze: Artifact, images: list[torch.Tensor],
     write_display_target(tmp_path / "exposed", [0.5 * images[0], 0.2 * images[1]])
     light, content = _fitted(freeze, tmp_path / "out", tmp_path / "exposed", fit__exposure="free")
     assert _error(light) < 2e-3 and content["exposures"][1] == pytest.approx(0.4, rel=0.02)
+
+
+def _stating(exposures: list[float], bases: list[float] | None = None) -> list[View]:
+    """Grey views whose files state exposures, and bases that do."""
+    grey, alpha = torch.full((RESOLUTION, RESOLUTION, 3), 0.3), torch.ones(RESOLUTION, RESOLUTION)
+    views = [
+        View(f"v{index}", camera, grey, alpha, exposure=exposure)
+        for index, (camera, exposure) in enumerate(zip(room_cameras(RESOLUTION), exposures, strict=True))
+    ]
+    if bases is None:
+        return views
+    return [replace(view, base=0.5 * grey, base_exposure=base) for view, base in zip(views, bases, strict=True)]
+
+
+def test_views_that_state_other_exposures_are_refused_where_these_are_known() -> None:
+    captured_views(_stating([1.0, 1.03]), "a", _config())
+    with pytest.raises(InputError, match=r"target a: .*v1 exposed 4 times as much as v0.*Set fit\.exposure=free"):
+        captured_views(_stating([1.0, 4.0]), "a", _config())
+    assert captured_views(_stating([1.0, 4.0]), "a", _config(fit__exposure="free"))[1].exposure_free
+
+
+def test_a_base_that_states_another_exposure_than_its_view_is_refused_where_its_factor_is_known() -> None:
+    captured_views(_stating([1.0, 4.0], [1.0, 4.0]), "a", _config(fit__exposure="free"))
+    for exposures, exposure in (([1.0, 1.0], "known"), ([1.0, 4.0], "free")):
+        with pytest.raises(InputError, match=r"v0 with the lamps off exposed 4 times as much as v0.*fit\.base_scale"):
+            captured_views(_stating(exposures, [4.0, 4.0]), "a", _config(fit__exposure=exposure))
+    captured_views(_stating([1.0, 1.0], [4.0, 4.0]), "a", _config(fit__base_scale="free"))
+    with pytest.raises(InputError, match=r"v1 with the lamps off exposed 2 times as much as v0 with the lamps off"):
+        captured_views(_stating([1.0, 1.0], [2.0, 4.0]), "a", _config(fit__base_scale="free"))
 
 
 def test_radiance_is_not_clipped_and_a_stated_clip_counts(images: list[torch.Tensor]) -> None:

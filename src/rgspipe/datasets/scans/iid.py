@@ -13,7 +13,7 @@ import numpy as np
 
 from rgspipe.datasets.scans.frame import DepthImage, Scan, ScanFrame
 from rgspipe.datasets.scans.options import ScanOptions
-from rgspipe.datasets.scans.pictures import read_depth_image
+from rgspipe.datasets.scans.pictures import read_depth_image, size_of
 from rgspipe.datasets.scans.single import chosen, lens_by_field, level_pose
 from rgspipe.errors import InputError
 
@@ -50,7 +50,9 @@ def read(root: Path, options: ScanOptions) -> Scan:
         unit = 1.0 / float(np.nanmedian(stored)) if np.isfinite(stored).any() else 1.0
     field = options.fov or USUAL_FIELD
     lens = lens_by_field(image, field)
-    frame = ScanFrame(image, lens, level_pose(), DepthImage(depth, unit), _partner(root, image, "albedo"))
+    # A network's pixels may have another shape; the field is the same.
+    predicted = DepthImage(depth, unit, lens.resized(*size_of(depth)))
+    frame = ScanFrame(image, lens, level_pose(), predicted, _partner(root, image, "albedo"))
     scale = "of median depth 1, not in metres" if options.depth_unit is None else "by ScanOptions.depth_unit"
     notes = (f"a field of view of {field:g}° is taken for granted (ScanOptions.fov)", f"lengths are {scale}")
     return Scan("iid", image, (), (frame,), options.camera_axes(AXES), notes)

@@ -8,13 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
+from rgspipe.datasets.exif_exposure import differ, exposure_of
 from rgspipe.datasets.exr import write_channels, write_image
 from rgspipe.datasets.gs3_write import frame_entry, write_transforms
 from rgspipe.datasets.info import INFO
 from rgspipe.datasets.scans.frame import Lens, Scan, ScanFrame
 from rgspipe.datasets.scans.lens_check import check_shape
 from rgspipe.datasets.scans.options import ScanOptions
-from rgspipe.datasets.scans.pictures import Picture, exposure_of, read_depth_image, read_picture
+from rgspipe.datasets.scans.pictures import Picture, read_depth_image, read_picture
 from rgspipe.datasets.scans.resample import resampled_colour, resampled_depth, straight_camera
 from rgspipe.errors import InputError
 from rgspipe.progress import progress_bar
@@ -23,9 +24,6 @@ from rgspipe.scene.passes import Passes
 from rgspipe.store.files import write_json
 
 TRANSFORMS = "transforms_train.json"
-
-#: Levels of a mask, of 1, up to which pixels do not count.
-MASKED = 0.5
 
 #: What a camera sees of surfaces that are known.
 Surfaces = Callable[[Camera], Passes]
@@ -87,12 +85,24 @@ def import_scan(scan: Scan, options: ScanOptions, folder: Path, surfaces: Surfac
 
 
 def _exposures(scan: Scan, options: ScanOptions) -> np.ndarray | None:
-    """(V,) exposures by EXIF over their geometric mean; None where one does not say."""
+    """(V,) exposures by EXIF over their geometric mean; None where one does not say, and the others are alike.
+
+    Raises:
+        InputError: one does not say, and the others differ.
+    """
     if options.exposure != "exif":
         return None
     stated = [exposure_of(frame.image) for frame in scan.frames]
     known = np.array([value for value in stated if value is not None])
     if len(known) < len(stated):
+        if differ(known.tolist()):
+            raise InputError(
+                scan.frames[stated.index(None)].image,
+                expected="shutter, aperture and ISO (EXIF), as in other photographs, whose exposures differ by a "
+                f"factor of {known.max() / known.min():.3g}",
+                found=f"not all three in {len(stated) - len(known)} of {len(stated)} photographs",
+                remedy="Leave those out, or take all as they are: ScanOptions(exposure='same').",
+            )
         return None
     return known / np.exp(np.log(known).mean())
 
@@ -111,7 +121,7 @@ def _written(
         light = np.where(clipped, np.maximum(light, limit), light)
         entry["saturated_from"] = float(limit / np.float32(exposure))
     write_image(path.with_suffix(".exr"), light / np.float32(exposure))
-    passes = _measured(frame, camera, options) if surfaces is None else surfaces(camera)
+    passes = _measured(frame, camera) if surfaces is None else surfaces(camera)
     used = _used(frame, picture, camera)
     if used is not None:
         passes = replace(passes, depth=None if passes.depth is None else np.where(used, passes.depth, np.nan))
@@ -122,13 +132,15 @@ def _written(
     return frame_entry(f"{path.parent.name}/{path.name}", camera, surfaces=kinds) | entry, share
 
 
-def _measured(frame: ScanFrame, camera: Camera, options: ScanOptions) -> Passes:
-    """Depth and predicted albedo of a frame, as far as it has them."""
+def _measured(frame: ScanFrame, camera: Camera) -> Passes:
+    """Depth and predicted albedo of a frame, as far as it has them; networks write albedo in sRGB or floats."""
     depth = albedo = None
     if frame.depth is not None:
-        depth = resampled_depth(read_depth_image(frame.depth), camera, frame.depth.lens or frame.lens)
+        stored, lens = read_depth_image(frame.depth), frame.depth.lens or frame.lens
+        check_shape(frame.depth.path, stored.shape, lens)
+        depth = resampled_depth(stored, camera, lens)
     if frame.albedo is not None:
-        albedo, _ = resampled_colour(read_picture(frame.albedo, options.response).light, None, camera, frame.lens)
+        albedo, _ = resampled_colour(read_picture(frame.albedo, "srgb").light, None, camera, frame.lens)
     if albedo is not None and frame.material is not None:
         material, _ = resampled_colour(read_picture(frame.material, "linear").light, None, camera, frame.lens)
         albedo = albedo * (1.0 - np.clip(material[..., 1:2], 0.0, 1.0))
@@ -148,7 +160,8 @@ def _used(frame: ScanFrame, picture: Picture, camera: Camera) -> np.ndarray | No
     if frame.mask is not None:
         mask = read_picture(frame.mask, "linear")
         check_shape(frame.mask, mask.light.shape, frame.lens)
-        hidden += [mask.hidden, (mask.light <= MASKED).any(axis=2)]
+        # Masks may be of levels 0 and 1: whatever is not black counts.
+        hidden += [mask.hidden, (mask.light <= 0.0).any(axis=2)]
     parts = [part for part in hidden if part is not None]
     return ~np.any([_shown(part, camera, frame.lens) for part in parts], axis=0) if parts else None
 

@@ -47,7 +47,7 @@ def check_lens(lens: Lens, where: str | Path) -> None:
 
 
 def check_shape(path: Path, shape: tuple[int, ...], lens: Lens) -> None:
-    """Refuse a photograph of another shape than its intrinsics: it was turned or cropped; another size is fine.
+    """Refuse an image of another shape than its intrinsics: it was turned or cropped; another size is fine.
 
     Raises:
         InputError: naming both.
@@ -56,7 +56,7 @@ def check_shape(path: Path, shape: tuple[int, ...], lens: Lens) -> None:
     if abs(width * lens.height / (height * lens.width) - 1.0) > SAME_SHAPE:
         raise InputError(
             path,
-            expected=f"a photograph of the shape of its intrinsics, {lens.width} × {lens.height}",
+            expected=f"an image of the shape of its intrinsics, {lens.width} × {lens.height}",
             found=f"{width} × {height} pixels",
-            remedy="Do not turn or crop photographs, or change the intrinsics with them.",
+            remedy="Do not turn or crop images, or change the intrinsics with them.",
         )

@@ -23,10 +23,10 @@ class ScanOptions(Options):
     resolution: int = option(160, low=8, high=8192)
     """pixels along the longer side that photographs are reduced to"""
     response: Literal["srgb", "linear"] = "srgb"
-    """how levels of PNG and JPEG rise with light; EXR is linear"""
+    """how levels of PNG and JPEG photographs rise with light; EXR is linear, and albedo maps in levels are sRGB"""
     exposure: Literal["exif", "same"] = "exif"
-    """exif: photographs are made alike by shutter, aperture and ISO where all of them state them; same: taken as they
-    are"""
+    """exif: photographs are made alike by shutter, aperture and ISO where all of them state them, and refused where
+    some do and differ; same: taken as they are"""
     axes: Literal["layout", "opengl", "opencv"] = "layout"
     """axes of the cameras, where files do not keep to their layout: y up and z backwards, or y down and z forwards"""
     depth_unit: float | None = option(None, low=1e-9, high=1e9)

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
-from PIL import ExifTags
 
 from rgspipe.datasets.display_image import DAMAGED, opened, read_levels, saturated_from
 from rgspipe.datasets.exr import read_channels
@@ -20,11 +19,11 @@ from rgspipe.datasets.scans.raw_image import RAW, read_raw
 from rgspipe.errors import InputError
 from rgspipe.scene import srgb
 
-#: What a camera can have been set to: shutter [s], ISO and f-number; what is beyond it is damaged.
-EXPOSED = ((1e-7, 1e5), (1.0, 1e8), (0.1, 1e3))
-
 #: Alpha from which on a pixel is opaque; floats of renderers may miss 1 by this.
 OPAQUE = 1.0 - 1e-3
+
+#: Level of 16-bit depth that tells no distance.
+FARTHEST = 65535
 
 Pixels = npt.NDArray[np.float32]
 
@@ -92,25 +91,6 @@ def read_depth_image(image: DepthImage) -> Pixels:
     return np.where(known, stored * image.unit, np.nan).astype(np.float32)
 
 
-def exposure_of(path: Path) -> float | None:
-    """Shutter time × ISO / aperture², by the file's EXIF; None where it does not state all three."""
-    if path.suffix.lower() in (".exr", ".hdr"):
-        return None
-    keys = (ExifTags.Base.ExposureTime, ExifTags.Base.ISOSpeedRatings, ExifTags.Base.FNumber)
-    try:
-        with opened(input_file(path, "a photograph"), path, ["JPEG", "PNG"]) as file:
-            tags = file.getexif().get_ifd(ExifTags.IFD.Exif)
-        shutter, sensitivity, aperture = (float(np.ravel(tags.get(key, 0))[0]) for key in keys)
-    except InputError:
-        raise
-    except (*DAMAGED, TypeError, ZeroDivisionError):
-        # Whether its pixels can be read is asked elsewhere.
-        return None
-    values = zip((shutter, sensitivity, aperture), EXPOSED, strict=True)
-    stated = all(least <= value <= most for value, (least, most) in values)
-    return shutter * sensitivity / aperture**2 if stated else None
-
-
 @timed
 def _stored_depth(path: Path) -> npt.NDArray[np.float64]:
     suffix = path.suffix.lower()
@@ -133,7 +113,8 @@ def _stored_depth(path: Path) -> npt.NDArray[np.float64]:
             found="8 bits, which is a picture of depth",
             remedy="Export the depth itself.",
         )
-    return levels[..., 0].astype(np.float64)
+    # The highest level is all that is too far as well, or nothing measured.
+    return np.where(levels == FARTHEST, np.nan, levels.astype(np.float64))[..., 0]
 
 
 def _confidence(path: Path) -> Pixels:

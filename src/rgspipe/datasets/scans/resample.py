@@ -57,7 +57,7 @@ def resampled_colour(
 
 
 def resampled_depth(depth: npt.NDArray[np.float32], camera: Camera, lens: Lens) -> npt.NDArray[np.float32]:
-    """(H, W) medians of planar depth over the pixels of a camera; NaN where less than half is known.
+    """(H, W) medians of planar depth over the pixels of a camera; NaN where less than half is known or in the image.
 
     1/z is linear in the image of a plane, so that is what is interpolated, within a surface.
     """
@@ -103,7 +103,10 @@ def _corners(
 
 
 def _depth_at(depth: npt.NDArray[np.float32], columns: Numbers, rows: Numbers) -> Numbers:
-    """Depth at places (…,): between the four around it where they are of one surface, else the nearest pixel's."""
+    """Depth at places (…,): between the four around it where they are of one surface, else the nearest pixel's.
+
+    NaN outside of the image: another camera than the photograph's may have looked at less.
+    """
     corners = _corners(columns, rows, depth.shape)
     values = np.stack([depth[row, column].astype(np.float64) for row, column, _ in corners])
     weights = np.stack([weight for _, _, weight in corners])
@@ -111,8 +114,10 @@ def _depth_at(depth: npt.NDArray[np.float32], columns: Numbers, rows: Numbers) -
     nearest = np.take_along_axis(values, weights.argmax(axis=0)[None], axis=0)[0]
     values = np.where(counts, values, nearest)
     smooth = values.max(axis=0) <= (1.0 + SAME_SURFACE) * values.min(axis=0)
+    inside = (columns >= 0.0) & (columns <= depth.shape[1]) & (rows >= 0.0) & (rows <= depth.shape[0])
     with np.errstate(invalid="ignore"):
-        return np.where(smooth, weights.sum(axis=0) / (weights / values).sum(axis=0), nearest)
+        found = np.where(smooth, weights.sum(axis=0) / (weights / values).sum(axis=0), nearest)
+    return np.where(inside, found, np.nan)
 
 
 def _middle(samples: Numbers) -> Numbers:

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from rgspipe.datasets.display_image import FORMATS
+from rgspipe.datasets.json_file import shown
 from rgspipe.datasets.scans.frame import DepthImage, Lens, Scan, ScanFrame
 from rgspipe.datasets.scans.options import ScanOptions
 from rgspipe.datasets.scans.pictures import size_of
@@ -23,6 +24,9 @@ WANTED = "color/, pose/ and intrinsic/"
 
 MILLIMETRE = 1e-3
 
+#: Entries of a camera's place beside the other one's that are next to nothing: a millimetre, a milliradian.
+BESIDE = 1e-3
+
 
 def found_in(root: Path) -> bool:
     """Whether the folder has this layout."""
@@ -33,7 +37,7 @@ def read(root: Path, options: ScanOptions) -> Scan:
     """The cameras of all frames that were tracked.
 
     Raises:
-        InputError: no frames, broken files, or poses that are not rigid.
+        InputError: no frames, broken files, poses that are not rigid, or cameras of depth and colour in two places.
     """
     images = sorted(
         (path for path in (root / "color").iterdir() if path.suffix.lower() in FORMATS and path.stem.isdecimal()),
@@ -46,6 +50,7 @@ def read(root: Path, options: ScanOptions) -> Scan:
         raise InputError(
             root / "color", expected="frames that were tracked", found=found, remedy="Export the scan anew."
         )
+    _check_one_place(root)
     colour = _lens(root / "intrinsic" / "intrinsic_color.txt", tracked[0][0])
     frames = tuple(_frame(root, image, pose, colour, options) for image, pose in tracked)
     lost = len(images) - len(tracked)
@@ -65,6 +70,20 @@ def _frame(root: Path, image: Path, matrix: np.ndarray, lens: Lens, options: Sca
     if depth.is_file():
         measured = DepthImage(depth, unit, _lens(own, depth) if own.is_file() else None)
     return ScanFrame(image, lens, placed(matrix, where, options, AXES), measured)
+
+
+def _check_one_place(root: Path) -> None:
+    """Depth is taken along the rays of the photograph, so that both cameras must be where the pose is."""
+    for path in (root / "intrinsic" / f"extrinsic_{name}.txt" for name in ("color", "depth")):
+        if path.is_file() and (root / "depth").is_dir():
+            matrix = read_numbers(path, 4, "extrinsics")
+            if matrix.shape != (4, 4) or not np.abs(matrix - np.eye(4)).max() <= BESIDE:  # also where it is NaN
+                raise InputError(
+                    path,
+                    expected="the identity: cameras of depth and colour in one place",
+                    found=shown(matrix.tolist()),
+                    remedy="Bring depth to the colour camera, and remove this file; or go without depth/.",
+                )
 
 
 def _lens(path: Path, image: Path) -> Lens:

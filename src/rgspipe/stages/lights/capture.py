@@ -9,6 +9,7 @@ from dataclasses import replace
 import torch
 
 from rgspipe.config import RgspipeConfig
+from rgspipe.datasets.exif_exposure import EXPOSE_ALIKE, check_exposures
 from rgspipe.datasets.views import View
 from rgspipe.degradation.target_capture import captured
 from rgspipe.errors import InputError
@@ -27,8 +28,9 @@ def captured_views(views: Sequence[View], target: str, config: RgspipeConfig) ->
 
     Raises:
         InputError: the paper's method is asked for unknown exposures or given a base, only some of the views have a
-            base, or one is stored in 8 bits beside images that are not.
+            base, one is stored in 8 bits beside images that are not, or files state other exposures than are known.
     """
+    _check_exposures(views, f"target {target}", config)
     free, base = config.fit.exposure == "free", _base(views, target, config)
     taken, white = captured(views, target, config.target_capture)
     if config.fit.method == "paper_adam":
@@ -43,6 +45,24 @@ def captured_views(views: Sequence[View], target: str, config: RgspipeConfig) ->
     clip = white if white is not None else config.fit.clip
     capture = ImageCapture(free, clip) if clip is not None else _found_capture(taken, free)
     return taken, capture if base is None else replace(capture, base=base)
+
+
+def _check_exposures(views: Sequence[View], where: str, config: RgspipeConfig) -> None:
+    """Refuse what files state against exposures that are taken for alike: of views, and of each with its base.
+
+    Raises:
+        InputError: says which are not, and what to set.
+    """
+    if config.fit.exposure != "free":
+        remedy = "Set fit.exposure=free, or photograph all with one exposure."
+        check_exposures([(view.name, view.exposure) for view in views], where, remedy)
+    off = [(f"{view.name} with the lamps off", view.base_exposure) for view in views]
+    if config.fit.base_scale == "free":
+        check_exposures(off, where, EXPOSE_ALIKE)
+        return
+    remedy = "Photograph with one exposure with the lamps on and off, or set fit.base_scale=free."
+    for view, without in zip(views, off, strict=True):
+        check_exposures([(view.name, view.exposure), without], where, remedy)
 
 
 def _base(views: Sequence[View], target: str, config: RgspipeConfig) -> BaseImages | None:
