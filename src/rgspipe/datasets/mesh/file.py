@@ -20,6 +20,7 @@ from rgspipe.datasets.mesh.gltf_check import check_gltf
 from rgspipe.datasets.mesh.links import FORMATS, GLTF, mesh_links
 from rgspipe.datasets.mesh.obj_text import plain_obj
 from rgspipe.datasets.mesh.options import MeshOptions
+from rgspipe.datasets.mesh.ply_polygons import with_triangles
 from rgspipe.datasets.mesh.texture import check_texture, texture_light
 from rgspipe.datasets.ply.header import COLOURS, check_colours, check_rows, without_texture
 from rgspipe.datasets.reading_limits import RAISE, reading_limits, timed
@@ -130,7 +131,8 @@ def _loaded(path: Path) -> Any:
                 return trimesh.load_scene(path, **options)
             content = path.read_bytes()
             content = plain_obj(content, path) if kind == ".obj" else without_texture(content)
-            return trimesh.load_scene(io.BytesIO(content), file_type=kind[1:], **options)
+            apart = {"split_groups": True} if kind == ".obj" else {}
+            return trimesh.load_scene(io.BytesIO(content), file_type=kind[1:], **options, **apart)
     except InputError:
         raise
     except Exception as error:  # the library says of no format what it raises
@@ -156,6 +158,7 @@ def _placed(content: Any, path: Path) -> list[tuple[Any, Numbers]]:
 
 def _part(part: Any, matrix: Numbers, *, linear: bool, path: Path) -> TriangleMesh:
     """One mesh, moved; `linear` says whether its vertices' colours are light, as in glTF, or display values."""
+    part = with_triangles(part, path)
     vertices, faces = np.asarray(part.vertices, np.float64), np.asarray(part.faces, np.int64)
     if faces.min() < 0 or faces.max() >= len(vertices):
         found = f"a triangle with point {int(faces.max())} of {len(vertices)}"
@@ -208,12 +211,10 @@ def _material(material: Any) -> tuple[Numbers, Image.Image | None]:
     if isinstance(material, trimesh.visual.material.PBRMaterial):
         level, image = material.baseColorFactor, material.baseColorTexture
         level = np.full(3, 255) if level is None else level
-    else:
-        # Of one that says nothing of a colour the library invents a grey.
-        level = material.diffuse if "kd" in material.kwargs else np.full(3, np.nan)
-        image = material.image
-    colour = np.asarray(level)[:3].astype(np.float64) / 255.0
-    return colour, image
+        return np.asarray(level)[:3].astype(np.float64) / 255.0, image
+    # Of one that says nothing of a colour the library invents a grey, of none at all a grey picture without a format.
+    made_up = material.image is not None and material.image.format is None
+    return np.asarray(material.kwargs.get("kd", [np.nan] * 3), np.float64), None if made_up else material.image
 
 
 def _joined(parts: list[TriangleMesh], path: Path, content: Any) -> TriangleMesh:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from rgspipe.datasets.mesh.obj_faces import plain_faces
 from rgspipe.errors import InputError
 
 #: A face that counts back from the last point, which those who decode it count from the end of the file; and one with
@@ -19,10 +20,11 @@ COUNTED = (b"v", b"vt", b"vn")
 
 
 def plain_obj(content: bytes, path: Path) -> bytes:
-    """The same mesh with a line for each statement, words apart by one space, points counted from the first, UTF-8.
+    """The same mesh with a line for each statement, words apart by one space, points counted from the first, UTF-8;
+    faces as `plain_faces` has them.
 
     Raises:
-        InputError: a face has point 0, or counts back beyond the first.
+        InputError: a face has point 0, counts back beyond the first, or crosses itself.
     """
     content = re.sub(rb"\\\n", b" ", re.sub(rb"\r\n?", b"\n", content))
     content = re.sub(rb"(?m)^ +", b"", content.replace(b"\t", b" "))
@@ -30,7 +32,7 @@ def plain_obj(content: bytes, path: Path) -> bytes:
         raise _refusal(path, "0")
     if BACKWARDS.search(content):
         content = _forwards(content, path)
-    return content.decode("utf-8", "backslashreplace").encode()
+    return plain_faces(content, path).decode("utf-8", "backslashreplace").encode()
 
 
 def _forwards(content: bytes, path: Path) -> bytes:
