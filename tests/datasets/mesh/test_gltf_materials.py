@@ -162,6 +162,14 @@ def test_the_end_of_a_texture_that_does_not_repeat_is_not_its_begin(tmp_path: Pa
         np.testing.assert_allclose(found, LIGHT[[expected] * 2], atol=1e-7)
 
 
+@pytest.mark.parametrize("mode", ["MASK", "BLEND"])
+def test_it_is_said_that_what_one_sees_through_is_taken_for_opaque(tmp_path: Path, mode: str) -> None:
+    assert read_mesh(write(tmp_path, nothing)).remarks == ()
+    path = write(tmp_path, lambda content, material: content["materials"][0].update(alphaMode=mode))
+    (remark,) = read_mesh(path).remarks
+    assert "taken for opaque" in remark
+
+
 def test_levels_of_16_bits_of_grey_are_not_cut_off(tmp_path: Path) -> None:
     """They were white."""
 

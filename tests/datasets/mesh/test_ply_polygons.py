@@ -107,3 +107,14 @@ def test_binary_lists_that_differ_in_length_but_not_together_are_refused(tmp_pat
     path = write(tmp_path / "a.ply", "binary_little_endian", points, [(0, 1, 2, 3), (1, 4, 5), (1, 4, 6, 7, 5)])
     with pytest.raises(InputError, match=r"a\.ply.*Triangulate the faces when you export it"):
         read_mesh(path)
+
+
+def test_strips_of_triangles_are_refused(tmp_path: Path) -> None:
+    """They were left out."""
+    path = write(tmp_path / "a.ply", "ascii", SQUARES, [(0, 1, 2)])
+    text = path.read_text().replace(
+        "end_header", "element tristrips 1\nproperty list int int vertex_indices\nend_header"
+    )
+    path.write_text(text + "4 0 2 3 5\n")
+    with pytest.raises(InputError, match=r"a\.ply: element tristrips: expected faces, found strips of triangles"):
+        read_mesh(path)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import warnings
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,7 @@ from rgspipe.datasets.mesh.options import MeshOptions
 from rgspipe.datasets.mesh.paint import check_shares, paint_of
 from rgspipe.datasets.mesh.ply_polygons import with_triangles
 from rgspipe.datasets.mesh.texture import check_texture
-from rgspipe.datasets.ply.header import check_colours, check_rows, without_texture
+from rgspipe.datasets.ply.header import check_colours, check_rows, check_strips, without_texture
 from rgspipe.datasets.reading_limits import RAISE, reading_limits, timed
 from rgspipe.errors import InputError
 from rgspipe.scene.mesh import Numbers, Paint, TriangleMesh
@@ -32,6 +33,10 @@ WHAT = "a triangle mesh (.ply, .obj, .glb or .gltf)"
 
 #: From y up to z up, as Blender and glTF have it: (x, −z, y).
 UPRIGHT = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
+
+
+#: What is said of a glTF whose materials have an alphaMode.
+SEE_THROUGH = "Materials of the mesh that one can see through (alphaMode MASK or BLEND) are taken for opaque."
 
 
 @timed
@@ -54,6 +59,8 @@ def read_mesh(path: str | Path, options: MeshOptions | None = None) -> TriangleM
         raise
     except (ValueError, IndexError, TypeError, KeyError, AttributeError, OSError) as error:
         raise _broken(path, error) from error
+    if not all(material.opaque for material in materials):
+        mesh = replace(mesh, remarks=(SEE_THROUGH,))
     scaled = np.diag([*[options.unit] * 3, 1.0])
     return _checked(mesh.moved(scaled @ UPRIGHT if is_y_up(path, options) else scaled), path)
 
@@ -113,6 +120,7 @@ class OwnFiles(trimesh.resolvers.FilePathResolver):
         if self._path.suffix.lower() == ".ply":
             check_rows(self._path)
             check_colours(self._path)
+            check_strips(self._path)
         if self._path.suffix.lower() == ".ply" and len(self._links.textures) > 1:
             found, remedy = f"{len(self._links.textures)}", "Export it as GLB."
             raise InputError(self._path, expected="one texture at most in a PLY", found=found, remedy=remedy)
@@ -202,4 +210,4 @@ def _checked(mesh: TriangleMesh, path: Path) -> TriangleMesh:
         raise InputError(path, expected=WHAT, found=found, remedy="Export it again.")
     paint = mesh.paint
     paint = Paint(paint.corners[real], paint.uv[real], paint.texture[real], paint.textures)
-    return TriangleMesh(mesh.vertices, mesh.faces[real], paint)
+    return replace(mesh, faces=mesh.faces[real], paint=paint)

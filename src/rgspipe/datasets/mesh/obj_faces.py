@@ -19,14 +19,14 @@ APART = (b"g plain", b"g textured")
 
 
 def plain_faces(content: bytes, path: Path) -> bytes:
-    """The same mesh without comments beside faces and without groups, unless faces with and without places in a
+    """The same mesh without comments beside numbers and without groups, unless faces with and without places in a
     texture stand in one file: these are two groups, without normals. Of polygons only those stay that a fan covers.
 
     Raises:
         InputError: a polygon crosses itself.
     """
     content = re.sub(rb"(?m)^g(?: .*)?$", b"", content)
-    content = re.sub(rb"(?m)^(f [^#\n]*)#.*$", rb"\1", content)
+    content = re.sub(rb"(?m)^((?:f|v[tn]?) [^#\n]*)#.*$", rb"\1", content)
     kinds = _kinds(content)
     mixed = len({corner for kind in kinds for corner in kind}) > 1
     if not mixed and all(len(kind) < 4 for kind in kinds):

@@ -30,6 +30,9 @@ LIST = "list"
 PLACES, COLOURS = ("x", "y", "z", "nx", "ny", "nz"), ("red", "green", "blue", "alpha")
 COLOUR_KINDS = ("u1", "f4", "f8")
 
+#: The element of strips of triangles.
+STRIPS = "tristrips"
+
 #: The list of a face's places in a texture.
 FACE_PLACES = "texcoord"
 
@@ -91,6 +94,24 @@ def check_colours(path: Path) -> None:
                     found=kind,
                     remedy="Export the mesh again with colours in bytes.",
                 )
+
+
+def check_strips(path: Path) -> None:
+    """Refuse strips of triangles, which those who decode a mesh leave out.
+
+    What is no header at all is left to the reader.
+
+    Raises:
+        InputError: names the element.
+    """
+    for element in _listed(_head(path)[1]):
+        if element.name == STRIPS and element.count:
+            raise InputError(
+                f"{path}: element {element.name}",
+                expected="faces",
+                found="strips of triangles",
+                remedy="Triangulate the faces when you export it.",
+            )
 
 
 def without_texture(content: bytes) -> bytes:
