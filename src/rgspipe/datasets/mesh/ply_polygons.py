@@ -88,5 +88,5 @@ def _texture_places(elements: dict[str, Any], corners: np.ndarray, points: np.nd
     faces, vertices = elements["face"]["data"], elements["vertex"]["data"]
     if FACE_PLACES in _names(faces):
         return np.concatenate(_lists(faces, FACE_PLACES, path)).reshape(-1, 2)[corners]
-    names = next(pair for pair in PLACES if set(pair) <= set(_names(vertices)))
+    names = next((pair for pair in PLACES if set(pair) <= set(_names(vertices))), PLACES[-1])
     return np.column_stack([vertices[name] for name in names])[points]

@@ -53,14 +53,14 @@ def clipped(points: Numbers, polygons: Sequence[Sequence[int] | Indices], path: 
     return found
 
 
+@np.errstate(all="ignore")  # of points that are refused later
 def _fans_are_wrong(corners: Numbers) -> np.ndarray:
     """(M,) of polygons (M, k, 3); those that are a little bent, as quads of round things, are not."""
     arms = corners - corners[:, :1]
     crosses = np.cross(arms[:, 1:-1], arms[:, 2:])
     total = crosses.sum(axis=1)
     length, size = np.linalg.norm(total, axis=1), np.linalg.norm(crosses, axis=2).sum(axis=1)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        along = np.einsum("mkd,md->mk", crosses, total) / length[:, None]
+    along = np.einsum("mkd,md->mk", crosses, total) / length[:, None]
     outside = np.where(length > SLIVER * size, -along.min(axis=1), size)
     return outside > SLIVER * (arms**2).sum(axis=2).max(axis=1)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -163,7 +164,7 @@ def check_rows(path: Path) -> None:
         rows = (words for line in stream if (words := line.split()))
         read = 0
         for element in _listed(lines):
-            for number, words in enumerate(itertools.islice(rows, element.count)):
+            for number, words in enumerate(itertools.islice(rows, min(element.count, sys.maxsize))):
                 read += 1
                 if not _fits(words, element.kinds):
                     expected = f"a row of {len(element.kinds)} properties"
