@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -79,3 +81,19 @@ def painted(path: Path) -> np.ndarray:
         face, shares = (0, [1 - x, x - y, y]) if y <= x else (1, [1 - y, x, y - x])
         found.append(mesh.paint.at(np.array([face]), np.array([shares]))[0])
     return np.round(255.0 * srgb.encode(np.array(found)))
+
+
+def gltf_parts(folder: Path) -> tuple[dict, bytes]:
+    """The JSON and the buffer of a textured square."""
+    trimesh.Scene(textured_square(quarters())).export(folder / "square.glb")
+    content = (folder / "square.glb").read_bytes()
+    length = int.from_bytes(content[12:16], "little")
+    return json.loads(content[20 : 20 + length]), content[28 + length :]
+
+
+def write_glb(path: Path, content: dict, buffer: bytes) -> Path:
+    text = json.dumps(content).encode()
+    text = text.ljust(-(-len(text) // 4) * 4)
+    chunks = struct.pack("<I", len(text)) + b"JSON" + text + struct.pack("<I", len(buffer)) + b"BIN\0" + buffer
+    path.write_bytes(b"glTF" + struct.pack("<II", 2, 12 + len(chunks)) + chunks)
+    return path

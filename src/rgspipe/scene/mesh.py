@@ -55,11 +55,13 @@ class TriangleMesh:
         vertices: (V, 3) scene units.
         faces: (F, 3) int64, corners; which way round says nothing.
         paint: their colours.
+        remarks: sentences on what a file said that is not in them.
     """
 
     vertices: Numbers
     faces: Indices
     paint: Paint
+    remarks: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.faces)

@@ -178,6 +178,14 @@ def test_text_of_a_ply_has_the_rows_that_it_says(tmp_path: Path, rows: int) -> N
         read_mesh(tmp_path / "a.ply")
 
 
+def test_text_of_a_ply_may_say_more_rows_than_can_be_counted(tmp_path: Path) -> None:
+    """There was a bare ValueError."""
+    lines = text_ply(tmp_path)
+    (tmp_path / "a.ply").write_text("\n".join(lines).replace("element face 12", f"element face {2**63}"))
+    with pytest.raises(InputError, match=r"a\.ply: expected .* rows after the header, found 36"):
+        read_mesh(tmp_path / "a.ply")
+
+
 def text_ply(folder: Path) -> list[str]:
     """Lines of `a.ply`, a box in text."""
     content = trimesh.Trimesh(VERTICES, FACES, process=False).export(file_type="ply", encoding="ascii").decode()

@@ -2,36 +2,16 @@
 
 from __future__ import annotations
 
-import json
 import re
-import struct
 from pathlib import Path
 
 import numpy as np
 import pytest
-import trimesh
 
-from mesh_files import QUARTERS, painted, quarters, textured_square
+from mesh_files import QUARTERS, gltf_parts, painted, write_glb
 from rgspipe.datasets.mesh.file import read_mesh
 from rgspipe.datasets.reading_limits import ReadingLimits, reading_within
 from rgspipe.errors import InputError
-
-
-def gltf_parts(folder: Path) -> tuple[dict, bytes]:
-    """The JSON and the buffer of a textured square."""
-    trimesh.Scene(textured_square(quarters())).export(folder / "square.glb")
-    content = (folder / "square.glb").read_bytes()
-    length = int.from_bytes(content[12:16], "little")
-    return json.loads(content[20 : 20 + length]), content[28 + length :]
-
-
-def write_glb(path: Path, content: dict, buffer: bytes) -> Path:
-    text = json.dumps(content).encode()
-    text = text.ljust(-(-len(text) // 4) * 4)
-    chunks = struct.pack("<I", len(text)) + b"JSON" + text + struct.pack("<I", len(buffer)) + b"BIN\0" + buffer
-    path.write_bytes(b"glTF" + struct.pack("<II", 2, 12 + len(chunks)) + chunks)
-    return path
-
 
 #: The accessor of places in the texture, in the files that are written here.
 UV = 2
@@ -46,6 +26,23 @@ CLAIMS: dict[str, tuple[tuple, object, str]] = {
     "a negative count": (("accessors", 0, "count"), -1, "accessors[0].count: expected a whole number"),
     "a fan": (("meshes", 0, "primitives", 0, "mode"), 6, "triangles or strips"),
     "what must be understood": (("extensionsRequired",), ["KHR_mesh_quantization"], "KHR_mesh_quantization"),
+    "colours in other words": (
+        ("extensionsUsed",),
+        ["KHR_materials_pbrSpecularGlossiness"],
+        "KHR_materials_pbrSpecularGlossiness",
+    ),
+    "places of other points": (("accessors", UV, "count"), 3, "TEXCOORD_0: expected 4 entries, one a point, found 3"),
+    "metal beyond all": (
+        ("materials", 0, "pbrMetallicRoughness", "metallicFactor"),
+        1.5,
+        "metallicFactor: expected a number from 0 to 1",
+    ),
+    "metal in no picture": (
+        ("materials", 0, "pbrMetallicRoughness", "metallicRoughnessTexture"),
+        {"index": 7},
+        "index: expected the number of one of 1",
+    ),
+    "no such sampler": (("textures", 0, "sampler"), 0, "sampler: expected the number of one of 0"),
     "turned textures": (("extensionsUsed",), ["KHR_texture_transform"], "KHR_texture_transform"),
     "a colour outside of the folder": (("images", 0), {"uri": "../t.png"}, "the folder of the mesh or below"),
     "a colour that is not there": (("images", 0), {"uri": "t.png"}, "t.png: expected a texture that a.glb names"),

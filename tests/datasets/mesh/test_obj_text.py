@@ -10,6 +10,7 @@ import pytest
 from mesh_files import QUARTERS, painted, quarters, textured_square
 from rgspipe.datasets.mesh.file import read_mesh
 from rgspipe.errors import InputError
+from rgspipe.scene import srgb
 
 #: Two triangles, the second above the first.
 POINTS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 5], [1, 0, 5], [0, 1, 5]], float)
@@ -54,3 +55,19 @@ def test_names_of_materials_may_be_in_an_old_encoding(tmp_path: Path) -> None:
     for path in (tmp_path / "a.obj", tmp_path / "material.mtl"):
         path.write_bytes(path.read_bytes().replace(b" material_0\n", b" H\xf6lz\n"))
     assert np.array_equal(painted(tmp_path / "a.obj"), QUARTERS)
+
+
+@pytest.mark.parametrize("values", ["128 0 0", "0.5 -0.1 0", "0.5 nan 0", "1.0 0.5 0.5 0.5", "0.5 0.5", "1 2 3 4 5"])
+def test_colours_of_points_that_are_no_three_shares_are_refused(tmp_path: Path, values: str) -> None:
+    """Levels up to 255 all became 1, and of a weight and a colour the weight was taken for red."""
+    (tmp_path / "a.obj").write_text("".join(f"v {x} {y} 0 {values}\n" for x, y in POINTS[:3, :2]) + "f 1 2 3\n")
+    with pytest.raises(InputError, match=r"a\.obj: expected points x y z, or x y z r g b with colours from 0 to 1"):
+        read_mesh(tmp_path / "a.obj")
+
+
+@pytest.mark.parametrize("values", ["0.2 0.4 1.0", "0.2 0.4 1 # of a scan"])
+def test_colours_of_points_are_shares(tmp_path: Path, values: str) -> None:
+    (tmp_path / "a.obj").write_text("".join(f"v {x} {y} 0 {values}\n" for x, y in POINTS[:3, :2]) + "f 1 2 3\n")
+    # Off by nothing: these are bytes.
+    found = read_mesh(tmp_path / "a.obj").paint.corners
+    np.testing.assert_allclose(found, np.broadcast_to(srgb.decode(np.array([0.2, 0.4, 1.0])), (1, 3, 3)), atol=1e-12)

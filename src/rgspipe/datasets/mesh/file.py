@@ -4,33 +4,39 @@ from __future__ import annotations
 
 import io
 import warnings
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import trimesh
 import trimesh.resolvers
-from PIL import Image
 
 from rgspipe.arguments import as_path
 from rgspipe.datasets.input_file import input_file, is_there
 from rgspipe.datasets.json_file import shown
 from rgspipe.datasets.limits import FARTHEST
 from rgspipe.datasets.mesh.gltf_check import check_gltf
+from rgspipe.datasets.mesh.gltf_materials import GltfMaterial, numbered
 from rgspipe.datasets.mesh.links import FORMATS, GLTF, mesh_links
 from rgspipe.datasets.mesh.obj_text import plain_obj
 from rgspipe.datasets.mesh.options import MeshOptions
-from rgspipe.datasets.mesh.texture import check_texture, texture_light
-from rgspipe.datasets.ply.header import COLOURS, check_colours, check_rows, without_texture
+from rgspipe.datasets.mesh.paint import check_shares, paint_of
+from rgspipe.datasets.mesh.ply_polygons import with_triangles
+from rgspipe.datasets.mesh.texture import check_texture
+from rgspipe.datasets.ply.header import check_colours, check_rows, check_strips, without_texture
 from rgspipe.datasets.reading_limits import RAISE, reading_limits, timed
 from rgspipe.errors import InputError
-from rgspipe.scene import srgb
 from rgspipe.scene.mesh import Numbers, Paint, TriangleMesh
 
 WHAT = "a triangle mesh (.ply, .obj, .glb or .gltf)"
 
 #: From y up to z up, as Blender and glTF have it: (x, −z, y).
 UPRIGHT = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
+
+
+#: What is said of a glTF whose materials have an alphaMode.
+SEE_THROUGH = "Materials of the mesh that one can see through (alphaMode MASK or BLEND) are taken for opaque."
 
 
 @timed
@@ -45,14 +51,16 @@ def read_mesh(path: str | Path, options: MeshOptions | None = None) -> TriangleM
     if kind not in FORMATS:
         remedy = "Export it as binary PLY or GLB."
         raise InputError(path, expected=WHAT, found=f"the suffix {path.suffix!r}", remedy=remedy)
-    content = _loaded(input_file(path, WHAT, most_bytes=reading_limits().bytes))
+    content, materials = _loaded(input_file(path, WHAT, most_bytes=reading_limits().bytes))
     try:
-        parts = [_part(*placed, linear=kind in GLTF, path=path) for placed in _placed(content, path)]
+        parts = [_part(*placed, materials, path) for placed in _placed(content, path)]
         mesh = _joined(parts, path, content)
     except InputError:
         raise
     except (ValueError, IndexError, TypeError, KeyError, AttributeError, OSError) as error:
         raise _broken(path, error) from error
+    if not all(material.opaque for material in materials):
+        mesh = replace(mesh, remarks=(SEE_THROUGH,))
     scaled = np.diag([*[options.unit] * 3, 1.0])
     return _checked(mesh.moved(scaled @ UPRIGHT if is_y_up(path, options) else scaled), path)
 
@@ -112,12 +120,14 @@ class OwnFiles(trimesh.resolvers.FilePathResolver):
         if self._path.suffix.lower() == ".ply":
             check_rows(self._path)
             check_colours(self._path)
+            check_strips(self._path)
         if self._path.suffix.lower() == ".ply" and len(self._links.textures) > 1:
             found, remedy = f"{len(self._links.textures)}", "Export it as GLB."
             raise InputError(self._path, expected="one texture at most in a PLY", found=found, remedy=remedy)
 
 
-def _loaded(path: Path) -> Any:
+def _loaded(path: Path) -> tuple[Any, list[GltfMaterial]]:
+    """The scene in a file, and the materials of a glTF."""
     own = OwnFiles(path)
     try:
         # Of broken files numpy warns before they are refused.
@@ -126,11 +136,12 @@ def _loaded(path: Path) -> Any:
             # Nothing is merged or mended: points without area do no harm, and merging would move textures.
             options = {"resolver": own, "process": False, "maintain_order": True}
             kind = path.suffix.lower()
-            if kind in GLTF or (kind == ".ply" and own.has_textures):
-                return trimesh.load_scene(path, **options)
-            content = path.read_bytes()
-            content = plain_obj(content, path) if kind == ".obj" else without_texture(content)
-            return trimesh.load_scene(io.BytesIO(content), file_type=kind[1:], **options)
+            content, materials = numbered(path) if kind in GLTF else (path.read_bytes(), [])
+            if kind == ".obj":
+                content, options = plain_obj(content, path), options | {"split_groups": True}
+            elif kind == ".ply" and not own.has_textures:
+                content = without_texture(content)
+            return trimesh.load_scene(io.BytesIO(content), file_type=kind[1:], **options), materials
     except InputError:
         raise
     except Exception as error:  # the library says of no format what it raises
@@ -154,66 +165,15 @@ def _placed(content: Any, path: Path) -> list[tuple[Any, Numbers]]:
     return placed
 
 
-def _part(part: Any, matrix: Numbers, *, linear: bool, path: Path) -> TriangleMesh:
-    """One mesh, moved; `linear` says whether its vertices' colours are light, as in glTF, or display values."""
+def _part(part: Any, matrix: Numbers, materials: list[GltfMaterial], path: Path) -> TriangleMesh:
+    """One mesh, moved."""
+    part = with_triangles(part, path)
     vertices, faces = np.asarray(part.vertices, np.float64), np.asarray(part.faces, np.int64)
     if faces.min() < 0 or faces.max() >= len(vertices):
         found = f"a triangle with point {int(faces.max())} of {len(vertices)}"
         raise InputError(path, expected="triangles between its points", found=found, remedy="Export it again.")
-    _check_shares(part, path)
-    return TriangleMesh(vertices, faces, _paint(part, faces, linear, path)).moved(matrix)
-
-
-def _check_shares(part: Any, path: Path) -> None:
-    """Refuse colours of a PLY in floats that are no shares of 1: the library has cut them off by then."""
-    for name, element in part.metadata.get("_ply_raw", {}).items():
-        data = element.get("data")
-        given = getattr(getattr(data, "dtype", None), "names", None) or (data if isinstance(data, dict) else ())
-        for key in set(COLOURS).intersection(given):
-            values = np.asarray(data[key])
-            if values.dtype.kind == "f" and not ((values >= 0.0) & (values <= 1.0)).all():
-                found = f"{values.min():g} to {values.max():g}"
-                where, remedy = f"{path}: element {name}, property {key}", "Export the mesh with colours in bytes."
-                raise InputError(where, expected="floats from 0 to 1", found=found, remedy=remedy)
-
-
-def _paint(part: Any, faces: np.ndarray, linear: bool, path: Path) -> Paint:
-    visual, count = part.visual, len(faces)
-    uv, none = np.zeros((count, 3, 2)), np.full(count, -1)
-    if visual.kind == "texture" and visual.uv is not None:
-        colour, image = _material(visual.material)
-        given = np.asarray(visual.uv, np.float64)
-        if image is None or given.shape != (len(part.vertices), 2) or not np.isfinite(given).all():
-            return Paint(np.broadcast_to(colour, (count, 3, 3)), uv, none)
-        white = colour if linear else np.ones(3)  # Kd beside map_Kd is what exporters leave there
-        corners = np.broadcast_to(white, (count, 3, 3))
-        return Paint(corners, given[faces], np.zeros(count, np.int64), (texture_light(image, path),))
-    if visual.kind == "texture":
-        return Paint(np.broadcast_to(_material(visual.material)[0], (count, 3, 3)), uv, none)
-    if visual.kind == "vertex":
-        return Paint(_colours(visual.vertex_colors, linear)[faces], uv, none)
-    if visual.kind == "face":
-        return Paint(np.repeat(_colours(visual.face_colors, linear)[:, None], 3, axis=1), uv, none)
-    return Paint(np.full((count, 3, 3), np.nan), uv, none)
-
-
-def _colours(levels: np.ndarray, linear: bool) -> Numbers:
-    """(N, 3) linear, of (N, 3 or 4) bytes."""
-    values = np.asarray(levels)[:, :3].astype(np.float64) / 255.0
-    return values if linear else srgb.decode(values)
-
-
-def _material(material: Any) -> tuple[Numbers, Image.Image | None]:
-    """Linear colour (3,), NaN if it has none, and the image that it is times, if there is one."""
-    if isinstance(material, trimesh.visual.material.PBRMaterial):
-        level, image = material.baseColorFactor, material.baseColorTexture
-        level = np.full(3, 255) if level is None else level
-    else:
-        # Of one that says nothing of a colour the library invents a grey.
-        level = material.diffuse if "kd" in material.kwargs else np.full(3, np.nan)
-        image = material.image
-    colour = np.asarray(level)[:3].astype(np.float64) / 255.0
-    return colour, image
+    check_shares(part, path)
+    return TriangleMesh(vertices, faces, paint_of(part, faces, materials, path)).moved(matrix)
 
 
 def _joined(parts: list[TriangleMesh], path: Path, content: Any) -> TriangleMesh:
@@ -250,4 +210,4 @@ def _checked(mesh: TriangleMesh, path: Path) -> TriangleMesh:
         raise InputError(path, expected=WHAT, found=found, remedy="Export it again.")
     paint = mesh.paint
     paint = Paint(paint.corners[real], paint.uv[real], paint.texture[real], paint.textures)
-    return TriangleMesh(mesh.vertices, mesh.faces[real], paint)
+    return replace(mesh, faces=mesh.faces[real], paint=paint)

@@ -40,7 +40,13 @@ MODES = range(6)
 HARMLESS = ("KHR_materials_", "KHR_lights_", "KHR_xmp", "MSFT_lod")
 
 #: Extensions that change what is read, wherever they stand.
-UNREAD = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_texture_transform", "EXT_mesh_gpu_instancing")
+UNREAD = (
+    "KHR_draco_mesh_compression",
+    "EXT_meshopt_compression",
+    "KHR_texture_transform",
+    "EXT_mesh_gpu_instancing",
+    "KHR_materials_pbrSpecularGlossiness",
+)
 
 PLAIN = "Export it without compression and without extensions, as GLB."
 
@@ -84,7 +90,7 @@ class _Check:
         needed = self.content.get("extensionsRequired", [])
         needed = needed if isinstance(needed, list) else [needed]
         used = self.content.get("extensionsUsed", [])
-        unread = [one for one in needed if not (isinstance(one, str) and one.startswith(HARMLESS))]
+        unread = [one for one in needed if one in UNREAD or not (isinstance(one, str) and one.startswith(HARMLESS))]
         unread += [one for one in UNREAD if isinstance(used, list) and one in used]
         if unread:
             self._refuse("extensionsUsed", "a file without such extensions", shown(unread[0]), PLAIN)
@@ -157,6 +163,12 @@ class _Check:
                 self._refuse(f"{where}.{key}", "types of numbers that are read", found, PLAIN)
             if "bufferView" not in accessor or "sparse" in accessor:
                 self._refuse(f"{where}.{key}", "numbers in a buffer", "compressed or sparse ones, or none", PLAIN)
+            if key in ("TEXCOORD_0", "COLOR_0") and accessor["count"] != (need := self._points(attributes, where)):
+                self._refuse(f"{where}.{key}", f"{need} entries, one a point", f"{accessor['count']}", PLAIN)
+
+    def _points(self, attributes: dict, where: str) -> int:
+        accessors = self._listed(self.content, "accessors")
+        return accessors[self._index(attributes, "POSITION", where, len(accessors))]["count"]
 
     def _images(self, buffers: list[bytes | Path | slice]) -> None:
         """Look at the pictures that are colours: without one of them the decoder would go on, with another colour."""
@@ -166,11 +178,18 @@ class _Check:
             factor = numbers(colour.get("baseColorFactor", [1.0] * 4), 4, f"{self.path}: {where}", "baseColorFactor")
             if not all(0.0 <= one <= 1.0 for one in factor):
                 self._refuse(f"{where}.baseColorFactor", "numbers from 0 to 1", shown(factor), PLAIN)
-            base = self._object(colour, "baseColorTexture", where)
-            if base:
-                if self._count(base, "texCoord", where, 0) != 0:
+            metallic = numbers([colour.get("metallicFactor", 0.0)], 1, f"{self.path}: {where}", "metallicFactor")
+            if not 0.0 <= metallic[0] <= 1.0:
+                self._refuse(f"{where}.metallicFactor", "a number from 0 to 1", shown(metallic[0]), PLAIN)
+            for key in ("baseColorTexture", "metallicRoughnessTexture"):
+                used = self._object(colour, key, where)
+                if not used:
+                    continue
+                if self._count(used, "texCoord", where, 0) != 0:
                     self._refuse(f"{where}.texCoord", "one set of texture coordinates", "another one", PLAIN)
-                place, texture = textures[self._index(base, "index", where, len(textures))]
+                place, texture = textures[self._index(used, "index", where, len(textures))]
+                if "sampler" in texture:
+                    self._index(texture, "sampler", place, len(self._parts("samplers")))
                 self._image(*images[self._index(texture, "source", place, len(images))], buffers)
 
     def _image(self, where: str, image: dict, buffers: list[bytes | Path | slice]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -29,6 +30,9 @@ LIST = "list"
 #: Properties that say where points of a mesh are and which colours they have, the latter in bytes or as floats up to 1.
 PLACES, COLOURS = ("x", "y", "z", "nx", "ny", "nz"), ("red", "green", "blue", "alpha")
 COLOUR_KINDS = ("u1", "f4", "f8")
+
+#: The element of strips of triangles.
+STRIPS = "tristrips"
 
 #: The list of a face's places in a texture.
 FACE_PLACES = "texcoord"
@@ -93,6 +97,24 @@ def check_colours(path: Path) -> None:
                 )
 
 
+def check_strips(path: Path) -> None:
+    """Refuse strips of triangles, which those who decode a mesh leave out.
+
+    What is no header at all is left to the reader.
+
+    Raises:
+        InputError: names the element.
+    """
+    for element in _listed(_head(path)[1]):
+        if element.name == STRIPS and element.count:
+            raise InputError(
+                f"{path}: element {element.name}",
+                expected="faces",
+                found="strips of triangles",
+                remedy="Triangulate the faces when you export it.",
+            )
+
+
 def without_texture(content: bytes) -> bytes:
     """A mesh whose places in a texture have other names, where there is none: decoders make a white one up for them.
 
@@ -142,7 +164,7 @@ def check_rows(path: Path) -> None:
         rows = (words for line in stream if (words := line.split()))
         read = 0
         for element in _listed(lines):
-            for number, words in enumerate(itertools.islice(rows, element.count)):
+            for number, words in enumerate(itertools.islice(rows, min(element.count, sys.maxsize))):
                 read += 1
                 if not _fits(words, element.kinds):
                     expected = f"a row of {len(element.kinds)} properties"

@@ -32,7 +32,8 @@ def run(context: StageContext) -> None:
         check_scan(scan, views)
     else:
         check_mesh(scan, views, mesh, mesh_path(config), config.scene.mesh)
-    print(as_keys(imported.words(scan.layout)))
+    for words in (imported.words(scan.layout), *(() if mesh is None else mesh.remarks)):
+        print(as_keys(words))
     context.note(layout=scan.layout, frames=imported.frames, with_depth=imported.with_depth, exif=imported.exif)
 
 
