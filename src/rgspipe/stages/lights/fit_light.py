@@ -99,9 +99,8 @@ class Fitter:
         images = [image / exposure for image, exposure in zip(taken, exposures, strict=True)]
         there = prepared.there_anyway(result, capture)
         there = there and [image / exposure for image, exposure in zip(there, exposures, strict=True)]
-        limits = (capture.saturated * capture.clips(len(taken))).tolist()
-        clipped = [image >= limit for image, limit in zip(taken, limits, strict=True)]
-        saturated = None if capture.clip is None else clipped
+        pairs = zip(taken, capture.saturated * capture.clips(len(taken)), strict=True)
+        saturated = None if capture.clip is None else [image >= float(limit) for image, limit in pairs]
         write_result(folder / target.name, result, prepared, images, further, as_keys, there, saturated)
 
     def solver(self, seed: int = 0) -> Solver:
