@@ -50,12 +50,17 @@ def test_every_format_is_written_for_every_kind(tmp_path: Path) -> None:
 def test_a_light_file_in_metres_gives_the_same_irradiance(tmp_path: Path, metres: float) -> None:
     """I/d² is the same in both units, and so is a sun's irradiance."""
     text(tmp_path, "json", *RIG, metres=metres)
-    for light, exported in zip(RIG, rg.read_lights(tmp_path / "lamps.json"), strict=True):
+    for light, exported in zip(RIG, rg.read_lights(tmp_path / "lamps.json", any_world=True), strict=True):
         torch.testing.assert_close(exported.position, metres * light.position)
         factor = 1.0 if light.distant else metres**2
         torch.testing.assert_close(exported.intensity / factor, light.intensity)
-    sphere = rg.read_lights(tmp_path / "lamps.json")[[*BY_KIND].index("sphere")]
+    sphere = rg.read_lights(tmp_path / "lamps.json", any_world=True)[[*BY_KIND].index("sphere")]
     assert sphere.radius == pytest.approx(metres * BY_KIND["sphere"].radius)
+    if metres == 1.0:
+        assert len(rg.read_lights(tmp_path / "lamps.json")) == len(RIG)
+    else:
+        with pytest.raises(InputError, match="expected lights in the scene's units"):
+            rg.read_lights(tmp_path / "lamps.json")
 
 
 def test_scaling_and_offset_of_a_scene_are_undone() -> None:
@@ -204,7 +209,7 @@ def test_what_is_refused_is_what_cannot_be_read_back(tmp_path: Path, metres: flo
     lamp = rg.PointLight([0.0, 0.0, 1.0], 1.0 / metres**2)
     export_lights(lamp, tmp_path, ["ies", "json"], metres=metres)
     assert read_photometry(tmp_path / "lamp_1.ies").relative.max() == 1.0
-    (back,) = read_lights(tmp_path / "lamps.json")
+    (back,) = read_lights(tmp_path / "lamps.json", any_world=True)
     # The square of a unit is taken twice, in double precision.
     torch.testing.assert_close(back.intensity, torch.ones(3).double())
 

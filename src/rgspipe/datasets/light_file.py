@@ -24,18 +24,32 @@ AMBIENT, RADIANCE = "ambient", "radiance"
 #: Vectors shorter than this are enlarged before they are squared.
 TINY = 1e-100
 
+#: The field of a file whose lights are not in the scene's units and axes: by which they came out of these.
+WORLD = "world"
 
-def read_lights(path: str | Path) -> LightRig:
+
+def read_lights(path: str | Path, *, any_world: bool = False) -> LightRig:
     """The lights of a light file, float64; fields that are not part of a light are ignored.
 
+    Args:
+        any_world: whether to take lights that were exported to other units and places than the scene's, too.
+
     Raises:
-        InputError: missing or unreadable file, another version, unknown types, missing or impossible values.
+        InputError: missing or unreadable file, another version, unknown types, missing or impossible values; or lights
+            that were exported for other programs.
     """
     content = read_json(path, "a light file")
     version = required(content, "version", path)
     if version != VERSION:
         raise InputError(
             path, expected=f'"version": {VERSION}', found=repr(version), remedy="Use the release that wrote this file."
+        )
+    if WORLD in content and not any_world:
+        raise InputError(
+            path,
+            expected="lights in the scene's units and axes",
+            found=f"those of an export, {content[WORLD]!r}"[:120],
+            remedy="Take the lights.json that was exported; in Python, read_lights(…, any_world=True) reads these.",
         )
     return lights_in(content, path)
 

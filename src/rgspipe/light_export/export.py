@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Literal, get_args
 
 from torch import Tensor
 
 from rgspipe.arguments import as_path, as_several
-from rgspipe.datasets.light_file import write_lights
+from rgspipe.datasets.light_file import WORLD, write_lights
 from rgspipe.errors import InputError
 from rgspipe.light_export.blend import blend
 from rgspipe.light_export.gltf import gltf
@@ -87,7 +87,8 @@ def export_lights(
     folder.mkdir(parents=True, exist_ok=True)
     for path, text, _ in made:
         if text is None:
-            write_lights(path, rig, {"units": "metres, W/sr; of suns W/m²"})
+            moved = {} if world == World() else {WORLD: asdict(world)}
+            write_lights(path, rig, {"units": "metres, W/sr; of suns W/m²"} | moved)
         else:
             write_text(path, text)
     notes = [note for _, _, said in made for note in said] + _lost(rig, {*formats})

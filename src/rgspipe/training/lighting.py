@@ -15,6 +15,7 @@ from rgspipe.renderer.direct import unit_irradiance
 from rgspipe.renderer.kernels.irradiance import transmittance
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.transport import PatchTransport
+from rgspipe.scene import PointLight
 
 #: Lights whose shadows are traced at once; bounds the memory of their derivatives.
 LIGHTS_AT_ONCE = 16
@@ -53,13 +54,18 @@ def trace_lighting(bvh: SurfelBvh, views: Sequence[View]) -> Lighting:
     """Cast the shadows of every view's light.
 
     Raises:
-        InputError: a view has no light.
+        InputError: a view has no light, or one that is no point.
     """
     missing = [view.name for view in views if view.light is None]
     if missing:
         found = f"none in {len(missing)} of {len(views)} views ({', '.join(missing[:5])})"
         remedy = "Train on views of a dataset; capture_scene takes photographs under lamps that nobody measured."
         raise InputError("the training views", expected="the light of each", found=found, remedy=remedy)
+    others = {view.name: view.light.label for view in views if type(view.light) is not PointLight}
+    if others:
+        found = f"a {', a '.join(sorted(set(others.values())))}, of {', '.join([*others][:5])}"
+        remedy = "Photograph under small bare lamps, or take such photographs as a capture (capture_scene)."
+        raise InputError("the training views", expected="point lights", found=found, remedy=remedy)
     positions = torch.stack([view.light.position for view in views])
     intensity = torch.stack([view.light.intensity for view in views]).float()
     blocks = positions.split(LIGHTS_AT_ONCE)
