@@ -11,6 +11,7 @@ import bpy
 import numpy as np
 
 from rgspipe.blender import blend
+from rgspipe.blender.geometry import FreeSpace, scene_geometry
 from rgspipe.blender.nodes import tree_of
 from rgspipe.errors import InputError
 
@@ -93,6 +94,19 @@ def treated(folder: Path) -> None:
     _write(folder, "treated", blend.open_normalised(folder / "treated.blend").remarks)
 
 
+def mirrored(folder: Path) -> None:
+    """Whether a closed room is a room, as it is and mirrored."""
+    found = {}
+    for scale in (1, -1):
+        item = _cube()
+        item.data.flip_normals()
+        item.scale.x = scale
+        path = folder / f"room{scale}.blend"
+        bpy.ops.wm.save_as_mainfile(filepath=str(path))
+        found[scale] = FreeSpace(scene_geometry(blend.open_normalised(path).scene)).is_room
+    _write(folder, "mirrored", found)
+
+
 def _cube(name: str = "cube", x: float = 0.0, size: float = 1.0, fresh: bool = True) -> bpy.types.Object:
     if fresh:
         bpy.ops.wm.read_factory_settings(use_empty=True)
@@ -153,6 +167,40 @@ def _instanced(item: bpy.types.Object) -> None:
     item.show_instancer_for_render = False
 
 
+def _scattered(item: bpy.types.Object) -> None:
+    """The second cube as geometry nodes make it: itself, and at its corners a small cube that is no object."""
+    tree = bpy.data.node_groups.new("scatter", "GeometryNodeTree")
+    for way in ("INPUT", "OUTPUT"):
+        tree.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
+    kinds = ("NodeGroupInput", "NodeGroupOutput", "GeometryNodeMeshCube", "GeometryNodeInstanceOnPoints")
+    taken, given, small, placed = (tree.nodes.new(kind) for kind in kinds)
+    both = tree.nodes.new("GeometryNodeJoinGeometry")
+    small.inputs["Size"].default_value = (0.1, 0.1, 0.1)
+    tree.links.new(taken.outputs[0], placed.inputs["Points"])
+    tree.links.new(small.outputs["Mesh"], placed.inputs["Instance"])
+    tree.links.new(placed.outputs[0], both.inputs[0])
+    tree.links.new(taken.outputs[0], both.inputs[0])
+    tree.links.new(both.outputs[0], given.inputs[0])
+    item.modifiers.new("scatter", "NODES").node_group = tree
+
+
+def _collected(item: bpy.types.Object) -> None:
+    """The second cube, subdivided as by `_subdivided`, as an instance of a collection that is not shown itself."""
+    _subdivided(item)
+    hidden = bpy.data.collections.new("hidden")
+    hidden.objects.link(item)
+    bpy.context.scene.collection.objects.unlink(item)
+    shown = bpy.data.objects.new("shown", None)
+    shown.instance_type, shown.instance_collection = "COLLECTION", hidden
+    bpy.context.scene.collection.objects.link(shown)
+
+
+def _ball(item: bpy.types.Object) -> None:
+    """A NURBS ball instead of the second cube: in Blender there is a mesh of it beside it."""
+    bpy.data.objects.remove(item)
+    bpy.ops.surface.primitive_nurbs_surface_sphere_add(location=(3.0, 0.0, 0.0))
+
+
 def _hidden_in_viewport(item: bpy.types.Object) -> None:
     item.hide_viewport = True
 
@@ -172,6 +220,9 @@ FILES = {
     "row in renders": _repeated(in_viewport=False),
     "row in the viewport": _repeated(in_viewport=True),
     "instancer": _instanced,
+    "scattered": _scattered,
+    "collection": _collected,
+    "ball": _ball,
     "hidden in the viewport": _hidden_in_viewport,
     "hidden in renders": _hidden_in_render,
     "second layer": _in_second_layer,
@@ -181,6 +232,6 @@ SIZES = ((1e-42, 0.0, "tiny"), (1e-9, 0.0, "small"), (1e11, 0.0, "huge"), (1e9, 
 
 
 if __name__ == "__main__":
-    measurements = {one.__name__: one for one in (rendered_alone, linked, hidden_cameras, extents, treated)}
+    measurements = {one.__name__: one for one in (rendered_alone, linked, hidden_cameras, extents, treated, mirrored)}
     for name in sys.argv[2:]:
         measurements[name](Path(sys.argv[1]))

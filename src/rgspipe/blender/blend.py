@@ -6,6 +6,7 @@ number: no lights, cameras, world, compositing, animation, render settings or vi
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -78,8 +79,12 @@ def open_normalised(path: str | Path) -> Normalised:
     scene = bpy.data.scenes.new("surfaces")
     bpy.context.window.scene = scene
     for index, surface in enumerate(surfaces):
-        surface.mesh.transform(Matrix.Scale(rescale, 4) @ Matrix.Translation(offset) @ surface.pose)
-        scene.collection.objects.link(bpy.data.objects.new(f"surface_{index}", surface.mesh))
+        item = bpy.data.objects.new(f"surface_{index}", surface.mesh)
+        # What mirrors a mesh stays the object's, as Blender knows then where its front faces and normals are.
+        item.scale.x = math.copysign(1.0, surface.pose.determinant())
+        mirror = Matrix.Scale(item.scale.x, 4, (1.0, 0.0, 0.0))
+        surface.mesh.transform(mirror @ Matrix.Scale(rescale, 4) @ Matrix.Translation(offset) @ surface.pose)
+        scene.collection.objects.link(item)
     remove_emission()
     bpy.context.view_layer.update()
     return Normalised(scene, rescale, tuple(offset.tolist()), [*remarks, *others], cameras)
