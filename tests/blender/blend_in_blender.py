@@ -107,6 +107,25 @@ def mirrored(folder: Path) -> None:
     _write(folder, "mirrored", found)
 
 
+def keyed(folder: Path) -> None:
+    """The colour and the glow that renders have of a material with keys from frame 1 to 11, saved at 8.5."""
+    _cube().data.materials.append(paint := _paint((0.0, 0.0, 0.0, 1.0)))
+    inputs = tree_of(paint).nodes["Principled BSDF"].inputs
+    for frame, value in ((1, 0.0), (11, 1.0)):
+        inputs["Base Color"].default_value = (value, value, value, 1.0)
+        inputs["Emission Strength"].default_value = value
+        inputs["Base Color"].keyframe_insert("default_value", frame=frame)
+        inputs["Emission Strength"].keyframe_insert("default_value", frame=frame)
+    bpy.context.scene.frame_set(8, subframe=0.5)
+    colour = inputs["Base Color"].default_value[0]
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "keyed.blend"))
+    [item] = blend.open_normalised(folder / "keyed.blend").scene.objects
+    rendered = item.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.materials[0]
+    inputs = tree_of(rendered).nodes["Principled BSDF"].inputs
+    found = {"colour": inputs["Base Color"].default_value[0], "glow": inputs["Emission Strength"].default_value}
+    _write(folder, "keyed", {"set": colour, **found})
+
+
 def _cube(name: str = "cube", x: float = 0.0, size: float = 1.0, fresh: bool = True) -> bpy.types.Object:
     if fresh:
         bpy.ops.wm.read_factory_settings(use_empty=True)
@@ -232,6 +251,7 @@ SIZES = ((1e-42, 0.0, "tiny"), (1e-9, 0.0, "small"), (1e11, 0.0, "huge"), (1e9, 
 
 
 if __name__ == "__main__":
-    measurements = {one.__name__: one for one in (rendered_alone, linked, hidden_cameras, extents, treated, mirrored)}
+    measured = (rendered_alone, linked, hidden_cameras, extents, treated, mirrored, keyed)
+    measurements = {one.__name__: one for one in measured}
     for name in sys.argv[2:]:
         measurements[name](Path(sys.argv[1]))

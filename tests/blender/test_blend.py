@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-MEASURED = ("rendered_alone", "linked", "hidden_cameras", "extents", "treated", "mirrored")
+MEASURED = ("rendered_alone", "linked", "hidden_cameras", "extents", "treated", "mirrored", "keyed")
 
 
 @pytest.fixture(scope="module")
@@ -89,3 +89,9 @@ def test_what_a_render_does_with_an_object_besides_showing_it_is_told(found: Cal
 def test_a_mirrored_room_is_the_room_that_it_is_as_it_was_modelled(found: Callable[[str], Any]) -> None:
     """A closed room whose faces look inwards, at scale x of 1 and -1: it would be a solid inside out."""
     assert found("mirrored") == {"1": True, "-1": True}
+
+
+def test_materials_stand_at_the_frame_at_which_the_file_was_saved(found: Callable[[str], Any]) -> None:
+    told = found("keyed")
+    assert 0.5 < told["set"] < 1.0 and told["colour"] == told["set"]
+    assert told["glow"] == 0.0  # keys of it would turn it on again

@@ -85,15 +85,28 @@ def open_normalised(path: str | Path) -> Normalised:
         mirror = Matrix.Scale(item.scale.x, 4, (1.0, 0.0, 0.0))
         surface.mesh.transform(mirror @ Matrix.Scale(rescale, 4) @ Matrix.Translation(offset) @ surface.pose)
         scene.collection.objects.link(item)
+    _stand_still(scene, source)
     remove_emission()
     bpy.context.view_layer.update()
     return Normalised(scene, rescale, tuple(offset.tolist()), [*remarks, *others], cameras)
 
 
+def _stand_still(scene: bpy.types.Scene, source: bpy.types.Scene) -> None:
+    """Have `scene` stand where `source` does, and no material change any more."""
+    scene.frame_set(source.frame_current, subframe=source.frame_subframe)
+    for tree in _trees():
+        tree.animation_data_clear()
+
+
+def _trees() -> list[bpy.types.NodeTree]:
+    """Those of all materials, and all groups."""
+    own = [material.node_tree for material in bpy.data.materials if material.node_tree is not None]
+    return [*own, *bpy.data.node_groups]
+
+
 def remove_emission() -> None:
     """No material of the open file glows any more."""
-    trees = [material.node_tree for material in bpy.data.materials if material.node_tree is not None]
-    for tree in [*trees, *bpy.data.node_groups]:
+    for tree in _trees():
         for node in tree.nodes:
             for name in GLOWING_SOCKETS.get(node.type, ()):
                 _set_to_zero(tree, node, name)
