@@ -126,6 +126,26 @@ def keyed(folder: Path) -> None:
     _write(folder, "keyed", {"set": colour, **found})
 
 
+def distorted(folder: Path) -> None:
+    """The cameras of a file whose renders are not whole images of square pixels, and what is said of them."""
+    found = {}
+    settings = {"use_border": True, "use_crop_to_border": True}
+    for name, values in {
+        "wide": {"pixel_aspect_x": 2.0},
+        "cropped": {**settings, "border_min_x": 0.5},
+        "border": {"use_border": True, "border_min_x": 0.5},
+        "whole": settings,
+    }.items():
+        _cube()
+        _camera((0.0, -5.0, 0.0))
+        for key, value in values.items():
+            setattr(bpy.context.scene.render, key, value)
+        bpy.ops.wm.save_as_mainfile(filepath=str(folder / f"{name}.blend"))
+        taken = blend.open_normalised(folder / f"{name}.blend")
+        found[name] = [[*taken.cameras], taken.remarks]
+    _write(folder, "distorted", found)
+
+
 def _cube(name: str = "cube", x: float = 0.0, size: float = 1.0, fresh: bool = True) -> bpy.types.Object:
     if fresh:
         bpy.ops.wm.read_factory_settings(use_empty=True)
@@ -251,7 +271,7 @@ SIZES = ((1e-42, 0.0, "tiny"), (1e-9, 0.0, "small"), (1e11, 0.0, "huge"), (1e9, 
 
 
 if __name__ == "__main__":
-    measured = (rendered_alone, linked, hidden_cameras, extents, treated, mirrored, keyed)
+    measured = (rendered_alone, linked, hidden_cameras, extents, treated, mirrored, keyed, distorted)
     measurements = {one.__name__: one for one in measured}
     for name in sys.argv[2:]:
         measurements[name](Path(sys.argv[1]))

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-MEASURED = ("rendered_alone", "linked", "hidden_cameras", "extents", "treated", "mirrored", "keyed")
+MEASURED = ("rendered_alone", "linked", "hidden_cameras", "extents", "treated", "mirrored", "keyed", "distorted")
 
 
 @pytest.fixture(scope="module")
@@ -95,3 +95,14 @@ def test_materials_stand_at_the_frame_at_which_the_file_was_saved(found: Callabl
     told = found("keyed")
     assert 0.5 < told["set"] < 1.0 and told["colour"] == told["set"]
     assert told["glow"] == 0.0  # keys of it would turn it on again
+
+
+def test_a_camera_whose_images_are_stretched_or_cropped_is_none_of_ours(found: Callable[[str], Any]) -> None:
+    """A border that leaves the rest of the image black crops nothing, and neither does one around all of it."""
+    last = "and cannot be a target's: Kitchen"
+    assert found("distorted") == {
+        "wide": [[], [f"cameras whose pixels are not square (aspect 2 : 1), {last}"]],
+        "cropped": [[], [f"cameras whose images are cropped to a render region, {last}"]],
+        "border": [["Kitchen"], []],
+        "whole": [["Kitchen"], []],
+    }

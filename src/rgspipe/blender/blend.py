@@ -16,7 +16,7 @@ import numpy as np
 from mathutils import Matrix
 
 from rgspipe.blender.left_out import left_out
-from rgspipe.blender.own_cameras import own_cameras
+from rgspipe.blender.own_cameras import image_distortion, own_cameras
 from rgspipe.blender.rendered import Surface, rendered_surfaces
 from rgspipe.datasets.input_file import input_file
 from rgspipe.datasets.limits import FARTHEST
@@ -62,6 +62,7 @@ def open_normalised(path: str | Path) -> Normalised:
     path = Path(path)
     _open(path)
     source, layer = bpy.context.scene, bpy.context.view_layer
+    distortion = image_distortion(source)
     surfaces = rendered_surfaces(source, layer)
     if not surfaces:
         raise InputError(
@@ -75,7 +76,7 @@ def open_normalised(path: str | Path) -> Normalised:
     _require_extent(path, lo, hi)
     rescale, offset = 1.0 / float((hi - lo).max()), -0.5 * (lo + hi)
     _show_cameras(source)
-    cameras, others = own_cameras(source, rescale, tuple(offset.tolist()))
+    cameras, others = own_cameras(source, rescale, tuple(offset.tolist()), distortion)
     scene = bpy.data.scenes.new("surfaces")
     bpy.context.window.scene = scene
     for index, surface in enumerate(surfaces):
