@@ -146,6 +146,28 @@ def distorted(folder: Path) -> None:
     _write(folder, "distorted", found)
 
 
+def posed(folder: Path) -> None:
+    """What is said of materials that go by the pose of their object, or have a relief, on a straight and a turned one.
+
+    Of reliefs only the first is no bump; and the view layer of the last file has one material for all.
+    """
+    said = {}
+    for name, (kind, output, to) in POSED.items():
+        for turn in (0.0, 0.6):
+            _cube().rotation_euler.z = turn
+            paint = _paint((0.5, 0.5, 0.5, 1.0))
+            bpy.context.object.data.materials.append(paint)
+            tree = tree_of(paint)
+            node = tree.nodes.new(kind)
+            tree.links.new(node.outputs[output], tree.nodes[to[0]].inputs[to[1]])
+            paint.displacement_method = "DISPLACEMENT" if name == "relief" else "BUMP"
+            bpy.context.view_layer.material_override = paint if name == "override" else None
+            bpy.ops.wm.save_as_mainfile(filepath=str(folder / "posed.blend"))
+            remarks = blend.open_normalised(folder / "posed.blend").remarks
+            said[f"{name} {turn:g}"] = [remark.split(" is ")[0] for remark in remarks]
+    _write(folder, "posed", said)
+
+
 def _cube(name: str = "cube", x: float = 0.0, size: float = 1.0, fresh: bool = True) -> bpy.types.Object:
     if fresh:
         bpy.ops.wm.read_factory_settings(use_empty=True)
@@ -254,6 +276,21 @@ def _in_second_layer(item: bpy.types.Object) -> None:
     bpy.context.scene.view_layers[0].use = False
 
 
+BASE, RELIEF = ("Principled BSDF", "Base Color"), ("Material Output", "Displacement")
+
+#: A node, one of its outputs, and where that leads.
+POSED = {
+    "object": ("ShaderNodeTexCoord", "Object", BASE),
+    "position": ("ShaderNodeNewGeometry", "Position", BASE),
+    "random": ("ShaderNodeObjectInfo", "Random", BASE),
+    "generated": ("ShaderNodeTexCoord", "Generated", BASE),
+    "checker": ("ShaderNodeTexChecker", "Color", BASE),
+    "uv": ("ShaderNodeTexCoord", "UV", BASE),
+    "relief": ("ShaderNodeDisplacement", "Displacement", RELIEF),
+    "bump": ("ShaderNodeDisplacement", "Displacement", RELIEF),
+    "override": ("ShaderNodeTexCoord", "UV", BASE),
+}
+
 FILES = {
     "subdivided": _subdivided,
     "row in renders": _repeated(in_viewport=False),
@@ -271,7 +308,7 @@ SIZES = ((1e-42, 0.0, "tiny"), (1e-9, 0.0, "small"), (1e11, 0.0, "huge"), (1e9, 
 
 
 if __name__ == "__main__":
-    measured = (rendered_alone, linked, hidden_cameras, extents, treated, mirrored, keyed, distorted)
+    measured = (rendered_alone, linked, hidden_cameras, extents, treated, mirrored, keyed, distorted, posed)
     measurements = {one.__name__: one for one in measured}
     for name in sys.argv[2:]:
         measurements[name](Path(sys.argv[1]))

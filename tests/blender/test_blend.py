@@ -9,7 +9,17 @@ from typing import Any
 
 import pytest
 
-MEASURED = ("rendered_alone", "linked", "hidden_cameras", "extents", "treated", "mirrored", "keyed", "distorted")
+MEASURED = (
+    "rendered_alone",
+    "linked",
+    "hidden_cameras",
+    "extents",
+    "treated",
+    "mirrored",
+    "keyed",
+    "distorted",
+    "posed",
+)
 
 
 @pytest.fixture(scope="module")
@@ -106,3 +116,15 @@ def test_a_camera_whose_images_are_stretched_or_cropped_is_none_of_ours(found: C
         "border": [["Kitchen"], []],
         "whole": [["Kitchen"], []],
     }
+
+
+def test_materials_that_go_by_their_object_are_named(found: Callable[[str], Any]) -> None:
+    """Places in the box around an object are other ones only where it is turned."""
+    pattern, relief = 'pattern of "Paint"', 'relief of "Paint"'
+    override = '"Paint", the material of all in its view layer,'
+    both = {"object": [pattern], "position": [pattern], "random": [pattern], "uv": [], "relief": [relief], "bump": []}
+    expected = {f"{name} {turn}": said for name, said in both.items() for turn in ("0", "0.6")}
+    expected |= {f"{name} 0": [] for name in ("generated", "checker")}
+    expected |= {f"{name} 0.6": [pattern] for name in ("generated", "checker")}
+    expected |= {f"override {turn}": [override] for turn in ("0", "0.6")}
+    assert found("posed") == expected
