@@ -11,6 +11,7 @@ import bpy
 import numpy as np
 
 from rgspipe.blender import blend
+from rgspipe.blender.geometry import FreeSpace, scene_geometry
 from rgspipe.blender.nodes import tree_of
 from rgspipe.errors import InputError
 
@@ -93,6 +94,80 @@ def treated(folder: Path) -> None:
     _write(folder, "treated", blend.open_normalised(folder / "treated.blend").remarks)
 
 
+def mirrored(folder: Path) -> None:
+    """Whether a closed room is a room, as it is and mirrored."""
+    found = {}
+    for scale in (1, -1):
+        item = _cube()
+        item.data.flip_normals()
+        item.scale.x = scale
+        path = folder / f"room{scale}.blend"
+        bpy.ops.wm.save_as_mainfile(filepath=str(path))
+        found[scale] = FreeSpace(scene_geometry(blend.open_normalised(path).scene)).is_room
+    _write(folder, "mirrored", found)
+
+
+def keyed(folder: Path) -> None:
+    """The colour and the glow that renders have of a material with keys from frame 1 to 11, saved at 8.5."""
+    _cube().data.materials.append(paint := _paint((0.0, 0.0, 0.0, 1.0)))
+    inputs = tree_of(paint).nodes["Principled BSDF"].inputs
+    for frame, value in ((1, 0.0), (11, 1.0)):
+        inputs["Base Color"].default_value = (value, value, value, 1.0)
+        inputs["Emission Strength"].default_value = value
+        inputs["Base Color"].keyframe_insert("default_value", frame=frame)
+        inputs["Emission Strength"].keyframe_insert("default_value", frame=frame)
+    bpy.context.scene.frame_set(8, subframe=0.5)
+    colour = inputs["Base Color"].default_value[0]
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "keyed.blend"))
+    [item] = blend.open_normalised(folder / "keyed.blend").scene.objects
+    rendered = item.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.materials[0]
+    inputs = tree_of(rendered).nodes["Principled BSDF"].inputs
+    found = {"colour": inputs["Base Color"].default_value[0], "glow": inputs["Emission Strength"].default_value}
+    _write(folder, "keyed", {"set": colour, **found})
+
+
+def distorted(folder: Path) -> None:
+    """The cameras of a file whose renders are not whole images of square pixels, and what is said of them."""
+    found = {}
+    settings = {"use_border": True, "use_crop_to_border": True}
+    for name, values in {
+        "wide": {"pixel_aspect_x": 2.0},
+        "cropped": {**settings, "border_min_x": 0.5},
+        "border": {"use_border": True, "border_min_x": 0.5},
+        "whole": settings,
+    }.items():
+        _cube()
+        _camera((0.0, -5.0, 0.0))
+        for key, value in values.items():
+            setattr(bpy.context.scene.render, key, value)
+        bpy.ops.wm.save_as_mainfile(filepath=str(folder / f"{name}.blend"))
+        taken = blend.open_normalised(folder / f"{name}.blend")
+        found[name] = [[*taken.cameras], taken.remarks]
+    _write(folder, "distorted", found)
+
+
+def posed(folder: Path) -> None:
+    """What is said of materials that go by the pose of their object, or have a relief, on a straight and a turned one.
+
+    Of reliefs only the first is no bump; and the view layer of the last file has one material for all.
+    """
+    said = {}
+    for name, (kind, output, to) in POSED.items():
+        for turn in (0.0, 0.6):
+            _cube().rotation_euler.z = turn
+            paint = _paint((0.5, 0.5, 0.5, 1.0))
+            bpy.context.object.data.materials.append(paint)
+            tree = tree_of(paint)
+            node = tree.nodes.new(kind)
+            tree.links.new(node.outputs[output], tree.nodes[to[0]].inputs[to[1]])
+            paint.displacement_method = "DISPLACEMENT" if name == "relief" else "BUMP"
+            bpy.context.view_layer.material_override = paint if name == "override" else None
+            bpy.ops.wm.save_as_mainfile(filepath=str(folder / "posed.blend"))
+            remarks = blend.open_normalised(folder / "posed.blend").remarks
+            said[f"{name} {turn:g}"] = [remark.split(" is ")[0] for remark in remarks]
+    _write(folder, "posed", said)
+
+
 def _cube(name: str = "cube", x: float = 0.0, size: float = 1.0, fresh: bool = True) -> bpy.types.Object:
     if fresh:
         bpy.ops.wm.read_factory_settings(use_empty=True)
@@ -153,6 +228,40 @@ def _instanced(item: bpy.types.Object) -> None:
     item.show_instancer_for_render = False
 
 
+def _scattered(item: bpy.types.Object) -> None:
+    """The second cube as geometry nodes make it: itself, and at its corners a small cube that is no object."""
+    tree = bpy.data.node_groups.new("scatter", "GeometryNodeTree")
+    for way in ("INPUT", "OUTPUT"):
+        tree.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
+    kinds = ("NodeGroupInput", "NodeGroupOutput", "GeometryNodeMeshCube", "GeometryNodeInstanceOnPoints")
+    taken, given, small, placed = (tree.nodes.new(kind) for kind in kinds)
+    both = tree.nodes.new("GeometryNodeJoinGeometry")
+    small.inputs["Size"].default_value = (0.1, 0.1, 0.1)
+    tree.links.new(taken.outputs[0], placed.inputs["Points"])
+    tree.links.new(small.outputs["Mesh"], placed.inputs["Instance"])
+    tree.links.new(placed.outputs[0], both.inputs[0])
+    tree.links.new(taken.outputs[0], both.inputs[0])
+    tree.links.new(both.outputs[0], given.inputs[0])
+    item.modifiers.new("scatter", "NODES").node_group = tree
+
+
+def _collected(item: bpy.types.Object) -> None:
+    """The second cube, subdivided as by `_subdivided`, as an instance of a collection that is not shown itself."""
+    _subdivided(item)
+    hidden = bpy.data.collections.new("hidden")
+    hidden.objects.link(item)
+    bpy.context.scene.collection.objects.unlink(item)
+    shown = bpy.data.objects.new("shown", None)
+    shown.instance_type, shown.instance_collection = "COLLECTION", hidden
+    bpy.context.scene.collection.objects.link(shown)
+
+
+def _ball(item: bpy.types.Object) -> None:
+    """A NURBS ball instead of the second cube: in Blender there is a mesh of it beside it."""
+    bpy.data.objects.remove(item)
+    bpy.ops.surface.primitive_nurbs_surface_sphere_add(location=(3.0, 0.0, 0.0))
+
+
 def _hidden_in_viewport(item: bpy.types.Object) -> None:
     item.hide_viewport = True
 
@@ -167,11 +276,29 @@ def _in_second_layer(item: bpy.types.Object) -> None:
     bpy.context.scene.view_layers[0].use = False
 
 
+BASE, RELIEF = ("Principled BSDF", "Base Color"), ("Material Output", "Displacement")
+
+#: A node, one of its outputs, and where that leads.
+POSED = {
+    "object": ("ShaderNodeTexCoord", "Object", BASE),
+    "position": ("ShaderNodeNewGeometry", "Position", BASE),
+    "random": ("ShaderNodeObjectInfo", "Random", BASE),
+    "generated": ("ShaderNodeTexCoord", "Generated", BASE),
+    "checker": ("ShaderNodeTexChecker", "Color", BASE),
+    "uv": ("ShaderNodeTexCoord", "UV", BASE),
+    "relief": ("ShaderNodeDisplacement", "Displacement", RELIEF),
+    "bump": ("ShaderNodeDisplacement", "Displacement", RELIEF),
+    "override": ("ShaderNodeTexCoord", "UV", BASE),
+}
+
 FILES = {
     "subdivided": _subdivided,
     "row in renders": _repeated(in_viewport=False),
     "row in the viewport": _repeated(in_viewport=True),
     "instancer": _instanced,
+    "scattered": _scattered,
+    "collection": _collected,
+    "ball": _ball,
     "hidden in the viewport": _hidden_in_viewport,
     "hidden in renders": _hidden_in_render,
     "second layer": _in_second_layer,
@@ -181,6 +308,7 @@ SIZES = ((1e-42, 0.0, "tiny"), (1e-9, 0.0, "small"), (1e11, 0.0, "huge"), (1e9, 
 
 
 if __name__ == "__main__":
-    measurements = {one.__name__: one for one in (rendered_alone, linked, hidden_cameras, extents, treated)}
+    measured = (rendered_alone, linked, hidden_cameras, extents, treated, mirrored, keyed, distorted, posed)
+    measurements = {one.__name__: one for one in measured}
     for name in sys.argv[2:]:
         measurements[name](Path(sys.argv[1]))

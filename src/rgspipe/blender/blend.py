@@ -6,6 +6,7 @@ number: no lights, cameras, world, compositing, animation, render settings or vi
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +16,7 @@ import numpy as np
 from mathutils import Matrix
 
 from rgspipe.blender.left_out import left_out
-from rgspipe.blender.own_cameras import own_cameras
+from rgspipe.blender.own_cameras import image_distortion, own_cameras
 from rgspipe.blender.rendered import Surface, rendered_surfaces
 from rgspipe.datasets.input_file import input_file
 from rgspipe.datasets.limits import FARTHEST
@@ -61,6 +62,7 @@ def open_normalised(path: str | Path) -> Normalised:
     path = Path(path)
     _open(path)
     source, layer = bpy.context.scene, bpy.context.view_layer
+    distortion = image_distortion(source)
     surfaces = rendered_surfaces(source, layer)
     if not surfaces:
         raise InputError(
@@ -74,21 +76,38 @@ def open_normalised(path: str | Path) -> Normalised:
     _require_extent(path, lo, hi)
     rescale, offset = 1.0 / float((hi - lo).max()), -0.5 * (lo + hi)
     _show_cameras(source)
-    cameras, others = own_cameras(source, rescale, tuple(offset.tolist()))
+    cameras, others = own_cameras(source, rescale, tuple(offset.tolist()), distortion)
     scene = bpy.data.scenes.new("surfaces")
     bpy.context.window.scene = scene
     for index, surface in enumerate(surfaces):
-        surface.mesh.transform(Matrix.Scale(rescale, 4) @ Matrix.Translation(offset) @ surface.pose)
-        scene.collection.objects.link(bpy.data.objects.new(f"surface_{index}", surface.mesh))
+        item = bpy.data.objects.new(f"surface_{index}", surface.mesh)
+        # What mirrors a mesh stays the object's, as Blender knows then where its front faces and normals are.
+        item.scale.x = math.copysign(1.0, surface.pose.determinant())
+        mirror = Matrix.Scale(item.scale.x, 4, (1.0, 0.0, 0.0))
+        surface.mesh.transform(mirror @ Matrix.Scale(rescale, 4) @ Matrix.Translation(offset) @ surface.pose)
+        scene.collection.objects.link(item)
+    _stand_still(scene, source)
     remove_emission()
     bpy.context.view_layer.update()
     return Normalised(scene, rescale, tuple(offset.tolist()), [*remarks, *others], cameras)
 
 
+def _stand_still(scene: bpy.types.Scene, source: bpy.types.Scene) -> None:
+    """Have `scene` stand where `source` does, and no material change any more."""
+    scene.frame_set(source.frame_current, subframe=source.frame_subframe)
+    for tree in _trees():
+        tree.animation_data_clear()
+
+
+def _trees() -> list[bpy.types.NodeTree]:
+    """Those of all materials, and all groups."""
+    own = [material.node_tree for material in bpy.data.materials if material.node_tree is not None]
+    return [*own, *bpy.data.node_groups]
+
+
 def remove_emission() -> None:
     """No material of the open file glows any more."""
-    trees = [material.node_tree for material in bpy.data.materials if material.node_tree is not None]
-    for tree in [*trees, *bpy.data.node_groups]:
+    for tree in _trees():
         for node in tree.nodes:
             for name in GLOWING_SOCKETS.get(node.type, ()):
                 _set_to_zero(tree, node, name)

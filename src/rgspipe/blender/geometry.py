@@ -73,7 +73,9 @@ def scene_geometry(scene: bpy.types.Scene) -> Geometry:
         mesh.loop_triangles.foreach_get("vertices", corners)
         matrix = np.array(item.matrix_world)
         vertices.append(points.reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3])
-        triangles.append(corners.reshape(-1, 3) + offset)
+        # A mirrored mesh shows its front faces where it did, although its corners go round the other way.
+        turn = -1 if np.linalg.det(matrix[:3, :3]) < 0.0 else 1
+        triangles.append(corners.reshape(-1, 3)[:, ::turn] + offset)
         offset += len(mesh.vertices)
         evaluated.to_mesh_clear()
     return Geometry(np.concatenate(vertices), np.concatenate(triangles))

@@ -7,6 +7,8 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TypeVar
 
 import bpy
+import numpy as np
+from mathutils import Matrix
 
 from rgspipe.blender.rendered import Surface
 
@@ -16,6 +18,15 @@ MIRRORING = {"BSDF_GLOSSY", "BSDF_METALLIC", "BSDF_ANISOTROPIC"}
 
 #: Inputs that all have to be above 0 for a surface to glow.
 GLOWING = {"EMISSION": ("Strength", "Color"), "BSDF_PRINCIPLED": ("Emission Strength", "Emission Color")}
+
+#: Outputs by which a material knows its object, or where it is, by the type of the node.
+POSED = {"TEX_COORD": ("Object",), "NEW_GEOMETRY": ("Position",), "OBJECT_INFO": ("Location", "Color", "Random")}
+
+#: Textures that go by the box around an object where nothing says by what.
+BOXED = {"TEX_BRICK", "TEX_CHECKER", "TEX_GABOR", "TEX_GRADIENT", "TEX_MAGIC", "TEX_NOISE", "TEX_VORONOI", "TEX_WAVE"}
+
+#: A pose whose axes are off by less, in its largest scale, turns nothing.
+STRAIGHT = 1e-4
 
 #: Names of materials or objects that a sentence lists.
 LISTED = 4
@@ -36,8 +47,11 @@ def left_out(scene: bpy.types.Scene, layer: bpy.types.ViewLayer, surfaces: Seque
     """
     used = _by_name({material for one in surfaces for material in one.mesh.materials if material is not None})
     items = _by_name({one.item for one in surfaces})
+    turned = {material for one in surfaces if _turned(one.pose) for material in one.mesh.materials}
     found = {what: _listed([one for one in used if _has(one, test)]) for what, test in TESTS.items()}
-    sentences = [_lamps(scene), _world(scene)]
+    found["pattern"] = _listed([one for one in used if _has(one, _posed) or (one in turned and _has(one, _boxed))])
+    found["relief"] = _listed([one for one in used if _moves(one) and _has(one, _displaced)])
+    sentences = [_lamps(scene), _world(scene), _override(layer)]
     sentences += [f"{what} of {names} {COSTS[what]}" for what, names in found.items() if names]
     treated = {what: _listed([one for one in items if test(one, layer)]) for what, test in TREATED.items()}
     sentences += [f"{what} of {names} is left out: {ORDINARY}" for what, names in treated.items() if names]
@@ -60,6 +74,11 @@ def _world(scene: bpy.types.Scene) -> str:
         for node in reached(tree)
     )
     return "light of its world is left out: what is around the scene is black" if shines else ""
+
+
+def _override(layer: bpy.types.ViewLayer) -> str:
+    material = layer.material_override
+    return "" if material is None else f'"{material.name}", the material of all in its view layer, is left out'
 
 
 def _other_objects(scene: bpy.types.Scene) -> str:
@@ -107,8 +126,43 @@ def _mirrors(tree: bpy.types.ShaderNodeTree) -> bool:
 
 
 def _scatters(tree: bpy.types.ShaderNodeTree) -> bool:
+    return _ends_in(tree, "Volume")
+
+
+def _posed(tree: bpy.types.ShaderNodeTree) -> bool:
+    return any(node.outputs[name].is_linked for node in reached(tree) for name in POSED.get(node.type, ()))
+
+
+def _boxed(tree: bpy.types.ShaderNodeTree) -> bool:
+    return any(
+        (node.type == "TEX_COORD" and node.outputs["Generated"].is_linked)
+        or (node.type in BOXED and not node.inputs["Vector"].is_linked)
+        for node in reached(tree)
+    )
+
+
+def _turned(pose: Matrix) -> bool:
+    """Whether the box around a surface is another one in the scene than in its object; mirrored in x it is the same."""
+    axes = np.array(pose.to_3x3())
+    axes[0] *= np.sign(np.linalg.det(axes))
+    scales = np.diag(axes)
+    return bool(scales.min() <= 0.0 or np.abs(axes - np.diag(scales)).max() > STRAIGHT * scales.max())
+
+
+def _displaced(tree: bpy.types.ShaderNodeTree) -> bool:
+    return _ends_in(tree, "Displacement")
+
+
+def _moves(material: bpy.types.Material) -> bool:
+    """Whether displacement moves surfaces, and not their normals alone."""
+    held_by = material.cycles if bpy.app.version < (4, 1, 0) else material
+    return held_by.displacement_method != "BUMP"
+
+
+def _ends_in(tree: bpy.types.ShaderNodeTree, name: str) -> bool:
+    """Whether something is linked to this input of a material."""
     outputs = [node for node in tree.nodes if node.type == "OUTPUT_MATERIAL" and node.is_active_output]
-    return any(node.inputs["Volume"].is_linked for node in outputs)
+    return any(node.inputs[name].is_linked for node in outputs)
 
 
 #: What a material may be besides a diffuse surface, and what comes of it.
@@ -120,6 +174,10 @@ COSTS = {
     "metal": "is in the images, but surfels are diffuse (training with gloss finds broad highlights): what it mirrors "
     "is taken for its own colour",
     "fog": "is in the images, but no model has any: surfaces behind it are taken for paler or darker than they are",
+    "pattern": "is another one in the images than in the file: it goes by its object (the pose, a number or a "
+    "colour), and each surface is an object of its own, in a scene scaled into a cube of 1",
+    "relief": "is higher or lower in the images than in the file: displacement has a length, and surfaces are scaled "
+    "into a cube of 1",
 }
 
 

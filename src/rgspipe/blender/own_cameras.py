@@ -15,19 +15,31 @@ SIDES: dict[str, Side] = {"AUTO": "longer", "HORIZONTAL": "width", "VERTICAL": "
 
 
 def own_cameras(
-    scene: bpy.types.Scene, rescale: float, offset: tuple[float, float, float]
+    scene: bpy.types.Scene, rescale: float, offset: tuple[float, float, float], distortion: str = ""
 ) -> tuple[dict[str, NamedCamera], list[str]]:
     """Its perspective cameras by name, and sentences about the others.
 
     Args:
         rescale, offset: a point x of the file becomes (x + offset) · rescale.
+        distortion: the scene's; with any, none of its cameras is ours.
     """
     cameras = [item for item in scene.objects if item.type == "CAMERA"]
     names = _names(cameras)
-    pinholes = {names[item]: _camera(item, rescale, offset) for item in cameras if item.data.type == "PERSP"}
-    others = [names[item] for item in cameras if item.data.type != "PERSP"]
-    remark = f"cameras that are no perspective ones, and cannot be a target's: {', '.join(others)}"
-    return pinholes, [remark] if others else []
+    kinds = {item: distortion if item.data.type == "PERSP" else "that are no perspective ones" for item in cameras}
+    pinholes = {names[item]: _camera(item, rescale, offset) for item, kind in kinds.items() if not kind}
+    others = {kind: [names[item] for item in cameras if kinds[item] == kind] for kind in kinds.values() if kind}
+    return pinholes, [f"cameras {kind}, and cannot be a target's: {', '.join(some)}" for kind, some in others.items()]
+
+
+def image_distortion(scene: bpy.types.Scene) -> str:
+    """In which way a render of `scene`, as it is set, is not the whole image of a pinhole; empty for one that is."""
+    render = scene.render
+    if render.pixel_aspect_x != render.pixel_aspect_y:
+        return f"whose pixels are not square (aspect {render.pixel_aspect_x:g} : {render.pixel_aspect_y:g})"
+    region = (render.border_min_x, render.border_min_y, render.border_max_x, render.border_max_y)
+    if render.use_border and render.use_crop_to_border and region != (0.0, 0.0, 1.0, 1.0):
+        return "whose images are cropped to a render region"
+    return ""
 
 
 def _names(cameras: Sequence[bpy.types.Object]) -> dict[bpy.types.Object, str]:

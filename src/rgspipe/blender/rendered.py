@@ -13,9 +13,6 @@ from typing import ClassVar
 import bpy
 from mathutils import Matrix
 
-#: Objects that have faces, or may have them.
-KINDS = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
-
 #: The smallest width and height of an image that Blender renders, pixels.
 SMALLEST = 4
 
@@ -93,12 +90,21 @@ def _prepare(scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> bpy.types.Ca
 def _surfaces(graph: bpy.types.Depsgraph) -> Iterator[Surface]:
     for instance in graph.object_instances:
         item = instance.object
-        if item.type not in KINDS or not instance.show_self:
+        # The faces of curves, texts and balls are meshes beside them, as Blender tells them to engines.
+        if item.type != "MESH" or not instance.show_self:
             continue
-        mesh = bpy.data.meshes.new_from_object(item, preserve_all_data_layers=True, depsgraph=graph)
+        mesh = _copied(instance, graph)
         if len(mesh.polygons):
             _take_materials(mesh, item)
             yield Surface(mesh, instance.matrix_world.copy(), item.original)
+
+
+def _copied(instance: bpy.types.DepsgraphObjectInstance, graph: bpy.types.Depsgraph) -> bpy.types.Mesh:
+    """Its faces. Those of geometry nodes may be no object's: of their object Blender gives the instancer's."""
+    item = instance.object
+    if instance.is_instance:
+        return item.data.copy()
+    return bpy.data.meshes.new_from_object(item, preserve_all_data_layers=True, depsgraph=graph)
 
 
 def _take_materials(mesh: bpy.types.Mesh, item: bpy.types.Object) -> None:
