@@ -12,6 +12,7 @@ from rgspipe.renderer.images.model import SurfelModel
 from rgspipe.scene import PointLight
 from rgspipe.scene.lights import KINDS
 from rgspipe.viewer.lamp_images import LampImages
+from rgspipe.viewer.material import Case, Found, Photograph
 from rgspipe.viewer.session import ILLUMINANCE, IRRADIANCE, OFFERED, Session, kinds_for, same_lights
 
 LAMP = PointLight(list(VISIBLE), [0.6, 0.5, 0.4])
@@ -141,6 +142,20 @@ def test_a_photograph_is_compared_with_the_picture(session: Session) -> None:
     assert strip.shape == (32, 104, 3)
     # Equal images differ nowhere.
     assert (strip[:, 72:].reshape(-1, 3).max(axis=0) == 247).all()
+
+
+def test_a_comparison_has_what_shines_with_the_lamps_off_and_the_exposures(session: Session) -> None:
+    cameras, other = room_cameras(32), PointLight([0.3, 0.2, 0.1], 0.5)
+    images = [session.images.image(camera, (LAMP,), "sharp") for camera in cameras]
+    off = [session.images.image(camera, (other,), "sharp") for camera in cameras]
+    taken = [Photograph(f"{k}", cameras[k], (k + 1) * images[k] + 2.0 * off[k], base=off[k]) for k in range(2)]
+    scale = torch.full((3,), 2.0, dtype=torch.float64)
+    session.open(Case("evening", taken, found=Found((LAMP,), exposures=(1.0, 2.0), base_scale=scale)))
+    for one in taken:
+        assert (session.compared(one)[:, 72:].reshape(-1, 3).min(axis=0) >= 246).all()
+    known = Photograph("known", cameras[0], images[0] + off[0], base=off[0])
+    session.open(Case("night", [known], found=Found((LAMP,))))
+    assert (session.compared(known)[:, 72:].reshape(-1, 3).min(axis=0) >= 246).all()
 
 
 def test_lamps_and_a_still_are_saved(session: Session, tmp_path) -> None:

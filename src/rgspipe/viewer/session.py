@@ -138,12 +138,23 @@ class Session:
     def compared(self, photograph: Photograph) -> Bytes:
         """A photograph, the picture from its camera, and their signed difference, side by side.
 
-        The picture is that of the lamps of the photograph where these are known, else of those of now.
+        The picture is that of the lamps of the photograph where these are known, else of those of now, in the exposure
+        that was found; what the photograph shows with the lamps off is in it.
         """
         rig = self.lights if photograph.lights is None else photograph.lights
         now, factor = self.images.image(photograph.camera, rig, "sharp"), display_gain(photograph.image)
+        now = self._exposure_of(photograph) * now
+        if photograph.base is not None:
+            scale = None if self.found is None else self.found.base_scale
+            now = now + photograph.base.to(now) * (1.0 if scale is None else scale.to(now))
         difference = signed_difference(photograph.image, now, factor)
         return beside([tone_map(photograph.image, factor), tone_map(now, factor), difference])
+
+    def _exposure_of(self, photograph: Photograph) -> float:
+        """Over that of the first photograph of the case, as a search found it; 1 where none did."""
+        exposures = () if self.found is None else self.found.exposures
+        pairs = zip(self.case.photographs, exposures, strict=False)
+        return next((exposure for taken, exposure in pairs if taken is photograph), 1.0)
 
     def open(self, case: Case) -> None:
         """Look at other photographs, and at what a fit found in them."""
