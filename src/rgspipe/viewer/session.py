@@ -117,15 +117,20 @@ class Session:
 
     def picture(self, camera: Camera, quality: Quality = "sharp") -> tuple[Bytes, float]:
         """(H, W, 3) uint8 for the screen; and what its brightest colour stands for."""
-        image = self.image(camera, quality)
+        [picture], top = self.pictures([self.image(camera, quality)])
+        return picture, top
+
+    def pictures(self, images: Sequence[Tensor]) -> tuple[list[Bytes], float]:
+        """What `image` gave of several cameras for the screen, all on one scale; and what their brightest colour is."""
         if self.shown == IRRADIANCE:
-            return coloured(image.mean(dim=2).numpy(), 2.0**self.exposure)
+            return coloured([image.mean(dim=2).numpy() for image in images], 2.0**self.exposure)
         if self.shown == ILLUMINANCE:
-            return coloured(LUMENS_PER_WATT * (image @ torch.tensor(LUMINANCE)).numpy(), 2.0**self.exposure)
-        if self._gain is None and image.any():
-            self._gain = display_gain(image)
+            eye = LUMENS_PER_WATT * torch.tensor(LUMINANCE)
+            return coloured([(image @ eye).numpy() for image in images], 2.0**self.exposure)
+        if self._gain is None:
+            self._gain = next((display_gain(image) for image in images if image.any()), None)
         factor = (self._gain or 1.0) * 2.0**self.exposure
-        return tone_map(image, factor), 1.0 / factor
+        return [tone_map(image, factor) for image in images], 1.0 / factor
 
     def photograph(self, camera: Camera) -> Photograph:
         """Keep what a camera sees now; the lamps of now are the truth, and others' photographs are dropped."""
