@@ -159,9 +159,8 @@ def view(
         resolution: pixels along the longer side of pictures at rest, 32 to 2048.
         address: of this machine to listen at, if others are to look: then with a token in `url`.
         world: how scene units came about, for lamps that are exported; metres if None.
-        exposure_free: whether every photograph but the first has an unknown exposure, as with `fit.exposure=free`.
-        base_scale_free: whether images with the lamps off are in photographs an unknown number of times, as with
-            `fit.base_scale=free`.
+        exposure_free: whether every photograph but the first has an unknown exposure.
+        base_scale_free: whether images with the lamps off are in photographs an unknown number of times.
 
     Raises:
         InputError: viser is not installed, or an argument is not what it should be.
