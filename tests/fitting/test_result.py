@@ -17,6 +17,7 @@ from rgspipe.fitting.findings import FitStatus, Undetermined
 from rgspipe.fitting.result import FitResult, dark_result
 from rgspipe.fitting.result_text import headline, light_line
 from rgspipe.scene import LightRig, PointLight
+from rgspipe.scene.lights.sphere import SphereLight
 
 NEAR, FAR = PointLight([0.1, 0.2, 0.3], [1.0, 2.0, 3.0]), PointLight([0.5, 0.5, 0.5], 4.0)
 
@@ -51,6 +52,19 @@ def test_a_faint_light_is_not_told_as_none() -> None:
     """Images have any unit: those of a camera's own may be a millionth of the scene's."""
     faint = light_line(PointLight([0.1, 0.2, 0.3], [6e-7, 8e-7, 0.0]), torch.full((6, 6), 1e-14).tolist())
     assert faint.endswith("RGB (6.00e-07, 8.00e-07, 0.00e+00) W/sr ± 1.00e-07")
+
+
+def test_places_in_a_small_scene_are_told() -> None:
+    """A table top of 5 cm, in metres: three decimals are a millimetre."""
+    spread = torch.diag(torch.tensor([4e-5] * 3 + [0.01] * 3).square()).tolist()
+    small = light_line(PointLight([0.0004, -0.0003, 0.0002], 0.3), spread)
+    assert small.startswith("point at (0.000400, -0.000300, 0.000200) ± 0.0000400, RGB (0.300, 0.300, 0.300)")
+    assert light_line(PointLight([0.03, 0.0, 0.0], 0.3), spread).startswith(
+        "point at (0.0300, 0.0000, 0.0000) ± 0.00004"
+    )
+    sphere = light_line(SphereLight([0.004, 0.0, 0.0], 0.3, 0.0004))
+    assert sphere.startswith("sphere at (0.00400, 0.00000, 0.00000), radius 0.000400")
+    assert light_line(PointLight([0.0, 0.0, 0.0], 0.3), spread).startswith("point at (0.000, 0.000, 0.000) ± 0.0000")
 
 
 def test_a_notebook_shows_the_same_as_a_list() -> None:

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
 import pytest
 import torch
 
+from rgspipe.datasets.gs3 import load_target
 from rgspipe.datasets.light_file import write_lights
 from rgspipe.demo import TARGET
 from rgspipe.scene import PointLight, SpotLight
 from rgspipe.viewer.drawings import ways
-from rgspipe.viewer.material import case_in, found_in
+from rgspipe.viewer.material import Case, case_in, found_in
 
 RIG = (PointLight([0.1, 0.2, 0.3], 1.0), SpotLight.shaped("smoothstep", 0.4, 0.1))
 
@@ -48,6 +50,25 @@ def test_a_fit_is_read_with_its_way(tmp_path: Path) -> None:
     first, second = ways(found.path)
     torch.testing.assert_close(torch.from_numpy(first)[:, 0], 0.1 + 0.1 * torch.arange(4).double())
     torch.testing.assert_close(torch.from_numpy(second)[:, 2], 0.1 * torch.arange(4).double())
+
+
+def test_what_a_fit_found_of_exposures_and_of_the_lamps_off_is_read(tmp_path: Path) -> None:
+    told = {"exposures": [1.0, 2.0], "base_scale": {"factor": [0.5, 0.5, 0.25]}}
+    write_lights(tmp_path / "lights.json", RIG, told)
+    found = found_in(tmp_path)
+    assert found.exposures == (1.0, 2.0) and found.base_scale.tolist() == [0.5, 0.5, 0.25]
+
+
+def test_images_with_the_lamps_off_come_with_their_photographs() -> None:
+    target = load_target(TARGET)
+    off = [replace(view, base=0.5 * view.image, saturated_from=0.2) for view in target.views]
+    photographs = Case.of(replace(target, views=tuple(off))).photographs
+    for view, one in zip(off, photographs, strict=True):
+        assert one.base is view.base
+        # What is saturated with the lamps off tells nothing of them.
+        assert not one.mask[(view.base >= 0.2).any(dim=-1)].any()
+    case = Case.of(replace(target, views=(off[0], *target.views[1:])))
+    assert not case.photographs and "only some of the photographs" in case.lacking
 
 
 @pytest.mark.parametrize("change", ["gone", "fewer lights", "not finite"])

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import threading
+from dataclasses import replace
 
 import pytest
 import torch
 
 from lit_room import VISIBLE, room_cameras
 from rgspipe.errors import InputError
+from rgspipe.fitting import LightSpec
 from rgspipe.progress import progress_told
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import PointLight
@@ -62,6 +64,56 @@ def test_a_refit_keeps_the_kind(finder: Finder, photographs: list[Photograph]) -
     assert [light.kind for light in result.lights] == ["sphere"]
     # A small sphere shines as a point does, but for shadows' edges: measured 1.1e-3.
     assert torch.allclose(result.lights[0].position, LAMP.position, atol=1e-2)
+
+
+@pytest.fixture(scope="module")
+def beside_another(frozen: FrozenScene) -> list[Photograph]:
+    """Photographs with a second lamp that is no lamp to look for: it shines with the others off, too."""
+    other = PointLight([0.3, 0.2, 0.1], [0.5, 0.5, 0.5])
+    pairs = [(camera, frozen.render(camera, other)) for camera in room_cameras(32)]
+    return [Photograph(f"{k}", one, frozen.render(one, LAMP) + off, base=off) for k, (one, off) in enumerate(pairs)]
+
+
+def test_what_shines_with_the_lamps_off_is_no_lamp(finder: Finder, beside_another: list[Photograph]) -> None:
+    result = finder.find(beside_another, LightSpec("point", count=None))
+    # Found 1e-8 off; without what is there anyway two lamps are found.
+    assert len(result.lights) == 1
+    assert torch.allclose(result.lights[0].position, LAMP.position, atol=1e-3)
+
+
+def test_a_refit_leaves_what_shines_with_the_lamps_off(finder: Finder, beside_another: list[Photograph]) -> None:
+    result = finder.refit(beside_another, (LAMP.at(LAMP.position - 0.1),))
+    # Found 3.2e-8 off, and 0.43 without what is there anyway.
+    assert torch.allclose(result.lights[0].position, LAMP.position, atol=1e-3)
+
+
+def test_photographs_taken_here_have_nothing_with_the_lamps_off(
+    finder: Finder, frozen: FrozenScene, beside_another: list[Photograph]
+) -> None:
+    camera = cameras_around(frozen, beside_another[0].camera)[0][1].reduced(32)
+    mixed = [*beside_another, Photograph("taken", camera, frozen.render(camera, LAMP))]
+    [light] = finder.refit(mixed, (LAMP.at(LAMP.position - 0.1),)).lights
+    assert torch.allclose(light.position, LAMP.position, atol=1e-3)
+
+
+def test_free_exposures_and_a_free_factor_are_found(frozen: FrozenScene, beside_another: list[Photograph]) -> None:
+    start = (LAMP.at(LAMP.position - 0.05),)
+    plain = [replace(one, image=one.image - one.base, base=None) for one in beside_another]
+    twice = [plain[0], replace(plain[1], image=2.0 * plain[1].image)]
+    result = Finder(frozen, exposure_free=True).refit(twice, start)
+    assert result.exposures == pytest.approx((1.0, 2.0), rel=1e-3)
+    assert torch.allclose(result.lights[0].position, LAMP.position, atol=1e-3)
+    half = [replace(one, base=0.5 * one.base) for one in beside_another]
+    result = Finder(frozen, base_scale_free=True).refit(half, start)
+    assert result.base_scale is not None and result.base_scale.value.tolist() == pytest.approx([2.0] * 3, rel=1e-3)
+    assert torch.allclose(result.lights[0].position, LAMP.position, atol=1e-3)
+
+
+def test_the_advice_is_about_the_lamps_alone(finder: Finder, frozen: FrozenScene, beside_another) -> None:
+    candidates = [camera for _, camera in cameras_around(frozen, beside_another[0].camera)]
+    advice = finder.advice(beside_another, (LAMP,), candidates, wanted=0.01)
+    # 5.6e-8 of the scene's size; 0.083 without what is there anyway, which one lamp does not explain.
+    assert advice.present_sd < 1e-3
 
 
 def test_pictures_are_made_while_a_search_runs(

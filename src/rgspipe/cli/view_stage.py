@@ -75,6 +75,8 @@ def _serve(made: _Made) -> int:
         resolution=page.resolution,
         address=page.address,
         world=world,
+        exposure_free=config.fit.exposure == "free",
+        base_scale_free=config.fit.base_scale == "free",
     )
     return serve(viewer, page.port, page.browser)
 

@@ -107,11 +107,16 @@ def _polished(refiner: Refiner, best: State, iterations: int) -> tuple[Refiner, 
     best = refiner.refined(refiner.at(best, _told(best)), PLAIN, iterations)
     if (told := _told(best)) != best.emitters:
         best = refiner.at(best, told)
+    return exposed(refiner, best), best
+
+
+def exposed(refiner: Refiner, best: State) -> Refiner:
+    """The refiner on the problem with the exposures of a rig's images, from here on taken as known."""
     problem = refiner.problem
     if problem.exposure_free:
         exposures = problem.moments(best.columns, PLAIN.at(problem, best.columns, best.intensity)).exposures
         problem = replace(problem.with_exposures(exposures), exposure_free=False)
-    return refiner.on(problem), best
+    return refiner.on(problem)
 
 
 def _told(state: State) -> tuple[Emitter, ...]:

@@ -11,6 +11,7 @@ from torch import Tensor
 from rgspipe.fitting.findings import FitStatus
 from rgspipe.fitting.model.known_images import Strength
 from rgspipe.scene import Light, LightRig
+from rgspipe.scene.lights.shape_coordinates import LENGTH
 
 
 def as_text(headline: str, lines: Sequence[str], reason: str) -> str:
@@ -56,12 +57,13 @@ def light_line(light: Light, covariance: Sequence[Sequence[float]] | None = None
         covariance: as `FitResult.covariance` has it; deviations are the root of the mean variance of a coordinate.
     """
     variances = None if covariance is None else [float(row[index]) for index, row in enumerate(covariance)]
-    place = ", ".join(f"{value:.3f}" for value in light.position.tolist())
+    decimals = max(3, decimals_of(float(light.position.abs().max()), 3))
+    place = ", ".join(f"{value:.{decimals}f}" for value in light.position.tolist())
     form = _strength_form(light.intensity)
     colour = ", ".join(map(form.format, light.intensity.tolist()))
     told = light.label
     if not light.distant:
-        told += f" at ({place})" + ("" if variances is None else _deviation(variances[:3], "{:.4f}"))
+        told += f" at ({place})" + ("" if variances is None else _deviation(variances[:3], f"{{:.{decimals + 1}f}}"))
     if light.axis is not None:
         told += "" if light.distant else ","
         told += f" axis ({', '.join(f'{value:.3f}' for value in light.axis.tolist())})"
@@ -69,9 +71,15 @@ def light_line(light: Light, covariance: Sequence[Sequence[float]] | None = None
     for number in light.shape:
         if number.decimals is not None:
             value = number.shown(getattr(light, number.name))
-            told += f", {number.key.replace('_', ' ')} {value:.{number.decimals}f}{number.unit}"
+            own = number.decimals + (decimals - 3 if number.coordinate is LENGTH else 0)
+            told += f", {number.key.replace('_', ' ')} {value:.{own}f}{number.unit}"
     told += f", RGB ({colour}) {light.unit}"
     return told + ("" if variances is None else _deviation(variances[-3:], form))
+
+
+def decimals_of(value: float, digits: int) -> int:
+    """With which a number of this size has `digits` digits or more; `digits` for 0."""
+    return max(0, digits - math.floor(math.log10(value)) - 1) if 0.0 < value < math.inf else digits
 
 
 def ambient_line(ambient: Strength) -> str:

@@ -21,7 +21,7 @@ from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.moments import moments
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.options import SearchOptions
-from rgspipe.fitting.polish import polished_on_pixels, seen_well
+from rgspipe.fitting.polish import exposed, polished_on_pixels, seen_well
 from rgspipe.fitting.result import FitResult, dark_result
 from rgspipe.fitting.search.refine import Refiner, State
 from rgspipe.fitting.search.weighting import PLAIN
@@ -86,6 +86,7 @@ def fit_from(
         refiner, course = Refiner.of(problem.sharpest(), meter), meter.course
         with course.polishing(size, 1):
             best = refiner.refined(refiner.start(start, PLAIN), PLAIN, iterations)
+        refiner = exposed(refiner, best)
         if best.status is FitStatus.CONVERGED:
             with course.part("bright spots", BRIGHT_SPOTS * size):
                 refiner, (best,) = seen_well(refiner, [best], options)

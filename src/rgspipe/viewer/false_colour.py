@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import matplotlib
 import numpy as np
 import numpy.typing as npt
@@ -13,10 +15,13 @@ from rgspipe.evaluation.images import Bytes
 TOP = 98.0
 
 
-def coloured(values: npt.NDArray, gain: float = 1.0) -> tuple[Bytes, float]:
-    """(H, W, 3) uint8 of values (H, W), dark blue for 0; and the value of the brightest colour, `gain` times less."""
-    top = (float(np.percentile(values, TOP)) or 1.0) / gain
-    return _colours(np.clip(values / top, 0.0, 1.0)), top
+def coloured(values: Sequence[npt.NDArray], gain: float = 1.0) -> tuple[list[Bytes], float]:
+    """(H, W, 3) uint8 of values (H, W) of pictures that are looked at together, dark blue for 0.
+
+    Also the value of the brightest colour in all of them, `gain` times less.
+    """
+    top = (float(np.percentile(np.stack(values), TOP)) or 1.0) / gain
+    return [_colours(np.clip(one / top, 0.0, 1.0)) for one in values], top
 
 
 def scale() -> Bytes:

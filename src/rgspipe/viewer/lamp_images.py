@@ -14,6 +14,7 @@ from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.images.model import Lit, SurfelModel, ViewModel
 from rgspipe.renderer.images.pixels import PixelModel
 from rgspipe.renderer.images.viewed_pixels import ViewedPixels
+from rgspipe.renderer.rig import rig_irradiance
 from rgspipe.renderer.view_weights import ViewWeights
 from rgspipe.scene import Camera, LightRig
 from rgspipe.scene.lights import Light
@@ -26,6 +27,9 @@ Quality = Literal["coarse", "soft", "sharp"]
 #: Pixels of single lamps' images that are kept, 12 bytes each: 200 MB. Pixels of views, some 200 bytes each (measured
 #: at 512²): 400 MB. Lamps whose light on the surfels is kept, 12 bytes a surfel.
 IMAGE_PIXELS, VIEW_PIXELS, LIT = 2**24, 2**21, 16
+
+#: Of an albedo below this the radiance does not tell what arrives.
+BLACK = 1e-3
 
 
 class LampImages:
@@ -45,6 +49,7 @@ class LampImages:
         self._weights: Kept[ViewWeights] = Kept(VIEW_PIXELS, lambda view: view.camera.pixel_count)
         self._models: Kept[ViewModel] = Kept(VIEW_PIXELS, lambda model: len(model.views.pixels))
         self._lit: Kept[Lit] = Kept(LIT)
+        self._onto: Kept[Tensor] = Kept(LIT)
 
     def knows(self, camera: Camera) -> bool:
         """Whether the camera was traced already for images that are not coarse."""
@@ -60,15 +65,36 @@ class LampImages:
     def irradiance(self, camera: Camera, rig: LightRig, quality: Quality = "soft") -> Tensor:
         """(H, W, 3) what arrives on the surfaces that a camera sees, with all bounces, W per square scene unit.
 
-        The radiance of diffuse surfels times π over their albedo; 0 where there is no surface.
+        The radiance of diffuse surfels times π over their albedo, or what arrives on those that are black; 0 where
+        there is no surface.
         """
         model, albedo = self._model(camera, "coarse" if quality == "coarse" else "soft"), self.frozen.surfels.albedo
-        radiance = torch.zeros_like(albedo)
+        arriving = torch.zeros_like(albedo)
         for light in rig:
-            lit = self._lit_by(model, _white(light))
-            radiance += light.intensity.to(albedo) * (lit if isinstance(lit, Tensor) else lit.radiance)
-        arriving = radiance * math.pi / albedo.clamp(min=1e-3)
+            arriving += light.intensity.to(albedo) * self._arriving(self._lit_by(model, _white(light)), _white(light))
         return (model.views.operator @ arriving).reshape(camera.height, camera.width, 3).cpu()
+
+    def _arriving(self, lit: Lit, light: Light) -> Tensor:
+        """(N, 3) irradiance of the surfels that a lamp has `lit`."""
+        albedo = self.frozen.surfels.albedo
+        arriving = (lit if isinstance(lit, Tensor) else lit.radiance) * math.pi / albedo.clamp(min=BLACK)
+        black = albedo < BLACK
+        if not bool(black.any()):
+            return arriving
+        return torch.where(black, self._onto.get(_told(light), lambda: self._gathered(lit, light)), arriving)
+
+    def _gathered(self, lit: Lit, light: Light) -> Tensor:
+        """(N, 3) the same before any of it is reflected: from the lamp, and from other surfels."""
+        transport = self.frozen.transport
+        with torch.no_grad():
+            direct = rig_irradiance(self.frozen.bvh, (light,))
+            sent = (self.frozen.surfels.albedo * direct / math.pi)[..., None]
+            if isinstance(lit, Tensor):
+                received = transport.gathered(sent)
+            else:
+                highlights = lit.transport.highlights(lit.towards, lit.irradiance).sum(dim=0)[..., None]
+                received, _ = lit.transport.received(transport, sent, highlights)
+            return direct + math.pi * received[..., 0]
 
     def _unit_image(self, camera: Camera, light: Light, quality: Quality) -> Tensor:
         white = _white(light)

@@ -10,6 +10,7 @@ from functools import partial
 import torch
 from torch import Tensor
 
+from rgspipe.fitting.result_text import decimals_of
 from rgspipe.scene.lights import Light
 from rgspipe.scene.lights.shape_number import ShapeNumber
 
@@ -51,7 +52,7 @@ class Number:
 
 def numbers_of(light: Light, size: float) -> list[Number]:
     """The numbers of a lamp in a scene of `size`, in the order in which they are listed."""
-    decimals = _decimals(size)
+    decimals = decimals_of(size, DIGITS)
     numbers = [] if light.distant else [_place(axis, size, decimals) for axis in range(3)]
     if light.axis is not None:
         numbers += [
@@ -61,7 +62,9 @@ def numbers_of(light: Light, size: float) -> list[Number]:
     numbers += [_channel(index) for index in range(3)]
     level = level_of(light)
     hint = "Intensity of the brightest channel."
-    numbers.append(Number(light.unit, hint, level_of, _levelled, SHARE * (level or 1.0), _decimals(level or 1.0)))
+    numbers.append(
+        Number(light.unit, hint, level_of, _levelled, SHARE * (level or 1.0), decimals_of(level or 1.0, DIGITS))
+    )
     return numbers + [_shape(number, size, decimals) for number in light.shape]
 
 
@@ -153,11 +156,6 @@ def _aimed(light: Light, heading: float, pitch: float) -> Light:
 def _axis(light: Light) -> list[float]:
     assert light.axis is not None
     return light.axis.tolist()
-
-
-def _decimals(value: float) -> int:
-    """With which a number of this size has DIGITS digits or more."""
-    return max(0, DIGITS - math.floor(math.log10(value)) - 1) if value > 0.0 else DIGITS
 
 
 def _rounded(value: float) -> float:

@@ -24,6 +24,9 @@ from rgspipe.fitting.words import told_alternative
 from rgspipe.scene import Camera, LightRig
 from rgspipe.scene.arrays import ArrayLike
 
+#: Of photographs of which only some are known with the lamps off.
+HALF_KNOWN = "Lamps cannot be looked for here: only some of the photographs are there with the lamps off, too."
+
 
 @dataclass(frozen=True, eq=False)
 class Photograph:
@@ -32,6 +35,7 @@ class Photograph:
     Attributes:
         mask: (H, W) the scene's share of each pixel, 0 where that tells too little of it; 1 if None.
         lights: under which it was taken, where they are known and not looked for.
+        base: (H, W, 3) the same with the lamps off; black if None.
     """
 
     name: str
@@ -39,12 +43,16 @@ class Photograph:
     image: Tensor
     mask: Tensor | None = None
     lights: LightRig | None = None
+    base: Tensor | None = None
 
     @classmethod
     def of(cls, view: View, name: str) -> Photograph:
         """A view of a dataset or target; what is saturated in it is not searched for lamps."""
-        mask = torch.where(view.saturated.any(dim=-1), 0.0, view.alpha)
-        return cls(name, view.camera, view.image, mask, None if view.light is None else (view.light,))
+        saturated = view.saturated
+        if view.base is not None and view.saturated_from is not None:
+            saturated = saturated | (view.base >= view.saturated_from)
+        mask = torch.where(saturated.any(dim=-1), 0.0, view.alpha)
+        return cls(name, view.camera, view.image, mask, None if view.light is None else (view.light,), view.base)
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +65,8 @@ class Found:
         costs: robust cost of the best rig of each number of lamps that was tried.
         path: the rigs on the way, from the start that won.
         alternatives: what they were weighed against.
+        exposures: of each photograph over the first one's; empty where they were known.
+        base_scale: (3,) how many times images with the lamps off are in the photographs; once if None.
     """
 
     lights: LightRig
@@ -65,13 +75,17 @@ class Found:
     costs: Mapping[int, float] = field(default_factory=dict)
     path: tuple[LightRig, ...] = ()
     alternatives: tuple[ToldAlternative, ...] = ()
+    exposures: tuple[float, ...] = ()
+    base_scale: Tensor | None = None
 
     @classmethod
     def of(cls, result: FitResult) -> Found:
         """What a fit found."""
         steps = tuple(step.lights for step in result.trajectory)
         others = (ToldAlternative(one.lights, told_alternative(one), one.ruled_out) for one in result.alternatives)
-        return cls(result.lights, result.covariance, repr(result), result.costs, steps, tuple(others))
+        scale = None if result.base_scale is None else result.base_scale.value
+        told = repr(result)
+        return cls(result.lights, result.covariance, told, result.costs, steps, tuple(others), result.exposures, scale)
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +104,9 @@ class Case:
 
     @classmethod
     def of(cls, target: Target, truth: LightRig = (), found: Found | None = None) -> Case:
-        """A target."""
+        """A target; without its photographs where only some of them are known with the lamps off."""
+        if len({view.base is None for view in target.views}) > 1:
+            return cls(target.name, (), truth, found, HALF_KNOWN)
         views = [Photograph.of(view, f"{target.name}, view {index}") for index, view in enumerate(target.views)]
         return cls(target.name, views, truth, found)
 
@@ -121,7 +137,9 @@ def found_in(fit: str | Path) -> Found:
     covariances = read_covariances(path)
     words = _words(told, lights, covariances) if {"result", "reason", "seconds"} <= told.keys() else ""
     steps = _path(Path(fit) / "convergence.csv", lights)
-    return Found(lights, covariances, words, costs, steps, read_alternatives(path))
+    exposures = tuple(float(one) for one in told.get("exposures", ()))
+    scale = torch.tensor(told["base_scale"]["factor"]).double() if "base_scale" in told else None
+    return Found(lights, covariances, words, costs, steps, read_alternatives(path), exposures, scale)
 
 
 def _words(told: Mapping[str, Any], lights: LightRig, covariances: Sequence[Tensor]) -> str:

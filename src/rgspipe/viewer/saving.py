@@ -10,8 +10,9 @@ from concurrent.futures import Future
 from pathlib import Path
 
 import torch
+from torch import Tensor
 
-from rgspipe.evaluation.images import Bytes, png_bytes
+from rgspipe.evaluation.images import png_bytes
 from rgspipe.light_export.export import export_lights
 from rgspipe.light_export.world import World
 from rgspipe.relighting.pictures import video
@@ -60,7 +61,8 @@ class Saving:
         lower, upper = (corner.double().cpu() for corner in self._session.images.frozen.bounds)
 
         def made() -> bytes:
-            return video([self._frame(one) for one in swing(camera, 0.5 * (lower + upper))], SECONDS)
+            images = [self._image(one) for one in swing(camera, 0.5 * (lower + upper))]
+            return video(self._session.pictures(images)[0], SECONDS)
 
         def take(ended: Future) -> None:
             told.remove()
@@ -68,9 +70,9 @@ class Saving:
 
         self._visit.actions.beside("swing.webp", made, take)
 
-    def _frame(self, camera: Camera) -> Bytes:
+    def _image(self, camera: Camera) -> Tensor:
         with self._turn:  # Between two frames others have their turn.
-            return self._session.picture(self._session.seen(camera), "soft")[0]
+            return self._session.image(self._session.seen(camera), "soft")
 
     def _send(self, name: str, content: bytes) -> None:
         self._visit.client.send_file_download(name, content, save_immediately=True)

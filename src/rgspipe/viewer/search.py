@@ -6,9 +6,12 @@ import threading
 from collections.abc import Sequence
 from dataclasses import replace
 
+import torch
+
 from rgspipe.errors import InputError
 from rgspipe.fitting import FitResult, FitViews, LightSpec
 from rgspipe.fitting.certainty.advice import ViewAdvice, suggest_views
+from rgspipe.fitting.model.capture import BaseImages, ImageCapture
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import Camera, LightRig
 from rgspipe.viewer.kept import Kept
@@ -26,10 +29,13 @@ class Finder:
 
     Args:
         frozen: the scene; what fits keep of it is not shared with those who look at it.
+        exposure_free: whether every photograph but the first has an unknown exposure.
+        base_scale_free: whether images with the lamps off are in photographs an unknown number of times.
     """
 
-    def __init__(self, frozen: FrozenScene) -> None:
+    def __init__(self, frozen: FrozenScene, exposure_free: bool = False, base_scale_free: bool = False) -> None:
         self._frozen, self._turn = replace(frozen), threading.Lock()
+        self._exposure_free, self._base_scale_free = exposure_free, base_scale_free
         self._views: Kept[FitViews] = Kept(KEPT_VIEWS)
 
     @property
@@ -44,7 +50,7 @@ class Finder:
             InputError: there are no photographs.
         """
         with self._turn:
-            return self._prepared(photographs, lights).fit(_images(photographs))
+            return self._prepared(photographs, lights).fit(_images(photographs), capture=self._capture(photographs))
 
     def refit(self, photographs: Sequence[Photograph], start: LightRig) -> FitResult:
         """The lamps of photographs, as many and of those kinds that `start` has, from there downhill.
@@ -75,18 +81,28 @@ class Finder:
             if not result.lights:
                 raise InputError("lamps", expected="some light", found="none", remedy="Take a photograph with a lamp.")
             present = [taken.camera for taken in photographs]
-            return suggest_views(self._frozen, result, present, candidates, wanted=wanted)
+            capture = self._capture(photographs)
+            return suggest_views(self._frozen, result, present, candidates, wanted=wanted, capture=capture)
 
     def _refit(self, photographs: Sequence[Photograph], start: LightRig) -> FitResult:
-        return self._prepared(photographs, "auto").refit(_images(photographs), start)
+        return self._prepared(photographs, "auto").refit(_images(photographs), start, self._capture(photographs))
+
+    def _capture(self, photographs: Sequence[Photograph]) -> ImageCapture:
+        """How photographs were taken; of those without an image with the lamps off that is black."""
+        if all(taken.base is None for taken in photographs):
+            return ImageCapture(self._exposure_free)
+        images = [torch.zeros_like(taken.image) if taken.base is None else taken.base for taken in photographs]
+        return ImageCapture(self._exposure_free, base=BaseImages(images, self._base_scale_free))
 
     def _prepared(self, photographs: Sequence[Photograph], lights: str | LightSpec) -> FitViews:
         if not photographs:
             remedy = "Take one with the button, or start the viewer with target=DIR."
             raise InputError("photographs", expected="at least one to find the lights of", found="none", remedy=remedy)
         cameras = [taken.camera for taken in photographs]
-        masks = [taken.mask for taken in photographs] if all(one.mask is not None for one in photographs) else None
-        key = b"".join(camera.key for camera in cameras), repr(lights), masks and tuple(map(id, masks))
+        masks, owners = None, tuple(id(taken.mask) for taken in photographs)
+        if any(taken.mask is not None for taken in photographs):
+            masks = [torch.ones(one.image.shape[:2]) if one.mask is None else one.mask for one in photographs]
+        key = b"".join(camera.key for camera in cameras), repr(lights), owners
         return self._views.get(key, lambda: FitViews.prepare(self._frozen, cameras, lights=lights, masks=masks))
 
 

@@ -143,6 +143,8 @@ def view(
     resolution: int = 256,
     address: str = LOOPBACK,
     world: World | None = None,
+    exposure_free: bool = False,
+    base_scale_free: bool = False,
 ) -> Viewer:
     """Show a scene in the browser, at 127.0.0.1 only; returns at once.
 
@@ -157,6 +159,8 @@ def view(
         resolution: pixels along the longer side of pictures at rest, 32 to 2048.
         address: of this machine to listen at, if others are to look: then with a token in `url`.
         world: how scene units came about, for lamps that are exported; metres if None.
+        exposure_free: whether every photograph but the first has an unknown exposure.
+        base_scale_free: whether images with the lamps off are in photographs an unknown number of times.
 
     Raises:
         InputError: viser is not installed, or an argument is not what it should be.
@@ -174,7 +178,7 @@ def view(
     taken = [photograph for case in cases for photograph in case.photographs]
     camera = camera or (taken[0].camera if taken else first_camera(*scene.bounds))
     is_open = address not in (LOOPBACK, "localhost")
-    images, finder = LampImages(scene), Finder(scene)
+    images, finder = LampImages(scene), Finder(scene, exposure_free, base_scale_free)
     exhibit = Exhibit(images, finder, camera, rig, tuple(cases), tuple(references), resolution, world or World())
     viewer = Viewer(exhibit, 0 if is_open else port)
     if is_open:

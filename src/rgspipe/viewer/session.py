@@ -117,15 +117,20 @@ class Session:
 
     def picture(self, camera: Camera, quality: Quality = "sharp") -> tuple[Bytes, float]:
         """(H, W, 3) uint8 for the screen; and what its brightest colour stands for."""
-        image = self.image(camera, quality)
+        [picture], top = self.pictures([self.image(camera, quality)])
+        return picture, top
+
+    def pictures(self, images: Sequence[Tensor]) -> tuple[list[Bytes], float]:
+        """What `image` gave of several cameras for the screen, all on one scale; and what their brightest colour is."""
         if self.shown == IRRADIANCE:
-            return coloured(image.mean(dim=2).numpy(), 2.0**self.exposure)
+            return coloured([image.mean(dim=2).numpy() for image in images], 2.0**self.exposure)
         if self.shown == ILLUMINANCE:
-            return coloured(LUMENS_PER_WATT * (image @ torch.tensor(LUMINANCE)).numpy(), 2.0**self.exposure)
-        if self._gain is None and image.any():
-            self._gain = display_gain(image)
+            eye = LUMENS_PER_WATT * torch.tensor(LUMINANCE)
+            return coloured([(image @ eye).numpy() for image in images], 2.0**self.exposure)
+        if self._gain is None:
+            self._gain = next((display_gain(image) for image in images if image.any()), None)
         factor = (self._gain or 1.0) * 2.0**self.exposure
-        return tone_map(image, factor), 1.0 / factor
+        return [tone_map(image, factor) for image in images], 1.0 / factor
 
     def photograph(self, camera: Camera) -> Photograph:
         """Keep what a camera sees now; the lamps of now are the truth, and others' photographs are dropped."""
@@ -138,12 +143,23 @@ class Session:
     def compared(self, photograph: Photograph) -> Bytes:
         """A photograph, the picture from its camera, and their signed difference, side by side.
 
-        The picture is that of the lamps of the photograph where these are known, else of those of now.
+        The picture is that of the lamps of the photograph where these are known, else of those of now, in the exposure
+        that was found; what the photograph shows with the lamps off is in it.
         """
         rig = self.lights if photograph.lights is None else photograph.lights
         now, factor = self.images.image(photograph.camera, rig, "sharp"), display_gain(photograph.image)
+        now = self._exposure_of(photograph) * now
+        if photograph.base is not None:
+            scale = None if self.found is None else self.found.base_scale
+            now = now + photograph.base.to(now) * (1.0 if scale is None else scale.to(now))
         difference = signed_difference(photograph.image, now, factor)
         return beside([tone_map(photograph.image, factor), tone_map(now, factor), difference])
+
+    def _exposure_of(self, photograph: Photograph) -> float:
+        """Over that of the first photograph of the case, as a search found it; 1 where none did."""
+        exposures = () if self.found is None else self.found.exposures
+        pairs = zip(self.case.photographs, exposures, strict=False)
+        return next((exposure for taken, exposure in pairs if taken is photograph), 1.0)
 
     def open(self, case: Case) -> None:
         """Look at other photographs, and at what a fit found in them."""
