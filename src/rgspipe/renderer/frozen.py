@@ -13,7 +13,6 @@ from torch import Tensor
 
 from rgspipe.arguments import as_count, as_one_of, as_path
 from rgspipe.errors import InputError
-from rgspipe.names import Solver
 from rgspipe.renderer.areas import surfel_areas
 from rgspipe.renderer.clusters import cluster_patches
 from rgspipe.renderer.dictionary import GRID, LightDictionary, build_dictionary
@@ -26,7 +25,7 @@ from rgspipe.renderer.images.model import SurfelModel
 from rgspipe.renderer.images.pixels import PixelModel
 from rgspipe.renderer.images.recent_views import RecentViews
 from rgspipe.renderer.images.viewed_pixels import ViewedPixels
-from rgspipe.renderer.indirect import IndirectSolver, indirect_solver
+from rgspipe.renderer.indirect import IndirectSolver, Solver, indirect_solver
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.mutual_visibility import build_needed_gather
 from rgspipe.renderer.openness import openness, void_irradiance
