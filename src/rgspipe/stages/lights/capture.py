@@ -11,7 +11,7 @@ import torch
 from rgspipe.config import RgspipeConfig
 from rgspipe.datasets.exif_exposure import EXPOSE_ALIKE, check_exposures
 from rgspipe.datasets.views import View
-from rgspipe.degradation.target_capture import captured
+from rgspipe.degradation.degraded_target import captured
 from rgspipe.errors import InputError
 from rgspipe.fitting.fit import Emitters
 from rgspipe.fitting.model.capture import SATURATED, BaseImages, ImageCapture, stored_in_eight_bits
