@@ -24,10 +24,10 @@ def test_a_sweep_is_refused(capsys: pytest.CaptureFixture) -> None:
 
 def test_a_target_of_ones_own_is_shown_with_its_truth(tmp_path: Path) -> None:
     truth = ROOM / "truth" / "hidden.json"
-    made = _Made([f"outputs={tmp_path}", f"fit.target={TARGET}", f"fit.truth={truth}", "views.count=3"], load_stage)
+    made = _Made([f"outputs={tmp_path}", f"fit.target={TARGET}", f"fit.truth={truth}"], load_stage)
     assert made.find("generate_dataset") is None and made.find("fit_light") is None
     [case] = _cases(made, made.config("freeze"))
-    assert case.name == "hidden" and len(case.photographs) == 3 and case.found is None
+    assert case.name == "hidden" and (len(case.photographs), len(case.others)) == (1, 2) and case.found is None
     assert case.truth == read_lights(truth)
 
 
@@ -37,7 +37,8 @@ def test_it_is_shown_as_the_fit_takes_it(tmp_path: Path) -> None:
     config = made.config("freeze")
     [case] = _cases(made, config)
     views, capture = captured_views(used_views(load_target(TARGET), config), "hidden", config)
-    assert len(case.photographs) == 2
+    assert [one.name for one in case.photographs] == ["hidden, view 2", "hidden, view 0"]
+    assert [one.name for one in case.others] == ["hidden, view 1"]  # looked at, not searched
     for one, view in zip(case.photographs, views, strict=True):
         assert torch.equal(one.image, view.image) and torch.equal(one.mask, view.alpha)
         assert (one.clip, one.saturated) == (capture.clip, capture.saturated)
@@ -50,6 +51,7 @@ def test_why_a_fit_cannot_take_it_is_told(tmp_path: Path) -> None:
     made = _Made([f"outputs={tmp_path}", f"fit.target={TARGET}", "views.count=7"], load_stage)
     [case] = _cases(made, made.config("freeze"))
     assert not case.photographs and "Ask for fewer views" in case.lacking
+    assert len(case.others) == 3
 
 
 def test_a_fit_of_it_is_shown_where_there_is_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -115,16 +115,25 @@ def _cases(made: _Made, config: RgspipeConfig) -> list:
 
 
 def _case(target: Target, config: RgspipeConfig, truth: LightRig, found: Found | None) -> Case:
-    """A target as a fit of this configuration takes it; without photographs, and why, where none can."""
-    from rgspipe.stages.lights.capture import captured_views
-    from rgspipe.stages.lights.targets import used_views
-    from rgspipe.viewer.material import Case
+    """A target as a fit of this configuration takes it; without photographs to search, and why, where none can.
 
+    What the fit does not look at can still be looked at.
+    """
+    from rgspipe.stages.lights.capture import captured_views
+    from rgspipe.stages.lights.targets import used_indices
+    from rgspipe.viewer.material import Case, Photograph
+
+    every = [Photograph.of(view, f"{target.name}, view {index}") for index, view in enumerate(target.views)]
     try:
-        views, capture = captured_views(used_views(target, config), target.name, config)
+        used = used_indices(target.name, len(target.views), config)
+        views, capture = captured_views([target.views[index] for index in used], target.name, config)
     except InputError as error:
-        return Case(target.name, (), truth, found, f"Lamps cannot be looked for here. {error}")
-    return Case.of(replace(target, views=tuple(views)), truth, found, capture)
+        return Case(target.name, (), truth, found, f"Lamps cannot be looked for here. {error}", every)
+    case = Case.of(replace(target, views=tuple(views)), truth, found, capture)
+    # None where only some of them are known with the lamps off.
+    taken = [replace(one, name=every[index].name) for one, index in zip(case.photographs, used, strict=False)]
+    others = [one for one in every if one.name not in {own.name for own in taken}]
+    return replace(case, photographs=taken, others=others)
 
 
 def _references(dataset: Artifact | None) -> list:

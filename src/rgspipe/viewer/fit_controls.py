@@ -106,7 +106,7 @@ class FitControls:
     @property
     def _photographs(self) -> list[Photograph]:
         """Those of the case and the references, each once: browsers refuse a list that offers one name twice."""
-        own = self._session.case.photographs
+        own = [*self._session.case.photographs, *self._session.case.others]
         names = {one.name for one in own}
         return [*own, *(one for one in self._visit.exhibit.references if one.name not in names)]
 

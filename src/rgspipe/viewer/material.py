@@ -117,6 +117,7 @@ class Case:
 
     Attributes:
         lacking: why there are no photographs, in a sentence.
+        others: further photographs under the same lamps, which are looked at and not searched.
     """
 
     name: str = "none"
@@ -124,6 +125,7 @@ class Case:
     truth: LightRig = ()
     found: Found | None = None
     lacking: str = "There are no photographs to find lamps in."
+    others: Sequence[Photograph] = ()
 
     @classmethod
     def of(
