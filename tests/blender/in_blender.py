@@ -90,9 +90,9 @@ def save_blends(folder: Path) -> None:
 
 def normalise(folder: Path) -> None:
     """Bounds and scale of a normalised file."""
-    found = blend.open_normalised(folder / "lit.blend")
-    geometry = scene_geometry(found.scene)
-    np.savez(folder / "normal.npz", lo=geometry.lo, hi=geometry.hi, rescale=found.rescale, offset=found.offset)
+    found = blend.open_blend(folder / "lit.blend")
+    geometry, world = found.geometry, found.world
+    np.savez(folder / "normal.npz", lo=geometry.lo, hi=geometry.hi, rescale=world.rescale, offset=world.offset)
 
 
 def own_cameras(folder: Path) -> None:
@@ -117,9 +117,9 @@ def own_cameras(folder: Path) -> None:
             seen = np.array([world_to_camera_view(scene, item, Vector(point)) for point in points])
             pixels[f"{item.name} {width} {height}"] = np.stack([seen[:, 0] * width, (1 - seen[:, 1]) * height], axis=1)
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "room.blend"))
-    found = blend.open_normalised(folder / "room.blend")
+    found = blend.open_blend(folder / "room.blend")
     write_cameras(folder / "cameras.json", found.cameras)
-    np.savez(folder / "pixels.npz", points=(points + found.offset) * found.rescale, **pixels)
+    np.savez(folder / "pixels.npz", points=(points + found.world.offset) * found.world.rescale, **pixels)
     (folder / "remarks.txt").write_text("\n".join(found.remarks))
 
 

@@ -12,6 +12,7 @@ from luminaire_files import COLUMNS, ies, ldt
 from rgspipe.datasets.photometric_file import read_catalogue, read_photometry
 from rgspipe.errors import InputError
 from rgspipe.light_export.export import export_lights
+from rgspipe.light_export.ies import ies as write_ies
 from rgspipe.scene.lights import LedLight, Photometry, ProfileLight
 
 
@@ -36,11 +37,27 @@ def test_planes_of_half_a_turn_are_mirrored(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("planes", "count", "horizontal"),
-    [("0", 1, [0]), ("0 45 90", 3, [0, 45, 90, 135, 180, 225, 270, 315]), ("0 120 360", 3, [0, 120])],
+    [("0", 1, [0]), ("0 45 90", 3, [0, 45, 90, 135, 180, 225, 270, 315]), ("0 120 360", 3, [0, 240])],
 )
 def test_the_last_plane_tells_the_symmetry(tmp_path: Path, planes: str, count: int, horizontal: list[float]) -> None:
     table = read(tmp_path, "a.ies", ies(planes, COLUMNS[:count]))
     assert torch.rad2deg(table.horizontal).tolist() == pytest.approx(horizontal)
+
+
+@pytest.mark.parametrize("name", ["a.ies", "a.ldt"])
+def test_planes_are_counted_anticlockwise_from_above(tmp_path: Path, name: str) -> None:
+    """As LM-63-2002 defines horizontal angles, and Radiance's ies2rad reads them; written, they are what was read."""
+    columns = [[1, 1, 0], [1, 9, 0], [1, 1, 0], [1, 2, 0], [1, 1, 0]]
+    text = ies("0 90 180 270 360", columns) if name == "a.ies" else ldt(0, 4, columns[:4])
+    table = read(tmp_path, name, text)
+    light = ProfileLight([0.0, 0.0, 1.0], 1.0, [0.0, 0.0, -1.0], 0.0, table)
+    below = torch.tensor([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]], dtype=torch.float64)
+    expected = torch.tensor([1.0, 9.0, 1.0, 2.0], dtype=torch.float64) / 9.0
+    torch.testing.assert_close(light.relative_intensity_towards(below), expected)
+    again = read(tmp_path, "again.ies", write_ies(light, "again")[0])
+    torch.testing.assert_close(again.horizontal, table.horizontal)
+    # Files have six digits: measured 3.3e-7.
+    torch.testing.assert_close(again.relative, table.relative, rtol=0.0, atol=2e-6)
 
 
 @pytest.mark.parametrize(
@@ -72,7 +89,7 @@ def test_eulumdat_is_candela_per_1000_lumens(tmp_path: Path, symmetry: int, plan
 def test_symmetry_about_the_other_plane(tmp_path: Path) -> None:
     """Of the planes 270°, 0° and 90°; 180° is the mirror image of 0°."""
     table = read(tmp_path, "a.ldt", ldt(3, 4, [*COLUMNS]))
-    expected = torch.tensor([COLUMNS[k] for k in (1, 2, 1, 0)], dtype=torch.float64)
+    expected = torch.tensor([COLUMNS[k] for k in (1, 0, 1, 2)], dtype=torch.float64)
     torch.testing.assert_close(candela(table), 2.0 * expected)
 
 

@@ -11,8 +11,8 @@ import torch
 from misread_views import misread_view
 from raycast import ROOM, Cuboid, room_views, view_of
 from rgspipe.datasets.views import View
-from rgspipe.degradation.capture import degraded
-from rgspipe.degradation.options import Capture
+from rgspipe.degradation.degraded_views import degraded
+from rgspipe.degradation.options import ViewErrors
 from rgspipe.evidence.conventions import misread
 from rgspipe.evidence.readings import READINGS, Reading
 
@@ -58,10 +58,15 @@ def test_planar_depth_that_is_said_to_be_along_rays_is_told(room: list[View]) ->
 @pytest.mark.parametrize("views", ["room", "table"])
 @pytest.mark.parametrize(
     "capture",
-    [Capture(), Capture(depth_noise=0.01, depth_missing=0.3), Capture(depth_noise=0.05), Capture(depth_noise=0.15)],
+    [
+        ViewErrors(),
+        ViewErrors(depth_noise=0.01, depth_missing=0.3),
+        ViewErrors(depth_noise=0.05),
+        ViewErrors(depth_noise=0.15),
+    ],
     ids=["clean", "holes", "noise", "much noise"],
 )
-def test_what_is_stated_rightly_is_left_alone(request: pytest.FixtureRequest, views: str, capture: Capture) -> None:
+def test_what_is_stated_rightly_is_left_alone(request: pytest.FixtureRequest, views: str, capture: ViewErrors) -> None:
     assert misread(degraded(request.getfixturevalue(views), capture), along_rays=False) is None
 
 
@@ -72,7 +77,7 @@ def test_units_that_no_reading_has_are_not_taken_for_one_of_them(table: list[Vie
 
 def test_noisy_depth_still_tells_axes(table: list[View]) -> None:
     meant = Reading(opencv=True)
-    noisy = degraded([misread_view(view, meant) for view in table], Capture(depth_noise=0.05))
+    noisy = degraded([misread_view(view, meant) for view in table], ViewErrors(depth_noise=0.05))
     assert misread(noisy, along_rays=False).reading == meant
 
 

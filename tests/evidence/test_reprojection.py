@@ -9,8 +9,8 @@ import torch
 
 from raycast import ROOM, Cuboid, room_views, view_of
 from rgspipe.datasets.views import View
-from rgspipe.degradation.capture import degraded
-from rgspipe.degradation.options import Capture
+from rgspipe.degradation.degraded_views import degraded
+from rgspipe.degradation.options import ViewErrors
 from rgspipe.evidence.readings import READINGS, Reading
 from rgspipe.evidence.reprojection import POINTS, ROUNDING, Agreement, Trials
 
@@ -70,6 +70,6 @@ def test_cameras_in_one_place_have_nothing_to_say() -> None:
 def test_noise_widens_what_agrees() -> None:
     views = room_views(6, 24)
     assert Trials.draw(views, False).tolerance < 1.1 * ROUNDING
-    noisy = Trials.draw(degraded(views, Capture(depth_noise=0.02)), False)
+    noisy = Trials.draw(degraded(views, ViewErrors(depth_noise=0.02)), False)
     assert noisy.tolerance == pytest.approx(3 * 2**0.5 * 0.02, rel=0.3)  # measured 0.102
     assert noisy.agreement(STATED).share > 0.95  # measured 0.99

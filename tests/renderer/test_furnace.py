@@ -7,9 +7,9 @@ import math
 import pytest
 import torch
 
+from rgspipe.names import Solver
 from rgspipe.renderer.effects import Effects
 from rgspipe.renderer.frozen import FrozenScene
-from rgspipe.renderer.indirect import Solver
 from rgspipe.renderer.radiosity import GatherSolver, solve_radiosity_directly
 from rgspipe.renderer.transport import with_albedo
 from rgspipe.scene import PointLight

@@ -11,8 +11,8 @@ import pytest
 import torch
 from torch import Tensor
 
+from rgspipe.names import Solver
 from rgspipe.renderer.frozen import FrozenScene
-from rgspipe.renderer.indirect import Solver
 from rgspipe.renderer.radiosity import GatherSolver, solve_radiosity, solve_radiosity_directly
 from rgspipe.renderer.transport import build_patch_transport, with_albedo, with_bounces
 from rooms import closed_box

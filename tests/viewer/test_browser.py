@@ -14,6 +14,7 @@ import torch
 from PIL import Image
 
 from lit_room import VISIBLE
+from rgspipe.evaluation.images import tone_map
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import Camera, PointLight
 from rgspipe.scene.lights import KINDS
@@ -63,6 +64,32 @@ def browser() -> Iterator:
         made.close()
 
 
+#: Keeps the image of a size that came last: pictures are as large as their camera, which no other image of a page is.
+KEPT = """
+const source = Object.getOwnPropertyDescriptor(HTMLImageElement.prototype, "src");
+window.came = {};
+Object.defineProperty(HTMLImageElement.prototype, "src", {...source, set(url) {
+  this.addEventListener("load", () => { window.came[`${this.naturalWidth} ${this.naturalHeight}`] = this; });
+  source.set.call(this, url);
+}});
+"""
+
+#: Its RGBA values.
+VALUES_OF = """size => {
+  const image = window.came[size], board = document.createElement("canvas");
+  [board.width, board.height] = [image.naturalWidth, image.naturalHeight];
+  const pen = board.getContext("2d");
+  pen.drawImage(image, 0, 0);
+  return [...pen.getImageData(0, 0, board.width, board.height).data];
+}"""
+
+
+def frame(window, camera: Camera) -> np.ndarray:
+    """(H, W, 3) the picture that the browser was sent last, as it decodes it."""
+    values = window.evaluate(VALUES_OF, f"{camera.width} {camera.height}")
+    return np.array(values, dtype=float).reshape(camera.height, camera.width, 4)[..., :3]
+
+
 def opened(browser, url: str, width: int, height: int, dots: float = 1.0):
     """A page with so many dots a pixel, what it was told to log and what it asked for."""
     size = {"width": width, "height": height}
@@ -72,6 +99,7 @@ def opened(browser, url: str, width: int, height: int, dots: float = 1.0):
     page.on("console", lambda message: page.told.append(message.text) if message.type == "error" else None)
     page.on("pageerror", lambda error: page.told.append(str(error)))
     page.on("request", lambda request: page.asked.append(request.url))
+    page.add_init_script(KEPT)
     page.goto(url)
     page.get_by_text("There are no photographs to find lamps in.").wait_for()
     return page
@@ -126,6 +154,8 @@ def test_a_lamp_is_dragged_and_the_picture_is_that_of_the_scene(viewer: Viewer, 
     shown = seen(page, window)
     expected = session.images.frozen.render(camera, session.lights)
     assert (session.image(camera) - expected).abs().max() <= 1e-3 * expected.max()
+    # What the browser has is that of `relight` in 8 bits: measured no level apart.
+    assert np.abs(frame(window, camera) - tone_map(expected, session._gain)).max() <= 1.0
     picture = Image.fromarray(session.picture(camera)[0]).resize(shown.shape[1::-1], Image.Resampling.BILINEAR)
     # The gizmo covers a part, and the browser's way of enlarging differs on edges.
     assert np.median(np.abs(shown - np.asarray(picture, dtype=float))) < 3.0

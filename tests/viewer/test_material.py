@@ -13,6 +13,7 @@ from rgspipe.datasets.gs3 import load_target
 from rgspipe.datasets.light_file import write_lights
 from rgspipe.demo import TARGET
 from rgspipe.scene import PointLight, SpotLight
+from rgspipe.stages.lights.capture import found_capture
 from rgspipe.viewer.drawings import ways
 from rgspipe.viewer.material import Case, case_in, found_in
 
@@ -54,9 +55,24 @@ def test_a_fit_is_read_with_its_way(tmp_path: Path) -> None:
 
 def test_what_a_fit_found_of_exposures_and_of_the_lamps_off_is_read(tmp_path: Path) -> None:
     told = {"exposures": [1.0, 2.0], "base_scale": {"factor": [0.5, 0.5, 0.25]}}
+    told |= {"ambient": {"radiance": [0.1, 0.2, 0.3]}}
     write_lights(tmp_path / "lights.json", RIG, told)
     found = found_in(tmp_path)
     assert found.exposures == (1.0, 2.0) and found.base_scale.tolist() == [0.5, 0.5, 0.25]
+    assert found.ambient.tolist() == [0.1, 0.2, 0.3]
+    assert found.unknowns == {"exposure_free": True, "base_scale_free": True, "ambient": True}
+    write_fit(tmp_path, 1)
+    assert not any(found_in(tmp_path).unknowns.values())
+
+
+def test_a_target_in_a_folder_is_clipped_where_its_images_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    target = load_target(TARGET)
+    read = replace(target, views=tuple(replace(view, saturated_from=0.2 + k) for k, view in enumerate(target.views)))
+    monkeypatch.setattr("rgspipe.viewer.material.load_target", lambda folder: read)
+    for one, view in zip(case_in(TARGET, None, found_capture).photographs, read.views, strict=True):
+        assert one.clip == view.saturated_from and torch.equal(one.mask, view.alpha)
+    # Without that, what is saturated is left out.
+    assert not case_in(TARGET).photographs[0].mask[(read.views[0].image >= 0.2).any(dim=-1)].any()
 
 
 def test_images_with_the_lamps_off_come_with_their_photographs() -> None:

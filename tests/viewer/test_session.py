@@ -8,7 +8,11 @@ import pytest
 import torch
 
 from lit_room import VISIBLE, room_cameras
+from open_room import TINT, frozen_open_room, open_room_cameras
 from rgspipe.datasets.light_file import read_lights
+from rgspipe.fitting.alternative import Alternative
+from rgspipe.fitting.result import dark_result
+from rgspipe.renderer.ambient import ambient_image
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.images.model import SurfelModel
 from rgspipe.scene import PointLight
@@ -198,6 +202,51 @@ def test_a_comparison_has_what_shines_with_the_lamps_off_and_the_exposures(sessi
     known = Photograph("known", cameras[0], images[0] + off[0], base=off[0])
     session.open(Case("night", [known], found=Found((LAMP,))))
     assert (session.compared(known)[:, 72:].reshape(-1, 3).min(axis=0) >= 246).all()
+
+
+def test_a_comparison_is_clipped_where_the_photograph_is(session: Session) -> None:
+    camera = room_cameras(32)[0]
+    image = session.images.image(camera, (LAMP,), "sharp")
+    limit = float(image.quantile(0.9))
+    taken = Photograph("clipped", camera, image.clamp(max=limit), clip=limit)
+    strip = session.compared(taken)
+    # The picture beside the photograph is as bright as that, and differs nowhere.
+    assert (strip[:, :32] == strip[:, 36:68]).all()
+    assert (strip[:, 72:].reshape(-1, 3).min(axis=0) >= 246).all()
+    darker = replace(taken, image=0.5 * taken.image)
+    assert session.compared(darker)[:, 72:].min() < 200, "where nothing is saturated all counts"
+
+
+def test_a_comparison_has_what_was_found_to_come_through_openings() -> None:
+    room, camera = frozen_open_room(), open_room_cameras(24)[2]
+    session, ambient = Session(LampImages(room), (LAMP,)), 0.2 * TINT
+    image = session.images.image(camera, (LAMP,), "sharp") + ambient * ambient_image(room, camera)
+    taken = Photograph("day", camera, 2.0 * image)
+    first = Photograph("first", camera, image)
+    session.open(Case("day", [first, taken], found=Found((LAMP,), exposures=(1.0, 2.0), ambient=ambient)))
+    for one in (first, taken):
+        assert (session.compared(one)[:, 56:].reshape(-1, 3).min(axis=0) >= 246).all()
+    # That of the case is not in photographs under lamps of their own.
+    own = Photograph("own", camera, session.images.image(camera, (LAMP,), "sharp"), lights=(LAMP,))
+    assert (session.compared(own)[:, 56:].reshape(-1, 3).min(axis=0) >= 246).all()
+
+
+def test_a_refit_keeps_what_its_answer_was_weighed_against(session: Session) -> None:
+    other = Alternative((LAMP.at(LAMP.position - 0.3),), 2.0, 2.0, 0, True)
+    searched = replace(dark_result(1.0), lights=(LAMP,), alternatives=(other,), costs={1: 1.0, 2: 0.9})
+    again = replace(dark_result(1.0), lights=(LAMP.at(LAMP.position + 1e-4),), costs={})
+    session.take(searched)
+    session.take(again, searched=False)
+    assert len(session.found.alternatives) == 1 and session.found.costs == {1: 1.0, 2: 0.9}
+    assert session.found.lights == again.lights
+    # Elsewhere, of another kind, or after a search that weighed nothing there are none.
+    for lights in ((other.lights[0],), (KINDS["sphere"].shaped().at(LAMP.position, None, LAMP.intensity),), ()):
+        session.take(searched)
+        session.take(replace(again, lights=lights), searched=False)
+        assert session.found.alternatives == () and session.found.costs == {}
+    session.take(searched)
+    session.take(again)
+    assert session.found.alternatives == ()
 
 
 def test_lamps_and_a_still_are_saved(session: Session, tmp_path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -46,9 +47,9 @@ def viewer(frozen: FrozenScene) -> Iterator[Viewer]:
     made.stop()
 
 
-def visitor(viewer: Viewer) -> ClientConnection:
+def visitor(viewer: Viewer, agent: str = "test") -> ClientConnection:
     kind = f"viser-v{viser.__version__}"
-    return connect(viewer.url.replace("http", "ws"), subprotocols=[kind], max_size=None)
+    return connect(viewer.url.replace("http", "ws"), subprotocols=[kind], max_size=None, user_agent_header=agent)
 
 
 def message(**other: Any) -> bytes:
@@ -110,6 +111,55 @@ def test_a_camera_that_can_be_no_more_harms_no_page(viewer: Viewer) -> None:
         wait_for(lambda: page._client.camera.position.tolist() == [1.0, -3.0, 0.0])
         page._go_to(viewer._exhibit.camera)
         assert page._client.camera.position.tolist() == pytest.approx(EYE)
+    wait_for(lambda: not viewer.pages and not threads())
+
+
+def test_the_first_picture_is_taken_from_where_browsers_are_told_to_begin(viewer: Viewer) -> None:
+    begin = viewer._server.initial_camera
+    assert begin.position == pytest.approx(EYE)
+    aim = [one - other for one, other in zip(begin.look_at, EYE, strict=True)]
+    # Along 0.55, 0.3, 0.25.
+    assert [one / aim[0] for one in aim] == pytest.approx([1.0, 0.3 / 0.55, 0.25 / 0.55])
+
+
+def test_sides_stay_in_sight_where_the_window_becomes_narrow(viewer: Viewer) -> None:
+    with visitor(viewer) as browser:
+        browser.send(message(image_width=300))
+        wait_for(lambda: viewer.pages)
+        [page] = viewer.pages.values()
+        wait_until_told(browser, b"SetCameraLookAtMessage")
+        held, half = page._client.camera, math.radians(35.0)
+        wait_for(lambda: abs(held.fov - 2.0 * half) < 1e-6)
+        told = {"position": EYE, "look_at": held.look_at.tolist(), "fov": held.fov}
+        browser.send(message(**told, image_width=150))
+        wait_for(lambda: abs(math.tan(0.5 * held.fov) - 2.0 * math.tan(half)) < 1e-6)
+        # Not where the visitor has moved.
+        browser.send(message(**(told | {"position": [0.0, -0.4, 0.0]}), image_width=150))
+        wait_for(lambda: page._begun is None)
+        browser.send(message(**(told | {"position": [0.0, -0.4, 0.0]}), image_width=100))
+        wait_for(lambda: held.image_width == 100 and page.actions.do("wait", lambda: None).result() is None)
+        assert held.fov == pytest.approx(2.0 * half)
+    wait_for(lambda: not viewer.pages and not threads())
+
+
+@pytest.mark.parametrize(
+    ("agent", "width", "height", "is_wide"),
+    [
+        ("Mozilla/5.0 (X11; Linux x86_64)", 580, 1000, True),
+        ("Mozilla/5.0 (X11; Linux x86_64)", 400, 800, False),
+        # A telephone whose browser has bars of its own, upright and turned.
+        ("Mozilla/5.0 (iPhone) Mobile/15E148", 1170, 1992, False),
+        ("Mozilla/5.0 (iPhone) Mobile/15E148", 1992, 1170, True),
+    ],
+)
+def test_fields_begin_folded_on_telephones_alone(
+    viewer: Viewer, agent: str, width: int, height: int, is_wide: bool
+) -> None:
+    with visitor(viewer, agent) as browser:
+        browser.send(message(image_width=width, image_height=height))
+        wait_for(lambda: viewer.pages)
+        [page] = viewer.pages.values()
+        assert page._is_wide() is is_wide
     wait_for(lambda: not viewer.pages and not threads())
 
 

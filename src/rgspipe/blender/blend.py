@@ -1,59 +1,73 @@
-"""A user's .blend file as a scene of bare surfaces in the unit cube.
+"""A user's .blend file as a scene of bare surfaces, which stay where and what they are in the file.
 
-The meshes that a render shows are copied into a scene of their own. So nothing else of the file can change a
-number: no lights, cameras, world, compositing, animation, render settings or view layers.
+Its own scene is rendered, at its own size: materials may go by anything that a file knows of an object (its pose, its
+own coordinates, its number, lengths of bumps, reliefs and fogs). Nothing else of the file can change a number: lights
+and worlds are dark, and render settings are Blender's own, then ours.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
 import numpy as np
-from mathutils import Matrix
 
-from rgspipe.blender.left_out import left_out
-from rgspipe.blender.own_cameras import image_distortion, own_cameras
+from rgspipe.blender.geometry import Geometry
+from rgspipe.blender.left_out import DRAWINGS, RAYS, left_out
+from rgspipe.blender.own_cameras import cut_off, image_distortion, own_cameras
+from rgspipe.blender.own_renders import differences, not_taken
 from rgspipe.blender.rendered import Surface, rendered_surfaces
 from rgspipe.datasets.input_file import input_file
 from rgspipe.datasets.limits import FARTHEST
 from rgspipe.datasets.named_cameras import NamedCamera
 from rgspipe.errors import InputError
+from rgspipe.light_export.world import World
 
-#: The smallest extent of a scene, its units: even an atom is larger, in metres.
-SMALLEST_SCENE = 1e-10
+#: The smallest extent of a scene, its units: of one of 1e-6 Cycles loses the faces (5.0), and its cameras cut off what
+#: is nearer than 1e-6.
+SMALLEST_SCENE = 1e-4
 
-#: Sockets by which a surface or a volume glows, by node type, and what turns them off.
+#: Sockets by which a surface or a volume glows, by node type.
 GLOWING_SOCKETS = {
     "EMISSION": ("Strength",),
     "BSDF_PRINCIPLED": ("Emission Strength",),
     "PRINCIPLED_VOLUME": ("Emission Strength", "Blackbody Intensity"),
+    "VOLUME_COEFFICIENTS": ("Emission Coefficients",),
     "EEVEE_SPECULAR": ("Emissive Color",),
 }
 
+#: Settings of renders that make the surfaces what they are.
+KEPT = {
+    "use_simplify", "simplify_subdivision_render", "simplify_child_particles_render", "hair_type", "hair_subdiv",
+    "fps", "fps_base", "frame_map_old", "frame_map_new",
+}  # fmt: skip
+KEPT_OF_CYCLES = {
+    "feature_set", "dicing_rate", "offscreen_dicing_scale", "max_subdivisions", "dicing_camera", "texture_limit_render",
+}  # fmt: skip
+
 
 @dataclass(frozen=True)
-class Normalised:
-    """A new scene with the surfaces of a .blend file, centred at the origin, longest side 1.
+class Opened:
+    """A .blend file whose scene has its surfaces alone.
 
     Attributes:
-        scene: it.
-        rescale, offset: a point x of the file became (x + offset) · rescale.
+        scene: its own.
+        world: how its coordinates are brought to a scene's, which is centred at the origin, its longest side 1.
+        geometry: the surfaces, in scene units.
         remarks: sentences about what of the file is left out or not modelled.
         cameras: the file's own, by name.
     """
 
     scene: bpy.types.Scene
-    rescale: float
-    offset: tuple[float, float, float]
+    world: World
+    geometry: Geometry
     remarks: list[str]
     cameras: dict[str, NamedCamera]
 
 
-def open_normalised(path: str | Path) -> Normalised:
+def open_blend(path: str | Path) -> Opened:
     """The surfaces of a .blend file, and what of its own they were.
 
     Raises:
@@ -61,65 +75,82 @@ def open_normalised(path: str | Path) -> Normalised:
     """
     path = Path(path)
     _open(path)
-    source, layer = bpy.context.scene, bpy.context.view_layer
-    distortion = image_distortion(source)
-    surfaces = rendered_surfaces(source, layer)
+    scene, layer = bpy.context.scene, bpy.context.view_layer
+    distortion, differ, others = image_distortion(scene), differences(scene), not_taken(scene, layer)
+    surfaces = rendered_surfaces(scene, layer)
     if not surfaces:
         raise InputError(
             path,
-            expected=f'meshes in its scene "{source.name}"',
+            expected=f'meshes in its scene "{scene.name}"',
             found="none that is rendered",
             remedy="Add an object with faces, or show the hidden ones in renders.",
         )
-    remarks = left_out(source, layer, surfaces)
+    remarks = [*others, *left_out(scene, layer, surfaces)]
     lo, hi = _bounds(surfaces)
     _require_extent(path, lo, hi)
-    rescale, offset = 1.0 / float((hi - lo).max()), -0.5 * (lo + hi)
-    _show_cameras(source)
-    cameras, others = own_cameras(source, rescale, tuple(offset.tolist()), distortion)
-    scene = bpy.data.scenes.new("surfaces")
-    bpy.context.window.scene = scene
-    for index, surface in enumerate(surfaces):
-        item = bpy.data.objects.new(f"surface_{index}", surface.mesh)
-        # What mirrors a mesh stays the object's, as Blender knows then where its front faces and normals are.
-        item.scale.x = math.copysign(1.0, surface.pose.determinant())
-        mirror = Matrix.Scale(item.scale.x, 4, (1.0, 0.0, 0.0))
-        surface.mesh.transform(mirror @ Matrix.Scale(rescale, 4) @ Matrix.Translation(offset) @ surface.pose)
-        scene.collection.objects.link(item)
-    _stand_still(scene, source)
+    world = World(rescale=1.0 / float((hi - lo).max()), offset=tuple((-0.5 * (lo + hi)).tolist()))
+    _show_cameras(scene)
+    cameras, said = own_cameras(scene, world.rescale, world.offset, distortion)
+    geometry = _geometry(surfaces, world)
+    remarks += [*said, *cut_off(scene, cameras, geometry, world), *(differ if cameras else [])]
+    _leave_surfaces_alone(scene, layer)
+    return Opened(scene, world, geometry, remarks, cameras)
+
+
+def _geometry(surfaces: Sequence[Surface], world: World) -> Geometry:
+    points = np.concatenate([one.points for one in surfaces])
+    starts = np.cumsum([0, *(len(one.points) for one in surfaces[:-1])])
+    triangles = np.concatenate([one.triangles + start for one, start in zip(surfaces, starts, strict=True)])
+    # Blender's tree is of single precision: bounds that are not would lie beside its faces.
+    placed = ((points + np.array(world.offset)) * world.rescale).astype(np.float32)
+    return Geometry(placed.astype(np.float64), triangles)
+
+
+def _leave_surfaces_alone(scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> None:
+    """Have nothing shine, every surface be one like any other, and renders of `scene` have no settings of its own."""
     remove_emission()
-    bpy.context.view_layer.update()
-    return Normalised(scene, rescale, tuple(offset.tolist()), [*remarks, *others], cameras)
+    for lamp in bpy.data.lights:
+        lamp.animation_data_clear()
+        lamp.energy = 0.0
+    for item in bpy.data.objects:
+        item.is_holdout = item.is_shadow_catcher = False
+        for ray in RAYS:
+            setattr(item, f"visible_{ray}", True)
+        item.hide_render |= item.type in {"LIGHT", *DRAWINGS}
+    for collection in _collections(layer.layer_collection):
+        collection.holdout = collection.indirect_only = False
+    for other in [one for one in scene.view_layers if one != layer]:
+        scene.view_layers.remove(other)
+    # Markers switch cameras, and keys turn settings.
+    scene.timeline_markers.clear()
+    scene.animation_data_clear()
+    _reset(scene.render, KEPT)
+    _reset(scene.render.image_settings)
+    _reset(scene.cycles, KEPT_OF_CYCLES)
+    _reset(layer, {"name", "material_override"})
+    _reset(layer.cycles)
 
 
-def _stand_still(scene: bpy.types.Scene, source: bpy.types.Scene) -> None:
-    """Have `scene` stand where `source` does, and no material change any more."""
-    scene.frame_set(source.frame_current, subframe=source.frame_subframe)
-    for tree in _trees():
-        tree.animation_data_clear()
+def _reset(settings: bpy.types.bpy_struct, kept: set[str] = frozenset()) -> None:
+    for entry in settings.bl_rna.properties:
+        if not entry.is_readonly and entry.identifier not in kept:
+            settings.property_unset(entry.identifier)
 
 
-def _trees() -> list[bpy.types.NodeTree]:
-    """Those of all materials, and all groups."""
-    own = [material.node_tree for material in bpy.data.materials if material.node_tree is not None]
-    return [*own, *bpy.data.node_groups]
+def _collections(root: bpy.types.LayerCollection) -> Iterator[bpy.types.LayerCollection]:
+    yield root
+    for child in root.children:
+        yield from _collections(child)
 
 
 def remove_emission() -> None:
-    """No material of the open file glows any more."""
-    for tree in _trees():
-        for node in tree.nodes:
+    """No material of the open file glows any more, whatever keys and drivers say."""
+    materials = [material.node_tree for material in bpy.data.materials if material.node_tree is not None]
+    for tree in [*materials, *bpy.data.node_groups]:
+        for node in [*tree.nodes]:
             for name in GLOWING_SOCKETS.get(node.type, ()):
-                _set_to_zero(tree, node, name)
-
-
-def _set_to_zero(tree: bpy.types.NodeTree, node: bpy.types.Node, name: str) -> None:
-    socket = node.inputs.get(name)
-    if socket is None:
-        return
-    for link in list(socket.links):
-        tree.links.remove(link)
-    socket.default_value = 0.0 if socket.type == "VALUE" else (0.0, 0.0, 0.0, 1.0)
+                if name in node.inputs:
+                    tree.links.new(tree.nodes.new("ShaderNodeValue").outputs[0], node.inputs[name])
 
 
 def _open(path: Path) -> None:
@@ -156,11 +187,5 @@ def _require_extent(path: Path, lo: np.ndarray, hi: np.ndarray) -> None:
 
 
 def _bounds(surfaces: Sequence[Surface]) -> tuple[np.ndarray, np.ndarray]:
-    points = []
-    for surface in surfaces:
-        local = np.empty(3 * len(surface.mesh.vertices), np.float32)
-        surface.mesh.vertices.foreach_get("co", local)
-        pose = np.array(surface.pose)
-        points.append(local.reshape(-1, 3) @ pose[:3, :3].T + pose[:3, 3])
-    stacked = np.concatenate(points)
-    return stacked.min(axis=0), stacked.max(axis=0)
+    lo = np.min([one.points.min(axis=0) for one in surfaces], axis=0)
+    return lo, np.max([one.points.max(axis=0) for one in surfaces], axis=0)

@@ -6,7 +6,7 @@ from functools import cached_property
 
 import bpy
 import numpy as np
-from mathutils import Vector
+from mathutils import Matrix, Vector
 from mathutils.bvhtree import BVHTree
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
@@ -65,20 +65,29 @@ def scene_geometry(scene: bpy.types.Scene) -> Geometry:
         if item.type != "MESH":
             continue
         evaluated = item.evaluated_get(graph)
-        mesh = evaluated.to_mesh()
-        mesh.calc_loop_triangles()
-        points = np.empty(3 * len(mesh.vertices), np.float32)
-        mesh.vertices.foreach_get("co", points)
-        corners = np.empty(3 * len(mesh.loop_triangles), np.int32)
-        mesh.loop_triangles.foreach_get("vertices", corners)
-        matrix = np.array(item.matrix_world)
-        vertices.append(points.reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3])
-        # A mirrored mesh shows its front faces where it did, although its corners go round the other way.
-        turn = -1 if np.linalg.det(matrix[:3, :3]) < 0.0 else 1
-        triangles.append(corners.reshape(-1, 3)[:, ::turn] + offset)
-        offset += len(mesh.vertices)
+        points, corners = world_triangles(evaluated.to_mesh(), item.matrix_world)
         evaluated.to_mesh_clear()
+        vertices.append(points)
+        triangles.append(corners + offset)
+        offset += len(points)
     return Geometry(np.concatenate(vertices), np.concatenate(triangles))
+
+
+def world_triangles(mesh: bpy.types.Mesh, pose: Matrix) -> tuple[np.ndarray, np.ndarray]:
+    """Points (V, 3) of a mesh in world coordinates, and the corners (T, 3) of its triangles, fronts counter-clockwise.
+
+    Args:
+        pose: of the mesh.
+    """
+    mesh.calc_loop_triangles()
+    points = np.empty(3 * len(mesh.vertices), np.float32)
+    mesh.vertices.foreach_get("co", points)
+    corners = np.empty(3 * len(mesh.loop_triangles), np.int32)
+    mesh.loop_triangles.foreach_get("vertices", corners)
+    matrix = np.array(pose)
+    # A mirrored mesh shows its front faces where it did, although its corners go round the other way.
+    turn = -1 if np.linalg.det(matrix[:3, :3]) < 0.0 else 1
+    return points.reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3], corners.reshape(-1, 3)[:, ::turn]
 
 
 class FreeSpace:

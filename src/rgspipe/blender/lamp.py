@@ -94,8 +94,9 @@ def _table(nodes: _Nodes, light: ProfileLight) -> bpy.types.NodeSocket:
     node.mode, node.ies = "INTERNAL", bpy.data.texts.new(TABLE)
     node.ies.write(ies(unit, TABLE)[0])
     node.inputs["Strength"].default_value = 1.0 / (CYCLES_CANDELA * candela(unit))
-    # Cycles counts angles from −z, and around it from −y towards −x.
-    across, up, axis = (-part for part in light.frame())
+    # Cycles counts angles from −z, and around it from −y towards −x: clockwise as seen from above, unlike such files.
+    across, up, axis = light.frame()
+    across, axis = -across, -axis
     vector = nodes.add("ShaderNodeCombineXYZ")
     for name, part in (("X", up), ("Y", across), ("Z", axis)):
         nodes.tree.links.new(nodes.cosine(part.tolist()), vector.inputs[name])

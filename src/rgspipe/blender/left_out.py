@@ -7,8 +7,6 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TypeVar
 
 import bpy
-import numpy as np
-from mathutils import Matrix
 
 from rgspipe.blender.rendered import Surface
 
@@ -19,14 +17,8 @@ MIRRORING = {"BSDF_GLOSSY", "BSDF_METALLIC", "BSDF_ANISOTROPIC"}
 #: Inputs that all have to be above 0 for a surface to glow.
 GLOWING = {"EMISSION": ("Strength", "Color"), "BSDF_PRINCIPLED": ("Emission Strength", "Emission Color")}
 
-#: Outputs by which a material knows its object, or where it is, by the type of the node.
-POSED = {"TEX_COORD": ("Object",), "NEW_GEOMETRY": ("Position",), "OBJECT_INFO": ("Location", "Color", "Random")}
-
-#: Textures that go by the box around an object where nothing says by what.
-BOXED = {"TEX_BRICK", "TEX_CHECKER", "TEX_GABOR", "TEX_GRADIENT", "TEX_MAGIC", "TEX_NOISE", "TEX_VORONOI", "TEX_WAVE"}
-
-#: A pose whose axes are off by less, in its largest scale, turns nothing.
-STRAIGHT = 1e-4
+#: Types of grease pencil, which Blender draws over images.
+DRAWINGS = {"GPENCIL", "GREASEPENCIL"}
 
 #: Names of materials or objects that a sentence lists.
 LISTED = 4
@@ -45,17 +37,15 @@ def left_out(scene: bpy.types.Scene, layer: bpy.types.ViewLayer, surfaces: Seque
         scene, layer: what is rendered of it.
         surfaces: the same.
     """
-    used = _by_name({material for one in surfaces for material in one.mesh.materials if material is not None})
+    override = layer.material_override
+    used = [override] if override else _by_name({material for one in surfaces for material in one.materials})
     items = _by_name({one.item for one in surfaces})
-    turned = {material for one in surfaces if _turned(one.pose) for material in one.mesh.materials}
     found = {what: _listed([one for one in used if _has(one, test)]) for what, test in TESTS.items()}
-    found["pattern"] = _listed([one for one in used if _has(one, _posed) or (one in turned and _has(one, _boxed))])
-    found["relief"] = _listed([one for one in used if _moves(one) and _has(one, _displaced)])
-    sentences = [_lamps(scene), _world(scene), _override(layer)]
+    sentences = [_lamps(scene), _world(scene)]
     sentences += [f"{what} of {names} {COSTS[what]}" for what, names in found.items() if names]
     treated = {what: _listed([one for one in items if test(one, layer)]) for what, test in TREATED.items()}
     sentences += [f"{what} of {names} is left out: {ORDINARY}" for what, names in treated.items() if names]
-    sentences.append(_other_objects(scene))
+    sentences += _other_objects(scene)
     return [sentence for sentence in sentences if sentence]
 
 
@@ -76,18 +66,23 @@ def _world(scene: bpy.types.Scene) -> str:
     return "light of its world is left out: what is around the scene is black" if shines else ""
 
 
-def _override(layer: bpy.types.ViewLayer) -> str:
-    material = layer.material_override
-    return "" if material is None else f'"{material.name}", the material of all in its view layer, is left out'
-
-
-def _other_objects(scene: bpy.types.Scene) -> str:
+def _other_objects(scene: bpy.types.Scene) -> list[str]:
     kinds = {"VOLUME": "volumes", "CURVES": "hair", "POINTCLOUD": "point clouds"}
-    count = Counter(kinds[item.type] for item in scene.objects if item.type in kinds and not item.hide_render)
-    if not count:
-        return ""
-    listed = ", ".join(f"{kind}: {number}" for kind, number in sorted(count.items()))
-    return f"objects that are no surfaces ({listed}) are left out: they are in no image"
+    shown = [item for item in scene.objects if not item.hide_render]
+    count = Counter(kinds[item.type] for item in shown if item.type in kinds)
+    count["hair"] += sum(
+        system.settings.type == "HAIR" and system.settings.render_type == "PATH"
+        for item in shown
+        for system in item.particle_systems
+    )
+    listed = ", ".join(f"{kind}: {number}" for kind, number in sorted(count.items()) if number)
+    drawings = sum(item.type in DRAWINGS for item in shown)
+    found = {
+        f"objects without faces ({listed}) are in the images, but cameras and lamps are placed as if they were not, "
+        "and no model has fog": listed,
+        f"drawings ({drawings}) are left out: they are in no image": drawings,
+    }
+    return [sentence for sentence, there in found.items() if there]
 
 
 def _by_name(blocks: Iterable[Block]) -> list[Block]:
@@ -129,34 +124,12 @@ def _scatters(tree: bpy.types.ShaderNodeTree) -> bool:
     return _ends_in(tree, "Volume")
 
 
-def _posed(tree: bpy.types.ShaderNodeTree) -> bool:
-    return any(node.outputs[name].is_linked for node in reached(tree) for name in POSED.get(node.type, ()))
+def _cuts(tree: bpy.types.ShaderNodeTree) -> bool:
+    return any(node.type == "HOLDOUT" for node in reached(tree))
 
 
-def _boxed(tree: bpy.types.ShaderNodeTree) -> bool:
-    return any(
-        (node.type == "TEX_COORD" and node.outputs["Generated"].is_linked)
-        or (node.type in BOXED and not node.inputs["Vector"].is_linked)
-        for node in reached(tree)
-    )
-
-
-def _turned(pose: Matrix) -> bool:
-    """Whether the box around a surface is another one in the scene than in its object; mirrored in x it is the same."""
-    axes = np.array(pose.to_3x3())
-    axes[0] *= np.sign(np.linalg.det(axes))
-    scales = np.diag(axes)
-    return bool(scales.min() <= 0.0 or np.abs(axes - np.diag(scales)).max() > STRAIGHT * scales.max())
-
-
-def _displaced(tree: bpy.types.ShaderNodeTree) -> bool:
-    return _ends_in(tree, "Displacement")
-
-
-def _moves(material: bpy.types.Material) -> bool:
-    """Whether displacement moves surfaces, and not their normals alone."""
-    held_by = material.cycles if bpy.app.version < (4, 1, 0) else material
-    return held_by.displacement_method != "BUMP"
+def _scripted(tree: bpy.types.ShaderNodeTree) -> bool:
+    return any(node.type == "SCRIPT" for node in reached(tree))
 
 
 def _ends_in(tree: bpy.types.ShaderNodeTree, name: str) -> bool:
@@ -166,7 +139,14 @@ def _ends_in(tree: bpy.types.ShaderNodeTree, name: str) -> bool:
 
 
 #: What a material may be besides a diffuse surface, and what comes of it.
-TESTS: dict[str, Test] = {"light": _glows, "glass": _clear, "metal": _mirrors, "fog": _scatters}
+TESTS: dict[str, Test] = {
+    "light": _glows,
+    "glass": _clear,
+    "metal": _mirrors,
+    "fog": _scatters,
+    "holdout": _cuts,
+    "script": _scripted,
+}
 COSTS = {
     "light": "is left out: nothing glows",
     "glass": "is in the images, but a surfel lets no light through: what is seen through it, and the light that "
@@ -174,16 +154,16 @@ COSTS = {
     "metal": "is in the images, but surfels are diffuse (training with gloss finds broad highlights): what it mirrors "
     "is taken for its own colour",
     "fog": "is in the images, but no model has any: surfaces behind it are taken for paler or darker than they are",
-    "pattern": "is another one in the images than in the file: it goes by its object (the pose, a number or a "
-    "colour), and each surface is an object of its own, in a scene scaled into a cube of 1",
-    "relief": "is higher or lower in the images than in the file: displacement has a length, and surfaces are scaled "
-    "into a cube of 1",
+    "holdout": "is a hole in the images, and a surface to light: no surfel is so",
+    "script": "is left out: Open Shading Language is off, and what its nodes make is 0",
 }
 
 
 #: What a render may do with an object besides showing it, and what is done instead.
 TREATED: dict[str, Callable[[bpy.types.Object, bpy.types.ViewLayer], bool]] = {
-    "invisibility to some rays": lambda item, layer: not all(getattr(item, f"visible_{ray}") for ray in RAYS),
+    "invisibility to some rays": lambda item, layer: (
+        item.indirect_only_get(view_layer=layer) or not all(getattr(item, f"visible_{ray}") for ray in RAYS)
+    ),
     "the holdout": lambda item, layer: item.is_holdout or item.holdout_get(view_layer=layer),
     "the shadow catcher": lambda item, layer: item.is_shadow_catcher,
 }

@@ -2,16 +2,26 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import bpy
+import numpy as np
 import torch
 
+from rgspipe.blender.geometry import Geometry
 from rgspipe.datasets.named_cameras import NamedCamera, Side
+from rgspipe.light_export.world import World
 
 #: What a lens is stated for, by Blender's name.
 SIDES: dict[str, Side] = {"AUTO": "longer", "HORIZONTAL": "width", "VERTICAL": "height"}
+
+#: Rays along each side of an image that ask what is cut off.
+PROBES = 16
+
+#: Axes whose products are off by less are straight; Blender's are of single precision.
+STRAIGHT = 1e-4
 
 
 def own_cameras(
@@ -25,7 +35,7 @@ def own_cameras(
     """
     cameras = [item for item in scene.objects if item.type == "CAMERA"]
     names = _names(cameras)
-    kinds = {item: distortion if item.data.type == "PERSP" else "that are no perspective ones" for item in cameras}
+    kinds = {item: _oddity(item) or distortion for item in cameras}
     pinholes = {names[item]: _camera(item, rescale, offset) for item, kind in kinds.items() if not kind}
     others = {kind: [names[item] for item in cameras if kinds[item] == kind] for kind in kinds.values() if kind}
     return pinholes, [f"cameras {kind}, and cannot be a target's: {', '.join(some)}" for kind, some in others.items()]
@@ -40,6 +50,41 @@ def image_distortion(scene: bpy.types.Scene) -> str:
     if render.use_border and render.use_crop_to_border and region != (0.0, 0.0, 1.0, 1.0):
         return "whose images are cropped to a render region"
     return ""
+
+
+def cut_off(scene: bpy.types.Scene, cameras: Mapping[str, NamedCamera], geometry: Geometry, world: World) -> list[str]:
+    """Sentences about cameras in whose images surfaces are missing, by their clip distances, or blurred.
+
+    Args:
+        cameras, geometry: ours of `scene`, in scene units.
+        world: how the file's coordinates became these.
+    """
+    items = [item for item in scene.objects if item.type == "CAMERA"]
+    own = {name: item.data for item, name in _names(items).items() if name in cameras}
+    cut = [name for name, lens in own.items() if _cuts(lens, cameras[name], geometry, world.unit)]
+    blurred = [name for name, lens in own.items() if lens.dof.use_dof]
+    what = {
+        "whose clip distances cut off surfaces that are in our images (a target through it is of another scene)": cut,
+        "with depth of field, whose images are blurred, and ours are not": blurred,
+    }
+    return [f"cameras {kind}: {', '.join(names)}" for kind, names in what.items() if names]
+
+
+def _cuts(lens: bpy.types.Camera, camera: NamedCamera, geometry: Geometry, unit: float) -> bool:
+    """Whether the first surface along some ray of a square image is nearer or farther than `lens` shows any."""
+    origins, directions, lengths = camera.of_image(PROBES, PROBES).rays()
+    found = zip(origins.numpy(), directions.numpy(), lengths.tolist(), strict=True)
+    depths = [geometry.cast(origin, direction)[0] / length * unit for origin, direction, length in found]
+    return any(depth < lens.clip_start or lens.clip_end < depth < math.inf for depth in depths)
+
+
+def _oddity(item: bpy.types.Object) -> str:
+    """In which way a camera is none of ours; empty for one that is."""
+    if item.data.type != "PERSP":
+        return "that are no perspective ones"
+    axes = np.array(item.matrix_world.normalized().to_3x3())
+    straight = np.allclose(axes.T @ axes, np.eye(3), atol=STRAIGHT)
+    return "" if straight and np.linalg.det(axes) > 0.0 else "that are mirrored or sheared"
 
 
 def _names(cameras: Sequence[bpy.types.Object]) -> dict[bpy.types.Object, str]:

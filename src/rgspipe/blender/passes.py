@@ -14,6 +14,7 @@ from rgspipe.blender.exr_files import read_channels, write_channels, write_image
 from rgspipe.blender.job import RenderSettings
 from rgspipe.blender.lamp import place_lamp
 from rgspipe.blender.plan import Frame
+from rgspipe.light_export.world import World
 from rgspipe.scene import Camera, Light
 
 #: Suffixes of the surface files beside an image, and their channels.
@@ -21,6 +22,12 @@ SURFACE_CHANNELS = {"depth": ("Z",), "normal": ("X", "Y", "Z"), "albedo": ("R", 
 
 #: What Blender called its passes before version 5, and calls them now.
 RENAMED = {"DiffCol": "Diffuse Color"}
+
+#: Cycles' depth of what is no surface.
+NO_DEPTH = np.float32(1e10)
+
+#: Blender's own coordinates are the scene's.
+HERE = World()
 
 #: Of Blender's camera, in its millimetres; only the ratio to the focal length matters.
 SENSOR_WIDTH = 36.0
@@ -33,13 +40,14 @@ class Studio:
         scene: what stands there already; its camera is replaced.
         settings: the quality of its images.
         scratch: folder for Blender's own output.
+        world: where cameras, lamps and depths of the scene are in what Blender renders.
     """
 
-    def __init__(self, scene: bpy.types.Scene, settings: RenderSettings, scratch: Path) -> None:
-        self._scene, self._settings, self._scratch = scene, settings, scratch
+    def __init__(self, scene: bpy.types.Scene, settings: RenderSettings, scratch: Path, world: World = HERE) -> None:
+        self._scene, self._settings, self._scratch, self._world = scene, settings, scratch, world
         cycles.configure(scene, settings)
         self._camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
-        self._camera.data.clip_start, self._camera.data.clip_end = 1e-3, 1e3
+        self._camera.data.clip_start, self._camera.data.clip_end = 1e-3 * world.unit, 1e3 * world.unit
         scene.collection.objects.link(self._camera)
         scene.camera = self._camera
         self._lamps = [self._new_lamp()]
@@ -55,7 +63,7 @@ class Studio:
         self, camera: Camera, lights: Sequence[Light], seed: int, samples: int | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
         """Mean over each pixel: radiance (H, W, 3) and alpha (H, W); with the settings' samples by default."""
-        place_camera(self._camera, camera)
+        place_camera(self._camera, camera, self._world)
         self._switch_on(lights)
         cycles.use_colour_sampling(self._scene, samples or self._settings.samples, self._settings.denoise, seed)
         passes = self._passes()
@@ -72,7 +80,7 @@ class Studio:
         self._lamps += [self._new_lamp() for _ in range(len(lights) - len(self._lamps))]
         for index, lamp in enumerate(self._lamps):
             lamp.hide_render = index >= len(lights)
-        for lamp, light in zip(self._lamps, lights, strict=False):
+        for lamp, light in zip(self._lamps, self._world.lights(tuple(lights)), strict=False):
             place_lamp(lamp, light)
 
     def _passes(self) -> dict[str, np.ndarray]:
@@ -85,11 +93,12 @@ class Studio:
         return {f"{RENAMED.get(name, name)}.{channel}": values for (name, channel), values in parts.items()}
 
     def _write_surfaces(self, frame: Frame, folder: Path) -> None:
-        place_camera(self._camera, frame.camera)
+        place_camera(self._camera, frame.camera, self._world)
         self._switch_on(frame.lights)
         cycles.use_center_sampling(self._scene)
         passes = self._passes()
         depth = passes["Depth.Z"]
+        depth[depth != NO_DEPTH] /= self._world.unit
         normal = face_camera(_stack(passes, "Normal", "XYZ"), frame.camera)
         arrays = {"depth": depth[..., None], "normal": normal, "albedo": _stack(passes, "Diffuse Color", "RGB")}
         for kind, names in SURFACE_CHANNELS.items():
@@ -98,9 +107,11 @@ class Studio:
             write_channels(folder / f"{frame.name}_{kind}.exr", {n: stored[..., i] for i, n in enumerate(names)})
 
 
-def place_camera(item: bpy.types.Object, camera: Camera) -> None:
+def place_camera(item: bpy.types.Object, camera: Camera, world: World = HERE) -> None:
     """Give Blender's camera the pose and field of view of ours (square pixels, axis in the middle)."""
-    item.matrix_world = Matrix(camera.camera_to_world.tolist())
+    pose = camera.camera_to_world.double().clone()
+    pose[:3, 3] = world.place(pose[:3, 3])
+    item.matrix_world = Matrix(pose.tolist())
     item.data.sensor_fit = "HORIZONTAL"
     # A wide sensor, because Blender silently raises focal lengths below 1 mm.
     item.data.sensor_width = SENSOR_WIDTH

@@ -47,7 +47,7 @@ def _render(content: dict, folder: Path, parent: Parent) -> None:
     write_dataset_files(job, plan, prepared, folder)
     frames = Frames(parent, folder, frame_files)
     missing = frames.missing(plan.frames)
-    studio = Studio(prepared.scene, job.settings, folder / SCRATCH)
+    studio = Studio(prepared.scene, job.settings, folder / SCRATCH, prepared.world)
     for frame in frames.each(missing):
         studio.render(frame, folder)
 

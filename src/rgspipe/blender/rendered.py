@@ -11,7 +11,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import bpy
-from mathutils import Matrix
+import numpy as np
+
+from rgspipe.blender.geometry import world_triangles
 
 #: The smallest width and height of an image that Blender renders, pixels.
 SMALLEST = 4
@@ -22,13 +24,15 @@ class Surface:
     """Faces that are rendered.
 
     Attributes:
-        mesh: a copy of them that nothing else of the file can change.
-        pose: of the mesh.
+        points: (V, 3) where they are in the file.
+        triangles: (T, 3) indices; a front face is counter-clockwise.
+        materials: that they may have.
         item: the object that they are of; instances have one together.
     """
 
-    mesh: bpy.types.Mesh
-    pose: Matrix
+    points: np.ndarray
+    triangles: np.ndarray
+    materials: list[bpy.types.Material]
     item: bpy.types.Object
 
 
@@ -93,22 +97,13 @@ def _surfaces(graph: bpy.types.Depsgraph) -> Iterator[Surface]:
         # The faces of curves, texts and balls are meshes beside them, as Blender tells them to engines.
         if item.type != "MESH" or not instance.show_self:
             continue
-        mesh = _copied(instance, graph)
-        if len(mesh.polygons):
-            _take_materials(mesh, item)
-            yield Surface(mesh, instance.matrix_world.copy(), item.original)
+        points, triangles = world_triangles(item.data, instance.matrix_world)
+        if len(triangles):
+            yield Surface(points, triangles, _materials(item), item.original)
 
 
-def _copied(instance: bpy.types.DepsgraphObjectInstance, graph: bpy.types.Depsgraph) -> bpy.types.Mesh:
-    """Its faces. Those of geometry nodes may be no object's: of their object Blender gives the instancer's."""
-    item = instance.object
-    if instance.is_instance:
-        return item.data.copy()
-    return bpy.data.meshes.new_from_object(item, preserve_all_data_layers=True, depsgraph=graph)
-
-
-def _take_materials(mesh: bpy.types.Mesh, item: bpy.types.Object) -> None:
-    """Materials may hang on the object instead of its mesh; by name they are not told apart, as libraries have any."""
-    for index, slot in enumerate(item.material_slots):
-        if slot.material is not None and index < len(mesh.materials):
-            mesh.materials[index] = slot.material.original
+def _materials(item: bpy.types.Object) -> list[bpy.types.Material]:
+    """Materials may hang on the object instead of its mesh."""
+    slots = [slot.material for slot in item.material_slots]
+    found = [*slots, *item.data.materials[len(slots) :]]
+    return [material.original for material in found if material is not None]

@@ -13,7 +13,9 @@ from rgspipe.blender.geometry import FreeSpace, Geometry, scene_geometry
 from rgspipe.blender.job import DatasetJob
 from rgspipe.blender.models import cornell, corner, hotdog, room, zoo
 from rgspipe.blender.models.parameters import BlendFile, kind_of
+from rgspipe.blender.passes import HERE
 from rgspipe.datasets.named_cameras import NamedCamera
+from rgspipe.light_export.world import World
 
 #: The scenes that are modelled here.
 MODELS = {"cornell": cornell, "corner": corner, "hotdog": hotdog, "room": room, "zoo": zoo}
@@ -27,7 +29,7 @@ class PreparedScene:
         scene: Blender's scene.
         geometry: its surfaces.
         layout: draws cameras and lights.
-        rescale, offset: how the original coordinates became the scene's: (x + offset) · rescale.
+        world: how the coordinates of what Blender renders become the scene's.
         remarks: sentences about what of the original is left out or not modelled.
         cameras: of the original, by name.
     """
@@ -35,8 +37,7 @@ class PreparedScene:
     scene: bpy.types.Scene
     geometry: Geometry
     layout: Layout
-    rescale: float
-    offset: tuple[float, float, float]
+    world: World = HERE
     remarks: Sequence[str] = ()
     cameras: Mapping[str, NamedCamera] = field(default_factory=dict)
 
@@ -53,12 +54,11 @@ def open_scene(job: DatasetJob) -> PreparedScene:
     scene = model.build(job.model)
     geometry = scene_geometry(scene)
     layout = model.layout(job.model, FreeSpace(geometry), job.resolution)
-    return PreparedScene(scene, geometry, layout, 1.0, (0.0, 0.0, 0.0))
+    return PreparedScene(scene, geometry, layout)
 
 
 def _open_file(file: BlendFile, resolution: int) -> PreparedScene:
-    found = blend.open_normalised(file.path)
-    geometry = scene_geometry(found.scene)
-    space = FreeSpace(geometry)
+    found = blend.open_blend(file.path)
+    space = FreeSpace(found.geometry)
     layout = RoomLayout(space, resolution) if space.is_room else ObjectLayout(space, resolution)
-    return PreparedScene(found.scene, geometry, layout, found.rescale, found.offset, found.remarks, found.cameras)
+    return PreparedScene(found.scene, found.geometry, layout, found.world, found.remarks, found.cameras)

@@ -28,7 +28,7 @@ def write_dataset_files(job: DatasetJob, plan: Plan, prepared: PreparedScene, fo
     if prepared.cameras:
         write_cameras(folder / OWN_CAMERAS, prepared.cameras)
     bounds = [prepared.geometry.lo.tolist(), prepared.geometry.hi.tolist()]
-    write_info(folder, job.scene, bounds, prepared.rescale, list(prepared.offset))
+    write_info(folder, job.scene, bounds, prepared.world.rescale, list(prepared.world.offset))
 
 
 def _view_entry(frame: Frame, known: bool) -> dict:

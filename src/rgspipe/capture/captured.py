@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from rgspipe.arguments import as_count, as_several
-from rgspipe.capture.certainty import GUESS, Certainty
+from rgspipe.capture.certainty import Certainty
 from rgspipe.capture.field import Field, Graph, Variances
 from rgspipe.capture.lamps import LampProblem
 from rgspipe.capture.oddities import Oddities
 from rgspipe.capture.options import CaptureOptions
-from rgspipe.capture.photographs import Numbers
+from rgspipe.capture.photographs import SHOWN, Numbers
 from rgspipe.capture.prediction import Prediction
-from rgspipe.capture.radiance import Measured, measured_radiance
+from rgspipe.capture.radiance import DRAWS, Measured, measured_radiance
 from rgspipe.capture.received import Received
 from rgspipe.capture.refusals import OFF, check_brackets, check_lightings, check_measured, check_overlap, check_views
 from rgspipe.capture.search import BAR, FoundLamps, found_lamps
@@ -27,6 +27,7 @@ from rgspipe.capture.several import found_in_turns, without
 from rgspipe.capture.thinned import thinned, thinning
 from rgspipe.completion import with_unseen_surfaces
 from rgspipe.datasets.views import View
+from rgspipe.fitting.options import CertaintyOptions
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.view_weights import ViewWeights
 from rgspipe.scene.guesses import LEAST_DOUBT
@@ -41,12 +42,6 @@ from rgspipe.training.prior import albedo_prior
 
 #: Albedo of surfaces of which nothing is known.
 GREY = 0.5
-
-#: Fewer pixels than this, all together, do not measure a surfel.
-LEAST_SEEN = 0.3
-
-#: Draws of the albedo for its uncertainty, which is then known to a tenth of itself.
-DRAWS = 48
 
 
 @dataclass(frozen=True, repr=False)
@@ -78,7 +73,8 @@ class Captured:
     @property
     def guesses(self) -> NDArray[np.bool_]:
         """(K,) bool: lamps whose place is little sure, or all where light that is the same everywhere does as well."""
-        return (self.certainty.spread(self.frozen.size) > GUESS) | (self.answer.over_even < BAR.least)
+        in_doubt = self.certainty.spread(self.frozen.size) > CertaintyOptions.doubtful
+        return in_doubt | (self.answer.over_even < BAR.least)
 
     def __repr__(self) -> str:
         return f"Captured({self.surfels!r}, {len(self.lamps)} lamps)"
@@ -160,7 +156,7 @@ def _measured(
             chosen, taken, exposure=options.exposure, vignetting=options.vignetting, bent=bent
         )
         if name != OFF:
-            seen = (found[name].seen >= LEAST_SEEN) & ~found[name].blown_out.all(axis=1)
+            seen = (found[name].seen >= SHOWN) & ~found[name].blown_out.all(axis=1)
             check_measured(seen, found[name].radiance, taken, where)
     off = found.pop(OFF, None)
     return found if off is None else {name: without(measured, off) for name, measured in found.items()}
@@ -183,7 +179,7 @@ def _problem(
     frozen: FrozenScene, measured: Measured, predicted: Numbers, graph: Graph, options: CaptureOptions
 ) -> LampProblem:
     gather = frozen.gather.to_scipy().astype(np.float64).tocsr()
-    seen = measured.seen >= LEAST_SEEN
+    seen = measured.seen >= SHOWN
     told, clipped = seen[:, None] & ~measured.blown_out, seen[:, None] & measured.blown_out
     bounded = bool(clipped.any())
     prediction = None if options.albedo_prior == "none" else Prediction.of(predicted, graph)

@@ -28,9 +28,6 @@ from rgspipe.capture.shared_errors import shared_covariance
 #: Steps of the lamps without one of the scene's parts.
 STEPS = 6
 
-#: A lamp whose place is less sure than this part of the scene's size is a guess.
-GUESS = 0.05
-
 #: Standard deviation of the logarithm of all intensities together up to which their scale is tied down.
 TIED = 0.1
 

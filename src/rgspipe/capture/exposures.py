@@ -15,14 +15,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
 from rgspipe.capture.photographs import Numbers, TracedPhotograph
 from rgspipe.capture.response import Response
-
-Exposure = Literal["same", "free", "free_colour"]
+from rgspipe.names import Exposure
 
 #: Powers of r² in the vignetting.
 POWERS = (1, 2)

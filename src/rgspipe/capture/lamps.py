@@ -23,14 +23,15 @@ from rgspipe.capture.field import Field
 from rgspipe.capture.photographs import Numbers
 from rgspipe.capture.prediction import Prediction
 from rgspipe.capture.received import Received
+from rgspipe.fitting.options import StepLimits
 from rgspipe.optim.levenberg_marquardt import NormalEquations, least_squares, within
 from rgspipe.renderer.clusters import cluster_patches
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene.lights import PointLight
 from rgspipe.scene.spacing import surfel_spacing
 
-#: Longest steps: of a place in parts of the scene's size, and of the logarithm of an intensity.
-LONGEST_MOVE, LONGEST_GAIN = 0.12, 1.0
+#: Longest step of the logarithm of an intensity; that of a place is `StepLimits.move`.
+LONGEST_GAIN = 1.0
 
 #: Of a lamp six numbers are looked for: its place, and its intensity in three channels.
 NUMBERS = 6
@@ -231,7 +232,7 @@ class _Around:
     def allowed(self, step: Tensor) -> float:
         moves, gains = _split(step)
         longest = float(np.linalg.norm(moves, axis=1).max())
-        return min(within(longest, LONGEST_MOVE), within(float(np.abs(gains).max()), LONGEST_GAIN))
+        return min(within(longest, StepLimits.move), within(float(np.abs(gains).max()), LONGEST_GAIN))
 
     def moved(self, step: Tensor) -> tuple[Numbers, Numbers]:
         moves, gains = _split(step)

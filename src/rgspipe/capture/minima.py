@@ -10,6 +10,7 @@ import numpy as np
 from rgspipe.capture.candidates import CandidateLamps, ranked
 from rgspipe.capture.lamps import LampProblem, Lamps
 from rgspipe.capture.likelihood import ROUNDS, STEPS, Tried, chances
+from rgspipe.fitting.certainty.regions import CONFIDENCE
 from rgspipe.progress import progress_bar
 
 #: Places around a lamp from which it is refined, of 26: the best of these led out of most false minima that were met.
@@ -26,7 +27,7 @@ FIRST = 8
 POSSIBLE = 0.001
 
 #: One that is likelier than this is told, and a region of 95 % holds it.
-LIKELY = 0.05
+LIKELY = 1.0 - CONFIDENCE
 
 
 @dataclass(frozen=True, eq=False)

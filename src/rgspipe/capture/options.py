@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from rgspipe.names import AlbedoPrior, Exposure
 from rgspipe.options import Options, option
 
 
@@ -16,7 +17,7 @@ class CaptureOptions(Options):
     """how many lamps were on; found if null"""
     most: int = option(4, low=1, high=8)
     """most lamps that are looked for where their number is not known"""
-    exposure: Literal["same", "free", "free_colour"] = "same"
+    exposure: Exposure = "same"
     """whether all photographs were exposed alike, or each has its own exposure, or its own white balance, too, found by
     what they share"""
     vignetting: bool = False
@@ -24,7 +25,7 @@ class CaptureOptions(Options):
     response: Literal["known", "free"] = "known"
     """whether images of 8 or 16 bits were decoded by their camera's own curve, or that curve is found by photographs of
     exposures that are known and differ"""
-    albedo_prior: Literal["none", "dataset"] = "none"
+    albedo_prior: AlbedoPrior = "none"
     """what is known of the albedo: nothing, or the albedo maps of the training views, from any method and up to a scale
     of each image"""
     unseen: bool = True

@@ -9,18 +9,16 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from rgspipe.datasets.views import View
+from rgspipe.fitting.model.views import LEAST_SHARE
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.view_weights import ViewWeights
 
 Numbers = NDArray[np.float64]
 
-#: Pixels with less surface than this are mixed with what is behind.
-LEAST_COVERAGE = 0.9
-
 #: Weight of pixels beside edges, and beside the others of saturated ones: they say where nothing else does.
 LITTLE = 0.03
 
-#: Pixels, all together, with which a photograph shows a surfel.
+#: Pixels, all together, with which a photograph shows a surfel, and all photographs measure it.
 SHOWN = 0.3
 
 
@@ -41,7 +39,7 @@ class TracedPhotograph:
     @classmethod
     def of(cls, weights: ViewWeights, view: View) -> TracedPhotograph:
         """A photograph and what its pixels see; edges count little, what is not the scene nothing."""
-        whole = (weights.coverage >= LEAST_COVERAGE).cpu() & (view.alpha.reshape(-1) >= LEAST_COVERAGE)
+        whole = (weights.coverage >= LEAST_SHARE).cpu() & (view.alpha.reshape(-1) >= LEAST_SHARE)
         base = np.where(weights.edges.cpu().numpy(), LITTLE, 1.0) * whole.numpy()
         return cls(weights.operator, view, base.astype(np.float32))
 

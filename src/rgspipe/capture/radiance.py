@@ -33,7 +33,7 @@ MOST_CLIPPED = 0.3
 #: Rounds of reweighting.
 ROUNDS = 4
 
-#: Draws of the pixels' errors, by which variances are known to a fifth.
+#: Draws of the pixels' errors and of the albedo, by which variances are known to a fifth, deviations to a tenth.
 DRAWS = 48
 
 #: Relative error at which a pixel counts half, in medians of all.

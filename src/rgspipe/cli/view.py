@@ -62,6 +62,7 @@ def view_folder(arguments: Sequence[str]) -> int:
     from rgspipe.datasets.light_file import read_lights
     from rgspipe.renderer.frozen import FrozenScene
     from rgspipe.renderer.frozen_file import SURFELS
+    from rgspipe.stages.lights.capture import found_capture
     from rgspipe.stages.scene.export import world_of
     from rgspipe.stages.scene.light_origin import origin_of
     from rgspipe.stages.sources import check_target
@@ -72,7 +73,7 @@ def view_folder(arguments: Sequence[str]) -> int:
     if asked.target is not None:
         check_target(asked.target)
     found = None if asked.fit is None else found_in(asked.fit)
-    case = Case(found=found) if asked.target is None else case_in(asked.target, found)
+    case = Case(found=found) if asked.target is None else case_in(asked.target, found, found_capture)
     viewer = view(
         FrozenScene.load(asked.folder).to(device),
         None if asked.lights is None else read_lights(asked.lights),
@@ -81,6 +82,7 @@ def view_folder(arguments: Sequence[str]) -> int:
         resolution=asked.resolution,
         address=asked.address,
         world=world_of(1.0, origin_of(asked.folder / SURFELS)),
+        **({} if found is None else found.unknowns),
     )
     return serve(viewer, asked.port, asked.browser)
 

@@ -16,7 +16,7 @@ from rgspipe.datasets.json_file import read_json
 from rgspipe.datasets.light_file import read_lights
 from rgspipe.datasets.location import open_dataset
 from rgspipe.datasets.views import View
-from rgspipe.degradation.capture import degraded
+from rgspipe.degradation.degraded_views import degraded
 from rgspipe.store.artifacts import Artifact
 from rgspipe.viewer.material import Case, Found, Photograph
 

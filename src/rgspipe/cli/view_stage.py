@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rgspipe.cli.compose import compose_config
 from rgspipe.cli.jobs import run_jobs
@@ -12,6 +14,11 @@ from rgspipe.config import RgspipeConfig
 from rgspipe.errors import InputError
 from rgspipe.graph.pipeline import StageLoader, resolve
 from rgspipe.store.artifacts import Artifact, ArtifactStore
+
+if TYPE_CHECKING:
+    from rgspipe.datasets.views import Target
+    from rgspipe.scene import LightRig
+    from rgspipe.viewer.material import Case, Found
 
 #: How the command is written.
 STAGE = "stage=view"
@@ -77,6 +84,7 @@ def _serve(made: _Made) -> int:
         world=world,
         exposure_free=config.fit.exposure == "free",
         base_scale_free=config.fit.base_scale == "free",
+        ambient=config.light.ambient,
     )
     return serve(viewer, page.port, page.browser)
 
@@ -88,7 +96,7 @@ def _cases(made: _Made, config: RgspipeConfig) -> list:
     from rgspipe.datasets.location import open_dataset
     from rgspipe.stages.sources import target_stage
     from rgspipe.stages.targets.true_lights import truth_file
-    from rgspipe.viewer.material import Case, found_in
+    from rgspipe.viewer.material import found_in
 
     source = next((made.find(stage) for stage in target_stage(config)), None)
     if config.fit.target is not None:
@@ -102,8 +110,21 @@ def _cases(made: _Made, config: RgspipeConfig) -> list:
         truth = truth_file(config, source, target.name)
         folder = None if fits is None else fits.path / target.name
         found = found_in(folder) if folder is not None and folder.is_dir() else None
-        cases.append(Case.of(target, () if truth is None else read_lights(truth), found))
+        cases.append(_case(target, config, () if truth is None else read_lights(truth), found))
     return cases
+
+
+def _case(target: Target, config: RgspipeConfig, truth: LightRig, found: Found | None) -> Case:
+    """A target as a fit of this configuration takes it; without photographs, and why, where none can."""
+    from rgspipe.stages.lights.capture import captured_views
+    from rgspipe.stages.lights.targets import used_views
+    from rgspipe.viewer.material import Case
+
+    try:
+        views, capture = captured_views(used_views(target, config), target.name, config)
+    except InputError as error:
+        return Case(target.name, (), truth, found, f"Lamps cannot be looked for here. {error}")
+    return Case.of(replace(target, views=tuple(views)), truth, found, capture)
 
 
 def _references(dataset: Artifact | None) -> list:

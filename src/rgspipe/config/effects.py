@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
+from rgspipe.names import Solver
 from rgspipe.options import Options, option
 
 
@@ -18,7 +18,7 @@ class EffectsConfig(Options):
     """light bounces between surfels"""
     at_pixels: bool = True
     """direct light where pixels look, in a fit's last steps: sharper than at surfels' centres, and dearer"""
-    solver: Literal["patches", "gather", "monte_carlo"] = "patches"
+    solver: Solver = "patches"
     """how light bounces: averaged over patches, through the full gather operator, or by the paper's random rays"""
     bounces: int | None = option(None, low=0, high=1000)
     """how many; by default all, and 4 for monte_carlo"""

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
+from rgspipe.names import LightFormat, SurfelLayout
 from rgspipe.options import Options, option
-
-#: Formats of `rgspipe.light_export`.
-LightFormat = Literal["blend", "usda", "gltf", "mitsuba", "three", "ies", "json"]
 
 
 @dataclass(frozen=True)
@@ -21,5 +18,5 @@ class ExportConfig(Options):
     """write the lights of export.light, and no surfels: blend, usda, gltf, mitsuba, three, ies, json"""
     metres: float = option(1.0, low=1e-9, high=1e9)
     """of lights: how long a unit of the scene's own file is (a .blend's, or that of your images' poses)"""
-    layout: Literal["full", "viewer"] = "full"
+    layout: SurfelLayout = "full"
     """all of a surfel, for this program and viewers that read properties by name; or just those of 3DGS, in order"""

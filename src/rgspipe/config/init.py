@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
+from rgspipe.names import NormalSource
 from rgspipe.options import Options, option
 
 
@@ -18,7 +18,7 @@ class InitConfig(Options):
     """… times this; by default 2 for hotdog and room, which have much of it, else 1"""
     scale: float = option(0.6, low=0.05, high=10)
     """standard deviation of a surfel over the spacing of its neighbours"""
-    normals: Literal["auto", "estimate", "pass"] = "auto"
+    normals: NormalSource = "auto"
     """fitted to the depth, or the views' normal pass"""
     clips: bool = True
     """straight edges for surfels at the border of a flat surface"""

@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 from rgspipe.errors import InputError
 from rgspipe.fitting.options import MOST_LIGHTS
+from rgspipe.names import LightType, Mount, SpotProfile
 from rgspipe.options import Options, option
-
-#: How intensity falls with the angle from the axis.
-Profile = Literal["smoothstep", "gaussian", "linear"]
 
 
 @dataclass(frozen=True)
 class SpotConfig(Options):
     """The profile of unknown spots; with fit.shape=free its kind, and a rim to begin with."""
 
-    profile: Profile = "smoothstep"
+    profile: SpotProfile = "smoothstep"
     """how intensity falls with the angle from the axis: Blender's smoothstep, gaussian, or Mitsuba's linear"""
     cone_angle: float = option(25.0, low=1, high=89)
     """half-angle of the cone, degrees"""
@@ -66,11 +63,11 @@ class ProfileConfig(Options):
 class LightConfig(Options):
     """What is looked for."""
 
-    type: Literal["point", "spot", "led", "sphere", "panel", "sun", "profile", "auto"] = "point"
+    type: LightType = "point"
     """type of the unknown lights"""
     count: int | None = option(1, low=1, high=MOST_LIGHTS)
     """how many unknown lights; null finds out"""
-    mount: Literal["free", "surface", "ceiling"] = "free"
+    mount: Mount = "free"
     """surface: they hang on surfaces of the scene; ceiling: on such as face down. Panels and LEDs shine away from it"""
     distance: float | None = option(None, low=0, high=1e6)
     """with a mount, how far they hang from it, scene units; by default it is found, and panels lie on it"""

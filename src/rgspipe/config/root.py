@@ -24,7 +24,7 @@ from rgspipe.config.train import TrainConfig
 from rgspipe.config.viewer import ViewerConfig
 from rgspipe.datasets.classes import LightClass
 from rgspipe.datasets.reading_limits import ReadingLimits
-from rgspipe.degradation.options import Capture, ModelError, TargetCapture
+from rgspipe.degradation.options import ModelError, TargetErrors, ViewErrors
 from rgspipe.machine.device import Wanted
 from rgspipe.options import Options, option
 
@@ -65,7 +65,7 @@ class RgspipeConfig(Options):
     scene: SceneConfig = SceneConfig()
     dataset: DatasetOptions = DatasetOptions()
     blender: BlenderOptions = BlenderOptions()
-    capture: Capture = Capture()
+    capture: ViewErrors = ViewErrors()
     init: InitConfig = InitConfig()
     train: TrainConfig = TrainConfig()
     lamps: CaptureOptions = CaptureOptions()
@@ -84,7 +84,7 @@ class RgspipeConfig(Options):
     debug: DebugConfig = DebugConfig()
     limits: ReadingLimits = ReadingLimits()
     model_error: ModelError = ModelError()
-    target_capture: TargetCapture = TargetCapture()
+    target_capture: TargetErrors = TargetErrors()
     track: TrackConfig = TrackConfig()
     targets: TargetsConfig = TargetsConfig()
     relight: RelightConfig = RelightConfig()

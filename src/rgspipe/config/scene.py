@@ -9,7 +9,7 @@ from typing import Literal, get_args
 from rgspipe.arguments import as_path
 from rgspipe.blender.options import HotdogParameters, RoomParameters, ZooParameters
 from rgspipe.datasets.input_file import input_file, input_folder, is_plain_name
-from rgspipe.datasets.mesh.options import MeshOptions
+from rgspipe.datasets.mesh.options import FORMATS, MeshOptions
 from rgspipe.datasets.ply.options import PlyOptions
 from rgspipe.datasets.scans.options import ScanOptions
 from rgspipe.errors import InputError
@@ -21,8 +21,7 @@ MODELLED: tuple[Modelled, ...] = get_args(Modelled)
 
 #: What `scene.path` has to be, by kind.
 PATHS = {"blend": "a .blend file", "external": "a dataset's folder", "ply": "a .ply file"}
-MESHES = (".ply", ".obj", ".glb", ".gltf")
-PATHS |= {"rgbd": "a capture's folder", "mesh": f"a mesh ({', '.join(MESHES)})"}
+PATHS |= {"rgbd": "a capture's folder", "mesh": f"a mesh ({', '.join(FORMATS)})"}
 
 Colour = tuple[float, float, float]
 
@@ -152,6 +151,6 @@ class SceneConfig(Options):
             remedy = "Check scene.path; a relative path starts at the current folder."
             raise InputError(error.where, expected=what, found=error.found, remedy=remedy) from None
         suffix = Path(self.path).suffix
-        if self.kind == "mesh" and suffix.lower() not in MESHES:
+        if self.kind == "mesh" and suffix.lower() not in FORMATS:
             remedy = "Name the mesh, or export it as binary PLY or GLB."
             raise InputError(self.path, expected=what, found=f"the suffix {suffix!r}", remedy=remedy)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from rgspipe.config.light import Profile
 from rgspipe.datasets.classes import LIGHT_CLASSES, LightClass
 from rgspipe.errors import InputError
 from rgspipe.fitting.options import MOST_LIGHTS
+from rgspipe.names import PoolKind, SpotProfile
 from rgspipe.options import Options, option
 
 
@@ -27,7 +27,7 @@ def check_order(name: str, ends: tuple[float, float] | None) -> None:
 class TargetSpotConfig(Options):
     """The spots of generated targets; each range is drawn from uniformly."""
 
-    profile: Profile = "smoothstep"
+    profile: SpotProfile = "smoothstep"
     """how intensity falls with the angle from the axis"""
     cone_angle: tuple[float, float] = option((25.0, 25.0), low=1, high=89)
     """least and largest half-angle of the cone, degrees"""
@@ -44,7 +44,7 @@ class TargetSpotConfig(Options):
 class TargetsConfig(Options):
     """Generated fit targets: sums of single lights, each of which is rendered once."""
 
-    kind: Literal["points", "spots", "mixed", "spheres", "panels", "suns", "leds", "profiles", "drive"] = "points"
+    kind: Literal[PoolKind, "mixed"] = "points"
     """lights of a target: points, spots, of each at least one, spheres, panels, suns, LEDs, measured luminaires, or the
     headlights of a car that drives around the bend of scene=corner"""
     number: int = option(40, low=1, high=100000)

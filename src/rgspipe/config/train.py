@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
+from rgspipe.names import AlbedoPrior
 from rgspipe.options import option
 from rgspipe.training.options import TrainOptions
 
@@ -13,7 +13,7 @@ from rgspipe.training.options import TrainOptions
 class TrainConfig(TrainOptions):
     """From images to material and refined geometry."""
 
-    albedo_prior: Literal["none", "dataset"] = "none"
+    albedo_prior: AlbedoPrior = "none"
     """what is known of the albedo: nothing, or the albedo maps of the training views, from any method and up to a scale
     of each image"""
     albedo_prior_weight: float = option(0.3, low=0, high=1e6)

@@ -94,7 +94,11 @@ class _Source:
         return int(value)
 
     def table(self, vertical: Sequence[float], planes: dict[float, Sequence[float]], factor: float) -> Photometry:
-        """Of candela, over `factor`, by vertical angle in each plane [degrees]."""
+        """Of candela, over `factor`, by vertical angle in each plane [degrees].
+
+        Files count planes anticlockwise as seen from above (LM-63-2002, 3), lights clockwise.
+        """
+        planes = {-angle % 360.0: column for angle, column in planes.items()}
         angles = [math.radians(min(angle, 180.0)) for angle in vertical]
         horizontal = sorted(planes)
         candela = factor * torch.tensor([list(planes[angle]) for angle in horizontal], dtype=torch.float64).T

@@ -8,7 +8,7 @@ from rgspipe.options import Options, option
 
 
 @dataclass(frozen=True)
-class Capture(Options):
+class ViewErrors(Options):
     """Errors of a real capture, put into the training views; held-out views and targets stay clean."""
 
     depth_noise: float = option(0.0, low=0, high=1)
@@ -39,7 +39,7 @@ class Capture(Options):
 
 
 @dataclass(frozen=True)
-class TargetCapture(Options):
+class TargetErrors(Options):
     """Errors of a real camera, put into the images of fit targets."""
 
     noise: float = option(0.0, low=0, high=10)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from numbers import Integral
-from typing import Any, NoReturn, Self
+from typing import Any, NoReturn, Self, get_args
 
 from rgspipe.errors import InputError
 from rgspipe.fitting.options import MOST_LIGHTS
+from rgspipe.names import LightType, Mount
 from rgspipe.options import check_names
 from rgspipe.scene.lights import KINDS, Light, Photometry, ProfileLight
 
@@ -18,10 +19,10 @@ AUTO = "auto"
 #: as the kinds that only look like these from afar, too: see `selection.kinds`.
 AUTO_KINDS, AUTO_SHAPED = ("point", "sun", "spot", "led"), "spot"
 
-TYPES = (*KINDS, AUTO)
+TYPES: tuple[LightType, ...] = get_args(LightType)
 
 #: What lights may hang on, nothing first.
-MOUNTS = ("free", "surface", "ceiling")
+MOUNTS: tuple[Mount, ...] = get_args(Mount)
 
 
 @dataclass(frozen=True)
@@ -48,11 +49,11 @@ class LightSpec:
         InputError: an unknown field or type, a count out of range, a shape of another kind, or luminaires of one.
     """
 
-    type: str = "point"
+    type: LightType = "point"
     count: int | None = 1
     shape: Light | None = None
     shape_free: bool = False
-    mount: str = "free"
+    mount: Mount = "free"
     distance: float | None = None
     ambient: bool = False
     luminaires: tuple[Photometry, ...] = ()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Literal, get_args
+from typing import get_args
 
 from torch import Tensor
 
@@ -21,12 +21,12 @@ from rgspipe.light_export.parts import Numbered, is_of_another_shape, is_told
 from rgspipe.light_export.three import three
 from rgspipe.light_export.usd import usda
 from rgspipe.light_export.world import World, table
+from rgspipe.names import LightFormat
 from rgspipe.scene import Light, LightRig
 from rgspipe.scene.lights import ProfileLight, as_rig
 from rgspipe.store.files import write_text
 
-Format = Literal["blend", "usda", "gltf", "mitsuba", "three", "ies", "json"]
-FORMATS: tuple[Format, ...] = get_args(Format)
+FORMATS: tuple[LightFormat, ...] = get_args(LightFormat)
 
 #: Files of formats that hold all lights in one.
 NAMES = {"blend": "lamps_blender.py", "usda": "lamps.usda", "gltf": "lamps.gltf"}
@@ -56,7 +56,7 @@ class LightExport:
 def export_lights(
     lights: Light | Sequence[Light],
     folder: str | Path,
-    formats: Sequence[Format] = FORMATS,
+    formats: Sequence[LightFormat] = FORMATS,
     *,
     metres: float = 1.0,
     world: World | None = None,

@@ -54,10 +54,13 @@ def ies(light: Light, name: str) -> tuple[str, list[str]]:
 def _table(light: Light) -> tuple[Tensor, Tensor, Tensor]:
     """Angles from the axis (V,) and around it (H,) [degrees], and relative intensities (H, V)."""
     if isinstance(light, ProfileLight):
-        table, turn = light.table, torch.full((1,), 2.0 * math.pi).double()
-        around = [table.horizontal] if table.round else [table.horizontal, turn]
-        columns = table.relative if table.round else torch.cat([table.relative, table.relative[:, :1]], dim=1)
-        return torch.rad2deg(table.vertical), torch.rad2deg(torch.cat(around)), columns.T
+        table, whole = light.table, torch.full((1,), 2.0 * math.pi).double()
+        if table.round:
+            return torch.rad2deg(table.vertical), torch.rad2deg(table.horizontal), table.relative.T
+        # Files count planes anticlockwise as seen from above, lights clockwise.
+        around = torch.cat([whole - whole, (whole - table.horizontal).flip(0)])
+        columns = torch.cat([table.relative[:, :1], table.relative.flip(1)], dim=1)
+        return torch.rad2deg(table.vertical), torch.rad2deg(around), columns.T
     share = torch.ones_like(ANGLES) if light.axis is None else light.relative_intensity_at(torch.deg2rad(ANGLES))
     return ANGLES, torch.zeros(1).double(), share[None]
 

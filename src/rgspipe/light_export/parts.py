@@ -7,8 +7,9 @@ from collections.abc import Mapping
 import torch
 from torch import Tensor
 
+from rgspipe.names import SpotProfile
 from rgspipe.scene import Light, SpotLight
-from rgspipe.scene.lights import AxialLight, SpotProfile
+from rgspipe.scene.lights import AxialLight
 from rgspipe.scene.lights.panel import sides
 from rgspipe.scene.lights.surface import EvenRectangle, EvenSphere, Surface
 

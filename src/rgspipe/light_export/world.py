@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import torch
+from torch import Tensor
 
 from rgspipe.scene import Light, LightRig
 from rgspipe.scene.lights.shape_coordinates import Length
@@ -39,16 +40,18 @@ class World:
         """
         return tuple(self._light(light) for light in rig)
 
+    def place(self, point: Tensor) -> Tensor:
+        """Where a point (3,) of the scene is, in metres."""
+        return self.metres * (point.double() / self.rescale - torch.tensor(self.offset, dtype=torch.float64))
+
     def _light(self, light: Light) -> Light:
-        offset = torch.tensor(self.offset, dtype=torch.float64)
-        position = self.metres * (light.position.double() / self.rescale - offset)
         sizes = {
             number.name: self.unit * getattr(light, number.name)
             for number in light.shape
             if isinstance(number.coordinate, Length)
         }
         factor = 1.0 if light.distant else self.unit * self.unit
-        return replace(light, position=position, intensity=factor * light.intensity.double(), **sizes)
+        return replace(light, position=self.place(light.position), intensity=factor * light.intensity.double(), **sizes)
 
     def line(self) -> str:
         """What was done, for people."""

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import torch
 from torch import Tensor
 
 from rgspipe.arguments import as_count
 from rgspipe.errors import InputError
+from rgspipe.names import Solver
 from rgspipe.renderer.monte_carlo import MonteCarloSolver
 from rgspipe.renderer.radiosity import GatherSolver
 from rgspipe.renderer.transport import with_bounces
 
 if TYPE_CHECKING:
     from rgspipe.renderer.frozen import FrozenScene
-
-Solver = Literal["patches", "gather", "monte_carlo"]
 
 #: Bounces of Monte Carlo where no number is given: what is left after four is 6 % of the light at albedo 0.5.
 MONTE_CARLO_BOUNCES = 4

@@ -91,7 +91,7 @@ class OperatorStore:
             expected=f"room for {size / MIB:.1f} MiB more of the views' operators, after {kept:.0f} MiB",
             found=str(error),
             remedy=f"Free disk space there, raise {self._name}.memory_mib if the machine has memory left, "
-            "or take fewer (Capture.views) or smaller images.",
+            "or take fewer (ViewErrors.views) or smaller images.",
         )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import Future
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -87,12 +88,12 @@ class FitControls:
     def find(self) -> None:
         """Search the lamps of the photographs, and show them with their regions."""
         photographs = self._session.case.photographs
-        self._search(lambda: self._visit.exhibit.finder.find(photographs))
+        self._search(lambda: self._visit.exhibit.finder.find(photographs), searched=True)
 
     def refit(self) -> None:
         """The nearest lamps to those of now that explain the photographs."""
         photographs, lights = self._session.case.photographs, self._session.lights
-        self._search(lambda: self._visit.exhibit.finder.refit(photographs, lights))
+        self._search(lambda: self._visit.exhibit.finder.refit(photographs, lights), searched=False)
 
     def _offered(self) -> tuple[Action, ...]:
         return (
@@ -109,14 +110,15 @@ class FitControls:
         names = {one.name for one in own}
         return [*own, *(one for one in self._visit.exhibit.references if one.name not in names)]
 
-    def _search(self, search: Callable[[], FitResult]) -> None:
+    def _search(self, search: Callable[[], FitResult], searched: bool) -> None:
         if self.searching:
             return
         self.searching = True
         for button in self._buttons:
             button.disabled = True
         self._told.content = "Somebody else's search goes first …" if self._visit.exhibit.finder.busy else _SEARCHING
-        self._visit.actions.beside("find it", lambda: self._telling(_SEARCHING, search), self._found)
+        work = partial(self._telling, _SEARCHING, search)
+        self._visit.actions.beside("find it", work, partial(self._found, searched))
 
     def _telling(self, words: str, work: Callable[[], Any]) -> Any:
         """What the finder works out; until then `words` and how far it is stand there."""
@@ -127,11 +129,11 @@ class FitControls:
         with progress_told(tell):
             return work()
 
-    def _found(self, ended: Future) -> None:
+    def _found(self, searched: bool, ended: Future) -> None:
         self.searching = False
         for button in self._buttons:
             button.disabled = False
-        self._session.take(self._result(ended))
+        self._session.take(self._result(ended), searched)
         self._lamps_changed()
         self.refresh()
         self._show(0)

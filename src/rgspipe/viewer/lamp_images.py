@@ -9,6 +9,7 @@ from typing import Literal
 import torch
 from torch import Tensor
 
+from rgspipe.renderer.ambient import ambient_image
 from rgspipe.renderer.effects import ALL_EFFECTS
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.images.model import Lit, SurfelModel, ViewModel
@@ -50,6 +51,7 @@ class LampImages:
         self._models: Kept[ViewModel] = Kept(VIEW_PIXELS, lambda model: len(model.views.pixels))
         self._lit: Kept[Lit] = Kept(LIT)
         self._onto: Kept[Tensor] = Kept(LIT)
+        self._ambient: Kept[Tensor] = Kept(LIT)
 
     def knows(self, camera: Camera) -> bool:
         """Whether the camera was traced already for images that are not coarse."""
@@ -73,6 +75,10 @@ class LampImages:
         for light in rig:
             arriving += light.intensity.to(albedo) * self._arriving(self._lit_by(model, _white(light)), _white(light))
         return (model.views.operator @ arriving).reshape(camera.height, camera.width, 3).cpu()
+
+    def ambient(self, camera: Camera) -> Tensor:
+        """(H, W, 3) what a camera sees under radiance 1 from all around, through openings; black in a closed scene."""
+        return self._ambient.get(camera.key, lambda: ambient_image(self.frozen, self._view(camera, False)).cpu())
 
     def _arriving(self, lit: Lit, light: Light) -> Tensor:
         """(N, 3) irradiance of the surfels that a lamp has `lit`."""

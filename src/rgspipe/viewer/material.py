@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +15,11 @@ from rgspipe.datasets.alternatives_file import ToldAlternative, read_alternative
 from rgspipe.datasets.covariance_file import read_covariances
 from rgspipe.datasets.gs3 import load_target
 from rgspipe.datasets.json_file import read_json
-from rgspipe.datasets.light_file import read_lights
+from rgspipe.datasets.light_file import read_ambient, read_lights
 from rgspipe.datasets.views import Target, View
 from rgspipe.fitting import FitResult
 from rgspipe.fitting.findings import FitStatus
+from rgspipe.fitting.model.capture import SATURATED, ImageCapture
 from rgspipe.fitting.result_text import as_text, headline, light_lines
 from rgspipe.fitting.words import told_alternative
 from rgspipe.scene import Camera, LightRig
@@ -36,6 +37,8 @@ class Photograph:
         mask: (H, W) the scene's share of each pixel, 0 where that tells too little of it; 1 if None.
         lights: under which it was taken, where they are known and not looked for.
         base: (H, W, 3) the same with the lamps off; black if None.
+        clip: radiance at which the image is clipped; inf where it is not.
+        saturated: a value from here on, as a part of the clip, tells only that the scene is at least so bright.
     """
 
     name: str
@@ -44,6 +47,8 @@ class Photograph:
     mask: Tensor | None = None
     lights: LightRig | None = None
     base: Tensor | None = None
+    clip: float = math.inf
+    saturated: float = SATURATED
 
     @classmethod
     def of(cls, view: View, name: str) -> Photograph:
@@ -53,6 +58,11 @@ class Photograph:
             saturated = saturated | (view.base >= view.saturated_from)
         mask = torch.where(saturated.any(dim=-1), 0.0, view.alpha)
         return cls(name, view.camera, view.image, mask, None if view.light is None else (view.light,), view.base)
+
+    def explained(self, seen: Tensor) -> Tensor:
+        """(H, W, 3) `seen` as it would have been photographed: what is saturated hides how much brighter it is."""
+        is_hidden = (self.image >= self.saturated * self.clip) & (seen > self.image)
+        return torch.where(is_hidden, self.image.to(seen), seen)
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +77,7 @@ class Found:
         alternatives: what they were weighed against.
         exposures: of each photograph over the first one's; empty where they were known.
         base_scale: (3,) how many times images with the lamps off are in the photographs; once if None.
+        ambient: (3,) radiance that comes from all around through openings; black if None.
     """
 
     lights: LightRig
@@ -77,15 +88,27 @@ class Found:
     alternatives: tuple[ToldAlternative, ...] = ()
     exposures: tuple[float, ...] = ()
     base_scale: Tensor | None = None
+    ambient: Tensor | None = None
+
+    @property
+    def unknowns(self) -> dict[str, bool]:
+        """What the fit looked for besides lamps, as `view` takes it, so that it is looked for again."""
+        return {
+            "exposure_free": any(exposure != 1.0 for exposure in self.exposures),
+            "base_scale_free": self.base_scale is not None,
+            "ambient": self.ambient is not None,
+        }
 
     @classmethod
     def of(cls, result: FitResult) -> Found:
         """What a fit found."""
         steps = tuple(step.lights for step in result.trajectory)
         others = (ToldAlternative(one.lights, told_alternative(one), one.ruled_out) for one in result.alternatives)
-        scale = None if result.base_scale is None else result.base_scale.value
-        told = repr(result)
-        return cls(result.lights, result.covariance, told, result.costs, steps, tuple(others), result.exposures, scale)
+        scale, ambient = (None if one is None else one.value for one in (result.base_scale, result.ambient))
+        told, exposures = repr(result), result.exposures
+        return cls(
+            result.lights, result.covariance, told, result.costs, steps, tuple(others), exposures, scale, ambient
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,11 +126,21 @@ class Case:
     lacking: str = "There are no photographs to find lamps in."
 
     @classmethod
-    def of(cls, target: Target, truth: LightRig = (), found: Found | None = None) -> Case:
-        """A target; without its photographs where only some of them are known with the lamps off."""
+    def of(
+        cls, target: Target, truth: LightRig = (), found: Found | None = None, capture: ImageCapture | None = None
+    ) -> Case:
+        """A target; without its photographs where only some of them are known with the lamps off.
+
+        Args:
+            capture: where its images are clipped; what is saturated in them is not searched for lamps if None.
+        """
         if len({view.base is None for view in target.views}) > 1:
             return cls(target.name, (), truth, found, HALF_KNOWN)
         views = [Photograph.of(view, f"{target.name}, view {index}") for index, view in enumerate(target.views)]
+        if capture is not None:
+            limits = zip(views, target.views, capture.clips(len(views)).tolist(), strict=True)
+            known = capture.saturated
+            views = [replace(one, mask=view.alpha, clip=clip, saturated=known) for one, view, clip in limits]
         return cls(target.name, views, truth, found)
 
 
@@ -117,9 +150,16 @@ def as_photographs(cameras: Sequence[Camera], images: Sequence[ArrayLike]) -> li
     return [Photograph(f"view {index}", camera, torch.as_tensor(image)) for index, (camera, image) in pairs]
 
 
-def case_in(target: str | Path, found: Found | None = None) -> Case:
-    """The target in a folder; its truth stands in its dataset's folder truth/ where it is known."""
-    return Case.of(load_target(target), truth_of(target), found)
+def case_in(
+    target: str | Path, found: Found | None = None, capture: Callable[[Sequence[View]], ImageCapture] | None = None
+) -> Case:
+    """The target in a folder; its truth stands in its dataset's folder truth/ where it is known.
+
+    Args:
+        capture: tells where images are clipped; see `Case.of`.
+    """
+    read = load_target(target)
+    return Case.of(read, truth_of(target), found, None if capture is None else capture(read.views))
 
 
 def truth_of(target: str | Path) -> LightRig:
@@ -139,7 +179,8 @@ def found_in(fit: str | Path) -> Found:
     steps = _path(Path(fit) / "convergence.csv", lights)
     exposures = tuple(float(one) for one in told.get("exposures", ()))
     scale = torch.tensor(told["base_scale"]["factor"]).double() if "base_scale" in told else None
-    return Found(lights, covariances, words, costs, steps, read_alternatives(path), exposures, scale)
+    others, ambient = read_alternatives(path), read_ambient(path)
+    return Found(lights, covariances, words, costs, steps, others, exposures, scale, ambient)
 
 
 def _words(told: Mapping[str, Any], lights: LightRig, covariances: Sequence[Tensor]) -> str:

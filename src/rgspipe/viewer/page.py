@@ -29,9 +29,13 @@ STEEP = 0.95
 _HELP = "Drag a lamp by its arrows. Mouse: turn, move, zoom; **W A S D Q E** fly. **Ctrl-K** lists all keys."
 
 
-#: Width over height below which a page is a phone's: these have 9/16 and less, and a window of 640 × 480 has 0.66 for
-#: the moment in which its fields stand beside the picture while it is laid out.
-UPRIGHT = 0.6
+#: Width over height below which a picture has so narrow a page that fields over it begin folded, as on phones that
+#: are held upright: 9/16 and less, but more where the phone's browser has bars of its own. In a window of 900 × 1000
+#: the picture beside the fields has 0.58.
+UPRIGHT = 0.57
+
+#: A browser's camera has not been moved where it is no farther away, scene units: it tells of places in float32.
+STILL = 1e-5
 
 #: What comes of a camera that cannot be: a canvas without a size, a turn of length zero, what is no number. Browsers
 #: tell of such ones while a page is folded away or not yet drawn, and whoever is no browser may tell of anything.
@@ -41,9 +45,11 @@ NO_CAMERA = (ValueError, ArithmeticError, TypeError)
 class Page:
     """What a visitor sees and does; to be furnished once it is known who leaves it."""
 
-    def __init__(self, client: viser.ClientHandle, exhibit: Exhibit) -> None:
+    def __init__(self, client: viser.ClientHandle, exhibit: Exhibit, is_phone: bool = False) -> None:
+        self._upright = 1.0 if is_phone else UPRIGHT
         self._client, self._exhibit, self._resolution, self._seen = client, exhibit, exhibit.resolution, b""
         self._wanted: Camera | None = None
+        self._begun: tuple[Camera, float] | None = None
         self.session = exhibit.session()
         self.painter = Painter(self.session, self.camera, self._show, exhibit.resolution, exhibit.turn)
         self.drawings = Drawings(client.scene, exhibit.images.frozen.size, self._go_to)
@@ -91,7 +97,7 @@ class Page:
         Its pixels do not tell: browsers count several to a point on phones, and draw fewer where drawing is slow.
         """
         held = self._client.camera
-        return held.image_width >= UPRIGHT * held.image_height
+        return held.image_width >= self._upright * held.image_height
 
     async def _moved(self, _: viser.CameraHandle) -> None:
         camera = self._here()
@@ -104,6 +110,7 @@ class Page:
     def _look(self, camera: Camera) -> None:
         self.drawings.seen_from(camera)
         self.lamps.seen_from(camera)
+        self._fit()
         self._follow()
 
     def _show(self, picture: Bytes, top: float, sharp: bool) -> None:
@@ -118,6 +125,15 @@ class Page:
         """Look through a camera; where the browser's own cannot be, as soon as it can."""
         self._wanted = camera
         self._follow()
+
+    def _fit(self) -> None:
+        """Take the same camera again where the window has changed since, as it does while a page is laid out."""
+        with contextlib.suppress(*NO_CAMERA):
+            if self._wanted is None and self._begun is not None:
+                camera, aspect = self._begun
+                stays = float(abs(self._client.camera.position - camera.origin.numpy()).max()) < STILL
+                self._begun = self._begun if stays else None
+                self._wanted = camera if stays and self._client.camera.aspect != aspect else None
 
     def _follow(self) -> None:
         camera = self._wanted
@@ -137,3 +153,4 @@ class Page:
         held.up_direction = up if abs(forward[2]) > STEEP else (0.0, 0.0, 1.0)
         held.position, held.fov = position, fov
         held.look_at = position + forward * max(self.session.images.frozen.size, 1e-3)
+        self._begun = camera, held.aspect

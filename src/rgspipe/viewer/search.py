@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Sequence
 from dataclasses import replace
@@ -12,6 +13,7 @@ from rgspipe.errors import InputError
 from rgspipe.fitting import FitResult, FitViews, LightSpec
 from rgspipe.fitting.certainty.advice import ViewAdvice, suggest_views
 from rgspipe.fitting.model.capture import BaseImages, ImageCapture
+from rgspipe.fitting.spec import as_spec
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import Camera, LightRig
 from rgspipe.viewer.kept import Kept
@@ -31,10 +33,17 @@ class Finder:
         frozen: the scene; what fits keep of it is not shared with those who look at it.
         exposure_free: whether every photograph but the first has an unknown exposure.
         base_scale_free: whether images with the lamps off are in photographs an unknown number of times.
+        ambient: whether there may be light from all around through openings besides.
     """
 
-    def __init__(self, frozen: FrozenScene, exposure_free: bool = False, base_scale_free: bool = False) -> None:
-        self._frozen, self._turn = replace(frozen), threading.Lock()
+    def __init__(
+        self,
+        frozen: FrozenScene,
+        exposure_free: bool = False,
+        base_scale_free: bool = False,
+        ambient: bool = False,
+    ) -> None:
+        self._frozen, self._turn, self._ambient = replace(frozen), threading.Lock(), ambient
         self._exposure_free, self._base_scale_free = exposure_free, base_scale_free
         self._views: Kept[FitViews] = Kept(KEPT_VIEWS)
 
@@ -85,20 +94,24 @@ class Finder:
             return suggest_views(self._frozen, result, present, candidates, wanted=wanted, capture=capture)
 
     def _refit(self, photographs: Sequence[Photograph], start: LightRig) -> FitResult:
-        return self._prepared(photographs, "auto").refit(_images(photographs), start, self._capture(photographs))
+        return self._prepared(photographs, ANY).refit(_images(photographs), start, self._capture(photographs))
 
     def _capture(self, photographs: Sequence[Photograph]) -> ImageCapture:
         """How photographs were taken; of those without an image with the lamps off that is black."""
-        if all(taken.base is None for taken in photographs):
-            return ImageCapture(self._exposure_free)
-        images = [torch.zeros_like(taken.image) if taken.base is None else taken.base for taken in photographs]
-        return ImageCapture(self._exposure_free, base=BaseImages(images, self._base_scale_free))
+        base, clips = None, [taken.clip for taken in photographs]
+        if any(taken.base is not None for taken in photographs):
+            images = [torch.zeros_like(taken.image) if taken.base is None else taken.base for taken in photographs]
+            base = BaseImages(images, self._base_scale_free)
+        if min(clips) == math.inf:
+            return ImageCapture(self._exposure_free, base=base)
+        saturated = min(taken.saturated for taken in photographs)
+        return ImageCapture(self._exposure_free, clips, saturated, base)
 
     def _prepared(self, photographs: Sequence[Photograph], lights: str | LightSpec) -> FitViews:
         if not photographs:
             remedy = "Take one with the button, or start the viewer with target=DIR."
             raise InputError("photographs", expected="at least one to find the lights of", found="none", remedy=remedy)
-        cameras = [taken.camera for taken in photographs]
+        cameras, lights = [taken.camera for taken in photographs], replace(as_spec(lights), ambient=self._ambient)
         masks, owners = None, tuple(id(taken.mask) for taken in photographs)
         if any(taken.mask is not None for taken in photographs):
             masks = [torch.ones(one.image.shape[:2]) if one.mask is None else one.mask for one in photographs]

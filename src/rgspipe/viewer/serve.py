@@ -20,7 +20,7 @@ from rgspipe.light_export.world import World
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import Camera
 from rgspipe.scene.lights import Light, as_rig
-from rgspipe.viewer.cameras import first_camera
+from rgspipe.viewer.cameras import first_camera, pose_of
 from rgspipe.viewer.lamp_images import LampImages
 from rgspipe.viewer.material import Case, Photograph
 from rgspipe.viewer.search import Finder
@@ -63,6 +63,7 @@ class Viewer:
         self._server.gui.main_panel.dock_right()
         self._server.gui.set_panel_label("rgspipe")
         self._server.scene.set_up_direction("+z")
+        self._begin_at(exhibit.camera)
         self._server.on_client_connect(self._welcome)
         self._server.on_client_disconnect(self._bye)
         self.url = f"http://{LOOPBACK}:{self._server.get_port()}"
@@ -94,15 +95,27 @@ class Viewer:
         with _unsaid():
             self._server.stop()
 
+    def _begin_at(self, camera: Camera) -> None:
+        """Have browsers begin there: what they tell before they are moved would be the first picture's place."""
+        position, _, fov = pose_of(camera)
+        begin, forward = self._server.initial_camera, -camera.camera_to_world[:3, 2].numpy()
+        begin.position, begin.fov = tuple(position), fov
+        begin.look_at = tuple(position + forward * max(self._exhibit.images.frozen.size, 1e-3))
+
     def _welcome(self, client) -> None:
         from rgspipe.viewer.page import Page
 
-        page = self.pages[client.client_id] = Page(client, self._exhibit)
+        page = self.pages[client.client_id] = Page(client, self._exhibit, self._is_phone(client.client_id))
         try:
             page.furnish()
         finally:
             if client.client_id not in self._server.get_clients():  # left meanwhile
                 self._bye(client)
+
+    def _is_phone(self, number: int) -> bool:
+        """Whether the browser says that it is one's; viser 1.1.1 keeps its request without a door to it."""
+        connection = self._server._websock_server._live_connections.get(number)
+        return connection is not None and "Mobi" in connection.request.headers.get("User-Agent", "")
 
     def _bye(self, client) -> None:
         page = self.pages.pop(client.client_id, None)
@@ -145,6 +158,7 @@ def view(
     world: World | None = None,
     exposure_free: bool = False,
     base_scale_free: bool = False,
+    ambient: bool = False,
 ) -> Viewer:
     """Show a scene in the browser, at 127.0.0.1 only; returns at once.
 
@@ -161,6 +175,7 @@ def view(
         world: how scene units came about, for lamps that are exported; metres if None.
         exposure_free: whether every photograph but the first has an unknown exposure.
         base_scale_free: whether images with the lamps off are in photographs an unknown number of times.
+        ambient: whether searches allow for light from all around through openings besides.
 
     Raises:
         InputError: viser is not installed, or an argument is not what it should be.
@@ -178,7 +193,7 @@ def view(
     taken = [photograph for case in cases for photograph in case.photographs]
     camera = camera or (taken[0].camera if taken else first_camera(*scene.bounds))
     is_open = address not in (LOOPBACK, "localhost")
-    images, finder = LampImages(scene), Finder(scene, exposure_free, base_scale_free)
+    images, finder = LampImages(scene), Finder(scene, exposure_free, base_scale_free, ambient)
     exhibit = Exhibit(images, finder, camera, rig, tuple(cases), tuple(references), resolution, world or World())
     viewer = Viewer(exhibit, 0 if is_open else port)
     if is_open:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import torch
@@ -26,6 +26,9 @@ OFFERED = ("point", "spot", "sphere", "panel")
 #: What pictures show: radiance as a photograph, or what arrives on surfaces in false colours.
 PICTURE, IRRADIANCE, ILLUMINANCE = "picture", "irradiance, W/m²", "illuminance, lux"
 SHOWN = (PICTURE, IRRADIANCE, ILLUMINANCE)
+
+#: Two answers are one where their lamps are no farther apart, of the scene's size.
+SAME = 0.01
 
 #: Steps that can be undone.
 STEPS = 100
@@ -144,14 +147,18 @@ class Session:
         """A photograph, the picture from its camera, and their signed difference, side by side.
 
         The picture is that of the lamps of the photograph where these are known, else of those of now, in the exposure
-        that was found; what the photograph shows with the lamps off is in it.
+        that was found and clipped where the photograph is. What the photograph shows with the lamps off is in it, and
+        what was found to come from all around.
         """
         rig = self.lights if photograph.lights is None else photograph.lights
         now, factor = self.images.image(photograph.camera, rig, "sharp"), display_gain(photograph.image)
+        if photograph.lights is None and self.found is not None and self.found.ambient is not None:
+            now = now + self.found.ambient.to(now) * self.images.ambient(photograph.camera)
         now = self._exposure_of(photograph) * now
         if photograph.base is not None:
             scale = None if self.found is None else self.found.base_scale
             now = now + photograph.base.to(now) * (1.0 if scale is None else scale.to(now))
+        now = photograph.explained(now)
         difference = signed_difference(photograph.image, now, factor)
         return beside([tone_map(photograph.image, factor), tone_map(now, factor), difference])
 
@@ -169,9 +176,17 @@ class Session:
         if case.found is not None:
             self.change(case.found.lights)
 
-    def take(self, result: FitResult) -> None:
-        """Make what was found the lamps."""
-        self.found = Found.of(result)
+    def take(self, result: FitResult, searched: bool = True) -> None:
+        """Make what was found the lamps.
+
+        Args:
+            searched: whether it was weighed against others. What was not, but is what was found before, has the
+                others of then; elsewhere there are none, as those of then were weighed against another answer.
+        """
+        found, before = Found.of(result), self.found
+        if not searched and before is not None and alike(found.lights, before.lights, SAME * self.images.frozen.size):
+            found = replace(found, alternatives=before.alternatives, costs=before.costs)
+        self.found = found
         self.change(result.lights)
 
     def save(self, path: str | Path) -> None:
@@ -191,6 +206,13 @@ def kinds_for(light: Light | None) -> list[str]:
 def same_lights(one: LightRig, other: LightRig) -> bool:
     """Whether two rigs shine alike."""
     return len(one) == len(other) and all(_fields(a) == _fields(b) for a, b in zip(one, other, strict=True))
+
+
+def alike(one: LightRig, other: LightRig, apart: float) -> bool:
+    """Whether two rigs are of the same kinds in the same order, each lamp at most so far from the other's."""
+    if [light.kind for light in one] != [light.kind for light in other]:
+        return False
+    return all(float((a.position - b.position).norm()) <= apart for a, b in zip(one, other, strict=True))
 
 
 def _fields(light: Light) -> tuple:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -13,13 +14,13 @@ from plyfile import PlyData
 
 from clouds import cloud
 from rgspipe.datasets.ply.file import PlyOptions, save_ply
-from rgspipe.datasets.ply.own import Layout
 from rgspipe.errors import InputError
+from rgspipe.names import SurfelLayout
 from rgspipe.renderer.ply import load_ply
 from rgspipe.scene import Surfels
 from rooms import closed_box
 
-LAYOUTS: tuple[Layout, ...] = ("full", "viewer")
+LAYOUTS: tuple[SurfelLayout, ...] = get_args(SurfelLayout)
 
 #: What SuperSplat refuses a file without.
 NEEDED = ["x", "y", "z", *(f"scale_{i}" for i in range(3)), *(f"rot_{i}" for i in range(4))]

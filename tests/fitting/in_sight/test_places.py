@@ -71,7 +71,7 @@ def test_pixels_fill_the_solid_angle_of_the_image() -> None:
 
 
 def test_places_are_on_the_rays_and_where_they_meet(views: FitViews, lamps: list[LampInSight]) -> None:
-    found = places(views.sights, lamps, views.prepared.frozen.size).double()
+    found = places(views.sights, lamps, 0.05 * views.prepared.frozen.size).double()
     assert found.shape == (3 * ON_RAY + 3, 3)
     away = (found[-3:] - PLACE).norm(dim=1)
     assert float(away.max()) < 0.05  # where two rays meet; measured 0.005 to 0.031
@@ -80,11 +80,11 @@ def test_places_are_on_the_rays_and_where_they_meet(views: FitViews, lamps: list
         to_lamp = torch.nn.functional.normalize(PLACE - sight.camera.origin, dim=0)
         beside = (ray - (ray @ to_lamp)[:, None] * to_lamp).norm(dim=1)
         assert float((beside / ray.norm(dim=1)).max()) < 0.035  # rad; a pixel is 0.026, measured 0.028
-    assert len(places(views.sights, lamps[:1], 1.0)) == ON_RAY and places(views.sights, [], 1.0).shape == (0, 3)
+    assert len(places(views.sights, lamps[:1], 0.05)) == ON_RAY and places(views.sights, [], 0.05).shape == (0, 3)
 
 
 def test_places_are_candidates_besides_those_of_the_scene(views: FitViews, lamps: list[LampInSight]) -> None:
-    own, more = views.dictionary, places(views.sights, lamps, 1.0)
+    own, more = views.dictionary, places(views.sights, lamps, 0.05)
     masks = left_out(lamps, [(64, 64)] * 3)
     fewer = views.without(masks, more)
     joined = fewer.dictionary

@@ -7,7 +7,7 @@ import torch
 
 from emitters import emitter_at
 from lit_room import VISIBLE
-from rgspipe.degradation.capture import eight_bit
+from rgspipe.degradation.degraded_views import eight_bit
 from rgspipe.fitting import ImageCapture
 from rgspipe.fitting.model.capture import rounding_noise, stored_in_eight_bits
 from rgspipe.fitting.model.problem import LightProblem

@@ -12,7 +12,7 @@ from rgspipe.config import RgspipeConfig, with_changes
 from rgspipe.config.light import LightConfig
 from rgspipe.errors import InputError
 from rgspipe.fitting import LightSpec
-from rgspipe.fitting.spec import TYPES
+from rgspipe.fitting.spec import AUTO, TYPES
 from rgspipe.options import settings
 from rgspipe.renderer.zonal_harmonics import BandLimit
 from rgspipe.scene.lights import KINDS
@@ -27,7 +27,7 @@ def test_one_point_light_is_looked_for_by_default() -> None:
 
 def test_every_kind_can_be_looked_for() -> None:
     """By its name, in the shape that it usually has."""
-    assert {setting.name: setting for setting in settings(LightConfig)}["type"].choices == TYPES
+    assert {setting.name: setting for setting in settings(LightConfig)}["type"].choices == TYPES == (*KINDS, AUTO)
     for name, kind in KINDS.items():
         spec = light_spec(with_changes(RgspipeConfig(stage="fit_light"), {"light.type": name}))
         (found,), usual = spec.kinds, kind.shaped()

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from curved import torus_distance, torus_normals, torus_views
 from raycast import BLOCK, ROOM, room_views, surface_distance
 from rgspipe.datasets.views import View
-from rgspipe.degradation.capture import degraded
-from rgspipe.degradation.options import Capture
+from rgspipe.degradation.degraded_views import degraded
+from rgspipe.degradation.options import ViewErrors
 from rgspipe.errors import InputError
 from rgspipe.scene import Camera
 from rgspipe.training.initialise import cloud_from_views, initialise_surfels, see_surfaces
@@ -43,14 +43,14 @@ def rms(values: np.ndarray) -> float:
 @pytest.mark.parametrize(
     "capture, turn, off",
     [
-        (Capture(depth_noise=0.01, normals=False), 0.2, 0.001),  # measured 0.095, 5.3e-4
-        (Capture(depth_noise=0.03, normals=False), 0.6, 0.006),  # measured 0.194, 3.1e-3
-        (Capture(depth_noise=0.01, depth_missing=0.2, normals=False), 0.2, 0.0015),  # measured 0.104, 7.6e-4
-        (Capture(depth_noise=0.01), 0.2, 0.001),  # measured 0.084, 2.2e-4
+        (ViewErrors(depth_noise=0.01, normals=False), 0.2, 0.001),  # measured 0.095, 5.3e-4
+        (ViewErrors(depth_noise=0.03, normals=False), 0.6, 0.006),  # measured 0.194, 3.1e-3
+        (ViewErrors(depth_noise=0.01, depth_missing=0.2, normals=False), 0.2, 0.0015),  # measured 0.104, 7.6e-4
+        (ViewErrors(depth_noise=0.01), 0.2, 0.001),  # measured 0.084, 2.2e-4
     ],
     ids=["1 %", "3 %", "1 % with gaps", "1 % with normals"],
 )
-def test_flat_surfaces_come_out_of_noise(room: list[View], capture: Capture, turn: float, off: float) -> None:
+def test_flat_surfaces_come_out_of_noise(room: list[View], capture: ViewErrors, turn: float, off: float) -> None:
     surfels = initialise_surfels(degraded(room, capture), 1500, seed=0)
     angle, distance = degrees_off(surfels.normals.double().numpy()), surface_distance(surfels.centers.double().numpy())
     assert np.median(angle) < turn
@@ -58,7 +58,7 @@ def test_flat_surfaces_come_out_of_noise(room: list[View], capture: Capture, tur
 
 
 def test_a_curved_surface_comes_out_of_noise(torus: list[View]) -> None:
-    noisy = degraded(torus, Capture(depth_noise=0.01))
+    noisy = degraded(torus, ViewErrors(depth_noise=0.01))
     seen, cloud = see_surfaces(noisy), cloud_from_views(noisy, 1500)
     angle = np.degrees(np.arccos(np.clip((torus_normals(cloud.points) * cloud.normals).sum(axis=1), -1.0, 1.0)))
     assert len(cloud) > 0.9 * len(seen)  # measured 0.999
@@ -79,21 +79,21 @@ def test_an_even_part_of_many_pixels_is_kept(room: list[View], share: float) -> 
 
 
 def test_exact_depth_is_left_as_it_is(room: list[View]) -> None:
-    bare = degraded(room[:4], Capture(normals=False))
+    bare = degraded(room[:4], ViewErrors(normals=False))
     cloud, seen = cloud_from_views(bare, 500), see_surfaces(bare)
     assert not seen.noisy
     assert np.array_equal(cloud.points, seen.measured_points)
 
 
 def test_gaps_in_exact_depth_cost_no_accuracy(room: list[View]) -> None:
-    cloud = cloud_from_views(degraded(room[:12], Capture(depth_missing=0.3, normals=False)), 500)
+    cloud = cloud_from_views(degraded(room[:12], ViewErrors(depth_missing=0.3, normals=False)), 500)
     assert surface_distance(cloud.points).max() < 1e-6  # measured 5e-8, float32 depth
     assert np.percentile(degrees_off(cloud.normals), 99) < 0.01  # measured 1e-4
 
 
 def test_what_no_other_view_confirms_is_left_out(room: list[View]) -> None:
     """One view measures a screen in the middle of the room, through which all others see."""
-    noisy = list(degraded(room, Capture(depth_noise=0.01, normals=False)))
+    noisy = list(degraded(room, ViewErrors(depth_noise=0.01, normals=False)))
     wrong = noisy[0].depth.clone()
     wrong[10:30, 10:30] = 0.3 * (1.0 + 0.01 * torch.randn(20, 20, generator=torch.Generator().manual_seed(0)))
     views = [replace(noisy[0], depth=wrong), *noisy[1:]]
@@ -112,7 +112,7 @@ def test_what_no_other_view_confirms_is_left_out(room: list[View]) -> None:
 def test_any_capture_gives_finite_points_and_unit_normals(
     room: list[View], count: int, noise: float, missing: float, far: float
 ) -> None:
-    noisy = degraded(room[:count], Capture(depth_noise=noise, depth_missing=missing, normals=False))
+    noisy = degraded(room[:count], ViewErrors(depth_noise=noise, depth_missing=missing, normals=False))
     moved = [replace(view, camera=_shifted(view.camera, far)) for view in noisy]
     try:
         cloud = cloud_from_views(moved, 200)
@@ -129,7 +129,7 @@ def _shifted(camera: Camera, far: float) -> Camera:
 
 
 def test_the_same_views_give_the_same_surface(room: list[View]) -> None:
-    noisy = degraded(room[:10], Capture(depth_noise=0.01, normals=False))
+    noisy = degraded(room[:10], ViewErrors(depth_noise=0.01, normals=False))
     first, again = cloud_from_views(noisy, 500), cloud_from_views(noisy, 500)
     assert np.array_equal(first.points, again.points)
     assert np.array_equal(first.normals, again.normals)

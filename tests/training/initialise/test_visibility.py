@@ -9,8 +9,8 @@ import pytest
 import torch
 
 from raycast import room_views
-from rgspipe.degradation.capture import degraded
-from rgspipe.degradation.options import Capture
+from rgspipe.degradation.degraded_views import degraded
+from rgspipe.degradation.options import ViewErrors
 from rgspipe.training.initialise.facets import Facets
 from rgspipe.training.initialise.visibility import confirmed
 
@@ -32,7 +32,7 @@ def facets_at(height: float) -> Facets:
 
 @pytest.fixture(scope="module")
 def views():
-    return degraded(room_views(30, 64), Capture(depth_noise=NOISE))
+    return degraded(room_views(30, 64), ViewErrors(depth_noise=NOISE))
 
 
 @pytest.mark.parametrize("height, share", [(0.0, 1.0), (0.08, 0.0), (-0.08, 0.0)], ids=["on", "before", "behind"])

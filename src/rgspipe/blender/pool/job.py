@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass, field
-from typing import Literal
 
 import numpy as np
 
@@ -12,11 +11,9 @@ from rgspipe.blender.fixed_view import FixedView
 from rgspipe.blender.job import DatasetJob
 from rgspipe.blender.pool.lamps import LampRange
 from rgspipe.datasets.classes import LIGHT_CLASSES, LightClass
-from rgspipe.scene.lights import SpotLight, SpotProfile
+from rgspipe.names import PoolKind, SpotProfile
+from rgspipe.scene.lights import SpotLight
 from rgspipe.scene.lights.spot_profiles import PROFILES
-
-#: What a pool holds: lights of one kind (profiles: measured luminaires), or the headlights of a car on its way.
-Kind = Literal["points", "spots", "spheres", "panels", "suns", "leds", "profiles", "drive"]
 
 #: Lights of a car.
 HEADLIGHTS = 2
@@ -74,7 +71,7 @@ class PoolJob:
     """
 
     dataset: DatasetJob
-    kind: Kind
+    kind: PoolKind
     number: int
     classes: tuple[LightClass, ...] = LIGHT_CLASSES
     spot: SpotRange = SpotRange()

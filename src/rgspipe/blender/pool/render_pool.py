@@ -40,10 +40,10 @@ def _render(content: dict, folder: Path, parent: Parent) -> None:
     bounds = [prepared.geometry.lo.tolist(), prepared.geometry.hi.tolist()]
     cameras = [frame.camera for frame in lights[0].frames]
     entries = [(plan.name, plan.occlusion, plan.light) for plan in lights]
-    write_pool(folder, job.dataset.scene, entries, cameras, bounds, prepared.rescale, list(prepared.offset))
+    write_pool(folder, job.dataset.scene, entries, cameras, bounds, prepared.world.rescale, list(prepared.world.offset))
     frames = Frames(parent, folder, frame_files)
     missing = frames.missing([frame for plan in lights for frame in plan.frames])
-    studio = Studio(prepared.scene, job.dataset.settings, folder / SCRATCH)
+    studio = Studio(prepared.scene, job.dataset.settings, folder / SCRATCH, prepared.world)
     for frame in frames.each(missing):
         studio.render(frame, folder)
 

@@ -18,9 +18,9 @@ from rgspipe.datasets.json_file import shown
 from rgspipe.datasets.limits import FARTHEST
 from rgspipe.datasets.mesh.gltf_check import check_gltf
 from rgspipe.datasets.mesh.gltf_materials import GltfMaterial, numbered
-from rgspipe.datasets.mesh.links import FORMATS, GLTF, mesh_links
+from rgspipe.datasets.mesh.links import mesh_links
 from rgspipe.datasets.mesh.obj_text import plain_obj
-from rgspipe.datasets.mesh.options import MeshOptions
+from rgspipe.datasets.mesh.options import FORMATS, GLTF, MeshOptions
 from rgspipe.datasets.mesh.paint import check_shares, paint_of
 from rgspipe.datasets.mesh.ply_polygons import with_triangles
 from rgspipe.datasets.mesh.texture import check_texture

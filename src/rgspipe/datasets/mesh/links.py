@@ -15,10 +15,6 @@ from rgspipe.datasets.mesh.obj_materials import ObjMaterials, read_materials
 from rgspipe.datasets.reading_limits import reading_limits
 from rgspipe.errors import InputError
 
-#: Suffixes of meshes, and those of glTF.
-GLTF = (".glb", ".gltf")
-FORMATS = (".ply", ".obj", *GLTF)
-
 #: What in the header of a PLY names a picture.
 NAMED = re.compile(rb"texturefile([^\r\n]+)", re.IGNORECASE)
 

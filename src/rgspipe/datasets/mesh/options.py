@@ -7,6 +7,10 @@ from typing import Literal
 
 from rgspipe.options import Options, option
 
+#: Suffixes of meshes, and those of glTF.
+GLTF = (".glb", ".gltf")
+FORMATS = (".ply", ".obj", *GLTF)
+
 
 @dataclass(frozen=True)
 class MeshOptions(Options):

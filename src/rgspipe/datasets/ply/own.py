@@ -10,7 +10,7 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import torch
@@ -24,6 +24,7 @@ from rgspipe.datasets.ply.gaussians import HIGH, LOW, Y0, unit_quaternions
 from rgspipe.datasets.ply.options import PlyOptions
 from rgspipe.datasets.ply.table import VertexTable, write_vertices
 from rgspipe.errors import InputError
+from rgspipe.names import SurfelLayout
 from rgspipe.scene import srgb
 from rgspipe.scene.gloss import Gloss
 from rgspipe.scene.spacing import inferred_coverage
@@ -60,11 +61,9 @@ OWN = {
 OWN_GUESSED = "guessed"
 OWN_GLOSS = {"reflectance": ("gloss_0", "gloss_1", "gloss_2"), "exponents": ("gloss_exponent",)}
 
-Layout = Literal["full", "viewer"]
-
 
 def save_ply(
-    path: str | Path, surfels: Surfels, *, radiance: Tensor | None = None, layout: Layout = "full"
+    path: str | Path, surfels: Surfels, *, radiance: Tensor | None = None, layout: SurfelLayout = "full"
 ) -> Conversion:
     """Write surfels as a PLY file that 3DGS viewers open.
 

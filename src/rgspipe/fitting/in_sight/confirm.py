@@ -10,20 +10,11 @@ import scipy.ndimage
 
 from rgspipe.fitting.in_sight.lamp import BESIDE, TOUCHING, LampInSight, Mask, grown, parts
 from rgspipe.fitting.in_sight.sight import Numbers, Sight
-from rgspipe.fitting.in_sight.suspects import LEAST_PIXELS, sent, shaded
+from rgspipe.fitting.in_sight.suspects import LEAST_PIXELS, SATURATED, sent, shaded
 from rgspipe.scene import Light, LightRig
 
 #: A lamp's pixels are so many times as bright as lights that stand elsewhere can make what is behind it.
 BRIGHTER = 2.5
-
-#: … or so many times, where they are saturated and may be brighter than they look.
-AT_LEAST = 1.25
-
-#: A lamp that no light was found for sends at least this part of what all lights send: highlights do not.
-LEAST_SHARE = 0.1
-
-#: A light is where a lamp is seen if it stands within this part of the scene's size beside the rays through it.
-NEAR = 0.02
 
 
 def confirmed(
@@ -33,22 +24,24 @@ def confirmed(
     lights: LightRig,
     rendered: Sequence[Numbers],
     full: Sequence[Mask],
-    size: float,
+    near: float,
+    faint: float,
 ) -> list[LampInSight]:
     """What of the lamps is nothing that `lights` light, with the numbers of the lights that stand there.
 
     Args:
         images, rendered: (H, W) mean radiance of the channels, one a view, as they are and under the lights.
         full: (H, W) bool, one a view, pixels that are saturated.
-        size: the scene's, scene units.
+        near: how far beside the rays through a lamp its light may stand, scene units.
+        faint: a lamp that no light was found for sends at least this part of what all lights send: highlights do not.
     """
     found = []
     for view, (sight, image, lit, most) in enumerate(zip(views, images, rendered, full, strict=True)):
         here = [lamp for lamp in lamps if lamp.view == view]
         if here:
             cores = parts(too_bright(sight, image, lit, most))
-            named = located(views, [LampInSight(view, core, grown(core, BESIDE)) for core in cores], lights, size)
-            found += [lamp for lamp in named if _is_lamp(sight, image - lit, lamp, here, lights)]
+            named = located(views, [LampInSight(view, core, grown(core, BESIDE)) for core in cores], lights, near)
+            found += [lamp for lamp in named if _is_lamp(sight, image - lit, lamp, here, lights, faint)]
     return found
 
 
@@ -60,16 +53,16 @@ def too_bright(sight: Sight, image: Numbers, rendered: Numbers, full: Mask) -> M
     """
     shading = shaded(sight, image)
     lit = scipy.ndimage.maximum_filter(rendered, footprint=TOUCHING)
-    return (image > np.where(full, AT_LEAST, BRIGHTER) * lit) & (shading > np.median(shading[sight.surface]))
+    return (image > np.where(full, SATURATED, BRIGHTER) * lit) & (shading > np.median(shading[sight.surface]))
 
 
-def located(views: Sequence[Sight], lamps: Sequence[LampInSight], lights: LightRig, size: float) -> list[LampInSight]:
+def located(views: Sequence[Sight], lamps: Sequence[LampInSight], lights: LightRig, near: float) -> list[LampInSight]:
     """The lamps with the numbers of the lights that stand where they are seen."""
-    return [replace(lamp, light=_light_at(views[lamp.view], lamp, lights, size)) for lamp in lamps]
+    return [replace(lamp, light=_light_at(views[lamp.view], lamp, lights, near)) for lamp in lamps]
 
 
 def _is_lamp(
-    sight: Sight, excess: Numbers, lamp: LampInSight, suspects: Sequence[LampInSight], lights: LightRig
+    sight: Sight, excess: Numbers, lamp: LampInSight, suspects: Sequence[LampInSight], lights: LightRig, faint: float
 ) -> bool:
     """Whether it was a suspect, and a light stands there or at least as much light comes from it as lamps send."""
     if not any((lamp.core & suspect.core).any() for suspect in suspects):
@@ -77,10 +70,10 @@ def _is_lamp(
     if lamp.light is not None:
         return True
     sends = sum(float(light.intensity.double().mean()) for light in lights)
-    return int(lamp.core.sum()) >= LEAST_PIXELS and sent(sight, excess, lamp.core) >= LEAST_SHARE * sends
+    return int(lamp.core.sum()) >= LEAST_PIXELS and sent(sight, excess, lamp.core) >= faint * sends
 
 
-def _light_at(sight: Sight, lamp: LampInSight, lights: Sequence[Light], size: float) -> int | None:
+def _light_at(sight: Sight, lamp: LampInSight, lights: Sequence[Light], near: float) -> int | None:
     """The number (from 1) of the light that projects closest to a lamp, if that is close."""
     away = scipy.ndimage.distance_transform_edt(~lamp.core)
     # Of a lamp that something hides in part, the middle may be hidden.
@@ -89,7 +82,7 @@ def _light_at(sight: Sight, lamp: LampInSight, lights: Sequence[Light], size: fl
     for number, light in enumerate(lights, start=1):
         (column, row), depth = (part.tolist() for part in sight.camera.project(light.position.double().cpu()))
         if depth > 0.0:
-            allowed = BESIDE + half + NEAR * size * sight.camera.fx / depth
+            allowed = BESIDE + half + near * sight.camera.fx / depth
             distance = _distance(away, column, row)
             if distance <= allowed:
                 beside[distance] = number

@@ -19,16 +19,11 @@ from rgspipe.fitting.in_sight.suspects import POSSIBLE, SURE, Bar, saturated, sh
 from rgspipe.fitting.model.capture import ImageCapture
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.problem import ROUNDING
+from rgspipe.fitting.options import SearchOptions
 from rgspipe.fitting.result import FitResult
 from rgspipe.fitting.search.refine import Refiner
 from rgspipe.fitting.search.weighting import PLAIN
 from rgspipe.fitting.target_views import TargetViews
-
-#: Steps of a fit that goes on without what is saturated.
-FURTHER = 5
-
-#: Lights that leave less than this part of what others leave of the same pixels are the better ones by far.
-FAR_BETTER = 0.5
 
 
 @dataclass(frozen=True)
@@ -47,16 +42,28 @@ class Lookout:
         views: they are of.
         images: (all pixels, 3), stacked.
         capture: how they were taken.
+        search: how lights are searched; what is no light to a search is no lamp either.
     """
 
     views: TargetViews
     images: Tensor
     capture: ImageCapture
+    search: SearchOptions
 
     @property
     def size(self) -> float:
         """Longest side of the scene."""
         return self.views.prepared.frozen.size
+
+    @property
+    def near(self) -> float:
+        """How far beside the rays through a lamp its light may stand, scene units."""
+        return self.search.schedule.met * self.size
+
+    @property
+    def without_rival(self) -> float:
+        """Lights that leave less than this part of what others leave of the same pixels are the better ones by far."""
+        return 1.0 - self.search.bar.least_faint
 
     @property
     def sights(self) -> tuple[Sight, ...]:
@@ -83,7 +90,7 @@ class Lookout:
         ]
         seen = np.concatenate(values)
         needed = needed_intensity(self.views.prepared, float(seen.mean()) if seen.size else 0.0)
-        return suspects(self.sights, self.greys, needed, bar)
+        return suspects(self.sights, self.greys, self.search.bar.least_energy * needed, bar)
 
     def striking(self) -> list[LampInSight]:
         """What no reflection is; and, as a lamp in one view may be in the others, too, what may be one there."""
@@ -110,7 +117,7 @@ class Lookout:
         views = self.without(self.saturated)
         refiner = Refiner.of(views.problem(self.images, self.capture).sharpest())
         rig = [Emitter.fitted(light, matrix) for light, matrix in zip(result.lights, result.covariance, strict=True)]
-        state = refiner.refined(refiner.start(rig, PLAIN), PLAIN, FURTHER)
+        state = refiner.refined(refiner.start(rig, PLAIN), PLAIN, self.search.schedule.steps)
         return self.confirmed(self.saturated, replace(result, lights=state.lights(refiner.problem)))
 
     def rendered(self, result: FitResult) -> list[Numbers]:
@@ -130,7 +137,7 @@ class Lookout:
     def without(self, lamps: Sequence[LampInSight]) -> TargetViews:
         """The views less the lamps' pixels, looked at first from where the lamps may stand."""
         masks = left_out(lamps, [grey.shape for grey in self.greys])
-        return self.views.without(masks, places(self.sights, lamps, self.size))
+        return self.views.without(masks, places(self.sights, lamps, self.search.certainty.doubtful * self.size))
 
     def enough_without(self, lamps: Sequence[LampInSight]) -> bool:
         """Whether most of the trusted pixels are left without the lamps'."""
@@ -140,13 +147,18 @@ class Lookout:
 
     def sure(self, answer: Answer) -> bool:
         """Whether lights explain what was not left out, and stand where lamps are: pools of light are no lamps."""
-        lamps = located(self.sights, answer.lamps, answer.result.lights, self.size)
+        lamps = self.located(answer)
         return not poorly_explained(answer.result) and all(lamp.light is not None for lamp in lamps)
+
+    def located(self, answer: Answer) -> list[LampInSight]:
+        """The lamps of an answer with the numbers of its lights."""
+        return located(self.sights, answer.lamps, answer.result.lights, self.near)
 
     def confirmed(self, lamps: Sequence[LampInSight], result: FitResult) -> list[LampInSight]:
         """Those that a fit without them does not light."""
         rendered = self.rendered(result)
-        return confirmed(self.sights, self.exposed(result), lamps, result.lights, rendered, self.full, self.size)
+        lights, faint = result.lights, self.search.bar.faint
+        return confirmed(self.sights, self.exposed(result), lamps, lights, rendered, self.full, self.near, faint)
 
     def explains_more(self, result: FitResult, searched: TargetViews) -> bool:
         """Whether lights leave about as little of what was not `searched` as of what was."""
@@ -155,7 +167,7 @@ class Lookout:
         if not len(more):
             return True
         explained = self.explained(result)
-        return FAR_BETTER * self._left(explained, more) <= max(self._left(explained, own), ROUNDING**2)
+        return self.without_rival * self._left(explained, more) <= max(self._left(explained, own), ROUNDING**2)
 
     def far_better(self, answer: Answer, whole: FitResult) -> bool:
         """Whether a fit without lamps is to be preferred to one with them."""
@@ -163,7 +175,7 @@ class Lookout:
             return True
         rest = self.without(answer.lamps).prepared.pixels
         left, left_by_whole = (self._left(self.explained(one), rest) for one in (answer.result, whole))
-        return left < FAR_BETTER * left_by_whole
+        return left < self.without_rival * left_by_whole
 
     def _left(self, explained: Sequence[Tensor], pixels: Tensor) -> float:
         """Share of the energy of `pixels` (P,) of all views that images do not explain."""
@@ -174,7 +186,7 @@ class Lookout:
     def told(self, answer: Answer) -> FitResult:
         """A fit with what is to be said of the lamps that it left out."""
         result = answer.result
-        lamps = located(self.sights, answer.lamps, result.lights, self.size)
+        lamps = self.located(answer)
         masks = left_out(lamps, [grey.shape for grey in self.greys])
         count, views = int(sum(mask.sum() for mask in masks)), sum(bool(mask.any()) for mask in masks)
         elsewhere = [LampElsewhere(lamp.view, *lamp.place) for lamp in lamps if lamp.light is None and result.lights]

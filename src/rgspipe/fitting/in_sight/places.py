@@ -15,20 +15,17 @@ from rgspipe.fitting.in_sight.sight import Numbers, Sight
 #: Places on a ray, evenly spread between the camera and the surface behind the lamp.
 ON_RAY = 12
 
-#: Rays of two views that pass each other by less than this part of the scene's size are of one lamp.
-PASSING = 0.05
 
-
-def places(views: Sequence[Sight], lamps: Sequence[LampInSight], size: float) -> Tensor:
+def places(views: Sequence[Sight], lamps: Sequence[LampInSight], passing: float) -> Tensor:
     """(K, 3) float32 where lights may stand that these are the images of.
 
     Args:
-        size: the scene's, scene units.
+        passing: rays of two views that pass each other by less than this are of one lamp, scene units.
     """
     rays = [_Ray(lamp.view, *_ray(views[lamp.view], lamp)) for lamp in lamps]
     found = [ray.origin + share * ray.reach * ray.direction for ray in rays for share in _shares()]
     for one, other in combinations(rays, 2):
-        if one.view != other.view and (meeting := _meeting(one, other, PASSING * size)) is not None:
+        if one.view != other.view and (meeting := _meeting(one, other, passing)) is not None:
             found.append(meeting)
     return torch.from_numpy(np.array(found).reshape(-1, 3)).float()
 

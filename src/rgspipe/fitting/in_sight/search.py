@@ -20,15 +20,13 @@ from rgspipe.fitting.in_sight.lookout import Answer, Lookout, poorly_explained
 from rgspipe.fitting.in_sight.suspects import POSSIBLE
 from rgspipe.fitting.meter import Meter
 from rgspipe.fitting.model.capture import ImageCapture
+from rgspipe.fitting.options import SearchOptions
 from rgspipe.fitting.result import FitResult
 from rgspipe.fitting.searched import Searched
 from rgspipe.fitting.solvers import Search, Solver
 from rgspipe.fitting.target_views import TargetViews
 
-#: A fit is made again where more than this part of what was left out for it are no lamp's pixels, or beside them …
-SPARED = 0.5
-
-#: … but not more often than that.
+#: A fit is made again where most of what was left out for it are no lamp's pixels, nor beside them; but not more often.
 ROUNDS = 3
 
 
@@ -36,7 +34,8 @@ def fit_without(
     views: TargetViews, images: Tensor, capture: ImageCapture, solver: Solver, masks: Sequence[Mask]
 ) -> FitResult:
     """A fit that leaves out given pixels of lamps, masks (H, W) bool, one a view."""
-    lookout, lamps = Lookout(views, images, capture), given_lamps(masks)
+    search = solver if isinstance(solver, SearchOptions) else SearchOptions()
+    lookout, lamps = Lookout(views, images, capture, search), given_lamps(masks)
     if not lamps:
         return solver.fit(views, images, capture)
     return lookout.told(Answer(solver.fit(lookout.without(lamps), images, capture), lamps))
@@ -45,7 +44,7 @@ def fit_without(
 def fit_on_lookout(views: TargetViews, images: Tensor, capture: ImageCapture, solver: Search) -> FitResult:
     """A fit that leaves out the lamps that it finds in sight; without any it is that of all pixels."""
     with Meter.shown(effort_of(views.lights)) as meter:
-        result = _Fits(Lookout(views, images, capture), solver, meter).best()
+        result = _Fits(Lookout(views, images, capture, solver), solver, meter).best()
         return replace(result, seconds=meter.seconds, iterations=meter.iterations, evaluations=meter.evaluations)
 
 
@@ -139,7 +138,7 @@ def _agree(before: Sequence[LampInSight], after: Sequence[LampInSight]) -> bool:
         if any(not any((lamp.core & one.pixels).any() for one in wanted) for lamp in out):
             return False
         left, core, most = (np.any(masks, axis=0) for masks in _masks(out, wanted))
-        if (core & ~left).any() or (left & ~most).sum() > SPARED * left.sum():
+        if (core & ~left).any() or 2 * (left & ~most).sum() > left.sum():
             return False
     return True
 

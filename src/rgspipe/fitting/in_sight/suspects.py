@@ -29,16 +29,15 @@ class Bar:
         view: times as bright as the view …
         compact: … apart from this share of it, the brightest: no lamp covers more.
         around: times as bright as the surroundings.
-        share: of the intensity that makes the scene as bright as it is, at least so much has to come from them.
     """
 
     view: float
     compact: float
     around: float
-    share: float = 0.02
 
 
-#: What is saturated may be a lamp if it is so many times as bright as the surroundings.
+#: What is saturated may be a lamp if it is so many times as bright as the surroundings, or as lights elsewhere make it:
+#: it may be brighter than it looks.
 SATURATED = 1.25
 
 #: What is saturated, or does not light the scene, has to cover so many pixels.
@@ -48,24 +47,24 @@ LEAST_PIXELS = 3
 SURE, POSSIBLE = Bar(view=8.0, compact=0.1, around=6.0), Bar(view=3.0, compact=0.35, around=2.0)
 
 
-def suspects(views: Sequence[Sight], images: Sequence[Numbers], needed: float, bar: Bar = SURE) -> list[LampInSight]:
+def suspects(views: Sequence[Sight], images: Sequence[Numbers], least: float, bar: Bar) -> list[LampInSight]:
     """What is brighter than reflections are, of all views.
 
     Args:
         images: (H, W) mean radiance of the channels, one a view.
-        needed: intensity of lights that make the scene as bright as it is; see `needed_intensity`.
+        least: intensity that at least comes from a lamp.
     """
     pairs = zip(views, images, strict=True)
-    return [lamp for index, (sight, image) in enumerate(pairs) for lamp in _suspects(index, sight, image, needed, bar)]
+    return [lamp for index, (sight, image) in enumerate(pairs) for lamp in _suspects(index, sight, image, least, bar)]
 
 
-def _suspects(index: int, sight: Sight, image: Numbers, needed: float, bar: Bar) -> Iterator[LampInSight]:
+def _suspects(index: int, sight: Sight, image: Numbers, least: float, bar: Bar) -> Iterator[LampInSight]:
     shading = shaded(sight, image)
     level = usual(sight, shading, bar.compact)
     # Where most of a view is dark, what is lit says nothing of lamps.
     bright = (shading > bar.view * level) & (level > 0.0)
     for core in parts(bright) if bright.any() else ():
-        sends = sent(sight, image, core) >= bar.share * needed
+        sends = sent(sight, image, core) >= least
         if sends and np.median(shading[core]) >= bar.around * _around(sight, shading, core, bright):
             yield LampInSight(index, core, grown(core, BESIDE))
 

@@ -20,7 +20,7 @@ from rgspipe.scene import Light
 from rgspipe.scene.walls import walls_near
 
 #: Starts that are refined, of all that are tried: sizes of clearly different rigs, as they were found and as they lie
-#: on surfaces.
+#: on surfaces; turns of a measured table.
 STARTS = 2
 
 #: Walls that a light may lie on are looked for among so many that are nearest to where a point explains most.

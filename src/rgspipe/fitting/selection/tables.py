@@ -13,6 +13,7 @@ from rgspipe.fitting.findings import KindOpen
 from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.options import SearchOptions
 from rgspipe.fitting.search.compare import light_energies
+from rgspipe.fitting.search.grow import STARTS
 from rgspipe.fitting.search.refine import Refiner, State
 from rgspipe.fitting.search.schedule import refined_starts
 from rgspipe.fitting.search.starts import EmitterRig
@@ -20,9 +21,6 @@ from rgspipe.fitting.search.weighting import PLAIN
 from rgspipe.fitting.selection.rivals import as_good
 from rgspipe.fitting.spec import LightSpec
 from rgspipe.scene import Light
-
-#: Turns of each table that are refined, of all that are tried.
-TURNED = 2
 
 
 def told_tables(
@@ -81,7 +79,7 @@ def _replaced(refiner: Refiner, answer: State, index: int, tables: Sequence[Ligh
         if not table.same_sort(found.light):
             turned = [_as(found, light) for light in table.grown(size, True)]
             starts = [refiner.start((*before, one, *after), PLAIN, answer) for one in turned]
-            yield from (state.emitters for state in sorted(starts, key=refiner.unexplained)[:TURNED])
+            yield from (state.emitters for state in sorted(starts, key=refiner.unexplained)[:STARTS])
 
 
 def _as(found: Emitter, light: Light) -> Emitter:

@@ -11,7 +11,7 @@ from rgspipe.scene.lights.profile import ProfileLight
 from rgspipe.scene.lights.rig import LightRig, as_rig, check_numbers
 from rgspipe.scene.lights.shape_number import ShapeNumber
 from rgspipe.scene.lights.sphere import SphereLight
-from rgspipe.scene.lights.spot import SpotLight, SpotProfile
+from rgspipe.scene.lights.spot import SpotLight
 from rgspipe.scene.lights.sun import SunLight
 
 #: Every kind by its name.
@@ -35,7 +35,6 @@ __all__ = [
     "ShapeNumber",
     "SphereLight",
     "SpotLight",
-    "SpotProfile",
     "SunLight",
     "as_rig",
     "check_numbers",

@@ -5,19 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Literal, Self
+from typing import Any, ClassVar, Self
 
 import torch
 from torch import Tensor
 
 from rgspipe.errors import InputError
+from rgspipe.names import SpotProfile
 from rgspipe.scene.lights.axial import AxialLight
 from rgspipe.scene.lights.reader import Reader
 from rgspipe.scene.lights.shape_coordinates import Between, Positive
 from rgspipe.scene.lights.shape_number import ShapeNumber
 from rgspipe.scene.lights.spot_profiles import PROFILES, Profile, softened
-
-SpotProfile = Literal["gaussian", "smoothstep", "linear"]
 
 #: A free cone stays between these half-angles, and a free Gaussian falloff within its own limits, rad.
 CONE = Between(math.radians(1.0), math.radians(89.0))

@@ -11,7 +11,7 @@ import torch
 from rgspipe.config import RgspipeConfig
 from rgspipe.datasets.exif_exposure import EXPOSE_ALIKE, check_exposures
 from rgspipe.datasets.views import View
-from rgspipe.degradation.target_capture import captured
+from rgspipe.degradation.degraded_target import captured
 from rgspipe.errors import InputError
 from rgspipe.fitting.fit import Emitters
 from rgspipe.fitting.model.capture import SATURATED, BaseImages, ImageCapture, stored_in_eight_bits
@@ -43,7 +43,7 @@ def captured_views(views: Sequence[View], target: str, config: RgspipeConfig) ->
             )
         return taken, ImageCapture()
     clip = white if white is not None else config.fit.clip
-    capture = ImageCapture(free, clip) if clip is not None else _found_capture(taken, free)
+    capture = ImageCapture(free, clip) if clip is not None else found_capture(taken, free)
     return taken, capture if base is None else replace(capture, base=base)
 
 
@@ -98,7 +98,7 @@ def known_emitters(views: Sequence[View], config: RgspipeConfig) -> Emitters:
     return "auto" if config.fit.emitters == "auto" else None
 
 
-def _found_capture(views: Sequence[View], free: bool) -> ImageCapture:
+def found_capture(views: Sequence[View], free: bool = False) -> ImageCapture:
     """What the images themselves tell of where they are clipped."""
     limits = [view.saturated_from for view in views]
     known = [limit for limit in limits if limit is not None]

@@ -23,7 +23,7 @@ from rgspipe.datasets.location import LAMPS_TRUTH, dataset_root, open_dataset
 from rgspipe.datasets.surfel_file import load_surfels, save_surfels
 from rgspipe.datasets.tensor_file import save_tensors
 from rgspipe.datasets.views import View
-from rgspipe.degradation.capture import degraded
+from rgspipe.degradation.degraded_views import degraded
 from rgspipe.evaluation.captured_lamps import against_truth
 from rgspipe.evaluation.grading import grade_scene, graded_words
 from rgspipe.evaluation.held_out import held_out_picture

@@ -11,7 +11,7 @@ from rgspipe.datasets.location import dataset_root
 from rgspipe.datasets.mesh.file import read_mesh
 from rgspipe.datasets.mesh.links import mesh_files
 from rgspipe.datasets.surfel_file import save_surfels
-from rgspipe.degradation.capture import degraded
+from rgspipe.degradation.degraded_views import degraded
 from rgspipe.scene import NO_CLIP
 from rgspipe.stages.base import Stage, StageContext
 from rgspipe.stages.scene.detail import surfel_count

@@ -18,7 +18,7 @@ from rgspipe.datasets.grade_file import GRADE, save_grade
 from rgspipe.datasets.location import open_dataset
 from rgspipe.datasets.surfel_file import load_surfels, save_surfels
 from rgspipe.datasets.views import View
-from rgspipe.degradation.capture import degraded
+from rgspipe.degradation.degraded_views import degraded
 from rgspipe.evaluation.grading import grade_scene, graded_words
 from rgspipe.evaluation.held_out import held_out_picture
 from rgspipe.evaluation.held_out_views import render_held_out

@@ -5,19 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
 from rgspipe.datasets.views import View
 from rgspipe.errors import InputError
+from rgspipe.names import NormalSource
 from rgspipe.progress import progress_bar
 from rgspipe.training.initialise.depth_noise import relative_noise
 from rgspipe.training.initialise.normals import normals_from_depth
 from rgspipe.training.initialise.sightings import EXACT, Sightings, joined
 
 #: Which normals a view contributes: fitted to its depth, its normal pass, or the pass where there is one.
-NormalSource = Literal["auto", "estimate", "pass"]
 
 #: 1/ρ and 1/ρ² of the plastic number ρ, the root of ρ³ = ρ + 1: steps whose multiples fill the unit square evenly.
 PLASTIC = (0.7548776662466927, 0.5698402909980532)

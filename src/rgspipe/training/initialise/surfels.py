@@ -12,8 +12,9 @@ import torch
 
 from rgspipe.datasets.views import View
 from rgspipe.errors import InputError
+from rgspipe.names import NormalSource
 from rgspipe.scene.surfels import NO_CLIP, Coverage, Surfels, quaternion_from_normal, quaternion_to_axes
-from rgspipe.training.initialise.back_projection import NormalSource, see_surfaces
+from rgspipe.training.initialise.back_projection import see_surfaces
 from rgspipe.training.initialise.cloud import Cloud
 from rgspipe.training.initialise.edges import find_edges
 from rgspipe.training.initialise.fusion import fuse

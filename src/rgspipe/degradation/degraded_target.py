@@ -14,11 +14,11 @@ import numpy as np
 import torch
 
 from rgspipe.datasets.views import View
-from rgspipe.degradation.capture import degraded, eight_bit
-from rgspipe.degradation.options import Capture, TargetCapture
+from rgspipe.degradation.degraded_views import degraded, eight_bit
+from rgspipe.degradation.options import TargetErrors, ViewErrors
 
 
-def captured(views: Sequence[View], name: str, capture: TargetCapture) -> tuple[list[View], float | None]:
+def captured(views: Sequence[View], name: str, capture: TargetErrors) -> tuple[list[View], float | None]:
     """The views of target `name` as such a camera would have taken them, and the radiance at which they are clipped.
 
     Radiance keeps its unit: 8-bit images are multiplied by what their brightest level stands for, which is the clip;
@@ -28,7 +28,7 @@ def captured(views: Sequence[View], name: str, capture: TargetCapture) -> tuple[
     exposures = _exposures(len(views), capture.exposure, seed)
     taken = [replace(view, image=view.image * factor) for view, factor in zip(views, exposures, strict=True)]
     if capture.noise > 0.0:
-        taken = list(degraded(taken, Capture(image_noise=capture.noise, seed=seed)))
+        taken = list(degraded(taken, ViewErrors(image_noise=capture.noise, seed=seed)))
     if capture.white is None:
         return taken, None
     white = float(torch.cat([view.image.reshape(-1) for view in taken]).double().quantile(capture.white))

@@ -16,7 +16,7 @@ from torch import Tensor
 
 from rgspipe.datasets.views import View
 from rgspipe.degradation.albedo_maps import with_predicted_albedo
-from rgspipe.degradation.options import Capture
+from rgspipe.degradation.options import ViewErrors
 from rgspipe.scene import PointLight, srgb
 
 #: Read noise of an image, as a share of its relative noise and of the image's brightest values.
@@ -27,7 +27,7 @@ BRIGHT = 0.995
 BLOB_SHARE, BLOB_SIZE = 0.5, 1.0 / 30.0
 
 
-def degraded(views: Sequence[View], capture: Capture) -> tuple[View, ...]:
+def degraded(views: Sequence[View], capture: ViewErrors) -> tuple[View, ...]:
     """The views as such a capture would have taken them; where nothing is asked for, the very same tensors.
 
     Missing depth is NaN: not known, as opposed to +inf, where there is no surface.
@@ -66,7 +66,7 @@ def _exposed(view: View, factor: float) -> View:
     return view if factor == 1.0 else replace(view, image=factor * view.image)
 
 
-def _degrade(view: View, capture: Capture, index: int) -> View:
+def _degrade(view: View, capture: ViewErrors, index: int) -> View:
     # One stream for each kind of draw: switching one on leaves the others as they are.
     depth_rng, hole_rng, image_rng, light_rng = (
         np.random.default_rng([capture.seed, index, kind]) for kind in range(4)
@@ -117,7 +117,7 @@ def _noisy_image(view: View, deviation: float, rng: np.random.Generator) -> Tens
     return (image + noise * view.alpha[..., None]).to(view.image.dtype)
 
 
-def _moved(light: PointLight | None, capture: Capture, rng: np.random.Generator) -> PointLight | None:
+def _moved(light: PointLight | None, capture: ViewErrors, rng: np.random.Generator) -> PointLight | None:
     """The light where, and as bright as, the capture believes it to be."""
     if light is None or (capture.light_position_noise == 0 and capture.light_intensity_noise == 0):
         return light
