@@ -9,7 +9,7 @@ TEST_WORKERS ?= 2
 ARGS ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup test test-python test-slurm third-party crash soak bits devices fuzz fuzz-commands smoke reproduce scenes train-study light-study bench docs lint house
+.PHONY: help setup test test-python test-slurm third-party crash soak bits devices large-capture fuzz fuzz-commands smoke reproduce scenes train-study light-study bench docs lint house
 
 help:  ## this list
 	@echo "rgspipe: from images of a scene, find its lights"
@@ -54,6 +54,9 @@ bits: setup  ## training and a fit with other numbers of threads, and other inst
 
 devices: setup  ## how long freezing, training, images and fits take on the CPU and on a GPU (minutes)
 	$(VENV)/bin/python tests/device_times.py
+
+large-capture: setup  ## 200 large photographs to lamps and a frozen scene: seconds and memory of each stage (an hour; ARGS="VIEWS WIDTH SURFELS")
+	$(VENV)/bin/python tests/large_capture.py $(ARGS)
 
 fuzz: setup  ## damaged files of every kind that is read: each is read or refused (a minute; ARGS="CASES SEED")
 	$(VENV)/bin/python tests/fuzz.py $(ARGS)

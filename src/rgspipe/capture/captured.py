@@ -24,6 +24,7 @@ from rgspipe.capture.received import Received
 from rgspipe.capture.refusals import OFF, check_brackets, check_lightings, check_measured, check_overlap, check_views
 from rgspipe.capture.search import BAR, FoundLamps, found_lamps
 from rgspipe.capture.several import found_in_turns, without
+from rgspipe.capture.thinned import thinned, thinning
 from rgspipe.completion import with_unseen_surfaces
 from rgspipe.datasets.views import View
 from rgspipe.fitting.options import CertaintyOptions
@@ -124,8 +125,10 @@ def capture_scenes(
     surfels, views = surfels.to(torch.float32).to("cpu"), [view.to("cpu") for view in views]
     if options.unseen:
         surfels = with_unseen_surfaces(surfels, [view.camera for view in views], depths=[view.depth for view in views])
-    store = OperatorStore(options.memory_mib, name="CaptureOptions")
-    weights = trace_views(surfels, views, options.supersampling, store)
+    step, store = thinning(views, len(surfels)), OperatorStore(options.memory_mib, name="CaptureOptions")
+    views = [thinned(view, step) for view in views]
+    # A pixel among some that are left out is nearer to its middle than to the mean of what is around it.
+    weights = trace_views(surfels, views, options.supersampling if step == 1 else 1, store)
     lit = _measured(weights, views, options, where)
     frozen = FrozenScene.freeze(surfels, gather_rays=options.gather_rays, seed=options.seed)
     frozen = frozen.with_dictionary(options.grid, seed=options.seed)

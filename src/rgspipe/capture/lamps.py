@@ -218,11 +218,14 @@ class _Around:
         residual, jacobian = self.problem.residual(self.lamps), self.problem.jacobian(self.lamps)
         width, field = jacobian.shape[2], self.problem.field
         matrix, direction, cost = np.zeros((width, width)), np.zeros(width), 0.0
+        number = np.arange(width) % NUMBERS
         for channel in range(3):
-            own = residual[:, channel]
-            whitened = field.channel(channel).whitened(np.column_stack([jacobian[channel], own]))
-            matrix += jacobian[channel].T @ whitened[:, :-1]
-            direction += jacobian[channel].T @ whitened[:, -1]
+            # Intensities of other channels change nothing here.
+            used = np.flatnonzero((number < 3) | (number == 3 + channel))
+            columns, own = jacobian[channel][:, used], residual[:, channel]
+            whitened = field.channel(channel).whitened(np.column_stack([columns, own]))
+            matrix[np.ix_(used, used)] += columns.T @ whitened[:, :-1]
+            direction[used] += columns.T @ whitened[:, -1]
             cost += float(own @ whitened[:, -1])
         return NormalEquations(torch.from_numpy(0.5 * (matrix + matrix.T)), torch.from_numpy(direction), cost)
 

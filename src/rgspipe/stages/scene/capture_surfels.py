@@ -32,6 +32,7 @@ from rgspipe.evaluation.images import save_png
 from rgspipe.machine.description import PeakMemory
 from rgspipe.options import settings
 from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.renderer.repainted import repainted
 from rgspipe.scene.grade import SceneGrade
 from rgspipe.scene.lights import LightRig
 from rgspipe.stages.base import Stage, StageContext
@@ -64,7 +65,7 @@ def run(context: StageContext) -> None:
         write_lamps(context.folder / (f"lamps_{one.lighting}.json" if one.lighting else "lamps.json"), one)
         words = as_keys(captured_words(one))
         print(f"Lighting {one.lighting}: {words}" if one.lighting else words)
-    frozen = FrozenScene.freeze(found.surfels, gather_rays=context.config.lamps.gather_rays)
+    frozen = repainted(found.frozen, found.surfels)
     further = {one.lighting: _metrics(one) for one in others}
     metrics = (
         _metrics(found)
