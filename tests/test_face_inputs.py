@@ -90,6 +90,19 @@ def test_images_are_whatever_holds_numbers(scene, image, given) -> None:
     assert torch.equal(result.lights[0].position, same.lights[0].position)
 
 
+def test_views_are_of_whatever_holds_numbers(image) -> None:
+    depth, sees = np.ones((HEIGHT, WIDTH), np.float16), [[True] * WIDTH] * HEIGHT
+    view = replace(VIEW, image=image.double().requires_grad_(), depth=depth, emitters=sees, base=image.tolist())
+    assert view.image.dtype == view.depth.dtype == view.base.dtype == torch.float32 and not view.image.requires_grad
+    assert view.emitters.dtype == torch.bool and view.emitters.all()
+
+
+def test_one_image_is_a_base_in_whatever_says_so(scene, image) -> None:
+    capture = rg.ImageCapture(base=rg.BaseImages(image))
+    result, same = rg.fit_lights(scene, CAMERA, 2.0 * image, capture=capture), rg.fit_lights(scene, CAMERA, image)
+    torch.testing.assert_close(result.lights[0].position, same.lights[0].position, rtol=0.0, atol=1e-5)  # 0
+
+
 @pytest.mark.parametrize("dtype", [torch.bool, torch.float64])
 def test_masks_are_shares_or_truths(scene, image, dtype) -> None:
     masks = torch.ones(HEIGHT, WIDTH, dtype=dtype)
@@ -318,6 +331,104 @@ REFUSED: dict[str, tuple[Callable[[rg.FrozenScene, Tensor], object], str, str, s
     "no lights": (lambda s, i: rg.LightSpec(count=0), "LightSpec.count", "0", "counted"),
     "a number in quotes": (lambda s, i: rg.LightSpec(count="2"), "LightSpec.count", "'2'", "counted"),
     "half a light": (lambda s, i: rg.LightSpec(count=1.5), "LightSpec.count", "1.5", "counted"),
+    "a kind's name for a shape": (
+        lambda s, i: rg.LightSpec("spot", shape="gaussian"),
+        "LightSpec.shape",
+        "'gaussian'",
+        "agree",
+    ),
+    "a word for a truth": (lambda s, i: rg.LightSpec(ambient="no"), "LightSpec.ambient", "'no'", "Pass one"),
+    "an endless distance": (
+        lambda s, i: rg.LightSpec(mount="ceiling", distance=math.inf),
+        "LightSpec.distance",
+        "inf",
+        "mount",
+    ),
+    "a path for a table": (
+        lambda s, i: rg.LightSpec("auto", luminaires=("lamp.ies",)),
+        "LightSpec.luminaires",
+        "lamp.ies",
+        "read_photometry",
+    ),
+    "a clip below 0": (lambda s, i: rg.ImageCapture(clip=[0.8, -1]), "clip", "-1", "None"),
+    "a clip in words": (lambda s, i: rg.ImageCapture(clip="white"), "clip", "'white'", "Pass"),
+    "a share beyond the clip": (lambda s, i: rg.ImageCapture(clip=1, saturated=255), "saturated", "255", "range"),
+    "an image for a base": (lambda s, i: rg.ImageCapture(base=i), "base", "Tensor", "BaseImages"),
+    "two bases": (
+        lambda s, i: fit(s, i, base=i, capture=rg.ImageCapture(base=rg.BaseImages(i, scale_free=True))),
+        "base",
+        "images",
+        "once",
+    ),
+    "words for a capture": (lambda s, i: fit(s, i, capture="8 bits"), "capture", "str", "ImageCapture"),
+    "words for effects": (lambda s, i: fit(s, i, effects="all"), "effects", "str", "Effects"),
+    "a view of another scene": (
+        lambda s, i: rg.fit_lights(s, freeze(few_surfels()).view(CAMERA), i),
+        "cameras[0]",
+        "one of 93",
+        "scene.view",
+    ),
+    "no light to start from": (
+        lambda s, i: rg.FitViews.prepare(s, CAMERA).refit(i, []),
+        "start",
+        "none",
+        "fit",
+    ),
+    "captures too few": (
+        lambda s, i: rg.track_lights(rg.FitViews.prepare(s, CAMERA), [i, i], capture=[rg.ImageCapture()]),
+        "capture",
+        "1 of them",
+        "as frames",
+    ),
+    "a search for a track's options": (
+        lambda s, i: rg.track_lights(rg.FitViews.prepare(s, CAMERA), [i], options=rg.Search()),
+        "options",
+        "Search",
+        "TrackOptions",
+    ),
+    "one bounce in a file": (lambda s, i: s.with_solver("patches", bounces=1).save("x"), "scene", "another", "again"),
+    "a layout of no name": (lambda s, i: rg.save_ply("x.ply", few_surfels(), layout="ful"), "layout", "'ful'", "one"),
+    "radiance of NaN": (
+        lambda s, i: rg.save_ply("x.ply", few_surfels(), radiance=np.full((93, 3), np.nan)),
+        "radiance",
+        "NaN",
+        "made",
+    ),
+    "an albedo of NaN in a file": (
+        lambda s, i: rg.save_surfels("x", few_surfels(albedo=np.full((93, 3), np.nan))),
+        "surfels.albedo",
+        "NaN",
+        "made",
+    ),
+    "a folder for a PLY": (lambda s, i: rg.save_ply("/", few_surfels()), "/", "a folder", "surfels.ply"),
+    "a turn without length": (
+        lambda s, i: freeze(few_surfels(rotations=np.zeros((93, 4)))),
+        "surfels.rotations",
+        "(0, 0, 0, 0)",
+        "Pass",
+    ),
+    "levels for a view": (
+        lambda s, i: replace(VIEW, image=rg.tone_map(i)),
+        "image",
+        "0 to 255",
+        "srgb.decode",
+    ),
+    "a view of NaN": (lambda s, i: replace(VIEW, image=i * math.nan), "image", "NaN", "alpha"),
+    "alpha in levels": (lambda s, i: replace(VIEW, alpha=VIEW.alpha * 255), "alpha", "255", "Divide"),
+    "depth of another size": (lambda s, i: replace(VIEW, depth=np.ones((3, 3))), "depth", "shape (3, 3)", "Pass"),
+    "saturated from 0": (lambda s, i: replace(VIEW, saturated_from=0), "saturated_from", "0", "None"),
+    "a view's light nowhere": (
+        lambda s, i: replace(VIEW, light=rg.PointLight([0, 0, math.nan], 1)),
+        "lights[0].position",
+        "NaN",
+        "steps",
+    ),
+    "a light that takes light away": (
+        lambda s, i: rg.train([replace(VIEW, light=rg.PointLight([0, 0, 0.3], -1))], few_surfels()),
+        "the training views",
+        "below 0",
+        "Correct",
+    ),
     "a solver's name": (lambda s, i: fit(s, i, solver="paper_adam"), "solver", "'paper_adam'", "Pass such"),
     "a solver's class": (lambda s, i: fit(s, i, solver=rg.Search), "solver", "Search", "Pass such"),
     "a threshold out of range": (

@@ -40,6 +40,19 @@ def as_path(path: str | os.PathLike[str], name: str = "path") -> Path:
     return made
 
 
+def as_file(path: str | os.PathLike[str], example: str) -> Path:
+    """The path of a file that is to be written; `example` is a name that it may have.
+
+    Raises:
+        InputError: see `as_path`, or a folder has this name.
+    """
+    made = as_path(path)
+    if made.is_dir():
+        remedy = f"Add one: {example} in it."
+        raise InputError(path, expected="the name of a file", found="a folder", remedy=remedy)
+    return made
+
+
 def as_number(
     value: object,
     name: str,
@@ -82,7 +95,7 @@ def as_one_of(value: object, kind: type[One], name: str, remedy: str) -> One:
         InputError: it is of another one.
     """
     if not isinstance(value, kind):
-        raise InputError(name, expected=f"a {kind.__name__}", found=type(value).__name__, remedy=remedy)
+        raise InputError(name, expected=_one(kind), found=type(value).__name__, remedy=remedy)
     return value
 
 
@@ -97,13 +110,18 @@ def as_several(values: object, kinds: type[One] | tuple[type[One], ...], name: s
         return [values]
     if not isinstance(values, Iterable):
         found = type(values).__name__
-        raise InputError(name, expected=f"a {one.__name__}, or a list of them", found=found, remedy=remedy)
+        raise InputError(name, expected=f"{_one(one)}, or a list of them", found=found, remedy=remedy)
     listed = list(values)
     for index, value in enumerate(listed):
         if not isinstance(value, kinds):
             found = type(value).__name__
-            raise InputError(f"{name}[{index}]", expected=f"a {one.__name__}", found=found, remedy=remedy)
+            raise InputError(f"{name}[{index}]", expected=_one(one), found=found, remedy=remedy)
     return listed
+
+
+def _one(kind: type) -> str:
+    name = kind.__name__
+    return f"{'an' if name[0] in 'AEIO' else 'a'} {name}"
 
 
 def _shown(value: object) -> str:

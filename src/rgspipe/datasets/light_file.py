@@ -9,7 +9,7 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
-from rgspipe.arguments import as_path
+from rgspipe.arguments import as_file
 from rgspipe.datasets.json_file import is_number, numbers, read_json, required, shown
 from rgspipe.datasets.limits import FARTHEST, STRONGEST
 from rgspipe.errors import InputError
@@ -96,9 +96,7 @@ def write_lights(path: str | Path, lights: Light | Sequence[Light], extra: dict 
         InputError: `path` is a folder, or `lights` are none, or have numbers that are not finite.
         ValueError: `extra` would overwrite a field of the format.
     """
-    path = as_path(path)
-    if path.is_dir():
-        raise InputError(path, expected="the name of a file", found="a folder", remedy="Add one: lights.json in it.")
+    path = as_file(path, "lights.json")
     rig = as_rig(lights)
     check_numbers(rig)
     extra = dict(extra or {})

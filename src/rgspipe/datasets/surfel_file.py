@@ -8,7 +8,7 @@ from typing import Any
 
 from torch import Tensor
 
-from rgspipe.arguments import as_one_of, as_path
+from rgspipe.arguments import as_file, as_one_of
 from rgspipe.datasets.input_file import input_file
 from rgspipe.datasets.json_file import is_number
 from rgspipe.datasets.surfel_range import check_surfels
@@ -26,13 +26,20 @@ GLOSS = "gloss."
 #: Tensors that files of earlier versions lack.
 OPTIONAL = {"guessed"}
 
+#: What such a file is usually called.
+SURFELS = "surfels.safetensors"
+
 MAKE_AGAIN = "Remove it and run the stage that makes it again."
 
 
 def save_surfels(path: str | Path, surfels: Surfels) -> None:
-    """Write `surfels` with their coverage; the file appears under its name only when it is whole."""
-    path = as_path(path)
-    as_one_of(surfels, Surfels, "surfels", "Pass those of a scene: scene.surfels.")
+    """Write `surfels` with their coverage; the file appears under its name only when it is whole.
+
+    Raises:
+        InputError: no path of a file, or no surfels, or some with impossible numbers; see `Surfels.check`.
+    """
+    path = as_file(path, SURFELS)
+    as_one_of(surfels, Surfels, "surfels", "Pass those of a scene: scene.surfels.").check()
     note = {"format": FORMAT, "version": VERSION, "coverage": asdict(surfels.coverage)}
     gloss = {} if surfels.gloss is None else {GLOSS + name: part for name, part in surfels.gloss.tensors().items()}
     save_tensors(path, surfels.tensors() | gloss, note)

@@ -8,18 +8,28 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
-from rgspipe.arguments import as_one_of
+from rgspipe.arguments import as_number, as_one_of
 from rgspipe.datasets.classes import Occlusion
 from rgspipe.errors import InputError
 from rgspipe.scene import Camera, PointLight
-from rgspipe.scene.arrays import as_device, as_tensor
-from rgspipe.scene.lights import Light
-from rgspipe.scene.shapes import Float
+from rgspipe.scene.arrays import as_device, as_tensor, check_finite, check_levels, check_radiance
+from rgspipe.scene.lights import Light, check_numbers
+from rgspipe.scene.shapes import Float, Given
+
+#: The images of a view, and their channels.
+PARTS: dict[str, tuple[int, ...]] = {"image": (3,), "alpha": (), "depth": ()}
+PARTS |= dict.fromkeys(("normal", "albedo", "base"), (3,))
+
+#: So much alpha may be above 1: it may have been resampled.
+ROUNDING = 1e-3
+
+#: The least radiance above 0.
+TINY = 5e-324
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class View:
-    """One image and what is known of it.
+    """One image and what is known of it; lists and numpy arrays are taken for its tensors.
 
     Attributes:
         name: for people and tables, e.g. "train/r_0001".
@@ -41,20 +51,21 @@ class View:
         base_exposure: what that of `base` states.
 
     Raises:
-        InputError: the camera or the light is none, or image and alpha are no numbers of the camera's size.
+        InputError: the camera or the light is none, a part is no numbers of the camera's size, image or base are not
+            finite or levels of 8 bits, or alpha is out of range.
     """
 
     name: str
     camera: Camera
-    image: Float[Tensor, "H W 3"]
-    alpha: Float[Tensor, "H W"]
+    image: Given
+    alpha: Given
     light: PointLight | None = None
-    depth: Float[Tensor, "H W"] | None = None
-    normal: Float[Tensor, "H W 3"] | None = None
-    albedo: Float[Tensor, "H W 3"] | None = None
+    depth: Given | None = None
+    normal: Given | None = None
+    albedo: Given | None = None
     saturated_from: float | None = None
-    emitters: Tensor | None = None
-    base: Float[Tensor, "H W 3"] | None = None
+    emitters: Given | None = None
+    base: Given | None = None
     lighting: str = ""
     exposure: float | None = None
     base_exposure: float | None = None
@@ -63,9 +74,34 @@ class View:
         as_one_of(self.camera, Camera, "camera", "Camera.look_at makes one.")
         if self.light is not None:
             as_one_of(self.light, Light, "light", "Pass one, such as PointLight([0, 0, 0.3], 1.0).")
+            check_numbers((self.light,))
         size = (self.camera.height, self.camera.width)
-        object.__setattr__(self, "image", as_tensor(self.image, "image", (*size, 3)))
-        object.__setattr__(self, "alpha", as_tensor(self.alpha, "alpha", size))
+        for name, channels in PARTS.items():
+            if (given := getattr(self, name)) is not None:
+                check_levels(name, given)
+                object.__setattr__(self, name, as_tensor(given, name, (*size, *channels), torch.float32).detach())
+        if self.emitters is not None:
+            object.__setattr__(self, "emitters", as_tensor(self.emitters, "emitters", size) >= 0.5)
+        self._check()
+
+    def _check(self) -> None:
+        """Refuse numbers that no photograph has.
+
+        Raises:
+            InputError: says which.
+        """
+        for name in ("image", "base", "alpha"):
+            if (part := getattr(self, name)) is not None:
+                check_finite(part, name, "Correct it; alpha says which pixels do not count.")
+                check_radiance(name, float(part.min()), float(part.max()))
+        least, most = float(self.alpha.min()), float(self.alpha.max())
+        if least < 0.0 or most > 1.0 + ROUNDING:
+            found, remedy = f"values from {least:.4g} to {most:.4g}", "Divide levels of 8 bits by 255."
+            raise InputError("alpha", expected="shares of pixels, 0 to 1", found=found, remedy=remedy)
+        if self.saturated_from is not None:
+            expected, remedy = "radiance above 0", "None is for images that are not."
+            limit = as_number(self.saturated_from, "saturated_from", remedy, expected=expected, low=TINY)
+            object.__setattr__(self, "saturated_from", limit)
 
     @property
     def saturated(self) -> Tensor:

@@ -11,7 +11,7 @@ import numpy.typing as npt
 import scipy.ndimage
 from PIL import Image, ImageDraw
 
-from rgspipe.arguments import as_path
+from rgspipe.arguments import as_file
 from rgspipe.errors import InputError
 from rgspipe.evaluation.arrays import ArrayLike, to_array
 from rgspipe.scene import srgb
@@ -149,7 +149,7 @@ def save_png(path: str | Path, pixels: Bytes) -> None:
     Raises:
         InputError: the pixels are something else, such as radiance, of which `tone_map` makes them.
     """
-    write_bytes(as_path(path), png_bytes(pixels))
+    write_bytes(as_file(path, "image.png"), png_bytes(pixels))
 
 
 def fit_within(png: bytes, max_bytes: int, max_width: int = 1600, min_width: int = 240) -> bytes:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
+from rgspipe.arguments import as_one_of
 from rgspipe.errors import InputError
 from rgspipe.fitting.in_sight.search import fit_on_lookout, fit_without
 from rgspipe.fitting.model.capture import BaseImages, ImageCapture
@@ -17,8 +18,9 @@ from rgspipe.fitting.spec import LightSpec
 from rgspipe.fitting.target_views import Cameras, TargetViews
 from rgspipe.renderer.effects import ALL_EFFECTS, Effects
 from rgspipe.renderer.frozen import FrozenScene
-from rgspipe.scene import LightRig
+from rgspipe.scene import Light
 from rgspipe.scene.arrays import ArrayLike, as_list
+from rgspipe.scene.lights import as_rig, check_numbers
 
 #: What is known of lamps in sight: their pixels, that there are none, or nothing.
 Emitters: TypeAlias = "str | Sequence[ArrayLike] | ArrayLike | None"
@@ -39,7 +41,7 @@ class FitViews(TargetViews):
         emitters: Emitters = "auto",
     ) -> FitResult:
         """The lights of one image a view; see `fit_lights`."""
-        stacked = self.prepared.stack_images(as_list(images, axes=3))
+        stacked = self.prepared.stack_images(images)
         solver = Search() if solver is None else solver
         if isinstance(solver, type) or not isinstance(solver, Solver):
             raise InputError(
@@ -48,7 +50,7 @@ class FitViews(TargetViews):
                 found=f"{solver!r}",
                 remedy="Pass such an object.",
             )
-        capture = capture or ImageCapture()
+        capture = as_one_of(capture or ImageCapture(), ImageCapture, "capture", "Pass ImageCapture(…).")
 
         if not isinstance(emitters, str | None):
             masks = self.prepared.emitter_masks(as_list(emitters, axes=2))
@@ -61,11 +63,21 @@ class FitViews(TargetViews):
         return solver.fit(self, stacked, capture)
 
     def refit(
-        self, images: Sequence[ArrayLike] | ArrayLike, start: LightRig, capture: ImageCapture | None = None
+        self,
+        images: Sequence[ArrayLike] | ArrayLike,
+        start: Light | Sequence[Light],
+        capture: ImageCapture | None = None,
     ) -> FitResult:
-        """The lights of one image a view, as many and of those kinds that `start` has, from there downhill."""
-        stacked = self.prepared.stack_images(as_list(images, axes=3))
-        return fit_from(self.problem(stacked, capture, Search().loss), [Emitter.of(light) for light in start])
+        """The lights of one image a view, as many and of those kinds that `start` has, from there downhill.
+
+        Raises:
+            InputError: see `fit_lights`, or there is no light to start from, or one that is nowhere.
+        """
+        stacked, rig = self.prepared.stack_images(images), as_rig(start)
+        check_numbers(rig)
+        if not rig:
+            raise InputError("start", expected="a light to start from", found="none", remedy="Pass one, or use fit.")
+        return fit_from(self.problem(stacked, capture, Search().loss), [Emitter.of(light) for light in rig])
 
 
 def fit_lights(
@@ -96,7 +108,7 @@ def fit_lights(
             any kind; or all that there is to know.
         solver: how, such as `Search(starts=8)` or `PaperAdam(seed=1)`; `Search()` if None.
         base: what `images` show with the lamps off, taken as they were; it is taken away from them. More can be said of
-            it in `capture`.
+            it in `capture`, which has it then instead.
         masks: (H, W) per camera, the scene's share of each pixel (the image's alpha); 1 if None.
         capture: what is known of how the images were taken; as radiance, with known exposures, if None.
         effects: parts of light transport.
@@ -120,5 +132,9 @@ def fit_lights(
         scene, cameras, lights=lights, masks=masks, effects=effects, sharp=sharp, mask_edges=mask_edges
     )
     if base is not None:
-        capture = replace(capture or ImageCapture(), base=BaseImages(as_list(base, axes=3)))
+        capture = capture or ImageCapture()
+        if capture.base is not None:
+            remedy = "Give them once; what is known of them is said in the capture's."
+            raise InputError("base", expected="nothing beside the capture's own", found="images", remedy=remedy)
+        capture = replace(capture, base=BaseImages(base))
     return views.fit(images, solver=solver, capture=capture, emitters=emitters)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields
-from numbers import Integral
+from numbers import Integral, Real
 from typing import Any, NoReturn, Self, get_args
+
+import numpy as np
 
 from rgspipe.errors import InputError
 from rgspipe.fitting.options import MOST_LIGHTS
@@ -67,8 +70,11 @@ class LightSpec:
             _refuse("type", f"one of {', '.join(TYPES)}", self.type, "Correct the name.")
         if self.count is not None and not (isinstance(self.count, Integral) and 1 <= self.count <= MOST_LIGHTS):
             _refuse("count", f"None or a whole number from 1 to {MOST_LIGHTS}", self.count, "None has them counted.")
+        for name in ("shape_free", "ambient"):
+            if not isinstance(getattr(self, name), bool | np.bool_):
+                _refuse(name, "True or False", getattr(self, name), "Pass one of them.")
         kind = shaped_kind(self.type)
-        if self.shape is not None and self.shape.kind != kind:
+        if self.shape is not None and not (isinstance(self.shape, Light) and self.shape.kind == kind):
             _refuse("shape", f"a {kind}, as the type is {self.type}", self.shape, "Let type and shape agree.")
         if self.luminaires and self.type != AUTO:
             remedy = 'Put the tables of a "profile" into its shape.'
@@ -77,7 +83,9 @@ class LightSpec:
             _refuse("mount", f"one of {', '.join(MOUNTS)}", self.mount, "Correct the name.")
         if self.mounted and self.kinds[-1].distant:
             _refuse("mount", MOUNTS[0], self.mount, f"A {self.type} hangs on nothing.")
-        if self.distance is not None and (self.mount == MOUNTS[0] or not self.distance >= 0.0):
+        if not all(isinstance(table, Photometry) for table in self.luminaires):
+            _refuse("luminaires", "tables", self.luminaires, "rg.read_photometry reads one.")
+        if self.distance is not None and (self.mount == MOUNTS[0] or not _is_distance(self.distance)):
             remedy = "Say what they hang on (mount), or leave the distance out."
             _refuse("distance", "None, or with a mount a number ≥ 0", self.distance, remedy)
 
@@ -148,6 +156,10 @@ def as_spec(lights: str | LightSpec) -> LightSpec:
 
 def _refuse(field: str, expected: str, found: object, remedy: str) -> NoReturn:
     raise InputError(f"LightSpec.{field}", expected=expected, found=f"{found!r}", remedy=remedy)
+
+
+def _is_distance(value: object) -> bool:
+    return isinstance(value, Real) and 0.0 <= value < math.inf
 
 
 def shaped_kind(type: str) -> str:

@@ -10,7 +10,7 @@ from typing import Self
 import torch
 from torch import Tensor
 
-from rgspipe.arguments import as_several
+from rgspipe.arguments import as_one_of, as_several
 from rgspipe.errors import InputError
 from rgspipe.fitting.in_sight.sight import Sight, sights
 from rgspipe.fitting.model.capture import ImageCapture
@@ -77,6 +77,7 @@ class TargetViews:
                 is not known.
         """
         weights = _weights(scene, cameras)
+        as_one_of(effects, Effects, "effects", "Pass Effects(…).")
         masks = None if masks is None else as_list(masks, axes=2)
         prepared = prepare_views(scene, weights, masks=masks, mask_edges=mask_edges)
         return cls(prepared, as_spec(lights), effects, sharp)
@@ -179,4 +180,10 @@ def _weights(scene: FrozenScene, cameras: Cameras) -> list[ViewWeights]:
         remedy = "FrozenScene.load(folder) reads one, FrozenScene.freeze(surfels) makes one."
         raise InputError("scene", expected="a FrozenScene", found=type(scene).__name__, remedy=remedy)
     views = as_several(cameras, (Camera, ViewWeights), "cameras", "Camera.look_at makes one.")
-    return [scene.view(view) if isinstance(view, Camera) else view for view in views]
+    weights = [scene.view(view) if isinstance(view, Camera) else view for view in views]
+    own = len(scene.surfels)
+    for index, view in enumerate(weights):
+        if (found := view.operator.shape[1]) != own:
+            expected, remedy = f"a view of this scene, of {own} surfels", "Pass its camera, or scene.view(camera)."
+            raise InputError(f"cameras[{index}]", expected=expected, found=f"one of {found}", remedy=remedy)
+    return weights

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 import torch
 from torch import Tensor
@@ -23,6 +24,8 @@ class LightPart:
         chain: (1 + D', 1 + D) from the columns of a unit light here to the part that it has in those of the whole.
         share: which of them it is.
     """
+
+    ways: ClassVar[None] = None
 
     light: Light
     softness: float

@@ -18,7 +18,7 @@ from rgspipe.renderer.clusters import cluster_patches
 from rgspipe.renderer.dictionary import GRID, LightDictionary, build_dictionary
 from rgspipe.renderer.direct import unit_irradiance
 from rgspipe.renderer.effects import ALL_EFFECTS, Effects
-from rgspipe.renderer.frozen_file import load_parts, save_parts
+from rgspipe.renderer.frozen_file import OWN_SOLVER, load_parts, save_parts
 from rgspipe.renderer.frozen_pickle import pickled
 from rgspipe.renderer.glossy_transport import GlossyLight, GlossyTransport, build_glossy_transport
 from rgspipe.renderer.images.model import SurfelModel
@@ -111,10 +111,10 @@ class FrozenScene:
         """Write surfels and operators, and the dictionary if it is made; docs/reference/formats.md has the files.
 
         Raises:
-            ValueError: the transport has a limited number of bounces: what is stored is the scene with all of them.
+            InputError: it has another solver, or a limited number of bounces, which no file has.
         """
-        if self.transport.bounces is not None:
-            raise ValueError(f"a frozen scene is stored with all bounces, got {self.transport.bounces}")
+        if (self.solver or self.transport) is not self.transport or self.transport.bounces is not None:
+            raise InputError("scene", expected="its own solver, with all bounces", found="another", remedy=OWN_SOLVER)
         save_parts(
             as_path(folder, "folder"),
             surfels=self.surfels,

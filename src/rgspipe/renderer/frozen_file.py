@@ -38,6 +38,9 @@ FINEST = 100
 
 NAME_IT = "Name the folder that holds one: outputs/<scene>/freeze/latest, or what FrozenScene.save was given."
 
+#: What to do about a scene with another solver than its own, which no file holds.
+OWN_SOLVER = "Store the scene that with_solver was called on, and call it again on what is loaded."
+
 MAKE_AGAIN = "Freeze the scene again: FrozenScene.freeze and save, or the stage freeze."
 
 

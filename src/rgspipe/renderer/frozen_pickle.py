@@ -17,10 +17,8 @@ def pickled(scene: FrozenScene) -> tuple[Callable, tuple]:
     """What `FrozenScene.__reduce__` returns: the scene comes back on its device, without what it kept of its images.
 
     Raises:
-        ValueError: it has another solver or a limited number of bounces, which no file has.
+        InputError: see `FrozenScene.save`.
     """
-    if scene.solver is not None and scene.solver is not scene.transport:
-        raise ValueError("a scene with another solver is not pickled: pickle it first, then call with_solver")
     with TemporaryDirectory() as folder:
         scene.save(folder)
         files = {path.name: path.read_bytes() for path in Path(folder).iterdir()}

@@ -75,7 +75,7 @@ def lit_columns(
             return (lit_surfels(bvh, part, effects, least).columns,)
         # A light that shines alike in all directions takes one pass over the surfels.
         irradiance, slope = unit_irradiance(bvh, part.light.place[None], effects.shadows)
-        return (torch.cat([irradiance.T, slope[0]], dim=1),)
+        return (attenuated(torch.cat([irradiance.T, slope[0]], dim=1), None, part),)
 
     return added(light, columns, few)[0]
 

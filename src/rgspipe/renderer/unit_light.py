@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple, Protocol
+from typing import ClassVar, NamedTuple, Protocol
 
 import torch
 from torch import Tensor
@@ -27,7 +27,7 @@ WHOLE = Share()
 class UnitLight(Protocol):
     """A light of unit intensity, and the D numbers that its image is differentiated towards.
 
-    The first three of them are its position; those of a light that shines alike in all directions are no others.
+    The first of them move it; those of a light that shines alike in all directions are no others.
     """
 
     @property
@@ -48,6 +48,11 @@ class UnitLight(Protocol):
     @property
     def share(self) -> Share:
         """Which of the points of a light with an extent it is."""
+        ...
+
+    @property
+    def ways(self) -> Tensor | None:
+        """(3, d) float64 where the first d numbers move it; None where they are its position."""
         ...
 
     def slopes(self, by: Mapping[str, Tensor]) -> Tensor:
@@ -72,14 +77,16 @@ def attenuated(columns: Tensor, sent: RelativeIntensity | None, light: UnitLight
     Returns:
         (N, …, 1 + D): the value, then its derivatives.
     """
+    if light.ways is not None:
+        columns = torch.cat([columns[..., :1], columns[..., 1:] @ light.ways.to(columns)], dim=-1)
     if sent is None:
         return columns
     between = [1] * (columns.ndim - 2)
     value, slopes = sent.value.reshape(-1, *between, 1), light.slopes(sent.by)
     slopes = slopes.reshape(len(slopes), *between, slopes.shape[1])
-    unit = columns[..., :1]
-    products = slopes * unit
-    products = torch.cat([products[..., :3] + value * columns[..., 1:], products[..., 3:]], dim=-1)
+    unit, moved = columns[..., :1], columns[..., 1:]
+    products, ways = slopes * unit, moved.shape[-1]
+    products = torch.cat([products[..., :ways] + value * moved, products[..., ways:]], dim=-1)
     return torch.cat([value * unit, products], dim=-1)
 
 
@@ -92,6 +99,8 @@ class OwnLight:
         softness: by how much its edge of light is widened [rad].
         share: which of the points of a light with an extent it is.
     """
+
+    ways: ClassVar[None] = None
 
     given: Light
     softness: float = 0.0

@@ -117,6 +117,21 @@ def check_radiance(where: object, least: float, most: float) -> None:
         raise InputError(where, expected="radiance, which is not negative", found=found, remedy="Export it again.")
 
 
+def check_levels(where: object, image: object) -> None:
+    """Refuse an image of 8 bits where radiance is meant.
+
+    Raises:
+        InputError: it is one.
+    """
+    if "uint8" in str(getattr(image, "dtype", "")):
+        raise InputError(
+            where,
+            expected="linear radiance, as floats",
+            found="levels from 0 to 255",
+            remedy="rg.load_views reads files as radiance, and rgspipe.scene.srgb.decode makes it of levels / 255.",
+        )
+
+
 def _from_numbers(value: object, name: str, shape: Sequence[Axis], remedy: str) -> Tensor:
     if isinstance(value, list | tuple) and any(isinstance(part, Tensor) for part in value):
         try:

@@ -131,6 +131,7 @@ class Surfels:
 
         Raises:
             InputError: a number is not finite or impossible, such as an albedo above 1.
+            ValueError: see `Gloss.check`.
         """
         for name, tensor in self.tensors().items():
             check_finite(tensor, f"surfels.{name}", "Look where they were made.")
@@ -139,6 +140,11 @@ class Surfels:
                 expected = "lengths, 0 or more" if high == math.inf else "values from 0 to 1"
                 found = f"{float(tensor.min()):.4g} to {float(tensor.max()):.4g}"
                 raise InputError(f"surfels.{name}", expected=expected, found=found, remedy="Correct or clamp them.")
+        if not bool(self.rotations.any(dim=1).all()):
+            expected, remedy = "quaternions with a length", "Pass (1, 0, 0, 0) for one that is not turned."
+            raise InputError("surfels.rotations", expected=expected, found="(0, 0, 0, 0)", remedy=remedy)
+        if self.gloss is not None:
+            self.gloss.check(self.albedo)
 
     def __len__(self) -> int:
         return self.centers.shape[0]

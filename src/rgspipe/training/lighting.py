@@ -54,7 +54,7 @@ def trace_lighting(bvh: SurfelBvh, views: Sequence[View]) -> Lighting:
     """Cast the shadows of every view's light.
 
     Raises:
-        InputError: a view has no light, or one that is no point.
+        InputError: a view has no light, or one that is no point or does not shine.
     """
     missing = [view.name for view in views if view.light is None]
     if missing:
@@ -66,12 +66,20 @@ def trace_lighting(bvh: SurfelBvh, views: Sequence[View]) -> Lighting:
         found = f"a {', a '.join(sorted(set(others.values())))}, of {', '.join([*others][:5])}"
         remedy = "Photograph under small bare lamps, or take such photographs as a capture (capture_scene)."
         raise InputError("the training views", expected="point lights", found=found, remedy=remedy)
+    dark = [view.name for view in views if not _shines(view.light)]
+    if dark:
+        expected, found = "lights that shine", f"intensities below 0, or all 0, of {', '.join(dark[:5])}"
+        raise InputError("the training views", expected=expected, found=found, remedy="Correct them.")
     positions = torch.stack([view.light.position for view in views])
     intensity = torch.stack([view.light.intensity for view in views]).float()
     blocks = positions.split(LIGHTS_AT_ONCE)
     passing = torch.cat([transmittance(bvh, block)[0] for block in blocks])
     falloff = torch.cat([unit_irradiance(bvh, block, shadows=False)[0] for block in blocks])
     return Lighting(passing * falloff, passing, positions, intensity.to(bvh.device))
+
+
+def _shines(light: PointLight) -> bool:
+    return bool((light.intensity >= 0.0).all() and (light.intensity > 0.0).any())
 
 
 def indirect_irradiance(lighting: Lighting, albedo: Tensor, transport: PatchTransport) -> Tensor:

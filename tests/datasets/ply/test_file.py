@@ -147,5 +147,5 @@ def test_a_damaged_comment_is_refused(tmp_path: Path, old: bytes, new: bytes, wo
 
 
 def test_radiance_of_another_scene_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match=r"radiance must have shape \(5, 3\)"):
+    with pytest.raises(InputError, match=r"radiance: expected numbers of shape \(5, 3\)"):
         save_ply(tmp_path / "s.ply", cloud(5, 0), radiance=torch.zeros(4, 3))

@@ -10,14 +10,14 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import torch
 from scipy.special import expit, logit
 from torch import Tensor
 
-from rgspipe.arguments import as_one_of, as_path
+from rgspipe.arguments import as_file, as_one_of
 from rgspipe.datasets.conversion import Conversion, Loss, loss
 from rgspipe.datasets.json_file import is_number
 from rgspipe.datasets.ply.gaussians import HIGH, LOW, Y0, unit_quaternions
@@ -26,6 +26,7 @@ from rgspipe.datasets.ply.table import VertexTable, write_vertices
 from rgspipe.errors import InputError
 from rgspipe.names import SurfelLayout
 from rgspipe.scene import srgb
+from rgspipe.scene.arrays import ArrayLike, as_tensor, check_finite
 from rgspipe.scene.gloss import Gloss
 from rgspipe.scene.spacing import inferred_coverage
 from rgspipe.scene.surfels import NO_CLIP, Coverage, Surfels, quaternion_to_axes
@@ -63,7 +64,7 @@ OWN_GLOSS = {"reflectance": ("gloss_0", "gloss_1", "gloss_2"), "exponents": ("gl
 
 
 def save_ply(
-    path: str | Path, surfels: Surfels, *, radiance: Tensor | None = None, layout: SurfelLayout = "full"
+    path: str | Path, surfels: Surfels, *, radiance: ArrayLike | None = None, layout: SurfelLayout = "full"
 ) -> Conversion:
     """Write surfels as a PLY file that 3DGS viewers open.
 
@@ -75,15 +76,19 @@ def save_ply(
         what a viewer does not show, and for "viewer" what the file does not hold.
 
     Raises:
-        InputError: no path, or no surfels, or none of them.
-        ValueError: `radiance` is of another number of surfels.
+        InputError: no path of a file, no surfels, none of them, or some with impossible numbers (`Surfels.check`);
+            `radiance` is of another number of surfels, or not finite; or a layout of another name.
     """
-    path = as_path(path)
-    as_one_of(surfels, Surfels, "surfels", "Pass those of a scene: scene.surfels.")
+    path = as_file(path, "surfels.ply")
+    as_one_of(surfels, Surfels, "surfels", "Pass those of a scene: scene.surfels.").check()
     if not len(surfels):
         raise InputError("surfels", expected="some of them", found="none", remedy="Pass those of a scene.")
-    if radiance is not None and radiance.shape != (len(surfels), 3):
-        raise ValueError(f"radiance must have shape {(len(surfels), 3)}, got {tuple(radiance.shape)}")
+    if layout not in get_args(SurfelLayout):
+        expected = " or ".join(get_args(SurfelLayout))
+        raise InputError("layout", expected=expected, found=repr(layout)[:80], remedy="Choose one of them.")
+    if radiance is not None:
+        radiance = as_tensor(radiance, "radiance", (len(surfels), 3))
+        check_finite(radiance, "radiance", "Look where it was made.")
     shown, colour_losses = _shown(surfels, radiance)
     columns = _viewer_columns(surfels, shown, REST if layout == "viewer" else 0)
     comments = []
@@ -227,7 +232,7 @@ def _with_gloss(surfels: Surfels, table: VertexTable) -> Surfels:
 def _shown(surfels: Surfels, radiance: Tensor | None) -> tuple[np.ndarray, list[Loss]]:
     """(N, 3) linear colours in [0, 1] for viewers."""
     if radiance is None:
-        return surfels.albedo.double().cpu().numpy(), []
+        return surfels.albedo.detach().double().cpu().numpy(), []
     values = radiance.detach().double().cpu().numpy()
     values = values / max(float(np.quantile(values, 0.995)), 1e-30)
     over = loss("brighter than white", values.max(axis=1) - 1.0, 1e-6, "largest excess over white")

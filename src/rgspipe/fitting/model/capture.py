@@ -10,9 +10,11 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from rgspipe.arguments import as_one_of
 from rgspipe.errors import InputError
+from rgspipe.options import Options, option
 from rgspipe.scene import srgb
-from rgspipe.scene.arrays import ArrayLike
+from rgspipe.scene.arrays import ArrayLike, as_tensor
 
 #: Levels of an 8-bit image.
 LEVELS = 255.0
@@ -29,16 +31,16 @@ class BaseImages:
     """The same views with the lamps off, each taken with the exposure of its view and clipped where that is.
 
     Attributes:
-        images: (H, W, 3) linear radiance per view.
+        images: (H, W, 3) linear radiance per view; one stands for a list of it.
         scale_free: whether they are in the target a factor times, per colour, that is not known.
     """
 
-    images: Sequence[ArrayLike]
+    images: Sequence[ArrayLike] | ArrayLike
     scale_free: bool = False
 
 
 @dataclass(frozen=True)
-class ImageCapture:
+class ImageCapture(Options):
     """How images were taken.
 
     Attributes:
@@ -50,12 +52,13 @@ class ImageCapture:
         base: what was there anyway; nothing if None.
 
     Raises:
-        InputError: neither exposures nor the factor of the base are known.
+        InputError: neither exposures nor the factor of the base are known; or a number that cannot be.
     """
 
     exposure_free: bool = False
     clip: float | Sequence[float] | None = None
-    saturated: float = SATURATED
+    saturated: float = option(SATURATED, low=1e-9, high=1)
+    """a value from here on, as a part of the clip, is saturated"""
     base: BaseImages | None = None
 
     def clips(self, count: int) -> Tensor:
@@ -64,13 +67,23 @@ class ImageCapture:
         Raises:
             InputError: it is known of another number of views.
         """
-        found = torch.tensor(math.inf if self.clip is None else self.clip, dtype=torch.float64)
+        found = torch.tensor(math.inf).double() if self.clip is None else _limits(self.clip)
         if found.dim() and len(found) != count:
             expected, remedy = f"one number, or {count}, as there are views", "Give inf for views that are not clipped."
             raise InputError("clip", expected=expected, found=f"{len(found)}", remedy=remedy)
         return found.expand(count)
 
-    def __post_init__(self) -> None:
+    def check(self) -> None:
+        """Refuse clips that are none, a base that is none, and unknowns that do not go together.
+
+        Raises:
+            InputError: says which.
+        """
+        if self.clip is not None and not bool((_limits(self.clip) > 0.0).all()):
+            expected, found = "radiance above 0", f"{self.clip}"[:80]
+            raise InputError("clip", expected=expected, found=found, remedy="None is for images that are not clipped.")
+        if self.base is not None:
+            as_one_of(self.base, BaseImages, "base", "Pass BaseImages([image, …]).")
         if self.exposure_free and self.base is not None and self.base.scale_free:
             raise InputError(
                 "base",
@@ -78,6 +91,15 @@ class ImageCapture:
                 found="an unknown factor besides",
                 remedy="Take target and base with the same settings of the camera, and say that the factor is known.",
             )
+
+
+def _limits(clip: ArrayLike) -> Tensor:
+    """() or (V,) float64.
+
+    Raises:
+        InputError: no number, nor a list of them.
+    """
+    return as_tensor(clip, "clip", () if np.ndim(clip) == 0 else ("V",), torch.float64)
 
 
 def stored_in_eight_bits(image: Tensor, alpha: Tensor) -> bool:

@@ -148,6 +148,13 @@ class Emitter:
         moving = [(one.spread(self._value(name)).T, one.motion) for name, one in self.coordinates.items() if one.motion]
         return torch.cat([torch.cat([scale * spread for scale in scales[how]], dim=1) for spread, how in moving])
 
+    @cached_property
+    def ways(self) -> Tensor | None:
+        """(3, d) float64 where the first d parameters move it; None where it is free."""
+        if self.mount is None:
+            return None
+        return self.coordinates["position"].slopes(self.position, torch.eye(3, dtype=torch.float64))
+
     def slopes(self, by: Mapping[str, Tensor]) -> Tensor:
         """(N, D) natural derivatives towards its parameters, scene units and rad, from those towards its fields."""
         by = self.light.tied_slopes(by)

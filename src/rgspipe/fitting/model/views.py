@@ -17,7 +17,7 @@ from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.images.viewed_pixels import ViewedPixels
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.view_weights import ViewWeights
-from rgspipe.scene.arrays import REMEDY, ArrayLike, as_tensor, check_finite, check_radiance
+from rgspipe.scene.arrays import REMEDY, ArrayLike, as_list, as_tensor, check_finite, check_levels, check_radiance
 from rgspipe.scene.camera import AXES
 from rgspipe.scene.guesses import guessed_surfaces
 
@@ -105,13 +105,13 @@ class PreparedViews(ViewedPixels):
         _check_masks(checked, "emitters", "1 where a lamp is, 0 elsewhere")
         return [(mask >= 0.5).cpu().numpy() for mask in checked]
 
-    def stack_images(self, images: Sequence[ArrayLike], name: str = "images") -> Tensor:
+    def stack_images(self, images: Sequence[ArrayLike] | ArrayLike, name: str = "images") -> Tensor:
         """(all pixels, 3) float32 of one image (H, W, 3) per view, called `name` in errors.
 
         Raises:
             InputError: a wrong number of images, a wrong size, display values, or pixels that are not finite.
         """
-        checked = _one_each(name, images, self.views, (3,))
+        checked = _one_each(name, as_list(images, axes=3), self.views, (3,))
         for index, image in enumerate(checked):
             check_radiance(f"{name}[{index}]", float(image.detach().min()), float(image.detach().max()))
         return torch.cat([image.detach().reshape(-1, 3).float() for image in checked]).to(self.operator.matrix.device)
@@ -176,13 +176,8 @@ def _one_each(
     checked = []
     for index, (view, value) in enumerate(zip(views, values, strict=True)):
         where = f"{name}[{index}]"
-        if channels and "uint8" in str(getattr(value, "dtype", "")):
-            raise InputError(
-                where,
-                expected="linear radiance, as floats",
-                found="levels from 0 to 255",
-                remedy="rg.load_views reads files as radiance, and rgspipe.scene.srgb.decode makes it of levels / 255.",
-            )
+        if channels:
+            check_levels(where, value)
         size = (view.camera.height, view.camera.width, *channels)
         tensor = as_tensor(value, where, size, remedy=IMAGE_REMEDY if channels else REMEDY)
         # As fits take it: single precision holds less.

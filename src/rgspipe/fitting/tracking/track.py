@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import torch
 
-from rgspipe.arguments import as_one_of
+from rgspipe.arguments import as_one_of, as_several
 from rgspipe.errors import InputError
 from rgspipe.fitting.findings import FitStatus
 from rgspipe.fitting.fit import FitViews
@@ -54,11 +54,18 @@ def track_lights(
         capture: of all frames, or one for each.
 
     Raises:
-        InputError: light from all around, or images with the lamps off of unknown strength, are among the unknowns.
+        InputError: light from all around, or images with the lamps off of unknown strength, are among the unknowns; or
+            there are not as many captures as frames.
     """
     as_one_of(views, FitViews, "views", "FitViews.prepare makes them of a scene and its cameras.")
-    same = capture is None or isinstance(capture, ImageCapture)
-    captures = [capture or ImageCapture()] * len(frames) if same else capture
+    search = as_one_of(search or Search(), Search, "search", "Pass Search(…).")
+    options = as_one_of(options or TrackOptions(), TrackOptions, "options", "Pass TrackOptions(…).")
+    taken = [as_list(images, axes=3) for images in frames]
+    given = as_several(capture or ImageCapture(), ImageCapture, "capture", "Pass one, or one for each frame.")
+    captures = given * len(taken) if capture is None or isinstance(capture, ImageCapture) else given
+    if len(captures) != len(taken):
+        expected, found = f"one, or one for each of {len(taken)} frames", f"{len(captures)} of them"
+        raise InputError("capture", expected=expected, found=found, remedy="Pass as many as frames.")
     if views.lights.ambient or any(one.base is not None and one.base.scale_free for one in captures):
         raise InputError(
             "lights.ambient" if views.lights.ambient else "base",
@@ -66,8 +73,7 @@ def track_lights(
             found="light that is there anyway, of unknown strength",
             remedy="Give images with the lamps off, of known strength, or fit each frame by itself.",
         )
-    taken = list(zip((as_list(images, axes=3) for images in frames), captures, strict=True))
-    return _Tracker(views, search or Search(), options or TrackOptions(), taken).run()
+    return _Tracker(views, search, options, list(zip(taken, captures, strict=True))).run()
 
 
 @dataclass(frozen=True)

@@ -102,6 +102,5 @@ class PixelModel(ViewModel):
         for index, highlights in enumerate(self.highlights):
             images[index] = images[index] + highlights.image(place, lit.passing, lit.slope)
         columns = torch.cat(images)
-        if light.light.axis is None:
-            return columns
-        return attenuated(columns, emitted_intensity(light, self.points, self.effects.spots), light)
+        sent = None if light.light.axis is None else emitted_intensity(light, self.points, self.effects.spots)
+        return attenuated(columns, sent, light)
