@@ -306,6 +306,17 @@ def test_a_name_with_its_suffix_needs_no_file_ext(dataset: Path, change: Change)
     assert load_dataset(dataset).train[0].name == "train/a"
 
 
+@pytest.mark.parametrize("written", ["a.png", "a.PNG", "a.jpg"])
+@pytest.mark.parametrize("stated", ["train/a", ".\\train\\a"])
+def test_a_name_without_a_suffix_is_that_of_the_image_that_is_there(
+    dataset: Path, change: Change, written: str, stated: str
+) -> None:
+    """NeRF's own datasets name PNG images so, and programs on Windows write backslashes: no such EXR was found."""
+    Image.new("RGB", (6, 4), (188, 188, 188)).save(dataset / "train" / written)
+    change(TRAIN, _frame(file_path=stated, file_ext=...))
+    assert float(load_dataset(dataset).train[0].image.mean()) == pytest.approx(0.5028, abs=1e-3)  # 0.50289
+
+
 def test_maps_need_no_suffix_either(dataset: Path, change: Change) -> None:
     change(TRAIN, _frame(depth_path="train/r_0000_depth"))
     assert load_dataset(dataset).train[0].depth is not None

@@ -51,6 +51,23 @@ def _of_second(path: Path, fields: dict) -> None:
     path.write_text(json.dumps(content))
 
 
+def test_a_field_of_view_and_the_image_s_size_will_do_for_nerfstudio(tmp_path: Path) -> None:
+    """As instant-ngp takes them; they were refused."""
+    write_nerfstudio(tmp_path, SCANNED, ".png", ".png")
+    path, lens = tmp_path / "transforms.json", read_scan(tmp_path, ScanOptions()).frames[0].lens
+    content = json.loads(path.read_text())
+    shared = {key: value for key, value in content.items() if key not in ("fl_x", "fl_y", "w", "h", "cx", "cy")}
+    angle = 2.0 * np.arctan(0.5 * lens.width / lens.fx)
+    path.write_text(json.dumps(shared | {"camera_angle_x": angle}))
+    found = read_scan(tmp_path, ScanOptions()).frames[0].lens
+    assert (found.fx, found.width, found.height) == pytest.approx((lens.fx, lens.width, lens.height))
+    path.write_text(json.dumps(shared | {"camera_angle_x": angle, "camera_angle_y": 0.5 * angle}))
+    with pytest.raises(InputError, match="camera_angle_y: expected the same field of view"):
+        read_scan(tmp_path, ScanOptions())
+    path.write_text(json.dumps(content | {"camera_angle_x": 0.5 * angle}))  # nerfstudio looks at fl_x alone
+    assert read_scan(tmp_path, ScanOptions()).frames[0].lens.fx == lens.fx
+
+
 def test_optics_of_nerfstudio_that_do_nothing_are_read(tmp_path: Path) -> None:
     nothing = {"k5": 0, "skew": 0.0, "distortion_params": [0.0] * 6, "is_fisheye": False, "rolling_shutter_time": None}
     write_nerfstudio(tmp_path, SCANNED, ".png", ".png", nothing)

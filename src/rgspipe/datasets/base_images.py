@@ -12,7 +12,7 @@ from rgspipe.datasets.frames import FrameEntry, read_entries
 from rgspipe.datasets.images import check_size, read_colour
 from rgspipe.datasets.input_file import input_folder
 from rgspipe.datasets.json_file import is_number
-from rgspipe.datasets.pinhole_keys import KEYS
+from rgspipe.datasets.pinhole_keys import ANGLES, KEYS
 from rgspipe.errors import InputError
 from rgspipe.scene import Camera
 
@@ -83,6 +83,6 @@ def _require_same(entry: FrameEntry, other: FrameEntry) -> None:
 def _stated(frame: FrameEntry) -> Tensor:
     """What a frame says of its camera: the pose, and intrinsics or the field of view, with what stands beside it."""
     fields = frame.shared | frame.fields
-    beside = [fields[key] for key in KEYS if is_number(fields.get(key))]
-    numbers = fields.get("camera_intrinsics", [fields.get("camera_angle_x", 0.0), *beside])
+    beside = [fields[key] for key in (*KEYS, *ANGLES) if is_number(fields.get(key))]
+    numbers = fields.get("camera_intrinsics", beside)
     return torch.cat([frame.pose().reshape(-1), torch.tensor(numbers, dtype=torch.float64).reshape(-1)])

@@ -22,7 +22,17 @@ def camera_of_angle(pose: Tensor, angle: object, width: int, height: int, place:
     Raises:
         InputError: no lens has this angle.
     """
+    focal = focal_of_angle(angle, width, place)
+    return Camera(pose, focal, focal, 0.5 * width, 0.5 * height, width, height)
+
+
+def focal_of_angle(angle: object, size: float, place: str) -> float:
+    """The focal length, in pixels, with which `angle` radians are `size` pixels wide.
+
+    Raises:
+        InputError: no lens has this angle; names its `place`.
+    """
     if not is_number(angle) or not NARROWEST <= angle < math.pi:
         expected = f"radians between {NARROWEST:g} and π"
         raise InputError(place, expected=expected, found=shown(angle), remedy="Correct it.")
-    return Camera.from_field_of_view(pose, float(angle), width, height)
+    return 0.5 * size / math.tan(0.5 * float(angle))

@@ -8,12 +8,12 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
-from rgspipe.datasets.field_of_view import camera_of_angle
+from rgspipe.datasets.image_names import image_named
 from rgspipe.datasets.input_file import is_plain_name
 from rgspipe.datasets.json_file import is_number, numbers, read_json, required, shown
 from rgspipe.datasets.limits import STRONGEST
 from rgspipe.datasets.named_cameras import read_camera
-from rgspipe.datasets.pinhole_keys import KEYS, stated_intrinsics
+from rgspipe.datasets.pinhole_keys import ANGLES, KEYS, stated_intrinsics
 from rgspipe.datasets.rigid_pose import check_place, rigid_pose
 from rgspipe.errors import InputError
 from rgspipe.scene import Camera
@@ -22,9 +22,6 @@ from rgspipe.scene.lights import WATTS_PER_INTENSITY
 
 #: The key of a camera by its name in the scene's own file, and that of the file that lists these.
 CAMERA, CAMERAS = "camera", "cameras_path"
-
-#: Suffixes of images; names without one of them are completed.
-SUFFIXES = (".exr", ".png", ".jpg", ".jpeg")
 
 #: A principal point off the middle by more than ELSEWHERE of the half width, and by as much of the half height within
 #: ALIKE, is that of an image of another size: lenses are off by some hundredths, and rarely by as much both ways.
@@ -60,13 +57,13 @@ class FrameEntry:
 
     @property
     def image_path(self) -> Path:
-        """The image; `file_ext` is added unless `file_path` has it already, or .exr where neither says anything."""
+        """The image; `file_ext` is added unless `file_path` has it already, see `image_named` where none is stated."""
         name, extension = self._text("file_path"), self.fields.get("file_ext", self.shared.get("file_ext"))
         if extension is None:
             return self._image(name)
         if not isinstance(extension, str):
             raise InputError(f"{self.where}.file_ext", expected="a suffix", found=repr(extension), remedy="Correct it.")
-        return self._path(name if name.endswith(extension) else name + extension)
+        return self._image(name if name.endswith(extension) else name + extension)
 
     @property
     def depth_path(self) -> Path | None:
@@ -150,23 +147,23 @@ class FrameEntry:
         if CAMERA in self.fields:
             return read_camera(self.cameras_path, self._text(CAMERA)).of_image(width, height)
         pose = self.pose()
-        own = self.fields.keys() & {"camera_intrinsics", "camera_angle_x", *KEYS}
+        own = self.fields.keys() & {"camera_intrinsics", *ANGLES, *KEYS}
         holder = self.fields if own else self.shared
         if "camera_intrinsics" in holder:
             self._require_size(width, height)
             values = numbers(holder["camera_intrinsics"], 4, self.where, "camera_intrinsics")
             return self._camera_of(values, "camera_intrinsics", pose, width, height)
-        values = stated_intrinsics(self.shared | self.fields, width, height, self.where)
-        if values is not None:
-            return self._camera_of(values, ", ".join(KEYS), pose, width, height)
-        if "camera_angle_x" not in holder:
+        stated = self.shared | self.fields
+        values = stated_intrinsics(stated, width, height, self.where)
+        if values is None:
             raise InputError(
                 self.where,
                 expected='"camera_angle_x" [rad] or "camera_intrinsics" [cx, cy, fx, fy], here or at the top',
                 found="neither",
                 remedy="Add one of them.",
             )
-        return camera_of_angle(pose, holder["camera_angle_x"], width, height, f"{self.where}: camera_angle_x")
+        keys = ", ".join(key for key in (*KEYS, *ANGLES) if key in stated)
+        return self._camera_of(values, keys, pose, width, height)
 
     def _refuse_distortion(self) -> None:
         """Images of lenses that bend straight lines are not of the cameras that are known here."""
@@ -265,8 +262,7 @@ class FrameEntry:
         return self._image(self._text(key)) if key in self.fields else None
 
     def _image(self, name: str) -> Path:
-        """An image by a name that may lack its suffix."""
-        return self._path(name if name.lower().endswith(SUFFIXES) else name + ".exr")
+        return image_named(self.transforms_path.parent, name)
 
     def _text(self, key: str, fields: dict | None = None) -> str:
         value = required(self.fields if fields is None else fields, key, self.where)

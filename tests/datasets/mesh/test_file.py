@@ -41,6 +41,22 @@ def test_points_and_colours_come_back(tmp_path: Path, suffix: str) -> None:
     assert np.abs(mesh.paint.at(np.arange(12), CENTRE) - expected).max() < 1e-6
 
 
+def test_the_mesh_of_polycam_is_where_its_cameras_are(tmp_path: Path) -> None:
+    """It lay a quarter turn from them, and where Polycam had moved it."""
+    turn = trimesh.transformations.rotation_matrix(0.7, [0, 1, 0], [0.3, -0.2, 0.5])
+    # Cameras are read with the third row first: the file has our y, z, x.
+    raw = VERTICES[:, [1, 2, 0]]
+    write_coloured(tmp_path / "raw.glb", trimesh.transform_points(raw, turn), FACES, LEVELS)
+    (tmp_path / "mesh_info.json").write_text(json.dumps({"alignmentTransform": turn.T.reshape(-1).tolist()}))
+    (tmp_path / "keyframes").mkdir()
+    found = middles(read_mesh(tmp_path / "raw.glb"))
+    assert np.abs(found - VERTICES[FACES].mean(axis=1)).max() < 1e-6  # single precision: 1e-7
+    assert tmp_path / "mesh_info.json" in mesh_files(tmp_path / "raw.glb")
+    (tmp_path / "mesh_info.json").write_text(json.dumps({"alignmentTransform": 16 * [1.0]}))
+    with pytest.raises(InputError, match=r"mesh_info\.json: alignmentTransform: expected a rigid"):
+        read_mesh(tmp_path / "raw.glb")
+
+
 @pytest.mark.parametrize("name", ["a.obj", "a.glb", "a.gltf"])
 def test_textures_are_where_they_belong(tmp_path: Path, name: str) -> None:
     trimesh.Scene(textured_square(quarters())).export(tmp_path / name)

@@ -23,6 +23,7 @@ from rgspipe.datasets.mesh.obj_text import plain_obj
 from rgspipe.datasets.mesh.options import FORMATS, GLTF, MeshOptions
 from rgspipe.datasets.mesh.paint import check_shares, paint_of
 from rgspipe.datasets.mesh.ply_polygons import with_triangles
+from rgspipe.datasets.mesh.polycam_place import polycam_place
 from rgspipe.datasets.mesh.texture import check_texture
 from rgspipe.datasets.ply.header import check_colours, check_rows, check_strips, without_texture
 from rgspipe.datasets.reading_limits import RAISE, reading_limits, timed
@@ -62,7 +63,10 @@ def read_mesh(path: str | Path, options: MeshOptions | None = None) -> TriangleM
     if not all(material.opaque for material in materials):
         mesh = replace(mesh, remarks=(SEE_THROUGH,))
     scaled = np.diag([*[options.unit] * 3, 1.0])
-    return _checked(mesh.moved(scaled @ UPRIGHT if is_y_up(path, options) else scaled), path)
+    placed = polycam_place(path) if options.up == "auto" else None
+    if placed is None:
+        placed = UPRIGHT if is_y_up(path, options) else np.eye(4)
+    return _checked(mesh.moved(scaled @ placed), path)
 
 
 def is_y_up(path: Path, options: MeshOptions) -> bool:

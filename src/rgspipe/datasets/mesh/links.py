@@ -12,6 +12,7 @@ from urllib.parse import unquote
 from rgspipe.datasets.input_file import input_file, is_there
 from rgspipe.datasets.json_file import parse_json, read_json, shown
 from rgspipe.datasets.mesh.obj_materials import ObjMaterials, read_materials
+from rgspipe.datasets.mesh.polycam_place import polycam_info
 from rgspipe.datasets.reading_limits import reading_limits
 from rgspipe.errors import InputError
 
@@ -77,14 +78,15 @@ def mesh_links(path: Path) -> Links:
 
 
 def mesh_files(path: Path) -> list[Path]:
-    """The file and those that it names, as far as they are there.
+    """The file and those that it names, or that say where it is, as far as they are there.
 
     Raises:
         InputError: as `mesh_links`, but for a file that is missing; or one of them is no regular file.
     """
     if not path.exists():
         return [path]
-    return [path, *mesh_links(path).there()]
+    info = polycam_info(path)
+    return [path, *mesh_links(path).there(), *([] if info is None else [info])]
 
 
 def _place(mesh: Path, by: Path, name: str) -> Path:

@@ -83,6 +83,7 @@ class ScanFrame:
         material: an image whose green channel is the part of the albedo that is a metal's and not diffuse.
         mask: an image that is 0 where the photograph is not to be used.
         lighting: the name of the capture, where there are several.
+        border: part of the image's longer side along its rim that is not to be used.
     """
 
     image: Path
@@ -93,6 +94,7 @@ class ScanFrame:
     material: Path | None = None
     mask: Path | None = None
     lighting: str = ""
+    border: float = 0.0
 
     @property
     def files(self) -> list[Path]:

@@ -162,6 +162,11 @@ def _used(frame: ScanFrame, picture: Picture, camera: Camera) -> np.ndarray | No
         check_shape(frame.mask, mask.light.shape, frame.lens)
         # Masks may be of levels 0 and 1: whatever is not black counts.
         hidden += [mask.hidden, (mask.light <= 0.0).any(axis=2)]
+    if frame.border:
+        rim = np.ones(picture.light.shape[:2], bool)
+        wide = int(np.ceil(frame.border * max(rim.shape)))
+        rim[wide:-wide, wide:-wide] = False
+        hidden.append(rim)
     parts = [part for part in hidden if part is not None]
     return ~np.any([_shown(part, camera, frame.lens) for part in parts], axis=0) if parts else None
 

@@ -10,9 +10,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rgspipe.datasets.frames import FrameEntry, read_entries
+from rgspipe.datasets.image_names import image_named
 from rgspipe.datasets.json_file import is_number, shown, whole
+from rgspipe.datasets.pinhole_keys import stated_intrinsics
 from rgspipe.datasets.scans.frame import DepthImage, Lens, Scan, ScanFrame
 from rgspipe.datasets.scans.options import ScanOptions
+from rgspipe.datasets.scans.pictures import size_of
 from rgspipe.datasets.scans.poses import matrix_of, placed
 from rgspipe.errors import InputError
 
@@ -31,6 +34,9 @@ MOST_UNITS = 1e9
 #: Models whose distortion is that of `Lens`.
 STRAIGHT = ("OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "PERSPECTIVE")
 FISHEYE = "OPENCV_FISHEYE"
+
+#: Which focal length stands over an angle.
+FOCAL_OF = {"camera_angle_x": "fl_x", "camera_angle_y": "fl_y"}
 
 #: What changes where a camera sees things and `Lens` does not have, in files for nerfstudio and instant-ngp.
 OTHER_OPTICS = ("k5", "k6", "skew", "distortion_params", "fisheye_crop_radius")
@@ -63,7 +69,7 @@ def _frame(entry: FrameEntry, options: ScanOptions) -> ScanFrame:
     matrix = matrix_of(entry.fields["transform_matrix"], where)
     matrix[:3, 3] /= _unit(entry, "applied_scale", 1.0)
     return ScanFrame(
-        image=entry.transforms_path.parent / _text(entry, "file_path"),
+        image=_image(entry),
         lens=_lens(entry),
         pose=placed(matrix, where, options, AXES),
         depth=_depth(entry, options),
@@ -83,13 +89,24 @@ def _lens(entry: FrameEntry) -> Lens:
     fisheye = model == FISHEYE
     # instant-ngp tells a fisheye lens by a key of its own.
     _refuse_other_optics(entry, OTHER_OPTICS if fisheye else (*OTHER_OPTICS, "is_fisheye"))
-    width, height = (whole(_positive(entry, key), entry.where, key) for key in ("w", "h"))
-    fx = _positive(entry, "fl_x")
-    centre = [_number(entry, key, 0.5 * size) for key, size in (("cx", width), ("cy", height))]
+    stated = entry.shared | entry.fields
+    # Of a focal length nerfstudio asks for no angle beside it, which may be left of another size.
+    stated = {key: value for key, value in stated.items() if FOCAL_OF.get(key) not in stated}
+    sizes = [whole(stated[key], entry.where, key) if key in stated else None for key in ("w", "h")]
+    width, height = size_of(_image(entry)) if None in sizes else sizes
+    values = stated_intrinsics(stated, width, height, entry.where)
+    if values is None:
+        expected = '"fl_x" or "camera_angle_x", here or at the top'
+        raise InputError(entry.where, expected=expected, found="neither", remedy="Add one of them.")
+    cx, cy, fx, fy = values
     radial = tuple(_number(entry, key, 0.0) for key in ("k1", "k2", "k3", "k4"))
     # A fisheye lens has no such terms; files may hold those of another model.
     tangential = (0.0, 0.0) if fisheye else (_number(entry, "p1", 0.0), _number(entry, "p2", 0.0))
-    return Lens(fx, _positive(entry, "fl_y", fx), *centre, width, height, radial, tangential, fisheye)
+    return Lens(fx, fy, cx, cy, width, height, radial, tangential, fisheye)
+
+
+def _image(entry: FrameEntry) -> Path:
+    return image_named(entry.transforms_path.parent, _text(entry, "file_path"))
 
 
 def _refuse_other_optics(entry: FrameEntry, keys: Sequence[str]) -> None:

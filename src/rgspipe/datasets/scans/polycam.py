@@ -24,6 +24,9 @@ WANTED = "keyframes/corrected_cameras/ or keyframes/cameras/"
 #: Folders of cameras and their photographs: what the app corrected afterwards goes first.
 FOLDERS = (("corrected_cameras", "corrected_images"), ("cameras", "images"))
 
+#: Part of the longer side within which undoing distortion leaves black at the rim; nerfstudio cuts off 15 of 1024.
+BORDER = 15 / 1024
+
 MILLIMETRE = 1e-3
 
 #: The rows of the file's matrix in our order.
@@ -42,8 +45,9 @@ def read(root: Path, options: ScanOptions) -> Scan:
         InputError: no camera files, missing keys, or poses that are not rigid.
     """
     keyframes = root / "keyframes"
-    cameras, images = next(pair for pair in FOLDERS if (keyframes / pair[0]).is_dir())
-    files = sorted((keyframes / cameras).glob("*.json"))
+    found = {pair: sorted((keyframes / pair[0]).glob("*.json")) for pair in FOLDERS}
+    cameras, images = next((pair for pair, files in found.items() if files), FOLDERS[-1])
+    files = found[cameras, images]
     if not files:
         raise InputError(keyframes / cameras, expected="a .json file a camera", found="none", remedy="Export raw data.")
     frames = tuple(_frame(path, keyframes, images, options) for path in files)
@@ -67,4 +71,5 @@ def _frame(path: Path, keyframes: Path, images: str, options: ScanOptions) -> Sc
         lens=Lens(*lens, *size),
         pose=placed(matrix, path, options, AXES),
         depth=measured if depth.is_file() else None,
+        border=BORDER if images == FOLDERS[0][1] else 0.0,
     )
