@@ -17,6 +17,9 @@ MIRRORING = {"BSDF_GLOSSY", "BSDF_METALLIC", "BSDF_ANISOTROPIC"}
 #: Inputs that all have to be above 0 for a surface to glow.
 GLOWING = {"EMISSION": ("Strength", "Color"), "BSDF_PRINCIPLED": ("Emission Strength", "Emission Color")}
 
+#: What inputs were called before Blender 4.
+FORMERLY = {"Emission Color": "Emission", "Transmission Weight": "Transmission"}
+
 #: Types of grease pencil, which Blender draws over images.
 DRAWINGS = {"GPENCIL", "GREASEPENCIL"}
 
@@ -188,7 +191,7 @@ def reached(tree: bpy.types.ShaderNodeTree) -> Iterator[bpy.types.Node]:
 
 def _above_zero(node: bpy.types.Node, name: str) -> bool:
     """Whether an input may be above 0: it is, or something is linked to it."""
-    socket = node.inputs.get(name)
+    socket = node.inputs.get(name) or node.inputs.get(FORMERLY.get(name, name))
     if socket is None:
         return False
     value = socket.default_value
