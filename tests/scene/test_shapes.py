@@ -11,6 +11,7 @@ import pytest
 import torch
 
 from rgspipe.datasets.views import View
+from rgspipe.errors import InputError
 from rgspipe.fitting.result import dark_result
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import Camera, PointLight
@@ -32,7 +33,7 @@ def test_arguments_of_other_shapes_are_refused() -> None:
 def test_the_maps_of_a_view_have_one_size() -> None:
     camera = Camera.look_at([0.0, -2.0, 0.0], [0.0, 0.0, 0.0], width=8, height=6)
     view = View("one", camera, torch.zeros(6, 8, 3), torch.ones(6, 8))
-    with pytest.raises(jaxtyping.TypeCheckError):
+    with pytest.raises(InputError, match=r"depth: expected numbers of shape \(6, 8\)"):
         replace(view, depth=torch.ones(8, 6))
 
 

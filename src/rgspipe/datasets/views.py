@@ -79,7 +79,8 @@ class View:
         for name, channels in PARTS.items():
             if (given := getattr(self, name)) is not None:
                 check_levels(name, given)
-                object.__setattr__(self, name, as_tensor(given, name, (*size, *channels), torch.float32).detach())
+                taken = as_tensor(given, name, (*size, *channels), torch.float32)
+                object.__setattr__(self, name, taken.detach() if taken.requires_grad else taken)
         if self.emitters is not None:
             object.__setattr__(self, "emitters", as_tensor(self.emitters, "emitters", size) >= 0.5)
         self._check()
