@@ -191,6 +191,20 @@ def test_a_lens_that_folds_the_image_is_refused() -> None:
         straight_camera(lens, np.eye(4), 64, Path("a.png"))
 
 
+def test_no_photograph_is_made_larger_than_it_is(tmp_path: Path) -> None:
+    """Intrinsics of twice the size made 48 pixels 96."""
+    views = photographed(3, 48)
+    write_nerfstudio(tmp_path / "scan", views)
+    path = tmp_path / "scan/transforms.json"
+    content = json.loads(path.read_text())
+    content |= {key: 2 * content[key] for key in ("w", "h", "fl_x", "fl_y", "cx", "cy")}
+    path.write_text(json.dumps(content))
+    for read, view in zip(imported(tmp_path / "scan", resolution=96), views, strict=True):
+        assert (read.camera.width, read.camera.height) == (48, 48)
+        assert read.camera.fx == pytest.approx(view.camera.fx) and read.camera.cx == pytest.approx(view.camera.cx)
+        assert torch.allclose(read.image, view.image, atol=1e-6)
+
+
 @pytest.mark.parametrize("kept", [255, 1])
 def test_masked_pixels_are_left_out_however_little_of_one_is_masked(tmp_path: Path, kept: int) -> None:
     """Programs write masks of 0 and 255, or of 0 and 1."""
