@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from PIL import Image
+from PIL import ExifTags, Image
 
 from raycast import BLOCK, ROOM, cast, room_views
 from rgspipe.datasets.display_image import read_levels
@@ -203,6 +203,32 @@ def test_no_photograph_is_made_larger_than_it_is(tmp_path: Path) -> None:
         assert (read.camera.width, read.camera.height) == (48, 48)
         assert read.camera.fx == pytest.approx(view.camera.fx) and read.camera.cx == pytest.approx(view.camera.cx)
         assert torch.allclose(read.image, view.image, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("size", "stated", "turned", "taken"),
+    [
+        ((48, 32), (96, 64), 6, True),
+        ((48, 32), (32, 48), 6, False),
+        ((48, 32), None, 6, False),
+        ((48, 32), (48, 32), 3, False),
+        ((48, 48), (48, 48), 8, False),
+    ],
+)
+def test_a_photograph_on_its_side_is_taken_as_stored_where_intrinsics_say_so(
+    tmp_path: Path, size: tuple, stated: tuple | None, turned: int, taken: bool
+) -> None:
+    """COLMAP ignores the tag, so that its intrinsics are of the pixels as they are stored."""
+    levels = np.random.default_rng(0).integers(0, 256, (size[1], size[0], 3)).astype(np.uint8)
+    exif = Image.Exif()
+    exif[ExifTags.Base.Orientation] = turned
+    Image.fromarray(levels).save(tmp_path / "a.png", exif=exif)
+    if taken:
+        light = read_picture(tmp_path / "a.png", "linear", stated).light
+        assert np.array_equal(np.round(255.0 * light), levels)
+        return
+    with pytest.raises(InputError, match=f"orientation {turned}"):
+        read_picture(tmp_path / "a.png", "linear", stated)
 
 
 @pytest.mark.parametrize("kept", [255, 1])

@@ -87,6 +87,7 @@ def _frame(
         lens=cameras[photograph.camera],
         pose=placed(matrix, f"{where}: {photograph.name}", options, AXES),
         depth=_depth(root, photograph.name, options),
+        size_stated=True,
     )
 
 

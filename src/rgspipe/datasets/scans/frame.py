@@ -84,6 +84,7 @@ class ScanFrame:
         mask: an image that is 0 where the photograph is not to be used.
         lighting: the name of the capture, where there are several.
         border: part of the image's longer side along its rim that is not to be used.
+        size_stated: whether the layout states the size of `lens`, which else is that of the image as it is stored.
     """
 
     image: Path
@@ -95,6 +96,7 @@ class ScanFrame:
     mask: Path | None = None
     lighting: str = ""
     border: float = 0.0
+    size_stated: bool = False
 
     @property
     def files(self) -> list[Path]:

@@ -74,6 +74,7 @@ def _frame(entry: FrameEntry, options: ScanOptions) -> ScanFrame:
         pose=placed(matrix, where, options, AXES),
         depth=_depth(entry, options),
         mask=entry.transforms_path.parent / _text(entry, "mask_path") if "mask_path" in entry.fields else None,
+        size_stated={"w", "h"} <= entry.shared.keys() | entry.fields.keys(),
     )
 
 

@@ -44,8 +44,11 @@ class Picture:
     hidden: npt.NDArray[np.bool_] | None = None
 
 
-def read_picture(path: Path, response: str) -> Picture:
+def read_picture(path: Path, response: str, stated: tuple[int, int] | None = None) -> Picture:
     """A photograph in 8 or 16 bits, by its `response` ("srgb" or "linear"), or in floats.
+
+    Args:
+        stated: as of `read_levels`.
 
     Raises:
         InputError: missing or broken file, another format than the suffix says, pixels to be turned (EXIF), or levels
@@ -58,7 +61,7 @@ def read_picture(path: Path, response: str) -> Picture:
         return Picture(read_hdr(path), None)
     if path.suffix.lower() in RAW:
         return Picture(*read_raw(path))
-    stored, limit = read_levels(path), saturated_from(path)
+    stored, limit = read_levels(path, stated), saturated_from(path)
     linear = response == "linear"
     light = stored.values if linear else stored.light
     light = np.repeat(light, 3, axis=2) if light.shape[2] == 1 else light
