@@ -119,6 +119,22 @@ def test_the_highest_level_of_depth_is_no_distance(tmp_path: Path) -> None:
     assert np.array_equal(read, np.array([[np.nan, 65534.0, 1.0]], np.float32), equal_nan=True)
 
 
+@pytest.mark.parametrize("shape", [(3, 4), (3, 4, 1)])
+def test_depth_of_numpy_is_read(tmp_path: Path, shape: tuple) -> None:
+    depth = np.arange(1.0, 13.0, dtype=np.float32)
+    np.save(tmp_path / "a.npy", depth.reshape(shape))
+    assert np.array_equal(read_depth_image(DepthImage(tmp_path / "a.npy", 2.0)), 2.0 * depth.reshape(3, 4))
+
+
+@pytest.mark.parametrize(
+    "stored", [np.ones((3, 4, 2)), np.ones(12), np.array([[None]]), np.ones((0, 4)), np.ones((3, 4), bool)]
+)
+def test_other_arrays_of_numpy_are_no_depth(tmp_path: Path, stored: np.ndarray) -> None:
+    np.save(tmp_path / "a.npy", stored)
+    with pytest.raises(InputError, match=r"a\.npy: expected an array \(H, W\) of depth"):
+        read_depth_image(DepthImage(tmp_path / "a.npy", 1.0))
+
+
 @pytest.mark.parametrize("kind", ["8 bits", "colours"])
 def test_pictures_of_depth_are_refused(tmp_path: Path, kind: str) -> None:
     shape = (4, 4) if kind == "8 bits" else (4, 4, 3)

@@ -58,7 +58,7 @@ class DepthImage:
     """A depth image of a photograph.
 
     Attributes:
-        path: PNG (16 bits), EXR, or COLMAP's binary array.
+        path: PNG (16 bits), EXR, an array of numpy, or COLMAP's binary array.
         unit: what a stored 1 is, in the unit of the cameras' places.
         lens: its own, where it is not the photograph's at another size.
         confidence: an image of the same size that is 0 where depth is not to be believed.
