@@ -133,6 +133,10 @@ def test_sides_stay_in_sight_where_the_window_becomes_narrow(viewer: Viewer) -> 
         told = {"position": EYE, "look_at": held.look_at.tolist(), "fov": held.fov}
         browser.send(message(**told, image_width=150))
         wait_for(lambda: abs(math.tan(0.5 * held.fov) - 2.0 * math.tan(half)) < 1e-6)
+        once = page._begun
+        browser.send(message(**told, image_width=150))  # it did not hear of it
+        wait_for(lambda: page._begun is not once)
+        wait_for(lambda: abs(math.tan(0.5 * held.fov) - 2.0 * math.tan(half)) < 1e-6)
         # Not where the visitor has moved.
         browser.send(message(**(told | {"position": [0.0, -0.4, 0.0]}), image_width=150))
         wait_for(lambda: page._begun is None)

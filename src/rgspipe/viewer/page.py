@@ -49,7 +49,7 @@ class Page:
         self._upright = 1.0 if is_phone else UPRIGHT
         self._client, self._exhibit, self._resolution, self._seen = client, exhibit, exhibit.resolution, b""
         self._wanted: Camera | None = None
-        self._begun: tuple[Camera, float] | None = None
+        self._begun: tuple[Camera, float, float] | None = None
         self.session = exhibit.session()
         self.painter = Painter(self.session, self.camera, self._show, exhibit.resolution, exhibit.turn)
         self.drawings = Drawings(client.scene, exhibit.images.frozen.size, self._go_to)
@@ -102,7 +102,7 @@ class Page:
     async def _moved(self, _: viser.CameraHandle) -> None:
         camera = self._here()
         # The browser tells of its camera also where it stands still.
-        if camera is not None and (camera.key != self._seen or self._wanted is not None):
+        if camera is not None and (camera.key != self._seen or self._wanted is not None or self._is_unheard()):
             self._seen = camera.key
             self.painter.changed()
             self.actions.do("look", lambda: self._look(camera))
@@ -127,13 +127,23 @@ class Page:
         self._follow()
 
     def _fit(self) -> None:
-        """Take the same camera again where the window has changed since, as it does while a page is laid out."""
+        """Take the same camera again where the browser has another window, or did not hear of it."""
         with contextlib.suppress(*NO_CAMERA):
             if self._wanted is None and self._begun is not None:
-                camera, aspect = self._begun
+                camera = self._begun[0]
                 stays = float(abs(self._client.camera.position - camera.origin.numpy()).max()) < STILL
                 self._begun = self._begun if stays else None
-                self._wanted = camera if stays and self._client.camera.aspect != aspect else None
+                self._wanted = camera if stays and self._is_unheard() else None
+
+    def _is_unheard(self) -> bool:
+        """Whether the window has changed since a camera was taken, as it does while a page is laid out.
+
+        Or a browser that was not ready did not hear of the field of view, which nobody else changes.
+        """
+        if self._begun is None:
+            return False
+        (_, aspect, fov), held = self._begun, self._client.camera
+        return held.aspect != aspect or abs(held.fov - fov) >= STILL
 
     def _follow(self) -> None:
         camera = self._wanted
@@ -153,4 +163,4 @@ class Page:
         held.up_direction = up if abs(forward[2]) > STEEP else (0.0, 0.0, 1.0)
         held.position, held.fov = position, fov
         held.look_at = position + forward * max(self.session.images.frozen.size, 1e-3)
-        self._begun = camera, held.aspect
+        self._begun = camera, held.aspect, fov
