@@ -102,6 +102,16 @@ def test_a_cropped_data_window_is_placed_in_the_display_window(tmp_path: Path) -
     np.testing.assert_array_equal(image, np.repeat(expected[..., None], 3, axis=2))
 
 
+def test_what_lies_outside_of_the_data_window_is_not_seen(tmp_path: Path) -> None:
+    """Without alpha it was black and opaque."""
+    _write_windows(tmp_path / "cropped.exr", _noise(3, 4), ((12, 21), (15, 23)), ((10, 20), (19, 27)))
+    expected = np.zeros((8, 10), np.float32)
+    expected[1:4, 2:6] = 1.0
+    image, alpha = read_image(tmp_path / "cropped.exr")
+    np.testing.assert_array_equal(alpha, expected)
+    assert (image[expected == 0.0] == 0.0).all() and (image[expected == 1.0] > 0.0).all()
+
+
 @pytest.mark.parametrize("data", [((-1, 0), (8, 7)), ((1, 0), (10, 7)), ((0, 1), (9, 8))])
 def test_pixels_outside_of_the_display_window_are_refused(tmp_path: Path, data: tuple) -> None:
     _write_windows(tmp_path / "over.exr", _noise(8, 10), data, ((0, 0), (9, 7)))

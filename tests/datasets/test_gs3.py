@@ -15,8 +15,10 @@ from PIL import Image
 
 from rgspipe.datasets.exr import write_channels, write_image
 from rgspipe.datasets.gs3 import load_dataset, load_target
+from rgspipe.datasets.images import read_depth
 from rgspipe.datasets.location import load_views, open_dataset, point_at_dataset
 from rgspipe.errors import InputError
+from rgspipe.scene import Camera
 
 Change = Callable[[str, Callable[[dict], object]], None]
 TRAIN = "transforms_train.json"
@@ -346,6 +348,13 @@ def test_a_target_in_other_axes_is_refused(dataset: Path, change: Change) -> Non
     change("targets/one/transforms.json", lambda content: content.update(applied_transform=turned))
     with pytest.raises(InputError, match=r"applied_transform.*axes of the scene"):
         load_target(dataset / "targets/one")
+
+
+def test_a_png_of_depth_is_called_one(tmp_path: Path) -> None:
+    Image.fromarray(np.full((4, 6), 900, np.uint16)).save(tmp_path / "depth.png")
+    camera = Camera(torch.eye(4, dtype=torch.float64), 5.0, 5.0, 3.0, 2.0, 6, 4)
+    with pytest.raises(InputError, match=r"depth\.png: expected depth as OpenEXR.*found a PNG image.*0\.001"):
+        read_depth(tmp_path / "depth.png", camera, "planar_z")
 
 
 def test_a_negative_pixel_is_no_radiance(dataset: Path) -> None:

@@ -76,6 +76,14 @@ def test_optics_of_nerfstudio_that_do_nothing_are_read(tmp_path: Path) -> None:
     assert read_scan(tmp_path, ScanOptions()).frames[0].lens.fisheye
 
 
+def test_a_model_that_is_null_and_sizes_as_text_are_read(tmp_path: Path) -> None:
+    write_nerfstudio(tmp_path, SCANNED, ".png", ".png")
+    expected = read_scan(tmp_path, ScanOptions()).frames[0].lens
+    shared = {"camera_model": None, "w": str(expected.width), "h": str(expected.height)}
+    write_nerfstudio(tmp_path, SCANNED, ".png", ".png", shared)
+    assert read_scan(tmp_path, ScanOptions()).frames[0].lens == expected
+
+
 def test_a_frame_of_nerfstudio_has_its_own_scale(tmp_path: Path) -> None:
     """That of the first frame held for all."""
     write_nerfstudio(tmp_path, SCANNED, ".png", ".png", {"applied_scale": 0.5})

@@ -253,16 +253,23 @@ def test_broken_cameras_of_openrooms_are_refused(tmp_path: Path, change: Callabl
 
 @pytest.mark.parametrize(
     ("model", "values"),
-    [("OPENCV_FISHEYE", 8), ("RADIAL_FISHEYE", 5), ("SIMPLE_RADIAL_FISHEYE", 4)],
+    [
+        ("OPENCV_FISHEYE", 8),
+        ("RADIAL_FISHEYE", 5),
+        ("SIMPLE_RADIAL_FISHEYE", 4),
+        ("FISHEYE", 4),
+        ("SIMPLE_FISHEYE", 3),
+    ],
 )
 @pytest.mark.parametrize("binary", [False, True])
 def test_fisheye_lenses_of_colmap_are_read(tmp_path: Path, model: str, values: int, binary: bool) -> None:
     write_colmap(tmp_path, VIEWS[:1], binary=binary)
-    focal = [20.0, 21.0] if values == 8 else [20.0]
+    focal = [20.0, 21.0] if model in ("OPENCV_FISHEYE", "FISHEYE") else [20.0]
     numbers = [*focal, 16.0, 15.0, *np.linspace(0.1, 0.01, values - 2 - len(focal)).tolist()]
     folder = tmp_path / "sparse/0"
     if binary:
-        kind = {"OPENCV_FISHEYE": 5, "SIMPLE_RADIAL_FISHEYE": 8, "RADIAL_FISHEYE": 9}[model]
+        kinds = {"OPENCV_FISHEYE": 5, "SIMPLE_RADIAL_FISHEYE": 8, "RADIAL_FISHEYE": 9}
+        kind = (kinds | {"SIMPLE_FISHEYE": 14, "FISHEYE": 15})[model]
         content = struct.pack(f"<QiiQQ{values}d", 1, 7, kind, SIZE, SIZE, *numbers)
         (folder / "cameras.bin").write_bytes(content)
     else:
@@ -292,6 +299,12 @@ def test_maps_of_colmap_are_read(tmp_path: Path) -> None:
         header = f"{SIZE}&{SIZE}&1&".encode()
         (folder / f"{index:02d}.exr.geometric.bin").write_bytes(header + view.depth.numpy().astype("<f4").tobytes())
     assert max(off(back(tmp_path / "scan")[1], VIEWS)) < 1e-12
+
+
+def test_smaller_copies_alone_will_do_for_colmap(tmp_path: Path) -> None:
+    write_colmap(tmp_path, VIEWS, binary=True)
+    (tmp_path / "images").rename(tmp_path / "images_2")
+    assert read_scan(tmp_path, ScanOptions()).frames[0].image == tmp_path / "images_2/00.exr"
 
 
 @pytest.mark.parametrize("suffix", ["txt", "bin"])

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from PIL import Image
+from PIL import ExifTags, Image
 
 from raycast import BLOCK, ROOM, cast, room_views
 from rgspipe.datasets.display_image import read_levels
@@ -119,6 +119,22 @@ def test_the_highest_level_of_depth_is_no_distance(tmp_path: Path) -> None:
     assert np.array_equal(read, np.array([[np.nan, 65534.0, 1.0]], np.float32), equal_nan=True)
 
 
+@pytest.mark.parametrize("shape", [(3, 4), (3, 4, 1)])
+def test_depth_of_numpy_is_read(tmp_path: Path, shape: tuple) -> None:
+    depth = np.arange(1.0, 13.0, dtype=np.float32)
+    np.save(tmp_path / "a.npy", depth.reshape(shape))
+    assert np.array_equal(read_depth_image(DepthImage(tmp_path / "a.npy", 2.0)), 2.0 * depth.reshape(3, 4))
+
+
+@pytest.mark.parametrize(
+    "stored", [np.ones((3, 4, 2)), np.ones(12), np.array([[None]]), np.ones((0, 4)), np.ones((3, 4), bool)]
+)
+def test_other_arrays_of_numpy_are_no_depth(tmp_path: Path, stored: np.ndarray) -> None:
+    np.save(tmp_path / "a.npy", stored)
+    with pytest.raises(InputError, match=r"a\.npy: expected an array \(H, W\) of depth"):
+        read_depth_image(DepthImage(tmp_path / "a.npy", 1.0))
+
+
 @pytest.mark.parametrize("kind", ["8 bits", "colours"])
 def test_pictures_of_depth_are_refused(tmp_path: Path, kind: str) -> None:
     shape = (4, 4) if kind == "8 bits" else (4, 4, 3)
@@ -189,6 +205,46 @@ def test_a_lens_that_folds_the_image_is_refused() -> None:
     lens = Lens(40.0, 40.0, 32.0, 32.0, 64, 64, (-30.0,))
     with pytest.raises(InputError, match="distortion"):
         straight_camera(lens, np.eye(4), 64, Path("a.png"))
+
+
+def test_no_photograph_is_made_larger_than_it_is(tmp_path: Path) -> None:
+    """Intrinsics of twice the size made 48 pixels 96."""
+    views = photographed(3, 48)
+    write_nerfstudio(tmp_path / "scan", views)
+    path = tmp_path / "scan/transforms.json"
+    content = json.loads(path.read_text())
+    content |= {key: 2 * content[key] for key in ("w", "h", "fl_x", "fl_y", "cx", "cy")}
+    path.write_text(json.dumps(content))
+    for read, view in zip(imported(tmp_path / "scan", resolution=96), views, strict=True):
+        assert (read.camera.width, read.camera.height) == (48, 48)
+        assert read.camera.fx == pytest.approx(view.camera.fx) and read.camera.cx == pytest.approx(view.camera.cx)
+        assert torch.allclose(read.image, view.image, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("size", "stated", "turned", "taken"),
+    [
+        ((48, 32), (96, 64), 6, True),
+        ((48, 32), (32, 48), 6, False),
+        ((48, 32), None, 6, False),
+        ((48, 32), (48, 32), 3, False),
+        ((48, 48), (48, 48), 8, False),
+    ],
+)
+def test_a_photograph_on_its_side_is_taken_as_stored_where_intrinsics_say_so(
+    tmp_path: Path, size: tuple, stated: tuple | None, turned: int, taken: bool
+) -> None:
+    """COLMAP ignores the tag, so that its intrinsics are of the pixels as they are stored."""
+    levels = np.random.default_rng(0).integers(0, 256, (size[1], size[0], 3)).astype(np.uint8)
+    exif = Image.Exif()
+    exif[ExifTags.Base.Orientation] = turned
+    Image.fromarray(levels).save(tmp_path / "a.png", exif=exif)
+    if taken:
+        light = read_picture(tmp_path / "a.png", "linear", stated).light
+        assert np.array_equal(np.round(255.0 * light), levels)
+        return
+    with pytest.raises(InputError, match=f"orientation {turned}"):
+        read_picture(tmp_path / "a.png", "linear", stated)
 
 
 @pytest.mark.parametrize("kept", [255, 1])

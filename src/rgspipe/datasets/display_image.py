@@ -35,6 +35,9 @@ DEPTH, COLOUR_TYPE, COLOURED, GREY_ALPHA = 24, 25, (2, 6), 4
 #: colour are rounded, and these go into blue 1.77 times.
 COLOUR_ROUNDING = 1.5
 
+#: EXIF's orientations that exchange width and height, and the logarithm of their ratio from which that is to be seen.
+ON_SIDE, NO_SQUARE = (5, 6, 7, 8), 0.05
+
 #: What Pillow raises of damaged files, and of those that claim more pixels than it decodes.
 DAMAGED = (OSError, SyntaxError, ValueError, MemoryError, Image.DecompressionBombError)
 
@@ -96,15 +99,19 @@ def _shares(levels: np.ndarray) -> Pixels:
 
 
 @timed
-def read_levels(path: Path) -> Levels:
+def read_levels(path: Path, stated: tuple[int, int] | None = None) -> Levels:
     """What an image stores.
+
+    Args:
+        stated: width and height of an image of the shape that the camera's intrinsics are of, where these are stated:
+            they tell whether a photograph on its side is meant as it is stored.
 
     Raises:
         InputError: missing or broken file, too many pixels, another format than the suffix says, CMYK, or 16-bit
             grey with alpha, which no library at hand reads whole.
     """
     input_file(path, "an image")
-    stored, curve = _levels(path, _format(path))
+    stored, curve = _levels(path, _format(path), stated)
     stored = stored[..., None] if stored.ndim == 2 else stored
     channels = stored.shape[2]
     has_alpha = channels in (2, 4)
@@ -146,14 +153,14 @@ def _format(path: Path) -> str:
     return kind
 
 
-def _levels(path: Path, kind: str) -> tuple[np.ndarray, InputError | None]:
+def _levels(path: Path, kind: str, stated: tuple[int, int] | None) -> tuple[np.ndarray, InputError | None]:
     """(H, W) or (H, W, C) uint8 or uint16; and what speaks against taking them for sRGB."""
     try:
         with opened(path, path, [kind]) as file:
             depth, colour_type = _depth(path, kind)
             if depth == 16 and colour_type == GREY_ALPHA:
                 raise _refusal(path, "8 bits a channel, or 16 of grey or colours", "16 of grey and alpha")
-            _check_orientation(path, file)
+            _check_orientation(path, file, stated)
             wide = depth == 16 and colour_type in COLOURED
             stored, curve = (_wide if wide else _unpacked)(path, file), other_curve(path, file)
         if kind == "JPEG":
@@ -209,10 +216,13 @@ def _with_clear(levels: np.ndarray, file: Image.Image) -> np.ndarray:
     return np.dstack([levels, opaque.astype(np.uint16)])
 
 
-def _check_orientation(path: Path, file: Image.Image) -> None:
-    """Refuse pixels that are to be turned before they are shown: a camera's pose may be meant for either."""
+def _check_orientation(path: Path, file: Image.Image, stated: tuple[int, int] | None) -> None:
+    """Refuse pixels that are to be turned before they are shown, unless intrinsics of the stored shape are stated.
+
+    A camera's pose may be meant for either.
+    """
     turned = file.getexif().get(ExifTags.Base.Orientation, 1)
-    if turned not in (0, 1):
+    if turned not in (0, 1) and not (turned in ON_SIDE and stated is not None and _lies_as(file.size, stated)):
         raise InputError(
             path,
             expected="pixels as they are shown: no EXIF orientation, or 1",
@@ -221,6 +231,15 @@ def _check_orientation(path: Path, file: Image.Image) -> None:
             "tag (exiftool -Orientation= FILE); if they are of the image as it is shown, turn the pixels (mogrify "
             "-auto-orient FILE).",
         )
+
+
+def _lies_as(size: tuple[int, int], stated: tuple[int, int]) -> bool:
+    """Whether an image, which is no square, is longer in the direction in which one of the stated size is.
+
+    Whether their shapes agree is asked of all photographs.
+    """
+    ratios = [np.log(width / height) for width, height in (size, stated)]
+    return bool(min(abs(ratio) for ratio in ratios) > NO_SQUARE and ratios[0] * ratios[1] > 0.0)
 
 
 def _unpacked(path: Path, file: Image.Image) -> np.ndarray:

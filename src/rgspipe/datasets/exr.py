@@ -87,11 +87,18 @@ def _placed(path: Path, part: OpenEXR.Part) -> dict[str, np.ndarray]:
     if (width, height) == (columns, rows):
         return stored
     check_pixel_count(path, columns, rows, reading_limits().cropped_pixels)
-    place = np.s_[top - upper : top - upper + height, left - first : left - first + width]
+    place = _place(part)
     whole = {name: np.zeros((rows, columns), np.float32) for name in stored}
     for name, values in stored.items():
         whole[name][place] = values
     return whole
+
+
+def _place(part: OpenEXR.Part) -> tuple[slice, slice]:
+    """Rows and columns of the display window that the data window takes."""
+    (left, top), (width, height) = _window(part.header["dataWindow"])
+    (first, upper), _ = _window(part.header["displayWindow"])
+    return np.s_[top - upper : top - upper + height, left - first : left - first + width]
 
 
 def _corners(window: tuple[np.ndarray, np.ndarray]) -> str:
@@ -155,7 +162,7 @@ def _stacked(path: str | Path, channels: dict[str, np.ndarray], names: tuple[str
 def read_image(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
     """Colour (H, W, 3) and alpha (H, W) of an RGB or RGBA file, float32, linear, premultiplied as stored.
 
-    Alpha is 1 for a file without it.
+    Alpha is that of the data window for a file without it: 1 within, and 0 outside, where nothing was stored.
 
     Raises:
         InputError: as `read_array`.
@@ -163,9 +170,20 @@ def read_image(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
     channels = read_channels(path)
     if set(channels) == {"R", "G", "B"}:
         image = _stacked(path, channels, ("R", "G", "B"))
-        return image, np.ones(image.shape[:2], np.float32)
+        return image, _stored(path, image.shape[:2])
     image = _stacked(path, channels, ("R", "G", "B", "A"))
     return np.ascontiguousarray(image[..., :3]), np.ascontiguousarray(image[..., 3])
+
+
+def _stored(path: str | Path, shape: tuple[int, ...]) -> np.ndarray:
+    """(H, W) float32 of a file that was found whole: 1 where all of its parts have pixels, else 0."""
+    alpha = np.ones(shape, np.float32)
+    with OpenEXR.File(str(path), separate_channels=True, header_only=True) as file:
+        for part in file.parts:
+            inside = np.zeros(shape, np.float32)
+            inside[_place(part)] = 1.0
+            alpha *= inside
+    return alpha
 
 
 def write_channels(path: str | Path, channels: dict[str, np.ndarray]) -> None:

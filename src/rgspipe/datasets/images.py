@@ -8,7 +8,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from rgspipe.datasets.display_image import read_colour_levels, read_levels
+from rgspipe.datasets.display_image import FORMATS, read_colour_levels, read_levels
 from rgspipe.datasets.exr import read_array, read_channels, read_image
 from rgspipe.errors import InputError
 from rgspipe.scene import Camera
@@ -39,8 +39,16 @@ def read_depth(path: Path, camera: Camera, convention: str) -> Tensor:
     depth sensors.
 
     Raises:
-        InputError: missing or broken file, more than one channel, another size than the image, negative depth.
+        InputError: missing or broken file, a PNG or JPEG, more than one channel, another size than the image, negative
+            depth.
     """
+    if path.suffix.lower() in FORMATS:
+        raise InputError(
+            path,
+            expected="depth as OpenEXR, of one channel of floats in the unit of the cameras' places",
+            found=f"a {FORMATS[path.suffix.lower()]} image",
+            remedy="Multiply its levels by the unit (0.001 for millimetres in metres), and write them as EXR.",
+        )
     channels = read_channels(path)
     if len(channels) != 1:
         found = f"{len(channels)}: {', '.join(sorted(channels))}"

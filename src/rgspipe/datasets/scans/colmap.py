@@ -23,8 +23,8 @@ AXES = "opencv"
 
 WANTED = "sparse/0/ (or sparse/, or the folder itself) with cameras and images, .bin or .txt"
 
-#: Where a model may be, and photographs.
-MODELS, IMAGES = ("sparse/0", "sparse", "."), ("images", ".")
+#: Where a model may be, and photographs: as large as can be had, as datasets have them in smaller copies.
+MODELS, IMAGES = ("sparse/0", "sparse", "."), ("images", ".", "images_2", "images_4", "images_8")
 
 #: Where depth of a photograph may be; {name} is that of its file, {stem} without suffix.
 DEPTHS = (
@@ -87,6 +87,7 @@ def _frame(
         lens=cameras[photograph.camera],
         pose=placed(matrix, f"{where}: {photograph.name}", options, AXES),
         depth=_depth(root, photograph.name, options),
+        size_stated=True,
     )
 
 

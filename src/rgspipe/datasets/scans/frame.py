@@ -58,7 +58,7 @@ class DepthImage:
     """A depth image of a photograph.
 
     Attributes:
-        path: PNG (16 bits), EXR, or COLMAP's binary array.
+        path: PNG (16 bits), EXR, an array of numpy, or COLMAP's binary array.
         unit: what a stored 1 is, in the unit of the cameras' places.
         lens: its own, where it is not the photograph's at another size.
         confidence: an image of the same size that is 0 where depth is not to be believed.
@@ -84,6 +84,7 @@ class ScanFrame:
         mask: an image that is 0 where the photograph is not to be used.
         lighting: the name of the capture, where there are several.
         border: part of the image's longer side along its rim that is not to be used.
+        size_stated: whether the layout states the size of `lens`, which else is that of the image as it is stored.
     """
 
     image: Path
@@ -95,6 +96,7 @@ class ScanFrame:
     mask: Path | None = None
     lighting: str = ""
     border: float = 0.0
+    size_stated: bool = False
 
     @property
     def files(self) -> list[Path]:

@@ -111,9 +111,12 @@ def _written(
     frame: ScanFrame, exposure: float, options: ScanOptions, path: Path, surfaces: Surfaces | None
 ) -> tuple[dict, float | None]:
     """The entry of a frame whose files were written to `path`, and the part of its depth that is known, if any is."""
-    camera = straight_camera(frame.lens, frame.pose, options.resolution, frame.image)
-    picture = read_picture(frame.image, options.response)
+    stated = (frame.lens.width, frame.lens.height) if frame.size_stated else None
+    picture = read_picture(frame.image, options.response, stated)
     check_shape(frame.image, picture.light.shape, frame.lens)
+    height, width = picture.light.shape[:2]
+    # Intrinsics may be of a larger image: no camera has more pixels than the photograph.
+    camera = straight_camera(frame.lens.resized(width, height), frame.pose, options.resolution, frame.image)
     light, clipped = resampled_colour(picture.light, picture.clipped_from, camera, frame.lens)
     entry: dict = {}
     if picture.clipped_from is not None:

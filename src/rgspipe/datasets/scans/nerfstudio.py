@@ -6,6 +6,7 @@ metres, the turn is kept.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -34,6 +35,9 @@ MOST_UNITS = 1e9
 #: Models whose distortion is that of `Lens`.
 STRAIGHT = ("OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "PERSPECTIVE")
 FISHEYE = "OPENCV_FISHEYE"
+
+#: A size that is given as text.
+SIZE = re.compile("[0-9]{1,9}")
 
 #: Which focal length stands over an angle.
 FOCAL_OF = {"camera_angle_x": "fl_x", "camera_angle_y": "fl_y"}
@@ -74,11 +78,13 @@ def _frame(entry: FrameEntry, options: ScanOptions) -> ScanFrame:
         pose=placed(matrix, where, options, AXES),
         depth=_depth(entry, options),
         mask=entry.transforms_path.parent / _text(entry, "mask_path") if "mask_path" in entry.fields else None,
+        size_stated={"w", "h"} <= entry.shared.keys() | entry.fields.keys(),
     )
 
 
 def _lens(entry: FrameEntry) -> Lens:
-    model = _value(entry, "camera_model", "OPENCV")
+    model = _value(entry, "camera_model")
+    model = STRAIGHT[0] if model is None else model
     if model not in (*STRAIGHT, FISHEYE):
         raise InputError(
             f"{entry.where}: camera_model",
@@ -92,6 +98,7 @@ def _lens(entry: FrameEntry) -> Lens:
     stated = entry.shared | entry.fields
     # Of a focal length nerfstudio asks for no angle beside it, which may be left of another size.
     stated = {key: value for key, value in stated.items() if FOCAL_OF.get(key) not in stated}
+    stated |= {key: int(text) for key in ("w", "h") if SIZE.fullmatch(text := str(stated.get(key)))}
     sizes = [whole(stated[key], entry.where, key) if key in stated else None for key in ("w", "h")]
     width, height = size_of(_image(entry)) if None in sizes else sizes
     values = stated_intrinsics(stated, width, height, entry.where)

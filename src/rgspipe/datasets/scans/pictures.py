@@ -44,8 +44,11 @@ class Picture:
     hidden: npt.NDArray[np.bool_] | None = None
 
 
-def read_picture(path: Path, response: str) -> Picture:
+def read_picture(path: Path, response: str, stated: tuple[int, int] | None = None) -> Picture:
     """A photograph in 8 or 16 bits, by its `response` ("srgb" or "linear"), or in floats.
+
+    Args:
+        stated: as of `read_levels`.
 
     Raises:
         InputError: missing or broken file, another format than the suffix says, pixels to be turned (EXIF), or levels
@@ -58,7 +61,7 @@ def read_picture(path: Path, response: str) -> Picture:
         return Picture(read_hdr(path), None)
     if path.suffix.lower() in RAW:
         return Picture(*read_raw(path))
-    stored, limit = read_levels(path), saturated_from(path)
+    stored, limit = read_levels(path, stated), saturated_from(path)
     linear = response == "linear"
     light = stored.values if linear else stored.light
     light = np.repeat(light, 3, axis=2) if light.shape[2] == 1 else light
@@ -98,6 +101,8 @@ def _stored_depth(path: Path) -> npt.NDArray[np.float64]:
         return _colmap_array(path)
     if suffix == ".dat":
         return _openrooms_array(path)
+    if suffix == ".npy":
+        return _numpy_array(path)
     if suffix == ".exr":
         channels = read_channels(path)
         first = next(iter(channels.values()))
@@ -137,6 +142,23 @@ def _colmap_array(path: Path) -> npt.NDArray[np.float64]:
         raise InputError(path, expected="a depth map of COLMAP", found=found, remedy="Write it anew.") from error
     with np.errstate(invalid="ignore"):
         return values[: width * height].reshape(height, width).astype(np.float64)
+
+
+def _numpy_array(path: Path) -> npt.NDArray[np.float64]:
+    """(H, W) of an array of numpy, which nerfstudio reads, too; its header alone allocates nothing."""
+    input_file(path, "depth of numpy", most_bytes=reading_limits().image_bytes)
+    try:
+        stored = np.lib.format.open_memmap(path, mode="r")
+        if stored.dtype.kind not in "fiu" or stored.size == 0 or stored.ndim not in (2, 3):
+            raise ValueError(f"{stored.dtype} of shape {stored.shape}")
+        values = stored.reshape(stored.shape[:2])  # one channel at most
+        check_pixel_count(path, values.shape[1], values.shape[0])
+    except InputError:
+        raise
+    except (OSError, ValueError, OverflowError, SyntaxError) as error:
+        expected, remedy = "an array (H, W) of depth, as numpy.save writes it", "Write it anew."
+        raise InputError(path, expected=expected, found=f"other content ({error})", remedy=remedy) from error
+    return values.astype(np.float64)
 
 
 def _openrooms_array(path: Path) -> npt.NDArray[np.float64]:
