@@ -93,7 +93,8 @@ def write_lights(path: str | Path, lights: Light | Sequence[Light], extra: dict 
     """Write lights; `extra` holds further top-level fields, its "lights" a list of further fields per light.
 
     Raises:
-        InputError: `path` is a folder, or `lights` are none, or have numbers that are not finite.
+        InputError: `path` is a folder, or `lights` are none, or what `read_lights` refuses: numbers that are
+            not finite, too large, or intensities below 0.
         ValueError: `extra` would overwrite a field of the format.
     """
     path = as_file(path, "lights.json")
@@ -104,6 +105,8 @@ def write_lights(path: str | Path, lights: Light | Sequence[Light], extra: dict 
     if len(further) != len(rig):
         raise ValueError(f'extra["lights"] must have {len(rig)} entries, got {len(further)}')
     entries = [_merged(light_fields(light), fields) for light, fields in zip(rig, further, strict=True)]
+    # What `read_lights` would refuse is not written.
+    lights_in({"lights": entries}, path)
     write_json(path, _merged({"version": VERSION, "lights": entries}, extra))
 
 
