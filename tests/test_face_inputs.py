@@ -119,6 +119,21 @@ def test_surfels_are_made_of_arrays() -> None:
     assert torch.equal(made.albedo.float(), surfels.albedo) and freeze(made).surfels.albedo.dtype == torch.float32
 
 
+def test_a_frozen_scene_of_surfels_with_gradients_is_that_without() -> None:
+    surfels = few_surfels()
+    frozen = freeze(replace(surfels, albedo=surfels.albedo.clone().requires_grad_()))
+    assert torch.equal(frozen.areas, freeze(surfels).areas) and not frozen.surfels.albedo.requires_grad
+
+
+def test_a_ply_far_from_the_origin_says_that_it_rounds(tmp_path) -> None:
+    surfels = few_surfels()
+    centers = surfels.centers.double()
+    near = rg.save_ply(tmp_path / "near.ply", replace(surfels, centers=centers))
+    far = rg.save_ply(tmp_path / "far.ply", replace(surfels, centers=centers + 1e4 + 1 / 3))
+    assert not any("float32" in loss.what for loss in near.losses)
+    assert any("float32" in loss.what and loss.surfels > 0 for loss in far.losses)
+
+
 def test_surfels_come_from_ply(tmp_path) -> None:
     surfels = few_surfels()
     rg.save_ply(tmp_path / "surfels.ply", surfels)
@@ -531,6 +546,13 @@ REFUSED: dict[str, tuple[Callable[[rg.FrozenScene, Tensor], object], str, str, s
         "PointLight",
     ),
     "words for surfels to train": (lambda s, i: rg.train([VIEW], "many"), "surfels", "'many'", "how many"),
+    "words for a prior": (lambda s, i: rg.train([VIEW], few_surfels(), prior="x"), "prior", "'x'", "None"),
+    "words for a checkpoint": (
+        lambda s, i: rg.train([VIEW], few_surfels(), checkpoint="x"),
+        "checkpoint",
+        "str",
+        "None",
+    ),
     "words for options": (lambda s, i: rg.train([VIEW], 50, "fast"), "options", "str", "such"),
     "no camera for other light": (lambda s, i: rg.ambient_image(s, None), "camera", "NoneType", "look_at"),
     "a scene for its views": (lambda s, i: rg.track_lights(s, [i]), "views", "FrozenScene", "FitViews.prepare"),

@@ -122,3 +122,11 @@ def test_what_is_wrong_with_ambient_light_is_named(tmp_path: Path, ambient: obje
     path.write_text(json.dumps({"version": 1, "lights": [], "ambient": ambient}))
     with pytest.raises(InputError, match="ambient"):
         read_ambient(path)
+
+
+@pytest.mark.parametrize("intensity", [-1.0, 1e19])
+def test_what_the_reader_refuses_is_not_written(tmp_path: Path, intensity: float) -> None:
+    path = tmp_path / "lights.json"
+    with pytest.raises(InputError, match="intensity"):
+        write_lights(path, PointLight(_vector(0, 0, 0), _vector(intensity, 1, 1)))
+    assert not path.exists()

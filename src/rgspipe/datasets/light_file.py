@@ -93,7 +93,8 @@ def write_lights(path: str | Path, lights: Light | Sequence[Light], extra: dict 
     """Write lights; `extra` holds further top-level fields, its "lights" a list of further fields per light.
 
     Raises:
-        InputError: `path` is a folder, or `lights` are none, or have numbers that are not finite.
+        InputError: `path` is a folder, or `lights` are none, or have numbers that are not finite, positions or
+            intensities too large to be read, or intensities below 0.
         ValueError: `extra` would overwrite a field of the format.
     """
     path = as_file(path, "lights.json")
@@ -104,6 +105,8 @@ def write_lights(path: str | Path, lights: Light | Sequence[Light], extra: dict 
     if len(further) != len(rig):
         raise ValueError(f'extra["lights"] must have {len(rig)} entries, got {len(further)}')
     entries = [_merged(light_fields(light), fields) for light, fields in zip(rig, further, strict=True)]
+    for index, fields in enumerate(entries):
+        _placed(_Fields(fields, f"{path}: lights[{index}]"))
     write_json(path, _merged({"version": VERSION, "lights": entries}, extra))
 
 
@@ -121,14 +124,20 @@ def light_fields(light: Light) -> dict:
     return fields | light.file_fields()
 
 
-def _read_light(fields: dict, path: str | Path, where: str) -> Light:
-    reader = _Fields(fields, f"{path}: {where}")
-    kind = KINDS[reader.choice("type", tuple(KINDS))]
+def _placed(reader: _Fields) -> tuple[Tensor, Tensor]:
+    """Position (3,) and intensity (3,) of a light, whatever its kind, within what files may have."""
     position, intensity = reader.vector("position"), reader.vector("intensity")
     if (position.abs() > FARTHEST).any():
         raise reader.refusal("position", f"coordinates within ±{FARTHEST:g}", str(position.tolist()))
     if (intensity < 0).any() or (intensity > STRONGEST).any():
         raise reader.refusal("intensity", f"W/sr from 0 to {STRONGEST:g}", str(intensity.tolist()))
+    return position, intensity
+
+
+def _read_light(fields: dict, path: str | Path, where: str) -> Light:
+    reader = _Fields(fields, f"{path}: {where}")
+    kind = KINDS[reader.choice("type", tuple(KINDS))]
+    position, intensity = _placed(reader)
     try:
         light = kind.from_fields(position, intensity, reader)
     except InputError as error:

@@ -72,7 +72,7 @@ class FrozenScene:
 
     @classmethod
     def freeze(cls, surfels: Surfels, *, gather_rays: int = 256, patches: int = 1000, seed: int = 0) -> FrozenScene:
-        """Precompute the operators of `surfels`: the gather from hemisphere rays, then patch transport.
+        """Precompute the operators of `surfels`, whose gradients end here: the gather, then patch transport.
 
         Args:
             gather_rays: hemisphere rays of a surfel.
@@ -82,8 +82,8 @@ class FrozenScene:
         Raises:
             InputError: they are no surfels, or have impossible numbers; see `Surfels.check`.
         """
-        as_one_of(surfels, Surfels, "surfels", "rg.exact_surfels makes them of a model, rg.train of views.")
-        surfels.check()
+        as_one_of(surfels, Surfels, "surfels", "rg.exact_surfels makes them of a model, rg.train of views.").check()
+        surfels = surfels.detached()
         for name, count in (("gather_rays", gather_rays), ("patches", patches), ("seed", seed)):
             as_count(count, name, 0 if name == "seed" else 1, remedy="Leave the default.")
         centers, surfels = surfels.centers.double(), surfels.to(torch.float32)

@@ -43,6 +43,10 @@ class Gloss:
         """(G,) int64 indices of the surfels that are not diffuse."""
         return (self.reflectance > 0.0).any(dim=1).nonzero()[:, 0]
 
+    def detached(self) -> Gloss:
+        """The same numbers without their gradients."""
+        return Gloss(self.reflectance.detach(), self.exponents.detach())
+
     def to(self, *args: torch.dtype | torch.device | str) -> Gloss:
         """A copy with both tensors moved by `Tensor.to`."""
         return Gloss(self.reflectance.to(*args), self.exponents.to(*args))

@@ -186,6 +186,11 @@ class Surfels:
         moved = {name: tensor.to(*args) for name, tensor in self.tensors().items()}
         return replace(self, **moved, gloss=None if self.gloss is None else self.gloss.to(*args))
 
+    def detached(self) -> Surfels:
+        """The same numbers without their gradients."""
+        own = {name: tensor.detach() for name, tensor in self.tensors().items()}
+        return replace(self, **own, gloss=None if self.gloss is None else self.gloss.detached())
+
     def tensors(self) -> dict[str, Tensor]:
         """The surfels' own tensors by name, as they are stored; those of `gloss` are its own."""
         return {name: getattr(self, name) for name in tensor_names()}

@@ -85,11 +85,17 @@ def train(
         device: where to compute, and what is trained is; where the surfels are if None.
 
     Raises:
-        InputError: there are no views, or they have no lights, no depth to make surfels from, or no such device.
+        InputError: an argument is of another kind; there are no views, or they have no lights, no depth to
+            make surfels from, or no such device.
     """
     options = TrainOptions() if options is None else as_one_of(options, TrainOptions, "options", "Pass such.")
     views = as_several(views, View, "views", "rg.load_views reads them.")
     device = None if device is None else as_device(device)
+    if checkpoint is not None:
+        as_one_of(checkpoint, Checkpoint, "checkpoint", "Pass such, or None.")
+    if not (prior is None or callable(prior)):
+        expected = "a function of surfels that gives an AlbedoPrior"
+        raise InputError("prior", expected=expected, found=repr(prior)[:80], remedy="Pass such, or None.")
     if not isinstance(surfels, Surfels):
         surfels = initialise_surfels(
             views, as_count(surfels, "surfels", remedy="Pass surfels, or how many to make."), seed=options.seed

@@ -48,6 +48,9 @@ THIN = float(np.log(1e-6))
 #: Viewers take logits: opacities 0 and 1 have none.
 OPACITY_RANGE = (1e-6, 1.0 - 1e-6)
 
+#: Centres that the file moves by more of their surfel's smaller scale are reported.
+MOVED = 1e-3
+
 #: Coefficients beyond the constant that a file of degree 3 has.
 REST = 45
 
@@ -81,6 +84,7 @@ def save_ply(
     """
     path = as_file(path, "surfels.ply")
     as_one_of(surfels, Surfels, "surfels", "Pass those of a scene: scene.surfels.").check()
+    surfels = surfels.detached()
     if not len(surfels):
         raise InputError("surfels", expected="some of them", found="none", remedy="Pass those of a scene.")
     if layout not in get_args(SurfelLayout):
@@ -278,6 +282,7 @@ def _unseen(surfels: Surfels, where: str) -> list[Loss]:
     losses = [
         loss(f"straight edges: {where} them, so surfels hang over", clips, 0.0, "most edges of a surfel"),
         loss(f"coverage: {where} it, so surfaces look softer", low, -1.0, "opacity that counts as none"),
+        _rounded(surfels),
     ]
     if surfels.gloss is not None:
         size = surfels.gloss.reflectance.amax(dim=1).double().cpu().numpy()
@@ -285,3 +290,11 @@ def _unseen(surfels: Surfels, where: str) -> list[Loss]:
     guessed = surfels.guessed.double().cpu().numpy()
     losses.append(loss(f"surfels that are guessed: {where} that they are", guessed, 0.0, "largest doubt of log albedo"))
     return losses
+
+
+def _rounded(surfels: Surfels) -> Loss:
+    """What float32, which PLY viewers read, leaves of centres in double precision far from the origin."""
+    moved = (surfels.centers.float().double() - surfels.centers.double()).norm(dim=1)
+    size = (moved / surfels.scales.double().amin(dim=1)).cpu().numpy()
+    what = "centres: the file rounds them to float32, so move the scene near the origin"
+    return loss(what, size, MOVED, "moved at most, in parts of its smaller scale,")
