@@ -69,7 +69,8 @@ def trace_lighting(bvh: SurfelBvh, views: Sequence[View]) -> Lighting:
     dark = [view.name for view in views if not _shines(view.light)]
     if dark:
         expected, found = "lights that shine", f"intensities below 0, or all 0, of {', '.join(dark[:5])}"
-        raise InputError("the training views", expected=expected, found=found, remedy="Correct them.")
+        remedy = "Correct them, or leave these photographs out: without light they tell nothing of the surfaces."
+        raise InputError("the training views", expected=expected, found=found, remedy=remedy)
     positions = torch.stack([view.light.position for view in views])
     intensity = torch.stack([view.light.intensity for view in views]).float()
     blocks = positions.split(LIGHTS_AT_ONCE)
