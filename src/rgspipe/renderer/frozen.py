@@ -14,7 +14,6 @@ from torch import Tensor
 from rgspipe.arguments import as_count, as_one_of, as_path
 from rgspipe.errors import InputError
 from rgspipe.renderer.areas import surfel_areas
-from rgspipe.renderer.clusters import cluster_patches
 from rgspipe.renderer.dictionary import GRID, LightDictionary, build_dictionary
 from rgspipe.renderer.direct import unit_irradiance
 from rgspipe.renderer.effects import ALL_EFFECTS, Effects
@@ -32,7 +31,7 @@ from rgspipe.renderer.openness import openness, void_irradiance
 from rgspipe.renderer.rig import rig_irradiance, unit_response
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.surroundings import OPEN, Surroundings
-from rgspipe.renderer.transport import PatchTransport, build_patch_transport
+from rgspipe.renderer.transport import PatchTransport, clustered_transport
 from rgspipe.renderer.view_weights import ViewWeights, build_view_weights
 from rgspipe.scene.arrays import ArrayLike, as_device, as_tensor, check_finite
 from rgspipe.scene.camera import Camera
@@ -87,12 +86,12 @@ class FrozenScene:
         for name, count in (("gather_rays", gather_rays), ("patches", patches), ("seed", seed)):
             as_count(count, name, 0 if name == "seed" else 1, remedy="Leave the default.")
         centers, surfels = surfels.centers.double(), surfels.to(torch.float32)
-        bvh = SurfelBvh(replace(surfels, centers=centers))
+        exact = replace(surfels, centers=centers)
+        bvh = SurfelBvh(exact)
         areas = surfel_areas(bvh, seed=seed)
         gather = build_needed_gather(bvh, gather_rays, seed=seed, areas=areas)
-        labels = cluster_patches(centers, surfels.normals, patches if gather.entries else 1, seed=seed)
-        transport = build_patch_transport(gather, labels, areas, surfels.albedo)
-        gloss = build_glossy_transport(replace(surfels, centers=centers), gather, transport)
+        transport = clustered_transport(gather, exact, areas, patches, seed=seed)
+        gloss = build_glossy_transport(exact, gather, transport)
         return cls(surfels, areas, gather, transport, gloss=gloss, centers=centers)
 
     @classmethod

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from rgspipe.renderer.clusters import cluster_patches
 from rgspipe.renderer.frozen import FrozenScene
-from rgspipe.renderer.transport import build_patch_transport
+from rgspipe.renderer.transport import clustered_transport
 from rgspipe.scene.surfels import Surfels
 
 
@@ -19,7 +18,6 @@ def repainted(frozen: FrozenScene, surfels: Surfels, *, patches: int = 1000, see
         patches, seed: as of `freeze`.
     """
     centers = surfels.centers.double() if frozen.centers is None else frozen.centers
-    count = patches if frozen.gather.entries else 1
-    labels = cluster_patches(centers, surfels.normals, count, seed=seed)
-    transport = build_patch_transport(frozen.gather, labels, frozen.areas, surfels.albedo)
+    exact = replace(surfels, centers=centers)
+    transport = clustered_transport(frozen.gather, exact, frozen.areas, patches, seed=seed)
     return replace(frozen, surfels=surfels, transport=transport)

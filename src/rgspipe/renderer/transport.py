@@ -9,8 +9,10 @@ import scipy.sparse
 import torch
 from torch import Tensor
 
+from rgspipe.renderer.clusters import cluster_patches
 from rgspipe.renderer.radiosity import LARGEST_ALBEDO
 from rgspipe.renderer.sparse import SparseOperator
+from rgspipe.scene.surfels import Surfels
 
 
 @dataclass(frozen=True)
@@ -70,6 +72,21 @@ class PatchTransport:
     def indirect(self, direct: Tensor) -> Tensor:
         """(N, 3, K) indirect part of the radiosity for K lightings with direct radiosity (N, 3, K)."""
         return self.albedo[:, :, None] * self.gathered(direct)
+
+
+def clustered_transport(
+    gather: SparseOperator, surfels: Surfels, areas: Tensor, patches: int, *, seed: int
+) -> PatchTransport:
+    """Patch transport of surfels that are gathered into up to so many patches; into one where no light bounces.
+
+    Args:
+        gather, areas: as of `build_patch_transport`.
+        surfels: N, their centres in double precision.
+        seed: of the patches.
+    """
+    count = patches if gather.entries else 1
+    labels = cluster_patches(surfels.centers, surfels.normals, count, seed=seed)
+    return build_patch_transport(gather, labels, areas, surfels.albedo)
 
 
 def build_patch_transport(
