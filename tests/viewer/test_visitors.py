@@ -104,7 +104,7 @@ def test_a_camera_that_can_be_no_more_harms_no_page(viewer: Viewer) -> None:
         browser.send(message())
         wait_for(lambda: viewer.pages)
         [page] = viewer.pages.values()
-        wait_until_told(browser, b"SetCameraLookAtMessage", b"BackgroundImageMessage")  # it went to its first place
+        wait_for(lambda: page._begun is not None and page._wanted is None)  # it went to its first place
         for other in IMPOSSIBLE.values():
             browser.send(message(**other))
         browser.send(message(position=[1.0, -3.0, 0.0]))
@@ -127,9 +127,9 @@ def test_sides_stay_in_sight_where_the_window_becomes_narrow(viewer: Viewer) -> 
         browser.send(message(image_width=300))
         wait_for(lambda: viewer.pages)
         [page] = viewer.pages.values()
-        wait_until_told(browser, b"SetCameraLookAtMessage")
         held, half = page._client.camera, math.radians(35.0)
-        wait_for(lambda: abs(held.fov - 2.0 * half) < 1e-6)
+        wait_for(lambda: page._begun is not None and page._wanted is None)
+        assert held.fov == pytest.approx(2.0 * half, abs=1e-6)
         told = {"position": EYE, "look_at": held.look_at.tolist(), "fov": held.fov}
         browser.send(message(**told, image_width=150))
         wait_for(lambda: abs(math.tan(0.5 * held.fov) - 2.0 * math.tan(half)) < 1e-6)

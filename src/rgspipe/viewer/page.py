@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+import threading
 
 import viser
 
@@ -50,6 +51,7 @@ class Page:
         self._client, self._exhibit, self._resolution, self._seen = client, exhibit, exhibit.resolution, b""
         self._wanted: Camera | None = None
         self._begun: tuple[Camera, float, float] | None = None
+        self._turn = threading.Lock()
         self.session = exhibit.session()
         self.painter = Painter(self.session, self.camera, self._show, exhibit.resolution, exhibit.turn)
         self.drawings = Drawings(client.scene, exhibit.images.frozen.size, self._go_to)
@@ -127,13 +129,16 @@ class Page:
         self._follow()
 
     def _fit(self) -> None:
-        """Take the same camera again where the browser has another window, or did not hear of it."""
-        with contextlib.suppress(*NO_CAMERA):
-            if self._wanted is None and self._begun is not None:
-                camera = self._begun[0]
-                stays = float(abs(self._client.camera.position - camera.origin.numpy()).max()) < STILL
-                self._begun = self._begun if stays else None
-                self._wanted = camera if stays and self._is_unheard() else None
+        """Have all of the camera in sight where the browser has another window, or did not hear of it."""
+        with self._turn, contextlib.suppress(*NO_CAMERA):
+            if self._wanted is not None or self._begun is None:
+                return
+            camera, is_unheard = self._begun[0], self._is_unheard()
+            # Read last: a browser that tells of its window and then moves is not where it was.
+            if float(abs(self._client.camera.position - camera.origin.numpy()).max()) >= STILL:
+                self._begun = None
+            elif is_unheard:
+                self._widen(camera)
 
     def _is_unheard(self) -> bool:
         """Whether the window has changed since a camera was taken, as it does while a page is laid out.
@@ -146,21 +151,23 @@ class Page:
         return held.aspect != aspect or abs(held.fov - fov) >= STILL
 
     def _follow(self) -> None:
-        camera = self._wanted
-        if camera is None:
-            return
-        with contextlib.suppress(*NO_CAMERA), self._client.atomic():
-            self._set(camera)
-            self._wanted = None
+        # Both the page's own thread and whoever furnishes it come here; the second would go where the first has been.
+        with self._turn, contextlib.suppress(*NO_CAMERA), self._client.atomic():
+            if self._wanted is not None:
+                self._set(self._wanted)
+                self._wanted = None
 
     def _set(self, camera: Camera) -> None:
-        position, _, fov = pose_of(camera)
-        held = self._client.camera
+        position, held = pose_of(camera)[0], self._client.camera
         forward, up = -camera.camera_to_world[:3, 2].numpy(), camera.camera_to_world[:3, 1].numpy()
-        # On a page that is narrower than the picture, its sides are to be seen rather than its top and bottom.
-        across = math.tan(0.5 * fov) * camera.width / camera.height
-        fov = 2.0 * math.atan(max(math.tan(0.5 * fov), across / max(held.aspect, 0.1)))
+        self._widen(camera)
         held.up_direction = up if abs(forward[2]) > STEEP else (0.0, 0.0, 1.0)
-        held.position, held.fov = position, fov
+        held.position = position
         held.look_at = position + forward * max(self.session.images.frozen.size, 1e-3)
-        self._begun = camera, held.aspect, fov
+
+    def _widen(self, camera: Camera) -> None:
+        """On a page that is narrower than the picture, its sides are to be seen rather than its top and bottom."""
+        held, fov = self._client.camera, pose_of(camera)[2]
+        across, aspect = math.tan(0.5 * fov) * camera.width / camera.height, held.aspect
+        fov = 2.0 * math.atan(max(math.tan(0.5 * fov), across / max(aspect, 0.1)))
+        held.fov, self._begun = fov, (camera, aspect, fov)

@@ -75,7 +75,10 @@ class Painter:
             if not quick:
                 session.rest()
             if quick and not session.images.knows(session.seen(camera)):
+                # It may have become one that cannot be while the processor was another visitor's.
                 camera = self._camera(COARSE)
+                if camera is None:
+                    return
             camera = session.seen(camera)
             quality = "sharp" if not quick else ("soft" if session.images.knows(camera) else "coarse")
             picture, top = session.picture(camera, quality)
