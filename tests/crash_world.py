@@ -16,7 +16,8 @@ import faults
 from faults import Fault
 from rgspipe.config import RgspipeConfig
 from rgspipe.errors import InputError
-from rgspipe.graph.pipeline import StageLoader, Usual, run
+from rgspipe.graph.pipeline import Usual, run
+from rgspipe.graph.resolver import StageLoader
 
 #: Exit statuses of a run that was refused, and of one that failed in any other way.
 REFUSED, FAILED = 2, 1

@@ -74,7 +74,7 @@ class Command:
 
 def _serve() -> None:
     """Become each command that is read, a folder and arguments; say its process and, in the end, its status."""
-    from rgspipe.graph.pipeline import NO_RESULT
+    from rgspipe.graph.resolver import NO_RESULT
     from rgspipe.graph.source_code import SourceCode
     from rgspipe.stages import NAMES, load_stage
 

@@ -17,7 +17,7 @@ from rgspipe.cli.compose import compose_config
 from rgspipe.datasets.exr import read_channels, write_channels
 from rgspipe.datasets.light_file import read_lights, write_lights
 from rgspipe.demo import ROOM, TARGET
-from rgspipe.graph.pipeline import resolve
+from rgspipe.graph.resolver import resolve
 from rgspipe.renderer.frozen_file import SURFELS
 from rgspipe.stages import load_stage
 from rgspipe.store.artifacts import Artifact, ArtifactStore

@@ -11,7 +11,8 @@ import pytest
 from rgspipe.cli.compose import check_sweep, compose_config
 from rgspipe.cli.sequence import SequenceStep, load_sequence, run_sequence
 from rgspipe.errors import InputError
-from rgspipe.graph.pipeline import Node, resolve
+from rgspipe.graph.nodes import Node
+from rgspipe.graph.resolver import resolve
 from rgspipe.stages import NAMES, load_stage
 
 TOYS = (sys.executable, "-m", "toys")

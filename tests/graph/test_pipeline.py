@@ -16,7 +16,8 @@ import torch
 import toys
 from rgspipe.config import RgspipeConfig, with_changes
 from rgspipe.errors import InputError
-from rgspipe.graph.pipeline import describe_plan, plan, resolve, run
+from rgspipe.graph.pipeline import describe_plan, plan, run
+from rgspipe.graph.resolver import resolve
 from rgspipe.store.artifacts import ArtifactStore
 from rgspipe.store.retention import Choice, removable, remove, stored
 

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 import toys
 from rgspipe.cli.compose import check_sweep, compose_config, usual_command
 from rgspipe.config import RgspipeConfig, with_changes
-from rgspipe.graph.pipeline import Usual, resolve, run
+from rgspipe.graph.pipeline import Usual, run
+from rgspipe.graph.resolver import resolve
 from rgspipe.graph.variants import LONGEST, variant_name
 from rgspipe.store.artifacts import ArtifactStore
 

@@ -12,7 +12,7 @@ import pytest
 import rgspipe
 from rgspipe.config import RgspipeConfig, get_value, with_changes
 from rgspipe.errors import InputError
-from rgspipe.graph.pipeline import NO_RESULT
+from rgspipe.graph.resolver import NO_RESULT
 from rgspipe.graph.source_code import SourceCode
 from rgspipe.stages import NAMES, load_stage, stage_summary
 

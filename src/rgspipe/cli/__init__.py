@@ -14,7 +14,7 @@ from rgspipe.cli.completion import LINE, completed, is_question
 from rgspipe.cli.help import help_text, version_text
 from rgspipe.cli.messages import EXIT_INPUT, EXIT_INTERRUPTED, EXIT_UNREAD, show_input_error
 from rgspipe.errors import InputError
-from rgspipe.graph.pipeline import StageLoader
+from rgspipe.graph.resolver import StageLoader
 from rgspipe.program import typed
 from rgspipe.stages import load_stage
 from rgspipe.store.files import NO_ROOM

@@ -105,15 +105,16 @@ def compose_config(overrides: Sequence[str]) -> RgspipeConfig:
         raise _composition_error(error, overrides) from None
 
 
-def usual_command(overrides: Sequence[str], config: RgspipeConfig) -> Usual:
+def usual_command(overrides: Sequence[str], config: RgspipeConfig, is_all: bool = True) -> Usual:
     """What a command, or each job of a sweep, would make if nothing varied.
 
     Args:
         config: of these overrides, or of a sweep's first job.
+        is_all: see `Usual`.
     """
     swept = frozenset(str(override.key_or_group) for override in _parse(overrides) if override.is_sweep_override())
     plain = plain_overrides(overrides, swept)
-    return Usual(config if plain == list(overrides) else compose_config(plain), swept)
+    return Usual(config if plain == list(overrides) else compose_config(plain), swept, is_all)
 
 
 def check_sweep(overrides: Sequence[str]) -> RgspipeConfig:

@@ -31,7 +31,8 @@ from rgspipe.cli.leading import lead_on, lead_on_sweep
 from rgspipe.cli.messages import EXIT_FAILED, EXIT_INPUT, EXIT_INTERRUPTED, show_failure, show_input_error
 from rgspipe.cli.sweep_table import write_sweep_table
 from rgspipe.errors import InputError
-from rgspipe.graph.pipeline import StageLoader, Usual, run
+from rgspipe.graph.pipeline import Usual, run
+from rgspipe.graph.resolver import StageLoader
 from rgspipe.stages import load_stage
 from rgspipe.store.artifacts import Artifact
 from rgspipe.store.files import NO_RIGHT
@@ -50,8 +51,9 @@ def run_jobs(overrides: Sequence[str], stage_loader: StageLoader, multirun: bool
     Launchers are for sweeps, so that with launcher=slurm even a single run is one: of one job, on the cluster.
 
     Args:
-        leads_on: whether the end says what usually comes next. A run or sweep whose folder is given is a step of
-            something larger, as in a pipeline, and does not.
+        leads_on: whether this is all that was asked for, so that it is said which overrides have no effect, and at the
+            end what usually comes next. A run or sweep whose folder is given is a step of something larger, as in a
+            pipeline, and does not say the latter.
 
     Raises:
         InputError: an override cannot be used; nothing was started.
@@ -62,7 +64,7 @@ def run_jobs(overrides: Sequence[str], stage_loader: StageLoader, multirun: bool
         check_stage(config.stage)
     mode = "sweep" if multirun else "run"
     folder = given_folder(overrides, mode) or given_folder(overrides, "run")
-    leads_on &= folder is None
+    is_all, leads_on = leads_on, leads_on and folder is None
     if folder is None:
         what = "sweep" if multirun else config.stage
         folder = new_run_folder(Path(config.outputs), what, elsewhere=not leaves_machine(overrides))
@@ -71,7 +73,7 @@ def run_jobs(overrides: Sequence[str], stage_loader: StageLoader, multirun: bool
     # Said again even where it was given: interpolations such as the time must not be resolved twice.
     chosen = f"hydra.{mode}.dir={quoted(folder)}"
     # Worked out here: within a job Hydra composes nothing else.
-    usual = usual_command(overrides, config)
+    usual = usual_command(overrides, config, is_all)
     try:
         code = run_hydra([*(["-m"] if multirun else []), *overrides, chosen], stage_loader, usual)
     except KeyboardInterrupt:

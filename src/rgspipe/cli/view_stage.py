@@ -12,7 +12,7 @@ from rgspipe.cli.jobs import run_jobs
 from rgspipe.cli.view import serve
 from rgspipe.config import RgspipeConfig
 from rgspipe.errors import InputError
-from rgspipe.graph.pipeline import StageLoader, resolve
+from rgspipe.graph.resolver import StageLoader, resolve
 from rgspipe.store.artifacts import Artifact, ArtifactStore
 
 if TYPE_CHECKING:

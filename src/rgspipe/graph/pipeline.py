@@ -8,51 +8,24 @@ from __future__ import annotations
 
 import logging
 import textwrap
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
-from rgspipe.config import RgspipeConfig, get_value, with_changes
+from rgspipe.config import RgspipeConfig
 from rgspipe.config.spoken import told_with_keys
 from rgspipe.datasets.reading_limits import reading_within
 from rgspipe.errors import InputError
 from rgspipe.graph.commands import as_override, command
 from rgspipe.graph.expected_time import EarlierRuns, Expected, in_words
 from rgspipe.graph.nodes import Making, Node, indispensable
-from rgspipe.graph.source_code import SourceCode
+from rgspipe.graph.resolver import Resolver, StageLoader
 from rgspipe.graph.variants import variant_name
-from rgspipe.machine.threads import order_of_sums
+from rgspipe.graph.without_effect import without_effect
 from rgspipe.renderer.device import chosen_device
-from rgspipe.stages.base import Stage
 from rgspipe.store.artifacts import Artifact, ArtifactStore, Key
-from rgspipe.store.files import tree_digest
-from rgspipe.store.fingerprints import differences, fingerprint
+from rgspipe.store.fingerprints import differences
 from rgspipe.store.unwritable import told_below
-
-StageLoader = Callable[[str], Stage]
-
-#: Code that runs stages and talks to people: it decides over no result but by what the configuration and inputs are.
-NO_RESULT = (
-    "rgspipe.cli",
-    "rgspipe.config",
-    "rgspipe.datasets.reading_limits",
-    "rgspipe.errors",
-    "rgspipe.fitting.course",
-    "rgspipe.graph",
-    "rgspipe.machine.description",
-    "rgspipe.options",
-    "rgspipe.progress",
-    "rgspipe.stages.base",
-    "rgspipe.stages.sources",
-    "rgspipe.store.artifacts",
-    "rgspipe.store.files",
-    "rgspipe.store.locks",
-    "rgspipe.store.manifest",
-    "rgspipe.store.partial",
-    "rgspipe.store.status",
-    "rgspipe.store.unwritable",
-    "rgspipe.store.whole_files",
-)
 
 #: At most this many causes are named for one stage in the plan.
 SHOWN_CAUSES = 3
@@ -85,50 +58,12 @@ class Usual:
     Attributes:
         config: its configuration.
         swept: keys and groups of which a sweep tries several values.
+        is_all: whether nothing but the stage hears the command, so that it can be said what has no effect.
     """
 
     config: RgspipeConfig
     swept: frozenset[str] = frozenset()
-
-
-@dataclass
-class _Resolver:
-    """Builds the graph; every module and foreign file is read once."""
-
-    load_stage: StageLoader
-    code: SourceCode = field(default_factory=lambda: SourceCode(NO_RESULT))
-    files: dict[str, str] = field(default_factory=dict)
-
-    def resolve(self, name: str, config: RgspipeConfig, changes: Mapping[str, object]) -> Node:
-        stage = self.load_stage(name)
-        needs = stage.needs(config)
-        inputs = tuple(
-            self.resolve(need.stage, with_changes(config, need.changes), {**changes, **need.changes}) for need in needs
-        )
-        recipe = {
-            "config": {key: get_value(config, key) for key in sorted(stage.keys(config))},
-            "inputs": _input_fingerprints(inputs),
-            "foreign": {str(path): self._file(path) for path in stage.files(config)},
-            "code": self.code.fingerprints(stage.run.__module__),
-            "sums": order_of_sums(),
-        }
-        key = Key(stage.place(config), stage.name, fingerprint({"stage": stage.name, **recipe}))
-        return Node(stage, config, changes, key, recipe, inputs, tuple(need.may_fail for need in needs))
-
-    def _file(self, path: Path) -> str:
-        if str(path) not in self.files:
-            self.files[str(path)] = tree_digest(path)
-        return self.files[str(path)]
-
-
-def _input_fingerprints(inputs: Sequence[Node]) -> dict[str, list[str]]:
-    names = dict.fromkeys(node.stage.name for node in inputs)
-    return {name: [node.key.fingerprint for node in inputs if node.stage.name == name] for name in names}
-
-
-def resolve(config: RgspipeConfig, load_stage: StageLoader) -> Node:
-    """The graph that ends in `config.stage`."""
-    return _Resolver(load_stage).resolve(config.stage, config, {})
+    is_all: bool = True
 
 
 def plan(root: Node, store: ArtifactStore) -> list[PlannedStep]:
@@ -181,14 +116,22 @@ def _remarks(node: Node, store: ArtifactStore) -> tuple[str, ...]:
     return tuple(node.stage.remarks(node.config, made))
 
 
-def planned(config: RgspipeConfig, load_stage: StageLoader) -> list[PlannedStep]:
-    """What `run` would make and reuse, of which nothing is made.
+def told_plan(config: RgspipeConfig, load_stage: StageLoader, overrides: Sequence[str]) -> str:
+    """What `run` would make and reuse, of which nothing is made, and which overrides have no effect; as a text.
 
     Raises:
         InputError: an input cannot be used, or the store cannot be read.
     """
     with told_below(Path(config.outputs)), reading_within(config.limits):
-        return plan(resolve(config, load_stage), ArtifactStore(Path(config.outputs)))
+        resolver = Resolver(load_stage)
+        root = resolver.resolve(config.stage, config, {})
+        text = describe_plan(plan(root, ArtifactStore(Path(config.outputs))))
+        return "\n".join([text, *_told_idle(without_effect(root, overrides, resolver))])
+
+
+def _told_idle(overrides: Sequence[str]) -> list[str]:
+    """The line about overrides that have no effect, if there are any."""
+    return [f"No effect on this stage, nor on what it needs: {', '.join(overrides)}"] if overrides else []
 
 
 def describe_plan(steps: Sequence[PlannedStep]) -> str:
@@ -242,10 +185,12 @@ def _run(config: RgspipeConfig, load_stage: StageLoader, overrides: Sequence[str
         # Where there is none, that is told before anything is made.
         chosen_device("cuda")
     store = ArtifactStore(Path(config.outputs))
-    resolver = _Resolver(load_stage)
+    resolver = Resolver(load_stage)
     root = resolver.resolve(config.stage, config, {})
     steps = plan(root, store)
     log.info(describe_plan(steps))
+    for line in _told_idle(without_effect(root, overrides, resolver) if usual is not None and usual.is_all else ()):
+        log.warning(line)
     if config.upstream == "require":
         _refuse_missing(steps, overrides)
     store.remove_unfinished_links()
@@ -259,7 +204,7 @@ def _run(config: RgspipeConfig, load_stage: StageLoader, overrides: Sequence[str
     return artifacts[root.key]
 
 
-def _variant(node: Node, resolver: _Resolver, overrides: Sequence[str], usual: Usual | None) -> str:
+def _variant(node: Node, resolver: Resolver, overrides: Sequence[str], usual: Usual | None) -> str:
     """What tells a node from the one that is called `latest`; empty for that one."""
     if usual is None:
         return ""

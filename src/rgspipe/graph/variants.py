@@ -26,7 +26,7 @@ def plain_overrides(overrides: Sequence[str], swept: Collection[str]) -> list[st
     Args:
         swept: keys and groups of which a sweep tries several values.
     """
-    return [text for text in overrides if not _varies(_key(text), swept)]
+    return [text for text in overrides if not _varies(key_of(text), swept)]
 
 
 def variant_name(
@@ -40,11 +40,11 @@ def variant_name(
         changes: values by dotted key that a stage asks of its inputs; they stand over those of the command.
         keys: dotted keys and sections that the artifact and all behind it depend on.
     """
-    given = {_key(text): text.partition("=")[2] for text in overrides if _varies(_key(text), swept)}
+    given = {key_of(text): text.partition("=")[2] for text in overrides if _varies(key_of(text), swept)}
     texts = [
         f"{key}={value}"
         for key, value in sorted((given | changes).items())
-        if _below(key, keys) or any(_below(other, (key,)) for other in keys)
+        if below(key, keys) or any(below(other, (key,)) for other in keys)
     ]
     name = re.sub(r"[^\w.,=+-]+", "_", ",".join(texts), flags=re.ASCII)
     if len(name) <= LONGEST:
@@ -52,14 +52,15 @@ def variant_name(
     return f"{name[: LONGEST - DIGITS - 1]}-{hashlib.sha256(name.encode()).hexdigest()[:DIGITS]}"
 
 
-def _key(override: str) -> str:
+def key_of(override: str) -> str:
+    """The key, or the group, that an override of the command line is of."""
     return override.split("=")[0].lstrip("+~")
 
 
 def _varies(key: str, swept: Collection[str]) -> bool:
-    return key in swept or key == METHODS or _below(key, COMPARED)
+    return key in swept or key == METHODS or below(key, COMPARED)
 
 
-def _below(key: str, sections: Iterable[str]) -> bool:
+def below(key: str, sections: Iterable[str]) -> bool:
     """Whether a key is one of the sections, or in one."""
     return any(key == section or key.startswith(f"{section}.") for section in sections)

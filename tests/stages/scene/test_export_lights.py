@@ -13,7 +13,8 @@ from rgspipe.cli.compose import compose_config
 from rgspipe.config import RgspipeConfig
 from rgspipe.datasets.light_file import read_lights, write_lights
 from rgspipe.errors import InputError
-from rgspipe.graph.pipeline import resolve, run
+from rgspipe.graph.pipeline import run
+from rgspipe.graph.resolver import resolve
 from rgspipe.scene import PointLight
 from rgspipe.stages import load_stage
 from rgspipe.stages.scene.export import world_of

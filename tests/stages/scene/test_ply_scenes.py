@@ -23,7 +23,8 @@ from rgspipe.datasets.ply.file import save_ply
 from rgspipe.datasets.surfel_file import load_surfels
 from rgspipe.errors import InputError
 from rgspipe.fitting import FitViews
-from rgspipe.graph.pipeline import resolve, run
+from rgspipe.graph.pipeline import run
+from rgspipe.graph.resolver import resolve
 from rgspipe.renderer.ply import load_ply
 from rgspipe.scene import PointLight
 from rgspipe.stages import load_stage

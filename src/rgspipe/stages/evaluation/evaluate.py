@@ -24,6 +24,7 @@ from rgspipe.evaluation.summary import summary_table
 from rgspipe.evaluation.tables import exemplars, target_table
 from rgspipe.scene import Camera, LightRig, PointLight
 from rgspipe.stages.base import Stage, StageContext
+from rgspipe.stages.lights.targets import view_keys
 from rgspipe.stages.sources import target_stage
 from rgspipe.stages.targets.true_lights import scene_bounds, truth_file
 from rgspipe.store.artifacts import Artifact
@@ -188,17 +189,22 @@ def _plain(value: Any) -> Any:
 
 def _truth_file(config: RgspipeConfig) -> list[Path]:
     """The true lights that are given, read now: what is wrong with them should show before lights are fitted."""
-    if config.fit.truth is None:
+    if config.fit.target is None or config.fit.truth is None:
         return []
     read_lights(config.fit.truth)
     return [Path(config.fit.truth)]
+
+
+def _keys(config: RgspipeConfig) -> list[str]:
+    keys = ["evaluate", "seed", "fit.target", "light.type", "light.count", *view_keys(config)]
+    return keys if config.fit.target is None else [*keys, "fit.truth"]
 
 
 STAGE = Stage(
     name="evaluate",
     help="errors of the recovered lights per target and per class",
     inputs=lambda config: ["fit_light", *target_stage(config), "freeze"],
-    config_keys=("evaluate", "seed", "views", "fit.target", "fit.truth", "light.type", "light.count"),
+    config_keys=_keys,
     files=_truth_file,
     run=run,
 )

@@ -34,9 +34,9 @@ from rgspipe.stages.base import Stage, StageContext
 from rgspipe.stages.lights.capture import KEYS as CAPTURE_KEYS
 from rgspipe.stages.lights.capture import captured_views, known_emitters
 from rgspipe.stages.lights.extras import Named, further_files, training_cameras
-from rgspipe.stages.lights.spec import light_spec, table_files
-from rgspipe.stages.lights.targets import all_targets, require_views, select_targets, target_seed, used_views
-from rgspipe.stages.scene.effects import chosen_effects, frozen_scene, wanted_effects
+from rgspipe.stages.lights.spec import light_keys, light_spec, table_files
+from rgspipe.stages.lights.targets import all_targets, require_views, select_targets, target_seed, used_views, view_keys
+from rgspipe.stages.scene.effects import chosen_effects, effect_keys, frozen_scene, wanted_effects
 from rgspipe.stages.sources import check_target, image_stage, require_images, target_stage
 from rgspipe.store.artifacts import Artifact
 from rgspipe.store.files import write_text
@@ -210,6 +210,11 @@ def remarks(config: RgspipeConfig, made: Mapping[str, Artifact]) -> Sequence[str
     return _choice(config, made["freeze"])[1].reasons
 
 
+def band_keys(config: RgspipeConfig) -> list[str]:
+    """What `band_limit` depends on."""
+    return ["fit.spot_basis", *(["fit.sh_degree", "fit.sh_mirrored"] if config.fit.spot_basis == "sh" else [])]
+
+
 def band_limit(config: RgspipeConfig) -> BandLimit | None:
     """How the model of a fit encodes spots; None for exact profiles."""
     fit = config.fit
@@ -247,21 +252,11 @@ def _inputs(config: RgspipeConfig) -> list[str]:
 
 
 def _keys(config: RgspipeConfig) -> list[str]:
-    keys = [
-        "seed",
-        "effects",
-        "light",
-        "fit.method",
-        "fit.target",
-        "fit.spot_basis",
-        "views.count",
-        "views.indices",
-        *CAPTURE_KEYS,
-    ]
+    keys = ["seed", *effect_keys(config.effects), *light_keys(config.light), *view_keys(config), *CAPTURE_KEYS]
+    keys += ["fit.method", "fit.target", *band_keys(config)]
     keys += ["fit.emitters", "fit.suggest_view", "fit.landscape"]
     keys += ["fit.wanted_accuracy"] if config.fit.suggest_view else []
     keys += ["fit.adam"] if config.fit.method == "paper_adam" else ["fit.search", "fit.shape"]
-    keys += ["fit.sh_degree", "fit.sh_mirrored"] if config.fit.spot_basis == "sh" else []
     return [*keys, "fit.base"] if config.fit.target is not None else [*keys, "occlusion", "fit.limit"]
 
 

@@ -10,8 +10,15 @@ from rgspipe.datasets.photometric_file import read_catalogue, read_photometry
 from rgspipe.errors import InputError
 from rgspipe.fitting import LightSpec
 from rgspipe.fitting.spec import AUTO, shaped_kind
+from rgspipe.options import settings
 from rgspipe.scene.lights import KINDS, Photometry
 from rgspipe.stages.lights.shape import light_shape
+
+
+def light_keys(light: LightConfig) -> list[str]:
+    """Those of `light` that count for the type that is looked for: shapes of other kinds do not."""
+    kind = shaped_kind(light.type)
+    return [f"light.{one.name}" for one in settings(LightConfig) if one.section is None or one.name == kind]
 
 
 def light_spec(config: RgspipeConfig) -> LightSpec:

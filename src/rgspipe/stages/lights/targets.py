@@ -109,6 +109,11 @@ def used_indices(target: str, views: int, config: RgspipeConfig) -> list[int]:
     return list(indices)
 
 
+def view_keys(config: RgspipeConfig) -> list[str]:
+    """Those of `views` that say which views of a target are used."""
+    return ["views.count" if config.views.indices is None else "views.indices"]
+
+
 def target_seed(target: Target, config: RgspipeConfig) -> int:
     """A seed of the target's own, so that a start does not depend on which other targets are fitted."""
     return zlib.crc32(f"{config.seed}/{STREAM}/{target.name}".encode())

@@ -25,9 +25,10 @@ from rgspipe.scene import LightRig
 from rgspipe.stages.base import Need, Stage, StageContext
 from rgspipe.stages.lights.capture import KEYS as CAPTURE_KEYS
 from rgspipe.stages.lights.capture import captured_views
-from rgspipe.stages.lights.fit_light import Fitter
-from rgspipe.stages.lights.spec import table_files
-from rgspipe.stages.lights.targets import used_views
+from rgspipe.stages.lights.fit_light import Fitter, band_keys
+from rgspipe.stages.lights.spec import light_keys, table_files
+from rgspipe.stages.lights.targets import used_views, view_keys
+from rgspipe.stages.scene.effects import effect_keys
 from rgspipe.store.files import write_bytes, write_text
 
 
@@ -114,24 +115,16 @@ def _files(config: RgspipeConfig) -> list[Path]:
     return tables if config.track.folder is None else [*tables, *files_read(config.track.folder)]
 
 
+def _keys(config: RgspipeConfig) -> list[str]:
+    keys = ["track", "seed", *effect_keys(config.effects), *light_keys(config.light), *view_keys(config)]
+    return [*keys, "fit.search", "fit.shape", *band_keys(config), *CAPTURE_KEYS]
+
+
 STAGE = Stage(
     name="track",
     help="follow moving lights through a sequence of fit targets",
     run=run,
     inputs=_inputs,
-    config_keys=(
-        "track",
-        "seed",
-        "effects",
-        "light",
-        "fit.search",
-        "fit.shape",
-        "fit.spot_basis",
-        "fit.sh_degree",
-        "fit.sh_mirrored",
-        "views.count",
-        "views.indices",
-        *CAPTURE_KEYS,
-    ),
+    config_keys=_keys,
     files=_files,
 )

@@ -21,6 +21,7 @@ from rgspipe.stages.lights.shape import light_shape
 from rgspipe.stages.relight.scene import Relighter, chosen_indices, configured_cameras
 from rgspipe.stages.relight.sweep import write_sweep
 from rgspipe.stages.relight.targets import relight_targets, target_needs
+from rgspipe.stages.scene.effects import effect_keys
 from rgspipe.stages.sources import image_stage, require_images, target_stage
 from rgspipe.store.files import write_text
 
@@ -29,6 +30,13 @@ SHEET, TABLE = "sheet.png", "relight.csv"
 
 #: What shows the true rigs of targets.
 COMPARED = ("counts", "targets")
+
+#: What of `relight` counts for sweeps alone: for both, and for each.
+SPOT = ("path.frames", "path.seconds", "path.intensity", "path.spot")
+WAYS = {
+    "aim": (*SPOT, "path.position", "path.aims"),
+    "orbit": (*SPOT, "path.center", "path.radius", "path.height"),
+}
 
 
 def run(context: StageContext) -> None:
@@ -150,11 +158,20 @@ def _files(config: RgspipeConfig) -> list[Path]:
     return files
 
 
+def _keys(config: RgspipeConfig) -> list[str]:
+    wanted = config.relight
+    keys = ["lights", "rigs", "counts", "sweep", "indices", *WAYS.get(wanted.sweep, ())]
+    keys += ["limit"] if shows(wanted) in COMPARED else ["views", "resolution"]
+    keys += ["count", "seed"] if shows(wanted) == "rig" and wanted.lights is None else []
+    target = ["fit.target"] if wanted.views == "targets" else []
+    return [*(f"relight.{name}" for name in keys), *effect_keys(config.effects), "seed", *target]
+
+
 STAGE = Stage(
     name="relight",
     help="the frozen scene in other lights: light files, rigs of targets beside path-traced truth, sweeps of a spot",
     run=run,
     inputs=_inputs,
-    config_keys=("relight", "effects", "seed", "fit.target", "fit.targets"),
+    config_keys=_keys,
     files=_files,
 )

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from rgspipe.config import RgspipeConfig
 from rgspipe.config.effects import EffectsConfig
 from rgspipe.datasets.json_file import read_json
+from rgspipe.options import settings
 from rgspipe.renderer.device import chosen_device
 from rgspipe.renderer.effect_bounds import EffectBounds
 from rgspipe.renderer.effect_choice import EffectChoice, RigKind, choose_effects
@@ -16,6 +17,13 @@ from rgspipe.store.artifacts import Artifact
 
 #: What each effect can change in a frozen scene, and its cost, beside the scene's own files.
 EFFECTS = "effects.json"
+
+
+def effect_keys(wanted: EffectsConfig) -> list[str]:
+    """Those of `effects` that count beside the others."""
+    idle = [("tolerance", not wanted.auto), ("samples", wanted.solver != "monte_carlo")]
+    names = [one.name for one in settings(EffectsConfig) if (one.name, True) not in idle]
+    return [f"effects.{name}" for name in names]
 
 
 def frozen_scene(config: RgspipeConfig, artifact: Artifact) -> FrozenScene:

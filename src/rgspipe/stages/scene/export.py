@@ -84,11 +84,16 @@ def _files(config: RgspipeConfig) -> list[Path]:
     return [light] if origin is None else [light, origin]
 
 
+def _form(config: RgspipeConfig) -> str:
+    """What says how it is written: of lights their unit, of surfels the layout."""
+    return "layout" if config.export.lights is None else "metres"
+
+
 STAGE = Stage(
     name="export",
     help="writes surfels.ply, which viewers of Gaussians open, or lights for other programs",
     run=run,
     inputs=_inputs,
-    config_keys=("export",),
+    config_keys=lambda config: ("export.light", "export.lights", f"export.{_form(config)}"),
     files=_files,
 )
