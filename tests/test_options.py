@@ -64,6 +64,8 @@ def test_values_take_the_types_of_their_fields() -> None:
         ({"count": None}, "^count: expected a value, found null"),
         ({"rate": math.nan}, "^rate: expected a value from 0 to 1 .how fast, and how far., found nan"),
         ({"rate": "inf"}, "^rate"),
+        ({"name": ""}, r"^name: expected text, found ''\. Leave it away, or say null\."),
+        ({"folder": ""}, "^folder: expected text, found ''"),
         ({"on": 1}, "^on: expected true or false, found 1"),
         ({"place": [0, 0]}, r"^place: expected 3 values, found \[0,0\]"),
         ({"place": 1.0}, "^place: expected a list, found 1.0"),

@@ -28,6 +28,8 @@ def as_path(path: str | os.PathLike[str], name: str = "path") -> Path:
     """
     if not isinstance(path, str | os.PathLike):
         raise InputError(name, expected="a path", found=_shown(path), remedy="Pass the name of a file or folder.")
+    if path == "":  # which would be the folder that one is in
+        raise InputError(name, expected="a path", found="no text", remedy="Pass the name of a file or folder.")
     made = Path(path)
     text = str(made)
     try:

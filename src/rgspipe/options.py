@@ -163,6 +163,10 @@ class Setting:
         """The value as the command line, YAML or Python may have it, in the field's type."""
         if self.type is bool and isinstance(value, str) and value.lower() in TRUTHS:
             return TRUTHS[value.lower()]
+        if self.type in (str, Path) and value == "":
+            # Mostly a variable of the shell that is not set; as a path it would be the folder that one is in.
+            remedy = f"Leave it away{', or say null' if self.optional else ''}."
+            raise self._refusal("text", "''", remedy)
         if isinstance(value, self.type) and (self.type is bool or not isinstance(value, bool)):
             return value
         try:

@@ -50,6 +50,16 @@ def test_results_of_a_stage_are_listed_one_by_one(outputs: Path, capsys: pytest.
     assert all("MB" in line and "h ago" in line for line in told)
 
 
+@pytest.mark.parametrize("command", [["outputs"], ["outputs", "prune", "remove=true"], ["status"], ["verify"]])
+def test_a_folder_without_a_name_is_not_the_one_that_one_is_in(
+    command: list[str], outputs: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Mostly a variable of the shell that is not set: outputs=$RESULTS.
+    monkeypatch.chdir(outputs)
+    assert main([*command, "outputs="]) == 2
+    assert "expected a path, found no text" in " ".join(capsys.readouterr().err.split())
+
+
 def test_what_a_killed_removal_left_goes_whatever_is_chosen_next(outputs: Path) -> None:
     left = outputs / "cornell" / "fit_light" / f".gone-{16 * 'a'}"
     left.mkdir(parents=True)

@@ -106,6 +106,17 @@ def test_steps_run_in_order_and_their_results_and_times_are_told(
     assert "Step 1 (break) failed" in told.err and "[2/2]" not in told.out
 
 
+def test_its_folder_is_that_of_its_steps_as_hydra_reads_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # It was a folder whose name had the quotes, or the one that is named first.
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.yaml").write_text("steps: [{stage: sow}]")
+    assert run_sequence("mine.yaml", ["outputs=first", "outputs='a b'"], ("true",)) == 0
+    assert [path.name for path in tmp_path.iterdir() if path.is_dir()] == ["a b"]
+    with pytest.raises(InputError, match="^seed: "):
+        run_sequence("mine.yaml", ["seed=-1"], ("true",))
+    assert not (tmp_path / "outputs").exists()
+
+
 @pytest.mark.slow
 def test_a_pipeline_ends_with_what_comes_after_its_last_step(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch

@@ -9,6 +9,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
+from rgspipe.arguments import as_path
 from rgspipe.cli.arguments import refused
 from rgspipe.cli.columns import columns, without_empty
 from rgspipe.datasets.input_file import input_folder
@@ -39,7 +40,7 @@ def show_outputs(arguments: Sequence[str]) -> int:
     if not prune and "remove=true" in words:
         raise InputError("remove", expected="prune", found="a list", remedy="Say outputs prune remove=true.")
     values = _values([text for text in words if text not in ("list", "prune")])
-    outputs = Path(values.get("outputs", "outputs"))
+    outputs = as_path(values.get("outputs", "outputs"), "outputs")
     if "outputs" not in values and not outputs.exists():
         print(f"No results in {outputs}.")
         return 0

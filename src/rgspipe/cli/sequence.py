@@ -15,7 +15,7 @@ from typing import Any
 
 import yaml
 
-from rgspipe.cli.compose import compose_config, leaves_machine
+from rgspipe.cli.compose import check_sweep, compose_config, leaves_machine
 from rgspipe.cli.jobs import new_run_folder, quoted
 from rgspipe.cli.leading import lead_on
 from rgspipe.cli.messages import EXIT_FAILED
@@ -91,8 +91,9 @@ def run_sequence(name: str, extra: Sequence[str], program: Sequence[str] = RGSPI
         program: the command that understands a step's overrides.
     """
     steps = load_sequence(name)
-    outputs = Path(next((text.partition("=")[2] for text in extra if text.startswith("outputs=")), "outputs"))
-    folder = new_run_folder(outputs, f"pipeline-{Path(name).stem}", elsewhere=not leaves_machine(extra))
+    first = steps[0]
+    config = check_sweep([f"stage={first.stage}", *first.overrides, *extra])
+    folder = new_run_folder(Path(config.outputs), f"pipeline-{Path(name).stem}", elsewhere=not leaves_machine(extra))
     start, seconds, jobs = time.perf_counter(), [], []
     for number, step in enumerate(steps, 1):
         run_folder = folder / f"{number:02d}_{step.stage}"
