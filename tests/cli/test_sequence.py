@@ -112,7 +112,7 @@ def test_its_folder_is_that_of_its_steps_as_hydra_reads_it(tmp_path: Path, monke
     (tmp_path / "mine.yaml").write_text("steps: [{stage: sow}]")
     assert run_sequence("mine.yaml", ["outputs=first", "outputs='a b'"], ("true",)) == 0
     assert [path.name for path in tmp_path.iterdir() if path.is_dir()] == ["a b"]
-    with pytest.raises(InputError, match="^seed: "):
+    with pytest.raises(InputError, match=r"^seed: "):
         run_sequence("mine.yaml", ["seed=-1"], ("true",))
     assert not (tmp_path / "outputs").exists()
 

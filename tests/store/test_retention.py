@@ -52,6 +52,20 @@ def test_what_no_link_leads_to_and_no_report_needs_goes(store: Path) -> None:
     assert names(removable(stored(store), Choice())) == {"b2"}
 
 
+def test_what_a_report_shows_stays_though_another_of_its_stage_is_the_latest(tmp_path: Path) -> None:
+    """Studies and relightings that a report finds are none of its inputs; it depends on their manifests."""
+    put(tmp_path, "fit", "b1")
+    put(tmp_path, "study", "d1", fit="b1")
+    put(tmp_path, "study", "d2")
+    put(tmp_path, "study", "d3")
+    put(tmp_path, "fit", "b2")
+    shown = {str(tmp_path / "room" / "study" / full("d1") / "manifest.json"): "0", "/a/lamp.json": "1", "lamp": "2"}
+    recipe = {"config": {}, "inputs": {}, "foreign": shown, "code": {}}
+    ArtifactStore(tmp_path).build(Key("room", "report", full("c1")), recipe, lambda folder: {})
+    assert names(removable(stored(tmp_path), Choice())) == {"d2"}
+    assert names(removable(stored(tmp_path), Choice(stage="study"))) == {"d2", "d3"}
+
+
 @pytest.mark.parametrize(
     ("choice", "gone"),
     [

@@ -13,7 +13,7 @@ from pathlib import Path
 from filelock import Timeout
 
 from rgspipe.errors import InputError
-from rgspipe.store.artifacts import LATEST, ArtifactStore, Key
+from rgspipe.store.artifacts import LATEST, Artifact, ArtifactStore, Key
 from rgspipe.store.files import ASIDE, GONE, remove_any, remove_at_once
 from rgspipe.store.fingerprints import DIGITS
 from rgspipe.store.locks import LOCK, folder_locked_if_free, locked_if_free, locked_to_remove
@@ -39,7 +39,7 @@ class Stored:
         key: what it is, or was to be.
         bytes: of all of its files.
         made: seconds since the epoch.
-        inputs: stages and fingerprints of what it was made from.
+        inputs: stages and fingerprints of what it was made from, or shows.
         linked: whether `latest`, or another such link, points to it.
         whole: whether it is an artifact.
     """
@@ -215,9 +215,17 @@ def _stored(store: ArtifactStore, folder: Path, is_artifact: bool, key: Key, lin
     if artifact is None:
         return None
     named = artifact.manifest.get("inputs", {})
-    inputs = frozenset((stage, one) for stage, prints in named.items() for one in prints)
+    inputs = frozenset((stage, one) for stage, prints in named.items() for one in prints) | _shown(artifact)
     made = (folder / MANIFEST).stat().st_mtime
     return Stored(folder, key, _bytes_below(folder), made, inputs, folder.resolve() in linked, whole=True)
+
+
+def _shown(artifact: Artifact) -> frozenset[tuple[str, str]]:
+    """What a page shows of results that it found: their manifests are among the files that it depends on."""
+    paths = (Path(name).parts for name in artifact.manifest.get("foreign", {}))
+    return frozenset(
+        (stage, name) for *_, stage, name, file in (parts for parts in paths if len(parts) > 2) if file == MANIFEST
+    )
 
 
 def _bytes_below(folder: Path) -> int:
