@@ -60,6 +60,16 @@ def test_without_passes_there_are_no_figures_off_edges_and_none_of_albedo() -> N
     assert held_out.plain_pixels(gaps) is None and not held_out.surface_pixels(gaps).any()
 
 
+def test_a_black_view_has_no_psnr_and_takes_that_of_others_from_nobody(views: list[View]) -> None:
+    # The mean was NaN: no figure in the report, and no grade that JSON could hold after a whole training.
+    black = replace(views[1], image=torch.zeros_like(views[1].image))
+    table = held_out.view_table([views[0].image + 0.01, black.image], [views[0], black])
+    summary = held_out.held_out_summary(table, None, None)
+    first = metrics.psnr(views[0].image + 0.01, views[0].image)
+    assert [summary[f"test_psnr_{what}"] for what in ("mean", "median", "min")] == [pytest.approx(first)] * 3
+    assert summary["per_view"][1]["psnr"] is None
+
+
 def test_worst_is_the_lowest_similarity_and_the_largest_error(views: list[View]) -> None:
     table = held_out.view_table([views[0].image + 0.01, views[1].image + 0.1], views)
     summary = held_out.held_out_summary(table, *held_out.albedo_of_views([view.albedo for view in views], views))

@@ -83,15 +83,17 @@ def held_out_summary(
 ) -> dict[str, Any]:
     """What metrics.json says of a `view_table` and the albedo's errors; None for what is not known.
 
-    `test_<measure>_mean`, `_median` and, for the worst view, `_min` or `_max`; `per_view`, a row a view; `albedo` and
-    `albedo_off_edges`.
+    `test_<measure>_mean`, `_median` and, for the worst view, `_min` or `_max`, of the views that have the measure: a
+    black one has no PSNR; `per_view`, a row a view; `albedo` and `albedo_off_edges`.
     """
     found: dict[str, Any] = {"per_view": [_finite(row) for row in table.to_dict("records")]}
     for name, more_is_better in MEASURES.items():
         values = table[name].to_numpy(dtype=float)
-        worst = ("min", values.min()) if more_is_better else ("max", values.max())
-        for what, value in (("mean", values.mean()), ("median", np.median(values)), worst):
-            found[f"test_{name}_{what}"] = float(value) if math.isfinite(value) else None
+        values = values[~np.isnan(values)]
+        worst = ("min", np.min) if more_is_better else ("max", np.max)
+        for what, measure in (("mean", np.mean), ("median", np.median), worst):
+            value = float(measure(values)) if values.size else math.nan
+            found[f"test_{name}_{what}"] = value if math.isfinite(value) else None
     for name, errors in (("albedo", on_surfaces), ("albedo_off_edges", off_edges)):
         found[name] = None if errors is None else _finite(errors.summary())
     return found

@@ -27,13 +27,14 @@ def test_a_training_can_be_resumed_with_less_memory() -> None:
     assert left_out == {f"train.{name}" for name in NO_RESULT}
 
 
-def _trained(folder: Path, left_out: int) -> StageContext:
-    """A training of materials alone on views of a painted room, of which the last are left out."""
+def _trained(folder: Path, left_out: int, black: int = 0) -> StageContext:
+    """A training of materials alone on views of a painted room, of which the last are left out, and some are black."""
     splits: dict[str, list[dict]] = {"train": [], "test": []}
     views = painted_views()[:8]
     for index, view in enumerate(views):
         split = "train" if index < len(views) - left_out else "test"
-        write_image(folder / f"data/{split}/{index}.exr", view.image.numpy())
+        lit = float(index < len(views) - black)
+        write_image(folder / f"data/{split}/{index}.exr", lit * view.image.numpy())
         splits[split].append(frame_entry(f"{split}/{index}", view.camera, view.light))
     for split, entries in splits.items():
         if entries:
@@ -50,6 +51,16 @@ def _trained(folder: Path, left_out: int) -> StageContext:
     context = StageContext(config, inputs, {}, folder / "out")
     STAGE.run(context)
     return context
+
+
+def test_views_left_out_that_are_black_leave_a_grade(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    # It was a raw error about JSON once the scene had been trained.
+    for black, psnr in ((1, True), (2, False)):
+        (tmp_path / f"{black}").mkdir()
+        context = _trained(tmp_path / f"{black}", 2, black)
+        grade = load_grade(context.folder / "grade.json")
+        assert grade.views == 2 and (grade.psnr is not None) == psnr == (context.facts["test_psnr_mean"] is not None)
+        assert ("as the views that were left out are black" in capsys.readouterr().out) == (not psnr)
 
 
 @pytest.mark.parametrize("left_out", [0, 2])

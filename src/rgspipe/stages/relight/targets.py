@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -55,9 +54,7 @@ def relight_targets(context: StageContext, relighter: Relighter) -> pd.DataFrame
         shown.append(Relit(row["lights"], truths[row["rig"], row["view"]], render, row["psnr"]))
     if shown:
         write_bytes(context.folder / COMPARISON, png_of(comparison_figure(shown)))
-    # Equal images have no finite PSNR, and JSON no infinity.
-    means = [round(mean, 2) if math.isfinite(mean) else None for mean in summary["psnr"]]
-    context.note(psnr=dict(zip(summary["lights"].astype(str), means, strict=True)))
+    context.note(psnr=dict(zip(summary["lights"].astype(str), summary["psnr"].round(2), strict=True)))
     return table
 
 

@@ -138,7 +138,7 @@ def _grade(frozen: FrozenScene, lamps: LightRig, views: Sequence[View], held_out
             images = [view.as_photographed(frozen.render(view.camera, lamps)) for view in chosen]
         truths, psnr = [view.image for view in chosen], None
     else:
-        images, psnr = held_out.images, float(np.mean(held_out.psnr))
+        images, psnr = held_out.images, held_out.summary()["test_psnr_mean"]
         truths = [view.image for view in held_out.views]
     return grade_scene(frozen, images, truths, cameras=cameras, psnr=psnr, highest_albedo=ALBEDO_RANGE[1])
 

@@ -9,7 +9,6 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
 import torch
 
@@ -100,15 +99,16 @@ def _judged(
         OperatorStore.of(options),
         frozen.gather,
     )
-    psnr = float(np.mean(judged.psnr)) if left_out else None
+    summary = judged.summary() if left_out else {}
     truths = [view.image for view in judged.views]
     cameras = [view.camera for view in trained.views]
+    psnr = summary.get("test_psnr_mean")
     grade = grade_scene(frozen, judged.images, truths, cameras=cameras, psnr=psnr, highest_albedo=ALBEDO_RANGE[1])
     if not left_out:
-        return {}, grade
+        return summary, grade
     picture = held_out_picture(judged.views, judged.images, judged.psnr, judged.albedo)
     save_png(folder / "comparison.png", picture)
-    return judged.summary(), grade
+    return summary, grade
 
 
 def _quality(metrics: dict[str, Any]) -> str:
@@ -126,14 +126,14 @@ def _quality(metrics: dict[str, Any]) -> str:
 
 def _direct_only(
     trained: Trained, train_views: tuple[View, ...], test_views: tuple[View, ...], options: TrainOptions
-) -> float:
+) -> float | None:
     """Mean held-out PSNR of the same geometry when light does not bounce, its albedo fitted accordingly."""
     there = [view.to(trained.surfels.centers.device) for view in train_views]
     surfels = fit_materials(trained.surfels, there, options, bounces=False).surfels
     held_out = render_held_out(
         surfels, test_views, None, options.supersampling, options.at_pixels, OperatorStore.of(options)
     )
-    return float(np.mean(held_out.psnr))
+    return held_out.summary()["test_psnr_mean"]
 
 
 def _gloss(gloss: Gloss) -> dict[str, float]:
