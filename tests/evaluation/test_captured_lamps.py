@@ -28,7 +28,9 @@ def test_lamps_are_matched_and_measured() -> None:
     assert told["stated"] == pytest.approx([3**0.5 * 0.005] * 2)
     # Ten and one standard deviations; a ball of 95 % reaches 2.8.
     assert told["inside_95"] == [False, True]
-    assert told["in_sight"] == [False, True]
+    assert told["in_sight"] == [False, True] and told["missed_in_sight"] == []
+    missed = against_truth(found[:1], places[:1], TRUE, 2.0, [VIEW])
+    assert missed["in_sight"] == [False] and missed["missed_in_sight"] == [True]
 
 
 def test_a_lamp_outside_of_the_image_is_in_no_sight() -> None:

@@ -22,6 +22,8 @@ def against_truth(
 ) -> dict[str, Any]:
     """How far each lamp is from a true one, and whether its region holds it; JSON values, in the order of the found.
 
+    Of true ones that were missed, whether they are in sight.
+
     Args:
         found: K lamps.
         places: (K, 3, 3) their covariances, scene units².
@@ -30,6 +32,7 @@ def against_truth(
         views: the photographs, which may show a lamp where their depth leaves it free.
     """
     pairs = match_positions(*(np.stack([light.position.numpy() for light in rig]) for rig in (found, truth)))
+    held = {true for _, true in pairs}
     matched = [(found[own], truth[true], places[own]) for own, true in sorted(pairs)]
     return {
         "lamps": len(truth),
@@ -37,13 +40,18 @@ def against_truth(
         "stated": [float(np.sqrt(np.trace(covariance))) / size for _, _, covariance in matched],
         "intensity_ratio": [float(a.intensity.mean() / b.intensity.mean()) for a, b, _ in matched],
         "inside_95": [_inside(a, b, covariance) for a, b, covariance in matched],
-        "in_sight": [any(_shows(view, b) for view in views) for _, b, _ in matched],
+        "in_sight": [_in_sight(views, b) for _, b, _ in matched],
+        "missed_in_sight": [_in_sight(views, one) for index, one in enumerate(truth) if index not in held],
     }
 
 
 def _inside(lamp: PointLight, true: PointLight, covariance: np.ndarray) -> bool:
     off = (lamp.position - true.position).double().numpy()
     return bool(off @ np.linalg.solve(covariance, off) <= chi2.ppf(REGION, 3))
+
+
+def _in_sight(views: Sequence[View], lamp: PointLight) -> bool:
+    return any(_shows(view, lamp) for view in views)
 
 
 def _shows(view: View, lamp: PointLight) -> bool:

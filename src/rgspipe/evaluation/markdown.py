@@ -31,4 +31,6 @@ def _cell(value: object, form: str) -> str:
         return "–"
     if isinstance(value, bool):
         return "yes" if value else "no"
+    if isinstance(value, float) and math.isinf(value):
+        return "∞"
     return format(value, form) if form else str(value)

@@ -1,4 +1,8 @@
-"""What a study of captures under unknown lamps measures, lamp by lamp, and its medians."""
+"""What a study of captures under unknown lamps measures, lamp by lamp, and its medians.
+
+Lamps that a capture did not find count as infinitely far off, and captures that were refused as of a wrong number:
+medians of those that were found alone would be the better, the fewer they are.
+"""
 
 from __future__ import annotations
 
@@ -8,8 +12,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-#: How a lamp stood to the photographs, or when it was on.
-IN_SIGHT, HIDDEN, LATER = "in sight", "of none", "later"
+#: How a lamp stood to the photographs, or when it was on; and that nothing is known of any.
+IN_SIGHT, HIDDEN, LATER, REFUSED = "in sight", "of none", "later", "refused"
 
 #: Columns of a row.
 COLUMNS = ("position_error", "stated", "intensity_error", "inside_95", "found", "lamps", "albedo", "psnr", "failed")
@@ -33,6 +37,9 @@ def lamp_rows(known: Mapping[str, Any], metrics: Mapping[str, Any]) -> Iterator[
                 "inside_95": truth["inside_95"][index],
             }
         )
+    for in_sight in truth["missed_in_sight"]:
+        missed = {"where": IN_SIGHT if in_sight else HIDDEN, "position_error": np.inf, "intensity_error": np.inf}
+        yield dict(known) | dict.fromkeys(COLUMNS) | shared | missed
 
 
 def later_rows(known: Mapping[str, Any], fits: pd.DataFrame) -> Iterator[dict[str, Any]]:
@@ -51,27 +58,39 @@ def later_rows(known: Mapping[str, Any], fits: pd.DataFrame) -> Iterator[dict[st
         )
 
 
-def failed_row(known: Mapping[str, Any], reason: str) -> dict[str, Any]:
-    """The row of a capture that was refused."""
-    return dict(known) | dict.fromkeys(COLUMNS) | {"where": "", "failed": reason}
+def failed_row(known: Mapping[str, Any], reason: str, where: str = REFUSED) -> dict[str, Any]:
+    """The row of a capture that was refused, or of fits of later lamps that were."""
+    return dict(known) | dict.fromkeys(COLUMNS) | {"where": where, "failed": reason}
 
 
 def summary(table: pd.DataFrame) -> pd.DataFrame:
-    """Medians and shares by scene, case and where the lamp was; `right` is how often the number of lamps was."""
+    """Medians and shares by scene, case and where the lamp was; `right` is how often the number of lamps was.
+
+    `count` are lamps, `failed` what was refused; captures that were count as not `right` wherever lamps of their case
+    were.
+    """
     groups = []
-    for names, part in table[table["failed"].isna()].groupby(["scene", "case", "where"], sort=False):
+    refused = table[table["where"] == REFUSED].groupby(["scene", "case"]).size()
+    for names, part in table.groupby(["scene", "case", "where"], sort=False):
         once = part.drop_duplicates("lighting").dropna(subset=["found"])
+        captures = len(once) + int(refused.get(names[:2], 0))
         groups.append(
             dict(zip(("scene", "case", "where"), names, strict=True))
             | {
-                "count": len(part),
-                "position_error": part["position_error"].median(),
-                "worst": part["position_error"].max(),
-                "intensity_error": part["intensity_error"].median(),
+                "count": int(part["failed"].isna().sum()),
+                "failed": int(part["failed"].notna().sum()),
+                "position_error": _median(part["position_error"]),
+                "worst": part["position_error"].astype(float).max(),
+                "intensity_error": _median(part["intensity_error"]),
                 "inside_95": part["inside_95"].astype(float).mean(),
-                "right": (once["found"] == once["lamps"]).mean() if len(once) else np.nan,
-                "albedo": once["albedo"].astype(float).median() if len(once) else np.nan,
-                "psnr": once["psnr"].astype(float).median() if len(once) else np.nan,
+                "right": (once["found"] == once["lamps"]).sum() / captures if len(once) else np.nan,
+                "albedo": _median(once["albedo"]),
+                "psnr": _median(once["psnr"]),
             }
         )
     return pd.DataFrame(groups)
+
+
+def _median(values: pd.Series) -> float:
+    known = values.dropna().astype(float)
+    return float(known.median()) if len(known) else np.nan

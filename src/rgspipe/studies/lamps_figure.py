@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import matplotlib
 import pandas as pd
 from matplotlib.figure import Figure
@@ -13,7 +15,10 @@ COLOURS = ("#0072B2", "#E69F00", "#6A1B4D", "#009E73", "#56B4E9", "#222222")
 
 
 def lamps_figure(table: pd.DataFrame) -> Figure:
-    """Errors of places, a dot a lamp, by case; colours say where the lamp was, a bar is the median."""
+    """Errors of places, a dot a lamp, by case; colours say where the lamp was, a bar is the median.
+
+    Lamps that were missed count in the median, and have no dot.
+    """
     shown = table[table["position_error"].notna()]
     cases, groups = list(dict.fromkeys(table["case"])), list(dict.fromkeys(shown["where"]))
     with matplotlib.rc_context(STYLE):
@@ -25,7 +30,7 @@ def lamps_figure(table: pd.DataFrame) -> Figure:
                 height, colour = row + 0.7 * ((place + 0.5) / len(groups) - 0.5), COLOURS[place % len(COLOURS)]
                 label = group.replace("_", " ") if row == 0 else None
                 axis.scatter(errors, [height] * len(errors), s=14, color=colour, alpha=0.7, lw=0, label=label)
-                if len(errors):
+                if len(errors) and math.isfinite(errors.median()):
                     axis.scatter([errors.median()], [height], marker="|", s=160, color=colour)
         if groups:
             axis.set_xscale("log")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -24,6 +25,7 @@ METRICS = {
         "intensity_ratio": [0.9, 1.02],
         "inside_95": [True, False],
         "in_sight": [True, False],
+        "missed_in_sight": [],
     },
     "lamps": {"number": 2},
     "albedo": {"relative_l1": 0.03},
@@ -59,10 +61,33 @@ def test_lamps_become_rows_and_medians(tmp_path: Path) -> None:
     study.run(context)
     table = pd.read_csv(tmp_path / "out/study.csv")
     assert len(table) == 3 * 3 + 1 and context.facts["failed"] == 1
-    assert table["where"].value_counts().to_dict() == {"in sight": 3, "of none": 3, "later, visible": 3}
+    assert table["where"].value_counts().to_dict() == {"in sight": 3, "of none": 3, "later, visible": 3, "refused": 1}
     figures = pd.read_csv(tmp_path / "out/summary.csv").set_index(["case", "where"])
     row = figures.loc[("1 lamp", "of none")]
     assert row["position_error"] == 0.02 and row["inside_95"] == 0.0 and row["right"] == 1.0 and row["count"] == 2
     assert figures.loc[("8 bits", "later, visible"), "intensity_error"] == pytest.approx(0.01)
+    refused = figures.loc[("8 bits", "refused")]
+    assert refused["failed"] == 1 and refused["count"] == 0 and pd.isna(refused["position_error"])
+    # Of two captures one was refused, so that one number is right of two.
+    assert figures.loc[("8 bits", "in sight"), "right"] == 0.5
     assert "| 2.00% |" in (tmp_path / "out/study.md").read_text()
     assert (tmp_path / "out/study.png").stat().st_size > 1000
+
+
+def test_what_was_missed_or_refused_counts(tmp_path: Path) -> None:
+    """One lamp of two was found, in half of the captures; fits of later lamps could not be made."""
+    found = {name: values[:1] for name, values in METRICS["truth"].items() if name != "lamps"}
+    truth = found | {"lamps": 2, "missed_in_sight": [True]}
+    (tmp_path / "metrics.json").write_text(json.dumps(METRICS | {"truth": truth, "lamps": {"number": 1}}))
+    artifact = SimpleNamespace(file=lambda name: tmp_path / name)
+    lost = {"evaluate": dict.fromkeys(range(4), Failure("fit_light", "no light"))}
+    (tmp_path / "out").mkdir()
+    context = StageContext(
+        _config("study.limit=1"), {}, {"capture_surfels": [artifact] * 4}, tmp_path / "out", failures=lost
+    )
+    study.run(context)
+    figures = pd.read_csv(tmp_path / "out/summary.csv").set_index(["case", "where"])
+    row = figures.loc[("1 lamp", "in sight")]
+    assert row["count"] == 4 and row["worst"] == math.inf and row["right"] == 0.0
+    assert figures.loc[("1 lamp", "later"), "failed"] == 2
+    assert "| ∞ |" in (tmp_path / "out/study.md").read_text()

@@ -14,7 +14,7 @@ from rgspipe.stages.base import Failure, Need, StageContext
 from rgspipe.stages.studies.cases import checked_cases, chosen_scenes
 from rgspipe.stages.studies.kind import StudyKind
 from rgspipe.store.artifacts import Artifact
-from rgspipe.studies.lamps import failed_row, lamp_rows, later_rows, summary
+from rgspipe.studies.lamps import LATER, failed_row, lamp_rows, later_rows, summary
 from rgspipe.studies.lamps_figure import lamps_figure
 from rgspipe.studies.written import Study
 
@@ -24,6 +24,7 @@ SHOWN = {
     "case": ("capture", ""),
     "where": ("lamps", ""),
     "count": ("number", "d"),
+    "failed": ("refused", "d"),
     "position_error": ("off (of the room)", ".2%"),
     "worst": ("worst", ".2%"),
     "intensity_error": ("intensity off", ".1%"),
@@ -64,7 +65,9 @@ def _rows(
         yield failed_row(known, captured.reason)
         return
     yield from lamp_rows(known, read_json(captured.file("metrics.json"), "the measures of a capture"))
-    if later is not None and not isinstance(later, Failure):
+    if isinstance(later, Failure):
+        yield failed_row(known, later.reason, LATER)
+    elif later is not None:
         yield from later_rows(known, pd.read_csv(later.file("metrics.csv")))
 
 
