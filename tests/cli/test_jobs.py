@@ -1,12 +1,15 @@
-"""The line at the end of a run that says what usually comes next."""
+"""What is said at the end of a run or a sweep: how jobs ended, and what usually comes next."""
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 from rgspipe.cli import main
+from rgspipe.store.status import read_statuses
 
 
 def _said(capsys: pytest.CaptureFixture[str], *arguments: str) -> list[str]:
@@ -52,3 +55,19 @@ def test_parts_of_something_larger_do_not(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert _said(capsys, *arguments) == []
+
+
+@pytest.mark.slow
+def test_jobs_that_never_began_are_told(
+    tmp_path: Path, child_environment: dict[str, str], capfd: pytest.CaptureFixture[str]
+) -> None:
+    """The process of a job ends, and others with it: they had no status, so that all jobs seemed to be told of."""
+    words = ["-m", "stage=break", "seed=0,3,4,5", "hydra.launcher.n_jobs=2", "outputs=here"]
+    ended = subprocess.run([sys.executable, "-m", "toys", *words], cwd=tmp_path, env=child_environment, check=False)
+    assert ended.returncode == 1
+    [sweep] = (tmp_path / "here/runs").iterdir()
+    states = [status["state"] for _, status in read_statuses(sweep)]
+    assert len(states) == 4 and set(states) <= {"done", "killed"} and "killed" in states
+    said = capfd.readouterr().out
+    assert f"{states.count('done')} of 4 jobs done" in said
+    assert len((sweep / "table.csv").read_text().splitlines()) == 5

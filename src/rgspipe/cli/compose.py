@@ -21,7 +21,7 @@ from omegaconf.errors import OmegaConfBaseException
 
 from rgspipe.cli.commands import COMMANDS
 from rgspipe.cli.hydra_settings import check_hydra
-from rgspipe.cli.sweep_values import check_jobs, first_value, single_jobs
+from rgspipe.cli.sweep_values import check_jobs, first_value, job_overrides, single_jobs
 from rgspipe.config import RgspipeConfig
 from rgspipe.config.core import build, plain, unknown_key
 from rgspipe.datasets.json_file import shown
@@ -131,6 +131,11 @@ def check_sweep(overrides: Sequence[str]) -> RgspipeConfig:
         for text in itertools.islice(single_jobs(override), 1, CHECKED_VALUES):
             compose_config([*first[:index], text, *first[index + 1 :]])
     return config
+
+
+def sweep_jobs(overrides: Sequence[str]) -> list[list[str]]:
+    """The overrides of each job of a sweep, in their order."""
+    return list(job_overrides(_parse(overrides)))
 
 
 def given_folder(overrides: Sequence[str], mode: str) -> Path | None:

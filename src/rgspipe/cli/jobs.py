@@ -24,6 +24,7 @@ from rgspipe.cli.compose import (
     given_folder,
     leaves_machine,
     register_schema,
+    sweep_jobs,
     typed,
     usual_command,
 )
@@ -36,13 +37,16 @@ from rgspipe.graph.resolver import StageLoader
 from rgspipe.stages import load_stage
 from rgspipe.store.artifacts import Artifact
 from rgspipe.store.files import NO_RIGHT
-from rgspipe.store.status import RunStatus, read_status, read_statuses, record_stopped
+from rgspipe.store.status import RunStatus, read_status, read_statuses, record_killed, record_stopped
 
 #: What a run writes about itself: its configuration and how it ended.
 RUN_BYTES = 2**16
 
 #: Stages whose result is told in lines on the terminal.
 TOLD = ("fit_light", "track", "evaluate")
+
+#: What became of jobs of a sweep that was over before they began.
+UNBEGUN = "did not begin, as the process of another job ended, and the sweep with it; mostly there was no memory left"
 
 
 def run_jobs(overrides: Sequence[str], stage_loader: StageLoader, multirun: bool, leads_on: bool = True) -> int:
@@ -81,6 +85,7 @@ def run_jobs(overrides: Sequence[str], stage_loader: StageLoader, multirun: bool
             record_stopped(folder, EXIT_INTERRUPTED)
         raise
     if multirun:
+        _record_unbegun(folder, sweep_jobs(overrides))
         return _sweep_summary(folder, code, overrides if leads_on else None)
     status = read_status(folder)
     code = max(code, EXIT_FAILED if status is None else int(status.get("exit_code", EXIT_FAILED)))
@@ -214,6 +219,15 @@ def _outcome(artifact: Artifact) -> list[str]:
     from rgspipe.cli.outcome import outcome
 
     return outcome(artifact)
+
+
+def _record_unbegun(folder: Path, jobs: Sequence[Sequence[str]]) -> None:
+    """Say of jobs of a sweep that never began that they were killed, where the jobs' folders are called as usual."""
+    begun = [path for path, _ in read_statuses(folder)]
+    if len(begun) < len(jobs) and all(path.parent == folder and path.name.isdecimal() for path in begun):
+        for number, overrides in enumerate(jobs):
+            if folder / str(number) not in begun:
+                record_killed(folder / str(number), overrides, UNBEGUN)
 
 
 def _sweep_summary(folder: Path, code: int, overrides: Sequence[str] | None) -> int:

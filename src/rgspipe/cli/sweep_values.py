@@ -42,6 +42,12 @@ def single_jobs(override: Override) -> Iterator[str]:
         ) from None
 
 
+def job_overrides(overrides: Sequence[Override]) -> Iterator[list[str]]:
+    """The overrides of each job of a sweep, in the order in which Hydra numbers them."""
+    own = [override for override in overrides if not override.key_or_group.startswith("hydra")]
+    return (list(job) for job in itertools.product(*map(single_jobs, own)))
+
+
 def check_jobs(overrides: Sequence[Override]) -> None:
     """Refuse sweeps of too many jobs.
 
