@@ -217,6 +217,40 @@ def test_a_file_that_changes_while_a_run_reads_it_is_refused_and_nothing_is_kept
     assert run(config, load).file("totals.txt").read_text() == "496\n1488\n"
 
 
+def test_a_file_that_changes_before_a_stage_reads_it_through_its_input_is_refused(
+    config: RgspipeConfig, tmp_path: Path
+) -> None:
+    """Photographs are read where they are: what was fitted to others had the fingerprint of those of the plan."""
+    source = tmp_path / "foreign.txt"
+    source.write_text("1")
+
+    def change(*_: object) -> list[str]:
+        source.write_text("2")
+        return []
+
+    sow = dataclasses.replace(toys.SOW, files=lambda config: [source])
+    run(with_changes(config, {"stage": "sow"}), {**toys.STAGES, "sow": sow}.__getitem__)
+    # Remarks are asked for once the plan knows what the file holds.
+    load = {**toys.STAGES, "sow": sow, "grow": dataclasses.replace(toys.GROW, remarks=change)}.__getitem__
+    with pytest.raises(InputError, match=r"foreign\.txt: expected what it was when the run began"):
+        run(with_changes(config, {"stage": "grow"}), load)
+    assert not list((Path(config.outputs) / "cornell").glob("grow/*"))
+
+
+def test_a_foreign_folder_may_hold_any_name_and_what_cannot_be_read_is_named(
+    config: RgspipeConfig, tmp_path: Path
+) -> None:
+    (tmp_path / "foreign").mkdir()
+    load = {**toys.STAGES, "sow": dataclasses.replace(toys.SOW, files=lambda config: [tmp_path / "foreign"])}
+    before = resolve(config, load.__getitem__).key
+    Path(os.fsdecode(bytes(tmp_path / "foreign") + b"/K\xfcche.jpg")).touch()
+    assert resolve(config, load.__getitem__).key != before
+    # What the system refuses to read, also to root.
+    (tmp_path / "foreign" / "memory").symlink_to("/proc/self/mem")
+    with pytest.raises(InputError, match="foreign: expected a file to read, found Input/output error"):
+        resolve(config, load.__getitem__)
+
+
 @pytest.mark.parametrize(
     ("name", "damage", "word"),
     [

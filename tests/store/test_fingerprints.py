@@ -16,3 +16,6 @@ def test_differences_are_told_in_words() -> None:
     now = {"config": {"a": {"b": 5, "c": 2}}, "inputs": {"x": ["2"]}, "code": {"m": "2"}, "sums": "of two", **same}
     assert differences(now, before) == ["a.b 1 → 5", "the code of m changed", "another x", "sums of one → of two"]
     assert differences(now, now) == []
+    moved, changed = now | {"foreign": {"b": "7"}}, now | {"foreign": {"a": "8"}}
+    assert differences(moved, now | {"foreign": {"a": "7"}}) == ["a is now b"]
+    assert differences(changed, now | {"foreign": {"a": "7"}}) == ["the files in a changed"]

@@ -46,6 +46,14 @@ class Node:
         return (needed for needed, may_fail in zip(self.inputs, self.may_fail, strict=True) if not may_fail)
 
 
+def foreign_behind(node: Node) -> dict[str, str]:
+    """The files and folders that a node's inputs depend on, and their digests: an input may lead to them."""
+    found: dict[str, str] = {}
+    for needed in node.inputs:
+        found |= needed.recipe["foreign"] | foreign_behind(needed)
+    return found
+
+
 def indispensable(root: Node) -> set[Key]:
     """What `root` cannot be made without, itself among it."""
     return {root.key}.union(*map(indispensable, root.required()))
@@ -93,8 +101,15 @@ class Making:
 
         def make(folder: Path) -> Mapping[str, Any]:
             context = StageContext(node.config, inputs, lists, folder, failures=failed)
+            # Photographs are read where they are by whatever is made of them, and hours may have passed.
+            _check_unchanged(foreign_behind(node))
             node.stage.run(context)
-            _check_unchanged(node.recipe["foreign"], folder)
+            try:
+                _check_unchanged(node.recipe["foreign"])
+            except InputError:
+                for path in list(folder.iterdir()):
+                    remove_any(path)
+                raise
             gpu = gpu_in_use()
             return context.facts if gpu is None else {**context.facts, "gpu": gpu}
 
@@ -121,15 +136,26 @@ class Making:
         return lists, failed
 
 
-def _check_unchanged(foreign: Mapping[str, str], folder: Path) -> None:
-    """Refuse what was made of other files than those that its fingerprint is of, and remove it.
+def foreign_digest(path: Path) -> str:
+    """That of a file or folder outside the store that a result depends on.
+
+    Raises:
+        InputError: it, or something in it, cannot be read.
+    """
+    try:
+        return tree_digest(path)
+    except OSError as error:
+        where, remedy = error.filename or path, f"Have its owner let you read it, or take it out of {path}."
+        raise InputError(where, expected="a file to read", found=str(error.strerror), remedy=remedy) from error
+
+
+def _check_unchanged(foreign: Mapping[str, str]) -> None:
+    """Refuse what is made of other files than those that its fingerprint is of.
 
     Raises:
         InputError: a file or folder has changed since the run began.
     """
-    changed = [path for path, digest in foreign.items() if tree_digest(Path(path)) != digest]
+    changed = [path for path, digest in foreign.items() if foreign_digest(Path(path)) != digest]
     if changed:
-        for path in list(folder.iterdir()):
-            remove_any(path)
-        remedy = "Run again once nothing writes to it: what was made of it is removed."
+        remedy = "Run again once nothing writes to it: nothing that was made of it is kept."
         raise InputError(changed[0], expected="what it was when the run began", found="other content", remedy=remedy)

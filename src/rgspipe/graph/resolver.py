@@ -7,12 +7,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from rgspipe.config import RgspipeConfig, get_value, with_changes
-from rgspipe.graph.nodes import Node
+from rgspipe.graph.nodes import Node, foreign_digest
 from rgspipe.graph.source_code import SourceCode
 from rgspipe.machine.threads import order_of_sums
 from rgspipe.stages.base import Stage
 from rgspipe.store.artifacts import Key
-from rgspipe.store.files import tree_digest
 from rgspipe.store.fingerprints import fingerprint
 
 StageLoader = Callable[[str], Stage]
@@ -67,7 +66,7 @@ class Resolver:
 
     def _file(self, path: Path) -> str:
         if str(path) not in self.files:
-            self.files[str(path)] = tree_digest(path)
+            self.files[str(path)] = foreign_digest(path)
         return self.files[str(path)]
 
 

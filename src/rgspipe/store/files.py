@@ -273,7 +273,8 @@ def tree_digest(root: Path) -> str:
     if root.is_file():
         return sha256(root)
     lines = [f"{path.relative_to(root).as_posix()} {sha256(path)}" for path in sorted(_files_below(root))]
-    return hashlib.sha256("\n".join(lines).encode()).hexdigest()
+    # Names may have bytes that are no text, such as umlauts of an old archive.
+    return hashlib.sha256("\n".join(lines).encode(errors="surrogateescape")).hexdigest()
 
 
 def _files_below(root: Path) -> Iterator[Path]:

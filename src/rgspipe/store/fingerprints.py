@@ -22,9 +22,15 @@ def fingerprint(value: Any) -> str:
 def differences(now: Mapping[str, Any], before: Mapping[str, Any]) -> list[str]:
     """What changed between two recipes, one phrase each, such as "dataset.resolution 64 → 128"."""
     phrases = config_differences(now["config"], before.get("config", {}))
-    for kind, text in (("code", "the code of {} changed"), ("foreign", "the files in {} changed")):
-        old = before.get(kind, {})
-        phrases += [text.format(name) for name, digest in now[kind].items() if old.get(name) != digest]
+    old = before.get("code", {})
+    phrases += [f"the code of {name} changed" for name, digest in now["code"].items() if old.get(name) != digest]
+    old = before.get("foreign", {})
+    former = {digest: name for name, digest in old.items()}
+    phrases += [
+        f"{former[digest]} is now {name}" if digest in former else f"the files in {name} changed"
+        for name, digest in now["foreign"].items()
+        if old.get(name) != digest
+    ]
     old = before.get("inputs", {})
     phrases += [f"another {name}" for name, prints in now["inputs"].items() if old.get(name) != prints]
     if now["sums"] != before.get("sums", now["sums"]):
