@@ -29,11 +29,18 @@ def test_without_a_judgement_training_speaks_for_itself(full_contents):
     assert [tile["label"] for tile in tiles(found)] == ["PSNR of held-out views"]
 
 
+def test_where_most_fits_failed_the_error_is_told_and_not_left_out(full_contents):
+    summary = full_contents.summary.assign(median_position_error=math.inf, median_intensity_error=math.inf)
+    found = highlights(full_contents.quality, summary, full_contents.true_summary, full_contents.training)
+    shown = {tile["label"]: tile["value"] for tile in tiles(found)}
+    assert shown["lights: median position error"] == "∞" and found["intensity_error"] == math.inf
+
+
 def test_a_scenes_summary_is_strict_json_with_a_row_for_each_class(full_contents):
     full_contents.summary.loc[full_contents.summary["occlusion"] == "occluded", "median_position_error"] = math.inf
     summary = json.loads(json.dumps(scene_summary(full_contents), allow_nan=False))
     rows = {row["occlusion"]: row for row in summary["lights"]}
     assert list(rows) == ["visible", "out_of_frame", "occluded"]
-    assert rows["occluded"]["position_error"] is None and rows["visible"]["count"] == 3
+    assert rows["occluded"]["position_error"] == "inf" and rows["visible"]["count"] == 3
     true = full_contents.true_summary.query("occlusion == 'visible'").iloc[0]
     assert rows["visible"]["true_position_error"] == pytest.approx(true["median_position_error"])

@@ -1,5 +1,9 @@
 """The page over scenes."""
 
+import json
+import math
+from dataclasses import replace
+
 import numpy as np
 
 from html_page import Page
@@ -23,6 +27,14 @@ def test_figures_that_are_not_known_are_dashes():
     summary = {"counts": "", "highlights": {"psnr": 30.0}, "lights": []}
     page = Page(render_overview([SceneEntry("room", "room.html", "today", summary)], {}))
     assert "30.0 — — — — — — — — — —" in page.text and not page.pictures
+
+
+def test_errors_of_failed_fits_are_infinite_and_not_unknown(full_contents):
+    contents = replace(full_contents, summary=full_contents.summary.assign(median_position_error=math.inf))
+    summary = json.loads(json.dumps(scene_summary(contents), allow_nan=False))
+    page = Page(render_overview([SceneEntry("room", "room.html", "today", summary)], {}))
+    # In the row of the scene, and in those of its three classes.
+    assert page.text.count("∞") == 4
 
 
 def test_without_any_report_the_page_says_so():

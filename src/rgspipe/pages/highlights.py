@@ -36,7 +36,7 @@ def highlights(
     true_summary: pd.DataFrame | None,
     training: Mapping[str, Any] | None,
 ) -> dict[str, float | None]:
-    """Every figure of `NAMES`; None for what is not known.
+    """Every figure of `NAMES`; None for what is not known. Errors are infinite where more than half of fits failed.
 
     Args:
         quality: rows of every measure of held-out views with `surfels` and `light`; those with light at pixels count.
@@ -103,4 +103,4 @@ def _lights(summary: pd.DataFrame, method: str, views: int | None = None) -> pd.
 
 
 def _plain(value: Any) -> float | None:
-    return None if value is None or not math.isfinite(value) else float(value)
+    return None if value is None or math.isnan(value) else float(value)

@@ -43,7 +43,7 @@ def decimals(value: Any, digits: int = 2) -> str:
     """A number with this many decimals."""
     if value is None or pd.isna(value):
         return MISSING
-    return "∞" if math.isinf(value) else f"{float(value):,.{digits}f}"
+    return "∞" if math.isinf(float(value)) else f"{float(value):,.{digits}f}"
 
 
 def label(name: str) -> str:

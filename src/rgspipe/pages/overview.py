@@ -14,6 +14,7 @@ from rgspipe.pages.highlights import NAMES, highlights
 from rgspipe.pages.html import picture_address, render
 from rgspipe.pages.quality import compared_lights
 from rgspipe.pages.report import ReportContents
+from rgspipe.store.strict_json import as_json
 
 #: Most bytes and pixels across of a scene's pictures.
 VIEW_BYTES, VIEW_WIDTH = 120_000, 320
@@ -45,13 +46,14 @@ def scene_summary(contents: ReportContents) -> dict[str, Any]:
     """What a page over scenes says of one, as strict JSON: `counts` of the dataset, `highlights` and `lights` by class.
 
     `lights`: of the main method with the fewest views, rows of `occlusion`, `count`, `position_error`,
-    `true_position_error` (with surfels made from the truth) and `solved`; None for what is not known or infinite.
+    `true_position_error` (with surfels made from the truth) and `solved`; None for what is not known.
     """
-    return {
+    summary = {
         "counts": "" if contents.gallery is None else contents.gallery.counts,
         "highlights": highlights(contents.quality, contents.summary, contents.true_summary, contents.training),
         "lights": _lights(contents.summary, contents.true_summary),
     }
+    return as_json(summary)
 
 
 def render_overview(scenes: Sequence[SceneEntry], missing: Mapping[str, str]) -> str:
@@ -89,13 +91,9 @@ def _lights(summary: pd.DataFrame, true_summary: pd.DataFrame | None) -> list[di
         {
             "occlusion": row["occlusion"],
             "count": int(row["count"]),
-            "position_error": _plain(row["median_position_error"]),
-            "true_position_error": _plain(true.get(row["occlusion"])),
-            "solved": _plain(row["success_rate"]),
+            "position_error": row["median_position_error"],
+            "true_position_error": true.get(row["occlusion"]),
+            "solved": row["success_rate"],
         }
         for row in rows.to_dict("records")
     ]
-
-
-def _plain(value: Any) -> float | None:
-    return None if value is None or pd.isna(value) or abs(value) == float("inf") else float(value)

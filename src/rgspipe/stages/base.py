@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from rgspipe.config import RgspipeConfig
 from rgspipe.renderer.device import chosen_device
 from rgspipe.store.artifacts import Artifact
+from rgspipe.store.strict_json import as_json
 
 if TYPE_CHECKING:
     import torch
@@ -74,8 +74,8 @@ class StageContext:
         return [failed[place] if place in failed else next(made) for place in range(count)]
 
     def note(self, **facts: Any) -> None:
-        """Keep JSON values in the manifest, under "facts"; numbers that JSON does not know, such as NaN, are null."""
-        self.facts.update(_as_json(facts))
+        """Keep JSON values in the manifest, under "facts"; see `as_json`."""
+        self.facts.update(as_json(facts))
 
     @cached_property
     def device(self) -> torch.device:
@@ -92,14 +92,6 @@ class StageContext:
         folder = self.folder / ".scratch"
         folder.mkdir(exist_ok=True)
         return folder
-
-
-def _as_json(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {key: _as_json(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_as_json(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _nothing(config: RgspipeConfig) -> tuple[()]:

@@ -6,9 +6,23 @@ NaN and infinity are left to those who know which key they stand for.
 from __future__ import annotations
 
 import json
+import math
+from collections.abc import Mapping
+from typing import Any
 
 #: Digits of the largest integer that a double can hold.
 MOST_DIGITS = 308
+
+
+def as_json(value: Any) -> Any:
+    """A value as strict JSON knows it: NaN is null, infinity the text "inf", and tuples are lists."""
+    if isinstance(value, Mapping):
+        return {key: as_json(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [as_json(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None if math.isnan(value) else "inf"
+    return value
 
 
 def parse_json(text: str) -> object:

@@ -29,6 +29,7 @@ from rgspipe.stages.sources import target_stage
 from rgspipe.stages.targets.true_lights import scene_bounds, truth_file
 from rgspipe.store.artifacts import Artifact
 from rgspipe.store.files import write_bytes, write_json, write_text
+from rgspipe.store.strict_json import as_json
 
 
 @dataclass(frozen=True)
@@ -71,7 +72,7 @@ def run(context: StageContext) -> None:
         ],
         "notes": truth.notes,
     }
-    write_json(context.folder / "metrics.json", _plain(content))
+    write_json(context.folder / "metrics.json", as_json(content))
     context.note(targets=len(targets), with_truth=int(targets["position_error"].notna().sum()))
 
 
@@ -174,17 +175,6 @@ def _camera(camera: Camera) -> dict[str, Any]:
         "direction": (-camera.camera_to_world[:3, 2]).tolist(),
         "angle": 2.0 * math.atan(0.5 * camera.width / camera.fx),
     }
-
-
-def _plain(value: Any) -> Any:
-    """`value` as strict JSON knows it: NaN becomes null, infinity the text "inf"."""
-    if isinstance(value, Mapping):
-        return {key: _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None if math.isnan(value) else "inf"
-    return value
 
 
 def _truth_file(config: RgspipeConfig) -> list[Path]:
