@@ -1,4 +1,4 @@
-"""Fits that are set beside each other, by studies and by the report."""
+"""What is set beside each other: fits, by studies and by the report, and scenes with what they could have been."""
 
 from __future__ import annotations
 
@@ -6,6 +6,10 @@ from dataclasses import dataclass
 
 from rgspipe.fitting.options import Method
 from rgspipe.options import Options, option
+
+#: Keys and sections that ask what would come of another scene or other images than those that are there: of other
+#: surfels, or of errors that are put in; and of another method.
+OTHER_SCENE, OTHER_METHOD = ("capture", "freeze.surfels", "model_error", "target_capture"), "fit.method"
 
 
 @dataclass(frozen=True)

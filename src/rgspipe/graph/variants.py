@@ -10,8 +10,10 @@ import hashlib
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 
-#: Keys and sections that are for comparisons: other surfels, other methods, errors put in.
-COMPARED = ("capture", "fit.method", "freeze.surfels", "model_error", "target_capture")
+from rgspipe.config.compared import OTHER_METHOD, OTHER_SCENE
+
+#: Keys and sections that are for comparisons.
+COMPARED = (OTHER_METHOD, *OTHER_SCENE)
 
 #: The group of methods, whose members set `fit.method`.
 METHODS = "fit"

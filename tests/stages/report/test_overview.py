@@ -11,18 +11,22 @@ import pytest
 from html_page import Page
 from rgspipe.cli.compose import compose_config
 from rgspipe.config import RgspipeConfig, with_changes
+from rgspipe.config.core import plain
 from rgspipe.stages.base import StageContext
 from rgspipe.stages.report import overview
 from rgspipe.store.artifacts import ArtifactStore, Key
 
 
-def _write(root: Path, scene: str, fingerprint: str, files: dict[str, bytes]) -> None:
+def _write(
+    root: Path, scene: str, fingerprint: str, files: dict[str, bytes], config: dict[str, object] | None = None
+) -> None:
     def make(folder: Path) -> dict:
         for name, content in files.items():
             (folder / name).write_bytes(content)
         return {}
 
-    ArtifactStore(root).build(Key(scene, "report", fingerprint), {"config": {}, "inputs": {}, "code": {}}, make)
+    recipe = {"config": config or {}, "inputs": {}, "code": {}}
+    ArtifactStore(root).build(Key(scene, "report", fingerprint), recipe, make)
 
 
 def _files(psnr: float) -> dict[str, bytes]:
@@ -57,6 +61,17 @@ def test_links_lead_to_the_newest_report_of_each_scene(config: RgspipeConfig) ->
     assert context.facts == {"scenes": ["a b"], "missing": ["room", "old"]}
     assert "python -m rgspipe pipeline=reproduce scene=room" in page.text
     assert "scene=external scene.path=DIR scene.name=old" in page.text
+
+
+def test_a_report_of_another_scene_than_the_one_that_is_there_says_so(config: RgspipeConfig) -> None:
+    """The newest may be one with true surfels, or with errors put in: its figures are not those of the scene."""
+    sections = {name: plain(getattr(RgspipeConfig(), name)) for name in ("freeze", "capture", "fit")}
+    others = sections | {"freeze": sections["freeze"] | {"surfels": "truth", "patches": 8}}
+    _write(Path(config.outputs), "a b", "01", _files(31.0), sections)
+    _write(Path(config.outputs), "room", "02", _files(32.0), others)
+    path, _ = _run(config)
+    text = Page(path.read_text(encoding="utf-8")).text
+    assert text.count("UTC; freeze.surfels trained → truth") == 1 and "patches" not in text
 
 
 def test_a_new_report_makes_another_page(config: RgspipeConfig) -> None:

@@ -7,6 +7,8 @@ from pathlib import Path
 from urllib.parse import quote
 
 from rgspipe.config import RgspipeConfig
+from rgspipe.config.compared import OTHER_SCENE
+from rgspipe.config.core import plain
 from rgspipe.datasets.json_file import read_json
 from rgspipe.machine.resources import resource_folder
 from rgspipe.pages.overview import SceneEntry, render_overview
@@ -14,6 +16,7 @@ from rgspipe.stages.base import Stage, StageContext
 from rgspipe.stages.report.report import HELD_OUT, REPORT, SUMMARY, VIEW
 from rgspipe.store.artifacts import Artifact, ArtifactStore
 from rgspipe.store.files import write_text
+from rgspipe.store.fingerprints import config_differences
 from rgspipe.store.manifest import MANIFEST
 
 PAGE = "overview.html"
@@ -40,7 +43,18 @@ def _entry(name: str, report: Artifact) -> SceneEntry:
     address = "/".join(["..", "..", "..", quote(name), "report", report.fingerprint, REPORT])
     summary = read_json(report.file(SUMMARY), "the figures of a report")
     made = str(report.manifest.get("created", "")).partition("+")[0].replace("T", " ") + " UTC"
+    made = "; ".join([made, *_others(report)])
     return SceneEntry(name, address, made, summary, _bytes(report, VIEW), _bytes(report, HELD_OUT))
+
+
+def _others(report: Artifact) -> list[str]:
+    """The settings by which a report is of another scene than the one that is there."""
+    of_report, usual = report.manifest["config"], RgspipeConfig()
+    sections = [key.partition(".")[0] for key in OTHER_SCENE]
+    before = {name: plain(getattr(usual, name)) for name in sections}
+    now = {name: of_report[name] for name in sections if name in of_report}
+    told = config_differences(now, before)
+    return [text for text in told if any(text.startswith((f"{key} ", f"{key}.")) for key in OTHER_SCENE)]
 
 
 def _bytes(report: Artifact, name: str) -> bytes | None:
