@@ -62,9 +62,9 @@ def _compare(changes: Mapping[str, object]) -> Following:
 
 
 def _generated(config: RgspipeConfig, made: Artifact) -> Following:
-    changes = {"fit.targets": "generated"}
-    moving = config.targets.kind == "drive"
-    return Following("to follow its lamps", "track", changes) if moving else _compare(changes)
+    if config.targets.kind == "drive":
+        return Following("to follow its lamps", "track")
+    return _compare({"fit.targets": "generated"})
 
 
 def _fitted(config: RgspipeConfig, made: Artifact) -> Following:
