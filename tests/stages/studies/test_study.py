@@ -57,4 +57,4 @@ def test_what_is_prepared_takes_few_targets(name: str, kind: str, limit: int) ->
 def test_a_study_depends_on_what_its_kind_reads() -> None:
     assert study.STAGE.keys(_config("captures")) == ("study",)
     assert study.STAGE.keys(_config("classes")) == ("study", "seed")
-    assert {"study", "evaluate.success", "fit.truth", "light"} <= set(study.STAGE.keys(_config("courses")))
+    assert {"study", "evaluate.success", "fit.truth", "light.type"} <= set(study.STAGE.keys(_config("courses")))
