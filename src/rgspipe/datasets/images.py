@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from rgspipe.datasets.display_image import FORMATS, read_colour_levels, read_levels
-from rgspipe.datasets.exr import read_array, read_channels, read_image
+from rgspipe.datasets.exr import read_array, read_channels, read_depth_channel, read_image
 from rgspipe.errors import InputError
 from rgspipe.scene import Camera
 from rgspipe.scene.arrays import check_radiance
@@ -49,11 +49,7 @@ def read_depth(path: Path, camera: Camera, convention: str) -> Tensor:
             found=f"a {FORMATS[path.suffix.lower()]} image",
             remedy="Multiply its levels by the unit (0.001 for millimetres in metres), and write them as EXR.",
         )
-    channels = read_channels(path)
-    if len(channels) != 1:
-        found = f"{len(channels)}: {', '.join(sorted(channels))}"
-        raise InputError(path, expected="one channel of depth", found=found, remedy="Export only the depth.")
-    (stored,) = channels.values()
+    stored = read_depth_channel(path)
     check_size(path, stored, camera)
     depth = torch.from_numpy(np.array(stored))
     if (depth < 0).any():

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rgspipe.datasets.display_image import DAMAGED, opened, read_levels, saturated_from
-from rgspipe.datasets.exr import read_channels
+from rgspipe.datasets.exr import read_channels, read_depth_channel
 from rgspipe.datasets.images import NO_SURFACE, read_colour
 from rgspipe.datasets.input_file import check_pixel_count, input_file
 from rgspipe.datasets.reading_limits import reading_limits, timed
@@ -104,12 +104,7 @@ def _stored_depth(path: Path) -> npt.NDArray[np.float64]:
     if suffix == ".npy":
         return _numpy_array(path)
     if suffix == ".exr":
-        channels = read_channels(path)
-        first = next(iter(channels.values()))
-        if not all(np.array_equal(first, other, equal_nan=True) for other in channels.values()):
-            found = ", ".join(sorted(channels))
-            raise InputError(path, expected="one channel of depth", found=found, remedy="Export only the depth.")
-        return first.astype(np.float64)
+        return read_depth_channel(path).astype(np.float64)
     levels = read_levels(path).levels
     if levels.dtype != np.uint16 or levels.shape[2] != 1:
         raise InputError(
