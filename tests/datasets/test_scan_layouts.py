@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import struct
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -10,12 +11,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from PIL import Image
 
 from raycast import room_views
 from rgspipe.datasets.gs3 import load_dataset
 from rgspipe.datasets.scans.importing import Imported, import_scan
 from rgspipe.datasets.scans.layouts import READERS, read_scan
 from rgspipe.datasets.scans.options import ScanOptions
+from rgspipe.datasets.scans.pictures import read_depth_image
 from rgspipe.datasets.views import View
 from rgspipe.errors import InputError
 from scan_layouts import (
@@ -30,6 +33,7 @@ from scan_layouts import (
     write_polycam,
     write_replica,
     write_scannet,
+    write_wide_png,
 )
 
 SIZE = 32
@@ -277,6 +281,69 @@ def test_fisheye_lenses_of_colmap_are_read(tmp_path: Path, model: str, values: i
     lens = read_scan(tmp_path, ScanOptions()).frames[0].lens
     assert lens.fisheye and lens.bends and (lens.fx, lens.fy) == (20.0, focal[-1])
     assert lens.radial == tuple(numbers[len(focal) + 2 :])
+
+
+@pytest.mark.parametrize("binary", [False, True])
+def test_the_rational_lens_of_colmap_is_read(tmp_path: Path, binary: bool) -> None:
+    """FULL_OPENCV has k3 after the two tangential terms, and k4 to k6 below the line."""
+    write_colmap(tmp_path, VIEWS[:1], binary=binary)
+    values = [20.0, 21.0, 16.0, 15.0, 0.1, 0.02, 0.003, 0.004, 0.05, 0.06, 0.007, 0.008]
+    if binary:
+        content = struct.pack("<QiiQQ12d", 1, 7, 6, SIZE, SIZE, *values)
+        (tmp_path / "sparse/0/cameras.bin").write_bytes(content)
+    else:
+        line = f"7 FULL_OPENCV {SIZE} {SIZE} {' '.join(map(repr, values))}\n"
+        (tmp_path / "sparse/0/cameras.txt").write_text(line)
+    lens = read_scan(tmp_path, ScanOptions()).frames[0].lens
+    x, y, r = 0.3, -0.4, 0.25  # r²
+    bent = (1 + 0.1 * r + 0.02 * r**2 + 0.05 * r**3) / (1 + 0.06 * r + 0.007 * r**2 + 0.008 * r**3)
+    u = 20.0 * (x * bent + 2 * 0.003 * x * y + 0.004 * (r + 2 * x**2)) + 16.0
+    v = 21.0 * (y * bent + 0.003 * (r + 2 * y**2) + 2 * 0.004 * x * y) + 15.0
+    np.testing.assert_allclose(lens.places(np.array([x]), np.array([y])), [[u], [v]], rtol=1e-14)
+
+
+def test_of_several_models_the_largest_is_taken_and_said(tmp_path: Path) -> None:
+    write_colmap(tmp_path / "few", VIEWS[:2], binary=True)
+    write_colmap(tmp_path / "scan", VIEWS, binary=True)
+    (tmp_path / "scan/sparse/0").rename(tmp_path / "scan/sparse/10")
+    for name in ("0", "2"):
+        shutil.copytree(tmp_path / "few/sparse/0", tmp_path / f"scan/sparse/{name}")
+    scan = read_scan(tmp_path / "scan", ScanOptions())
+    assert len(scan.frames) == len(VIEWS) and scan.stated.parent.name == "10"
+    assert f"10 with {len(VIEWS)} of {len(VIEWS) + 4} photographs" in scan.notes[1]
+
+
+def test_inverse_depth_beside_a_model_is_read_by_its_scale_and_offset(tmp_path: Path) -> None:
+    write_colmap(tmp_path / "scan", VIEWS, binary=True, depth=False)
+    (tmp_path / "scan/depths").mkdir()
+    stated, nearest = {}, [1.0 / float(view.depth.min()) for view in VIEWS]
+    for index, (view, near) in enumerate(zip(VIEWS, nearest, strict=True)):
+        levels = np.round(65536 * (1.0 / view.depth.numpy() - 0.05) / near).astype(np.uint16)
+        Image.fromarray(levels).save(tmp_path / f"scan/depths/{index:02d}.png")
+        stated[f"{index:02d}"] = {"scale": near, "offset": 0.05}
+    # Of these 3D Gaussian Splatting uses no depth, either.
+    stated["00"]["scale"], stated["01"]["scale"] = 0.0, 50.0 * nearest[1]
+    (tmp_path / "scan/sparse/0/depth_params.json").write_text(json.dumps(stated))
+    scan = read_scan(tmp_path / "scan", ScanOptions(pose_unit=2.0))
+    assert [frame.depth is None for frame in scan.frames[:4]] == [True, True, False, False]
+    for frame, view in zip(scan.frames[2:], VIEWS[2:], strict=True):
+        # Half a level of 65536 is up to 1e-4 of the farthest depth.
+        np.testing.assert_allclose(read_depth_image(frame.depth), 2.0 * view.depth.numpy(), rtol=1e-4)
+    (tmp_path / "scan/sparse/0/depth_params.json").write_text('{"00": {"scale": 1}}')
+    with pytest.raises(InputError, match=r'depth_params\.json: 00.*"offset"'):
+        read_scan(tmp_path / "scan", ScanOptions())
+
+
+def test_folders_of_scannetpp_are_read(tmp_path: Path) -> None:
+    write_colmap(tmp_path, VIEWS, binary=False)
+    (tmp_path / "sparse/0").rename(tmp_path / "colmap")
+    (tmp_path / "images").rename(tmp_path / "resized_images")
+    write_wide_png(tmp_path / "0.png", np.full((SIZE, SIZE, 1), 65535, np.uint16))
+    (tmp_path / "resized_anon_masks").mkdir()
+    (tmp_path / "0.png").rename(tmp_path / "resized_anon_masks/00.png")
+    scan = read_scan(tmp_path, ScanOptions())
+    assert [frame.mask is None for frame in scan.frames[:2]] == [False, True]
+    assert max(off(back(tmp_path)[1], VIEWS)) < 1e-12
 
 
 def test_frames_are_spread_evenly(tmp_path: Path) -> None:

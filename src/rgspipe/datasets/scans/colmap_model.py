@@ -19,7 +19,7 @@ from rgspipe.store.files import LONGEST_NAME
 
 #: Camera models by COLMAP's numbers, with how many parameters each has; of the others no lens is known here.
 MODELS = {0: ("SIMPLE_PINHOLE", 3), 1: ("PINHOLE", 4), 2: ("SIMPLE_RADIAL", 4), 3: ("RADIAL", 5), 4: ("OPENCV", 8)}
-MODELS |= {5: ("OPENCV_FISHEYE", 8), 8: ("SIMPLE_RADIAL_FISHEYE", 4), 9: ("RADIAL_FISHEYE", 5)}
+MODELS |= {5: ("OPENCV_FISHEYE", 8), 6: ("FULL_OPENCV", 12), 8: ("SIMPLE_RADIAL_FISHEYE", 4), 9: ("RADIAL_FISHEYE", 5)}
 MODELS |= {14: ("SIMPLE_FISHEYE", 3), 15: ("FISHEYE", 4)}  # of COLMAP 4
 
 #: What helps against files that another program, or a person, wrote in another way than COLMAP.
@@ -104,6 +104,9 @@ def _lens(path: Path, model: str, size: Sequence[int], values: Sequence[float]) 
         case "OPENCV":
             fx, fy, cx, cy, k1, k2, p1, p2 = values
             return Lens(fx, fy, cx, cy, *size, (k1, k2), (p1, p2))
+        case "FULL_OPENCV":
+            fx, fy, cx, cy, k1, k2, p1, p2, k3, *rational = values
+            return Lens(fx, fy, cx, cy, *size, (k1, k2, k3), (p1, p2), rational=tuple(rational))
         case "SIMPLE_RADIAL_FISHEYE" | "RADIAL_FISHEYE" | "SIMPLE_FISHEYE":
             focal, cx, cy, *radial = values
             return Lens(focal, focal, cx, cy, *size, tuple(radial), fisheye=True)
