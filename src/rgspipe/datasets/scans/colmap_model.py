@@ -186,4 +186,4 @@ def _photograph(name: str, camera: int, values: Sequence[float]) -> ColmapImage:
 
 def _lines(content: bytes) -> list[str]:
     """Without comments; empty lines mean something."""
-    return [line for line in content.decode().splitlines() if not line.startswith("#")]
+    return [line for line in content.decode("utf-8-sig").splitlines() if not line.startswith("#")]
