@@ -18,7 +18,7 @@ from rgspipe.datasets.gs3 import load_dataset, load_target
 from rgspipe.datasets.images import read_depth
 from rgspipe.datasets.location import load_views, open_dataset, point_at_dataset
 from rgspipe.errors import InputError
-from rgspipe.scene import Camera
+from rgspipe.scene import Camera, look_at
 
 Change = Callable[[str, Callable[[dict], object]], None]
 TRAIN = "transforms_train.json"
@@ -74,6 +74,21 @@ def test_one_field_of_view_for_all_frames(dataset: Path, change: Change) -> None
     camera = load_dataset(dataset).train[0].camera
     assert camera.fx == camera.fy == pytest.approx(3.0 / math.tan(0.5))
     assert (camera.cx, camera.cy) == (3.0, 2.0)
+
+
+def test_poses_that_a_fit_of_gs3_found_stand_over_the_first_ones(dataset: Path, change: Change) -> None:
+    """R_opt to the world, with OpenCV axes, and T_opt from it."""
+    pose = look_at([1.0, -3.0, 0.5], [0.0, 0.0, 0.0]).double().numpy()
+    camera_to_world = pose @ np.diag([1.0, -1.0, -1.0, 1.0])
+    world_to_camera = np.linalg.inv(camera_to_world)
+    refined = {"R_opt": camera_to_world[:3, :3].tolist(), "T_opt": world_to_camera[:3, 3].tolist()}
+    change("transforms_train.json", lambda content: content["frames"][0].update(refined))
+    (view,) = load_dataset(dataset).train
+    # Measured 2e-16.
+    np.testing.assert_allclose(view.camera.camera_to_world.numpy(), pose, atol=1e-12)
+    change("transforms_train.json", lambda content: content["frames"][0].pop("T_opt"))
+    with pytest.raises(InputError, match=r'the key "T_opt"'):
+        load_dataset(dataset)
 
 
 def test_png_is_linearised_and_premultiplied(dataset: Path, change: Change) -> None:

@@ -14,7 +14,7 @@ from rgspipe.datasets.json_file import is_number, numbers, read_json, required, 
 from rgspipe.datasets.limits import STRONGEST
 from rgspipe.datasets.named_cameras import read_camera
 from rgspipe.datasets.pinhole_keys import ANGLES, KEYS, stated_intrinsics
-from rgspipe.datasets.rigid_pose import check_place, rigid_pose
+from rgspipe.datasets.rigid_pose import check_place, refined_pose, rigid_pose
 from rgspipe.errors import InputError
 from rgspipe.scene import Camera
 from rgspipe.scene.camera import longest_focal
@@ -255,6 +255,9 @@ class FrameEntry:
         Raises:
             InputError: it is missing or not rigid.
         """
+        refined = refined_pose(self.fields, self.where)
+        if refined is not None:
+            return refined
         value = required(self.fields, "transform_matrix", self.where)
         return rigid_pose(value, f"{self.where}.transform_matrix")
 
