@@ -84,6 +84,22 @@ def test_a_model_that_is_null_and_sizes_as_text_are_read(tmp_path: Path) -> None
     assert read_scan(tmp_path, ScanOptions()).frames[0].lens == expected
 
 
+def test_depth_of_instant_ngp_has_the_scale_that_it_states(tmp_path: Path) -> None:
+    """As NeRFCapture writes it; without a scale instant-ngp has no depth. A key that is null is none."""
+    write_nerfstudio(tmp_path, photographed(2, 8), depth=".png")
+    path = tmp_path / "transforms.json"
+    content = json.loads(path.read_text())
+    for frame in content["frames"]:
+        frame |= {"depth_path": frame.pop("depth_file_path").removesuffix(".png"), "mask_path": None}
+    content["frames"][1] |= {"depth_path": None, "depth_file_path": None}
+    path.write_text(json.dumps(content | {"integer_depth_scale": 10.0 / 65535.0}))
+    first, second = read_scan(tmp_path, ScanOptions()).frames
+    assert first.depth.unit == 10.0 / 65535.0 and first.depth.path.name == "0.png" and first.mask is None
+    assert second.depth is None
+    path.write_text(json.dumps(content))
+    assert all(frame.depth is None for frame in read_scan(tmp_path, ScanOptions(), depth=False).frames)
+
+
 def test_a_frame_of_nerfstudio_has_its_own_scale(tmp_path: Path) -> None:
     """That of the first frame held for all."""
     write_nerfstudio(tmp_path, SCANNED, ".png", ".png", {"applied_scale": 0.5})

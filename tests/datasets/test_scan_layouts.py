@@ -22,7 +22,9 @@ from rgspipe.datasets.scans.pictures import read_depth_image
 from rgspipe.datasets.views import View
 from rgspipe.errors import InputError
 from scan_layouts import (
+    FLIP,
     photographed,
+    pose_of,
     write_colmap,
     write_depth,
     write_iid,
@@ -135,6 +137,25 @@ def test_replica_comes_back(tmp_path: Path) -> None:
     assert views[0].camera.cx == VIEWS[0].camera.cx
     # JPEG at quality 95 halves the resolution of colours: measured 0.009.
     assert all(float((a.image - b.image).abs().median()) < 0.02 for a, b in zip(views, VIEWS, strict=True))
+
+
+def test_replica_comes_back_as_semantic_nerf_has_it(tmp_path: Path) -> None:
+    """Frames 9 and 10 of twelve poses, which go by numbers and not by letters."""
+    views = dict(zip((3, 9, 10), VIEWS[:3], strict=True))
+    for number, view in views.items():
+        write_photograph(tmp_path / f"scan/rgb/rgb_{number}.png", view.image.numpy())
+        write_depth(tmp_path / f"scan/depth/depth_{number}.png", view.depth.numpy(), 1000.0)
+    poses = [pose_of(views[number]) @ FLIP if number in views else np.eye(4) for number in range(12)]
+    np.savetxt(tmp_path / "scan/traj_w_c.txt", np.reshape(poses, (12, 16)))
+    field = float(np.degrees(2.0 * np.arctan(0.5 * SIZE / VIEWS[0].camera.fx)))
+    _, read = back(tmp_path / "scan", fov=field)
+    pose, depth = off(read, VIEWS[:3])
+    assert pose < 1e-12 and depth < 0.5e-3 / min(float(view.depth.min()) for view in VIEWS) + 1e-6
+    lens = read_scan(tmp_path / "scan", ScanOptions()).frames[0].lens
+    assert lens.fx == pytest.approx(0.5 * SIZE, rel=1e-12) and lens.cx == 0.5 * SIZE
+    (tmp_path / "scan/rgb/rgb_3.png").rename(tmp_path / "scan/rgb/rgb_12.png")
+    with pytest.raises(InputError, match=r"12 poses, and images up to 12"):
+        read_scan(tmp_path / "scan", ScanOptions())
 
 
 @pytest.mark.parametrize("scale", [0.0, -1.0])
