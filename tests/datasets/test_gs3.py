@@ -91,6 +91,21 @@ def test_poses_that_a_fit_of_gs3_found_stand_over_the_first_ones(dataset: Path, 
         load_dataset(dataset)
 
 
+def test_a_lamp_at_the_top_is_that_of_all_frames_that_name_no_other(dataset: Path, change: Change) -> None:
+    """NRHints names places alone: one power for all is enough. They counted as unknown lamps."""
+    (own,) = load_dataset(dataset).train
+
+    def share(content: dict) -> None:
+        content |= {key: content["frames"][0].pop(key) for key in ("pl_pos", "pl_intensity")}
+        content["frames"].append(content["frames"][0] | {"pl_pos": [1.0, 2.0, 3.0]})
+
+    change("transforms_train.json", share)
+    first, second = load_dataset(dataset).train
+    assert torch.equal(first.light.position, own.light.position)
+    assert torch.equal(second.light.intensity, own.light.intensity)
+    assert second.light.position.tolist() == [1.0, 2.0, 3.0]
+
+
 def test_png_is_linearised_and_premultiplied(dataset: Path, change: Change) -> None:
     Image.fromarray(np.full((4, 6, 4), (188, 188, 188, 51), np.uint8), "RGBA").save(dataset / "train/r_0000.png")
     change(TRAIN, lambda content: content["frames"][0].update(file_ext=".png"))

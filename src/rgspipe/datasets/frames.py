@@ -195,8 +195,8 @@ class FrameEntry:
 
     @property
     def names_light(self) -> bool:
-        """Whether the frame says anything of a light of its own."""
-        return bool(self.fields.keys() & {"pl_pos", "pl_intensity"})
+        """Whether anything is said of the frame's light."""
+        return bool((self.shared | self.fields).keys() & {"pl_pos", "pl_intensity"})
 
     def light(self) -> tuple[Tensor, Tensor]:
         """Position (3,) and intensity (3,) [W/sr] of the frame's light, float64; the file holds watts.
@@ -204,8 +204,9 @@ class FrameEntry:
         Raises:
             InputError: "pl_pos" or "pl_intensity" is missing or impossible.
         """
-        position = numbers(required(self.fields, "pl_pos", self.where), 3, self.where, "pl_pos")
-        watts = required(self.fields, "pl_intensity", self.where)
+        stated = self.shared | self.fields
+        position = numbers(required(stated, "pl_pos", self.where), 3, self.where, "pl_pos")
+        watts = required(stated, "pl_intensity", self.where)
         watts = numbers([watts] * 3 if is_number(watts) else watts, 3, self.where, "pl_intensity")
         if min(watts) < 0 or not 0 < max(watts) <= STRONGEST:
             expected = f"watts above 0, up to {STRONGEST:g}"
