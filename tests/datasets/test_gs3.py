@@ -207,6 +207,10 @@ def _fill(path: Path, channels: str, value: float = 1.0, height: int = 4) -> Non
     write_channels(path, {name: np.full((height, 6), value, np.float32) for name in channels})
 
 
+def _transparent(path: Path) -> None:
+    write_image(path, np.ones((4, 6, 3), np.float32), np.zeros((4, 6), np.float32))
+
+
 @pytest.mark.parametrize(
     ("name", "spoil", "message"),
     [
@@ -216,6 +220,7 @@ def _fill(path: Path, channels: str, value: float = 1.0, height: int = 4) -> Non
         ("r_0000", lambda path: _fill(path, "RGBA", float("nan")), "NaN or infinity"),
         ("r_0000", lambda path: _fill(path, "RG"), "4 channels R, G, B, A"),
         ("r_0000", lambda path: _fill(path, "RGBA", 3.0), "alpha from 0 to 1"),
+        ("r_0000", lambda path: _transparent(path), "pixels that are opaque.*alpha 0 everywhere.*colours up to 1"),
         ("r_0000_depth", lambda path: _fill(path, "Z", -1.0), "24 negative pixels"),
         ("r_0000_depth", lambda path: _fill(path, "XYZ"), "one channel of depth"),
         ("r_0000_depth", lambda path: _fill(path, "Z", height=5), "6 × 4 pixels, as the colour image"),
