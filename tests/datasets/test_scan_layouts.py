@@ -415,6 +415,11 @@ def test_lenses_that_are_not_known_are_refused(tmp_path: Path) -> None:
     for root in (tmp_path / "a", tmp_path / "b"):
         with pytest.raises(InputError, match="image_undistorter"):
             read_scan(root, ScanOptions())
+    write_colmap(tmp_path / "c", VIEWS[:1], binary=True)
+    content = struct.pack("<QiiQQ12d", 1, 7, 10, SIZE, SIZE, *[20.0] * 12)
+    (tmp_path / "c/sparse/0/cameras.bin").write_bytes(content)
+    with pytest.raises(InputError, match="THIN_PRISM_FISHEYE"):
+        read_scan(tmp_path / "c", ScanOptions())
 
 
 def test_a_folder_without_a_layout_is_told_with_what_is_in_it(tmp_path: Path) -> None:

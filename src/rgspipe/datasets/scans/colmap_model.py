@@ -22,6 +22,9 @@ MODELS = {0: ("SIMPLE_PINHOLE", 3), 1: ("PINHOLE", 4), 2: ("SIMPLE_RADIAL", 4), 
 MODELS |= {5: ("OPENCV_FISHEYE", 8), 6: ("FULL_OPENCV", 12), 8: ("SIMPLE_RADIAL_FISHEYE", 4), 9: ("RADIAL_FISHEYE", 5)}
 MODELS |= {14: ("SIMPLE_FISHEYE", 3), 15: ("FISHEYE", 4)}  # of COLMAP 4
 
+#: Numbers of those, which have other distortion.
+OTHERS = {7: "FOV", 10: "THIN_PRISM_FISHEYE", 11: "RAD_TAN_THIN_PRISM_FISHEYE"}
+
 #: What helps against files that another program, or a person, wrote in another way than COLMAP.
 REWRITE = "Write it as COLMAP does (colmap model_converter --output_type TXT)."
 
@@ -129,7 +132,7 @@ def _binary_cameras(path: Path, content: bytes) -> dict[int, Lens]:
     found = {}
     for _ in range(count):
         number, kind, width, height = struct.unpack_from("<iiQQ", content, place)
-        model, parameters = MODELS.get(kind, (f"number {kind}", 0))
+        model, parameters = MODELS.get(kind, (OTHERS.get(kind, f"number {kind}"), 0))
         values = struct.unpack_from(f"<{parameters}d", content, place + 24)
         if number in found:
             raise ValueError(f"camera {number} twice")
