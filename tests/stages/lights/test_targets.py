@@ -41,5 +41,8 @@ def test_targets_of_another_class_do_not_count(config: RgspipeConfig, tmp_path: 
     write_target_list(tmp_path, [("one", "visible")])
     with pytest.raises(InputError, match="a class that the dataset has targets of: visible"):
         known_targets(with_changes(config, {"occlusion": "occluded"}))
+    write_target_list(tmp_path, [])
+    with pytest.raises(InputError, match=r"fit\.target: expected the folder of a target.*fit\.target=DIR"):
+        known_targets(config)
     # Targets that are made here are not on disk yet.
     assert known_targets(with_changes(config, {"fit.targets": "generated"})) == []
