@@ -11,6 +11,7 @@ from photographed_room import LAMPS, frozen_room
 from rgspipe.capture.field import Field, Graph, Variances
 from rgspipe.capture.lamps import LampProblem, Lamps
 from rgspipe.capture.received import Received
+from rgspipe.capture.receivers import Receivers
 
 
 @cache
@@ -51,7 +52,7 @@ def problem() -> LampProblem:
     grey = np.full_like(albedo, 0.5)
     measured = np.where(unseen(), np.inf, 1e-4)
     field = Field(Graph.of(frozen.surfels, grey), measured, (~unseen()).astype(np.float64), Variances())
-    return LampProblem(frozen, received, field, radiance(), grey, measured, 256)
+    return LampProblem(Receivers(frozen), received, field, radiance(), grey, measured, 256)
 
 
 def true_lamps(problem: LampProblem) -> Lamps:

@@ -51,6 +51,15 @@ def test_both_lamps_are_found_and_no_third() -> None:
     assert np.abs(ratios - 1.0).max() < 0.05, ratios  # 0.005
 
 
+def test_lamps_that_are_looked_for_on_a_part_of_the_surfels_are_the_same() -> None:
+    again = capture_scene(photographs(), blank_room(), replace(OPTIONS, search_surfels=400))
+    assert len(again.answer.best.problem.radiance) == len(found().surfels)
+    pairs = match_positions(*(np.stack([lamp.position.numpy() for lamp in one.lamps]) for one in (again, found())))
+    apart = [float((again.lamps[own].position - found().lamps[other].position).norm()) for own, other in pairs]
+    assert max(apart) < 0.001 * found().frozen.size, apart  # 0.0004, and 0.0002 from 250 surfels
+    assert errors(again)[0].max() < 0.008  # 0.0054
+
+
 def test_the_search_tells_how_far_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
     bars, problem = [], found().answer.best.problem
     for module in (search, minima):

@@ -13,11 +13,12 @@ from rgspipe.capture.candidates import CandidateLamps
 from rgspipe.capture.lamps import LampProblem, Lamps
 from rgspipe.capture.likelihood import Tried
 from rgspipe.capture.minima import likelier_beside, likeliest, looked_beside, minima_beside, settled_beside
+from rgspipe.capture.receivers import Receivers
 
 
 @cache
 def room() -> tuple[LampProblem, CandidateLamps]:
-    made = replace(problem(), frozen=problem().frozen.with_dictionary(8, seed=0))
+    made = replace(problem(), receivers=Receivers(problem().frozen.with_dictionary(8, seed=0)))
     return made, CandidateLamps.of(made)
 
 

@@ -8,12 +8,13 @@ import numpy as np
 
 from lamp_problem import problem, true_lamps
 from rgspipe.capture.candidates import CandidateLamps
+from rgspipe.capture.receivers import Receivers
 from rgspipe.capture.search import looked_for_again
 
 
 def test_a_lamp_in_a_wrong_place_is_found_again_beside_the_others() -> None:
     made = problem()
-    made = replace(made, frozen=made.frozen.with_dictionary(4, seed=0))
+    made = replace(made, receivers=Receivers(made.frozen.with_dictionary(4, seed=0)))
     places = true_lamps(made).places.copy()
     places[1] *= -1.0
     stuck = made.refined(made.lamps(places, true_lamps(made).logs - 1.0), 25)

@@ -11,6 +11,7 @@ from photographed_room import LAMPS, frozen_room, radiance_under
 from rgspipe.capture.field import Field, Graph, Variances
 from rgspipe.capture.lamps import LampProblem
 from rgspipe.capture.received import Received
+from rgspipe.capture.receivers import Receivers
 from rgspipe.capture.shared_errors import shared_covariance
 
 
@@ -23,7 +24,7 @@ def problem(noise: float) -> LampProblem:
     measured = np.full(len(albedo), 1e-4)
     variances = Variances(noise=noise**2)
     field = Field(Graph.of(frozen.surfels, albedo), measured, np.ones(len(albedo)), variances)
-    return LampProblem(frozen, received, field, radiance, albedo, measured, 256)
+    return LampProblem(Receivers(frozen), received, field, radiance, albedo, measured, 256)
 
 
 @pytest.mark.parametrize(("noise", "low", "high"), [(0.0, 0.0, 1e-9), (0.02, 1e-4, 5e-3), (0.3, 5e-3, 0.2)])

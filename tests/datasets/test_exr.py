@@ -9,7 +9,14 @@ import numpy as np
 import OpenEXR
 import pytest
 
-from rgspipe.datasets.exr import read_array, read_channels, read_image, write_channels, write_image
+from rgspipe.datasets.exr import (
+    read_array,
+    read_channels,
+    read_depth_channel,
+    read_image,
+    write_channels,
+    write_image,
+)
 from rgspipe.datasets.reading_limits import ReadingLimits, reading_within
 from rgspipe.errors import InputError
 
@@ -78,11 +85,54 @@ def test_pixels_that_are_no_numbers_are_counted_and_placed(tmp_path: Path, value
 
 
 def test_other_channels_are_listed(tmp_path: Path) -> None:
-    write_channels(tmp_path / "grey.exr", {"Y": _noise(4, 4)})
-    with pytest.raises(InputError, match=r"grey\.exr.*4 channels R, G, B, A.*found 1: Y"):
+    write_channels(tmp_path / "grey.exr", {"V": _noise(4, 4)})
+    with pytest.raises(InputError, match=r"grey\.exr.*4 channels R, G, B, A.*found 1: V"):
         read_image(tmp_path / "grey.exr")
     with pytest.raises(InputError, match="1 channel Z"):
         read_array(tmp_path / "grey.exr", ("Z",))
+
+
+@pytest.mark.parametrize("layer", ["", "ViewLayer.Combined.", "beauty."])
+@pytest.mark.parametrize("beside", [(), ("ViewLayer.Depth.Z", "ViewLayer.Normal.X", "ViewLayer.DiffCol.R"), ("Z",)])
+def test_colours_are_told_from_what_stands_beside_them(tmp_path: Path, layer: str, beside: tuple[str, ...]) -> None:
+    image, alpha = np.arange(24, dtype=np.float32).reshape(2, 4, 3), _noise(2, 4)
+    stored = {f"{layer}{name}": image[..., index] for index, name in enumerate("RGB")} | {f"{layer}A": alpha}
+    write_channels(tmp_path / "a.exr", stored | {name: _noise(2, 4) for name in beside})
+    if layer == "beauty." and beside:
+        with pytest.raises(InputError, match="4 channels R, G, B, A"):
+            read_image(tmp_path / "a.exr")
+        return
+    read, read_alpha = read_image(tmp_path / "a.exr")
+    np.testing.assert_array_equal(read, image)
+    np.testing.assert_array_equal(read_alpha, alpha)
+
+
+def test_two_layers_of_colours_are_not_guessed_between(tmp_path: Path) -> None:
+    layers = ("ViewLayer.Combined", "Composite.Combined")
+    write_channels(tmp_path / "a.exr", {f"{layer}.{name}": _noise(2, 4) for layer in layers for name in "RGBA"})
+    with pytest.raises(InputError, match=r"in one layer.*ViewLayer\.Combined"):
+        read_image(tmp_path / "a.exr")
+
+
+def test_luminance_alone_is_grey(tmp_path: Path) -> None:
+    write_channels(tmp_path / "a.exr", {"Y": _noise(2, 4)})
+    np.testing.assert_array_equal(read_image(tmp_path / "a.exr")[0], np.repeat(_noise(2, 4)[..., None], 3, axis=2))
+
+
+@pytest.mark.parametrize("names", ["Z", "V", "RGB", "RGBA", "Z R G B A", "s.Depth.Z s.Combined.R s.Normal.Z"])
+def test_depth_is_told_from_what_stands_beside_it(tmp_path: Path, names: str) -> None:
+    listed = names.split() if " " in names else list(names)
+    depth = [name for name in listed if name.endswith("Depth.Z") or name in ("Z", "V")] or list("RGB")
+    stored = {name: _noise(2, 4) if name in depth else np.ones((2, 4), np.float32) for name in listed}
+    write_channels(tmp_path / "a.exr", stored)
+    np.testing.assert_array_equal(read_depth_channel(tmp_path / "a.exr"), _noise(2, 4))
+
+
+def test_vectors_and_colours_are_no_depth(tmp_path: Path) -> None:
+    for names in ("XYZ", "RGB"):
+        write_channels(tmp_path / "a.exr", {name: index * _noise(2, 4) for index, name in enumerate(names)})
+        with pytest.raises(InputError, match="one channel of depth"):
+            read_depth_channel(tmp_path / "a.exr")
 
 
 def _write_windows(path: Path, values: np.ndarray, data: tuple, display: tuple, names: str = "RGB") -> None:

@@ -18,7 +18,7 @@ from rgspipe.datasets.gs3 import load_dataset, load_target
 from rgspipe.datasets.images import read_depth
 from rgspipe.datasets.location import load_views, open_dataset, point_at_dataset
 from rgspipe.errors import InputError
-from rgspipe.scene import Camera
+from rgspipe.scene import Camera, look_at
 
 Change = Callable[[str, Callable[[dict], object]], None]
 TRAIN = "transforms_train.json"
@@ -74,6 +74,36 @@ def test_one_field_of_view_for_all_frames(dataset: Path, change: Change) -> None
     camera = load_dataset(dataset).train[0].camera
     assert camera.fx == camera.fy == pytest.approx(3.0 / math.tan(0.5))
     assert (camera.cx, camera.cy) == (3.0, 2.0)
+
+
+def test_poses_that_a_fit_of_gs3_found_stand_over_the_first_ones(dataset: Path, change: Change) -> None:
+    """R_opt to the world, with OpenCV axes, and T_opt from it."""
+    pose = look_at([1.0, -3.0, 0.5], [0.0, 0.0, 0.0]).double().numpy()
+    camera_to_world = pose @ np.diag([1.0, -1.0, -1.0, 1.0])
+    world_to_camera = np.linalg.inv(camera_to_world)
+    refined = {"R_opt": camera_to_world[:3, :3].tolist(), "T_opt": world_to_camera[:3, 3].tolist()}
+    change("transforms_train.json", lambda content: content["frames"][0].update(refined))
+    (view,) = load_dataset(dataset).train
+    # Measured 2e-16.
+    np.testing.assert_allclose(view.camera.camera_to_world.numpy(), pose, atol=1e-12)
+    change("transforms_train.json", lambda content: content["frames"][0].pop("T_opt"))
+    with pytest.raises(InputError, match=r'the key "T_opt"'):
+        load_dataset(dataset)
+
+
+def test_a_lamp_at_the_top_is_that_of_all_frames_that_name_no_other(dataset: Path, change: Change) -> None:
+    """NRHints names places alone: one power for all is enough. They counted as unknown lamps."""
+    (own,) = load_dataset(dataset).train
+
+    def share(content: dict) -> None:
+        content |= {key: content["frames"][0].pop(key) for key in ("pl_pos", "pl_intensity")}
+        content["frames"].append(content["frames"][0] | {"pl_pos": [1.0, 2.0, 3.0]})
+
+    change("transforms_train.json", share)
+    first, second = load_dataset(dataset).train
+    assert torch.equal(first.light.position, own.light.position)
+    assert torch.equal(second.light.intensity, own.light.intensity)
+    assert second.light.position.tolist() == [1.0, 2.0, 3.0]
 
 
 def test_png_is_linearised_and_premultiplied(dataset: Path, change: Change) -> None:
@@ -177,6 +207,10 @@ def _fill(path: Path, channels: str, value: float = 1.0, height: int = 4) -> Non
     write_channels(path, {name: np.full((height, 6), value, np.float32) for name in channels})
 
 
+def _transparent(path: Path) -> None:
+    write_image(path, np.ones((4, 6, 3), np.float32), np.zeros((4, 6), np.float32))
+
+
 @pytest.mark.parametrize(
     ("name", "spoil", "message"),
     [
@@ -186,6 +220,7 @@ def _fill(path: Path, channels: str, value: float = 1.0, height: int = 4) -> Non
         ("r_0000", lambda path: _fill(path, "RGBA", float("nan")), "NaN or infinity"),
         ("r_0000", lambda path: _fill(path, "RG"), "4 channels R, G, B, A"),
         ("r_0000", lambda path: _fill(path, "RGBA", 3.0), "alpha from 0 to 1"),
+        ("r_0000", lambda path: _transparent(path), "pixels that are opaque.*alpha 0 everywhere.*colours up to 1"),
         ("r_0000_depth", lambda path: _fill(path, "Z", -1.0), "24 negative pixels"),
         ("r_0000_depth", lambda path: _fill(path, "XYZ"), "one channel of depth"),
         ("r_0000_depth", lambda path: _fill(path, "Z", height=5), "6 × 4 pixels, as the colour image"),

@@ -14,7 +14,7 @@ from rgspipe.datasets.scans.layouts import read_scan
 from rgspipe.datasets.scans.options import ScanOptions
 from rgspipe.datasets.scans.pictures import read_picture
 from rgspipe.errors import InputError
-from scan_layouts import write_colmap, write_nerfstudio, write_polycam
+from scan_layouts import photographed, write_colmap, write_nerfstudio, write_polycam, write_replica
 
 
 @pytest.mark.parametrize(
@@ -84,6 +84,22 @@ def test_a_model_that_is_null_and_sizes_as_text_are_read(tmp_path: Path) -> None
     assert read_scan(tmp_path, ScanOptions()).frames[0].lens == expected
 
 
+def test_depth_of_instant_ngp_has_the_scale_that_it_states(tmp_path: Path) -> None:
+    """As NeRFCapture writes it; without a scale instant-ngp has no depth. A key that is null is none."""
+    write_nerfstudio(tmp_path, photographed(2, 8), depth=".png")
+    path = tmp_path / "transforms.json"
+    content = json.loads(path.read_text())
+    for frame in content["frames"]:
+        frame |= {"depth_path": frame.pop("depth_file_path").removesuffix(".png"), "mask_path": None}
+    content["frames"][1] |= {"depth_path": None, "depth_file_path": None}
+    path.write_text(json.dumps(content | {"integer_depth_scale": 10.0 / 65535.0}))
+    first, second = read_scan(tmp_path, ScanOptions()).frames
+    assert first.depth.unit == 10.0 / 65535.0 and first.depth.path.name == "0.png" and first.mask is None
+    assert second.depth is None
+    path.write_text(json.dumps(content))
+    assert all(frame.depth is None for frame in read_scan(tmp_path, ScanOptions(), depth=False).frames)
+
+
 def test_a_frame_of_nerfstudio_has_its_own_scale(tmp_path: Path) -> None:
     """That of the first frame held for all."""
     write_nerfstudio(tmp_path, SCANNED, ".png", ".png", {"applied_scale": 0.5})
@@ -140,6 +156,23 @@ def test_images_of_colmap_without_lines_of_points_are_refused(tmp_path: Path) ->
     path.write_text("\n".join([lines[0], *lines[1::2]]) + "\n")
     with pytest.raises(InputError, match=r"images\.txt: expected a line of points below that of 00\.exr.*found '2 "):
         read_scan(tmp_path, ScanOptions())
+
+
+def test_marks_of_encoding_do_no_harm(tmp_path: Path) -> None:
+    """As editors on Windows write them before the first line."""
+    write_colmap(tmp_path / "colmap", photographed(2, 8), binary=False)
+    write_nerfstudio(tmp_path / "nerfstudio", photographed(2, 8))
+    write_replica(tmp_path / "replica", photographed(2, 8))
+    texts = (
+        *(tmp_path / "colmap/sparse/0").iterdir(),
+        tmp_path / "nerfstudio/transforms.json",
+        tmp_path / "replica/traj.txt",
+    )
+    for path in texts:
+        path.write_text("\ufeff" + path.read_text())
+    for path in tmp_path.iterdir():
+        if path.is_dir():
+            assert len(read_scan(path, ScanOptions()).frames) == 2
 
 
 def test_empty_lines_between_images_of_colmap_and_a_last_line_that_is_missing_do_no_harm(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import struct
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -10,16 +11,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from PIL import Image
 
 from raycast import room_views
 from rgspipe.datasets.gs3 import load_dataset
 from rgspipe.datasets.scans.importing import Imported, import_scan
 from rgspipe.datasets.scans.layouts import READERS, read_scan
 from rgspipe.datasets.scans.options import ScanOptions
+from rgspipe.datasets.scans.pictures import read_depth_image
 from rgspipe.datasets.views import View
 from rgspipe.errors import InputError
 from scan_layouts import (
+    FLIP,
     photographed,
+    pose_of,
     write_colmap,
     write_depth,
     write_iid,
@@ -30,6 +35,7 @@ from scan_layouts import (
     write_polycam,
     write_replica,
     write_scannet,
+    write_wide_png,
 )
 
 SIZE = 32
@@ -131,6 +137,25 @@ def test_replica_comes_back(tmp_path: Path) -> None:
     assert views[0].camera.cx == VIEWS[0].camera.cx
     # JPEG at quality 95 halves the resolution of colours: measured 0.009.
     assert all(float((a.image - b.image).abs().median()) < 0.02 for a, b in zip(views, VIEWS, strict=True))
+
+
+def test_replica_comes_back_as_semantic_nerf_has_it(tmp_path: Path) -> None:
+    """Frames 9 and 10 of twelve poses, which go by numbers and not by letters."""
+    views = dict(zip((3, 9, 10), VIEWS[:3], strict=True))
+    for number, view in views.items():
+        write_photograph(tmp_path / f"scan/rgb/rgb_{number}.png", view.image.numpy())
+        write_depth(tmp_path / f"scan/depth/depth_{number}.png", view.depth.numpy(), 1000.0)
+    poses = [pose_of(views[number]) @ FLIP if number in views else np.eye(4) for number in range(12)]
+    np.savetxt(tmp_path / "scan/traj_w_c.txt", np.reshape(poses, (12, 16)))
+    field = float(np.degrees(2.0 * np.arctan(0.5 * SIZE / VIEWS[0].camera.fx)))
+    _, read = back(tmp_path / "scan", fov=field)
+    pose, depth = off(read, VIEWS[:3])
+    assert pose < 1e-12 and depth < 0.5e-3 / min(float(view.depth.min()) for view in VIEWS) + 1e-6
+    lens = read_scan(tmp_path / "scan", ScanOptions()).frames[0].lens
+    assert lens.fx == pytest.approx(0.5 * SIZE, rel=1e-12) and lens.cx == 0.5 * SIZE
+    (tmp_path / "scan/rgb/rgb_3.png").rename(tmp_path / "scan/rgb/rgb_12.png")
+    with pytest.raises(InputError, match=r"12 poses, and images up to 12"):
+        read_scan(tmp_path / "scan", ScanOptions())
 
 
 @pytest.mark.parametrize("scale", [0.0, -1.0])
@@ -279,6 +304,69 @@ def test_fisheye_lenses_of_colmap_are_read(tmp_path: Path, model: str, values: i
     assert lens.radial == tuple(numbers[len(focal) + 2 :])
 
 
+@pytest.mark.parametrize("binary", [False, True])
+def test_the_rational_lens_of_colmap_is_read(tmp_path: Path, binary: bool) -> None:
+    """FULL_OPENCV has k3 after the two tangential terms, and k4 to k6 below the line."""
+    write_colmap(tmp_path, VIEWS[:1], binary=binary)
+    values = [20.0, 21.0, 16.0, 15.0, 0.1, 0.02, 0.003, 0.004, 0.05, 0.06, 0.007, 0.008]
+    if binary:
+        content = struct.pack("<QiiQQ12d", 1, 7, 6, SIZE, SIZE, *values)
+        (tmp_path / "sparse/0/cameras.bin").write_bytes(content)
+    else:
+        line = f"7 FULL_OPENCV {SIZE} {SIZE} {' '.join(map(repr, values))}\n"
+        (tmp_path / "sparse/0/cameras.txt").write_text(line)
+    lens = read_scan(tmp_path, ScanOptions()).frames[0].lens
+    x, y, r = 0.3, -0.4, 0.25  # r²
+    bent = (1 + 0.1 * r + 0.02 * r**2 + 0.05 * r**3) / (1 + 0.06 * r + 0.007 * r**2 + 0.008 * r**3)
+    u = 20.0 * (x * bent + 2 * 0.003 * x * y + 0.004 * (r + 2 * x**2)) + 16.0
+    v = 21.0 * (y * bent + 0.003 * (r + 2 * y**2) + 2 * 0.004 * x * y) + 15.0
+    np.testing.assert_allclose(lens.places(np.array([x]), np.array([y])), [[u], [v]], rtol=1e-14)
+
+
+def test_of_several_models_the_largest_is_taken_and_said(tmp_path: Path) -> None:
+    write_colmap(tmp_path / "few", VIEWS[:2], binary=True)
+    write_colmap(tmp_path / "scan", VIEWS, binary=True)
+    (tmp_path / "scan/sparse/0").rename(tmp_path / "scan/sparse/10")
+    for name in ("0", "2"):
+        shutil.copytree(tmp_path / "few/sparse/0", tmp_path / f"scan/sparse/{name}")
+    scan = read_scan(tmp_path / "scan", ScanOptions())
+    assert len(scan.frames) == len(VIEWS) and scan.stated.parent.name == "10"
+    assert f"10 with {len(VIEWS)} of {len(VIEWS) + 4} photographs" in scan.notes[1]
+
+
+def test_inverse_depth_beside_a_model_is_read_by_its_scale_and_offset(tmp_path: Path) -> None:
+    write_colmap(tmp_path / "scan", VIEWS, binary=True, depth=False)
+    (tmp_path / "scan/depths").mkdir()
+    stated, nearest = {}, [1.0 / float(view.depth.min()) for view in VIEWS]
+    for index, (view, near) in enumerate(zip(VIEWS, nearest, strict=True)):
+        levels = np.round(65536 * (1.0 / view.depth.numpy() - 0.05) / near).astype(np.uint16)
+        Image.fromarray(levels).save(tmp_path / f"scan/depths/{index:02d}.png")
+        stated[f"{index:02d}"] = {"scale": near, "offset": 0.05}
+    # Of these 3D Gaussian Splatting uses no depth, either.
+    stated["00"]["scale"], stated["01"]["scale"] = 0.0, 50.0 * nearest[1]
+    (tmp_path / "scan/sparse/0/depth_params.json").write_text(json.dumps(stated))
+    scan = read_scan(tmp_path / "scan", ScanOptions(pose_unit=2.0))
+    assert [frame.depth is None for frame in scan.frames[:4]] == [True, True, False, False]
+    for frame, view in zip(scan.frames[2:], VIEWS[2:], strict=True):
+        # Half a level of 65536 is up to 1e-4 of the farthest depth.
+        np.testing.assert_allclose(read_depth_image(frame.depth), 2.0 * view.depth.numpy(), rtol=1e-4)
+    (tmp_path / "scan/sparse/0/depth_params.json").write_text('{"00": {"scale": 1}}')
+    with pytest.raises(InputError, match=r'depth_params\.json: 00.*"offset"'):
+        read_scan(tmp_path / "scan", ScanOptions())
+
+
+def test_folders_of_scannetpp_are_read(tmp_path: Path) -> None:
+    write_colmap(tmp_path, VIEWS, binary=False)
+    (tmp_path / "sparse/0").rename(tmp_path / "colmap")
+    (tmp_path / "images").rename(tmp_path / "resized_images")
+    write_wide_png(tmp_path / "0.png", np.full((SIZE, SIZE, 1), 65535, np.uint16))
+    (tmp_path / "resized_anon_masks").mkdir()
+    (tmp_path / "0.png").rename(tmp_path / "resized_anon_masks/00.png")
+    scan = read_scan(tmp_path, ScanOptions())
+    assert [frame.mask is None for frame in scan.frames[:2]] == [False, True]
+    assert max(off(back(tmp_path)[1], VIEWS)) < 1e-12
+
+
 def test_frames_are_spread_evenly(tmp_path: Path) -> None:
     write_nerfstudio(tmp_path / "scan", photographed(9, 8))
     scan = read_scan(tmp_path / "scan", ScanOptions(frames=3))
@@ -327,6 +415,11 @@ def test_lenses_that_are_not_known_are_refused(tmp_path: Path) -> None:
     for root in (tmp_path / "a", tmp_path / "b"):
         with pytest.raises(InputError, match="image_undistorter"):
             read_scan(root, ScanOptions())
+    write_colmap(tmp_path / "c", VIEWS[:1], binary=True)
+    content = struct.pack("<QiiQQ12d", 1, 7, 10, SIZE, SIZE, *[20.0] * 12)
+    (tmp_path / "c/sparse/0/cameras.bin").write_bytes(content)
+    with pytest.raises(InputError, match="THIN_PRISM_FISHEYE"):
+        read_scan(tmp_path / "c", ScanOptions())
 
 
 def test_a_folder_without_a_layout_is_told_with_what_is_in_it(tmp_path: Path) -> None:

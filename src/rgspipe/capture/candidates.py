@@ -11,7 +11,6 @@ from functools import cached_property
 from itertools import product
 
 import numpy as np
-import torch
 from scipy.spatial import cKDTree
 
 from rgspipe.capture.lamps import DARK, LampProblem, Lamps
@@ -42,9 +41,8 @@ class CandidateLamps:
     @classmethod
     def of(cls, problem: LampProblem) -> CandidateLamps:
         """Those of the scene's dictionary."""
-        dictionary = problem.frozen.dictionary
-        shares = problem.received.spread(dictionary.irradiance.double().cpu().numpy().T)
-        return cls(dictionary.positions.double().numpy(), shares)
+        places, irradiance = problem.receivers.candidates()
+        return cls(places, problem.received.spread(irradiance.T))
 
     @cached_property
     def between(self) -> float:
@@ -55,8 +53,8 @@ class CandidateLamps:
         """Those of a cube around `place` (3,) whose sides are two of `between`, where lamps may be."""
         sides = np.array([offset for offset in product((-1.0, 0.0, 1.0), repeat=3) if any(offset)])
         places = np.clip(place + self.between * sides, *problem.bounds)
-        irradiance, _ = problem.frozen.unit_irradiance(torch.from_numpy(places))
-        return CandidateLamps(places, problem.received.spread(irradiance.double().cpu().numpy().T))
+        irradiance, _ = problem.receivers.irradiance(places)
+        return CandidateLamps(places, problem.received.spread(irradiance.T))
 
 
 def ranked(problem: LampProblem, candidates: CandidateLamps, known: Lamps | None) -> tuple[Numbers, Numbers]:

@@ -21,8 +21,9 @@ from rgspipe.capture.photographs import SHOWN, Numbers
 from rgspipe.capture.prediction import Prediction
 from rgspipe.capture.radiance import DRAWS, Measured, measured_radiance
 from rgspipe.capture.received import Received
+from rgspipe.capture.receivers import Receivers
 from rgspipe.capture.refusals import OFF, check_brackets, check_lightings, check_measured, check_overlap, check_views
-from rgspipe.capture.search import BAR, FoundLamps, found_lamps
+from rgspipe.capture.search import BAR, FoundLamps, found_lamps, settled_on_all
 from rgspipe.capture.several import found_in_turns, without
 from rgspipe.capture.thinned import thinned, thinning
 from rgspipe.completion import with_unseen_surfaces
@@ -132,10 +133,7 @@ def capture_scenes(
     lit = _measured(weights, views, options, where)
     frozen = FrozenScene.freeze(surfels, gather_rays=options.gather_rays, seed=options.seed)
     frozen = frozen.with_dictionary(options.grid, seed=options.seed)
-    predicted = _predicted(weights, views, options)
-    graph = Graph.of(frozen.surfels, predicted)
-    problems = [_problem(frozen, measured, predicted, graph, options) for measured in lit.values()]
-    answers = found_in_turns(problems, lambda problem: found_lamps(problem, options.count, options.most))
+    answers = _found(frozen, list(lit.values()), _predicted(weights, views, options), options)
     return [_captured(lit[name], answer, options, name) for name, answer in zip(lit, answers, strict=True)]
 
 
@@ -175,22 +173,47 @@ def _predicted(weights: Sequence[ViewWeights], views: Sequence[View], options: C
     return np.where(known[:, None], albedo, middle)
 
 
+def _found(
+    frozen: FrozenScene, lit: Sequence[Measured], predicted: Numbers, options: CaptureOptions
+) -> list[FoundLamps]:
+    """The lamps of each lighting: looked for on an even part of the surfels if there are many, and settled on all."""
+    every = Receivers(frozen)
+    told = np.concatenate([part for measured in lit for part in _told(measured)], axis=1)
+    kinds = np.unique(told, axis=0, return_inverse=True)[1].ravel()
+    part = Receivers.of(frozen, kinds, options.search_surfels)
+
+    def problems(receivers: Receivers) -> list[LampProblem]:
+        own = receivers.at(predicted)
+        graph = Graph.of(receivers.surfels, own)
+        return [_problem(receivers, measured, own, graph, options) for measured in lit]
+
+    answers = found_in_turns(problems(part), lambda problem, _: found_lamps(problem, options.count, options.most))
+    if part.are_all:
+        return answers
+    return found_in_turns(problems(every), lambda problem, own: settled_on_all(problem, answers[own]))
+
+
+def _told(measured: Measured) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """(N, 3) bool each: channels that are measured, and those that are known from below."""
+    seen = (measured.seen >= SHOWN)[:, None]
+    return seen & ~measured.blown_out, seen & measured.blown_out
+
+
 def _problem(
-    frozen: FrozenScene, measured: Measured, predicted: Numbers, graph: Graph, options: CaptureOptions
+    receivers: Receivers, measured: Measured, predicted: Numbers, graph: Graph, options: CaptureOptions
 ) -> LampProblem:
-    gather = frozen.gather.to_scipy().astype(np.float64).tocsr()
-    seen = measured.seen >= SHOWN
-    told, clipped = seen[:, None] & ~measured.blown_out, seen[:, None] & measured.blown_out
+    """What `measured` (A surfels) tells of lamps, on the N that are looked at, of albedo `predicted` (N, 3)."""
+    told, clipped = (receivers.at(part) for part in _told(measured))
+    radiance, seen = receivers.at(measured.radiance), receivers.at(measured.seen) >= SHOWN
     bounded = bool(clipped.any())
     prediction = None if options.albedo_prior == "none" else Prediction.of(predicted, graph)
     # A surface's paint is taken for even until there are lamps to ask.
     expected = predicted if prediction is None else prediction.with_shares(1.0, 0.0)
-    received = Received.of(gather, measured.radiance, told, expected)
-    pixels = np.where(seen, measured.variance, np.inf)
+    received = Received.of(receivers.gather(), radiance, told, expected)
+    pixels = np.where(seen, receivers.at(measured.variance), np.inf)
     field = Field(graph, pixels, seen.astype(np.float64), Variances(), told=told if bounded else None)
-    rays = options.gather_rays
     bounds = clipped if bounded else None
-    return LampProblem(frozen, received, field, measured.radiance, expected, pixels, rays, prediction, bounds)
+    return LampProblem(receivers, received, field, radiance, expected, pixels, options.gather_rays, prediction, bounds)
 
 
 def _captured(measured: Measured, answer: FoundLamps, options: CaptureOptions, lighting: str) -> Captured:

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sp
-import torch
 
 from rgspipe.capture.field import Graph
 from rgspipe.capture.lamps import LampProblem, Lamps
@@ -27,9 +26,8 @@ def model_variance(problem: LampProblem, lamps: Lamps | None, rays: int) -> Numb
     arriving = problem.arriving(lamps).mean(axis=1)
     variance = _gather_variance(problem, rays)
     if lamps is not None:
-        places, gains = torch.from_numpy(lamps.places), np.exp(lamps.logs).mean(axis=1)
-        shadowed = problem.frozen.unit_irradiance(places)[0].double().numpy()
-        open_ = problem.frozen.unit_irradiance(places, shadows=False)[0].double().numpy()
+        gains = np.exp(lamps.logs).mean(axis=1)
+        shadowed, open_ = (problem.receivers.irradiance(lamps.places, shadows)[0] for shadows in (True, False))
         for gain, lit, unlit in zip(gains, shadowed, open_, strict=True):
             passing = np.divide(lit, unlit, out=np.ones_like(lit), where=unlit > 0.0)
             variance = variance + (gain * unlit) ** 2 * _variation(problem.field.graph, passing, unlit > 0.0)

@@ -23,6 +23,7 @@ from rgspipe.capture.field import Field
 from rgspipe.capture.photographs import Numbers
 from rgspipe.capture.prediction import Prediction
 from rgspipe.capture.received import Received
+from rgspipe.capture.receivers import Receivers
 from rgspipe.fitting.options import StepLimits
 from rgspipe.optim.levenberg_marquardt import NormalEquations, least_squares, within
 from rgspipe.renderer.clusters import cluster_patches
@@ -93,7 +94,7 @@ class LampProblem:
     """What lamps are looked for in.
 
     Attributes:
-        frozen: the surfels, for what a lamp sends to each.
+        receivers: the surfels, for what a lamp sends to each.
         received: what they send each other.
         field: the field that is eliminated.
         radiance: (N, 3) L, or the least that it may be.
@@ -105,7 +106,7 @@ class LampProblem:
         clipped: (N, 3) bool, where L is known from below alone; None if it is nowhere.
     """
 
-    frozen: FrozenScene
+    receivers: Receivers
     received: Received
     field: Field
     radiance: Numbers
@@ -114,6 +115,11 @@ class LampProblem:
     rays: int
     prediction: Prediction | None = None
     clipped: NDArray[np.bool_] | None = None
+
+    @property
+    def frozen(self) -> FrozenScene:
+        """The scene that the surfels are of."""
+        return self.receivers.frozen
 
     @cached_property
     def target(self) -> Numbers:
@@ -128,13 +134,13 @@ class LampProblem:
     @cached_property
     def resolved(self) -> float:
         """Distance below which the surfels tell no places apart, scene units."""
-        surfels = self.frozen.surfels
+        surfels = self.receivers.surfels
         return RESOLVED * surfel_spacing(surfels.centers.cpu(), surfels.normals.cpu())
 
     @cached_property
     def parts(self) -> NDArray[np.integer]:
         """(N,) which of up to `PARTS` parts of the scene each surfel belongs to."""
-        surfels = self.frozen.surfels
+        surfels = self.receivers.surfels
         return cluster_patches(surfels.centers.double(), surfels.normals, PARTS, seed=0)
 
     @cached_property
@@ -145,10 +151,11 @@ class LampProblem:
 
     def lamps(self, places: Numbers, logs: Numbers) -> Lamps:
         """Lamps at places (K, 3)."""
-        shares, slopes = self.frozen.unit_irradiance(torch.from_numpy(np.atleast_2d(places)))
-        shares, slopes = shares.double().numpy(), self.size * slopes.double().numpy()
+        shares, slopes = self.receivers.irradiance(places)
         count, surfels = shares.shape
-        columns = np.concatenate([shares[:, :, None], slopes], axis=2).transpose(1, 0, 2).reshape(surfels, -1)
+        columns = (
+            np.concatenate([shares[:, :, None], self.size * slopes], axis=2).transpose(1, 0, 2).reshape(surfels, -1)
+        )
         spread = self.received.spread_colours(columns).reshape(surfels, count, 4, 3).transpose(1, 0, 2, 3)
         return Lamps(np.atleast_2d(places), logs, spread[:, :, 0], spread[:, :, 1:])
 

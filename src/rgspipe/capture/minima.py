@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -106,7 +106,23 @@ def _likeliest(candidates: CandidateLamps, best: Tried, others: list[Tried], aro
                 bar.update()
             if best is before:
                 break
-    rivals = [other for other in others if _is_new(best.problem, other.lamps, [best.lamps])]
+    return _with_chances(best, others)
+
+
+def minima_among(tried: Sequence[Tried]) -> Minima:
+    """The likeliest of some settled lamps, and the others; those that came to the same place count once."""
+    best = tried[0]
+    for other in tried[1:]:
+        if _is_new(best.problem, other.lamps, [best.lamps]) and other.over(best).gain > 0.0:
+            best = other
+    return _with_chances(best, [other.put_by() for other in tried if other is not best])
+
+
+def _with_chances(best: Tried, others: Sequence[Tried]) -> Minima:
+    rivals: list[Tried] = []
+    for other in others:
+        if _is_new(best.problem, other.lamps, _lamps(best, *rivals)):
+            rivals.append(other)
     chance = chances([best.over(rival.put_by()) for rival in rivals])[1:]
     return Minima(best, tuple(RivalLamps(rival, float(part)) for rival, part in zip(rivals, chance, strict=True)))
 

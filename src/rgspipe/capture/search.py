@@ -11,14 +11,23 @@ Edges of shadows make many minima beside each other, so that each lamp is looked
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rgspipe.capture.candidates import CandidateLamps, ranked
 from rgspipe.capture.lamps import LampProblem, Lamps
 from rgspipe.capture.likelihood import ROUNDS, STEPS, Tried, settled_once, weighed
-from rgspipe.capture.minima import AROUND, FIRST, RivalLamps, likeliest, likeliest_all_around, settled_beside
+from rgspipe.capture.minima import (
+    AROUND,
+    FIRST,
+    POSSIBLE,
+    RivalLamps,
+    likeliest,
+    likeliest_all_around,
+    minima_among,
+    settled_beside,
+)
 from rgspipe.capture.variances import with_likely_variances
 from rgspipe.fitting.options import BarOptions
 from rgspipe.fitting.search.apart import CandidatePlaces
@@ -92,7 +101,7 @@ class OneMoreLamp:
         """By the variances that are most likely for either."""
         measurements = more.problem.field.measurements
         gain = 1.0 - float(np.exp(min(0.0, more.deviance - fewer.deviance) / max(measurements, 1)))
-        sent = more.lamps.sent(more.problem.frozen.areas.double().cpu().numpy())
+        sent = more.lamps.sent(more.problem.receivers.areas)
         faint = sent.min() < BAR.faint * sent.sum()
         return cls(fewer, more, gain, BAR.least_faint if faint else BAR.least)
 
@@ -149,6 +158,15 @@ def found_lamps(problem: LampProblem, count: int | None, most: int) -> FoundLamp
         minima = likeliest(candidates, found.more)
     minima = likeliest_all_around(candidates, minima)
     return FoundLamps(minima.best, minima.rivals, tuple(compared), over_even(minima.best))
+
+
+def settled_on_all(problem: LampProblem, found: FoundLamps) -> FoundLamps:
+    """Lamps that were found on a part of the surfels, where they belong by all of them."""
+    problem = weighed(problem, None)
+    tried = [found.best, *(rival.tried for rival in found.rivals if rival.chance > POSSIBLE)]
+    with progress_bar(tried, "settling lamps on all surfels", unit="place") as bar:
+        minima = minima_among([Tried.settled(problem, problem.lamps(one.lamps.places, one.lamps.logs)) for one in bar])
+    return replace(found, best=minima.best, rivals=minima.rivals)
 
 
 def over_even(best: Tried) -> float:

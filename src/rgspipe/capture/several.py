@@ -32,13 +32,15 @@ ROUNDS = 2
 LEAST_LEFT = 0.02
 
 
-def found_in_turns(problems: Sequence[LampProblem], search: Callable[[LampProblem], FoundLamps]) -> list[FoundLamps]:
-    """The lamps of each capture, beside what the others tell of the albedo."""
-    answers = [search(problem) for problem in problems]
+def found_in_turns(
+    problems: Sequence[LampProblem], search: Callable[[LampProblem, int], FoundLamps]
+) -> list[FoundLamps]:
+    """The lamps of each capture, which `search` finds by its number, beside what the others tell of the albedo."""
+    answers = [search(problem, own) for own, problem in enumerate(problems)]
     for _ in range(ROUNDS if len(problems) > 1 else 0):
         for own, problem in enumerate(problems):
             others = [answer.best for other, answer in enumerate(answers) if other != own]
-            answers[own] = search(informed(problem, others))
+            answers[own] = search(informed(problem, others), own)
     return answers
 
 

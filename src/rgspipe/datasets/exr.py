@@ -15,6 +15,8 @@ from rgspipe.store.files import replacing
 #: How much pixels may differ from squares: an image of 4000 pixels would be one off.
 SQUARE = 1.0 / 4000.0
 
+COLOURS = ("R", "G", "B")
+
 RENDER_AGAIN = "Export or render this image again."
 
 
@@ -160,19 +162,66 @@ def _stacked(path: str | Path, channels: dict[str, np.ndarray], names: tuple[str
 
 
 def read_image(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
-    """Colour (H, W, 3) and alpha (H, W) of an RGB or RGBA file, float32, linear, premultiplied as stored.
+    """Colour (H, W, 3) and alpha (H, W) of a file, float32, linear, premultiplied as stored.
 
+    Colours are R, G and B, or Y, which is grey; beside other channels those without a layer, or of the layer Combined.
     Alpha is that of the data window for a file without it: 1 within, and 0 outside, where nothing was stored.
 
     Raises:
-        InputError: as `read_array`.
+        InputError: as `read_array`; or it is not told which of several layers are the colours.
     """
     channels = read_channels(path)
-    if set(channels) == {"R", "G", "B"}:
-        image = _stacked(path, channels, ("R", "G", "B"))
+    found = _of_layer(path, channels, COLOURS, "Combined")
+    if not found and "Y" in channels and channels.keys() <= {"Y", "A"}:
+        found = channels | dict.fromkeys(COLOURS, channels["Y"])
+    if found and "A" not in found:
+        image = _stacked(path, {name: found[name] for name in COLOURS}, COLOURS)
         return image, _stored(path, image.shape[:2])
-    image = _stacked(path, channels, ("R", "G", "B", "A"))
+    wanted = (*COLOURS, "A")
+    image = _stacked(path, {name: found[name] for name in wanted} if found else channels, wanted)
     return np.ascontiguousarray(image[..., :3]), np.ascontiguousarray(image[..., 3])
+
+
+def read_depth_channel(path: str | Path) -> np.ndarray:
+    """(H, W) float32 as stored: Z without a layer or of the layer Depth, the only channel, or levels of grey.
+
+    Raises:
+        InputError: as `read_channels`; also where it is not told which channel is the depth.
+    """
+    channels = read_channels(path)
+    found = _of_layer(path, channels, ("Z",), "Depth")
+    if found and "X" not in found:  # a vector's
+        return found["Z"]
+    grey = [values for name, values in channels.items() if len(channels) == 1 or name != "A"]
+    levels = len(channels) == 1 or channels.keys() <= {*COLOURS, "A"}
+    if not (levels and all(np.array_equal(grey[0], other, equal_nan=True) for other in grey)):
+        listed = ", ".join(sorted(channels))
+        raise InputError(path, expected="one channel of depth", found=listed, remedy="Export only the depth.")
+    return grey[0]
+
+
+def _of_layer(
+    path: str | Path, channels: dict[str, np.ndarray], names: tuple[str, ...], called: str
+) -> dict[str, np.ndarray]:
+    """Channels by their names within the layer that has `names`; empty if none is told to be the one that is meant.
+
+    That is the nameless one, or else the only one called so (Blender has scene.Combined.R), or the only one there is.
+
+    Raises:
+        InputError: several are called so.
+    """
+    layers: dict[str, dict[str, np.ndarray]] = {}
+    for name, values in channels.items():
+        layer, _, own = name.rpartition(".")
+        layers.setdefault(layer, {})[own] = values
+    having = [layer for layer, own in layers.items() if all(name in own for name in names)]
+    meant = [layer for layer in having if layer == "" or len(layers) == 1]
+    meant = meant or [layer for layer in having if layer.rpartition(".")[2] == called]
+    if len(meant) > 1:
+        expected, found = f"channels {', '.join(names)} in one layer", f"them in {' and '.join(meant)}"
+        remedy = "Export the layer that is meant into a file of its own."
+        raise InputError(path, expected=expected, found=found, remedy=remedy)
+    return layers[meant[0]] if meant else {}
 
 
 def _stored(path: str | Path, shape: tuple[int, ...]) -> np.ndarray:

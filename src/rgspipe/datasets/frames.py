@@ -14,7 +14,7 @@ from rgspipe.datasets.json_file import is_number, numbers, read_json, required, 
 from rgspipe.datasets.limits import STRONGEST
 from rgspipe.datasets.named_cameras import read_camera
 from rgspipe.datasets.pinhole_keys import ANGLES, KEYS, stated_intrinsics
-from rgspipe.datasets.rigid_pose import check_place, rigid_pose
+from rgspipe.datasets.rigid_pose import check_place, refined_pose, rigid_pose
 from rgspipe.errors import InputError
 from rgspipe.scene import Camera
 from rgspipe.scene.camera import longest_focal
@@ -195,8 +195,8 @@ class FrameEntry:
 
     @property
     def names_light(self) -> bool:
-        """Whether the frame says anything of a light of its own."""
-        return bool(self.fields.keys() & {"pl_pos", "pl_intensity"})
+        """Whether anything is said of the frame's light."""
+        return bool((self.shared | self.fields).keys() & {"pl_pos", "pl_intensity"})
 
     def light(self) -> tuple[Tensor, Tensor]:
         """Position (3,) and intensity (3,) [W/sr] of the frame's light, float64; the file holds watts.
@@ -204,8 +204,9 @@ class FrameEntry:
         Raises:
             InputError: "pl_pos" or "pl_intensity" is missing or impossible.
         """
-        position = numbers(required(self.fields, "pl_pos", self.where), 3, self.where, "pl_pos")
-        watts = required(self.fields, "pl_intensity", self.where)
+        stated = self.shared | self.fields
+        position = numbers(required(stated, "pl_pos", self.where), 3, self.where, "pl_pos")
+        watts = required(stated, "pl_intensity", self.where)
         watts = numbers([watts] * 3 if is_number(watts) else watts, 3, self.where, "pl_intensity")
         if min(watts) < 0 or not 0 < max(watts) <= STRONGEST:
             expected = f"watts above 0, up to {STRONGEST:g}"
@@ -255,6 +256,9 @@ class FrameEntry:
         Raises:
             InputError: it is missing or not rigid.
         """
+        refined = refined_pose(self.fields, self.where)
+        if refined is not None:
+            return refined
         value = required(self.fields, "transform_matrix", self.where)
         return rigid_pose(value, f"{self.where}.transform_matrix")
 

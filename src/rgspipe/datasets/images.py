@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from rgspipe.datasets.display_image import FORMATS, read_colour_levels, read_levels
-from rgspipe.datasets.exr import read_array, read_channels, read_image
+from rgspipe.datasets.exr import read_array, read_channels, read_depth_channel, read_image
 from rgspipe.errors import InputError
 from rgspipe.scene import Camera
 from rgspipe.scene.arrays import check_radiance
@@ -22,13 +22,17 @@ def read_colour(path: Path) -> tuple[Tensor, Tensor]:
     """Linear, premultiplied colour (H, W, 3) and alpha (H, W) of an EXR image, or a PNG or JPEG (sRGB, straight alpha).
 
     Raises:
-        InputError: missing or broken file, other channels, negative radiance, NaN or infinity, alpha outside of [0, 1].
+        InputError: missing or broken file, other channels, negative radiance, NaN or infinity, alpha outside of [0, 1],
+            or 0 everywhere beside light.
     """
     image, alpha = read_image(path) if path.suffix.lower() == ".exr" else _read_display_image(path)
     check_radiance(path, float(image.min()), float(image.max()))
     if alpha.min() < 0 or alpha.max() > 1 + 1e-3:
         found = f"{alpha.min():g} to {alpha.max():g}"
         raise InputError(path, expected="alpha from 0 to 1", found=found, remedy="Export the image again.")
+    if alpha.max() == 0.0 < image.max():  # of programs that have no use for it, or for which 1 is transparent
+        expected, found = "pixels that are opaque", f"alpha 0 everywhere, beside colours up to {image.max():g}"
+        raise InputError(path, expected=expected, found=found, remedy="Write it without alpha, or correct its alpha.")
     return torch.from_numpy(image), torch.from_numpy(np.minimum(alpha, 1.0))
 
 
@@ -49,11 +53,7 @@ def read_depth(path: Path, camera: Camera, convention: str) -> Tensor:
             found=f"a {FORMATS[path.suffix.lower()]} image",
             remedy="Multiply its levels by the unit (0.001 for millimetres in metres), and write them as EXR.",
         )
-    channels = read_channels(path)
-    if len(channels) != 1:
-        found = f"{len(channels)}: {', '.join(sorted(channels))}"
-        raise InputError(path, expected="one channel of depth", found=found, remedy="Export only the depth.")
-    (stored,) = channels.values()
+    stored = read_depth_channel(path)
     check_size(path, stored, camera)
     depth = torch.from_numpy(np.array(stored))
     if (depth < 0).any():

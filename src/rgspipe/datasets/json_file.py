@@ -35,7 +35,7 @@ def read_json_value(path: str | Path, what: str) -> object:
     """
     path = input_file(path, what, most_bytes=reading_limits().text_bytes)
     try:
-        return parse_json(path.read_text(encoding="utf-8"))
+        return parse_json(path.read_text(encoding="utf-8-sig"))
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(path, expected=what, found=f"an unreadable file ({error})", remedy="Check it.") from error
     except ValueError as error:

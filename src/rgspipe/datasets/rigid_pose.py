@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import torch
 from torch import Tensor
 
-from rgspipe.datasets.json_file import is_number, shown
+from rgspipe.datasets.json_file import is_number, numbers, required, shown
 from rgspipe.datasets.limits import FARTHEST
 from rgspipe.errors import InputError
 from rgspipe.scene.rigid import check_rigid
+
+#: Keys of a pose that was found anew.
+REFINED = {"R_opt", "T_opt"}
 
 
 def rigid_pose(value: object, place: str) -> Tensor:
@@ -27,6 +32,26 @@ def rigid_pose(value: object, place: str) -> Tensor:
     check_place(pose[:3, 3].tolist(), place)
     check_rigid(pose.numpy(), place)
     return pose
+
+
+def refined_pose(fields: Mapping[str, object], where: str) -> Tensor | None:
+    """The pose that GS³'s fit of real captures found, which stands over a frame's transform_matrix; None without one.
+
+    `R_opt` takes the camera, with OpenCV axes, to the world, and `T_opt` is where the camera sees the world's origin.
+
+    Raises:
+        InputError: only one of both, or they are no pose.
+    """
+    if not REFINED & fields.keys():
+        return None
+    rows, place = (required(dict(fields), key, where) for key in ("R_opt", "T_opt"))
+    if not isinstance(rows, list) or len(rows) != 3:
+        raise InputError(f"{where}.R_opt", expected="a 3 × 3 matrix", found=shown(rows), remedy="Correct it.")
+    rotation = torch.tensor([numbers(row, 3, where, "R_opt") for row in rows], dtype=torch.float64)
+    seen = torch.tensor(numbers(place, 3, where, "T_opt"), dtype=torch.float64)
+    axes = rotation * torch.tensor([1.0, -1.0, -1.0], dtype=torch.float64)
+    matrix = torch.cat([axes, -(rotation @ seen)[:, None]], dim=1).tolist()
+    return rigid_pose([*matrix, [0.0, 0.0, 0.0, 1.0]], f"{where}.R_opt")
 
 
 def check_place(position: list[float], place: str) -> None:

@@ -92,6 +92,4 @@ def _without(surfels: Surfels, box: Sequence[float]) -> Surfels:
             found=f"{list(box)} with {int(inside.sum())} of {len(surfels)}",
             remedy="Give the lower and then the upper corner of what is to be left out, scene units.",
         )
-    kept = (~inside).to(surfels.centers.device)
-    gloss = None if surfels.gloss is None else surfels.gloss.selected(kept)
-    return replace(surfels, **{name: tensor[kept] for name, tensor in surfels.tensors().items()}, gloss=gloss)
+    return surfels.selected((~inside).to(surfels.centers.device))

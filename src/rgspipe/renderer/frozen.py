@@ -206,14 +206,14 @@ class FrozenScene:
         return build_view_weights(self.bvh, camera, supersampling)
 
     def unit_irradiance(
-        self, positions: ArrayLike, shadows: bool = True
+        self, positions: ArrayLike, shadows: bool = True, at: Tensor | None = None
     ) -> tuple[Float[Tensor, "L N"], Float[Tensor, "L N 3"]]:
-        """Irradiance (L, N) of unit point lights at (L, 3) and its derivative (L, N, 3).
+        """Irradiance (L, N) of unit point lights at (L, 3), and derivative (L, N, 3); of surfels `at` (N,), else all.
 
         Raises:
             InputError: positions have another shape.
         """
-        return unit_irradiance(self.bvh, as_tensor(positions, "positions", ("L", 3)), shadows)
+        return unit_irradiance(self.bvh, as_tensor(positions, "positions", ("L", 3)), shadows, at)
 
     def with_solver(
         self, solver: Solver, *, bounces: int | None = None, samples: int = 64, seed: int = 0

@@ -186,6 +186,11 @@ class Surfels:
         moved = {name: tensor.to(*args) for name, tensor in self.tensors().items()}
         return replace(self, **moved, gloss=None if self.gloss is None else self.gloss.to(*args))
 
+    def selected(self, index: Tensor) -> Surfels:
+        """Those of `index` (M,)."""
+        parts = {name: tensor[index] for name, tensor in self.tensors().items()}
+        return replace(self, **parts, gloss=None if self.gloss is None else self.gloss.selected(index))
+
     def detached(self) -> Surfels:
         """The same numbers without their gradients."""
         own = {name: tensor.detach() for name, tensor in self.tensors().items()}

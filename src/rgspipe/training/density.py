@@ -58,16 +58,12 @@ def redistributed(
     order = errors[kept].argsort(descending=True, stable=True)[:count]
     split = kept[order[errors[kept][order] > 0.0]]
     whole = kept[~torch.isin(kept, split)]
-    parts = [_selected(surfels, whole), *_halves(_selected(surfels, split))]
+    matt = replace(surfels, gloss=None)
+    parts = [matt.selected(whole), *_halves(matt.selected(split))]
     joined = {name: torch.cat([getattr(part, name) for part in parts]) for name in surfels.tensors()}
     parent = torch.cat([whole, split, split])
     gloss = None if surfels.gloss is None else surfels.gloss.selected(parent)
     return replace(surfels, **joined, gloss=gloss), parent
-
-
-def _selected(surfels: Surfels, index: Tensor) -> Surfels:
-    parts = {name: tensor[index] for name, tensor in surfels.tensors().items()}
-    return replace(surfels, **parts, gloss=None)
 
 
 def _halves(surfels: Surfels) -> tuple[Surfels, Surfels]:

@@ -34,11 +34,11 @@ def write(folder: Path, change: Callable[[dict, dict], None], colours: np.ndarra
     content, buffer = gltf_parts(folder)
     material = content["materials"][0]["pbrMetallicRoughness"]
     if colours is not None:
-        kind = 5126 if colours.dtype == np.float32 else 5121
+        kind = {"float32": 5126, "uint16": 5123, "uint8": 5121}[colours.dtype.name]
         content["bufferViews"].append({"buffer": 0, "byteOffset": len(buffer), "byteLength": colours.nbytes})
         content["accessors"].append(
             {"bufferView": len(content["bufferViews"]) - 1, "componentType": kind, "count": 4, "type": "VEC4"}
-            | ({"normalized": True} if kind == 5121 else {})
+            | ({"normalized": True} if kind != 5126 else {})
         )
         content["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = len(content["accessors"]) - 1
         buffer += colours.tobytes()
@@ -70,7 +70,11 @@ def corners(path: Path) -> np.ndarray:
 
 @pytest.mark.parametrize(
     ("colours", "value"),
-    [(np.full((4, 4), 0.1, np.float32), 0.1), (np.full((4, 4), 51, np.uint8), 0.2)],
+    [
+        (np.full((4, 4), 0.1, np.float32), 0.1),
+        (np.full((4, 4), 51, np.uint8), 0.2),
+        (np.full((4, 4), 6553, np.uint16), 6553 / 65535),
+    ],
 )
 def test_colours_of_points_are_times_the_material(tmp_path: Path, colours: np.ndarray, value: float) -> None:
     """They were dropped where there is one."""

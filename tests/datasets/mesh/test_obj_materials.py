@@ -74,6 +74,12 @@ def test_what_an_obj_names_and_is_not_read_is_said(tmp_path: Path, texture: str,
         read_mesh(path)
 
 
+def test_a_mark_of_encoding_hides_no_material(tmp_path: Path) -> None:
+    path = write_square(tmp_path, "", "t.png", "mtllib a.mtl")
+    (tmp_path / "a.mtl").write_text("\ufeff" + (tmp_path / "a.mtl").read_text())
+    assert (read_mesh(path).paint.corners == 0.5).all()
+
+
 def test_a_material_without_a_colour_has_none(tmp_path: Path) -> None:
     assert np.isnan(read_mesh(write_square(tmp_path, "illum 1", "t.png", "mtllib a.mtl")).paint.corners).sum() == 0
     (tmp_path / "a.mtl").write_text((tmp_path / "a.mtl").read_text().replace("Kd", "#"))

@@ -23,6 +23,7 @@ WRITTEN = {
     "with blanks before": f"  {LOWER}\n \t{UPPER}\n  f 1 2 3\n\tf 4 5 6\n",
     "with tabs": f"{LOWER}\n{UPPER}\nf 1 2 3\nf 4 5 6\n".replace(" ", "\t"),
     "with carriage returns": f"{LOWER}\n{UPPER}\nf 1 2 3\nf 4 5 6\n".replace("\n", "\r"),
+    "with a mark of its encoding": f"\ufeff{LOWER}\n{UPPER}\nf 1 2 3\nf 4 5 6\n",
     "with lines that go on": f"{LOWER}\n{UPPER}\nf 1 \\\n2 3\nf 4 5 \\\r\n6\n",
 }
 

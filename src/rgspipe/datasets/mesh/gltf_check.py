@@ -29,7 +29,7 @@ READ_AS = {
     "indices": ((5121, 5123, 5125), ("SCALAR",)),
     "POSITION": ((5126,), ("VEC3",)),
     "TEXCOORD_0": ((5126,), ("VEC2",)),
-    "COLOR_0": ((5121, 5126), ("VEC3", "VEC4")),
+    "COLOR_0": ((5121, 5123, 5126), ("VEC3", "VEC4")),
 }
 
 #: Kinds of primitives that are read, or have no triangles: points, lines, triangles and strips of them. No fans.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -95,6 +96,7 @@ def _statements(path: Path) -> Iterator[tuple[str, str]]:
 def _found(path: Path, pattern: re.Pattern[bytes]) -> Iterator[tuple[str, ...]]:
     """What a pattern finds in the lines of a file, which a backslash continues."""
     content = input_file(path, "a mesh or its materials", most_bytes=reading_limits().bytes).read_bytes()
+    content = content.removeprefix(codecs.BOM_UTF8)
     for groups in pattern.finditer(re.sub(rb"\\\r?\n", b" ", content) if b"\\\n" in content else content):
         yield tuple(part.decode("utf-8", "surrogateescape").strip() for part in groups.groups())
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import re
 from pathlib import Path
 
@@ -33,7 +34,8 @@ def plain_obj(content: bytes, path: Path) -> bytes:
         InputError: a face has point 0, counts back beyond the first, or crosses itself; colours of points that are no
             shares of 1, or no three.
     """
-    content = re.sub(rb"\\\n", b" ", re.sub(rb"\r\n?", b"\n", content))
+    content = re.sub(rb"\r\n?", b"\n", content.removeprefix(codecs.BOM_UTF8))
+    content = re.sub(rb"\\\n", b" ", content)
     content = re.sub(rb"(?m)^ +", b"", content.replace(b"\t", b" "))
     if COLOURED.search(content):
         _check_colours(content, path)

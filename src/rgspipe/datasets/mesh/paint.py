@@ -102,9 +102,9 @@ def _within(used: Numbers, uv: Numbers, path: Path) -> Numbers:
 
 
 def _light(levels: np.ndarray) -> Numbers:
-    """(N, 3) linear, of (N, 3 or 4) bytes or shares."""
+    """(N, 3) linear, of (N, 3 or 4) levels of 8 or 16 bits, or shares."""
     values = np.asarray(levels)[:, :3]
-    return values / 255.0 if values.dtype == np.uint8 else values.astype(np.float64)
+    return values / np.iinfo(values.dtype).max if values.dtype.kind == "u" else values.astype(np.float64)
 
 
 def _display(levels: np.ndarray) -> Numbers:

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from rgspipe.datasets.input_file import is_there
+from rgspipe.datasets.json_file import numbers, read_json, required
 from rgspipe.datasets.scans.colmap_model import ColmapImage, read_cameras, read_images
 from rgspipe.datasets.scans.frame import DepthImage, Lens, Scan, ScanFrame
 from rgspipe.datasets.scans.options import ScanOptions
@@ -21,27 +22,34 @@ from rgspipe.errors import InputError
 #: Of the cameras.
 AXES = "opencv"
 
-WANTED = "sparse/0/ (or sparse/, or the folder itself) with cameras and images, .bin or .txt"
+WANTED = "sparse/0/ (or sparse/, colmap/, or the folder itself) with cameras and images, .bin or .txt"
 
-#: Where a model may be, and photographs: as large as can be had, as datasets have them in smaller copies.
-MODELS, IMAGES = ("sparse/0", "sparse", "."), ("images", ".", "images_2", "images_4", "images_8")
+#: Where models may be (several have numbers), and photographs: as large as can be had, as datasets have them in smaller
+#: copies, and in folders of ScanNet++.
+MODELS, NUMBERED = ("sparse/0", "sparse", ".", "colmap"), "sparse"
+RESIZED = "resized_images"
+IMAGES = ("images", ".", "images_2", "images_4", "images_8", RESIZED, "rgb")
 
 #: Where depth of a photograph may be; {name} is that of its file, {stem} without suffix.
 DEPTHS = (
-    "depth/{stem}.png",
-    "depth/{stem}.exr",
-    "depths/{stem}.png",
-    "depths/{stem}.exr",
+    *(f"{folder}/{{stem}}{suffix}" for folder in ("depth", "depths") for suffix in (".png", ".exr", ".npy")),
     "stereo/depth_maps/{name}.geometric.bin",
     "stereo/depth_maps/{name}.photometric.bin",
 )
+
+#: Where ScanNet++ has what of its resized photographs is not to be used.
+MASKS = "resized_anon_masks/{stem}.png"
+
+#: Beside a model: by which scale and offset 3D Gaussian Splatting takes levels of depth for 1 over it, and by how many
+#: times their median a scale may be off before that is not believed there.
+DISPARITIES, BELIEVED = "depth_params.json", 5.0
 
 MILLIMETRE = 1e-3
 
 
 def found_in(root: Path) -> bool:
     """Whether the folder has this layout."""
-    return _model(root) is not None
+    return bool(_models(root))
 
 
 def read(root: Path, options: ScanOptions) -> Scan:
@@ -50,35 +58,80 @@ def read(root: Path, options: ScanOptions) -> Scan:
     Raises:
         InputError: broken files, or a lens that is not known.
     """
-    found = _model(root)
-    if found is None:
+    models = _models(root)
+    if not models:
         raise InputError(root, expected=WANTED, found="no model", remedy="Run colmap mapper, or correct the path.")
-    cameras_path, images_path = found
-    cameras, photographs = read_cameras(cameras_path), read_images(images_path)
+    images = [read_images(path) for _, path in models]
+    largest = max(range(len(models)), key=lambda index: len(images[index]))
+    (cameras_path, images_path), photographs = models[largest], images[largest]
+    cameras, disparities = read_cameras(cameras_path), _disparities(cameras_path.with_name(DISPARITIES))
     folder = next((root / name for name in IMAGES if is_there(root / name / photographs[0].name)), root / IMAGES[0])
     # The order of the file is that of registration.
     ordered = sorted(photographs, key=lambda one: one.name)
-    frames = tuple(_frame(one, cameras, root, folder, images_path, options) for one in ordered)
-    unit = "lengths are in the model's own unit, which is metres only if it was scaled (ScanOptions.pose_unit)"
-    return Scan("colmap", images_path, (cameras_path, images_path), frames, options.camera_axes(AXES), (unit,))
+    frames = tuple(_frame(one, cameras, root, folder, images_path, options, disparities) for one in ordered)
+    notes = ["lengths are in the model's own unit, which is metres only if it was scaled (ScanOptions.pose_unit)"]
+    if len(models) > 1:
+        notes.append(
+            f"of {len(models)} models, which share no coordinates, the largest is taken: {images_path.parent.name} "
+            f"with {len(photographs)} of {sum(map(len, images))} photographs"
+        )
+    if disparities is not None:
+        notes.append(f"depth is predicted: 1 over the levels by {DISPARITIES}")
+    sources = (cameras_path, images_path, *([] if disparities is None else [cameras_path.with_name(DISPARITIES)]))
+    return Scan("colmap", images_path, sources, frames, options.camera_axes(AXES), tuple(notes))
 
 
-def _model(root: Path) -> tuple[Path, Path] | None:
-    """Cameras and images of the model."""
-    for place in MODELS:
-        for suffix in (".bin", ".txt"):
-            cameras, images = (root / place / f"{name}{suffix}" for name in ("cameras", "images"))
-            if cameras.is_file() and images.is_file():
-                return cameras, images
+def _models(root: Path) -> list[tuple[Path, Path]]:
+    """Cameras and images of the model, or of each of several, 0 first."""
+    found = next((pair for place in MODELS if (pair := _model(root / place))), None)
+    if found is None or found[0].parent != root / MODELS[0]:
+        return [] if found is None else [found]
+    others = (path for path in (root / NUMBERED).iterdir() if path.name.isdecimal() and int(path.name) > 0)
+    more = (_model(path) for path in sorted(others, key=lambda path: int(path.name)))
+    return [found, *(pair for pair in more if pair is not None)]
+
+
+def _model(folder: Path) -> tuple[Path, Path] | None:
+    for suffix in (".bin", ".txt"):
+        cameras, images = (folder / f"{name}{suffix}" for name in ("cameras", "images"))
+        if cameras.is_file() and images.is_file():
+            return cameras, images
     return None
 
 
+def _disparities(path: Path) -> dict[str, tuple[float, float]] | None:
+    """Scale and offset by a photograph's name without suffix, as far as they are believed; None without a file.
+
+    Raises:
+        InputError: the file holds anything else.
+    """
+    if not path.is_file():
+        return None
+    content = read_json(path, "scale and offset of each photograph's depth")
+    found = {}
+    for name, stated in content.items():
+        where = f"{path}: {name}"
+        stated = stated if isinstance(stated, dict) else {}
+        scale, offset = (numbers([required(stated, key, where)], 1, where, key)[0] for key in ("scale", "offset"))
+        if scale > 0.0:
+            found[name] = scale, offset
+    usual = float(np.median([scale for scale, _ in found.values()])) if found else 1.0
+    return {name: pair for name, pair in found.items() if 1.0 / BELIEVED <= pair[0] / usual <= BELIEVED}
+
+
 def _frame(
-    photograph: ColmapImage, cameras: Mapping[int, Lens], root: Path, folder: Path, where: Path, options: ScanOptions
+    photograph: ColmapImage,
+    cameras: Mapping[int, Lens],
+    root: Path,
+    folder: Path,
+    where: Path,
+    options: ScanOptions,
+    disparities: Mapping[str, tuple[float, float]] | None,
 ) -> ScanFrame:
     if photograph.camera not in cameras:
         found = f"camera {photograph.camera} of {photograph.name}, which the model lacks"
         raise InputError(where, expected="a camera for each image", found=found, remedy="Copy the whole model.")
+    mask = root / MASKS.format(stem=_stem(photograph.name))
     matrix = np.eye(4)
     rotation = from_quaternion(photograph.quaternion).T
     matrix[:3, :3], matrix[:3, 3] = rotation, -rotation @ photograph.translation
@@ -86,15 +139,25 @@ def _frame(
         image=folder / photograph.name,
         lens=cameras[photograph.camera],
         pose=placed(matrix, f"{where}: {photograph.name}", options, AXES),
-        depth=_depth(root, photograph.name, options),
+        depth=_depth(root, photograph.name, options, disparities),
+        mask=mask if folder.name == RESIZED and is_there(mask) else None,
         size_stated=True,
     )
 
 
-def _depth(root: Path, name: str, options: ScanOptions) -> DepthImage | None:
-    stem = Path(name).with_suffix("").as_posix()
+def _stem(name: str) -> str:
+    return Path(name).with_suffix("").as_posix()
+
+
+def _depth(
+    root: Path, name: str, options: ScanOptions, disparities: Mapping[str, tuple[float, float]] | None
+) -> DepthImage | None:
+    stem = _stem(name)
     path = next((path for place in DEPTHS if is_there(path := root / place.format(name=name, stem=stem))), None)
     if path is None:
         return None
-    usual = MILLIMETRE if path.suffix == ".png" else 1.0
+    own = 1.0 if options.pose_unit is None else options.pose_unit  # of the model
+    if disparities is not None and path.suffix == ".png":
+        return DepthImage(path, own, disparity=disparities[stem]) if stem in disparities else None
+    usual = MILLIMETRE if path.suffix == ".png" else own
     return DepthImage(path, usual if options.depth_unit is None else options.depth_unit)

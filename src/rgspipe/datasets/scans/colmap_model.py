@@ -19,8 +19,11 @@ from rgspipe.store.files import LONGEST_NAME
 
 #: Camera models by COLMAP's numbers, with how many parameters each has; of the others no lens is known here.
 MODELS = {0: ("SIMPLE_PINHOLE", 3), 1: ("PINHOLE", 4), 2: ("SIMPLE_RADIAL", 4), 3: ("RADIAL", 5), 4: ("OPENCV", 8)}
-MODELS |= {5: ("OPENCV_FISHEYE", 8), 8: ("SIMPLE_RADIAL_FISHEYE", 4), 9: ("RADIAL_FISHEYE", 5)}
+MODELS |= {5: ("OPENCV_FISHEYE", 8), 6: ("FULL_OPENCV", 12), 8: ("SIMPLE_RADIAL_FISHEYE", 4), 9: ("RADIAL_FISHEYE", 5)}
 MODELS |= {14: ("SIMPLE_FISHEYE", 3), 15: ("FISHEYE", 4)}  # of COLMAP 4
+
+#: Numbers of those, which have other distortion.
+OTHERS = {7: "FOV", 10: "THIN_PRISM_FISHEYE", 11: "RAD_TAN_THIN_PRISM_FISHEYE"}
 
 #: What helps against files that another program, or a person, wrote in another way than COLMAP.
 REWRITE = "Write it as COLMAP does (colmap model_converter --output_type TXT)."
@@ -104,6 +107,9 @@ def _lens(path: Path, model: str, size: Sequence[int], values: Sequence[float]) 
         case "OPENCV":
             fx, fy, cx, cy, k1, k2, p1, p2 = values
             return Lens(fx, fy, cx, cy, *size, (k1, k2), (p1, p2))
+        case "FULL_OPENCV":
+            fx, fy, cx, cy, k1, k2, p1, p2, k3, *rational = values
+            return Lens(fx, fy, cx, cy, *size, (k1, k2, k3), (p1, p2), rational=tuple(rational))
         case "SIMPLE_RADIAL_FISHEYE" | "RADIAL_FISHEYE" | "SIMPLE_FISHEYE":
             focal, cx, cy, *radial = values
             return Lens(focal, focal, cx, cy, *size, tuple(radial), fisheye=True)
@@ -126,7 +132,7 @@ def _binary_cameras(path: Path, content: bytes) -> dict[int, Lens]:
     found = {}
     for _ in range(count):
         number, kind, width, height = struct.unpack_from("<iiQQ", content, place)
-        model, parameters = MODELS.get(kind, (f"number {kind}", 0))
+        model, parameters = MODELS.get(kind, (OTHERS.get(kind, f"number {kind}"), 0))
         values = struct.unpack_from(f"<{parameters}d", content, place + 24)
         if number in found:
             raise ValueError(f"camera {number} twice")
@@ -183,4 +189,4 @@ def _photograph(name: str, camera: int, values: Sequence[float]) -> ColmapImage:
 
 def _lines(content: bytes) -> list[str]:
     """Without comments; empty lines mean something."""
-    return [line for line in content.decode().splitlines() if not line.startswith("#")]
+    return [line for line in content.decode("utf-8-sig").splitlines() if not line.startswith("#")]

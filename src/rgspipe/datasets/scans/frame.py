@@ -21,21 +21,25 @@ class Lens(Pinhole):
         radial: k1, k2, …: a point at distance r from the axis (at depth 1) is seen 1 + k1 r² + k2 r⁴ + … as far out.
         tangential: p1, p2 of Brown's model, as OpenCV and COLMAP have them.
         fisheye: whether r is the angle from the axis instead, as far out as which an undistorted point is seen.
+        rational: k4, k5, k6 of OpenCV's model: by 1 + k4 r² + k5 r⁴ + k6 r⁶ that is divided.
     """
 
     radial: tuple[float, ...] = ()
     tangential: tuple[float, float] = (0.0, 0.0)
     fisheye: bool = False
+    rational: tuple[float, ...] = ()
 
     @property
     def bends(self) -> bool:
         """Whether straight lines do not stay straight."""
-        return self.fisheye or any((*self.radial, *self.tangential))
+        return self.fisheye or any((*self.radial, *self.tangential, *self.rational))
 
     def places(self, x: Numbers, y: Numbers) -> tuple[Numbers, Numbers]:
         """Columns and rows where rays (x right, y down, 1 forward) land in the image."""
         squared = x**2 + y**2
-        factor = self._radial(np.arctan(np.sqrt(squared)) ** 2 if self.fisheye else squared)
+        angle = np.arctan(np.sqrt(squared)) ** 2 if self.fisheye else squared
+        with np.errstate(divide="ignore", invalid="ignore"):  # beyond what such a lens shows
+            factor = _series(self.radial, angle) / _series(self.rational, angle)
         if self.fisheye:
             radius = np.sqrt(squared)
             factor = factor * np.divide(np.arctan(radius), radius, out=np.ones_like(radius), where=radius > 0.0)
@@ -44,13 +48,14 @@ class Lens(Pinhole):
         bent_y = y * factor + p1 * (squared + 2.0 * y**2) + 2.0 * p2 * x * y
         return self.fx * bent_x + self.cx, self.fy * bent_y + self.cy
 
-    def _radial(self, squared: Numbers) -> Numbers:
-        """1 + k1 r² + k2 r⁴ + …"""
-        factor, power = np.ones_like(squared), np.ones_like(squared)
-        for coefficient in self.radial:
-            power = power * squared
-            factor = factor + coefficient * power
-        return factor
+
+def _series(coefficients: tuple[float, ...], squared: Numbers) -> Numbers:
+    """1 + k1 r² + k2 r⁴ + …"""
+    factor, power = np.ones_like(squared), np.ones_like(squared)
+    for coefficient in coefficients:
+        power = power * squared
+        factor = factor + coefficient * power
+    return factor
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,12 +67,14 @@ class DepthImage:
         unit: what a stored 1 is, in the unit of the cameras' places.
         lens: its own, where it is not the photograph's at another size.
         confidence: an image of the same size that is 0 where depth is not to be believed.
+        disparity: scale and offset by which levels over 65536 become 1 over the depth, if they do.
     """
 
     path: Path
     unit: float
     lens: Lens | None = None
     confidence: Path | None = None
+    disparity: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, eq=False)

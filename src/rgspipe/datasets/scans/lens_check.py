@@ -28,7 +28,7 @@ def check_lens(lens: Lens, where: str | Path) -> None:
             middle of the image.
     """
     check_pixel_count(Path(where), lens.width, lens.height)
-    bends = np.array([*lens.radial, *lens.tangential])
+    bends = np.array([*lens.radial, *lens.tangential, *lens.rational])
     if not (np.isfinite(bends).all() and (np.abs(bends) <= STRONGEST).all()):
         expected = f"coefficients of distortion within ±{STRONGEST:g}"
         raise InputError(where, expected=expected, found=str(bends.tolist()), remedy="Correct them.")

@@ -29,6 +29,9 @@ WANTED = "transforms.json"
 #: Metres of 1 in a depth PNG, where the file does not say.
 MILLIMETRE = 1e-3
 
+#: Depth, and metres of 1 in it, as nerfstudio and as instant-ngp call them, which has none without the second.
+DEPTHS = (("depth_file_path", "depth_unit_scale_factor"), ("depth_path", "integer_depth_scale"))
+
 #: How many times as long as another one a unit of length may be.
 MOST_UNITS = 1e9
 
@@ -77,7 +80,7 @@ def _frame(entry: FrameEntry, options: ScanOptions) -> ScanFrame:
         lens=_lens(entry),
         pose=placed(matrix, where, options, AXES),
         depth=_depth(entry, options),
-        mask=entry.transforms_path.parent / _text(entry, "mask_path") if "mask_path" in entry.fields else None,
+        mask=entry.transforms_path.parent / _text(entry, "mask_path") if _stated(entry, "mask_path") else None,
         size_stated={"w", "h"} <= entry.shared.keys() | entry.fields.keys(),
     )
 
@@ -129,12 +132,19 @@ def _refuse_other_optics(entry: FrameEntry, keys: Sequence[str]) -> None:
 
 
 def _depth(entry: FrameEntry, options: ScanOptions) -> DepthImage | None:
-    if "depth_file_path" not in entry.fields:
+    own = not _stated(entry, DEPTHS[0][0])
+    key, scale = DEPTHS[own]
+    if not _stated(entry, key) or (own and _value(entry, scale) is None):
         return None
-    path = entry.transforms_path.parent / _text(entry, "depth_file_path")
+    path = image_named(entry.transforms_path.parent, _text(entry, key))
     default = 1.0 if path.suffix.lower() == ".exr" else MILLIMETRE
-    stated = _unit(entry, "depth_unit_scale_factor", default)
+    stated = _unit(entry, scale, default)
     return DepthImage(path, stated if options.depth_unit is None else options.depth_unit)
+
+
+def _stated(entry: FrameEntry, key: str) -> bool:
+    """Whether a frame has this key, and does not say that there is none."""
+    return entry.fields.get(key) is not None
 
 
 def _value(entry: FrameEntry, key: str, default: object = None) -> object:

@@ -90,7 +90,7 @@ def _cameras(path: Path) -> list[Numbers]:
 def _rows(path: Path) -> Iterator[Numbers]:
     """Lines of three numbers; a first line with one says how many cameras they are of."""
     text = input_file(path, "cameras of OpenRooms", most_bytes=reading_limits().text_bytes).read_text(
-        "utf-8", "replace"
+        "utf-8-sig", "replace"
     )
     stated, count = None, 0
     for index, line in enumerate(line for line in text.splitlines() if line.strip()):

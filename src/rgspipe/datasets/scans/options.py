@@ -34,8 +34,8 @@ class ScanOptions(Options):
     pose_unit: float | None = option(None, low=1e-9, high=1e9)
     """metres of 1 in the cameras' places; by default 1"""
     fov: float | None = option(None, low=1, high=179)
-    """horizontal field of view of photographs whose files do not state it (iid, interiorverse, openrooms), degrees; by
-    default the layout's usual one"""
+    """horizontal field of view of photographs whose files do not state it (iid, interiorverse, openrooms,
+    replica with traj_w_c.txt), degrees; by default the layout's usual one"""
     others: tuple[str, ...] = ()
     """folders of further captures of the same room under other lamps, in the same layout and coordinates"""
     lamps_off: str | None = None

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rgspipe.datasets.display_image import DAMAGED, opened, read_levels, saturated_from
-from rgspipe.datasets.exr import read_channels
+from rgspipe.datasets.exr import read_channels, read_depth_channel
 from rgspipe.datasets.images import NO_SURFACE, read_colour
 from rgspipe.datasets.input_file import check_pixel_count, input_file
 from rgspipe.datasets.reading_limits import reading_limits, timed
@@ -82,7 +82,7 @@ def read_depth_image(image: DepthImage) -> Pixels:
     Raises:
         InputError: missing or broken file, colours, 8 bits, or a confidence of another size.
     """
-    stored = _stored_depth(image.path)
+    stored = _stored_depth(image.path) if image.disparity is None else _predicted_depth(image.path, *image.disparity)
     known = np.isfinite(stored) & (stored > 0.0) & (stored < NO_SURFACE)
     if image.confidence is not None:
         sure = _confidence(image.confidence)
@@ -104,12 +104,7 @@ def _stored_depth(path: Path) -> npt.NDArray[np.float64]:
     if suffix == ".npy":
         return _numpy_array(path)
     if suffix == ".exr":
-        channels = read_channels(path)
-        first = next(iter(channels.values()))
-        if not all(np.array_equal(first, other, equal_nan=True) for other in channels.values()):
-            found = ", ".join(sorted(channels))
-            raise InputError(path, expected="one channel of depth", found=found, remedy="Export only the depth.")
-        return first.astype(np.float64)
+        return read_depth_channel(path).astype(np.float64)
     levels = read_levels(path).levels
     if levels.dtype != np.uint16 or levels.shape[2] != 1:
         raise InputError(
@@ -120,6 +115,15 @@ def _stored_depth(path: Path) -> npt.NDArray[np.float64]:
         )
     # The highest level is all that is too far as well, or nothing measured.
     return np.where(levels == FARTHEST, np.nan, levels.astype(np.float64))[..., 0]
+
+
+def _predicted_depth(path: Path, scale: float, offset: float) -> npt.NDArray[np.float64]:
+    """(H, W) of levels that say how near a surface is, of which 8 bits hold the lower ones of 65536, too."""
+    levels = read_levels(path).levels.astype(np.float64)
+    if not (levels == levels[..., :1]).all():
+        raise InputError(path, expected="levels of grey", found="colours", remedy="Export the levels themselves.")
+    with np.errstate(divide="ignore"):
+        return 1.0 / (levels[..., 0] / (FARTHEST + 1) * scale + offset)
 
 
 def _confidence(path: Path) -> Pixels:

@@ -81,7 +81,9 @@ def read_numbers(path: Path, count: int, what: str) -> Numbers:
     Raises:
         InputError: missing file, or other text.
     """
-    text = input_file(path, what, most_bytes=reading_limits().text_bytes).read_text(encoding="utf-8", errors="replace")
+    text = input_file(path, what, most_bytes=reading_limits().text_bytes).read_text(
+        encoding="utf-8-sig", errors="replace"
+    )
     rows = [line.split() for line in text.splitlines() if line.strip()]
     try:
         values = np.array([[float(word) for word in row] for row in rows], dtype=np.float64)

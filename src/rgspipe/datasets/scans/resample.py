@@ -140,8 +140,8 @@ def _crop(lens: Lens, where: Path) -> float:
     if not _fits(lens, high):
         raise InputError(
             where,
-            expected="distortion (k1, k2, k3, k4, p1, p2) under which the image shows what a camera without it would",
-            found=f"radial {list(lens.radial)}, tangential {list(lens.tangential)}",
+            expected="distortion (k1, k2, …, p1, p2) under which the image shows what a camera without it would",
+            found=f"radial {[*lens.radial, *lens.rational]}, tangential {list(lens.tangential)}",
             remedy="Check the coefficients: they are those of OpenCV's model, of images in units of the focal length.",
         )
     for _ in range(STEPS):

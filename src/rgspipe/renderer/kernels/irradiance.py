@@ -24,7 +24,8 @@ def _irradiance(
     offset: int,
     slab: int,
     tree: SurfelTree,
-    order: wp.array(dtype=int),
+    receivers: wp.array(dtype=int),
+    places: wp.array(dtype=int),
     lights: wp.array(dtype=wp.vec4),
     falloff: int,
     shadows: int,
@@ -33,9 +34,10 @@ def _irradiance(
 ):
     item = wp.tid() + offset
     surfels = tree.records
-    count = surfels.shape[0]
+    count = receivers.shape[0]
     light = lights[item / count]
-    i = item % count
+    k = item % count
+    i = receivers[k]
     n = surfels[i].normal
     d = way_to(light, surfels[i].center)
     projected = wp.dot(d, n)
@@ -56,17 +58,19 @@ def _irradiance(
             passing, passing_slope = light_transmittance(tree, i, surfels[i].center, light, d)
             slope = passing * slope + value * passing_slope
             value *= passing
-    place = item - i + order[i]
+    place = item - k + places[k]
     irradiance[place] = value
     derivative[place] = slope
 
 
-def point_irradiance(bvh: SurfelBvh, positions: Tensor, shadows: bool) -> tuple[Tensor, Tensor]:
+def point_irradiance(
+    bvh: SurfelBvh, positions: Tensor, shadows: bool, at: Tensor | None = None
+) -> tuple[Tensor, Tensor]:
     """Irradiance (L, N) of unit lights at (L, 3) or places (L, 4), and its derivative (L, N, 3) towards x, y and z.
 
-    Without shadows the hierarchy is neither built nor read.
+    Without shadows the hierarchy is neither built nor read. N are all surfels, or those `at` (N,).
     """
-    return _launch(bvh, positions, falloff=True, shadows=shadows)
+    return _launch(bvh, positions, at, falloff=True, shadows=shadows)
 
 
 def transmittance(bvh: SurfelBvh, positions: Tensor) -> tuple[Tensor, Tensor]:
@@ -74,16 +78,28 @@ def transmittance(bvh: SurfelBvh, positions: Tensor) -> tuple[Tensor, Tensor]:
 
     Occluders are two-sided. Surfels that face away from the light get 1: their irradiance is zero by the cosine.
     """
-    return _launch(bvh, positions, falloff=False, shadows=True)
+    return _launch(bvh, positions, None, falloff=False, shadows=True)
 
 
-def _launch(bvh: SurfelBvh, positions: Tensor, *, falloff: bool, shadows: bool) -> tuple[Tensor, Tensor]:
-    lights, count = positions.shape[0], len(bvh.surfels)
+def _launch(
+    bvh: SurfelBvh, positions: Tensor, at: Tensor | None, *, falloff: bool, shadows: bool
+) -> tuple[Tensor, Tensor]:
+    receivers, places = _receivers(bvh, at)
+    lights, count = positions.shape[0], len(receivers)
     value = torch.empty((lights, count), dtype=torch.float32, device=bvh.device)
     derivative = torch.empty((lights, count, 3), dtype=torch.float32, device=bvh.device)
     if count > 0:
-        inputs = [bvh.tree if shadows else bvh.leaves, bvh.order, as_places(bvh, positions)]
+        tree = bvh.tree if shadows else bvh.leaves
+        inputs = [tree, as_array(receivers), as_array(places), as_places(bvh, positions)]
         outputs = [as_array(value.view(-1)), as_vec3(derivative.view(-1, 3))]
         inputs += [int(falloff), int(shadows), *outputs]
         launch(_irradiance, lights * count, inputs, bvh.device, even=not shadows)
     return value, derivative
+
+
+def _receivers(bvh: SurfelBvh, at: Tensor | None) -> tuple[Tensor, Tensor]:
+    """(N,) int32 records that light falls on, neighbours after each other, and where each one's value belongs."""
+    if at is None:
+        return torch.arange(len(bvh.surfels), dtype=torch.int32, device=bvh.device), wp.to_torch(bvh.order)
+    records, places = wp.to_torch(bvh.rank)[at.to(bvh.device)].sort()
+    return records, places.int()

@@ -1,0 +1,101 @@
+"""Surfels at which light is compared: all of a scene, or of very many an even part, each for those around it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+import torch
+from numpy.typing import NDArray
+
+from rgspipe.capture.photographs import Numbers
+from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.scene.surfels import Surfels
+
+#: Halvings after which the side of a cell is known to 1 in 10 000.
+HALVINGS = 24
+
+
+@dataclass(frozen=True, eq=False)
+class Receivers:
+    """N surfels of a scene of A, at which light is compared.
+
+    Light comes to them from all A, of which each of the N sends what those that it stands for send.
+
+    Attributes:
+        frozen: the scene; what stands in the way of light is all of it.
+        stand_in: (A,) which of the N stands for each; None where they are all.
+        chosen: (N,) which of the A they are, likewise.
+    """
+
+    frozen: FrozenScene
+    stand_in: NDArray[np.int64] | None = None
+    chosen: NDArray[np.int64] | None = None
+
+    @classmethod
+    def of(cls, frozen: FrozenScene, kinds: NDArray[np.int64], count: int) -> Receivers:
+        """About `count` of them, evenly spread, each for those of its cell, side and kind (A,); all if there are fewer.
+
+        The cells are cubes of a grid, and of those that one holds the nearest to their middle is taken.
+        """
+        if len(frozen.surfels) <= count:
+            return cls(frozen)
+        centers, normals = (part.double().cpu().numpy() for part in (frozen.surfels.centers, frozen.surfels.normals))
+        across = np.abs(normals).argmax(axis=1)
+        sides = 2 * across + (np.take_along_axis(normals, across[:, None], axis=1)[:, 0] > 0.0)
+
+        def cells(side: float) -> NDArray[np.int64]:
+            placed = np.floor((centers - centers.min(axis=0)) / side).astype(np.int64)
+            return np.unique(np.column_stack([placed, sides, kinds]), axis=0, return_inverse=True)[1].ravel()
+
+        low, high = frozen.size / count, frozen.size
+        for _ in range(HALVINGS):
+            middle = float(np.sqrt(low * high))
+            low, high = (middle, high) if cells(middle).max() >= count else (low, middle)
+        labels = cells(high)
+        number = np.bincount(labels)
+        means = np.stack([np.bincount(labels, column) / number for column in centers.T], axis=1)
+        order = np.lexsort([((centers - means[labels]) ** 2).sum(axis=1), labels])
+        return cls(frozen, labels, order[np.searchsorted(labels[order], np.arange(len(number)))])
+
+    @property
+    def are_all(self) -> bool:
+        """Whether they are all of the scene's."""
+        return self.chosen is None
+
+    @cached_property
+    def surfels(self) -> Surfels:
+        """The N."""
+        every = self.frozen.surfels
+        return every if self.chosen is None else every.selected(torch.from_numpy(self.chosen))
+
+    @cached_property
+    def areas(self) -> Numbers:
+        """(N,) surface that each stands for, scene units²."""
+        areas = self.frozen.areas.double().cpu().numpy()
+        return areas if self.stand_in is None else np.bincount(self.stand_in, areas)
+
+    def at(self, values: np.ndarray) -> np.ndarray:
+        """(N, …) of values (A, …)."""
+        return values if self.chosen is None else values[self.chosen]
+
+    def gather(self) -> sp.csr_matrix:
+        """(N, N) F, what each gets from those that the others stand for."""
+        gather = self.frozen.gather.to_scipy().astype(np.float64).tocsr()
+        if self.stand_in is None:
+            return gather
+        every = np.arange(len(self.stand_in))
+        return (gather[self.chosen] @ sp.csr_matrix((np.ones(len(every)), (every, self.stand_in)))).tocsr()
+
+    def irradiance(self, places: Numbers, shadows: bool = True) -> tuple[Numbers, Numbers]:
+        """(L, N) from unit lamps at (L, 3), and its derivative (L, N, 3)."""
+        at = None if self.chosen is None else torch.from_numpy(self.chosen)
+        own = self.frozen.unit_irradiance(torch.from_numpy(np.atleast_2d(places)), shadows, at)
+        return own[0].double().cpu().numpy(), own[1].double().cpu().numpy()
+
+    def candidates(self) -> tuple[Numbers, Numbers]:
+        """(C, 3) places of the scene's dictionary, and (C, N) irradiance from there."""
+        dictionary = self.frozen.dictionary
+        return dictionary.positions.double().numpy(), self.at(dictionary.irradiance.double().cpu().numpy().T).T
