@@ -21,7 +21,7 @@ from rgspipe.capture.likelihood import ROUNDS, STEPS, Tried, settled_once, weigh
 from rgspipe.capture.minima import (
     AROUND,
     FIRST,
-    POSSIBLE,
+    LIKELY,
     RivalLamps,
     likeliest,
     likeliest_all_around,
@@ -161,12 +161,13 @@ def found_lamps(problem: LampProblem, count: int | None, most: int) -> FoundLamp
 
 
 def settled_on_all(problem: LampProblem, found: FoundLamps) -> FoundLamps:
-    """Lamps that were found on a part of the surfels, where they belong by all of them."""
+    """Lamps that were found on a part of the surfels, where they belong by all of them; likewise likely rivals."""
     problem = weighed(problem, None)
-    tried = [found.best, *(rival.tried for rival in found.rivals if rival.chance > POSSIBLE)]
-    with progress_bar(tried, "settling lamps on all surfels", unit="place") as bar:
+    likely = [rival.tried for rival in found.rivals if rival.chance > LIKELY]
+    rest = tuple(rival for rival in found.rivals if rival.chance <= LIKELY)
+    with progress_bar([found.best, *likely], "settling lamps on all surfels", unit="place") as bar:
         minima = minima_among([Tried.settled(problem, problem.lamps(one.lamps.places, one.lamps.logs)) for one in bar])
-    return replace(found, best=minima.best, rivals=minima.rivals)
+    return replace(found, best=minima.best, rivals=(*minima.rivals, *rest))
 
 
 def over_even(best: Tried) -> float:
