@@ -58,13 +58,16 @@ def as_file(path: str | os.PathLike[str], example: str) -> Path:
 def as_number(
     value: object,
     name: str,
-    remedy: str = "Pass a number.",
+    remedy: str = "",
     *,
     expected: str = "a finite number",
     low: float = -math.inf,
     high: float = math.inf,
 ) -> float:
     """A finite number from `low` to `high`, of Python, numpy, or a tensor of one.
+
+    Args:
+        remedy: what errors tell to do; to pass a number, or one from `low` to `high`, if empty.
 
     Raises:
         InputError: something else.
@@ -74,7 +77,8 @@ def as_number(
     except (TypeError, ValueError, OverflowError, RuntimeError):  # what numpy and torch say of several numbers
         number = math.nan
     if not (math.isfinite(number) and low <= number <= high):
-        raise InputError(name, expected=expected, found=_shown(value), remedy=remedy)
+        usual = "Choose one in this range." if math.isfinite(number) else "Pass a number."
+        raise InputError(name, expected=expected, found=_shown(value), remedy=remedy or usual)
     return number
 
 

@@ -32,7 +32,12 @@ AT_BOUND = MEANINGS[FitStatus.AT_BOUND]
 
 
 def _fits(
-    tmp_path: Path, count: int, rig: LightRig = (POINT, SPOT), exposures: tuple[float, ...] = (), advice: str = ""
+    tmp_path: Path,
+    count: int,
+    rig: LightRig = (POINT, SPOT),
+    exposures: tuple[float, ...] = (),
+    advice: str = "",
+    **more: object,
 ) -> Artifact:
     def make(folder: Path) -> None:
         rows = []
@@ -41,7 +46,7 @@ def _fits(
             told = {"result": str(status), "reason": MEANINGS[status], "seconds": 0.5 + index, "psnr": 36.04}
             told["exposures"] = list(exposures)
             spread = [{"covariance": torch.diag(torch.full((6,), value)).tolist()} for value in (1e-4, 4e-4)]
-            write_lights(folder / name / "lights.json", rig, told | {"lights": spread[: len(rig)]})
+            write_lights(folder / name / "lights.json", rig, told | {"lights": spread[: len(rig)]} | more)
             if advice:
                 write_json(folder / name / "advice.json", {"words": advice})
             rows.append({"target": name, "occlusion": "occluded"} | told)
@@ -67,6 +72,20 @@ def test_a_fit_tells_the_exposures_and_the_advice_that_it_was_asked_for(tmp_path
     ]
     known = outcome(_fits(tmp_path / "known", 1, exposures=(1.0, 1.0)))
     assert len(known) == len(lines) - 2 and "over the first" not in "".join(known)
+
+
+def test_a_fit_tells_the_other_light_that_it_was_asked_for(tmp_path: Path) -> None:
+    """Only `lights.json` said it."""
+    known, open_ = torch.diag(_vector(1e-4, 1e-4, 1e-4)).tolist(), [["inf", 0, 0], [0, "inf", 0], [0, 0, "inf"]]
+    other = {
+        "ambient": {"radiance": [3.0, 2.0, 1.0], "covariance": known, "share": 0.55},
+        "base_scale": {"factor": [1.5, 1.5, 1.5], "covariance": open_, "share": 0.2},
+    }
+    lines = outcome(_fits(tmp_path, 1, **other))
+    assert lines[3:-1] == [
+        "  ambient RGB (3.000, 2.000, 1.000) ± 0.010 W/(sr·unit²), 55 % of the light",
+        "  lamps off RGB (1.500, 1.500, 1.500) ± unknown times, 20 % of the light",
+    ]
 
 
 def test_many_targets_are_a_row_a_class(tmp_path: Path) -> None:

@@ -148,6 +148,8 @@ def test_what_decides_are_numbers_of_the_search() -> None:
         (1, 1.0, 1.1, 0, False, "Explains the target as well: another answer."),
         (2, 0.96, 0.9, 1, True, "2 lights lower the cost by 4 %, too little to count."),
         (2, 1.2, 0.9, 1, True, "2 lights do not lower the cost."),
+        (4, 0.68, 7.48, 1, True, "4 lights: 7.5 times as much unexplained."),
+        (2, 0.89, 19.8, -1, True, "2 lights: 20 times as much unexplained."),
         (2, 0.2, 0.1, 1, False, "2 lights lower the cost by 80 %."),
         (1, 12345.0, 1e9, -1, True, "1 light: more than 10000 times the cost."),
         (2, 1.1, 1.2, -1, False, "2 lights: 1.1 times the cost, too little to rule them out."),

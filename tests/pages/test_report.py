@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import re
 
 import numpy as np
 import pandas as pd
@@ -26,6 +27,21 @@ def test_a_report_refers_to_nothing_outside_itself(full_report):
     assert page.pictures and not outside
     assert "link" not in page.tags and "iframe" not in page.tags
     assert not [word for word in ("http:", "https:", "@import", "url(") if word in full_report]
+
+
+def test_pictures_do_not_wait_to_be_looked_at(full_report):
+    """Those that came later moved what is below: the list of contents led as much as 5000 pixels astray."""
+    assert "loading=" not in full_report
+
+
+def test_one_target_has_no_interval(fitted):
+    targets, curves = fitted(1)
+    targets = targets.drop_duplicates("occlusion")
+    summary = summary_table(targets, 0)
+    contents = dataclasses.replace(_empty(fitted), summary=summary, targets=targets, curves=curves)
+    several = int((summary["with_truth"] > 1).sum())
+    assert 0 < several < len(summary)
+    assert len(re.findall(r"<td>[\d.]+ to [\d.]+ %</td>", report.render_report(contents))) == several
 
 
 def test_a_report_shows_everything_and_misses_nothing(full_report):

@@ -11,13 +11,12 @@ ENOUGH_BOUNCES = 16
 
 
 def differences(scene: bpy.types.Scene) -> list[str]:
-    """A sentence about what makes renders of `scene`, as it is set, no measure of its lamps; none if nothing does."""
+    """Sentences about what makes renders of `scene`, as it is set, no measure of its lamps; none if nothing does."""
     found = [*_of_render(scene), *_of_linking(scene)]
     if scene.render.engine == "CYCLES":
         found += _of_cycles(scene.cycles)
-    if not found:
-        return []
-    return [f"renders of its own, as targets, are not what a lamp of rgspipe makes of it: {', '.join(found)}"]
+    told = "renders of its own, as targets, are not what a lamp of rgspipe makes of it"
+    return [*([f"{told}: {', '.join(found)}"] if found else []), *_curve(scene.view_settings.view_transform)]
 
 
 def not_taken(scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> list[str]:
@@ -55,6 +54,15 @@ def _of_render(scene: bpy.types.Scene) -> Iterator[str]:
         strips = editor.strips_all if bpy.app.version >= (4, 4, 0) else editor.sequences_all
         if len(strips):
             yield "they are made of the sequencer's strips"
+
+
+def _curve(view_transform: str) -> Iterator[str]:
+    """Files of 8 bits are taken as sRGB, which is what this view transform makes."""
+    if view_transform != "Standard":
+        yield (
+            f"PNGs and JPEGs of its renders, as targets, have the tone curve of {view_transform}, through which no "
+            "lamp is found: save EXRs, or set the view transform to Standard"
+        )
 
 
 def _of_linking(scene: bpy.types.Scene) -> Iterator[str]:

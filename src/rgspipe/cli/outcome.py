@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import pandas as pd
+import torch
 
 from rgspipe.cli.cells import decibels, degrees, percent, seconds, time, words
 from rgspipe.cli.columns import columns, without_empty
@@ -16,7 +18,8 @@ from rgspipe.datasets.light_file import read_lights
 from rgspipe.evaluation.classes import ALL, class_order
 from rgspipe.evaluation.plots import LABELS
 from rgspipe.fitting.findings import FitStatus
-from rgspipe.fitting.result_text import ending, light_line
+from rgspipe.fitting.model.known_images import Strength
+from rgspipe.fitting.result_text import ambient_line, base_line, ending, light_line
 from rgspipe.fitting.words import MEANINGS
 from rgspipe.store.artifacts import Artifact
 
@@ -52,8 +55,21 @@ def _fit(artifact: Artifact, row: Row) -> list[str]:
         head += f", PSNR {told['psnr']:.1f} dB"
     spread = dict(enumerate(spreads))
     lines = [f"  {light_line(light, spread.get(index))}" for index, light in enumerate(lights)]
+    lines += [f"  {line}" for line in _known_light(told)]
     lines += [] if told["reason"] == MEANINGS[FitStatus.CONVERGED] else [f"  {told['reason']}"]
     return [head, *lines, *_exposures(told["exposures"]), *_advice(artifact, str(row["target"]))]
+
+
+def _known_light(told: Mapping[str, Any]) -> list[str]:
+    """Light that is there beside the lamps, where the fit was to say how strong it is."""
+    tellers = (("ambient", "radiance", ambient_line), ("base_scale", "factor", base_line))
+    return [teller(_strength(told[name], value)) for name, value, teller in tellers if name in told]
+
+
+def _strength(told: Mapping[str, Any], value: str) -> Strength:
+    spread = [[float(number) for number in row] for row in told["covariance"]]  # JSON has infinity as a text
+    numbers = (torch.tensor(rows, dtype=torch.float64) for rows in (told[value], spread))
+    return Strength(*numbers, told["share"])
 
 
 def _exposures(exposures: Sequence[float]) -> list[str]:

@@ -15,7 +15,7 @@ from rgspipe.arguments import as_file
 from rgspipe.errors import InputError
 from rgspipe.evaluation.arrays import ArrayLike, to_array
 from rgspipe.scene import srgb
-from rgspipe.scene.arrays import as_tensor
+from rgspipe.scene.arrays import as_tensor, check_levels
 from rgspipe.store.files import write_bytes
 
 Bytes = npt.NDArray[np.uint8]
@@ -43,7 +43,12 @@ def display_gain(target: ArrayLike) -> float:
 
 
 def tone_map(image: ArrayLike, factor: float | None = None) -> Bytes:
-    """(H, W, 3) uint8 sRGB of a linear image times `factor` (None: its `display_gain`); NaN becomes magenta."""
+    """(H, W, 3) uint8 sRGB of a linear image times `factor` (None: its `display_gain`); NaN becomes magenta.
+
+    Raises:
+        InputError: it is no image of three channels, or one of 8 bits.
+    """
+    check_levels("image", image)
     linear = _image(image) * (display_gain(image) if factor is None else factor)
     broken = np.isnan(linear).any(axis=-1)
     linear = np.clip(np.nan_to_num(linear, nan=0.0, posinf=1.0, neginf=0.0), 0.0, 1.0)
@@ -147,9 +152,14 @@ def save_png(path: str | Path, pixels: Bytes) -> None:
     """Write (H, W, 3) uint8 pixels; the file appears under its name only when it is whole.
 
     Raises:
-        InputError: the pixels are something else, such as radiance, of which `tone_map` makes them.
+        InputError: the pixels are something else, such as radiance, of which `tone_map` makes them; or the name is that
+            of another format.
     """
-    write_bytes(as_file(path, "image.png"), png_bytes(pixels))
+    file = as_file(path, "image.png")
+    if file.suffix.lower() not in ("", ".png"):
+        found, remedy = f"{file.name}, another format", f"Call it {file.with_suffix('.png').name}."
+        raise InputError(path, expected="the name of a PNG", found=found, remedy=remedy)
+    write_bytes(file, png_bytes(pixels))
 
 
 def fit_within(png: bytes, max_bytes: int, max_width: int = 1600, min_width: int = 240) -> bytes:

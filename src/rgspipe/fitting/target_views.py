@@ -179,7 +179,8 @@ def _weights(scene: FrozenScene, cameras: Cameras) -> list[ViewWeights]:
     if not isinstance(scene, FrozenScene):
         remedy = "FrozenScene.load(folder) reads one, FrozenScene.freeze(surfels) makes one."
         raise InputError("scene", expected="a FrozenScene", found=type(scene).__name__, remedy=remedy)
-    views = as_several(cameras, (Camera, ViewWeights), "cameras", "Camera.look_at makes one.")
+    remedy = "Camera.look_at makes one, and a View has its own: view.camera."
+    views = as_several(cameras, (Camera, ViewWeights), "cameras", remedy)
     weights = [scene.view(view) if isinstance(view, Camera) else view for view in views]
     own = len(scene.surfels)
     for index, view in enumerate(weights):

@@ -37,13 +37,13 @@ MEANINGS = {
     FitStatus.CONVERGED: "The loss has a minimum here: a further step would change nothing.",
     FitStatus.MAX_ITERATIONS: "All iterations were used while the loss was still falling: allow more of them.",
     FitStatus.AT_BOUND: "A light was stopped at the edge of the region that is searched: it may truly be outside, or "
-    "these views do not tell its distance; give more views or a larger region.",
+    "these views do not tell its distance; give more views, or look for a sun if it is far away.",
     FitStatus.AMBIGUOUS: "Clearly different lights explain the target as well as these: give more views, or say more "
     "of the lights (their number, their type).",
     FitStatus.UNDETERMINED: "These views do not tell all of the lights.",
     FitStatus.UNEXPLAINED: "These lights leave much of the target unexplained: their number or type may be another, or "
-    "the scene that was photographed is not the one that was frozen, or the image is not linear radiance; say more of "
-    "the lights, or search more starts.",
+    "the scene that was photographed is not the one that was frozen, or the image is not linear radiance (RGB, of its "
+    "camera, from the top row down); say more of the lights, or search more starts.",
     FitStatus.NOT_ENOUGH_LIGHT: "The target is black, or no light in the scene can explain it: check its exposure, "
     "its mask and that it shows this scene.",
 }
@@ -65,6 +65,9 @@ def explained(findings: Sequence[Finding]) -> str:
 
 def told_alternative(one: Alternative) -> str:
     """What speaks against lights that an answer was weighed against, in a sentence."""
+    if one.more and one.cost < 1.0 < one.left:
+        # An answer by squares need not have the least robust cost: such a gain says nothing for other lights.
+        return f"{_lights(len(one.lights))}: {_times(one.left)} as much unexplained."
     if one.more > 0:
         if one.cost > 0.995:
             return f"{len(one.lights)} lights do not lower the cost."

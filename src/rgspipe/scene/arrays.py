@@ -21,6 +21,9 @@ NUMBERS = "biuf"
 #: What to pass where numbers are meant, if nothing more can be said.
 REMEDY = "Pass a list, numpy array or tensor."
 
+#: What to do with numbers of another shape, if nothing more can be said.
+SHAPE_REMEDY = "Pass them in this shape."
+
 #: Noise reaches about as far below zero as above it; what reaches so many times as far is a broken pixel.
 NOISE = 2.0
 
@@ -32,7 +35,7 @@ Axis = int | str
 
 
 def as_tensor(
-    value: ArrayLike, name: str, shape: Sequence[Axis], dtype: torch.dtype | None = None, remedy: str = REMEDY
+    value: ArrayLike, name: str, shape: Sequence[Axis], dtype: torch.dtype | None = None, remedy: str = ""
 ) -> Tensor:
     """`value` as a floating-point tensor of `shape`.
 
@@ -42,18 +45,18 @@ def as_tensor(
     Args:
         name: what errors call it.
         shape: entries along each axis, names where any number will do, such as ("H", "W", 3).
-        remedy: what errors tell to do.
+        remedy: what errors tell to do; to pass numbers, or to pass them in this shape, if empty.
 
     Raises:
         InputError: it holds no numbers, or has another shape.
     """
-    tensor = value if isinstance(value, Tensor) else _from_numbers(value, name, shape, remedy)
+    tensor = value if isinstance(value, Tensor) else _from_numbers(value, name, shape, remedy or REMEDY)
     if tensor.is_complex() or tensor.layout != torch.strided or tensor.device.type not in DEVICES:
-        _refuse(name, shape, f"a tensor of {tensor.dtype}, {tensor.layout}, on {tensor.device}", remedy)
+        _refuse(name, shape, f"a tensor of {tensor.dtype}, {tensor.layout}, on {tensor.device}", remedy or REMEDY)
     if not tensor.is_floating_point():
         tensor = tensor.double()
     if not _fits(tensor.shape, shape):
-        _refuse(name, shape, f"shape {_written(tensor.shape)}", remedy)
+        _refuse(name, shape, f"shape {_written(tensor.shape)}", remedy or SHAPE_REMEDY)
     return tensor if dtype is None else tensor.to(dtype)
 
 

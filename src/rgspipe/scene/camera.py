@@ -18,10 +18,12 @@ from rgspipe.scene.shapes import Float, Given
 
 #: What to check where a camera sees nothing.
 AXES = (
-    "cameras are in the scene's coordinates and look along −z, with +y up (from OpenCV, change the sign of their "
-    "second and third column)"
+    "cameras are in the scene's coordinates (camera-to-world, not its inverse) and look along −z, with +y up (from "
+    "OpenCV, change the sign of their second and third column)"
 )
 
+#: What a pose is given as.
+ROWS = "Pass four rows of four numbers, the last of them 0, 0, 0, 1."
 
 #: What to do about a number of pixels that is none.
 ROUND = "Round it up."
@@ -61,7 +63,7 @@ class Camera(ByValue, Pinhole, _Pose):
     """
 
     def __post_init__(self) -> None:
-        pose = as_tensor(self.camera_to_world, "camera_to_world", (4, 4), torch.float64)
+        pose = as_tensor(self.camera_to_world, "camera_to_world", (4, 4), torch.float64, ROWS)
         check_finite(pose, "camera_to_world", "Check where the camera stands and where it looks.")
         check_rigid(pose.detach().cpu().numpy(), "camera_to_world")
         object.__setattr__(self, "camera_to_world", pose)

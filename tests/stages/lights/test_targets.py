@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import pytest
@@ -41,5 +42,8 @@ def test_targets_of_another_class_do_not_count(config: RgspipeConfig, tmp_path: 
     write_target_list(tmp_path, [("one", "visible")])
     with pytest.raises(InputError, match="a class that the dataset has targets of: visible"):
         known_targets(with_changes(config, {"occlusion": "occluded"}))
+    shutil.rmtree(tmp_path / "targets")
+    with pytest.raises(InputError, match=r"fit\.target: expected the folder of a target.*fit\.target=DIR"):
+        known_targets(config)
     # Targets that are made here are not on disk yet.
     assert known_targets(with_changes(config, {"fit.targets": "generated"})) == []

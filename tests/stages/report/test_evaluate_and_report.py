@@ -237,11 +237,12 @@ def test_a_report_does_without_views_that_are_left_out_and_has_the_grade_above_t
         save_grade(folder / GRADE, grade)
 
     trained = _artifact(tmp_path, "train_surfels", lambda folder: (folder / "metrics.json").write_text("{}"))
-    parts = {"judge": [judged], "freeze": [_artifact(tmp_path, "freeze", frozen)], "train_surfels": [trained]}
+    parts = {"judge": [judged, judged], "freeze": [_artifact(tmp_path, "freeze", frozen)], "train_surfels": [trained]}
     report.STAGE.run(_context(tmp_path / "report", external, **parts))
     html = (tmp_path / "report" / "report.html").read_text()
     assert "The scene is poor" in html and "first of all around (0.50, 0.00, 0.25)" in html
     assert html.index("The scene is poor") < html.index('id="trained"') < html.index('id="lights"')
+    assert "judge</td>" in html and "judge (true surfels)</td>" in html
     assert "no picture that compares" in html and "Where the squared error sits" not in html
 
 

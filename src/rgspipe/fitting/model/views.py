@@ -17,7 +17,7 @@ from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.images.viewed_pixels import ViewedPixels
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.view_weights import ViewWeights
-from rgspipe.scene.arrays import REMEDY, ArrayLike, as_list, as_tensor, check_finite, check_levels, check_radiance
+from rgspipe.scene.arrays import ArrayLike, as_list, as_tensor, check_finite, check_levels, check_radiance
 from rgspipe.scene.camera import AXES
 from rgspipe.scene.guesses import guessed_surfaces
 
@@ -172,14 +172,15 @@ def _one_each(
     """
     if len(values) != len(views):
         expected, found = f"as many as there are views ({len(views)})", f"{len(values)} of them"
-        raise InputError(name, expected=expected, found=found, remedy=f"Pass as many {name} as cameras.")
+        shape = f"(H, W{', 3' if channels else ''})"
+        raise InputError(name, expected=expected, found=found, remedy=f"Pass as many {name} as cameras, each {shape}.")
     checked = []
     for index, (view, value) in enumerate(zip(views, values, strict=True)):
         where = f"{name}[{index}]"
         if channels:
             check_levels(where, value)
         size = (view.camera.height, view.camera.width, *channels)
-        tensor = as_tensor(value, where, size, remedy=IMAGE_REMEDY if channels else REMEDY)
+        tensor = as_tensor(value, where, size, remedy=IMAGE_REMEDY if channels else "")
         # As fits take it: single precision holds less.
         check_finite(tensor.float(), where, "Make it again.")
         checked.append(tensor)

@@ -27,6 +27,9 @@ if TYPE_CHECKING:
 #: What tables call the components of an axis.
 AXIS_COLUMNS = ("ax", "ay", "az")
 
+#: What an intensity is given as.
+COLOUR = "Pass one number, which is grey, or three: red, green and blue."
+
 #: Power [W] of a light that shines alike in all directions over its radiant intensity [W/sr].
 WATTS_PER_INTENSITY = 4.0 * math.pi
 
@@ -291,5 +294,5 @@ class Light(ByValue, ABC):
 def _colour(value: ArrayLike) -> Tensor:
     """(3,) RGB; one number stands for all three."""
     if np.ndim(value) == 0:
-        return as_tensor(value, "intensity", ()).expand(3)
-    return as_tensor(value, "intensity", (3,))
+        return as_tensor(value, "intensity", (), remedy=COLOUR).expand(3)
+    return as_tensor(value, "intensity", (3,), remedy=COLOUR)

@@ -43,7 +43,7 @@ class SpotLight(AxialLight):
 
     kind: ClassVar[str] = "spot"
     ranges: ClassVar = {
-        "cone_angle": ("a half-angle from 0 to π radians", 0.0, math.pi),
+        "cone_angle": ("a half-angle from 0 to π radians (math.radians makes them of degrees)", 0.0, math.pi),
         "falloff": ("an angle, or a blend, of 0 or more", 0.0, math.inf),
     }
 

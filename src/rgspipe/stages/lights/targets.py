@@ -65,6 +65,14 @@ def select_targets(targets: Sequence[_Target], config: RgspipeConfig) -> list[_T
     """
     if config.fit.target is not None:
         return list(targets)
+    if not targets:
+        raise InputError(
+            "fit.target",
+            expected="the folder of a target, as the dataset has none of its own",
+            found="null",
+            remedy="Name one with fit.target=DIR: images whose lights are unknown, and their cameras in a "
+            "transforms.json (docs/guides/your_own_scene.md).",
+        )
     chosen: list[_Target] = []
     for target in targets:
         before = sum(other.occlusion == target.occlusion for other in chosen)
@@ -75,7 +83,7 @@ def select_targets(targets: Sequence[_Target], config: RgspipeConfig) -> list[_T
         classes = sorted({target.occlusion for target in targets})
         raise InputError(
             "occlusion",
-            expected=f"a class that the dataset has targets of: {', '.join(classes) or 'it has no targets at all'}",
+            expected=f"a class that the dataset has targets of: {', '.join(classes)}",
             found=config.occlusion,
             remedy="Choose another class, or fit a folder of your own with fit.target=DIR.",
         )

@@ -180,9 +180,10 @@ def _configuration(config: RgspipeConfig) -> str:
 def _stages(context: StageContext, described: Sequence[Mapping[str, Any]]) -> list[StageRecord]:
     """Every artifact behind the report, in the order of the pipeline; fits and evaluations stand in pairs."""
     records = [
-        stage_record(stage, artifact.manifest)
+        # What true surfels reach is judged last.
+        stage_record(f"{stage} (true surfels)" if index else stage, artifact.manifest)
         for stage in ("generate_dataset", "init_depth", "train_surfels", "capture_surfels", "freeze", "judge")
-        for artifact in context.input_lists.get(stage, ())
+        for index, artifact in enumerate(context.input_lists.get(stage, ()))
     ]
     for stage in ("fit_light", "evaluate"):
         for artifact, content in zip(context.input_lists.get(stage, ()), described, strict=False):
