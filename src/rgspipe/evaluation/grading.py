@@ -96,7 +96,7 @@ def structured_error(images: Sequence[ArrayLike], truths: Sequence[ArrayLike]) -
         pixels = BLOCK**2 * white.shape[0] * white.shape[1]
         shared += BLOCK**2 * float((white * black).sum()) * true.shape[0] * true.shape[1] / max(1, pixels)
         energy += float(np.square(true).sum())
-    return float(np.sqrt(max(0.0, shared) / energy)) if energy > 0.0 else 0.0
+    return float(np.sqrt(max(0.0, shared) / energy)) if energy > 0.0 else 1.0
 
 
 def _two_means(error: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
