@@ -49,6 +49,7 @@ class Resolver:
     files: dict[str, str] = field(default_factory=dict)
 
     def resolve(self, name: str, config: RgspipeConfig, changes: Mapping[str, object]) -> Node:
+        """A stage with all that it needs, where `changes` of the command's configuration led to `config`."""
         stage = self.load_stage(name)
         needs = stage.needs(config)
         inputs = tuple(
