@@ -50,7 +50,7 @@ READERS: dict[str, tuple[str, Callable[[Path], object]]] = {
     "a list of targets": ("targets.json", lambda path: load_target(_target_beside(path))),
     "a pipeline": ("mine.yaml", lambda path: load_sequence(str(path))),
     "lights to relight": ("lights.json", lambda path: foreign("relight", {"relight.lights": str(path)})),
-    "true lights": ("lights.json", lambda path: foreign("evaluate", {"fit.truth": str(path)})),
+    "true lights": ("lights.json", lambda path: foreign("evaluate", {"fit.target": "there", "fit.truth": str(path)})),
     "a .blend file": ("a.blend", lambda path: scene("blend", path)),
     "a .ply file": ("a.ply", lambda path: scene("ply", path)),
 }

@@ -222,9 +222,12 @@ def _outcome(artifact: Artifact) -> list[str]:
 
 
 def _record_unbegun(folder: Path, jobs: Sequence[Sequence[str]]) -> None:
-    """Say of jobs of a sweep that never began that they were killed, where the jobs' folders are called as usual."""
+    """Say of jobs of a sweep that never began that they were killed, where others did and folders are called as usual.
+
+    Where none began nothing took them along: the sweep itself was refused.
+    """
     begun = [path for path, _ in read_statuses(folder)]
-    if len(begun) < len(jobs) and all(path.parent == folder and path.name.isdecimal() for path in begun):
+    if 0 < len(begun) < len(jobs) and all(path.parent == folder and path.name.isdecimal() for path in begun):
         for number, overrides in enumerate(jobs):
             if folder / str(number) not in begun:
                 record_killed(folder / str(number), overrides, UNBEGUN)

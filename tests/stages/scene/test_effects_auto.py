@@ -77,9 +77,9 @@ def allow_nothing_but_direct_light(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whoever casts a shadow ray or a gather ray, or lets light bounce, fails."""
     point_irradiance = direct.point_irradiance
 
-    def unshadowed(bvh, positions, shadows):
+    def unshadowed(bvh, positions, shadows, at):
         assert not shadows, "a shadow ray was cast"
-        return point_irradiance(bvh, positions, shadows)
+        return point_irradiance(bvh, positions, shadows, at)
 
     def refuse(*arguments: object, **named: object) -> None:
         raise AssertionError("light bounced, or would have to")
