@@ -40,7 +40,7 @@ def test_they_are_spread_evenly(part: Receivers) -> None:
 def test_surface_and_light_of_all_are_theirs(part: Receivers) -> None:
     frozen = part.frozen
     assert part.areas.sum() == pytest.approx(float(frozen.areas.sum()), rel=1e-5)
-    own, every = part.gather(), Receivers(frozen).gather()
+    own, every = part.gather, Receivers(frozen).gather
     np.testing.assert_allclose(own @ np.ones(own.shape[1]), part.at(every @ np.ones(every.shape[1])), rtol=1e-6)
     sent = np.random.default_rng(0).uniform(size=own.shape[1])
     np.testing.assert_allclose(own @ sent, part.at(every @ sent[part.stand_in]), rtol=1e-6)

@@ -209,7 +209,7 @@ def _problem(
     prediction = None if options.albedo_prior == "none" else Prediction.of(predicted, graph)
     # A surface's paint is taken for even until there are lamps to ask.
     expected = predicted if prediction is None else prediction.with_shares(1.0, 0.0)
-    received = Received.of(receivers.gather(), radiance, told, expected)
+    received = Received.of(receivers.gather, radiance, told, expected)
     pixels = np.where(seen, receivers.at(measured.variance), np.inf)
     field = Field(graph, pixels, seen.astype(np.float64), Variances(), told=told if bounded else None)
     bounds = clipped if bounded else None

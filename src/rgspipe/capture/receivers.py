@@ -81,6 +81,7 @@ class Receivers:
         """(N, …) of values (A, …)."""
         return values if self.chosen is None else values[self.chosen]
 
+    @cached_property
     def gather(self) -> sp.csr_matrix:
         """(N, N) F, what each gets from those that the others stand for."""
         gather = self.frozen.gather.to_scipy().astype(np.float64).tocsr()
