@@ -33,8 +33,8 @@ def test_there_are_as_many_as_asked_for_and_each_stands_for_its_own_kind(part: R
 
 def test_they_are_spread_evenly(part: Receivers) -> None:
     away = (part.frozen.surfels.centers - part.surfels.centers[part.stand_in]).norm(dim=1)
-    # A cell of 400 on the room's 6 sides and more is 0.12 wide; measured 0.13 at most.
-    assert float(away.max()) < 0.16
+    # Measured 0.106 at most, 0.071 in the median; neighbours of all 1272 are 0.071 apart.
+    assert float(away.max()) < 0.14
 
 
 def test_surface_and_light_of_all_are_theirs(part: Receivers) -> None:

@@ -14,7 +14,7 @@ from rgspipe.capture.photographs import Numbers
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene.surfels import Surfels
 
-#: Halvings after which the side of a cell is known to 1 in 10 000.
+#: Halvings after which the side of a cell is known to a millionth.
 HALVINGS = 24
 
 

@@ -145,9 +145,10 @@ class Page:
 
         Or a browser that was not ready did not hear of the field of view, which nobody else changes.
         """
-        if self._begun is None:
+        begun, held = self._begun, self._client.camera
+        if begun is None:
             return False
-        (_, aspect, fov), held = self._begun, self._client.camera
+        _, aspect, fov = begun
         return held.aspect != aspect or abs(held.fov - fov) >= STILL
 
     def _follow(self) -> None:
