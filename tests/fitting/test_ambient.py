@@ -9,10 +9,10 @@ import pytest
 import torch
 
 from lit_room import HIDDEN, VISIBLE
-from open_room import TINT, frozen_open_room, lit_images, open_room_cameras, radiance_for
+from open_room import TINT, frozen_hole, frozen_open_room, lit_images, open_room_cameras, radiance_for
 from rgspipe.errors import InputError
 from rgspipe.fitting import BaseImages, FitStatus, FitViews, ImageCapture, LightSpec, PaperAdam, fit_lights
-from rgspipe.fitting.findings import LightMissing, MaybeAmbient, MuchAmbient, NoOpening
+from rgspipe.fitting.findings import AmbientOpen, LightMissing, MaybeAmbient, MuchAmbient, NoOpening
 from rgspipe.fitting.tracking.track import track_lights
 from rgspipe.renderer.ambient import ambient_image
 from rgspipe.renderer.frozen import FrozenScene
@@ -120,6 +120,24 @@ def test_in_a_closed_room_none_arrives(room, point_light) -> None:
     assert result.ambient is None and "closed" in result.reason
     assert [type(finding) for finding in result.findings] == [NoOpening]
     assert torch.equal(result.lights[0].position, plain.lights[0].position)
+
+
+def test_what_a_hole_does_not_tell_is_said(point_light) -> None:
+    frozen, light = frozen_hole(), point_light(VISIBLE)
+    views = [frozen.view(camera) for camera in open_room_cameras(24)[:1]]
+    images = lit_images(frozen, views, (light,), torch.zeros(3), noise=0.02)
+    result = fit_lights(frozen, views, images, lights=AMBIENT, sharp=False)
+    [doubt] = [finding for finding in result.findings if isinstance(finding, AmbientOpen)]
+    assert doubt.error > 0.5  # measured 2.6
+    assert result.status is FitStatus.CONVERGED and "do not tell whether light comes from all around" in result.reason
+
+
+@pytest.mark.parametrize("outside", [0.0, 1.0])
+def test_an_open_wall_tells_how_much_comes_in(open_room, point_light, outside: float) -> None:
+    frozen, views = open_room[0], open_room[1][:1]
+    images = lit_images(frozen, views, (point_light(VISIBLE),), torch.full((3,), outside), noise=0.02)
+    result = fit_lights(frozen, views, images, lights=AMBIENT, sharp=False)
+    assert not any(isinstance(finding, AmbientOpen) for finding in result.findings)
 
 
 @pytest.mark.parametrize("where", [VISIBLE, HIDDEN])

@@ -254,6 +254,17 @@ class MaybeAmbient(Finding):
 
 
 @dataclass(frozen=True)
+class AmbientOpen(Finding):
+    """Light from all around was allowed for, and the views do not tell whether there is any.
+
+    Its radiance is uncertain by `error` times what they show on the average.
+    """
+
+    error: float
+    status = FitStatus.CONVERGED
+
+
+@dataclass(frozen=True)
 class NoOpening(Finding):
     """Light from outside was allowed for, and the scene is closed: none arrives."""
 

@@ -27,7 +27,7 @@ from rgspipe.fitting.search.refine import Refiner, State
 from rgspipe.fitting.search.weighting import PLAIN
 from rgspipe.fitting.searched import Searched, strengths
 from rgspipe.fitting.selection.alternatives import least_bad, still_apart, weighed
-from rgspipe.fitting.selection.ambient import ambient_found, ambient_missing
+from rgspipe.fitting.selection.ambient import ambient_found, ambient_missing, ambient_open
 from rgspipe.fitting.selection.diagnosis import Costs, hanging, standing
 from rgspipe.fitting.selection.number import faded_light
 from rgspipe.fitting.selection.rivals import as_good_nearby, rival_elsewhere, rival_polished, told_rival
@@ -113,7 +113,10 @@ def _result(
     told = weighed(refiner, best, [*rivals, *others], findings, options)
     told += still_apart(refiner, best, earlier, told, options.certainty.doubtful)
     open_tables = tables_open(refiner, best, others, options)
+    known = strengths(problem, best, spread.known)
     findings = (*(told_rival(refiner, best, other) for other in rivals), *findings, *open_tables)
+    if "ambient" in known:
+        findings = (*findings, *ambient_open(known["ambient"], problem.scale))
     return FitResult(
         lights=last.lights,
         findings=(*standing(refiner, best, certainty, options.certainty), *findings, *hanging(best)),
@@ -128,7 +131,7 @@ def _result(
         exposures=tuple(problem.exposures.tolist()),
         noise_covariance=spread.noise,
         alternatives=tuple(least_bad(told)),
-        **strengths(problem, best, spread.known),
+        **known,
     )
 
 
@@ -144,5 +147,6 @@ def _without_lights(problem: LightProblem, meter: Meter) -> FitResult:
     spreads = [torch.diag(variance * one.unit**2 / gram[:, k, k]) for k, one in enumerate(problem.known)]
     known = strengths(problem, state, spreads)
     told = [MuchAmbient(known["ambient"].share)] if "ambient" in known else []
+    told += [] if "ambient" not in known else ambient_open(known["ambient"], problem.scale)
     loss = problem.unexplained(columns, found.intensity)
     return replace(result, findings=(*result.findings, *told), loss=loss, **known)

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from rgspipe.fitting.alternative import Alternative
 from rgspipe.fitting.findings import (
     AllStepsTaken,
+    AmbientOpen,
     ExposureUnknown,
     ExtentOpen,
     Finding,
@@ -213,6 +214,15 @@ def _maybe_ambient(found: MaybeAmbient) -> str:
     return f"{gain}; allow for it (LightSpec(ambient=True)), or give images with the lamps off."
 
 
+def _ambient_open(found: AmbientOpen) -> str:
+    often = f"by {found.error:.2g} times what they show on the average" if math.isfinite(found.error) else "altogether"
+    return (
+        "These views do not tell whether light comes from all around, as next to none of it would reach what they "
+        f"show: its radiance is uncertain {often}; give views of what lies before the openings, or images with the "
+        "lamps off."
+    )
+
+
 def _no_opening(found: NoOpening) -> str:
     return "The scene is closed: no light comes in from outside."
 
@@ -237,6 +247,7 @@ _WORDS: dict[type[Finding], Callable[..., str]] = {
     LampsLeftOut: _left_out,
     MuchAmbient: _much_ambient,
     MaybeAmbient: _maybe_ambient,
+    AmbientOpen: _ambient_open,
     NoOpening: _no_opening,
 }
 

@@ -1,11 +1,12 @@
-"""What is to be said of light from all around: how much of it there is, that none arrives, or that some is missing."""
+"""What is to be said of light from all around: how much there is, that none arrives, that some is missing, or that
+nobody can tell."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from rgspipe.fitting.findings import Finding, LightMissing, MaybeAmbient, MuchAmbient, NoOpening
-from rgspipe.fitting.model.known_images import KnownImage
+from rgspipe.fitting.findings import AmbientOpen, Finding, LightMissing, MaybeAmbient, MuchAmbient, NoOpening
+from rgspipe.fitting.model.known_images import KnownImage, Strength
 from rgspipe.fitting.model.problem import LightProblem
 from rgspipe.fitting.options import BarOptions, SearchOptions
 from rgspipe.fitting.search.compare import best_state, column_energies, drop
@@ -13,6 +14,21 @@ from rgspipe.fitting.search.refine import Refiner, State
 from rgspipe.fitting.search.schedule import refined_starts
 from rgspipe.fitting.search.starts import Candidates
 from rgspipe.renderer.ambient import rough_ambient_radiance
+
+#: Standard deviations within which light from all around may be anything: as strong as all that views show, or none.
+DEVIATIONS = 2.0
+
+
+def ambient_open(ambient: Strength, shown: float) -> list[Finding]:
+    """Whether views tell that there is light from all around, or that there is none.
+
+    Args:
+        ambient: as it was found.
+        shown: mean radiance of the views.
+    """
+    deviation = DEVIATIONS * float(ambient.covariance.diagonal().mean().sqrt())
+    told = deviation <= max(float(ambient.value.mean()), shown)
+    return [] if told else [AmbientOpen(deviation / DEVIATIONS / shown)]
 
 
 def ambient_found(problem: LightProblem, best: State, bar: BarOptions) -> list[Finding]:
