@@ -51,6 +51,14 @@ def test_both_lamps_are_found_and_no_third() -> None:
     assert np.abs(ratios - 1.0).max() < 0.05, ratios  # 0.005
 
 
+def test_exposures_that_nobody_spoke_of_are_told() -> None:
+    assert "differ in exposure" not in captured_words(found())
+    cameras = replace(found().measured.cameras, exposure="free", gains=np.linspace(0.8, 1.2, 14)[:, None].repeat(3, 1))
+    cameras = replace(cameras, vignetting=True, falloff=np.array([-0.3, 0.0]))
+    words = captured_words(replace(found(), measured=replace(found().measured, cameras=cameras)))
+    assert "differ in exposure, by a factor of up to 1.50" in words and "26 % darker in their corners" in words
+
+
 def test_lamps_that_are_looked_for_on_a_part_of_the_surfels_are_the_same() -> None:
     again = capture_scene(photographs(), blank_room(), replace(OPTIONS, search_surfels=400))
     assert len(again.answer.best.problem.radiance) == len(found().surfels)

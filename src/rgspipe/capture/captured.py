@@ -22,10 +22,19 @@ from rgspipe.capture.prediction import Prediction
 from rgspipe.capture.radiance import DRAWS, Measured, measured_radiance
 from rgspipe.capture.received import Received
 from rgspipe.capture.receivers import Receivers
-from rgspipe.capture.refusals import OFF, check_brackets, check_lightings, check_measured, check_overlap, check_views
+from rgspipe.capture.refusals import (
+    OFF,
+    check_alike,
+    check_brackets,
+    check_lightings,
+    check_measured,
+    check_overlap,
+    check_views,
+)
 from rgspipe.capture.search import BAR, FoundLamps, found_lamps, settled_on_all
 from rgspipe.capture.several import found_in_turns, without
 from rgspipe.capture.thinned import thinned, thinning
+from rgspipe.capture.unlike import Said
 from rgspipe.completion import with_unseen_surfaces
 from rgspipe.datasets.views import View
 from rgspipe.fitting.options import CertaintyOptions
@@ -58,6 +67,7 @@ class Captured:
         answer: how the number of lamps was chosen.
         frozen: the surfels with their light transport, as the lamps were found with.
         oddities: what is not matt, or lights itself, or cannot be.
+        said: of the cameras; where those of `measured` have more of it free, the photographs contradict it.
         lighting: the name of the lamps that were on, if there are several.
     """
 
@@ -69,6 +79,7 @@ class Captured:
     answer: FoundLamps
     frozen: FrozenScene
     oddities: Oddities
+    said: Said
     lighting: str = ""
 
     @property
@@ -130,7 +141,7 @@ def capture_scenes(
     views = [thinned(view, step) for view in views]
     # A pixel among some that are left out is nearer to its middle than to the mean of what is around it.
     weights = trace_views(surfels, views, options.supersampling if step == 1 else 1, store)
-    lit = _measured(weights, views, options, where)
+    lit = _measured(weights, views, surfels, options, where)
     frozen = FrozenScene.freeze(surfels, gather_rays=options.gather_rays, seed=options.seed)
     frozen = frozen.with_dictionary(options.grid, seed=options.seed)
     answers = _found(frozen, list(lit.values()), _predicted(weights, views, options), options)
@@ -138,24 +149,30 @@ def capture_scenes(
 
 
 def _measured(
-    weights: Sequence[ViewWeights], views: Sequence[View], options: CaptureOptions, where: str | Path
+    weights: Sequence[ViewWeights],
+    views: Sequence[View],
+    surfels: Surfels,
+    options: CaptureOptions,
+    where: str | Path,
 ) -> dict[str, Measured]:
     """The radiance of each lighting, without what shines with the lamps off."""
-    found = {}
+    found, said = {}, Said.of(options)
     for name in dict.fromkeys(view.lighting for view in views):
         own = [index for index, view in enumerate(views) if view.lighting == name]
         chosen, taken = [weights[index] for index in own], [views[index] for index in own]
-        if options.exposure != "same":
-            check_overlap(chosen, where)
         bent = options.response == "free"
         if bent:
             check_brackets(taken, options.exposure)
-        found[name] = measured_radiance(
-            chosen, taken, exposure=options.exposure, vignetting=options.vignetting, bent=bent
-        )
+        # Of a curve that is not known nobody can tell it from exposures that are not.
+        free = said if bent else said.borne_out(chosen, taken, surfels)
+        if free.exposure != "same":
+            check_overlap(chosen, where)
+        found[name] = measured_radiance(chosen, taken, exposure=free.exposure, vignetting=free.vignetting, bent=bent)
         if name != OFF:
             seen = (found[name].seen >= SHOWN) & ~found[name].blown_out.all(axis=1)
             check_measured(seen, found[name].radiance, taken, where)
+    if OFF in found:
+        check_alike({name: measured.cameras for name, measured in found.items()}, where)
     off = found.pop(OFF, None)
     return found if off is None else {name: without(measured, off) for name, measured in found.items()}
 
@@ -225,4 +242,6 @@ def _captured(measured: Measured, answer: FoundLamps, options: CaptureOptions, l
     surfels = replace(surfels, albedo=albedo, guessed=guessed)
     certainty = Certainty.of(answer)
     oddities = Oddities.of(best.problem, best.lamps, measured)
-    return Captured(surfels, best.lamps.lights(), certainty, doubt, measured, answer, frozen, oddities, lighting)
+    return Captured(
+        surfels, best.lamps.lights(), certainty, doubt, measured, answer, frozen, oddities, Said.of(options), lighting
+    )

@@ -17,8 +17,9 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from rgspipe.capture.photographs import Numbers, TracedPhotograph
+from rgspipe.capture.photographs import Numbers, Photograph, TracedPhotograph
 from rgspipe.capture.response import Response
 from rgspipe.names import Exposure
 
@@ -51,14 +52,18 @@ class Cameras:
 
     def even(self, photographs: Sequence[TracedPhotograph]) -> Iterator[Numbers]:
         """(P, 3) of each photograph what it would show under factors of 1."""
-        for photograph, gains in zip(photographs, self.gains, strict=True):
-            yield self._light(photograph) / (gains * self._corner(photograph))
+        for index, photograph in enumerate(photographs):
+            yield self.evened(index, photograph)
 
-    def _light(self, photograph: TracedPhotograph) -> Numbers:
+    def evened(self, index: int, photograph: Photograph) -> Numbers:
+        """(P, 3) what photograph `index` would show under a factor of 1."""
+        return self._light(photograph) / (self.gains[index] * self._corner(photograph))
+
+    def _light(self, photograph: Photograph) -> Numbers:
         """(P, 3) as the curve has it."""
         return photograph.image if self.response is None else self.response.light(photograph)
 
-    def _corner(self, photograph: TracedPhotograph) -> Numbers:
+    def _corner(self, photograph: Photograph) -> Numbers:
         """(P, 1) what the lens leaves of the light."""
         if not self.vignetting:
             return np.ones((1, 1))
@@ -79,8 +84,9 @@ class Cameras:
             cameras, radiance = replace(self, response=self.response.fitted(photographs, weights)), None
         if self.vignetting:
             grey = (cameras._light(photograph).mean(axis=1) for photograph in photographs)
-            means = _Means.of(photographs, grey, weights)
-            falloff = means.factors(_powers(photographs, weights), free=self.exposure != "same")[1]
+            means = Means.of(photographs, grey, weights)
+            equations = means.equations(powers(photographs, weights))
+            falloff = equations.solved(free=self.exposure != "same")[1]
             cameras, radiance = replace(cameras, falloff=falloff), None
         if self.exposure == "same":
             return cameras
@@ -108,7 +114,7 @@ class Cameras:
             self._seen_as_one(self._light(photograph) / self._corner(photograph))[:, channel]
             for photograph in photographs
         )
-        return _Means.of(photographs, pixels, weights).factors([], free=True)[0]
+        return np.exp(Means.of(photographs, pixels, weights).equations([]).solved(free=True)[0])
 
     def _seen_as_one(self, colours: Numbers) -> Numbers:
         """(P, 3) colours, grey where all channels have one factor."""
@@ -117,29 +123,35 @@ class Cameras:
         return np.repeat(colours.mean(axis=1, keepdims=True), 3, axis=1)
 
 
-def _powers(photographs: Sequence[TracedPhotograph], weights: Sequence[Numbers]) -> list[Numbers]:
-    """(V, N) means of each power of r² over the pixels that show a surfel."""
+def powers(
+    photographs: Sequence[TracedPhotograph], weights: Sequence[Numbers], asked: NDArray[np.integer] | None = None
+) -> list[Numbers]:
+    """(V, A) means of each power of r² over the pixels that show a surfel, of A that are `asked`, or all."""
     pairs = list(zip(photographs, weights, strict=True))
     return [
-        np.stack([_mean(photograph, photograph.squared_radius**power, weight)[0] for photograph, weight in pairs])
+        np.stack(
+            [_mean(photograph, photograph.squared_radius**power, weight, asked)[0] for photograph, weight in pairs]
+        )
         for power in POWERS
     ]
 
 
-def _mean(photograph: TracedPhotograph, values: Numbers, weight: Numbers) -> tuple[Numbers, Numbers]:
-    """(N,) means of values (P,) over the pixels that show each surfel, and (N,) how many do."""
-    back = photograph.rows.T
-    shown = back @ weight
-    return (back @ (weight * values)) / np.maximum(shown, 1e-12), shown
+def _mean(
+    photograph: TracedPhotograph, values: Numbers, weight: Numbers, asked: NDArray[np.integer] | None
+) -> tuple[Numbers, Numbers]:
+    """(A,) means of values (P,) over the pixels that show each surfel, and (A,) how many do."""
+    back, kept = photograph.rows.T, slice(None) if asked is None else asked
+    shown = (back @ weight)[kept]
+    return (back @ (weight * values))[kept] / np.maximum(shown, 1e-12), shown
 
 
 @dataclass(frozen=True, eq=False)
-class _Means:
+class Means:
     """What photographs show of surfels.
 
     Attributes:
-        logs: (V, N) l.
-        counted: (V, N) how many pixels say so; 0 where too few.
+        logs: (V, A) l.
+        counted: (V, A) how many pixels say so; 0 where too few.
     """
 
     logs: Numbers
@@ -147,16 +159,24 @@ class _Means:
 
     @classmethod
     def of(
-        cls, photographs: Sequence[TracedPhotograph], pixels: Iterable[Numbers], weights: Sequence[Numbers]
-    ) -> _Means:
-        """By `pixels` (P,) of each photograph."""
-        parts = (_mean(*one) for one in zip(photographs, pixels, weights, strict=True))
+        cls,
+        photographs: Sequence[TracedPhotograph],
+        pixels: Iterable[Numbers],
+        weights: Sequence[Numbers],
+        asked: NDArray[np.integer] | None = None,
+    ) -> Means:
+        """By `pixels` (P,) of each photograph; of the A surfels that are `asked`, or all."""
+        parts = (_mean(*one, asked) for one in zip(photographs, pixels, weights, strict=True))
         mean, shown = (np.stack(part) for part in zip(*parts, strict=True))
         counted = np.where((shown >= 1.0) & (mean > 0.0), shown, 0.0)
         return cls(np.log(np.where(counted > 0.0, mean, 1.0)), counted)
 
-    def factors(self, columns: Sequence[Numbers], *, free: bool) -> tuple[Numbers, Numbers]:
-        """(V,) gains of mean logarithm 0, 1 where they are not `free`, and a coefficient of each column (V, N)."""
+    def part(self, kept: NDArray[np.bool_]) -> Means:
+        """Of some of the surfels, (A,) bool."""
+        return Means(self.logs[:, kept], self.counted[:, kept])
+
+    def equations(self, columns: Sequence[Numbers]) -> Equations:
+        """With a coefficient of each column (V, A)."""
         own = [self._centred(column) for column in columns]
         logs, count = self._centred(self.logs), len(self.logs)
         laplacian = np.diag(self.counted.sum(axis=1)) - (self.counted / self._total) @ self.counted.T
@@ -164,10 +184,7 @@ class _Means:
         within = np.array([[(self.counted * a * b).sum() for a in own] for b in own]).reshape(len(own), len(own))
         matrix = np.block([[laplacian, across.T], [across, within]])
         right = np.array([*(self.counted * logs).sum(axis=1), *((self.counted * a * logs).sum() for a in own)])
-        kept = slice(None) if free else slice(count, None)
-        solved = np.zeros(len(right))
-        solved[kept] = np.linalg.lstsq(matrix[kept, kept], right[kept], rcond=1e-9)[0]
-        return np.exp(solved[:count] - solved[:count].mean()), solved[count:]
+        return Equations(matrix, right, count)
 
     @property
     def _total(self) -> Numbers:
@@ -176,3 +193,31 @@ class _Means:
     def _centred(self, values: Numbers) -> Numbers:
         """Less the mean over the photographs, surfel by surfel."""
         return values - (self.counted * values).sum(axis=0) / self._total
+
+
+@dataclass(frozen=True, eq=False)
+class Equations:
+    """Normal equations of V gains' logarithms and C coefficients; those of parts of the surfels add up.
+
+    Attributes:
+        matrix, right: (V + C, V + C) and (V + C,).
+        count: V.
+    """
+
+    matrix: Numbers
+    right: Numbers
+    count: int
+
+    def __add__(self, other: Equations) -> Equations:
+        return replace(self, matrix=self.matrix + other.matrix, right=self.right + other.right)
+
+    def __sub__(self, other: Equations) -> Equations:
+        return replace(self, matrix=self.matrix - other.matrix, right=self.right - other.right)
+
+    def solved(self, *, free: bool) -> tuple[Numbers, Numbers]:
+        """(V,) logarithms of mean 0, 0 where gains are not `free`, and (C,) coefficients."""
+        kept = slice(None) if free else slice(self.count, None)
+        solved = np.zeros(len(self.right))
+        solved[kept] = np.linalg.lstsq(self.matrix[kept, kept], self.right[kept], rcond=1e-9)[0]
+        gains, coefficients = np.split(solved, [self.count])
+        return gains - gains.mean(), coefficients

@@ -23,30 +23,14 @@ SHOWN = 0.3
 
 
 @dataclass(frozen=True, eq=False)
-class TracedPhotograph:
-    """A photograph of which was traced what its P pixels see: they are sums of the radiance of N surfels.
+class Photograph:
+    """P pixels.
 
     Attributes:
-        operator: (P, N) view weights.
         view: what was photographed.
-        base: (P,) what pixels count before they are looked at: nothing where they are half outside of all surfaces.
     """
 
-    operator: SparseOperator
     view: View
-    base: NDArray[np.float32]
-
-    @classmethod
-    def of(cls, weights: ViewWeights, view: View) -> TracedPhotograph:
-        """A photograph and what its pixels see; edges count little, what is not the scene nothing."""
-        whole = (weights.coverage >= LEAST_SHARE).cpu() & (view.alpha.reshape(-1) >= LEAST_SHARE)
-        base = np.where(weights.edges.cpu().numpy(), LITTLE, 1.0) * whole.numpy()
-        return cls(weights.operator, view, base.astype(np.float32))
-
-    @property
-    def rows(self) -> sp.csr_matrix:
-        """(P, N) W, float64."""
-        return self.operator.to_scipy().astype(np.float64)
 
     @property
     def image(self) -> Numbers:
@@ -65,6 +49,31 @@ class TracedPhotograph:
     def saturated(self) -> NDArray[np.bool_]:
         """(P, 3) where channels are saturated."""
         return self.view.saturated.reshape(-1, 3).numpy()
+
+
+@dataclass(frozen=True, eq=False)
+class TracedPhotograph(Photograph):
+    """A photograph of which was traced what its P pixels see: they are sums of the radiance of N surfels.
+
+    Attributes:
+        operator: (P, N) view weights.
+        base: (P,) what pixels count before they are looked at: nothing where they are half outside of all surfaces.
+    """
+
+    operator: SparseOperator
+    base: NDArray[np.float32]
+
+    @classmethod
+    def of(cls, weights: ViewWeights, view: View) -> TracedPhotograph:
+        """A photograph and what its pixels see; edges count little, what is not the scene nothing."""
+        whole = (weights.coverage >= LEAST_SHARE).cpu() & (view.alpha.reshape(-1) >= LEAST_SHARE)
+        base = np.where(weights.edges.cpu().numpy(), LITTLE, 1.0) * whole.numpy()
+        return cls(view, weights.operator, base.astype(np.float32))
+
+    @property
+    def rows(self) -> sp.csr_matrix:
+        """(P, N) W, float64."""
+        return self.operator.to_scipy().astype(np.float64)
 
     def plain(self, weight: NDArray[np.float32]) -> NDArray[np.float32]:
         """Weights (P,) of the pixels in which nothing is saturated; 0 for the others."""

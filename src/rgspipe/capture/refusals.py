@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
+from rgspipe.capture.exposures import Cameras
 from rgspipe.capture.photographs import SHOWN, Numbers
 from rgspipe.datasets.exif_exposure import check_exposures
 from rgspipe.datasets.views import View
@@ -126,6 +127,25 @@ def check_overlap(weights: Sequence[ViewWeights], where: str | Path) -> None:
             expected="photographs that show the same surfaces as others do, so that their exposures follow",
             found=f"{groups} groups of {', '.join(map(str, sizes))} photographs that share nothing",
             remedy="Add photographs in between, or expose all alike (CaptureOptions(exposure='same')).",
+        )
+
+
+def check_alike(exposures: Mapping[str, Cameras], where: str | Path) -> None:
+    """Refuse photographs with the lamps off where some turn out to be exposed in ways of their own.
+
+    Args:
+        exposures: of the photographs of each lighting.
+
+    Raises:
+        InputError: says which lighting.
+    """
+    apart = [name or "the first one" for name, cameras in exposures.items() if cameras.exposure != "same"]
+    if apart:
+        raise InputError(
+            where,
+            expected="one exposure for all photographs, so that what shines with the lamps off can be taken away",
+            found=f"photographs that differ in it, by the surfaces that they share, in lighting {', '.join(apart)}",
+            remedy="Expose all photographs alike, with one white balance, or leave those with the lamps off out.",
         )
 
 

@@ -25,7 +25,9 @@ NOTICEABLE, GLOW = 0.03, 0.05
 
 def captured_words(found: Captured) -> str:
     """Sentences: the lamps, how sure they are, whether intensities and albedo are told apart, and what to doubt."""
-    return " ".join([_lamps(found), *_rivals(found), _number(found), _even(found), _scale(found), *_doubts(found)])
+    return " ".join(
+        [_lamps(found), *_rivals(found), _number(found), _even(found), _scale(found), *_unsaid(found), *_doubts(found)]
+    )
 
 
 def _lamps(found: Captured) -> str:
@@ -97,6 +99,24 @@ def _even(found: Captured) -> str:
     if share < BAR.least:
         return f"Lamps explain no more than {explains}: the photographs do not tell that there is one."
     return f"Lamps explain {explains}."
+
+
+def _unsaid(found: Captured) -> Iterator[str]:
+    """What the cameras did and nobody said."""
+    cameras, said = found.measured.cameras, found.said
+    if cameras.exposure != said.exposure:
+        apart = cameras.gains.max(axis=0) / cameras.gains.min(axis=0)
+        balance = " and white balance" if cameras.exposure == "free_colour" else ""
+        yield (
+            f"Photographs differ in exposure{balance}, by a factor of up to {apart.max():.2f}: the surfaces that they "
+            "share tell it, though it was not said, and it was taken out as by "
+            f"CaptureOptions(exposure={cameras.exposure!r})."
+        )
+    if cameras.vignetting and not said.vignetting:
+        yield (
+            f"Photographs are {100.0 * (1.0 - math.exp(cameras.falloff.sum())):.0f} % darker in their corners, by the "
+            "surfaces that they share; it was taken out as by CaptureOptions(vignetting=True)."
+        )
 
 
 def _doubts(found: Captured) -> Iterator[str]:

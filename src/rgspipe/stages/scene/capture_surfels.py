@@ -15,6 +15,7 @@ import torch
 from rgspipe.capture.captured import Captured, capture_scenes
 from rgspipe.capture.lamp_file import write_lamps
 from rgspipe.capture.options import CaptureOptions
+from rgspipe.capture.photographs import Photograph
 from rgspipe.capture.words import captured_words
 from rgspipe.config.spoken import as_keys
 from rgspipe.datasets.grade_file import GRADE, save_grade
@@ -22,7 +23,7 @@ from rgspipe.datasets.light_file import read_lights
 from rgspipe.datasets.location import LAMPS_TRUTH, dataset_root, open_dataset
 from rgspipe.datasets.surfel_file import load_surfels, save_surfels
 from rgspipe.datasets.tensor_file import save_tensors
-from rgspipe.datasets.views import View
+from rgspipe.datasets.views import View, as_photographed
 from rgspipe.degradation.degraded_views import degraded
 from rgspipe.evaluation.captured_lamps import against_truth
 from rgspipe.evaluation.grading import grade_scene, graded_words
@@ -34,7 +35,6 @@ from rgspipe.options import settings
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.repainted import repainted
 from rgspipe.scene.grade import SceneGrade
-from rgspipe.scene.lights import LightRig
 from rgspipe.stages.base import Stage, StageContext
 from rgspipe.store.files import write_json
 from rgspipe.training.albedo import ALBEDO_RANGE
@@ -75,7 +75,7 @@ def run(context: StageContext) -> None:
     held_out = _held_out(frozen, dataset.test, context.folder)
     metrics |= {} if held_out is None else held_out.summary()
     own = [view for view in views if view.lighting == found.lighting]
-    grade = _grade(frozen, found.lamps, own, held_out)
+    grade = _grade(frozen, found, own, held_out)
     print(graded_words(grade))
     save_grade(context.folder / GRADE, grade)
     metrics |= {"surfels": len(found.surfels), "seconds": seconds, "peak_memory_mib": memory.mib()}
@@ -129,18 +129,26 @@ def _held_out(frozen: FrozenScene, views: Sequence[View], folder: Path) -> HeldO
     return judged
 
 
-def _grade(frozen: FrozenScene, lamps: LightRig, views: Sequence[View], held_out: HeldOut | None) -> SceneGrade:
+def _grade(frozen: FrozenScene, found: Captured, views: Sequence[View], held_out: HeldOut | None) -> SceneGrade:
     """The scene's grade by views that were left out, or else by the photographs under the lamps that were found."""
     cameras = [view.camera for view in views]
     if held_out is None:
-        chosen = views[:: math.ceil(len(views) / MOST_JUDGED)]
+        chosen, psnr = range(0, len(views), math.ceil(len(views) / MOST_JUDGED)), None
+        truths = [_evened(found, index, views[index]) for index in chosen]
         with torch.no_grad():
-            images = [view.as_photographed(frozen.render(view.camera, lamps)) for view in chosen]
-        truths, psnr = [view.image for view in chosen], None
+            renders = [frozen.render(views[index].camera, found.lamps) for index in chosen]
+        saturated = [views[index].saturated for index in chosen]
+        images = [as_photographed(*one) for one in zip(renders, truths, saturated, strict=True)]
     else:
         images, psnr = held_out.images, held_out.summary()["test_psnr_mean"]
         truths = [view.image for view in held_out.views]
     return grade_scene(frozen, images, truths, cameras=cameras, psnr=psnr, highest_albedo=ALBEDO_RANGE[1])
+
+
+def _evened(found: Captured, index: int, view: View) -> torch.Tensor:
+    """(H, W, 3) what a photograph would show if all had one exposure, and corners were no darker."""
+    light = found.measured.cameras.evened(index, Photograph(view))
+    return torch.from_numpy(light).float().reshape(view.image.shape)
 
 
 STAGE = Stage(
