@@ -30,9 +30,7 @@ def read_colour(path: Path) -> tuple[Tensor, Tensor]:
     if alpha.min() < 0 or alpha.max() > 1 + 1e-3:
         found = f"{alpha.min():g} to {alpha.max():g}"
         raise InputError(path, expected="alpha from 0 to 1", found=found, remedy="Export the image again.")
-    if alpha.max() == 0.0 < image.max():  # of programs that have no use for it, or for which 1 is transparent
-        expected, found = "pixels that are opaque", f"alpha 0 everywhere, beside colours up to {image.max():g}"
-        raise InputError(path, expected=expected, found=found, remedy="Write it without alpha, or correct its alpha.")
+    _check_seen(path, image, alpha)
     return torch.from_numpy(image), torch.from_numpy(np.minimum(alpha, 1.0))
 
 
@@ -123,8 +121,16 @@ def _read_display_image(path: Path) -> tuple[np.ndarray, np.ndarray]:
     light, alpha = stored.light, stored.alpha
     if alpha is None:
         return light, np.ones(light.shape[:2], np.float32)
+    _check_seen(path, light, alpha)
     light *= alpha[..., None]
     return light, alpha
+
+
+def _check_seen(path: Path, image: np.ndarray, alpha: np.ndarray) -> None:
+    """Refuse colours without alpha, of programs that have no use for it, or for which 1 is transparent."""
+    if alpha.max() == 0.0 < image.max():
+        expected, found = "pixels that are opaque", f"alpha 0 everywhere, beside colours up to {image.max():g}"
+        raise InputError(path, expected=expected, found=found, remedy="Write it without alpha, or correct its alpha.")
 
 
 def _mask_levels(path: Path) -> np.ndarray:

@@ -39,6 +39,9 @@ UPRIGHT = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
 #: What is said of a glTF whose materials have an alphaMode.
 SEE_THROUGH = "Materials of the mesh that one can see through (alphaMode MASK or BLEND) are taken for opaque."
 
+#: What is said of an OBJ with pictures of what is metal, which have no place in the one that is its colour.
+METAL_TEXTURES = "Pictures of what is metal (map_Pm) are not read: it is taken for as matt as the rest of the mesh."
+
 
 @timed
 def read_mesh(path: str | Path, options: MeshOptions | None = None) -> TriangleMesh:
@@ -52,7 +55,8 @@ def read_mesh(path: str | Path, options: MeshOptions | None = None) -> TriangleM
     if kind not in FORMATS:
         remedy = "Export it as binary PLY or GLB."
         raise InputError(path, expected=WHAT, found=f"the suffix {path.suffix!r}", remedy=remedy)
-    content, materials = _loaded(input_file(path, WHAT, most_bytes=reading_limits().bytes))
+    own = OwnFiles(input_file(path, WHAT, most_bytes=reading_limits().bytes))
+    content, materials = _loaded(path, own)
     try:
         parts = [_part(*placed, materials, path) for placed in _placed(content, path)]
         mesh = _joined(parts, path, content)
@@ -60,8 +64,8 @@ def read_mesh(path: str | Path, options: MeshOptions | None = None) -> TriangleM
         raise
     except (ValueError, IndexError, TypeError, KeyError, AttributeError, OSError) as error:
         raise _broken(path, error) from error
-    if not all(material.opaque for material in materials):
-        mesh = replace(mesh, remarks=(SEE_THROUGH,))
+    said = {SEE_THROUGH: not all(material.opaque for material in materials), METAL_TEXTURES: own.has_metal_textures}
+    mesh = replace(mesh, remarks=tuple(text for text, holds in said.items() if holds))
     scaled = np.diag([*[options.unit] * 3, 1.0])
     placed = polycam_place(path) if options.up == "auto" else None
     if placed is None:
@@ -93,6 +97,11 @@ class OwnFiles(trimesh.resolvers.FilePathResolver):
     def has_textures(self) -> bool:
         """Whether the mesh names any picture."""
         return bool(self._links.textures)
+
+    @property
+    def has_metal_textures(self) -> bool:
+        """Whether materials of an OBJ say by a picture where they are metal."""
+        return self._links.materials is not None and self._links.materials.metal_textures
 
     def namespaced(self, namespace: str) -> OwnFiles:
         """No folder has files of its own."""
@@ -130,9 +139,8 @@ class OwnFiles(trimesh.resolvers.FilePathResolver):
             raise InputError(self._path, expected="one texture at most in a PLY", found=found, remedy=remedy)
 
 
-def _loaded(path: Path) -> tuple[Any, list[GltfMaterial]]:
+def _loaded(path: Path, own: OwnFiles) -> tuple[Any, list[GltfMaterial]]:
     """The scene in a file, and the materials of a glTF."""
-    own = OwnFiles(path)
     try:
         # Of broken files numpy warns before they are refused.
         with warnings.catch_warnings():

@@ -33,9 +33,9 @@ class ScanOptions(Options):
     """metres of 1 in a depth image, where files do not keep to their layout"""
     pose_unit: float | None = option(None, low=1e-9, high=1e9)
     """metres of 1 in the cameras' places; by default 1"""
-    fov: float | None = option(None, low=1, high=179)
-    """horizontal field of view of photographs whose files do not state it (iid, interiorverse, openrooms,
-    replica with traj_w_c.txt), degrees; by default the layout's usual one"""
+    fov: float | None = option(None, low=3.2, high=179)
+    """horizontal field of view of photographs whose files do not state it (iid, interiorverse, openrooms, tum,
+    replica with traj_w_c.txt), degrees, of which less than 3.2 would be radians; by default the layout's usual one"""
     others: tuple[str, ...] = ()
     """folders of further captures of the same room under other lamps, in the same layout and coordinates"""
     lamps_off: str | None = None
