@@ -8,7 +8,10 @@ from typing import Literal, get_args
 from rgspipe.options import Options, option
 
 #: Layouts that are read.
-Layout = Literal["nerfstudio", "polycam", "colmap", "replica", "scannet", "iid", "interiorverse", "openrooms"]
+Layout = Literal[
+    "nerfstudio", "polycam", "colmap", "replica", "scannet", "iid", "interiorverse", "openrooms",
+    "tum", "7scenes", "arkitscenes",
+]  # fmt: skip
 LAYOUTS: tuple[Layout, ...] = get_args(Layout)
 
 
