@@ -7,7 +7,7 @@ from pathlib import Path
 from rgspipe.datasets.input_file import is_there
 
 #: Suffixes of images; a name without one is that of the first of these that is there, or else of an .exr.
-SUFFIXES = (".exr", ".png", ".jpg", ".jpeg")
+SUFFIXES = (".exr", ".png", ".jpg", ".jpeg", ".hdr", ".tif", ".tiff")
 
 
 def image_named(folder: Path, name: str) -> Path:

@@ -10,6 +10,8 @@ from torch import Tensor
 
 from rgspipe.datasets.display_image import FORMATS, read_colour_levels, read_levels
 from rgspipe.datasets.exr import read_array, read_channels, read_depth_channel, read_image
+from rgspipe.datasets.radiance_image import read_hdr
+from rgspipe.datasets.tiff_image import read_tiff
 from rgspipe.errors import InputError
 from rgspipe.scene import Camera
 from rgspipe.scene.arrays import check_radiance
@@ -18,14 +20,25 @@ from rgspipe.scene.arrays import check_radiance
 NO_SURFACE = 1e9
 
 
+def _read_radiance(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    light = read_hdr(path)
+    return light, np.ones(light.shape[:2], np.float32)
+
+
+#: What reads images of light, by suffix; others are of levels.
+LINEAR = {".exr": read_image, ".hdr": _read_radiance, ".tif": read_tiff, ".tiff": read_tiff}
+
+
 def read_colour(path: Path) -> tuple[Tensor, Tensor]:
-    """Linear, premultiplied colour (H, W, 3) and alpha (H, W) of an EXR image, or a PNG or JPEG (sRGB, straight alpha).
+    """Linear, premultiplied colour (H, W, 3) and alpha (H, W) of an image.
+
+    EXR, TIFF of floats and Radiance's .hdr are linear; PNG and JPEG are sRGB with straight alpha.
 
     Raises:
         InputError: missing or broken file, other channels, negative radiance, NaN or infinity, alpha outside of [0, 1],
             or 0 everywhere beside light.
     """
-    image, alpha = read_image(path) if path.suffix.lower() == ".exr" else _read_display_image(path)
+    image, alpha = LINEAR.get(path.suffix.lower(), _read_display_image)(path)
     check_radiance(path, float(image.min()), float(image.max()))
     if alpha.min() < 0 or alpha.max() > 1 + 1e-3:
         found = f"{alpha.min():g} to {alpha.max():g}"
