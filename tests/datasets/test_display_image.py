@@ -311,3 +311,9 @@ def test_colours_without_any_alpha_are_refused(tmp_path: Path, levels: int) -> N
         return
     with pytest.raises(InputError, match=r"a\.png.*opaque.*alpha 0 everywhere, beside colours up to 0\.10"):
         read_colour(tmp_path / "a.png")
+
+
+def test_a_mask_of_levels_0_and_1_is_one_of_false_and_true(tmp_path: Path) -> None:
+    """As libraries store it; it left 1/255 of all pixels."""
+    Image.fromarray((MASK > 0).astype(np.uint8)).save(tmp_path / "mask.png")
+    np.testing.assert_array_equal(read_mask(tmp_path / "mask.png", _camera()), (MASK > 0).astype(np.float32))

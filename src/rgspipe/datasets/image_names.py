@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Sequence
 from pathlib import Path
 
 from rgspipe.datasets.input_file import is_there
+from rgspipe.errors import InputError
 
 #: Suffixes of images; a name without one is that of the first of these that is there, or else of an .exr.
 SUFFIXES = (".exr", ".png", ".jpg", ".jpeg", ".hdr", ".tif", ".tiff")
@@ -19,3 +22,16 @@ def image_named(folder: Path, name: str) -> Path:
         return path
     places = [path.with_name(path.name + suffix) for low in SUFFIXES for suffix in (low, low.upper())]
     return next((place for place in places if is_there(place)), places[0])
+
+
+def check_once(images: Sequence[Path], where: Path) -> None:
+    """Refuse an image that several frames have: it was taken from one place.
+
+    Raises:
+        InputError: names it and the frames of the file `where`.
+    """
+    places: dict[str, int] = {}
+    for index, path in enumerate(images):
+        if (first := places.setdefault(os.path.normpath(path), index)) < index:
+            found = f"{path.name} in frames[{first}] and frames[{index}]"
+            raise InputError(where, expected="each image once", found=found, remedy="Leave one of the frames out.")

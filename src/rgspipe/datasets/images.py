@@ -152,6 +152,8 @@ def _mask_levels(path: Path) -> np.ndarray:
     values, alpha = stored.values, stored.alpha
     if alpha is not None and alpha.min() < 1.0:
         return alpha
+    if stored.levels.max() == 1:  # of programs that store false and true
+        values = stored.levels.astype(np.float32)
     if not (values == values[..., :1]).all():
         found = "colours, all of them opaque"
         raise InputError(path, expected="grey levels, or an alpha channel", found=found, remedy="Export it in grey.")
