@@ -445,3 +445,10 @@ def test_a_view_that_names_half_of_a_light_is_wrong(dataset: Path, change: Chang
     change("transforms_train.json", lambda content: content["frames"][0].pop("pl_pos"))
     with pytest.raises(InputError, match="pl_pos"):
         load_dataset(dataset)
+
+
+def test_an_image_whose_suffix_has_other_letters_is_found(dataset: Path, change: Change) -> None:
+    """As cameras name theirs, and file systems that do not tell letters apart find them."""
+    (dataset / "train/r_0000.exr").rename(dataset / "train/r_0000.EXR")
+    change(TRAIN, lambda content: content["frames"][0].update(file_path="train/r_0000.exr"))
+    load_dataset(dataset)

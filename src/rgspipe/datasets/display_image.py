@@ -149,7 +149,7 @@ def saturated_from(path: Path) -> float:
 def _format(path: Path) -> str:
     kind = FORMATS.get(path.suffix.lower())
     if kind is None:
-        raise _refusal(path, f"an image ending in .exr, {', '.join(FORMATS)}, .hdr or .tif", path.suffix or "no suffix")
+        raise _refusal(path, f"an image ending in .exr, {', '.join(FORMATS)}", path.suffix or "no suffix")
     return kind
 
 

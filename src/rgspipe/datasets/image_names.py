@@ -14,12 +14,17 @@ SUFFIXES = (".exr", ".png", ".jpg", ".jpeg", ".hdr", ".tif", ".tiff")
 
 
 def image_named(folder: Path, name: str) -> Path:
-    """The image by a name relative to a folder, which may lack its suffix, or have backslashes as on Windows."""
+    """The image by a name relative to a folder, which may be as on Windows: with backslashes, or .jpg for .JPG; or lack
+    its suffix.
+    """
     path = folder / name
     if not is_there(path) and "\\" in name:
         path = folder / name.replace("\\", "/")
-    if is_there(path) or path.name.lower().endswith(SUFFIXES):
+    if is_there(path):
         return path
+    if path.name.lower().endswith(SUFFIXES):
+        others = (path.with_suffix(suffix) for suffix in (path.suffix.lower(), path.suffix.upper()))
+        return next((other for other in others if is_there(other)), path)
     places = [path.with_name(path.name + suffix) for low in SUFFIXES for suffix in (low, low.upper())]
     return next((place for place in places if is_there(place)), places[0])
 
