@@ -104,3 +104,12 @@ def test_pictures_of_metal_of_an_obj_are_said_to_be_left_out(tmp_path: Path) -> 
 def test_a_share_of_metal_that_cannot_be_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"a\.mtl: expected a number from 0 to 1 as Pm, found “Pm 2”"):
         read_mesh(write_square(tmp_path, "Pm 2", "t.png", "mtllib a.mtl"))
+
+
+@pytest.mark.parametrize(
+    ("line", "said"), [("d 0.3", True), ("d -halo 0.3", True), ("map_d a.png", True), ("d 1.0", False)]
+)
+def test_it_is_said_of_an_obj_that_what_one_sees_through_is_opaque(tmp_path: Path, line: str, said: bool) -> None:
+    """It was said of glTF alone."""
+    remarks = read_mesh(write_square(tmp_path, f"map_Kd t.png\n{line}", "t.png", "mtllib a.mtl")).remarks
+    assert ["see through" in remark for remark in remarks] == [True] * said

@@ -19,6 +19,7 @@ from rgspipe.datasets.limits import FARTHEST
 from rgspipe.datasets.mesh.gltf_check import check_gltf
 from rgspipe.datasets.mesh.gltf_materials import GltfMaterial, numbered
 from rgspipe.datasets.mesh.links import mesh_links
+from rgspipe.datasets.mesh.obj_materials import ObjMaterials
 from rgspipe.datasets.mesh.obj_text import plain_obj
 from rgspipe.datasets.mesh.options import FORMATS, GLTF, MeshOptions
 from rgspipe.datasets.mesh.paint import check_shares, paint_of
@@ -36,8 +37,8 @@ WHAT = "a triangle mesh (.ply, .obj, .glb or .gltf)"
 UPRIGHT = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
 
 
-#: What is said of a glTF whose materials have an alphaMode.
-SEE_THROUGH = "Materials of the mesh that one can see through (alphaMode MASK or BLEND) are taken for opaque."
+#: What is said of materials that have an alphaMode, or in an MTL d or map_d.
+SEE_THROUGH = "Materials of the mesh that one can see through (alphaMode, d, map_d) are taken for opaque."
 
 #: What is said of an OBJ with pictures of what is metal, which have no place in the one that is its colour.
 METAL_TEXTURES = "Pictures of what is metal (map_Pm) are not read: it is taken for as matt as the rest of the mesh."
@@ -64,7 +65,8 @@ def read_mesh(path: str | Path, options: MeshOptions | None = None) -> TriangleM
         raise
     except (ValueError, IndexError, TypeError, KeyError, AttributeError, OSError) as error:
         raise _broken(path, error) from error
-    said = {SEE_THROUGH: not all(material.opaque for material in materials), METAL_TEXTURES: own.has_metal_textures}
+    see_through = own.obj.see_through or not all(material.opaque for material in materials)
+    said = {SEE_THROUGH: see_through, METAL_TEXTURES: own.obj.metal_textures}
     mesh = replace(mesh, remarks=tuple(text for text, holds in said.items() if holds))
     scaled = np.diag([*[options.unit] * 3, 1.0])
     placed = polycam_place(path) if options.up == "auto" else None
@@ -99,9 +101,9 @@ class OwnFiles(trimesh.resolvers.FilePathResolver):
         return bool(self._links.textures)
 
     @property
-    def has_metal_textures(self) -> bool:
-        """Whether materials of an OBJ say by a picture where they are metal."""
-        return self._links.materials is not None and self._links.materials.metal_textures
+    def obj(self) -> ObjMaterials:
+        """The materials of an OBJ, none of other files."""
+        return self._links.materials or ObjMaterials([], {}, b"")
 
     def namespaced(self, namespace: str) -> OwnFiles:
         """No folder has files of its own."""

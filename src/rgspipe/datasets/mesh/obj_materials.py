@@ -18,7 +18,7 @@ Named = Callable[[Path, str], Path]
 
 #: Lines that name files of materials, and lines of these that are read. Some end with a carriage return alone.
 LIBRARIES = re.compile(rb"(?:^|[\r\n])[ \t]*mtllib[ \t]+([^\r\n]+)", re.IGNORECASE)
-STATEMENTS = re.compile(rb"(?:^|[\r\n])[ \t]*(newmtl|kd|map_kd|pm|map_pm)[ \t]+([^\r\n]+)", re.IGNORECASE)
+STATEMENTS = re.compile(rb"(?:^|[\r\n])[ \t]*(newmtl|kd|map_kd|pm|map_pm|d|map_d)[ \t]+([^\r\n]+)", re.IGNORECASE)
 
 #: Options before a texture's name, with what may follow each: the values that leave the texture as it is, where others
 #: would be read wrongly, or None where any will do.
@@ -45,12 +45,14 @@ class ObjMaterials:
         textures: files of textures, whether they are there or not, by the names that `text` has for them.
         text: all of it as one plain MTL file, with `pm` for the part of a colour that is a metal's.
         metal_textures: whether any of them says by a picture where it is metal.
+        see_through: whether one can see through any of them.
     """
 
     files: list[Path]
     textures: dict[str, Path]
     text: bytes
     metal_textures: bool = False
+    see_through: bool = False
 
 
 def read_materials(path: Path, named: Named) -> ObjMaterials:
@@ -80,7 +82,8 @@ def read_materials(path: Path, named: Named) -> ObjMaterials:
             lines.append(f"{key} {_colour(file, value, key) if key in ('kd', 'pm') else value}")
         known |= own
     metal_textures = any(line.startswith("map_pm ") for line in lines)
-    return ObjMaterials(files, textures, "\n".join(lines).encode(), metal_textures)
+    see_through = any(line.startswith("map_d ") or _dissolves(line) for line in lines)
+    return ObjMaterials(files, textures, "\n".join(lines).encode(), metal_textures, see_through)
 
 
 def _libraries(path: Path, named: Named) -> Iterator[Path]:
@@ -140,6 +143,13 @@ def _colour(path: Path, text: str, key: str) -> str:
         remedy = "Correct it, or remove the line."
         raise InputError(path, expected=expected, found=f"“{name} {text}”", remedy=remedy)
     return " ".join(repr(min(one, 1.0)) for one in levels if one is not None)
+
+
+def _dissolves(line: str) -> bool:
+    """Whether a line is a `d` below 1, which may have the option -halo before its number."""
+    key, _, value = line.partition(" ")
+    opaque = _number(value.split()[-1]) if key == "d" and value.split() else None
+    return opaque is not None and opaque < 1.0
 
 
 def _number(text: str) -> float | None:
