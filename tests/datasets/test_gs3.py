@@ -447,6 +447,11 @@ def test_a_view_that_names_half_of_a_light_is_wrong(dataset: Path, change: Chang
         load_dataset(dataset)
 
 
+def test_a_suffix_may_be_named_without_its_dot(dataset: Path, change: Change) -> None:
+    change(TRAIN, _frame(file_ext="exr"))
+    load_dataset(dataset)
+
+
 def test_an_image_whose_suffix_has_other_letters_is_found(dataset: Path, change: Change) -> None:
     """As cameras name theirs, and file systems that do not tell letters apart find them."""
     (dataset / "train/r_0000.exr").rename(dataset / "train/r_0000.EXR")

@@ -72,9 +72,17 @@ REFUSED: dict[str, tuple[Callable[[Path], object], str]] = {
         r"turned \(orientation 6\)",
     ),
     "half of one": (lambda path: _cut(path), "half of one|cannot be read"),
+    "a damaged tag": (lambda path: _damaged(path), "invalid data type"),
     "another format": (lambda path: path.write_text("no image"), "cannot be read"),
     "below black": (lambda path: tifffile.imwrite(path, LIGHT - 2.0, **RGB), "expected radiance"),
 }
+
+
+def _damaged(path: Path) -> None:
+    """A TIFF whose tag of its orientation is of no type."""
+    tifffile.imwrite(path, LIGHT, **RGB, extratags=[(274, "H", 1, 6, True)])
+    content = path.read_bytes()
+    path.write_bytes(content.replace(b"\x12\x01\x03\x00", b"\x12\x01\x63\x00", 1))
 
 
 def _cut(path: Path) -> None:

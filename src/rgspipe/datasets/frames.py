@@ -8,7 +8,7 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
-from rgspipe.datasets.image_names import image_named
+from rgspipe.datasets.image_names import SUFFIXES, image_named
 from rgspipe.datasets.input_file import is_plain_name
 from rgspipe.datasets.json_file import is_number, numbers, read_json, required, shown
 from rgspipe.datasets.lens_keys import DISTORTION, OTHER_OPTICS, STRAIGHT, first_that_bends
@@ -61,6 +61,7 @@ class FrameEntry:
             return self._image(name)
         if not isinstance(extension, str):
             raise InputError(f"{self.where}.file_ext", expected="a suffix", found=repr(extension), remedy="Correct it.")
+        extension = f".{extension}" if f".{extension.lower()}" in SUFFIXES else extension
         return self._image(name if name.endswith(extension) else name + extension)
 
     @property

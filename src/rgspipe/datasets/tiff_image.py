@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
+import logging
+import threading
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -43,12 +47,14 @@ def read_tiff(path: Path) -> tuple[Pixels, Pixels]:
     """
     file = input_file(path, "a TIFF image", most_bytes=2 * reading_limits().image_bytes)
     try:
-        with tifffile.TiffFile(file) as opened:
+        with _complaints() as complaints, tifffile.TiffFile(file) as opened:
             if len(opened.pages) != 1:
                 raise _refusal(path, f"{len(opened.pages)} images in one file", "Write the one that is meant alone.")
             page = opened.pages[0]
             _check_kind(path, page)
             stored = page.asarray()
+            if complaints:
+                raise ValueError(complaints[0])
     except InputError:
         raise
     except Exception as error:  # the library says of no broken file what it raises
@@ -61,6 +67,21 @@ def read_tiff(path: Path) -> tuple[Pixels, Pixels]:
     if page.extrasamples == (STRAIGHT,):
         colours = colours * alpha[..., None]
     return np.array(np.broadcast_to(colours, (*alpha.shape, 3))), np.array(alpha)
+
+
+@contextlib.contextmanager
+def _complaints() -> Iterator[list[str]]:
+    """What the library says of damaged tags, which it passes over, in the place of printing it."""
+    found, logger, here = [], tifffile.logger(), threading.get_ident()
+    handler, spoken = logging.Handler(logging.ERROR), logger.propagate
+    handler.emit = lambda record: found.append(record.getMessage()) if record.thread == here else None
+    logger.addHandler(handler)
+    logger.propagate = False
+    try:
+        yield found
+    finally:
+        logger.propagate = spoken
+        logger.removeHandler(handler)
 
 
 def _check_kind(path: Path, page: tifffile.TiffPage) -> None:
