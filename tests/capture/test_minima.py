@@ -12,7 +12,14 @@ from lamp_problem import problem, true_lamps
 from rgspipe.capture.candidates import CandidateLamps
 from rgspipe.capture.lamps import LampProblem, Lamps
 from rgspipe.capture.likelihood import Tried
-from rgspipe.capture.minima import likelier_beside, likeliest, looked_beside, minima_beside, settled_beside
+from rgspipe.capture.minima import (
+    likelier_among,
+    likeliest,
+    looked_beside,
+    minima_beside,
+    settled_beside,
+    with_chances,
+)
 from rgspipe.capture.receivers import Receivers
 
 
@@ -69,9 +76,12 @@ def false_minimum() -> tuple[CandidateLamps, Tried]:
 def test_a_lamp_goes_to_the_likelier_minimum_beside_it_and_stays_there() -> None:
     candidates, false = false_minimum()
     assert distance(false.lamps) > 0.5  # 0.70
-    found = likeliest(candidates, false)
-    assert distance(found.best.lamps) < 0.003  # 7e-4
-    assert all(likelier_beside(candidates, found.best, own, []) is found.best for own in (0, 1))
+    others: list[Tried] = []
+    best = likeliest(candidates, false, others)
+    assert distance(best.lamps) < 0.003  # 7e-4
+    for own in (0, 1):
+        assert likelier_among(best, minima_beside(best.problem, candidates, best.lamps, own), []) is best
+    found = with_chances(best, others)
     # 0.093, by a chance of 5e-4; and 0.014
     assert all(distance(rival.tried.lamps) > 0.05 and rival.chance < 0.05 for rival in found.rivals)
     assert found.rivals
@@ -81,6 +91,6 @@ def test_a_minimum_that_is_known_is_not_settled_again(monkeypatch: pytest.Monkey
     candidates, false = false_minimum()
     beside = minima_beside(false.problem, candidates, false.lamps, 1)
     assert len(beside) > 1
-    monkeypatch.setattr(Tried, "settled", lambda *_: pytest.fail("it is settled again"))
+    monkeypatch.setattr(Tried, "settled_if", lambda *_: pytest.fail("it is settled again"))
     others = [replace(false, lamps=lamps) for lamps in beside]
-    assert likelier_beside(candidates, false, 1, others) is false
+    assert likelier_among(false, beside, others) is false

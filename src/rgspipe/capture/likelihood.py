@@ -8,7 +8,7 @@ all, a side is the likelier one (the bootstrap of Efron 1979).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -81,6 +81,15 @@ class Tried:
         """The lamps where they belong by what belongs to them."""
         for _ in range(ROUNDS):
             problem, lamps = settled_once(problem, lamps)
+        return cls.of(problem, lamps)
+
+    @classmethod
+    def settled_if(cls, problem: LampProblem, lamps: Lamps, wanted: Callable[[Lamps], bool]) -> Tried | None:
+        """The same; None as soon as they come to where they are not `wanted`."""
+        for _ in range(ROUNDS):
+            problem, lamps = settled_once(problem, lamps)
+            if not wanted(lamps):
+                return None
         return cls.of(problem, lamps)
 
     def put_by(self) -> Tried:

@@ -53,10 +53,11 @@ class Minima:
 
 def settled_beside(problem: LampProblem, candidates: CandidateLamps, lamps: Lamps) -> Lamps:
     """The least minimum that is reached by moving one lamp after the other to a better one beside it."""
-    for own in range(len(lamps)):
+    own = stays = 0
+    while stays < len(lamps):
         beside = looked_beside(problem, candidates, lamps, own)
-        if beside is not lamps:
-            return settled_beside(problem, candidates, beside)
+        stays = stays + 1 if beside is lamps else 0
+        lamps, own = beside, (own + 1) % len(lamps)
     return lamps
 
 
@@ -86,39 +87,26 @@ def minima_beside(
     return found
 
 
-def likeliest(candidates: CandidateLamps, best: Tried) -> Minima:
-    """The likeliest of the minima that are reached by moving one lamp after the other, each by its own variances."""
-    return _likeliest(candidates, Tried.settled(best.problem, best.lamps), [], AROUND)
+def likeliest(candidates: CandidateLamps, best: Tried, others: list[Tried], around: int = AROUND) -> Tried:
+    """The likeliest of the minima that are reached by moving one lamp after the other, each by its own variances.
 
-
-def likeliest_all_around(candidates: CandidateLamps, minima: Minima) -> Minima:
-    """The same from more places around the lamps, and the minima that are known."""
-    return _likeliest(candidates, minima.best, [rival.tried for rival in minima.rivals], ALL_AROUND)
-
-
-def _likeliest(candidates: CandidateLamps, best: Tried, others: list[Tried], around: int) -> Minima:
-    count = len(best.lamps)
+    From so many places around each; what is settled on the way joins `others`, as in `likelier_among`.
+    """
+    count, stays = len(best.lamps), 0
     with progress_bar([], "comparing places of lamps", count, unit="step") as bar:
-        for passes in range(1, ROUNDS + 1):
-            before, bar.total = best, passes * count
-            for own in range(count):
-                best = likelier_beside(candidates, best, own, others, around)
-                bar.update()
-            if best is before:
+        for look in range(ROUNDS * count):
+            before, own = best, look % count
+            best = likelier_among(best, minima_beside(best.problem, candidates, best.lamps, own, around), others)
+            stays = stays + 1 if best is before else 0
+            bar.total = min(look + 1 + count - stays, ROUNDS * count)
+            bar.update()
+            if stays == count:
                 break
-    return _with_chances(best, others)
+    return best
 
 
-def minima_among(tried: Sequence[Tried]) -> Minima:
-    """The likeliest of some settled lamps, and the others; those that came to the same place count once."""
-    best = tried[0]
-    for other in tried[1:]:
-        if _is_new(best.problem, other.lamps, [best.lamps]) and other.over(best).gain > 0.0:
-            best = other
-    return _with_chances(best, [other.put_by() for other in tried if other is not best])
-
-
-def _with_chances(best: Tried, others: Sequence[Tried]) -> Minima:
+def with_chances(best: Tried, others: Sequence[Tried]) -> Minima:
+    """The likeliest minimum and how likely each of the others is; those that came to the same place count once."""
     rivals: list[Tried] = []
     for other in others:
         if _is_new(best.problem, other.lamps, _lamps(best, *rivals)):
@@ -127,19 +115,21 @@ def _with_chances(best: Tried, others: Sequence[Tried]) -> Minima:
     return Minima(best, tuple(RivalLamps(rival, float(part)) for rival, part in zip(rivals, chance, strict=True)))
 
 
-def likelier_beside(
-    candidates: CandidateLamps, best: Tried, own: int, others: list[Tried], around: int = AROUND
-) -> Tried:
-    """Lamps of which one has moved to a likelier minimum beside, or the same if none is found.
+def likelier_among(best: Tried, minima: Iterable[Lamps], others: list[Tried]) -> Tried:
+    """The likeliest of the best lamps and other `minima`, by the best's variances, that may be likelier by their own.
 
-    What is settled on the way and is not the answer joins `others`, from which none is settled again.
+    What is settled on the way and is not the answer joins `others`; what comes to where these are is not followed.
     """
     problem = best.problem
-    for beside in minima_beside(problem, candidates, best.lamps, own, around):
-        if best.costs_less(beside).doubt < POSSIBLE or not _is_new(problem, beside, _lamps(best, *others)):
+
+    def is_new(lamps: Lamps) -> bool:
+        return _is_new(problem, lamps, _lamps(best, *others))
+
+    for beside in minima:
+        if not is_new(beside) or best.costs_less(beside).doubt < POSSIBLE:
             continue
-        rival = Tried.settled(problem, beside)
-        if not _is_new(problem, rival.lamps, _lamps(best, *others)):
+        rival = Tried.settled_if(problem, beside, is_new)
+        if rival is None:
             continue
         less, best = (best, rival) if rival.over(best).gain > 0.0 else (rival, best)
         others.append(less.put_by())

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 import scipy.sparse as sp
@@ -11,11 +12,19 @@ import torch
 from numpy.typing import NDArray
 
 from rgspipe.capture.photographs import Numbers
+from rgspipe.renderer.clusters import cluster_patches
 from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.scene.spacing import surfel_spacing
 from rgspipe.scene.surfels import Surfels
 
 #: Halvings after which the side of a cell is known to a millionth.
 HALVINGS = 24
+
+#: Parts of the scene, each of neighbours, whose errors are taken for independent.
+PARTS = 12
+
+#: Lamps whose light is remembered: weighed anew they stand where they stood.
+REMEMBERED = 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +86,16 @@ class Receivers:
         areas = self.frozen.areas.double().cpu().numpy()
         return areas if self.stand_in is None else np.bincount(self.stand_in, areas)
 
+    @cached_property
+    def spacing(self) -> float:
+        """Typical distance of neighbours, scene units."""
+        return surfel_spacing(self.surfels.centers.cpu(), self.surfels.normals.cpu())
+
+    @cached_property
+    def parts(self) -> NDArray[np.integer]:
+        """(N,) which of up to `PARTS` parts of the scene each surfel belongs to."""
+        return cluster_patches(self.surfels.centers.double(), self.surfels.normals, PARTS, seed=0)
+
     def at(self, values: np.ndarray) -> np.ndarray:
         """(N, …) of values (A, …)."""
         return values if self.chosen is None else values[self.chosen]
@@ -92,9 +111,20 @@ class Receivers:
 
     def irradiance(self, places: Numbers, shadows: bool = True) -> tuple[Numbers, Numbers]:
         """(L, N) from unit lamps at (L, 3), and its derivative (L, N, 3)."""
+        values, slopes = zip(*(self._lamp(tuple(place), shadows) for place in np.atleast_2d(places)), strict=True)
+        return np.stack(values), np.stack(slopes)
+
+    @cached_property
+    def _lamp(self) -> Callable[[tuple[float, ...], bool], tuple[Numbers, Numbers]]:
+        """(N,) and (N, 3) of one lamp."""
         at = None if self.chosen is None else torch.from_numpy(self.chosen)
-        own = self.frozen.unit_irradiance(torch.from_numpy(np.atleast_2d(places)), shadows, at)
-        return own[0].double().cpu().numpy(), own[1].double().cpu().numpy()
+
+        @lru_cache(maxsize=REMEMBERED)
+        def lamp(place: tuple[float, ...], shadows: bool) -> tuple[Numbers, Numbers]:
+            value, slope = self.frozen.unit_irradiance(torch.tensor([place], dtype=torch.float64), shadows, at)
+            return value[0].double().cpu().numpy(), slope[0].double().cpu().numpy()
+
+        return lamp
 
     def candidates(self) -> tuple[Numbers, Numbers]:
         """(C, 3) places of the scene's dictionary, and (C, N) irradiance from there."""
