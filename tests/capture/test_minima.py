@@ -11,8 +11,9 @@ import pytest
 from lamp_problem import problem, true_lamps
 from rgspipe.capture.candidates import CandidateLamps
 from rgspipe.capture.lamps import LampProblem, Lamps
-from rgspipe.capture.likelihood import Tried
+from rgspipe.capture.likelihood import Comparison, Tried
 from rgspipe.capture.minima import (
+    LessLikely,
     likelier_among,
     likeliest,
     looked_beside,
@@ -76,7 +77,7 @@ def false_minimum() -> tuple[CandidateLamps, Tried]:
 def test_a_lamp_goes_to_the_likelier_minimum_beside_it_and_stays_there() -> None:
     candidates, false = false_minimum()
     assert distance(false.lamps) > 0.5  # 0.70
-    others: list[Tried] = []
+    others: list[LessLikely] = []
     best = likeliest(candidates, false, others)
     assert distance(best.lamps) < 0.003  # 7e-4
     for own in (0, 1):
@@ -92,5 +93,5 @@ def test_a_minimum_that_is_known_is_not_settled_again(monkeypatch: pytest.Monkey
     beside = minima_beside(false.problem, candidates, false.lamps, 1)
     assert len(beside) > 1
     monkeypatch.setattr(Tried, "settled_if", lambda *_: pytest.fail("it is settled again"))
-    others = [replace(false, lamps=lamps) for lamps in beside]
+    others = [LessLikely(replace(false, lamps=lamps), false, Comparison(np.ones(1))) for lamps in beside]
     assert likelier_among(false, beside, others) is false

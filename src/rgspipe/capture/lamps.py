@@ -213,7 +213,7 @@ class _Around:
     problem: LampProblem
     lamps: Lamps
 
-    @cached_property
+    @property
     def normal(self) -> NormalEquations:
         residual, jacobian = self.problem.residual(self.lamps), self.problem.jacobian(self.lamps)
         width, field = jacobian.shape[2], self.problem.field

@@ -127,6 +127,11 @@ class Comparison:
         return float(self.gains.sum())
 
     @property
+    def turned(self) -> Comparison:
+        """How much likelier the others are."""
+        return Comparison(-self.gains)
+
+    @property
     def doubt(self) -> float:
         """Part of the draws of the scene's parts by which the others are likelier."""
         return float(chances([self])[1])

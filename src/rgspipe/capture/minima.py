@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from rgspipe.capture.candidates import CandidateLamps, ranked
 from rgspipe.capture.lamps import LampProblem, Lamps
-from rgspipe.capture.likelihood import ROUNDS, STEPS, Tried, chances
+from rgspipe.capture.likelihood import ROUNDS, STEPS, Comparison, Tried, chances
+from rgspipe.capture.side_by_side import side_by_side
 from rgspipe.fitting.certainty.regions import CONFIDENCE
 from rgspipe.progress import progress_bar
 
@@ -26,6 +28,9 @@ FIRST = 8
 #: By other variances a minimum may be the likelier one that is so in this part of the draws of the scene's parts.
 POSSIBLE = 0.001
 
+#: So many settle side by side, on however many cores, as what each comes to may save others the way.
+AT_ONCE = 2
+
 #: One that is likelier than this is told, and a region of 95 % holds it.
 LIKELY = 1.0 - CONFIDENCE
 
@@ -41,6 +46,25 @@ class RivalLamps:
 
     tried: Tried
     chance: float
+
+
+@dataclass(frozen=True, eq=False)
+class LessLikely:
+    """Settled lamps that were compared with likelier ones.
+
+    Attributes:
+        tried: with what belongs to them, put by.
+        likelier: what they were compared with.
+        gain: how much likelier these are.
+    """
+
+    tried: Tried
+    likelier: Tried
+    gain: Comparison
+
+    def than(self, best: Tried) -> Comparison:
+        """How much likelier `best` is."""
+        return self.gain if best is self.likelier else best.over(self.tried.put_by())
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,19 +99,20 @@ def minima_beside(
     others = lamps.at([other for other in range(len(lamps)) if other != own]) if len(lamps) > 1 else None
     beside = candidates.around(problem, lamps.places[own])
     costs, _ = ranked(problem, beside, others)
-    reached = []
-    for index in np.argsort(costs)[:around]:
+
+    def refined(index: int) -> Lamps:
         places = lamps.places.copy()
         places[own] = beside.places[index]
-        reached.append(problem.refined(problem.lamps(places, lamps.logs), FIRST))
+        return problem.refined(problem.lamps(places, lamps.logs), FIRST)
+
     found: list[Lamps] = []
-    for one in sorted(reached, key=problem.cost):
+    for one in sorted(side_by_side(refined, np.argsort(costs)[:around]), key=problem.cost):
         if _is_new(problem, one, (lamps, *found)):
             found.append(one)
     return found
 
 
-def likeliest(candidates: CandidateLamps, best: Tried, others: list[Tried], around: int = AROUND) -> Tried:
+def likeliest(candidates: CandidateLamps, best: Tried, others: list[LessLikely], around: int = AROUND) -> Tried:
     """The likeliest of the minima that are reached by moving one lamp after the other, each by its own variances.
 
     From so many places around each; what is settled on the way joins `others`, as in `likelier_among`.
@@ -105,39 +130,40 @@ def likeliest(candidates: CandidateLamps, best: Tried, others: list[Tried], arou
     return best
 
 
-def with_chances(best: Tried, others: Sequence[Tried]) -> Minima:
+def with_chances(best: Tried, others: Sequence[LessLikely]) -> Minima:
     """The likeliest minimum and how likely each of the others is; those that came to the same place count once."""
-    rivals: list[Tried] = []
+    rivals: list[LessLikely] = []
     for other in others:
-        if _is_new(best.problem, other.lamps, _lamps(best, *rivals)):
+        if _is_new(best.problem, other.tried.lamps, _lamps(best, rivals)):
             rivals.append(other)
-    chance = chances([best.over(rival.put_by()) for rival in rivals])[1:]
-    return Minima(best, tuple(RivalLamps(rival, float(part)) for rival, part in zip(rivals, chance, strict=True)))
+    chance = chances(side_by_side(lambda rival: rival.than(best), rivals))[1:]
+    return Minima(best, tuple(RivalLamps(rival.tried, float(own)) for rival, own in zip(rivals, chance, strict=True)))
 
 
-def likelier_among(best: Tried, minima: Iterable[Lamps], others: list[Tried]) -> Tried:
+def likelier_among(best: Tried, minima: Sequence[Lamps], others: list[LessLikely]) -> Tried:
     """The likeliest of the best lamps and other `minima`, by the best's variances, that may be likelier by their own.
 
     What is settled on the way and is not the answer joins `others`; what comes to where these are is not followed.
     """
-    problem = best.problem
-
-    def is_new(lamps: Lamps) -> bool:
-        return _is_new(problem, lamps, _lamps(best, *others))
-
-    for beside in minima:
-        if not is_new(beside) or best.costs_less(beside).doubt < POSSIBLE:
-            continue
-        rival = Tried.settled_if(problem, beside, is_new)
-        if rival is None:
-            continue
-        less, best = (best, rival) if rival.over(best).gain > 0.0 else (rival, best)
-        others.append(less.put_by())
+    problem, waiting = best.problem, list(minima)
+    while waiting:
+        known, batch = _lamps(best, others), list[Lamps]()
+        while waiting and len(batch) < AT_ONCE:
+            beside = waiting.pop(0)
+            if _is_new(problem, beside, known) and best.costs_less(beside).doubt >= POSSIBLE:
+                batch.append(beside)
+        is_new = partial(_is_new, problem, known=known)
+        for rival in side_by_side(lambda lamps, new=is_new: Tried.settled_if(problem, lamps, new), batch):
+            if rival is None or not _is_new(problem, rival.lamps, _lamps(best, others)):
+                continue
+            than = best.over(rival)
+            less, best, than = (rival, best, than) if than.gain >= 0.0 else (best, rival, than.turned)
+            others.append(LessLikely(less.put_by(), best, than))
     return best
 
 
-def _lamps(*tried: Tried) -> list[Lamps]:
-    return [one.lamps for one in tried]
+def _lamps(best: Tried, others: Sequence[LessLikely]) -> list[Lamps]:
+    return [best.lamps, *(one.tried.lamps for one in others)]
 
 
 def _is_new(problem: LampProblem, lamps: Lamps, known: Iterable[Lamps]) -> bool:

@@ -23,8 +23,8 @@ HALVINGS = 24
 #: Parts of the scene, each of neighbours, whose errors are taken for independent.
 PARTS = 12
 
-#: Lamps whose light is remembered: weighed anew they stand where they stood.
-REMEMBERED = 16
+#: Sets of lamps whose light is remembered: weighed anew they stand where they stood.
+REMEMBERED = 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,20 +111,18 @@ class Receivers:
 
     def irradiance(self, places: Numbers, shadows: bool = True) -> tuple[Numbers, Numbers]:
         """(L, N) from unit lamps at (L, 3), and its derivative (L, N, 3)."""
-        values, slopes = zip(*(self._lamp(tuple(place), shadows) for place in np.atleast_2d(places)), strict=True)
-        return np.stack(values), np.stack(slopes)
+        return self._irradiance(tuple(map(tuple, np.atleast_2d(places).tolist())), shadows)
 
     @cached_property
-    def _lamp(self) -> Callable[[tuple[float, ...], bool], tuple[Numbers, Numbers]]:
-        """(N,) and (N, 3) of one lamp."""
+    def _irradiance(self) -> Callable[[tuple[tuple[float, ...], ...], bool], tuple[Numbers, Numbers]]:
         at = None if self.chosen is None else torch.from_numpy(self.chosen)
 
         @lru_cache(maxsize=REMEMBERED)
-        def lamp(place: tuple[float, ...], shadows: bool) -> tuple[Numbers, Numbers]:
-            value, slope = self.frozen.unit_irradiance(torch.tensor([place], dtype=torch.float64), shadows, at)
-            return value[0].double().cpu().numpy(), slope[0].double().cpu().numpy()
+        def found(places: tuple[tuple[float, ...], ...], shadows: bool) -> tuple[Numbers, Numbers]:
+            own = self.frozen.unit_irradiance(torch.tensor(places, dtype=torch.float64), shadows, at)
+            return own[0].double().cpu().numpy(), own[1].double().cpu().numpy()
 
-        return lamp
+        return found
 
     def candidates(self) -> tuple[Numbers, Numbers]:
         """(C, 3) places of the scene's dictionary, and (C, N) irradiance from there."""

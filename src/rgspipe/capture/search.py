@@ -23,12 +23,14 @@ from rgspipe.capture.minima import (
     AROUND,
     FIRST,
     LIKELY,
+    LessLikely,
     RivalLamps,
     likelier_among,
     likeliest,
     settled_beside,
     with_chances,
 )
+from rgspipe.capture.side_by_side import side_by_side
 from rgspipe.capture.variances import with_likely_variances
 from rgspipe.fitting.options import BarOptions
 from rgspipe.fitting.search.apart import CandidatePlaces
@@ -48,15 +50,18 @@ def with_one_more(problem: LampProblem, candidates: CandidateLamps, known: Lamps
     """The best lamps found that are one more than `known`; TRIES + 1 refinements at most."""
     costs, logs = ranked(problem, candidates, known)
     ranking, standing = [(int(index),) for index in np.argsort(costs)], CandidatePlaces(candidates.places, None, 0.0)
-    found = []
-    for (index,) in standing.first_apart(ranking, TRIES, APART * problem.size):
+
+    def refined(index: int) -> Lamps:
         place, log = candidates.places[index][None], np.full((1, 3), logs[index])
         places = place if known is None else np.concatenate([known.places, place])
         gains = log if known is None else np.concatenate([known.logs, log])
         lamps = problem.refined(problem.lamps(places, gains), FIRST)
-        found.append((problem.cost(lamps), lamps))
         told(1)
-    best = problem.refined(min(found, key=lambda pair: pair[0])[1], STEPS)
+        return lamps
+
+    apart = standing.first_apart(ranking, TRIES, APART * problem.size)
+    found = side_by_side(refined, [index for (index,) in apart])
+    best = problem.refined(min(found, key=problem.cost), STEPS)
     told(1)
     return best
 
@@ -161,25 +166,25 @@ def found_lamps(problem: LampProblem, count: int | None, most: int) -> FoundLamp
     return FoundLamps(minima.best, minima.rivals, tuple(compared), over_even(minima.best))
 
 
-def _likeliest(candidates: CandidateLamps, found: Tried) -> tuple[Tried, list[Tried]]:
+def _likeliest(candidates: CandidateLamps, found: Tried) -> tuple[Tried, list[LessLikely]]:
     """The likeliest lamps beside those found, settled, and the others that were."""
-    others: list[Tried] = []
+    others: list[LessLikely] = []
     return likeliest(candidates, Tried.settled(found.problem, found.lamps), others), others
 
 
 def settled_on_all(problem: LampProblem, found: FoundLamps) -> FoundLamps:
     """Lamps that were found on a part of the surfels, where they belong by all of them; likewise likely rivals."""
     problem = weighed(problem, None)
-    likely = sorted((rival for rival in found.rivals if rival.chance > LIKELY), key=lambda rival: -rival.chance)
+    likely = [rival.tried.lamps for rival in found.rivals if rival.chance > LIKELY]
     rest = tuple(rival for rival in found.rivals if rival.chance <= LIKELY)
-    others: list[Tried] = []
+    others: list[LessLikely] = []
     with progress_bar([], "settling lamps on all surfels", 1 + len(likely), unit="place") as bar:
         best = Tried.settled(problem, problem.lamps(found.best.lamps.places, found.best.lamps.logs))
         bar.update()
-        for rival in likely:
-            lamps = best.problem.lamps(rival.tried.lamps.places, rival.tried.lamps.logs)
-            best = likelier_among(best, [best.problem.refined(lamps, FIRST)], others)
-            bar.update()
+        whole = best.problem
+        reached = side_by_side(lambda one: whole.refined(whole.lamps(one.places, one.logs), FIRST), likely)
+        best = likelier_among(best, sorted(reached, key=whole.cost), others)
+        bar.update(len(likely))
     minima = with_chances(best, others)
     return replace(found, best=minima.best, rivals=(*minima.rivals, *rest))
 
