@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from lamp_problem import problem, true_lamps
+from rgspipe.capture import likelihood, minima
 from rgspipe.capture.candidates import CandidateLamps
 from rgspipe.capture.lamps import LampProblem, Lamps
 from rgspipe.capture.likelihood import Comparison, Tried
@@ -95,3 +96,29 @@ def test_a_minimum_that_is_known_is_not_settled_again(monkeypatch: pytest.Monkey
     monkeypatch.setattr(Tried, "settled_if", lambda *_: pytest.fail("it is settled again"))
     others = [LessLikely(replace(false, lamps=lamps), false, Comparison(np.ones(1))) for lamps in beside]
     assert likelier_among(false, beside, others) is false
+
+
+def test_looks_that_cannot_find_anything_else_are_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first look moves a lamp, and none after it does: the other lamp, and then the first one once more."""
+    candidates, first = false_minimum()
+    second, looks = replace(first), []
+    monkeypatch.setattr(minima, "minima_beside", lambda *given: looks.append(given[3]) or [])
+    monkeypatch.setattr(minima, "likelier_among", lambda *_: second)
+    assert likeliest(candidates, first, []) is second
+    assert looks == [0, 1, 0]
+
+
+def test_what_was_compared_is_not_compared_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    _, false = false_minimum()
+    gain = Comparison(np.ones(1))
+    less = LessLikely(false, false, gain)
+    monkeypatch.setattr(Tried, "over", lambda *_: pytest.fail("it is compared again"))
+    assert less.than(false) is gain
+
+
+def test_lamps_that_come_to_a_known_place_are_not_settled_to_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    _, false = false_minimum()
+    rounds: list[Lamps] = []
+    monkeypatch.setattr(likelihood, "settled_once", lambda problem, lamps: rounds.append(lamps) or (problem, lamps))
+    assert Tried.settled_if(false.problem, false.lamps, lambda _: False) is None
+    assert len(rounds) == 1
