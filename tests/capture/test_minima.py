@@ -9,10 +9,19 @@ import numpy as np
 import pytest
 
 from lamp_problem import problem, true_lamps
+from rgspipe.capture import likelihood, minima
 from rgspipe.capture.candidates import CandidateLamps
 from rgspipe.capture.lamps import LampProblem, Lamps
-from rgspipe.capture.likelihood import Tried
-from rgspipe.capture.minima import likelier_beside, likeliest, looked_beside, minima_beside, settled_beside
+from rgspipe.capture.likelihood import Comparison, Tried
+from rgspipe.capture.minima import (
+    LessLikely,
+    likelier_among,
+    likeliest,
+    looked_beside,
+    minima_beside,
+    settled_beside,
+    with_chances,
+)
 from rgspipe.capture.receivers import Receivers
 
 
@@ -69,9 +78,12 @@ def false_minimum() -> tuple[CandidateLamps, Tried]:
 def test_a_lamp_goes_to_the_likelier_minimum_beside_it_and_stays_there() -> None:
     candidates, false = false_minimum()
     assert distance(false.lamps) > 0.5  # 0.70
-    found = likeliest(candidates, false)
-    assert distance(found.best.lamps) < 0.003  # 7e-4
-    assert all(likelier_beside(candidates, found.best, own, []) is found.best for own in (0, 1))
+    others: list[LessLikely] = []
+    best = likeliest(candidates, false, others)
+    assert distance(best.lamps) < 0.003  # 7e-4
+    for own in (0, 1):
+        assert likelier_among(best, minima_beside(best.problem, candidates, best.lamps, own), []) is best
+    found = with_chances(best, others)
     # 0.093, by a chance of 5e-4; and 0.014
     assert all(distance(rival.tried.lamps) > 0.05 and rival.chance < 0.05 for rival in found.rivals)
     assert found.rivals
@@ -81,6 +93,32 @@ def test_a_minimum_that_is_known_is_not_settled_again(monkeypatch: pytest.Monkey
     candidates, false = false_minimum()
     beside = minima_beside(false.problem, candidates, false.lamps, 1)
     assert len(beside) > 1
-    monkeypatch.setattr(Tried, "settled", lambda *_: pytest.fail("it is settled again"))
-    others = [replace(false, lamps=lamps) for lamps in beside]
-    assert likelier_beside(candidates, false, 1, others) is false
+    monkeypatch.setattr(Tried, "settled_if", lambda *_: pytest.fail("it is settled again"))
+    others = [LessLikely(replace(false, lamps=lamps), false, Comparison(np.ones(1))) for lamps in beside]
+    assert likelier_among(false, beside, others) is false
+
+
+def test_looks_that_cannot_find_anything_else_are_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first look moves a lamp, and none after it does: the other lamp, and then the first one once more."""
+    candidates, first = false_minimum()
+    second, looks = replace(first), []
+    monkeypatch.setattr(minima, "minima_beside", lambda *given: looks.append(given[3]) or [])
+    monkeypatch.setattr(minima, "likelier_among", lambda *_: second)
+    assert likeliest(candidates, first, []) is second
+    assert looks == [0, 1, 0]
+
+
+def test_what_was_compared_is_not_compared_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    _, false = false_minimum()
+    gain = Comparison(np.ones(1))
+    less = LessLikely(false, false, gain)
+    monkeypatch.setattr(Tried, "over", lambda *_: pytest.fail("it is compared again"))
+    assert less.than(false) is gain
+
+
+def test_lamps_that_come_to_a_known_place_are_not_settled_to_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    _, false = false_minimum()
+    rounds: list[Lamps] = []
+    monkeypatch.setattr(likelihood, "settled_once", lambda problem, lamps: rounds.append(lamps) or (problem, lamps))
+    assert Tried.settled_if(false.problem, false.lamps, lambda _: False) is None
+    assert len(rounds) == 1

@@ -46,6 +46,17 @@ def test_a_prediction_beyond_what_surfaces_reflect_is_no_light_without_end() -> 
     np.testing.assert_array_equal(half_unseen(3.0).known, half_unseen(0.98).known)
 
 
+def test_channels_that_are_told_after_all_are_measured_as_if_they_always_had_been() -> None:
+    """Which bounds count is asked anew for each round of lamps, and cuts no operators out of the whole again."""
+    right = frozen_room().surfels.centers.numpy()[:, :1]
+    told = (right > 0.2) | (right > 0.0) & np.array([True, False, False])
+    albedo = np.full(told.shape, 0.6)
+    few = Received.of(gather(), radiance(), np.repeat(right > 0.2, 3, axis=1), albedo)
+    expected = Received.of(gather(), radiance(), told, albedo)
+    assert np.abs(few.known / expected.known - 1.0).max() > 0.01
+    np.testing.assert_allclose(few.with_told(told, albedo).known, expected.known, rtol=1e-6)
+
+
 def test_another_albedo_is_taken_throughout() -> None:
     received = half_unseen(0.9).with_albedo(np.full(radiance().shape, 0.3))
     np.testing.assert_array_equal(received.known, half_unseen(0.3).known)

@@ -7,6 +7,7 @@ import pytest
 
 from lamp_problem import frozen_room, unseen
 from rgspipe.capture.receivers import Receivers
+from rgspipe.renderer.frozen import FrozenScene
 
 
 @pytest.fixture(scope="module")
@@ -53,6 +54,14 @@ def test_lamps_send_them_what_they_send_them_among_all(part: Receivers, shadows:
         part.irradiance(places, shadows), Receivers(part.frozen).irradiance(places, shadows), strict=True
     ):
         np.testing.assert_array_equal(own, every[:, part.chosen])
+
+
+def test_light_of_lamps_that_stand_is_not_made_again(part: Receivers, monkeypatch: pytest.MonkeyPatch) -> None:
+    places = np.array([[0.1, -0.2, 0.3], [-0.3, 0.1, -0.1]])
+    first = part.irradiance(places)
+    monkeypatch.setattr(FrozenScene, "unit_irradiance", lambda *_: pytest.fail("it is made again"))
+    for own, again in zip(first, part.irradiance(places.copy()), strict=True):
+        np.testing.assert_array_equal(own, again)
 
 
 def test_candidates_are_those_of_the_scene(part: Receivers) -> None:

@@ -14,7 +14,6 @@ from dataclasses import replace
 import numpy as np
 
 from rgspipe.capture.lamps import LampProblem, Lamps
-from rgspipe.capture.received import Received
 from rgspipe.training.albedo import ALBEDO_RANGE
 
 
@@ -28,6 +27,6 @@ def with_bounds(problem: LampProblem, lamps: Lamps | None) -> tuple[LampProblem,
     albedo = np.clip(problem.albedo(lamps), *ALBEDO_RANGE)
     met = problem.clipped & (albedo * problem.arriving(lamps) > problem.radiance)
     told = np.isfinite(problem.pixels)[:, None] & ~met
-    received = Received.of(problem.received.gather, problem.radiance, told, albedo)
+    received = problem.received.with_told(told, albedo)
     problem = replace(problem, received=received, field=replace(problem.field, told=told))
     return problem, problem.lamps(lamps.places, lamps.logs)

@@ -24,6 +24,7 @@ from rgspipe.capture.minima import LIKELY
 from rgspipe.capture.photographs import Numbers
 from rgspipe.capture.search import FoundLamps
 from rgspipe.capture.shared_errors import shared_covariance
+from rgspipe.capture.side_by_side import side_by_side
 
 #: Steps of the lamps without one of the scene's parts.
 STEPS = 6
@@ -79,7 +80,8 @@ class Certainty:
 def _covariance(problem: LampProblem, lamps: Lamps) -> Numbers:
     """(6 K, 6 K) C of the lamps' numbers."""
     parts = problem.parts
-    found = np.stack([_numbers(problem, _without(problem, lamps, parts == part)) for part in np.unique(parts)])
+    left = side_by_side(lambda part: _numbers(problem, _without(problem, lamps, parts == part)), np.unique(parts))
+    found = np.stack(left)
     apart = found - found.mean(axis=0)
     resampled = (len(found) - 1) / len(found) * (apart.T @ apart)
     return problem.covariance(lamps) + resampled + shared_covariance(problem, lamps)

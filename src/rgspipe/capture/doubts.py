@@ -24,7 +24,7 @@ BESIDE = 0.2
 def model_variance(problem: LampProblem, lamps: Lamps | None, rays: int) -> Numbers:
     """(N,) variance of log L − log d by the model of light alone."""
     arriving = problem.arriving(lamps).mean(axis=1)
-    variance = _gather_variance(problem, rays)
+    variance = problem.received.uneven / rays
     if lamps is not None:
         gains = np.exp(lamps.logs).mean(axis=1)
         shadowed, open_ = (problem.receivers.irradiance(lamps.places, shadows)[0] for shadows in (True, False))
@@ -32,13 +32,6 @@ def model_variance(problem: LampProblem, lamps: Lamps | None, rays: int) -> Numb
             passing = np.divide(lit, unlit, out=np.ones_like(lit), where=unlit > 0.0)
             variance = variance + (gain * unlit) ** 2 * _variation(problem.field.graph, passing, unlit > 0.0)
     return variance / arriving**2
-
-
-def _gather_variance(problem: LampProblem, rays: int) -> Numbers:
-    """(N,) variance of F L, by as many rays."""
-    grey = problem.radiance.mean(axis=1)
-    gather = problem.received.gather
-    return np.maximum(gather @ grey**2 - (gather @ grey) ** 2, 0.0) / rays
 
 
 def _variation(graph: Graph, values: Numbers, counted: np.ndarray) -> Numbers:

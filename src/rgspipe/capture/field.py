@@ -90,15 +90,37 @@ class Graph:
 
     def precision(self, variances: Variances, rough: Numbers | None = None) -> sp.csc_matrix:
         """(N, N) Q, of surfaces that are as `rough` (S,) as that; all alike if None."""
-        count, weight = len(self.sizes), self.weight
+        (first, second, weight), count = self.edges, len(self.sizes)
+        weight = weight / variances.step
         if rough is not None:
             own = rough[self.surfaces]
-            weight = weight / np.sqrt(own[self.first] * own[self.second])
-        one_way = sp.coo_matrix((0.5 * weight, (self.first, self.second)), (count, count))
-        both = (one_way + one_way.T).tocsc()
-        laplacian = sp.diags(np.asarray(both.sum(axis=1)).ravel()) - both
-        alone = sp.diags(1.0 / (variances.surface * self.sizes))
-        return (laplacian / variances.step + alone).tocsc()
+            weight = weight / np.sqrt(own[first] * own[second])
+        diagonal = 1.0 / (variances.surface * self.sizes)
+        diagonal += np.bincount(first, weight, count) + np.bincount(second, weight, count)
+        every = np.arange(count)
+        rows, columns = np.concatenate([first, second, every]), np.concatenate([second, first, every])
+        return sp.csc_matrix((np.concatenate([-weight, -weight, diagonal]), (rows, columns)), (count, count))
+
+    @cached_property
+    def edges(self) -> tuple[np.ndarray, np.ndarray, Numbers]:
+        """(P,) pairs of neighbours, each once, and w_ij."""
+        count = len(self.sizes)
+        one_way = sp.coo_matrix((0.5 * self.weight, (self.first, self.second)), (count, count))
+        pairs = sp.triu(one_way + one_way.T, 1).tocoo()
+        return pairs.row, pairs.col, pairs.data
+
+    def bends(self, values: Numbers) -> Numbers:
+        """(S,) mean of sᵀ L_k s of fields (N, K) over these, L_k the steps within surface k."""
+        first, second, weight = self._inner_edges
+        steps = values[first] - values[second]
+        squares = weight * np.einsum("pk,pk->p", steps, steps) / values.shape[1]
+        return np.bincount(self.surfaces[first], squares, minlength=self.surfaces.max() + 1)
+
+    @cached_property
+    def _inner_edges(self) -> tuple[np.ndarray, np.ndarray, Numbers]:
+        first, second, weight = self.edges
+        inner = self.surfaces[first] == self.surfaces[second]
+        return first[inner], second[inner], weight[inner]
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +156,10 @@ class Field:
         trust = np.repeat(self.trust[:, None], 3, axis=1)
         trust = (trust if self.told is None else np.where(self.told, trust, 0.0)).T
         known = self.known.T if elsewhere else [self.known] * 3
-        return tuple(replace(self, trust=own, known=k, told=None) for own, k in zip(trust, known, strict=True))
+        parts = tuple(replace(self, trust=own, known=k, told=None) for own, k in zip(trust, known, strict=True))
+        for part in parts:
+            part.__dict__["precision"] = self.precision  # the same, not made again
+        return parts
 
     def channel(self, number: int) -> Field:
         """That of one channel."""
@@ -206,17 +231,20 @@ class Field:
 
     def deviance(self, residual: Numbers) -> float:
         """−2 log p of residuals (N, 3), up to a constant."""
-        return sum(own._deviance(part) for own, part in self._parts(residual))
+        alike = self.known is None or self.known.ndim == 1
+        before = _log_determinant(factorised(self._prior)) if alike else None
+        return sum(own._deviance(part, before) for own, part in self._parts(residual))
 
     @property
     def measurements(self) -> int:
         """How many there are, all channels together."""
         return sum(int((own.weight > 0.0).sum()) for own in self.channels) * 3 // len(self.channels)
 
-    def _deviance(self, residual: Numbers) -> float:
+    def _deviance(self, residual: Numbers, before: float | None) -> float:
+        """With the logarithm of the determinant of the precision before, if it is known."""
         kept = self.weight > 0.0
         determinant = _log_determinant(self._posterior) - np.log(self.weight[kept]).sum()
-        determinant -= _log_determinant(factorised(self._prior))
+        determinant -= _log_determinant(factorised(self._prior)) if before is None else before
         return float((residual * self.whitened(residual)).sum() + residual.shape[1] * determinant)
 
 

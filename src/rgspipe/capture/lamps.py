@@ -26,19 +26,14 @@ from rgspipe.capture.received import Received
 from rgspipe.capture.receivers import Receivers
 from rgspipe.fitting.options import StepLimits
 from rgspipe.optim.levenberg_marquardt import NormalEquations, least_squares, within
-from rgspipe.renderer.clusters import cluster_patches
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene.lights import PointLight
-from rgspipe.scene.spacing import surfel_spacing
 
 #: Longest step of the logarithm of an intensity; that of a place is `StepLimits.move`.
 LONGEST_GAIN = 1.0
 
 #: Of a lamp six numbers are looked for: its place, and its intensity in three channels.
 NUMBERS = 6
-
-#: Parts of the scene, each of neighbours, whose errors are taken for independent.
-PARTS = 12
 
 #: No coordinate is known better than to this part of the distance of neighbours, over which light is taken for even:
 #: with 2000 to 4000 surfels in a Cornell box lamps were 0.1 to 0.3 of it off where their covariance said 0.05.
@@ -131,17 +126,15 @@ class LampProblem:
         """Longest side of the scene."""
         return self.frozen.size
 
-    @cached_property
+    @property
     def resolved(self) -> float:
         """Distance below which the surfels tell no places apart, scene units."""
-        surfels = self.receivers.surfels
-        return RESOLVED * surfel_spacing(surfels.centers.cpu(), surfels.normals.cpu())
+        return RESOLVED * self.receivers.spacing
 
-    @cached_property
+    @property
     def parts(self) -> NDArray[np.integer]:
-        """(N,) which of up to `PARTS` parts of the scene each surfel belongs to."""
-        surfels = self.receivers.surfels
-        return cluster_patches(surfels.centers.double(), surfels.normals, PARTS, seed=0)
+        """(N,) which part of the scene each surfel belongs to."""
+        return self.receivers.parts
 
     @cached_property
     def bounds(self) -> tuple[Numbers, Numbers]:
@@ -220,7 +213,7 @@ class _Around:
     problem: LampProblem
     lamps: Lamps
 
-    @cached_property
+    @property
     def normal(self) -> NormalEquations:
         residual, jacobian = self.problem.residual(self.lamps), self.problem.jacobian(self.lamps)
         width, field = jacobian.shape[2], self.problem.field

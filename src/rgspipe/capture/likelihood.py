@@ -8,7 +8,7 @@ all, a side is the likelier one (the bootstrap of Efron 1979).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -83,6 +83,15 @@ class Tried:
             problem, lamps = settled_once(problem, lamps)
         return cls.of(problem, lamps)
 
+    @classmethod
+    def settled_if(cls, problem: LampProblem, lamps: Lamps, wanted: Callable[[Lamps], bool]) -> Tried | None:
+        """The same; None as soon as they come to where they are not `wanted`."""
+        for _ in range(ROUNDS):
+            problem, lamps = settled_once(problem, lamps)
+            if not wanted(lamps):
+                return None
+        return cls.of(problem, lamps)
+
     def put_by(self) -> Tried:
         """The same without what is large and can be made again."""
         problem = self.problem
@@ -116,6 +125,11 @@ class Comparison:
     def gain(self) -> float:
         """Of the whole scene."""
         return float(self.gains.sum())
+
+    @property
+    def turned(self) -> Comparison:
+        """How much likelier the others are."""
+        return Comparison(-self.gains)
 
     @property
     def doubt(self) -> float:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from rgspipe.capture.candidates import CandidateLamps, ranked
 from rgspipe.capture.lamps import LampProblem, Lamps
-from rgspipe.capture.likelihood import ROUNDS, STEPS, Tried, chances
+from rgspipe.capture.likelihood import ROUNDS, STEPS, Comparison, Tried, chances
+from rgspipe.capture.side_by_side import side_by_side
 from rgspipe.fitting.certainty.regions import CONFIDENCE
 from rgspipe.progress import progress_bar
 
@@ -25,6 +27,9 @@ FIRST = 8
 
 #: By other variances a minimum may be the likelier one that is so in this part of the draws of the scene's parts.
 POSSIBLE = 0.001
+
+#: So many settle side by side, on however many cores, as what each comes to may save others the way.
+AT_ONCE = 2
 
 #: One that is likelier than this is told, and a region of 95 % holds it.
 LIKELY = 1.0 - CONFIDENCE
@@ -44,6 +49,25 @@ class RivalLamps:
 
 
 @dataclass(frozen=True, eq=False)
+class LessLikely:
+    """Settled lamps that were compared with likelier ones.
+
+    Attributes:
+        tried: with what belongs to them, put by.
+        likelier: what they were compared with.
+        gain: how much likelier these are.
+    """
+
+    tried: Tried
+    likelier: Tried
+    gain: Comparison
+
+    def than(self, best: Tried) -> Comparison:
+        """How much likelier `best` is."""
+        return self.gain if best is self.likelier else best.over(self.tried.put_by())
+
+
+@dataclass(frozen=True, eq=False)
 class Minima:
     """The likeliest minimum that was reached, and the others that were."""
 
@@ -53,10 +77,11 @@ class Minima:
 
 def settled_beside(problem: LampProblem, candidates: CandidateLamps, lamps: Lamps) -> Lamps:
     """The least minimum that is reached by moving one lamp after the other to a better one beside it."""
-    for own in range(len(lamps)):
+    own = stays = 0
+    while stays < len(lamps):
         beside = looked_beside(problem, candidates, lamps, own)
-        if beside is not lamps:
-            return settled_beside(problem, candidates, beside)
+        stays = stays + 1 if beside is lamps else 0
+        lamps, own = beside, (own + 1) % len(lamps)
     return lamps
 
 
@@ -74,80 +99,71 @@ def minima_beside(
     others = lamps.at([other for other in range(len(lamps)) if other != own]) if len(lamps) > 1 else None
     beside = candidates.around(problem, lamps.places[own])
     costs, _ = ranked(problem, beside, others)
-    reached = []
-    for index in np.argsort(costs)[:around]:
+
+    def refined(index: int) -> Lamps:
         places = lamps.places.copy()
         places[own] = beside.places[index]
-        reached.append(problem.refined(problem.lamps(places, lamps.logs), FIRST))
+        return problem.refined(problem.lamps(places, lamps.logs), FIRST)
+
     found: list[Lamps] = []
-    for one in sorted(reached, key=problem.cost):
+    for one in sorted(side_by_side(refined, np.argsort(costs)[:around]), key=problem.cost):
         if _is_new(problem, one, (lamps, *found)):
             found.append(one)
     return found
 
 
-def likeliest(candidates: CandidateLamps, best: Tried) -> Minima:
-    """The likeliest of the minima that are reached by moving one lamp after the other, each by its own variances."""
-    return _likeliest(candidates, Tried.settled(best.problem, best.lamps), [], AROUND)
+def likeliest(candidates: CandidateLamps, best: Tried, others: list[LessLikely], around: int = AROUND) -> Tried:
+    """The likeliest of the minima that are reached by moving one lamp after the other, each by its own variances.
 
-
-def likeliest_all_around(candidates: CandidateLamps, minima: Minima) -> Minima:
-    """The same from more places around the lamps, and the minima that are known."""
-    return _likeliest(candidates, minima.best, [rival.tried for rival in minima.rivals], ALL_AROUND)
-
-
-def _likeliest(candidates: CandidateLamps, best: Tried, others: list[Tried], around: int) -> Minima:
-    count = len(best.lamps)
-    with progress_bar([], "comparing places of lamps", count, unit="step") as bar:
-        for passes in range(1, ROUNDS + 1):
-            before, bar.total = best, passes * count
-            for own in range(count):
-                best = likelier_beside(candidates, best, own, others, around)
-                bar.update()
-            if best is before:
-                break
-    return _with_chances(best, others)
-
-
-def minima_among(tried: Sequence[Tried]) -> Minima:
-    """The likeliest of some settled lamps, and the others; those that came to the same place count once."""
-    best = tried[0]
-    for other in tried[1:]:
-        if _is_new(best.problem, other.lamps, [best.lamps]) and other.over(best).gain > 0.0:
-            best = other
-    return _with_chances(best, [other.put_by() for other in tried if other is not best])
-
-
-def _with_chances(best: Tried, others: Sequence[Tried]) -> Minima:
-    rivals: list[Tried] = []
-    for other in others:
-        if _is_new(best.problem, other.lamps, _lamps(best, *rivals)):
-            rivals.append(other)
-    chance = chances([best.over(rival.put_by()) for rival in rivals])[1:]
-    return Minima(best, tuple(RivalLamps(rival, float(part)) for rival, part in zip(rivals, chance, strict=True)))
-
-
-def likelier_beside(
-    candidates: CandidateLamps, best: Tried, own: int, others: list[Tried], around: int = AROUND
-) -> Tried:
-    """Lamps of which one has moved to a likelier minimum beside, or the same if none is found.
-
-    What is settled on the way and is not the answer joins `others`, from which none is settled again.
+    From so many places around each; what is settled on the way joins `others`, as in `likelier_among`.
     """
-    problem = best.problem
-    for beside in minima_beside(problem, candidates, best.lamps, own, around):
-        if best.costs_less(beside).doubt < POSSIBLE or not _is_new(problem, beside, _lamps(best, *others)):
-            continue
-        rival = Tried.settled(problem, beside)
-        if not _is_new(problem, rival.lamps, _lamps(best, *others)):
-            continue
-        less, best = (best, rival) if rival.over(best).gain > 0.0 else (rival, best)
-        others.append(less.put_by())
+    count, stays = len(best.lamps), 0
+    with progress_bar([], "comparing places of lamps", count, unit="step") as bar:
+        for look in range(ROUNDS * count):
+            before, own = best, look % count
+            best = likelier_among(best, minima_beside(best.problem, candidates, best.lamps, own, around), others)
+            stays = stays + 1 if best is before else 0
+            bar.total = min(look + 1 + count - stays, ROUNDS * count)
+            bar.update()
+            if stays == count:
+                break
     return best
 
 
-def _lamps(*tried: Tried) -> list[Lamps]:
-    return [one.lamps for one in tried]
+def with_chances(best: Tried, others: Sequence[LessLikely]) -> Minima:
+    """The likeliest minimum and how likely each of the others is; those that came to the same place count once."""
+    rivals: list[LessLikely] = []
+    for other in others:
+        if _is_new(best.problem, other.tried.lamps, _lamps(best, rivals)):
+            rivals.append(other)
+    chance = chances(side_by_side(lambda rival: rival.than(best), rivals))[1:]
+    return Minima(best, tuple(RivalLamps(rival.tried, float(own)) for rival, own in zip(rivals, chance, strict=True)))
+
+
+def likelier_among(best: Tried, minima: Sequence[Lamps], others: list[LessLikely]) -> Tried:
+    """The likeliest of the best lamps and other `minima`, by the best's variances, that may be likelier by their own.
+
+    What is settled on the way and is not the answer joins `others`; what comes to where these are is not followed.
+    """
+    problem, waiting = best.problem, list(minima)
+    while waiting:
+        known, batch = _lamps(best, others), list[Lamps]()
+        while waiting and len(batch) < AT_ONCE:
+            beside = waiting.pop(0)
+            if _is_new(problem, beside, known) and best.costs_less(beside).doubt >= POSSIBLE:
+                batch.append(beside)
+        is_new = partial(_is_new, problem, known=known)
+        for rival in side_by_side(lambda lamps, new=is_new: Tried.settled_if(problem, lamps, new), batch):
+            if rival is None or not _is_new(problem, rival.lamps, _lamps(best, others)):
+                continue
+            than = best.over(rival)
+            less, best, than = (rival, best, than) if than.gain >= 0.0 else (best, rival, than.turned)
+            others.append(LessLikely(less.put_by(), best, than))
+    return best
+
+
+def _lamps(best: Tried, others: Sequence[LessLikely]) -> list[Lamps]:
+    return [best.lamps, *(one.tried.lamps for one in others)]
 
 
 def _is_new(problem: LampProblem, lamps: Lamps, known: Iterable[Lamps]) -> bool:

@@ -90,7 +90,7 @@ def _shining(problem: LampProblem, measured: Measured, used: np.ndarray) -> Odd 
 def _open(problem: LampProblem, lamps: Lamps) -> Odd | None:
     areas = problem.frozen.areas.double().cpu().numpy()
     sent = areas * (np.clip(problem.albedo(lamps), *ALBEDO_RANGE) * problem.arriving(lamps)).mean(axis=1)
-    leaves = np.maximum(1.0 - np.asarray(problem.received.gather.sum(axis=1)).ravel(), 0.0)
+    leaves = np.maximum(1.0 - np.asarray(problem.receivers.gather.sum(axis=1)).ravel(), 0.0)
     share = float(sent @ leaves / sent.sum())
     return Odd(share, _place(problem, areas * leaves)) if share > 0.0 else None
 

@@ -34,7 +34,7 @@ class CaptureOptions(Options):
     """hemisphere rays of a surfel: what surfaces send each other is measured, not fitted, so that noise of it stays"""
     supersampling: int = option(4, low=1, high=16)
     """rays per edge pixel in view weights, squared"""
-    search_surfels: int = option(8000, low=100, high=10_000_000)
+    search_surfels: int = option(4000, low=100, high=10_000_000)
     """surfels, evenly spread, that lamps are looked for on where there are more; what is found is settled on all"""
     grid: int = option(8, low=2, high=32)
     """candidates for lamps along each axis"""

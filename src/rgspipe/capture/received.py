@@ -20,6 +20,7 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from rgspipe.capture.photographs import Numbers
@@ -56,10 +57,20 @@ class FromUnseen:
         return cls(SparseOperator.from_scipy(on_all[unseen]), SparseOperator.from_scipy(on_all))
 
     def returned(self, arriving: Numbers, albedo: Numbers, further: Tensor) -> Numbers:
-        """(N, K) what comes back of `arriving` (U, K) from surfels of `albedo` (U,) to which `further` (U,) belongs."""
+        """(N, K, C) what comes back of `arriving` (U, K, C or 1) from surfels of C kinds of `albedo` (U, C), to which
+        `further` (U, C) belongs.
+
+        All at once, as a product takes little longer for more columns.
+        """
         reflected = _single(albedo)[:, None]
-        sent, last = self._followed(reflected * _single(arriving), reflected)
-        return (self.on_all @ (sent + further[:, None] * last)).double().numpy()
+        first = reflected * _single(arriving)
+        sent, last = self._followed(first.flatten(1), reflected.expand_as(first).flatten(1))
+        sent = sent + (further[:, None] * last.reshape(first.shape)).flatten(1)
+        return self.arriving(sent).reshape(-1, *first.shape[1:])
+
+    def arriving(self, sent: Numbers) -> Numbers:
+        """(N, K) what arrives of what they have `sent` (U, K)."""
+        return (self.on_all @ _single(sent)).double().numpy()
 
     def further(self, albedo: Numbers) -> Tensor:
         """(U, K) what bounces that are not followed add to the last that is, for each albedo (U, K)."""
@@ -80,8 +91,8 @@ class FromUnseen:
         return sent, last
 
 
-def _single(values: Numbers) -> Tensor:
-    return torch.from_numpy(np.ascontiguousarray(values)).float()
+def _single(values: Numbers | Tensor) -> Tensor:
+    return torch.as_tensor(np.ascontiguousarray(values)).float()
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,38 +100,49 @@ class Received:
     """Light that arrives at N surfels.
 
     Attributes:
-        gather: (N, N) F.
-        unseen: (U,) surfels whose radiance was not measured in all channels.
+        unseen: (U,) surfels whose radiance was not measured in all channels, or may not have been.
         from_unseen: where their light goes.
         told: (U, 3) bool, channels in which it was.
         albedo: (U, 3) of those; 0 in these channels.
-        seen: (N, 3) F_·s L_s, what arrives from the seen.
+        radiance: (U, 3) L of these.
+        others: (N, 3) F_·s L_s, what arrives from all others.
+        uneven: (N,) Σ_j F_ij L_j² − (F L)_i², variance of the grey radiance that each surfel looks at.
     """
 
-    gather: sp.csr_matrix
     unseen: np.ndarray
     from_unseen: FromUnseen
     told: np.ndarray
     albedo: Numbers
-    seen: Numbers
+    radiance: Numbers
+    others: Numbers
+    uneven: Numbers
 
     @classmethod
     def of(cls, gather: sp.csr_matrix, radiance: Numbers, seen: np.ndarray, albedo: Numbers) -> Received:
         """With the measured `radiance` (N, 3) where `seen` (N, 3) bool, and `albedo` (N, 3) elsewhere."""
-        unseen = (~seen.all(axis=1)).nonzero()[0]
-        told = seen[unseen]
-        sent = gather @ np.where(seen, radiance, 0.0)
-        return cls(gather, unseen, FromUnseen.of(gather, unseen), told, _untold(told, albedo[unseen]), sent)
+        fully = seen.all(axis=1)
+        unseen, grey = (~fully).nonzero()[0], radiance.mean(axis=1)
+        others, told = gather @ np.where(fully[:, None], radiance, 0.0), seen[unseen]
+        uneven = np.maximum(gather @ grey**2 - (gather @ grey) ** 2, 0.0)
+        from_unseen = FromUnseen.of(gather, unseen)
+        return cls(unseen, from_unseen, told, _untold(told, albedo[unseen]), radiance[unseen], others, uneven)
 
     def with_albedo(self, albedo: Numbers) -> Received:
         """With another albedo (N, 3); that of the seen is not looked at."""
         return replace(self, albedo=_untold(self.told, albedo[self.unseen]))
 
+    def with_told(self, told: NDArray[np.bool_], albedo: Numbers) -> Received:
+        """With other channels `told` (N, 3), of those in which the radiance may not have been measured, and albedo."""
+        told = told[self.unseen]
+        return replace(self, told=told, albedo=_untold(told, albedo[self.unseen]))
+
     @cached_property
     def known(self) -> Numbers:
         """(N, 3) G, radiance per unit albedo."""
-        columns = [self.spread(self.seen[:, channel : channel + 1], channel) for channel in range(3)]
-        return np.concatenate(columns, axis=1)
+        if not len(self.unseen):
+            return self.others
+        seen = self.others + self.from_unseen.arriving(np.where(self.told, self.radiance, 0.0))
+        return self._spread(seen[:, None], slice(0, MEAN))[:, 0]
 
     @cached_property
     def _albedos(self) -> Numbers:
@@ -133,17 +155,19 @@ class Received:
 
     def spread(self, arriving: Numbers, channel: int | None = None) -> Numbers:
         """(N, K) T e of `arriving` (N, K), with what returns from the unseen; grey if `channel` is None."""
-        if not len(self.unseen):
-            return arriving
         kind = MEAN if channel is None else channel
-        albedo, further = self._albedos[:, kind], self._further[:, kind]
-        return arriving + self.from_unseen.returned(arriving[self.unseen], albedo, further)
+        return self._spread(arriving[:, :, None], slice(kind, kind + 1))[:, :, 0]
 
     def spread_colours(self, arriving: Numbers) -> Numbers:
         """(N, K, 3) `spread` in each channel."""
+        return self._spread(arriving[:, :, None], slice(0, MEAN))
+
+    def _spread(self, arriving: Numbers, kinds: slice) -> Numbers:
+        """(N, K, C) of `arriving` (N, K, C or 1), by C kinds of albedo."""
+        albedo, further = self._albedos[:, kinds], self._further[:, kinds]
         if not len(self.unseen):
-            return np.repeat(arriving[:, :, None], 3, axis=2)
-        return np.stack([self.spread(arriving, channel) for channel in range(3)], axis=2)
+            return np.repeat(arriving, albedo.shape[1] // arriving.shape[2], axis=2)
+        return arriving + self.from_unseen.returned(arriving[self.unseen], albedo, further)
 
 
 def _untold(told: np.ndarray, albedo: Numbers) -> Numbers:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 import scipy.sparse as sp
@@ -11,11 +12,19 @@ import torch
 from numpy.typing import NDArray
 
 from rgspipe.capture.photographs import Numbers
+from rgspipe.renderer.clusters import cluster_patches
 from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.scene.spacing import surfel_spacing
 from rgspipe.scene.surfels import Surfels
 
 #: Halvings after which the side of a cell is known to a millionth.
 HALVINGS = 24
+
+#: Parts of the scene, each of neighbours, whose errors are taken for independent.
+PARTS = 12
+
+#: Sets of lamps whose light is remembered: weighed anew they stand where they stood.
+REMEMBERED = 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +86,16 @@ class Receivers:
         areas = self.frozen.areas.double().cpu().numpy()
         return areas if self.stand_in is None else np.bincount(self.stand_in, areas)
 
+    @cached_property
+    def spacing(self) -> float:
+        """Typical distance of neighbours, scene units."""
+        return surfel_spacing(self.surfels.centers.cpu(), self.surfels.normals.cpu())
+
+    @cached_property
+    def parts(self) -> NDArray[np.integer]:
+        """(N,) which of up to `PARTS` parts of the scene each surfel belongs to."""
+        return cluster_patches(self.surfels.centers.double(), self.surfels.normals, PARTS, seed=0)
+
     def at(self, values: np.ndarray) -> np.ndarray:
         """(N, …) of values (A, …)."""
         return values if self.chosen is None else values[self.chosen]
@@ -92,9 +111,18 @@ class Receivers:
 
     def irradiance(self, places: Numbers, shadows: bool = True) -> tuple[Numbers, Numbers]:
         """(L, N) from unit lamps at (L, 3), and its derivative (L, N, 3)."""
+        return self._irradiance(tuple(map(tuple, np.atleast_2d(places).tolist())), shadows)
+
+    @cached_property
+    def _irradiance(self) -> Callable[[tuple[tuple[float, ...], ...], bool], tuple[Numbers, Numbers]]:
         at = None if self.chosen is None else torch.from_numpy(self.chosen)
-        own = self.frozen.unit_irradiance(torch.from_numpy(np.atleast_2d(places)), shadows, at)
-        return own[0].double().cpu().numpy(), own[1].double().cpu().numpy()
+
+        @lru_cache(maxsize=REMEMBERED)
+        def found(places: tuple[tuple[float, ...], ...], shadows: bool) -> tuple[Numbers, Numbers]:
+            own = self.frozen.unit_irradiance(torch.tensor(places, dtype=torch.float64), shadows, at)
+            return own[0].double().cpu().numpy(), own[1].double().cpu().numpy()
+
+        return found
 
     def candidates(self) -> tuple[Numbers, Numbers]:
         """(C, 3) places of the scene's dictionary, and (C, N) irradiance from there."""

@@ -19,15 +19,18 @@ from rgspipe.capture.candidates import CandidateLamps, ranked
 from rgspipe.capture.lamps import LampProblem, Lamps
 from rgspipe.capture.likelihood import ROUNDS, STEPS, Tried, settled_once, weighed
 from rgspipe.capture.minima import (
+    ALL_AROUND,
     AROUND,
     FIRST,
     LIKELY,
+    LessLikely,
     RivalLamps,
+    likelier_among,
     likeliest,
-    likeliest_all_around,
-    minima_among,
     settled_beside,
+    with_chances,
 )
+from rgspipe.capture.side_by_side import side_by_side
 from rgspipe.capture.variances import with_likely_variances
 from rgspipe.fitting.options import BarOptions
 from rgspipe.fitting.search.apart import CandidatePlaces
@@ -47,15 +50,18 @@ def with_one_more(problem: LampProblem, candidates: CandidateLamps, known: Lamps
     """The best lamps found that are one more than `known`; TRIES + 1 refinements at most."""
     costs, logs = ranked(problem, candidates, known)
     ranking, standing = [(int(index),) for index in np.argsort(costs)], CandidatePlaces(candidates.places, None, 0.0)
-    found = []
-    for (index,) in standing.first_apart(ranking, TRIES, APART * problem.size):
+
+    def refined(index: int) -> Lamps:
         place, log = candidates.places[index][None], np.full((1, 3), logs[index])
         places = place if known is None else np.concatenate([known.places, place])
         gains = log if known is None else np.concatenate([known.logs, log])
         lamps = problem.refined(problem.lamps(places, gains), FIRST)
-        found.append((problem.cost(lamps), lamps))
         told(1)
-    best = problem.refined(min(found, key=lambda pair: pair[0])[1], STEPS)
+        return lamps
+
+    apart = standing.first_apart(ranking, TRIES, APART * problem.size)
+    found = side_by_side(refined, [index for (index,) in apart])
+    best = problem.refined(min(found, key=problem.cost), STEPS)
     told(1)
     return best
 
@@ -148,25 +154,38 @@ def found_lamps(problem: LampProblem, count: int | None, most: int) -> FoundLamp
     """So many lamps, or as many as what was measured calls for, one to `most`."""
     problem = weighed(problem, None)
     candidates = CandidateLamps.of(problem)
-    minima = likeliest(candidates, best_with_one_more(problem, candidates, None))
+    best, others = _likeliest(candidates, best_with_one_more(problem, candidates, None))
     compared: list[OneMoreLamp] = []
-    while count is None or len(minima.best.lamps) < count:
-        found = one_more(candidates, minima.best)
+    while count is None or len(best.lamps) < count:
+        found = one_more(candidates, best)
         compared.append(found)
-        if count is None and (not found.worth or len(minima.best.lamps) == most):
+        if count is None and (not found.worth or len(best.lamps) == most):
             break
-        minima = likeliest(candidates, found.more)
-    minima = likeliest_all_around(candidates, minima)
+        best, others = _likeliest(candidates, found.more)
+    minima = with_chances(likeliest(candidates, best, others, ALL_AROUND), others)
     return FoundLamps(minima.best, minima.rivals, tuple(compared), over_even(minima.best))
+
+
+def _likeliest(candidates: CandidateLamps, found: Tried) -> tuple[Tried, list[LessLikely]]:
+    """The likeliest lamps beside those found, settled, and the others that were."""
+    others: list[LessLikely] = []
+    return likeliest(candidates, Tried.settled(found.problem, found.lamps), others), others
 
 
 def settled_on_all(problem: LampProblem, found: FoundLamps) -> FoundLamps:
     """Lamps that were found on a part of the surfels, where they belong by all of them; likewise likely rivals."""
     problem = weighed(problem, None)
-    likely = [rival.tried for rival in found.rivals if rival.chance > LIKELY]
+    likely = [rival.tried.lamps for rival in found.rivals if rival.chance > LIKELY]
     rest = tuple(rival for rival in found.rivals if rival.chance <= LIKELY)
-    with progress_bar([found.best, *likely], "settling lamps on all surfels", unit="place") as bar:
-        minima = minima_among([Tried.settled(problem, problem.lamps(one.lamps.places, one.lamps.logs)) for one in bar])
+    others: list[LessLikely] = []
+    with progress_bar([], "settling lamps on all surfels", 1 + len(likely), unit="place") as bar:
+        best = Tried.settled(problem, problem.lamps(found.best.lamps.places, found.best.lamps.logs))
+        bar.update()
+        whole = best.problem
+        reached = side_by_side(lambda one: whole.refined(whole.lamps(one.places, one.logs), FIRST), likely)
+        best = likelier_among(best, sorted(reached, key=whole.cost), others)
+        bar.update(len(likely))
+    minima = with_chances(best, others)
     return replace(found, best=minima.best, rivals=(*minima.rivals, *rest))
 
 

@@ -71,4 +71,4 @@ def _unseen(problem: LampProblem, lamps: Lamps) -> Iterator[Numbers]:
     parts = problem.parts[received.unseen]
     for part in np.unique(parts):
         own = np.where((parts == part)[:, None], sent, 0.0)
-        yield deviation * (received.gather[:, received.unseen] @ own) / arriving
+        yield deviation * received.from_unseen.arriving(own) / arriving

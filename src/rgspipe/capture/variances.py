@@ -112,18 +112,10 @@ class _Squares:
         """1/λ, and (S,) h."""
         surfels = np.bincount(self.field.graph.surfaces)
         rough = _or_ones(self.field.rough, len(surfels))
-        squares = self._bends(self._mean)
-        unknown = np.mean([self._bends(draws) for draws in self._draws], axis=0)
+        squares = self.field.graph.bends(self._mean)
+        unknown = np.mean([self.field.graph.bends(draws) for draws in self._draws], axis=0)
         known = surfels - 1.0 - unknown / (self.field.variances.step * rough)
         return _shared(squares, np.maximum(known, LEAST_FREE * (surfels - 1.0)), rough)
-
-    def _bends(self, values: Numbers) -> Numbers:
-        """(S,) mean of sᵀ L_k s of fields (N, K)."""
-        graph = self.field.graph
-        own = graph.surfaces[graph.first] == graph.surfaces[graph.second]
-        first, second = graph.first[own], graph.second[own]
-        squares = 0.5 * graph.weight[own] * ((values[first] - values[second]) ** 2).mean(axis=1)
-        return np.bincount(graph.surfaces[first], squares, minlength=graph.surfaces.max() + 1)
 
     def _surface(self) -> float:
         """τ²."""
