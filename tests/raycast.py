@@ -80,7 +80,9 @@ def view_of(
     )
 
 
-def room_views(count: int, resolution: int = 64, normals: bool = False, seed: int = 0) -> list[View]:
+def room_views(
+    count: int, resolution: int = 64, normals: bool = False, seed: int = 0, angle: float = 1.4
+) -> list[View]:
     """Views of a block in a closed room, from all around inside the room."""
     rng = np.random.default_rng(seed)
     views = []
@@ -89,7 +91,7 @@ def room_views(count: int, resolution: int = 64, normals: bool = False, seed: in
         if (np.abs(BLOCK.local(origin)) < 0.5 * np.array(BLOCK.size) + 0.03).all():
             continue
         name = f"train/r_{len(views):04d}"
-        views.append(view_of([ROOM, BLOCK], tuple(origin), tuple(target), resolution, 1.4, normals, name))
+        views.append(view_of([ROOM, BLOCK], tuple(origin), tuple(target), resolution, angle, normals, name))
     return views
 
 

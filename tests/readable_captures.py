@@ -19,7 +19,9 @@ from rgspipe.datasets.scans.layouts import read_scan
 from rgspipe.datasets.scans.options import ScanOptions
 from rgspipe.datasets.scans.raw_image import read_raw
 from scan_layouts import (
+    landscape,
     photographed,
+    write_arkitscenes,
     write_colmap,
     write_dng,
     write_iid,
@@ -29,13 +31,18 @@ from scan_layouts import (
     write_polycam,
     write_replica,
     write_scannet,
+    write_seven_scenes,
+    write_tum,
 )
 
 #: What a reader makes of a folder: all of its numbers.
 Numbers = Iterator[torch.Tensor]
 
 #: Photographs of a capture.
-SCANNED = photographed(2, 8)
+SCANNED, WIDE = photographed(2, 8), landscape(2, 8, 525.0)
+
+#: The folder of a video of ARKitScenes.
+VIDEO = "41069021_frames"
 
 
 @dataclass(frozen=True)
@@ -110,6 +117,14 @@ CAPTURES: dict[str, Kind] = {
     "scan: Radiance picture": _of_scan("im_1.hdr", lambda root: write_openrooms(root, SCANNED)),
     "scan: Radiance, plain": _of_scan("im_2.hdr", lambda root: write_openrooms(root, SCANNED)),
     "scan: Replica, lens": _of_scan("cam_params.json", _replica_lens),
+    "scan: TUM": _of_scan("groundtruth.txt", lambda root: write_tum(root, SCANNED)),
+    "scan: TUM, list": _of_scan("rgb.txt", lambda root: write_tum(root, SCANNED)),
+    "scan: TUM, lens": _of_scan("calibration.txt", lambda root: write_tum(root, SCANNED)),
+    "scan: 7-Scenes": _of_scan("frame-000000.pose.txt", lambda root: write_seven_scenes(root, WIDE, WIDE)),
+    "scan: ARKitScenes": _of_scan(f"{VIDEO}/lowres_wide.traj", lambda root: write_arkitscenes(root, SCANNED)),
+    "scan: ARKitScenes, lens": _of_scan(
+        f"{VIDEO}/lowres_wide_intrinsics/41069021_305.376.pincam", lambda root: write_arkitscenes(root, SCANNED)
+    ),
     "scan: one image": _of_scan("depth.exr", lambda root: write_iid(root, SCANNED[0], (8, 8))),
 }
 

@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import tifffile
 import torch
 from PIL import Image
 
@@ -45,6 +46,12 @@ def _image(name: str, mode: str, **options: object) -> Kind:
         Image.fromarray(values).convert(mode).save(folder / name, **options)
 
     return Kind(name, make, lambda folder: iter(read_colour(folder / name)))
+
+
+def _light(name: str, write: Callable[[Path, np.ndarray], object]) -> Kind:
+    """An image of light."""
+    light = np.random.default_rng(0).random((8, 8, 3), dtype=np.float32)
+    return Kind(name, lambda folder: write(folder / name, light), lambda folder: iter(read_colour(folder / name)))
 
 
 def _surfels(folder: Path) -> None:
@@ -212,6 +219,7 @@ KINDS: dict[str, Kind] = {
     "PNG": _image("a.png", "RGBA"),
     "PNG, palette": _image("a.png", "P"),
     "JPEG": _image("a.jpg", "RGB"),
+    "TIFF": _light("a.tif", lambda path, light: tifffile.imwrite(path, light, photometric="rgb")),
     "JPEG, restarts": _image("a.jpg", "RGB", restart_marker_blocks=1, subsampling=0),
     "JPEG, progressive": _image("a.jpg", "RGB", progressive=True),
     "light file": Kind("a.json", _lights, _read_lights),

@@ -13,6 +13,7 @@ import numpy as np
 import tifffile
 import torch
 from PIL import ExifTags, Image
+from scipy.spatial.transform import Rotation
 
 from raycast import room_views
 from rgspipe.datasets.exr import write_channels, write_image
@@ -23,15 +24,29 @@ from rgspipe.scene import srgb
 FLIP = np.diag([1.0, -1.0, -1.0, 1.0])
 
 
-def photographed(count: int = 12, resolution: int = 32) -> list[View]:
+def photographed(count: int = 12, resolution: int = 32, angle: float = 1.4) -> list[View]:
     """Views of a room of two units with a block in it, whose surfaces have smooth colours below 0.9."""
     views = []
-    for view in room_views(count, resolution):
+    for view in room_views(count, resolution, angle=angle):
         origins, directions, lengths = view.camera.rays()
         points = origins + directions * (view.depth.double().reshape(-1) * lengths)[:, None]
         colours = 0.45 + 0.4 * torch.sin(5.0 * points + torch.tensor([0.0, 1.0, 2.0]))
         views.append(replace(view, image=colours.reshape(*view.depth.shape, 3).float()))
     return views
+
+
+def landscape(count: int, width: int, focal: float) -> list[View]:
+    """Such views of 4 : 3 by a focal length of 640 pixels across."""
+    views, rows = photographed(count, width, 2.0 * np.arctan(320.0 / focal)), width // 8
+    parts = ("image", "alpha", "depth")
+    return [
+        replace(
+            view,
+            camera=replace(view.camera, cy=3 * rows, height=6 * rows),
+            **{name: getattr(view, name)[rows:-rows] for name in parts},
+        )
+        for view in views
+    ]
 
 
 def lens_of(view: View, radial: tuple[float, ...] = (), tangential: tuple[float, float] = (0.0, 0.0)) -> Lens:
@@ -211,6 +226,60 @@ def write_scannet(root: Path, views: Sequence[View]) -> None:
         matrix = np.diag([camera.fx / step, camera.fy / step, 1.0, 1.0])
         matrix[:2, 2] = (camera.cx - 0.5) / step, (camera.cy - 0.5) / step
         np.savetxt(root / f"intrinsic/intrinsic_{name}.txt", matrix)
+
+
+def write_tum(root: Path, views: Sequence[View], steps: float = 5000.0, flip: np.ndarray = FLIP) -> None:
+    """Depth 5 ms after each photograph, poses at twice the rate with some in between, and one photograph without."""
+    lists: dict[str, list[str]] = {name: ["# a comment"] for name in ("rgb", "depth", "groundtruth")}
+    for index, view in enumerate(views):
+        time = 1305031102.175304 + 0.1 * index
+        write_photograph(root / f"rgb/{time:.6f}.png", view.image.numpy())
+        write_depth(root / f"depth/{time + 0.005:.6f}.png", view.depth.numpy(), steps)
+        lists["rgb"].append(f"{time:.6f} rgb/{time:.6f}.png")
+        lists["depth"].append(f"{time + 0.005:.6f} depth/{time + 0.005:.6f}.png")
+        pose = pose_of(view) @ flip
+        w, *xyz = quaternion_of(pose[:3, :3]).tolist()
+        lists["groundtruth"].append(" ".join(map(repr, [round(time + 0.003, 6), *pose[:3, 3].tolist(), *xyz, w])))
+        lists["groundtruth"].append(f"{time + 0.05:.6f} 9 9 9 0 0 0 1")
+    lists["rgb"].append(f"{time + 9.0:.6f} rgb/{time:.6f}.png")
+    for name, lines in lists.items():
+        (root / f"{name}.txt").write_text("\n".join(lines) + "\n")
+    camera = views[0].camera
+    (root / "calibration.txt").write_text(f"{camera.fx!r} {camera.fy!r} {camera.cx - 0.5!r} {camera.cy - 0.5!r}\n")
+
+
+def write_seven_scenes(root: Path, views: Sequence[View], depths: Sequence[View]) -> None:
+    """Photographs, and depth from the same places through the other lens; what is not known is 65535."""
+    for index, (view, coarse) in enumerate(zip(views, depths, strict=True)):
+        write_photograph(root / f"frame-{index:06d}.color.png", view.image.numpy())
+        levels = np.round(1000.0 * coarse.depth.numpy())
+        levels[0, 0] = 65535
+        Image.fromarray(levels.astype(np.uint16)).save(root / f"frame-{index:06d}.depth.png")
+        np.savetxt(root / f"frame-{index:06d}.pose.txt", pose_of(view) @ FLIP, delimiter="\t ", fmt="%.7e")
+
+
+def write_arkitscenes(root: Path, views: Sequence[View]) -> None:
+    """In a folder of frames; the first row of depth is unsure, and the last photograph has no pose."""
+    folder, lines = root / "41069021_frames", []
+    for name in ("lowres_wide_intrinsics", "confidence"):
+        (folder / name).mkdir(parents=True)
+    for index, view in enumerate(views):
+        time = 305.377 + 0.1 * index
+        name, camera = f"41069021_{time:.3f}", view.camera
+        write_photograph(folder / f"lowres_wide/{name}.png", view.image.numpy())
+        write_depth(folder / f"lowres_depth/{name}.png", view.depth.numpy(), 1000.0)
+        sure = np.full(view.depth.shape, 2, np.uint8)
+        sure[0] = 0
+        Image.fromarray(sure).save(folder / f"confidence/{name}.png")
+        numbers = [camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy]
+        # Names of intrinsics may be a millisecond off.
+        path = folder / f"lowres_wide_intrinsics/41069021_{time - 0.001:.3f}.pincam"
+        path.write_text(" ".join(map(repr, numbers)))
+        matrix = np.linalg.inv(pose_of(view) @ FLIP)
+        rotation = Rotation.from_matrix(matrix[:3, :3]).as_rotvec()
+        lines.append(" ".join(map(repr, [time + 0.0004, *rotation.tolist(), *matrix[:3, 3].tolist()])))
+    write_photograph(folder / "lowres_wide/41069021_999.000.png", views[0].image.numpy())
+    (folder / "lowres_wide.traj").write_text("\n".join(lines) + "\n")
 
 
 def write_iid(root: Path, view: View, depth_size: tuple[int, int]) -> None:

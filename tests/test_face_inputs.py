@@ -256,6 +256,12 @@ REFUSED: dict[str, tuple[Callable[[rg.FrozenScene, Tensor], object], str, str, s
         "1e-300",
         "usual",
     ),
+    "an angle in radians": (
+        lambda s, i: rg.Camera.look_at([0, -1, 0], [0, 0, 0], fov_degrees=0.7),
+        "fov_degrees",
+        "0.7",
+        "radians",
+    ),
     "a focal length of no lens": (
         lambda s, i: rg.Camera(np.eye(4), 1e300, 9, 8, 8, 16, 16),
         "fx",

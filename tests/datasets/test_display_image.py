@@ -300,3 +300,20 @@ def test_colours_by_the_curve_of_another_profile_are_refused(
 def test_a_damaged_profile_says_nothing(tmp_path: Path, profile: bytes) -> None:
     Image.fromarray(COLOUR).save(tmp_path / "a.png", icc_profile=profile)
     read_colour(tmp_path / "a.png")
+
+
+@pytest.mark.parametrize("levels", [90, 0])
+def test_colours_without_any_alpha_are_refused(tmp_path: Path, levels: int) -> None:
+    """As programs write them that have no use for alpha: the photograph counted as one of nothing."""
+    Image.fromarray(np.array([[[levels] * 3 + [0]] * 2], np.uint8)).save(tmp_path / "a.png")
+    if levels == 0:  # nothing is in sight
+        assert not read_colour(tmp_path / "a.png")[1].any()
+        return
+    with pytest.raises(InputError, match=r"a\.png.*opaque.*alpha 0 everywhere, beside colours up to 0\.10"):
+        read_colour(tmp_path / "a.png")
+
+
+def test_a_mask_of_levels_0_and_1_is_one_of_false_and_true(tmp_path: Path) -> None:
+    """As libraries store it; it left 1/255 of all pixels."""
+    Image.fromarray((MASK > 0).astype(np.uint8)).save(tmp_path / "mask.png")
+    np.testing.assert_array_equal(read_mask(tmp_path / "mask.png", _camera()), (MASK > 0).astype(np.float32))

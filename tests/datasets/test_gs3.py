@@ -97,8 +97,9 @@ def test_a_lamp_at_the_top_is_that_of_all_frames_that_name_no_other(dataset: Pat
 
     def share(content: dict) -> None:
         content |= {key: content["frames"][0].pop(key) for key in ("pl_pos", "pl_intensity")}
-        content["frames"].append(content["frames"][0] | {"pl_pos": [1.0, 2.0, 3.0]})
+        content["frames"].append(content["frames"][0] | {"pl_pos": [1.0, 2.0, 3.0], "file_path": "train/r_0001"})
 
+    (dataset / "train/r_0001.exr").write_bytes((dataset / "train/r_0000.exr").read_bytes())
     change("transforms_train.json", share)
     first, second = load_dataset(dataset).train
     assert torch.equal(first.light.position, own.light.position)
@@ -378,10 +379,36 @@ def test_distorted_images_are_refused(dataset: Path, change: Change, key: str) -
         load_dataset(dataset)
 
 
-def test_a_target_in_other_axes_is_refused(dataset: Path, change: Change) -> None:
-    turned = [[0, 1, 0, 0], [1, 0, 0, 0], [0, 0, -1, 0]]
-    change("targets/one/transforms.json", lambda content: content.update(applied_transform=turned))
-    with pytest.raises(InputError, match=r"applied_transform.*axes of the scene"):
+OTHER_LENSES = [("camera_model", "OPENCV_FISHEYE"), ("is_fisheye", True), ("distortion_params", [0.1, 0, 0, 0])]
+
+
+@pytest.mark.parametrize(("key", "value"), OTHER_LENSES)
+def test_lenses_that_bend_by_other_keys_are_refused(dataset: Path, change: Change, key: str, value: object) -> None:
+    """They were ignored."""
+    change(TRAIN, lambda content: content.update({"camera_model": "OPENCV", "skew": 0, "k5": None} | {key: value}))
+    with pytest.raises(InputError, match=rf"frames\[0\]: {key}.*without distortion"):
+        load_dataset(dataset)
+
+
+def test_an_image_of_two_frames_is_refused(dataset: Path, change: Change) -> None:
+    """It counted twice, under another lamp or pose, too."""
+    change(
+        TRAIN, lambda content: content["frames"].append(content["frames"][0] | {"file_path": "train/../train/r_0000"})
+    )
+    with pytest.raises(
+        InputError, match=r"transforms_train\.json: .*once, found r_0000\.exr in frames\[0\] and frames\[1\]"
+    ):
+        load_dataset(dataset)
+
+
+@pytest.mark.parametrize(
+    ("key", "value"), [("applied_transform", [[0, 1, 0, 0], [1, 0, 0, 0], [0, 0, -1, 0]]), ("applied_scale", 0.5)]
+)
+def test_a_target_in_other_axes_or_another_unit_is_refused(
+    dataset: Path, change: Change, key: str, value: object
+) -> None:
+    change("targets/one/transforms.json", lambda content: content.update({key: value}))
+    with pytest.raises(InputError, match=rf"{key}.*axes and the unit of the scene"):
         load_target(dataset / "targets/one")
 
 
@@ -418,3 +445,15 @@ def test_a_view_that_names_half_of_a_light_is_wrong(dataset: Path, change: Chang
     change("transforms_train.json", lambda content: content["frames"][0].pop("pl_pos"))
     with pytest.raises(InputError, match="pl_pos"):
         load_dataset(dataset)
+
+
+def test_a_suffix_may_be_named_without_its_dot(dataset: Path, change: Change) -> None:
+    change(TRAIN, _frame(file_ext="exr"))
+    load_dataset(dataset)
+
+
+def test_an_image_whose_suffix_has_other_letters_is_found(dataset: Path, change: Change) -> None:
+    """As cameras name theirs, and file systems that do not tell letters apart find them."""
+    (dataset / "train/r_0000.exr").rename(dataset / "train/r_0000.EXR")
+    change(TRAIN, lambda content: content["frames"][0].update(file_path="train/r_0000.exr"))
+    load_dataset(dataset)

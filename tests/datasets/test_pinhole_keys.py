@@ -63,6 +63,7 @@ def test_what_is_stated_is_the_camera(
     [
         ({"camera_angle_x": 1.02 * ANGLE, "fl_x": 5}, r"camera_angle_x: .*same field.*beside a focal length of 5 in"),
         ({"camera_angle_x": "wide", "fl_x": 5}, "camera_angle_x: expected radians between 1e-06 and π, found 'wide'"),
+        ({"camera_angle_x": 40.0}, r"camera_angle_x: expected radians .* found 40\.0\. Of degrees write 0\.698132\."),
         ({"camera_angle_x": ANGLE, "camera_angle_y": DOWN}, "camera_angle_y: .*same field.*where it is 0.76101"),
         ({"camera_angle_x": ANGLE, "fl_y": 5, "camera_angle_y": DOWN}, "camera_angle_y: expected the same field"),
         ({"camera_angle_x": ANGLE, "w": 4, "h": 6}, r"w, h: expected the shape of the image, 6 × 4, found 4 × 6"),

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from rgspipe.datasets.scans.radiance_image import read_hdr
+from rgspipe.datasets.radiance_image import read_hdr
 from rgspipe.errors import InputError
 
 

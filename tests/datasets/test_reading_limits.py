@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import tifffile
 import torch
 from PIL import Image
 
@@ -24,9 +25,10 @@ from rgspipe.datasets.json_file import read_json
 from rgspipe.datasets.mesh.file import read_mesh
 from rgspipe.datasets.photometric_file import read_photometry
 from rgspipe.datasets.ply.table import read_vertices, write_vertices
+from rgspipe.datasets.radiance_image import read_hdr
 from rgspipe.datasets.reading_limits import ReadingLimits, reading_limits, reading_within, timed
-from rgspipe.datasets.scans.radiance_image import read_hdr
 from rgspipe.datasets.tensor_file import load_tensors, save_tensors
+from rgspipe.datasets.tiff_image import read_tiff
 from rgspipe.graph.pipeline import run
 from rgspipe.store.files import write_json
 
@@ -44,6 +46,7 @@ KINDS: dict[str, tuple[Callable[[Path], object], Callable[[Path], object], dict[
     "b.ply": (lambda path: write_coloured(path, *cuboid_triangles(ROOM), COLOURS), read_mesh, {"vertices": 11}),
     "a.ies": (lambda path: path.write_text(ies()), read_photometry, {"text_bytes": 100}),
     "a.hdr": (lambda path: path.write_bytes(HDR), read_hdr, {"pixels": 7}),
+    "a.tif": (lambda path: tifffile.imwrite(path, np.zeros((4, 2), np.float32)), read_tiff, {"pixels": 7}),
     "a.safetensors": (lambda path: save_tensors(path, {"x": torch.zeros(99)}), load_tensors, {"bytes": 99}),
 }
 

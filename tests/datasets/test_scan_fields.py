@@ -194,3 +194,8 @@ def test_parameters_of_colmap_that_a_model_has_not_are_refused(
     path.write_text(" ".join(["1", model, "8", "8", *["4"] * count]))
     with pytest.raises(InputError, match=rf"cameras\.txt: expected {expected} parameters.* {model}, found {count}\."):
         read_cameras(path)
+
+
+def test_a_field_of_view_in_radians_is_refused() -> None:
+    with pytest.raises(InputError, match=r"fov: expected a value from 3\.2 to 179 .*radians.*found 1\.2"):
+        ScanOptions(fov=1.2)

@@ -334,6 +334,22 @@ def test_of_several_models_the_largest_is_taken_and_said(tmp_path: Path) -> None
     assert f"10 with {len(VIEWS)} of {len(VIEWS) + 4} photographs" in scan.notes[1]
 
 
+@pytest.mark.parametrize(("broken", "file"), [("0", "images"), ("2", "images"), ("2", "cameras")])
+def test_a_model_beside_others_that_cannot_be_read_is_left_out_and_said(tmp_path: Path, broken: str, file: str) -> None:
+    """It took the whole capture with it."""
+    write_colmap(tmp_path / "scan", VIEWS, binary=True)
+    (tmp_path / "scan/sparse/0").rename(tmp_path / "scan/sparse/1")
+    write_colmap(tmp_path / "few", VIEWS[:2], binary=True)
+    shutil.copytree(tmp_path / "few/sparse/0", tmp_path / f"scan/sparse/{broken}")
+    path = tmp_path / f"scan/sparse/{broken}/{file}.bin"
+    path.write_bytes(path.read_bytes()[:-9])
+    scan = read_scan(tmp_path / "scan", ScanOptions())
+    assert len(scan.frames) == len(VIEWS) and scan.stated.parent.name == "1"
+    assert "left out" in scan.notes[1] and str(path) in scan.notes[1] and len(scan.notes) == 2
+    path.unlink()  # which is no model, of which nothing needs to be said
+    assert len(read_scan(tmp_path / "scan", ScanOptions()).notes) == 1
+
+
 def test_inverse_depth_beside_a_model_is_read_by_its_scale_and_offset(tmp_path: Path) -> None:
     write_colmap(tmp_path / "scan", VIEWS, binary=True, depth=False)
     (tmp_path / "scan/depths").mkdir()
@@ -415,6 +431,9 @@ def test_lenses_that_are_not_known_are_refused(tmp_path: Path) -> None:
     for root in (tmp_path / "a", tmp_path / "b"):
         with pytest.raises(InputError, match="image_undistorter"):
             read_scan(root, ScanOptions())
+    cameras.write_text(f"7 FOV {SIZE} {SIZE} 20 20 16 16 0.9\n")
+    with pytest.raises(InputError, match=r"cameras\.txt: .*FISHEYE, found 'FOV'.*image_undistorter"):
+        read_scan(tmp_path / "a", ScanOptions())
     write_colmap(tmp_path / "c", VIEWS[:1], binary=True)
     content = struct.pack("<QiiQQ12d", 1, 7, 10, SIZE, SIZE, *[20.0] * 12)
     (tmp_path / "c/sparse/0/cameras.bin").write_bytes(content)

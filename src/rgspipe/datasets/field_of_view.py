@@ -34,5 +34,7 @@ def focal_of_angle(angle: object, size: float, place: str) -> float:
     """
     if not is_number(angle) or not NARROWEST <= angle < math.pi:
         expected = f"radians between {NARROWEST:g} and π"
-        raise InputError(place, expected=expected, found=shown(angle), remedy="Correct it.")
+        degrees = is_number(angle) and math.pi <= angle < 180.0
+        remedy = f"Of degrees write {math.radians(float(angle)):.6g}." if degrees else "Correct it."
+        raise InputError(place, expected=expected, found=shown(angle), remedy=remedy)
     return 0.5 * size / math.tan(0.5 * float(angle))

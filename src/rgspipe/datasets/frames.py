@@ -8,9 +8,10 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
-from rgspipe.datasets.image_names import image_named
+from rgspipe.datasets.image_names import SUFFIXES, image_named
 from rgspipe.datasets.input_file import is_plain_name
 from rgspipe.datasets.json_file import is_number, numbers, read_json, required, shown
+from rgspipe.datasets.lens_keys import DISTORTION, OTHER_OPTICS, STRAIGHT, first_that_bends
 from rgspipe.datasets.limits import STRONGEST
 from rgspipe.datasets.named_cameras import read_camera
 from rgspipe.datasets.pinhole_keys import ANGLES, KEYS, stated_intrinsics
@@ -29,9 +30,6 @@ ELSEWHERE, ALIKE = 0.1, 0.02
 
 #: The shortest focal length, pixels.
 SHORTEST = 1e-6
-
-#: Coefficients of lens distortion, as COLMAP and nerfstudio name them.
-DISTORTION = ("k1", "k2", "k3", "k4", "p1", "p2")
 
 
 @dataclass(frozen=True)
@@ -63,6 +61,7 @@ class FrameEntry:
             return self._image(name)
         if not isinstance(extension, str):
             raise InputError(f"{self.where}.file_ext", expected="a suffix", found=repr(extension), remedy="Correct it.")
+        extension = f".{extension}" if f".{extension.lower()}" in SUFFIXES else extension
         return self._image(name if name.endswith(extension) else name + extension)
 
     @property
@@ -167,31 +166,33 @@ class FrameEntry:
 
     def _refuse_distortion(self) -> None:
         """Images of lenses that bend straight lines are not of the cameras that are known here."""
-        for key in DISTORTION:
-            value = self.fields.get(key, self.shared.get(key, 0))
-            if not (is_number(value) and value == 0):
-                raise InputError(
-                    f"{self.where}: {key}",
-                    expected="0: images without distortion",
-                    found=shown(value),
-                    remedy="Undistort the images (colmap image_undistorter), and leave the key away.",
-                )
+        stated = self.shared | self.fields
+        key = first_that_bends(stated, (*DISTORTION, *OTHER_OPTICS))
+        if key is None and stated.get("camera_model") not in (None, *STRAIGHT):
+            key = "camera_model"
+        if key is not None:
+            raise InputError(
+                f"{self.where}: {key}",
+                expected="0: images without distortion" if key != "camera_model" else "a camera without distortion",
+                found=shown(stated[key]),
+                remedy="Undistort the images (colmap image_undistorter), and leave the key away.",
+            )
 
     def refuse_other_world(self) -> None:
-        """Refuse a target whose poses are in other axes than those of the scene.
+        """Refuse a target whose poses are in other axes, or another unit, than those of the scene.
 
         Raises:
-            InputError: there is an `applied_transform` other than 1.
+            InputError: there is an `applied_transform` or an `applied_scale` other than 1.
         """
-        value = self.shared.get("applied_transform")
         rows = [[float(row == column) for column in range(4)] for row in range(4)]
-        if value not in (None, rows, rows[:3]):
-            raise InputError(
-                f"{self.transforms_path}: applied_transform",
-                expected="poses in the axes of the scene",
-                found=shown(value),
-                remedy="Write the poses as those of the training views are, and leave the key away.",
-            )
+        for key, nothing in (("applied_transform", (None, rows, rows[:3])), ("applied_scale", (None, 1))):
+            if (value := self.shared.get(key)) not in nothing:
+                raise InputError(
+                    f"{self.transforms_path}: {key}",
+                    expected="poses in the axes and the unit of the scene",
+                    found=shown(value),
+                    remedy="Write the poses as those of the training views are, and leave the key away.",
+                )
 
     @property
     def names_light(self) -> bool:

@@ -16,6 +16,7 @@ from rgspipe.datasets.base_images import base_paths, read_base
 from rgspipe.datasets.classes import OCCLUSIONS
 from rgspipe.datasets.exif_exposure import EXPOSE_ALIKE, check_exposures, exposure_of
 from rgspipe.datasets.frames import FrameEntry, read_entries
+from rgspipe.datasets.image_names import check_once
 from rgspipe.datasets.images import read_colour, read_depth, read_mask, read_vectors
 from rgspipe.datasets.info import INFO, DatasetInfo, read_info
 from rgspipe.datasets.input_file import input_folder, is_plain_name
@@ -60,6 +61,7 @@ def load_split(root: Path, split: str, info: DatasetInfo | None) -> tuple[View, 
     """
     what = f"the cameras and lights of the {split} views, laid out as docs/guides/your_own_scene.md says"
     entries = read_entries(root / f"transforms_{split}.json", what)
+    check_once([entry.image_path for entry in entries], entries[0].transforms_path)
     lit = any(entry.names_light for entry in entries)
     reading = progress_bar(entries, f"reading {split} views", unit="view")
     views = [_load_view(entry, root, info, light=lit, depth=True) for entry in reading]
@@ -86,6 +88,7 @@ def load_target(folder: str | Path, base: str | Path | None = None) -> Target:
     occlusion = _listed_targets(place.parent).get(place.name, "unknown")
     entries = read_entries(folder / "transforms.json", "the cameras of a fit target")
     entries[0].refuse_other_world()
+    check_once([entry.image_path for entry in entries], entries[0].transforms_path)
     info = _target_info(folder, place)
     pairs = zip(entries, base_paths(entries, base), strict=True)
     views = [_load_view(entry, folder, info, light=False, depth=False, base=path) for entry, path in pairs]

@@ -10,6 +10,8 @@ from torch import Tensor
 
 from rgspipe.datasets.display_image import FORMATS, read_colour_levels, read_levels
 from rgspipe.datasets.exr import read_array, read_channels, read_depth_channel, read_image
+from rgspipe.datasets.radiance_image import read_hdr
+from rgspipe.datasets.tiff_image import read_tiff
 from rgspipe.errors import InputError
 from rgspipe.scene import Camera
 from rgspipe.scene.arrays import check_radiance
@@ -18,21 +20,30 @@ from rgspipe.scene.arrays import check_radiance
 NO_SURFACE = 1e9
 
 
+def _read_radiance(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    light = read_hdr(path)
+    return light, np.ones(light.shape[:2], np.float32)
+
+
+#: What reads images of light, by suffix; others are of levels.
+LINEAR = {".exr": read_image, ".hdr": _read_radiance, ".tif": read_tiff, ".tiff": read_tiff}
+
+
 def read_colour(path: Path) -> tuple[Tensor, Tensor]:
-    """Linear, premultiplied colour (H, W, 3) and alpha (H, W) of an EXR image, or a PNG or JPEG (sRGB, straight alpha).
+    """Linear, premultiplied colour (H, W, 3) and alpha (H, W) of an image.
+
+    EXR, TIFF of floats and Radiance's .hdr are linear; PNG and JPEG are sRGB with straight alpha.
 
     Raises:
         InputError: missing or broken file, other channels, negative radiance, NaN or infinity, alpha outside of [0, 1],
             or 0 everywhere beside light.
     """
-    image, alpha = read_image(path) if path.suffix.lower() == ".exr" else _read_display_image(path)
+    image, alpha = LINEAR.get(path.suffix.lower(), _read_display_image)(path)
     check_radiance(path, float(image.min()), float(image.max()))
     if alpha.min() < 0 or alpha.max() > 1 + 1e-3:
         found = f"{alpha.min():g} to {alpha.max():g}"
         raise InputError(path, expected="alpha from 0 to 1", found=found, remedy="Export the image again.")
-    if alpha.max() == 0.0 < image.max():  # of programs that have no use for it, or for which 1 is transparent
-        expected, found = "pixels that are opaque", f"alpha 0 everywhere, beside colours up to {image.max():g}"
-        raise InputError(path, expected=expected, found=found, remedy="Write it without alpha, or correct its alpha.")
+    _check_seen(path, image, alpha)
     return torch.from_numpy(image), torch.from_numpy(np.minimum(alpha, 1.0))
 
 
@@ -123,8 +134,16 @@ def _read_display_image(path: Path) -> tuple[np.ndarray, np.ndarray]:
     light, alpha = stored.light, stored.alpha
     if alpha is None:
         return light, np.ones(light.shape[:2], np.float32)
+    _check_seen(path, light, alpha)
     light *= alpha[..., None]
     return light, alpha
+
+
+def _check_seen(path: Path, image: np.ndarray, alpha: np.ndarray) -> None:
+    """Refuse colours without alpha, of programs that have no use for it, or for which 1 is transparent."""
+    if alpha.max() == 0.0 < image.max():
+        expected, found = "pixels that are opaque", f"alpha 0 everywhere, beside colours up to {image.max():g}"
+        raise InputError(path, expected=expected, found=found, remedy="Write it without alpha, or correct its alpha.")
 
 
 def _mask_levels(path: Path) -> np.ndarray:
@@ -133,6 +152,8 @@ def _mask_levels(path: Path) -> np.ndarray:
     values, alpha = stored.values, stored.alpha
     if alpha is not None and alpha.min() < 1.0:
         return alpha
+    if stored.levels.max() == 1:  # of programs that store false and true
+        values = stored.levels.astype(np.float32)
     if not (values == values[..., :1]).all():
         found = "colours, all of them opaque"
         raise InputError(path, expected="grey levels, or an alpha channel", found=found, remedy="Export it in grey.")

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from rgspipe.datasets.display_image import saturated_from
 from rgspipe.datasets.frames import FrameEntry
+from rgspipe.datasets.images import LINEAR
 from rgspipe.datasets.views import View
 
 #: Values of an image that ends by itself thin out towards its maximum; where it was clipped, more of them are equal to
@@ -16,7 +17,7 @@ BELOW = 0.1
 
 def with_saturation(entries: Sequence[FrameEntry], views: Sequence[View]) -> tuple[View, ...]:
     """Views that one camera took, each with the radiance from which on it tells only that the scene is as bright."""
-    linear = [entry.image_path.suffix.lower() == ".exr" for entry in entries]
+    linear = [entry.image_path.suffix.lower() in LINEAR for entry in entries]
     clipped = common_maximum([view for view, is_linear in zip(views, linear, strict=True) if is_linear])
     return tuple(
         replace(view, saturated_from=_limit(entry, clipped if is_linear else saturated_from(entry.image_path)))

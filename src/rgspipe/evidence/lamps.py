@@ -16,6 +16,13 @@ from rgspipe.datasets.views import View
 from rgspipe.evidence.comparison import FEWEST_VIEWS, REMAINDER, clearly_above, plainest
 from rgspipe.evidence.readings import FLIP, Numbers
 
+#: Units of the poses over those of the lamps, as millimetres, centimetres or a scene that was scaled without its lamps.
+SCALES = (0.001, 1000.0, 0.01, 100.0, 0.1, 10.0)
+
+#: Of so many views a smaller mean correlation is of images that do not show what the lamps light: true places have 0.6
+#: and more, images put to other frames −0.1 to 0.1.
+ENOUGH_VIEWS, LEAST_CORRELATED = 10, 0.1
+
 #: Pixels of each view, and the fewest that have an order.
 POINTS, FEWEST_POINTS = 500, 50
 
@@ -28,11 +35,13 @@ class LampReading:
         words: in words.
         remedy: what to do.
         place: from the place (3,) that was read and the camera's pose (4, 4) to the one that was meant.
+        frame: how many views further on the place was read.
     """
 
     words: str
     remedy: str
     place: Callable[[Numbers, Numbers], Numbers]
+    frame: int = 0
 
 
 def _in_camera(flip: Numbers) -> Callable[[Numbers, Numbers], Numbers]:
@@ -41,6 +50,16 @@ def _in_camera(flip: Numbers) -> Callable[[Numbers, Numbers], Numbers]:
 
 def _turned(*rows: tuple[float, float, float]) -> Callable[[Numbers, Numbers], Numbers]:
     return lambda place, pose: np.array(rows) @ place
+
+
+def _scaled(factor: float) -> LampReading:
+    words = f"times {factor:g}"
+    return LampReading(words, f"Write them in the unit of the poses: {words}.", lambda place, pose: factor * place)
+
+
+def _moved(frame: int, words: str) -> LampReading:
+    remedy = f"Each frame needs its own lamp: give each that of the {words} frame."
+    return LampReading(f"of the {words} frame", remedy, lambda place, pose: place, frame)
 
 
 STATED = LampReading("as read", "", lambda place, pose: place)
@@ -52,8 +71,9 @@ READINGS = (
                 _turned((1, 0, 0), (0, 0, 1), (0, -1, 0))),
     LampReading("with y and z of other sign", "Change the sign of y and z.",
                 _turned((1, 0, 0), (0, -1, 0), (0, 0, -1))),
-    LampReading("times 0.001", "Write them in the unit of the poses: times 0.001.", lambda place, pose: 0.001 * place),
-    LampReading("times 1000", "Write them in the unit of the poses: times 1000.", lambda place, pose: 1000.0 * place),
+    *map(_scaled, SCALES),
+    _moved(1, "next"),
+    _moved(-1, "previous"),
     LampReading("in the camera's axes", "Multiply them by transform_matrix.", _in_camera(np.eye(4))),
     LampReading("in OpenCV axes of the camera", "Change the sign of y and z, then multiply by transform_matrix.",
                 _in_camera(FLIP)),
@@ -65,28 +85,31 @@ class LampFinding:
     """Places that explain the brightness of images where the files' own do not.
 
     Attributes:
-        lamps: what was meant.
+        lamps: what was meant; None where no reading explains it.
         found, stated: mean rank correlation of brightness with what surfaces get, as meant and as stated.
     """
 
-    lamps: LampReading
+    lamps: LampReading | None
     found: float
     stated: float
 
 
 def misplaced(views: Sequence[View], seed: int = 0) -> LampFinding | None:
-    """The places of lamps that brightness clearly calls for, if they are not those that were read."""
+    """What brightness clearly says of the lamps' places, unless it is that they are where they were read."""
     generator = np.random.default_rng(seed)
-    lit = [view for view in views if view.depth is not None and view.light is not None]
-    shown = [(view, surface) for view in lit if (surface := _surface(view, generator)) is not None]
-    if len(shown) < FEWEST_VIEWS:
+    lit = [view for view in views if view.light is not None]
+    surfaces = [None if view.depth is None else _surface(view, generator) for view in lit]
+    if sum(surface is not None for surface in surfaces) < FEWEST_VIEWS:
         return None
-    scores = {lamps: np.array([_correlation(view, surface, lamps) for view, surface in shown]) for lamps in READINGS}
+    scores = {lamps: _scores(lit, surfaces, lamps) for lamps in READINGS}
     meant = plainest(scores)
     found, stated = float(scores[meant].mean()), float(scores[STATED].mean())
-    if 1.0 - found > REMAINDER * (1.0 - stated) or not clearly_above(scores[meant]):
-        return None
-    return LampFinding(meant, found, stated)
+    if 1.0 - found <= REMAINDER * (1.0 - stated) and clearly_above(scores[meant]):
+        return LampFinding(meant, found, stated)
+    told = scores[STATED][scores[STATED] != 0.0]
+    if len(told) >= ENOUGH_VIEWS and told.mean() < LEAST_CORRELATED:
+        return LampFinding(None, float(told.mean()), float(told.mean()))
+    return None
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,9 +148,18 @@ def _some(
     return rows[chosen], columns[chosen]
 
 
-def _correlation(view: View, surface: _Surface, lamps: LampReading) -> float:
+def _scores(views: Sequence[View], surfaces: Sequence[_Surface | None], lamps: LampReading) -> Numbers:
+    """(V,) correlations of those views that show surfaces."""
+    found = []
+    for index, (view, surface) in enumerate(zip(views, surfaces, strict=True)):
+        if surface is not None:
+            read = views[(index + lamps.frame) % len(views)].light.position.double().numpy()
+            found.append(_correlation(surface, lamps.place(read, view.camera.camera_to_world.numpy())))
+    return np.array(found)
+
+
+def _correlation(surface: _Surface, place: Numbers) -> float:
     """Rank correlation of brightness with what the surfaces would get; 0 where either is the same all over."""
-    place = lamps.place(view.light.position.double().numpy(), view.camera.camera_to_world.numpy())
     path = place - surface.points
     squared = np.maximum((path**2).sum(axis=1), 1e-300)
     received = np.maximum((path * surface.normals).sum(axis=1), 0.0) / squared**1.5

@@ -34,6 +34,9 @@ STEEPEST = 1e100
 #: Radians across the narrowest image: telescopes see a hundred times as much.
 NARROWEST = 1e-6
 
+#: Fewer degrees than these are radians, which somebody forgot to convert.
+LEAST_DEGREES = 3.2
+
 #: Of a focal length that is computed from an angle.
 ROUNDING = 1e-9
 
@@ -88,16 +91,16 @@ class Camera(ByValue, Pinhole, _Pose):
         """A camera at `eye` whose axis goes through `target`, both (3,) scene units.
 
         Args:
-            fov_degrees: field of view across the width.
+            fov_degrees: field of view across the width, 3.2 at least: less is taken for radians, and refused.
             width, height: image size in pixels, which are square.
             up: (3,) what is up in the image; +z if None, or +y for a view along z.
 
         Raises:
             InputError: a point is not three numbers, both are one, or the field of view or a size is out of range.
         """
-        least, remedy = math.degrees(NARROWEST), "40 is usual."
-        expected = f"an angle from {least:.1g} to below 180 degrees"
-        as_number(fov_degrees, "fov_degrees", remedy, expected=expected, low=least, high=math.nextafter(180.0, 0.0))
+        remedy = "40 is usual; Camera.from_field_of_view takes radians, and narrower views."
+        expected, below = f"an angle from {LEAST_DEGREES} to below 180 degrees", math.nextafter(180.0, 0.0)
+        as_number(fov_degrees, "fov_degrees", remedy, expected=expected, low=LEAST_DEGREES, high=below)
         return cls.from_field_of_view(look_at(eye, target, up), math.radians(fov_degrees), width, height)
 
     @classmethod

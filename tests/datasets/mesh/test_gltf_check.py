@@ -10,11 +10,15 @@ import pytest
 
 from mesh_files import QUARTERS, gltf_parts, painted, write_glb
 from rgspipe.datasets.mesh.file import read_mesh
+from rgspipe.datasets.mesh.options import MeshOptions
 from rgspipe.datasets.reading_limits import ReadingLimits, reading_within
 from rgspipe.errors import InputError
 
 #: The accessor of places in the texture, in the files that are written here.
 UV = 2
+
+#: The node that has the mesh in them.
+SQUARE = 0
 
 #: Where something of a textured square's JSON is changed, what it becomes (None: nothing), and words of the refusal.
 CLAIMS: dict[str, tuple[tuple, object, str]] = {
@@ -74,6 +78,9 @@ CLAIMS: dict[str, tuple[tuple, object, str]] = {
         "found two: nodes[0] and nodes[1]",
     ),
     "a child of no number": (("nodes",), [{"mesh": 0, "children": [9]}], "children: expected the number of one of 1"),
+    "a skeleton": (("nodes", SQUARE, "skin"), 0, f"nodes[{SQUARE}].skin: expected a mesh that stands still"),
+    "another shape": (("nodes", SQUARE, "weights"), [0, 0.5], f"nodes[{SQUARE}].weights: expected a mesh of one shape"),
+    "another shape of all": (("meshes", 0, "weights"), [1], "weights: expected a mesh of one shape"),
     "an old version": (("asset", "version"), "1.0", "asset.version: expected 2.0"),
     "a picture of no number": (("textures", 0, "source"), 7, "textures[0].source: expected the number of one of 1"),
 }
@@ -93,6 +100,31 @@ def test_a_glb_that_claims_what_it_has_not_is_refused_before_it_is_decoded(tmp_p
         holder[key] = value
     with pytest.raises(InputError, match=re.escape(words)):
         read_mesh(write_glb(tmp_path / "a.glb", content, buffer))
+
+
+def test_shapes_without_a_weight_change_nothing(tmp_path: Path) -> None:
+    content, buffer = gltf_parts(tmp_path)
+    content["meshes"][0]["weights"], content["nodes"][SQUARE]["weights"] = [1.0], [0.0]
+    assert np.array_equal(painted(write_glb(tmp_path / "a.glb", content, buffer)), QUARTERS)
+
+
+def test_a_file_without_a_scene_has_all_that_is_in_it(tmp_path: Path) -> None:
+    """Nothing was found in it."""
+    content, buffer = gltf_parts(tmp_path)
+    del content["scenes"], content["scene"]
+    assert np.array_equal(painted(write_glb(tmp_path / "a.glb", content, buffer)), QUARTERS)
+
+
+def test_what_hangs_on_a_camera_is_where_it_is(tmp_path: Path) -> None:
+    """It was left out, or stood at the origin."""
+    content, buffer = gltf_parts(tmp_path)
+    content["cameras"] = [{"type": "perspective", "perspective": {"yfov": 1.0, "znear": 0.1}}]
+    content["nodes"] += [{"camera": 0, "translation": [0, 0, 5.0], "children": [SQUARE]}]
+    for node in content["nodes"][:-1]:
+        node.pop("children", None)
+    content["scenes"][0]["nodes"] = [len(content["nodes"]) - 1]
+    mesh = read_mesh(write_glb(tmp_path / "a.glb", content, buffer), MeshOptions(up="z"))
+    np.testing.assert_allclose(mesh.vertices[:, 2], 5.0)
 
 
 def test_a_mesh_at_many_nodes_counts_as_often(tmp_path: Path) -> None:

@@ -84,3 +84,32 @@ def test_a_material_without_a_colour_has_none(tmp_path: Path) -> None:
     assert np.isnan(read_mesh(write_square(tmp_path, "illum 1", "t.png", "mtllib a.mtl")).paint.corners).sum() == 0
     (tmp_path / "a.mtl").write_text((tmp_path / "a.mtl").read_text().replace("Kd", "#"))
     assert np.isnan(read_mesh(tmp_path / "a.obj").paint.corners).all(), "and not the grey that the decoder invents"
+
+
+@pytest.mark.parametrize("texture", ["map_Kd t.png", ""])
+def test_metal_of_an_obj_reflects_nothing_diffusely(tmp_path: Path, texture: str) -> None:
+    """As Blender writes it; it was taken for paint of its colour."""
+    path = write_square(tmp_path, f"{texture}\nPm 0.75", "t.png", "mtllib a.mtl")
+    mesh = read_mesh(path)
+    factor = mesh.paint.corners if texture else mesh.paint.corners / 0.5
+    np.testing.assert_allclose(factor, 0.25)
+    assert mesh.remarks == ()
+
+
+def test_pictures_of_metal_of_an_obj_are_said_to_be_left_out(tmp_path: Path) -> None:
+    (remark,) = read_mesh(write_square(tmp_path, "map_Pm metal.png", "t.png", "mtllib a.mtl")).remarks
+    assert "map_Pm" in remark
+
+
+def test_a_share_of_metal_that_cannot_be_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"a\.mtl: expected a number from 0 to 1 as Pm, found “Pm 2”"):
+        read_mesh(write_square(tmp_path, "Pm 2", "t.png", "mtllib a.mtl"))
+
+
+@pytest.mark.parametrize(
+    ("line", "said"), [("d 0.3", True), ("d -halo 0.3", True), ("map_d a.png", True), ("d 1.0", False)]
+)
+def test_it_is_said_of_an_obj_that_what_one_sees_through_is_opaque(tmp_path: Path, line: str, said: bool) -> None:
+    """It was said of glTF alone."""
+    remarks = read_mesh(write_square(tmp_path, f"map_Kd t.png\n{line}", "t.png", "mtllib a.mtl")).remarks
+    assert ["see through" in remark for remark in remarks] == [True] * said

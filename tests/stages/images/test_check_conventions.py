@@ -11,7 +11,7 @@ import pytest
 from misread_views import lit_view, misread_view
 from raycast import room_views
 from rgspipe.config import RgspipeConfig, with_changes
-from rgspipe.datasets.exr import write_channels, write_image
+from rgspipe.datasets.exr import read_channels, write_channels, write_image
 from rgspipe.datasets.gs3_write import frame_entry, write_info, write_transforms
 from rgspipe.errors import InputError
 from rgspipe.evidence.readings import Reading
@@ -96,3 +96,13 @@ def test_planar_depth_that_is_called_ray_distance_is_told(tmp_path: Path) -> Non
 def test_what_is_stated_rightly_passes(tmp_path: Path, convention: str) -> None:
     _check(_written(tmp_path / "room", Reading(), convention), tmp_path / "out")
     assert (tmp_path / "out/dataset.json").is_file()
+
+
+def test_depth_that_agrees_under_no_reading_is_refused(tmp_path: Path) -> None:
+    """As of scans: 1 over the depth passed, and so did images upside down."""
+    root = _written(tmp_path / "room", Reading())
+    for path in root.glob("train/*_depth.exr"):
+        (depth,) = read_channels(path).values()
+        write_channels(path, {"Z": np.ascontiguousarray(depth[::-1])})
+    with pytest.raises(InputError, match=r"transforms_train\.json: .* agreeing, under no axes and no unit.*mirrored"):
+        _check(root, tmp_path / "out")

@@ -19,6 +19,7 @@ from rgspipe.datasets.limits import FARTHEST
 from rgspipe.datasets.mesh.gltf_check import check_gltf
 from rgspipe.datasets.mesh.gltf_materials import GltfMaterial, numbered
 from rgspipe.datasets.mesh.links import mesh_links
+from rgspipe.datasets.mesh.obj_materials import ObjMaterials
 from rgspipe.datasets.mesh.obj_text import plain_obj
 from rgspipe.datasets.mesh.options import FORMATS, GLTF, MeshOptions
 from rgspipe.datasets.mesh.paint import check_shares, paint_of
@@ -36,8 +37,11 @@ WHAT = "a triangle mesh (.ply, .obj, .glb or .gltf)"
 UPRIGHT = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
 
 
-#: What is said of a glTF whose materials have an alphaMode.
-SEE_THROUGH = "Materials of the mesh that one can see through (alphaMode MASK or BLEND) are taken for opaque."
+#: What is said of materials that have an alphaMode, or in an MTL d or map_d.
+SEE_THROUGH = "Materials of the mesh that one can see through (alphaMode, d, map_d) are taken for opaque."
+
+#: What is said of an OBJ with pictures of what is metal, which have no place in the one that is its colour.
+METAL_TEXTURES = "Pictures of what is metal (map_Pm) are not read: it is taken for as matt as the rest of the mesh."
 
 
 @timed
@@ -52,7 +56,8 @@ def read_mesh(path: str | Path, options: MeshOptions | None = None) -> TriangleM
     if kind not in FORMATS:
         remedy = "Export it as binary PLY or GLB."
         raise InputError(path, expected=WHAT, found=f"the suffix {path.suffix!r}", remedy=remedy)
-    content, materials = _loaded(input_file(path, WHAT, most_bytes=reading_limits().bytes))
+    own = OwnFiles(input_file(path, WHAT, most_bytes=reading_limits().bytes))
+    content, materials = _loaded(path, own)
     try:
         parts = [_part(*placed, materials, path) for placed in _placed(content, path)]
         mesh = _joined(parts, path, content)
@@ -60,8 +65,9 @@ def read_mesh(path: str | Path, options: MeshOptions | None = None) -> TriangleM
         raise
     except (ValueError, IndexError, TypeError, KeyError, AttributeError, OSError) as error:
         raise _broken(path, error) from error
-    if not all(material.opaque for material in materials):
-        mesh = replace(mesh, remarks=(SEE_THROUGH,))
+    see_through = own.obj.see_through or not all(material.opaque for material in materials)
+    said = {SEE_THROUGH: see_through, METAL_TEXTURES: own.obj.metal_textures}
+    mesh = replace(mesh, remarks=tuple(text for text, holds in said.items() if holds))
     scaled = np.diag([*[options.unit] * 3, 1.0])
     placed = polycam_place(path) if options.up == "auto" else None
     if placed is None:
@@ -93,6 +99,11 @@ class OwnFiles(trimesh.resolvers.FilePathResolver):
     def has_textures(self) -> bool:
         """Whether the mesh names any picture."""
         return bool(self._links.textures)
+
+    @property
+    def obj(self) -> ObjMaterials:
+        """The materials of an OBJ, none of other files."""
+        return self._links.materials or ObjMaterials([], {}, b"")
 
     def namespaced(self, namespace: str) -> OwnFiles:
         """No folder has files of its own."""
@@ -130,9 +141,8 @@ class OwnFiles(trimesh.resolvers.FilePathResolver):
             raise InputError(self._path, expected="one texture at most in a PLY", found=found, remedy=remedy)
 
 
-def _loaded(path: Path) -> tuple[Any, list[GltfMaterial]]:
+def _loaded(path: Path, own: OwnFiles) -> tuple[Any, list[GltfMaterial]]:
     """The scene in a file, and the materials of a glTF."""
-    own = OwnFiles(path)
     try:
         # Of broken files numpy warns before they are refused.
         with warnings.catch_warnings():

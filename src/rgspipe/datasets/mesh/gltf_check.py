@@ -83,7 +83,7 @@ class _Check:
         self._images(buffers)
         for where, node in self._parts("nodes"):
             if "mesh" in node:
-                self._index(node, "mesh", where, len(self._parts("meshes")))
+                self._still(node, where)
         self._tree()
 
     def _extensions(self) -> None:
@@ -165,6 +165,18 @@ class _Check:
                 self._refuse(f"{where}.{key}", "numbers in a buffer", "compressed or sparse ones, or none", PLAIN)
             if key in ("TEXCOORD_0", "COLOR_0") and accessor["count"] != (need := self._points(attributes, where)):
                 self._refuse(f"{where}.{key}", f"{need} entries, one a point", f"{accessor['count']}", PLAIN)
+
+    def _still(self, node: dict, where: str) -> None:
+        """Refuse a mesh that is moved by a skeleton, or by shapes beside its own: its points are read as stored."""
+        meshes = self._listed(self.content, "meshes")
+        mesh = meshes[self._index(node, "mesh", where, len(meshes))]
+        if "skin" in node:
+            remedy = "Apply what moves it (in Blender its armature), and export it again."
+            self._refuse(f"{where}.skin", "a mesh that stands still", "one that a skeleton moves", remedy)
+        weights = node.get("weights", mesh.get("weights", []))
+        if not isinstance(weights, list) or any(weights):
+            remedy = "Apply its shapes (in Blender its shape keys), and export it again."
+            self._refuse(f"{where}.weights", "a mesh of one shape", f"others with weights {shown(weights)}", remedy)
 
     def _points(self, attributes: dict, where: str) -> int:
         accessors = self._listed(self.content, "accessors")

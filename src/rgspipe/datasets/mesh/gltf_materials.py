@@ -1,4 +1,5 @@
-"""Materials of glTF files: their decoder rounds colours to bytes, and drops what textures do beyond their ends."""
+"""glTF files as their decoder reads them rightly: it rounds colours to bytes, drops what textures do beyond their ends,
+finds nothing in a file without a scene, and leaves out what hangs on a camera."""
 
 from __future__ import annotations
 
@@ -36,11 +37,18 @@ class GltfMaterial:
 def numbered(path: Path) -> tuple[bytes, list[GltfMaterial]]:
     """A checked file whose materials have their numbers as names, and these materials.
 
-    Colours of points that have no material get a white one, by which their decoder keeps them as they are.
+    Colours of points that have no material get a white one, by which their decoder keeps them as they are. A file
+    without scenes gets one of all that it has.
     """
     content = gltf_content(path)
     if not isinstance(content, dict):
         return path.read_bytes(), []
+    nodes = content.get("nodes", [])
+    below = {child for node in nodes for child in node.get("children", [])}
+    if not content.get("scenes"):
+        content["scenes"] = [{"nodes": [number for number in range(len(nodes)) if number not in below]}]
+    for node in nodes:
+        node.pop("camera", None)
     read = [_material(content, one) for one in content.get("materials", [])]
     primitives = [one for mesh in content.get("meshes", []) for one in mesh.get("primitives", [])]
     plain = [one for one in primitives if "COLOR_0" in one["attributes"] and "material" not in one]

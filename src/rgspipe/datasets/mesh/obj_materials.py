@@ -18,7 +18,7 @@ Named = Callable[[Path, str], Path]
 
 #: Lines that name files of materials, and lines of these that are read. Some end with a carriage return alone.
 LIBRARIES = re.compile(rb"(?:^|[\r\n])[ \t]*mtllib[ \t]+([^\r\n]+)", re.IGNORECASE)
-STATEMENTS = re.compile(rb"(?:^|[\r\n])[ \t]*(newmtl|kd|map_kd)[ \t]+([^\r\n]+)", re.IGNORECASE)
+STATEMENTS = re.compile(rb"(?:^|[\r\n])[ \t]*(newmtl|kd|map_kd|pm|map_pm|d|map_d)[ \t]+([^\r\n]+)", re.IGNORECASE)
 
 #: Options before a texture's name, with what may follow each: the values that leave the texture as it is, where others
 #: would be read wrongly, or None where any will do.
@@ -43,12 +43,16 @@ class ObjMaterials:
     Attributes:
         files: MTL files in their order, whether they are there or not.
         textures: files of textures, whether they are there or not, by the names that `text` has for them.
-        text: all of it as one plain MTL file.
+        text: all of it as one plain MTL file, with `pm` for the part of a colour that is a metal's.
+        metal_textures: whether any of them says by a picture where it is metal.
+        see_through: whether one can see through any of them.
     """
 
     files: list[Path]
     textures: dict[str, Path]
     text: bytes
+    metal_textures: bool = False
+    see_through: bool = False
 
 
 def read_materials(path: Path, named: Named) -> ObjMaterials:
@@ -75,9 +79,11 @@ def read_materials(path: Path, named: Named) -> ObjMaterials:
                 texture = named(file, _texture_name(file, value))
                 value = next((name for name, one in textures.items() if one == texture), f"texture-{len(textures)}")
                 textures[value] = texture
-            lines.append(f"{key} {_colour(file, value) if key == 'kd' else value}")
+            lines.append(f"{key} {_colour(file, value, key) if key in ('kd', 'pm') else value}")
         known |= own
-    return ObjMaterials(files, textures, "\n".join(lines).encode())
+    metal_textures = any(line.startswith("map_pm ") for line in lines)
+    see_through = any(line.startswith("map_d ") or _dissolves(line) for line in lines)
+    return ObjMaterials(files, textures, "\n".join(lines).encode(), metal_textures, see_through)
 
 
 def _libraries(path: Path, named: Named) -> Iterator[Path]:
@@ -127,14 +133,23 @@ def _unquoted(name: str) -> str:
     return quoted[1] if quoted else name
 
 
-def _colour(path: Path, text: str) -> str:
-    """Three numbers from 0 to 1 of a colour that may be given by one."""
+def _colour(path: Path, text: str, key: str) -> str:
+    """Three numbers from 0 to 1 of a colour that may be given by one, or the one of what is metal."""
+    count, name = {"kd": (3, "Kd"), "pm": (1, "Pm")}[key]
     levels = [_number(word) for word in text.split()]
-    levels = levels * 3 if len(levels) == 1 else levels
-    if len(levels) != 3 or not all(one is not None and 0.0 <= one <= 1.0 + ROUNDING for one in levels):
-        expected, remedy = "three numbers from 0 to 1 as Kd", "Correct it, or remove the line."
-        raise InputError(path, expected=expected, found=f"“Kd {text}”", remedy=remedy)
+    levels = levels * count if len(levels) == 1 else levels
+    if len(levels) != count or not all(one is not None and 0.0 <= one <= 1.0 + ROUNDING for one in levels):
+        expected = f"{'three numbers' if count == 3 else 'a number'} from 0 to 1 as {name}"
+        remedy = "Correct it, or remove the line."
+        raise InputError(path, expected=expected, found=f"“{name} {text}”", remedy=remedy)
     return " ".join(repr(min(one, 1.0)) for one in levels if one is not None)
+
+
+def _dissolves(line: str) -> bool:
+    """Whether a line is a `d` below 1, which may have the option -halo before its number."""
+    key, _, value = line.partition(" ")
+    opaque = _number(value.split()[-1]) if key == "d" and value.split() else None
+    return opaque is not None and opaque < 1.0
 
 
 def _number(text: str) -> float | None:

@@ -49,10 +49,12 @@ def paint_of(part: Any, faces: np.ndarray, materials: Sequence[GltfMaterial], pa
         return _gltf_paint(part, faces, materials[int(visual.material.name)], path)
     if visual.kind == "texture":
         colour, image = _material(visual.material)
+        diffuse = 1.0 - float(visual.material.kwargs.get("pm", [0.0])[0])
         if image is None or (uv := _places(part)) is None:
-            return _plain(np.broadcast_to(colour, (count, 3, 3)))
+            return _plain(np.broadcast_to(colour * diffuse, (count, 3, 3)))
         # Kd beside map_Kd is what exporters leave there.
-        return Paint(np.ones((count, 3, 3)), uv[faces], np.zeros(count, np.int64), (texture_light(image, path),))
+        light = texture_light(image, path)
+        return Paint(np.full((count, 3, 3), diffuse), uv[faces], np.zeros(count, np.int64), (light,))
     if visual.kind == "vertex":
         return _plain(_display(visual.vertex_colors)[faces])
     if visual.kind == "face":

@@ -26,7 +26,7 @@ WANTED = "sparse/0/ (or sparse/, colmap/, or the folder itself) with cameras and
 
 #: Where models may be (several have numbers), and photographs: as large as can be had, as datasets have them in smaller
 #: copies, and in folders of ScanNet++.
-MODELS, NUMBERED = ("sparse/0", "sparse", ".", "colmap"), "sparse"
+NUMBERED, MODELS = "sparse", ("sparse", ".", "colmap")
 RESIZED = "resized_images"
 IMAGES = ("images", ".", "images_2", "images_4", "images_8", RESIZED, "rgb")
 
@@ -46,6 +46,9 @@ DISPARITIES, BELIEVED = "depth_params.json", 5.0
 
 MILLIMETRE = 1e-3
 
+#: The files of a model, and what is in them.
+_Model = tuple[Path, Path, dict[int, Lens], list[ColmapImage]]
+
 
 def found_in(root: Path) -> bool:
     """Whether the folder has this layout."""
@@ -61,19 +64,19 @@ def read(root: Path, options: ScanOptions) -> Scan:
     models = _models(root)
     if not models:
         raise InputError(root, expected=WANTED, found="no model", remedy="Run colmap mapper, or correct the path.")
-    images = [read_images(path) for _, path in models]
-    largest = max(range(len(models)), key=lambda index: len(images[index]))
-    (cameras_path, images_path), photographs = models[largest], images[largest]
-    cameras, disparities = read_cameras(cameras_path), _disparities(cameras_path.with_name(DISPARITIES))
+    whole, broken = _read(models)
+    cameras_path, images_path, cameras, photographs = max(whole, key=lambda model: len(model[-1]))
+    disparities = _disparities(cameras_path.with_name(DISPARITIES))
     folder = next((root / name for name in IMAGES if is_there(root / name / photographs[0].name)), root / IMAGES[0])
     # The order of the file is that of registration.
     ordered = sorted(photographs, key=lambda one: one.name)
     frames = tuple(_frame(one, cameras, root, folder, images_path, options, disparities) for one in ordered)
     notes = ["lengths are in the model's own unit, which is metres only if it was scaled (ScanOptions.pose_unit)"]
-    if len(models) > 1:
+    notes += [f"a model is left out, as it cannot be read: {error}" for error in broken]
+    if len(whole) > 1:
         notes.append(
-            f"of {len(models)} models, which share no coordinates, the largest is taken: {images_path.parent.name} "
-            f"with {len(photographs)} of {sum(map(len, images))} photographs"
+            f"of {len(whole)} models, which share no coordinates, the largest is taken: {images_path.parent.name} "
+            f"with {len(photographs)} of {sum(len(model[-1]) for model in whole)} photographs"
         )
     if disparities is not None:
         notes.append(f"depth is predicted: 1 over the levels by {DISPARITIES}")
@@ -81,14 +84,28 @@ def read(root: Path, options: ScanOptions) -> Scan:
     return Scan("colmap", images_path, sources, frames, options.camera_axes(AXES), tuple(notes))
 
 
+def _read(models: list[tuple[Path, Path]]) -> tuple[list[_Model], list[InputError]]:
+    """Models with what is in their files, and what is wrong with others beside them.
+
+    Raises:
+        InputError: none can be read; what is wrong with the first.
+    """
+    whole, broken = [], []
+    for cameras, images in models:
+        try:
+            whole.append((cameras, images, read_cameras(cameras), read_images(images)))
+        except InputError as error:
+            broken.append(error)
+    if not whole:
+        raise broken[0]
+    return whole, broken
+
+
 def _models(root: Path) -> list[tuple[Path, Path]]:
-    """Cameras and images of the model, or of each of several, 0 first."""
-    found = next((pair for place in MODELS if (pair := _model(root / place))), None)
-    if found is None or found[0].parent != root / MODELS[0]:
-        return [] if found is None else [found]
-    others = (path for path in (root / NUMBERED).iterdir() if path.name.isdecimal() and int(path.name) > 0)
-    more = (_model(path) for path in sorted(others, key=lambda path: int(path.name)))
-    return [found, *(pair for pair in more if pair is not None)]
+    """Cameras and images of the model, or of each of several by number."""
+    numbered = [path for path in (root / NUMBERED).glob("*") if path.name.isdecimal()]
+    several = [pair for path in sorted(numbered, key=lambda path: int(path.name)) if (pair := _model(path))]
+    return several or [pair for place in MODELS if (pair := _model(root / place))][:1]
 
 
 def _model(folder: Path) -> tuple[Path, Path] | None:

@@ -6,13 +6,37 @@ from pathlib import Path
 from types import ModuleType
 
 from rgspipe.datasets.input_file import input_folder
-from rgspipe.datasets.scans import colmap, iid, interiorverse, nerfstudio, openrooms, polycam, replica, scannet
+from rgspipe.datasets.scans import (
+    arkitscenes,
+    colmap,
+    iid,
+    interiorverse,
+    nerfstudio,
+    openrooms,
+    polycam,
+    replica,
+    scannet,
+    seven_scenes,
+    tum,
+)
 from rgspipe.datasets.scans.frame import Scan
 from rgspipe.datasets.scans.lens_check import check_lens
 from rgspipe.datasets.scans.options import LAYOUTS, ScanOptions
 from rgspipe.errors import InputError
 
-MODULES = (nerfstudio, polycam, colmap, replica, scannet, iid, interiorverse, openrooms)
+MODULES = (
+    nerfstudio,
+    polycam,
+    colmap,
+    replica,
+    scannet,
+    iid,
+    interiorverse,
+    openrooms,
+    tum,
+    seven_scenes,
+    arkitscenes,
+)
 READERS: dict[str, ModuleType] = dict(zip(LAYOUTS, MODULES, strict=True))
 
 #: Names of a folder that errors list.

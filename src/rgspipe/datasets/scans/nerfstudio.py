@@ -7,12 +7,13 @@ metres, the turn is kept.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from rgspipe.datasets.frames import FrameEntry, read_entries
-from rgspipe.datasets.image_names import image_named
+from rgspipe.datasets.image_names import check_once, image_named
 from rgspipe.datasets.json_file import is_number, shown, whole
+from rgspipe.datasets.lens_keys import FISHEYE, OTHER_OPTICS, STRAIGHT, first_that_bends
 from rgspipe.datasets.pinhole_keys import stated_intrinsics
 from rgspipe.datasets.scans.frame import DepthImage, Lens, Scan, ScanFrame
 from rgspipe.datasets.scans.options import ScanOptions
@@ -35,19 +36,11 @@ DEPTHS = (("depth_file_path", "depth_unit_scale_factor"), ("depth_path", "intege
 #: How many times as long as another one a unit of length may be.
 MOST_UNITS = 1e9
 
-#: Models whose distortion is that of `Lens`.
-STRAIGHT = ("OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "PERSPECTIVE")
-FISHEYE = "OPENCV_FISHEYE"
-
 #: A size that is given as text.
 SIZE = re.compile("[0-9]{1,9}")
 
 #: Which focal length stands over an angle.
 FOCAL_OF = {"camera_angle_x": "fl_x", "camera_angle_y": "fl_y"}
-
-#: What changes where a camera sees things and `Lens` does not have, in files for nerfstudio and instant-ngp.
-OTHER_OPTICS = ("k5", "k6", "skew", "distortion_params", "fisheye_crop_radius")
-OTHER_OPTICS += ("rolling_shutter", "rolling_shutter_time")
 
 
 def found_in(root: Path) -> bool:
@@ -64,6 +57,7 @@ def read(root: Path, options: ScanOptions) -> Scan:
     path = root / TRANSFORMS
     entries = read_entries(path, "the cameras of a nerfstudio capture")
     frames = tuple(_frame(entry, options) for entry in entries)
+    check_once([frame.image for frame in frames], path)
     turned = "applied_transform" in entries[0].shared
     notes = ("the world's axes are those of the file, after its applied_transform",) if turned else ()
     return Scan("nerfstudio", path, (path,), frames, options.camera_axes(AXES), notes)
@@ -96,9 +90,8 @@ def _lens(entry: FrameEntry) -> Lens:
             remedy="Undistort the photographs first (colmap image_undistorter).",
         )
     fisheye = model == FISHEYE
-    # instant-ngp tells a fisheye lens by a key of its own.
-    _refuse_other_optics(entry, OTHER_OPTICS if fisheye else (*OTHER_OPTICS, "is_fisheye"))
     stated = entry.shared | entry.fields
+    _refuse_other_optics(entry, stated, OTHER_OPTICS[:-1] if fisheye else OTHER_OPTICS)
     # Of a focal length nerfstudio asks for no angle beside it, which may be left of another size.
     stated = {key: value for key, value in stated.items() if FOCAL_OF.get(key) not in stated}
     stated |= {key: int(text) for key in ("w", "h") if SIZE.fullmatch(text := str(stated.get(key)))}
@@ -119,16 +112,15 @@ def _image(entry: FrameEntry) -> Path:
     return image_named(entry.transforms_path.parent, _text(entry, "file_path"))
 
 
-def _refuse_other_optics(entry: FrameEntry, keys: Sequence[str]) -> None:
-    for key in keys:
-        value = _value(entry, key)
-        if not all(part in (None, 0) for part in (value if isinstance(value, list) else [value])):  # 0 is False, too
-            raise InputError(
-                f"{entry.where}: {key}",
-                expected=f"0: lenses of k1 to k4, p1 and p2, or the camera_model {FISHEYE} with k1 to k4",
-                found=shown(value),
-                remedy="State the lens so, or undistort the photographs (colmap image_undistorter); remove the key.",
-            )
+def _refuse_other_optics(entry: FrameEntry, stated: Mapping[str, object], keys: Sequence[str]) -> None:
+    key = first_that_bends(stated, keys)
+    if key is not None:
+        raise InputError(
+            f"{entry.where}: {key}",
+            expected=f"0: lenses of k1 to k4, p1 and p2, or the camera_model {FISHEYE} with k1 to k4",
+            found=shown(stated[key]),
+            remedy="State the lens so, or undistort the photographs (colmap image_undistorter); remove the key.",
+        )
 
 
 def _depth(entry: FrameEntry, options: ScanOptions) -> DepthImage | None:

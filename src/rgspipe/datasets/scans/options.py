@@ -8,7 +8,10 @@ from typing import Literal, get_args
 from rgspipe.options import Options, option
 
 #: Layouts that are read.
-Layout = Literal["nerfstudio", "polycam", "colmap", "replica", "scannet", "iid", "interiorverse", "openrooms"]
+Layout = Literal[
+    "nerfstudio", "polycam", "colmap", "replica", "scannet", "iid", "interiorverse", "openrooms",
+    "tum", "7scenes", "arkitscenes",
+]  # fmt: skip
 LAYOUTS: tuple[Layout, ...] = get_args(Layout)
 
 
@@ -33,9 +36,9 @@ class ScanOptions(Options):
     """metres of 1 in a depth image, where files do not keep to their layout"""
     pose_unit: float | None = option(None, low=1e-9, high=1e9)
     """metres of 1 in the cameras' places; by default 1"""
-    fov: float | None = option(None, low=1, high=179)
-    """horizontal field of view of photographs whose files do not state it (iid, interiorverse, openrooms,
-    replica with traj_w_c.txt), degrees; by default the layout's usual one"""
+    fov: float | None = option(None, low=3.2, high=179)
+    """horizontal field of view of photographs whose files do not state it (iid, interiorverse, openrooms, tum,
+    replica with traj_w_c.txt), degrees, of which less than 3.2 would be radians; by default the layout's usual one"""
     others: tuple[str, ...] = ()
     """folders of further captures of the same room under other lamps, in the same layout and coordinates"""
     lamps_off: str | None = None

@@ -10,12 +10,13 @@ import numpy.typing as npt
 
 from rgspipe.datasets.display_image import DAMAGED, opened, read_levels, saturated_from
 from rgspipe.datasets.exr import read_channels, read_depth_channel
-from rgspipe.datasets.images import NO_SURFACE, read_colour
+from rgspipe.datasets.images import LINEAR, NO_SURFACE, read_colour
 from rgspipe.datasets.input_file import check_pixel_count, input_file
+from rgspipe.datasets.radiance_image import hdr_size
 from rgspipe.datasets.reading_limits import reading_limits, timed
 from rgspipe.datasets.scans.frame import DepthImage
-from rgspipe.datasets.scans.radiance_image import hdr_size, read_hdr
 from rgspipe.datasets.scans.raw_image import RAW, read_raw
+from rgspipe.datasets.tiff_image import tiff_size
 from rgspipe.errors import InputError
 from rgspipe.scene import srgb
 
@@ -54,11 +55,9 @@ def read_picture(path: Path, response: str, stated: tuple[int, int] | None = Non
         InputError: missing or broken file, another format than the suffix says, pixels to be turned (EXIF), or levels
             by another curve than that of sRGB.
     """
-    if path.suffix.lower() == ".exr":
+    if path.suffix.lower() in LINEAR:
         light, alpha = read_colour(path)
         return Picture(light.numpy(), None, _not_opaque(alpha.numpy()))
-    if path.suffix.lower() == ".hdr":
-        return Picture(read_hdr(path), None)
     if path.suffix.lower() in RAW:
         return Picture(*read_raw(path))
     stored, limit = read_levels(path, stated), saturated_from(path)
@@ -188,6 +187,8 @@ def size_of(path: Path) -> tuple[int, int]:
         return width, height
     if path.suffix.lower() == ".hdr":
         return hdr_size(path)
+    if path.suffix.lower() in LINEAR:
+        return tiff_size(path)
     try:
         with opened(input_file(path, "an image"), path, ["PNG", "JPEG"]) as file:
             return file.size

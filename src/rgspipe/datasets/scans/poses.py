@@ -76,7 +76,7 @@ def matrix_of(value: object, where: str | Path) -> Numbers:
 
 @timed
 def read_numbers(path: Path, count: int, what: str) -> Numbers:
-    """(N, count) numbers of a text file, `count` a line.
+    """(N, count) numbers of a text file, `count` a line, without lines that begin with #.
 
     Raises:
         InputError: missing file, or other text.
@@ -84,7 +84,7 @@ def read_numbers(path: Path, count: int, what: str) -> Numbers:
     text = input_file(path, what, most_bytes=reading_limits().text_bytes).read_text(
         encoding="utf-8-sig", errors="replace"
     )
-    rows = [line.split() for line in text.splitlines() if line.strip()]
+    rows = [line.split() for line in text.splitlines() if line.strip() and not line.startswith("#")]
     try:
         values = np.array([[float(word) for word in row] for row in rows], dtype=np.float64)
     except ValueError:

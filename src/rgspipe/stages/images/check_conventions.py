@@ -7,7 +7,7 @@ from pathlib import Path
 from rgspipe.datasets.info import INFO, read_info
 from rgspipe.datasets.views import Dataset
 from rgspipe.errors import InputError
-from rgspipe.evidence.conventions import ViewFinding, misread
+from rgspipe.evidence.conventions import ViewFinding, contradicted, misread
 from rgspipe.evidence.lamps import misplaced
 from rgspipe.evidence.readings import Reading
 from rgspipe.evidence.reprojection import Agreement
@@ -27,17 +27,29 @@ def check_conventions(dataset: Dataset) -> None:
     info = read_info(dataset.root)
     if info is None or info.depth_convention is None:
         return
-    finding = misread(dataset.train, info.depth_convention == "ray_distance")
+    along_rays = info.depth_convention == "ray_distance"
+    finding = misread(dataset.train, along_rays)
     if finding is not None:
         raise _refusal(dataset.root, info.depth_convention, finding)
+    stated = contradicted(dataset.train, along_rays)
+    if stated is not None:
+        raise InputError(
+            dataset.root / TRANSFORMS,
+            expected="poses and depth by which the views agree where they show the same places",
+            found=f"{_share(stated)} agreeing, under no axes and no unit that is known",
+            remedy="Check that depth and poses are those of the images, that neither is turned, mirrored or 1 over the "
+            "depth, and that the intrinsics are of their size.",
+        )
     lamps = misplaced(dataset.train)
     if lamps is not None:
+        meant = "" if lamps.lamps is None else f", {lamps.found:.2f} with the places {lamps.lamps.words}"
+        belong = "Check that images, lamps and poses of each frame belong together, and that no other light was on."
         raise InputError(
             f"{dataset.root / TRANSFORMS}: pl_pos",
             expected="places of lamps, in the axes and the unit of the poses, near which surfaces are brighter",
             found=f"a rank correlation of {lamps.stated:.2f} between brightness and the light that surfaces would get "
-            f"as read, {lamps.found:.2f} with the places {lamps.lamps.words}",
-            remedy=lamps.lamps.remedy,
+            f"as read{meant}",
+            remedy=belong if lamps.lamps is None else lamps.lamps.remedy,
         )
 
 

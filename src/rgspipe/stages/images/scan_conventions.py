@@ -7,13 +7,9 @@ from collections.abc import Sequence
 from rgspipe.datasets.scans.frame import Scan
 from rgspipe.datasets.views import View
 from rgspipe.errors import InputError
-from rgspipe.evidence.conventions import ViewFinding, misread, stated_agreement
+from rgspipe.evidence.conventions import ViewFinding, contradicted, misread
 from rgspipe.evidence.readings import Reading
 from rgspipe.evidence.reprojection import Agreement
-
-#: Views that agree in less than this part of the points that can be compared are no capture of one room, and so few
-#: points do not tell. Poses of other photographs leave 0.17 to 0.27, poses that are 5 % of the room and 3° off 0.53.
-LEAST_AGREEING, LEAST_TESTED = 0.4, 300
 
 #: Axes of cameras, in words.
 AXES = {"opengl": "OpenGL axes (y up, z backwards)", "opencv": "OpenCV axes (y down, z forwards)"}
@@ -30,8 +26,8 @@ def check_scan(scan: Scan, views: Sequence[View]) -> None:
     finding = misread(views, along_rays=False)
     if finding is not None:
         raise _refusal(scan, finding)
-    stated = stated_agreement(views, along_rays=False)
-    if stated is not None and stated.tested >= LEAST_TESTED and stated.share < LEAST_AGREEING:
+    stated = contradicted(views, along_rays=False)
+    if stated is not None:
         raise InputError(
             scan.stated,
             expected=EXPECTED,
