@@ -10,7 +10,7 @@ import torch
 
 from photographed_room import frozen_room, photographs
 from rgspipe.capture.exposures import Cameras
-from rgspipe.capture.photographs import Photograph
+from rgspipe.capture.photographs import PixelsOfView
 from rgspipe.capture.refusals import check_alike
 from rgspipe.capture.unlike import Said
 from rgspipe.datasets.views import View
@@ -73,7 +73,7 @@ def test_a_photograph_is_evened() -> None:
         Cameras.of(2, "free", True), gains=np.array([[1.0] * 3, [2.0] * 3]), falloff=np.array([-0.3, 0.0])
     )
     view = darkened(0.3)[1]
-    evened = cameras.evened(1, Photograph(view))
+    evened = cameras.evened(1, PixelsOfView(view))
     np.testing.assert_allclose(2.0 * evened, photographs()[1].image.reshape(-1, 3).numpy(), rtol=1e-5)
 
 

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rgspipe.capture.photographs import Numbers, Photograph, TracedPhotograph
+from rgspipe.capture.photographs import Numbers, PixelsOfView, TracedPhotograph
 from rgspipe.capture.response import Response
 from rgspipe.names import Exposure
 
@@ -55,15 +55,15 @@ class Cameras:
         for index, photograph in enumerate(photographs):
             yield self.evened(index, photograph)
 
-    def evened(self, index: int, photograph: Photograph) -> Numbers:
+    def evened(self, index: int, photograph: PixelsOfView) -> Numbers:
         """(P, 3) what photograph `index` would show under a factor of 1."""
         return self._light(photograph) / (self.gains[index] * self._corner(photograph))
 
-    def _light(self, photograph: Photograph) -> Numbers:
+    def _light(self, photograph: PixelsOfView) -> Numbers:
         """(P, 3) as the curve has it."""
         return photograph.image if self.response is None else self.response.light(photograph)
 
-    def _corner(self, photograph: Photograph) -> Numbers:
+    def _corner(self, photograph: PixelsOfView) -> Numbers:
         """(P, 1) what the lens leaves of the light."""
         if not self.vignetting:
             return np.ones((1, 1))

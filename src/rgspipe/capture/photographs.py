@@ -23,8 +23,8 @@ SHOWN = 0.3
 
 
 @dataclass(frozen=True, eq=False)
-class Photograph:
-    """P pixels.
+class PixelsOfView:
+    """The P pixels of a photograph.
 
     Attributes:
         view: what was photographed.
@@ -52,7 +52,7 @@ class Photograph:
 
 
 @dataclass(frozen=True, eq=False)
-class TracedPhotograph(Photograph):
+class TracedPhotograph(PixelsOfView):
     """A photograph of which was traced what its P pixels see: they are sums of the radiance of N surfels.
 
     Attributes:

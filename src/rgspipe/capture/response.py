@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rgspipe.capture.photographs import Numbers, Photograph, TracedPhotograph
+from rgspipe.capture.photographs import Numbers, PixelsOfView, TracedPhotograph
 
 #: Stops below white between which r is linear.
 STOPS = np.arange(-8.0, 1.0)
@@ -42,7 +42,7 @@ class Response:
         """The curve that images were decoded by."""
         return cls(np.zeros(len(STOPS)))
 
-    def light(self, photograph: Photograph) -> Numbers:
+    def light(self, photograph: PixelsOfView) -> Numbers:
         """(P, 3) what the pixels of a photograph tell of the light."""
         return photograph.image * np.exp(-_shares(photograph) @ self.logs)
 
@@ -81,7 +81,7 @@ def _means(photograph: TracedPhotograph, weight: Numbers) -> list[tuple[Numbers,
     return found
 
 
-def _shares(photograph: Photograph) -> Numbers:
+def _shares(photograph: PixelsOfView) -> Numbers:
     """(P, 3, K) what each pixel has of the value at each of STOPS."""
     white = photograph.view.saturated_from
     level = np.log2(np.maximum(photograph.image / white, 2.0 ** STOPS[0]))

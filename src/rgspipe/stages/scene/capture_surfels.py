@@ -15,7 +15,7 @@ import torch
 from rgspipe.capture.captured import Captured, capture_scenes
 from rgspipe.capture.lamp_file import write_lamps
 from rgspipe.capture.options import CaptureOptions
-from rgspipe.capture.photographs import Photograph
+from rgspipe.capture.photographs import PixelsOfView
 from rgspipe.capture.words import captured_words
 from rgspipe.config.spoken import as_keys
 from rgspipe.datasets.grade_file import GRADE, save_grade
@@ -147,7 +147,7 @@ def _grade(frozen: FrozenScene, found: Captured, views: Sequence[View], held_out
 
 def _evened(found: Captured, index: int, view: View) -> torch.Tensor:
     """(H, W, 3) what a photograph would show if all had one exposure, and corners were no darker."""
-    light = found.measured.cameras.evened(index, Photograph(view))
+    light = found.measured.cameras.evened(index, PixelsOfView(view))
     return torch.from_numpy(light).float().reshape(view.image.shape)
 
 
