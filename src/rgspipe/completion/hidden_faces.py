@@ -87,11 +87,11 @@ class _WayBack:
         # Rays that graze the edge are taken to pass behind it.
         return cls(edge, places, met.reshape(seen_through.shape), seen_through & (steps > GRAZED * spacing))
 
-    def face(self, others: Sequence[Continued]) -> Continued:
+    def face(self, others: Sequence[Continued], open_ended: bool = False) -> Continued:
         """The places of the face behind the edge, up to what it meets, as `others` that are not along it.
 
-        Where a camera looked through it before it met anything there is none: what was seen through a door is no
-        inside.
+        Where a camera looked through it before it met anything there is none, unless it may be `open_ended`: what was
+        seen through a door is no inside.
         """
         outward, met = self.edge.outward, self.met
         across = [other.places for other in others if len(other) and abs(float(other.normals[0] @ outward)) < ACROSS]
@@ -100,7 +100,7 @@ class _WayBack:
             met = met | near.reshape(met.shape)
         stops, steps = met | self.seen_through, met.shape[1]
         first = np.where(stops.any(axis=1), stops.argmax(axis=1), steps)
-        is_met = met[np.arange(len(met)), first.clip(max=steps - 1)]
+        is_met = open_ended | met[np.arange(len(met)), first.clip(max=steps - 1)]
         kept = binary_opening((np.arange(steps) < first[:, None]) & is_met[:, None], np.ones((3, 3))).reshape(-1)
         return Continued(self.places[kept], np.broadcast_to(outward, (int(kept.sum()), 3)).copy())
 
@@ -127,7 +127,15 @@ def hidden_faces(
     ways_back = [_WayBack.of(edge, centers, grid, space) for own in edges for edge in own]
     # First each as if there were no others, then up to these.
     whole = [way.face([]) for way in ways_back]
-    faces = _once([way.face([*whole[:i], *whole[i + 1 :]]) for i, way in enumerate(ways_back)], spacing)
+    # Where cameras look past a thing two of its faces end each other, of which either would be seen through.
+    ending = [one if len(one) else way.face([], open_ended=True) for way, one in zip(ways_back, whole, strict=True)]
+    for _ in range(2):
+        faces = [
+            way.face([other for k, other in enumerate(whole if len(whole[i]) else ending) if k != i])
+            for i, way in enumerate(ways_back)
+        ]
+        ending = [one if len(face) else Continued.joined([]) for one, face in zip(ending, faces, strict=True)]
+    faces = _once(faces, spacing)
     rest = iter(faces)
     return [Continued.joined([next(rest) for _ in own]) for own in edges]
 
