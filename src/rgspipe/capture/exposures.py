@@ -85,7 +85,7 @@ class Cameras:
         if self.vignetting:
             grey = (cameras._light(photograph).mean(axis=1) for photograph in photographs)
             means = Means.of(photographs, grey, weights)
-            equations = means.equations(powers(photographs, weights))
+            equations = means.equations(_powers(photographs, weights))
             falloff = equations.solved(free=self.exposure != "same")[1]
             cameras, radiance = replace(cameras, falloff=falloff), None
         if self.exposure == "same":
@@ -123,26 +123,23 @@ class Cameras:
         return np.repeat(colours.mean(axis=1, keepdims=True), 3, axis=1)
 
 
-def powers(
-    photographs: Sequence[TracedPhotograph], weights: Sequence[Numbers], asked: NDArray[np.integer] | None = None
-) -> list[Numbers]:
-    """(V, A) means of each power of r² over the pixels that show a surfel, of A that are `asked`, or all."""
-    pairs = list(zip(photographs, weights, strict=True))
-    return [
-        np.stack(
-            [_mean(photograph, photograph.squared_radius**power, weight, asked)[0] for photograph, weight in pairs]
-        )
-        for power in POWERS
-    ]
+def _powers(photographs: Sequence[TracedPhotograph], weights: Sequence[Numbers]) -> list[Numbers]:
+    """(V, N) means of each power of r² over the pixels that show a surfel."""
+    pairs = zip(photographs, weights, strict=True)
+    means = np.stack([mean_shown(photograph, radial(photograph), weight)[0] for photograph, weight in pairs])
+    return list(np.moveaxis(means, 2, 0))
 
 
-def _mean(
-    photograph: TracedPhotograph, values: Numbers, weight: Numbers, asked: NDArray[np.integer] | None
-) -> tuple[Numbers, Numbers]:
-    """(A,) means of values (P,) over the pixels that show each surfel, and (A,) how many do."""
-    back, kept = photograph.rows.T, slice(None) if asked is None else asked
-    shown = (back @ weight)[kept]
-    return (back @ (weight * values))[kept] / np.maximum(shown, 1e-12), shown
+def radial(photograph: PixelsOfView) -> Numbers:
+    """(P, C) powers of r² of the pixels."""
+    return np.stack([photograph.squared_radius**power for power in POWERS], axis=1)
+
+
+def mean_shown(photograph: TracedPhotograph, values: Numbers, weight: Numbers) -> tuple[Numbers, Numbers]:
+    """(N, K) means of values (P, K) over the pixels that show each surfel, and (N,) how many do."""
+    back = photograph.rows.T
+    shown = back @ weight
+    return (back @ (weight[:, None] * values)) / np.maximum(shown, 1e-12)[:, None], shown
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,15 +156,17 @@ class Means:
 
     @classmethod
     def of(
-        cls,
-        photographs: Sequence[TracedPhotograph],
-        pixels: Iterable[Numbers],
-        weights: Sequence[Numbers],
-        asked: NDArray[np.integer] | None = None,
+        cls, photographs: Sequence[TracedPhotograph], pixels: Iterable[Numbers], weights: Sequence[Numbers]
     ) -> Means:
-        """By `pixels` (P,) of each photograph; of the A surfels that are `asked`, or all."""
-        parts = (_mean(*one, asked) for one in zip(photographs, pixels, weights, strict=True))
+        """Of all surfels, by `pixels` (P,) of each photograph."""
+        triples = zip(photographs, pixels, weights, strict=True)
+        parts = [mean_shown(photograph, one[:, None], weight) for photograph, one, weight in triples]
         mean, shown = (np.stack(part) for part in zip(*parts, strict=True))
+        return cls.counting(mean[:, :, 0], shown)
+
+    @classmethod
+    def counting(cls, mean: Numbers, shown: Numbers) -> Means:
+        """By the means (V, A) over so many pixels (V, A)."""
         counted = np.where((shown >= 1.0) & (mean > 0.0), shown, 0.0)
         return cls(np.log(np.where(counted > 0.0, mean, 1.0)), counted)
 

@@ -14,17 +14,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rgspipe.capture.exposures import Means, powers
+from rgspipe.capture.exposures import Means, mean_shown, radial
 from rgspipe.capture.options import CaptureOptions
 from rgspipe.capture.photographs import Numbers, TracedPhotograph
+from rgspipe.capture.receivers import PARTS
 from rgspipe.datasets.views import View
 from rgspipe.names import Exposure
 from rgspipe.renderer.clusters import cluster_patches
 from rgspipe.renderer.view_weights import ViewWeights
 from rgspipe.scene.surfels import Surfels
 
-#: Parts of the scene, and surfels that are asked, evenly spread.
-PARTS, ASKED = 12, 8000
+#: Surfels that are asked, evenly spread.
+ASKED = 8000
 
 #: Differences of this many standard errors are there, from this root mean square of their logarithm on, and corners
 #: that are darker by this logarithm. In rooms without any, what photographs share tells of 2.2 and 0.02 at most, of
@@ -112,12 +113,13 @@ def _found(photographs: Sequence[TracedPhotograph], surfels: Surfels) -> tuple[_
     weights = [photograph.plain(photograph.base) for photograph in photographs]
     asked = np.arange(0, len(surfels), math.ceil(len(surfels) / ASKED))
     parts = cluster_patches(surfels.centers[asked].double(), surfels.normals[asked], PARTS, seed=0)
-    columns = powers(photographs, weights, asked)
-    channels = []
-    for channel in range(3):
-        pixels = (photograph.image[:, channel] for photograph in photographs)
-        means = Means.of(photographs, pixels, weights, asked)
-        channels.append(_all_and_without(means, columns, parts))
+    shown = []
+    for photograph, weight in zip(photographs, weights, strict=True):
+        mean, count = mean_shown(photograph, np.concatenate([photograph.image, radial(photograph)], axis=1), weight)
+        shown.append((mean[asked], count[asked]))
+    means, counts = (np.stack(part) for part in zip(*shown, strict=True))
+    columns = list(np.moveaxis(means[:, :, 3:], 2, 0))
+    channels = [_all_and_without(Means.counting(means[:, :, c], counts), columns, parts) for c in range(3)]
     solved = np.stack(channels, axis=1)
     gains, corner = solved[..., : len(photographs)], solved[..., len(photographs) :].sum(axis=2, keepdims=True)
     return _Told(gains[0], gains[1:]), _Told(corner[0], corner[1:])

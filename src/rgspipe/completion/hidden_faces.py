@@ -127,17 +127,22 @@ def hidden_faces(
     ways_back = [_WayBack.of(edge, centers, grid, space) for own in edges for edge in own]
     # First each as if there were no others, then up to these.
     whole = [way.face([]) for way in ways_back]
+    faces = [way.face(_without(whole, i)) if len(whole[i]) else whole[i] for i, way in enumerate(ways_back)]
     # Where cameras look past a thing two of its faces end each other, of which either would be seen through.
+    dropped = [i for i, one in enumerate(whole) if not len(one)]
     ending = [one if len(one) else way.face([], open_ended=True) for way, one in zip(ways_back, whole, strict=True)]
     for _ in range(2):
-        faces = [
-            way.face([other for k, other in enumerate(whole if len(whole[i]) else ending) if k != i])
-            for i, way in enumerate(ways_back)
-        ]
-        ending = [one if len(face) else Continued.joined([]) for one, face in zip(ending, faces, strict=True)]
+        for i in dropped:
+            faces[i] = ways_back[i].face(_without(ending, i))
+        for i in dropped:
+            ending[i] = ending[i] if len(faces[i]) else Continued.joined([])
     faces = _once(faces, spacing)
     rest = iter(faces)
     return [Continued.joined([next(rest) for _ in own]) for own in edges]
+
+
+def _without(faces: Sequence[Continued], own: int) -> list[Continued]:
+    return [*faces[:own], *faces[own + 1 :]]
 
 
 def _once(faces: Sequence[Continued], spacing: float) -> list[Continued]:
