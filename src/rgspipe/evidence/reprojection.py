@@ -112,18 +112,22 @@ def _outcomes(
 ) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
     """(N,) which points (N, 3), seen from `origins` (N, 3), agree with the view's depth, and which contradict it."""
     row, column, depth = view.project(points)
-    shown = (row >= 0) & (_parallax(view, points, origins) > LEAST_PARALLAX)
-    height, width = view.depth.shape
-    rows = (row[:, None] + AROUND[:, 0]).clip(0, height - 1)
-    columns = (column[:, None] + AROUND[:, 1]).clip(0, width - 1)
+    # Where other cameras look, few of the points are in the image: the rest costs nothing more.
+    shown = (row >= 0).nonzero()[0]
+    shown = shown[_parallax(view, points[shown], origins[shown]) > LEAST_PARALLAX]
+    depth, (height, width) = depth[shown], view.depth.shape
+    rows = (row[shown, None] + AROUND[:, 0]).clip(0, height - 1)
+    columns = (column[shown, None] + AROUND[:, 1]).clip(0, width - 1)
     around = view.depth_at(rows, columns)
     known = np.isfinite(around)
     # The point may fall anywhere within the pixel, and the surface lean as it does from pixel to pixel.
     nearest = np.where(known, around, np.inf).min(axis=1) * (1.0 - tolerance)
     farthest = np.where(known, around, -np.inf).max(axis=1) * (1.0 + tolerance)
     surface, void = known.any(axis=1), np.isposinf(around).all(axis=1)
-    agrees = shown & surface & (depth >= nearest) & (depth <= farthest)
-    return agrees, shown & (void | (surface & (depth < nearest)))
+    agrees, contradicts = np.zeros((2, len(points)), np.bool_)
+    agrees[shown] = surface & (depth >= nearest) & (depth <= farthest)
+    contradicts[shown] = void | (surface & (depth < nearest))
+    return agrees, contradicts
 
 
 def _parallax(view: PlacedView, points: Numbers, origins: Numbers) -> Numbers:
