@@ -42,7 +42,7 @@ def test_it_is_what_the_float64_reference_integrates() -> None:
     """Against even directions over the sphere, composited by brute force."""
     surfels = open_surfels()
     bvh, chosen = SurfelBvh(surfels), torch.arange(0, len(surfels), 40)
-    directions = fibonacci_directions(6000).double()
+    directions = fibonacci_directions(2000).double()
     found = void_irradiance(bvh, 1024)[chosen]
     expected = []
     for index in chosen.tolist():
@@ -54,7 +54,7 @@ def test_it_is_what_the_float64_reference_integrates() -> None:
         passing = torch.where(passing < 0.5, 0.0, passing)
         expected.append(4.0 * math.pi / len(directions) * float(cosine[cosine > 0] @ passing))
     error = found.double() - torch.tensor(expected)
-    # Measured: 0.0040 root mean square, of values with a deviation of 0.41; both have rays of their own.
+    # Measured: 0.0053 root mean square (0.0040 with 6000), of values with a deviation of 0.41: each has its own rays.
     assert float(error.square().mean().sqrt()) < 0.01
     assert float(found.std()) > 0.2
 
