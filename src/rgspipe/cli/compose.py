@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from hydra import compose, initialize_config_dir
+from hydra._internal.hydra import Hydra
 from hydra.core.config_store import ConfigStore
 from hydra.core.global_hydra import GlobalHydra
 from hydra.core.override_parser.overrides_parser import OverridesParser
@@ -60,6 +61,11 @@ CHECKED_VALUES = 50
 def register_schema() -> None:
     """Let the files under conf/ extend the defaults. Hydra composes plain values; `typed` knows what they may be."""
     ConfigStore.instance().store(name="schema", node=plain(RgspipeConfig()), provider="rgspipe")
+    # Hydra copies all that is registered whenever it composes, and what it takes of that once more: a quarter of its
+    # time. The store of a process is one.
+    ConfigStore.__deepcopy__ = lambda store, memo: store
+    # Before a run it composes everything to ask for `hydra.mode`, and finds None: `check_hydra` lets nobody set it.
+    Hydra.get_mode = lambda *_, **__: None
 
 
 def config_folder() -> str:
