@@ -14,7 +14,8 @@ from rgspipe.datasets.views import View
 from rgspipe.errors import InputError
 from rgspipe.scene import Camera, look_at
 
-OPTIONS = CaptureOptions(gather_rays=16, supersampling=1, grid=2)
+#: The room is closed: there is nothing unseen to look for before what is refused late.
+OPTIONS = CaptureOptions(gather_rays=16, supersampling=1, grid=2, unseen=False)
 
 
 def refusal(views: list[View], **changes: object) -> str:
