@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import hashlib
+import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from rgspipe.datasets.exr import write_channels
+from tiny_dataset import write_tiny_dataset
 from warm_start import WarmStart
 
 REFUSED = 2
@@ -24,13 +27,26 @@ class Ended:
     stderr: str
 
 
+def ended(place: WarmStart, folder: Path, *arguments: str) -> Ended:
+    """What a command in a folder came to."""
+    status = place.start(folder, arguments).wait(timeout=120)
+    return Ended(status, (folder / "stderr").read_text())
+
+
 @pytest.fixture
 def run_cli(tmp_path: Path, warm_start: WarmStart) -> Callable[..., Ended]:
-    def run(*arguments: str) -> Ended:
-        status = warm_start.start(tmp_path, arguments).wait(timeout=120)
-        return Ended(status, (tmp_path / "stderr").read_text())
+    return partial(ended, warm_start, tmp_path)
 
-    return run
+
+@pytest.fixture(scope="module")
+def checked(tmp_path_factory: pytest.TempPathFactory, warm_start: WarmStart) -> Path:
+    """A folder with a dataset, `scene`, and the results of having read it."""
+    folder = tmp_path_factory.mktemp("checked")
+    write_tiny_dataset(folder / "scene")
+    good = ended(warm_start, folder, "stage=generate_dataset", "scene=external", "scene.path=scene")
+    assert good.returncode == 0, good.stderr
+    assert artifacts(folder)
+    return folder
 
 
 def artifacts(folder: Path) -> dict[str, str]:
@@ -74,14 +90,13 @@ def shear(root: Path, change: Callable) -> None:
     ids=["missing file", "truncated", "NaN", "channels", "negative depth", "no rotation", "no depth", "no images"],
 )
 def test_a_bad_dataset_is_refused(
-    dataset: Path, change: Callable, run_cli: Callable, tmp_path: Path, spoil: Callable, words: list[str]
+    checked: Path, change: Callable, dataset: Path, run_cli: Callable, tmp_path: Path, spoil: Callable, words: list[str]
 ) -> None:
-    external = ["scene=external", f"scene.path={dataset}"]
-    good = run_cli("stage=generate_dataset", *external)
-    assert good.returncode == 0, good.stderr
+    shutil.copytree(checked, tmp_path, symlinks=True, dirs_exist_ok=True)
     before = artifacts(tmp_path)
+    assert before == artifacts(checked)
     spoil(dataset, change)
-    result = run_cli("stage=init_depth", *external)
+    result = run_cli("stage=init_depth", "scene=external", "scene.path=scene")
     message = " ".join(result.stderr.split())
     assert result.returncode == REFUSED, result.stderr
     assert all(word in message for word in words), message
