@@ -13,9 +13,9 @@ from rgspipe.cli.commands import COMMANDS
 from rgspipe.cli.completion import LINE, completed, is_question
 from rgspipe.cli.help import help_text, version_text
 from rgspipe.cli.messages import EXIT_INPUT, EXIT_INTERRUPTED, EXIT_UNREAD, show_input_error
-from rgspipe.cli.plain_values import as_typed
 from rgspipe.errors import InputError
 from rgspipe.graph.resolver import StageLoader
+from rgspipe.plain_values import as_typed
 from rgspipe.program import typed
 from rgspipe.stages import load_stage
 from rgspipe.store.files import NO_ROOM

@@ -30,11 +30,11 @@ from rgspipe.cli.compose import (
 )
 from rgspipe.cli.leading import lead_on, lead_on_sweep
 from rgspipe.cli.messages import EXIT_FAILED, EXIT_INPUT, EXIT_INTERRUPTED, show_failure, show_input_error
-from rgspipe.cli.plain_values import quoted
 from rgspipe.cli.sweep_table import write_sweep_table
 from rgspipe.errors import InputError
 from rgspipe.graph.pipeline import Usual, run
 from rgspipe.graph.resolver import StageLoader
+from rgspipe.plain_values import quoted
 from rgspipe.stages import load_stage
 from rgspipe.store.artifacts import Artifact
 from rgspipe.store.files import NO_RIGHT

@@ -19,10 +19,10 @@ from rgspipe.cli.compose import check_sweep, compose_config, leaves_machine
 from rgspipe.cli.jobs import new_run_folder
 from rgspipe.cli.leading import lead_on
 from rgspipe.cli.messages import EXIT_FAILED
-from rgspipe.cli.plain_values import quoted
 from rgspipe.datasets.input_file import input_file
 from rgspipe.errors import InputError
 from rgspipe.machine.resources import resource_folder
+from rgspipe.plain_values import quoted
 from rgspipe.program import typed
 from rgspipe.store.status import read_statuses
 

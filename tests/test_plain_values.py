@@ -8,7 +8,7 @@ import pytest
 from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.core.override_parser.types import QuotedString
 
-from rgspipe.cli.plain_values import as_typed
+from rgspipe.plain_values import as_shown, as_typed
 
 
 def value(argument: str) -> object:
@@ -21,7 +21,8 @@ def value(argument: str) -> object:
     ["Küche", "my room", "Fotos 28.11. (1)", "it's here", "a&b", "50 %", "#3", "run=2", "写真", "ü\\b", "ü\\'b", "ü\\"],
 )
 def test_a_name_is_read_as_it_is_typed(name: str) -> None:
-    assert value(f"scene.path={name}") == name
+    typed = f"scene.path={name}"
+    assert value(typed) == name and as_shown(as_typed(typed)) == typed
 
 
 def test_a_path_may_begin_at_home(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -25,6 +25,13 @@ def as_typed(argument: str) -> str:
     return f"{key}={value}" if READ.fullmatch(value) else f"{key}={quoted(value)}"
 
 
+def as_shown(argument: str) -> str:
+    """KEY=VALUE as it was typed, without the quotes that `as_typed` puts around it."""
+    key, _, value = argument.partition("=")
+    inner = re.sub(r"(\\+)('|$)", lambda found: found[1][: len(found[1]) // 2] + found[2], value[1:-1])
+    return f"{key}={inner}" if as_typed(f"{key}={inner}") == argument else argument
+
+
 def quoted(text: str) -> str:
     """A text as Hydra reads it whatever it holds: backslashes escape quotes, and themselves before one alone."""
     inner = re.sub(r"(\\*)('|$)", lambda found: 2 * found[1] + ("\\'" if found[2] else ""), text)
