@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pandas as pd
+import pytest
 import torch
 
 from fitted_lights import make_fitted
@@ -86,6 +87,22 @@ def test_a_fit_tells_the_other_light_that_it_was_asked_for(tmp_path: Path) -> No
         "  ambient RGB (3.000, 2.000, 1.000) ± 0.010 W/(sr·unit²), 55 % of the light",
         "  lamps off RGB (1.500, 1.500, 1.500) ± unknown times, 20 % of the light",
     ]
+
+
+def test_a_fit_in_a_scene_that_was_scaled_says_where_lamps_are_in_its_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A lamp of a .blend was told at (0.332, 0.281, 0.014) alone, and not where it is in the file."""
+    info = tmp_path / "dataset_info.json"
+    monkeypatch.setattr("rgspipe.cli.outcome.origin_of", lambda path: info)
+    write_json(info, {"version": 1, "rescale": 0.25, "offset": [-2.0, -1.5, -1.25]})
+    fits = _fits(tmp_path, 1)
+    assert outcome(fits)[3] == (
+        "  in the scene's own file (1 here is 4 there): (2.4, 2.3, 2.45), (4, 3.5, 3.25); stage=export brings lamps "
+        "there"
+    )
+    write_json(info, {"version": 1, "rescale": 1.0, "offset": [0, 0, 0]})
+    assert not any("own file" in line for line in outcome(fits))
 
 
 def test_many_targets_are_a_row_a_class(tmp_path: Path) -> None:

@@ -15,16 +15,16 @@ from rgspipe.scene.grade import KnownLamps, SceneGrade
 @pytest.mark.parametrize(("psnr", "place"), [(None, None), (31.5, (0.5, -1.0, 2.0))])
 def test_a_grade_comes_back(tmp_path: Path, psnr: float | None, place: tuple[float, float, float] | None) -> None:
     lamps = None if place is None else KnownLamps(19, psnr and 0.01, 1.5)
-    grade = SceneGrade(psnr, 8, 0.02, 0.1, 0.05, 0.01, 0.0, place, lamps)
+    grade = SceneGrade(psnr, 8, 0.02, 0.1, 0.05, 0.01, 0.0, place, lamps, scale=0.0 if psnr else 0.2)
     save_grade(tmp_path / "grade.json", grade)
     assert load_grade(tmp_path / "grade.json") == grade
 
 
 def test_a_grade_of_before_lamps_were_asked_for_is_read(tmp_path: Path) -> None:
     content = SceneGrade(31.5, 8, 0.02, 0.1, 0.05, 0.01, 0.0).data()
-    del content["lamps"]
+    del content["lamps"], content["scale"]
     (tmp_path / "grade.json").write_text(json.dumps(content))
-    assert load_grade(tmp_path / "grade.json").lamps is None
+    assert load_grade(tmp_path / "grade.json").lamps is None and load_grade(tmp_path / "grade.json").scale == 0.0
 
 
 @pytest.mark.parametrize("lamps", [3, {"asked": 4, "error": None}, {"asked": 4, "error": 0.1, "excess": 0.5}])

@@ -143,6 +143,13 @@ def test_pictures_of_depth_are_refused(tmp_path: Path, kind: str) -> None:
         read_depth_image(DepthImage(tmp_path / "a.png", 1e-3))
 
 
+def test_depth_in_whole_metres_is_refused(tmp_path: Path) -> None:
+    """It is what `depth.astype(np.uint16)` leaves of metres; in millimetres no surface comes of it, without a word."""
+    Image.fromarray(np.array([[0, 1], [4, 65535]], np.uint16)).save(tmp_path / "a.png")
+    with pytest.raises(InputError, match="found levels up to 4, as of depth in metres that was rounded"):
+        read_depth_image(DepthImage(tmp_path / "a.png", 1e-3))
+
+
 def test_smaller_images_are_means_and_depth_of_planes_stays_in_them() -> None:
     (fine,), (coarse,) = room_views(1, 128), room_views(1, 32)
     lens = lens_of(fine)

@@ -22,6 +22,7 @@ from rgspipe.fitting.findings import (
     PoorScene,
     Rival,
     RoughShape,
+    ScaleOpen,
     Uncertain,
     Undetermined,
     gravest,
@@ -120,6 +121,12 @@ def test_findings_are_data() -> None:
 def test_a_poor_scene_is_no_place_for_an_answer_that_is_sure() -> None:
     assert gravest([PoorScene(0.05)]) is FitStatus.UNDETERMINED
     assert "The scene is poor: lights in it are expected to be off by 5 % of its size." in explained([PoorScene(0.05)])
+
+
+def test_a_scale_that_photographs_left_open_is_told_beside_a_sure_answer() -> None:
+    assert gravest([ScaleOpen(0.21)]) is FitStatus.CONVERGED
+    told = explained([ScaleOpen(0.21)])
+    assert told.startswith(MEANINGS[FitStatus.CONVERGED]) and "to 21 % only: all intensities may be off" in told
 
 
 def test_a_finding_names_the_settings_that_decided() -> None:

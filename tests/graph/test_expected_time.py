@@ -56,6 +56,13 @@ def test_other_scenes_tell_where_a_scene_has_no_runs_of_its_own(tmp_path: Path) 
     assert runs.expected(Key("hall", "train", 16 * "f"), SETTINGS) is None
 
 
+def test_scenes_that_are_read_tell_nothing_of_those_that_are_rendered(tmp_path: Path) -> None:
+    """A .blend's 28 images were expected in 2.8 s, which checking those of a scan had taken."""
+    put(tmp_path, 1, 2.8, {"scene.kind": "rgbd"})
+    assert expected(tmp_path, {"scene.kind": "blend", "dataset": {"samples": 48}}) is None
+    assert expected(tmp_path, {"scene.kind": "rgbd"}) == Expected(2.8, same=True)
+
+
 @pytest.mark.parametrize(
     "more",
     [

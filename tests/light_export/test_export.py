@@ -6,8 +6,11 @@ import ast
 import json
 import math
 import re
+import sys
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
+from types import SimpleNamespace
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
@@ -176,6 +179,31 @@ def test_blender_s_script_says_that_it_is_in_metres(tmp_path: Path) -> None:
     for metres, said in ((0.01, True), (1.0, False)):
         lines = export_lights(light, tmp_path, ["blend"], metres=metres).lines
         assert any("metres=1" in line for line in lines) is said
+
+
+def test_blender_s_script_runs_where_nothing_falls_off_softly(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Blender 3.4 and its like have no such switch; the script ended with an AttributeError."""
+
+    class Data(SimpleNamespace):
+        bl_rna = SimpleNamespace(properties=("energy", "color", "shadow_soft_size"))
+
+        def __setattr__(self, name: str, value: object) -> None:
+            assert name in self.bl_rna.properties
+            super().__setattr__(name, value)
+
+    made: list[Data] = []
+
+    def new(*_: object) -> Data:
+        made.append(Data())
+        return made[-1]
+
+    blender = MagicMock()
+    blender.data.lights.new = new
+    monkeypatch.setitem(sys.modules, "bpy", blender)
+    monkeypatch.setitem(sys.modules, "mathutils", MagicMock())
+    monkeypatch.setattr(sys, "argv", ["blender"])
+    exec(text(tmp_path, "blend", BY_KIND["point"]), {})
+    assert made[0].shadow_soft_size == 0.0 and made[0].energy == pytest.approx(8.0 * math.pi)
 
 
 def test_ies_files_have_the_candela_of_every_angle(tmp_path: Path) -> None:

@@ -7,10 +7,11 @@ import pytest
 import torch
 from hypothesis import given
 from hypothesis import strategies as st
+from PIL import Image
 
 from rgspipe.errors import InputError
 from rgspipe.scene import Camera, PointLight, SpotLight, look_at
-from rgspipe.scene.arrays import as_tensor
+from rgspipe.scene.arrays import as_tensor, check_levels
 from rgspipe.scene.lights import as_rig
 
 numbers = st.floats(-1e6, 1e6)
@@ -74,3 +75,16 @@ def test_one_light_is_a_rig() -> None:
     assert as_rig(light) == (light,) == as_rig([light])
     with pytest.raises(InputError, match=r"lights\[1\]: expected a light, found str"):
         as_rig([light, "lamp"])
+
+
+def test_levels_of_stored_images_are_no_radiance() -> None:
+    """PIL's images have no type of their own, and were taken for radiance of up to 255."""
+    stored = np.zeros((2, 2, 3), np.uint8)
+    for image in (stored, torch.from_numpy(stored), Image.fromarray(stored)):
+        with pytest.raises(InputError, match="found levels from 0 to 255"):
+            check_levels("images[0]", image)
+    for type_ in (np.uint16, ">u2"):
+        with pytest.raises(InputError, match="found levels from 0 to 65535"):
+            check_levels("images[0]", stored.astype(type_))
+    check_levels("images[0]", stored.astype(np.float32))
+    check_levels("images[0]", [[[0, 0, 1]]])

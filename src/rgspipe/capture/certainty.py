@@ -25,12 +25,10 @@ from rgspipe.capture.photographs import Numbers
 from rgspipe.capture.search import FoundLamps
 from rgspipe.capture.shared_errors import shared_covariance
 from rgspipe.capture.side_by_side import side_by_side
+from rgspipe.scene.grade import TIED
 
 #: Steps of the lamps without one of the scene's parts.
 STEPS = 6
-
-#: Standard deviation of the logarithm of all intensities together up to which their scale is tied down.
-TIED = 0.1
 
 
 @dataclass(frozen=True, eq=False)

@@ -160,8 +160,8 @@ def _doubts(found: Captured) -> Iterator[str]:
     if noise > DISAGREE:
         yield (
             f"Lamps and paint leave {100.0 * noise:.0f} % of a surface's light unexplained: detail that surfels are "
-            "too coarse for (surfels=…), gloss, or depth and poses that are off. Lamps may be missing, and places "
-            "worse than is said."
+            "too coarse for (surfels=…), gloss, a tone curve of the images, or depth and poses that are off. Lamps "
+            "may be missing, and places worse than is said."
         )
     if found.measured.error > DISAGREE:
         yield (

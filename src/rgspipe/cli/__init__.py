@@ -15,6 +15,7 @@ from rgspipe.cli.help import help_text, version_text
 from rgspipe.cli.messages import EXIT_INPUT, EXIT_INTERRUPTED, EXIT_UNREAD, show_input_error
 from rgspipe.errors import InputError
 from rgspipe.graph.resolver import StageLoader
+from rgspipe.plain_values import as_typed
 from rgspipe.program import typed
 from rgspipe.stages import load_stage
 from rgspipe.store.files import NO_ROOM
@@ -120,6 +121,7 @@ def _dispatch(arguments: list[str], stage_loader: StageLoader) -> int:
     _check_working_folder()
     if arguments[0] in COMMANDS:
         return COMMANDS[arguments[0]].load()(arguments[1:])
+    arguments = [as_typed(text) for text in arguments]
     if DRY_RUN in arguments:
         from rgspipe.cli.dry_run import dry_run
 

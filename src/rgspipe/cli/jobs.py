@@ -34,6 +34,7 @@ from rgspipe.cli.sweep_table import write_sweep_table
 from rgspipe.errors import InputError
 from rgspipe.graph.pipeline import Usual, run
 from rgspipe.graph.resolver import StageLoader
+from rgspipe.plain_values import quoted
 from rgspipe.stages import load_stage
 from rgspipe.store.artifacts import Artifact
 from rgspipe.store.files import NO_RIGHT
@@ -75,7 +76,7 @@ def run_jobs(overrides: Sequence[str], stage_loader: StageLoader, multirun: bool
     else:
         _make(folder, f"hydra.{mode}.dir", exist_ok=True)
     # Said again even where it was given: interpolations such as the time must not be resolved twice.
-    chosen = f"hydra.{mode}.dir={quoted(folder)}"
+    chosen = f"hydra.{mode}.dir={quoted(str(folder))}"
     # Worked out here: within a job Hydra composes nothing else.
     usual = usual_command(overrides, config, is_all)
     try:
@@ -174,12 +175,6 @@ def _make(folder: Path, key: str, exist_ok: bool) -> None:
             found=f"{folder}: {error.strerror}",
             remedy=f"Give another one: {key}=FOLDER.",
         ) from error
-
-
-def quoted(path: Path) -> str:
-    """A path as a value of Hydra's override grammar."""
-    text = str(path).replace("\\", "\\\\").replace("'", "\\'")
-    return f"'{text}'"
 
 
 def _job(values: DictConfig, stage_loader: StageLoader, usual: Usual | None, found: list[str]) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import pandas as pd
@@ -21,6 +22,9 @@ from rgspipe.fitting.findings import FitStatus
 from rgspipe.fitting.model.known_images import Strength
 from rgspipe.fitting.result_text import ambient_line, base_line, ending, light_line
 from rgspipe.fitting.words import MEANINGS
+from rgspipe.scene import LightRig
+from rgspipe.stages.scene.export import world_of
+from rgspipe.stages.scene.light_origin import origin_of
 from rgspipe.store.artifacts import Artifact
 
 #: Exposures that differ by less from 1 are those that were known.
@@ -55,9 +59,20 @@ def _fit(artifact: Artifact, row: Row) -> list[str]:
         head += f", PSNR {told['psnr']:.1f} dB"
     spread = dict(enumerate(spreads))
     lines = [f"  {light_line(light, spread.get(index))}" for index, light in enumerate(lights)]
+    lines += _in_file(path, lights)
     lines += [f"  {line}" for line in _known_light(told)]
     lines += [] if told["reason"] == MEANINGS[FitStatus.CONVERGED] else [f"  {told['reason']}"]
     return [head, *lines, *_exposures(told["exposures"]), *_advice(artifact, str(row["target"]))]
+
+
+def _in_file(path: Path, lights: LightRig) -> list[str]:
+    """Where lights are in the file that the scene was made from, if the scene was moved or scaled."""
+    world = world_of(1.0, origin_of(path))
+    places = [world.place(light.position).tolist() for light in lights if not light.distant]
+    if not places or (world.rescale == 1.0 and not any(world.offset)):
+        return []
+    told = ", ".join(f"({', '.join(f'{x:.4g}' for x in place)})" for place in places)
+    return [f"  in the scene's own file (1 here is {world.unit:.4g} there): {told}; stage=export brings lamps there"]
 
 
 def _known_light(told: Mapping[str, Any]) -> list[str]:

@@ -16,12 +16,13 @@ from typing import Any
 import yaml
 
 from rgspipe.cli.compose import check_sweep, compose_config, leaves_machine
-from rgspipe.cli.jobs import new_run_folder, quoted
+from rgspipe.cli.jobs import new_run_folder
 from rgspipe.cli.leading import lead_on
 from rgspipe.cli.messages import EXIT_FAILED
 from rgspipe.datasets.input_file import input_file
 from rgspipe.errors import InputError
 from rgspipe.machine.resources import resource_folder
+from rgspipe.plain_values import quoted
 from rgspipe.program import typed
 from rgspipe.store.status import read_statuses
 
@@ -101,7 +102,7 @@ def run_sequence(name: str, extra: Sequence[str], program: Sequence[str] = RGSPI
         print(f"[{number}/{len(steps)}] {typed(*command)}", flush=True)
         begin = time.perf_counter()
         key = "hydra.sweep.dir" if step.sweep else "hydra.run.dir"
-        code = _run([*program, *command, f"{key}={quoted(run_folder)}"])
+        code = _run([*program, *command, f"{key}={quoted(str(run_folder))}"])
         seconds.append(time.perf_counter() - begin)
         if code != 0:
             print(f"Step {number} ({step.stage}) failed; see {run_folder}. What is done is kept.", file=sys.stderr)

@@ -16,6 +16,9 @@ GRADE = "grade.json"
 #: What scenes that were asked for lamps have beside the other numbers.
 _LAMPS = "lamps"
 
+#: What scenes have whose lamps were not measured; 0 where it is missing.
+_SCALE = "scale"
+
 #: No number of a grade but its place is as large: PSNR is in decibels, the others are parts of the light.
 LARGEST = 1e6
 
@@ -31,7 +34,7 @@ def load_grade(path: Path) -> SceneGrade:
     Raises:
         InputError: no such file, no JSON, or a number is missing or impossible.
     """
-    content = read_json(path, "the grade of a scene")
+    content = {_SCALE: 0.0} | read_json(path, "the grade of a scene")
     names = [field.name for field in fields(SceneGrade) if field.name != _LAMPS]
     unknown = [name for name in names if name not in content or not _is_known(name, content[name])]
     if unknown:

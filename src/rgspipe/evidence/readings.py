@@ -18,9 +18,9 @@ Numbers = npt.NDArray[np.float64]
 #: From OpenGL's camera axes (x right, y up, z backwards) to OpenCV's (x right, y down, z forwards), and back.
 FLIP = np.diag([1.0, -1.0, -1.0, 1.0])
 
-#: What depths may have to be multiplied by: as they are, millimetres and metres taken for each other, and millimetres
-#: and steps of 1/5000 m.
-SCALES = (1.0, 0.001, 1000.0, 5.0, 0.2)
+#: What depths may have to be multiplied by: as they are; millimetres, centimetres and metres taken for each other; and
+#: millimetres and steps of 1/5000 m.
+SCALES = (1.0, 0.001, 1000.0, 0.01, 100.0, 0.1, 10.0, 5.0, 0.2)
 
 
 @dataclass(frozen=True)

@@ -8,14 +8,14 @@ direction, where any depth would agree.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from rgspipe.datasets.views import View
-from rgspipe.evidence.readings import Numbers, Pixels, PlacedView, Reading
+from rgspipe.evidence.readings import READINGS, Numbers, Pixels, PlacedView, Reading
 from rgspipe.training.initialise.depth_noise import relative_noise
 
 #: Views that are looked at, evenly spaced; pixels of each, and other views that each of these is put into.
@@ -63,6 +63,21 @@ class Agreement:
 
 
 @dataclass(frozen=True)
+class SharedPlaces:
+    """Points of one view that lie on the depth of another.
+
+    Attributes:
+        view, other: which.
+        source, target: rows and columns (N,) at which they show them.
+    """
+
+    view: int
+    other: int
+    source: tuple[Pixels, Pixels]
+    target: tuple[Pixels, Pixels]
+
+
+@dataclass(frozen=True)
 class Trials:
     """Which points of which views are put into which others; the same for every reading.
 
@@ -105,6 +120,17 @@ class Trials:
             for kind, outcome in enumerate(found):
                 counts[kind, sources] += outcome.reshape(len(sources), POINTS).sum(axis=1)
         return Agreement(*counts)
+
+    def shared(self) -> Iterator[SharedPlaces]:
+        """What pairs of views both show, by the files' own reading."""
+        placed = [PlacedView.of(view, READINGS[0], self.along_rays) for view in self.views]
+        for view, (rows, columns) in enumerate(self.pixels):
+            points = placed[view].points(rows, columns)
+            origins = placed[view].pose[None, :3, 3].repeat(POINTS, axis=0)
+            for other in self.partners[view]:
+                agrees, _ = _outcomes(placed[other], points, origins, self.tolerance)
+                row, column, _ = placed[other].project(points[agrees])
+                yield SharedPlaces(view, int(other), (rows[agrees], columns[agrees]), (row, column))
 
 
 def _outcomes(

@@ -226,6 +226,17 @@ class ExposureUnknown(Finding):
 
 
 @dataclass(frozen=True)
+class ScaleOpen(Finding):
+    """Intensities are known up to a factor that all share, as the scene's albedo is: its logarithm to `error`.
+
+    Standard deviations of intensities do not hold it.
+    """
+
+    error: float
+    status = FitStatus.CONVERGED
+
+
+@dataclass(frozen=True)
 class LampsLeftOut(Finding):
     """`count` times a lamp is in sight, in `views` of the views; its `pixels`, of all views, were left out."""
 

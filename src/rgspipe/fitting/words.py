@@ -27,6 +27,7 @@ from rgspipe.fitting.findings import (
     PoorScene,
     Rival,
     RoughShape,
+    ScaleOpen,
     Uncertain,
     Undetermined,
     gravest,
@@ -182,6 +183,11 @@ def _exposure(found: ExposureUnknown) -> str:
     return "One view cannot tell its exposure from the lights' intensity: intensities are relative to the exposure."
 
 
+def _scale_open(found: ScaleOpen) -> str:
+    known = f"The photographs of the scene tell the scale of intensities and albedo to {percent(found.error, 0)} only"
+    return f"{known}: all intensities may be off by that much together, beyond what ± says."
+
+
 def _hangs(found: Hangs) -> str:
     return f"{_the_light(found.number, found.count)} hangs {found.distance:.2g} (scene units) from its surface."
 
@@ -240,6 +246,7 @@ _WORDS: dict[type[Finding], Callable[..., str]] = {
     AllStepsTaken: _all_steps,
     MaybeOneMore: _maybe,
     ExposureUnknown: _exposure,
+    ScaleOpen: _scale_open,
     Hangs: _hangs,
     ExtentOpen: _extent_open,
     KindOpen: _kind_open,

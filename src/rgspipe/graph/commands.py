@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from rgspipe.plain_values import as_shown
 from rgspipe.program import typed
 
 
@@ -21,7 +22,7 @@ def command(
     own = {"stage", "upstream", *changes}
     kept = [text for text in overrides if text.split("=")[0].lstrip("+~") not in own]
     changed = [f"{key}={as_override(value)}" for key, value in changes.items()]
-    return typed(*(["-m"] if sweep else []), f"stage={stage}", *kept, *changed)
+    return typed(*(["-m"] if sweep else []), f"stage={stage}", *map(as_shown, [*kept, *changed]))
 
 
 def as_override(value: object) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import statistics
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from glob import escape
 from itertools import islice
@@ -20,6 +20,9 @@ COUNTED = 5
 
 #: At most so many are compared with the settings at hand: studies leave hundreds.
 LOOKED_AT = 50
+
+#: The setting by which a stage does other work: images of one kind of scene are rendered, of another read.
+WORK = "scene.kind"
 
 #: What of a machine decides over times; versions of Python and of the system do so little.
 SAME = ("processor", "cores")
@@ -51,14 +54,14 @@ class EarlierRuns:
     )
 
     def expected(self, key: Key, config: Mapping[str, Any]) -> Expected | None:
-        """What making an artifact is expected to take; None where its stage was never made here.
+        """What making an artifact is expected to take; None where such work was never done here.
 
         Args:
             key: of the artifact.
             config: the settings that it depends on.
         """
-        own = self._runs(key.scene, key.stage)
-        made = own or self._runs(None, key.stage)
+        own = _alike(self._runs(key.scene, key.stage), config)
+        made = own or _alike(self._runs(None, key.stage), config)
         runs = [(len(config_differences(config, one["config"])), one["seconds"]) for one in made]
         if not runs:
             return None
@@ -86,6 +89,11 @@ class EarlierRuns:
                 continue
             if artifact is not None:
                 yield artifact.manifest
+
+
+def _alike(made: Sequence[Mapping[str, Any]], config: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """Those of the runs that did the same work."""
+    return [one for one in made if one["config"].get(WORK) == config.get(WORK)]
 
 
 def in_words(seconds: float) -> str:

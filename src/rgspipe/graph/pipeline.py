@@ -22,6 +22,7 @@ from rgspipe.graph.nodes import Making, Node, indispensable
 from rgspipe.graph.resolver import Resolver, StageLoader
 from rgspipe.graph.variants import variant_name
 from rgspipe.graph.without_effect import without_effect
+from rgspipe.plain_values import as_shown
 from rgspipe.renderer.device import chosen_device
 from rgspipe.store.artifacts import Artifact, ArtifactStore, Key
 from rgspipe.store.fingerprints import differences
@@ -131,7 +132,8 @@ def told_plan(config: RgspipeConfig, load_stage: StageLoader, overrides: Sequenc
 
 def _told_idle(overrides: Sequence[str]) -> list[str]:
     """The line about overrides that have no effect, if there are any."""
-    return [f"No effect on this stage, nor on what it needs: {', '.join(overrides)}"] if overrides else []
+    told = ", ".join(map(as_shown, overrides))
+    return [f"No effect on this stage, nor on what it needs: {told}"] if told else []
 
 
 def describe_plan(steps: Sequence[PlannedStep]) -> str:

@@ -34,7 +34,9 @@ def lamp(name, kind, watts, colour, pose, **fields):
     data = bpy.data.lights.new(name, kind)
     data.energy, data.color = watts, colour
     for field, value in fields.items():
-        setattr(data, field, value)
+        # Before Blender 4 there is no soft falloff to be switched off.
+        if field != "use_soft_falloff" or field in data.bl_rna.properties:
+            setattr(data, field, value)
     item = bpy.data.objects.new(name, data)
     item.matrix_world = Matrix(pose)
     bpy.context.scene.collection.objects.link(item)

@@ -27,6 +27,9 @@ SHAPE_REMEDY = "Pass them in this shape."
 #: Noise reaches about as far below zero as above it; what reaches so many times as far is a broken pixel.
 NOISE = 2.0
 
+#: Bits of a level, by what the types of stored images are called, in numpy, torch, and the protocol of arrays.
+LEVELS = {"uint8": 8, "u1": 8, "uint16": 16, "u2": 16}
+
 #: Kinds of devices that there are kernels for.
 DEVICES = ("cpu", "cuda")
 
@@ -121,18 +124,19 @@ def check_radiance(where: object, least: float, most: float) -> None:
 
 
 def check_levels(where: object, image: object) -> None:
-    """Refuse an image of 8 bits where radiance is meant.
+    """Refuse an image of 8 or 16 bits, an array, a tensor or one of PIL's, where radiance is meant.
 
     Raises:
         InputError: it is one.
     """
-    if "uint8" in str(getattr(image, "dtype", "")):
-        raise InputError(
-            where,
-            expected="linear radiance, as floats",
-            found="levels from 0 to 255",
-            remedy="rg.load_views reads files as radiance, and rgspipe.scene.srgb.decode makes it of levels / 255.",
-        )
+    stored = getattr(image, "dtype", None) or getattr(image, "__array_interface__", {}).get("typestr", "")
+    bits = next((bits for name, bits in LEVELS.items() if name in str(stored)), 0)
+    if bits:
+        most = 2**bits - 1
+        remedy = f"rg.load_views reads files as radiance, and rgspipe.scene.srgb.decode makes it of levels / {most}"
+        remedy += ", which are radiance as they are if no curve was put on them." if bits > 8 else "."
+        found = f"levels from 0 to {most}"
+        raise InputError(where, expected="linear radiance, as floats", found=found, remedy=remedy)
 
 
 def _from_numbers(value: object, name: str, shape: Sequence[Axis], remedy: str) -> Tensor:

@@ -15,6 +15,10 @@ ERROR_PER_LIGHT = 0.1
 GOOD, FAIR = 0.01, 0.03
 
 
+#: Standard deviation of the logarithm of all intensities together up to which their scale is tied down.
+TIED = 0.1
+
+
 class Grade(StrEnum):
     """What a scene is fit for."""
 
@@ -54,6 +58,8 @@ class SceneGrade:
         at_bound: area of the surfels whose albedo is as high as it may be, as if light were missing.
         unseen_at: (x, y, z) around which most of what is guessed or missing lies, scene units; None where nothing is.
         lamps: what was found of lamps that are known; None before any is asked for.
+        scale: standard deviation of the logarithm of the scale that all intensities share, as photographs under unknown
+            lamps leave it open; the albedo has the same, the other way round. 0 where lamps were measured.
     """
 
     psnr: float | None
@@ -65,6 +71,7 @@ class SceneGrade:
     at_bound: float
     unseen_at: tuple[float, float, float] | None = None
     lamps: KnownLamps | None = None
+    scale: float = 0.0
 
     @property
     def light_error(self) -> float:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from rgspipe.plain_values import as_shown
 from rgspipe.store.files import write_json
 from rgspipe.store.strict_json import parse_json
 
@@ -48,7 +49,7 @@ log = logging.getLogger(__name__)
 
 def _command(overrides: Sequence[str]) -> str:
     """How a run is started again, quoted for a shell."""
-    return shlex.join(["python", "-m", "rgspipe", *overrides])
+    return shlex.join(["python", "-m", "rgspipe", *map(as_shown, overrides)])
 
 
 def _now() -> str:

@@ -146,3 +146,30 @@ def test_a_capture_goes_all_the_way_to_its_lamp(tmp_path: Path) -> None:
     ratio = float((lamp.intensity * white / LAMPS[0].intensity).mean())
     assert error < 0.02, error
     assert abs(ratio - 1.0) < 0.1, ratio
+
+
+def test_images_of_the_next_frame_are_refused(capture: Path, tmp_path: Path) -> None:
+    """Poses and depth agree with each other, so that nothing was said."""
+    path = capture / "transforms.json"
+    content = json.loads(path.read_text())
+    names = [frame["file_path"] for frame in content["frames"]]
+    for frame, name in zip(content["frames"], [*names[1:], names[0]], strict=True):
+        frame["file_path"] = name
+    path.write_text(json.dumps(content))
+    with pytest.raises(InputError, match=r"taken for those of the previous frame.*Put each image to the frame after"):
+        imported(capture, tmp_path / "imported")
+
+
+def test_a_single_photograph_that_stands_elsewhere_is_named(
+    capture: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def moved(poses: np.ndarray) -> np.ndarray:
+        poses[5, :3, 3] += (0.25, 0.0, 0.0)
+        return poses
+
+    imported(capture, tmp_path / "right")
+    assert "warning" not in capsys.readouterr().out
+    change(capture, moved)
+    imported(capture, tmp_path / "moved")
+    name = Path(json.loads((capture / "transforms.json").read_text())["frames"][5]["file_path"]).name
+    assert f"warning: {name}: " in capsys.readouterr().out

@@ -144,6 +144,24 @@ def test_a_poor_scene_is_refused_unless_it_is_asked_for_and_then_says_so(inputs,
     assert (table["result"] == "undetermined").all() and table["reason"].str.contains("The scene is poor").all()
 
 
+def test_lights_in_a_captured_scene_say_that_its_scale_is_open(inputs, tmp_path):
+    """Under unknown lamps intensities came out 18 % too faint with ± 7 %, as the albedo was too bright."""
+    told = {}
+    for scale in (0.05, 0.21):
+
+        def captured(folder: Path, scale: float = scale) -> None:
+            for path in inputs["freeze"].folder().iterdir():
+                if path.name != MANIFEST:
+                    shutil.copy(path, folder)
+            save_grade(folder / GRADE, SceneGrade(None, 8, 0.0, 0.0, 0.0, 0.0, 0.0, scale=scale))
+
+        graded = inputs | {"freeze": _build(tmp_path / f"store_{scale}", "freeze", captured)}
+        told[scale] = _fit(graded, tmp_path / f"fit_{scale}", fit__limit=1)
+    assert all((table["result"] == "converged").all() for table in told.values())
+    assert told[0.21]["reason"].str.contains("scale of intensities and albedo to 21 % only").all()
+    assert not told[0.05]["reason"].str.contains("scale of").any()
+
+
 def test_a_grade_goes_with_the_surfels_to_the_frozen_scene(tmp_path):
     grade = SceneGrade(43.0, 8, 0.01, 0.02, 0.005, 0.01, 0.0, (0.1, 0.2, -0.3))
 

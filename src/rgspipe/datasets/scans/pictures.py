@@ -26,6 +26,9 @@ OPAQUE = 1.0 - 1e-3
 #: Level of 16-bit depth that tells no distance.
 FARTHEST = 65535
 
+#: Depth whose largest level is below this is rounded by more than 2 % everywhere: no surface comes of it.
+FEWEST_STEPS = 25
+
 Pixels = npt.NDArray[np.float32]
 
 
@@ -113,6 +116,14 @@ def _stored_depth(path: Path) -> npt.NDArray[np.float64]:
             remedy="Export the depth itself.",
         )
     # The highest level is all that is too far as well, or nothing measured.
+    measured = levels[(levels > 0) & (levels < FARTHEST)]
+    if len(measured) and measured.max() < FEWEST_STEPS:
+        raise InputError(
+            path,
+            expected=f"depth in steps that are small beside it, so levels of {FEWEST_STEPS} and more",
+            found=f"levels up to {measured.max()}, as of depth in metres that was rounded",
+            remedy="Multiply depth by 1000, for millimetres, before it is made whole numbers.",
+        )
     return np.where(levels == FARTHEST, np.nan, levels.astype(np.float64))[..., 0]
 
 

@@ -17,11 +17,12 @@ from rgspipe.fitting.findings import (
     OutOfSteps,
     PoorlyExplained,
     PoorScene,
+    ScaleOpen,
 )
 from rgspipe.fitting.options import BarOptions, CertaintyOptions
 from rgspipe.fitting.search.compare import robust_costs, wanted
 from rgspipe.fitting.search.refine import Refiner, State
-from rgspipe.scene.grade import Grade
+from rgspipe.scene.grade import TIED, Grade
 
 
 def standing(
@@ -43,6 +44,7 @@ def standing(
         *([PoorlyExplained(loss)] if loss > options.poorly else []),
         *([PoorScene(grade.error)] if grade is not None and grade.grade is Grade.POOR else []),
         *doubts(state.lights(problem), covariance, problem.views.frozen.bvh.surfels, region.size, options),
+        *([ScaleOpen(grade.scale)] if grade is not None and grade.scale > TIED else []),
         *([OutOfSteps()] if state.status is FitStatus.MAX_ITERATIONS else []),
     ]
 

@@ -14,11 +14,13 @@ from rgspipe.config import RgspipeConfig
 from rgspipe.config.scene import MODELLED
 from rgspipe.datasets.blend_links import blend_links
 from rgspipe.datasets.gs3 import load_dataset
+from rgspipe.datasets.info import read_info
 from rgspipe.datasets.location import point_at_dataset
 from rgspipe.datasets.read_files import files_read
 from rgspipe.datasets.views import Dataset
 from rgspipe.errors import InputError
 from rgspipe.stages.base import Stage, StageContext
+from rgspipe.stages.images.astray_views import tell_astray
 from rgspipe.stages.images.check_conventions import check_conventions
 from rgspipe.stages.images.scene_model import scene_model
 from rgspipe.stages.sources import require_images
@@ -37,7 +39,10 @@ LISTED = 3
 def run(context: StageContext) -> None:
     """Leave a dataset in the stage's folder, or a pointer to one that is there, which is checked first."""
     if context.config.scene.kind == "external":
-        _take(context, _existing_path(context.config, "the folder of a dataset"))
+        dataset = _take(context, _existing_path(context.config, "the folder of a dataset"))
+        info = read_info(dataset.root)
+        along_rays = info is not None and info.depth_convention == "ray_distance"
+        tell_astray(dataset.train, [view.name for view in dataset.train], along_rays)
     elif context.config.scene.is_capture:
         _take(context, context.inputs["import_scan"].folder())
     else:
@@ -58,13 +63,14 @@ def dataset_job(config: RgspipeConfig) -> DatasetJob:
     return DatasetJob(scene=config.scene.folder, model=scene_model(scene), **vars(config.dataset))
 
 
-def _take(context: StageContext, root: Path) -> None:
+def _take(context: StageContext, root: Path) -> Dataset:
     """Read every file of a dataset that is there, so that what is wrong shows now and not an hour later."""
     dataset = load_dataset(root)
     check_conventions(dataset)
     point_at_dataset(context.folder, root)
     context.note(train=len(dataset.train), test=len(dataset.test), targets=len(dataset.targets))
     _tell_saturated(dataset, context)
+    return dataset
 
 
 def _tell_saturated(dataset: Dataset, context: StageContext) -> None:

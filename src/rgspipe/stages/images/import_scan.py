@@ -16,8 +16,9 @@ from rgspipe.datasets.scans.layouts import read_scan
 from rgspipe.errors import InputError
 from rgspipe.renderer.mesh_passes import MeshPasses
 from rgspipe.stages.base import Stage, StageContext
+from rgspipe.stages.images.astray_views import tell_astray
 from rgspipe.stages.images.mesh_conventions import check_mesh
-from rgspipe.stages.images.scan_conventions import check_scan
+from rgspipe.stages.images.scan_conventions import check_images, check_scan
 from rgspipe.stages.sources import mesh_path
 
 
@@ -30,6 +31,8 @@ def run(context: StageContext) -> None:
     views = load_dataset(context.folder, targets=False).train
     if mesh is None:
         check_scan(scan, views)
+        check_images(scan, views)
+        tell_astray(views, [frame.image.name for frame in scan.frames])
     else:
         check_mesh(scan, views, mesh, mesh_path(config), config.scene.mesh)
     for words in (imported.words(scan.layout), *(() if mesh is None else mesh.remarks)):

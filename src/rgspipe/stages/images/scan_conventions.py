@@ -8,6 +8,7 @@ from rgspipe.datasets.scans.frame import Scan
 from rgspipe.datasets.views import View
 from rgspipe.errors import InputError
 from rgspipe.evidence.conventions import ViewFinding, contradicted, misread
+from rgspipe.evidence.image_order import misplaced_images
 from rgspipe.evidence.readings import Reading
 from rgspipe.evidence.reprojection import Agreement
 
@@ -34,6 +35,23 @@ def check_scan(scan: Scan, views: Sequence[View]) -> None:
             found=f"{_share(stated)} agreeing, under no axes and no unit that is known",
             remedy="Poses may be of other photographs: check that lines or files are in the order of the images, that "
             "rows of matrices are in theirs, and that depth belongs to the photographs.",
+        )
+
+
+def check_images(scan: Scan, views: Sequence[View]) -> None:
+    """Refuse a capture whose images are not those of its frames.
+
+    Raises:
+        InputError: naming where they seem to belong.
+    """
+    finding = misplaced_images(views)
+    if finding is not None:
+        raise InputError(
+            scan.stated,
+            expected="images that belong to their poses and depth, in which the same places are as bright as in others",
+            found=f"a rank correlation of {finding.found:.2f} with images taken for {finding.words}, and "
+            f"{finding.stated:.2f} as read",
+            remedy=finding.remedy,
         )
 
 

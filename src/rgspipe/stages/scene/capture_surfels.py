@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -142,7 +142,8 @@ def _grade(frozen: FrozenScene, found: Captured, views: Sequence[View], held_out
     else:
         images, psnr = held_out.images, held_out.summary()["test_psnr_mean"]
         truths = [view.image for view in held_out.views]
-    return grade_scene(frozen, images, truths, cameras=cameras, psnr=psnr, highest_albedo=ALBEDO_RANGE[1])
+    grade = grade_scene(frozen, images, truths, cameras=cameras, psnr=psnr, highest_albedo=ALBEDO_RANGE[1])
+    return replace(grade, scale=float(found.certainty.scale))
 
 
 def _evened(found: Captured, index: int, view: View) -> torch.Tensor:
