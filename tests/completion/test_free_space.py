@@ -135,3 +135,14 @@ def test_rays_that_meet_nothing_look_through_all_of_the_box() -> None:
     away = camera_at([-2.0, 0.5, 0.5], [0.5, 0.5, 0.5], 64, 0.6)
     beside = replace(wall, centers=wall.centers + torch.tensor([0.0, 5.0, 0.0]))
     assert bool(free(beside, away)[:, 10:15, 10:15].all())
+
+
+def test_a_pixel_beside_an_edge_sees_past_it_and_the_rays_around_a_point_do_not() -> None:
+    """A wall at y = 0.5 ends at x = 0.5; the middle ray of nine pixels goes past it at x = 0.51."""
+    wall = surfels_on(rectangle([-1.0, 0.5, -1.0], [1.5, 0.0, 0.0], [0.0, 0.0, 3.0], [0.5, 0.5, 0.5]), 1500)
+    camera = camera_at([0.51, 0.0, 0.5], [0.51, 1.0, 0.5], 9, 1.2)
+    space = SeenSpace.of(SurfelBvh(wall), [camera])
+    # The way to the first goes through the wall; the second lies on the middle ray, and the last in the next pixel.
+    points = torch.tensor([[0.46, 1.0, 0.5], [0.51, 1.0, 0.5], [0.75, 1.0, 0.5]])
+    assert space.holds(points, 0.0).tolist() == [True, True, True]
+    assert space.holds(points, 0.0, around=True).tolist() == [False, True, True]

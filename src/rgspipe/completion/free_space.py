@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 import torch
@@ -92,15 +93,20 @@ class SeenSpace:
         known = depths or [None] * len(reduced)
         return cls(reduced, tuple(_reach(bvh, *one) for one in zip(reduced, known, strict=True)))
 
-    def holds(self, points: Tensor, margin: float) -> Tensor:
-        """(P,) bool: points (P, 3) that lie nearer to a camera, by `margin`, than the surface behind them."""
+    def holds(self, points: Tensor, margin: float, *, around: bool = False) -> Tensor:
+        """(P,) bool: points (P, 3) that lie nearer to a camera, by `margin`, than the surface behind them.
+
+        Args:
+            around: the surface is that which is nearest of what the four rays around a point meet, or else that of its
+                own pixel. Beside the edge of a thing this one's ray may go past it, and that through the point not.
+        """
         free = torch.zeros(len(points), dtype=torch.bool)
         for first in range(0, len(self.cameras), AT_ONCE):
             unseen = (~free).nonzero()[:, 0]
-            free[unseen] = self._seen_by_some(slice(first, first + AT_ONCE), points[unseen].double(), margin)
+            free[unseen] = self._seen_by_some(slice(first, first + AT_ONCE), points[unseen].double(), margin, around)
         return free
 
-    def _seen_by_some(self, cameras: slice, points: Tensor, margin: float) -> Tensor:
+    def _seen_by_some(self, cameras: slice, points: Tensor, margin: float, around: bool) -> Tensor:
         """(P,) bool: what some of the cameras (C,) see of points (P, 3), as in `holds`."""
         origins, rotations, lenses, sizes, starts, reaches = self._stacked
         fx, fy, cx, cy = lenses[cameras, :, None].unbind(1)
@@ -109,10 +115,15 @@ class SeenSpace:
         local = (points - origins[cameras, None]) @ rotations[cameras]
         depth = -local[:, :, 2]
         scale = 1.0 / torch.where(depth.abs() > 1e-12, depth, 1e-12)
-        column, row = (cx + fx * local[:, :, 0] * scale).floor(), (cy - fy * local[:, :, 1] * scale).floor()
-        framed = (depth > 0) & (column >= 0) & (column < width) & (row >= 0) & (row < height)
-        pixel = starts[cameras, None] + torch.where(framed, row * width + column, 0.0).long()
-        return (framed & (local.norm(dim=2) < reaches[pixel] - margin)).any(dim=0)
+        u, v = cx + fx * local[:, :, 0] * scale, cy - fy * local[:, :, 1] * scale
+        framed = (depth > 0) & (u >= 0.0) & (u < width) & (v >= 0.0) & (v < height)
+        reach = torch.full_like(depth, torch.inf)
+        for across, down in product((-0.5, 0.5), repeat=2) if around else [(0.0, 0.0)]:
+            column, row = (u + across).floor().clamp(min=0.0), (v + down).floor().clamp(min=0.0)
+            inside = torch.minimum(row, height - 1.0) * width + torch.minimum(column, width - 1.0)
+            pixel = starts[cameras, None] + torch.where(framed, inside, 0.0).long()
+            reach = torch.minimum(reach, reaches[pixel])
+        return (framed & (local.norm(dim=2) < reach - margin)).any(dim=0)
 
     @cached_property
     def _stacked(self) -> tuple[Tensor, ...]:

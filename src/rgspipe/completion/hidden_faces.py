@@ -83,7 +83,8 @@ class _WayBack:
         others = np.delete(centers, edge.sheet.plane.members.numpy(), axis=0)
         met = ~grid.contains(places) | are_near(others, places, BARE * spacing)
         behind = torch.from_numpy(places - BEYOND * spacing * edge.outward)
-        seen_through = space.holds(behind, 0.0).numpy().reshape(len(edge.places), len(steps))
+        # Cameras nearly in line with the face see past the edge in pixels that cover more than that.
+        seen_through = space.holds(behind, 0.0, around=True).numpy().reshape(len(edge.places), len(steps))
         # Rays that graze the edge are taken to pass behind it.
         return cls(edge, places, met.reshape(seen_through.shape), seen_through & (steps > GRAZED * spacing))
 
