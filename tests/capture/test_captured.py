@@ -51,6 +51,13 @@ def test_both_lamps_are_found_and_no_third() -> None:
     assert np.abs(ratios - 1.0).max() < 0.05, ratios  # 0.005
 
 
+def test_lamps_are_counted_by_steps_alone_and_settle_with_bends() -> None:
+    """A lamp that is left out looks like paint that changes slowly: in uneven paint the second one went unseen."""
+    answer = found().answer
+    assert all(one.more.problem.field.graph.bent is None for one in answer.compared)
+    assert answer.best.problem.field.graph.bent is not None
+
+
 def test_exposures_that_nobody_spoke_of_are_told() -> None:
     assert "differ in exposure" not in captured_words(found())
     cameras = replace(found().measured.cameras, exposure="free", gains=np.linspace(0.8, 1.2, 14)[:, None].repeat(3, 1))

@@ -73,13 +73,21 @@ def test_each_surface_is_as_rough_and_as_grainy_as_is_said_of_it(field: Field) -
     factors[2] = 9.0
     own, measured = field.graph.surfaces == 2, np.where(np.isfinite(field.measured), 0.0, np.inf)
     varied = replace(field, measured=measured, rough=factors, grain=factors)
-    alike = replace(
-        field, measured=measured, variances=replace(VARIANCES, step=9 * VARIANCES.step, noise=9 * VARIANCES.noise)
-    )
+    wide = Variances(9 * VARIANCES.step, VARIANCES.surface, 9 * VARIANCES.noise, 9 * VARIANCES.bend)
+    alike = replace(field, measured=measured, variances=wide)
     r = residual(field) * own[:, None]
     np.testing.assert_allclose(varied.whitened(r)[own], alike.whitened(r)[own], rtol=1e-9, atol=1e-9)
     plain = replace(field, measured=measured)
     np.testing.assert_allclose(varied.weight[~own], plain.weight[~own])
+
+
+def test_paint_that_changes_evenly_along_a_wall_has_steps_and_no_bends(graph: Graph) -> None:
+    """Up to the edges of each wall and into its corners: nothing ties paint to be level there."""
+    centers = closed_box(1 / 7).centers.numpy()
+    ramp = (centers @ np.random.default_rng(3).normal(size=(3, 2))) + graph.surfaces[:, None]
+    assert graph.bends(ramp).max() < 1e-12 < graph.steps(ramp).min()
+    waves = np.sin(9.0 * centers)
+    assert graph.bends(waves).min() > 1.0  # 8.3
 
 
 def test_neighbours_of_other_predicted_paint_are_not_of_one_surface() -> None:

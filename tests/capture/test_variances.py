@@ -20,11 +20,11 @@ def graph() -> Graph:
     return Graph.of(surfels, np.full((len(surfels), 3), 0.5))
 
 
-def drawn(graph: Graph, rough: np.ndarray, grain: np.ndarray) -> np.ndarray:
+def drawn(graph: Graph, rough: np.ndarray, grain: np.ndarray, true: Variances = TRUE) -> np.ndarray:
     """(N, 3) residuals of surfaces that are as rough and as grainy (S,) as that."""
     rng, count = np.random.default_rng(0), len(graph.sizes)
-    root = np.linalg.cholesky(np.linalg.inv(graph.precision(TRUE, rough).toarray()))
-    noise = np.sqrt(TRUE.noise * grain[graph.surfaces])[:, None]
+    root = np.linalg.cholesky(np.linalg.inv(graph.precision(true, rough).toarray()))
+    noise = np.sqrt(true.noise * grain[graph.surfaces])[:, None]
     return root @ rng.normal(size=(count, 3)) + noise * rng.normal(size=(count, 3))
 
 
@@ -43,6 +43,17 @@ def test_variances_are_those_that_a_field_was_drawn_with(graph: Graph) -> None:
     # What one draw of twelve surfaces tells of their smooth part and of their means.
     assert found.variances.step == pytest.approx(TRUE.step, rel=0.6)  # 0.97
     assert found.variances.surface == pytest.approx(TRUE.surface, rel=0.6)  # 0.83
+
+
+def test_paint_that_changes_slowly_has_little_of_bends_and_leaves_steps_free(graph: Graph) -> None:
+    """Steps ten times as wide as bends: a field of steps alone would have to take both for one."""
+    true = Variances(0.5**2, TRUE.surface, 0.02**2, 0.05**2)
+    residual = drawn(graph, alike(graph), alike(graph), true)
+    found = with_likely_variances(unknown(graph), residual)
+    assert found.variances.bend == pytest.approx(true.bend, rel=0.6)  # 0.89
+    assert found.variances.step == pytest.approx(true.step, rel=0.6)  # 1.20
+    steps = with_likely_variances(replace(unknown(graph), graph=replace(graph, bent=None)), residual)
+    assert found.deviance(residual) < steps.deviance(residual) - 100.0
 
 
 @pytest.mark.parametrize(("rough", "grain"), [(36.0, 1.0), (1.0, 36.0)])

@@ -3,15 +3,17 @@
 Each surfel's log-albedo is z = m + s, with m what was predicted (or grey) and s a Gaussian field that differs little
 between neighbours of one surface:
 
-    s ~ N(0, Q⁻¹) ,    Q = λ Σ_(i,j) w_ij / √(h_i h_j) (e_i − e_j)(e_i − e_j)ᵀ + diag(1 / (τ² n_i)) ,
+    s ~ N(0, Q⁻¹) ,
+    Q = λ Σ_(i,j) w_ij / √(h_i h_j) (e_i − e_j)(e_i − e_j)ᵀ + β Σ_i b_i b_iᵀ / h_i + diag(1 / (τ² n_i)) ,
 
-n_i the surfels of i's surface, so that the mean of a surface has the variance τ², and h_i how rough that surface is
-beside the others. What is measured of it, r = z − m + noise with the variances v_i + σ² g_i, g_i the grain of the
-surface, then has the covariance Σ = diag(v + σ² g) + Q⁻¹, and
+n_i the surfels of i's surface, so that the mean of a surface has the variance τ², h_i how rough that surface is beside
+the others, and b_iᵀ s what i is off the plane through its neighbours (`capture.planes`): paint that changes slowly has
+steps and hardly bends, rough paint has both. What is measured of it, r = z − m + noise with the variances v_i + σ² g_i,
+g_i the grain of the surface, then has the covariance Σ = diag(v + σ² g) + Q⁻¹, and
 
     −2 log p(r) = rᵀ Σ⁻¹ r + log det Σ ,     Σ⁻¹ = D − D (D + Q)⁻¹ D ,    D = diag(1/(v + σ² g))
 
-with one sparse factorisation. λ, τ, σ, h and g are found by what was measured (`capture.variances`).
+with one sparse factorisation. λ, β, τ, σ, h and g are found by what was measured (`capture.variances`).
 """
 
 from __future__ import annotations
@@ -26,6 +28,7 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
 from rgspipe.capture.photographs import Numbers
+from rgspipe.capture.planes import off_planes
 from rgspipe.capture.radiance import factorised
 from rgspipe.scene.spacing import surfel_spacing
 from rgspipe.scene.surfels import Surfels
@@ -47,11 +50,13 @@ class Variances:
         surface: of the mean of a surface, τ².
         noise: of a measurement beside what its pixels say, σ²: errors of the gather and of the geometry, and texture
             that is finer than surfels.
+        bend: of what a surfel is off the plane through its neighbours, 1/β.
     """
 
     step: float = 0.03**2
     surface: float = 0.5**2
     noise: float = 0.05**2
+    bend: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,12 +67,14 @@ class Graph:
         first, second: (E,) int64 surfels.
         weight: (E,) in [0, 1].
         surfaces: (N,) int, number of the surface that each surfel is of.
+        bent: (N, N) B, what each is off the plane through its neighbours on a surface; None where that says nothing.
     """
 
     first: np.ndarray
     second: np.ndarray
     weight: Numbers
     surfaces: np.ndarray
+    bent: sp.csr_matrix | None = None
 
     @classmethod
     def of(cls, surfels: Surfels, predicted: Numbers) -> Graph:
@@ -81,7 +88,9 @@ class Graph:
         joined, count = weight > APART, len(surfels)
         adjacency = sp.coo_matrix((weight[joined], (first[joined], second[joined])), (count, count))
         labels = connected_components(adjacency, directed=False)[1]
-        return cls(first, second, weight, labels)
+        graph = cls(first, second, weight, labels)
+        places, normals = (part.double().cpu().numpy() for part in (surfels.centers, surfels.normals))
+        return replace(graph, bent=off_planes(places, normals, graph._inner_edges))
 
     @cached_property
     def sizes(self) -> Numbers:
@@ -99,7 +108,12 @@ class Graph:
         diagonal += np.bincount(first, weight, count) + np.bincount(second, weight, count)
         every = np.arange(count)
         rows, columns = np.concatenate([first, second, every]), np.concatenate([second, first, every])
-        return sp.csc_matrix((np.concatenate([-weight, -weight, diagonal]), (rows, columns)), (count, count))
+        steps = sp.csc_matrix((np.concatenate([-weight, -weight, diagonal]), (rows, columns)), (count, count))
+        if self.bent is None:
+            return steps
+        own = 1.0 if rough is None else rough[self.surfaces]
+        bends = sp.diags(np.ones(count) / (variances.bend * own))
+        return (steps + self.bent.T @ bends @ self.bent).tocsc()
 
     @cached_property
     def edges(self) -> tuple[np.ndarray, np.ndarray, Numbers]:
@@ -110,6 +124,13 @@ class Graph:
         return pairs.row, pairs.col, pairs.data
 
     def bends(self, values: Numbers) -> Numbers:
+        """(S,) mean of sᵀ H_k s of fields (N, K) over these, H_k = Bᵀ B of surface k."""
+        if self.bent is None:
+            return np.zeros(self.surfaces.max() + 1)
+        squares = ((self.bent @ values) ** 2).mean(axis=1)
+        return np.bincount(self.surfaces, squares)
+
+    def steps(self, values: Numbers) -> Numbers:
         """(S,) mean of sᵀ L_k s of fields (N, K) over these, L_k the steps within surface k."""
         first, second, weight = self._inner_edges
         steps = values[first] - values[second]
@@ -220,10 +241,11 @@ class Field:
 
     def draws(self, samples: int, seed: int) -> Numbers:
         """(N, samples) the field beside its mean, as it may be after the measurements."""
-        factors, rng = self._posterior, np.random.default_rng(seed)
-        # With D + Q = P' L U P and U = diag(U) L', what has this covariance is P' L √diag(U) times white noise.
-        white = np.sqrt(factors.U.diagonal())[:, None] * rng.standard_normal((len(self.trust), samples))
-        return factors.solve((factors.L @ white)[factors.perm_r])
+        return _drawn(self._posterior, samples, seed)
+
+    def draws_before(self, samples: int, seed: int) -> Numbers:
+        """(N, samples) the field as it may be before the measurements, and before what is known from elsewhere."""
+        return _drawn(factorised(self.precision), samples, seed)
 
     def deviation(self, samples: int, seed: int) -> Numbers:
         """(N,) standard deviation of the field after the measurements, by draws of it in every channel."""
@@ -246,6 +268,13 @@ class Field:
         determinant = _log_determinant(self._posterior) - np.log(self.weight[kept]).sum()
         determinant -= _log_determinant(factorised(self._prior)) if before is None else before
         return float((residual * self.whitened(residual)).sum() + residual.shape[1] * determinant)
+
+
+def _drawn(factors: sp.linalg.SuperLU, samples: int, seed: int) -> Numbers:
+    """(N, samples) draws of the precision that was factorised."""
+    # With D + Q = P' L U P and U = diag(U) L', what has this covariance is P' L √diag(U) times white noise.
+    white = np.random.default_rng(seed).standard_normal((factors.shape[0], samples))
+    return factors.solve((factors.L @ (np.sqrt(factors.U.diagonal())[:, None] * white))[factors.perm_r])
 
 
 def _log_determinant(factors: sp.linalg.SuperLU) -> float:

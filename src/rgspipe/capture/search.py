@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rgspipe.capture.candidates import CandidateLamps, ranked
+from rgspipe.capture.field import Graph
 from rgspipe.capture.lamps import LampProblem, Lamps
 from rgspipe.capture.likelihood import ROUNDS, STEPS, Tried, settled_once, weighed
 from rgspipe.capture.minima import (
@@ -152,9 +153,11 @@ class FoundLamps:
 
 def found_lamps(problem: LampProblem, count: int | None, most: int) -> FoundLamps:
     """So many lamps, or as many as what was measured calls for, one to `most`."""
-    problem = weighed(problem, None)
-    candidates = CandidateLamps.of(problem)
-    best, others = _likeliest(candidates, best_with_one_more(problem, candidates, None))
+    # What others know of the paint has the variances that belong to bends.
+    plain = problem if problem.field.known is not None else _without_bends(problem)
+    plain = weighed(plain, None)
+    candidates = CandidateLamps.of(plain)
+    best, others = _likeliest(candidates, best_with_one_more(plain, candidates, None))
     compared: list[OneMoreLamp] = []
     while count is None or len(best.lamps) < count:
         found = one_more(candidates, best)
@@ -162,8 +165,20 @@ def found_lamps(problem: LampProblem, count: int | None, most: int) -> FoundLamp
         if count is None and (not found.worth or len(best.lamps) == most):
             break
         best, others = _likeliest(candidates, found.more)
+    told = over_even(best)
+    if plain is not problem:
+        best, others = Tried.settled(_on_graph(best.problem, problem.field.graph), best.lamps), []
     minima = with_chances(likeliest(candidates, best, others, ALL_AROUND), others)
-    return FoundLamps(minima.best, minima.rivals, tuple(compared), over_even(minima.best))
+    return FoundLamps(minima.best, minima.rivals, tuple(compared), told)
+
+
+def _without_bends(problem: LampProblem) -> LampProblem:
+    """With paint that is rough: a lamp that is left out looks like paint that changes slowly."""
+    return _on_graph(problem, replace(problem.field.graph, bent=None))
+
+
+def _on_graph(problem: LampProblem, graph: Graph) -> LampProblem:
+    return replace(problem, field=replace(problem.field, graph=graph))
 
 
 def _likeliest(candidates: CandidateLamps, found: Tried) -> tuple[Tried, list[LessLikely]]:

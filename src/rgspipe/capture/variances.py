@@ -6,11 +6,12 @@ all surfaces have in common, of FREEDOM degrees of freedom: a surface of few sur
 follows from the squares that it stands for, once the field is eliminated, over the number of those that the
 measurements left free (MacKay 1992; Harville 1977 for restricted likelihood):
 
-    h_k = (ν + λ ŝᵀ L_k ŝ) / (ν + n_k − 1 − tr L_k cov(s) λ/h_k)
+    h_k = (ν + λ ŝᵀ L_k ŝ + β ŝᵀ H_k ŝ) / (ν + tr (λ L_k + β H_k) (Q⁻¹ − cov(s)) / h_k)
 
-and likewise for τ² with the means of surfaces, and for σ_k² with what is left, r − ŝ. The traces are those of draws of
-the field. A few rounds take the place of a search. Errors that nothing foretells are taken for draws of Student's t
-(Lange, Little and Taylor 1989): each surfel is judged by what all others say of it.
+with L_k its steps and H_k its bends, each of which holds its part of Q, and likewise for τ² with the means of surfaces,
+and for σ_k² with what is left, r − ŝ. The traces are those of draws of the field. A few rounds take the place of a
+search. Errors that nothing foretells are taken for draws of Student's t (Lange, Little and Taylor 1989): each surfel is
+judged by what all others say of it.
 """
 
 from __future__ import annotations
@@ -42,6 +43,9 @@ LEAST_FREE = 1e-3
 #: Believed to 0.04 %, the box in a painted room came out 28 % off.
 LEAST = 0.005**2
 
+#: Most variance of steps and of bends: more says nothing of paint.
+MOST = 1.0
+
 
 def with_likely_variances(field: Field, residual: Numbers, *, trusting: bool = False) -> Field:
     """With the variances that residuals (N, C) call for, and the trust in each of them if `trusting`."""
@@ -70,8 +74,8 @@ class _Squares:
         if self.field.known is not None:
             variances = replace(self.field.variances, noise=noise)
             return replace(self.field, variances=variances, grain=grain, trust=trust)
-        step, rough = self._steps()
-        variances = Variances(step, max(self._surface(), LEAST), noise)
+        step, bend, rough = self._steps()
+        variances = Variances(step, max(self._surface(), LEAST), noise, bend)
         return replace(self.field, variances=variances, rough=rough, grain=grain, trust=trust)
 
     @cached_property
@@ -108,14 +112,22 @@ class _Squares:
         """(N, 1 or 3) part of a measurement that the field follows."""
         return np.minimum(self._weight * self._unknown, FOLLOWED)
 
-    def _steps(self) -> tuple[float, Numbers]:
-        """1/λ, and (S,) h."""
-        surfels = np.bincount(self.field.graph.surfaces)
+    def _steps(self) -> tuple[float, float, Numbers]:
+        """1/λ, 1/β, and (S,) h."""
+        graph, variances = self.field.graph, self.field.variances
+        surfels = np.bincount(graph.surfaces)
         rough = _or_ones(self.field.rough, len(surfels))
-        squares = self.field.graph.bends(self._mean)
-        unknown = np.mean([self.field.graph.bends(draws) for draws in self._draws], axis=0)
-        known = surfels - 1.0 - unknown / (self.field.variances.step * rough)
-        return _shared(squares, np.maximum(known, LEAST_FREE * (surfels - 1.0)), rough)
+        before = self.field.draws_before(DRAWS, self.seed)
+        found, squares, known = [], np.zeros(len(surfels)), np.zeros(len(surfels))
+        for variance, of in ((variances.step, graph.steps), (variances.bend, graph.bends)):
+            own = of(self._mean)
+            unknown = np.mean([of(draws) for draws in self._draws], axis=0)
+            # Of the numbers that either holds before the measurements, those that these leave it free to tell.
+            told = np.maximum((of(before) - unknown) / (variance * rough), LEAST_FREE * (surfels - 1.0))
+            common = (own / rough).sum() / max(told.sum(), LEAST_FREE)
+            found.append(float(np.clip(common, LEAST, MOST)))
+            squares, known = squares + own / found[-1], known + told
+        return *found, (FREEDOM + squares) / (FREEDOM + known)
 
     def _surface(self) -> float:
         """τ²."""
