@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -33,6 +34,12 @@ def warm_start(child_environment: dict[str, str]) -> Iterator[WarmStart]:
     """Starts commands that need not import anything any more, one at a time."""
     with WarmStart(child_environment) as place:
         yield place
+
+
+def pytest_collection_finish() -> None:
+    """What was imported and collected stays: each collection of garbage would look at all of it."""
+    gc.collect()
+    gc.freeze()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
