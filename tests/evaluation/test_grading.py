@@ -120,6 +120,8 @@ def test_albedo_at_its_bound_is_told_by_area():
         ({"missing": 0.35}, Grade.POOR, "Photograph what no view shows"),
         ({"at_bound": 0.5}, Grade.POOR, "Photograph what no view shows"),
         ({"at_bound": 0.5, "unseen_at": None}, Grade.POOR, "Check the power of the lamps"),
+        ({"residual": 0.2, "scale": 0.1}, Grade.FAIR, "Check poses, depth, exposures and the tone curve"),
+        ({"at_bound": 0.5, "unseen_at": None, "scale": 0.1}, Grade.POOR, "a lamp or a window that was not found"),
     ],
 )
 def test_the_grade_is_the_error_that_lights_are_expected_to_have(change, grade, advice):

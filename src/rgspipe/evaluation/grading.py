@@ -135,9 +135,17 @@ def _lamps(lamps: KnownLamps | None) -> list[str]:
 def _advice(grade: SceneGrade) -> str:
     if grade.error > grade.light_error:
         return "Its light looks right, and yet lamps that are known are found elsewhere: take more photographs of it."
+    captured = grade.scale > 0.0  # under lamps that nobody measured, by a search that does not go on
     if grade.residual >= max(grade.doubt, grade.missing, grade.at_bound):
+        if captured:
+            return "Check poses, depth, exposures and the tone curve of the photographs, or take more surfels."
         return "Check poses, lamps and exposure of the training images, or train longer."
     if grade.unseen_at is None:
+        if captured:
+            return (
+                "Light is missing that no lamp explains: a lamp or a window that was not found, or lamps inside of "
+                "what depth shows."
+            )
         return (
             "Check the power of the lamps and the exposure of the training images: the scene seems too bright for them."
         )

@@ -34,7 +34,8 @@ def check_scan(scan: Scan, views: Sequence[View]) -> None:
             expected=EXPECTED,
             found=f"{_share(stated)} agreeing, under no axes and no unit that is known",
             remedy="Poses may be of other photographs: check that lines or files are in the order of the images, that "
-            "rows of matrices are in theirs, and that depth belongs to the photographs.",
+            "rows of matrices are in theirs, that depth belongs to the photographs, and that focal lengths are in "
+            "pixels of the stated size.",
         )
 
 
