@@ -17,6 +17,7 @@ from rgspipe.capture.bounds import with_bounds
 from rgspipe.capture.doubts import model_variance
 from rgspipe.capture.lamps import LampProblem, Lamps
 from rgspipe.capture.photographs import Numbers
+from rgspipe.capture.side_by_side import side_by_side
 from rgspipe.capture.variances import with_likely_variances
 from rgspipe.training.albedo import ALBEDO_RANGE
 
@@ -104,8 +105,10 @@ class Tried:
 
     def over(self, other: Tried) -> Comparison:
         """How much likelier these settled lamps are than others, by what belongs to either, both together."""
-        theirs = other.problem.refined(other.problem.lamps(self.lamps.places, self.lamps.logs), STEPS)
-        ours = self.problem.refined(self.problem.lamps(other.lamps.places, other.lamps.logs), STEPS)
+        theirs, ours = side_by_side(
+            lambda of: of[0].refined(of[0].lamps(of[1].places, of[1].logs), STEPS),
+            [(other.problem, self.lamps), (self.problem, other.lamps)],
+        )
         gains = self.problem.costs(ours) - self.problem.costs(self.lamps)
         gains += other.problem.costs(other.lamps) - other.problem.costs(theirs)
         return Comparison(np.bincount(self.problem.parts, gains))
