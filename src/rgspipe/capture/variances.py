@@ -117,17 +117,28 @@ class _Squares:
         graph, variances = self.field.graph, self.field.variances
         surfels = np.bincount(graph.surfaces)
         rough = _or_ones(self.field.rough, len(surfels))
-        before = self.field.draws_before(DRAWS, self.seed)
+        held = self._held_by_bends() / rough
+        parts = [(variances.step, graph.steps, surfels - 1.0 - held)]
+        if graph.bent is not None:
+            parts.append((variances.bend, graph.bends, held))
         found, squares, known = [], np.zeros(len(surfels)), np.zeros(len(surfels))
-        for variance, of in ((variances.step, graph.steps), (variances.bend, graph.bends)):
+        for variance, of, before in parts:
             own = of(self._mean)
-            unknown = np.mean([of(draws) for draws in self._draws], axis=0)
+            unknown = np.mean([of(draws) for draws in self._draws], axis=0) / (variance * rough)
             # Of the numbers that either holds before the measurements, those that these leave it free to tell.
-            told = np.maximum((of(before) - unknown) / (variance * rough), LEAST_FREE * (surfels - 1.0))
+            told = np.maximum(before - unknown, LEAST_FREE * (surfels - 1.0))
             common = (own / rough).sum() / max(told.sum(), LEAST_FREE)
             found.append(float(np.clip(common, LEAST, MOST)))
             squares, known = squares + own / found[-1], known + told
-        return *found, (FREEDOM + squares) / (FREEDOM + known)
+        step, bend = (*found, variances.bend)[:2]
+        return step, bend, (FREEDOM + squares) / (FREEDOM + known)
+
+    def _held_by_bends(self) -> Numbers | float:
+        """(S,) how many of a surface's numbers bends hold before the measurements, times its h; steps hold the rest."""
+        graph = self.field.graph
+        if graph.bent is None:
+            return 0.0
+        return graph.bends(self.field.draws_before(DRAWS, self.seed)) / self.field.variances.bend
 
     def _surface(self) -> float:
         """τ²."""
