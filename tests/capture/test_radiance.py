@@ -10,7 +10,8 @@ import pytest
 import torch
 
 from photographed_room import LAMPS, frozen_room, photographs
-from rgspipe.capture.radiance import Measured, measured_radiance
+from rgspipe.capture.photographs import TracedPhotograph
+from rgspipe.capture.radiance import PULL, Measured, _normal, measured_radiance
 from rgspipe.datasets.views import View
 from rgspipe.renderer.view_weights import ViewWeights
 from rgspipe.training.materials import trace_views
@@ -40,6 +41,21 @@ def error(found: Measured) -> float:
 
 def test_it_is_that_of_the_scene() -> None:
     assert error(plain()) < 0.01  # 0.0055
+
+
+def test_normal_equations_are_solved_to_the_share_that_is_asked_for() -> None:
+    """By the bound on their eigenvalues, which no pixel whose weights sum to more than 1 may break."""
+    traced = [TracedPhotograph.of(*pair) for pair in zip(weights(), photographs(), strict=True)]
+    normal = _normal(traced, [one.base for one in traced])
+    scaled = normal.matrix.toarray() / np.sqrt(normal.seen[:, None] * normal.seen)
+    values = np.linalg.eigvalsh(scaled)
+    assert values.min() >= PULL * (1.0 - 1e-6)  # 1.0: of surfels that nothing shows
+    assert values.max() <= 1.0 + PULL  # 1.01
+    right = normal.seen[:, None] * truth()
+    true = np.linalg.solve(normal.matrix.toarray(), right)
+    off = normal.solved(right, 1e-4, np.zeros_like(right)) - true
+    left = np.sqrt((off * (normal.matrix @ off)).sum(axis=0) / (true * right).sum(axis=0))
+    assert left.max() <= 1e-4  # 3e-6
 
 
 def test_exposures_follow_from_what_photographs_share() -> None:

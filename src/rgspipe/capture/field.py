@@ -20,16 +20,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import splu
 
 from rgspipe.capture.photographs import Numbers
 from rgspipe.capture.planes import off_planes
-from rgspipe.capture.radiance import factorised
+from rgspipe.capture.side_by_side import kept_property
 from rgspipe.scene.spacing import surfel_spacing
 from rgspipe.scene.surfels import Surfels
 from rgspipe.training.regularise import find_neighbours
@@ -92,7 +92,7 @@ class Graph:
         places, normals = (part.double().cpu().numpy() for part in (surfels.centers, surfels.normals))
         return replace(graph, bent=off_planes(places, normals, graph._inner_edges))
 
-    @cached_property
+    @kept_property
     def sizes(self) -> Numbers:
         """(N,) surfels of the surface that each is of."""
         return np.bincount(self.surfaces)[self.surfaces].astype(np.float64)
@@ -110,12 +110,12 @@ class Graph:
         rows, columns = np.concatenate([first, second, every]), np.concatenate([second, first, every])
         steps = sp.csc_matrix((np.concatenate([-weight, -weight, diagonal]), (rows, columns)), (count, count))
         if self.bent is None:
-            return steps
+            return _sorted(steps)
         own = 1.0 if rough is None else rough[self.surfaces]
         bends = sp.diags(np.ones(count) / (variances.bend * own))
-        return (steps + self.bent.T @ bends @ self.bent).tocsc()
+        return _sorted((steps + self.bent.T @ bends @ self.bent).tocsc())
 
-    @cached_property
+    @kept_property
     def edges(self) -> tuple[np.ndarray, np.ndarray, Numbers]:
         """(P,) pairs of neighbours, each once, and w_ij."""
         count = len(self.sizes)
@@ -137,7 +137,7 @@ class Graph:
         squares = weight * np.einsum("pk,pk->p", steps, steps) / values.shape[1]
         return np.bincount(self.surfaces[first], squares, minlength=self.surfaces.max() + 1)
 
-    @cached_property
+    @kept_property
     def _inner_edges(self) -> tuple[np.ndarray, np.ndarray, Numbers]:
         first, second, weight = self.edges
         inner = self.surfaces[first] == self.surfaces[second]
@@ -168,7 +168,7 @@ class Field:
     grain: Numbers | None = None
     told: NDArray[np.bool_] | None = None
 
-    @cached_property
+    @kept_property
     def channels(self) -> tuple[Field, ...]:
         """That of each channel; one for all where they do not differ."""
         elsewhere = self.known is not None and self.known.ndim > 1
@@ -190,31 +190,31 @@ class Field:
         """With another trust (N,)."""
         return replace(self, trust=trust)
 
-    @cached_property
+    @kept_property
     def noise(self) -> Numbers:
         """(N,) σ² g."""
         grain = 1.0 if self.grain is None else self.grain[self.graph.surfaces]
         return self.variances.noise * grain * np.ones(len(self.measured))
 
-    @cached_property
+    @kept_property
     def weight(self) -> Numbers:
         """(N,) diagonal of D, of surfels that any channel tells something of."""
         trust = self.trust if self.told is None else np.where(self.told.any(axis=1), self.trust, 0.0)
         return trust / (self.measured + self.noise)
 
-    @cached_property
+    @kept_property
     def precision(self) -> sp.csc_matrix:
         """(N, N) Q."""
         return self.graph.precision(self.variances, self.rough)
 
-    @cached_property
+    @kept_property
     def _prior(self) -> sp.csc_matrix:
         """(N, N) precision before the measurements."""
         if self.known is None:
             return self.precision
         return (self.precision + sp.diags(self.known.reshape(len(self.trust), -1).mean(axis=1))).tocsc()
 
-    @cached_property
+    @kept_property
     def _posterior(self) -> sp.linalg.SuperLU:
         return factorised((sp.diags(self.weight) + self._prior).tocsc())
 
@@ -268,6 +268,17 @@ class Field:
         determinant = _log_determinant(self._posterior) - np.log(self.weight[kept]).sum()
         determinant -= _log_determinant(factorised(self._prior)) if before is None else before
         return float((residual * self.whitened(residual)).sum() + residual.shape[1] * determinant)
+
+
+def _sorted(matrix: sp.csc_matrix) -> sp.csc_matrix:
+    """The matrix with its entries in order: a factorisation would sort them in place, while other threads read them."""
+    matrix.sum_duplicates()
+    return matrix
+
+
+def factorised(matrix: sp.csc_matrix) -> sp.linalg.SuperLU:
+    """A symmetric positive definite matrix, factorised."""
+    return splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
 
 
 def _drawn(factors: sp.linalg.SuperLU, samples: int, seed: int) -> Numbers:

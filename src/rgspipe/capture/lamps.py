@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 import torch
@@ -24,6 +23,7 @@ from rgspipe.capture.photographs import Numbers
 from rgspipe.capture.prediction import Prediction
 from rgspipe.capture.received import Received
 from rgspipe.capture.receivers import Receivers
+from rgspipe.capture.side_by_side import kept_property, side_by_side
 from rgspipe.fitting.options import StepLimits
 from rgspipe.optim.levenberg_marquardt import NormalEquations, least_squares, within
 from rgspipe.renderer.frozen import FrozenScene
@@ -62,7 +62,7 @@ class Lamps:
     def __len__(self) -> int:
         return len(self.places)
 
-    @cached_property
+    @kept_property
     def arriving(self) -> Numbers:
         """(N, 3) what arrives from all of them."""
         return np.einsum("knc,kc->nc", self.shares, np.exp(self.logs))
@@ -116,12 +116,12 @@ class LampProblem:
         """The scene that the surfels are of."""
         return self.receivers.frozen
 
-    @cached_property
+    @kept_property
     def target(self) -> Numbers:
         """(N, 3) log L − log ρ̂."""
         return np.log(self.radiance) - np.log(self.predicted)
 
-    @cached_property
+    @kept_property
     def size(self) -> float:
         """Longest side of the scene."""
         return self.frozen.size
@@ -136,7 +136,7 @@ class LampProblem:
         """(N,) which part of the scene each surfel belongs to."""
         return self.receivers.parts
 
-    @cached_property
+    @kept_property
     def bounds(self) -> tuple[Numbers, Numbers]:
         """(3,) corners of where lamps may be."""
         lower, upper = self.frozen.surroundings.bounds
@@ -219,14 +219,17 @@ class _Around:
         width, field = jacobian.shape[2], self.problem.field
         matrix, direction, cost = np.zeros((width, width)), np.zeros(width), 0.0
         number = np.arange(width) % NUMBERS
-        for channel in range(3):
-            # Intensities of other channels change nothing here.
-            used = np.flatnonzero((number < 3) | (number == 3 + channel))
-            columns, own = jacobian[channel][:, used], residual[:, channel]
-            whitened = field.channel(channel).whitened(np.column_stack([columns, own]))
-            matrix[np.ix_(used, used)] += columns.T @ whitened[:, :-1]
-            direction[used] += columns.T @ whitened[:, -1]
-            cost += float(own @ whitened[:, -1])
+        # Intensities of other channels change nothing in one.
+        used = [np.flatnonzero((number < 3) | (number == 3 + channel)) for channel in range(3)]
+
+        def products(channel: int) -> Numbers:
+            columns = np.column_stack([jacobian[channel][:, used[channel]], residual[:, channel]])
+            return columns.T @ field.channel(channel).whitened(columns)
+
+        for own, found in zip(used, side_by_side(products, range(3)), strict=True):
+            matrix[np.ix_(own, own)] += found[:-1, :-1]
+            direction[own] += found[:-1, -1]
+            cost += float(found[-1, -1])
         return NormalEquations(torch.from_numpy(0.5 * (matrix + matrix.T)), torch.from_numpy(direction), cost)
 
     def allowed(self, step: Tensor) -> float:

@@ -18,12 +18,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
+import torch
 from numpy.typing import NDArray
-from scipy.sparse.linalg import splu
 
 from rgspipe.capture.exposures import Cameras, Exposure
 from rgspipe.capture.photographs import SHOWN, Numbers, TracedPhotograph
 from rgspipe.datasets.views import View
+from rgspipe.optim.conjugate_gradients import conjugate_gradients, steps_to
 from rgspipe.renderer.view_weights import ViewWeights
 
 #: Surfels with a larger part of their pixels saturated in a channel, of those that the others do not contradict, are
@@ -43,6 +44,13 @@ OUTLIER = 3.0
 #: known worse than their mean. The mean is smoother than the radiance is, which costs light where it changes fast: in a
 #: painted room a pull of 0.05 leaves the intensities of lamps 5 % too small, one of 0.01 has them 1 % too large.
 PULL = 0.01
+
+#: Weight of pixels that every surfel has, so that one that no pixel shows has a number, too.
+LEAST_SEEN = 1e-7
+
+#: Of what a round changes no more than this is left undone, and of what pixels' errors make of the radiance: its
+#: variance is known to a fifth.
+SOLVED, DRAWN = 1e-6, 0.01
 
 #: Part of the bright pixels' radiance that is added to a pixel's own before errors are relative to it.
 FLOOR = 0.02
@@ -98,7 +106,8 @@ def measured_radiance(
         plain = [one.plain(weight) for one, weight in zip(photographs, counted, strict=True)]
         cameras = cameras.fitted(photographs, plain, radiance)
         believed = [one.believed(weight) for one, weight in zip(photographs, counted, strict=True)]
-        radiance, normal = _radiance(photographs, cameras, believed)
+        normal = _normal(photographs, believed)
+        radiance = _radiance(photographs, cameras, believed, normal, radiance)
         off, relative = _errors(photographs, cameras, radiance, floor)
         error = _typical(photographs, relative)
         latest, limit = counted, max(OUTLIER * error, 1e-6)
@@ -112,6 +121,34 @@ def measured_radiance(
     shown_by = sum((_pixels(view) > SHOWN).astype(np.int64) for view in weights)
     variance = np.where(known, variance, np.inf)
     return Measured(radiance, variance, seen, cameras, error, _apart(photographs, relative), shown_by, blown_out)
+
+
+@dataclass(frozen=True, eq=False)
+class _Normal:
+    """Normal equations of N radiances, as the pixels of all photographs weigh.
+
+    Attributes:
+        matrix: (N, N) Σ_v Wᵀ w W, and the pull.
+        seen: (N,) weight of the pixels that show each surfel, never 0.
+    """
+
+    matrix: sp.csr_matrix
+    seen: Numbers
+
+    def solved(self, right: Numbers, share: float, start: Numbers) -> Numbers:
+        """(N, K) what belongs to `right` (N, K), with a `share` of the error of `start` (N, K) at most.
+
+        The weights of a pixel sum to 1 or less, so that over `seen` the matrix has no eigenvalue above 1 + PULL, and
+        none below PULL. Surfels of overlapping pixels fill a factorisation.
+        """
+        over = torch.from_numpy(self.seen)[:, None]
+        step = conjugate_gradients(
+            lambda x: torch.from_numpy(self.matrix @ x.numpy()),
+            torch.from_numpy(right - self.matrix @ start),
+            lambda x: x / over,
+            steps_to(share, (1.0 + PULL) / PULL),
+        )
+        return start + step.numpy()
 
 
 def _floor(photographs: Sequence[TracedPhotograph]) -> float:
@@ -166,28 +203,38 @@ def _shown(photographs: Sequence[TracedPhotograph], weights: Sequence[Numbers]) 
     return shown, saturated
 
 
-def _radiance(
-    photographs: Sequence[TracedPhotograph], cameras: Cameras, weights: Sequence[Numbers]
-) -> tuple[Numbers, sp.linalg.SuperLU]:
-    """(N, 3) radiance, and the normal equations."""
-    seen, right, matrix = 0.0, 0.0, 0.0
-    for photograph, even, weight in zip(photographs, cameras.even(photographs), weights, strict=True):
-        rows = photograph.rows
-        weighted = rows.multiply(weight[:, None].astype(np.float64)).tocsr()
+def _normal(photographs: Sequence[TracedPhotograph], weights: Sequence[Numbers]) -> _Normal:
+    """The normal equations of pixels that count `weights` (P,)."""
+    seen, matrix = 0.0, 0.0
+    for photograph, weight in zip(photographs, weights, strict=True):
+        weighted = photograph.rows.multiply(weight[:, None].astype(np.float64)).tocsr()
         seen = seen + np.asarray(weighted.sum(axis=0)).ravel()
-        right = right + weighted.T @ even
-        matrix = matrix + rows.T @ weighted
-    pull = PULL * seen + 1e-9
-    normal = factorised((matrix + sp.diags(pull)).tocsc())
-    mean = right / np.maximum(seen, 1e-12)[:, None]
-    return np.maximum(normal.solve(right + pull[:, None] * mean), 0.0), normal
+        matrix = matrix + photograph.rows.T @ weighted
+    seen = seen + LEAST_SEEN
+    return _Normal((matrix + sp.diags(PULL * seen)).tocsr(), seen)
+
+
+def _radiance(
+    photographs: Sequence[TracedPhotograph],
+    cameras: Cameras,
+    weights: Sequence[Numbers],
+    normal: _Normal,
+    before: Numbers | None,
+) -> Numbers:
+    """(N, 3) radiance, from that of the round `before`."""
+    right = 0.0
+    for photograph, even, weight in zip(photographs, cameras.even(photographs), weights, strict=True):
+        right = right + photograph.rows.T @ (weight[:, None].astype(np.float64) * even)
+    mean = right / normal.seen[:, None]
+    start = mean if before is None else before
+    return np.maximum(normal.solved(right + PULL * right, SOLVED, start), 0.0)
 
 
 def _log_variance(
     photographs: Sequence[TracedPhotograph],
     weights: Sequence[Numbers],
     off: Sequence[NDArray[np.float32]],
-    normal: sp.linalg.SuperLU,
+    normal: _Normal,
     radiance: Numbers,
 ) -> Numbers:
     """(N,) variance of the logarithm of the radiance, by draws of the signs of what pixels are `off` (P,) by."""
@@ -195,11 +242,6 @@ def _log_variance(
     for photograph, weight, part in zip(photographs, weights, off, strict=True):
         signs = 2.0 * rng.integers(0, 2, (len(part), DRAWS), dtype=np.int8) - 1.0
         drawn = drawn + photograph.rows.T @ ((weight * part)[:, None] * signs)
-    squared = (normal.solve(drawn) ** 2).mean(axis=1)
+    squared = (normal.solved(drawn, DRAWN, np.zeros_like(drawn)) ** 2).mean(axis=1)
     grey = radiance.mean(axis=1)
     return np.where(grey > 0.0, squared / np.where(grey > 0.0, grey, 1.0) ** 2, np.inf)
-
-
-def factorised(matrix: sp.csc_matrix) -> sp.linalg.SuperLU:
-    """A symmetric positive definite matrix, factorised."""
-    return splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})

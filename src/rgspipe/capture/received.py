@@ -15,7 +15,6 @@ proportion to the last that was followed: by then light has forgotten where it c
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -24,6 +23,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from rgspipe.capture.photographs import Numbers
+from rgspipe.capture.side_by_side import kept_property
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.training.albedo import ALBEDO_RANGE
 
@@ -136,7 +136,7 @@ class Received:
         told = told[self.unseen]
         return replace(self, told=told, albedo=_untold(told, albedo[self.unseen]))
 
-    @cached_property
+    @kept_property
     def known(self) -> Numbers:
         """(N, 3) G, radiance per unit albedo."""
         if not len(self.unseen):
@@ -144,12 +144,12 @@ class Received:
         seen = self.others + self.from_unseen.arriving(np.where(self.told, self.radiance, 0.0))
         return self._spread(seen[:, None], slice(0, MEAN))[:, 0]
 
-    @cached_property
+    @kept_property
     def _albedos(self) -> Numbers:
         """(U, 4) of the channels, and their mean."""
         return np.column_stack([self.albedo, self.albedo.mean(axis=1)])
 
-    @cached_property
+    @kept_property
     def _further(self) -> Tensor:
         return self.from_unseen.further(self._albedos)
 

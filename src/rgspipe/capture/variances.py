@@ -17,12 +17,13 @@ judged by what all others say of it.
 from __future__ import annotations
 
 from dataclasses import astuple, dataclass, replace
-from functools import cached_property
+from functools import partial
 
 import numpy as np
 
 from rgspipe.capture.field import Field, Variances
 from rgspipe.capture.photographs import Numbers
+from rgspipe.capture.side_by_side import kept_property, side_by_side
 
 #: Degrees of freedom of Student's t, of surfels and of surfaces.
 FREEDOM = 4.0
@@ -69,6 +70,7 @@ class _Squares:
 
         A field that is known from elsewhere has its steps from there: what is left of it says nothing of them.
         """
+        _ = self._drawn  # first, as means are solved with the same factors
         noise, grain = self._noises()
         trust = self._trust() if trusting else self.field.trust
         if self.field.known is not None:
@@ -78,36 +80,46 @@ class _Squares:
         variances = Variances(step, max(self._surface(), LEAST), noise, bend)
         return replace(self.field, variances=variances, rough=rough, grain=grain, trust=trust)
 
-    @cached_property
+    @kept_property
     def _mean(self) -> Numbers:
         return self.field.mean_colours(self.residual)
 
-    @cached_property
+    @kept_property
     def _draws(self) -> list[Numbers]:
         """(N, DRAWS) of each channel, or of all where they do not differ."""
-        return [own.draws(DRAWS, self.seed) for own in self.field.channels]
+        return self._drawn[0]
 
-    @cached_property
+    @kept_property
+    def _drawn(self) -> tuple[list[Numbers], Numbers | None]:
+        """The field of each channel after the measurements, and where it bends before them: one factorisation each."""
+        field = self.field
+        works = [partial(own.draws, DRAWS, self.seed) for own in field.channels]
+        if field.graph.bent is None or field.known is not None:
+            return side_by_side(lambda work: work(), works), None
+        *drawn, before = side_by_side(lambda work: work(), [*works, partial(field.draws_before, DRAWS, self.seed)])
+        return drawn, before
+
+    @kept_property
     def _unknown(self) -> Numbers:
         """(N, 1 or 3) variance of the field."""
         return np.stack([(draws**2).mean(axis=1) for draws in self._draws], axis=1)
 
-    @cached_property
+    @kept_property
     def _weight(self) -> Numbers:
         """(N, 1 or 3) of the measurements."""
         return np.stack([own.weight for own in self.field.channels], axis=1)
 
-    @cached_property
+    @kept_property
     def _told(self) -> Numbers:
         """(N, 1 or 3) 1 where there may be one."""
         return np.ones((len(self.residual), 1)) if self.field.told is None else self.field.told.astype(np.float64)
 
-    @cached_property
+    @kept_property
     def _left(self) -> Numbers:
         """(N, 3) squares of what the field leaves over the variance of the measurement; 0 where there is none."""
         return self._weight * (self.residual - self._mean) ** 2
 
-    @cached_property
+    @kept_property
     def _explained(self) -> Numbers:
         """(N, 1 or 3) part of a measurement that the field follows."""
         return np.minimum(self._weight * self._unknown, FOLLOWED)
@@ -135,10 +147,8 @@ class _Squares:
 
     def _held_by_bends(self) -> Numbers | float:
         """(S,) how many of a surface's numbers bends hold before the measurements, times its h; steps hold the rest."""
-        graph = self.field.graph
-        if graph.bent is None:
-            return 0.0
-        return graph.bends(self.field.draws_before(DRAWS, self.seed)) / self.field.variances.bend
+        before = self._drawn[1]
+        return 0.0 if before is None else self.field.graph.bends(before) / self.field.variances.bend
 
     def _surface(self) -> float:
         """τ²."""

@@ -7,12 +7,13 @@ all others calls for: one for each of them, as light hardly tells their parts ap
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import torch
 from torch import Tensor
 
+from rgspipe.optim.conjugate_gradients import conjugate_gradients
 from rgspipe.progress import progress_bar
 from rgspipe.renderer.transport import PatchTransport, with_albedo
 from rgspipe.scene.surfels import Surfels
@@ -172,7 +173,7 @@ class Quadratic:
         right = ties.summed(right - self.smoothness * (self.laplacian.matrix @ at.albedo))
         precondition = 1.0 / ties.summed(self.diagonal)
         found = conjugate_gradients(
-            lambda x: ties.summed(self._normal(ties.spread(x))), right, lambda x: precondition * x
+            lambda x: ties.summed(self._normal(ties.spread(x))), right, lambda x: precondition * x, CG_STEPS
         )
         return ties.spread(found)
 
@@ -221,29 +222,3 @@ def pulled_to_kin(pulls: tuple[Tensor, Tensor], ties: Ties, albedo: Tensor) -> t
     weight = ties.once(weight)
     more = PULL * GREY**2 / variance
     return weight + more, (weight * target + more * expected) / (weight + more)
-
-
-def conjugate_gradients(
-    operator: Callable[[Tensor], Tensor],
-    right: Tensor,
-    precondition: Callable[[Tensor], Tensor],
-    steps: int = CG_STEPS,
-) -> Tensor:
-    """So many steps from 0 towards the solution x (M, C) of `operator` x = `right`, each column on its own.
-
-    Args:
-        precondition: about the operator's inverse, symmetric.
-    """
-    x, residual = torch.zeros_like(right), right
-    z = precondition(residual)
-    direction, energy = z, (residual * z).sum(dim=0)
-    for _ in range(steps):
-        image = operator(direction)
-        step = energy / (direction * image).sum(dim=0).clamp(min=1e-30)
-        x = x + step * direction
-        residual = residual - step * image
-        z = precondition(residual)
-        renewed = (residual * z).sum(dim=0)
-        direction = z + renewed / energy.clamp(min=1e-30) * direction
-        energy = renewed
-    return x

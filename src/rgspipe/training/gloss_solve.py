@@ -11,9 +11,10 @@ import torch
 from torch import Tensor
 
 from rgspipe.machine.sums import average
+from rgspipe.optim.conjugate_gradients import conjugate_gradients
 from rgspipe.scene.surfels import Surfels
 from rgspipe.training.albedo import ALBEDO_RANGE, AlbedoPrior
-from rgspipe.training.albedo_solve import SMOOTHNESS, conjugate_gradients, pull
+from rgspipe.training.albedo_solve import SMOOTHNESS, pull
 from rgspipe.training.gloss_model import EXPONENT_RANGE, GlossLight, GlossView, Reflection
 from rgspipe.training.likeness import Laplacian, graph_laplacian, nearest_surfels
 from rgspipe.training.view_model import LitViewModel
