@@ -189,7 +189,7 @@ def _likeliest(candidates: CandidateLamps, found: Tried) -> tuple[Tried, list[Le
 
 def settled_on_all(problem: LampProblem, found: FoundLamps) -> FoundLamps:
     """Lamps that were found on a part of the surfels, where they belong by all of them; likewise likely rivals."""
-    problem = weighed(_begun(problem, found.best.problem), None)
+    problem = weighed(problem, None)
     likely = [rival.tried.lamps for rival in found.rivals if rival.chance > LIKELY]
     rest = tuple(rival for rival in found.rivals if rival.chance <= LIKELY)
     others: list[LessLikely] = []
@@ -202,17 +202,6 @@ def settled_on_all(problem: LampProblem, found: FoundLamps) -> FoundLamps:
         bar.update(len(likely))
     minima = with_chances(best, others)
     return replace(found, best=minima.best, rivals=(*minima.rivals, *rest))
-
-
-def _begun(problem: LampProblem, part: LampProblem) -> LampProblem:
-    """With the variances that a part of its surfels has made likely, so that all of them need fewer rounds.
-
-    In a plane steps are the same however far neighbours are apart, and bends in proportion to their distance.
-    """
-    variances = part.field.variances
-    nearer = problem.receivers.spacing / part.receivers.spacing
-    begun = replace(variances, bend=variances.bend * nearer**2)
-    return replace(problem, field=replace(problem.field, variances=begun))
 
 
 def over_even(best: Tried) -> float:
