@@ -8,6 +8,7 @@ from scipy.spatial import cKDTree
 
 from half_seen_room import camera_at, only, seen_by
 from rgspipe.completion import with_unseen_surfaces
+from rgspipe.completion.hidden_faces import _parted
 from rgspipe.scene import Camera, Surfels
 from rgspipe.scene.rectangles import Rectangles, inside_of_box, rectangle, surfels_on
 
@@ -100,3 +101,22 @@ def test_sides_of_a_thing_that_cameras_look_past_end_each_other() -> None:
     gap, _ = cKDTree(closed.centers.numpy()).query(room.centers[hidden].numpy())
     # Measured 0.21 and 0.34; 2.5 and 4.5 where each was looked for as if there were no others.
     assert float(np.median(gap)) < 0.4 * SPACING and float(np.quantile(gap, 0.9)) < 0.6 * SPACING
+
+
+def test_an_edge_that_goes_on_past_another_face_has_no_face_beyond() -> None:
+    """Another face stands across at the fifth of ten places of an edge, three of whose first were seen to be one."""
+    free, near, seen = np.ones((10, 6), dtype=bool), np.zeros((10, 6), dtype=bool), np.arange(10) < 3
+    assert not _parted(free, near, seen).any()
+    near[5, :4] = True
+    # It goes around one that does not reach as far back, and not around one that does.
+    assert not _parted(free, near, seen).any()
+    near[5] = True
+    np.testing.assert_array_equal(_parted(free, near, seen).any(axis=1), np.arange(10) > 5)
+
+
+def test_what_something_else_parts_from_what_was_seen_stays() -> None:
+    """A surface in the way ends a face there, and tells nothing of what is behind it."""
+    free, near, seen = np.ones((10, 6), dtype=bool), np.zeros((10, 6), dtype=bool), np.arange(10) < 3
+    free[5] = False
+    near[8] = True
+    assert not _parted(free, near, seen).any()

@@ -48,14 +48,14 @@ class _Edge:
         places: (E, 3) along it, one distance of neighbours apart.
         outward: (3,) unit, in the sheet: the normal of the face behind it.
         inward: (3,) unit, back from the sheet.
-        seen: how many of the places were seen to be one.
+        seen: (E,) bool, the places that were seen to be one.
         sheet: that ends.
     """
 
     places: np.ndarray
     outward: np.ndarray
     inward: np.ndarray
-    seen: int
+    seen: np.ndarray
     sheet: Sheet
 
 
@@ -92,17 +92,19 @@ class _WayBack:
         """The places of the face behind the edge, up to what it meets, as `others` that are not along it.
 
         Where a camera looked through it before it met anything there is none, unless it may be `open_ended`: what was
-        seen through a door is no inside.
+        seen through a door is no inside. Nor is there one past where `others` part it from the edge that was seen.
         """
-        outward, met = self.edge.outward, self.met
+        outward, met, parted = self.edge.outward, self.met, np.zeros_like(self.met)
         across = [other.places for other in others if len(other) and abs(float(other.normals[0] @ outward)) < ACROSS]
         if across:
             near = are_near(np.concatenate(across), self.places, CUT * self.edge.sheet.raster.spacing)
-            met = met | near.reshape(met.shape)
+            near = near.reshape(met.shape)
+            parted, met = _parted(~(met | self.seen_through), near, self.edge.seen), met | near
         stops, steps = met | self.seen_through, met.shape[1]
         first = np.where(stops.any(axis=1), stops.argmax(axis=1), steps)
         is_met = open_ended | met[np.arange(len(met)), first.clip(max=steps - 1)]
-        kept = binary_opening((np.arange(steps) < first[:, None]) & is_met[:, None], np.ones((3, 3))).reshape(-1)
+        reached = (np.arange(steps) < first[:, None]) & is_met[:, None] & ~parted
+        kept = binary_opening(reached, np.ones((3, 3))).reshape(-1)
         return Continued(self.places[kept], np.broadcast_to(outward, (int(kept.sum()), 3)).copy())
 
 
@@ -142,6 +144,20 @@ def hidden_faces(
     return [Continued.joined([next(rest) for _ in own]) for own in edges]
 
 
+def _parted(free: np.ndarray, near: np.ndarray, seen: np.ndarray) -> np.ndarray:
+    """(E, D) bool: the places that hang together with those behind the `seen` (E,) part of an edge only across `near`.
+
+    Edges go on where nothing is known of them, past the faces of their own thing.
+
+    Args:
+        free: (E, D) bool, places where nothing but other faces stops a face.
+        near: (E, D) bool, those beside other faces.
+    """
+    whole, parts = label(free)[0], label(free & ~near)[0]
+    start = seen[:, None] & (np.cumsum(~free | near, axis=1) == 0)
+    return free & ~near & np.isin(whole, whole[start]) & ~np.isin(parts, parts[start])
+
+
 def _without(faces: Sequence[Continued], own: int) -> list[Continued]:
     return [*faces[:own], *faces[own + 1 :]]
 
@@ -179,7 +195,7 @@ def _ways(sheets: Sequence[Sheet], spacing: float) -> list[list[np.ndarray]]:
 def _longest(edges: Iterable[_Edge]) -> list[_Edge]:
     """Those that are not, for the most part, along a longer one that is turned a little."""
     kept: list[_Edge] = []
-    for edge in sorted(edges, key=lambda one: -one.seen):
+    for edge in sorted(edges, key=lambda one: -one.seen.sum()):
         alike = [other.places for other in kept if float(other.outward @ edge.outward) > ACROSS]
         reach = AROUND * edge.sheet.raster.spacing
         if not alike or are_near(np.concatenate(alike), edge.places, reach).mean() < 0.5:
@@ -214,7 +230,8 @@ def _edges_towards(sheet: Sheet, axis: int, sign: int) -> Iterator[_Edge]:
             past = _past(sheet, places[run, column], along, outward) if len(run) >= SHORTEST else None
             if past is not None:
                 rows = _reach(run, goes_on[:, column])
-                yield _Edge(places[rows, column] + past * outward, outward, -sheet.raster.normal, len(run), sheet)
+                seen = np.isin(rows, run)
+                yield _Edge(places[rows, column] + past * outward, outward, -sheet.raster.normal, seen, sheet)
 
 
 def _next(values: np.ndarray, steps: int) -> np.ndarray:

@@ -19,6 +19,7 @@ from scipy.spatial.transform import Rotation
 from skimage.measure import marching_cubes
 from torch import Tensor
 
+from rgspipe.completion.ends import ends
 from rgspipe.completion.free_space import Grid, SeenSpace
 from rgspipe.completion.hidden_room import parts_in_sight, with_hidden_room
 from rgspipe.completion.planes import Plane, frame_of, planes_of
@@ -30,7 +31,7 @@ from rgspipe.renderer.openness import openness
 from rgspipe.scene import Camera
 from rgspipe.scene.gloss import Gloss
 from rgspipe.scene.guesses import doubts_of_guesses, spread_of_albedo
-from rgspipe.scene.surfels import NO_CLIP, Surfels, quaternion_from_normal
+from rgspipe.scene.surfels import NO_CLIP, Surfels, quaternion_from_normal, quaternion_to_axes
 
 log = logging.getLogger(__name__)
 
@@ -101,7 +102,7 @@ def with_unseen_surfaces(
     if hidden:
         log.info("%d surfels close the scene where no camera saw what is there.", len(found))
     axes = frame.numpy()
-    closed = _joined(surfels, found.places @ axes, found.normals @ axes, spacing)
+    closed = _ended(_joined(surfels, found.places @ axes, found.normals @ axes, spacing), len(surfels), spacing)
     return replace(closed, guessed=doubts_of_guesses(closed))
 
 
@@ -157,6 +158,18 @@ def _shapes(
     around, bent = gone_around(centers, normals, space, spacing)
     flat = [plane for plane in planes if np.isin(plane.members.numpy(), bent).mean() < 0.5]
     return Continued.joined([continued(flat, centers, grid, space, spacing, is_room=is_room), around])
+
+
+def _ended(surfels: Surfels, seen: int, spacing: float) -> Surfels:
+    """The surfels, of which those after the first `seen` end where their faces meet others."""
+    chosen = np.arange(seen, len(surfels))
+    centers, normals = (part.double().cpu().numpy() for part in (surfels.centers, surfels.normals))
+    axes = quaternion_to_axes(surfels.rotations[seen:].double()).cpu().numpy()
+    found = ends(centers, normals, axes[:, :2], chosen, spacing)
+    offsets, angles = surfels.clip_offsets.clone(), surfels.clip_angles.clone()
+    offsets[seen:], angles[seen:] = (torch.from_numpy(part).to(offsets) for part in (found.offsets, found.angles))
+    kept = np.concatenate([np.arange(seen), chosen[found.kept]])
+    return replace(surfels, clip_offsets=offsets, clip_angles=angles).selected(torch.from_numpy(kept))
 
 
 def _turned(surfels: Surfels, frame: Tensor) -> Surfels:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from functools import cache, cached_property
 
 import numpy as np
@@ -87,6 +88,12 @@ class PixelDirect:
         """
         own = self._own_passing(position if origin is None else origin, passing, share)
         return self._light.image(position, passing, slope, own)
+
+    def among(self, bvh: SurfelBvh) -> PixelDirect:
+        """The same pixels, looking at the same places, where surfels a little elsewhere cast other shadows."""
+        other = copy(self)
+        other._bvh = bvh
+        return other
 
     def operator(self, position: Tensor, passing: Tensor) -> SparseOperator:
         """(P, N) irradiance per W/sr where each pixel looks on each surfel, times the view's weight of it.

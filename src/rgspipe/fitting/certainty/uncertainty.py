@@ -14,8 +14,9 @@ jackknife, Bell and McCaffrey 2002). A few cells tell nearly all of that, so S i
 large in others; V pulls it towards errors that are alike in all of them, as far as the cells' differences call for
 (α of Ledoit and Wolf 2004). ( )₊ keeps eigenvalues above zero, so that the noise is a lower bound. κ makes up
 for what the residual cannot show, as the fit has explained it away; it was chosen on fits with known truth. U is what
-surfaces that no camera saw leave uncertain, as their albedo is guessed (`certainty.guesses`). ε ≥ 1 is the scene's own
-excess: lamps whose places are known lay so far outside of their regions (`evaluation.known_lamps`).
+surfaces that no camera saw leave uncertain, as their albedo is guessed (`certainty.guesses`), and their place, by their
+shadows (`certainty.guessed_shadows`). ε ≥ 1 is the scene's own excess: lamps whose places are known lay so far outside
+of their regions (`evaluation.known_lamps`).
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from rgspipe.fitting.certainty.guessed_shadows import shadow_scores
 from rgspipe.fitting.certainty.guesses import guess_scores
 from rgspipe.fitting.model.moments import group_moments, information, scores
 from rgspipe.fitting.model.problem import ROUNDING, LightProblem
@@ -53,15 +55,20 @@ class Covariances:
     known: tuple[Tensor, ...] = ()
 
 
-def light_covariances(problem: LightProblem, state: State, options: CertaintyOptions | None = None) -> Covariances:
+def light_covariances(
+    problem: LightProblem, state: State, options: CertaintyOptions | None = None, *, displaced: bool = True
+) -> Covariances:
     """The covariances of a fit's lights.
 
     All lights are uncertain together: each matrix is a block of the joint covariance. What the views do not determine
     has an infinite variance and no covariance with the rest.
+
+    Args:
+        displaced: whether places of guessed surfaces are in doubt, too; each whose shadow is seen takes an image.
     """
     owners = torch.cat([torch.full((emitter.parameters,), index) for index, emitter in enumerate(state.emitters)])
     blocks, strengths = [], []
-    for joint, unknown in _joint(problem, state, options or CertaintyOptions()):
+    for joint, unknown in _joint(problem, state, options or CertaintyOptions(), displaced):
         per_light = []
         for index, emitter in enumerate(state.emitters):
             colours = len(owners) + 3 * index + torch.arange(3)
@@ -115,7 +122,7 @@ def surface_cells(views: PreparedViews, cell: float) -> tuple[Tensor, int]:
 
 
 def _joint(
-    problem: LightProblem, state: State, options: CertaintyOptions
+    problem: LightProblem, state: State, options: CertaintyOptions, displaced: bool
 ) -> tuple[tuple[Tensor, Tensor], tuple[Tensor, Tensor]]:
     """Calibrated and noise-only covariance (n, n) of all unknowns, each with what is not determined (n,)."""
     residual = problem.residual(state.columns, state.intensity)
@@ -128,7 +135,10 @@ def _joint(
     noise = float(values[..., -1, -1].sum()) / max(1, residual.numel() - cells.shape[-1])
     root, unknown = whitener(cells.sum(dim=0))
     model = inflated(sandwich(root, cells, cell_scores, options.largest_share), noise, options.inflation)
-    guessed = guess_scores(problem, state, weights) @ root
+    guesses = [guess_scores(problem, state, weights)]
+    if displaced:
+        guesses.append(shadow_scores(problem, state, weights))
+    guessed = torch.cat(guesses) @ root
     grade = problem.views.frozen.grade
     excess = 1.0 if grade is None else grade.excess
     calibrated = excess**2 * root @ (model + guessed.T @ guessed) @ root.T

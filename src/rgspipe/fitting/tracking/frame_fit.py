@@ -48,7 +48,7 @@ def observed(
     options = options or TrackOptions()
     refiner = _refiner(problem, rig)
     problem, state = refiner.problem, refiner.start(rig, PLAIN)
-    spread = light_covariances(problem, state, certainty)
+    spread = light_covariances(problem, state, certainty, displaced=False)
     inflation = inflation_of(spread, problem.target.numel())
     intensity = problem.scale * state.intensity
     evidence = Evidence.of(problem, state, references(intensity))
@@ -73,7 +73,7 @@ def follow(
     evidence = Evidence.of(problem, state, predicted.reference)
     information = evidence.information() / (evidence.variance * inflation**2)
     motion = predicted.updated(state.emitters, problem.scale * state.intensity, information)
-    spread = light_covariances(problem, state, certainty)
+    spread = light_covariances(problem, state, certainty, displaced=False)
     return Followed(
         _result(refiner, state, motion, spread, certainty), motion, inflation_of(spread, problem.target.numel())
     )

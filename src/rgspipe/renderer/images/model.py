@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, replace
-from typing import Self, TypeAlias
+from typing import TYPE_CHECKING, Self, TypeAlias
 
 import torch
 from torch import Tensor
@@ -19,6 +19,9 @@ from rgspipe.renderer.lit_surfels import lit_columns, lit_surfels
 from rgspipe.renderer.sparse import SparseOperator
 from rgspipe.renderer.unit_light import UnitLight
 from rgspipe.scene.lights import LightRig
+
+if TYPE_CHECKING:
+    from rgspipe.renderer.frozen import FrozenScene
 
 #: The light of a scene: (N, 3) outgoing radiance of diffuse surfels, or what gloss needs besides.
 Lit: TypeAlias = Tensor | GlossyLight
@@ -100,6 +103,10 @@ class ViewModel(ImageModel):
     def on(self, views: ViewedPixels) -> Self:
         """The model for other pixels of the same views."""
         return replace(self, views=views)
+
+    def among(self, frozen: FrozenScene) -> Self:
+        """The model of the same pixels where surfels of a scene like it cast other shadows; see `displaced`."""
+        return replace(self, views=replace(self.views, frozen=frozen))
 
     @abstractmethod
     def image(self, rig: LightRig) -> Tensor:

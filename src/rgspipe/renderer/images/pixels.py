@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import torch
 from torch import Tensor
@@ -21,6 +22,9 @@ from rgspipe.renderer.pixel_direct import PixelDirect
 from rgspipe.renderer.rig import RigResponse
 from rgspipe.renderer.unit_light import OwnLight, Share, UnitLight, attenuated, emitted_intensity
 from rgspipe.scene.lights import LightRig
+
+if TYPE_CHECKING:
+    from rgspipe.renderer.frozen import FrozenScene
 
 
 @dataclass(frozen=True)
@@ -53,6 +57,9 @@ class PixelModel(ViewModel):
         if views.pixels is self.views.pixels:
             return replace(self, views=views)
         return replace(PixelModel.of(views, self.effects), few=self.few)
+
+    def among(self, frozen: FrozenScene) -> PixelModel:
+        return replace(super().among(frozen), direct=tuple(one.among(frozen.bvh) for one in self.direct))
 
     @cached_property
     def points(self) -> Tensor:

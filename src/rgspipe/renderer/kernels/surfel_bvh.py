@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import replace
 from functools import cached_property
 
@@ -91,7 +92,11 @@ class SurfelBvh:
         order = curve_order(centers - self.middle)
         #: Surfel of each record, and record of each surfel.
         self.order, self.rank = as_array(order.int()), as_array(order.argsort().int())
+        self._record(order)
+
+    def _record(self, order: Tensor) -> None:
         # Warp reads the tensor's memory; the attribute keeps it.
+        surfels = self.surfels
         self._records = surfel_records(surfels, self.middle)[order]
         self.records = wp.array(
             ptr=self._records.data_ptr(),
@@ -99,6 +104,19 @@ class SurfelBvh:
             shape=(len(surfels),),
             device=wp.device_from_torch(self.device),
         )
+
+    def displaced(self, centers: Tensor) -> SurfelBvh:
+        """The same surfels at `centers` (N, 3), a little elsewhere.
+
+        Places are measured from the same middle, and shadow rays begin as far from their receivers.
+        """
+        moved = copy(self)
+        for made in ("_hierarchy", "tree", "leaves"):
+            moved.__dict__.pop(made, None)
+        moved.surfels = replace(self.surfels, centers=centers)
+        moved.__dict__["_starts"] = self._starts
+        moved._record(wp.to_torch(self.order).long())
+        return moved
 
     @cached_property
     def _hierarchy(self) -> wp.Bvh:
