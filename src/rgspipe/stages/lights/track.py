@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import torch
@@ -67,24 +68,25 @@ def _frames(
 ) -> tuple[FitViews, list[list[torch.Tensor]], list[ImageCapture]]:
     """The views that all frames share, the images of each frame, and how they were taken.
 
+    A pixel counts as the scene's where every frame says that it is: what a mask or the noise of an edge hides in one
+    frame is left out of all, which share what a search prepares.
+
     Raises:
-        InputError: the cameras or masks of two frames differ.
+        InputError: the cameras of two frames differ.
     """
-    frames, captures, prepared = [], [], None
-    for target in targets:
-        views, capture = captured_views(used_views(target, config), target.name, config)
-        own = fitter.prepare(views)
-        prepared = prepared or own
-        if own is not prepared:
+    taken = [captured_views(used_views(target, config), target.name, config) for target in targets]
+    [first, *others] = [views for views, _ in taken]
+    for target, views in zip(targets[1:], others, strict=True):
+        if [view.camera for view in views] != [view.camera for view in first]:
             raise InputError(
                 f"target {target.name}",
-                expected=f"the cameras and masks of the first frame, {targets[0].name}",
+                expected=f"the cameras of the first frame, {targets[0].name}",
                 found="others",
                 remedy="Follow frames of fixed cameras.",
             )
-        frames.append([view.image for view in views])
-        captures.append(capture)
-    return prepared, frames, captures
+    shared = [torch.stack([view.alpha for view in same]).amin(dim=0) for same in zip(first, *others, strict=True)]
+    prepared = fitter.prepare([replace(view, alpha=alpha) for view, alpha in zip(first, shared, strict=True)])
+    return prepared, [[view.image for view in views] for views, _ in taken], [capture for _, capture in taken]
 
 
 def _truths(root: Path, names: Sequence[str]) -> list[LightRig]:
