@@ -239,4 +239,5 @@ STAGE = Stage(
         *section_files(config),
     ],
     run=run,
+    own_keys=("scene.name", "scene.kind", "scene.path", "report", "evaluate.success"),
 )
