@@ -6,6 +6,7 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+import pytest
 import torch
 
 from frozen_store import artifact
@@ -34,7 +35,7 @@ def test_lamps_of_every_lighting_are_shown_with_what_is_to_be_thought_of_them(tm
     # ± is the root of the mean variance, 0.03.
     assert section.rows[0] == ["1", "point", "0.48, 0.50, 1.56", "0.173", "2.40 / 2.00 / 1.50"]
     assert section.rows[1][0] == "evening 1" and section.rows[1][3] == "—"
-    assert [light.position[0].item() for light in captured_lamps(made)] == [0.48, 1.48]
+    assert [light.position[0].item() for light in captured_lamps(made)] == pytest.approx([0.48, 1.48])
     page = render_report(replace(make_contents(), captured=[section], training={"surfels": 9}, training_log=None))
     assert "1 other lamp was on." in page and 'href="#lamps"' in page and "found in the photographs" in page
     assert "not recorded" not in page and "no training log" not in page
