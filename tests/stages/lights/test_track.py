@@ -81,6 +81,16 @@ def test_the_published_method_does_not_track() -> None:
         track.STAGE.needs(config)
 
 
+def test_what_is_no_sequence_is_refused_before_anything_is_made(dataset: Path) -> None:
+    """It was told after the scene had been trained."""
+    wrong = with_changes(RgspipeConfig(stage="track"), {"track.folder": str(dataset / "targets")})
+    with pytest.raises(InputError, match="expected targets/ with the frames, found none"):
+        track.STAGE.files(wrong)
+    few = with_changes(RgspipeConfig(stage="track"), {"track.folder": str(dataset), "views.count": 3})
+    with pytest.raises(InputError, match=r"views\.count"):
+        track.STAGE.files(few)
+
+
 def test_images_elsewhere_are_among_the_files_of_a_track(dataset: Path, change: Callable, tmp_path: Path) -> None:
     """An image outside of `track.folder` that changes must not leave the finished track in use."""
     outside = tmp_path / "elsewhere.exr"
